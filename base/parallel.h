@@ -1,0 +1,41 @@
+// The one door to the thread pool. Work is split into ranges whose results do not depend on the split.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace kpsa {
+
+// A reference to a callable; does not own it. Two pointers, so passing one allocates nothing.
+class RangeBody {
+ public:
+  template <typename F>
+  RangeBody(const F& f)  // NOLINT: implicit by design
+      : object_(&f), call_([](const void* object, std::size_t begin, std::size_t end) {
+          (*static_cast<const F*>(object))(begin, end);
+        }) {}
+  void operator()(std::size_t begin, std::size_t end) const { call_(object_, begin, end); }
+
+ private:
+  const void* object_;
+  void (*call_)(const void*, std::size_t, std::size_t);
+};
+
+// Calls body(begin, end) over disjoint ranges that cover [0, count), each range except the last a multiple of
+// `grain` long. Runs inline where count <= grain. Blocks until all ranges are done.
+void ParallelFor(std::size_t count, std::size_t grain, RangeBody body);
+
+// Limits the threads that ParallelFor may use, in this scope, process-wide (0: as many as there are cores).
+class ThreadLimit {
+ public:
+  explicit ThreadLimit(int threads);
+  ~ThreadLimit();
+  ThreadLimit(const ThreadLimit&) = delete;
+  ThreadLimit& operator=(const ThreadLimit&) = delete;
+
+ private:
+  void* impl_;
+};
+int HardwareThreads();
+
+}  // namespace kpsa

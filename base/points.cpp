@@ -1,0 +1,79 @@
+#include "base/points.h"
+
+#include <cstring>
+#include <new>
+#include <utility>
+
+#include "base/check.h"
+
+namespace kpsa {
+
+AlignedFloats::AlignedFloats(std::size_t size) : size_(size) {
+  if (size == 0) return;
+  data_ = static_cast<float*>(::operator new(size * sizeof(float), std::align_val_t(kPointAlignment)));
+  std::memset(data_, 0, size * sizeof(float));
+}
+
+AlignedFloats::AlignedFloats(AlignedFloats&& other) noexcept
+    : data_(std::exchange(other.data_, nullptr)), size_(std::exchange(other.size_, 0)) {}
+
+AlignedFloats& AlignedFloats::operator=(AlignedFloats&& other) noexcept {
+  std::swap(data_, other.data_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+AlignedFloats::AlignedFloats(const AlignedFloats& other) : AlignedFloats(other.size_) {
+  if (size_ > 0) std::memcpy(data_, other.data_, size_ * sizeof(float));
+}
+
+AlignedFloats& AlignedFloats::operator=(const AlignedFloats& other) {
+  if (this != &other) *this = AlignedFloats(other);
+  return *this;
+}
+
+AlignedFloats::~AlignedFloats() {
+  if (data_ != nullptr) ::operator delete(data_, std::align_val_t(kPointAlignment));
+}
+
+PointBuffer::PointBuffer(std::size_t count, int components)
+    : floats_(PaddedCount(count) * static_cast<std::size_t>(components)), count_(count), components_(components) {
+  KPSA_CHECK(components == 1 || components == 3);
+}
+
+PointBuffer PointBuffer::FromInterleaved(std::span<const float> xyz) {
+  PointBuffer buffer(xyz.size() / 3);
+  const PointsView view = buffer.view();
+  for (std::size_t i = 0; i < view.count; ++i) {
+    view.x[i] = xyz[3 * i];
+    view.y[i] = xyz[3 * i + 1];
+    view.z[i] = xyz[3 * i + 2];
+  }
+  return buffer;
+}
+
+PointsView PointBuffer::view() {
+  float* x = floats_.data();
+  const std::size_t padded = PaddedCount(count_);
+  if (components_ == 1) return {x, nullptr, nullptr, count_};
+  return {x, x + padded, x + 2 * padded, count_};
+}
+
+ConstPointsView PointBuffer::view() const { return const_cast<PointBuffer*>(this)->view(); }
+
+std::vector<float> PointBuffer::Interleaved() const {
+  const ConstPointsView points = view();
+  std::vector<float> xyz(count_ * static_cast<std::size_t>(components_));
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (components_ == 1) {
+      xyz[i] = points.x[i];
+    } else {
+      xyz[3 * i] = points.x[i];
+      xyz[3 * i + 1] = points.y[i];
+      xyz[3 * i + 2] = points.z[i];
+    }
+  }
+  return xyz;
+}
+
+}  // namespace kpsa

@@ -1,0 +1,96 @@
+#include "base/matrix.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "base/scalar_math.h"
+
+namespace kpsa {
+namespace {
+
+double MaxDifference(const Matrix4& a, const Matrix4& b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < 16; ++i) largest = std::max(largest, std::fabs(a.m[i] - b.m[i]));
+  return largest;
+}
+
+TEST(ScalarMath, AgreesWithTheCLibraryToAFewUlp) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> wide(-50, 50), unit(-1, 1);
+  for (int i = 0; i < 100000; ++i) {
+    const double x = wide(random), u = unit(random), v = unit(random);
+    EXPECT_NEAR(Sin(x), std::sin(x), 3e-16);
+    EXPECT_NEAR(Cos(x), std::cos(x), 3e-16);
+    EXPECT_NEAR(Atan2(u, v), std::atan2(u, v), 1e-15);
+    EXPECT_NEAR(Acos(u), std::acos(u), 1e-15);
+    EXPECT_NEAR(Asin(u), std::asin(u), 1e-15);
+    EXPECT_NEAR(Exp(x) / std::exp(x), 1, 2e-15);
+  }
+  EXPECT_EQ(Atan2(0.0, -1.0), kPi);
+  EXPECT_EQ(Atan2(-0.0, -1.0), -kPi);
+  EXPECT_TRUE(std::isnan(Sin(INFINITY)));
+  EXPECT_NEAR(Sin(1e8), std::sin(1e8), 1e-8);
+}
+
+TEST(Matrix, EulerAnglesComeBackForEveryOrder) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> angle(-1.5, 1.5);
+  for (int order = 0; order < 6; ++order) {
+    for (int i = 0; i < 200; ++i) {
+      const Double3 euler{angle(random), angle(random), angle(random)};
+      const Matrix4 m = RotationFromEuler(euler, static_cast<RotateOrder>(order));
+      const Double3 back = EulerFromRotation(m, static_cast<RotateOrder>(order));
+      EXPECT_LT(MaxDifference(m, RotationFromEuler(back, static_cast<RotateOrder>(order))), 1e-12);
+    }
+  }
+}
+
+TEST(Matrix, XyzTurnsAboutXFirst) {
+  const Matrix4 m = RotationFromEuler({kPi / 2, 0, kPi / 2}, RotateOrder::kXyz);
+  const Double3 p = TransformVector(m, {0, 1, 0});  // X takes y to z; Z leaves z alone
+  EXPECT_NEAR(p.z, 1, 1e-12);
+}
+
+TEST(Matrix, GimbalLockKeepsTheRotation) {
+  for (int order = 0; order < 6; ++order) {
+    for (double middle : {kPi / 2, -kPi / 2}) {
+      Double3 euler{0.3, 0.3, 0.3};
+      constexpr int kMiddle[6] = {1, 2, 0, 2, 0, 1};
+      euler[kMiddle[order]] = middle;
+      const Matrix4 m = RotationFromEuler(euler, static_cast<RotateOrder>(order));
+      const Double3 back = EulerFromRotation(m, static_cast<RotateOrder>(order));
+      EXPECT_LT(MaxDifference(m, RotationFromEuler(back, static_cast<RotateOrder>(order))), 1e-7);
+    }
+  }
+}
+
+TEST(Matrix, InverseAndDecomposition) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int i = 0; i < 200; ++i) {
+    const Quaternion q = Normalized({unit(random), unit(random), unit(random), unit(random)});
+    const Double3 t{unit(random), unit(random), unit(random)}, s{-0.5, 1.5, 2 + unit(random)};
+    const Matrix4 m = ComposeTrs(t, q, s);
+    Matrix4 inverse;
+    ASSERT_TRUE(Invert(m, &inverse));
+    EXPECT_LT(MaxDifference(m * inverse, Matrix4()), 1e-12);
+    Double3 t2, s2;
+    Quaternion q2;
+    DecomposeTrs(m, &t2, &q2, &s2);
+    EXPECT_LT(MaxDifference(ComposeTrs(t2, q2, s2), m), 1e-12);
+  }
+  Matrix4 singular = Scaling({1, 0, 1}), inverse;
+  EXPECT_FALSE(Invert(singular, &inverse));
+}
+
+TEST(Matrix, SlerpTakesTheShortWay) {
+  const Quaternion a, b{0, 0, std::sin(0.5), std::cos(0.5)};
+  const Quaternion half = Slerp(a, {-b.x, -b.y, -b.z, -b.w}, 0.5);
+  EXPECT_NEAR(half.z, std::sin(0.25), 1e-14);
+  EXPECT_NEAR(RotationVector(b).z, 1.0, 1e-14);
+}
+
+}  // namespace
+}  // namespace kpsa
