@@ -50,6 +50,8 @@ class NodeBuilder {
   NodeBuilder& array();
   NodeBuilder& per_geometry();  // implies array
   NodeBuilder& lazy();
+  NodeBuilder& alias(std::string other_name);
+  NodeBuilder& doc(std::string text) { attribute().doc = std::move(text); return *this; }
   NodeBuilder& grid(std::string divisions_attribute);
   NodeBuilder& default_from(std::function<Value(const Structural&)> f);
 

@@ -6,6 +6,11 @@ int NodeDef::FindAttribute(std::string_view attribute_name) const {
   for (std::size_t i = 0; i < attributes.size(); ++i) {
     if (attributes[i].name == attribute_name) return static_cast<int>(i);
   }
+  for (std::size_t i = 0; i < attributes.size(); ++i) {
+    for (const std::string& alias : attributes[i].aliases) {
+      if (alias == attribute_name) return static_cast<int>(i);
+    }
+  }
   return -1;
 }
 

@@ -34,6 +34,7 @@ struct AttributeDef {
   bool lazy = false;          // evaluated only if decide chooses it
   bool per_geometry = false;  // array whose element i belongs to the i-th deformed geometry
   std::vector<std::string> enum_names;
+  std::vector<std::string> aliases;  // other names under which plugs may be written
   std::string grid;           // elements may be written [s,t,u]; names the structural attribute with the divisions
   std::function<Value(const Structural&)> default_from;  // for defaults that follow from structural values
 };
