@@ -81,15 +81,15 @@ const Fields& TopLevel() {
   static const Fields scene = {{"name", kString}, {"nodes", kIndices, false, "nodes"}};
   static const Fields asset = {{"version", kString, true}, {"minVersion", kString}};
   static const Fields top = {{"asset", kObject, true, nullptr, 0, &asset},
-                             {"scene", kIndex, false, "scenes"},
-                             {"scenes", kObjects, false, nullptr, 0, &scene},
                              {"nodes", kObjects, false, nullptr, 0, &node},
                              {"meshes", kObjects, false, nullptr, 0, &mesh},
                              {"skins", kObjects, false, nullptr, 0, &skin},
                              {"materials", kObjects, false, nullptr, 0, &material},
                              {"animations", kObjects, false, nullptr, 0, &animation},
                              {"accessors", kObjects, false, nullptr, 0, &accessor},
-                             {"bufferViews", kObjects, false, nullptr, 0, &view}};
+                             {"bufferViews", kObjects, false, nullptr, 0, &view},
+                             {"scenes", kObjects, false, nullptr, 0, &scene},
+                             {"scene", kIndex, false, "scenes"}};
   return top;
 }
 
