@@ -88,13 +88,23 @@ namespace {
 constexpr std::size_t kTile = 384;   // rows and columns of C that one task computes: a multiple of 16 and 12
 constexpr std::size_t kDepth = 192;  // columns of A packed at a time; both packed tiles stay in the L2 cache
 
+// Zeros at a 64-byte boundary: vectors that straddle cache lines cost a third of the speed.
+class AlignedDoubles {
+ public:
+  explicit AlignedDoubles(std::size_t size) : floats_(2 * size) {}
+  double* data() { return reinterpret_cast<double*>(floats_.data()); }
+
+ private:
+  AlignedFloats floats_;
+};
+
 // One tile of C, accumulated over the whole depth in a fixed order.
 void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, std::size_t row, std::size_t column, Eigen::MatrixXd* c) {
   const std::size_t height = std::min(kTile, a.rows() - row), width = std::min(kTile, b_transposed.rows() - column);
   const std::size_t row_panels = (height + kRowStep - 1) / kRowStep;
   const std::size_t column_panels = (width + kColumnStep - 1) / kColumnStep;
-  std::vector<double> packed_a(row_panels * kRowStep * kDepth), packed_b(column_panels * kColumnStep * kDepth);
-  std::vector<double> tile(row_panels * kRowStep * column_panels * kColumnStep, 0.0);
+  AlignedDoubles packed_a(row_panels * kRowStep * kDepth), packed_b(column_panels * kColumnStep * kDepth);
+  AlignedDoubles tile(row_panels * kRowStep * column_panels * kColumnStep);
   for (std::size_t k = 0; k < a.columns(); k += kDepth) {
     const std::size_t depth = std::min(kDepth, a.columns() - k);
     a.Pack(row, height, k, depth, kRowStep, packed_a.data());
@@ -176,13 +186,11 @@ void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, 
         for (std::size_t k = 0; k < width; ++k) target[k * step + i] = source[k];
       }
     } else if (!transposed_) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const float* source = pose_rows_[first + i] + column;
-        if (scale_.empty()) {
-          for (std::size_t k = 0; k < width; ++k) target[k * step + i] = static_cast<double>(source[k]);
-        } else {
-          for (std::size_t k = 0; k < width; ++k) target[k * step + i] = static_cast<double>(source[k]) * scale_[column + k];
-        }
+      const float* sources[kRowStep];
+      for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i] + column;
+      for (std::size_t k = 0; k < width; ++k) {
+        const double scale = scale_.empty() ? 1.0 : scale_[column + k];
+        for (std::size_t i = 0; i < count; ++i) target[k * step + i] = static_cast<double>(sources[i][k]) * scale;
       }
     } else {
       for (std::size_t k = 0; k < width; ++k) {

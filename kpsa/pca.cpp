@@ -161,7 +161,7 @@ Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, con
 
 Eigen::VectorXd ProjectionErrors(const Pca& pca, const PoseMatrix& poses) {
   KPSA_CHECK(poses.centered() && poses.layout() == pca.layout);
-  const std::size_t outputs = pca.layout.outputs(), kChunk = PoseMatrix::kBlockPoses;
+  const std::size_t outputs = pca.layout.outputs(), kChunk = 384;
   const Eigen::MatrixXd a = pca.output_modes();
   Eigen::VectorXd errors(static_cast<Eigen::Index>(poses.poses()));
   Eigen::LDLT<Eigen::MatrixXd> gram;
