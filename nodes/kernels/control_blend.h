@@ -1,4 +1,4 @@
-// p' = p + envelope sum_c w_c d_c: offsets of a few control points, blended with fixed weights (wire, lattice).
+// p' = p + sum_c w_c d_c: offsets of a few control points, blended with fixed weights (wire, lattice).
 #pragma once
 
 #include <span>
@@ -17,8 +17,9 @@ class ControlBlend {
   ControlBlend(std::size_t width, std::span<const Index> controls, std::span<const float> weights);
 
   std::size_t affected_points() const { return points_.size(); }
-  // Adds to `points` in place, which has the bound count. offsets: x y z 0 of every control, 16-byte aligned.
-  void Run(const float* offsets, float envelope, PointsView points, const Parallel* parallel) const noexcept;
+  // Adds to `points` in place, which has the bound count. offsets: x y z 0 of every control, 16-byte aligned, the
+  // envelope multiplied in.
+  void Run(const float* offsets, PointsView points, const Parallel* parallel) const noexcept;
 
  private:
   std::size_t width_ = 0;

@@ -20,7 +20,7 @@ namespace kpsa {
 struct DeltaMushSettings {
   int iterations = 10;         // 0 to 1000
   double step = 0.5;           // 0 to 1: how far a point goes to its neighbours' mean
-  double distance_weight = 0;  // 0: all neighbours alike; 1: weighted with 1 / rest edge length
+  double distance_weight = 0;  // 0 to 1; 0: all neighbours alike; 1: weighted with 1 / rest edge length
   bool pin_borders = false;    // border points keep their place
   Status Validate() const;
 };
@@ -46,33 +46,44 @@ class DeltaMushKernel {
 
   std::size_t point_count() const { return count_; }
   std::size_t input_count() const { return in_count_; }
-  std::size_t ScratchFloats() const { return 8 * local_count_; }
+  std::size_t ScratchFloats() const { return 8 * PaddedCount(local_count_); }
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
   // Point evaluations of one Run, all iterations together; the price of a binding.
   std::size_t SmoothingSteps() const;
 
  private:
-  // Local numbers: the demand sorted by (ring, mesh index), so that what iteration j needs is a prefix.
-  struct Pass {
-    Index points;  // the prefix
+  // Points of a level that are smoothed together, grouped by their number of neighbours.
+  struct Group {
+    Index neighbors;  // of each point
+    Index count;
+    Index first_point, first_neighbor;  // in order_ and neighbors_
   };
-  const float* Smooth(ConstPointsView in, std::span<const Index> source, std::span<float> scratch,
-                      const Parallel* parallel) const noexcept;
+  void BuildRows(const Topology& topology, ConstPointsView rest, const DeltaMushSettings& settings,
+                 std::span<const Index> local, std::span<const int> level, std::span<const Index> local_of);
+  void BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
+                   std::span<const Index> local_of);
+  // Packs `in` and smooths it; the smoothed points, xyzw by local number.
+  const float* Smooth(ConstPointsView in, std::span<float> scratch, const Parallel* parallel) const noexcept;
 
   std::size_t count_ = 0, in_count_ = 0, local_count_ = 0;
   int iterations_ = 0;
-  std::vector<Index> prefix_;           // [iteration]: points that it computes
-  std::vector<Index> source_;           // local -> entry of `in`
-  std::vector<Index> out_in_;           // output -> entry of `in`
-  std::vector<Index> offsets_, neighbors_;  // local CSR; empty rows of points that do not smooth
-  std::vector<float> neighbor_weights_;     // per neighbour, empty if all alike
-  std::vector<float> steps_;                // per point: step, or step / neighbours
-  std::vector<Index> frame_offsets_, frame_neighbors_;  // per output
-  std::vector<float> frame_weights_;        // per frame neighbour: a, b
-  std::vector<Index> out_local_;            // output -> local
-  AlignedFloats detail_;                    // x, y, z rows, per output, padded
-  AlignedFloats masks_;                     // point weights, padded; empty if all 1
+  // Local numbers: the smoothed part of the demand sorted by (level, mesh index); level = the number of iterations
+  // from the end at which a point is last read, so that what an iteration computes is a prefix.
+  std::vector<Index> source_;        // local -> entry of `in`; empty if the same
+  std::vector<Index> out_in_;        // output -> entry of `in`; empty if the same
+  std::vector<Index> blocks_;        // first group of each block, and the end
+  std::vector<Index> block_counts_;  // [iteration]: blocks that it computes
+  std::vector<Group> groups_;
+  std::vector<Index> order_;         // 4 * local number, in the order of groups_
+  std::vector<Index> neighbors_;     // 4 * local number, rows in the order of order_
+  std::vector<float> neighbor_weights_;  // beside neighbors_; empty if all alike
+  std::vector<float> steps_;         // beside order_: step, or step / neighbours
+  std::vector<Index> out_local_;     // output -> 4 * local number
+  std::vector<Index> frame_offsets_, frame_neighbors_;  // per output; empty rows where the detail is 0
+  std::vector<float> frame_weights_;  // a, b of each frame neighbour
+  AlignedFloats detail_;              // 3 rows, padded
+  AlignedFloats masks_;               // point weights, padded; empty if all 1
 };
 
 }  // namespace kpsa

@@ -19,7 +19,7 @@ class NormalsKernel {
   // in_points: sorted, a superset of the demand.
   NormalsKernel(const Topology& topology, std::span<const Index> out_points, std::span<const Index> in_points);
   std::size_t point_count() const { return count_; }
-  std::size_t ScratchFloats() const { return 4 * (triangles_.size() / 3 + in_count_); }
+  std::size_t ScratchFloats() const { return 4 * (triangles_.size() / 3 + PaddedCount(in_count_)); }
   void Run(ConstPointsView in, PointsView normals, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
 
