@@ -182,28 +182,27 @@ namespace kpsa {
 HWY_EXPORT(SkinBlockLanes);
 
 Status SkinWeights::Validate() const {
-  if (influences.offsets.empty() || influences.offsets.front() != 0 ||
-      influences.offsets.back() != influences.values.size()) {
-    return Status::Invalid("skin weights: the offsets of the rows do not cover the {} influences",
-                           influences.values.size());
+  if (offsets.empty() || offsets.front() != 0 || offsets.back() != joints.size() || joints.size() != weights.size()) {
+    return Status::Invalid("skin weights: the rows do not cover the {} joints and {} weights", joints.size(),
+                           weights.size());
   }
   if (joint_count == 0) return Status::Invalid("skin weights: no joints, expected at least one");
-  for (std::size_t p = 0; p < influences.rows(); ++p) {
-    if (influences.offsets[p] > influences.offsets[p + 1] || influences.offsets[p + 1] > influences.values.size()) {
+  for (std::size_t p = 0; p < point_count(); ++p) {
+    if (offsets[p] > offsets[p + 1] || offsets[p + 1] > joints.size()) {
       return Status::Invalid("skin weights: the offsets do not ascend at point {}", p);
     }
-    for (const Influence& influence : influences.row(p)) {
-      if (influence.joint >= joint_count) {
-        return Status::Invalid("skin weights: point {} names joint {}, expected an index below {}", p,
-                               influence.joint, joint_count);
+    if (offsets[p + 1] - offsets[p] > 4096) {
+      return Status::Invalid("skin weights: point {} has {} influences, expected at most 4096", p,
+                             offsets[p + 1] - offsets[p]);
+    }
+    for (Index i = offsets[p]; i < offsets[p + 1]; ++i) {
+      if (joints[i] >= joint_count) {
+        return Status::Invalid("skin weights: point {} names joint {}, expected an index below {}", p, joints[i],
+                               joint_count);
       }
-      if (!std::isfinite(influence.weight)) {
+      if (!std::isfinite(weights[i])) {
         return Status::Invalid("skin weights: a weight of point {} is not a finite number", p);
       }
-    }
-    if (influences.row(p).size() > 4096) {
-      return Status::Invalid("skin weights: point {} has {} influences, expected at most 4096", p,
-                             influences.row(p).size());
     }
   }
   return {};
@@ -212,14 +211,14 @@ Status SkinWeights::Validate() const {
 SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_points,
                        std::span<const float> point_weights)
     : count_(out_points.size()), joint_count_(weights.joint_count), sums_(PaddedCount(out_points.size())) {
-  KPSA_CHECK(IsSortedSet(out_points, weights.influences.rows()));
+  KPSA_CHECK(IsSortedSet(out_points, weights.point_count()));
   KPSA_CHECK(point_weights.empty() || point_weights.size() == count_);
 
   // The joints that occur, and their places in the run's palette
   std::vector<Index> place(joint_count_, kNoIndex);
   for (Index p : out_points) {
-    for (const Influence& influence : weights.influences.row(p)) {
-      if (influence.weight != 0) place[influence.joint] = 0;
+    for (Index e = weights.offsets[p]; e < weights.offsets[p + 1]; ++e) {
+      if (weights.weights[e] != 0) place[weights.joints[e]] = 0;
     }
   }
   for (Index j = 0; j < joint_count_; ++j) {
@@ -231,8 +230,8 @@ SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_po
   std::vector<float> masks(point_weights.begin(), point_weights.end());
   for (std::size_t i = 0; i < count_; ++i) {
     double sum = 0;
-    for (const Influence& influence : weights.influences.row(out_points[i])) {
-      if (influence.weight != 0) ++influence_count[i], sum += influence.weight;
+    for (Index e = weights.offsets[out_points[i]]; e < weights.offsets[out_points[i] + 1]; ++e) {
+      if (weights.weights[e] != 0) ++influence_count[i], sum += weights.weights[e];
     }
     sums_.data()[i] = std::fabs(sum - 1) <= 1e-5 ? 0.0f : static_cast<float>(sum - 1);
     if (influence_count[i] == 0) {
@@ -257,10 +256,10 @@ SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_po
       const std::size_t at = begin + lanes_[first_lane + i];
       if (i == 0 || groups_.back().influences != influence_count[at]) groups_.push_back({influence_count[at], 0});
       ++groups_.back().count;
-      for (const Influence& influence : weights.influences.row(out_points[at])) {
-        if (influence.weight == 0) continue;
-        entry_joints_.push_back(place[influence.joint]);
-        entry_weights_.push_back(influence.weight);
+      for (Index e = weights.offsets[out_points[at]]; e < weights.offsets[out_points[at] + 1]; ++e) {
+        if (weights.weights[e] == 0) continue;
+        entry_joints_.push_back(place[weights.joints[e]]);
+        entry_weights_.push_back(weights.weights[e]);
       }
     }
   }

@@ -11,16 +11,16 @@
 
 namespace kpsa {
 
-struct Influence {
-  Index joint = 0;
-  float weight = 0;
-};
-
 // The influences of a whole mesh, any number a point; zero weights are skipped, joints may repeat.
+// Mesh point p is moved by joints[i] with weights[i], i in [offsets[p], offsets[p + 1]).
 struct SkinWeights {
-  CsrView<Influence> influences;  // one row a mesh point
+  std::span<const Index> offsets;  // points + 1
+  std::span<const Index> joints;
+  std::span<const float> weights;
   Index joint_count = 0;
-  // Names the first bad row: offsets that do not ascend, a joint out of range, a weight not finite.
+  std::size_t point_count() const { return offsets.size() - 1; }
+  // Names the first bad point: offsets that do not ascend, a joint out of range, a weight not finite, more than
+  // 4096 influences.
   Status Validate() const;
 };
 
