@@ -16,6 +16,14 @@ std::string Error::ToString() const {
   return place.empty() ? message : place + ": " + message;
 }
 
+Status Status::Make(ErrorKind kind, std::string message) {
+  Status status;
+  status.errors_.emplace_back();
+  status.errors_.back().kind = kind;
+  status.errors_.back().message = std::move(message);
+  return status;
+}
+
 void Status::Append(Status other) {
   for (Error& error : other.errors_) errors_.push_back(std::move(error));
 }

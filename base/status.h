@@ -45,16 +45,18 @@ class [[nodiscard]] Status {
 
   template <typename... Args>
   static Status Invalid(fmt::format_string<Args...> format, Args&&... args) {
-    return Status(Error{ErrorKind::kInvalidInput, {}, fmt::format(format, std::forward<Args>(args)...)});
+    return Make(ErrorKind::kInvalidInput, fmt::format(format, std::forward<Args>(args)...));
   }
   template <typename... Args>
   static Status Usage(fmt::format_string<Args...> format, Args&&... args) {
-    return Status(Error{ErrorKind::kUsage, {}, fmt::format(format, std::forward<Args>(args)...)});
+    return Make(ErrorKind::kUsage, fmt::format(format, std::forward<Args>(args)...));
   }
   template <typename... Args>
   static Status Evaluation(fmt::format_string<Args...> format, Args&&... args) {
-    return Status(Error{ErrorKind::kEvaluation, {}, fmt::format(format, std::forward<Args>(args)...)});
+    return Make(ErrorKind::kEvaluation, fmt::format(format, std::forward<Args>(args)...));
   }
+
+  static Status Make(ErrorKind kind, std::string message);
 
   bool ok() const { return errors_.empty(); }
   const std::vector<Error>& errors() const { return errors_; }

@@ -1,0 +1,79 @@
+// What a node's compute sees: its inputs and outputs as typed slots, its bound kernel, scratch and state. It sees
+// no graph and no host. A compute may run on any thread, several at once on different contexts, and must give the
+// same bytes whenever it is given the same inputs.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "base/parallel.h"
+#include "base/points.h"
+#include "base/types.h"
+
+namespace kpsa {
+
+// The elements of an array input, each in a slot of its own.
+template <typename T>
+class ArrayView {
+ public:
+  ArrayView(const std::byte* values, const std::uint32_t* table) : values_(values), table_(table) {}
+  std::uint32_t size() const { return table_[0]; }
+  const T& operator[](std::uint32_t i) const { return *reinterpret_cast<const T*>(values_ + table_[1 + i]); }
+
+ private:
+  const std::byte* values_;
+  const std::uint32_t* table_;
+};
+
+// What the host offers to a compute besides data.
+class ComputeHost {
+ public:
+  virtual ~ComputeHost() = default;
+  // Records an error of the node that computes now; its outputs are then taken as not computed.
+  virtual void Fail(std::string_view message) = 0;
+  // As kpsa::ParallelFor where the host evaluates in parallel, inline otherwise.
+  virtual void For(std::size_t count, std::size_t grain, RangeBody body) = 0;
+};
+
+class ComputeContext {
+ public:
+  std::byte* values = nullptr;           // the evaluator's slots
+  const std::uint32_t* in = nullptr;     // by input of the group: slot offset; for arrays: where their table begins
+  const std::uint32_t* out = nullptr;    // by output of the group, likewise
+  const void* kernel = nullptr;          // what bind returned, or null
+  float* scratch = nullptr;              // as many floats as bind asked for; content undefined; 64-byte aligned
+  std::byte* state = nullptr;            // as many bytes as bind asked for; kept from decide to compute; 64-byte aligned
+  std::uint64_t chosen = 0;              // bit i: the i-th lazy input was evaluated
+  ComputeHost* host = nullptr;
+
+  // Inputs and outputs by their position in the group's lists. T is the slot's type (graph/value.h).
+  template <typename T>
+  const T& get(int i) const { return *reinterpret_cast<const T*>(values + in[i]); }
+  template <typename T>
+  ArrayView<T> array(int i) const { return ArrayView<T>(values, in + in[i]); }
+  const ConstPointsView& points(int i) const { return get<ConstPointsView>(i); }
+  template <typename T>
+  T& out_value(int i) const { return *reinterpret_cast<T*>(values + out[i]); }
+  const PointsView& out_points(int i) const { return out_value<PointsView>(i); }
+  const PointsView& out_points(int i, std::uint32_t element) const {
+    return *reinterpret_cast<const PointsView*>(values + (out + out[i])[1 + element]);
+  }
+  std::uint32_t out_count(int i) const { return (out + out[i])[0]; }
+
+  template <typename K>
+  const K& kernel_as() const { return *static_cast<const K*>(kernel); }
+  template <typename S>
+  S& state_as() const { return *reinterpret_cast<S*>(state); }
+};
+
+// Slot types agree between views: points are written as PointsView and read as ConstPointsView.
+static_assert(sizeof(PointsView) == sizeof(ConstPointsView));
+
+using ComputeFn = void (*)(ComputeContext&);
+// Returns which lazy inputs to evaluate: bit i for the i-th in the order of declaration (array elements count).
+// Sees eager inputs only.
+using DecideFn = std::uint64_t (*)(ComputeContext&);
+// The same step of several evaluators at once (blocks of frames); same results as one by one.
+using ComputeBlockFn = void (*)(ComputeContext* contexts, std::size_t count);
+
+}  // namespace kpsa

@@ -1,0 +1,108 @@
+// The editable graph: nodes, plugs, connections and set values. It holds no computed values; a Compiler turns it and
+// a request into a Plan. Every edit is checked. Not thread-safe.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "base/status.h"
+#include "graph/node_registry.h"
+
+namespace kpsa {
+
+// An index and a version: the id of a removed node is noticed instead of meaning its successor.
+struct NodeId {
+  Index index = kNoIndex;
+  std::uint32_t version = 0;
+  friend bool operator==(const NodeId&, const NodeId&) = default;
+};
+
+// node.attribute, node.attribute[element], node.attribute.component (0..3 for .x .y .z .w), or both.
+// For points attributes that are no arrays, element is a point.
+struct PlugRef {
+  NodeId node;
+  int attribute = -1;
+  int element = -1;
+  int component = -1;
+  friend bool operator==(const PlugRef&, const PlugRef&) = default;
+};
+
+struct Connection {
+  PlugRef source, destination;
+};
+
+class Graph {
+ public:
+  explicit Graph(const NodeRegistry& registry) : registry_(&registry) {}
+  const NodeRegistry& registry() const { return *registry_; }
+
+  Result<NodeId> AddNode(std::string_view type, std::string_view name);
+  Status RemoveNode(NodeId node);  // with its connections and values
+  // Unit of numbers: the runtime's (metres, radians, seconds). The type and the range are checked.
+  Status Set(const PlugRef& plug, Value value);
+  Status Unset(const PlugRef& plug);
+  // Types must agree (bool, int and enum widen to double); cycles are refused with their whole path. A destination
+  // takes one connection; `replace` takes over an existing one.
+  Status Connect(const PlugRef& source, const PlugRef& destination, bool replace = false);
+  Status Disconnect(const PlugRef& destination);
+  // Names for the elements of an array (morph targets): plugs may then be written attr[name].
+  void SetElementNames(NodeId node, int attribute, std::vector<std::string> names);
+  // Another name for a node (a path, `Head#49`), found by FindNode. A name that several nodes claim becomes
+  // ambiguous: FindNode then names them all.
+  void AddAlias(NodeId node, std::string alias);
+  // Attributes that `node` lacks are looked for on `delegate` (head_mesh.weight is its blendShape's).
+  void AddDelegate(NodeId node, NodeId delegate);
+
+  // "node.attr", "node.attr[3].x", "node.attrX" for a child, "node.attr[name]", "node.attr[s,t,u]".
+  // The longest existing node name followed by '.' wins.
+  Result<PlugRef> FindPlug(std::string_view text) const;
+  Result<NodeId> FindNode(std::string_view name) const;
+  std::string PlugName(const PlugRef& plug) const;
+  Type PlugType(const PlugRef& plug) const;  // of the element or component
+
+  bool IsAlive(NodeId node) const;
+  const NodeDef& def(NodeId node) const;
+  const std::string& name(NodeId node) const;
+  std::vector<NodeId> Nodes() const;  // in the order of creation
+  Index node_capacity() const { return static_cast<Index>(nodes_.size()); }
+  NodeId IdAt(Index index) const;     // version 0 and kNoIndex for a removed node
+
+  const Value* FindValue(const PlugRef& plug) const;  // null where unset
+  const Connection* FindConnection(const PlugRef& destination) const;
+  const std::vector<Connection>& Inputs(NodeId node) const;    // connections into the node
+  const std::vector<Connection>& Outputs(NodeId node) const;   // connections out of it
+  int ArraySize(NodeId node, int attribute) const;  // elements set or connected: the highest plus one
+  const std::vector<std::string>* ElementNames(NodeId node, int attribute) const;
+
+ private:
+  struct SetValue {
+    int attribute, element, component;
+    Value value;
+  };
+  struct Node {
+    const NodeDef* def = nullptr;  // null: removed
+    std::string name;
+    std::uint32_t version = 0;
+    std::vector<SetValue> values;
+    std::vector<Connection> inputs, outputs;
+    std::vector<std::pair<int, std::vector<std::string>>> element_names;
+    std::vector<NodeId> delegates;
+  };
+  const Node& node(NodeId id) const;
+  Node& node(NodeId id);
+  Status CheckPlug(const PlugRef& plug) const;
+  Status CheckCycle(const PlugRef& source, const PlugRef& destination) const;
+  Result<int> ParseElement(const Node& node, int attribute, std::string_view text) const;
+  Result<PlugRef> FindAttribute(NodeId id, std::string_view text) const;
+  std::vector<std::string> Names() const;
+
+  const NodeRegistry* registry_;
+  std::vector<Node> nodes_;
+  std::unordered_map<std::string, Index> by_name_;
+  std::unordered_map<std::string, std::vector<Index>> ambiguous_;
+};
+
+}  // namespace kpsa

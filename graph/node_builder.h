@@ -1,0 +1,139 @@
+// The words in which a node type is declared. A utility node needs five lines:
+//
+//   registry.add("remapValue", "Maps a value from one range to another.")
+//       .in("inputValue", 0.0).in("inputMin", 0.0).in("inputMax", 1.0)
+//       .out("outValue", Type::kDouble)
+//       .compute([](double value, double lo, double hi) { return (value - lo) / (hi - lo); });
+//
+// compute() of a captureless function takes its inputs in the order of declaration (structural ones left out) and
+// returns the one output: bool, std::int64_t (int, enum), double, Double3, Quaternion, const Matrix4&, ArrayView<T>.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "graph/node_def.h"
+
+namespace kpsa {
+
+struct AttributeOptions {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  Unit unit = Unit::kNone;
+  std::string doc = {};
+};
+
+class NodeBuilder {
+ public:
+  explicit NodeBuilder(NodeDef* def) : def_(def) {}
+
+  NodeBuilder& category(std::string name) { def_->category = std::move(name); return *this; }
+  NodeBuilder& version(int number) { def_->version = number; return *this; }
+  NodeBuilder& animation() { def_->animation = true; return *this; }
+  NodeBuilder& stateful() { def_->stateful = true; return *this; }
+
+  // An animatable input; its type follows from the default (bool, int, double, Double3, Quaternion, Matrix4).
+  NodeBuilder& in(std::string name, Value default_value, AttributeOptions options = {});
+  // A structural input. The type is given where no default tells it.
+  NodeBuilder& structural(std::string name, Value default_value, AttributeOptions options = {});
+  NodeBuilder& structural(std::string name, Type type, AttributeOptions options = {});
+  // An enum input; the default is its first name.
+  NodeBuilder& enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc = {});
+  // A points, colors or weights input.
+  NodeBuilder& points_in(std::string name, std::string doc = {}, Type type = Type::kPoints);
+  NodeBuilder& out(std::string name, Type type, std::string doc = {});
+
+  // Change the attribute that was declared last.
+  NodeBuilder& array();
+  NodeBuilder& per_geometry();  // implies array
+  NodeBuilder& lazy();
+  NodeBuilder& alias(std::string other_name);
+  NodeBuilder& doc(std::string text) { attribute().doc = std::move(text); return *this; }
+  NodeBuilder& grid(std::string divisions_attribute);
+  NodeBuilder& default_from(std::function<Value(const Structural&)> f);
+
+  // Closes a group: computes all outputs that no group has yet, from all non-structural inputs.
+  template <typename F>
+  NodeBuilder& compute(F f) {
+    return group_compute(Thunk(f));
+  }
+  NodeBuilder& compute(ComputeFn f) { return group_compute(f); }
+  // As compute, of the named outputs from the named inputs only.
+  template <typename F>
+  NodeBuilder& compute_for(std::vector<std::string> outputs, std::vector<std::string> inputs, F f) {
+    ComputeFn compute;
+    if constexpr (std::is_convertible_v<F, ComputeFn>) {
+      compute = f;
+    } else {
+      compute = Thunk(f);
+    }
+    return group_for(std::move(outputs), std::move(inputs), compute);
+  }
+
+  // Change the group that was closed last.
+  NodeBuilder& decide(DecideFn f) { group().decide = f; return *this; }
+  NodeBuilder& block(ComputeBlockFn f) { group().compute_block = f; return *this; }
+  NodeBuilder& demand(DemandFn f) { group().demand = std::move(f); return *this; }
+  NodeBuilder& bind(BindFn f) { group().bind = std::move(f); return *this; }
+  NodeBuilder& point_count(PointCountFn f) { group().point_count = std::move(f); return *this; }
+  NodeBuilder& in_place(std::string_view input);
+  NodeBuilder& cost(float ns, float ns_per_point) { group().cost_ns = ns; group().cost_ns_per_point = ns_per_point; return *this; }
+
+ private:
+  template <typename T>
+  struct Argument {  // a value by its slot
+    static decltype(auto) Get(const ComputeContext& context, int i) {
+      if constexpr (std::is_same_v<T, bool>) {
+        return context.get<std::int64_t>(i) != 0;
+      } else if constexpr (std::is_integral_v<T>) {
+        return static_cast<T>(context.get<std::int64_t>(i));
+      } else {
+        return context.get<T>(i);
+      }
+    }
+  };
+  template <typename T>
+  struct Argument<ArrayView<T>> {
+    static ArrayView<T> Get(const ComputeContext& context, int i) { return context.array<T>(i); }
+  };
+
+  template <typename F, typename R, typename... Args, std::size_t... I>
+  static ComputeFn ThunkOf(R (F::*)(Args...) const, std::index_sequence<I...>) {
+    return [](ComputeContext& context) {
+      auto result = F{}(Argument<std::decay_t<Args>>::Get(context, static_cast<int>(I))...);
+      using Out = decltype(result);
+      if constexpr (std::is_integral_v<Out>) {
+        context.out_value<std::int64_t>(0) = static_cast<std::int64_t>(result);
+      } else {
+        context.out_value<Out>(0) = result;
+      }
+    };
+  }
+  template <typename F, typename R, typename... Args>
+  static ComputeFn ThunkWith(R (F::*call)(Args...) const) {
+    return ThunkOf<F>(call, std::index_sequence_for<Args...>{});
+  }
+  template <typename F>
+  static ComputeFn Thunk(F) {
+    static_assert(std::is_empty_v<F>, "compute must capture nothing: it may run on any thread");
+    if constexpr (std::is_invocable_v<F, ComputeContext&>) {
+      return [](ComputeContext& context) { F{}(context); };
+    } else {
+      return ThunkWith(&F::operator());
+    }
+  }
+
+  AttributeDef& attribute() { return def_->attributes.back(); }
+  ComputeGroup& group() { return def_->groups.back(); }
+  NodeBuilder& add(AttributeDef attribute);
+  NodeBuilder& group_compute(ComputeFn compute);
+  NodeBuilder& group_for(std::vector<std::string> outputs, std::vector<std::string> inputs, ComputeFn compute);
+  void finish_group();
+
+  NodeDef* def_;
+};
+
+}  // namespace kpsa

@@ -1,0 +1,124 @@
+// A node type as data: its attributes, and how groups of outputs are computed from inputs. Everybody who wants to
+// know about a type (the reader of rig files, the compiler, the reference) reads this declaration.
+// Definitions are immutable once they are in a registry.
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/status.h"
+#include "graph/compute_context.h"
+#include "graph/point_set.h"
+#include "graph/value.h"
+
+namespace kpsa {
+
+enum class Unit : std::uint8_t { kNone, kLength, kAngle, kTime };
+
+class Structural;
+
+struct AttributeDef {
+  std::string name;
+  Type type = Type::kDouble;
+  std::string doc;
+  Value default_value;  // of an element, for arrays
+  double min = -std::numeric_limits<double>::infinity();  // of numbers; outside is an author's error
+  double max = std::numeric_limits<double>::infinity();
+  Unit unit = Unit::kNone;
+  bool output = false;
+  bool array = false;         // plugs are name[i]
+  bool structural = false;    // read when a plan is made, baked into kernels
+  bool lazy = false;          // evaluated only if decide chooses it
+  bool per_geometry = false;  // array whose element i belongs to the i-th deformed geometry
+  std::vector<std::string> enum_names;
+  std::vector<std::string> aliases;  // other names under which plugs may be written
+  std::string grid;           // elements may be written [s,t,u]; names the structural attribute with the divisions
+  std::function<Value(const Structural&)> default_from;  // for defaults that follow from structural values
+};
+
+// The view that compile-time functions of a node receive. Names are attribute names; a name that the definition
+// lacks is a programmer's error.
+class Structural {
+ public:
+  virtual ~Structural() = default;
+  virtual const Value& value(std::string_view name, int element = -1) const = 0;  // set, driven or default
+  virtual bool is_set(std::string_view name, int element = -1) const = 0;         // set or driven
+  virtual int array_size(std::string_view name) const = 0;
+  virtual int geometry() const = 0;  // which element, for per-geometry groups; otherwise 0
+  virtual const std::string& node_name() const = 0;
+  // The value of an input with everything at its default: controls as set in the graph, no clip. Null where an
+  // upstream node failed. Points come complete.
+  virtual const Value* rest(std::string_view name, int element = -1) const = 0;
+
+  int get_int(std::string_view name) const { return static_cast<int>(value(name).AsInt()); }
+  double get_double(std::string_view name) const { return value(name).AsDouble(); }
+  bool get_bool(std::string_view name) const { return value(name).AsInt() != 0; }
+  template <typename T>
+  const T* asset(std::string_view name, int element = -1) const { return value(name, element).asset<T>(); }
+};
+
+// Which points of the inputs an output needs.
+class Demand {
+ public:
+  virtual ~Demand() = default;
+  virtual const Structural& structural() const = 0;
+  // The set demanded of an output (empty if nobody wants it).
+  virtual const PointSet& output(std::string_view name, int element = 0) const = 0;
+  virtual Index input_total(std::string_view name, int element = 0) const = 0;  // points of that input's array
+  virtual void Require(std::string_view name, int element, const PointSet& points) = 0;
+};
+
+// Everything of Demand, answered: the point sets of both sides.
+class Binding {
+ public:
+  virtual ~Binding() = default;
+  virtual const Structural& structural() const = 0;
+  virtual const PointSet& output(std::string_view name, int element = 0) const = 0;
+  virtual const PointSet& input(std::string_view name, int element = 0) const = 0;
+};
+
+struct BoundKernel {
+  std::shared_ptr<const void> object;
+  std::size_t scratch_floats = 0;  // per evaluation, from the thread's workspace
+  std::size_t state_bytes = 0;     // per evaluator, zeroed at its creation
+};
+
+using DemandFn = std::function<void(Demand&)>;
+using BindFn = std::function<Result<BoundKernel>(const Binding&)>;
+using PointCountFn = std::function<Result<Index>(const Structural&, std::string_view output, int element)>;
+
+// Outputs that are computed together, and from what.
+struct ComputeGroup {
+  std::vector<int> inputs;   // attribute numbers, without the structural ones
+  std::vector<int> outputs;
+  bool per_geometry = false;  // one step for every element of the per-geometry outputs
+  ComputeFn compute = nullptr;
+  DecideFn decide = nullptr;         // with lazy inputs
+  ComputeBlockFn compute_block = nullptr;
+  DemandFn demand;                   // null: the same points of every points input
+  BindFn bind;                       // null: no kernel
+  PointCountFn point_count;          // null: as many as the first points input has
+  int in_place_input = -1;           // position in inputs whose buffer the first output may overwrite
+  float cost_ns = 20;                // rough; decides what is worth a thread
+  float cost_ns_per_point = 0;
+};
+
+struct NodeDef {
+  std::string name;
+  std::string doc;
+  std::string category = "utility";  // heading in the reference
+  int version = 1;                   // raise it when results change: it invalidates kernels and subspaces
+  bool animation = false;            // brings a clip: its connections are ignored in the rest state
+  bool stateful = false;             // needs its previous frame
+  std::vector<AttributeDef> attributes;
+  std::vector<ComputeGroup> groups;
+
+  int FindAttribute(std::string_view attribute_name) const;  // -1 if there is none
+  int GroupOfOutput(int attribute) const;                    // -1 if no group computes it
+  std::vector<std::string> AttributeNames() const;
+};
+
+}  // namespace kpsa
