@@ -233,7 +233,7 @@ Status ConnectStages(std::vector<Stage> stages, CharacterMesh* mesh, Graph* grap
   std::vector<Stage> old = std::move(mesh->stages);
   for (const Stage& own : OwnStages(*mesh)) old.push_back(own);
   for (const Stage& stage : old) {
-    const PlugRef in = edit.Plug(stage.node, "points", stage.geometry);
+    const PlugRef in = edit.Plug(stage.node, "inPoints", stage.geometry);
     if (edit.ok() && graph->FindConnection(in) != nullptr) edit.Check(graph->Disconnect(in));
   }
   PlugRef points = edit.Plug(mesh->rest, "points");
@@ -242,7 +242,7 @@ Status ConnectStages(std::vector<Stage> stages, CharacterMesh* mesh, Graph* grap
     if (!edit.ok()) break;
     if (edit.Has(stage.node, "mesh")) edit.Set(stage.node, "mesh", stage.geometry, mesh->geometry.mesh);
     if (edit.Has(stage.node, "space")) edit.Set(stage.node, "space", Value(stage.world ? "world" : "mesh"));
-    edit.Connect(points, edit.Plug(stage.node, "points", stage.geometry));
+    edit.Connect(points, edit.Plug(stage.node, "inPoints", stage.geometry));
     stage.points = edit.Plug(stage.node, "outPoints", stage.geometry);
     points = stage.points;
     world = stage.world;

@@ -31,6 +31,7 @@ struct RigString {
 struct RigAttribute {
   std::string name;  // "iterations", "rotateX", "input[2]"; common words (parent, at, members, ...) are kept apart
   YamlNode key, value;
+  int source = 0;
 };
 
 struct RigNode {

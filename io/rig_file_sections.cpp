@@ -56,7 +56,7 @@ void SectionReader::ReadNodes(const YamlNode& node) {
     if (!ReadString(*type, what + ": type", &rig_node.type, errors)) continue;
     rig_node.type_node = *type;
     for (std::size_t k = 0; k < body.keys.size(); ++k) {
-      if (body.keys[k].scalar != "type") rig_node.attributes.push_back({body.keys[k].scalar, body.keys[k], body.items[k]});
+      if (body.keys[k].scalar != "type") rig_node.attributes.push_back({body.keys[k].scalar, body.keys[k], body.items[k], source});
     }
     rig->nodes.push_back(std::move(rig_node));
   }
