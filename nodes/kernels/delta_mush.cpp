@@ -31,6 +31,7 @@ struct MushFinish {
   const float* masks;   // null: all 1
   float *detail_x, *detail_y, *detail_z;
   float envelope, displacement;
+  float pivot[3];
 };
 }  // namespace kpsa
 #endif
@@ -39,11 +40,22 @@ HWY_BEFORE_NAMESPACE();
 namespace kpsa {
 namespace HWY_NAMESPACE {
 
-void PackLocal(ConstPointsView in, const Index* source, std::size_t begin, std::size_t end, float* xyzw) {
-  if (source == nullptr) return PackXyzw(in.x, in.y, in.z, begin, end, 0.0f, xyzw);
-  for (std::size_t i = begin; i < end; ++i) {
-    const Index p = source[i];
-    xyzw[4 * i] = in.x[p], xyzw[4 * i + 1] = in.y[p], xyzw[4 * i + 2] = in.z[p], xyzw[4 * i + 3] = 0;
+// The points minus the pivot, as xyzw by local number.
+void PackLocal(ConstPointsView in, const Index* source, const float* pivot, std::size_t begin, std::size_t end,
+               float* xyzw) {
+  if (source != nullptr) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Index p = source[i];
+      float* to = xyzw + 4 * i;
+      to[0] = in.x[p] - pivot[0], to[1] = in.y[p] - pivot[1], to[2] = in.z[p] - pivot[2], to[3] = 0;
+    }
+    return;
+  }
+  const DLanes d;
+  const VLanes px = hn::Set(d, pivot[0]), py = hn::Set(d, pivot[1]), pz = hn::Set(d, pivot[2]);
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    hn::StoreInterleaved4(hn::Sub(hn::Load(d, in.x + i), px), hn::Sub(hn::Load(d, in.y + i), py),
+                          hn::Sub(hn::Load(d, in.z + i), pz), hn::Zero(d), d, xyzw + 4 * i);
   }
 }
 
@@ -129,7 +141,9 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
     const VLanes f = Fma(tx, bx, Fma(ty, by, hn::Mul(tz, bz)));
     const VLanes g = Fma(bx, bx, Fma(by, by, hn::Mul(bz, bz)));
     const VLanes s2 = Fma(cx, cx, Fma(cy, cy, hn::Mul(cz, cz)));
-    const auto regular = hn::And(hn::Gt(s2, hn::Mul(hn::Set(d, 1e-10f), hn::Mul(e, g))), hn::Gt(s2, hn::Set(d, 1e-30f)));
+    // Not "s2 > ...": what is not a number must come out as such
+    const auto regular = hn::Not(hn::Or(hn::Le(s2, hn::Mul(hn::Set(d, 1e-10f), hn::Mul(e, g))),
+                                        hn::Le(s2, hn::Set(d, 1e-30f))));
     const VLanes s = hn::Sqrt(s2);
     const VLanes root = hn::Sqrt(hn::Add(hn::Add(e, g), hn::Add(s, s)));
     const VLanes scale = hn::Div(one, hn::Mul(root, s)), inverse_s = hn::Mul(scale, root);
@@ -152,7 +166,7 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
       const float* row = incoming + at;
       x = hn::Load(d, row), y = hn::Load(d, row + kFinishBlock), z = hn::Load(d, row + 2 * kFinishBlock);
     }
-    if constexpr (kBind) {
+    if constexpr (kBind) {  // with a pivot of 0
       x = hn::Sub(x, sx), y = hn::Sub(y, sy), z = hn::Sub(z, sz);
       hn::Store(Fma(ux, x, Fma(uy, y, hn::Mul(uz, z))), d, run.detail_x + i);
       hn::Store(Fma(vx, x, Fma(vy, y, hn::Mul(vz, z))), d, run.detail_y + i);
@@ -168,13 +182,14 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
     VLanes w = hn::Set(d, run.envelope);
     if (run.masks != nullptr) w = hn::Mul(w, hn::Load(d, run.masks + i));
     const auto all = hn::Eq(w, one), none = hn::Eq(w, zero);
-    const auto mix = [&](const VLanes mush, const VLanes unmoved) HWY_ATTR {
+    const auto mix = [&](const VLanes relative, const float pivot, const VLanes unmoved) HWY_ATTR {
+      const VLanes mush = hn::Add(relative, hn::Set(d, pivot));
       const VLanes part = hn::IfThenElse(all, mush, Fma(w, hn::Sub(mush, unmoved), unmoved));
       return hn::IfThenElse(none, unmoved, part);
     };
-    hn::Store(mix(mx, x), d, out.x + i);
-    hn::Store(mix(my, y), d, out.y + i);
-    hn::Store(mix(mz, z), d, out.z + i);
+    hn::Store(mix(mx, run.pivot[0], x), d, out.x + i);
+    hn::Store(mix(my, run.pivot[1], y), d, out.y + i);
+    hn::Store(mix(mz, run.pivot[2], z), d, out.z + i);
   }
 }
 
@@ -383,8 +398,9 @@ void DeltaMushKernel::BuildRows(const Topology& topology, ConstPointsView rest, 
 
 void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
                                   std::span<const Index> local_of) {
+  constexpr float kNoPivot[3] = {0, 0, 0};
   AlignedFloats scratch(ScratchFloats());
-  const float* smoothed = Smooth(rest, scratch.span(), nullptr);
+  const float* smoothed = Smooth(rest, kNoPivot, scratch.span(), nullptr);
   const auto point = [&](Index local4) {
     return Double3{smoothed[local4], smoothed[local4 + 1], smoothed[local4 + 2]};
   };
@@ -427,15 +443,15 @@ void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest
   const std::size_t row = PaddedCount(count_);
   const MushFinish run{smoothed, lanes_.data(), out_local_.data(), frame_offsets_.data(), frame_neighbors_.data(),
                        frame_weights_.data(), out_in_.empty() ? nullptr : out_in_.data(), nullptr,
-                       detail, detail + row, detail + 2 * row, 1, 1};
+                       detail, detail + row, detail + 2 * row, 1, 1, {}};
   HWY_DYNAMIC_DISPATCH(FinishDetail)(run, rest, 0, count_);
 }
 
-const float* DeltaMushKernel::Smooth(ConstPointsView in, std::span<float> scratch,
+const float* DeltaMushKernel::Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
                                      const Parallel* parallel) const noexcept {
   float *from = scratch.data(), *to = from + BufferFloats();
   ForRanges(parallel, local_count_, 8192, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(PackLocal)(in, source_.empty() ? nullptr : source_.data(), begin, end, from);
+    HWY_DYNAMIC_DISPATCH(PackLocal)(in, source_.empty() ? nullptr : source_.data(), pivot, begin, end, from);
   });
   for (int j = 1; j <= iterations_; ++j) {
     ForRanges(parallel, block_counts_[static_cast<std::size_t>(j)], 4, [&](std::size_t begin, std::size_t end) {
@@ -463,12 +479,15 @@ void DeltaMushKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView o
     if (out_in_.empty()) return CopyPoints(in, out);
     return GatherPoints(in, out_in_, out);
   }
-  const float* smoothed = Smooth(in, scratch, parallel);
+  const float pivot[3] = {static_cast<float>(inputs.pivot.x), static_cast<float>(inputs.pivot.y),
+                          static_cast<float>(inputs.pivot.z)};
+  const float* smoothed = Smooth(in, pivot, scratch, parallel);
   const std::size_t row = PaddedCount(count_);
   float* detail = const_cast<float*>(detail_.data());  // read only, unless the kernel is bound
   const MushFinish run{smoothed, lanes_.data(), out_local_.data(), frame_offsets_.data(), frame_neighbors_.data(),
                        frame_weights_.data(), out_in_.empty() ? nullptr : out_in_.data(), masks_.data(),
-                       detail, detail + row, detail + 2 * row, envelope, static_cast<float>(inputs.displacement)};
+                       detail, detail + row, detail + 2 * row, envelope, static_cast<float>(inputs.displacement),
+                       {pivot[0], pivot[1], pivot[2]}};
   ForRanges(parallel, count_, 1024, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(FinishPoints)(run, in, out, begin, end);
   });

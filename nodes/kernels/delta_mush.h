@@ -37,6 +37,7 @@ class DeltaMushKernel {
   struct Inputs {
     double envelope = 1;
     double displacement = 1;  // scale of the detail that comes back; 0: only smoothed
+    Double3 pivot;            // a place near the points, the same for all bindings; only precision depends on it
   };
 
   // rest: points of the whole mesh. settings must be valid. Cost: that of one Run, and of the demand.
@@ -67,7 +68,8 @@ class DeltaMushKernel {
   void BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
                    std::span<const Index> local_of);
   // Packs `in` and smooths it; the smoothed points, xyzw by local number.
-  const float* Smooth(ConstPointsView in, std::span<float> scratch, const Parallel* parallel) const noexcept;
+  const float* Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
+                      const Parallel* parallel) const noexcept;
 
   std::size_t count_ = 0, in_count_ = 0, local_count_ = 0;
   int iterations_ = 0;

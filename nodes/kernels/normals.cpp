@@ -68,8 +68,8 @@ void SumNormals(const std::uint8_t* lanes, const Index* offsets, const Index* ar
       VLanes x, y, z, spare;
       hn::LoadInterleaved4(d, sums + 4 * k, x, y, z, spare);
       const VLanes square = Fma(x, x, Fma(y, y, hn::Mul(z, z)));
-      const auto some = hn::Gt(square, hn::Zero(d));
-      const VLanes scale = hn::IfThenElseZero(some, hn::Div(hn::Set(d, 1.0f), hn::Sqrt(square)));
+      const auto none = hn::Eq(square, hn::Zero(d));
+      const VLanes scale = hn::IfThenZeroElse(none, hn::Div(hn::Set(d, 1.0f), hn::Sqrt(square)));
       hn::Store(hn::Mul(x, scale), d, normals.x + block + k);
       hn::Store(hn::Mul(y, scale), d, normals.y + block + k);
       hn::Store(hn::Mul(z, scale), d, normals.z + block + k);

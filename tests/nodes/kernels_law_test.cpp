@@ -35,7 +35,7 @@ struct Subject {
 
 class KernelLaw : public testing::Test {
  protected:
-  KernelLaw() : mesh_(MakeSheet(45, 41)), skin_(MakeSkin(mesh_.count(), 30, 6, true)), points_(mesh_.count()) {
+  explicit KernelLaw(Index nu = 45, Index nv = 41) : mesh_(MakeSheet(nu, nv)), skin_(MakeSkin(mesh_.count(), 30, 6, true)), points_(mesh_.count()) {
     // A pose that is not the rest; zeros of both signs in all places where a mirror plane would have them
     Random random(11);
     CopyPoints(mesh_.rest.view(), points_.view());
@@ -85,7 +85,7 @@ class KernelLaw : public testing::Test {
                              const DeltaMushKernel kernel(mesh_.topology, mesh_.rest.view(), Mush(masked), out_points,
                                                           in_points, masked ? Masked(out_points) : std::vector<float>());
                              AlignedFloats scratch(kernel.ScratchFloats());
-                             kernel.Run({masked ? 0.6 : 1.0, masked ? 0.8 : 1.0}, in, out, scratch.span(), parallel);
+                             kernel.Run({masked ? 0.6 : 1.0, masked ? 0.8 : 1.0, {0.1, masked ? 1.0 : 0.0, 0}}, in, out, scratch.span(), parallel);
                            }});
     }
     subjects_.push_back({"cluster", true, {}, [this](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
@@ -223,20 +223,30 @@ TEST_F(KernelLaw, SubsetsHaveTheBitsOfTheWhole) {
   }
 }
 
-TEST_F(KernelLaw, SplittingOverThreadsKeepsTheBits) {
+// Large enough for every kernel to be split.
+class KernelLawLarge : public KernelLaw {
+ protected:
+  KernelLawLarge() : KernelLaw(140, 121) {}
+};
+
+TEST_F(KernelLawLarge, SplittingOverThreadsKeepsTheBits) {
   // Every grain by itself, the last one first
-  const Parallel backwards{[](void*, std::size_t size, std::size_t grain, RangeBody body) {
+  int splits = 0;
+  const Parallel backwards{[](void* self, std::size_t size, std::size_t grain, RangeBody body) {
+                             ++*static_cast<int*>(self);
                              for (std::size_t end = (size + grain - 1) / grain * grain; end > 0; end -= grain) {
                                body(end - grain, std::min(end, size));
                              }
                            },
-                           nullptr};
+                           &splits};
   const Parallel threads{[](void*, std::size_t size, std::size_t grain, RangeBody body) { ParallelFor(size, grain, body); },
                          nullptr};
   const std::vector<Index> all = AllPoints(count());
   for (const Subject& subject : subjects_) {
     const std::vector<float> serial = Evaluate(subject, all);
+    splits = 0;
     EXPECT_EQ(Differences(serial, all, Evaluate(subject, all, &backwards)), 0u) << subject.name;
+    EXPECT_GT(splits, 0) << subject.name;
     EXPECT_EQ(Differences(serial, all, Evaluate(subject, all, &threads)), 0u) << subject.name;
   }
 }
