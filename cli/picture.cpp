@@ -188,7 +188,10 @@ Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lig
     matte += surface.matte[i] * w[k];
   }
   n = Unit(n);
-  if (Dot(n, view) < 0) n = n * -1.0;  // an open surface seen from behind
+  // An open surface seen from behind; the smooth normal alone may turn away at a silhouette, too
+  const ConstPointsView p = surface.points.view();
+  const Double3 a = PointOf(p, corner[0]), facet = Cross(PointOf(p, corner[1]) - a, PointOf(p, corner[2]) - a);
+  if (Dot(facet, view) < 0) n = n * -1.0;
   // Sky from above, ground bounce from below, key with a soft terminator, weak fill
   const double up = 0.5 + 0.5 * n.y;
   const Double3 ambient = (Double3{0.50, 0.54, 0.60} * up + Double3{0.34, 0.29, 0.26} * (1 - up)) * (sky * sky);

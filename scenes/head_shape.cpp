@@ -68,7 +68,11 @@ class Builder {
   void QuadPair(int a, int b, int c, int d) {
     const auto& m = shape_.mirror;
     Quad(a, b, c, d);
-    Quad(m[Size(a)], m[Size(d)], m[Size(c)], m[Size(b)]);
+    if (c == d) {
+      Quad(m[Size(a)], m[Size(c)], m[Size(b)], m[Size(b)]);
+    } else {
+      Quad(m[Size(a)], m[Size(d)], m[Size(c)], m[Size(b)]);
+    }
   }
   int Grid(int row, int column) const { return grid_[Size(row)][Size((column + kColumns) % kColumns)]; }
   std::vector<int> Loop(int row0, int row1, int column0, int column1, int first_row, int first_column) const;
@@ -614,7 +618,6 @@ EyeShape MakeEyeShape() {
   constexpr Ring kRings[] = {{0.10, 0.80, 2}, {0.16, 0.84, 2}, {0.185, 0.955, 1}, {0.26, 0.945, 1}, {0.36, 0.955, 1},
                              {0.425, 0.975, 0}, {0.47, 1.0, 0},  {0.62, 1.0, 0},    {0.90, 1.0, 0},   {1.25, 1.0, 0},
                              {1.65, 1.0, 0},  {2.1, 1.0, 0},   {2.6, 1.0, 0}};
-  const auto size = [](int i) { return static_cast<std::size_t>(i); };
   eye.points.push_back({0, 0, 0.80 * kEyeRadius});
   eye.part.push_back(2);
   for (const Ring& ring : kRings) {
@@ -637,7 +640,6 @@ EyeShape MakeEyeShape() {
     const int a = 1 + (rings - 1) * kAround;
     eye.quads.push_back({a + k, last, a + next, a + next});
   }
-  static_cast<void>(size);
   return eye;
 }
 
