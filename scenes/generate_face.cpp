@@ -31,9 +31,9 @@ std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadShape& shape) {
   for (const Double3& p : shape.points) {
     const Double3 q = {std::fabs(p.x), p.y, p.z};
     const double cheek = Bump(Length(q - Double3{4.3, 15.2, 6.6}), 2.8), nose = Bump(Length(q - Double3{0, 14.8, 11.0}), 1.8);
-    const double arch = 20.52 + 0.42 * Bump(q.x - 3.9, 2.6);  // the brow's line
-    const double brow = Bump(q.y - arch, 0.62) * Smooth(0.75, 1.5, q.x) * Smooth(5.6, 4.4, q.x) * Smooth(2, 4, p.z);
-    colors.push_back(mix(mix(kSkin, kFlush, std::max(0.55 * cheek, 0.5 * nose)), kBrow, 0.85 * brow));
+    const double arch = 20.62 + 0.32 * Bump(q.x - 3.7, 2.4) - 0.25 * Smooth(4.2, 5.6, q.x);  // the brow's line
+    const double brow = Bump(q.y - arch, 0.60) * Smooth(0.7, 1.6, q.x) * Smooth(5.7, 4.0, q.x) * Smooth(2, 4, p.z);
+    colors.push_back(mix(mix(kSkin, kFlush, std::max(0.30 * cheek, 0.35 * nose)), kBrow, 0.9 * brow));
   }
   const auto border = static_cast<std::size_t>(shape.border_ring);
   for (std::size_t ring = border; ring < shape.mouth_rings.size(); ++ring) {
