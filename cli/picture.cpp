@@ -39,17 +39,16 @@ void DiscPoint(int k, int n, double* x, double* y) {
   *y = radius * Sin(angle);
 }
 
+// Both directions of sRGB's curve by roots and powers alone, good to half a byte (I. Taylor, "sRGB approximations").
 std::uint8_t SrgbByte(double linear) {
-  linear = std::clamp(linear, 0.0, 1.0);
-  // x^(1/2.4) by cube and square roots only: x^(5/12) = cbrt(x^(5/4))
-  const double encoded =
-      linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::cbrt(linear * std::sqrt(std::sqrt(linear))) - 0.055;
+  const double s1 = std::sqrt(std::clamp(linear, 0.0, 1.0)), s2 = std::sqrt(s1), s3 = std::sqrt(s2);
+  const double encoded = linear <= 0.0031308 ? 12.92 * linear : 0.662002687 * s1 + 0.684122060 * s2 - 0.323583601 * s3 - 0.0225411470 * linear;
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(encoded, 0.0, 1.0)));
 }
 
 double LinearFromSrgb(std::uint8_t byte) {
   const double s = byte / 255.0;
-  return s * (s * (s * 0.305306011 + 0.682171111) + 0.012522878);  // a cubic fit, good to half a byte
+  return s * (s * (s * 0.305306011 + 0.682171111) + 0.012522878);
 }
 
 Double3 LinearFromRgb(Rgb c) { return {LinearFromSrgb(c[0]), LinearFromSrgb(c[1]), LinearFromSrgb(c[2])}; }
@@ -188,7 +187,10 @@ Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lig
     matte += surface.matte[i] * w[k];
   }
   n = Unit(n);
-  if (Dot(n, view) < 0) n = n * -1.0;  // an open surface seen from behind
+  // An open surface seen from behind; the smooth normal alone may turn away at a silhouette, too
+  const ConstPointsView p = surface.points.view();
+  const Double3 a = PointOf(p, corner[0]), facet = Cross(PointOf(p, corner[1]) - a, PointOf(p, corner[2]) - a);
+  if (Dot(facet, view) < 0) n = n * -1.0;
   // Sky from above, ground bounce from below, key with a soft terminator, weak fill
   const double up = 0.5 + 0.5 * n.y;
   const Double3 ambient = (Double3{0.50, 0.54, 0.60} * up + Double3{0.34, 0.29, 0.26} * (1 - up)) * (sky * sky);

@@ -159,9 +159,9 @@ void Speak(Track& track, Random& random) {
     const int syllables = 5 + random.Below(7);
     for (int s = 0; s < syllables && frame + 8 < track.frames(); ++s) {
       const int length = 4 + random.Below(3);
-      const double jaw = random.Uniform(2, 13), lips = random.Uniform(0.0, 0.4);
+      const double jaw = random.Uniform(1, 8), lips = random.Uniform(0.0, 0.3);
       const int shape = shapes[random.Below(static_cast<int>(std::size(shapes)))];
-      const double amount = random.Uniform(0.25, 0.95);
+      const double amount = random.Uniform(0.2, 0.8);
       const bool paired = shape + 1 < track.expressions() && (shape == shapes[3] || shape == shapes[4] || shape == shapes[5] ||
                                                               shape == shapes[8] || shape == shapes[10]);
       for (int k = -2; k < length + 2; ++k) {
@@ -195,7 +195,7 @@ GlbClip Talk(const std::vector<std::string>& names, int mesh_node) {
     if (static_cast<int>(c) == left_blink || static_cast<int>(c) == right_blink) continue;
     const bool turn = c >= names.size();
     const bool jaw = turn && c - names.size() < 2;
-    Wander(track, controls[c], random, turn ? 12 : 7, turn ? 30 : 20, turn ? 0.2 : 0.6, jaw ? 0.25 : turn ? 0.5 : 0.65,
+    Wander(track, controls[c], random, turn ? 12 : 7, turn ? 30 : 20, turn ? 0.2 : 0.6, jaw ? 0.12 : turn ? 0.4 : 0.7,
            turn && !(jaw && c == names.size()));
   }
   for (int f = 0; f < track.frames(); ++f) {

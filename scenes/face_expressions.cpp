@@ -161,7 +161,7 @@ void Maker::Cheeks() {
 void Maker::Lips() {
   Pair("smile", [](const Point& q) {
     const double corner = Ball(q.p, kCorner, {3.0, 2.5, 3.4}), cheek = Ball(q.p, {4.1, 14.9, 6.6}, {2.4, 2.3, 3.0});
-    return (Double3{0.85, 0.85, -0.72} * corner + Double3{0.22, 0.35, 0.30} * cheek) * (q.left * (1 - q.ear));
+    return (Double3{0.80, 0.70, -0.68} * corner + Double3{0.20, 0.32, 0.28} * cheek) * (q.left * (1 - q.ear));
   });
   Pair("frown", [](const Point& q) {
     return Double3{0.22, -0.85, -0.22} * (Ball(q.p, kCorner + Double3{0, -0.3, 0}, {2.7, 2.4, 3.2}) * q.left);

@@ -31,9 +31,9 @@ std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadShape& shape) {
   for (const Double3& p : shape.points) {
     const Double3 q = {std::fabs(p.x), p.y, p.z};
     const double cheek = Bump(Length(q - Double3{4.3, 15.2, 6.6}), 2.8), nose = Bump(Length(q - Double3{0, 14.8, 11.0}), 1.8);
-    const double arch = 20.52 + 0.42 * Bump(q.x - 3.9, 2.6);  // the brow's line
-    const double brow = Bump(q.y - arch, 0.62) * Smooth(0.75, 1.5, q.x) * Smooth(5.6, 4.4, q.x) * Smooth(2, 4, p.z);
-    colors.push_back(mix(mix(kSkin, kFlush, std::max(0.55 * cheek, 0.5 * nose)), kBrow, 0.85 * brow));
+    const double arch = 20.62 + 0.32 * Bump(q.x - 3.7, 2.4) - 0.25 * Smooth(4.2, 5.6, q.x);  // the brow's line
+    const double brow = Bump(q.y - arch, 0.60) * Smooth(0.7, 1.6, q.x) * Smooth(5.7, 4.0, q.x) * Smooth(2, 4, p.z);
+    colors.push_back(mix(mix(kSkin, kFlush, std::max(0.30 * cheek, 0.35 * nose)), kBrow, 0.9 * brow));
   }
   const auto border = static_cast<std::size_t>(shape.border_ring);
   for (std::size_t ring = border; ring < shape.mouth_rings.size(); ++ring) {
@@ -88,14 +88,17 @@ GlbMesh EyesMesh() {
   return mesh;
 }
 
-// The point nearest to `at` and its two neighbours in distance: a short curve, for a handle to be put at.
+// A short curve around `at`, for a handle to be put at: on the middle of the face a symmetric one.
 std::vector<int> Spot(const HeadShape& shape, Double3 at) {
   std::vector<int> order(shape.points.size());
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
   const auto distance = [&](int i) { return Length(shape.points[static_cast<std::size_t>(i)] - at); };
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return distance(a) < distance(b); });
-  order.resize(3);
-  return order;
+  if (at.x != 0) return {order[0], order[1], order[2]};
+  const auto mirrored = [&](int i) { return shape.mirror[static_cast<std::size_t>(i)]; };
+  const int middle = *std::find_if(order.begin(), order.end(), [&](int i) { return mirrored(i) == i; });
+  const int side = *std::find_if(order.begin(), order.end(), [&](int i) { return mirrored(i) != i; });
+  return {side, middle, mirrored(side)};
 }
 
 std::string CurvesYaml(const HeadShape& shape) {
@@ -108,14 +111,17 @@ std::string CurvesYaml(const HeadShape& shape) {
   out += fmt::format("  lowerLip: {{type: curve, vertices: {}, parent: jaw}}\n", list(shape.lower_lip_curve));
   out += fmt::format("  browL: {{type: curve, vertices: {}, parent: head}}\n", list(shape.brow_curve_left));
   out += fmt::format("  browR: {{type: curve, vertices: {}, parent: head}}\n", list(shape.brow_curve_right));
-  const auto spot = [&](const char* name, Double3 at, const char* parent) {
-    out += fmt::format("  {}: {{type: curve, vertices: {}, parent: {}}}\n", name, list(Spot(shape, at)), parent);
+  const auto spot = [&](const char* name, const std::vector<int>& points, const char* parent) {
+    out += fmt::format("  {}: {{type: curve, vertices: {}, parent: {}}}\n", name, list(points), parent);
   };
+  const std::vector<int> cheek = Spot(shape, {4.4, 14.6, 6.8});
+  std::vector<int> other_cheek;
+  for (int i : cheek) other_cheek.push_back(shape.mirror[static_cast<std::size_t>(i)]);
   out += "  # places for handles\n";
-  spot("noseSpot", {0, 14.8, 11.6}, "head");
-  spot("chinSpot", {0, 8.9, 8.8}, "jaw");
-  spot("cheekSpotL", {4.4, 14.6, 6.8}, "head");
-  spot("cheekSpotR", {-4.4, 14.6, 6.8}, "head");
+  spot("noseSpot", Spot(shape, {0, 14.8, 11.6}), "head");
+  spot("chinSpot", Spot(shape, {0, 8.9, 8.8}), "jaw");
+  spot("cheekSpotL", cheek, "head");
+  spot("cheekSpotR", other_cheek, "head");
   return out;
 }
 

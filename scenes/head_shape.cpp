@@ -68,7 +68,11 @@ class Builder {
   void QuadPair(int a, int b, int c, int d) {
     const auto& m = shape_.mirror;
     Quad(a, b, c, d);
-    Quad(m[Size(a)], m[Size(d)], m[Size(c)], m[Size(b)]);
+    if (c == d) {
+      Quad(m[Size(a)], m[Size(c)], m[Size(b)], m[Size(b)]);
+    } else {
+      Quad(m[Size(a)], m[Size(d)], m[Size(c)], m[Size(b)]);
+    }
   }
   int Grid(int row, int column) const { return grid_[Size(row)][Size((column + kColumns) % kColumns)]; }
   std::vector<int> Loop(int row0, int row1, int column0, int column1, int first_row, int first_column) const;
@@ -199,13 +203,13 @@ Double3 LidPoint(int k, int n, double wide, double open, double rho) {
   const bool upper = k <= half;
   const double even = upper ? static_cast<double>(k) / half : static_cast<double>(n - k) / half;
   const double s = 0.45 * even + 0.55 * (0.5 - 0.5 * Cos(kPi * even));
-  const double x = -1.36 + 2.76 * s;
+  const double x = -1.30 + 2.62 * s;
   const double skew = upper ? s + 0.16 * s * (1 - s) : s - 0.22 * s * (1 - s);
   const double arch = 4 * skew * (1 - skew), roundness = std::sqrt(arch);
-  const double height = upper ? 0.60 * (0.55 * arch + 0.45 * roundness) : -0.44 * (0.6 * arch + 0.4 * roundness);
+  const double height = upper ? 0.53 * (0.55 * arch + 0.45 * roundness) : -0.44 * (0.6 * arch + 0.4 * roundness);
   const double line = -0.14 * (1 - s) + 0.06 * s;
   const Double3 p = {x * wide, line + height * open, 0};
-  const double inside = rho * rho - 0.72 * p.x * p.x - p.y * p.y;
+  const double inside = rho * rho - 0.86 * p.x * p.x - p.y * p.y;
   return kEyeCenter + Double3{p.x, p.y, std::sqrt(std::max(inside, 0.04))};
 }
 
@@ -235,6 +239,7 @@ void Builder::MakeEyes() {
       } else {
         points.push_back(AddPair(LidPoint(k, n, kLidRings[lid].wide, kLidRings[lid].open, kLidRings[lid].rho)));
         if (lid == 0) At(points.back()) = ProjectToHead(At(points.back()));
+        if (lid == 1 && k < n / 2) At(points.back()).z -= 0.07 * Sin(2 * kPi * k / n);  // the upper lid's fold
         if (lid >= 1) Pin(points.back());
       }
     }
@@ -259,11 +264,11 @@ void Builder::MakeEyes() {
 double MouthLine(double s) { return -0.05 * Bump(s, 0.3) + 0.05 * Bump(std::fabs(s) - 0.4, 0.45) - 0.07 * s * s; }
 double UpperBorder(double s) {
   const double a = std::fabs(s), side = std::max(1 - a, 0.0);
-  return 0.82 * std::sqrt(side) * (0.35 + 0.65 * side) / (0.35 + 0.65 * 0.8) * 1.05 - 0.14 * Bump(s, 0.26);
+  return 0.72 * std::sqrt(side) * (0.35 + 0.65 * side) / (0.35 + 0.65 * 0.8) * 1.05 - 0.14 * Bump(s, 0.26);
 }
 double LowerBorder(double s) {
   const double c = std::max(1 - s * s, 0.0);
-  return -0.98 * (0.55 * c + 0.45 * c * c) - 0.02;
+  return -0.92 * (0.55 * c + 0.45 * c * c) - 0.02;
 }
 
 constexpr int kSkinRingsOfMouth = 3;
@@ -344,12 +349,12 @@ void Builder::FinishMouth() {
     const int b = shape_.border_ring;
     set(b, border + n_border * (0.05 * full));
     const auto mix = [&](double t) { return border * (1 - t) + contact * t; };
-    set(b + 1, mix(0.30) + n_border * (0.26 * full * pout));
-    set(b + 2, mix(0.66) + n_contact * (0.33 * full * pout));
-    const Double3 meet = contact + n_contact * (0.10 * full) + Double3{0, side * 0.012, 0};
+    set(b + 1, mix(0.30) + n_border * (0.21 * full * pout));
+    set(b + 2, mix(0.66) + n_contact * (0.27 * full * pout));
+    const Double3 meet = contact + n_contact * (0.15 * full) + Double3{0, side * 0.008, 0};
     set(b + 3, meet);
     const double shrink = 1 - 0.10 * std::fabs(s);
-    set(b + 4, Double3{meet.x * shrink, meet.y + side * 0.03, meet.z} + deep * (0.45 + 0.1 * full));
+    set(b + 4, Double3{meet.x * shrink, meet.y + side * 0.012, meet.z} + deep * (0.30 + 0.15 * full));
     set(b + 5, Double3{meet.x * shrink * 0.95, meet.y + side * 0.22 * full, meet.z} + deep * (0.95 + 0.15 * full));
     set(b + 6, Double3{meet.x * shrink * 0.9, meet.y + side * 0.55 * full, meet.z} + deep * (1.6 + 0.3 * full));
     set(b + 7, Double3{meet.x * shrink * 0.75, meet.y + side * 0.35 * full, meet.z} + deep * (2.3 + 0.5 * full));
@@ -422,7 +427,7 @@ void Builder::MakeEars() {
   for (int i : loop) center = center + At(i) * (1.0 / n);
   center = ProjectToHead(center);
   const Double3 origin = center + Double3{-0.15, 0.1, 0.5};
-  const Double3 back = {0.36, 0.0, -0.933}, lean = {0.10, 0.977, -0.19}, out = {0.93, -0.05, 0.36};
+  const Double3 back = {0.27, 0.05, -0.962}, lean = {0.09, 0.975, -0.20}, out = {0.96, -0.05, 0.27};
   std::vector<int> outer = loop;
   std::vector<int> points;
   const int ring_count = static_cast<int>(std::size(kEarRings));
@@ -588,10 +593,10 @@ HeadShape Builder::Build() {
       QuadPair(Grid(r, c), Grid(r, c + 1), Grid(r + 1, c + 1), Grid(r + 1, c));
     }
   }
-  Relax(12);
+  Relax(24);
   FinishMouth();
   FinishNostrils();
-  Relax(6);
+  Relax(10);
   FinishNostrils();
   Symmetrize();
   Compact();
@@ -614,7 +619,6 @@ EyeShape MakeEyeShape() {
   constexpr Ring kRings[] = {{0.10, 0.80, 2}, {0.16, 0.84, 2}, {0.185, 0.955, 1}, {0.26, 0.945, 1}, {0.36, 0.955, 1},
                              {0.425, 0.975, 0}, {0.47, 1.0, 0},  {0.62, 1.0, 0},    {0.90, 1.0, 0},   {1.25, 1.0, 0},
                              {1.65, 1.0, 0},  {2.1, 1.0, 0},   {2.6, 1.0, 0}};
-  const auto size = [](int i) { return static_cast<std::size_t>(i); };
   eye.points.push_back({0, 0, 0.80 * kEyeRadius});
   eye.part.push_back(2);
   for (const Ring& ring : kRings) {
@@ -637,7 +641,6 @@ EyeShape MakeEyeShape() {
     const int a = 1 + (rings - 1) * kAround;
     eye.quads.push_back({a + k, last, a + next, a + next});
   }
-  static_cast<void>(size);
   return eye;
 }
 
