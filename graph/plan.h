@@ -62,6 +62,7 @@ class Plan {
     std::size_t offset = 0;        // floats into the evaluator's buffers, or the workspace
     bool workspace = false;
     const float* constant = nullptr;  // points of the plan itself
+    const PointBuffer* initial = nullptr;  // what a varying points plug starts with
   };
   struct Varying {
     PlugRef plug;
@@ -78,10 +79,10 @@ class Plan {
     Index producer = kNoIndex;  // step, or steps().size() + varying; kNoIndex for a constant
     PointSet points;
   };
-  // What a person sees of a step.
+  // What a person sees of a step. Texts are offsets into the plan's text; see step_name and its kin.
   struct StepInfo {
     NodeId node;
-    std::string node_name, type, label;  // label: "" or what makes this step of the node special ("gather", ...)
+    std::uint32_t name = 0, type = 0, label = 0;
     Index segment = 0;
     Index points = 0, points_total = 0;  // 0 for steps without points
     float cost_ns = 0;
@@ -100,6 +101,9 @@ class Plan {
   const std::vector<Output>& outputs() const { return outputs_; }
   const std::vector<StepInfo>& infos() const { return infos_; }
   const std::vector<Excluded>& excluded() const { return excluded_; }
+  const char* step_name(Index step) const { return text_.data() + infos_[step].name; }    // of its node
+  const char* step_type(Index step) const { return text_.data() + infos_[step].type; }    // of its node
+  const char* step_label(Index step) const { return text_.data() + infos_[step].label; }  // "", "gather", "assemble", ...
   // Consumers of a producer: steps that read it (all segments).
   std::span<const Index> consumers(Index producer) const {
     return {consumers_.data() + consumer_offsets_[producer], consumer_offsets_[producer + 1] - consumer_offsets_[producer]};
@@ -129,6 +133,7 @@ class Plan {
   std::vector<Excluded> excluded_;
   std::vector<std::vector<std::pair<Index, Index>>> closures_;
   std::vector<std::byte> initial_values_;
+  std::string text_;
   std::vector<std::shared_ptr<const void>> owned_;  // kernels, constant points, gather maps
   std::size_t buffer_floats_ = 0, workspace_floats_ = 0, state_bytes_ = 0;
 };

@@ -1,0 +1,129 @@
+#include "kpsa/estimator.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/check.h"
+#include "kpsa/eigen_solvers.h"
+#include "kpsa/gemm.h"
+
+namespace kpsa {
+namespace {
+
+Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::Ref<const Eigen::MatrixXd>& b) {
+  return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
+}
+
+// covariance P [M x M] of the mode coordinates, cues C [r x M] -> G, its factors and B.
+Estimator MapWithCovariance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const Eigen::MatrixXd& p, const Eigen::VectorXd& noise) {
+  Estimator estimator;
+  const Eigen::MatrixXd cp = Multiply(c, p);  // [r x M]
+  estimator.covariance = Multiply(cp, c.transpose());
+  estimator.covariance = (0.5 * (estimator.covariance + estimator.covariance.transpose())).eval();
+  estimator.covariance.diagonal() += noise;
+  const Eigen::Index r = c.rows();
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(estimator.covariance);
+  KPSA_CHECK(cholesky.info() == Eigen::Success);  // the noise is positive
+  estimator.whitening = cholesky.matrixL().solve(Eigen::MatrixXd::Identity(r, r));
+  estimator.judge = TransposedProduct(estimator.whitening, estimator.whitening);
+  estimator.judge = (0.5 * (estimator.judge + estimator.judge.transpose())).eval();
+  estimator.coordinates = cholesky.solve(cp).transpose();
+  estimator.gain = Multiply(a, estimator.coordinates);
+  return estimator;
+}
+
+}  // namespace
+
+Estimator MapEstimator(const Pca& pca, const CueSet& cues) {
+  return MapWithCovariance(pca.output_modes(), cues.loadings, pca.mode_variance().asDiagonal(), cues.noise);
+}
+
+Estimator RotatedMapEstimator(const Pca& pca, const CueSet& cues, const Eigen::MatrixXd& rotation) {
+  const Eigen::MatrixXd covariance = rotation.transpose() * pca.mode_variance().asDiagonal() * rotation;
+  return MapWithCovariance(Multiply(pca.output_modes(), rotation), Multiply(cues.loadings, rotation), covariance, cues.noise);
+}
+
+Estimator LeastSquaresEstimator(const Pca& pca, const CueSet& cues) {
+  const Eigen::MatrixXd& c = cues.loadings;
+  const Eigen::Index r = c.rows(), m = c.cols();
+  Estimator estimator = MapEstimator(pca, cues);
+  if (r < m) {
+    estimator.warning = fmt::format("{} measured values cannot determine {} modes; the MAP estimate is used instead", r, m);
+    return estimator;
+  }
+  const ThinSvd svd = TallSvd(c);
+  const double smallest = svd.values[m - 1];
+  estimator.condition = smallest > 0 ? svd.values[0] / smallest : std::numeric_limits<double>::infinity();
+  if (!(estimator.condition <= kMaxCondition)) {
+    estimator.warning = fmt::format("the key points determine the modes badly (condition number {:.3g}, at most {:g} is good); "
+                                    "the MAP estimate is used instead",
+                                    estimator.condition, kMaxCondition);
+    return estimator;
+  }
+  // p = R^-1 Q^T y, the residual is (I - Q Q^T) y
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(c);
+  const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(r, m);
+  estimator.mode = EstimatorMode::kPaper;
+  estimator.coordinates = qr.matrixQR().topRows(m).triangularView<Eigen::Upper>().solve(q.transpose());
+  estimator.gain = Multiply(pca.output_modes(), estimator.coordinates);
+  estimator.judge = Eigen::MatrixXd::Identity(r, r) - q * q.transpose();
+  estimator.judge = (0.5 * (estimator.judge + estimator.judge.transpose())).eval();
+  return estimator;
+}
+
+Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues, std::span<const float> centered_row) {
+  Eigen::VectorXd y(cues.rows());
+  for (std::size_t k = 0; k < cues.cues.size(); ++k) {
+    const std::size_t column = CueColumn(layout, cues.cues[k]);
+    for (Index j = cues.offsets[k]; j < cues.offsets[k + 1]; ++j) {
+      const auto row = static_cast<Eigen::Index>(j);
+      y[row] = static_cast<double>(centered_row[column + j - cues.offsets[k]]) * cues.scale[row];
+    }
+  }
+  return y;
+}
+
+std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses) {
+  KPSA_CHECK(poses.centered() && poses.layout() == pca.layout);
+  const std::size_t outputs = pca.layout.outputs(), kChunk = 384;
+  const auto components = static_cast<Eigen::Index>(pca.layout.components);
+  const Eigen::MatrixXd a = pca.output_modes();
+  Eigen::LDLT<Eigen::MatrixXd> gram;
+  if (!pca.output_orthonormal) gram.compute(Gram(GemmOperand::Dense(a).Transposed()));
+  std::vector<PoseErrors> errors;
+  for (std::size_t first = 0; first < poses.poses(); first += kChunk) {
+    const std::size_t count = std::min(kChunk, poses.poses() - first);
+    const GemmOperand x = GemmOperand::Poses(poses, first, count, 0, outputs);
+    Eigen::MatrixXd best = Multiply(GemmOperand::Dense(a).Transposed(), x.Transposed());  // [M x count]
+    if (!pca.output_orthonormal) best = gram.solve(best);
+    Eigen::MatrixXd y(cues.rows(), static_cast<Eigen::Index>(count));
+    for (std::size_t t = 0; t < count; ++t) y.col(static_cast<Eigen::Index>(t)) = MeasuredCues(pca.layout, cues, poses.row(first + t));
+    const Eigen::MatrixXd estimated = estimator.coordinates * y;
+    const Eigen::MatrixXd projected = Multiply(a, best), reached = Multiply(a, estimated);
+    for (std::size_t t = 0; t < count; ++t) {
+      const auto column = static_cast<Eigen::Index>(t);
+      const Eigen::VectorXd f =
+          Eigen::Map<const Eigen::VectorXf>(poses.row(first + t).data(), static_cast<Eigen::Index>(outputs)).cast<double>();
+      const Eigen::VectorXd difference = f - reached.col(column);
+      PoseErrors e;
+      e.projection = (f - projected.col(column)).norm();
+      e.cue = (projected.col(column) - reached.col(column)).norm();
+      e.total = difference.norm();
+      const Eigen::Map<const Eigen::MatrixXd> by_point(difference.data(), components, difference.size() / components);
+      e.largest = std::sqrt(by_point.colwise().squaredNorm().maxCoeff());
+      errors.push_back(e);
+    }
+  }
+  return errors;
+}
+
+double RmsError(const std::vector<PoseErrors>& errors, std::size_t points) {
+  double sum = 0;
+  for (const PoseErrors& e : errors) sum += e.total * e.total;
+  return errors.empty() ? 0 : std::sqrt(sum / (static_cast<double>(errors.size()) * static_cast<double>(points)));
+}
+
+}  // namespace kpsa

@@ -1,0 +1,89 @@
+// SoftCache: how far a measurement is from what the subspace was trained on, and what to do about it.
+// Glossary: y the r normalised measurements, g = J y with J the estimator's `judge` matrix.
+//
+// map:   score 1 = y . g (residual and Mahalanobis distance in one); score 2 = the largest leave-one-out error of a
+//        cue, |([G^-1]_ii)^-1 g_i| with the block of the cue; each over its 99 % training quantile; the larger counts.
+// paper: |y - C p| over its 99 % training quantile.
+//
+// Below tau_lo = c tau: a hit. Between tau_lo and tau: a stateless smoothstep blends the full evaluation in. Above: the
+// full evaluation alone. Frames therefore do not depend on their order.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kpsa/estimator.h"
+
+namespace kpsa {
+
+// Why the full evaluation is needed.
+enum class MissReason : std::uint8_t {
+  kNone,        // a hit
+  kScore,       // the score is above tau_lo; `offender` is the cue of the largest leave-one-out error
+  kNotFinite,   // a measurement is NaN or infinite; `offender` is its cue
+  kOutOfRange,  // a control is outside its trained range; `offender` is its index
+  kNeverHit,    // the tolerance is zero, or no threshold keeps the violation rate
+};
+
+struct Verdict {
+  double score = 0;
+  double full_weight = 0;  // share of the full evaluation in the result: 0 for a hit, 1 for a full miss
+  bool hit = true;         // the full evaluation is not needed at all
+  MissReason reason = MissReason::kNone;
+  Index offender = kNoIndex;
+};
+
+// What decides; from kpsa/calibration.h. tau < 0: nothing is ever a hit; infinity: everything finite is.
+struct SoftCacheThreshold {
+  double tau = -1;
+  double blend_start = 0.7;  // c
+  double tau_lo() const { return tau * blend_start; }
+};
+
+// Share of the full evaluation at a score.
+double FullWeight(double score, const SoftCacheThreshold& threshold);
+
+// The immutable data. Plain arrays: it is stored in the subspace file.
+struct SoftCacheModel {
+  EstimatorMode mode = EstimatorMode::kMap;
+  std::vector<Index> offsets;         // [K + 1] rows of each cue
+  std::vector<double> judge;          // [r x r] J, column-major, symmetric
+  std::vector<double> leave_one_out;  // blocks ([J]_ii)^-1, h x h each, one after the other (map mode; else empty)
+  double quantile1 = 1, quantile2 = 1;  // 99 % training quantiles of the raw scores, > 0
+  std::size_t rows() const { return offsets.empty() ? 0 : offsets.back(); }
+  std::size_t cues() const { return offsets.empty() ? 0 : offsets.size() - 1; }
+};
+
+// From an estimator; the quantiles from training measurements, one a column [r x T].
+SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues, const Eigen::MatrixXd& training);
+
+struct RawScores {
+  double score1 = 0, score2 = 0;  // before division by the quantiles; score2 is 0 in paper mode
+  Index worst_cue = kNoIndex;     // of score 2; in paper mode of the largest residual
+};
+// Run time. y [r]; scratch of at least r doubles; allocates nothing; the same bits on every SIMD target.
+RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const double> y, std::span<double> scratch);
+// The score and what follows from it. NaN or infinity in y is a miss.
+Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const double> y,
+              std::span<double> scratch);
+
+// The trained range of a plug that may vary, margin included.
+struct TrainedRange {
+  std::string plug;
+  double lo = 0, hi = 0;
+};
+// [min, max] widened by `margin` of its extent on both sides (and by rounding, 1e-6 of the magnitude).
+TrainedRange MakeTrainedRange(std::string plug, double min, double max, double margin);
+// Index of the first value outside its range (NaN is outside), or kNoIndex.
+Index FirstOutside(std::span<const TrainedRange> ranges, std::span<const double> values);
+// "head.rotateX = 1.2 is outside its trained range [-0.5, 0.5]"
+std::string OutsideMessage(const TrainedRange& range, double value);
+
+// y = matrix * x for a column-major [n x n] matrix; sums in the order of the columns, the same bits on every target.
+// lower: the matrix is lower triangular; only that part is read.
+void MultiplyVector(std::span<const double> matrix, std::span<const double> x, bool lower, std::span<double> y);
+
+}  // namespace kpsa
