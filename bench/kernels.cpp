@@ -246,7 +246,7 @@ int Main(int argc, char** argv) {
       for (std::size_t k = 0; k < neighbors.row(i).size(); ++k) weights.push_back(1.0f / static_cast<float>(neighbors.row(i).size()));
     }
     Report(distance_weight == 0 ? "deltaMush, 10 iterations" : "deltaMush, 10, distance weights", n,
-           [&] { kernel.Run({1, 1}, in, out.view(), scratch.span()); },
+           [&] { kernel.Run({}, in, out.view(), scratch.span()); },
            [&] {
              a = points;
              for (int iteration = 0; iteration < 10; ++iteration) {

@@ -15,6 +15,7 @@
 #ifndef KPSA_NODES_KERNELS_DELTA_MUSH_RUN_
 #define KPSA_NODES_KERNELS_DELTA_MUSH_RUN_
 namespace kpsa {
+inline constexpr std::size_t kFinishBlock = 64;
 // Points with equally many neighbours.
 struct MushRows {
   const Index *order, *neighbors;
@@ -23,12 +24,14 @@ struct MushRows {
 };
 struct MushFinish {
   const float* smoothed;
-  const Index *out_local, *frame_offsets, *frame_neighbors;
+  const std::uint8_t* lanes;  // place in its block of 64 of each frame, sorted by the number of neighbours
+  const Index *out_local, *frame_offsets, *frame_neighbors;  // by frame
   const float* frame_weights;
-  const Index* out_in;  // null: the same
+  const Index* out_in;  // by output; null: the same
   const float* masks;   // null: all 1
   float *detail_x, *detail_y, *detail_z;
   float envelope, displacement;
+  float pivot[3];
 };
 }  // namespace kpsa
 #endif
@@ -37,21 +40,32 @@ HWY_BEFORE_NAMESPACE();
 namespace kpsa {
 namespace HWY_NAMESPACE {
 
-void PackLocal(ConstPointsView in, const Index* source, std::size_t begin, std::size_t end, float* xyzw) {
-  if (source == nullptr) return PackXyzw(in.x, in.y, in.z, begin, end, 0.0f, xyzw);
-  for (std::size_t i = begin; i < end; ++i) {
-    const Index p = source[i];
-    xyzw[4 * i] = in.x[p], xyzw[4 * i + 1] = in.y[p], xyzw[4 * i + 2] = in.z[p], xyzw[4 * i + 3] = 0;
+// The points minus the pivot, as xyzw by local number.
+void PackLocal(ConstPointsView in, const Index* source, const float* pivot, std::size_t begin, std::size_t end,
+               float* xyzw) {
+  if (source != nullptr) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Index p = source[i];
+      float* to = xyzw + 4 * i;
+      to[0] = in.x[p] - pivot[0], to[1] = in.y[p] - pivot[1], to[2] = in.z[p] - pivot[2], to[3] = 0;
+    }
+    return;
+  }
+  const DLanes d;
+  const VLanes px = hn::Set(d, pivot[0]), py = hn::Set(d, pivot[1]), pz = hn::Set(d, pivot[2]);
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    hn::StoreInterleaved4(hn::Sub(hn::Load(d, in.x + i), px), hn::Sub(hn::Load(d, in.y + i), py),
+                          hn::Sub(hn::Load(d, in.z + i), pz), hn::Zero(d), d, xyzw + 4 * i);
   }
 }
 
 template <std::size_t n, bool kWeighted>  // n = 0: at run time
-HWY_INLINE void SmoothGroup(const MushRows& rows, const float* from, float* to) {
-  const std::size_t neighbor_count = n == 0 ? rows.neighbor_count : n;
-  const Index* neighbors = rows.neighbors;
-  const float* weights = rows.weights;
-  for (std::size_t i = 0; i < rows.count; ++i, neighbors += neighbor_count) {
-    const F4 s = Load4(from + rows.order[i]);
+HWY_INLINE void SmoothGroup(const MushRows& rows, const float* HWY_RESTRICT from, float* HWY_RESTRICT to) {
+  const std::size_t neighbor_count = n == 0 ? rows.neighbor_count : n, count = rows.count;
+  const Index *HWY_RESTRICT neighbors = rows.neighbors, *HWY_RESTRICT order = rows.order;
+  const float *HWY_RESTRICT weights = rows.weights, *HWY_RESTRICT steps = rows.steps;
+  for (std::size_t i = 0; i < count; ++i, neighbors += neighbor_count) {
+    const F4 s = Load4(from + order[i]);
     F4 sum = Sub4(Load4(from + neighbors[0]), s);
     if constexpr (kWeighted) sum = Mul4(Splat4(weights[0]), sum);
     for (std::size_t j = 1; j < neighbor_count; ++j) {
@@ -59,7 +73,7 @@ HWY_INLINE void SmoothGroup(const MushRows& rows, const float* from, float* to) 
       sum = kWeighted ? Fma4(Splat4(weights[j]), edge, sum) : Add4(sum, edge);
     }
     if constexpr (kWeighted) weights += neighbor_count;
-    Store4(Fma4(Splat4(rows.steps[i]), sum, s), to + rows.order[i]);
+    Store4(Fma4(Splat4(steps[i]), sum, s), to + order[i]);
   }
 }
 
@@ -87,29 +101,37 @@ void SmoothRows(const MushRows& rows, const float* from, float* to) {
 template <bool kBind>
 HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out, std::size_t begin, std::size_t end) {
   const DLanes d;
-  const std::size_t lanes = hn::Lanes(d);
-  alignas(64) float buffer[4][64];  // smoothed point, t, b, incoming point
   const VLanes zero = hn::Zero(d), one = hn::Set(d, 1.0f);
-  for (std::size_t i = begin; i < end; i += lanes) {
-    const std::size_t size = HWY_MIN(lanes, end - i);
-    for (std::size_t k = 0; k < lanes; ++k) {
-      F4 s = Zero4(), t = s, b = s;
-      if (k < size) {
-        s = Load4(run.smoothed + run.out_local[i + k]);
-        for (Index e = run.frame_offsets[i + k]; e < run.frame_offsets[i + k + 1]; ++e) {
+  // Blocks of points: what is gathered has left the store buffer before the wider loads read it
+  alignas(64) float smoothed[4 * kFinishBlock] = {}, tangents[4 * kFinishBlock] = {}, bitangents[4 * kFinishBlock] = {};
+  alignas(64) float incoming[3 * kFinishBlock] = {};
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    const std::size_t at = (i - begin) % kFinishBlock;
+    if (at == 0) {
+      const std::size_t size = HWY_MIN(kFinishBlock, end - i);
+      for (std::size_t k = 0; k < size; ++k) {
+        const std::size_t lane = run.lanes[i + k];
+        const F4 s = Load4(run.smoothed + run.out_local[i + k]);
+        F4 t = Zero4(), b = t;
+        const Index last = run.frame_offsets[i + k + 1];
+        for (Index e = run.frame_offsets[i + k]; e < last; ++e) {
           const F4 edge = Sub4(Load4(run.smoothed + run.frame_neighbors[e]), s);
           t = Fma4(Splat4(run.frame_weights[2 * e]), edge, t);
           b = Fma4(Splat4(run.frame_weights[2 * e + 1]), edge, b);
         }
+        Store4(s, smoothed + 4 * lane);
+        Store4(t, tangents + 4 * lane);
+        Store4(b, bitangents + 4 * lane);
       }
-      Store4(s, buffer[0] + 4 * k);
-      Store4(t, buffer[1] + 4 * k);
-      Store4(b, buffer[2] + 4 * k);
+      for (std::size_t k = 0; k < (run.out_in == nullptr ? 0 : size); ++k) {
+        const Index p = run.out_in[i + k];
+        incoming[k] = in.x[p], incoming[kFinishBlock + k] = in.y[p], incoming[2 * kFinishBlock + k] = in.z[p];
+      }
     }
     VLanes sx, sy, sz, tx, ty, tz, bx, by, bz, spare;
-    hn::LoadInterleaved4(d, buffer[0], sx, sy, sz, spare);
-    hn::LoadInterleaved4(d, buffer[1], tx, ty, tz, spare);
-    hn::LoadInterleaved4(d, buffer[2], bx, by, bz, spare);
+    hn::LoadInterleaved4(d, smoothed + 4 * at, sx, sy, sz, spare);
+    hn::LoadInterleaved4(d, tangents + 4 * at, tx, ty, tz, spare);
+    hn::LoadInterleaved4(d, bitangents + 4 * at, bx, by, bz, spare);
 
     // Frame; the axes of space where the tangents are (nearly) parallel or have no length
     const VLanes cx = Fma(ty, bz, hn::Neg(hn::Mul(tz, by)));
@@ -119,7 +141,9 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
     const VLanes f = Fma(tx, bx, Fma(ty, by, hn::Mul(tz, bz)));
     const VLanes g = Fma(bx, bx, Fma(by, by, hn::Mul(bz, bz)));
     const VLanes s2 = Fma(cx, cx, Fma(cy, cy, hn::Mul(cz, cz)));
-    const auto regular = hn::And(hn::Gt(s2, hn::Mul(hn::Set(d, 1e-10f), hn::Mul(e, g))), hn::Gt(s2, hn::Set(d, 1e-30f)));
+    // Not "s2 > ...": what is not a number must come out as such
+    const auto regular = hn::Not(hn::Or(hn::Le(s2, hn::Mul(hn::Set(d, 1e-10f), hn::Mul(e, g))),
+                                        hn::Le(s2, hn::Set(d, 1e-30f))));
     const VLanes s = hn::Sqrt(s2);
     const VLanes root = hn::Sqrt(hn::Add(hn::Add(e, g), hn::Add(s, s)));
     const VLanes scale = hn::Div(one, hn::Mul(root, s)), inverse_s = hn::Mul(scale, root);
@@ -139,13 +163,10 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
     if (run.out_in == nullptr) {
       x = hn::Load(d, in.x + i), y = hn::Load(d, in.y + i), z = hn::Load(d, in.z + i);
     } else {
-      for (std::size_t k = 0; k < lanes; ++k) {
-        const std::size_t p = k < size ? run.out_in[i + k] : 0;
-        buffer[3][k] = in.x[p], buffer[3][16 + k] = in.y[p], buffer[3][32 + k] = in.z[p];
-      }
-      x = hn::Load(d, buffer[3]), y = hn::Load(d, buffer[3] + 16), z = hn::Load(d, buffer[3] + 32);
+      const float* row = incoming + at;
+      x = hn::Load(d, row), y = hn::Load(d, row + kFinishBlock), z = hn::Load(d, row + 2 * kFinishBlock);
     }
-    if constexpr (kBind) {
+    if constexpr (kBind) {  // with a pivot of 0
       x = hn::Sub(x, sx), y = hn::Sub(y, sy), z = hn::Sub(z, sz);
       hn::Store(Fma(ux, x, Fma(uy, y, hn::Mul(uz, z))), d, run.detail_x + i);
       hn::Store(Fma(vx, x, Fma(vy, y, hn::Mul(vz, z))), d, run.detail_y + i);
@@ -161,13 +182,14 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
     VLanes w = hn::Set(d, run.envelope);
     if (run.masks != nullptr) w = hn::Mul(w, hn::Load(d, run.masks + i));
     const auto all = hn::Eq(w, one), none = hn::Eq(w, zero);
-    const auto mix = [&](const VLanes mush, const VLanes unmoved) HWY_ATTR {
+    const auto mix = [&](const VLanes relative, const float pivot, const VLanes unmoved) HWY_ATTR {
+      const VLanes mush = hn::Add(relative, hn::Set(d, pivot));
       const VLanes part = hn::IfThenElse(all, mush, Fma(w, hn::Sub(mush, unmoved), unmoved));
       return hn::IfThenElse(none, unmoved, part);
     };
-    hn::Store(mix(mx, x), d, out.x + i);
-    hn::Store(mix(my, y), d, out.y + i);
-    hn::Store(mix(mz, z), d, out.z + i);
+    hn::Store(mix(mx, run.pivot[0], x), d, out.x + i);
+    hn::Store(mix(my, run.pivot[1], y), d, out.y + i);
+    hn::Store(mix(mz, run.pivot[2], z), d, out.z + i);
   }
 }
 
@@ -317,9 +339,7 @@ DeltaMushKernel::DeltaMushKernel(const Topology& topology, ConstPointsView rest,
   std::vector<float> masks(point_weights.begin(), point_weights.end());
   for (std::size_t i = 0; i < count_; ++i) {
     const Index at = local_of[out_points[i]];
-    const bool changes = at != kNoIndex && level[at] == 0;
-    out_local_.push_back(changes ? 4 * at : 0);
-    if (changes) continue;
+    if (at != kNoIndex && level[at] == 0) continue;
     if (masks.empty()) masks.assign(count_, 1.0f);
     masks[i] = 0;
   }
@@ -378,21 +398,30 @@ void DeltaMushKernel::BuildRows(const Topology& topology, ConstPointsView rest, 
 
 void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
                                   std::span<const Index> local_of) {
+  constexpr float kNoPivot[3] = {0, 0, 0};
   AlignedFloats scratch(ScratchFloats());
-  const float* smoothed = Smooth(rest, scratch.span(), nullptr);
+  const float* smoothed = Smooth(rest, kNoPivot, scratch.span(), nullptr);
   const auto point = [&](Index local4) {
     return Double3{smoothed[local4], smoothed[local4 + 1], smoothed[local4 + 2]};
   };
+  const auto changes = [&](std::size_t i) { return masks_.size() == 0 || masks_.data()[i] != 0; };
+  const auto ring_of = [&](std::size_t i) { return topology.neighbors().row(out_points[i]); };
+  for (std::size_t i = 0; i < count_; ++i) lanes_.push_back(static_cast<std::uint8_t>(i % kFinishBlock));
+  for (std::size_t begin = 0; begin < count_; begin += kFinishBlock) {
+    const auto first = lanes_.begin() + static_cast<std::ptrdiff_t>(begin);
+    std::stable_sort(first, first + static_cast<std::ptrdiff_t>(std::min(kFinishBlock, count_ - begin)),
+                     [&](std::uint8_t a, std::uint8_t b) { return ring_of(begin + a).size() < ring_of(begin + b).size(); });
+  }
   frame_offsets_.push_back(0);
-  for (std::size_t i = 0; i < count_; ++i) {
-    const bool changes = masks_.size() == 0 || masks_.data()[i] != 0;
-    if (changes) {
+  for (std::size_t k = 0; k < count_; ++k) {
+    const std::size_t i = k / kFinishBlock * kFinishBlock + lanes_[k];
+    out_local_.push_back(changes(i) ? 4 * local_of[out_points[i]] : 0);
+    if (changes(i)) {
       // The plane of the two largest spreads of the ring; tangents by least squares in it
-      const auto ring = topology.neighbors().row(out_points[i]);
-      const Double3 center = point(out_local_[i]);
+      const Double3 center = point(out_local_.back());
       double spread[3][3] = {}, values[3];
       Double3 axes[3];
-      for (Index q : ring) {
+      for (Index q : ring_of(i)) {
         const Double3 edge = point(4 * local_of[q]) - center;
         for (int r = 0; r < 3; ++r) {
           for (int c = 0; c < 3; ++c) spread[r][c] += edge[r] * edge[c];
@@ -400,7 +429,7 @@ void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest
       }
       SymmetricEigen(spread, values, axes);
       const bool flat = values[1] > 1e-10 * values[0];  // otherwise the ring is a line: no frame
-      for (Index q : ring) {
+      for (Index q : ring_of(i)) {
         const Double3 edge = point(4 * local_of[q]) - center;
         frame_neighbors_.push_back(4 * local_of[q]);
         frame_weights_.push_back(flat ? static_cast<float>(Dot(edge, axes[0]) / values[0]) : 0.0f);
@@ -412,17 +441,17 @@ void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest
   detail_ = AlignedFloats(3 * PaddedCount(count_));
   float* detail = detail_.data();
   const std::size_t row = PaddedCount(count_);
-  const MushFinish run{smoothed, out_local_.data(), frame_offsets_.data(), frame_neighbors_.data(),
+  const MushFinish run{smoothed, lanes_.data(), out_local_.data(), frame_offsets_.data(), frame_neighbors_.data(),
                        frame_weights_.data(), out_in_.empty() ? nullptr : out_in_.data(), nullptr,
-                       detail, detail + row, detail + 2 * row, 1, 1};
+                       detail, detail + row, detail + 2 * row, 1, 1, {}};
   HWY_DYNAMIC_DISPATCH(FinishDetail)(run, rest, 0, count_);
 }
 
-const float* DeltaMushKernel::Smooth(ConstPointsView in, std::span<float> scratch,
+const float* DeltaMushKernel::Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
                                      const Parallel* parallel) const noexcept {
-  float *from = scratch.data(), *to = from + 4 * PaddedCount(local_count_);
+  float *from = scratch.data(), *to = from + BufferFloats();
   ForRanges(parallel, local_count_, 8192, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(PackLocal)(in, source_.empty() ? nullptr : source_.data(), begin, end, from);
+    HWY_DYNAMIC_DISPATCH(PackLocal)(in, source_.empty() ? nullptr : source_.data(), pivot, begin, end, from);
   });
   for (int j = 1; j <= iterations_; ++j) {
     ForRanges(parallel, block_counts_[static_cast<std::size_t>(j)], 4, [&](std::size_t begin, std::size_t end) {
@@ -450,12 +479,15 @@ void DeltaMushKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView o
     if (out_in_.empty()) return CopyPoints(in, out);
     return GatherPoints(in, out_in_, out);
   }
-  const float* smoothed = Smooth(in, scratch, parallel);
+  const float pivot[3] = {static_cast<float>(inputs.pivot.x), static_cast<float>(inputs.pivot.y),
+                          static_cast<float>(inputs.pivot.z)};
+  const float* smoothed = Smooth(in, pivot, scratch, parallel);
   const std::size_t row = PaddedCount(count_);
   float* detail = const_cast<float*>(detail_.data());  // read only, unless the kernel is bound
-  const MushFinish run{smoothed, out_local_.data(), frame_offsets_.data(), frame_neighbors_.data(),
+  const MushFinish run{smoothed, lanes_.data(), out_local_.data(), frame_offsets_.data(), frame_neighbors_.data(),
                        frame_weights_.data(), out_in_.empty() ? nullptr : out_in_.data(), masks_.data(),
-                       detail, detail + row, detail + 2 * row, envelope, static_cast<float>(inputs.displacement)};
+                       detail, detail + row, detail + 2 * row, envelope, static_cast<float>(inputs.displacement),
+                       {pivot[0], pivot[1], pivot[2]}};
   ForRanges(parallel, count_, 1024, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(FinishPoints)(run, in, out, begin, end);
   });

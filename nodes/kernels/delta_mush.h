@@ -37,6 +37,7 @@ class DeltaMushKernel {
   struct Inputs {
     double envelope = 1;
     double displacement = 1;  // scale of the detail that comes back; 0: only smoothed
+    Double3 pivot;            // a place near the points, the same for all bindings; only precision depends on it
   };
 
   // rest: points of the whole mesh. settings must be valid. Cost: that of one Run, and of the demand.
@@ -46,7 +47,7 @@ class DeltaMushKernel {
 
   std::size_t point_count() const { return count_; }
   std::size_t input_count() const { return in_count_; }
-  std::size_t ScratchFloats() const { return 8 * PaddedCount(local_count_); }
+  std::size_t ScratchFloats() const { return 2 * BufferFloats(); }
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
   // Point evaluations of one Run, all iterations together; the price of a binding.
@@ -59,12 +60,16 @@ class DeltaMushKernel {
     Index count;
     Index first_point, first_neighbor;  // in order_ and neighbors_
   };
+  // Floats of one of the two buffers. They lie 3 KiB apart modulo 4 KiB: stores to one would otherwise hold up loads
+  // from the other whose addresses look alike.
+  std::size_t BufferFloats() const { return (4 * local_count_ + 1023) / 1024 * 1024 + 768; }
   void BuildRows(const Topology& topology, ConstPointsView rest, const DeltaMushSettings& settings,
                  std::span<const Index> local, std::span<const int> level, std::span<const Index> local_of);
   void BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
                    std::span<const Index> local_of);
   // Packs `in` and smooths it; the smoothed points, xyzw by local number.
-  const float* Smooth(ConstPointsView in, std::span<float> scratch, const Parallel* parallel) const noexcept;
+  const float* Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
+                      const Parallel* parallel) const noexcept;
 
   std::size_t count_ = 0, in_count_ = 0, local_count_ = 0;
   int iterations_ = 0;
@@ -79,8 +84,9 @@ class DeltaMushKernel {
   std::vector<Index> neighbors_;     // 4 * local number, rows in the order of order_
   std::vector<float> neighbor_weights_;  // beside neighbors_; empty if all alike
   std::vector<float> steps_;         // beside order_: step, or step / neighbours
-  std::vector<Index> out_local_;     // output -> 4 * local number
-  std::vector<Index> frame_offsets_, frame_neighbors_;  // per output; empty rows where the detail is 0
+  std::vector<std::uint8_t> lanes_;  // outputs in blocks of 64, sorted by their number of neighbours: place in block
+  std::vector<Index> out_local_;     // beside lanes_: 4 * local number
+  std::vector<Index> frame_offsets_, frame_neighbors_;  // beside lanes_; empty rows where the detail is 0
   std::vector<float> frame_weights_;  // a, b of each frame neighbour
   AlignedFloats detail_;              // 3 rows, padded
   AlignedFloats masks_;               // point weights, padded; empty if all 1

@@ -130,6 +130,10 @@ void SkinBlockLanes(const SkinRun& run, const SkinBlock& block, ConstPointsView 
       case 2: SkinGroup<2>(run.palette, n, size, lanes, joints, weights, points, result); break;
       case 3: SkinGroup<3>(run.palette, n, size, lanes, joints, weights, points, result); break;
       case 4: SkinGroup<4>(run.palette, n, size, lanes, joints, weights, points, result); break;
+      case 5: SkinGroup<5>(run.palette, n, size, lanes, joints, weights, points, result); break;
+      case 6: SkinGroup<6>(run.palette, n, size, lanes, joints, weights, points, result); break;
+      case 7: SkinGroup<7>(run.palette, n, size, lanes, joints, weights, points, result); break;
+      case 8: SkinGroup<8>(run.palette, n, size, lanes, joints, weights, points, result); break;
       default: SkinGroup<0>(run.palette, n, size, lanes, joints, weights, points, result); break;
     }
     lanes += size;
