@@ -1,5 +1,4 @@
 // kpsa get: values of plugs over time.
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -7,6 +6,7 @@
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/frames_range.h"
+#include "cli/options.h"
 #include "cli/output.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
@@ -19,7 +19,7 @@ constexpr std::size_t kMaxNumbers = 200'000'000;  // printed
 
 struct GetFlags : Flags {
   std::vector<std::string> plugs;
-  std::string format = "csv";
+  std::optional<std::string> format;  // csv if not given
 };
 
 // A plug and the numbers that it gives each frame.
@@ -29,10 +29,10 @@ struct Column {
   Type type = Type::kDouble;
   double factor = 1;  // from the runtime's unit to the file's
   std::string unit;
-  Index output = kNoIndex;             // of the plan; kNoIndex: `text` is its constant value
+  Index output = kNoIndex;  // of the plan; kNoIndex: `text` is its constant value
   std::string text;
-  std::vector<std::string> suffixes;   // one a number
-  Index points = 0;                    // of a points plug
+  std::vector<std::string> suffixes;  // one a number
+  Index points = 0;                   // of a points plug
 
   void Read(const Evaluator& evaluator, std::vector<double>* numbers) const;
 };
@@ -43,8 +43,10 @@ void Column::Read(const Evaluator& evaluator, std::vector<double>* numbers) cons
   switch (type) {
     case Type::kBool:
     case Type::kInt:
-    case Type::kEnum: return add(static_cast<double>(evaluator.Get<std::int64_t>(output)));
-    case Type::kDouble: return add(evaluator.Get<double>(output));
+    case Type::kEnum:
+      return add(static_cast<double>(evaluator.Get<std::int64_t>(output)));
+    case Type::kDouble:
+      return add(evaluator.Get<double>(output));
     case Type::kDouble3: {
       const Double3& v = evaluator.Get<Double3>(output);
       for (int i = 0; i < 3; ++i) {
@@ -104,7 +106,8 @@ std::vector<std::string> Suffixes(const Column& column) {
 }
 
 // The columns that the plugs give, and the request that evaluates them.
-Result<std::vector<Column>> FindColumns(const Rig& rig, const std::vector<std::string>& plugs, Request* request) {
+Result<std::vector<Column>> FindColumns(const Rig& rig, const std::vector<std::string>& plugs,
+                                        Request* request) {
   std::vector<Column> columns;
   for (const std::string& text : plugs) {
     const Result<WantedPlug> wanted = FindWanted(rig, text);
@@ -112,17 +115,22 @@ Result<std::vector<Column>> FindColumns(const Rig& rig, const std::vector<std::s
     Column column;
     column.name = text;
     column.wanted = *wanted;
-    const AttributeDef& attribute = rig.graph->def(wanted->plug.node).attributes[static_cast<std::size_t>(wanted->plug.attribute)];
+    const AttributeDef& attribute =
+        rig.graph->def(wanted->plug.node).attributes[static_cast<std::size_t>(wanted->plug.attribute)];
     RequestedOutput output{wanted->plug, {}};
     output.plug.component = -1;
     column.type = attribute.type;
     column.factor = 1 / rig.units.FactorOf(attribute.unit);
-    column.unit = attribute.unit == Unit::kLength ? rig.units.length_name : attribute.unit == Unit::kAngle ? rig.units.angle_name : attribute.unit == Unit::kTime ? "s" : "";
+    column.unit = attribute.unit == Unit::kLength  ? rig.units.length_name
+                  : attribute.unit == Unit::kAngle ? rig.units.angle_name
+                  : attribute.unit == Unit::kTime  ? "s"
+                                                   : "";
     if (!IsSmallType(column.type) && !IsPointType(column.type)) {
       const Value* value = rig.graph->FindValue(wanted->plug);
       column.text = (value != nullptr ? *value : attribute.default_value).ToString();
     } else if (attribute.array && wanted->plug.element < 0) {
-      return Status::Usage("{} is an array: expected an element, as in {}[0] (it has {})", text, text, rig.graph->ArraySize(wanted->plug.node, wanted->plug.attribute));
+      return Status::Usage("{} is an array: expected an element, as in {}[0] (it has {})", text, text,
+                           rig.graph->ArraySize(wanted->plug.node, wanted->plug.attribute));
     } else {
       column.output = static_cast<Index>(request->outputs.size());
       request->outputs.push_back(std::move(output));
@@ -137,7 +145,8 @@ CommandResult Get(const GetFlags& flags) {
   const Result<int> threads = ThreadCount(flags);
   if (!threads.ok()) return threads.status();
   const bool json = flags.json || flags.format == "json";
-  if (flags.format != "csv" && flags.format != "json") return Status::Usage("--format {}: expected csv or json", flags.format);
+  if (flags.format.value_or("csv") != "csv" && flags.format != "json")
+    return Status::Usage("--format {}: expected csv or json", *flags.format);
   const std::string place = flags.output.value_or("-");
   KPSA_RETURN_IF_ERROR(CheckOutput(place, flags.force, {}));
   const ThreadLimit limit(*threads);
@@ -164,7 +173,9 @@ CommandResult Get(const GetFlags& flags) {
     column.suffixes = Suffixes(column);
     width += column.suffixes.size();
   }
-  if (width * times->size() > kMaxNumbers) return Status::Usage("{} numbers are more than {}: expected fewer frames, or kpsa eval for points", Thousands(width * times->size()), Thousands(kMaxNumbers));
+  if (width * times->size() > kMaxNumbers)
+    return Status::Usage("{} numbers are more than {}: expected fewer frames, or kpsa eval for points",
+                         Thousands(width * times->size()), Thousands(kMaxNumbers));
 
   const InterruptScope interruptible;
   std::string text;
@@ -184,33 +195,38 @@ CommandResult Get(const GetFlags& flags) {
   std::vector<double> numbers;
   RigFrameOptions options;
   options.threads = *threads;
-  KPSA_RETURN_IF_ERROR(EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
-    if (!json) text += NumberText((*times)[frame]);
-    for (std::size_t c = 0; c < columns->size(); ++c) {
-      const Column& column = (*columns)[c];
-      numbers.clear();
-      if (column.output != kNoIndex) column.Read(evaluator, &numbers);
-      if (!json) {
-        for (double number : numbers) text += "," + NumberText(number);
-        if (column.output == kNoIndex) text += ",\"" + column.text + "\"";
-      } else if (column.output == kNoIndex) {
-        values[c].push_back(column.text);
-      } else if (numbers.size() == 1) {
-        values[c].push_back(numbers[0]);
-      } else {
-        values[c].push_back(numbers);
-      }
-    }
-    if (!json) text += "\n";
-    return Status();
-  }));
+  KPSA_RETURN_IF_ERROR(
+      EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
+        if (!json) text += NumberText((*times)[frame]);
+        for (std::size_t c = 0; c < columns->size(); ++c) {
+          const Column& column = (*columns)[c];
+          numbers.clear();
+          if (column.output != kNoIndex) column.Read(evaluator, &numbers);
+          if (!json) {
+            for (double number : numbers) text += "," + NumberText(number);
+            if (column.output == kNoIndex) text += ",\"" + column.text + "\"";
+          } else if (column.output == kNoIndex) {
+            values[c].push_back(column.text);
+          } else if (numbers.size() == 1) {
+            values[c].push_back(numbers[0]);
+          } else {
+            values[c].push_back(numbers);
+          }
+        }
+        if (!json) text += "\n";
+        return Status();
+      }));
   if (json) {
     nlohmann::ordered_json plugs = nlohmann::ordered_json::array();
     for (std::size_t c = 0; c < columns->size(); ++c) {
       const Column& column = (*columns)[c];
-      plugs.push_back({{"plug", column.name}, {"type", TypeName(column.type)}, {"unit", column.unit}, {"values", std::move(values[c])}});
+      plugs.push_back({{"plug", column.name},
+                       {"type", TypeName(column.type)},
+                       {"unit", column.unit},
+                       {"values", std::move(values[c])}});
     }
-    const nlohmann::ordered_json document = {{"schema", "kpsa.get/1"}, {"times", *times}, {"plugs", std::move(plugs)}};
+    const nlohmann::ordered_json document = {
+        {"schema", "kpsa.get/1"}, {"times", *times}, {"plugs", std::move(plugs)}};
     text = document.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   }
   KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, text));
@@ -221,20 +237,21 @@ CommandResult Get(const GetFlags& flags) {
 
 void AddGetCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<GetFlags>();
-  CLI::App* command = program->add_subcommand("get", "Print values of plugs over time");
+  CLI::App* command = AddCommand(program, "get", "Print values of plugs over time",
+                                 "One row a frame. Lengths and angles in the rig's units; matrices in "
+                                 "metres, column by column; points by vertex.\n"
+                                 "Examples:\n"
+                                 "  kpsa get head.yaml jaw.worldMatrix jaw.poseRotateX --frames 0:48\n"
+                                 "  kpsa get head.glb head_mesh.weight[mouth-open] --json --times 0.5",
+                                 chosen, [flags] { return Get(*flags); });
   AddRigFlags(command, flags.get());
-  command->add_option("PLUG", flags->plugs, "plugs (jaw.worldMatrix), or points of a mesh (head_mesh@mush)")->required();
+  AddRepeated(command, "PLUG", "", &flags->plugs,
+              "plugs (jaw.worldMatrix), or points of a mesh (head_mesh@mush)");
   AddTimeFlags(command, flags.get());
-  command->add_option("--format", flags->format, "csv (the default) or json");
+  AddOption(command, "--format", "", &flags->format, "csv (the default) or json");
   AddOutputFlags(command, flags.get(), "a file instead of stdout");
   AddThreadsFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
-  command->footer(
-      "One row a frame. Lengths and angles in the rig's units; matrices in metres, column by column; points by vertex.\n"
-      "Examples:\n"
-      "  kpsa get head.yaml jaw.worldMatrix jaw.poseRotateX --frames 0:48\n"
-      "  kpsa get head.glb head_mesh.weight[mouth-open] --json --times 0.5");
-  command->callback([flags, chosen] { *chosen = [flags] { return Get(*flags); }; });
 }
 
 }  // namespace kpsa

@@ -1,5 +1,4 @@
 // kpsa inspect: what is in a file.
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -8,6 +7,7 @@
 #include "cli/common.h"
 #include "cli/file_facts.h"
 #include "cli/frames_range.h"
+#include "cli/options.h"
 #include "cli/table.h"
 
 namespace kpsa {
@@ -73,7 +73,11 @@ CommandResult Inspect(const Flags& flags) {
   for (const auto& [name, value] : facts->facts) {
     const auto* bytes = std::get_if<std::uint64_t>(&value);
     const std::string text = bytes != nullptr && name.ends_with("bytes") ? ByteText(*bytes) : CellText(value);
-    Print(fmt::format("  {:<18} {}\n", name.ends_with(" bytes") ? name.substr(0, name.size() - 6) : name == "bytes" ? "size" : name, text));
+    Print(fmt::format("  {:<18} {}\n",
+                      name.ends_with(" bytes") ? name.substr(0, name.size() - 6)
+                      : name == "bytes"        ? "size"
+                                               : name,
+                      text));
   }
   for (const FactTable& facts_table : facts->tables) {
     if (facts_table.rows.empty()) continue;
@@ -93,15 +97,14 @@ CommandResult Inspect(const Flags& flags) {
 
 void AddInspectCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<Flags>();
-  CLI::App* command = program->add_subcommand("inspect", "What is in any file that kpsa reads or writes");
-  command->add_option("FILE", flags->file, ".glb .gltf .yaml .npz .pc2 .mdd .kpsa, or .json (weight maps)")->required();
-  command->add_option("--fps", flags->fps, "frames a second of .pc2 files; 24 if not given")->type_name("N");
+  CLI::App* command = AddCommand(program, "inspect", "What is in any file that kpsa reads or writes",
+                                 "Examples:\n"
+                                 "  kpsa inspect head.glb\n"
+                                 "  kpsa inspect head.kpsa --json",
+                                 chosen, [flags] { return Inspect(*flags); });
+  AddRequired(command, "FILE", &flags->file, ".glb .gltf .yaml .npz .pc2 .mdd .kpsa, or .json (weight maps)");
+  AddOption(command, "--fps", "N", &flags->fps, "frames a second of .pc2 files; 24 if not given");
   AddJsonFlag(command, flags.get());
-  command->footer(
-      "Examples:\n"
-      "  kpsa inspect head.glb\n"
-      "  kpsa inspect head.kpsa --json");
-  command->callback([flags, chosen] { *chosen = [flags] { return Inspect(*flags); }; });
 }
 
 }  // namespace kpsa

@@ -1,5 +1,4 @@
 // kpsa nodes: the node reference, from the registry.
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -7,6 +6,7 @@
 
 #include "cli/command.h"
 #include "cli/common.h"
+#include "cli/options.h"
 #include "cli/table.h"
 #include "io/quantity.h"
 
@@ -20,10 +20,14 @@ struct NodesFlags : Flags {
 
 const char* UnitName(Unit unit) {
   switch (unit) {
-    case Unit::kLength: return "length";
-    case Unit::kAngle: return "angle";
-    case Unit::kTime: return "time";
-    default: return "";
+    case Unit::kLength:
+      return "length";
+    case Unit::kAngle:
+      return "angle";
+    case Unit::kTime:
+      return "time";
+    default:
+      return "";
   }
 }
 
@@ -67,8 +71,9 @@ Table Attributes(const NodeDef& def) {
 nlohmann::ordered_json Json(const NodeDef& def) {
   nlohmann::ordered_json attributes = nlohmann::ordered_json::array();
   for (const AttributeDef& a : def.attributes) {
-    nlohmann::ordered_json json = {{"name", a.name}, {"type", TypeName(a.type)}, {"doc", a.doc}, {"output", a.output}, {"array", a.array},
-                                   {"structural", a.structural}, {"lazy", a.lazy}, {"per_geometry", a.per_geometry}};
+    nlohmann::ordered_json json = {
+        {"name", a.name},   {"type", TypeName(a.type)},   {"doc", a.doc},   {"output", a.output},
+        {"array", a.array}, {"structural", a.structural}, {"lazy", a.lazy}, {"per_geometry", a.per_geometry}};
     if (!a.output) json["default"] = DefaultText(a);
     if (!std::isinf(a.min)) json["min"] = a.min;
     if (!std::isinf(a.max)) json["max"] = a.max;
@@ -77,8 +82,13 @@ nlohmann::ordered_json Json(const NodeDef& def) {
     if (!a.aliases.empty()) json["aliases"] = a.aliases;
     attributes.push_back(std::move(json));
   }
-  return {{"name", def.name}, {"doc", def.doc}, {"category", def.category}, {"version", def.version}, {"animation", def.animation},
-          {"stateful", def.stateful}, {"attributes", std::move(attributes)}};
+  return {{"name", def.name},
+          {"doc", def.doc},
+          {"category", def.category},
+          {"version", def.version},
+          {"animation", def.animation},
+          {"stateful", def.stateful},
+          {"attributes", std::move(attributes)}};
 }
 
 CommandResult Nodes(const NodesFlags& flags) {
@@ -88,7 +98,9 @@ CommandResult Nodes(const NodesFlags& flags) {
   for (const std::string& name : registry.Names()) defs.push_back(registry.Find(name));
   if (flags.type.has_value()) {
     const NodeDef* def = registry.Find(*flags.type);
-    if (def == nullptr) return Status::Usage("no node type is called \"{}\"{}", *flags.type, DidYouMean(*flags.type, registry.Names()));
+    if (def == nullptr)
+      return Status::Usage("no node type is called \"{}\"{}", *flags.type,
+                           DidYouMean(*flags.type, registry.Names()));
     defs = {def};
   }
   if (flags.json) {
@@ -100,15 +112,19 @@ CommandResult Nodes(const NodesFlags& flags) {
   std::map<std::string, std::vector<const NodeDef*>> by_category;
   for (const NodeDef* def : defs) by_category[def->category].push_back(def);
   if (flags.markdown) {
-    Print("# Node reference\n\nWritten by `kpsa nodes --markdown`. Lengths in metres, angles in radians, times in seconds unless a rig's `units` say otherwise.\n");
+    Print(
+        "# Node reference\n\nWritten by `kpsa nodes --markdown`. Lengths in metres, angles in radians, times "
+        "in seconds unless a rig's `units` say otherwise.\n");
     for (const auto& [category, members] : by_category) {
       Print("\n## " + category + "\n");
-      for (const NodeDef* def : members) Print(fmt::format("\n### {}\n\n{}\n\n{}", def->name, def->doc, Attributes(*def).Markdown()));
+      for (const NodeDef* def : members)
+        Print(fmt::format("\n### {}\n\n{}\n\n{}", def->name, def->doc, Attributes(*def).Markdown()));
     }
     return 0;
   }
   if (flags.type.has_value()) {
-    Print(fmt::format("{} ({})\n{}\n\n{}", defs[0]->name, defs[0]->category, defs[0]->doc, Attributes(*defs[0]).Text()));
+    Print(fmt::format("{} ({})\n{}\n\n{}", defs[0]->name, defs[0]->category, defs[0]->doc,
+                      Attributes(*defs[0]).Text()));
     return 0;
   }
   Table table({"type", "category", "what it does"});
@@ -123,16 +139,15 @@ CommandResult Nodes(const NodesFlags& flags) {
 
 void AddNodesCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<NodesFlags>();
-  CLI::App* command = program->add_subcommand("nodes", "The node reference");
-  command->add_option("TYPE", flags->type, "one node type, with its attributes");
-  command->add_flag("--markdown", flags->markdown, "print the whole reference as Markdown");
+  CLI::App* command = AddCommand(program, "nodes", "The node reference",
+                                 "Examples:\n"
+                                 "  kpsa nodes\n"
+                                 "  kpsa nodes deltaMush\n"
+                                 "  kpsa nodes --json",
+                                 chosen, [flags] { return Nodes(*flags); });
+  AddOption(command, "TYPE", "", &flags->type, "one node type, with its attributes");
+  AddSwitch(command, "--markdown", &flags->markdown, "print the whole reference as Markdown");
   AddJsonFlag(command, flags.get());
-  command->footer(
-      "Examples:\n"
-      "  kpsa nodes\n"
-      "  kpsa nodes deltaMush\n"
-      "  kpsa nodes --json");
-  command->callback([flags, chosen] { *chosen = [flags] { return Nodes(*flags); }; });
 }
 
 }  // namespace kpsa

@@ -16,12 +16,13 @@ using CommandResult = Result<int>;
 using Command = std::function<CommandResult()>;
 
 // Each adds one subcommand to the program. When it is chosen, *chosen becomes its work.
-void AddInitCommand(CLI::App* program, Command* chosen);
 void AddValidateCommand(CLI::App* program, Command* chosen);
 void AddInspectCommand(CLI::App* program, Command* chosen);
 void AddEvalCommand(CLI::App* program, Command* chosen);
 void AddGetCommand(CLI::App* program, Command* chosen);
 void AddRenderCommand(CLI::App* program, Command* chosen);
+void AddTrainCommand(CLI::App* program, Command* chosen);
+void AddBenchCommand(CLI::App* program, Command* chosen);
 void AddCompileCommand(CLI::App* program, Command* chosen);
 void AddProfileCommand(CLI::App* program, Command* chosen);
 void AddCompareCommand(CLI::App* program, Command* chosen);

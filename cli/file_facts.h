@@ -24,7 +24,8 @@ struct FileFacts {
   std::vector<std::string> notes;
 };
 
-// Of any file that kpsa reads or writes, by suffix: .glb .gltf .yaml .yml .npz .pc2 .mdd .kpsa .json (weight maps).
+// Of any file that kpsa reads or writes, by suffix: .glb .gltf .yaml .yml .npz .pc2 .mdd .kpsa .json (weight
+// maps).
 Result<FileFacts> InspectFile(const std::string& path, double fps);
 
 // One kind each; see InspectFile.

@@ -29,7 +29,8 @@ std::string NeededBy(const Plan& plan, Index step) {
   std::vector<std::string> names;
   for (Index consumer : plan.consumers(step)) {
     const std::string name = plan.step_name(consumer);
-    if (name != plan.step_name(step) && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    if (name != plan.step_name(step) && std::find(names.begin(), names.end(), name) == names.end())
+      names.push_back(name);
   }
   for (const Plan::Output& output : plan.outputs()) {
     if (output.producer == step) names.insert(names.begin(), "the request");
@@ -49,8 +50,11 @@ std::vector<NodeTime> NodeTimes(const Plan& plan, const Profile& profile) {
   const auto count = static_cast<Index>(plan.steps().size());
   for (Index s = 0; s < count; ++s) {
     const Plan::StepInfo& info = plan.infos()[s];
-    const auto [it, added] = by_name.emplace(std::make_pair(std::string(plan.step_name(s)), info.segment), nodes.size());
-    if (added) nodes.push_back({plan.step_name(s), plan.step_type(s), SegmentName(plan, info.segment), {}, 0, 0, 0, 0, 0});
+    const auto [it, added] =
+        by_name.emplace(std::make_pair(std::string(plan.step_name(s)), info.segment), nodes.size());
+    if (added)
+      nodes.push_back(
+          {plan.step_name(s), plan.step_type(s), SegmentName(plan, info.segment), {}, 0, 0, 0, 0, 0});
     NodeTime& node = nodes[it->second];
     node.steps.push_back(s);
     node.count += profile.counts()[s];
@@ -72,7 +76,8 @@ std::vector<NodeTime> NodeTimes(const Plan& plan, const Profile& profile) {
       }
     }
   }
-  std::stable_sort(nodes.begin(), nodes.end(), [](const NodeTime& a, const NodeTime& b) { return a.self_ns > b.self_ns; });
+  std::stable_sort(nodes.begin(), nodes.end(),
+                   [](const NodeTime& a, const NodeTime& b) { return a.self_ns > b.self_ns; });
   return nodes;
 }
 

@@ -23,8 +23,8 @@ std::string StepName(const Plan& plan, Index step);
 struct NodeTime {
   std::string name, type, segment;
   std::vector<Index> steps;
-  std::uint64_t count = 0;            // computes, all frames
-  Index points = 0, points_total = 0;  // of its largest step
+  std::uint64_t count = 0;               // computes, all frames
+  Index points = 0, points_total = 0;    // of its largest step
   double self_ns = 0, inclusive_ns = 0;  // all frames; inclusive: with all that is upstream, each step once
 };
 // In descending order of self time.

@@ -26,13 +26,15 @@ Result<MeshStage> FindMeshStage(const Rig& rig, std::string_view text) {
   const std::size_t at = text.rfind('@');
   const std::string_view name = text.substr(0, at);
   const CharacterMesh* mesh = FindMesh(rig, name);
-  if (mesh == nullptr) return Status::Usage("\"{}\": no mesh is called \"{}\"{}", text, name, DidYouMean(name, MeshNames(rig)));
+  if (mesh == nullptr)
+    return Status::Usage("\"{}\": no mesh is called \"{}\"{}", text, name, DidYouMean(name, MeshNames(rig)));
   const std::string_view stage_name = text.substr(at + 1);
   const Stage* stage = mesh->FindStage(stage_name);
   if (stage == nullptr) {
     std::vector<std::string> stages;
     for (const Stage& s : mesh->stages) stages.push_back(s.name);
-    return Status::Usage("\"{}\": the mesh has no stage \"{}\"; it has {}", text, stage_name, fmt::join(stages, ", "));
+    return Status::Usage("\"{}\": the mesh has no stage \"{}\"; it has {}", text, stage_name,
+                         fmt::join(stages, ", "));
   }
   return MeshStage{mesh, stage->points};
 }
@@ -51,7 +53,8 @@ Result<WantedPlug> FindWanted(const Rig& rig, std::string_view text) {
   return usage;
 }
 
-Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wanted, const std::optional<std::string>& vertices) {
+Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wanted,
+                             const std::optional<std::string>& vertices) {
   std::vector<WantedPlug> plugs;
   for (const std::string& text : wanted) {
     Result<WantedPlug> plug = FindWanted(rig, text);
@@ -67,8 +70,11 @@ Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wan
     RequestedOutput output{plug.plug, {}};
     output.plug.component = -1;
     if (vertices.has_value()) {
-      if (plug.mesh == nullptr) return Status::Usage("--vertices is for the points of meshes, not for {}", rig.graph->PlugName(plug.plug));
-      const Result<std::vector<Index>> indices = ParseIndices("--vertices", *vertices, plug.mesh->vertex_count);
+      if (plug.mesh == nullptr)
+        return Status::Usage("--vertices is for the points of meshes, not for {}",
+                             rig.graph->PlugName(plug.plug));
+      const Result<std::vector<Index>> indices =
+          ParseIndices("--vertices", *vertices, plug.mesh->vertex_count);
       if (!indices.ok()) return indices.status();
       std::vector<Index> points;
       for (Index vertex : *indices) points.push_back(plug.mesh->mesh().data().vertex_to_point[vertex]);

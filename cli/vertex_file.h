@@ -20,8 +20,8 @@ struct VertexFile {
   std::vector<VertexArray> arrays;
 };
 
-// .npz (every float array [T, V, 3], and `times`), .pc2 or .mdd by suffix. Errors: those of the readers, other suffixes,
-// arrays of other shapes or different numbers of frames.
+// .npz (every float array [T, V, 3], and `times`), .pc2 or .mdd by suffix. Errors: those of the readers,
+// other suffixes, arrays of other shapes or different numbers of frames.
 Result<VertexFile> ReadVertexFile(const std::string& path, double fps = 24);
 std::vector<std::string> VertexFileSuffixes();
 

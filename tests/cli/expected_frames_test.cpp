@@ -72,7 +72,8 @@ TEST(ExpectedFrames, EveryCharacterAndClip) {
     const Result<Npz> expected = ReadNpz(file.path);
     ASSERT_TRUE(expected.ok()) << expected.status().ToString();
     std::string times;
-    for (double time : expected->Find("times")->Doubles()) times += fmt::format("{}{:.17g}", times.empty() ? "" : ",", time);
+    for (double time : expected->Find("times")->Doubles())
+      times += fmt::format("{}{:.17g}", times.empty() ? "" : ",", time);
     const std::string output = folder / (file.stem + ".npz");
     std::vector<std::string> arguments = {"eval", file.character, "--times", times, "-o", output};
     if (file.clip == "rest") {

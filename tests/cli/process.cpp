@@ -19,8 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-ProcessResult Run(const std::vector<std::string>& arguments, double limit_seconds, double interrupt_after, const std::string& folder,
-                  const std::vector<std::string>& more_environment) {
+ProcessResult Run(const std::vector<std::string>& arguments, double limit_seconds, double interrupt_after,
+                  const std::string& folder, const std::vector<std::string>& more_environment) {
   ProcessResult result;
   const TemporaryFolder streams;
   posix_spawn_file_actions_t actions;
@@ -68,9 +68,12 @@ ProcessResult Run(const std::vector<std::string>& arguments, double limit_second
 
 }  // namespace
 
-std::size_t ProcessResult::error_lines() const { return static_cast<std::size_t>(std::count(err.begin(), err.end(), '\n')); }
+std::size_t ProcessResult::error_lines() const {
+  return static_cast<std::size_t>(std::count(err.begin(), err.end(), '\n'));
+}
 
-ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds, const std::string& folder, const std::vector<std::string>& environment) {
+ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds,
+                      const std::string& folder, const std::vector<std::string>& environment) {
   return Run(arguments, limit_seconds, -1, folder, environment);
 }
 

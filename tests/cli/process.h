@@ -13,8 +13,8 @@ struct ProcessResult {
 };
 
 // Without a terminal; `environment` entries ("NO_COLOR=1") are added to the test's.
-ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds = 60, const std::string& folder = "",
-                      const std::vector<std::string>& environment = {});
+ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds = 60,
+                      const std::string& folder = "", const std::vector<std::string>& environment = {});
 // Starts it, sends SIGINT after the delay, and waits.
 ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds);
 
