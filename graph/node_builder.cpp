@@ -82,7 +82,11 @@ NodeBuilder& NodeBuilder::out(std::string name, Type type, std::string doc) {
 
 NodeBuilder& NodeBuilder::array() { attribute().array = true; return *this; }
 NodeBuilder& NodeBuilder::per_geometry() { attribute().array = attribute().per_geometry = true; return *this; }
-NodeBuilder& NodeBuilder::lazy() { attribute().lazy = true; return *this; }
+NodeBuilder& NodeBuilder::lazy(bool together) {
+  attribute().lazy = true;
+  attribute().lazy_together = together;
+  return *this;
+}
 NodeBuilder& NodeBuilder::alias(std::string other_name) { attribute().aliases.push_back(std::move(other_name)); return *this; }
 NodeBuilder& NodeBuilder::grid(std::string divisions_attribute) { attribute().grid = std::move(divisions_attribute); return *this; }
 NodeBuilder& NodeBuilder::default_from(std::function<Value(const Structural&)> f) {

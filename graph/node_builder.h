@@ -49,7 +49,7 @@ class NodeBuilder {
   // Change the attribute that was declared last.
   NodeBuilder& array();
   NodeBuilder& per_geometry();  // implies array
-  NodeBuilder& lazy();
+  NodeBuilder& lazy(bool together = false);
   NodeBuilder& alias(std::string other_name);
   NodeBuilder& doc(std::string text) { attribute().doc = std::move(text); return *this; }
   NodeBuilder& grid(std::string divisions_attribute);

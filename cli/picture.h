@@ -1,0 +1,65 @@
+// Pictures of meshes: shaded clay with soft light, or a heat map of a number a point. What `kpsa render` draws.
+//
+// Light is computed at the points (ambient occlusion and the shadow of the key light, by rays) and interpolated, so
+// that pictures are free of noise; pixels are shaded with smooth normals, 2 x 2 samples each. The same input gives
+// the same picture at any number of threads.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/status.h"
+#include "base/types.h"
+#include "cli/image.h"
+
+namespace kpsa {
+
+// One surface. The spans must outlive the call that is given the part.
+struct RenderPart {
+  std::span<const float> points;     // 3 a point (x y z), metres, world space
+  std::span<const Index> triangles;  // 3 indices each, counter-clockwise from outside
+  std::span<const float> colors;     // 3 a point, linear light 0 .. 1; or empty: `color` everywhere
+  std::span<const float> scalars;    // 1 a point, metres; or empty: the part is drawn as clay
+  Double3 color = {0.62, 0.43, 0.35};  // linear light
+};
+
+struct RenderInput {
+  std::vector<RenderPart> parts;
+  double scalar_max = 1e-3;  // metres: the scalar drawn as the top of the colour scale
+};
+
+// A perspective camera. The field of view is the vertical one.
+struct Camera {
+  Double3 eye = {0, 0, 1};
+  Double3 target = {0, 0, 0};
+  Double3 up = {0, 1, 0};
+  double field_of_view = 0.35;  // radians
+};
+
+struct RenderOptions {
+  int width = 480;
+  int height = 600;
+  Rgb background_top = {250, 250, 252};
+  Rgb background_bottom = {206, 210, 218};
+};
+
+// A camera that sees every point of `input`: `azimuth` about Y (0: from +Z, the front; positive: towards +X),
+// `elevation` above the horizon, in radians. For animations, frame one pose and keep the camera.
+Camera FrameCamera(const RenderInput& input, const RenderOptions& options, double azimuth, double elevation);
+
+// The picture of the parts. Errors: those of RayScene::Build; a size below 1 or above 8192; a span of wrong length.
+Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const RenderOptions& options = {});
+
+// `count` pictures from all around, the camera of FrameCamera at the azimuths 2 pi i / count.
+Result<std::vector<Image>> RenderTurntable(const RenderInput& input, int count, double elevation,
+                                           const RenderOptions& options = {});
+
+// distances[i] = |a_i - b_i| of two sets of points (3 floats each): the scalars of a heat map.
+std::vector<float> PointDistances(std::span<const float> a, std::span<const float> b);
+
+// Three pictures side by side from one camera: "full", "accelerated" and the heat map of their distance, titled
+// with its maximum. `full` and `accelerated` hold the same parts with different points.
+Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accelerated, const Camera& camera,
+                               const RenderOptions& options = {});
+
+}  // namespace kpsa

@@ -1,0 +1,39 @@
+// Request -> plan. Works backward from the request (only needed nodes, only needed points), folds what depends on no
+// varying plug, binds kernels to their point sets, and lays out values.
+//
+// A Compiler keeps kernels and rest states between compilations, keyed by content: an edit of the graph rebinds only
+// what it changed. Not thread-safe; the plans that it gives are.
+#pragma once
+
+#include <memory>
+
+#include "graph/graph.h"
+#include "graph/plan.h"
+
+namespace kpsa {
+
+struct CompileStats {
+  Index kernels_bound = 0, kernels_reused = 0;  // in the last Compile
+  Index rest_evaluated = 0;
+};
+
+class Compiler {
+ public:
+  Compiler();
+  ~Compiler();
+  Compiler(const Compiler&) = delete;
+  Compiler& operator=(const Compiler&) = delete;
+
+  // Errors: a structural attribute driven by something that varies (names both ends), a kernel that cannot be
+  // bound (the node's reason), a demanded point out of range.
+  Result<std::shared_ptr<const Plan>> Compile(const Graph& graph, const Request& request);
+  // The value of a plug with everything at its default and no clip (DESIGN of rest states: node_def.h, Structural::rest).
+  Result<Value> Rest(const Graph& graph, const PlugRef& plug);
+  const CompileStats& stats() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace kpsa

@@ -1,0 +1,127 @@
+// Values, stamps and pulls: everything that changes while a plan is evaluated. One evaluator a thread; the plan is
+// shared.
+//
+// Setting a varying plug marks what depends on it as dirty (bits, no computation). A pull runs the dirty steps that
+// the wanted outputs need, in plan order: a step is stale if an input changed since it last computed; small outputs
+// that come out equal do not make their consumers stale. Lazy segments run only when their owner's decide says so.
+// A warm evaluation allocates nothing and takes no lock.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "base/status.h"
+#include "graph/plan.h"
+#include "graph/profile.h"
+#include "graph/workspace.h"
+
+namespace kpsa {
+
+struct EvaluatorOptions {
+  bool parallel = false;           // independent steps and wide kernels on the thread pool; the same bytes
+  Workspace* workspace = nullptr;  // shared by evaluators of one thread, outlives them; null: one of its own
+};
+
+class Evaluator final {
+ public:
+  explicit Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options = {});
+  ~Evaluator();
+  Evaluator(const Evaluator&) = delete;
+  Evaluator& operator=(const Evaluator&) = delete;
+  const Plan& plan() const { return *plan_; }
+
+  // The number of a varying plug, for Set. A plug that the request did not name as varying is an error.
+  Result<Index> FindVarying(const Graph& graph, const PlugRef& plug) const;
+  // Setting an equal value changes nothing. `component` sets one number of a double3 or quaternion.
+  void Set(Index varying, double value, int component = -1);
+  void SetInt(Index varying, std::int64_t value);
+  void Set(Index varying, const Double3& value);
+  void Set(Index varying, const Quaternion& value);
+  void Set(Index varying, const Matrix4& value);
+  void SetPoints(Index varying, ConstPointsView points);  // as many points as the plug had when the plan was made
+
+  // Brings outputs up to date: all of them, or one. On failure the error names the node; other outputs may be fine.
+  Status Evaluate();
+  Status Pull(Index output);
+  // An output after a pull. T is the slot type. Points are in the order of the request's set.
+  template <typename T>
+  const T& Get(Index output) const { return *reinterpret_cast<const T*>(values() + plan_->outputs()[output].slot); }
+  ConstPointsView Points(Index output) const { return Get<ConstPointsView>(output); }
+
+  // Records what runs from now on, as of that frame. Null to stop: then evaluation pays nothing for it.
+  void Record(Profile* profile, int frame = 0) { profile_ = profile, frame_ = frame; }
+  // Forgets every computed value (not the set ones): the next pull computes everything.
+  void Invalidate();
+  std::size_t MemoryBytes() const;
+
+  // For blocks of frames (graph/frames.h): one evaluation, cut at the steps of segment 0 that blocks share. Serial only.
+  //   BeginRun; for every such step in plan order: RunUntil(step), PrepareBlockStep, FinishBlockStep; EndRun.
+  // After a failure nothing more runs; EndRun tells.
+  void BeginRun();
+  void RunUntil(Index end);  // the steps of segment 0 before `end`
+  // Runs the decide of a stale step. True if it needs none of its lazy inputs: then *context is ready for a block compute,
+  // to be followed by FinishBlockStep. Otherwise the step is done: it is fresh, has run by itself, or has failed.
+  bool PrepareBlockStep(Index step, ComputeContext* context);
+  void FinishBlockStep(Index step, std::uint64_t begin_ns, std::uint64_t end_ns);  // times for the profile
+  Status EndRun();
+
+ private:
+  class StepHost;
+  std::byte* values() { return reinterpret_cast<std::byte*>(values_.get()); }
+  const std::byte* values() const { return reinterpret_cast<const std::byte*>(values_.get()); }
+  template <typename T>
+  void Write(Index varying, const T& value, std::size_t offset);
+  void Changed(Index varying);
+  void MarkWanted(Index step);
+  ComputeContext ContextOf(Index step);
+  Index NewerDep(Index step) const;
+  Index NewerLazyDep(Index step) const;
+  template <bool kRecord> bool RunRange(Index begin, Index end);
+  template <bool kRecord> bool RunStep(Index step);
+  template <bool kRecord> bool RunUnit(Index first);
+  template <bool kRecord> bool RunBranch(Index step);
+  template <bool kRecord> bool RunDecided(Index step, Index cause);
+  template <bool kRecord> bool Compute(Index step, Index cause, bool stale);
+  bool Run(const Plan::Segment& segment, Index begin, Index end);
+  bool RunLevels(const Plan::Segment& segment, Index begin, Index end);
+  bool Decide(Index step, Index* cause);
+  bool RunChosen(Index step);
+  void OwnWorkspace();
+  void AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns);
+  void RecordFailure(Index step, std::string_view message);
+  Status TakeFailure();
+  void MarkComputed(Index step, bool changed);
+  bool dirty(Index step) const { return (dirty_[step / 64] >> (step % 64) & 1) != 0; }
+  void SetDirty(Index begin, Index end);
+  void ClearDirty(Index step) { dirty_[step / 64] &= ~(std::uint64_t{1} << (step % 64)); }
+
+  std::shared_ptr<const Plan> plan_;
+  EvaluatorOptions options_;
+  std::unique_ptr<Workspace> own_workspace_;
+  Workspace* workspace_;
+  std::unique_ptr<std::uint64_t[]> values_;
+  AlignedFloats buffers_;
+  AlignedFloats state_;
+  std::vector<std::uint32_t> changed_;   // by producer: the epoch in which its value last changed
+  std::vector<std::uint32_t> computed_;  // by step: the epoch in which it last computed; 0 never
+  std::vector<std::uint64_t> chosen_;    // by branch
+  std::vector<std::uint64_t> dirty_, wanted_;  // bits, by step; wanted_ only during a pull of one output
+  bool wanted_only_ = false;
+  std::vector<Index> stack_;             // steps to visit
+  std::vector<Index> ready_;             // first steps of units of a level, for the parallel evaluation
+  Index cursor_ = 0;                     // of RunUntil
+  std::uint32_t epoch_ = 1;
+  bool set_since_run_ = false;
+  Profile* profile_ = nullptr;
+  int frame_ = 0;
+  std::unique_ptr<StepHost> block_host_;  // of the step between PrepareBlockStep and FinishBlockStep
+  Index block_cause_ = kNoIndex;
+  std::mutex failure_mutex_;             // taken on failures only
+  std::string failure_;
+  Index failed_step_ = kNoIndex;
+};
+
+}  // namespace kpsa

@@ -1,0 +1,146 @@
+// The compiled form of (graph, request): steps in dependency order, where their values lie, bound kernels, and why
+// each node is or is not part of it. Immutable, shared by all threads and evaluators; it does not refer to the graph
+// that it was made from.
+//
+// Steps belong to segments. Segment 0 is evaluated whenever asked; every lazy input opens a child segment, evaluated
+// only when its owner's decide chooses it. A segment's steps are a contiguous range, ordered by level: steps of one
+// level do not depend on each other.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "graph/graph.h"
+#include "graph/point_set.h"
+
+namespace kpsa {
+
+struct RequestedOutput {
+  PlugRef plug;
+  PointSet points;  // of a points plug; the default (total 0) means all
+};
+
+// What is wanted, and what may vary between evaluations.
+struct Request {
+  std::vector<RequestedOutput> outputs;
+  std::vector<PlugRef> varying;
+};
+
+class Plan {
+ public:
+  // One run of compute. 64 bytes, read in order.
+  struct Step {
+    ComputeFn compute = nullptr;
+    const void* kernel = nullptr;
+    std::uint32_t in = 0, out = 0;            // into tables()
+    std::uint32_t deps = 0, deps_count = 0;   // into deps(): producers whose change makes this step stale
+    std::uint32_t value = 0, value_size = 0;  // the small outputs, one range of slots
+    std::uint32_t scratch = 0;                // floats into the workspace
+    std::uint32_t state = 0;                  // bytes into the evaluator's state
+    std::uint32_t branch = kNoIndex;          // into branches(), for steps with lazy inputs
+    std::uint16_t unit_size = 1;              // steps that run together; at the first of them
+    std::uint16_t unit_offset = 0;            // how far the first of the unit is before this step
+  };
+  struct Branch {
+    DecideFn decide = nullptr;
+    ComputeBlockFn compute_block = nullptr;
+    // By lazy input, in the order of declaration
+    std::vector<std::uint8_t> bit_of_lazy;  // its bit in what decide returns
+    std::vector<Index> segment_of_lazy;     // kNoIndex where it needs no step
+    std::vector<Index> lazy_deps;           // its producer; kNoIndex for none
+  };
+  struct Segment {
+    Index parent = kNoIndex, owner = kNoIndex;  // owner: the step whose lazy input it serves
+    Index begin = 0, end = 0;                   // steps
+    std::vector<Index> levels;                  // begin of every level, and end
+    bool uses_workspace = false;
+  };
+  struct Buffer {  // of points: where its slot and its floats are
+    std::uint32_t slot = 0;
+    Index count = 0;
+    int components = 3;
+    std::size_t offset = 0;        // floats into the evaluator's buffers, or the workspace
+    bool workspace = false;
+    const float* constant = nullptr;  // points of the plan itself
+    const PointBuffer* initial = nullptr;  // what a varying points plug starts with
+  };
+  struct Varying {
+    PlugRef plug;
+    std::string name;
+    Type type = Type::kDouble;
+    std::uint32_t slot = 0;
+    Index points = 0;                           // of a points plug
+    double min = 0, max = 0;
+  };
+  struct Output {
+    std::string name;
+    Type type = Type::kDouble;
+    std::uint32_t slot = 0;
+    Index producer = kNoIndex;  // step, or steps().size() + varying; kNoIndex for a constant
+    PointSet points;
+  };
+  // What a person sees of a step. Texts are offsets into the plan's text; see step_name and its kin.
+  struct StepInfo {
+    NodeId node;
+    std::uint32_t name = 0, type = 0, label = 0;
+    Index segment = 0;
+    Index points = 0, points_total = 0;  // 0 for steps without points
+    float cost_ns = 0;
+  };
+  struct Excluded {
+    std::string node_name, reason;
+  };
+
+  const std::vector<Step>& steps() const { return steps_; }
+  const std::vector<std::uint32_t>& tables() const { return tables_; }
+  const std::vector<Index>& deps() const { return deps_; }
+  const std::vector<Branch>& branches() const { return branches_; }
+  const std::vector<Segment>& segments() const { return segments_; }
+  const std::vector<Buffer>& buffers() const { return buffers_; }
+  const std::vector<Varying>& varying() const { return varying_; }
+  const std::vector<Output>& outputs() const { return outputs_; }
+  const std::vector<StepInfo>& infos() const { return infos_; }
+  const std::vector<Excluded>& excluded() const { return excluded_; }
+  // The first node that needs its previous frame (NodeDef::stateful), or "": such a plan is evaluated in ascending
+  // order on one evaluator.
+  const std::string& stateful_node() const { return stateful_node_; }
+  const char* step_name(Index step) const { return text_.data() + infos_[step].name; }    // of its node
+  const char* step_type(Index step) const { return text_.data() + infos_[step].type; }    // of its node
+  const char* step_label(Index step) const { return text_.data() + infos_[step].label; }  // "", "gather", "assemble", ...
+  // Consumers of a producer: steps that read it (all segments).
+  std::span<const Index> consumers(Index producer) const {
+    return {consumers_.data() + consumer_offsets_[producer], consumer_offsets_[producer + 1] - consumer_offsets_[producer]};
+  }
+  // Closures of the varying plugs as ranges [begin, end) of steps; empty where a walk is cheaper than storing them.
+  std::span<const std::pair<Index, Index>> closure(Index varying) const {
+    return varying < closures_.size() ? std::span<const std::pair<Index, Index>>(closures_[varying]) : std::span<const std::pair<Index, Index>>();
+  }
+  const std::vector<std::byte>& initial_values() const { return initial_values_; }  // constants in their slots
+  std::size_t buffer_floats() const { return buffer_floats_; }
+  std::size_t workspace_floats() const { return workspace_floats_; }
+  std::size_t state_bytes() const { return state_bytes_; }
+  Index FindVarying(const PlugRef& plug) const;  // kNoIndex if the plug does not vary
+  std::size_t MemoryBytes() const;               // of this object without kernels and names
+
+ private:
+  friend class PlanBuilder;
+  std::vector<Step> steps_;
+  std::vector<std::uint32_t> tables_;
+  std::vector<Index> deps_, consumers_, consumer_offsets_;
+  std::vector<Branch> branches_;
+  std::vector<Segment> segments_;
+  std::vector<Buffer> buffers_;
+  std::vector<Varying> varying_;
+  std::vector<Output> outputs_;
+  std::vector<StepInfo> infos_;
+  std::vector<Excluded> excluded_;
+  std::vector<std::vector<std::pair<Index, Index>>> closures_;
+  std::vector<std::byte> initial_values_;
+  std::string text_, stateful_node_;
+  std::vector<std::shared_ptr<const void>> owned_;  // kernels, constant points, gather maps
+  std::size_t buffer_floats_ = 0, workspace_floats_ = 0, state_bytes_ = 0;
+};
+
+}  // namespace kpsa

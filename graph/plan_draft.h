@@ -1,0 +1,51 @@
+// The compiler's second pass: steps with their segments and point sets, before they are ordered and laid out.
+// Internal to graph/.
+#pragma once
+
+#include <vector>
+
+#include "graph/node_binding.h"
+
+namespace kpsa {
+
+// Where a draft step reads an input.
+struct DraftInput {
+  enum class Kind : std::uint8_t { kConstant, kVarying, kStep };
+  Kind kind = Kind::kConstant;
+  std::int8_t component = -1;
+  bool lazy = false;
+  Type type = Type::kDouble;
+  const Value* value = nullptr;  // kConstant
+  Index varying = kNoIndex;      // kVarying
+  Index step = kNoIndex;         // kStep: a draft step
+  int output = 0, element = 0;
+  PointSet points;               // what is read, of a points input
+};
+
+struct DraftStep {
+  Index instance = kNoIndex;  // kNoIndex: a gather
+  Index segment = 0;
+  InstanceSets sets;          // a gather has one output and one input
+  std::vector<DraftInput> inputs;
+  std::vector<Index> lazy_segments;  // by lazy input, in order; kNoIndex where nothing has to be evaluated
+  std::vector<std::uint8_t> lazy_bits;  // by lazy input: its bit in what decide returns
+  Type gather_type = Type::kPoints;
+};
+
+struct DraftSegment {
+  Index parent = kNoIndex, owner = kNoIndex;  // owner: a draft step of the parent
+  int depth = 0;
+};
+
+struct PlanDraft {
+  std::vector<DraftStep> steps;
+  std::vector<DraftSegment> segments;
+  std::vector<DraftInput> outputs;  // by request output
+  std::vector<bool> varying;        // by instance
+};
+
+// Decides segments and point sets backward from the request, and connects steps; inserts gathers where a reader
+// wants other points than the buffer holds.
+Result<PlanDraft> DraftPlan(InstanceTable& table, class StaticEvaluator& statics, const std::vector<Source>& wanted, const Request& request);
+
+}  // namespace kpsa

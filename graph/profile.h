@@ -1,0 +1,46 @@
+// What each step did and why, in an evaluator that was asked to record.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/types.h"
+#include "graph/plan.h"
+
+namespace kpsa {
+
+// One evaluation of a step.
+struct ProfileEvent {
+  Index step = 0;
+  Index cause = kNoIndex;   // the producer that changed: a step, or steps().size() + varying; kNoIndex: the first time
+  std::uint64_t begin_ns = 0, end_ns = 0;
+  int thread = 0;
+  int frame = 0;            // as told to Evaluator::Record
+};
+
+class Profile {
+ public:
+  explicit Profile(const Plan& plan) : counts_(plan.steps().size(), 0), self_ns_(plan.steps().size(), 0), last_cause_(plan.steps().size(), kNoIndex) {}
+  const std::vector<std::uint64_t>& counts() const { return counts_; }    // by step
+  const std::vector<std::uint64_t>& self_ns() const { return self_ns_; }  // by step
+  const std::vector<Index>& last_cause() const { return last_cause_; }    // by step
+  const std::vector<ProfileEvent>& events() const { return events_; }
+  bool keep_events = false;          // for traces; counts and times are kept always
+  std::size_t max_events = 1000000;  // no more are kept beyond
+
+  void Add(const ProfileEvent& event);  // from any thread
+  void Clear();
+
+ private:
+  std::vector<std::uint64_t> counts_, self_ns_;
+  std::vector<Index> last_cause_;
+  std::vector<ProfileEvent> events_;
+};
+
+std::uint64_t ProfileClock();  // nanoseconds of a steady clock
+
+// "skin_1.envelope" or "node "jaw"" for the cause of an event.
+std::string CauseName(const Plan& plan, Index cause);
+
+}  // namespace kpsa

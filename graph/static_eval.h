@@ -1,0 +1,45 @@
+// Evaluation while compiling: constants, and rest values. Every output is computed over all of its points, once.
+// Internal to graph/.
+#pragma once
+
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "graph/node_binding.h"
+
+namespace kpsa {
+
+class StaticEvaluator final : public StaticValues {
+ public:
+  explicit StaticEvaluator(InstanceTable& table) : table_(table), totals_(table, *this) {}
+  // Evaluates what the source needs. Null on failure, and ever after; status() says why.
+  const Value* Get(const Source& source, bool rest) override;
+  PointTotals& totals() { return totals_; }
+  const Status& status() const { return status_; }
+  Index evaluated() const { return evaluated_; }
+  // Rest values that are known already (from an earlier compilation), by instance.
+  using Outputs = std::vector<std::vector<Value>>;  // by output position and element
+  void SetRest(Index instance, std::shared_ptr<const Outputs> outputs) { slot(instance, true) = std::move(outputs); }
+  std::shared_ptr<const Outputs> FindRest(Index instance) { return slot(instance, true); }
+
+ private:
+  std::shared_ptr<const Outputs>& slot(Index instance, bool rest);
+  Status Run(Index instance, bool rest);
+  const Value* Ready(const Source& source, bool rest);
+
+  InstanceTable& table_;
+  PointTotals totals_;
+  std::vector<std::shared_ptr<const Outputs>> memo_[2];
+  std::vector<bool> opened_[2];  // by instance: its inputs were asked for
+  std::vector<std::unique_ptr<Value>> taken_;
+  Status status_;
+  Index evaluated_ = 0;
+};
+
+// The points of `set` out of a complete array.
+PointBuffer GatherPoints(ConstPointsView from, int components, const PointSet& set);
+// Replaces children of a value: `children` as in Instance::children.
+Value AssembleValue(const Value& whole, const std::vector<int>& children, const std::vector<const Value*>& parts);
+
+}  // namespace kpsa

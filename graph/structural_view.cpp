@@ -1,0 +1,52 @@
+#include "graph/structural_view.h"
+
+#include "base/check.h"
+
+namespace kpsa {
+
+int StructuralView::Attribute(std::string_view name) const {
+  const int attribute = table_.graph().def(node_).FindAttribute(name);
+  KPSA_CHECK(attribute >= 0);
+  return attribute;
+}
+
+int StructuralView::Element(int attribute, int element) const {
+  const AttributeDef& a = table_.graph().def(node_).attributes[static_cast<std::size_t>(attribute)];
+  return a.array && element < 0 ? geometry() : element;
+}
+
+const Value& StructuralView::value(std::string_view name, int element) const {
+  const int attribute = Attribute(name);
+  element = Element(attribute, element);
+  if (instance_ != nullptr && statics_ != nullptr) {
+    for (const StructuralInput& input : instance_->structural) {
+      if (input.attribute != attribute || input.element != element) continue;
+      const Value* driven = statics_->Get(input.source, false);
+      static const Value kNone;
+      return driven != nullptr ? *driven : kNone;
+    }
+  }
+  return *table_.HeldValue(node_, attribute, element);
+}
+
+bool StructuralView::is_set(std::string_view name, int element) const {
+  const int attribute = Attribute(name);
+  return table_.IsSet(node_, attribute, Element(attribute, element));
+}
+
+int StructuralView::array_size(std::string_view name) const { return table_.ArraySize(node_, Attribute(name)); }
+
+const Value* StructuralView::rest(std::string_view name, int element) const {
+  if (instance_ == nullptr || statics_ == nullptr) return nullptr;
+  const int attribute = Attribute(name);
+  element = Element(attribute, element);
+  const ComputeGroup& group = table_.group(*instance_);
+  for (const Input& input : instance_->inputs) {
+    if (group.inputs[static_cast<std::size_t>(input.position)] == attribute && input.element == element) {
+      return statics_->Get(input.rest, true);
+    }
+  }
+  return table_.HeldValue(node_, attribute, element);
+}
+
+}  // namespace kpsa

@@ -1,0 +1,262 @@
+#include "nodes/kernels/delta_mush.h"
+
+#include "base/check.h"
+#include "nodes/kernels/delta_mush_run.h"
+#include "nodes/kernels/weights.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nodes/kernels/delta_mush.cpp"
+#include "hwy/foreach_target.h"
+#include "nodes/kernels/xyzw-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace kpsa {
+namespace HWY_NAMESPACE {
+
+// The points minus the pivot, as xyzw by local number.
+void PackLocal(ConstPointsView in, const Index* source, const float* pivot, std::size_t begin,
+               std::size_t end, float* xyzw) {
+  if (source != nullptr) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Index p = source[i];
+      float* to = xyzw + 4 * i;
+      to[0] = in.x[p] - pivot[0], to[1] = in.y[p] - pivot[1], to[2] = in.z[p] - pivot[2], to[3] = 0;
+    }
+    return;
+  }
+  const DLanes d;
+  const VLanes px = hn::Set(d, pivot[0]), py = hn::Set(d, pivot[1]), pz = hn::Set(d, pivot[2]);
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    hn::StoreInterleaved4(hn::Sub(hn::Load(d, in.x + i), px), hn::Sub(hn::Load(d, in.y + i), py),
+                          hn::Sub(hn::Load(d, in.z + i), pz), hn::Zero(d), d, xyzw + 4 * i);
+  }
+}
+
+template <std::size_t n, bool kWeighted>  // n = 0: at run time
+HWY_INLINE void SmoothGroup(const MushRows& rows, const float* HWY_RESTRICT from, float* HWY_RESTRICT to) {
+  const std::size_t neighbor_count = n == 0 ? rows.neighbor_count : n, count = rows.count;
+  const Index *HWY_RESTRICT neighbors = rows.neighbors, *HWY_RESTRICT order = rows.order;
+  const float *HWY_RESTRICT weights = rows.weights, *HWY_RESTRICT steps = rows.steps;
+  for (std::size_t i = 0; i < count; ++i, neighbors += neighbor_count) {
+    const F4 s = Load4(from + order[i]);
+    F4 sum = Sub4(Load4(from + neighbors[0]), s);
+    if constexpr (kWeighted) sum = Mul4(Splat4(weights[0]), sum);
+    for (std::size_t j = 1; j < neighbor_count; ++j) {
+      const F4 edge = Sub4(Load4(from + neighbors[j]), s);
+      sum = kWeighted ? Fma4(Splat4(weights[j]), edge, sum) : Add4(sum, edge);
+    }
+    if constexpr (kWeighted) weights += neighbor_count;
+    Store4(Fma4(Splat4(steps[i]), sum, s), to + order[i]);
+  }
+}
+
+// One iteration of a group.
+void SmoothRows(const MushRows& rows, const float* from, float* to) {
+  if (rows.neighbor_count == 0) {
+    for (std::size_t i = 0; i < rows.count; ++i) Store4(Load4(from + rows.order[i]), to + rows.order[i]);
+    return;
+  }
+  if (rows.weights != nullptr) return SmoothGroup<0, true>(rows, from, to);
+  switch (rows.neighbor_count) {
+    case 3:
+      return SmoothGroup<3, false>(rows, from, to);
+    case 4:
+      return SmoothGroup<4, false>(rows, from, to);
+    case 5:
+      return SmoothGroup<5, false>(rows, from, to);
+    case 6:
+      return SmoothGroup<6, false>(rows, from, to);
+    case 7:
+      return SmoothGroup<7, false>(rows, from, to);
+    case 8:
+      return SmoothGroup<8, false>(rows, from, to);
+    default:
+      return SmoothGroup<0, false>(rows, from, to);
+  }
+}
+
+// The frames of the outputs [begin, end), and with them either the detail (kBind) or the points.
+// The frame is the rotation of the polar decomposition of the tangents (t b): with C = (t b)^T (t b) = (E F;
+// F G) and s = sqrt(det C) = |t x b|, the root of C is (C + s I) / sqrt(tr C + 2 s).
+template <bool kBind>
+HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out, std::size_t begin,
+                       std::size_t end) {
+  const DLanes d;
+  const VLanes zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+  // Blocks of points: what is gathered has left the store buffer before the wider loads read it
+  alignas(64) float smoothed[4 * kFinishBlock] = {}, tangents[4 * kFinishBlock] = {},
+                                 bitangents[4 * kFinishBlock] = {};
+  alignas(64) float incoming[3 * kFinishBlock] = {};
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    const std::size_t at = (i - begin) % kFinishBlock;
+    if (at == 0) {
+      const std::size_t size = HWY_MIN(kFinishBlock, end - i);
+      for (std::size_t k = 0; k < size; ++k) {
+        const std::size_t lane = run.lanes[i + k];
+        const F4 s = Load4(run.smoothed + run.out_local[i + k]);
+        F4 t = Zero4(), b = t;
+        const Index last = run.frame_offsets[i + k + 1];
+        for (Index e = run.frame_offsets[i + k]; e < last; ++e) {
+          const F4 edge = Sub4(Load4(run.smoothed + run.frame_neighbors[e]), s);
+          t = Fma4(Splat4(run.frame_weights[2 * e]), edge, t);
+          b = Fma4(Splat4(run.frame_weights[2 * e + 1]), edge, b);
+        }
+        Store4(s, smoothed + 4 * lane);
+        Store4(t, tangents + 4 * lane);
+        Store4(b, bitangents + 4 * lane);
+      }
+      for (std::size_t k = 0; k < (run.out_in == nullptr ? 0 : size); ++k) {
+        const Index p = run.out_in[i + k];
+        incoming[k] = in.x[p], incoming[kFinishBlock + k] = in.y[p], incoming[2 * kFinishBlock + k] = in.z[p];
+      }
+    }
+    VLanes sx, sy, sz, tx, ty, tz, bx, by, bz, spare;
+    hn::LoadInterleaved4(d, smoothed + 4 * at, sx, sy, sz, spare);
+    hn::LoadInterleaved4(d, tangents + 4 * at, tx, ty, tz, spare);
+    hn::LoadInterleaved4(d, bitangents + 4 * at, bx, by, bz, spare);
+
+    // Frame; the axes of space where the tangents are (nearly) parallel or have no length
+    const VLanes cx = Fma(ty, bz, hn::Neg(hn::Mul(tz, by)));
+    const VLanes cy = Fma(tz, bx, hn::Neg(hn::Mul(tx, bz)));
+    const VLanes cz = Fma(tx, by, hn::Neg(hn::Mul(ty, bx)));
+    const VLanes e = Fma(tx, tx, Fma(ty, ty, hn::Mul(tz, tz)));
+    const VLanes f = Fma(tx, bx, Fma(ty, by, hn::Mul(tz, bz)));
+    const VLanes g = Fma(bx, bx, Fma(by, by, hn::Mul(bz, bz)));
+    const VLanes s2 = Fma(cx, cx, Fma(cy, cy, hn::Mul(cz, cz)));
+    // Not "s2 > ...": what is not a number must come out as such
+    const auto regular = hn::Not(
+        hn::Or(hn::Le(s2, hn::Mul(hn::Set(d, 1e-10f), hn::Mul(e, g))), hn::Le(s2, hn::Set(d, 1e-30f))));
+    const VLanes s = hn::Sqrt(s2);
+    const VLanes root = hn::Sqrt(hn::Add(hn::Add(e, g), hn::Add(s, s)));
+    const VLanes scale = hn::Div(one, hn::Mul(root, s)), inverse_s = hn::Mul(scale, root);
+    const VLanes gs = hn::Mul(hn::Add(g, s), scale), es = hn::Mul(hn::Add(e, s), scale);
+    const VLanes fs = hn::Neg(hn::Mul(f, scale));
+    const VLanes ux = hn::IfThenElse(regular, Fma(gs, tx, hn::Mul(fs, bx)), one);
+    const VLanes uy = hn::IfThenElseZero(regular, Fma(gs, ty, hn::Mul(fs, by)));
+    const VLanes uz = hn::IfThenElseZero(regular, Fma(gs, tz, hn::Mul(fs, bz)));
+    const VLanes vx = hn::IfThenElseZero(regular, Fma(es, bx, hn::Mul(fs, tx)));
+    const VLanes vy = hn::IfThenElse(regular, Fma(es, by, hn::Mul(fs, ty)), one);
+    const VLanes vz = hn::IfThenElseZero(regular, Fma(es, bz, hn::Mul(fs, tz)));
+    const VLanes nx = hn::IfThenElseZero(regular, hn::Mul(cx, inverse_s));
+    const VLanes ny = hn::IfThenElseZero(regular, hn::Mul(cy, inverse_s));
+    const VLanes nz = hn::IfThenElse(regular, hn::Mul(cz, inverse_s), one);
+
+    VLanes x, y, z;
+    if (run.out_in == nullptr) {
+      x = hn::Load(d, in.x + i), y = hn::Load(d, in.y + i), z = hn::Load(d, in.z + i);
+    } else {
+      const float* row = incoming + at;
+      x = hn::Load(d, row), y = hn::Load(d, row + kFinishBlock), z = hn::Load(d, row + 2 * kFinishBlock);
+    }
+    if constexpr (kBind) {  // with a pivot of 0
+      x = hn::Sub(x, sx), y = hn::Sub(y, sy), z = hn::Sub(z, sz);
+      hn::Store(Fma(ux, x, Fma(uy, y, hn::Mul(uz, z))), d, run.detail_x + i);
+      hn::Store(Fma(vx, x, Fma(vy, y, hn::Mul(vz, z))), d, run.detail_y + i);
+      hn::Store(Fma(nx, x, Fma(ny, y, hn::Mul(nz, z))), d, run.detail_z + i);
+      continue;
+    }
+    const VLanes scale_detail = hn::Set(d, run.displacement);
+    const VLanes du = hn::Load(d, run.detail_x + i), dv = hn::Load(d, run.detail_y + i);
+    const VLanes dn = hn::Load(d, run.detail_z + i);
+    const VLanes mx = Fma(scale_detail, Fma(du, ux, Fma(dv, vx, hn::Mul(dn, nx))), sx);
+    const VLanes my = Fma(scale_detail, Fma(du, uy, Fma(dv, vy, hn::Mul(dn, ny))), sy);
+    const VLanes mz = Fma(scale_detail, Fma(du, uz, Fma(dv, vz, hn::Mul(dn, nz))), sz);
+    VLanes w = hn::Set(d, run.envelope);
+    if (run.masks != nullptr) w = hn::Mul(w, hn::Load(d, run.masks + i));
+    const auto all = hn::Eq(w, one), none = hn::Eq(w, zero);
+    const auto mix = [&](const VLanes relative, const float pivot, const VLanes unmoved) HWY_ATTR {
+      const VLanes mush = hn::Add(relative, hn::Set(d, pivot));
+      const VLanes part = hn::IfThenElse(all, mush, Fma(w, hn::Sub(mush, unmoved), unmoved));
+      return hn::IfThenElse(none, unmoved, part);
+    };
+    hn::Store(mix(mx, run.pivot[0], x), d, out.x + i);
+    hn::Store(mix(my, run.pivot[1], y), d, out.y + i);
+    hn::Store(mix(mz, run.pivot[2], z), d, out.z + i);
+  }
+}
+
+void FinishPoints(const MushFinish& run, ConstPointsView in, PointsView out, std::size_t begin,
+                  std::size_t end) {
+  Finish<false>(run, in, out, begin, end);
+}
+void FinishDetail(const MushFinish& run, ConstPointsView rest, std::size_t begin, std::size_t end) {
+  Finish<true>(run, rest, {}, begin, end);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace kpsa
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace kpsa {
+
+HWY_EXPORT(PackLocal);
+HWY_EXPORT(SmoothRows);
+HWY_EXPORT(FinishPoints);
+HWY_EXPORT(FinishDetail);
+
+void ComputeMushDetail(const MushFinish& run, ConstPointsView rest, std::size_t begin,
+                       std::size_t end) noexcept {
+  HWY_DYNAMIC_DISPATCH(FinishDetail)(run, rest, begin, end);
+}
+
+const float* DeltaMushKernel::Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
+                                     const Parallel* parallel) const noexcept {
+  float *from = scratch.data(), *to = from + BufferFloats();
+  ForRanges(parallel, local_count_, 8192, [&](std::size_t begin, std::size_t end) {
+    HWY_DYNAMIC_DISPATCH(PackLocal)(in, source_.empty() ? nullptr : source_.data(), pivot, begin, end, from);
+  });
+  for (int j = 1; j <= iterations_; ++j) {
+    ForRanges(parallel, block_counts_[static_cast<std::size_t>(j)], 4,
+              [&](std::size_t begin, std::size_t end) {
+                const auto smooth_rows = HWY_DYNAMIC_DISPATCH(SmoothRows);
+                for (Index g = blocks_[begin]; g < blocks_[end]; ++g) {
+                  const Group& group = groups_[g];
+                  const float* weights =
+                      neighbor_weights_.empty() ? nullptr : neighbor_weights_.data() + group.first_neighbor;
+                  smooth_rows({order_.data() + group.first_point, neighbors_.data() + group.first_neighbor,
+                               weights, steps_.data() + group.first_point, group.neighbors, group.count},
+                              from, to);
+                }
+              });
+    std::swap(from, to);
+  }
+  return from;
+}
+
+void DeltaMushKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
+                          const Parallel* parallel) const noexcept {
+  KPSA_CHECK_EQ(in.count, in_count_);
+  KPSA_CHECK_EQ(out.count, count_);
+  KPSA_CHECK_LE(ScratchFloats(), scratch.size());
+  const float envelope = static_cast<float>(inputs.envelope);
+  if (local_count_ == 0 || envelope == 0) {
+    if (out_in_.empty()) return CopyPoints(in, out);
+    return GatherPoints(in, out_in_, out);
+  }
+  const float pivot[3] = {static_cast<float>(inputs.pivot.x), static_cast<float>(inputs.pivot.y),
+                          static_cast<float>(inputs.pivot.z)};
+  const float* smoothed = Smooth(in, pivot, scratch, parallel);
+  const std::size_t row = PaddedCount(count_);
+  float* detail = const_cast<float*>(detail_.data());  // read only, unless the kernel is bound
+  const MushFinish run{smoothed,
+                       lanes_.data(),
+                       out_local_.data(),
+                       frame_offsets_.data(),
+                       frame_neighbors_.data(),
+                       frame_weights_.data(),
+                       out_in_.empty() ? nullptr : out_in_.data(),
+                       masks_.data(),
+                       detail,
+                       detail + row,
+                       detail + 2 * row,
+                       envelope,
+                       static_cast<float>(inputs.displacement),
+                       {pivot[0], pivot[1], pivot[2]}};
+  ForRanges(parallel, count_, 1024, [&](std::size_t begin, std::size_t end) {
+    HWY_DYNAMIC_DISPATCH(FinishPoints)(run, in, out, begin, end);
+  });
+}
+
+}  // namespace kpsa
+#endif  // HWY_ONCE

@@ -1,0 +1,252 @@
+#include "nodes/kernels/lattice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+#include "nodes/kernels/affine_delta.h"
+#include "nodes/kernels/weights.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "nodes/kernels/lattice.cpp"
+#include "hwy/foreach_target.h"
+#include "nodes/kernels/xyzw-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace kpsa {
+namespace HWY_NAMESPACE {
+
+// out += weight * sum_u wu sum_t wt sum_s ws offset(s, t, u) for tiles of 16 points.
+// axis: per tile the rows ws, wt, wu of 16; offsets: x y z 0 of each control.
+void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, std::size_t ds, std::size_t dt,
+                std::size_t du, const float* offsets, const float* weights, PointsView out) {
+  const DLanes d;
+  for (std::size_t tile = 0; tile < tile_count; ++tile, axis += 16 * (ds + dt + du)) {
+    for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
+      const float *ws = axis + lane, *wt = ws + 16 * ds, *wu = wt + 16 * dt;
+      const float* control = offsets;
+      VLanes x = hn::Zero(d), y = x, z = x;
+      for (std::size_t u = 0; u < du; ++u) {
+        VLanes ux = hn::Zero(d), uy = ux, uz = ux;
+        for (std::size_t t = 0; t < dt; ++t) {
+          VLanes w = hn::Load(d, ws);
+          VLanes tx = hn::Mul(w, hn::Set(d, control[0]));
+          VLanes ty = hn::Mul(w, hn::Set(d, control[1]));
+          VLanes tz = hn::Mul(w, hn::Set(d, control[2]));
+          control += 4;
+          for (std::size_t s = 1; s < ds; ++s, control += 4) {
+            w = hn::Load(d, ws + 16 * s);
+            tx = Fma(w, hn::Set(d, control[0]), tx);
+            ty = Fma(w, hn::Set(d, control[1]), ty);
+            tz = Fma(w, hn::Set(d, control[2]), tz);
+          }
+          w = hn::Load(d, wt + 16 * t);
+          ux = Fma(w, tx, ux);
+          uy = Fma(w, ty, uy);
+          uz = Fma(w, tz, uz);
+        }
+        const VLanes w = hn::Load(d, wu + 16 * u);
+        x = Fma(w, ux, x);
+        y = Fma(w, uy, y);
+        z = Fma(w, uz, z);
+      }
+      const std::size_t p = tiles[tile] + lane;
+      const VLanes w = hn::Load(d, weights + p);
+      const auto moves = hn::Ne(w, hn::Zero(d));
+      const VLanes px = hn::Load(d, out.x + p), py = hn::Load(d, out.y + p), pz = hn::Load(d, out.z + p);
+      hn::Store(hn::IfThenElse(moves, Fma(w, x, px), px), d, out.x + p);
+      hn::Store(hn::IfThenElse(moves, Fma(w, y, py), py), d, out.y + p);
+      hn::Store(hn::IfThenElse(moves, Fma(w, z, pz), pz), d, out.z + p);
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace kpsa
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace kpsa {
+
+HWY_EXPORT(BlendTiles);
+
+namespace {
+constexpr double kRim =
+    1e-6;  // a point this far outside counts as inside: lattices are fitted to bounding boxes
+constexpr std::size_t kDenseControls = 13;  // measured: a stored control costs as much as 13 of the dense sum
+}  // namespace
+
+Status LatticeSettings::Validate() const {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t a = static_cast<std::size_t>(axis);
+    if (divisions[a] < 2 || divisions[a] > 32) {
+      return Status::Invalid("a lattice of {} x {} x {} divisions, expected 2 to 32 along each axis",
+                             divisions[0], divisions[1], divisions[2]);
+    }
+    if (local && (influence[a] < 2 || influence[a] > 32)) {
+      return Status::Invalid("a lattice's local influence of {} {} {}, expected 2 to 32 each", influence[0],
+                             influence[1], influence[2]);
+    }
+  }
+  if (outside == LatticeOutside::kFalloff && !(falloff_distance > 0 && std::isfinite(falloff_distance))) {
+    return Status::Invalid("a lattice's falloff distance of {}, expected more than 0", falloff_distance);
+  }
+  return {};
+}
+
+std::vector<double> LatticeBasis(int divisions, int order, double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  const std::size_t n = static_cast<std::size_t>(divisions);
+  std::vector<double> w(n, 0.0);
+  if (order == 0) {  // Bernstein, degree by degree
+    w[0] = 1;
+    for (std::size_t degree = 1; degree < n; ++degree) {
+      for (std::size_t i = degree; i > 0; --i) w[i] = (1 - x) * w[i] + x * w[i - 1];
+      w[0] *= 1 - x;
+    }
+    return w;
+  }
+  // Cox and de Boor on clamped uniform knots: knot i lies at clamp(i - degree, 0, spans) / spans
+  const int degree = std::min(order, divisions) - 1, spans = divisions - degree;
+  const auto knot = [&](int i) { return static_cast<double>(std::clamp(i - degree, 0, spans)); };
+  const double u = x * spans;
+  const int span = std::min(static_cast<int>(u), spans - 1) + degree;
+  std::vector<double> b(static_cast<std::size_t>(degree) + 1, 0.0);
+  b[0] = 1;
+  for (int k = 1; k <= degree; ++k) {
+    double carried = 0;
+    for (int i = 0; i < k; ++i) {
+      const double right = knot(span + i + 1), left = knot(span + i + 1 - k);
+      const double part = b[static_cast<std::size_t>(i)] / (right - left);
+      b[static_cast<std::size_t>(i)] = carried + (right - u) * part;
+      carried = (u - left) * part;
+    }
+    b[static_cast<std::size_t>(k)] = carried;
+  }
+  for (int i = 0; i <= degree; ++i)
+    w[static_cast<std::size_t>(span - degree + i)] = b[static_cast<std::size_t>(i)];
+  return w;
+}
+
+LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView rest,
+                             const Matrix4& lattice_from_rest, std::span<const Index> out_points,
+                             std::span<const float> point_weights)
+    : count_(out_points.size()), weights_(PaddedWeights(point_weights, out_points.size())) {
+  KPSA_CHECK(IsSortedSet(out_points, rest.count));
+  std::array<int, 3> order = {0, 0, 0};
+  std::size_t width = 1;
+  controls_ = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    divisions_[a] = static_cast<std::size_t>(settings.divisions[a]);
+    controls_ *= divisions_[a];
+    if (settings.local) order[a] = std::min(settings.influence[a], settings.divisions[a]);
+    width *= static_cast<std::size_t>(settings.local ? order[a] : settings.divisions[a]);
+  }
+  sparse_ = settings.local && controls_ > kDenseControls * width;
+
+  std::vector<Index> row_controls;
+  std::vector<float> row_weights, rows;
+  const std::size_t row_count = divisions_[0] + divisions_[1] + divisions_[2];
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Index p = out_points[i];
+    const Double3 q =
+        TransformPoint(lattice_from_rest, {rest.x[p], rest.y[p], rest.z[p]}) + Double3{0.5, 0.5, 0.5};
+    Double3 nearest = q;
+    for (int a = 0; a < 3; ++a) nearest[a] = std::clamp(q[a], 0.0, 1.0);
+    const double distance = Length(q - nearest);
+    float& weight = weights_.data()[i];
+    if (!(distance <= kRim)) {
+      if (settings.outside == LatticeOutside::kInside) weight = 0;
+      if (settings.outside == LatticeOutside::kFalloff) {
+        weight *= static_cast<float>(std::max(0.0, 1 - distance / settings.falloff_distance));
+      }
+    }
+    std::array<std::vector<double>, 3> basis;
+    if (sparse_ || weight != 0) {
+      for (int a = 0; a < 3; ++a) {
+        basis[static_cast<std::size_t>(a)] = LatticeBasis(settings.divisions[static_cast<std::size_t>(a)],
+                                                          order[static_cast<std::size_t>(a)], nearest[a]);
+      }
+    }
+    if (sparse_) {
+      // The block of `order` controls along each axis that holds all that are not 0
+      std::array<std::size_t, 3> first, size;
+      for (std::size_t a = 0; a < 3; ++a) {
+        size[a] = static_cast<std::size_t>(order[a]);
+        first[a] = 0;
+        while (first[a] + size[a] < divisions_[a] && basis[a][first[a]] == 0) ++first[a];
+      }
+      for (std::size_t u = first[2]; u < first[2] + size[2]; ++u) {
+        for (std::size_t t = first[1]; t < first[1] + size[1]; ++t) {
+          for (std::size_t s = first[0]; s < first[0] + size[0]; ++s) {
+            row_controls.push_back(static_cast<Index>(s + divisions_[0] * (t + divisions_[1] * u)));
+            row_weights.push_back(static_cast<float>(weight * (basis[0][s] * basis[1][t] * basis[2][u])));
+          }
+        }
+      }
+    } else if (weight != 0) {
+      const Index tile = static_cast<Index>(i / 16 * 16);
+      if (tiles_.empty() || tiles_.back() != tile) {
+        tiles_.push_back(tile);
+        rows.resize(rows.size() + 16 * row_count, 0.0f);
+      }
+      float* to = rows.data() + 16 * row_count * (tiles_.size() - 1) + (i - tile);
+      for (const std::vector<double>& axis : basis) {
+        for (double w : axis) *to = static_cast<float>(w), to += 16;
+      }
+    }
+  }
+  if (sparse_) blend_ = ControlBlend(width, row_controls, row_weights);
+  axis_weights_ = AlignedFloats(rows.size());
+  std::copy(rows.begin(), rows.end(), axis_weights_.data());
+}
+
+void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
+                        const Parallel* parallel) const noexcept {
+  KPSA_CHECK_EQ(inputs.offsets.size(), controls_);
+  KPSA_CHECK_EQ(in.count, count_);
+  KPSA_CHECK_EQ(out.count, count_);
+  KPSA_CHECK_LE(ScratchFloats(), scratch.size());
+  const float envelope = static_cast<float>(inputs.envelope);
+  if (envelope == 0 || count_ == 0) return CopyPoints(in, out);
+
+  // The move of the lattice as a whole
+  Matrix4 lattice_from_points;
+  const bool moved = inputs.matrix != inputs.base_matrix && Invert(inputs.base_matrix, &lattice_from_points);
+  if (moved) {
+    const AffineDelta delta =
+        MakeAffineDelta(inputs.matrix * lattice_from_points,
+                        {inputs.base_matrix(0, 3), inputs.base_matrix(1, 3), inputs.base_matrix(2, 3)});
+    ForRanges(parallel, count_, 4096, [&](std::size_t begin, std::size_t end) {
+      ApplyAffineDelta(delta, weights_.data(), envelope, in, out, begin, end);
+    });
+  } else {
+    CopyPoints(in, out);
+  }
+
+  // The moves of the controls, in the points' space
+  bool any = false;
+  for (std::size_t c = 0; c < controls_; ++c) {
+    const Double3 offset = TransformVector(inputs.matrix, inputs.offsets[c]);
+    float* to = scratch.data() + 4 * c;
+    for (int a = 0; a < 3; ++a) {
+      to[a] = static_cast<float>(offset[a] * inputs.envelope);
+      any |= to[a] != 0;
+    }
+    to[3] = 0;
+  }
+  if (!any) return;
+  if (sparse_) {
+    blend_.Run(scratch.data(), out, parallel);
+    return;
+  }
+  const std::size_t row_count = divisions_[0] + divisions_[1] + divisions_[2];
+  ForRanges(parallel, tiles_.size(), 32, [&](std::size_t begin, std::size_t end) {
+    HWY_DYNAMIC_DISPATCH(BlendTiles)
+    (tiles_.data() + begin, axis_weights_.data() + begin * 16 * row_count, end - begin, divisions_[0],
+     divisions_[1], divisions_[2], scratch.data(), weights_.data(), out);
+  });
+}
+
+}  // namespace kpsa
+#endif  // HWY_ONCE

@@ -1,0 +1,125 @@
+#include "nodes/kernels/ray_scene.h"
+
+#include <embree3/rtcore.h>
+
+#include <cmath>
+#include <utility>
+
+#include "base/check.h"
+
+namespace kpsa {
+namespace {
+
+// One device for the process: devices are costly to make, and every scene holds a reference of its own.
+RTCDevice SharedDevice() {
+  static RTCDevice device = rtcNewDevice(nullptr);
+  return device;
+}
+
+RTCRay ToEmbree(const Ray& ray) {
+  RTCRay out = {};
+  out.org_x = ray.origin[0];
+  out.org_y = ray.origin[1];
+  out.org_z = ray.origin[2];
+  out.tnear = ray.near;
+  out.dir_x = ray.direction[0];
+  out.dir_y = ray.direction[1];
+  out.dir_z = ray.direction[2];
+  out.tfar = ray.far;
+  out.mask = 0xffffffffu;
+  return out;
+}
+
+}  // namespace
+
+struct RayScene::Impl {
+  RTCScene scene = nullptr;
+  ~Impl() {
+    if (scene != nullptr) rtcReleaseScene(scene);
+  }
+};
+
+RayScene::RayScene(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+RayScene::RayScene(RayScene&&) noexcept = default;
+RayScene& RayScene::operator=(RayScene&&) noexcept = default;
+RayScene::~RayScene() = default;
+
+Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> triangles) {
+  if (triangles.size() % 3 != 0) {
+    return Status::Invalid("{} triangle indices are not a multiple of 3", triangles.size());
+  }
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (triangles[i] >= points.count) {
+      return Status::Invalid("triangle {} names point {}, there are {} points", i / 3, triangles[i],
+                             points.count);
+    }
+  }
+  for (std::size_t i = 0; i < points.count; ++i) {
+    if (!std::isfinite(points.x[i]) || !std::isfinite(points.y[i]) || !std::isfinite(points.z[i])) {
+      return Status::Invalid("point {} is not finite", i);
+    }
+  }
+  RTCDevice device = SharedDevice();
+  if (device == nullptr) return Status::Evaluation("the ray tracer (Embree) cannot start on this machine");
+
+  auto impl = std::make_unique<Impl>();
+  impl->scene = rtcNewScene(device);
+  rtcSetSceneFlags(impl->scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_MEDIUM);  // no spatial splits: one layout an input
+  if (!triangles.empty()) {
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* xyz = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                            3 * sizeof(float), points.count));
+    auto* corner = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size() / 3));
+    if (xyz == nullptr || corner == nullptr) {
+      rtcReleaseGeometry(geometry);
+      return Status::Evaluation("no memory for {} triangles in the ray tracer", triangles.size() / 3);
+    }
+    for (std::size_t i = 0; i < points.count; ++i) {
+      xyz[3 * i] = points.x[i];
+      xyz[3 * i + 1] = points.y[i];
+      xyz[3 * i + 2] = points.z[i];
+    }
+    for (std::size_t i = 0; i < triangles.size(); ++i) corner[i] = triangles[i];
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(impl->scene, geometry);
+    rtcReleaseGeometry(geometry);
+  }
+  rtcCommitScene(impl->scene);
+  if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE) {
+    return Status::Evaluation("the ray tracer failed to build over {} triangles (Embree error {})",
+                              triangles.size() / 3, static_cast<int>(error));
+  }
+  return RayScene(std::move(impl));
+}
+
+void RayScene::ClosestHits(std::span<const Ray> rays, std::span<RayHit> hits) const {
+  KPSA_CHECK_EQ(rays.size(), hits.size());
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    RTCRayHit query = {};
+    query.ray = ToEmbree(rays[i]);
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(impl_->scene, &context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+      hits[i] = {};
+    } else {
+      hits[i] = {query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v};
+    }
+  }
+}
+
+void RayScene::Occluded(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
+  KPSA_CHECK_EQ(rays.size(), occluded.size());
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    RTCRay ray = ToEmbree(rays[i]);
+    rtcOccluded1(impl_->scene, &context, &ray);
+    occluded[i] = ray.tfar < 0 ? 1 : 0;  // Embree reports a hit as minus infinity
+  }
+}
+
+}  // namespace kpsa

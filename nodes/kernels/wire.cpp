@@ -1,0 +1,214 @@
+#include "nodes/kernels/wire.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "base/check.h"
+#include "nodes/kernels/weights.h"
+
+namespace kpsa {
+namespace {
+
+// One span as a cubic in its own parameter t in [0, 1]: c0 + t (c1 + t (c2 + t c3)).
+struct Cubic {
+  Double3 c[4];
+  Double3 At(double t) const { return c[0] + (c[1] + (c[2] + c[3] * t) * t) * t; }
+  // Half the derivative of the squared distance to p.
+  double Slope(double t, Double3 p) const { return Dot(At(t) - p, c[1] + (c[2] * 2.0 + c[3] * (3 * t)) * t); }
+};
+
+std::vector<Cubic> Spans(const CurveShape& shape, std::span<const Double3> vertices) {
+  std::vector<Cubic> spans(shape.spans());
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    // Interpolate the weights at four parameters: exact for a cubic, and the formulas stay in one place
+    const double base = static_cast<double>(i);
+    Double3 f[4];
+    for (int k = 0; k < 4; ++k) {
+      const double t = k / 3.0;
+      Index controls[4];
+      double weights[4];
+      shape.Weights(k == 3 ? std::nextafter(base + 1, base) : base + t, controls, weights);
+      for (int c = 0; c < 4; ++c) f[k] = f[k] + vertices[controls[c]] * weights[c];
+    }
+    Cubic& cubic = spans[i];
+    cubic.c[0] = f[0];
+    cubic.c[1] = f[0] * -5.5 + f[1] * 9.0 + f[2] * -4.5 + f[3];
+    cubic.c[2] = f[0] * 9.0 + f[1] * -22.5 + f[2] * 18.0 + f[3] * -4.5;
+    cubic.c[3] = f[0] * -4.5 + f[1] * 13.5 + f[2] * -13.5 + f[3] * 4.5;
+  }
+  return spans;
+}
+
+double NearestOnSpans(std::span<const Cubic> spans, Double3 p, double* distance) {
+  double best = std::numeric_limits<double>::infinity(), best_u = 0;
+  const auto consider = [&](std::size_t span, double t) {
+    const Double3 offset = spans[span].At(t) - p;
+    const double d = Dot(offset, offset);
+    if (d < best) best = d, best_u = static_cast<double>(span) + t;
+  };
+  constexpr int kSteps = 8;
+  for (std::size_t i = 0; i < spans.size(); ++i) {
+    consider(i, 0);
+    double left = 0, slope_left = spans[i].Slope(0, p);
+    for (int k = 1; k <= kSteps; ++k) {
+      const double right = static_cast<double>(k) / kSteps, slope_right = spans[i].Slope(right, p);
+      if (slope_left < 0 && slope_right >= 0) {  // a minimum lies between
+        double a = left, b = right;
+        for (int step = 0; step < 30; ++step) {
+          const double middle = 0.5 * (a + b);
+          (spans[i].Slope(middle, p) < 0 ? a : b) = middle;
+        }
+        consider(i, 0.5 * (a + b));
+      }
+      left = right;
+      slope_left = slope_right;
+    }
+    consider(i, 1);
+  }
+  *distance = std::sqrt(best);
+  return best_u;
+}
+
+}  // namespace
+
+void CurveShape::Weights(double u, Index controls[4], double weights[4]) const {
+  const double span_count = static_cast<double>(spans()), n = static_cast<double>(vertices);
+  if (closed) {
+    u -= std::floor(u / n) * n;
+    if (!(u < n)) u = 0;
+  } else {
+    u = std::clamp(u, 0.0, span_count);
+  }
+  const std::size_t i = std::min(static_cast<std::size_t>(u), spans() - 1);
+  const double t = u - static_cast<double>(i), t2 = t * t, t3 = t2 * t;
+  double w[4];  // of the vertices i - 1, i, i + 1, i + 2
+  switch (basis) {
+    case CurveBasis::kLinear:
+      w[0] = 0, w[1] = 1 - t, w[2] = t, w[3] = 0;
+      break;
+    case CurveBasis::kCatmullRom:
+      w[0] = 0.5 * (-t3 + 2 * t2 - t), w[1] = 0.5 * (3 * t3 - 5 * t2 + 2);
+      w[2] = 0.5 * (-3 * t3 + 4 * t2 + t), w[3] = 0.5 * (t3 - t2);
+      break;
+    case CurveBasis::kBSpline:
+      w[0] = (1 - t) * (1 - t) * (1 - t) / 6, w[1] = (3 * t3 - 6 * t2 + 4) / 6;
+      w[2] = (-3 * t3 + 3 * t2 + 3 * t + 1) / 6, w[3] = t3 / 6;
+      break;
+  }
+  const std::size_t before = i > 0 ? i - 1 : (closed ? vertices - 1 : kNoIndex);
+  const std::size_t next = (i + 1) % vertices;
+  const std::size_t after = i + 2 < vertices ? i + 2 : (closed ? (i + 2) % vertices : kNoIndex);
+  // An end without a vertex is the reflection of the one inside: c(-1) = 2 c(0) - c(1)
+  if (before == kNoIndex) w[1] += 2 * w[0], w[2] -= w[0], w[0] = 0;
+  if (after == kNoIndex) w[2] += 2 * w[3], w[1] -= w[3], w[3] = 0;
+  controls[0] = static_cast<Index>(before == kNoIndex ? i : before);
+  controls[1] = static_cast<Index>(i);
+  controls[2] = static_cast<Index>(next);
+  controls[3] = static_cast<Index>(after == kNoIndex ? next : after);
+  std::copy(w, w + 4, weights);
+}
+
+Double3 CurveShape::Point(std::span<const Double3> curve_vertices, double u) const {
+  Index controls[4];
+  double weights[4];
+  Weights(u, controls, weights);
+  Double3 point;
+  for (int c = 0; c < 4; ++c) point = point + curve_vertices[controls[c]] * weights[c];
+  return point;
+}
+
+double CurveShape::Nearest(std::span<const Double3> curve_vertices, Double3 p) const {
+  double distance;
+  return NearestOnSpans(Spans(*this, curve_vertices), p, &distance);
+}
+
+Status WireKernel::Validate(const WireSettings& settings, std::span<const Double3> rest_vertices) {
+  const std::size_t least = settings.closed ? 3 : 2;
+  if (rest_vertices.size() < least) {
+    return Status::Invalid("a {} curve of {} vertices, expected at least {}",
+                           settings.closed ? "closed" : "wire", rest_vertices.size(), least);
+  }
+  if (rest_vertices.size() > 100000) {
+    return Status::Invalid("a wire curve of {} vertices, expected at most 100000", rest_vertices.size());
+  }
+  for (std::size_t i = 0; i < rest_vertices.size(); ++i) {
+    const Double3 v = rest_vertices[i];
+    if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z)) {
+      return Status::Invalid("vertex {} of a wire curve is not a finite point", i);
+    }
+  }
+  if (!(settings.dropoff > 0) || !std::isfinite(settings.dropoff)) {
+    return Status::Invalid("a wire's dropoff of {} m, expected more than 0", settings.dropoff);
+  }
+  return settings.profile.Validate();
+}
+
+WireKernel::WireKernel(const WireSettings& settings, std::span<const Double3> rest_vertices,
+                       ConstPointsView rest, std::span<const Index> out_points,
+                       std::span<const float> point_weights)
+    : count_(out_points.size()), vertices_(rest_vertices.size()) {
+  KPSA_CHECK(Validate(settings, rest_vertices).ok());
+  KPSA_CHECK(IsSortedSet(out_points, rest.count));
+  KPSA_CHECK(point_weights.empty() || point_weights.size() == count_);
+  const CurveShape shape{settings.basis, settings.closed, rest_vertices.size()};
+  const std::vector<Cubic> spans = Spans(shape, rest_vertices);
+
+  // A Catmull-Rom span, and a reflected end, may leave the box of the vertices by an eighth or two of its
+  // size; points farther than that and the dropoff need no search
+  Double3 low = rest_vertices[0], high = low;
+  for (Double3 v : rest_vertices) {
+    for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], v[a]), high[a] = std::max(high[a], v[a]);
+  }
+  const double margin = settings.dropoff + 0.5 * Length(high - low);
+
+  std::vector<Index> controls(4 * count_, 0);
+  std::vector<float> weights(4 * count_, 0.0f);
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Index index = out_points[i];
+    const Double3 p{rest.x[index], rest.y[index], rest.z[index]};
+    bool near = true;
+    for (int a = 0; a < 3; ++a) near &= p[a] >= low[a] - margin && p[a] <= high[a] + margin;
+    if (!near) continue;
+    double distance, basis[4];
+    const double u = NearestOnSpans(spans, p, &distance);
+    const double falloff = settings.profile.Evaluate(distance / settings.dropoff);
+    const double w = falloff * static_cast<double>(point_weights.empty() ? 1.0f : point_weights[i]);
+    if (w == 0) continue;
+    shape.Weights(u, controls.data() + 4 * i, basis);
+    for (std::size_t c = 0; c < 4; ++c) weights[4 * i + c] = static_cast<float>(w * basis[c]);
+  }
+  if (settings.basis == CurveBasis::kLinear) {  // the outer two are unused
+    for (std::size_t i = 0; i < count_; ++i) {
+      for (std::size_t c = 0; c < 2; ++c) {
+        controls[2 * i + c] = controls[4 * i + 1 + c];
+        weights[2 * i + c] = weights[4 * i + 1 + c];
+      }
+    }
+    controls.resize(2 * count_);
+    weights.resize(2 * count_);
+  }
+  blend_ = ControlBlend(settings.basis == CurveBasis::kLinear ? 2 : 4, controls, weights);
+}
+
+void WireKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
+                     const Parallel* parallel) const noexcept {
+  KPSA_CHECK_EQ(inputs.offsets.size(), vertices_);
+  KPSA_CHECK_EQ(in.count, count_);
+  KPSA_CHECK_EQ(out.count, count_);
+  KPSA_CHECK_LE(ScratchFloats(), scratch.size());
+  CopyPoints(in, out);
+  bool any = false;
+  for (std::size_t v = 0; v < vertices_; ++v) {
+    for (int a = 0; a < 3; ++a) {
+      float& to = scratch[4 * v + static_cast<std::size_t>(a)];
+      to = static_cast<float>(inputs.offsets[v][a] * inputs.envelope);
+      any |= to != 0;
+    }
+    scratch[4 * v + 3] = 0;
+  }
+  if (any) blend_.Run(scratch.data(), out, parallel);
+}
+
+}  // namespace kpsa

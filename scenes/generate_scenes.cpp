@@ -1,0 +1,39 @@
+// generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face and FOLDER/hello. The bytes are
+// the same on every machine; a test compares them with the files of the source tree.
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "scenes/face_model.h"
+
+namespace {
+
+bool WriteAll(const std::filesystem::path& folder, const kpsa::scenes::SceneFiles& files) {
+  for (const auto& [name, bytes] : files) {
+    const std::filesystem::path path = folder / name;
+    std::error_code error;
+    std::filesystem::create_directories(path.parent_path(), error);
+    std::ofstream out(path, std::ios::binary);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    if (!out.flush()) {
+      std::fprintf(stderr, "cannot write \"%s\"\n", path.c_str());
+      return false;
+    }
+    std::printf("%s: %zu bytes\n", path.c_str(), bytes.size());
+  }
+  return true;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: generate_scenes FOLDER\n");
+    return 2;
+  }
+  const std::filesystem::path folder = argv[1];
+  const bool written = WriteAll(folder / "face", kpsa::scenes::GenerateFace()) &&
+                       WriteAll(folder / "hello", kpsa::scenes::GenerateHello());
+  return written ? 0 : 4;
+}

@@ -1,0 +1,243 @@
+#include "scenes/glb_writer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#include "base/check.h"
+
+namespace kpsa::scenes {
+namespace {
+
+std::string Quoted(std::string_view text) { return fmt::format("\"{}\"", text); }  // names here need no escapes
+
+std::string Joined(const std::vector<std::string>& items) {
+  std::string out = "[";
+  for (const std::string& item : items) out += (out.size() > 1 ? "," : "") + item;
+  return out + "]";
+}
+
+std::string Numbers(std::span<const float> values) {
+  std::vector<std::string> items;
+  for (float v : values) items.push_back(fmt::format("{}", v));
+  return Joined(items);
+}
+
+class Writer {
+ public:
+  // Appends bytes as a buffer view, aligned to 4.
+  template <typename T>
+  int View(std::span<const T> data, int target = 0) {
+    while (binary_.size() % 4 != 0) binary_.push_back('\0');
+    views_.push_back(fmt::format("{{\"buffer\":0,\"byteOffset\":{},\"byteLength\":{}{}}}", binary_.size(),
+                                 data.size_bytes(), target == 0 ? "" : fmt::format(",\"target\":{}", target)));
+    const std::size_t at = binary_.size();
+    binary_.resize(at + data.size_bytes());
+    if (!data.empty()) std::memcpy(binary_.data() + at, data.data(), data.size_bytes());
+    return static_cast<int>(views_.size()) - 1;
+  }
+
+  int Accessor(int view, int component_type, std::size_t count, std::string_view type, std::string_view more = "") {
+    accessors_.push_back(fmt::format("{{\"bufferView\":{},\"componentType\":{},\"count\":{},\"type\":\"{}\"{}}}", view,
+                                     component_type, count, type, more));
+    return static_cast<int>(accessors_.size()) - 1;
+  }
+
+  static std::string Bounds(std::span<const Float3> values, bool with_zero) {
+    Float3 low = {0, 0, 0}, high = {0, 0, 0};
+    if (!with_zero && !values.empty()) low = high = values[0];
+    for (const Float3& v : values) {
+      for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], v[k]), high[k] = std::max(high[k], v[k]);
+    }
+    return fmt::format(",\"min\":{},\"max\":{}", Numbers(low), Numbers(high));
+  }
+
+  int Target(const SparseTarget& target, std::size_t points) {
+    std::vector<std::uint16_t> indices(target.points.begin(), target.points.end());
+    KPSA_CHECK_LT(points, std::size_t{65536});
+    const int index_view = View(std::span<const std::uint16_t>(indices));
+    const int value_view = View(std::span<const Float3>(target.deltas));
+    accessors_.push_back(
+        fmt::format("{{\"componentType\":5126,\"count\":{},\"type\":\"VEC3\"{},\"sparse\":{{\"count\":{},\"indices\":"
+                    "{{\"bufferView\":{},\"componentType\":5123}},\"values\":{{\"bufferView\":{}}}}}}}",
+                    points, Bounds(target.deltas, true), indices.size(), index_view, value_view));
+    return static_cast<int>(accessors_.size()) - 1;
+  }
+
+  std::string Mesh(const GlbMesh& mesh);
+  std::string Clip(const GlbClip& clip);
+  std::string Finish(const GlbScene& scene);
+
+ private:
+  std::string binary_;
+  std::vector<std::string> views_, accessors_;
+};
+
+std::string Writer::Mesh(const GlbMesh& mesh) {
+  constexpr int kArray = 34962, kElements = 34963;
+  const std::size_t count = mesh.positions.size();
+  const int position = Accessor(View(std::span<const Float3>(mesh.positions), kArray), 5126, count, "VEC3",
+                                Bounds(mesh.positions, false));
+  const int normal = Accessor(View(std::span<const Float3>(mesh.normals), kArray), 5126, count, "VEC3");
+  std::vector<std::array<std::uint8_t, 4>> joints;
+  std::vector<std::array<float, 4>> weights;
+  for (const Influences& i : mesh.influences) joints.push_back(i.joints), weights.push_back(i.weights);
+  const int joint = Accessor(View(std::span<const std::array<std::uint8_t, 4>>(joints), kArray), 5121, count, "VEC4");
+  const int weight = Accessor(View(std::span<const std::array<float, 4>>(weights), kArray), 5126, count, "VEC4");
+  std::string color;
+  if (!mesh.colors.empty()) {
+    color = fmt::format(",\"COLOR_0\":{}",
+                        Accessor(View(std::span<const std::array<std::uint8_t, 4>>(mesh.colors), kArray), 5121, count,
+                                 "VEC4", ",\"normalized\":true"));
+  }
+  const int indices = Accessor(View(std::span<const Index>(mesh.triangles), kElements), 5125, mesh.triangles.size(),
+                               "SCALAR");
+  std::vector<std::string> targets, names, zeros;
+  for (const SparseTarget& target : mesh.targets) {
+    targets.push_back(fmt::format("{{\"POSITION\":{}}}", Target(target, count)));
+    names.push_back(Quoted(target.name));
+    zeros.push_back("0");
+  }
+  std::string morph, more;
+  if (!targets.empty()) {
+    morph = ",\"targets\":" + Joined(targets);
+    more = fmt::format(",\"weights\":{},\"extras\":{{\"targetNames\":{}}}", Joined(zeros), Joined(names));
+  }
+  return fmt::format(
+      "{{\"name\":\"{}\",\"primitives\":[{{\"attributes\":{{\"POSITION\":{},\"NORMAL\":{},\"JOINTS_0\":{},\"WEIGHTS_0\":{}"
+      "{}}},\"indices\":{},\"material\":0{}}}]{}}}",
+      mesh.name, position, normal, joint, weight, color, indices, morph, more);
+}
+
+std::string Writer::Clip(const GlbClip& clip) {
+  std::vector<float> times;
+  for (int f = 0; f < clip.frames; ++f) times.push_back(static_cast<float>(f / kFramesPerSecond));
+  const int input = Accessor(View(std::span<const float>(times)), 5126, times.size(), "SCALAR",
+                             fmt::format(",\"min\":[{}],\"max\":[{}]", times.front(), times.back()));
+  std::vector<std::string> samplers, channels;
+  for (const GlbChannel& channel : clip.channels) {
+    const int view = View(std::span<const float>(channel.values));
+    const std::size_t count = channel.weights ? channel.values.size() : channel.values.size() / 4;
+    const int output = Accessor(view, 5126, count, channel.weights ? "SCALAR" : "VEC4");
+    channels.push_back(fmt::format("{{\"sampler\":{},\"target\":{{\"node\":{},\"path\":\"{}\"}}}}", samplers.size(),
+                                   channel.node, channel.weights ? "weights" : "rotation"));
+    samplers.push_back(fmt::format("{{\"input\":{},\"output\":{},\"interpolation\":\"LINEAR\"}}", input, output));
+  }
+  return fmt::format("{{\"name\":\"{}\",\"samplers\":{},\"channels\":{}}}", clip.name, Joined(samplers), Joined(channels));
+}
+
+std::string Writer::Finish(const GlbScene& scene) {
+  std::vector<std::string> nodes, meshes, clips, roots, joints;
+  for (const GlbMesh& mesh : scene.meshes) meshes.push_back(Mesh(mesh));
+  for (const GlbClip& clip : scene.clips) clips.push_back(Clip(clip));
+  std::vector<std::array<float, 16>> inverse_binds;
+  for (int joint : scene.joints) {
+    joints.push_back(fmt::format("{}", joint));
+    Double3 at = {};
+    for (int n = joint; n >= 0; n = scene.nodes[static_cast<std::size_t>(n)].parent) {
+      at = at + scene.nodes[static_cast<std::size_t>(n)].translation;
+    }
+    inverse_binds.push_back({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, static_cast<float>(-at.x), static_cast<float>(-at.y),
+                             static_cast<float>(-at.z), 1});
+  }
+  const int inverse = Accessor(View(std::span<const std::array<float, 16>>(inverse_binds)), 5126, inverse_binds.size(),
+                               "MAT4");
+  for (std::size_t i = 0; i < scene.nodes.size(); ++i) {
+    const GlbNode& node = scene.nodes[i];
+    std::vector<std::string> children;
+    for (std::size_t c = 0; c < scene.nodes.size(); ++c) {
+      if (scene.nodes[c].parent == static_cast<int>(i)) children.push_back(fmt::format("{}", c));
+    }
+    std::string text = fmt::format("{{\"name\":\"{}\"", node.name);
+    if (node.mesh >= 0) {
+      text += fmt::format(",\"mesh\":{},\"skin\":0", node.mesh);
+    } else {
+      const float t[3] = {static_cast<float>(node.translation.x), static_cast<float>(node.translation.y),
+                          static_cast<float>(node.translation.z)};
+      text += ",\"translation\":" + Numbers(t);
+    }
+    if (!children.empty()) text += ",\"children\":" + Joined(children);
+    nodes.push_back(text + "}");
+    if (node.parent < 0) roots.push_back(fmt::format("{}", i));
+  }
+  while (binary_.size() % 4 != 0) binary_.push_back('\0');
+  std::string json = fmt::format(
+      "{{\"asset\":{{\"version\":\"2.0\",\"generator\":\"kpsa generate_scenes\"}},\"scene\":0,\"scenes\":[{{\"nodes\":{}}}],"
+      "\"nodes\":{},\"meshes\":{},\"skins\":[{{\"joints\":{},\"inverseBindMatrices\":{},\"skeleton\":{}}}],"
+      "\"materials\":[{{\"name\":\"surface\",\"pbrMetallicRoughness\":{{\"metallicFactor\":0,\"roughnessFactor\":0.6}}}}],",
+      Joined(roots), Joined(nodes), Joined(meshes), Joined(joints), inverse, joints.front());
+  if (!clips.empty()) json += fmt::format("\"animations\":{},", Joined(clips));
+  json += fmt::format("\"accessors\":{},\"bufferViews\":{},\"buffers\":[{{\"byteLength\":{}}}]}}", Joined(accessors_),
+                      Joined(views_), binary_.size());
+  while (json.size() % 4 != 0) json.push_back(' ');
+
+  std::string out;
+  const auto word = [&](std::size_t value) {
+    const auto v = static_cast<std::uint32_t>(value);
+    for (int k = 0; k < 4; ++k) out.push_back(static_cast<char>(v >> (8 * k) & 0xff));
+  };
+  word(0x46546c67);  // glTF 2.0, 4.4: header, then the JSON and the BIN chunk
+  word(2);
+  word(12 + 8 + json.size() + 8 + binary_.size());
+  word(json.size());
+  word(0x4e4f534a);
+  out += json;
+  word(binary_.size());
+  word(0x004e4942);
+  return out + binary_;
+}
+
+}  // namespace
+
+std::string WriteGlb(const GlbScene& scene) { return Writer().Finish(scene); }
+
+std::vector<Float3> SmoothNormals(std::span<const Float3> positions, std::span<const Index> triangles) {
+  std::vector<Double3> sums(positions.size());
+  const auto at = [&](Index i) { return Double3{positions[i][0], positions[i][1], positions[i][2]}; };
+  for (std::size_t t = 0; t + 2 < triangles.size(); t += 3) {
+    const Index a = triangles[t], b = triangles[t + 1], c = triangles[t + 2];
+    const Double3 n = Cross(at(b) - at(a), at(c) - at(a));
+    for (Index i : {a, b, c}) sums[i] = sums[i] + n;
+  }
+  std::vector<Float3> out;
+  for (const Double3& sum : sums) {
+    const double length = Length(sum);
+    const Double3 n = length > 0 ? sum * (1 / length) : Double3{0, 0, 1};
+    out.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
+  }
+  return out;
+}
+
+std::vector<Index> Triangulate(std::span<const std::array<int, 4>> quads) {
+  std::vector<Index> out;
+  for (const auto& q : quads) {
+    const auto corner = [&](std::size_t k) { return static_cast<Index>(q[k]); };
+    out.insert(out.end(), {corner(0), corner(1), corner(2)});
+    if (q[2] != q[3]) out.insert(out.end(), {corner(0), corner(2), corner(3)});
+  }
+  return out;
+}
+
+Influences MakeInfluences(std::span<const double> weight_of_joint) {
+  std::vector<std::size_t> order(weight_of_joint.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return weight_of_joint[a] > weight_of_joint[b]; });
+  order.resize(std::min<std::size_t>(order.size(), 4));
+  double sum = 0;
+  for (std::size_t joint : order) sum += weight_of_joint[joint];
+  Influences out;
+  int rest = 4096;
+  for (std::size_t k = order.size(); k-- > 0;) {  // the largest comes last and takes what is left
+    const int share = k == 0 ? rest : static_cast<int>(std::floor(weight_of_joint[order[k]] / sum * 4096 + 0.5));
+    rest -= share;
+    out.joints[k] = share > 0 ? static_cast<std::uint8_t>(order[k]) : 0;
+    out.weights[k] = static_cast<float>(share) / 4096;
+  }
+  return out;
+}
+
+}  // namespace kpsa::scenes

@@ -1,0 +1,242 @@
+#include "graph/evaluator.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/test_graph.h"
+#include "tests/support/toy_nodes.h"
+
+namespace kpsa {
+namespace {
+
+TEST(Evaluator, ComputesOnceUntilSomethingChanges) {
+  TestGraph g(ToyRegistry());
+  g.add("add", "a");
+  g.add("add", "b", {{"b", 10.0}});
+  g.connect("a.out", "b.a");
+  g.vary("a.a");
+  EXPECT_DOUBLE_EQ(g.pull<double>("b.out"), 10);
+  EXPECT_DOUBLE_EQ(g.pull<double>("b.out"), 10);
+  EXPECT_EQ(g.computes("a"), 1u);
+  g.set("a.a", 3.0);
+  g.set("a.a", 4.0);
+  EXPECT_EQ(g.computes("b"), 1u);  // nothing runs until somebody pulls
+  EXPECT_DOUBLE_EQ(g.pull<double>("b.out"), 14);
+  EXPECT_EQ(g.computes("a"), 2u);
+  g.set("a.a", 4.0);  // the same value
+  g.pull<double>("b.out");
+  EXPECT_EQ(g.computes("a"), 2u);
+}
+
+TEST(Evaluator, EqualSmallOutputsStopThere) {
+  TestGraph g(ToyRegistry());
+  g.add("floor", "f");
+  g.add("add", "b");
+  g.connect("f.out", "b.a");
+  g.vary("f.input");
+  g.pull<double>("b.out");
+  g.set("f.input", 0.5);
+  g.pull<double>("b.out");
+  EXPECT_EQ(g.computes("f"), 2u);
+  EXPECT_EQ(g.computes("b"), 1u);
+  g.set("f.input", 1.5);
+  EXPECT_DOUBLE_EQ(g.pull<double>("b.out"), 1);
+  EXPECT_EQ(g.computes("b"), 2u);
+}
+
+TEST(Evaluator, PullRunsOnlyWhatThatOutputNeeds) {
+  TestGraph g(ToyRegistry());
+  g.add("add", "root");
+  g.add("add", "left");
+  g.add("add", "right");
+  g.connect("root.out", "left.a");
+  g.connect("root.out", "right.a");
+  g.vary("root.a");
+  g.want("left.out");
+  g.want("right.out");
+  g.pull<double>("left.out");
+  EXPECT_EQ(g.computes("right"), 0u);
+  g.pull<double>("right.out");
+  EXPECT_EQ(g.computes("root"), 1u);
+  EXPECT_EQ(g.computes("right"), 1u);
+}
+
+TEST(Evaluator, FoldsWhatDependsOnNothingThatVaries) {
+  TestGraph g(ToyRegistry());
+  g.add("add", "constant", {{"a", 2.0}, {"b", 3.0}});
+  g.add("add", "varies");
+  g.connect("constant.out", "varies.b");
+  g.vary("varies.a");
+  EXPECT_DOUBLE_EQ(g.pull<double>("varies.out"), 5);
+  EXPECT_EQ(g.plan->steps().size(), 1u);
+  ASSERT_EQ(g.plan->excluded().size(), 1u);
+  EXPECT_EQ(g.plan->excluded()[0].node_name, "constant");
+  // A plug that was not named as varying cannot be set
+  const Result<Index> varying = g.evaluator->FindVarying(g.graph, g.plug("constant.a"));
+  ASSERT_FALSE(varying.ok());
+  EXPECT_NE(varying.status().ToString().find("constant.a"), std::string::npos);
+}
+
+TEST(Evaluator, ChildrenOfVectorsAsSourcesAndDestinations) {
+  TestGraph g(ToyRegistry());
+  g.add("scale3", "s", {{"input", Double3{1, 2, 3}}, {"factor", 2.0}});
+  g.add("scale3", "t", {{"input", Double3{0, 0, 7}}});
+  g.connect("s.out.y", "t.input.x");
+  g.connect("s.outZ", "t.inputY");
+  g.vary("s.factor");
+  g.vary("t.input.z");
+  EXPECT_EQ(g.pull<Double3>("t.out"), (Double3{4, 6, 7}));
+  g.set("s.factor", 3.0);
+  g.set("t.input.z", 1.0);
+  EXPECT_EQ(g.pull<Double3>("t.out"), (Double3{6, 9, 1}));
+}
+
+TEST(Evaluator, SelectorThatFlipsAfterTenUnpulledFrames) {
+  TestGraph g(ToyRegistry());
+  g.add("add", "time");
+  g.add("add", "left");
+  g.add("add", "right", {{"b", 100.0}});
+  g.add("select", "s");
+  g.connect("time.out", "left.a");
+  g.connect("time.out", "right.a");
+  g.connect("left.out", "s.a");
+  g.connect("right.out", "s.b");
+  g.vary("time.a");
+  g.vary("s.which");
+  EXPECT_DOUBLE_EQ(g.pull<double>("s.out"), 0);
+  EXPECT_EQ(g.computes("right"), 0u);
+  for (int frame = 1; frame <= 10; ++frame) g.set("time.a", static_cast<double>(frame));
+  g.set("s.which", 1);
+  EXPECT_DOUBLE_EQ(g.pull<double>("s.out"), 110);
+  EXPECT_EQ(g.computes("left"), 1u);
+  EXPECT_EQ(g.computes("right"), 1u);
+  EXPECT_EQ(g.computes("time"), 2u);
+  g.set("s.which", 0);
+  EXPECT_DOUBLE_EQ(g.pull<double>("s.out"), 10);
+  EXPECT_EQ(g.computes("left"), 2u);
+  EXPECT_EQ(g.computes("right"), 1u);
+}
+
+TEST(Evaluator, TwoConsumersWithDifferentSubsetsAndALazyFullBranch) {
+  for (bool parallel : {false, true}) {
+    TestGraph g(ToyRegistry());
+    g.options.parallel = parallel;
+    g.add("source", "src", {{"count", 100}});
+    g.add("move", "m1");
+    g.add("smooth", "ring", {{"rings", 2}});
+    g.add("cached", "cache", {{"cues", std::vector<std::int64_t>{5, 50}}, {"threshold", 1000.0}});
+    g.add("measure", "probe");
+    g.connect("src.outPoints", "m1.points");
+    g.connect("m1.outPoints", "ring.points");
+    g.connect("ring.outPoints", "cache.cuePoints");
+    g.connect("ring.outPoints", "cache.full");
+    g.vary("m1.offset");
+    g.want("cache.outPoints");
+    g.want("m1.outPoints", PointSet::Of({7, 8}, 100));
+    g.pull_points("cache.outPoints");
+    EXPECT_FLOAT_EQ(g.pull_points("cache.outPoints")[0], 27.5f);
+    // Eager: the rings of 2 cues and the 2 points that are asked for; the full branch never ran
+    Index eager = 0, full = 0;
+    for (Index s = 0; s < g.plan->steps().size(); ++s) {
+      if (std::string(g.plan->step_name(s)) != "m1" || *g.plan->step_label(s) != 0) continue;
+      (g.plan->infos()[s].segment == 0 ? eager : full) = g.plan->infos()[s].points;
+    }
+    EXPECT_EQ(eager, 11u);  // 3..7 and 48..52, and 8
+    EXPECT_EQ(full, 100u);
+    EXPECT_EQ(g.computes("ring"), 1u);
+    g.set("m1.offset", 1000.0);
+    EXPECT_FLOAT_EQ(g.pull_points("cache.outPoints")[3 * 20], 1020.0f);
+    EXPECT_EQ(g.computes("ring"), 3u);  // 2 cues twice, and the full one
+    EXPECT_FLOAT_EQ(g.pull_points("m1.outPoints")[3], 1008.0f);
+  }
+}
+
+TEST(Evaluator, MidStageReaderUnderAnInPlaceChain) {
+  std::vector<float> expected;
+  for (bool parallel : {false, true}) {
+    TestGraph g(ToyRegistry());
+    g.options.parallel = parallel;
+    g.add("source", "src", {{"count", 64}});
+    for (const char* name : {"m1", "m2", "m3"}) g.add("move", name);
+    g.add("cached", "cue", {{"cues", std::vector<std::int64_t>{1, 2}}, {"threshold", 1e9}});
+    g.connect("src.outPoints", "m1.points");
+    g.connect("m1.outPoints", "m2.points");
+    g.connect("m2.outPoints", "m3.points");
+    g.connect("m1.outPoints", "cue.cuePoints");
+    g.connect("m3.outPoints", "cue.full");
+    for (const char* name : {"m1.offset", "m2.offset", "m3.offset", "src.step"}) g.vary(name);
+    g.want("m3.outPoints");
+    g.want("cue.outPoints");
+    g.set("m1.offset", 10.0);
+    g.set("m2.offset", 100.0);
+    EXPECT_FLOAT_EQ(g.pull_points("m3.outPoints")[3 * 4], 114.0f);
+    EXPECT_FLOAT_EQ(g.pull_points("cue.outPoints")[0], 11.5f);
+    g.set("m3.offset", 1000.0);  // late in the chain: it runs again from its last kept buffer
+    EXPECT_FLOAT_EQ(g.pull_points("m3.outPoints")[3 * 4], 1114.0f);
+    EXPECT_FLOAT_EQ(g.pull_points("cue.outPoints")[0], 11.5f);
+    EXPECT_EQ(g.computes("cue"), 1u);
+    EXPECT_EQ(g.computes("m1"), 2u);
+    g.set("src.step", 2.0);
+    const std::vector<float> points = g.pull_points("m3.outPoints");
+    EXPECT_FLOAT_EQ(points[3 * 4], 1118.0f);
+    EXPECT_FLOAT_EQ(g.pull_points("cue.outPoints")[0], 13.0f);
+    if (expected.empty()) expected = points;
+    EXPECT_EQ(points, expected);
+    // One buffer serves the whole chain
+    EXPECT_EQ(g.computes("m1", "gather"), 3u);
+  }
+}
+
+TEST(Evaluator, AFailureNamesItsNodeAndHealsWithItsInput) {
+  TestGraph g(ToyRegistry());
+  g.add("fail", "f");
+  g.add("add", "after");
+  g.add("add", "other");
+  g.connect("f.out", "after.a");
+  g.vary("f.input");
+  g.vary("other.a");
+  g.want("after.out");
+  g.want("other.out");
+  g.set("f.input", -1.0);
+  const Status status = g.try_pull("after.out");
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.kind(), ErrorKind::kEvaluation);
+  EXPECT_NE(status.ToString().find("\"f\""), std::string::npos);
+  EXPECT_TRUE(g.try_pull("other.out").ok());
+  EXPECT_FALSE(g.try_pull("after.out").ok());
+  g.set("f.input", 2.0);
+  EXPECT_DOUBLE_EQ(g.pull<double>("after.out"), 2);
+}
+
+TEST(Evaluator, EvaluatorsShareAWorkspace) {
+  TestGraph g(ToyRegistry());
+  g.add("source", "src", {{"count", 100}});
+  g.add("move", "m1");
+  g.add("smooth", "ring");
+  g.add("cached", "cache", {{"cues", std::vector<std::int64_t>{5}}, {"threshold", -1.0}});
+  g.connect("src.outPoints", "m1.points");
+  g.connect("m1.outPoints", "ring.points");
+  g.connect("ring.outPoints", "cache.cuePoints");
+  g.connect("ring.outPoints", "cache.full");
+  g.vary("m1.offset");
+  g.vary("cache.threshold");
+  g.want("cache.outPoints");
+  ASSERT_TRUE(g.compile().ok());
+  Workspace workspace(*g.plan);
+  EvaluatorOptions options;
+  options.workspace = &workspace;
+  Evaluator a(g.plan, options), b(g.plan, options);
+  for (int round = 0; round < 3; ++round) {
+    a.Set(0, 1.0 + round);
+    ASSERT_TRUE(a.Evaluate().ok());
+    b.Set(0, 2.0);
+    b.Set(1, -2.0 - round);
+    ASSERT_TRUE(b.Evaluate().ok());
+    a.Set(1, -5.0 - round);  // the full branch is stale only because b used the workspace
+    ASSERT_TRUE(a.Evaluate().ok());
+    EXPECT_FLOAT_EQ(a.Points(0).x[50], 51.0f + static_cast<float>(round));
+    EXPECT_FLOAT_EQ(b.Points(0).x[50], 52.0f);
+  }
+}
+
+}  // namespace
+}  // namespace kpsa

@@ -1,0 +1,152 @@
+#include "tests/support/toy_nodes.h"
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+
+namespace kpsa {
+namespace {
+
+struct SmoothKernel {
+  std::vector<std::vector<Index>> neighbours;  // positions in the input set
+};
+
+Result<BoundKernel> BindSmooth(const Binding& binding) {
+  const PointSet& out = binding.output("outPoints");
+  const PointSet& in = binding.input("points");
+  const int rings = binding.structural().get_int("rings");
+  auto kernel = std::make_shared<SmoothKernel>();
+  for (Index i = 0; i < out.size(); ++i) {
+    kernel->neighbours.emplace_back();
+    for (int d = -rings; d <= rings; ++d) {
+      const auto n = static_cast<int>(out.total());
+      const auto point = static_cast<Index>(((static_cast<int>(out[i]) + d) % n + n) % n);
+      kernel->neighbours.back().push_back(in.PositionsOf(PointSet::Of({point}, in.total()))[0]);
+    }
+  }
+  return BoundKernel{kernel, 0, 0};
+}
+
+void DemandSmooth(Demand& demand) {
+  const PointSet& out = demand.output("outPoints");
+  const int rings = demand.structural().get_int("rings");
+  std::vector<Index> needed;
+  for (Index i = 0; i < out.size(); ++i) {
+    for (int d = -rings; d <= rings; ++d) {
+      const auto n = static_cast<int>(out.total());
+      needed.push_back(static_cast<Index>(((static_cast<int>(out[i]) + d) % n + n) % n));
+    }
+  }
+  demand.Require("points", 0, PointSet::Of(needed, out.total()));
+}
+
+std::atomic<int> block_computes{0}, block_frames{0};
+
+void ComputeCached(ComputeContext& c) {
+  const PointsView& out = c.out_points(0);
+  const bool miss = c.chosen != 0;
+  const double mean = c.state_as<double>();
+  if (mean < c.get<double>(1)) return c.host->Fail("the cues are below the floor");
+  for (std::size_t i = 0; i < out.count; ++i) {
+    out.x[i] = miss ? c.points(3).x[i] : static_cast<float>(mean);
+    out.y[i] = out.z[i] = 0;
+  }
+}
+
+}  // namespace
+
+const NodeRegistry& ToyRegistry() {
+  static const NodeRegistry* registry = [] {
+    auto* toys = new NodeRegistry;
+    AddToyNodes(*toys);
+    return toys;
+  }();
+  return *registry;
+}
+
+BlockComputes TakeBlockComputes() { return {block_computes.exchange(0), block_frames.exchange(0)}; }
+
+void AddToyNodes(NodeRegistry& registry) {
+  registry.add("add", "Adds.").in("a", 0.0).in("b", 0.0).out("out", Type::kDouble).compute([](double a, double b) { return a + b; });
+  registry.add("scale3", "Scales a vector.").in("input", Double3()).in("factor", 1.0).out("out", Type::kDouble3)
+      .compute([](Double3 v, double f) { return v * f; });
+  registry.add("floor", "Rounds down.").in("input", 0.0).out("out", Type::kDouble).compute([](double v) { return std::floor(v); });
+  registry.add("sum", "Adds many.").in("input", 0.0).array().out("out", Type::kDouble).compute([](ArrayView<double> values) {
+    double sum = 0;
+    for (std::uint32_t i = 0; i < values.size(); ++i) sum += values[i];
+    return sum;
+  });
+  registry.add("select", "Takes one of two.").in("which", false).in("a", 0.0).lazy().in("b", 0.0).lazy().out("out", Type::kDouble)
+      .compute([](bool which, double a, double b) { return which ? b : a; })
+      .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 2 : 1; });
+  registry.add("fail", "Fails below zero.").in("input", 0.0).out("out", Type::kDouble).compute([](ComputeContext& c) {
+    if (c.get<double>(0) < 0) return c.host->Fail("input is below zero");
+    c.out_value<double>(0) = c.get<double>(0);
+  });
+  registry.add("source", "Points on a line.").structural("count", 10).in("step", 1.0).out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        const auto& set = c.kernel_as<PointSet>();
+        for (Index i = 0; i < set.size(); ++i) {
+          c.out_points(0).x[i] = static_cast<float>(set[i] * c.get<double>(0));
+          c.out_points(0).y[i] = c.out_points(0).z[i] = 0;
+        }
+      })
+      .bind([](const Binding& b) -> Result<BoundKernel> { return BoundKernel{std::make_shared<PointSet>(b.output("outPoints")), 0, 0}; })
+      .point_count([](const Structural& s, std::string_view, int) -> Result<Index> { return static_cast<Index>(s.get_int("count")); });
+  registry.add("move", "Moves points.").points_in("points").in("offset", 0.0).out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        const auto offset = static_cast<float>(c.get<double>(1));
+        for (std::size_t i = 0; i < c.points(0).count; ++i) {
+          c.out_points(0).x[i] = c.points(0).x[i] + offset;
+          c.out_points(0).y[i] = c.points(0).y[i];
+          c.out_points(0).z[i] = c.points(0).z[i];
+        }
+      })
+      .in_place("points").cost(20, 2);
+  registry.add("smooth", "Means over a ring.").structural("rings", 1).points_in("points").out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        const auto& kernel = c.kernel_as<SmoothKernel>();
+        for (std::size_t i = 0; i < kernel.neighbours.size(); ++i) {
+          float x = 0;
+          for (Index n : kernel.neighbours[i]) x += c.points(0).x[n];
+          c.out_points(0).x[i] = x / static_cast<float>(kernel.neighbours[i].size());
+          c.out_points(0).y[i] = c.out_points(0).z[i] = 0;
+        }
+      })
+      .demand(DemandSmooth).bind(BindSmooth).cost(20, 10);
+  registry.add("measure", "Sum of x.").points_in("points").out("out", Type::kDouble).compute([](ComputeContext& c) {
+    double sum = 0;
+    for (std::size_t i = 0; i < c.points(0).count; ++i) sum += c.points(0).x[i];
+    c.out_value<double>(0) = sum;
+  });
+  registry.add("cached", "A stand-in for a slow stack.")
+      .structural("cues", Type::kInts).in("threshold", 0.0).in("floor", -1e30).points_in("cuePoints").points_in("full").lazy()
+      .out("outPoints", Type::kPoints)
+      .compute(ComputeCached)
+      .decide([](ComputeContext& c) -> std::uint64_t {
+        double sum = 0;
+        for (std::size_t i = 0; i < c.points(2).count; ++i) sum += c.points(2).x[i];
+        c.state_as<double>() = sum / static_cast<double>(c.points(2).count);
+        return sum < c.get<double>(0) ? 0 : 1;
+      })
+      .block([](ComputeContext* contexts, std::size_t count) {
+        ++block_computes;
+        block_frames += static_cast<int>(count);
+        for (std::size_t i = 0; i < count; ++i) ComputeCached(contexts[i]);
+      })
+      .demand([](Demand& d) {
+        const auto& cues = d.structural().value("cues").get<std::vector<std::int64_t>>();
+        d.Require("cuePoints", 0, PointSet::Of({cues.begin(), cues.end()}, d.input_total("cuePoints")));
+        d.Require("full", 0, d.output("outPoints"));
+      })
+      .bind([](const Binding&) -> Result<BoundKernel> { return BoundKernel{nullptr, 0, sizeof(double)}; });
+  registry.add("trail", "Moves half of the way to its input, from where it was.").stateful().in("input", 0.0).out("out", Type::kDouble)
+      .compute([](ComputeContext& c) {
+        auto& at = c.state_as<double>();
+        at = (at + c.get<double>(0)) / 2;
+        c.out_value<double>(0) = at;
+      })
+      .bind([](const Binding&) -> Result<BoundKernel> { return BoundKernel{nullptr, 0, sizeof(double)}; });
+}
+
+}  // namespace kpsa
