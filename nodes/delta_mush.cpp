@@ -31,6 +31,20 @@ void DemandMush(Demand& demand) {
   demand.Require("inPoints", 0, PointSet::Of(DeltaMushDemand(*topology, Settings(s), out.ToVector(), WeightsAt(s, out)), out.total()));
 }
 
+// The pivot, for precision far from the origin: the middle of the rest shape, carried by parentMatrix. It does not
+// depend on the binding.
+struct MushBound {
+  DeltaMushKernel kernel;
+  CarriedFrame frame;
+  Double3 middle;
+};
+
+Double3 Middle(ConstPointsView rest) {
+  Double3 sum;
+  for (std::size_t i = 0; i < rest.count; ++i) sum = sum + Double3{rest.x[i], rest.y[i], rest.z[i]};
+  return rest.count == 0 ? sum : sum * (1.0 / static_cast<double>(rest.count));
+}
+
 Result<BoundKernel> BindMush(const Binding& binding) {
   const Structural& s = binding.structural();
   const DeltaMushSettings settings = Settings(s);
@@ -44,16 +58,19 @@ Result<BoundKernel> BindMush(const Binding& binding) {
   }
   Result<ConstPointsView> rest = RestPoints(s);
   if (!rest.ok()) return rest.status();
-  DeltaMushKernel kernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out));
-  const std::size_t scratch = kernel.ScratchFloats();
-  return MakeBound(std::move(kernel), scratch);
+  Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  MushBound bound{DeltaMushKernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out)), *frame, Middle(*rest)};
+  const std::size_t scratch = bound.kernel.ScratchFloats();
+  return MakeBound(std::move(bound), scratch);
 }
 
 void ComputeMush(ComputeContext& c) {
-  const auto& kernel = c.kernel_as<DeltaMushKernel>();
+  const auto& bound = c.kernel_as<MushBound>();
+  const Double3 pivot = TransformPoint(bound.frame.Motion(c.get<Matrix4>(kParentMatrix)), bound.middle);
   const Parallel parallel = HostParallel(c);
-  kernel.Run({c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput)}, c.points(kInPoints), c.out_points(0),
-             {c.scratch, kernel.ScratchFloats()}, &parallel);
+  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput), pivot}, c.points(kInPoints), c.out_points(0),
+                   {c.scratch, bound.kernel.ScratchFloats()}, &parallel);
 }
 
 }  // namespace

@@ -29,8 +29,10 @@ Matrix4 Local(const ComputeContext& c) {
   return ComposeLocal(offset, {translate, rotate, c.kernel_as<TransformKernel>().order, scale});
 }
 
-void ComputeMatrix(ComputeContext& c) { c.out_value<Matrix4>(0) = Local(c); }
-void ComputeWorld(ComputeContext& c) { c.out_value<Matrix4>(0) = c.get<Matrix4>(4) * Local(c); }
+void ComputeMatrices(ComputeContext& c) {
+  c.out_value<Matrix4>(0) = Local(c);
+  c.out_value<Matrix4>(1) = c.get<Matrix4>(4) * c.out_value<Matrix4>(0);
+}
 void ComputeWorldInverse(ComputeContext& c) { c.out_value<Matrix4>(0) = InverseOrIdentity(c.get<Matrix4>(4) * Local(c)); }
 
 void ComputePose(ComputeContext& c) {
@@ -73,8 +75,7 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip").unit(Unit::kLength)
       .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist").unit(Unit::kAngle)
       .out("twist", Type::kDouble, "angle about twistAxis").unit(Unit::kAngle);
-  b.compute_for({"matrix"}, local, &ComputeMatrix).bind(BindTransform).cost(60, 0);
-  b.compute_for({"worldMatrix"}, world, &ComputeWorld).bind(BindTransform).cost(90, 0);
+  b.compute_for({"matrix", "worldMatrix"}, world, &ComputeMatrices).bind(BindTransform).cost(90, 0);
   b.compute_for({"worldInverseMatrix"}, world, &ComputeWorldInverse).bind(BindTransform).cost(150, 0);
   b.compute_for({"poseRotate"}, local, &ComputePose).bind(BindTransform).cost(250, 0);
   b.compute_for({"poseRotateVector"}, local, &ComputePoseVector).bind(BindTransform).cost(200, 0);

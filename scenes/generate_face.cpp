@@ -88,40 +88,40 @@ GlbMesh EyesMesh() {
   return mesh;
 }
 
-// A short curve around `at`, for a handle to be put at: on the middle of the face a symmetric one.
-std::vector<int> Spot(const HeadShape& shape, Double3 at) {
-  std::vector<int> order(shape.points.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-  const auto distance = [&](int i) { return Length(shape.points[static_cast<std::size_t>(i)] - at); };
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return distance(a) < distance(b); });
-  if (at.x != 0) return {order[0], order[1], order[2]};
-  const auto mirrored = [&](int i) { return shape.mirror[static_cast<std::size_t>(i)]; };
-  const int middle = *std::find_if(order.begin(), order.end(), [&](int i) { return mirrored(i) == i; });
-  const int side = *std::find_if(order.begin(), order.end(), [&](int i) { return mirrored(i) != i; });
-  return {side, middle, mirrored(side)};
+// The point nearest to `at`; one on the middle of the face where `at` is.
+int Nearest(const HeadShape& shape, Double3 at) {
+  int best = 0;
+  double least = 1e30;
+  for (std::size_t i = 0; i < shape.points.size(); ++i) {
+    const double distance = Length(shape.points[i] - at);
+    if (distance >= least || (at.x == 0 && shape.points[i].x != 0)) continue;
+    least = distance;
+    best = static_cast<int>(i);
+  }
+  return best;
 }
 
 std::string CurvesYaml(const HeadShape& shape) {
-  const auto list = [](const std::vector<int>& points) { return fmt::format("[{}]", fmt::join(points, ", ")); };
   std::string out =
-      "# Written by generate_scenes: the vertices that face.yaml's wires run along and its handles sit at.\n"
+      "# Written by generate_scenes: the vertices that face.yaml's wires run along and its soft handles sit at.\n"
       "kpsa: 1\n"
       "nodes:\n";
-  out += fmt::format("  upperLip: {{type: curve, vertices: {}, parent: head}}\n", list(shape.upper_lip_curve));
-  out += fmt::format("  lowerLip: {{type: curve, vertices: {}, parent: jaw}}\n", list(shape.lower_lip_curve));
-  out += fmt::format("  browL: {{type: curve, vertices: {}, parent: head}}\n", list(shape.brow_curve_left));
-  out += fmt::format("  browR: {{type: curve, vertices: {}, parent: head}}\n", list(shape.brow_curve_right));
-  const auto spot = [&](const char* name, const std::vector<int>& points, const char* parent) {
-    out += fmt::format("  {}: {{type: curve, vertices: {}, parent: {}}}\n", name, list(points), parent);
+  const auto curve = [&](const char* name, const std::vector<int>& points, const char* parent) {
+    out += fmt::format("  {}: {{type: curve, mesh: face_mesh, vertices: [{}], parent: {}}}\n", name,
+                       fmt::join(points, ", "), parent);
   };
-  const std::vector<int> cheek = Spot(shape, {4.4, 14.6, 6.8});
-  std::vector<int> other_cheek;
-  for (int i : cheek) other_cheek.push_back(shape.mirror[static_cast<std::size_t>(i)]);
-  out += "  # places for handles\n";
-  spot("noseSpot", Spot(shape, {0, 14.8, 11.6}), "head");
-  spot("chinSpot", Spot(shape, {0, 8.9, 8.8}), "jaw");
-  spot("cheekSpotL", cheek, "head");
-  spot("cheekSpotR", other_cheek, "head");
+  curve("upperLip", shape.upper_lip_curve, "head");
+  curve("lowerLip", shape.lower_lip_curve, "jaw");
+  curve("browL", shape.brow_curve_left, "head");
+  curve("browR", shape.brow_curve_right, "head");
+  const auto handle = [&](const char* name, int point, const char* parent) {
+    out += fmt::format("  {}: {{type: transform, parent: {}, at: {{vertex: {}, mesh: face_mesh}}}}\n", name, parent, point);
+  };
+  const int cheek = Nearest(shape, {4.4, 14.6, 6.8});
+  handle("nose", Nearest(shape, {0, 14.8, 11.6}), "head");
+  handle("chin", Nearest(shape, {0, 8.9, 8.8}), "jaw");
+  handle("cheekL", cheek, "head");
+  handle("cheekR", shape.mirror[static_cast<std::size_t>(cheek)], "head");
   return out;
 }
 

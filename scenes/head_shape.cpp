@@ -569,7 +569,8 @@ void Builder::Compact() {
 void Builder::PickCurves() {
   const std::vector<int>& lips = shape_.mouth_rings[Size(shape_.border_ring + 1)];
   const int n = static_cast<int>(lips.size()), half = n / 2;
-  for (int k = 0; k <= half; k += 2) {
+  for (int k = 0; k <= half; ++k) {  // every other point: the corners, and the middle between them
+    if (k % 2 == 0 && k != 0 && k != half) continue;
     shape_.upper_lip_curve.push_back(lips[Size(k)]);
     shape_.lower_lip_curve.push_back(lips[Size((n - k) % n)]);
   }

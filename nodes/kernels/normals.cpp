@@ -13,8 +13,8 @@
 #ifndef KPSA_NODES_KERNELS_NORMALS_BLOCK_
 #define KPSA_NODES_KERNELS_NORMALS_BLOCK_
 namespace kpsa {
-// Points or triangles between two passes: the gathering stores of a block have left the store buffer before the
-// wider loads read them.
+// Points or triangles between two passes: the gathering stores of a block have left the store buffer before
+// the wider loads read them.
 inline constexpr std::size_t kNormalsBlock = 64;
 }  // namespace kpsa
 #endif
@@ -28,7 +28,8 @@ void PackPoints(ConstPointsView in, std::size_t begin, std::size_t end, float* x
 }
 
 // (b - a) x (c - a) of the triangles [begin, end), xyzw; begin a multiple of 16, writes whole vectors.
-void CrossTriangles(const Index* triangles, std::size_t begin, std::size_t end, const float* points, float* crosses) {
+void CrossTriangles(const Index* triangles, std::size_t begin, std::size_t end, const float* points,
+                    float* crosses) {
   const DLanes d;
   alignas(64) float corner[3][4 * kNormalsBlock] = {};
   for (std::size_t block = begin; block < end; block += kNormalsBlock) {
@@ -52,8 +53,8 @@ void CrossTriangles(const Index* triangles, std::size_t begin, std::size_t end, 
   }
 }
 
-void SumNormals(const std::uint8_t* lanes, const Index* offsets, const Index* around, std::size_t begin, std::size_t end, const float* crosses,
-                PointsView normals) {
+void SumNormals(const std::uint8_t* lanes, const Index* offsets, const Index* around, std::size_t begin,
+                std::size_t end, const float* crosses, PointsView normals) {
   const DLanes d;
   alignas(64) float sums[4 * kNormalsBlock] = {};
   for (std::size_t block = begin; block < end; block += kNormalsBlock) {
@@ -160,7 +161,8 @@ void NormalsKernel::Run(ConstPointsView in, PointsView normals, std::span<float>
     HWY_DYNAMIC_DISPATCH(CrossTriangles)(triangles_.data(), begin, end, points, crosses);
   });
   ForRanges(parallel, count_, 2048, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(SumNormals)(lanes_.data(), offsets_.data(), around_.data(), begin, end, crosses, normals);
+    HWY_DYNAMIC_DISPATCH(SumNormals)
+    (lanes_.data(), offsets_.data(), around_.data(), begin, end, crosses, normals);
   });
 }
 

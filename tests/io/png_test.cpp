@@ -57,8 +57,9 @@ TEST(Png, RefusesSizesThatDoNotFitThePixels) {
 
 TEST_F(PngFolder, IsWrittenWholeAndLeavesNothingBeside) {
   const std::string path = folder_ / "a.png";
-  ASSERT_TRUE(WritePng(path, 5, 4, Pattern(5, 4)).ok());
-  ASSERT_TRUE(WritePng(path, 3, 2, Pattern(3, 2)).ok());  // replaces
+  ASSERT_TRUE(WritePng(path, false, 5, 4, Pattern(5, 4)).ok());
+  EXPECT_FALSE(WritePng(path, false, 3, 2, Pattern(3, 2)).ok());
+  ASSERT_TRUE(WritePng(path, true, 3, 2, Pattern(3, 2)).ok());
   std::ifstream in(path, std::ios::binary);
   const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(in)), {});
   EXPECT_EQ(bytes, *EncodePng(3, 2, Pattern(3, 2)));
@@ -66,10 +67,10 @@ TEST_F(PngFolder, IsWrittenWholeAndLeavesNothingBeside) {
 }
 
 TEST_F(PngFolder, SaysWhereItCannotWrite) {
-  const Status status = WritePng(folder_ / "missing" / "a.png", 1, 1, Pattern(1, 1));
+  const Status status = WritePng(folder_ / "missing" / "a.png", true, 1, 1, Pattern(1, 1));
   EXPECT_FALSE(status.ok());
   EXPECT_NE(status.ToString().find("missing/a.png"), std::string::npos);
-  const Status onto_folder = WritePng(folder_, 1, 1, Pattern(1, 1));
+  const Status onto_folder = WritePng(folder_, true, 1, 1, Pattern(1, 1));
   EXPECT_FALSE(onto_folder.ok());
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }

@@ -37,7 +37,8 @@ bool Pinned(const Topology& topology, const DeltaMushSettings& settings, Index p
   return topology.neighbors().row(p).size() < 2 || (settings.pin_borders && topology.is_border(p));
 }
 
-Points SmoothTwin(const Topology& topology, const DeltaMushSettings& settings, const Points& rest, Points points) {
+Points SmoothTwin(const Topology& topology, const DeltaMushSettings& settings, const Points& rest,
+                  Points points) {
   for (int iteration = 0; iteration < settings.iterations; ++iteration) {
     Points next = points;
     for (Index p = 0; p < points.size(); ++p) {
@@ -48,7 +49,8 @@ Points SmoothTwin(const Topology& topology, const DeltaMushSettings& settings, c
       Double3 mean;
       for (Index q : ring) {
         const double by_length = 1 / Length(rest[q] - rest[p]) / inverse_lengths;
-        mean = mean + points[q] * ((1 - settings.distance_weight) / static_cast<double>(ring.size()) + settings.distance_weight * by_length);
+        mean = mean + points[q] * ((1 - settings.distance_weight) / static_cast<double>(ring.size()) +
+                                   settings.distance_weight * by_length);
       }
       next[p] = points[p] * (1 - settings.step) + mean * settings.step;
     }
@@ -68,8 +70,8 @@ Matrix4 Polar(Matrix4 m) {
   return m;
 }
 
-// How the ring around p turned from `rest` to `now`: the least-squares map of its plane, made a rotation. The plane is
-// found by inverse iteration, its normal being the direction of least spread.
+// How the ring around p turned from `rest` to `now`: the least-squares map of its plane, made a rotation. The
+// plane is found by inverse iteration, its normal being the direction of least spread.
 Matrix4 RingRotation(const Topology& topology, const Points& rest, const Points& now, Index p) {
   const auto ring = topology.neighbors().row(p);
   Matrix4 spread, map;
@@ -89,10 +91,12 @@ Matrix4 RingRotation(const Topology& topology, const Points& rest, const Points&
     normal = TransformVector(inverse, normal);
     normal = normal * (1 / Length(normal));
   }
-  // Fill the missing direction: spread along the normal is replaced, so that the map takes normal to new normal
+  // Fill the missing direction: spread along the normal is replaced, so that the map takes normal to new
+  // normal
   Matrix4 filled = spread;
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) filled(r, c) -= Dot(normal, TransformVector(spread, normal)) * normal[r] * normal[c];
+    for (int c = 0; c < 3; ++c)
+      filled(r, c) -= Dot(normal, TransformVector(spread, normal)) * normal[r] * normal[c];
   }
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) filled(r, c) += size * normal[r] * normal[c];
@@ -101,7 +105,8 @@ Matrix4 RingRotation(const Topology& topology, const Points& rest, const Points&
   const Matrix4 plane = map * InverseOrIdentity(filled);
   const Double3 u = Cross(normal, std::fabs(normal.x) < 0.7 ? Double3{1, 0, 0} : Double3{0, 1, 0});
   const Double3 v = Cross(normal, u);
-  const Double3 t = TransformVector(plane, u) * (1 / Length(u)), b = TransformVector(plane, v) * (1 / Length(v));
+  const Double3 t = TransformVector(plane, u) * (1 / Length(u)),
+                b = TransformVector(plane, v) * (1 / Length(v));
   const Double3 n = Cross(t, b) * (1 / Length(Cross(t, b)));
   const Double3 from[3] = {u * (1 / Length(u)), v * (1 / Length(v)), normal}, to[3] = {t, b, n};
   Matrix4 turn;
@@ -114,13 +119,15 @@ Matrix4 RingRotation(const Topology& topology, const Points& rest, const Points&
   return Polar(turn);
 }
 
-Points MushTwin(const Topology& topology, const DeltaMushSettings& settings, const Points& rest, const Points& points,
-                double envelope, double displacement) {
-  const Points rest_smooth = SmoothTwin(topology, settings, rest, rest), smooth = SmoothTwin(topology, settings, rest, points);
+Points MushTwin(const Topology& topology, const DeltaMushSettings& settings, const Points& rest,
+                const Points& points, double envelope, double displacement) {
+  const Points rest_smooth = SmoothTwin(topology, settings, rest, rest),
+               smooth = SmoothTwin(topology, settings, rest, points);
   Points result = points;
   for (Index p = 0; p < points.size(); ++p) {
     if (Pinned(topology, settings, p)) continue;
-    const Double3 detail = TransformVector(RingRotation(topology, rest_smooth, smooth, p), rest[p] - rest_smooth[p]);
+    const Double3 detail =
+        TransformVector(RingRotation(topology, rest_smooth, smooth, p), rest[p] - rest_smooth[p]);
     result[p] = points[p] * (1 - envelope) + (smooth[p] + detail * displacement) * envelope;
   }
   return result;
@@ -131,12 +138,14 @@ class DeltaMush : public testing::Test {
   DeltaMush() : mesh_(MakeSheet(23, 19)), all_(AllPoints(mesh_.count())), rest_(ToDouble(mesh_.rest.view())) {
     for (Double3 p : rest_) {  // bent about y, with a wave
       const double angle = 1.5 * p.x;
-      pose_.push_back({std::sin(angle) * (0.5 + p.z), p.y + 0.03 * std::sin(15 * p.x), std::cos(angle) * (0.5 + p.z)});
+      pose_.push_back(
+          {std::sin(angle) * (0.5 + p.z), p.y + 0.03 * std::sin(15 * p.x), std::cos(angle) * (0.5 + p.z)});
     }
     posed_ = ToFloat(pose_);
     pose_ = ToDouble(posed_.view());
   }
-  Points Run(const DeltaMushSettings& settings, ConstPointsView in, const DeltaMushKernel::Inputs& inputs = {}) const {
+  Points Run(const DeltaMushSettings& settings, ConstPointsView in,
+             const DeltaMushKernel::Inputs& inputs = {}) const {
     const DeltaMushKernel kernel(mesh_.topology, mesh_.rest.view(), settings, all_, all_);
     PointBuffer out(mesh_.count());
     AlignedFloats scratch(kernel.ScratchFloats());
@@ -151,17 +160,22 @@ class DeltaMush : public testing::Test {
 };
 
 TEST_F(DeltaMush, AgreesWithItsTwin) {
-  for (const DeltaMushSettings& settings : {DeltaMushSettings{1, 0.5, 0, false}, DeltaMushSettings{10, 0.5, 0, false},
-                                            DeltaMushSettings{6, 1, 0, true}, DeltaMushSettings{8, 0.3, 1, true},
-                                            DeltaMushSettings{5, 0.5, 0.5, false}}) {
-    // The rotation amplifies the rounding of a ring's edges (a hundredth of the mesh) by what is left of the detail
-    EXPECT_LT(MaxDistance(Run(settings, posed_.view(), {0.75, 0.9, {}}), MushTwin(mesh_.topology, settings, rest_, pose_, 0.75, 0.9)), 2e-6)
+  for (const DeltaMushSettings& settings :
+       {DeltaMushSettings{1, 0.5, 0, false}, DeltaMushSettings{10, 0.5, 0, false},
+        DeltaMushSettings{6, 1, 0, true}, DeltaMushSettings{8, 0.3, 1, true},
+        DeltaMushSettings{5, 0.5, 0.5, false}}) {
+    // The rotation amplifies the rounding of a ring's edges (a hundredth of the mesh) by what is left of the
+    // detail
+    EXPECT_LT(MaxDistance(Run(settings, posed_.view(), {0.75, 0.9, {}}),
+                          MushTwin(mesh_.topology, settings, rest_, pose_, 0.75, 0.9)),
+              2e-6)
         << settings.iterations << " " << settings.distance_weight;
   }
 }
 
 TEST_F(DeltaMush, TheRestShapeComesBack) {
-  for (int iterations : {1, 5, 40}) EXPECT_LT(MaxDistance(Run({iterations, 0.5, 0, false}, mesh_.rest.view()), rest_), 2e-7);
+  for (int iterations : {1, 5, 40})
+    EXPECT_LT(MaxDistance(Run({iterations, 0.5, 0, false}, mesh_.rest.view()), rest_), 2e-7);
 }
 
 TEST_F(DeltaMush, NothingToDoIsBitForBit) {
@@ -180,8 +194,8 @@ TEST_F(DeltaMush, CommutesWithRigidMotion) {
 }
 
 TEST_F(DeltaMush, KeepsTheShapeAThousandMetresAway) {
-  // The input is off by half the spacing of float there (3e-5 an axis), the output by as much again; the frames turn
-  // with the noise of the ring's edges. Without a pivot every iteration rounds once more.
+  // The input is off by half the spacing of float there (3e-5 an axis), the output by as much again; the
+  // frames turn with the noise of the ring's edges. Without a pivot every iteration rounds once more.
   Points moved, expected = Run({}, posed_.view());
   for (Double3 p : pose_) moved.push_back(p + Double3{1000, 1000, 1000});
   for (Double3& p : expected) p = p + Double3{1000, 1000, 1000};
@@ -208,7 +222,8 @@ TEST_F(DeltaMush, DegenerateRingsStayFinite) {
   const std::vector<Index> triangles = {0, 1, 2, 1, 2, 3, 4, 5, 6};
   const Result<Topology> topology = Topology::Build(8, triangles);
   ASSERT_TRUE(topology.ok());
-  const Points rest = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 2, 0}, {5, 5, 5}};
+  const Points rest = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0},
+                       {0, 1, 0}, {1, 1, 0}, {0, 2, 0}, {5, 5, 5}};
   const PointBuffer rest_points = ToFloat(rest);
   const std::vector<Index> all = AllPoints(8);
   const DeltaMushKernel kernel(*topology, rest_points.view(), {}, all, all);
@@ -218,7 +233,8 @@ TEST_F(DeltaMush, DegenerateRingsStayFinite) {
   EXPECT_LT(MaxDistance(ToDouble(out.view()), rest), 1e-6);
   const PointBuffer collapsed(8);
   kernel.Run({}, collapsed.view(), out.view(), scratch.span());
-  for (Double3 p : ToDouble(out.view())) EXPECT_TRUE(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
+  for (Double3 p : ToDouble(out.view()))
+    EXPECT_TRUE(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
 }
 
 TEST_F(DeltaMush, ASubsetCostsItsRings) {

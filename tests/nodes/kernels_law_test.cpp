@@ -1,5 +1,5 @@
-// The law of bound kernels, for all of them: the bits of a point depend neither on the set of points, nor on the
-// vector unit, nor on the split over threads, nor on working in place.
+// The law of bound kernels, for all of them: the bits of a point depend neither on the set of points, nor on
+// the vector unit, nor on the split over threads, nor on working in place.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,8 @@ namespace {
 
 const std::vector<std::string> kTargets = {"avx512", "avx2", "scalar"};
 
-// One kernel on a mesh, reduced to: the demand of a set of points, and their evaluation from the demanded points.
+// One kernel on a mesh, reduced to: the demand of a set of points, and their evaluation from the demanded
+// points.
 struct Subject {
   std::string name;
   bool local = true;
@@ -35,7 +36,8 @@ struct Subject {
 
 class KernelLaw : public testing::Test {
  protected:
-  explicit KernelLaw(Index nu = 45, Index nv = 41) : mesh_(MakeSheet(nu, nv)), skin_(MakeSkin(mesh_.count(), 30, 6, true)), points_(mesh_.count()) {
+  explicit KernelLaw(Index nu = 45, Index nv = 41)
+      : mesh_(MakeSheet(nu, nv)), skin_(MakeSkin(mesh_.count(), 30, 6, true)), points_(mesh_.count()) {
     // A pose that is not the rest; zeros of both signs in all places where a mirror plane would have them
     Random random(11);
     CopyPoints(mesh_.rest.view(), points_.view());
@@ -57,42 +59,53 @@ class KernelLaw : public testing::Test {
   ~KernelLaw() override { SelectSimdTarget(""); }
 
   std::size_t count() const { return mesh_.count(); }
-  std::vector<float> Masked(std::span<const Index> out_points) const { return GatherWeights(mask_, out_points); }
+  std::vector<float> Masked(std::span<const Index> out_points) const {
+    return GatherWeights(mask_, out_points);
+  }
 
   void AddSubjects() {
     for (bool masked : {false, true}) {
-      subjects_.push_back({masked ? "skin with weights" : "skin", true, {},
-                           [this, masked](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
-                             const SkinKernel kernel({skin_.offsets, skin_.joints, skin_.weights, 30}, out_points,
-                                                     masked ? Masked(out_points) : std::vector<float>());
-                             AlignedFloats scratch(kernel.ScratchFloats());
-                             const Matrix4 base = masked ? Translation({0.1, 0.2, 0.3}) : Matrix4();
-                             kernel.Run({palette_, masked ? 0.75 : 1.0, base}, in, out, scratch.span(), parallel);
-                           }});
-      subjects_.push_back({masked ? "blendShape with weights" : "blendShape", true, {},
-                           [this, masked](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
-                             const BlendShapeKernel kernel({count(), target_views_}, out_points,
-                                                           masked ? Masked(out_points) : std::vector<float>());
-                             AlignedFloats scratch(kernel.ScratchFloats());
-                             kernel.Run({target_weights_, 0.9}, in, out, scratch.span(), parallel);
-                           }});
-      subjects_.push_back({masked ? "deltaMush with weights" : "deltaMush", false,
-                           [this, masked](auto out_points) {
-                             return DeltaMushDemand(mesh_.topology, Mush(masked), out_points,
-                                                    masked ? Masked(out_points) : std::vector<float>());
-                           },
-                           [this, masked](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
-                             const DeltaMushKernel kernel(mesh_.topology, mesh_.rest.view(), Mush(masked), out_points,
-                                                          in_points, masked ? Masked(out_points) : std::vector<float>());
-                             AlignedFloats scratch(kernel.ScratchFloats());
-                             kernel.Run({masked ? 0.6 : 1.0, masked ? 0.8 : 1.0, {0.1, masked ? 1.0 : 0.0, 0}}, in, out, scratch.span(), parallel);
-                           }});
+      subjects_.push_back(
+          {masked ? "skin with weights" : "skin",
+           true,
+           {},
+           [this, masked](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             const SkinKernel kernel({skin_.offsets, skin_.joints, skin_.weights, 30}, out_points,
+                                     masked ? Masked(out_points) : std::vector<float>());
+             AlignedFloats scratch(kernel.ScratchFloats());
+             const Matrix4 base = masked ? Translation({0.1, 0.2, 0.3}) : Matrix4();
+             kernel.Run({palette_, masked ? 0.75 : 1.0, base}, in, out, scratch.span(), parallel);
+           }});
+      subjects_.push_back(
+          {masked ? "blendShape with weights" : "blendShape",
+           true,
+           {},
+           [this, masked](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             const BlendShapeKernel kernel({count(), target_views_}, out_points,
+                                           masked ? Masked(out_points) : std::vector<float>());
+             AlignedFloats scratch(kernel.ScratchFloats());
+             kernel.Run({target_weights_, 0.9}, in, out, scratch.span(), parallel);
+           }});
+      subjects_.push_back(
+          {masked ? "deltaMush with weights" : "deltaMush", false,
+           [this, masked](auto out_points) {
+             return DeltaMushDemand(mesh_.topology, Mush(masked), out_points,
+                                    masked ? Masked(out_points) : std::vector<float>());
+           },
+           [this, masked](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
+             const DeltaMushKernel kernel(mesh_.topology, mesh_.rest.view(), Mush(masked), out_points,
+                                          in_points, masked ? Masked(out_points) : std::vector<float>());
+             AlignedFloats scratch(kernel.ScratchFloats());
+             kernel.Run({masked ? 0.6 : 1.0, masked ? 0.8 : 1.0, {0.1, masked ? 1.0 : 0.0, 0}}, in, out,
+                        scratch.span(), parallel);
+           }});
     }
-    subjects_.push_back({"cluster", true, {}, [this](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
-                           const ClusterKernel kernel(out_points, Masked(out_points));
-                           kernel.Run({ComposeTrs({0.1, 0, 0.2}, Random(3).Rotation(), {1, 2, 1}), {0.1, 0.1, 0}, 0.5}, in,
-                                      out, {}, parallel);
-                         }});
+    subjects_.push_back(
+        {"cluster", true, {}, [this](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+           const ClusterKernel kernel(out_points, Masked(out_points));
+           kernel.Run({ComposeTrs({0.1, 0, 0.2}, Random(3).Rotation(), {1, 2, 1}), {0.1, 0.1, 0}, 0.5}, in,
+                      out, {}, parallel);
+         }});
     const struct {
       const char* name;
       LatticeSettings settings;
@@ -104,35 +117,40 @@ class KernelLaw : public testing::Test {
         {"lattice, outside", {{5, 5, 5}, true, {2, 2, 2}, LatticeOutside::kAll}, false},
     };
     for (const auto& c : lattices) {
-      subjects_.push_back({c.name, true, {}, [this, c](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
-                             const Matrix4 base = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
-                             const LatticeKernel kernel(c.settings, mesh_.rest.view(), InverseOrIdentity(base), out_points,
-                                                        Masked(out_points));
-                             Random random(9);
-                             std::vector<Double3> offsets(kernel.control_count());
-                             for (Double3& o : offsets) o = random.Vector() * 0.2;
-                             AlignedFloats scratch(kernel.ScratchFloats());
-                             const Matrix4 now = c.moved ? base * Translation({0.1, 0.2, 0}) : base;
-                             kernel.Run({offsets, base, now, 0.8}, in, out, scratch.span(), parallel);
-                           }});
+      subjects_.push_back(
+          {c.name, true, {}, [this, c](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             const Matrix4 base = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
+             const LatticeKernel kernel(c.settings, mesh_.rest.view(), InverseOrIdentity(base), out_points,
+                                        Masked(out_points));
+             Random random(9);
+             std::vector<Double3> offsets(kernel.control_count());
+             for (Double3& o : offsets) o = random.Vector() * 0.2;
+             AlignedFloats scratch(kernel.ScratchFloats());
+             const Matrix4 now = c.moved ? base * Translation({0.1, 0.2, 0}) : base;
+             kernel.Run({offsets, base, now, 0.8}, in, out, scratch.span(), parallel);
+           }});
     }
     for (CurveBasis basis : {CurveBasis::kLinear, CurveBasis::kCatmullRom, CurveBasis::kBSpline}) {
-      subjects_.push_back({"wire " + std::to_string(static_cast<int>(basis)), true, {},
+      subjects_.push_back({"wire " + std::to_string(static_cast<int>(basis)),
+                           true,
+                           {},
                            [this, basis](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
                              WireSettings settings;
                              settings.basis = basis;
                              settings.dropoff = 0.3;
-                             const WireKernel kernel(settings, vertices_, mesh_.rest.view(), out_points, Masked(out_points));
+                             const WireKernel kernel(settings, vertices_, mesh_.rest.view(), out_points,
+                                                     Masked(out_points));
                              AlignedFloats scratch(kernel.ScratchFloats());
                              kernel.Run({vertex_offsets_, 0.9}, in, out, scratch.span(), parallel);
                            }});
     }
-    subjects_.push_back({"normals", false, [this](auto out_points) { return NormalsDemand(mesh_.topology, out_points); },
-                         [this](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
-                           const NormalsKernel kernel(mesh_.topology, out_points, in_points);
-                           AlignedFloats scratch(kernel.ScratchFloats());
-                           kernel.Run(in, out, scratch.span(), parallel);
-                         }});
+    subjects_.push_back(
+        {"normals", false, [this](auto out_points) { return NormalsDemand(mesh_.topology, out_points); },
+         [this](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
+           const NormalsKernel kernel(mesh_.topology, out_points, in_points);
+           AlignedFloats scratch(kernel.ScratchFloats());
+           kernel.Run(in, out, scratch.span(), parallel);
+         }});
   }
 
   static DeltaMushSettings Mush(bool other) {
@@ -144,7 +162,8 @@ class KernelLaw : public testing::Test {
   }
 
   std::vector<Index> Demand(const Subject& subject, std::span<const Index> out_points) const {
-    return subject.local ? std::vector<Index>(out_points.begin(), out_points.end()) : subject.demand(out_points);
+    return subject.local ? std::vector<Index>(out_points.begin(), out_points.end())
+                         : subject.demand(out_points);
   }
   // x y z x y z ... of the output points.
   std::vector<float> Evaluate(const Subject& subject, std::span<const Index> out_points,
@@ -169,9 +188,11 @@ class KernelLaw : public testing::Test {
 };
 
 // The number of points whose bits differ.
-std::size_t Differences(const std::vector<float>& whole, std::span<const Index> points, const std::vector<float>& part) {
+std::size_t Differences(const std::vector<float>& whole, std::span<const Index> points,
+                        const std::vector<float>& part) {
   std::size_t count = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) count += std::memcmp(&whole[3 * points[i]], &part[3 * i], 12) != 0;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    count += std::memcmp(&whole[3 * points[i]], &part[3 * i], 12) != 0;
   return count;
 }
 
@@ -213,12 +234,14 @@ TEST_F(KernelLaw, SubsetsHaveTheBitsOfTheWhole) {
     for (std::size_t size = 1; size <= 65; ++size) {
       SelectSimdTarget(kTargets[size % 2]);
       const std::vector<Index> points = RandomSubset(&random, count(), size);
-      ASSERT_EQ(Differences(whole, points, Evaluate(subject, points)), 0u) << subject.name << ", " << size << " points";
+      ASSERT_EQ(Differences(whole, points, Evaluate(subject, points)), 0u)
+          << subject.name << ", " << size << " points";
     }
     SelectSimdTarget("scalar");
     for (std::size_t size : {5ul, 19ul, 300ul}) {
       const std::vector<Index> points = RandomSubset(&random, count(), size);
-      ASSERT_EQ(Differences(whole, points, Evaluate(subject, points)), 0u) << subject.name << ", " << size << " points";
+      ASSERT_EQ(Differences(whole, points, Evaluate(subject, points)), 0u)
+          << subject.name << ", " << size << " points";
     }
   }
 }
@@ -234,13 +257,15 @@ TEST_F(KernelLawLarge, SplittingOverThreadsKeepsTheBits) {
   int splits = 0;
   const Parallel backwards{[](void* self, std::size_t size, std::size_t grain, RangeBody body) {
                              ++*static_cast<int*>(self);
-                             for (std::size_t end = (size + grain - 1) / grain * grain; end > 0; end -= grain) {
+                             for (std::size_t end = (size + grain - 1) / grain * grain; end > 0;
+                                  end -= grain) {
                                body(end - grain, std::min(end, size));
                              }
                            },
                            &splits};
-  const Parallel threads{[](void*, std::size_t size, std::size_t grain, RangeBody body) { ParallelFor(size, grain, body); },
-                         nullptr};
+  const Parallel threads{
+      [](void*, std::size_t size, std::size_t grain, RangeBody body) { ParallelFor(size, grain, body); },
+      nullptr};
   const std::vector<Index> all = AllPoints(count());
   for (const Subject& subject : subjects_) {
     const std::vector<float> serial = Evaluate(subject, all);
@@ -274,7 +299,8 @@ TEST_F(KernelLaw, TheDemandSuffices) {
       PointBuffer in(count()), out(size);
       std::fill_n(in.view().x, 3 * PaddedCount(count()), std::numeric_limits<float>::quiet_NaN());
       for (Index p : demand) {
-        in.view().x[p] = points_.view().x[p], in.view().y[p] = points_.view().y[p], in.view().z[p] = points_.view().z[p];
+        in.view().x[p] = points_.view().x[p], in.view().y[p] = points_.view().y[p],
+        in.view().z[p] = points_.view().z[p];
       }
       subject.run(points, all, in.view(), out.view(), nullptr);
       EXPECT_EQ(Differences(whole, points, out.Interleaved()), 0u) << subject.name;

@@ -41,9 +41,11 @@ PointBuffer Evaluate(const Kernel& kernel, const typename Kernel::Inputs& inputs
 
 class LocalKernels : public testing::Test {
  protected:
-  LocalKernels() : mesh_(MakeSheet(37, 31)), all_(AllPoints(mesh_.count())), rest_(ToDouble(mesh_.rest.view())) {
+  LocalKernels()
+      : mesh_(MakeSheet(37, 31)), all_(AllPoints(mesh_.count())), rest_(ToDouble(mesh_.rest.view())) {
     Random random(31);
-    for (std::size_t i = 0; i < mesh_.count(); ++i) mask_.push_back(i % 4 == 0 ? 0.0f : static_cast<float>(random.Unit()));
+    for (std::size_t i = 0; i < mesh_.count(); ++i)
+      mask_.push_back(i % 4 == 0 ? 0.0f : static_cast<float>(random.Unit()));
   }
   ConstPointsView in() const { return mesh_.rest.view(); }
 
@@ -53,10 +55,11 @@ class LocalKernels : public testing::Test {
   std::vector<float> mask_;
 };
 
-// ---------------------------------------------------------------------------------------------------- skinCluster
+// ----------------------------------------------------------------------------------------------------
+// skinCluster
 
-std::vector<Double3> SkinTwin(const TestSkin& skin, const std::vector<Matrix4>& palette, const std::vector<Double3>& points,
-                              bool normalize) {
+std::vector<Double3> SkinTwin(const TestSkin& skin, const std::vector<Matrix4>& palette,
+                              const std::vector<Double3>& points, bool normalize) {
   std::vector<Double3> result;
   for (std::size_t p = 0; p < points.size(); ++p) {
     Double3 sum;
@@ -75,7 +78,8 @@ TEST_F(LocalKernels, SkinAgreesWithItsTwin) {
     const TestSkin skin = MakeSkin(mesh_.count(), 25, influences, influences == 12);
     const std::vector<Matrix4> palette = MakePalette(25, {0, 1, 0});
     const SkinKernel kernel({skin.offsets, skin.joints, skin.weights, 25}, all_);
-    EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {palette, 1, {}}, in()).view()), SkinTwin(skin, palette, rest_, false)),
+    EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {palette, 1, {}}, in()).view()),
+                          SkinTwin(skin, palette, rest_, false)),
               1e-6)
         << influences;
   }
@@ -95,7 +99,8 @@ TEST_F(LocalKernels, SkinKeepsTheShapeAThousandMetresAway) {
 
 TEST_F(LocalKernels, SkinLeavesWhatTheEnvelopeLeaves) {
   TestSkin skin = MakeSkin(mesh_.count(), 25, 3, false);
-  for (std::size_t e = 0; e < 60; ++e) skin.weights[e] *= e < 30 ? 0.0f : 0.5f;  // 10 points of none, 10 of a half
+  for (std::size_t e = 0; e < 60; ++e)
+    skin.weights[e] *= e < 30 ? 0.0f : 0.5f;  // 10 points of none, 10 of a half
   const std::vector<Matrix4> palette = MakePalette(25, {0, 1, 0});
   const Matrix4 world_from_mesh = ComposeTrs({1, 2, 3}, Random(1).Rotation(), {1, 1, 1});
   const SkinKernel kernel({skin.offsets, skin.joints, skin.weights, 25}, all_, mask_);
@@ -105,7 +110,8 @@ TEST_F(LocalKernels, SkinLeavesWhatTheEnvelopeLeaves) {
     const Double3 base = TransformPoint(world_from_mesh, rest_[i]);
     expected.push_back(i < 10 ? base : base + (skinned[i] - base) * (0.5 * mask_[i]));
   }
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {palette, 0.5, world_from_mesh}, in()).view()), expected), 2e-6);
+  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {palette, 0.5, world_from_mesh}, in()).view()), expected),
+            2e-6);
   const PointBuffer in_mesh_space = Evaluate(kernel, {palette, 0.5, {}}, in());
   for (std::size_t i = 0; i < rest_.size(); ++i) {
     EXPECT_EQ(SameBits(in_mesh_space.view(), in(), i), i < 10 || mask_[i] == 0) << i;
@@ -122,7 +128,8 @@ TEST_F(LocalKernels, SkinReadsTheJointsItNames) {
   }
   PointBuffer points(2);
   GatherPoints(in(), few, points.view());
-  const PointBuffer a = Evaluate(kernel, {palette, 1, {}}, points.view()), b = Evaluate(kernel, {poisoned, 1, {}}, points.view());
+  const PointBuffer a = Evaluate(kernel, {palette, 1, {}}, points.view()),
+                    b = Evaluate(kernel, {poisoned, 1, {}}, points.view());
   EXPECT_TRUE(SameBits(a.view(), b.view(), 0) && SameBits(a.view(), b.view(), 1));
   EXPECT_LE(kernel.joints().size(), 6u);
 }
@@ -140,7 +147,8 @@ TEST(SkinWeights, BadOnesAreNamed) {
   EXPECT_FALSE((SkinWeights{std::vector<Index>{1, 1, 2}, joints, weights, 2}.Validate().ok()));
 }
 
-// ----------------------------------------------------------------------------------------------------- blendShape
+// -----------------------------------------------------------------------------------------------------
+// blendShape
 
 TEST_F(LocalKernels, BlendShapeAgreesWithItsTwin) {
   const std::vector<TestTarget> targets = MakeTargets(mesh_.count(), 20, 0.25);
@@ -191,7 +199,8 @@ TEST(BlendShapeTargets, BadOnesAreNamed) {
   EXPECT_FALSE(ok(4, {points, nan}));
 }
 
-// -------------------------------------------------------------------------------------------- cluster and softMod
+// -------------------------------------------------------------------------------------------- cluster and
+// softMod
 
 TEST_F(LocalKernels, ClusterAgreesWithItsTwin) {
   const Matrix4 delta = ComposeTrs({0.1, 0.2, 0.3}, Random(2).Rotation(), {1, 2, 0.5});
@@ -208,7 +217,8 @@ TEST_F(LocalKernels, ClusterAgreesWithItsTwin) {
 TEST_F(LocalKernels, ClusterIsPreciseFarAway) {
   // A turn about a place 1,000 m from the origin, of points there
   const Double3 place{1000, 500, -700};
-  const Matrix4 delta = Translation(place) * ComposeTrs({}, Random(3).Rotation(), {1, 1, 1}) * Translation(place * -1);
+  const Matrix4 delta =
+      Translation(place) * ComposeTrs({}, Random(3).Rotation(), {1, 1, 1}) * Translation(place * -1);
   PointBuffer far(mesh_.count());
   for (std::size_t i = 0; i < mesh_.count(); ++i) {
     far.view().x[i] = static_cast<float>(rest_[i].x + place.x);
@@ -217,13 +227,15 @@ TEST_F(LocalKernels, ClusterIsPreciseFarAway) {
   }
   std::vector<Double3> expected;
   for (Double3 p : ToDouble(far.view())) expected.push_back(TransformPoint(delta, p));
-  const std::vector<Double3> turned = ToDouble(Evaluate(ClusterKernel(all_), {delta, place, 1}, far.view()).view());
+  const std::vector<Double3> turned =
+      ToDouble(Evaluate(ClusterKernel(all_), {delta, place, 1}, far.view()).view());
   for (std::size_t i = 0; i < turned.size(); ++i) {
     for (int a = 0; a < 3; ++a) ASSERT_NEAR(turned[i][a], expected[i][a], 3.2e-5);
   }
 }
 
-// -------------------------------------------------------------------------------------------------------- lattice
+// --------------------------------------------------------------------------------------------------------
+// lattice
 
 // The textbook definitions: binomials, and the recursion of Cox and de Boor over an explicit knot vector.
 double BernsteinTwin(int n, int i, double x) {
@@ -238,14 +250,17 @@ double SplineTwin(const std::vector<double>& knots, std::size_t i, int order, do
   }
   const std::size_t k = static_cast<std::size_t>(order);
   double value = 0;
-  if (knots[i + k - 1] > knots[i]) value += (x - knots[i]) / (knots[i + k - 1] - knots[i]) * SplineTwin(knots, i, order - 1, x);
-  if (knots[i + k] > knots[i + 1]) value += (knots[i + k] - x) / (knots[i + k] - knots[i + 1]) * SplineTwin(knots, i + 1, order - 1, x);
+  if (knots[i + k - 1] > knots[i])
+    value += (x - knots[i]) / (knots[i + k - 1] - knots[i]) * SplineTwin(knots, i, order - 1, x);
+  if (knots[i + k] > knots[i + 1])
+    value += (knots[i + k] - x) / (knots[i + k] - knots[i + 1]) * SplineTwin(knots, i + 1, order - 1, x);
   return value;
 }
 double BasisTwin(int divisions, int order, int i, double x) {
   if (order == 0) return BernsteinTwin(divisions - 1, i, x);
   std::vector<double> knots(static_cast<std::size_t>(order - 1), 0.0);
-  for (int k = 0; k <= divisions - order + 1; ++k) knots.push_back(static_cast<double>(k) / (divisions - order + 1));
+  for (int k = 0; k <= divisions - order + 1; ++k)
+    knots.push_back(static_cast<double>(k) / (divisions - order + 1));
   knots.insert(knots.end(), static_cast<std::size_t>(order - 1), 1.0);
   return SplineTwin(knots, static_cast<std::size_t>(i), order, x);
 }
@@ -259,7 +274,8 @@ TEST(Lattice, TheBasisIsTheTextbooks) {
         const std::vector<double> w = LatticeBasis(divisions, order, x);
         double sum = 0;
         for (int i = 0; i < divisions; ++i) {
-          EXPECT_NEAR(w[static_cast<std::size_t>(i)], BasisTwin(divisions, order, i, x), 1e-12) << divisions << " " << order << " " << x;
+          EXPECT_NEAR(w[static_cast<std::size_t>(i)], BasisTwin(divisions, order, i, x), 1e-12)
+              << divisions << " " << order << " " << x;
           sum += w[static_cast<std::size_t>(i)];
         }
         EXPECT_NEAR(sum, 1, 1e-13);
@@ -268,8 +284,9 @@ TEST(Lattice, TheBasisIsTheTextbooks) {
   }
 }
 
-std::vector<Double3> LatticeTwin(const LatticeSettings& settings, const Matrix4& lattice_from_rest, const LatticeKernel::Inputs& inputs,
-                                 const std::vector<Double3>& rest, const std::vector<Double3>& points, std::span<const float> mask) {
+std::vector<Double3> LatticeTwin(const LatticeSettings& settings, const Matrix4& lattice_from_rest,
+                                 const LatticeKernel::Inputs& inputs, const std::vector<Double3>& rest,
+                                 const std::vector<Double3>& points, std::span<const float> mask) {
   std::vector<Double3> result;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Double3 bound = TransformPoint(lattice_from_rest, rest[i]) + Double3{.5, .5, .5};
@@ -278,10 +295,13 @@ std::vector<Double3> LatticeTwin(const LatticeSettings& settings, const Matrix4&
     const double distance = Length(bound - inside);
     double weight = inputs.envelope * (mask.empty() ? 1.0f : mask[i]);
     if (settings.outside == LatticeOutside::kInside && distance > 1e-6) weight = 0;
-    if (settings.outside == LatticeOutside::kFalloff) weight *= std::max(0.0, 1 - distance / settings.falloff_distance);
+    if (settings.outside == LatticeOutside::kFalloff)
+      weight *= std::max(0.0, 1 - distance / settings.falloff_distance);
     Double3 q = TransformPoint(InverseOrIdentity(inputs.base_matrix), points[i]);
     std::size_t control = 0;
-    const auto order = [&](std::size_t a) { return settings.local ? std::min(settings.influence[a], settings.divisions[a]) : 0; };
+    const auto order = [&](std::size_t a) {
+      return settings.local ? std::min(settings.influence[a], settings.divisions[a]) : 0;
+    };
     for (int u = 0; u < settings.divisions[2]; ++u) {
       for (int t = 0; t < settings.divisions[1]; ++t) {
         for (int s = 0; s < settings.divisions[0]; ++s, ++control) {
@@ -330,7 +350,8 @@ TEST_F(LocalKernels, ALatticeThatMovesAsAWholeMovesItsPoints) {
   const Matrix4 base = Scaling({2, 2, 2});
   const LatticeSettings settings{{3, 4, 5}, true, {3, 2, 2}};
   const LatticeKernel kernel(settings, in(), InverseOrIdentity(base), all_);
-  const std::vector<Double3> still(kernel.control_count()), shifted(kernel.control_count(), Double3{0.25, 0.5, -0.125});
+  const std::vector<Double3> still(kernel.control_count()),
+      shifted(kernel.control_count(), Double3{0.25, 0.5, -0.125});
   // At rest: bit for bit
   const PointBuffer rest = Evaluate(kernel, {still, base, base, 1}, in());
   for (std::size_t i = 0; i < rest_.size(); ++i) ASSERT_TRUE(SameBits(rest.view(), in(), i));
@@ -341,13 +362,15 @@ TEST_F(LocalKernels, ALatticeThatMovesAsAWholeMovesItsPoints) {
   // The lattice itself turned
   const Matrix4 turn = ComposeTrs({1, 0, 0}, Random(4).Rotation(), {1, 1, 1});
   for (std::size_t i = 0; i < rest_.size(); ++i) expected[i] = TransformPoint(turn, rest_[i]);
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {still, base, turn * base, 1}, in()).view()), expected), 3e-7);
+  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {still, base, turn * base, 1}, in()).view()), expected),
+            3e-7);
 }
 
 TEST_F(LocalKernels, ASmallestLatticeShears) {
   const LatticeKernel kernel({{2, 2, 2}}, in(), Scaling({0.5, 0.5, 0.5}), all_);
   std::vector<Double3> offsets(8);
-  for (std::size_t c = 0; c < 8; ++c) offsets[c].x = (c & 2) != 0 ? 0.25 : 0;  // the upper half goes to the side
+  for (std::size_t c = 0; c < 8; ++c)
+    offsets[c].x = (c & 2) != 0 ? 0.25 : 0;  // the upper half goes to the side
   const Matrix4 base = Scaling({2, 2, 2});
   std::vector<Double3> expected;
   for (Double3 p : rest_) expected.push_back({p.x + 0.5 * (p.y / 2 + 0.5), p.y, p.z});
@@ -369,7 +392,10 @@ TEST_F(LocalKernels, ALatticeTurnedByItsParentTurnsItsResult) {
   }
   std::vector<Double3> expected = ToDouble(Evaluate(kernel, {offsets, base, base, 1}, in()).view());
   for (Double3& p : expected) p = TransformPoint(parent, p);
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {offsets, parent * base, parent * base, 1}, carried.view()).view()), expected), 1e-6);
+  EXPECT_LT(MaxDistance(
+                ToDouble(Evaluate(kernel, {offsets, parent * base, parent * base, 1}, carried.view()).view()),
+                expected),
+            1e-6);
 }
 
 TEST_F(LocalKernels, PointsOutsideOfALatticeStay) {
@@ -400,7 +426,8 @@ TEST(Lattice, BadSettingsAreNamed) {
   EXPECT_FALSE((LatticeSettings{{2, 5, 5}, true, {2, 2, 2}, LatticeOutside::kFalloff, NAN}.Validate().ok()));
 }
 
-// ----------------------------------------------------------------------------------------------------------- wire
+// -----------------------------------------------------------------------------------------------------------
+// wire
 
 std::vector<Double3> Curve(std::size_t n) {
   std::vector<Double3> vertices;
@@ -429,9 +456,12 @@ TEST(Curve, WeightsSumToOneAndCurvesAreContinuous) {
           EXPECT_LT(Length(p - last), 0.02);
           last = p;
         }
-        EXPECT_LT(Length(shape.Point(vertices, closed ? static_cast<double>(n) : 0) - shape.Point(vertices, 0)), 1e-12);
+        EXPECT_LT(
+            Length(shape.Point(vertices, closed ? static_cast<double>(n) : 0) - shape.Point(vertices, 0)),
+            1e-12);
         if (basis == CurveBasis::kBSpline) continue;
-        for (std::size_t i = 0; i < n; ++i) EXPECT_LT(Length(shape.Point(vertices, static_cast<double>(i)) - vertices[i]), 1e-12);
+        for (std::size_t i = 0; i < n; ++i)
+          EXPECT_LT(Length(shape.Point(vertices, static_cast<double>(i)) - vertices[i]), 1e-12);
       }
     }
   }
@@ -500,7 +530,10 @@ TEST_F(LocalKernels, AWireThatMovesAsAWholeMovesThePointsOnIt) {
   settings.dropoff = 10;
   std::vector<Double3> expected;
   for (Double3 p : rest_) expected.push_back(p + offsets[0]);
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(WireKernel(settings, vertices, in(), all_), {offsets, 1}, in()).view()), expected), 2e-7);
+  EXPECT_LT(
+      MaxDistance(ToDouble(Evaluate(WireKernel(settings, vertices, in(), all_), {offsets, 1}, in()).view()),
+                  expected),
+      2e-7);
 }
 
 TEST(Wire, BadSettingsAreNamed) {
@@ -509,13 +542,15 @@ TEST(Wire, BadSettingsAreNamed) {
   EXPECT_FALSE(WireKernel::Validate({}, std::span(vertices).first(1)).ok());
   EXPECT_FALSE(WireKernel::Validate({CurveBasis::kLinear, true, 1, {}}, std::span(vertices).first(2)).ok());
   EXPECT_FALSE(WireKernel::Validate({CurveBasis::kLinear, false, 0, {}}, vertices).ok());
-  EXPECT_FALSE(WireKernel::Validate({CurveBasis::kLinear, false, 1, {FalloffCurve::kRamp, {}}}, vertices).ok());
+  EXPECT_FALSE(
+      WireKernel::Validate({CurveBasis::kLinear, false, 1, {FalloffCurve::kRamp, {}}}, vertices).ok());
   std::vector<Double3> bad = vertices;
   bad[1].y = NAN;
   EXPECT_FALSE(WireKernel::Validate({}, bad).ok());
 }
 
-// ------------------------------------------------------------------------------------------------------- together
+// -------------------------------------------------------------------------------------------------------
+// together
 
 TEST_F(LocalKernels, AChainInPlaceIsTheChainApart) {
   const TestSkin skin = MakeSkin(mesh_.count(), 25, 4, true);
@@ -526,7 +561,8 @@ TEST_F(LocalKernels, AChainInPlaceIsTheChainApart) {
   const std::vector<Double3> offsets(27, Double3{0.1, 0, 0});
   const Matrix4 turn = ComposeTrs({}, Random(1).Rotation(), {1, 1, 1});
   AlignedFloats scratch(10000);
-  const PointBuffer a = Evaluate(skin_kernel, {palette, 1, {}}, in()), b = Evaluate(cluster, {turn, {}, 1}, a.view());
+  const PointBuffer a = Evaluate(skin_kernel, {palette, 1, {}}, in()),
+                    b = Evaluate(cluster, {turn, {}, 1}, a.view());
   const PointBuffer c = Evaluate(lattice, {offsets, {}, turn, 1}, b.view());
   PointBuffer d(mesh_.count());
   CopyPoints(in(), d.view());

@@ -35,7 +35,8 @@ TEST(Sampler, CubicFollowsTheHermiteFormula) {
   const std::array<float, 3> times = {0, 1, 3};
   std::vector<float> values;
   for (float t : times) {
-    values.insert(values.end(), {static_cast<float>(slope(t)), static_cast<float>(f(t)), static_cast<float>(slope(t))});
+    values.insert(values.end(),
+                  {static_cast<float>(slope(t)), static_cast<float>(f(t)), static_cast<float>(slope(t))});
   }
   const SamplerKeys keys{times, values, 1, Interpolation::kCubicSpline};
   ASSERT_TRUE(keys.Validate().ok());
@@ -107,7 +108,8 @@ TEST(Sampler, BadKeysAreNamed) {
   EXPECT_FALSE((SamplerKeys{times, values, 0, Interpolation::kStep}.Validate().ok()));
   EXPECT_FALSE((SamplerKeys{times, values, 4, Interpolation::kStep}.Validate().ok()));
   EXPECT_FALSE((SamplerKeys{times, values, 3, Interpolation::kCubicSpline}.Validate().ok()));
-  EXPECT_FALSE((SamplerKeys{times, values, std::size_t{1} << 63, Interpolation::kCubicSpline}.Validate().ok()));
+  EXPECT_FALSE(
+      (SamplerKeys{times, values, std::size_t{1} << 63, Interpolation::kCubicSpline}.Validate().ok()));
   EXPECT_FALSE((SamplerKeys{same, values, 3, Interpolation::kStep}.Validate().ok()));
   EXPECT_FALSE((SamplerKeys{nan, values, 3, Interpolation::kStep}.Validate().ok()));
   EXPECT_FALSE((SamplerKeys{times, infinite, 3, Interpolation::kStep}.Validate().ok()));
@@ -122,7 +124,8 @@ double MaxDifference(const Matrix4& a, const Matrix4& b) {
 TEST(TransformMath, ComposesInMayasOrder) {
   TransformValues values{{1, 2, 3}, {0.1, 0.2, 0.3}, RotateOrder::kZyx, {2, 3, 4}};
   const Matrix4 parent = ComposeTrs({5, 6, 7}, Quaternion{0, std::sin(0.2), 0, std::cos(0.2)}, {1, 1, 1});
-  const Matrix4 expected = parent * Translation({1, 2, 3}) * RotationFromEuler({0.1, 0.2, 0.3}, RotateOrder::kZyx) * Scaling({2, 3, 4});
+  const Matrix4 expected = parent * Translation({1, 2, 3}) *
+                           RotationFromEuler({0.1, 0.2, 0.3}, RotateOrder::kZyx) * Scaling({2, 3, 4});
   EXPECT_LT(MaxDifference(ComposeLocal(parent, values), expected), 1e-14);
   EXPECT_EQ(ComposeLocal(parent, {}), parent);  // a control at rest changes no bit
 }
@@ -139,7 +142,8 @@ TEST(TransformMath, SwingAndTwistMakeTheRotation) {
     EXPECT_NEAR(Dot(RotationVector(parts.swing), unit), 0, 1e-7);
     EXPECT_NEAR(Length(Cross(RotationVector(parts.twist), unit)), 0, 1e-7);
     const double angle = (random.Signed()) * 3.1;
-    const Quaternion twist{unit.x * std::sin(angle / 2), unit.y * std::sin(angle / 2), unit.z * std::sin(angle / 2), std::cos(angle / 2)};
+    const Quaternion twist{unit.x * std::sin(angle / 2), unit.y * std::sin(angle / 2),
+                           unit.z * std::sin(angle / 2), std::cos(angle / 2)};
     EXPECT_NEAR(TwistAngle(twist, unit), angle, 1e-12);
     EXPECT_NEAR(TwistAngle({-twist.x, -twist.y, -twist.z, -twist.w}, unit), angle, 1e-12);
   }

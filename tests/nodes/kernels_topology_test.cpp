@@ -52,7 +52,8 @@ TEST(Topology, TrianglesThatWeldingMadeFlatConnectAndCountForNothingElse) {
 TEST(Topology, BadTrianglesAreNamed) {
   const Index short_list[] = {0, 1}, far_index[] = {0, 1, 2, 0, 1, 7};
   EXPECT_NE(Topology::Build(3, short_list).status().ToString().find("multiple of 3"), std::string::npos);
-  EXPECT_NE(Topology::Build(3, far_index).status().ToString().find("triangle 1 names point 7"), std::string::npos);
+  EXPECT_NE(Topology::Build(3, far_index).status().ToString().find("triangle 1 names point 7"),
+            std::string::npos);
   EXPECT_FALSE(Topology::Build(std::size_t{1} << 31, {}).ok());
   EXPECT_TRUE(Topology::Build(0, {}).ok());
 }
@@ -75,7 +76,8 @@ TEST(Topology, DilationAgreesWithRingsOfSets) {
         EXPECT_EQ(ring_of[i] == rings, !std::binary_search(inner.begin(), inner.end(), dilated[i]));
       }
       std::set<Index> next = grown;
-      for (Index p : grown) next.insert(mesh.topology.neighbors().row(p).begin(), mesh.topology.neighbors().row(p).end());
+      for (Index p : grown)
+        next.insert(mesh.topology.neighbors().row(p).begin(), mesh.topology.neighbors().row(p).end());
       grown = next;
     }
   }
@@ -98,7 +100,8 @@ TEST(Weights, SetsAndProducts) {
   EXPECT_TRUE(IsSortedSet(std::vector<Index>{0, 4}, 5));
   EXPECT_FALSE(IsSortedSet(std::vector<Index>{0, 4}, 4));
   EXPECT_FALSE(IsSortedSet(std::vector<Index>{1, 1}, 5));
-  EXPECT_EQ(PositionsIn(std::vector<Index>{2, 3, 7, 9}, std::vector<Index>{3, 9}), (std::vector<Index>{1, 3}));
+  EXPECT_EQ(PositionsIn(std::vector<Index>{2, 3, 7, 9}, std::vector<Index>{3, 9}),
+            (std::vector<Index>{1, 3}));
   EXPECT_EQ(MultiplyWeights(std::vector<float>{1, 2}, std::vector<float>{3, 4}), (std::vector<float>{3, 8}));
   EXPECT_EQ(MultiplyWeights({}, std::vector<float>{3, 4}), (std::vector<float>{3, 4}));
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "io/gltf_import.h"
 #include "scenes/face_model.h"
 
 namespace kpsa::scenes {
@@ -46,6 +47,47 @@ TEST(Scenes, TheFilesAreGlb) {
   EXPECT_EQ(head[1], 2u);
   EXPECT_EQ(head[2], glb.size());
   EXPECT_LT(glb.size(), 2u << 20);
+}
+
+gltf::Character Load(const SceneFiles& files, const std::string& name) {
+  const std::string& glb = files.at(name);
+  auto character = gltf::LoadGltfFromMemory(std::span(reinterpret_cast<const std::uint8_t*>(glb.data()), glb.size()), "", name);
+  EXPECT_TRUE(character.ok()) << character.status().ToString();
+  return character.ok() ? *character : gltf::Character();
+}
+
+TEST(Scenes, TheFaceLoadsAsItWasMade) {
+  const gltf::Character face = Load(Face(), "face.glb");
+  ASSERT_EQ(face.meshes.size(), 2u);
+  const gltf::Mesh &skin = face.meshes[0], &eyes = face.meshes[1];
+  ASSERT_EQ(skin.vertex_count(), Shape().points.size());
+  const std::vector<Expression> expressions = FaceExpressions(Shape());
+  ASSERT_EQ(skin.targets.size(), expressions.size());
+  for (std::size_t t = 0; t < expressions.size(); ++t) {
+    EXPECT_EQ(skin.targets[t].name, expressions[t].name);
+    ASSERT_FALSE(skin.targets[t].vertices.empty());
+    const Double3 d = expressions[t].deltas[skin.targets[t].vertices[0]];
+    EXPECT_NEAR(skin.targets[t].deltas[0], d.x * 0.01, 1e-8);
+  }
+  for (std::size_t i = 0; i < Shape().points.size(); ++i) {
+    EXPECT_NEAR(skin.positions[3 * i + 1], Shape().points[i].y * 0.01, 1e-7);
+  }
+  EXPECT_EQ(skin.colors.size(), skin.positions.size());
+  EXPECT_EQ(eyes.colors.size(), eyes.positions.size());
+  EXPECT_TRUE(skin.skinned() && eyes.skinned());
+  for (const char* clip : {"extreme", "talk_train", "talk"}) EXPECT_NE(face.FindClip(clip), kNoIndex);
+  for (const char* joint : {"root", "neck", "head", "jaw", "eye.L", "eye.R", "face_mesh", "eyes"}) {
+    EXPECT_TRUE(std::any_of(face.nodes.begin(), face.nodes.end(), [&](const gltf::Node& n) { return n.name == joint; })) << joint;
+  }
+  EXPECT_TRUE(face.warnings.empty());
+}
+
+TEST(Scenes, TheColumnLoadsAndBends) {
+  const gltf::Character column = Load(GenerateHello(), "hello.glb");
+  ASSERT_EQ(column.meshes.size(), 1u);
+  EXPECT_TRUE(column.meshes[0].colors.empty());
+  ASSERT_EQ(column.clips.size(), 1u);
+  EXPECT_NEAR(column.clips[0].duration, 2, 1e-6);
 }
 
 TEST(Head, HasItsSizeAndItsNumberOfPoints) {
