@@ -9,6 +9,7 @@
 
 #include "cli/frames_range.h"
 #include "io/quantity.h"
+#include "kpsa/kpsa_node.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
@@ -67,6 +68,11 @@ Result<int> ThreadCount(const Flags& flags) {
   return ParseCount("--threads", *flags.threads, 1, 1024);
 }
 
+void AddAllNodes(NodeRegistry& registry) {
+  AddStandardNodes(registry);
+  AddKpsaNode(registry);
+}
+
 Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   RigOptions options;
   options.variant = flags.variant;
@@ -79,7 +85,7 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   if (flags.rest && flags.clip.has_value()) return Status::Usage("--rest and --clip {}: expected one of them", *flags.clip);
   options.rest = flags.rest;
   auto open = std::make_unique<OpenRig>();
-  AddStandardNodes(open->registry);
+  AddAllNodes(open->registry);
   Result<Rig> rig = LoadRig(open->registry, flags.file, options);
   if (!rig.ok()) return rig.status();
   open->rig = std::move(*rig);

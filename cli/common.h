@@ -43,6 +43,9 @@ void AddJsonFlag(CLI::App* command, Flags* flags);
 // --threads as a number, 0 where it was not given.
 Result<int> ThreadCount(const Flags& flags);
 
+// Every node type of the program: the standard ones and KPSA's.
+void AddAllNodes(NodeRegistry& registry);
+
 // The registry and the rig that refers to it.
 struct OpenRig {
   NodeRegistry registry;

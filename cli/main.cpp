@@ -67,16 +67,9 @@ int Main(int argc, char** argv) {
   program.set_help_flag("-h,--help", "this help");
   program.require_subcommand(0, 1);
   Command chosen;
-  AddInitCommand(&program, &chosen);
   AddValidateCommand(&program, &chosen);
-  AddInspectCommand(&program, &chosen);
   AddEvalCommand(&program, &chosen);
   AddGetCommand(&program, &chosen);
-  AddRenderCommand(&program, &chosen);
-  AddCompileCommand(&program, &chosen);
-  AddProfileCommand(&program, &chosen);
-  AddCompareCommand(&program, &chosen);
-  AddGraphCommand(&program, &chosen);
   AddNodesCommand(&program, &chosen);
   program.footer(kFirstMinutes + std::string("\nExit codes: 0 fine, 1 a check failed or things differ, 2 usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
 
