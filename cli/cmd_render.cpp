@@ -218,8 +218,7 @@ CommandResult Render(const RenderFlags& flags) {
     if (!row.empty()) rows.push_back(SideBySide(row));
   }
   const Image picture = Stack(rows);
-  KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, {}));
-  KPSA_RETURN_IF_ERROR(WritePng(*flags.output, picture.width, picture.height, picture.rgb));
+  KPSA_RETURN_IF_ERROR(WritePng(*flags.output, flags.force, picture.width, picture.height, picture.rgb));
   if (!flags.quiet) Say(fmt::format("{}: {} x {}", *flags.output, picture.width, picture.height));
   return 0;
 }

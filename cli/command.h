@@ -16,6 +16,7 @@ using CommandResult = Result<int>;
 using Command = std::function<CommandResult()>;
 
 // Each adds one subcommand to the program. When it is chosen, *chosen becomes its work.
+void AddInitCommand(CLI::App* program, Command* chosen);
 void AddValidateCommand(CLI::App* program, Command* chosen);
 void AddInspectCommand(CLI::App* program, Command* chosen);
 void AddEvalCommand(CLI::App* program, Command* chosen);

@@ -71,6 +71,7 @@ int Main(int argc, char** argv) {
   program.set_help_flag("-h,--help", "this help");
   program.require_subcommand(0, 1);
   Command chosen;
+  AddInitCommand(&program, &chosen);
   AddValidateCommand(&program, &chosen);
   AddInspectCommand(&program, &chosen);
   AddEvalCommand(&program, &chosen);
