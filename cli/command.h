@@ -22,6 +22,8 @@ void AddInspectCommand(CLI::App* program, Command* chosen);
 void AddEvalCommand(CLI::App* program, Command* chosen);
 void AddGetCommand(CLI::App* program, Command* chosen);
 void AddRenderCommand(CLI::App* program, Command* chosen);
+void AddTrainCommand(CLI::App* program, Command* chosen);
+void AddBenchCommand(CLI::App* program, Command* chosen);
 void AddCompileCommand(CLI::App* program, Command* chosen);
 void AddProfileCommand(CLI::App* program, Command* chosen);
 void AddCompareCommand(CLI::App* program, Command* chosen);

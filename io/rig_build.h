@@ -11,7 +11,7 @@
 #include "io/rest_pose.h"
 #include "io/rig_builder.h"
 #include "io/rig_values.h"
-#include "io/weight_file.h"
+#include "io/weights_json.h"
 
 namespace kpsa {
 
@@ -94,7 +94,7 @@ class RigBuild {
   bool MultiplyByMaps(const RigAttribute& attribute, const Made& made, std::vector<std::vector<float>>* weights);
   bool MultiplyByFalloff(const RigAttribute& attribute, const Geometry& of, std::vector<float>* weights);
   bool FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
-               const WeightFile::Map** map, const Geometry** of);
+               const NamedWeights** map, const Geometry** of);
   const WeightFile* FindWeightFile(const YamlNode& reference, const std::string& path);
   Index VertexCount(const Geometry& of) const;
   Index PointOf(const Geometry& of, Index vertex) const;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
+#include <tuple>
 
 #include "io/rig_build.h"
 
@@ -17,6 +19,19 @@ bool IsCharacterFile(const std::string& path) {
   }
   const std::string extension = std::filesystem::path(lower).extension().string();
   return extension == ".glb" || extension == ".gltf";
+}
+
+// By file, in the order in which they first come up, then by line.
+Status InOrder(const Status& status) {
+  std::map<std::string, std::size_t> files;
+  for (const Error& error : status.errors()) files.emplace(error.where.file, files.size());
+  std::vector<Error> errors = status.errors();
+  std::stable_sort(errors.begin(), errors.end(), [&](const Error& a, const Error& b) {
+    return std::tuple(files[a.where.file], a.where.line, a.where.column) < std::tuple(files[b.where.file], b.where.line, b.where.column);
+  });
+  Status ordered;
+  for (Error& error : errors) ordered.Add(std::move(error));
+  return ordered;
 }
 
 double RestDiagonal(const CharacterGraph& scene, RestPose* rest) {
@@ -78,15 +93,15 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
     return Status::Usage("frames a second: expected a number above 0, found {}", *options.fps);
   }
   RigFile file;
+  YamlErrors errors;
   SourceLocation character_at{path, 0, 0};
   if (IsCharacterFile(path)) {
     file.sources.push_back({path, "", FileUnits(), {}});
     file.character = RigString{path, character_at, 0};
     if (options.fps.has_value()) file.sources[0].units.fps = *options.fps;
   } else {
-    Result<RigFile> read = ReadRigFile(path, options.fps);
-    if (!read.ok()) return read.status();
-    file = std::move(*read);
+    errors.Append(ReadRigFile(path, options.fps, &file));
+    if (!file.character.has_value()) return errors.Take();
     character_at = file.character->where;
   }
 
@@ -99,9 +114,9 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   if (!character.ok()) {
     Status status = character.status();
     if (IsCharacterFile(path)) return status;
-    Status located = Status::Invalid("the character cannot be read").At(character_at);
-    located.Append(std::move(status));
-    return located;
+    errors.Append(Status::Invalid("the character cannot be read").At(character_at));
+    errors.Append(std::move(status));
+    return errors.Take();
   }
   if (!IsCharacterFile(path)) rig.files.push_back(file.character->text);
   rig.character = std::make_shared<const gltf::Character>(std::move(*character));
@@ -116,9 +131,8 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
 
   RestPose rest(*rig.character, rig.scene);
   rig.rest_diagonal = RestDiagonal(rig.scene, &rest);
-  YamlErrors errors;
   RigBuild(&file, &rig, &rest, &errors).Run();
-  if (!errors.ok()) return errors.Take();
+  if (!errors.ok()) return InOrder(errors.Take());
   rig.notes.insert(rig.notes.begin(), rig.scene.notes.begin(), rig.scene.notes.end());
   return rig;
 }

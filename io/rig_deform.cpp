@@ -31,7 +31,7 @@ void RigBuild::BuildStacks() {
   }
   for (Made& made : made_) {
     SetWeights(&made);
-    const bool deforms = graph().def(made.id).FindAttribute("outPoints") >= 0 && graph().def(made.id).FindAttribute("points") >= 0;
+    const bool deforms = graph().def(made.id).FindAttribute("outPoints") >= 0 && graph().def(made.id).FindAttribute("inPoints") >= 0;
     if (deforms && made.geometries.empty()) {
       rig_->notes.push_back(fmt::format("{}: \"{}\" is in no stack and deforms nothing", made.from->where.ToString(), made.from->name));
     }
@@ -42,7 +42,7 @@ RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
   std::vector<std::string> names{"gltf", "morph", "skin"};
   for (Made& made : made_) {
     const NodeDef& def = graph().def(made.id);
-    const int points = def.FindAttribute("points");
+    const int points = def.FindAttribute("inPoints");
     const bool deforms = points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && def.FindAttribute("outPoints") >= 0;
     if (deforms) names.push_back(made.from->name);
     if (made.from->name != name.text) continue;
@@ -160,9 +160,9 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
     GraphEditor edit(&graph());
     if (edit.Has(made->id, "space")) edit.Set(made->id, "space", Value("mesh"));
     if (last.has_value()) {
-      edit.Connect(*last, edit.Plug(made->id, "points", geometry));
+      edit.Connect(*last, edit.Plug(made->id, "inPoints", geometry));
     } else {
-      edit.Set(made->id, "points", geometry, Value(points));
+      edit.Set(made->id, "inPoints", geometry, Value(points));
     }
     last = edit.Plug(made->id, "outPoints", geometry);
     if (!Fail(item.where, edit.Take())) return;
@@ -188,7 +188,7 @@ PointBufferPtr RigBuild::PointsToDeform(const PlugRef& plug, const RigString& na
   const Value* divisions_set = graph().FindValue({plug.node, number, -1, -1});
   const Value& divisions = divisions_set != nullptr ? *divisions_set : def.attributes[static_cast<std::size_t>(number)].default_value;
   const auto* sizes = divisions.get_if<std::vector<std::int64_t>>();
-  constexpr std::int64_t kMaxDivisions = 1000;
+  constexpr std::int64_t kMaxDivisions = 32;
   if (sizes == nullptr || sizes->size() != 3 || std::any_of(sizes->begin(), sizes->end(), [](std::int64_t n) { return n < 2 || n > kMaxDivisions; })) {
     Fail(name.where, Status::Invalid("{}: the divisions {} are not three whole numbers from 2 to {}", name.text, divisions.ToString(), kMaxDivisions));
     return nullptr;
@@ -207,7 +207,7 @@ PointBufferPtr RigBuild::PointsToDeform(const PlugRef& plug, const RigString& na
   return std::make_shared<const PointBuffer>(PointBuffer::FromInterleaved(grid));
 }
 
-// The lattice's box at rest, in world axes. Where the rig does not set it, it is set here to what the members fill.
+// The lattice's box at rest, in the axes of its stage. Where the rig does not set it, it is set here to what the members fill.
 bool RigBuild::BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box) {
   GraphEditor edit(&graph());
   const PlugRef min_plug = edit.Plug(lattice->id, "boxMin"), max_plug = edit.Plug(lattice->id, "boxMax");
@@ -216,16 +216,18 @@ bool RigBuild::BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4*
   const Value* max_set = graph().FindValue(max_plug);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Double3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  const Matrix4 stage_from_world = InverseOrIdentity(lattice->world_from_stage);
   for (std::size_t g = 0; g < lattice->geometries.size(); ++g) {
     if (!lattice->geometries[g].mesh.has_value()) continue;
     const Value* map = graph().FindValue(edit.Plug(lattice->id, "weights", static_cast<int>(g)));
     const WeightMap* weights = map == nullptr ? nullptr : map->asset<WeightMap>();
     const Places& points = rest_->WorldPoints(*lattice->geometries[g].mesh);
     for (std::size_t p = 0; p < points.size(); ++p) {
-      if (weights != nullptr && weights->weights()[p] == 0) continue;
+      if (weights != nullptr && !(weights->weights()[p] > 0)) continue;
+      const Double3 point = TransformPoint(stage_from_world, points[p]);
       for (int i = 0; i < 3; ++i) {
-        low[i] = std::min(low[i], points[p][i]);
-        high[i] = std::max(high[i], points[p][i]);
+        low[i] = std::min(low[i], point[i]);
+        high[i] = std::max(high[i], point[i]);
       }
     }
   }
@@ -235,13 +237,14 @@ bool RigBuild::BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4*
     return Fail(where, Status::Invalid("\"{}\" has no members, so its points have no place: put it in a stack or set boxMin and boxMax",
                                        lattice->from->name));
   }
+  if (min_set == nullptr && max_set == nullptr) {
+    // A hair wider than the members, as the lattice makes it by itself
+    const double margin = 1e-4 * Length(high - low) + 1e-9;
+    for (int i = 0; i < 3; ++i) low[i] -= margin, high[i] += margin;
+  }
   edit.Set(lattice->id, "boxMin", low);
   edit.Set(lattice->id, "boxMax", high);
-  Double3 size = high - low;
-  for (int i = 0; i < 3; ++i) {
-    if (!(size[i] > 0)) size[i] = 1;  // flat: any scale does
-  }
-  *world_from_box = Translation(low) * Scaling(size);
+  *world_from_box = lattice->world_from_stage * Translation(low) * Scaling(high - low);
   return Fail(where, edit.Take());
 }
 

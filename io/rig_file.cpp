@@ -187,16 +187,15 @@ void ReadVersion(YamlMap* map, YamlErrors* errors) {
   }
 }
 
-Result<RigFile> ReadRigFile(const std::string& path, std::optional<double> fps) {
-  RigFile rig;
+Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig) {
+  *rig = RigFile();
   YamlErrors errors;
-  Reader(&rig, &errors, fps).Read(path, {path, 0, 0});
-  for (RigSource& source : rig.sources) source.units.fps = fps.value_or(rig.fps.value_or(kDefaultFps));
-  if (errors.ok() && !rig.character.has_value()) {
+  Reader(rig, &errors, fps).Read(path, {path, 0, 0});
+  for (RigSource& source : rig->sources) source.units.fps = fps.value_or(rig->fps.value_or(kDefaultFps));
+  if (errors.ok() && !rig->character.has_value()) {
     errors.Append(Status::Invalid("the rig names no character: add \"character: FILE.glb\"").At({path, 1, 1}));
   }
-  if (!errors.ok()) return errors.Take();
-  return rig;
+  return errors.Take();
 }
 
 }  // namespace kpsa

@@ -97,9 +97,9 @@ struct RigFile {
   std::vector<RigOverride> overrides;
 };
 
-// Reads a rig and what it includes, relative to the including file. Errors are collected over all files. `fps`
-// overrides the rig's for the suffix f.
-Result<RigFile> ReadRigFile(const std::string& path, std::optional<double> fps = std::nullopt);
+// Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig then
+// holds what could be read, for finding more of them. `fps` overrides the rig's for the suffix f.
+Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig);
 
 // The units: section into `units`.
 void ReadUnits(const YamlNode& node, FileUnits* units, YamlErrors* errors);

@@ -15,6 +15,12 @@ bool ParseVertex(std::string_view text, std::uint64_t* vertex) {
   return error == std::errc() && end == text.data() + text.size() && !text.empty();
 }
 
+std::vector<float> Dense(const WeightFile& file, const NamedWeights& map) {
+  std::vector<float> dense(file.points, map.default_value);
+  for (std::size_t i = 0; i < map.indices.size(); ++i) dense[map.indices[i]] = map.values[i];
+  return dense;
+}
+
 double Smooth(double t) { return t * t * (3 - 2 * t); }
 
 }  // namespace
@@ -127,11 +133,11 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
   }
   if (file_map != nullptr) {
     const WeightFile* file = nullptr;
-    const WeightFile::Map* values = nullptr;
+    const NamedWeights* values = nullptr;
     const Geometry* owner = nullptr;
     if (!FindMap(*file_map, source, made, &file, &values, &owner)) return false;
     if (owner->name != of.name) return true;
-    const std::vector<float> dense = file->Dense(*values);
+    const std::vector<float> dense = Dense(*file, *values);
     for (Index v = 0; v < dense.size(); ++v) {
       if (dense[v] > 0) (*weights)[PointOf(of, v)] = 1;
     }
@@ -189,28 +195,29 @@ const WeightFile* RigBuild::FindWeightFile(const YamlNode& reference, const std:
 
 // "w/lips.json#upper": the file, its map, and the geometry of the deformer that it is for.
 bool RigBuild::FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
-                       const WeightFile::Map** map, const Geometry** of) {
+                       const NamedWeights** map, const Geometry** of) {
   std::string text;
   if (!ReadString(reference, "weights", &text, errors_)) return false;
-  const std::size_t hash = text.rfind('#');
-  if (hash == std::string::npos || hash == 0 || hash + 1 == text.size()) {
-    return errors_->Add(reference, "weights \"{}\": expected \"file.json#map\"", text);
-  }
-  *file = FindWeightFile(reference, ResolvePath(folder(source), text.substr(0, hash)));
+  const std::size_t hash = text.rfind('#');  // without #map the file has one map only
+  const std::string path = ResolvePath(folder(source), text.substr(0, hash));
+  *file = FindWeightFile(reference, path);
   if (*file == nullptr) return false;
-  const std::string name = text.substr(hash + 1);
-  *map = (*file)->Find(name);
-  if (*map == nullptr) {
-    return errors_->Add(reference, "{} has no map \"{}\"{}", (*file)->path, name, DidYouMean(name, (*file)->Names()));
+  std::vector<std::string> maps;
+  for (const NamedWeights& each : (*file)->maps) maps.push_back(each.name);
+  if (hash == std::string::npos && maps.size() != 1) {
+    return errors_->Add(reference, "weights \"{}\": expected \"{}#MAP\"; the file has the maps {}", text, text, fmt::join(maps, ", "));
   }
+  const std::string name = hash == std::string::npos ? maps[0] : text.substr(hash + 1);
+  *map = (*file)->Find(name);
+  if (*map == nullptr) return errors_->Add(reference, "{} has no map \"{}\"{}", path, name, DidYouMean(name, maps));
   *of = GeometryOf(made, **file);
   if (*of == nullptr) {
     std::vector<std::string> names;
     for (const Geometry& geometry : made.geometries) names.push_back(geometry.name);
-    return errors_->Add(reference, "{} is for mesh \"{}\"; \"{}\" deforms {}", (*file)->path, (*file)->mesh, made.from->name, fmt::join(names, ", "));
+    return errors_->Add(reference, "{} is for mesh \"{}\"; \"{}\" deforms {}", path, (*file)->mesh, made.from->name, fmt::join(names, ", "));
   }
   if ((*file)->points != VertexCount(**of)) {
-    return errors_->Add(reference, "{} is for {} vertices; {} has {}", (*file)->path, (*file)->points, (*of)->name, VertexCount(**of));
+    return errors_->Add(reference, "{} is for {} vertices; {} has {}", path, (*file)->points, (*of)->name, VertexCount(**of));
   }
   return true;
 }
@@ -236,13 +243,13 @@ bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made, s
   bool good = true;
   for (const YamlNode* reference : references) {
     const WeightFile* file = nullptr;
-    const WeightFile::Map* map = nullptr;
+    const NamedWeights* map = nullptr;
     const Geometry* of = nullptr;
     if (!FindMap(*reference, attribute.source, made, &file, &map, &of)) {
       good = false;
       continue;
     }
-    const std::vector<float> dense = file->Dense(*map);
+    const std::vector<float> dense = Dense(*file, *map);
     constexpr float kNone = -std::numeric_limits<float>::infinity();
     std::vector<float> by_point(of->count, kNone);
     for (Index v = 0; v < dense.size(); ++v) {

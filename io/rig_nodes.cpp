@@ -12,7 +12,7 @@ constexpr const char* kStackWords[] = {"gltf", "morph", "skin", "transform"};
 bool HasAttribute(const NodeDef& def, const char* name) { return def.FindAttribute(name) >= 0; }
 
 bool IsDeformer(const NodeDef& def) {
-  const int points = def.FindAttribute("points");
+  const int points = def.FindAttribute("inPoints");
   return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && HasAttribute(def, "outPoints");
 }
 

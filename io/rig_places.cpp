@@ -118,8 +118,8 @@ bool RigBuild::Place(Made* made, int depth) {
   }
   const YamlNode& at = it->second->value;
   if (made->placing || depth > kMaxDepth) {
-    return errors_->Add(at, made->placing ? "\"{}\" is placed at something that is placed at it" : "\"{}\": places depend on each other too deeply",
-                        made->from->name);
+    return errors_->Add(at, "\"{}\" {}", made->from->name,
+                        made->placing ? "is placed at something that is placed at it" : "is placed at the end of too long a chain");
   }
   GraphEditor edit(&graph());
   const PlugRef offset = edit.Plug(made->id, "offsetParentMatrix");

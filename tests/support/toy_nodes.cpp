@@ -75,7 +75,7 @@ void AddToyNodes(NodeRegistry& registry) {
     double sum = 0;
     for (std::uint32_t i = 0; i < values.size(); ++i) sum += values[i];
     return sum;
-  });
+  }).cost(20000, 0);
   registry.add("select", "Takes one of two.").in("which", false).in("a", 0.0).lazy().in("b", 0.0).lazy().out("out", Type::kDouble)
       .compute([](bool which, double a, double b) { return which ? b : a; })
       .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 2 : 1; });
@@ -102,7 +102,7 @@ void AddToyNodes(NodeRegistry& registry) {
           c.out_points(0).z[i] = c.points(0).z[i];
         }
       })
-      .in_place("points").cost(20, 2);
+      .in_place("points").cost(20000, 2);
   registry.add("smooth", "Means over a ring.").structural("rings", 1).points_in("points").out("outPoints", Type::kPoints)
       .compute([](ComputeContext& c) {
         const auto& kernel = c.kernel_as<SmoothKernel>();
@@ -113,7 +113,7 @@ void AddToyNodes(NodeRegistry& registry) {
           c.out_points(0).y[i] = c.out_points(0).z[i] = 0;
         }
       })
-      .demand(DemandSmooth).bind(BindSmooth).cost(20, 10);
+      .demand(DemandSmooth).bind(BindSmooth).cost(20000, 10);
   registry.add("measure", "Sum of x.").points_in("points").out("out", Type::kDouble).compute([](ComputeContext& c) {
     double sum = 0;
     for (std::size_t i = 0; i < c.points(0).count; ++i) sum += c.points(0).x[i];

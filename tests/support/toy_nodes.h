@@ -12,6 +12,7 @@ namespace kpsa {
 // cached (cue points [S: cue list], full points lazy, threshold, floor -> points: where the cues' sum of x stays below
 // threshold, all points are the mean cue; otherwise the full points; fails where the mean is below floor),
 // trail (input -> out; stateful: half of the way from where it was).
+// Some claim to cost more than they do, so that small graphs are evaluated on several threads.
 void AddToyNodes(NodeRegistry& registry);
 const NodeRegistry& ToyRegistry();  // one with nothing else
 
