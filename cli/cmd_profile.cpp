@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
+#include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/frames_range.h"
@@ -18,6 +19,7 @@ namespace kpsa {
 namespace {
 
 struct ProfileFlags : Flags {
+  AccelerationFlags acceleration;
   std::optional<std::string> trace, top, sort;
 };
 
@@ -145,13 +147,16 @@ CommandResult RunProfile(const ProfileFlags& flags) {
   if (flags.trace.has_value()) KPSA_RETURN_IF_ERROR(CheckOutput(*flags.trace, flags.force, {".json"}));
   if (flags.trace == "-" && flags.json)
     return Status::Usage("--trace - and --json: stdout takes one of them");
+  KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
-  const Rig& rig = (*open)->rig;
+  Rig& rig = (*open)->rig;
   if (flags.trace.has_value()) KPSA_RETURN_IF_ERROR(CheckNotInput(*flags.trace, rig.files));
   const Result<std::vector<double>> times = SampleTimes(flags, rig);
   if (!times.ok()) return times.status();
   Compiler compiler;
+  if (flags.acceleration.wanted())
+    KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
   const auto plan = CompileFor(rig, &compiler, AllMeshes(rig));
   if (!plan.ok()) return plan.status();
 
@@ -199,6 +204,7 @@ void AddProfileCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--top", "N", &flags->top, "rows of the table; 20 if not given");
   AddOption(command, "--threads", "N", &flags->threads,
             "threads; 1 if not given, so that times of nodes add up");
+  AddAccelerationFlags(command, &flags->acceleration);
   AddQuietFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
 }

@@ -6,6 +6,7 @@
 #include "cli/common.h"
 #include "cli/options.h"
 #include "cli/rig_frames.h"
+#include "cli/rig_training.h"
 
 namespace kpsa {
 namespace {
@@ -19,7 +20,7 @@ Status Check(const Flags& flags, std::vector<std::string>* notes, std::string* s
   notes->insert(notes->end(), rig.notes.begin(), rig.notes.end());
   Compiler compiler;
   Request request = AllMeshes(rig);
-  for (const Control& control : rig.controls) request.varying.push_back(control.plug);
+  request.varying = VaryingPlugs(rig);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
   KPSA_RETURN_IF_ERROR(
