@@ -79,12 +79,12 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
 std::string BenchText(const BenchResult& r, const BenchContext& context) {
   std::string text;
   const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
-  text += (fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
-                       Plural(r.cues, "cue"), fmt::join(r.cue_stages, ", "), r.modes));
-  text += (fmt::format("trained on {}; tested on {}: {}, {}, medians of {}\n\n",
-                       fmt::join(r.trained_on, ", "), fmt::join(r.clips, ", "), Plural(r.frames, "frame"),
-                       Plural(static_cast<std::uint64_t>(context.options.threads), "thread"),
-                       Plural(static_cast<std::uint64_t>(context.options.runs), "run")));
+  text += fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
+                      Plural(r.cues, "cue"), fmt::join(r.cue_stages, ", "), r.modes);
+  text += fmt::format("trained on {}; tested on {}: {}, {}, medians of {}\n\n", fmt::join(r.trained_on, ", "),
+                      fmt::join(r.clips, ", "), Plural(r.frames, "frame"),
+                      Plural(static_cast<std::uint64_t>(context.options.threads), "thread"),
+                      Plural(static_cast<std::uint64_t>(context.options.runs), "run"));
   std::string heaviest;
   for (std::size_t i = 0; i < std::min<std::size_t>(4, r.full_nodes.size()); ++i)
     heaviest +=
@@ -96,32 +96,33 @@ std::string BenchText(const BenchResult& r, const BenchContext& context) {
   Table times({"", ">ms/frame", "of which"});
   times.Row({"full", fmt::format("{:.3f}", r.full_ms), heaviest});
   times.Row({"accelerated", fmt::format("{:.3f}", r.accelerated_ms), parts});
-  text += (times.Text());
-  text += (fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
-                       r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
-                       r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : ""));
-  text += (fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}\n",
-                       100 * static_cast<double>(r.hits) / frames,
-                       100 * static_cast<double>(r.violations) / frames, LengthText(r.tolerance)));
-  text += (fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
-                       LengthText(r.error_rms), LengthText(r.error_p99), LengthText(r.error_max),
-                       r.worst_frame, r.worst_clip, LengthText(r.motion_rms), LengthText(r.diagonal)));
-  text += (fmt::format("evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
-                       Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),
-                       Thousands(static_cast<std::uint64_t>(std::llround(r.points_full))),
-                       r.never_evaluated.size(), r.nodes_total,
-                       r.never_evaluated.empty()
-                           ? ""
-                           : fmt::format(": {}{}",
-                                         fmt::join(r.never_evaluated.begin(),
-                                                   r.never_evaluated.begin() +
-                                                       static_cast<std::ptrdiff_t>(std::min<std::size_t>(
-                                                           6, r.never_evaluated.size())),
-                                                   ", "),
-                                         r.never_evaluated.size() > 6 ? ", ..." : "")));
-  if (!r.worst_miss.empty()) text += (r.worst_miss + "\n");
+  text += times.Text();
+  text += fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
+                      r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
+                      r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  text += fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}\n",
+                      100 * static_cast<double>(r.hits) / frames,
+                      100 * static_cast<double>(r.violations) / frames, LengthText(r.tolerance));
+  text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
+                      LengthText(r.error_rms), LengthText(r.error_p99), LengthText(r.error_max),
+                      r.worst_frame, r.worst_clip, LengthText(r.motion_rms), LengthText(r.diagonal));
+  text += fmt::format(
+      "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
+      Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),
+      Thousands(static_cast<std::uint64_t>(std::llround(r.points_full))), r.never_evaluated.size(),
+      r.nodes_total,
+      r.never_evaluated.empty()
+          ? ""
+          : fmt::format(
+                ": {}{}",
+                fmt::join(r.never_evaluated.begin(),
+                          r.never_evaluated.begin() +
+                              static_cast<std::ptrdiff_t>(std::min<std::size_t>(6, r.never_evaluated.size())),
+                          ", "),
+                r.never_evaluated.size() > 6 ? ", ..." : ""));
+  if (!r.worst_miss.empty()) text += r.worst_miss + "\n";
   const std::string with = context.kpsa.has_value() ? "--kpsa " + *context.kpsa : "--accelerate";
-  text += (fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with));
+  text += fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
   return text;
 }
 
