@@ -3,18 +3,21 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/options.h"
 #include "cli/plan_report.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
+#include "cli/rig_training.h"
 #include "cli/table.h"
 
 namespace kpsa {
 namespace {
 
 struct CompileFlags : Flags {
+  AccelerationFlags acceleration;
   std::vector<std::string> wanted;
   std::optional<std::string> vertices;
   bool steps = false;
@@ -47,13 +50,16 @@ std::vector<Row> Rows(const Plan& plan, bool each_step) {
 }
 
 CommandResult Compile(const CompileFlags& flags) {
+  KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
-  const Rig& rig = (*open)->rig;
+  Rig& rig = (*open)->rig;
+  Compiler compiler;
+  if (flags.acceleration.wanted())
+    KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
   Result<Request> request = BuildRequest(rig, flags.wanted, flags.vertices);
   if (!request.ok()) return request.status();
-  for (const Control& control : rig.controls) request->varying.push_back(control.plug);
-  Compiler compiler;
+  request->varying = VaryingPlugs(rig);
   const auto compiled = CompileFor(rig, &compiler, *request);
   if (!compiled.ok()) return compiled.status();
   const Plan& plan = **compiled;
@@ -120,6 +126,7 @@ void AddCompileCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--vertices", "LIST", &flags->vertices,
             "only some vertices of the wanted meshes, as in 0:99,120");
   AddSwitch(command, "--steps", &flags->steps, "every step by itself instead of nodes");
+  AddAccelerationFlags(command, &flags->acceleration);
   AddJsonFlag(command, flags.get());
 }
 

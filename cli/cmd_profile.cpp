@@ -4,63 +4,23 @@
 #include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
+#include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/plan_report.h"
-#include "cli/rig_frames.h"
+#include "cli/profile_run.h"
 #include "cli/table.h"
-#include "cli/trace.h"
 
 namespace kpsa {
 namespace {
 
 struct ProfileFlags : Flags {
+  AccelerationFlags acceleration;
   std::optional<std::string> trace, top, sort;
 };
-
-// What was measured.
-struct Measured {
-  std::vector<FrameSpan> frames;
-  double wall_ns = 0, node_ns = 0, above_ns = 0;  // all frames; above: steps without points
-  double between_ns() const { return std::max(0.0, wall_ns - node_ns); }
-  // Nothing that skips points can be faster than what is above them, and what lies between the nodes.
-  double ceiling() const { return wall_ns / std::max(1.0, above_ns + between_ns()); }
-};
-
-// Every frame on one warm evaluator. A single frame is evaluated anew twenty times.
-Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan,
-                         const std::vector<double>& times, bool parallel, Profile* profile) {
-  Evaluator evaluator(plan, {.parallel = parallel});
-  const Index time = plan->FindVarying(rig.scene.time);
-  const std::size_t frames = times.size() > 1 ? times.size() : 20;
-  const auto located = [&](const Status& status, double t) {
-    return Status::Evaluation("at {} s: {}", t, status.errors().front().message).At({rig.path});
-  };
-  if (time != kNoIndex) evaluator.Set(time, times.back());
-  if (const Status warm = evaluator.Evaluate(); !warm.ok()) return located(warm, times.back());
-  Measured measured;
-  for (std::size_t f = 0; f < frames; ++f) {
-    if (Interrupted()) return InterruptedStatus();
-    evaluator.Record(profile, static_cast<int>(f));
-    const double t = times[std::min(f, times.size() - 1)];
-    const std::uint64_t begin = ProfileClock();
-    if (time != kNoIndex) evaluator.Set(time, t);
-    if (times.size() == 1) evaluator.Invalidate();
-    const Status status = evaluator.Evaluate();
-    measured.frames.push_back({begin, ProfileClock()});
-    if (!status.ok()) return located(status, t);
-    measured.wall_ns += static_cast<double>(measured.frames.back().end_ns - begin);
-  }
-  for (Index s = 0; s < plan->steps().size(); ++s) {
-    const auto ns = static_cast<double>(profile->self_ns()[s]);
-    measured.node_ns += ns;
-    if (plan->infos()[s].points_total == 0) measured.above_ns += ns;
-  }
-  return measured;
-}
 
 void PrintReport(const ProfileFlags& flags, const Plan& plan, const Measured& measured,
                  std::vector<NodeTime> nodes, const CriticalPath& path, std::size_t top) {
@@ -145,13 +105,16 @@ CommandResult RunProfile(const ProfileFlags& flags) {
   if (flags.trace.has_value()) KPSA_RETURN_IF_ERROR(CheckOutput(*flags.trace, flags.force, {".json"}));
   if (flags.trace == "-" && flags.json)
     return Status::Usage("--trace - and --json: stdout takes one of them");
+  KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
-  const Rig& rig = (*open)->rig;
+  Rig& rig = (*open)->rig;
   if (flags.trace.has_value()) KPSA_RETURN_IF_ERROR(CheckNotInput(*flags.trace, rig.files));
   const Result<std::vector<double>> times = SampleTimes(flags, rig);
   if (!times.ok()) return times.status();
   Compiler compiler;
+  if (flags.acceleration.wanted())
+    KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
   const auto plan = CompileFor(rig, &compiler, AllMeshes(rig));
   if (!plan.ok()) return plan.status();
 
@@ -199,6 +162,7 @@ void AddProfileCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--top", "N", &flags->top, "rows of the table; 20 if not given");
   AddOption(command, "--threads", "N", &flags->threads,
             "threads; 1 if not given, so that times of nodes add up");
+  AddAccelerationFlags(command, &flags->acceleration);
   AddQuietFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
 }

@@ -1,7 +1,6 @@
 // kpsa train: a rig to a subspace.
 #include <algorithm>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
 #include "cli/acceleration.h"
@@ -11,8 +10,7 @@
 #include "cli/output.h"
 #include "cli/progress.h"
 #include "cli/rig_training.h"
-#include "cli/subspace_check.h"
-#include "cli/table.h"
+#include "cli/train_report.h"
 
 namespace kpsa {
 namespace {
@@ -85,79 +83,6 @@ std::vector<std::string> SplitNames(const std::string& text) {
   return names;
 }
 
-void Report(const TrainFlags& flags, const std::string& path, const Subspace& subspace,
-            const TrainingRecord& record, const Calibration& calibration, const SubspaceCheck& check) {
-  std::size_t points = 0;
-  for (const SubspaceOutput& output : subspace.outputs) points += output.points;
-  if (flags.json) {
-    nlohmann::ordered_json poses = nlohmann::ordered_json::array(), regions = poses;
-    for (const auto& pose : check.worst_poses)
-      poses.push_back(
-          {{"controls", pose.controls}, {"region", pose.region}, {"max", pose.max}, {"rms", pose.rms}});
-    for (const auto& region : check.worst_regions)
-      regions.push_back({{"name", region.name}, {"rms", region.rms}, {"max", region.max}});
-    PrintJson(nlohmann::ordered_json{
-        {"schema", "kpsa.train/1"},
-        {"subspace", path},
-        {"points", points},
-        {"cues", subspace.cues.size()},
-        {"rows", subspace.rows()},
-        {"modes", subspace.modes},
-        {"trained_on",
-         {{"clips", record.clips},
-          {"clip_poses", record.clip_poses},
-          {"sampled_poses", record.sampled_poses}}},
-        {"seconds", record.seconds},
-        {"held_out",
-         {{"poses", record.calibration_poses}, {"rms", record.held_out_rms}, {"max", record.held_out_max}}},
-        {"motion", {{"rms", record.motion_rms}}},
-        {"calibration",
-         {{"tolerance", subspace.tolerance},
-          {"violation_rate", calibration.alpha},
-          {"hit_rate", calibration.hit_rate},
-          {"violations", calibration.violations},
-          {"warning", calibration.warning}}},
-        {"check",
-         {{"poses", check.poses},
-          {"rms", check.rms},
-          {"max", check.max},
-          {"worst_poses", poses},
-          {"worst_regions", regions}}},
-        {"predicted",
-         {{"full_ms", check.full_ms},
-          {"accelerated_ms", check.accelerated_ms},
-          {"speedup", check.PredictedSpeedup(calibration.hit_rate)}}}});
-    return;
-  }
-  Print(fmt::format("{}: {}, {} ({} numbers), {} modes, {:.1f} s\n", path, Plural(points, "point"),
-                    Plural(subspace.cues.size(), "cue"), subspace.rows(), subspace.modes, record.seconds));
-  Print(fmt::format("trained on {} of {} and {}\n", Plural(record.clip_poses, "frame"),
-                    record.clips.empty() ? "no clip" : fmt::format("{}", fmt::join(record.clips, ", ")),
-                    Plural(record.sampled_poses, "sampled pose")));
-  Print(fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(record.calibration_poses, "pose"),
-                    LengthText(record.held_out_rms), LengthText(record.held_out_max),
-                    LengthText(record.motion_rms)));
-  Print(fmt::format("calibrated for {} in {:.3g} % of poses: {:.1f} % of held-out poses hit\n",
-                    LengthText(subspace.tolerance), 100 * (1 - calibration.alpha),
-                    100 * calibration.hit_rate));
-  if (check.poses > 0) {
-    Print(
-        fmt::format("tried on {} of the controls: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "
-                    "{:.1f}x with these hits\n",
-                    Plural(check.poses, "new pose"), check.full_ms, check.accelerated_ms,
-                    check.PredictedSpeedup(calibration.hit_rate)));
-    Table poses({"worst poses (controls)", "where", ">max", ">RMS"});
-    for (const auto& pose : check.worst_poses)
-      poses.Row({pose.controls, pose.region, LengthText(pose.max), LengthText(pose.rms)});
-    Table regions({"worst regions", ">RMS", ">max"});
-    for (const auto& region : check.worst_regions)
-      regions.Row({region.name, LengthText(region.rms), LengthText(region.max)});
-    Print("\n" + poses.Text() + "\n" + regions.Text());
-  }
-  Print(fmt::format("\nnext: kpsa bench {}{}\n", flags.file,
-                    flags.output.has_value() ? " --kpsa " + path : ""));
-}
-
 CommandResult RunTrain(const TrainFlags& flags) {
   const Result<int> threads = ThreadCount(flags);
   if (!threads.ok()) return threads.status();
@@ -205,7 +130,9 @@ CommandResult RunTrain(const TrainFlags& flags) {
       CheckSubspace(&rig, *entry, subspace, kCheckPoses, options.seed ^ 0x9e3779b97f4a7c15ull);
   if (!check.ok()) return check.status();
   KPSA_RETURN_IF_ERROR(WriteSubspace(*subspace, path));
-  Report(flags, path, *subspace, record, calibration, *check);
+  const TrainResult result{flags.file,  path,  !flags.output.has_value(), subspace, record,
+                           calibration, *check};
+  Print(flags.json ? TrainJson(result) : TrainText(result));
   if (!flags.quiet) {
     for (const std::string& warning : {record.warning, calibration.warning}) {
       if (!warning.empty()) Say("warning: " + warning);

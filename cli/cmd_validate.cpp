@@ -20,7 +20,7 @@ Status Check(const Flags& flags, std::vector<std::string>* notes, std::string* s
   notes->insert(notes->end(), rig.notes.begin(), rig.notes.end());
   Compiler compiler;
   Request request = AllMeshes(rig);
-  for (const PlugRef& plug : VaryingPlugs(rig)) request.varying.push_back(plug);
+  request.varying = VaryingPlugs(rig);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
   KPSA_RETURN_IF_ERROR(

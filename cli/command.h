@@ -26,6 +26,7 @@ void AddTrainCommand(CLI::App* program, Command* chosen);
 void AddBenchCommand(CLI::App* program, Command* chosen);
 void AddCompileCommand(CLI::App* program, Command* chosen);
 void AddProfileCommand(CLI::App* program, Command* chosen);
+void AddExplainCommand(CLI::App* program, Command* chosen);
 void AddCompareCommand(CLI::App* program, Command* chosen);
 void AddGraphCommand(CLI::App* program, Command* chosen);
 void AddNodesCommand(CLI::App* program, Command* chosen);

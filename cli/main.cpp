@@ -81,6 +81,7 @@ int Main(int argc, char** argv) {
   AddBenchCommand(&program, &chosen);
   AddCompileCommand(&program, &chosen);
   AddProfileCommand(&program, &chosen);
+  AddExplainCommand(&program, &chosen);
   AddCompareCommand(&program, &chosen);
   AddGraphCommand(&program, &chosen);
   AddNodesCommand(&program, &chosen);
