@@ -65,6 +65,7 @@ class NodeBuilder {
   NodeBuilder& per_geometry();  // implies array
   NodeBuilder& lazy(bool together = false);
   NodeBuilder& alias(std::string other_name);
+  NodeBuilder& unit(Unit u) { attribute().unit = u; return *this; }
   NodeBuilder& doc(std::string text) { attribute().doc = std::move(text); return *this; }
   NodeBuilder& grid(std::string divisions_attribute);
   NodeBuilder& default_from(std::function<Value(const Structural&)> f);

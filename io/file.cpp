@@ -57,7 +57,8 @@ Status CopyTo(const std::string& from, const std::string& to) {
 
 Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::uint64_t max_bytes) {
   struct stat info = {};
-  if (::stat(path.c_str(), &info) != 0) return Status::Invalid("cannot be read: {}", Reason(errno)).At({path});
+  if (::stat(path.c_str(), &info) != 0)
+    return Status::Invalid("cannot be read: {}", Reason(errno)).At({path});
   if (S_ISDIR(info.st_mode)) return Status::Invalid("is a folder, expected a file").At({path});
   const auto too_large = [&] {
     return Status::Invalid("is larger than {} bytes, the most that is read", max_bytes).At({path});
@@ -68,7 +69,8 @@ Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::ui
 
   // The size is a hint only: pipes have none, and a file may grow
   std::vector<std::uint8_t> bytes;
-  std::size_t step = S_ISREG(info.st_mode) ? static_cast<std::size_t>(info.st_size) + 1 : std::size_t{1} << 16;
+  std::size_t step =
+      S_ISREG(info.st_mode) ? static_cast<std::size_t>(info.st_size) + 1 : std::size_t{1} << 16;
   for (;;) {
     const std::size_t before = bytes.size();
     bytes.resize(before + step);
@@ -90,7 +92,8 @@ Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
   if (path.empty()) return Status::Usage("the name of the output is empty");
   struct stat info = {};
   if (::stat(path.c_str(), &info) == 0) {
-    if (S_ISDIR(info.st_mode)) return Status::Usage("is a folder, expected the name of a file to write").At({path});
+    if (S_ISDIR(info.st_mode))
+      return Status::Usage("is a folder, expected the name of a file to write").At({path});
     file.device_ = !S_ISREG(info.st_mode);
     if (!file.device_ && !force) {
       return Status::Usage("exists already; give another name, or --force to replace it").At({path});
@@ -106,7 +109,8 @@ Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
   }
   if (file.temporary_.empty()) {
     const fs::path folder = fs::path(path).parent_path();
-    if (errno == ENOENT) return Status::Usage("cannot be written: there is no folder {}", folder.string()).At({path});
+    if (errno == ENOENT)
+      return Status::Usage("cannot be written: there is no folder {}", folder.string()).At({path});
     return Status::Usage("cannot be written: {}", Reason(errno)).At({path});
   }
   return file;

@@ -14,13 +14,13 @@ namespace kpsa {
 // The bytes of a file (not of a folder). An error where it is missing, unreadable or larger than max_bytes.
 Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::uint64_t max_bytes);
 
-// An output that is written under a temporary name beside its place and renamed by Commit, so that nobody ever sees
-// half a file; without Commit the destructor removes what was written. Move-only, for one thread.
+// An output that is written under a temporary name beside its place and renamed by Commit, so that nobody
+// ever sees half a file; without Commit the destructor removes what was written. Move-only, for one thread.
 // A device or pipe (/dev/null, /dev/stdout) cannot be renamed over: it gets a copy of the finished bytes.
 class OutputFile {
  public:
-  // Fails where the folder is missing or not writable, where `path` is a folder, and where it exists and `force` is
-  // false.
+  // Fails where the folder is missing or not writable, where `path` is a folder, and where it exists and
+  // `force` is false.
   static Result<OutputFile> Create(const std::string& path, bool force);
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&& other) noexcept;
@@ -41,7 +41,8 @@ class OutputFile {
 
 // Writes through a sink that appends bytes; sink errors (a full disk) stop the writer and are returned.
 using ByteSink = std::function<Status(std::span<const std::uint8_t>)>;
-Status WriteFileAtomically(const std::string& path, bool force, const std::function<Status(const ByteSink&)>& writer);
+Status WriteFileAtomically(const std::string& path, bool force,
+                           const std::function<Status(const ByteSink&)>& writer);
 Status WriteFileAtomically(const std::string& path, bool force, std::span<const std::uint8_t> bytes);
 
 }  // namespace kpsa

@@ -18,20 +18,30 @@ struct Elements {
 
 unsigned TypeBit(int component_type) {
   switch (component_type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE: return kByte;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return kUnsignedByte;
-    case TINYGLTF_COMPONENT_TYPE_SHORT: return kShort;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return kUnsignedShort;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return kUnsignedInt;
-    case TINYGLTF_COMPONENT_TYPE_FLOAT: return kFloat;
-    default: return 0;
+    case TINYGLTF_COMPONENT_TYPE_BYTE:
+      return kByte;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return kUnsignedByte;
+    case TINYGLTF_COMPONENT_TYPE_SHORT:
+      return kShort;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return kUnsignedShort;
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return kUnsignedInt;
+    case TINYGLTF_COMPONENT_TYPE_FLOAT:
+      return kFloat;
+    default:
+      return 0;
   }
 }
 
 std::string TypeNames(unsigned types) {
-  constexpr std::pair<unsigned, const char*> kNames[] = {{kByte, "byte"}, {kUnsignedByte, "unsigned byte"},
-                                                         {kShort, "short"}, {kUnsignedShort, "unsigned short"},
-                                                         {kUnsignedInt, "unsigned int"}, {kFloat, "float"}};
+  constexpr std::pair<unsigned, const char*> kNames[] = {{kByte, "byte"},
+                                                         {kUnsignedByte, "unsigned byte"},
+                                                         {kShort, "short"},
+                                                         {kUnsignedShort, "unsigned short"},
+                                                         {kUnsignedInt, "unsigned int"},
+                                                         {kFloat, "float"}};
   std::string text;
   for (const auto& [bit, name] : kNames) {
     if ((types & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);
@@ -53,19 +63,24 @@ double LoadNumber(const std::uint8_t* data, int component_type, bool normalized)
       const double c = Load<std::int8_t>(data);
       return normalized ? std::max(c / 127, -1.0) : c;
     }
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return normalized ? Load<std::uint8_t>(data) / 255.0 : Load<std::uint8_t>(data);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+      return normalized ? Load<std::uint8_t>(data) / 255.0 : Load<std::uint8_t>(data);
     case TINYGLTF_COMPONENT_TYPE_SHORT: {
       const double c = Load<std::int16_t>(data);
       return normalized ? std::max(c / 32767, -1.0) : c;
     }
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return normalized ? Load<std::uint16_t>(data) / 65535.0 : Load<std::uint16_t>(data);
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return Load<std::uint32_t>(data);
-    default: return Load<float>(data);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+      return normalized ? Load<std::uint16_t>(data) / 65535.0 : Load<std::uint16_t>(data);
+    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+      return Load<std::uint32_t>(data);
+    default:
+      return Load<float>(data);
   }
 }
 
 std::size_t ComponentSize(int component_type) {
-  return static_cast<std::size_t>(tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(component_type)));
+  return static_cast<std::size_t>(
+      tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(component_type)));
 }
 
 // `count` elements of `size` bytes from a view, all of them within the view and the view within its buffer.
@@ -76,8 +91,8 @@ Status ResolveView(const Document& document, int view_index, std::uint64_t offse
   const std::vector<std::uint8_t>& buffer = document.buffers[static_cast<std::size_t>(view.buffer)];
   if (view.byteOffset + view.byteLength > buffer.size()) {
     if (buffer.empty()) return Status::Invalid("{}: buffers[{}] has no data", what, view.buffer);
-    return Status::Invalid("{}: bufferViews[{}] ends at byte {} of buffers[{}], which has {}", what, view_index,
-                           view.byteOffset + view.byteLength, view.buffer, buffer.size());
+    return Status::Invalid("{}: bufferViews[{}] ends at byte {} of buffers[{}], which has {}", what,
+                           view_index, view.byteOffset + view.byteLength, view.buffer, buffer.size());
   }
   elements->stride = strided && view.byteStride != 0 ? view.byteStride : size;
   const std::uint64_t end = count == 0 ? 0 : offset + (count - 1) * elements->stride + size;
@@ -104,8 +119,8 @@ struct Access {
   std::vector<Index> sparse_indices;
 };
 
-Status ReadSparseIndices(const Document& document, const tinygltf::Accessor& accessor, const std::string& what,
-                         std::vector<Index>* indices) {
+Status ReadSparseIndices(const Document& document, const tinygltf::Accessor& accessor,
+                         const std::string& what, std::vector<Index>* indices) {
   const int type = accessor.sparse.indices.componentType;
   if ((TypeBit(type) & (kUnsignedByte | kUnsignedShort | kUnsignedInt)) == 0) {
     return Status::Invalid("{}: sparse indices have the component type {}", what, type);
@@ -148,8 +163,8 @@ Status Open(const Document& document, int index, int components, unsigned types,
   access->component_size = ComponentSize(accessor.componentType);
   access->size = access->component_size * static_cast<std::size_t>(components);
   if (accessor.bufferView != document.no_view) {
-    KPSA_RETURN_IF_ERROR(ResolveView(document, accessor.bufferView, accessor.byteOffset, access->count, access->size,
-                                     true, name, &access->base));
+    KPSA_RETURN_IF_ERROR(ResolveView(document, accessor.bufferView, accessor.byteOffset, access->count,
+                                     access->size, true, name, &access->base));
   }
   if (accessor.sparse.isSparse) {
     access->sparse_count = static_cast<std::size_t>(accessor.sparse.count);
@@ -186,14 +201,15 @@ Status ForEachNumber(const Access& access, const std::string& what, const Each& 
     }
   }
   for (std::size_t i = 0; i < access.sparse_count; ++i) {
-    KPSA_RETURN_IF_ERROR(visit(access.sparse_indices[i], access.sparse_values.data + i * access.sparse_values.stride));
+    KPSA_RETURN_IF_ERROR(
+        visit(access.sparse_indices[i], access.sparse_values.data + i * access.sparse_values.stride));
   }
   return {};
 }
 
 template <typename T>
-Status ReadAll(const Document& document, int accessor, int components, unsigned types, const std::string& what,
-               std::vector<T>* values) {
+Status ReadAll(const Document& document, int accessor, int components, unsigned types,
+               const std::string& what, std::vector<T>* values) {
   Access access;
   KPSA_RETURN_IF_ERROR(Open(document, accessor, components, types, what, &access));
   const std::size_t total = access.count * static_cast<std::size_t>(components);
@@ -213,20 +229,22 @@ std::size_t AccessorCount(const Document& document, int accessor) {
 }
 
 template <typename T>
-Status ReadNumbers(const Document& document, int accessor, int components, unsigned types, const std::string& what,
-                   std::vector<T>* values) {
+Status ReadNumbers(const Document& document, int accessor, int components, unsigned types,
+                   const std::string& what, std::vector<T>* values) {
   return ReadAll(document, accessor, components, types, what, values);
 }
-template Status ReadNumbers<float>(const Document&, int, int, unsigned, const std::string&, std::vector<float>*);
-template Status ReadNumbers<double>(const Document&, int, int, unsigned, const std::string&, std::vector<double>*);
+template Status ReadNumbers<float>(const Document&, int, int, unsigned, const std::string&,
+                                   std::vector<float>*);
+template Status ReadNumbers<double>(const Document&, int, int, unsigned, const std::string&,
+                                    std::vector<double>*);
 
-Status ReadIndices(const Document& document, int accessor, int components, unsigned types, const std::string& what,
-                   std::vector<Index>* values) {
+Status ReadIndices(const Document& document, int accessor, int components, unsigned types,
+                   const std::string& what, std::vector<Index>* values) {
   if (document.model->accessors[static_cast<std::size_t>(accessor)].normalized) {
     return Status::Invalid("{} (accessors[{}]) holds indices and must not be normalized", what, accessor);
   }
-  return ReadAll(document, accessor, components, types & (kUnsignedByte | kUnsignedShort | kUnsignedInt), what,
-                 values);
+  return ReadAll(document, accessor, components, types & (kUnsignedByte | kUnsignedShort | kUnsignedInt),
+                 what, values);
 }
 
 Status ReadSparseVectors(const Document& document, int accessor, unsigned types, const std::string& what,
@@ -245,7 +263,8 @@ Status ReadSparseVectors(const Document& document, int accessor, unsigned types,
     all[at] = static_cast<float>(number);
   }));
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < stored; ++i) kept += all[3 * i] != 0 || all[3 * i + 1] != 0 || all[3 * i + 2] != 0;
+  for (std::size_t i = 0; i < stored; ++i)
+    kept += all[3 * i] != 0 || all[3 * i + 1] != 0 || all[3 * i + 2] != 0;
   KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(16 * kept, what));
   indices->reserve(kept);
   values->reserve(3 * kept);

@@ -25,10 +25,12 @@ std::optional<Interpolation> ParseInterpolation(const std::string& text) {
   return std::nullopt;
 }
 
-Status ReadTimes(const Document& document, int accessor, const std::string& what, std::vector<double>* times) {
+Status ReadTimes(const Document& document, int accessor, const std::string& what,
+                 std::vector<double>* times) {
   KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, 1, kFloat, what, times));
   if (times->empty()) return Status::Invalid("{} has no keys", what);
-  if (times->front() < 0) return Status::Invalid("{}: the first key is at {} s, before 0", what, times->front());
+  if (times->front() < 0)
+    return Status::Invalid("{}: the first key is at {} s, before 0", what, times->front());
   for (std::size_t i = 1; i < times->size(); ++i) {
     if ((*times)[i] <= (*times)[i - 1]) {
       return Status::Invalid("{}: key {} is at {} s, not after the key before at {} s", what, i, (*times)[i],
@@ -46,8 +48,8 @@ Status ReadValues(const Document& document, int accessor, const std::string& wha
   const std::size_t parts = channel->interpolation == Interpolation::kCubicSpline ? 3 : 1;
   const std::size_t expected = channel->times.size() * parts * static_cast<std::size_t>(channel->components);
   if (channel->values.size() != expected) {
-    return Status::Invalid("{} has {} numbers, {} keys need {}", what, channel->values.size(), channel->times.size(),
-                           expected);
+    return Status::Invalid("{} has {} numbers, {} keys need {}", what, channel->values.size(),
+                           channel->times.size(), expected);
   }
   return {};
 }
@@ -61,12 +63,13 @@ Result<std::optional<Channel>> ReadChannel(const Document& document, const tinyg
   channel.node = static_cast<Index>(in.target_node);
   const std::optional<Path> path = ParsePath(in.target_path);
   if (!path) {
-    return Status::Invalid("{}.target.path is \"{}\", expected translation, rotation, scale or weights", where,
-                           in.target_path);
+    return Status::Invalid("{}.target.path is \"{}\", expected translation, rotation, scale or weights",
+                           where, in.target_path);
   }
   channel.path = *path;
   if (in.sampler < 0 || static_cast<std::size_t>(in.sampler) >= animation.samplers.size()) {
-    return Status::Invalid("{}.sampler is {}, there are {} samplers", where, in.sampler, animation.samplers.size());
+    return Status::Invalid("{}.sampler is {}, there are {} samplers", where, in.sampler,
+                           animation.samplers.size());
   }
   const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<std::size_t>(in.sampler)];
   const std::string sampler_place = fmt::format("{}.samplers[{}]", animation_place, in.sampler);
@@ -81,15 +84,17 @@ Result<std::optional<Channel>> ReadChannel(const Document& document, const tinyg
   if (channel.path == Path::kWeights) {
     const std::size_t targets = node.mesh == kNoIndex ? 0 : character.meshes[node.mesh].targets.size();
     if (targets == 0) {
-      warnings->push_back(fmt::format("{} animates morph weights of nodes[{}], which has no morph targets; ignored",
-                                      where, channel.node));
+      warnings->push_back(
+          fmt::format("{} animates morph weights of nodes[{}], which has no morph targets; ignored", where,
+                      channel.node));
       return std::optional<Channel>();
     }
     channel.components = static_cast<int>(targets);
   } else {
     if (node.has_matrix) {
-      return Status::Invalid("{} animates nodes[{}], which has a matrix; expected translation, rotation and scale",
-                             where, channel.node);
+      return Status::Invalid(
+          "{} animates nodes[{}], which has a matrix; expected translation, rotation and scale", where,
+          channel.node);
     }
     channel.components = channel.path == Path::kRotation ? 4 : 3;
   }

@@ -57,10 +57,12 @@ bool HasScheme(std::string_view uri) {
   return colon != std::string_view::npos && colon > 0 && uri[colon] == ':';
 }
 
-std::string Shortened(const std::string& text) { return text.size() <= 80 ? text : text.substr(0, 77) + "..."; }
+std::string Shortened(const std::string& text) {
+  return text.size() <= 80 ? text : text.substr(0, 77) + "...";
+}
 
-Result<std::vector<std::uint8_t>> LoadBuffer(const BufferSource& source, bool is_first, const Container& container,
-                                             const std::string& folder) {
+Result<std::vector<std::uint8_t>> LoadBuffer(const BufferSource& source, bool is_first,
+                                             const Container& container, const std::string& folder) {
   std::vector<std::uint8_t> bytes;
   if (source.has_uri) {
     if (source.uri.starts_with("data:")) {
@@ -98,14 +100,17 @@ tinygltf::FsCallbacks NoFiles() {
   tinygltf::FsCallbacks callbacks = {};
   callbacks.FileExists = [](const std::string&, void*) { return false; };
   callbacks.ExpandFilePath = [](const std::string& path, void*) { return path; };
-  callbacks.ReadWholeFile = [](std::vector<unsigned char>*, std::string*, const std::string&, void*) { return false; };
+  callbacks.ReadWholeFile = [](std::vector<unsigned char>*, std::string*, const std::string&, void*) {
+    return false;
+  };
   callbacks.WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
     return false;
   };
   return callbacks;
 }
 
-bool SkipImage(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
+bool SkipImage(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int,
+               void*) {
   return true;
 }
 
@@ -115,7 +120,8 @@ Status ParseModel(const std::string& text, tinygltf::Model* model) {
     tinygltf::TinyGLTF loader;
     loader.SetFsCallbacks(NoFiles());
     loader.SetImageLoader(&SkipImage, nullptr);
-    if (loader.LoadASCIIFromString(model, &error, &warning, text.data(), static_cast<unsigned>(text.size()), "")) {
+    if (loader.LoadASCIIFromString(model, &error, &warning, text.data(), static_cast<unsigned>(text.size()),
+                                   "")) {
       return {};
     }
   } catch (const std::exception& exception) {
@@ -150,10 +156,12 @@ Result<Container> SplitContainer(std::span<const std::uint8_t> bytes) {
   Container container;
   if (bytes.size() < 4 || std::memcmp(bytes.data(), "glTF", 4) != 0) {
     std::size_t i = bytes.size() >= 3 && bytes[0] == 0xef && bytes[1] == 0xbb && bytes[2] == 0xbf ? 3 : 0;
-    while (i < bytes.size() && (bytes[i] == ' ' || bytes[i] == '\t' || bytes[i] == '\n' || bytes[i] == '\r')) ++i;
+    while (i < bytes.size() && (bytes[i] == ' ' || bytes[i] == '\t' || bytes[i] == '\n' || bytes[i] == '\r'))
+      ++i;
     if (bytes.empty()) return Status::Invalid("is empty, expected glTF");
     if (i == bytes.size() || bytes[i] != '{') {
-      return Status::Invalid("is no glTF file: it starts neither with \"glTF\" (.glb) nor with a brace (.gltf)");
+      return Status::Invalid(
+          "is no glTF file: it starts neither with \"glTF\" (.glb) nor with a brace (.gltf)");
     }
     container.json = bytes;
     return container;
@@ -169,12 +177,13 @@ Result<Container> SplitContainer(std::span<const std::uint8_t> bytes) {
   }
   bool has_json = false, has_binary = false;
   for (std::size_t offset = 12; offset < bytes.size();) {
-    if (bytes.size() - offset < 8) return Status::Invalid("is damaged: a .glb chunk header is cut at byte {}", offset);
+    if (bytes.size() - offset < 8)
+      return Status::Invalid("is damaged: a .glb chunk header is cut at byte {}", offset);
     const std::uint32_t length = ReadUint32(bytes, offset), type = ReadUint32(bytes, offset + 4);
     offset += 8;
     if (length > bytes.size() - offset) {
-      return Status::Invalid("is damaged: the .glb chunk at byte {} says {} bytes, {} are left", offset - 8, length,
-                             bytes.size() - offset);
+      return Status::Invalid("is damaged: the .glb chunk at byte {} says {} bytes, {} are left", offset - 8,
+                             length, bytes.size() - offset);
     }
     if (type == 0x4e4f534a && !has_json) {
       container.json = bytes.subspan(offset, length);
@@ -214,7 +223,8 @@ Status CheckJsonDepth(std::span<const std::uint8_t> text, int max_depth) {
 Result<std::vector<std::uint8_t>> DecodeDataUri(const std::string& uri) {
   const std::size_t comma = uri.find(',');
   if (comma == std::string::npos) return Status::Invalid("the data URI has no comma");
-  const std::string_view header = std::string_view(uri).substr(0, comma), data = std::string_view(uri).substr(comma + 1);
+  const std::string_view header = std::string_view(uri).substr(0, comma),
+                         data = std::string_view(uri).substr(comma + 1);
   std::vector<std::uint8_t> bytes;
   if (!header.ends_with(";base64")) {
     const std::string decoded = PercentDecoded(data);
@@ -226,7 +236,8 @@ Result<std::vector<std::uint8_t>> DecodeDataUri(const std::string& uri) {
   int count = 0;
   for (std::size_t i = 0; i < data.size() && data[i] != '='; ++i) {
     const int value = Base64Value(data[i]);
-    if (value < 0) return Status::Invalid("the data URI has an invalid base64 character at byte {}", comma + 1 + i);
+    if (value < 0)
+      return Status::Invalid("the data URI has an invalid base64 character at byte {}", comma + 1 + i);
     bits = bits << 6 | static_cast<std::uint32_t>(value);
     if (++count % 4 != 0) continue;
     bytes.insert(bytes.end(), {static_cast<std::uint8_t>(bits >> 16), static_cast<std::uint8_t>(bits >> 8),
@@ -242,15 +253,17 @@ Result<std::vector<std::uint8_t>> DecodeDataUri(const std::string& uri) {
 
 Result<std::string> RelativePathOfUri(const std::string& uri) {
   if (HasScheme(uri)) {
-    return Status::Invalid("\"{}\" is no relative URI; only files in the document's folder and data URIs are read",
-                           Shortened(uri));
+    return Status::Invalid(
+        "\"{}\" is no relative URI; only files in the document's folder and data URIs are read",
+        Shortened(uri));
   }
   const std::string path = PercentDecoded(uri);
   if (path.empty()) return Status::Invalid("the URI is empty");
   if (path.find('\0') != std::string::npos) return Status::Invalid("the URI holds a zero byte");
   const std::filesystem::path normal = std::filesystem::path(path).lexically_normal();
   if (normal.is_absolute() || *normal.begin() == "..") {
-    return Status::Invalid("\"{}\" leaves the document's folder; move the file beside the document", Shortened(uri));
+    return Status::Invalid("\"{}\" leaves the document's folder; move the file beside the document",
+                           Shortened(uri));
   }
   return normal.string();
 }

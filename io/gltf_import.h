@@ -1,14 +1,16 @@
-// glTF 2.0 characters (.gltf with data URIs or files beside it, .glb) as plain structs: what deforms, and nothing
-// of how it is shaded. Names stay verbatim; indices are those of the file, so that messages can quote both.
+// glTF 2.0 characters (.gltf with data URIs or files beside it, .glb) as plain structs: what deforms, and
+// nothing of how it is shaded. Names stay verbatim; indices are those of the file, so that messages can quote
+// both.
 //
 // Units and spaces are glTF's, which are ours: metres, seconds, Y up, right-handed, column-major matrices.
 //
-// Extensions: KHR_mesh_quantization is read. Extensions that cannot move a point (KHR_texture_*, KHR_materials_*,
-// KHR_lights_punctual, EXT_texture_*, ...) are ignored even where the file requires them. Any other required one
-// (KHR_draco_mesh_compression, EXT_meshopt_compression, ...) is an error that names it. Images are never read.
+// Extensions: KHR_mesh_quantization is read. Extensions that cannot move a point (KHR_texture_*,
+// KHR_materials_*, KHR_lights_punctual, EXT_texture_*, ...) are ignored even where the file requires them.
+// Any other required one (KHR_draco_mesh_compression, EXT_meshopt_compression, ...) is an error that names
+// it. Images are never read.
 //
-// The file is hostile: JSON depth and size, container lengths, every index, count, stride and offset, every float
-// and every allocation are checked first, and a buffer may not lie outside the document's folder.
+// The file is hostile: JSON depth and size, container lengths, every index, count, stride and offset, every
+// float and every allocation are checked first, and a buffer may not lie outside the document's folder.
 #pragma once
 
 #include <cstdint>
@@ -39,8 +41,8 @@ struct Node {
   Matrix4 LocalMatrix() const;  // the rest pose: `matrix`, or T * R * S
 };
 
-// Triangles as vertex indices into the *mesh* (first_vertex is added), three each; strips and fans are unrolled.
-// Points, lines and primitives without POSITION have none.
+// Triangles as vertex indices into the *mesh* (first_vertex is added), three each; strips and fans are
+// unrolled. Points, lines and primitives without POSITION have none.
 struct Primitive {
   Index first_vertex = 0;
   Index vertex_count = 0;
@@ -66,10 +68,11 @@ struct MorphTarget {
 struct Mesh {
   std::string name;
   std::vector<float> positions;  // 3V, x y z interleaved, mesh-local
+  std::vector<float> colors;     // COLOR_0, 3V linear 0 .. 1, for pictures; empty where no primitive has it
   std::vector<Primitive> primitives;
-  // Row v: the influences of vertex v from all JOINTS_n/WEIGHTS_n in slot order, without zeros; a joint listed twice
-  // is summed. Weights are divided by their sum, as the specification wants them to be (glTF 2.0, 3.7.3.3);
-  // a skinned vertex whose weights are all zero follows the joint of its first slot.
+  // Row v: the influences of vertex v from all JOINTS_n/WEIGHTS_n in slot order, without zeros; a joint
+  // listed twice is summed. Weights are divided by their sum, as the specification wants them to be
+  // (glTF 2.0, 3.7.3.3); a skinned vertex whose weights are all zero follows the joint of its first slot.
   std::vector<Index> influence_offsets;  // V + 1, or empty where no primitive is skinned
   std::vector<Influence> influences;
   std::vector<MorphTarget> targets;
@@ -81,9 +84,10 @@ struct Mesh {
 
 struct Skin {
   std::string name;
-  std::vector<Index> joints;                   // node indices
-  std::vector<Matrix4> inverse_bind_matrices;  // joint_from_mesh at bind time, one a joint; identity where absent
-  Index skeleton = kNoIndex;                   // a hint only: joints need not be below it
+  std::vector<Index> joints;  // node indices
+  std::vector<Matrix4>
+      inverse_bind_matrices;  // joint_from_mesh at bind time, one a joint; identity where absent
+  Index skeleton = kNoIndex;  // a hint only: joints need not be below it
 };
 
 struct Material {
@@ -99,9 +103,10 @@ struct Channel {
   Index node = kNoIndex;
   Path path = Path::kTranslation;
   Interpolation interpolation = Interpolation::kLinear;
-  int components = 3;          // 3, 4 for rotations (x y z w), the number of targets for weights
-  std::vector<double> times;   // seconds, K >= 1 keys, strictly increasing
-  std::vector<double> values;  // K * components; kCubicSpline: 3K * components (in-tangent, value, out-tangent)
+  int components = 3;         // 3, 4 for rotations (x y z w), the number of targets for weights
+  std::vector<double> times;  // seconds, K >= 1 keys, strictly increasing
+  std::vector<double>
+      values;  // K * components; kCubicSpline: 3K * components (in-tangent, value, out-tangent)
 };
 
 struct Clip {
@@ -122,8 +127,8 @@ struct Character {
   std::vector<Index> scene_roots;     // of the default scene, else the first, else every root
   std::vector<std::string> warnings;  // what was ignored and might be missed, one line each
 
-  // The name of a node in outputs: its name, `node<index>` if it has none, `<name>#<index>` where it is shared.
-  // A mesh node shares with mesh nodes only; any other node with all nodes.
+  // The name of a node in outputs: its name, `node<index>` if it has none, `<name>#<index>` where it is
+  // shared. A mesh node shares with mesh nodes only; any other node with all nodes.
   std::string UniqueName(Index node) const;
   // The same for all nodes at once, in O(nodes); use this in loops.
   std::vector<std::string> UniqueNames() const;

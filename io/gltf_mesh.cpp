@@ -11,7 +11,7 @@ namespace kpsa::gltf {
 namespace {
 
 constexpr unsigned kPositionTypes = kFloat | kAnyInteger16;  // integers: KHR_mesh_quantization
-constexpr float kNegativeNoise = -1e-4f;                     // exporters' rounding; such weights count as zero
+constexpr float kNegativeNoise = -1e-4f;  // exporters' rounding; such weights count as zero
 
 int FindAttribute(const std::map<std::string, int>& attributes, const std::string& name) {
   const auto found = attributes.find(name);
@@ -21,7 +21,8 @@ int FindAttribute(const std::map<std::string, int>& attributes, const std::strin
 Status CheckCount(const Document& document, int accessor, std::size_t expected, const std::string& what) {
   const std::size_t count = AccessorCount(document, accessor);
   if (count == expected) return {};
-  return Status::Invalid("{} (accessors[{}]) has {} elements, POSITION has {}", what, accessor, count, expected);
+  return Status::Invalid("{} (accessors[{}]) has {} elements, POSITION has {}", what, accessor, count,
+                         expected);
 }
 
 // The list of vertices, as drawn, to triangles (glTF 2.0, 3.7.2.1); an incomplete last triangle is not drawn.
@@ -50,13 +51,15 @@ Status ReadTriangles(const Document& document, const tinygltf::Primitive& in, co
   const Index first = out->first_vertex;
   if (in.indices < 0) {
     KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(4 * factor * out->vertex_count, where));
-    Unroll(in.mode, out->vertex_count, [&](std::size_t i) { return first + static_cast<Index>(i); }, &out->triangles);
+    Unroll(
+        in.mode, out->vertex_count, [&](std::size_t i) { return first + static_cast<Index>(i); },
+        &out->triangles);
     return {};
   }
   std::vector<Index> indices;
   const std::string what = where + ".indices";
-  KPSA_RETURN_IF_ERROR(ReadIndices(document, in.indices, 1, kUnsignedByte | kUnsignedShort | kUnsignedInt, what,
-                                   &indices));
+  KPSA_RETURN_IF_ERROR(
+      ReadIndices(document, in.indices, 1, kUnsignedByte | kUnsignedShort | kUnsignedInt, what, &indices));
   for (std::size_t i = 0; i < indices.size(); ++i) {
     if (indices[i] >= out->vertex_count) {
       return Status::Invalid("{}: index {} is {}, the primitive has {} vertices", what, i, indices[i],
@@ -64,7 +67,8 @@ Status ReadTriangles(const Document& document, const tinygltf::Primitive& in, co
     }
   }
   KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(4 * factor * indices.size(), what));
-  Unroll(in.mode, indices.size(), [&](std::size_t i) { return first + indices[i]; }, &out->triangles);
+  Unroll(
+      in.mode, indices.size(), [&](std::size_t i) { return first + indices[i]; }, &out->triangles);
   return {};
 }
 
@@ -98,14 +102,15 @@ Status ReadInfluences(const Document& document, const tinygltf::Primitive& in, c
   std::vector<std::vector<Index>> joints(sets.size());
   std::vector<std::vector<float>> weights(sets.size());
   for (std::size_t s = 0; s < sets.size(); ++s) {
-    const std::string joints_name = fmt::format("JOINTS_{}", sets[s]), weights_name = fmt::format("WEIGHTS_{}", sets[s]);
+    const std::string joints_name = fmt::format("JOINTS_{}", sets[s]),
+                      weights_name = fmt::format("WEIGHTS_{}", sets[s]);
     const int joint_accessor = FindAttribute(in.attributes, joints_name);
     const int weight_accessor = FindAttribute(in.attributes, weights_name);
     const std::string joint_place = where + "." + joints_name, weight_place = where + "." + weights_name;
     KPSA_RETURN_IF_ERROR(CheckCount(document, joint_accessor, primitive->vertex_count, joint_place));
     KPSA_RETURN_IF_ERROR(CheckCount(document, weight_accessor, primitive->vertex_count, weight_place));
-    KPSA_RETURN_IF_ERROR(ReadIndices(document, joint_accessor, 4, kUnsignedByte | kUnsignedShort, joint_place,
-                                     &joints[s]));
+    KPSA_RETURN_IF_ERROR(
+        ReadIndices(document, joint_accessor, 4, kUnsignedByte | kUnsignedShort, joint_place, &joints[s]));
     KPSA_RETURN_IF_ERROR(ReadNumbers(document, weight_accessor, 4, kFloat | kUnsignedByte | kUnsignedShort,
                                      weight_place, &weights[s]));
   }
@@ -117,11 +122,13 @@ Status ReadInfluences(const Document& document, const tinygltf::Primitive& in, c
       for (std::size_t k = 4 * v; k < 4 * v + 4; ++k) {
         const float weight = weights[s][k];
         if (weight < kNegativeNoise) {
-          return Status::Invalid("{}.WEIGHTS_{}: vertex {} has the negative weight {}", where, sets[s], v, weight);
+          return Status::Invalid("{}.WEIGHTS_{}: vertex {} has the negative weight {}", where, sets[s], v,
+                                 weight);
         }
         if (weight <= 0) continue;
         sum += weight;
-        const auto same = std::find_if(row.begin(), row.end(), [&](const auto& r) { return r.first == joints[s][k]; });
+        const auto same =
+            std::find_if(row.begin(), row.end(), [&](const auto& r) { return r.first == joints[s][k]; });
         if (same != row.end()) {
           same->second += weight;
         } else {
@@ -134,7 +141,8 @@ Status ReadInfluences(const Document& document, const tinygltf::Primitive& in, c
       sum = 1;
     }
     KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(4 + 8 * row.size(), where));
-    for (const auto& [joint, weight] : row) mesh->influences.push_back({joint, static_cast<float>(weight / sum)});
+    for (const auto& [joint, weight] : row)
+      mesh->influences.push_back({joint, static_cast<float>(weight / sum)});
     mesh->influence_offsets.push_back(static_cast<Index>(mesh->influences.size()));
   }
   if (mesh->influences.size() >= kNoIndex) return Status::Invalid("{} has too many influences", where);
@@ -144,8 +152,8 @@ Status ReadInfluences(const Document& document, const tinygltf::Primitive& in, c
 Status ReadTargets(const Document& document, const tinygltf::Primitive& in, const std::string& where,
                    const Primitive& primitive, Mesh* mesh) {
   if (in.targets.size() != mesh->targets.size()) {
-    return Status::Invalid("{} has {} morph targets, primitives[0] has {}; all primitives must have the same", where,
-                           in.targets.size(), mesh->targets.size());
+    return Status::Invalid("{} has {} morph targets, primitives[0] has {}; all primitives must have the same",
+                           where, in.targets.size(), mesh->targets.size());
   }
   for (std::size_t t = 0; t < in.targets.size(); ++t) {
     const int accessor = FindAttribute(in.targets[t], "POSITION");
@@ -163,7 +171,31 @@ Status ReadTargets(const Document& document, const tinygltf::Primitive& in, cons
   return {};
 }
 
-Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, const std::string& where, Mesh* mesh) {
+// Appends the colours of this primitive where it has them, white else; nothing while no primitive had any.
+Status ReadColors(const Document& document, const tinygltf::Primitive& in, const std::string& where,
+                  const Primitive& primitive, Mesh* mesh) {
+  const int accessor = FindAttribute(in.attributes, "COLOR_0");
+  if (accessor < 0 && mesh->colors.empty()) return {};
+  KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(12 * (mesh->vertex_count() - mesh->colors.size() / 3), where));
+  if (accessor >= 0) {
+    const std::string place = where + ".COLOR_0";
+    KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
+    const bool with_alpha = document.model->accessors[static_cast<std::size_t>(accessor)].type == TINYGLTF_TYPE_VEC4;
+    const std::size_t components = with_alpha ? 4 : 3;
+    std::vector<float> colors;
+    KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, static_cast<int>(components),
+                                     kFloat | kUnsignedByte | kUnsignedShort, place, &colors));
+    mesh->colors.resize(3 * static_cast<std::size_t>(primitive.first_vertex), 1.0f);
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      if (i % components < 3) mesh->colors.push_back(std::clamp(colors[i], 0.0f, 1.0f));
+    }
+  }
+  mesh->colors.resize(mesh->positions.size(), 1.0f);
+  return {};
+}
+
+Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, const std::string& where,
+                     Mesh* mesh) {
   Primitive primitive;
   primitive.first_vertex = static_cast<Index>(mesh->vertex_count());
   primitive.material = in.material < 0 ? kNoIndex : static_cast<Index>(in.material);
@@ -179,6 +211,7 @@ Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, co
   KPSA_RETURN_IF_ERROR(ReadTriangles(document, in, where, &primitive));
   KPSA_RETURN_IF_ERROR(ReadInfluences(document, in, where, &primitive, mesh));
   KPSA_RETURN_IF_ERROR(ReadTargets(document, in, where, primitive, mesh));
+  KPSA_RETURN_IF_ERROR(ReadColors(document, in, where, primitive, mesh));
   mesh->primitives.push_back(std::move(primitive));
   return {};
 }
@@ -188,13 +221,15 @@ Status ReadMesh(const Document& document, std::size_t index, Mesh* mesh) {
   mesh->name = in.name;
   mesh->targets.resize(in.primitives.empty() ? 0 : in.primitives[0].targets.size());
   const std::vector<std::string>& names = document.target_names[index];
-  for (std::size_t t = 0; t < std::min(names.size(), mesh->targets.size()); ++t) mesh->targets[t].name = names[t];
+  for (std::size_t t = 0; t < std::min(names.size(), mesh->targets.size()); ++t)
+    mesh->targets[t].name = names[t];
   mesh->influence_offsets = {0};
   for (std::size_t p = 0; p < in.primitives.size(); ++p) {
     KPSA_RETURN_IF_ERROR(
         ReadPrimitive(document, in.primitives[p], fmt::format("meshes[{}].primitives[{}]", index, p), mesh));
   }
-  if (std::none_of(mesh->primitives.begin(), mesh->primitives.end(), [](const Primitive& p) { return p.skinned; })) {
+  if (std::none_of(mesh->primitives.begin(), mesh->primitives.end(),
+                   [](const Primitive& p) { return p.skinned; })) {
     mesh->influence_offsets.clear();
   }
   if (!in.weights.empty() && in.weights.size() != mesh->targets.size()) {

@@ -15,8 +15,10 @@ Index ToIndex(int index) { return index < 0 ? kNoIndex : static_cast<Index>(inde
 void ReadTransform(const tinygltf::Node& in, Node* node) {
   node->has_matrix = in.matrix.size() == 16;
   if (node->has_matrix) std::copy(in.matrix.begin(), in.matrix.end(), node->matrix.m.begin());
-  if (in.translation.size() == 3) node->translation = {in.translation[0], in.translation[1], in.translation[2]};
-  if (in.rotation.size() == 4) node->rotation = {in.rotation[0], in.rotation[1], in.rotation[2], in.rotation[3]};
+  if (in.translation.size() == 3)
+    node->translation = {in.translation[0], in.translation[1], in.translation[2]};
+  if (in.rotation.size() == 4)
+    node->rotation = {in.rotation[0], in.rotation[1], in.rotation[2], in.rotation[3]};
   if (in.scale.size() == 3) node->scale = {in.scale[0], in.scale[1], in.scale[2]};
 }
 
@@ -26,8 +28,8 @@ Status LinkHierarchy(Character* character) {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     for (const Index child : nodes[i].children) {
       if (nodes[child].parent != kNoIndex) {
-        return Status::Invalid("nodes[{}] is a child of nodes[{}] and of nodes[{}]; a node has one parent", child,
-                               nodes[child].parent, i);
+        return Status::Invalid("nodes[{}] is a child of nodes[{}] and of nodes[{}]; a node has one parent",
+                               child, nodes[child].parent, i);
       }
       nodes[child].parent = static_cast<Index>(i);
     }
@@ -43,7 +45,8 @@ Status LinkHierarchy(Character* character) {
   }
   if (order.size() == nodes.size()) return {};
 
-  // Every node has at most one parent, so what no root reaches is on, or below, a cycle: walk up until one repeats
+  // Every node has at most one parent, so what no root reaches is on, or below, a cycle: walk up until one
+  // repeats
   std::vector<bool> seen(nodes.size(), false);
   for (const Index node : order) seen[node] = true;
   Index at = static_cast<Index>(std::find(seen.begin(), seen.end(), false) - seen.begin());
@@ -141,10 +144,12 @@ Status ReadSkins(const Document& document, Character* character) {
     std::vector<double> numbers;
     KPSA_RETURN_IF_ERROR(ReadNumbers(document, in.inverseBindMatrices, 16, kFloat, what, &numbers));
     if (numbers.size() < 16 * skin.joints.size()) {
-      return Status::Invalid("{} has {} matrices for {} joints", what, numbers.size() / 16, skin.joints.size());
+      return Status::Invalid("{} has {} matrices for {} joints", what, numbers.size() / 16,
+                             skin.joints.size());
     }
     for (std::size_t j = 0; j < skin.joints.size(); ++j) {
-      std::copy_n(numbers.begin() + static_cast<std::ptrdiff_t>(16 * j), 16, skin.inverse_bind_matrices[j].m.begin());
+      std::copy_n(numbers.begin() + static_cast<std::ptrdiff_t>(16 * j), 16,
+                  skin.inverse_bind_matrices[j].m.begin());
     }
   }
   return CheckJoints(*character);

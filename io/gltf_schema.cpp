@@ -1,6 +1,6 @@
-// The structure of a glTF document, checked against a table of what is read, and copied without the rest. What
-// tinygltf gets afterwards has only known keys of the right type with indices in range: it drops or wraps others
-// silently, follows URIs, decodes images and recurses into extras.
+// The structure of a glTF document, checked against a table of what is read, and copied without the rest.
+// What tinygltf gets afterwards has only known keys of the right type with indices in range: it drops or
+// wraps others silently, follows URIs, decodes images and recurses into extras.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,7 +13,19 @@ namespace {
 
 using nlohmann::json;
 
-enum class Kind { kString, kBool, kSize, kInt, kIndex, kIndices, kNumbers, kObject, kObjects, kIndexMap, kIndexMaps };
+enum class Kind {
+  kString,
+  kBool,
+  kSize,
+  kInt,
+  kIndex,
+  kIndices,
+  kNumbers,
+  kObject,
+  kObjects,
+  kIndexMap,
+  kIndexMaps
+};
 
 // One key of an object. `array`: the top-level array that kIndex, kIndices and kIndexMap(s) point into.
 // `count`: the length of kNumbers, 0 for any. `fields`: of kObject and kObjects.
@@ -32,9 +44,8 @@ constexpr std::uint64_t kLargestInt = 0x7fffffff;
 
 const Fields& TopLevel() {
   using enum Kind;
-  static const Fields sparse_indices = {{"bufferView", kIndex, true, "bufferViews"},
-                                        {"byteOffset", kInt},
-                                        {"componentType", kInt, true}};
+  static const Fields sparse_indices = {
+      {"bufferView", kIndex, true, "bufferViews"}, {"byteOffset", kInt}, {"componentType", kInt, true}};
   static const Fields sparse_values = {{"bufferView", kIndex, true, "bufferViews"}, {"byteOffset", kInt}};
   static const Fields sparse = {{"count", kInt, true},
                                 {"indices", kObject, true, nullptr, 0, &sparse_indices},
@@ -46,8 +57,10 @@ const Fields& TopLevel() {
                                   {"count", kSize, true},
                                   {"type", kString, true},
                                   {"sparse", kObject, false, nullptr, 0, &sparse}};
-  static const Fields view = {
-      {"buffer", kIndex, true, "buffers"}, {"byteOffset", kSize}, {"byteLength", kSize, true}, {"byteStride", kSize}};
+  static const Fields view = {{"buffer", kIndex, true, "buffers"},
+                              {"byteOffset", kSize},
+                              {"byteLength", kSize, true},
+                              {"byteStride", kSize}};
   static const Fields node = {{"name", kString},
                               {"children", kIndices, false, "nodes"},
                               {"matrix", kNumbers, false, nullptr, 16},
@@ -69,7 +82,8 @@ const Fields& TopLevel() {
                               {"skeleton", kIndex, false, "nodes"},
                               {"inverseBindMatrices", kIndex, false, "accessors"}};
   static const Fields shading = {{"baseColorFactor", kNumbers, false, nullptr, 4}};
-  static const Fields material = {{"name", kString}, {"pbrMetallicRoughness", kObject, false, nullptr, 0, &shading}};
+  static const Fields material = {{"name", kString},
+                                  {"pbrMetallicRoughness", kObject, false, nullptr, 0, &shading}};
   static const Fields sampler = {{"input", kIndex, true, "accessors"},
                                  {"output", kIndex, true, "accessors"},
                                  {"interpolation", kString}};
@@ -115,20 +129,25 @@ class Reducer {
 
  private:
   static Status Wrong(const json& value, const std::string& where, std::string_view expected) {
-    return Status::Invalid("{} is {}, expected {}", where.empty() ? "the document" : where, Shown(value), expected);
+    return Status::Invalid("{} is {}, expected {}", where.empty() ? "the document" : where, Shown(value),
+                           expected);
   }
 
   static std::string Shown(const json& value) {
     if (value.is_number()) return value.dump();
-    return value.is_string() ? "text" : value.is_array() ? "an array" : value.is_object() ? "an object" : value.dump();
+    return value.is_string()   ? "text"
+           : value.is_array()  ? "an array"
+           : value.is_object() ? "an object"
+                               : value.dump();
   }
 
   Status CopyIndex(const json& in, const Field& field, const std::string& where, json* out) const {
     const auto array = root_.find(field.array);
     const std::size_t size = array == root_.end() || !array->is_array() ? 0 : array->size();
     if (!in.is_number_unsigned() || in.get<std::uint64_t>() >= size) {
-      return Wrong(in, where, size == 0 ? fmt::format("an index, and there are no {}", field.array)
-                                        : fmt::format("an index below {}, the number of {}", size, field.array));
+      return Wrong(in, where,
+                   size == 0 ? fmt::format("an index, and there are no {}", field.array)
+                             : fmt::format("an index below {}, the number of {}", size, field.array));
     }
     *out = in;
     return {};
@@ -183,11 +202,13 @@ class Reducer {
       case Kind::kIndexMap:
         return CopyIndexMap(in, field, where, out);
       case Kind::kIndexMaps:
-        return each([&](const json& v, const std::string& w, json* o) { return CopyIndexMap(v, field, w, o); });
+        return each(
+            [&](const json& v, const std::string& w, json* o) { return CopyIndexMap(v, field, w, o); });
       case Kind::kObject:
         return Copy(in, *field.fields, where, out);
       case Kind::kObjects:
-        return each([&](const json& v, const std::string& w, json* o) { return Copy(v, *field.fields, w, o); });
+        return each(
+            [&](const json& v, const std::string& w, json* o) { return Copy(v, *field.fields, w, o); });
     }
     *out = in;
     return {};
@@ -208,7 +229,8 @@ std::pair<int, int> ParseVersion(const std::string& text) {
 
 Status CheckVersion(const json& asset) {
   const std::string version = asset.at("version"), minimum = asset.value("minVersion", std::string());
-  if (ParseVersion(version).first != 2) return Status::Invalid("asset.version is \"{}\", expected 2.0", version);
+  if (ParseVersion(version).first != 2)
+    return Status::Invalid("asset.version is \"{}\", expected 2.0", version);
   if (!minimum.empty() && (ParseVersion(minimum).first < 0 || ParseVersion(minimum) > std::pair(2, 0))) {
     return Status::Invalid("asset.minVersion is \"{}\"; this reader knows glTF 2.0", minimum);
   }
@@ -216,8 +238,8 @@ Status CheckVersion(const json& asset) {
 }
 
 bool CannotMovePoints(std::string_view extension) {
-  for (const std::string_view prefix : {"KHR_texture_", "KHR_materials_", "KHR_lights_", "KHR_xmp", "EXT_texture_",
-                                        "EXT_lights_", "MSFT_texture_"}) {
+  for (const std::string_view prefix : {"KHR_texture_", "KHR_materials_", "KHR_lights_", "KHR_xmp",
+                                        "EXT_texture_", "EXT_lights_", "MSFT_texture_"}) {
     if (extension.starts_with(prefix)) return true;
   }
   return extension == "KHR_mesh_quantization";  // that one is read
@@ -252,9 +274,10 @@ Status CheckCompressedPrimitives(const json& root, const json& reduced) {
       if (position == attributes.end()) continue;
       const json& accessor = reduced["accessors"][position->get<std::size_t>()];
       if (!accessor.contains("bufferView") && !accessor.contains("sparse")) {
-        return Status::Invalid("meshes[{}].primitives[{}] is compressed with KHR_draco_mesh_compression, which is not "
-                               "supported; export the file without compression",
-                               m, p);
+        return Status::Invalid(
+            "meshes[{}].primitives[{}] is compressed with KHR_draco_mesh_compression, which is not "
+            "supported; export the file without compression",
+            m, p);
       }
     }
   }
@@ -319,7 +342,8 @@ Result<ReducedJson> ReduceJson(std::span<const std::uint8_t> text) {
         animation["channels"] = std::move(kept);
       }
     }
-    // tinygltf refuses index accessors without a buffer view, which are legal: give them one that stands for none
+    // tinygltf refuses index accessors without a buffer view, which are legal: give them one that stands for
+    // none
     if (!reduced.contains("bufferViews")) reduced["bufferViews"] = json::array();
     result.no_view = static_cast<int>(reduced["bufferViews"].size());
     reduced["bufferViews"].push_back({{"buffer", 0}, {"byteLength", 1}});

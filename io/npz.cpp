@@ -26,10 +26,11 @@ struct TypeInfo {
   const char* code;  // as in '<f4', without the byte order
   std::size_t size;
 };
-constexpr TypeInfo kTypes[] = {{NpzType::kFloat32, "f4", 4}, {NpzType::kFloat64, "f8", 8}, {NpzType::kInt8, "i1", 1},
-                               {NpzType::kInt16, "i2", 2},   {NpzType::kInt32, "i4", 4},   {NpzType::kInt64, "i8", 8},
-                               {NpzType::kUint8, "u1", 1},   {NpzType::kUint16, "u2", 2},  {NpzType::kUint32, "u4", 4},
-                               {NpzType::kUint64, "u8", 8},  {NpzType::kBool, "b1", 1}};
+constexpr TypeInfo kTypes[] = {
+    {NpzType::kFloat32, "f4", 4}, {NpzType::kFloat64, "f8", 8}, {NpzType::kInt8, "i1", 1},
+    {NpzType::kInt16, "i2", 2},   {NpzType::kInt32, "i4", 4},   {NpzType::kInt64, "i8", 8},
+    {NpzType::kUint8, "u1", 1},   {NpzType::kUint16, "u2", 2},  {NpzType::kUint32, "u4", 4},
+    {NpzType::kUint64, "u8", 8},  {NpzType::kBool, "b1", 1}};
 const TypeInfo& Info(NpzType type) { return kTypes[static_cast<std::size_t>(type)]; }
 
 // The bytes of an array of this shape; nullopt where they exceed 2^62.
@@ -86,7 +87,8 @@ struct NpzWriter::Impl {
     if (array->spool == nullptr) {
       array->bytes.insert(array->bytes.end(), bytes.begin(), bytes.end());
     } else if (std::fwrite(bytes.data(), 1, bytes.size(), array->spool.get()) != bytes.size()) {
-      return Status::Invalid("cannot be written: {}", std::generic_category().message(errno)).At({output.path()});
+      return Status::Invalid("cannot be written: {}", std::generic_category().message(errno))
+          .At({output.path()});
     }
     return {};
   }
@@ -106,7 +108,9 @@ Result<NpzWriter> NpzWriter::Create(const std::string& path, bool force) {
 Result<NpzWriter::ArrayId> NpzWriter::Declare(const std::string& name, NpzType type,
                                               std::vector<std::uint64_t> shape) {
   const std::string& path = impl_->output.path();
-  if (name.empty()) return Status::Invalid("an array needs a name").At({path});
+  if (name.empty() || name.find('\0') != std::string::npos) {
+    return Status::Invalid("an array needs a name without zero bytes").At({path});
+  }
   if (!impl_->names.emplace(name, impl_->arrays.size()).second) {
     return Status::Invalid("two arrays are named \"{}\"", name).At({path});
   }
@@ -149,33 +153,36 @@ Status NpzWriter::Append(ArrayId array, std::span<const double> values) {
                      {reinterpret_cast<const std::uint8_t*>(values.data()), values.size_bytes()});
 }
 
-Status NpzWriter::Add(const std::string& name, std::vector<std::uint64_t> shape, std::span<const float> values) {
+Status NpzWriter::Add(const std::string& name, std::vector<std::uint64_t> shape,
+                      std::span<const float> values) {
   const Result<ArrayId> array = Declare(name, NpzType::kFloat32, std::move(shape));
   return array.ok() ? Append(*array, values) : array.status();
 }
 
-Status NpzWriter::Add(const std::string& name, std::vector<std::uint64_t> shape, std::span<const double> values) {
+Status NpzWriter::Add(const std::string& name, std::vector<std::uint64_t> shape,
+                      std::span<const double> values) {
   const Result<ArrayId> array = Declare(name, NpzType::kFloat64, std::move(shape));
   return array.ok() ? Append(*array, values) : array.status();
 }
 
 Status NpzWriter::Finish() {
   const std::string& path = impl_->output.path();
-  const auto failed = [&](const char* reason) { return Status::Invalid("cannot be written: {}", reason).At({path}); };
+  const auto failed = [&](const char* reason) {
+    return Status::Invalid("cannot be written: {}", reason).At({path});
+  };
   KPSA_CHECK(!impl_->arrays.empty());
   int code = 0;
   zip_t* archive = zip_open(impl_->output.temporary_path().c_str(), ZIP_CREATE | ZIP_TRUNCATE, &code);
   if (archive == nullptr) return failed("the archive cannot be opened");
   for (Impl::Array& array : impl_->arrays) {
     KPSA_CHECK_EQ(array.written, array.expected);
-    if (array.spool != nullptr && std::fflush(array.spool.get()) != 0) {
+    if (array.spool != nullptr && std::fseek(array.spool.get(), 0, SEEK_SET) != 0) {  // flushes, too
       zip_discard(archive);
       return failed("the disk is full");
     }
-    zip_source_t* source =
-        array.spool != nullptr
-            ? zip_source_filep(archive, array.spool.release(), 0, -1)
-            : zip_source_buffer(archive, array.bytes.data(), array.bytes.size(), 0);
+    zip_source_t* source = array.spool != nullptr
+                               ? zip_source_filep(archive, array.spool.release(), 0, -1)
+                               : zip_source_buffer(archive, array.bytes.data(), array.bytes.size(), 0);
     const zip_int64_t entry =
         source == nullptr ? -1
                           : zip_file_add(archive, (array.name + ".npy").c_str(), source, ZIP_FL_ENC_UTF_8);
@@ -210,17 +217,27 @@ double ElementAsDouble(const std::uint8_t* data) {
 
 double ElementAsDouble(NpzType type, const std::uint8_t* data) {
   switch (type) {
-    case NpzType::kFloat32: return ElementAsDouble<float>(data);
-    case NpzType::kFloat64: return ElementAsDouble<double>(data);
-    case NpzType::kInt8: return ElementAsDouble<std::int8_t>(data);
-    case NpzType::kInt16: return ElementAsDouble<std::int16_t>(data);
-    case NpzType::kInt32: return ElementAsDouble<std::int32_t>(data);
-    case NpzType::kInt64: return ElementAsDouble<std::int64_t>(data);
-    case NpzType::kUint16: return ElementAsDouble<std::uint16_t>(data);
-    case NpzType::kUint32: return ElementAsDouble<std::uint32_t>(data);
-    case NpzType::kUint64: return ElementAsDouble<std::uint64_t>(data);
+    case NpzType::kFloat32:
+      return ElementAsDouble<float>(data);
+    case NpzType::kFloat64:
+      return ElementAsDouble<double>(data);
+    case NpzType::kInt8:
+      return ElementAsDouble<std::int8_t>(data);
+    case NpzType::kInt16:
+      return ElementAsDouble<std::int16_t>(data);
+    case NpzType::kInt32:
+      return ElementAsDouble<std::int32_t>(data);
+    case NpzType::kInt64:
+      return ElementAsDouble<std::int64_t>(data);
+    case NpzType::kUint16:
+      return ElementAsDouble<std::uint16_t>(data);
+    case NpzType::kUint32:
+      return ElementAsDouble<std::uint32_t>(data);
+    case NpzType::kUint64:
+      return ElementAsDouble<std::uint64_t>(data);
     case NpzType::kUint8:
-    case NpzType::kBool: return ElementAsDouble<std::uint8_t>(data);
+    case NpzType::kBool:
+      return ElementAsDouble<std::uint8_t>(data);
   }
   return 0;
 }
@@ -265,13 +282,16 @@ Status ParseShape(std::string_view text, std::vector<std::uint64_t>* shape) {
 
 // Splits the bytes of a .npy file into header and content.
 Status ParseNpy(std::vector<std::uint8_t> file, NpzArray* array) {
-  if (file.size() < 10 || std::memcmp(file.data(), "\x93NUMPY", 6) != 0) return Status::Invalid("is no .npy array");
+  if (file.size() < 10 || std::memcmp(file.data(), "\x93NUMPY", 6) != 0)
+    return Status::Invalid("is no .npy array");
   const int version = file[6];
-  if (version < 1 || version > 3) return Status::Invalid("is a .npy array of version {}, expected 1 to 3", version);
+  if (version < 1 || version > 3)
+    return Status::Invalid("is a .npy array of version {}, expected 1 to 3", version);
   const std::size_t prefix = version == 1 ? 10 : 12;
   if (file.size() < prefix) return Status::Invalid("is truncated");
   std::size_t length = file[8] | static_cast<std::size_t>(file[9]) << 8;
-  if (version > 1) length |= static_cast<std::size_t>(file[10]) << 16 | static_cast<std::size_t>(file[11]) << 24;
+  if (version > 1)
+    length |= static_cast<std::size_t>(file[10]) << 16 | static_cast<std::size_t>(file[11]) << 24;
   if (length > file.size() - prefix) return Status::Invalid("is truncated");
   const std::string_view dictionary(reinterpret_cast<const char*>(file.data()) + prefix, length);
 
@@ -321,13 +341,16 @@ Result<std::vector<std::uint8_t>> ReadEntry(zip_t* archive, zip_uint64_t index, 
   if (file == nullptr) return Status::Invalid("cannot be read: {}", zip_strerror(archive));
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(stat.size));
   for (std::size_t at = 0; at < bytes.size();) {
-    const zip_int64_t got = zip_fread(file.get(), bytes.data() + at, std::min<std::size_t>(bytes.size() - at, 1 << 28));
-    if (got <= 0) return Status::Invalid("is damaged: {}", got < 0 ? zip_file_strerror(file.get()) : "it ends early");
+    const zip_int64_t got =
+        zip_fread(file.get(), bytes.data() + at, std::min<std::size_t>(bytes.size() - at, 1 << 28));
+    if (got <= 0)
+      return Status::Invalid("is damaged: {}", got < 0 ? zip_file_strerror(file.get()) : "it ends early");
     at += static_cast<std::size_t>(got);
   }
   // The checksum is compared when the end is read
   std::uint8_t extra;
-  if (zip_fread(file.get(), &extra, 1) != 0) return Status::Invalid("is damaged: {}", zip_file_strerror(file.get()));
+  if (zip_fread(file.get(), &extra, 1) != 0)
+    return Status::Invalid("is damaged: {}", zip_file_strerror(file.get()));
   return bytes;
 }
 
@@ -335,7 +358,8 @@ Result<std::vector<std::uint8_t>> ReadEntry(zip_t* archive, zip_uint64_t index, 
 
 std::vector<double> NpzArray::Doubles() const {
   std::vector<double> values(size());
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = ElementAsDouble(type, &bytes[i * NpzTypeSize(type)]);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = ElementAsDouble(type, &bytes[i * NpzTypeSize(type)]);
   return values;
 }
 
@@ -364,7 +388,8 @@ Result<Npz> ReadNpz(const std::string& path, std::uint64_t max_bytes) {
   if (archive == nullptr) {
     zip_error_t error;
     zip_error_init_with_code(&error, code);
-    const Status status = Status::Invalid("cannot be read as .npz: {}", zip_error_strerror(&error)).At({path});
+    const Status status =
+        Status::Invalid("cannot be read as .npz: {}", zip_error_strerror(&error)).At({path});
     zip_error_fini(&error);
     return status;
   }
@@ -376,7 +401,8 @@ Result<Npz> ReadNpz(const std::string& path, std::uint64_t max_bytes) {
     const auto located = [&](const Status& status) {
       return Status::Invalid("array \"{}\" {}", name, status.errors().front().message).At({path});
     };
-    Result<std::vector<std::uint8_t>> bytes = ReadEntry(archive.get(), static_cast<zip_uint64_t>(i), &max_bytes);
+    Result<std::vector<std::uint8_t>> bytes =
+        ReadEntry(archive.get(), static_cast<zip_uint64_t>(i), &max_bytes);
     if (!bytes.ok()) return located(bytes.status());
     if (name.ends_with(".npy")) name.resize(name.size() - 4);
     NpzArray array;

@@ -22,12 +22,18 @@ HWY_INLINE F4 Load4(const float* p) { return {{p[0], p[1], p[2], p[3]}}; }
 HWY_INLINE void Store4(F4 a, float* p) {
   for (int i = 0; i < 4; ++i) p[i] = a.v[i];
 }
-HWY_INLINE F4 Add4(F4 a, F4 b) { return {{a.v[0] + b.v[0], a.v[1] + b.v[1], a.v[2] + b.v[2], a.v[3] + b.v[3]}}; }
-HWY_INLINE F4 Sub4(F4 a, F4 b) { return {{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2], a.v[3] - b.v[3]}}; }
-HWY_INLINE F4 Mul4(F4 a, F4 b) { return {{a.v[0] * b.v[0], a.v[1] * b.v[1], a.v[2] * b.v[2], a.v[3] * b.v[3]}}; }
+HWY_INLINE F4 Add4(F4 a, F4 b) {
+  return {{a.v[0] + b.v[0], a.v[1] + b.v[1], a.v[2] + b.v[2], a.v[3] + b.v[3]}};
+}
+HWY_INLINE F4 Sub4(F4 a, F4 b) {
+  return {{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2], a.v[3] - b.v[3]}};
+}
+HWY_INLINE F4 Mul4(F4 a, F4 b) {
+  return {{a.v[0] * b.v[0], a.v[1] * b.v[1], a.v[2] * b.v[2], a.v[3] * b.v[3]}};
+}
 HWY_INLINE F4 Fma4(F4 a, F4 b, F4 c) {
-  return {{std::fma(a.v[0], b.v[0], c.v[0]), std::fma(a.v[1], b.v[1], c.v[1]), std::fma(a.v[2], b.v[2], c.v[2]),
-           std::fma(a.v[3], b.v[3], c.v[3])}};
+  return {{std::fma(a.v[0], b.v[0], c.v[0]), std::fma(a.v[1], b.v[1], c.v[1]),
+           std::fma(a.v[2], b.v[2], c.v[2]), std::fma(a.v[3], b.v[3], c.v[3])}};
 }
 #else
 using D4 = hn::FixedTag<float, 4>;

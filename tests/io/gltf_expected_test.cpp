@@ -87,7 +87,8 @@ TEST(GltfExpected, EveryFileWithinTolerance) {
     const double error = RelativeError(*expected, actual);
     EXPECT_LT(error, 1e-5);
     RecordProperty(file.character + "_" + file.clip, std::to_string(error));
-    if (std::getenv("KPSA_SHOW") != nullptr) std::printf("%s__%s %.3g\n", file.character.c_str(), file.clip.c_str(), error);
+    if (std::getenv("KPSA_SHOW") != nullptr)
+      std::printf("%s__%s %.3g\n", file.character.c_str(), file.clip.c_str(), error);
   }
 }
 

@@ -17,8 +17,8 @@ namespace {
 using nlohmann::json;
 
 Result<Character> Load(const std::string& bytes) {
-  return LoadGltfFromMemory({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, "/nonexistent",
-                            "bad.gltf");
+  return LoadGltfFromMemory({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()},
+                            "/nonexistent", "bad.gltf");
 }
 
 void ExpectError(const std::string& bytes, const std::string& part) {
@@ -38,13 +38,16 @@ struct Damage {
 };
 
 void SetFloat(GltfBuilder& b, int accessor, std::size_t number, float value) {
-  const json& view = b.root["bufferViews"][b.root["accessors"][static_cast<std::size_t>(accessor)]["bufferView"].get<std::size_t>()];
+  const json& view =
+      b.root["bufferViews"]
+            [b.root["accessors"][static_cast<std::size_t>(accessor)]["bufferView"].get<std::size_t>()];
   std::memcpy(&b.buffer[view["byteOffset"].get<std::size_t>() + 4 * number], &value, 4);
 }
 
 // Accessors of GltfBuilder::Character
 enum { kPosition, kJoints, kWeights, kIndices, kDelta, kMatrices, kTimes, kTurn, kMorph };
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN(),
+                kInfinity = std::numeric_limits<float>::infinity();
 
 TEST(GltfHostile, DamagedStructure) {
   const std::vector<Damage> damages = {
@@ -54,27 +57,44 @@ TEST(GltfHostile, DamagedStructure) {
       {"minVersion", [](GltfBuilder& b) { b.root["asset"]["minVersion"] = "2.1"; }},
       {"nodes is an object", [](GltfBuilder& b) { b.root["nodes"] = json::object(); }},
       {"nodes[1] is 3", [](GltfBuilder& b) { b.root["nodes"][1] = 3; }},
-      {"nodes[0].mesh is 1, expected an index below 1", [](GltfBuilder& b) { b.root["nodes"][0]["mesh"] = 1; }},
+      {"nodes[0].mesh is 1, expected an index below 1",
+       [](GltfBuilder& b) { b.root["nodes"][0]["mesh"] = 1; }},
       {"nodes[0].mesh is -1", [](GltfBuilder& b) { b.root["nodes"][0]["mesh"] = -1; }},
       {"nodes[0].mesh is 4294967296", [](GltfBuilder& b) { b.root["nodes"][0]["mesh"] = 4294967296; }},
       {"nodes[0].mesh is 0.0", [](GltfBuilder& b) { b.root["nodes"][0]["mesh"] = 0.0; }},
       {"nodes[0].mesh is null", [](GltfBuilder& b) { b.root["nodes"][0]["mesh"] = nullptr; }},
       {"nodes[0].skin is 9", [](GltfBuilder& b) { b.root["nodes"][0]["skin"] = 9; }},
       {"nodes[1].children[0] is 77", [](GltfBuilder& b) { b.root["nodes"][1]["children"] = {77}; }},
-      {"nodes[2].rotation must be an array of 4", [](GltfBuilder& b) { b.root["nodes"][2]["rotation"] = {0, 0, 1}; }},
+      {"nodes[2].rotation must be an array of 4",
+       [](GltfBuilder& b) {
+         b.root["nodes"][2]["rotation"] = {0, 0, 1};
+       }},
       {"nodes[3].matrix must be", [](GltfBuilder& b) { b.root["nodes"][3]["matrix"][3] = "x"; }},
       {"has a cycle", [](GltfBuilder& b) { b.root["nodes"][2]["children"] = {1}; }},
       {"has a cycle", [](GltfBuilder& b) { b.root["nodes"][0]["children"] = {0}; }},
       {"a node has one parent", [](GltfBuilder& b) { b.root["nodes"][0]["children"] = {3}; }},
-      {"a node has one parent", [](GltfBuilder& b) { b.root["nodes"][1]["children"] = {3, 3}; }},
-      {"nodes[0].weights has 2", [](GltfBuilder& b) { b.root["nodes"][0]["weights"] = {0, 1}; }},
-      {"meshes[0].weights has 2", [](GltfBuilder& b) { b.root["meshes"][0]["weights"] = {0, 1}; }},
+      {"a node has one parent",
+       [](GltfBuilder& b) {
+         b.root["nodes"][1]["children"] = {3, 3};
+       }},
+      {"nodes[0].weights has 2",
+       [](GltfBuilder& b) {
+         b.root["nodes"][0]["weights"] = {0, 1};
+       }},
+      {"meshes[0].weights has 2",
+       [](GltfBuilder& b) {
+         b.root["meshes"][0]["weights"] = {0, 1};
+       }},
       {"meshes[0].primitives is missing", [](GltfBuilder& b) { b.root["meshes"][0].erase("primitives"); }},
-      {"attributes.POSITION is 99", [](GltfBuilder& b) { b.root["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 99; }},
-      {"attributes is missing", [](GltfBuilder& b) { b.root["meshes"][0]["primitives"][0].erase("attributes"); }},
+      {"attributes.POSITION is 99",
+       [](GltfBuilder& b) { b.root["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 99; }},
+      {"attributes is missing",
+       [](GltfBuilder& b) { b.root["meshes"][0]["primitives"][0].erase("attributes"); }},
       {"mode is 7", [](GltfBuilder& b) { b.root["meshes"][0]["primitives"][0]["mode"] = 7; }},
-      {"must have a WEIGHTS_n", [](GltfBuilder& b) { b.root["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0"); }},
-      {"has 1 morph targets, primitives[0] has 0", [](GltfBuilder& b) {
+      {"must have a WEIGHTS_n",
+       [](GltfBuilder& b) { b.root["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0"); }},
+      {"has 1 morph targets, primitives[0] has 0",
+       [](GltfBuilder& b) {
          json& p = b.root["meshes"][0]["primitives"];
          p.push_back(p[0]);
          p[0].erase("targets");
@@ -82,18 +102,32 @@ TEST(GltfHostile, DamagedStructure) {
        }},
       {"scene is 1", [](GltfBuilder& b) { b.root["scene"] = 1; }},
       {"scenes[0].nodes[0] is 4", [](GltfBuilder& b) { b.root["scenes"][0]["nodes"] = {4}; }},
-      {"skins[0].joints[1] is 4", [](GltfBuilder& b) { b.root["skins"][0]["joints"] = {1, 4}; }},
-      {"has 2 matrices for 3 joints", [](GltfBuilder& b) { b.root["skins"][0]["joints"] = {1, 2, 3}; }},
-      {"follows joint 1, but skins[0] of nodes[0] has 1", [](GltfBuilder& b) { b.root["skins"][0]["joints"] = {1}; }},
-      {"VENDOR_magic", [](GltfBuilder& b) { b.root["extensionsRequired"] = {"VENDOR_magic"}; }},
-      {"KHR_draco_mesh_compression", [](GltfBuilder& b) { b.root["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }},
-      {"export the file without compression", [](GltfBuilder& b) { b.root["extensionsRequired"] = {"EXT_meshopt_compression"}; }},
-      {"extensionsRequired", [](GltfBuilder& b) { b.root["extensionsRequired"] = {3}; }},
-      {"compressed with KHR_draco", [](GltfBuilder& b) {
-         b.root["accessors"][kPosition].erase("bufferView");
-         b.root["meshes"][0]["primitives"][0]["extensions"] = {{"KHR_draco_mesh_compression", {{"bufferView", 0}}}};
+      {"skins[0].joints[1] is 4",
+       [](GltfBuilder& b) {
+         b.root["skins"][0]["joints"] = {1, 4};
        }},
-      {"buffers[0] has no data", [](GltfBuilder& b) { b.root["buffers"] = {{{"byteLength", 4}}}; }},
+      {"has 2 matrices for 3 joints",
+       [](GltfBuilder& b) {
+         b.root["skins"][0]["joints"] = {1, 2, 3};
+       }},
+      {"follows joint 1, but skins[0] of nodes[0] has 1",
+       [](GltfBuilder& b) { b.root["skins"][0]["joints"] = {1}; }},
+      {"VENDOR_magic", [](GltfBuilder& b) { b.root["extensionsRequired"] = {"VENDOR_magic"}; }},
+      {"KHR_draco_mesh_compression",
+       [](GltfBuilder& b) { b.root["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }},
+      {"export the file without compression",
+       [](GltfBuilder& b) { b.root["extensionsRequired"] = {"EXT_meshopt_compression"}; }},
+      {"extensionsRequired", [](GltfBuilder& b) { b.root["extensionsRequired"] = {3}; }},
+      {"compressed with KHR_draco",
+       [](GltfBuilder& b) {
+         b.root["accessors"][kPosition].erase("bufferView");
+         b.root["meshes"][0]["primitives"][0]["extensions"] = {
+             {"KHR_draco_mesh_compression", {{"bufferView", 0}}}};
+       }},
+      {"buffers[0] has no data",
+       [](GltfBuilder& b) {
+         b.root["buffers"] = {{{"byteLength", 4}}};
+       }},
   };
   for (const Damage& damage : damages) {
     GltfBuilder b = GltfBuilder::Character();
@@ -104,11 +138,14 @@ TEST(GltfHostile, DamagedStructure) {
 }
 
 TEST(GltfHostile, DamagedAccessors) {
-  const auto accessor = [](GltfBuilder& b, int i) -> json& { return b.root["accessors"][static_cast<std::size_t>(i)]; };
+  const auto accessor = [](GltfBuilder& b, int i) -> json& {
+    return b.root["accessors"][static_cast<std::size_t>(i)];
+  };
   const std::vector<Damage> damages = {
       {"accessors[0].count is -3", [&](GltfBuilder& b) { accessor(b, kPosition)["count"] = -3; }},
       {"the most is", [&](GltfBuilder& b) { accessor(b, kPosition)["count"] = 9007199254740992; }},
-      {"accessors[0].count is 18446744073709551615", [&](GltfBuilder& b) { accessor(b, kPosition)["count"] = 18446744073709551615ull; }},
+      {"accessors[0].count is 18446744073709551615",
+       [&](GltfBuilder& b) { accessor(b, kPosition)["count"] = 18446744073709551615ull; }},
       {"accessors[0].count is 1e", [&](GltfBuilder& b) { accessor(b, kPosition)["count"] = 1e30; }},
       {"3000000000 elements need", [&](GltfBuilder& b) { accessor(b, kPosition)["count"] = 3000000000; }},
       {"4 elements need 48 bytes", [&](GltfBuilder& b) { accessor(b, kPosition)["count"] = 4; }},
@@ -128,47 +165,72 @@ TEST(GltfHostile, DamagedAccessors) {
       {"byteStride", [](GltfBuilder& b) { b.root["bufferViews"][0]["byteStride"] = 8; }},
       {"byteStride", [](GltfBuilder& b) { b.root["bufferViews"][0]["byteStride"] = 9007199254740992; }},
       {"elements need", [](GltfBuilder& b) { b.root["bufferViews"][0]["byteStride"] = 16; }},
-      {"far more than", [&](GltfBuilder& b) {
+      {"far more than",
+       [&](GltfBuilder& b) {
          accessor(b, kPosition).erase("bufferView");
          accessor(b, kPosition)["count"] = 4000000000;
        }},
-      {"sparse", [&](GltfBuilder& b) { accessor(b, kDelta)["sparse"] = {{"count", 1}}; }},
-      {"4 sparse elements of 3", [&](GltfBuilder& b) {
-         accessor(b, kDelta)["sparse"] = {{"count", 4}, {"indices", {{"bufferView", 0}, {"componentType", 5121}}}, {"values", {{"bufferView", 0}}}};
+      {"sparse",
+       [&](GltfBuilder& b) {
+         accessor(b, kDelta)["sparse"] = {{"count", 1}};
        }},
-      {"they must ascend", [&](GltfBuilder& b) {
-         accessor(b, kDelta)["sparse"] = {{"count", 2}, {"indices", {{"bufferView", 0}, {"componentType", 5121}}}, {"values", {{"bufferView", 4}}}};
+      {"4 sparse elements of 3",
+       [&](GltfBuilder& b) {
+         accessor(b, kDelta)["sparse"] = {{"count", 4},
+                                          {"indices", {{"bufferView", 0}, {"componentType", 5121}}},
+                                          {"values", {{"bufferView", 0}}}};
        }},
-      {"sparse indices have", [&](GltfBuilder& b) {
-         accessor(b, kDelta)["sparse"] = {{"count", 1}, {"indices", {{"bufferView", 0}, {"componentType", 5126}}}, {"values", {{"bufferView", 0}}}};
+      {"they must ascend",
+       [&](GltfBuilder& b) {
+         accessor(b, kDelta)["sparse"] = {{"count", 2},
+                                          {"indices", {{"bufferView", 0}, {"componentType", 5121}}},
+                                          {"values", {{"bufferView", 4}}}};
+       }},
+      {"sparse indices have",
+       [&](GltfBuilder& b) {
+         accessor(b, kDelta)["sparse"] = {{"count", 1},
+                                          {"indices", {{"bufferView", 0}, {"componentType", 5126}}},
+                                          {"values", {{"bufferView", 0}}}};
        }},
       {"component 1 of element 2 is not finite", [](GltfBuilder& b) { SetFloat(b, kPosition, 7, kNan); }},
       {"is not finite", [](GltfBuilder& b) { SetFloat(b, kPosition, 0, kInfinity); }},
-      {"WEIGHTS_0: component 0 of element 0 is not finite", [](GltfBuilder& b) { SetFloat(b, kWeights, 0, kNan); }},
+      {"WEIGHTS_0: component 0 of element 0 is not finite",
+       [](GltfBuilder& b) { SetFloat(b, kWeights, 0, kNan); }},
       {"vertex 1 has the negative weight", [](GltfBuilder& b) { SetFloat(b, kWeights, 4, -1); }},
-      {"targets[0].POSITION: component 2 of element 1 is not finite", [](GltfBuilder& b) { SetFloat(b, kDelta, 5, kNan); }},
-      {"inverseBindMatrices: component 3 of element 1 is not finite", [](GltfBuilder& b) { SetFloat(b, kMatrices, 19, -kInfinity); }},
-      {"samplers[0].input: component 0 of element 1 is not finite", [](GltfBuilder& b) { SetFloat(b, kTimes, 1, kNan); }},
+      {"targets[0].POSITION: component 2 of element 1 is not finite",
+       [](GltfBuilder& b) { SetFloat(b, kDelta, 5, kNan); }},
+      {"inverseBindMatrices: component 3 of element 1 is not finite",
+       [](GltfBuilder& b) { SetFloat(b, kMatrices, 19, -kInfinity); }},
+      {"samplers[0].input: component 0 of element 1 is not finite",
+       [](GltfBuilder& b) { SetFloat(b, kTimes, 1, kNan); }},
       {"samplers[0].output: component", [](GltfBuilder& b) { SetFloat(b, kTurn, 1, kNan); }},
       {"key 2 is at 0.5 s, not after", [](GltfBuilder& b) { SetFloat(b, kTimes, 2, 0.5); }},
       {"key 1 is at 0 s, not after", [](GltfBuilder& b) { SetFloat(b, kTimes, 1, 0); }},
       {"before 0", [](GltfBuilder& b) { SetFloat(b, kTimes, 0, -1); }},
-      {"index 1 is 9, the primitive has 3", [&](GltfBuilder& b) {
+      {"index 1 is 9, the primitive has 3",
+       [&](GltfBuilder& b) {
          b.buffer[b.root["bufferViews"][kIndices]["byteOffset"].get<std::size_t>() + 2] = 9;
        }},
-      {"vertex 1 follows joint 200", [](GltfBuilder& b) {
+      {"vertex 1 follows joint 200",
+       [](GltfBuilder& b) {
          b.buffer[b.root["bufferViews"][kJoints]["byteOffset"].get<std::size_t>() + 4] = 200;
        }},
       {"has no keys", [&](GltfBuilder& b) { accessor(b, kTimes)["count"] = 0; }},
       {"has 8 numbers, 3 keys need 12", [&](GltfBuilder& b) { accessor(b, kTurn)["count"] = 2; }},
-      {"3 keys need 36", [](GltfBuilder& b) { b.root["animations"][0]["samplers"][0]["interpolation"] = "CUBICSPLINE"; }},
-      {"interpolation is \"BEZIER\"", [](GltfBuilder& b) { b.root["animations"][0]["samplers"][0]["interpolation"] = "BEZIER"; }},
+      {"3 keys need 36",
+       [](GltfBuilder& b) { b.root["animations"][0]["samplers"][0]["interpolation"] = "CUBICSPLINE"; }},
+      {"interpolation is \"BEZIER\"",
+       [](GltfBuilder& b) { b.root["animations"][0]["samplers"][0]["interpolation"] = "BEZIER"; }},
       {"sampler is 5", [](GltfBuilder& b) { b.root["animations"][0]["channels"][0]["sampler"] = 5; }},
-      {"target.path is \"spin\"", [](GltfBuilder& b) { b.root["animations"][0]["channels"][0]["target"]["path"] = "spin"; }},
+      {"target.path is \"spin\"",
+       [](GltfBuilder& b) { b.root["animations"][0]["channels"][0]["target"]["path"] = "spin"; }},
       {"target is missing", [](GltfBuilder& b) { b.root["animations"][0]["channels"][0].erase("target"); }},
-      {"target.node is 8", [](GltfBuilder& b) { b.root["animations"][0]["channels"][0]["target"]["node"] = 8; }},
-      {"which has a matrix", [](GltfBuilder& b) { b.root["animations"][0]["channels"][0]["target"]["node"] = 3; }},
-      {"as a channel before does", [](GltfBuilder& b) {
+      {"target.node is 8",
+       [](GltfBuilder& b) { b.root["animations"][0]["channels"][0]["target"]["node"] = 8; }},
+      {"which has a matrix",
+       [](GltfBuilder& b) { b.root["animations"][0]["channels"][0]["target"]["node"] = 3; }},
+      {"as a channel before does",
+       [](GltfBuilder& b) {
          b.root["animations"][0]["channels"].push_back(b.root["animations"][0]["channels"][0]);
        }},
   };
@@ -189,8 +251,9 @@ TEST(GltfHostile, BuffersStayInTheFolder) {
     const Result<Character> c = LoadGltf(folder.Write("in/c.gltf", b.Text()));
     return c.ok() ? std::string("accepted") : c.status().ToString();
   };
-  for (const std::string& uri : {std::string("../secret.bin"), std::string("a/../../secret.bin"), std::string("%2e%2e/secret.bin"),
-                                 std::string("..%2fsecret.bin"), folder / "secret.bin", std::string("%2Fetc/passwd")}) {
+  for (const std::string& uri :
+       {std::string("../secret.bin"), std::string("a/../../secret.bin"), std::string("%2e%2e/secret.bin"),
+        std::string("..%2fsecret.bin"), folder / "secret.bin", std::string("%2Fetc/passwd")}) {
     EXPECT_NE(error_of(uri).find("leaves the document's folder"), std::string::npos) << error_of(uri);
   }
   for (const char* uri : {"http://example.org/a.bin", "file:///etc/passwd", "HTTPS:a"}) {
@@ -211,7 +274,8 @@ TEST(GltfHostile, BuffersStayInTheFolder) {
 
 TEST(GltfHostile, FilesThatAreNoGltf) {
   const TemporaryFolder folder;
-  EXPECT_NE(LoadGltf(folder / "none.glb").status().ToString().find("none.glb: cannot be read: No such file"), std::string::npos);
+  EXPECT_NE(LoadGltf(folder / "none.glb").status().ToString().find("none.glb: cannot be read: No such file"),
+            std::string::npos);
   EXPECT_NE(LoadGltf(folder.path()).status().ToString().find("is a folder"), std::string::npos);
   ExpectError("", "is empty");
   ExpectError("   \n", "is no glTF file");
@@ -288,11 +352,21 @@ TEST(GltfHostile, RandomDamage) {
     for (std::uint32_t edits = 1 + random() % 4; edits > 0; --edits) {
       const std::size_t at = random() % bytes.size();
       switch (random() % 6) {
-        case 0: bytes[at] = static_cast<char>(random()); break;
-        case 1: bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8)); break;
-        case 2: bytes[at] = kSpecial[random() % kSpecial.size()]; break;
-        case 3: bytes.insert(at, 1, kSpecial[random() % kSpecial.size()]); break;
-        case 4: bytes.erase(at, 1 + random() % 8); break;
+        case 0:
+          bytes[at] = static_cast<char>(random());
+          break;
+        case 1:
+          bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
+          break;
+        case 2:
+          bytes[at] = kSpecial[random() % kSpecial.size()];
+          break;
+        case 3:
+          bytes.insert(at, 1, kSpecial[random() % kSpecial.size()]);
+          break;
+        case 4:
+          bytes.erase(at, 1 + random() % 8);
+          break;
         default: {  // a digit becomes another: stays valid JSON, and names something else
           const std::size_t digit = bytes.find_first_of("0123456789", at);
           if (digit != std::string::npos) bytes[digit] = static_cast<char>('0' + random() % 10);

@@ -12,7 +12,8 @@ namespace {
 using nlohmann::json;
 
 Result<Character> Load(const std::string& bytes, const std::string& folder = "/nonexistent") {
-  return LoadGltfFromMemory({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, folder, "test.gltf");
+  return LoadGltfFromMemory({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, folder,
+                            "test.gltf");
 }
 
 Character MustLoad(const std::string& bytes, const std::string& folder = "/nonexistent") {
@@ -73,7 +74,8 @@ TEST(GltfImport, EverySectionOfACharacter) {
 TEST(GltfImport, OddButValidDocuments) {
   const Character empty = MustLoad(R"({"asset":{"version":"2.0"}})");
   EXPECT_TRUE(empty.nodes.empty());
-  MustLoad("\xef\xbb\xbf  {\"asset\":{\"version\":\"2.1\",\"minVersion\":\"2.0\"},\"meshes\":[],\"scenes\":[]}");
+  MustLoad(
+      "\xef\xbb\xbf  {\"asset\":{\"version\":\"2.1\",\"minVersion\":\"2.0\"},\"meshes\":[],\"scenes\":[]}");
   // Extras and unknown extensions anywhere, unused data with absurd counts, missing images
   GltfBuilder b = GltfBuilder::Character();
   b.root["extras"] = {1, {2, {3}}};
@@ -93,16 +95,18 @@ TEST(GltfImport, OddButValidDocuments) {
 TEST(GltfImport, ScenesAndNames) {
   json root = {{"asset", {{"version", "2.0"}}},
                {"meshes", {{{"primitives", json::array({{{"attributes", json::object()}}})}}}},
-               {"nodes", {{{"name", "Head"}, {"mesh", 0}, {"children", {1}}},
-                          {{"name", "Head"}, {"mesh", 0}},
-                          {{"name", "Head"}},
-                          {{"mesh", 0}},
-                          {{"name", "M\xc3\xbcnd/\xe5\x8f\xa3"}, {"mesh", 0}},
-                          {{"name", ""}}}},
+               {"nodes",
+                {{{"name", "Head"}, {"mesh", 0}, {"children", {1}}},
+                 {{"name", "Head"}, {"mesh", 0}},
+                 {{"name", "Head"}},
+                 {{"mesh", 0}},
+                 {{"name", "M\xc3\xbcnd/\xe5\x8f\xa3"}, {"mesh", 0}},
+                 {{"name", ""}}}},
                {"scenes", {{{"nodes", {3}}}, {{"nodes", {0}}}}},
                {"scene", 1}};
   Character c = MustLoad(root.dump());
-  const std::vector<std::string> names = {"Head#0", "Head#1", "Head#2", "node3", "M\xc3\xbcnd/\xe5\x8f\xa3", "node5"};
+  const std::vector<std::string> names = {"Head#0", "Head#1", "Head#2", "node3", "M\xc3\xbcnd/\xe5\x8f\xa3",
+                                          "node5"};
   EXPECT_EQ(c.UniqueNames(), names);
   for (Index i = 0; i < names.size(); ++i) EXPECT_EQ(c.UniqueName(i), names[i]);
   EXPECT_EQ(c.MeshNodes(), (std::vector<Index>{0, 1}));
@@ -130,7 +134,8 @@ TEST(GltfImport, PrimitiveModes) {
     const json attributes = {{"POSITION", position}};
     b.Push("meshes", {{"primitives", {{{"attributes", attributes}, {"mode", mode}}}}});
     const int indices = b.Accessor<std::uint8_t>({0, 1, 2, 3, 4}, "SCALAR");
-    b.root["meshes"][0]["primitives"].push_back({{"attributes", attributes}, {"mode", mode}, {"indices", indices}});
+    b.root["meshes"][0]["primitives"].push_back(
+        {{"attributes", attributes}, {"mode", mode}, {"indices", indices}});
     b.root["meshes"][0]["primitives"].push_back({{"attributes", json::object()}});
     const Character c = MustLoad(b.Text());
     const Mesh& mesh = c.meshes.at(0);
@@ -147,7 +152,8 @@ TEST(GltfImport, InterleavedViewsAndOffsets) {
   GltfBuilder b;
   // x y z and a normal, interleaved behind 8 bytes that belong to nobody
   const int view = b.View<float>({9, 9, 1, 2, 3, 0, 0, 1, 4, 5, 6, 0, 0, 1}, 24);
-  b.Push("accessors", {{"bufferView", view}, {"byteOffset", 8}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 2}});
+  b.Push("accessors",
+         {{"bufferView", view}, {"byteOffset", 8}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 2}});
   b = WithPrimitive(b, {{"attributes", {{"POSITION", 0}}}});
   EXPECT_EQ(MustLoad(b.Text()).meshes.at(0).positions, (std::vector<float>{1, 2, 3, 4, 5, 6}));
 }
@@ -161,15 +167,25 @@ TEST(GltfImport, SparseAccessors) {
             {"values", {{"bufferView", b.View(values)}}}};
   };
   b.root["accessors"][static_cast<std::size_t>(base)]["sparse"] = sparse({1}, {7, 8, 9});
-  const json no_base = {{"componentType", 5126}, {"type", "VEC3"}, {"count", 3}, {"sparse", sparse({0, 2}, {0, 0, 0, 1, 2, 3})}};
+  const json no_base = {{"componentType", 5126},
+                        {"type", "VEC3"},
+                        {"count", 3},
+                        {"sparse", sparse({0, 2}, {0, 0, 0, 1, 2, 3})}};
   const int target = b.Push("accessors", no_base);
   const int zeros = b.Push("accessors", {{"componentType", 5126}, {"type", "VEC3"}, {"count", 3}});
-  const int indices = b.Push("accessors", {{"componentType", 5123}, {"type", "SCALAR"}, {"count", 3}, {"sparse",
-      {{"count", 1}, {"indices", {{"bufferView", b.View<std::uint8_t>({1})}, {"componentType", 5121}}},
-       {"values", {{"bufferView", b.View<std::uint16_t>({2})}}}}}});
-  b = WithPrimitive(b, {{"attributes", {{"POSITION", base}}},
-                        {"indices", indices},
-                        {"targets", {{{"POSITION", target}}, {{"POSITION", zeros}}, {{"NORMAL", zeros}}, {{"POSITION", base}}}}});
+  const int indices = b.Push(
+      "accessors", {{"componentType", 5123},
+                    {"type", "SCALAR"},
+                    {"count", 3},
+                    {"sparse",
+                     {{"count", 1},
+                      {"indices", {{"bufferView", b.View<std::uint8_t>({1})}, {"componentType", 5121}}},
+                      {"values", {{"bufferView", b.View<std::uint16_t>({2})}}}}}});
+  b = WithPrimitive(
+      b, {{"attributes", {{"POSITION", base}}},
+          {"indices", indices},
+          {"targets",
+           {{{"POSITION", target}}, {{"POSITION", zeros}}, {{"NORMAL", zeros}}, {{"POSITION", base}}}}});
   const Character c = MustLoad(b.Text());
   const Mesh& mesh = c.meshes.at(0);
   EXPECT_EQ(mesh.positions, (std::vector<float>{0, 0, 0, 7, 8, 9, 2, 2, 2}));
@@ -188,10 +204,14 @@ TEST(GltfImport, QuantizedPositions) {
   for (const bool normalized : {false, true}) {
     GltfBuilder b;
     const int position = b.Push("accessors", {{"bufferView", b.View<std::int16_t>({-32768, 0, 32767, 0}, 8)},
-                                              {"componentType", 5122}, {"type", "VEC3"}, {"count", 1},
+                                              {"componentType", 5122},
+                                              {"type", "VEC3"},
+                                              {"count", 1},
                                               {"normalized", normalized}});
     const int delta = b.Push("accessors", {{"bufferView", b.View<std::int8_t>({-128, 0, 127, 0}, 4)},
-                                           {"componentType", 5120}, {"type", "VEC3"}, {"count", 1},
+                                           {"componentType", 5120},
+                                           {"type", "VEC3"},
+                                           {"count", 1},
                                            {"normalized", normalized}});
     b.root["extensionsRequired"] = {"KHR_mesh_quantization"};
     b = WithPrimitive(b, {{"attributes", {{"POSITION", position}}}, {"targets", {{{"POSITION", delta}}}}});
@@ -251,14 +271,15 @@ TEST(GltfImport, AnimationsOfAllKinds) {
   const int point = b.Accessor<float>({1, 2, 3}, "VEC3");
   const int turns = b.Accessor<std::int16_t>({0, 0, 0, 32767, 0, 0, 32767, 0}, "VEC4", true);
   const int cubic = b.Accessor<float>({0, 0, 0, 1, 1, 1, 2, 0, 0, 0, 0, 0, 3, 1, 1, 0, 0, 0}, "VEC3");
-  b.Push("animations",
-         {{"samplers", {{{"input", one}, {"output", point}},
-                        {{"input", two}, {"output", turns}},
-                        {{"input", two}, {"output", cubic}, {"interpolation", "CUBICSPLINE"}}}},
-          {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}},
-                        {{"sampler", 0}, {"target", {{"path", "pointer"}}}},
-                        {{"sampler", 1}, {"target", {{"node", 0}, {"path", "rotation"}}}},
-                        {{"sampler", 2}, {"target", {{"node", 0}, {"path", "scale"}}}}}}});
+  b.Push("animations", {{"samplers",
+                         {{{"input", one}, {"output", point}},
+                          {{"input", two}, {"output", turns}},
+                          {{"input", two}, {"output", cubic}, {"interpolation", "CUBICSPLINE"}}}},
+                        {"channels",
+                         {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}},
+                          {{"sampler", 0}, {"target", {{"path", "pointer"}}}},
+                          {{"sampler", 1}, {"target", {{"node", 0}, {"path", "rotation"}}}},
+                          {{"sampler", 2}, {"target", {{"node", 0}, {"path", "scale"}}}}}}});
   const Character c = MustLoad(b.Text());
   const Clip& clip = c.clips.at(0);
   EXPECT_EQ(clip.name, "");
@@ -282,15 +303,17 @@ TEST(GltfImport, BuffersBesideTheDocument) {
   b = WithPrimitive(b, {{"attributes", {{"POSITION", position}}}});
   const std::string data(b.buffer.begin(), b.buffer.end());
   folder.Write("sub dir/\xc3\xa4%1.bin", data + "trailing bytes are legal");
-  for (const char* uri : {"sub%20dir/%C3%A4%251.bin", "sub dir/\xc3\xa4%251.bin", "./sub%20dir/../sub%20dir/%c3%a4%251.bin"}) {
+  for (const char* uri :
+       {"sub%20dir/%C3%A4%251.bin", "sub dir/\xc3\xa4%251.bin", "./sub%20dir/../sub%20dir/%c3%a4%251.bin"}) {
     b.root["buffers"] = {{{"uri", uri}, {"byteLength", 12}}};
     const Result<Character> c = LoadGltf(folder.Write("c.gltf", b.Text()));
     ASSERT_TRUE(c.ok()) << c.status().ToString();
     EXPECT_EQ(c->meshes.at(0).positions, (std::vector<float>{1, 2, 3}));
   }
   // Data URIs of any media type, and without base64; a second buffer in a .glb
-  for (const std::string& uri : {"data:;base64," + b.Base64(), "data:application/gltf-buffer;base64," + b.Base64(),
-                                 std::string("data:application/octet-stream,%00%00%80%3F%00%00%00%40%00%00%40%40")}) {
+  for (const std::string& uri :
+       {"data:;base64," + b.Base64(), "data:application/gltf-buffer;base64," + b.Base64(),
+        std::string("data:application/octet-stream,%00%00%80%3F%00%00%00%40%00%00%40%40")}) {
     b.root["buffers"] = {{{"uri", uri}, {"byteLength", 12}}};
     EXPECT_EQ(MustLoad(b.Text()).meshes.at(0).positions, (std::vector<float>{1, 2, 3})) << uri;
   }

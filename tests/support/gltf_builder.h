@@ -61,7 +61,8 @@ class GltfBuilder {
   std::string Text() const {
     nlohmann::json copy = root;
     if (!buffer.empty() && !copy.contains("buffers")) {
-      copy["buffers"] = {{{"byteLength", buffer.size()}, {"uri", "data:application/octet-stream;base64," + Base64()}}};
+      copy["buffers"] = {
+          {{"byteLength", buffer.size()}, {"uri", "data:application/octet-stream;base64," + Base64()}}};
     }
     return copy.dump();
   }
@@ -114,15 +115,17 @@ class GltfBuilder {
     const int times = b.Accessor<float>({0, 1, 3}, "SCALAR");
     const int turn = b.Accessor<float>({0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 1}, "VEC4");
     const int morph = b.Accessor<float>({0, 1, 0.5f}, "SCALAR");
-    b.Push("meshes", {{"name", "tri"},
-                      {"extras", {{"targetNames", {"up"}}}},
-                      {"weights", {0.5}},
-                      {"primitives",
-                       {{{"attributes", {{"POSITION", position}, {"JOINTS_0", joints}, {"WEIGHTS_0", weights}}},
-                         {"indices", indices},
-                         {"material", 0},
-                         {"targets", {{{"POSITION", delta}}}}}}}});
-    b.Push("materials", {{"name", "Skin"}, {"pbrMetallicRoughness", {{"baseColorFactor", {1, 0.5, 0.25, 1}}}}});
+    b.Push("meshes",
+           {{"name", "tri"},
+            {"extras", {{"targetNames", {"up"}}}},
+            {"weights", {0.5}},
+            {"primitives",
+             {{{"attributes", {{"POSITION", position}, {"JOINTS_0", joints}, {"WEIGHTS_0", weights}}},
+               {"indices", indices},
+               {"material", 0},
+               {"targets", {{{"POSITION", delta}}}}}}}});
+    b.Push("materials",
+           {{"name", "Skin"}, {"pbrMetallicRoughness", {{"baseColorFactor", {1, 0.5, 0.25, 1}}}}});
     b.Push("skins", {{"joints", {1, 2}}, {"inverseBindMatrices", inverse_bind}, {"skeleton", 1}});
     b.Push("nodes", {{"name", "body"}, {"mesh", 0}, {"skin", 0}});
     b.Push("nodes", {{"name", "root"}, {"children", {3}}, {"translation", {0, 1, 0}}});

@@ -1,6 +1,6 @@
-// A naive evaluator of glTF characters in double precision, written from the specification and from nothing else of
-// this project but the plain structs: the reference that real evaluation is compared with. One vertex at a time,
-// libm throughout.
+// A naive evaluator of glTF characters in double precision, written from the specification and from nothing
+// else of this project but the plain structs: the reference that real evaluation is compared with. One vertex
+// at a time, libm throughout.
 #pragma once
 
 #include <cmath>
@@ -45,8 +45,8 @@ inline Vector Sample(const gltf::Channel& channel, double time) {
     const Vector out = part(k, 2), in = part(k + 1, 0);
     const double t2 = t * t, t3 = t2 * t;
     for (std::size_t i = 0; i < n; ++i) {
-      result[i] = (2 * t3 - 3 * t2 + 1) * a[i] + duration * (t3 - 2 * t2 + t) * out[i] + (-2 * t3 + 3 * t2) * b[i] +
-                  duration * (t3 - t2) * in[i];
+      result[i] = (2 * t3 - 3 * t2 + 1) * a[i] + duration * (t3 - 2 * t2 + t) * out[i] +
+                  (-2 * t3 + 3 * t2) * b[i] + duration * (t3 - t2) * in[i];
     }
     return finish(result);
   }
@@ -83,10 +83,18 @@ inline Pose Evaluate(const gltf::Character& character, const gltf::Clip* clip, d
       const Vector v = Sample(channel, time);
       gltf::Node& node = nodes[channel.node];
       switch (channel.path) {
-        case gltf::Path::kTranslation: node.translation = {v[0], v[1], v[2]}; break;
-        case gltf::Path::kRotation: node.rotation = {v[0], v[1], v[2], v[3]}; break;
-        case gltf::Path::kScale: node.scale = {v[0], v[1], v[2]}; break;
-        case gltf::Path::kWeights: node.weights = v; break;
+        case gltf::Path::kTranslation:
+          node.translation = {v[0], v[1], v[2]};
+          break;
+        case gltf::Path::kRotation:
+          node.rotation = {v[0], v[1], v[2], v[3]};
+          break;
+        case gltf::Path::kScale:
+          node.scale = {v[0], v[1], v[2]};
+          break;
+        case gltf::Path::kWeights:
+          node.weights = v;
+          break;
       }
     }
   }
@@ -126,7 +134,8 @@ inline std::vector<Double3> Points(const gltf::Character& character, const Pose&
       const gltf::Skin& skin = character.skins[node.skin];
       Double3 sum;
       for (const gltf::Influence& influence : mesh.influence_rows().row(v)) {
-        const Matrix4 joint = pose.world[skin.joints[influence.joint]] * skin.inverse_bind_matrices[influence.joint];
+        const Matrix4 joint =
+            pose.world[skin.joints[influence.joint]] * skin.inverse_bind_matrices[influence.joint];
         sum = sum + TransformPoint(joint, points[v]) * influence.weight;
       }
       points[v] = sum;
@@ -135,7 +144,8 @@ inline std::vector<Double3> Points(const gltf::Character& character, const Pose&
   return points;
 }
 
-// Every primitive in the scene at each of the times, under its name in an .npz: "<node>/<primitive>", T * V * 3.
+// Every primitive in the scene at each of the times, under its name in an .npz: "<node>/<primitive>", T * V
+// * 3.
 inline std::map<std::string, Vector> AllPoints(const gltf::Character& character, const gltf::Clip* clip,
                                                const Vector& times) {
   std::map<std::string, Vector> result;
@@ -144,10 +154,12 @@ inline std::map<std::string, Vector> AllPoints(const gltf::Character& character,
     const Pose pose = Evaluate(character, clip, time);
     for (const Index node : character.MeshNodes()) {
       const std::vector<Double3> points = Points(character, pose, node);
-      const std::vector<gltf::Primitive>& primitives = character.meshes[character.nodes[node].mesh].primitives;
+      const std::vector<gltf::Primitive>& primitives =
+          character.meshes[character.nodes[node].mesh].primitives;
       for (std::size_t p = 0; p < primitives.size(); ++p) {
         Vector& values = result[names[node] + "/" + std::to_string(p)];
-        for (Index v = primitives[p].first_vertex; v < primitives[p].first_vertex + primitives[p].vertex_count; ++v) {
+        for (Index v = primitives[p].first_vertex;
+             v < primitives[p].first_vertex + primitives[p].vertex_count; ++v) {
           values.insert(values.end(), {points[v].x, points[v].y, points[v].z});
         }
       }

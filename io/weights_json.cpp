@@ -1,0 +1,220 @@
+#include "io/weights_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "io/file.h"
+
+namespace kpsa {
+namespace {
+
+using json = nlohmann::ordered_json;
+constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 30;
+
+SourceLocation PlaceOfByte(const std::string& path, const std::vector<std::uint8_t>& text, std::size_t byte) {
+  SourceLocation place{path, 1, 1};
+  for (std::size_t i = 0; i + 1 < byte && i < text.size(); ++i) {
+    place.column = text[i] == '\n' ? 1 : place.column + 1;
+    place.line += text[i] == '\n';
+  }
+  return place;
+}
+
+// Collects the errors of one file.
+class Reader {
+ public:
+  Reader(const std::string& path, WeightFile* file) : path_(path), file_(file) {}
+
+  Status Read(const json& root) {
+    if (!root.is_object() || Text(root, "kpsa") != "weights") {
+      Fail("is no weight file; expected {{\"kpsa\": \"weights\", ...}}");
+      return std::move(status_);
+    }
+    CheckKeys(root, "", {"kpsa", "version", "mesh", "points", "maps"});
+    if (const auto version = root.find("version"); version == root.end() || *version != 1) {
+      Fail("version must be 1");
+    }
+    const std::optional<std::string> mesh = Text(root, "mesh");
+    if (!mesh) Fail("mesh must be the name of a mesh node");
+    file_->mesh = mesh.value_or("");
+    const auto points = root.find("points");
+    if (points == root.end() || !points->is_number_unsigned() || points->get<std::uint64_t>() >= kNoIndex) {
+      Fail("points must be the number of points of the mesh, a whole number below {}", kNoIndex);
+    } else {
+      file_->points = points->get<std::size_t>();
+    }
+    const auto maps = root.find("maps");
+    if (maps == root.end() || !maps->is_object()) {
+      Fail("maps must be an object of weight maps");
+    } else if (status_.ok()) {
+      for (const auto& [name, map] : maps->items()) ReadMap(name, map);
+    }
+    return std::move(status_);
+  }
+
+ private:
+  template <typename... Args>
+  void Fail(fmt::format_string<Args...> format, Args&&... args) {
+    constexpr std::size_t kMost = 20;
+    if (status_.errors().size() >= kMost) return;
+    status_.Append(Status::Invalid(format, std::forward<Args>(args)...).At({path_}));
+  }
+
+  static std::optional<std::string> Text(const json& object, const char* key) {
+    const auto found = object.find(key);
+    if (found == object.end() || !found->is_string()) return std::nullopt;
+    return found->get<std::string>();
+  }
+
+  void CheckKeys(const json& object, const std::string& where, const std::vector<std::string>& known) {
+    for (const auto& [key, value] : object.items()) {
+      if (std::find(known.begin(), known.end(), key) == known.end()) {
+        Fail("{}unknown key \"{}\"{}", where, key, DidYouMean(key, known));
+      }
+    }
+  }
+
+  // A finite float32, or nullopt.
+  static std::optional<float> Number(const json& value) {
+    if (!value.is_number()) return std::nullopt;
+    const double number = value.get<double>();
+    if (!(std::fabs(number) <= std::numeric_limits<float>::max())) return std::nullopt;
+    return static_cast<float>(number);
+  }
+
+  void ReadMap(const std::string& name, const json& in) {
+    const std::string where = fmt::format("map \"{}\": ", name);
+    if (!in.is_object()) return Fail("{}must be an object", where);
+    CheckKeys(in, where, {"default", "indices", "values"});
+    NamedWeights map;
+    map.name = name;
+    if (const auto found = in.find("default"); found != in.end()) {
+      const std::optional<float> number = Number(*found);
+      if (!number) return Fail("{}default must be a finite number", where);
+      map.default_value = *number;
+    }
+    const json none = json::array();
+    const json& indices = in.contains("indices") ? in["indices"] : none;
+    const json& values = in.contains("values") ? in["values"] : none;
+    if (!indices.is_array() || !values.is_array()) return Fail("{}indices and values must be arrays", where);
+    if (indices.size() != values.size()) {
+      return Fail("{}has {} indices and {} values; expected one value for each index", where, indices.size(),
+                  values.size());
+    }
+    std::set<Index> seen;
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      if (!indices[i].is_number_unsigned() || indices[i].get<std::uint64_t>() >= file_->points) {
+        Fail("{}indices[{}] is {}, expected a point from 0 to {}", where, i, indices[i].dump(),
+             static_cast<long long>(file_->points) - 1);
+        continue;
+      }
+      const auto index = indices[i].get<Index>();
+      if (!seen.insert(index).second) Fail("{}point {} occurs twice", where, index);
+      const std::optional<float> value = Number(values[i]);
+      if (!value) Fail("{}values[{}] is {}, expected a finite number", where, i, values[i].dump());
+      map.indices.push_back(index);
+      map.values.push_back(value.value_or(0));
+    }
+    file_->maps.push_back(std::move(map));
+  }
+
+  const std::string& path_;
+  WeightFile* file_;
+  Status status_;
+};
+
+std::vector<std::string> MapNames(const WeightFile& file) {
+  std::vector<std::string> names;
+  for (const NamedWeights& map : file.maps) names.push_back(map.name);
+  return names;
+}
+
+}  // namespace
+
+const NamedWeights* WeightFile::Find(std::string_view name) const {
+  for (const NamedWeights& map : maps) {
+    if (map.name == name) return &map;
+  }
+  return nullptr;
+}
+
+Result<WeightFile> ReadWeightFile(const std::string& path) {
+  const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kLargestFile);
+  if (!bytes.ok()) return bytes.status();
+  try {
+    // JSON libraries keep the last of equal keys; here the first is remembered, too
+    std::vector<std::set<std::string>> keys;
+    std::string repeated;
+    bool is_repeated = false;
+    const auto watch = [&](int, json::parse_event_t event, json& parsed) {
+      if (event == json::parse_event_t::object_start) keys.emplace_back();
+      if (event == json::parse_event_t::object_end && !keys.empty()) keys.pop_back();
+      if (event == json::parse_event_t::key && !keys.empty() && !is_repeated) {
+        const auto& key = parsed.get_ref<const std::string&>();
+        is_repeated = !keys.back().insert(key).second;
+        if (is_repeated) repeated = key;
+      }
+      return true;
+    };
+    const json root = json::parse(bytes->begin(), bytes->end(), watch);
+    if (is_repeated) return Status::Invalid("the key \"{}\" is defined twice", repeated).At({path});
+    WeightFile file;
+    KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root));
+    return file;
+  } catch (const json::parse_error& error) {
+    return Status::Invalid("is no valid JSON here (NaN and trailing commas are none)")
+        .At(PlaceOfByte(path, *bytes, error.byte));
+  } catch (const json::exception& error) {
+    return Status::Invalid("is no valid weight file: {}", error.what()).At({path});
+  }
+}
+
+Result<std::vector<float>> DenseWeights(const WeightFile& file, const std::string& path,
+                                        std::string_view name, std::string_view mesh, std::size_t points) {
+  if (file.mesh != mesh) {
+    return Status::Invalid("holds weights of the mesh \"{}\", expected \"{}\"", file.mesh, mesh).At({path});
+  }
+  if (file.points != points) {
+    return Status::Invalid("holds weights for {} points, \"{}\" has {}; the mesh changed since", file.points,
+                           mesh, points)
+        .At({path});
+  }
+  const NamedWeights* map = file.Find(name);
+  if (map == nullptr) {
+    return Status::Invalid("has no map \"{}\"{}", name, DidYouMean(name, MapNames(file))).At({path});
+  }
+  std::vector<float> weights(points, map->default_value);
+  for (std::size_t i = 0; i < map->indices.size(); ++i) weights[map->indices[i]] = map->values[i];
+  return weights;
+}
+
+Result<std::vector<float>> LoadWeights(const std::string& folder, const std::string& reference,
+                                       std::string_view mesh, std::size_t points) {
+  const std::size_t hash = reference.rfind('#');
+  const std::string path = (std::filesystem::path(folder) / reference.substr(0, hash)).string();
+  const Result<WeightFile> file = ReadWeightFile(path);
+  if (!file.ok()) return file.status();
+  if (hash != std::string::npos) return DenseWeights(*file, path, reference.substr(hash + 1), mesh, points);
+  if (file->maps.size() != 1) {
+    return Status::Invalid("has {} maps; say which one: \"{}#<map>\"", file->maps.size(), reference)
+        .At({path});
+  }
+  return DenseWeights(*file, path, file->maps[0].name, mesh, points);
+}
+
+Status WriteWeightFile(const std::string& path, const WeightFile& file, bool force) {
+  json root = {{"kpsa", "weights"}, {"version", 1}, {"mesh", file.mesh}, {"points", file.points}};
+  json& maps = root["maps"] = json::object();
+  for (const NamedWeights& map : file.maps) {
+    maps[map.name] = {{"default", map.default_value}, {"indices", map.indices}, {"values", map.values}};
+  }
+  const std::string text = root.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+  return WriteFileAtomically(path, force, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+}  // namespace kpsa
