@@ -108,7 +108,9 @@ Result<NpzWriter> NpzWriter::Create(const std::string& path, bool force) {
 Result<NpzWriter::ArrayId> NpzWriter::Declare(const std::string& name, NpzType type,
                                               std::vector<std::uint64_t> shape) {
   const std::string& path = impl_->output.path();
-  if (name.empty()) return Status::Invalid("an array needs a name").At({path});
+  if (name.empty() || name.find('\0') != std::string::npos) {
+    return Status::Invalid("an array needs a name without zero bytes").At({path});
+  }
   if (!impl_->names.emplace(name, impl_->arrays.size()).second) {
     return Status::Invalid("two arrays are named \"{}\"", name).At({path});
   }

@@ -84,9 +84,9 @@ void DemandWire(Demand& demand) {
 void AddCurveNodes(NodeRegistry& registry) {
   registry.add("curve", "A curve for wires, through control vertices.").category("geometry")
       .structural("curve", Type::kCurve, {.doc = "the vertices at rest, world space"})
-      .points_in("cv", "offsets of the vertices from rest, in the parent's axes").default_from(RestOffsets)
+      .points_in("cv", "offsets of the vertices from rest, in the parent's axes").unit(Unit::kLength).default_from(RestOffsets)
       .in("parentMatrix", Matrix4(), {.doc = "turns the offsets; `parent:` connects it"})
-      .out("displacements", Type::kPoints, "the offsets in world axes")
+      .out("displacements", Type::kPoints, "the offsets in world axes").unit(Unit::kLength)
       .compute(&ComputeDisplacements);
   NodeBuilder b = AddDeformer(registry, "wire", "Points near a curve follow it.");
   b.points_in("displacements", "the curve's displacements");

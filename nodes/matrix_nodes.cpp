@@ -40,7 +40,7 @@ void AddMatrixNodes(NodeRegistry& registry) {
       .compute(&ComputeCompose).bind(BindOrder);
   registry.add("decomposeMatrix", "Translation, rotation and scale of a matrix; shear is dropped.").category("matrix")
       .in("inputMatrix", Matrix4()).enumeration("rotateOrder", orders, true)
-      .out("outputTranslate", Type::kDouble3).out("outputRotate", Type::kDouble3).out("outputScale", Type::kDouble3)
+      .out("outputTranslate", Type::kDouble3).unit(Unit::kLength).out("outputRotate", Type::kDouble3).unit(Unit::kAngle).out("outputScale", Type::kDouble3)
       .out("outputQuat", Type::kQuaternion).compute(&ComputeDecompose).bind(BindOrder);
 }
 

@@ -70,10 +70,11 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .structural("restMatrix", Matrix4(), {.doc = "the local matrix at rest, for poseRotate, swing and twist"})
       .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")
       .out("matrix", Type::kMatrix, "local").out("worldMatrix", Type::kMatrix).out("worldInverseMatrix", Type::kMatrix)
-      .out("poseRotate", Type::kDouble3, "rotation against rest, as angles in rotateOrder; includes the clip")
-      .out("poseRotateVector", Type::kDouble3, "the same as axis times angle")
-      .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip")
-      .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist").out("twist", Type::kDouble, "angle about twistAxis");
+      .out("poseRotate", Type::kDouble3, "rotation against rest, as angles in rotateOrder; includes the clip").unit(Unit::kAngle)
+      .out("poseRotateVector", Type::kDouble3, "the same as axis times angle").unit(Unit::kAngle)
+      .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip").unit(Unit::kLength)
+      .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist").unit(Unit::kAngle)
+      .out("twist", Type::kDouble, "angle about twistAxis").unit(Unit::kAngle);
   b.compute_for({"matrix", "worldMatrix"}, world, &ComputeMatrices).bind(BindTransform).cost(90, 0);
   b.compute_for({"worldInverseMatrix"}, world, &ComputeWorldInverse).bind(BindTransform).cost(150, 0);
   b.compute_for({"poseRotate"}, local, &ComputePose).bind(BindTransform).cost(250, 0);

@@ -46,6 +46,7 @@ TEST(Npz, RoundTrip) {
     ASSERT_TRUE(writer->Add("empty", {0, 3}, std::vector<float>{}).ok());
     EXPECT_FALSE(writer->Declare("times", NpzType::kFloat32, {1}).ok());
     EXPECT_FALSE(writer->Declare("", NpzType::kFloat32, {1}).ok());
+    EXPECT_FALSE(writer->Declare(std::string("a\0b", 3), NpzType::kFloat32, {1}).ok());
     EXPECT_FALSE(
         writer->Declare("huge", NpzType::kFloat32, {std::uint64_t{1} << 40, std::uint64_t{1} << 40}).ok());
     ASSERT_TRUE(writer->Finish().ok());

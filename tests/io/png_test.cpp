@@ -37,7 +37,8 @@ TEST(Png, DecodesToTheSamePixels) {
     const auto bytes = EncodePng(width, height, rgb);
     ASSERT_TRUE(bytes.ok());
     int w = 0, h = 0, channels = 0;
-    std::uint8_t* pixels = stbi_load_from_memory(bytes->data(), static_cast<int>(bytes->size()), &w, &h, &channels, 0);
+    std::uint8_t* pixels =
+        stbi_load_from_memory(bytes->data(), static_cast<int>(bytes->size()), &w, &h, &channels, 0);
     ASSERT_NE(pixels, nullptr);
     EXPECT_EQ(w, width);
     EXPECT_EQ(h, height);
@@ -52,13 +53,15 @@ TEST(Png, RefusesSizesThatDoNotFitThePixels) {
   EXPECT_FALSE(EncodePng(-1, -1, Pattern(1, 1)).ok());
   EXPECT_FALSE(EncodePng(40000, 1, Pattern(1, 1)).ok());
   EXPECT_FALSE(EncodePng(32768, 32768, Pattern(1, 1)).ok());
-  EXPECT_NE(EncodePng(2, 2, Pattern(1, 1)).status().ToString().find("needs 12 bytes, there are 3"), std::string::npos);
+  EXPECT_NE(EncodePng(2, 2, Pattern(1, 1)).status().ToString().find("needs 12 bytes, there are 3"),
+            std::string::npos);
 }
 
 TEST_F(PngFolder, IsWrittenWholeAndLeavesNothingBeside) {
   const std::string path = folder_ / "a.png";
-  ASSERT_TRUE(WritePng(path, 5, 4, Pattern(5, 4)).ok());
-  ASSERT_TRUE(WritePng(path, 3, 2, Pattern(3, 2)).ok());  // replaces
+  ASSERT_TRUE(WritePng(path, false, 5, 4, Pattern(5, 4)).ok());
+  EXPECT_FALSE(WritePng(path, false, 3, 2, Pattern(3, 2)).ok());
+  ASSERT_TRUE(WritePng(path, true, 3, 2, Pattern(3, 2)).ok());
   std::ifstream in(path, std::ios::binary);
   const std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(in)), {});
   EXPECT_EQ(bytes, *EncodePng(3, 2, Pattern(3, 2)));
@@ -66,10 +69,10 @@ TEST_F(PngFolder, IsWrittenWholeAndLeavesNothingBeside) {
 }
 
 TEST_F(PngFolder, SaysWhereItCannotWrite) {
-  const Status status = WritePng(folder_ / "missing" / "a.png", 1, 1, Pattern(1, 1));
+  const Status status = WritePng(folder_ / "missing" / "a.png", true, 1, 1, Pattern(1, 1));
   EXPECT_FALSE(status.ok());
   EXPECT_NE(status.ToString().find("missing/a.png"), std::string::npos);
-  const Status onto_folder = WritePng(folder_, 1, 1, Pattern(1, 1));
+  const Status onto_folder = WritePng(folder_, true, 1, 1, Pattern(1, 1));
   EXPECT_FALSE(onto_folder.ok());
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }
