@@ -54,6 +54,10 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
     const std::size_t active = 1 + static_cast<std::size_t>(share * share * static_cast<double>(most));
     const double reach = pose.clip >= 0 ? 0.35 : active > 8 ? 0.6 : 1.0;
     for (std::size_t k = 0; k < active; ++k) move(random.Below(n), reach * random.Unit());
+    if (random.Unit() < 0.5) continue;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (controls[i].often) move(i, random.Unit());
+    }
   }
   return poses;
 }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kProbePoints = 20;    // of a stage, to see what a cue there would drag in
 constexpr double kMaxPointsPerCue = 1.5;    // points of a step that a local cue may cost
-constexpr double kTileShare = 0.04;          // of the tolerance: RMS error that tiles and half precision may add
+constexpr double kTileShare = 0.01;          // of the tolerance: RMS error that tiles and half precision may add
 constexpr double kMinMotion = 1e-3;         // of the largest: points that move less are no cues
 
 // Count of indices, evenly spread.
@@ -122,8 +122,7 @@ class Trainer {
       for (const ControlRange& control : rig_.controls) {
         if (clip < 0 || !control.by_clip) varying.push_back(control.plug);
       }
-      Result<std::vector<Signal>> found = FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying,
-                                                           rig_.target.space.empty() ? nullptr : &rig_.target.space[0], nullptr);
+      Result<std::vector<Signal>> found = FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, nullptr, nullptr);
       if (!found.ok()) return found.status();
       for (Signal& signal : *found) {
         const bool known = std::any_of(signals.begin(), signals.end(), [&](const Signal& s) { return s.name == signal.name; });

@@ -89,8 +89,16 @@ TEST_F(Allocations, CanaryTheCounterSeesEveryWay) {
               void* q = nullptr;
               return posix_memalign(&q, 64, 64) == 0 ? q : nullptr;
             }), 1);
-  EXPECT_EQ(In([&] { delete static_cast<int*>(p = new int(1)); }), 1);
-  EXPECT_EQ(In([&] { ::operator delete(p = ::operator new(64, std::align_val_t(64)), std::align_val_t(64)); }), 1);
+  EXPECT_EQ(In([&] {
+              int* made = new int(1);
+              p = made;
+              delete made;
+            }), 1);
+  EXPECT_EQ(In([&] {
+              void* made = ::operator new(64, std::align_val_t(64));
+              p = made;
+              ::operator delete(made, std::align_val_t(64));
+            }), 1);
   EXPECT_EQ(In([&] { p = mmap(nullptr, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0); }), 1);
   munmap(p, 4096);
   // On another thread
