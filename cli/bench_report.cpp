@@ -28,7 +28,7 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
                   r.bound_points_ms > 0
                       ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
                       : "");
-  return {
+  const nlohmann::ordered_json document = {
       {"schema", "kpsa.bench/1"},
       {"rig", context.rig},
       {"clip", fmt::format("{}", fmt::join(r.clips, ", "))},
