@@ -103,7 +103,7 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   }
   for (const std::string& text : flags.sets) {
     const Result<Setting> setting = ParseSetting(open->rig, text);
-    if (!setting.ok()) return AsUsage(setting.status().At({"--set " + text}));
+    if (!setting.ok()) return AsUsage(Status(setting.status()).At({"--set " + text}));
     KPSA_RETURN_IF_ERROR(AsUsage(ApplySetting(&open->rig, *setting).At({"--set " + text})));
   }
   return open;

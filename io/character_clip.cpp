@@ -8,6 +8,8 @@
 namespace kpsa {
 namespace {
 
+constexpr std::size_t kMaxNotes = 200;
+
 AnimationSampler ToSampler(const gltf::Channel& channel) {
   AnimationSampler sampler;
   switch (channel.interpolation) {
@@ -27,6 +29,10 @@ struct NodeKeys {
   bool moves = false, morphs = false;
 };
 
+void AddNote(std::string note, std::vector<std::string>* notes) {
+  if (std::find(notes->begin(), notes->end(), note) == notes->end() && notes->size() < kMaxNotes) notes->push_back(std::move(note));
+}
+
 std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const gltf::Clip& clip,
                                      std::vector<std::string>* notes) {
   std::map<Index, NodeKeys> keys;
@@ -41,12 +47,12 @@ std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const glt
       case gltf::Path::kWeights: sampler = &of_node.data.weights; break;
     }
     if (node.has_matrix && channel.path != gltf::Path::kWeights) {
-      notes->push_back(fmt::format("clip \"{}\" animates nodes[{}], which has a matrix; it stays at rest (glTF 2.0, 3.5.3)",
-                                   clip.id, channel.node));
+      AddNote(fmt::format("clip \"{}\" animates nodes[{}], which has a matrix; it stays at rest (glTF 2.0, 3.5.3)", clip.id, channel.node),
+              notes);
       continue;
     }
     if (!sampler->times.empty()) {
-      notes->push_back(fmt::format("clip \"{}\" animates one property of nodes[{}] twice; the first is used", clip.id, channel.node));
+      AddNote(fmt::format("clip \"{}\" animates one property of nodes[{}] twice; the first is used", clip.id, channel.node), notes);
       continue;
     }
     *sampler = ToSampler(channel);
@@ -136,23 +142,10 @@ Status SetClip(const gltf::Character& character, std::optional<std::string_view>
   return writer.edit().Take();
 }
 
-bool IsClipPlug(const gltf::Character& character, const CharacterGraph& scene, const Graph& graph, const PlugRef& plug) {
+bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug) {
   const NodeDef& def = graph.def(plug.node);
-  const bool is_offset = plug.attribute == def.FindAttribute("offsetParentMatrix");
-  const bool is_weight = plug.attribute == def.FindAttribute("weight");
-  if (!is_offset && !is_weight) return false;
-  for (const gltf::Clip& clip : character.clips) {
-    for (const gltf::Channel& channel : clip.channels) {
-      if (channel.path != gltf::Path::kWeights) {
-        if (is_offset && scene.transforms[channel.node] == plug.node) return true;
-      } else if (is_weight) {
-        for (const CharacterMesh& mesh : scene.meshes) {
-          if (mesh.gltf_node == channel.node && mesh.blend_shape == plug.node) return true;
-        }
-      }
-    }
-  }
-  return false;
+  if (plug.attribute == def.FindAttribute("offsetParentMatrix")) return scene.clip_transforms.count(plug.node.index) != 0;
+  return plug.attribute == def.FindAttribute("weight") && scene.clip_weights.count(plug.node.index) != 0;
 }
 
 }  // namespace kpsa

@@ -31,6 +31,8 @@ class Builder {
     }
     if (!edit_.ok()) return edit_.Take();
 
+    FindClipPlugs();
+
     std::optional<std::string_view> clip;
     if (options_.clip.has_value()) {
       clip = *options_.clip;
@@ -61,6 +63,22 @@ class Builder {
       }
     }
     return Status();
+  }
+
+  void FindClipPlugs() {
+    std::unordered_map<Index, Index> blend_shapes;  // by glTF node
+    for (const CharacterMesh& mesh : scene_.meshes) {
+      if (mesh.blend_shape.version != 0) blend_shapes[mesh.gltf_node] = mesh.blend_shape.index;
+    }
+    for (const gltf::Clip& clip : character_.clips) {
+      for (const gltf::Channel& channel : clip.channels) {
+        if (channel.path != gltf::Path::kWeights) {
+          scene_.clip_transforms.insert(scene_.transforms[channel.node].index);
+        } else if (const auto it = blend_shapes.find(channel.node); it != blend_shapes.end()) {
+          scene_.clip_weights.insert(it->second);
+        }
+      }
+    }
   }
 
   // Graph names of all glTF nodes: verbatim where nobody shares them.

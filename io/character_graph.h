@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "graph/geometry.h"
@@ -73,6 +74,7 @@ struct CharacterGraph {
   std::vector<NodeId> clip_nodes;
   PlugRef time;
   std::vector<std::string> notes;      // what was ignored, one line each
+  std::unordered_set<Index> clip_transforms, clip_weights;  // graph nodes that any clip moves, or whose weights
 };
 
 // Adds the character to an empty graph whose registry has the standard nodes. Works without recursion at any depth of
@@ -87,8 +89,8 @@ inline constexpr std::size_t kMaxMorphTargets = 8192;
 // Replaces the clip that plays; none: the rest pose. Plugs that somebody else drives are left alone.
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph);
-// The plugs that any clip of the character drives.
-bool IsClipPlug(const gltf::Character& character, const CharacterGraph& scene, const Graph& graph, const PlugRef& plug);
+// Whether any clip of the character drives the plug.
+bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug);
 
 // Chains the deformers from the mesh's rest points on, in place of the stages that it had; `points` of each stage is
 // set, and mesh[g] and space of each node. Deformers may serve several meshes, in different geometries.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <set>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -109,6 +110,7 @@ class RigBuild {
   const std::string& folder(int source) const { return file_->sources[static_cast<std::size_t>(source)].folder; }
   bool Fail(const SourceLocation& where, Status status);
   Made* FindMade(NodeId id);
+  Made* FindMade(const std::string& name);
 
   RigFile* file_;
   Rig* rig_;
@@ -116,11 +118,14 @@ class RigBuild {
   YamlErrors* errors_;
   std::vector<Made> made_;
   std::unordered_map<Index, std::size_t> made_by_node_;
+  std::unordered_map<std::string, std::size_t> made_by_name_;
+  std::unordered_map<std::string, std::size_t> written_;              // names in the file -> RigFile::nodes
   std::unordered_map<std::string, std::vector<Index>> gltf_by_name_;  // verbatim names
   std::unordered_map<Index, Index> gltf_by_node_;                     // graph node -> glTF node
   int conversions_ = 0;
   std::vector<Pending> pending_;
   std::vector<std::pair<PlugRef, bool>> overridden_;                  // plug; whether by a value
+  std::set<std::tuple<Index, int, int, int>> overridden_plugs_;       // the same
   std::unordered_map<Index, Places> curves_;          // by graph node: rest cvs in the world
   std::vector<std::optional<SourceLocation>> stack_of_mesh_;
   std::map<std::string, std::optional<WeightFile>> weight_files_;   // by path; none: it could not be read

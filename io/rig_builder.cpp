@@ -53,6 +53,7 @@ double RestDiagonal(const CharacterGraph& scene, RestPose* rest) {
 
 RigBuild::RigBuild(RigFile* file, Rig* rig, RestPose* rest, YamlErrors* errors)
     : file_(file), rig_(rig), rest_(rest), errors_(errors), stack_of_mesh_(rig->scene.meshes.size()) {
+  for (std::size_t n = 0; n < file->nodes.size(); ++n) written_.emplace(file->nodes[n].name, n);
   for (Index i = 0; i < rig->character->nodes.size(); ++i) {
     const std::string& name = rig->character->nodes[i].name;
     gltf_by_name_[name.empty() ? fmt::format("node{}", i) : name].push_back(i);
@@ -63,7 +64,9 @@ RigBuild::RigBuild(RigFile* file, Rig* rig, RestPose* rest, YamlErrors* errors)
 void RigBuild::Run() {
   ApplySpecialOverrides();
   AddNodes();
-  for (Made& made : made_) ReadAttributes(&made);
+  for (Made& made : made_) {
+    if (!errors_->full()) ReadAttributes(&made);
+  }
   ReadOverrides();
   AddCurves();
   ConnectParents();
@@ -80,6 +83,11 @@ bool RigBuild::Fail(const SourceLocation& where, Status status) {
   if (status.ok()) return true;
   errors_->Append(std::move(status).At(where));
   return false;
+}
+
+RigBuild::Made* RigBuild::FindMade(const std::string& name) {
+  const auto it = made_by_name_.find(name);
+  return it == made_by_name_.end() ? nullptr : &made_[it->second];
 }
 
 RigBuild::Made* RigBuild::FindMade(NodeId id) {

@@ -34,6 +34,10 @@ void RigBuild::ConnectCurves() {
 
 void RigBuild::MakeConnections() {
   for (const Pending& pending : pending_) {
+    if (errors_->full()) return;
+    // What the node itself asked for gives way to an override
+    const PlugRef& to = pending.to;
+    if (!pending.overrides && overridden_plugs_.count({to.node.index, to.attribute, to.element, to.component}) != 0) continue;
     const Result<PlugRef> from = graph().FindPlug(pending.from);
     if (!from.ok()) {
       Fail(pending.where, from.status());
@@ -42,6 +46,7 @@ void RigBuild::MakeConnections() {
     if (!pending.overrides) ConnectPlugs(*from, pending.to, pending.where, pending.source, false, false);
   }
   for (const RigConnection& connection : file_->connections) {
+    if (errors_->full()) return;
     const Result<PlugRef> from = graph().FindPlug(connection.from);
     const Result<PlugRef> to = graph().FindPlug(connection.to);
     const bool good = Fail(connection.where, from.status());
@@ -63,7 +68,7 @@ Unit RigBuild::PlugUnit(const PlugRef& plug) const {
 
 void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip,
                             bool replace) {
-  if (IsClipPlug(*rig_->character, rig_->scene, graph(), to)) {
+  if (IsClipPlug(rig_->scene, graph(), to)) {
     if (!override_clip) {
       Fail(where, Status::Invalid("a clip drives {0}: write {{from: {1}, to: {0}, override: true}} to take it over",
                                   graph().PlugName(to), graph().PlugName(from)));
@@ -98,18 +103,18 @@ void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const Source
 // Among mesh nodes only: by glTF name, name in outputs, `name#<index>` or path.
 std::optional<std::size_t> RigBuild::FindMesh(const std::string& name, const SourceLocation& where) {
   std::vector<std::size_t> found;
-  std::vector<std::string> names;
   const auto by_name = gltf_by_name_.find(name);
   const Result<NodeId> by_plug_name = by_name == gltf_by_name_.end() ? graph().FindNode(name) : Result<NodeId>(NodeId());
   for (std::size_t m = 0; m < rig_->scene.meshes.size(); ++m) {
     const CharacterMesh& mesh = rig_->scene.meshes[m];
-    names.push_back(mesh.name);
     const bool verbatim = by_name != gltf_by_name_.end() &&
                           std::find(by_name->second.begin(), by_name->second.end(), mesh.gltf_node) != by_name->second.end();
     if (verbatim || mesh.name == name || (by_plug_name.ok() && *by_plug_name == mesh.transform)) found.push_back(m);
   }
   if (found.size() == 1) return found[0];
   if (found.empty()) {
+    std::vector<std::string> names;
+    for (const CharacterMesh& mesh : rig_->scene.meshes) names.push_back(mesh.name);
     Fail(where, Status::Invalid("unknown mesh \"{}\"{}", name, DidYouMean(name, names)));
     return std::nullopt;
   }

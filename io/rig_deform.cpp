@@ -39,19 +39,20 @@ void RigBuild::BuildStacks() {
 }
 
 RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
-  std::vector<std::string> names{"gltf", "morph", "skin"};
-  for (Made& made : made_) {
+  const auto deforms = [&](const Made& made) {
     const NodeDef& def = graph().def(made.id);
     const int points = def.FindAttribute("inPoints");
-    const bool deforms = points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && def.FindAttribute("outPoints") >= 0;
-    if (deforms) names.push_back(made.from->name);
-    if (made.from->name != name.text) continue;
-    if (deforms) return &made;
-    Fail(name.where, Status::Invalid("\"{}\" is a {}, no deformer", name.text, def.name));
+    return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && def.FindAttribute("outPoints") >= 0;
+  };
+  if (Made* made = FindMade(name.text); made != nullptr) {
+    if (deforms(*made)) return made;
+    Fail(name.where, Status::Invalid("\"{}\" is a {}, no deformer", name.text, graph().def(made->id).name));
     return nullptr;
   }
-  for (const RigNode& node : file_->nodes) {
-    if (node.name == name.text) return nullptr;  // its own error was reported
+  if (written_.count(name.text) != 0 || errors_->full()) return nullptr;  // its own error was reported
+  std::vector<std::string> names{"gltf", "morph", "skin"};
+  for (const Made& made : made_) {
+    if (deforms(made)) names.push_back(made.from->name);
   }
   Fail(name.where, Status::Invalid("unknown deformer \"{}\"{}", name.text, DidYouMean(name.text, names)));
   return nullptr;

@@ -1,6 +1,7 @@
 #include "io/rig_file_sections.h"
 
 #include <algorithm>
+#include <map>
 
 namespace kpsa {
 namespace {
@@ -123,13 +124,11 @@ void SectionReader::ReadDeform(const YamlNode& node) {
       deform.points = RigString{{}, points->where(), source};
       if (ReadString(*points, "points", &deform.points->text, errors)) define("the stack of", deform.points->text, points->where());
     }
-    for (std::size_t i = 0; i < deform.stack.size(); ++i) {
-      for (std::size_t k = 0; k < i; ++k) {
-        if (deform.stack[k].text != deform.stack[i].text) continue;
-        errors->Append(Status::Invalid("\"{}\" is in this stack twice: first at {}", deform.stack[i].text,
-                                       deform.stack[k].where.ToString()).At(deform.stack[i].where));
-        break;
-      }
+    std::map<std::string, SourceLocation> seen;
+    for (const RigString& deformer : deform.stack) {
+      const auto [it, added] = seen.emplace(deformer.text, deformer.where);
+      if (added) continue;
+      errors->Append(Status::Invalid("\"{}\" is in this stack twice: first at {}", deformer.text, it->second.ToString()).At(deformer.where));
     }
     if (errors->count() == before) rig->deform.push_back(std::move(deform));
   }

@@ -37,13 +37,13 @@ void RigBuild::ApplySpecialOverrides() {
   std::vector<RigOverride> others;
   for (RigOverride& override_ : file_->overrides) {
     RigNode* longest = nullptr;
-    for (RigNode& node : file_->nodes) {
-      const std::string& text = override_.plug.text;
-      if (text.size() <= node.name.size() || text.compare(0, node.name.size(), node.name) != 0 || text[node.name.size()] != '.') continue;
-      if (longest == nullptr || node.name.size() > longest->name.size()) longest = &node;
+    const std::string& text = override_.plug.text;
+    for (std::size_t dot = text.rfind('.'); longest == nullptr && dot != std::string::npos && dot > 0; dot = text.rfind('.', dot - 1)) {
+      const auto it = written_.find(text.substr(0, dot));
+      if (it != written_.end()) longest = &file_->nodes[it->second];
     }
     const NodeDef* def = longest == nullptr ? nullptr : graph().registry().Find(longest->type);
-    const std::string key = longest == nullptr ? "" : override_.plug.text.substr(longest->name.size() + 1);
+    const std::string key = longest == nullptr ? "" : text.substr(longest->name.size() + 1);
     if (def == nullptr || !IsSpecial(*def, key)) {
       others.push_back(std::move(override_));
       continue;
@@ -64,6 +64,7 @@ void RigBuild::ApplySpecialOverrides() {
 
 void RigBuild::AddNodes() {
   for (const RigNode& node : file_->nodes) {
+    if (errors_->full()) return;
     if (std::find(std::begin(kStackWords), std::end(kStackWords), node.name) != std::end(kStackWords)) {
       Fail(node.where, Status::Invalid("\"{}\" is a word of stacks: give the node another name", node.name));
       continue;
@@ -75,6 +76,7 @@ void RigBuild::AddNodes() {
     Result<NodeId> id = graph().AddNode(node.type, node.name);
     if (!Fail(node.where, id.status())) continue;
     made_by_node_[id->index] = made_.size();
+    made_by_name_[node.name] = made_.size();
     made_.push_back({&node, *id, {}});
   }
 }
@@ -162,21 +164,15 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
 // Values are set at once (others may depend on them, as lattice points on divisions); connections wait.
 void RigBuild::ReadOverrides() {
   for (const RigOverride& override_ : file_->overrides) {
+    if (errors_->full()) return;
     const Result<PlugRef> plug = graph().FindPlug(override_.plug.text);
     if (!plug.ok()) {
       Fail(override_.plug.where, plug.status());
       continue;
     }
-    const std::size_t before = overridden_.size();
     ReadPlug(*plug, override_.value, override_.plug.source, true);
-    // Connections that the node itself asked for give way
-    for (std::size_t i = before; i < overridden_.size(); ++i) {
-      const PlugRef& target = overridden_[i].first;
-      pending_.erase(std::remove_if(pending_.begin(), pending_.end(),
-                                    [&](const Pending& p) { return !p.overrides && p.to == target; }),
-                     pending_.end());
-    }
   }
+  for (const auto& [plug, by_value] : overridden_) overridden_plugs_.emplace(plug.node.index, plug.attribute, plug.element, plug.component);
 }
 
 // An overriding value also ends what drives the plug.
@@ -184,7 +180,7 @@ void RigBuild::FinishOverrides() {
   for (const auto& [plug, by_value] : overridden_) {
     if (!by_value) continue;
     if (graph().FindConnection(plug) != nullptr) Fail({}, graph().Disconnect(plug));
-    if (IsClipPlug(*rig_->character, rig_->scene, graph(), plug)) rig_->pinned.push_back(plug);
+    if (IsClipPlug(rig_->scene, graph(), plug)) rig_->pinned.push_back(plug);
   }
 }
 

@@ -26,7 +26,7 @@ Double3 SetDouble3(const Graph& graph, NodeId node, const char* name, Double3 fa
 
 void RigBuild::AddCurves() {
   for (Made& made : made_) {
-    if (graph().def(made.id).name != "curve") continue;
+    if (graph().def(made.id).name != "curve" || errors_->full()) continue;
     const auto find = [&](const char* key) { return made.special.count(key) != 0 ? made.special[key] : nullptr; };
     const RigAttribute* vertices = find("vertices");
     const RigAttribute* places = find("places");
@@ -85,7 +85,7 @@ bool RigBuild::VertexPlaces(const YamlNode& vertices, const YamlNode* mesh_node,
 void RigBuild::ConnectParents() {
   for (Made& made : made_) {
     const auto it = made.special.find("parent");
-    if (it == made.special.end()) continue;
+    if (it == made.special.end() || errors_->full()) continue;
     std::string name;
     if (!ReadString(it->second->value, "parent", &name, errors_)) continue;
     const std::optional<NodeId> parent = FindTransform(name, it->second->value.where());
@@ -195,12 +195,9 @@ bool RigBuild::ReadPlace(const YamlNode& node, int source, int depth, Double3* p
   std::string name;
   if (!ReadString(node, "place", &name, errors_)) return false;
   const auto curve_of = [&](const std::string& curve) -> const Places* {
-    for (const Made& made : made_) {
-      if (made.from->name != curve) continue;
-      const auto it = curves_.find(made.id.index);
-      return it == curves_.end() ? nullptr : &it->second;
-    }
-    return nullptr;
+    const Made* made = FindMade(curve);
+    const auto it = made == nullptr ? curves_.end() : curves_.find(made->id.index);
+    return it == curves_.end() ? nullptr : &it->second;
   };
   if (const Places* cvs = curve_of(name)) {
     *place = (*cvs)[cvs->size() / 2];

@@ -8,6 +8,7 @@ namespace kpsa {
 void RigBuild::AddControls() {
   std::map<std::tuple<Index, int, int, int>, std::string> seen;
   for (const RigControl& from : file_->controls) {
+    if (errors_->full()) return;
     const Result<PlugRef> plug = graph().FindPlug(from.plug.text);
     if (!Fail(from.plug.where, plug.status())) continue;
     const AttributeDef& attribute = graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
@@ -29,7 +30,7 @@ void RigBuild::AddControls() {
     }
     PlugRef whole = *plug;
     whole.component = -1;
-    const bool by_clip = IsClipPlug(*rig_->character, rig_->scene, graph(), *plug);
+    const bool by_clip = IsClipPlug(rig_->scene, graph(), *plug);
     const Connection* driver = graph().FindConnection(*plug);
     if (driver == nullptr) driver = graph().FindConnection(whole);
     const std::vector<NodeId>& clip_nodes = rig_->scene.clip_nodes;

@@ -85,7 +85,7 @@ Status ApplySetting(Rig* rig, const Setting& setting) {
     }
     KPSA_RETURN_IF_ERROR(graph.Disconnect(plug));
   }
-  if (IsClipPlug(*rig->character, rig->scene, graph, setting.plug)) rig->pinned.push_back(setting.plug);
+  if (IsClipPlug(rig->scene, graph, setting.plug)) rig->pinned.push_back(setting.plug);
   return graph.Set(setting.plug, setting.value);
 }
 

@@ -50,20 +50,25 @@ class YamlErrors {
  public:
   template <typename... Args>
   bool Add(const YamlNode& node, fmt::format_string<Args...> format, Args&&... args) {
-    status_.Append(Status::Invalid(format, std::forward<Args>(args)...).At(node.where()));
+    Append(Status::Invalid(format, std::forward<Args>(args)...).At(node.where()));
     return false;
   }
   bool Add(const YamlNode& node, Status status) {
     if (status.ok()) return true;
-    status_.Append(std::move(status).At(node.where()));
+    Append(std::move(status).At(node.where()));
     return false;
   }
-  void Append(Status status) { status_.Append(std::move(status)); }
+  void Append(Status status) {
+    if (!full()) status_.Append(std::move(status));
+  }
   bool ok() const { return status_.ok(); }
+  // Nobody reads more: loops over an author's lines stop then. Later errors are dropped.
+  bool full() const { return count() >= kMaxErrors; }
   std::size_t count() const { return status_.errors().size(); }
   Status Take() { return std::move(status_); }
 
  private:
+  static constexpr std::size_t kMaxErrors = 100;
   Status status_;
 };
 

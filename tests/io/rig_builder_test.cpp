@@ -1,7 +1,9 @@
 // What a rig becomes in the graph, and every diagnostic that needs the registry or the character.
 #include "io/rig_builder.h"
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "base/matrix.h"
 #include "base/scalar_math.h"
@@ -524,6 +526,63 @@ controls: {"3D body.weight[up]": {min: 0, max: 1}}
   EXPECT_EQ(Driver(rig, "upper arm.L.translate"), "upper arm.translate");
   EXPECT_EQ(Driver(rig, "unitConversion1.input"), "upper arm.L.rotate.x");
   EXPECT_EQ(Driver(rig, "s.inputValue"), "3D body.translate.x");
+}
+
+// Bytes changed, removed and copied at random: never a crash, and every error has a message.
+TEST_F(RigBuilderTest, SurvivesRandomDamage) {
+  const std::string good = R"(units: {length: cm}
+include: [part.yaml]
+nodes:
+  c: {type: curve, vertices: [0, 1, 2], parent: root}
+  h: {type: transform, at: "c[1]", parent: tip, translate: [1, tip.rotateX, 0]}
+  w: {type: wire, curve: c, dropoff: 2, members: {joint: tip, above: 0.05}, falloff: {at: h, radius: 20}}
+  cage: {type: lattice, divisions: [3, 3, 3], members: {vertices: "0:1,2"}}
+  r: {type: remapValue, input: tip.poseRotateX, inputMax: -25}
+  mush: {type: deltaMush, iterations: 3}
+  l: {type: cluster, matrix: h.worldMatrix}
+connections:
+  - h.translate -> c.cv[1]
+  - r.outValue -> cage.points[2,0,1].y
+deform:
+  - {meshes: [body], stack: [morph, w, skin, cage, mush]}
+  - {points: cage.points, stack: [l]}
+controls:
+  tip.rotateX: {min: -25, max: 3}
+  body.weight[up]: {min: 0, max: 1}
+accelerate:
+  face: {points: [body@mush], space: root, tolerance: 0.2mm, train: {samples: 20}, test: {clips: [wave]}}
+overrides: {mush.iterations: 12, w.dropoff: 3}
+)";
+  folder.Write("part.yaml", "kpsa: 1\nnodes: {p: {type: transform}}\n");
+  ASSERT_TRUE(Load(good).ok()) << Errors(good);
+  std::mt19937 random(5);
+  const std::string alphabet = " \n:{}[],.#\"'&*!|>-0123456789abcxyz@\t";
+  int failures = 0;
+  for (int round = 0; round < 400; ++round) {
+    std::string text = good;
+    for (unsigned change = 0; change <= random() % 3; ++change) {
+      const std::size_t at = random() % text.size();
+      switch (random() % 4) {
+        case 0: text[at] = alphabet[random() % alphabet.size()]; break;
+        case 1: text.erase(at, 1 + random() % 8); break;
+        case 2: text.insert(at, 1, alphabet[random() % alphabet.size()]); break;
+        default: text.insert(at, text.substr(random() % text.size(), random() % 40)); break;
+      }
+    }
+    const Result<Rig> rig = Load(text);
+    if (rig.ok()) continue;
+    ++failures;
+    for (const Error& error : rig.status().errors()) EXPECT_FALSE(error.message.empty());
+  }
+  EXPECT_GT(failures, 200);
+}
+
+TEST_F(RigBuilderTest, AFloodOfErrorsIsCutShort) {
+  std::string text = "connections:\n";
+  for (int i = 0; i < 20000; ++i) text += fmt::format("  - nobody{}.x -> nobody.y\n", i);
+  const Result<Rig> rig = Load(text);
+  ASSERT_FALSE(rig.ok());
+  EXPECT_LE(rig.status().errors().size(), 110u);
 }
 
 }  // namespace
