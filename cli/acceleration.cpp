@@ -9,6 +9,7 @@
 #include "cli/request.h"
 #include "cli/rig_training.h"
 #include "io/quantity.h"
+#include "kpsa/accelerate.h"
 
 namespace kpsa {
 namespace {
@@ -137,7 +138,11 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
             .At(entry.where);
       const auto subspace = LoadSubspace(*rig, entry.subspace);
       if (!subspace.ok()) return subspace.status();
-      applied.push_back({entry.name, entry.subspace, entry, *subspace, {}, 0, 0});
+      AppliedSubspace one;
+      one.path = entry.subspace;
+      one.entry = entry;
+      one.subspace = *subspace;
+      applied.push_back(std::move(one));
     }
   }
   for (AppliedSubspace& one : applied) {
@@ -153,12 +158,14 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
     Result<Accelerated> accelerated =
         Accelerate(rig->graph.get(), compiler, MakeTarget(*rig, one.entry), one.subspace, node_name, options);
     if (!accelerated.ok()) return Status(accelerated.status()).At({one.path});
-    one.accelerated = std::move(*accelerated);
-    const NodeDef& def = rig->graph->def(one.accelerated.node);
+    one.node = accelerated->node;
+    one.config = accelerated->config;
+    one.notes = std::move(accelerated->notes);
+    const NodeDef& def = rig->graph->def(one.node);
     for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
       CharacterMesh& mesh = rig->scene.meshes[one.entry.points[p].mesh];
       if (mesh.points == mesh.stages[one.entry.points[p].stage].points) {
-        mesh.points = {one.accelerated.node, def.FindAttribute("outPoints"), static_cast<int>(p), -1};
+        mesh.points = {one.node, def.FindAttribute("outPoints"), static_cast<int>(p), -1};
       }
     }
   }
@@ -168,9 +175,9 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
 Verdicts::Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, Request* request)
     : applied_(&applied), first_output_(static_cast<Index>(request->outputs.size())) {
   for (const AppliedSubspace& one : applied) {
-    const NodeDef& def = rig.graph->def(one.accelerated.node);
+    const NodeDef& def = rig.graph->def(one.node);
     for (const char* name : {"hit", "score", "missReason", "offender"}) {
-      request->outputs.push_back({{one.accelerated.node, def.FindAttribute(name), -1, -1}, {}});
+      request->outputs.push_back({{one.node, def.FindAttribute(name), -1, -1}, {}});
     }
   }
 }
@@ -187,9 +194,9 @@ void Verdicts::Add(std::size_t frame, const Evaluator& evaluator) {
     if (evaluator.Get<std::int64_t>(output) != 0) continue;
     last_hit_ = false;
     const std::int64_t offender = evaluator.Get<std::int64_t>(output + 3);
-    const std::string text = MissText(*(*applied_)[n].accelerated.config,
-                                      static_cast<MissReason>(evaluator.Get<std::int64_t>(output + 2)),
-                                      offender < 0 ? kNoIndex : static_cast<Index>(offender));
+    const std::string text =
+        MissText(*(*applied_)[n].config, static_cast<MissReason>(evaluator.Get<std::int64_t>(output + 2)),
+                 offender < 0 ? kNoIndex : static_cast<Index>(offender));
     auto reason =
         std::find_if(reasons_.begin(), reasons_.end(), [&](const Reason& r) { return r.text == text; });
     if (reason == reasons_.end()) reason = reasons_.insert(reasons_.end(), Reason{text, 0, frame});

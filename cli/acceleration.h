@@ -9,10 +9,11 @@
 #include "cli/common.h"
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
-#include "kpsa/accelerate.h"
-#include "kpsa/training_record.h"
 
 namespace kpsa {
+
+class KpsaConfig;
+struct Subspace;
 
 struct AccelerationFlags {
   bool accelerate = false;
@@ -35,7 +36,9 @@ struct AppliedSubspace {
   std::string path;  // of the subspace file
   Acceleration entry;
   std::shared_ptr<const Subspace> subspace;
-  Accelerated accelerated;
+  NodeId node;                               // the KPSA node
+  std::shared_ptr<const KpsaConfig> config;  // of the node
+  std::vector<std::string> notes;            // what may surprise
   double tolerance = 0, violation_rate = 0;  // in force
 };
 

@@ -10,6 +10,8 @@
 #include "cli/point_errors.h"
 #include "cli/progress.h"
 #include "cli/rig_frames.h"
+#include "kpsa/accelerate.h"
+#include "kpsa/training_record.h"
 
 namespace kpsa {
 namespace {
@@ -201,7 +203,7 @@ class Bench {
     result_.tolerance = applied.front().tolerance;
     result_.violation_limit = applied.front().violation_rate;
     for (const AppliedSubspace& one : applied) {
-      for (const std::string& note : one.accelerated.notes) result_.notes.push_back(note);
+      for (const std::string& note : one.notes) result_.notes.push_back(note);
       for (const SubspaceOutput& output : one.subspace->outputs) result_.points += output.points;
       result_.cues += one.subspace->cues.size();
       result_.modes += one.subspace->modes;
@@ -244,7 +246,7 @@ class Bench {
                  fast_scale = fast_ns / std::max(1.0, fast_wall);
     std::vector<NodeId> stage_nodes, kpsa_nodes;
     for (const AppliedSubspace& one : applied) {
-      kpsa_nodes.push_back(one.accelerated.node);
+      kpsa_nodes.push_back(one.node);
       for (const AcceleratedPoints& points : one.entry.points) stage_nodes.push_back(points.points.node);
     }
     const std::vector<char> skippable = PointStepsAbove(*full->plan, stage_nodes);

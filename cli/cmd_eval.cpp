@@ -98,7 +98,7 @@ CommandResult Eval(const EvalFlags& flags) {
   }
   if (!flags.quiet) {
     for (const AppliedSubspace& one : applied) {
-      for (const std::string& note : one.accelerated.notes) Say("note: " + note);
+      for (const std::string& note : one.notes) Say("note: " + note);
     }
     for (const std::string& note : *notes) Say("note: " + note);
     if (!applied.empty()) Say(verdicts.Text());

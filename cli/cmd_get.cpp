@@ -16,7 +16,7 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kMaxNumbers = 200'000'000;  // printed
+constexpr std::size_t kMaxNumbers = 20'000'000;  // printed
 
 struct GetFlags : Flags {
   std::vector<std::string> plugs;

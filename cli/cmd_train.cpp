@@ -106,7 +106,7 @@ CommandResult RunTrain(const TrainFlags& flags) {
       ClipFrames(rig, flags.clips.has_value() ? SplitNames(*flags.clips) : entry->train_clips);
   if (!clips.ok()) return flags.clips.has_value() ? AsUsage(clips.status()) : clips.status();
 
-  const InterruptScope interruptible;
+  // Nothing is written before the end, so an interrupt may end the program at any time
   const ThreadLimit limit(*threads);
   Progress progress("train", 100, flags.quiet);
   std::string stage;
@@ -114,14 +114,10 @@ CommandResult RunTrain(const TrainFlags& flags) {
     if (stage != what) progress.SetLabel(fmt::format("train: {}", what), 100);
     stage = what;
     progress.Set(static_cast<std::size_t>(100 * share));
-    return !Interrupted();
+    return true;
   };
   Result<Subspace> trained = Train(MakeTrainingRig(&rig, *entry), *clips, options);
-  if (!trained.ok()) {
-    if (trained.status().kind() == ErrorKind::kInterrupted) return InterruptedStatus();
-    return Status(trained.status()).At({rig.path});
-  }
-  if (Interrupted()) return InterruptedStatus();
+  if (!trained.ok()) return Status(trained.status()).At({rig.path});
   const auto subspace = std::make_shared<const Subspace>(std::move(*trained));
   const TrainingRecord record = ParseTraining(subspace->training);
   const Calibration calibration =
@@ -129,6 +125,7 @@ CommandResult RunTrain(const TrainFlags& flags) {
   const Result<SubspaceCheck> check =
       CheckSubspace(&rig, *entry, subspace, kCheckPoses, options.seed ^ 0x9e3779b97f4a7c15ull);
   if (!check.ok()) return check.status();
+  const InterruptScope writing;
   KPSA_RETURN_IF_ERROR(WriteSubspace(*subspace, path));
   const TrainResult result{flags.file,  path,  !flags.output.has_value(), subspace, record,
                            calibration, *check};

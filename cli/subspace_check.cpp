@@ -6,7 +6,9 @@
 
 #include "cli/rig_frames.h"
 #include "cli/rig_training.h"
+#include "kpsa/accelerate.h"
 #include "kpsa/poses.h"
+#include "kpsa/training_record.h"
 
 namespace kpsa {
 namespace {

@@ -1,4 +1,5 @@
-// Mistakes on the command line and in files: one clear message of at most five lines, the right exit code, no output.
+// Mistakes on the command line and in files: one clear message of at most five lines, the right exit code, no
+// output.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -150,12 +151,15 @@ TEST(Arguments, BrokenFiles) {
   broken("text.yaml", "hello", "text.yaml");
   broken("tab.yaml", "kpsa: 1\n\tcharacter: x.glb\n", "tab.yaml:2");
   broken("nochar.yaml", "kpsa: 1\ncharacter: none.glb\n", "none.glb");
-  broken("typo.yaml", "kpsa: 1\ncharacter: " + kHelloGlb + "\nnodes:\n  m: {type: deltaMsuh}\n", "did you mean \"deltaMush\"");
+  broken("typo.yaml", "kpsa: 1\ncharacter: " + kHelloGlb + "\nnodes:\n  m: {type: deltaMsuh}\n",
+         "did you mean \"deltaMush\"");
   broken("deep.yaml", "kpsa: 1\nnodes: " + std::string(100000, '[') + "\n", "deep.yaml");
   broken("empty.glb", "", "empty.glb");
   broken("short.glb", "glTF", "short.glb");
   broken("deep.gltf", std::string(200000, '['), "deep.gltf");
-  broken("json.gltf", R"({"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {"POSITION": 7}}]}]})", "json.gltf");
+  broken("json.gltf",
+         R"({"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {"POSITION": 7}}]}]})",
+         "json.gltf");
   // Many errors: the first ones, and how many there are
   std::string many = "kpsa: 1\ncharacter: " + kHelloGlb + "\nnodes:\n";
   for (int i = 0; i < 50; ++i) many += "  n" + std::to_string(i) + ": {type: nonsense}\n";
@@ -175,10 +179,12 @@ TEST(Arguments, BrokenFiles) {
 TEST(Arguments, HelpAndFirstMinutes) {
   const ProcessResult bare = RunKpsa({});
   EXPECT_EQ(bare.exit_code, 0);
-  for (const char* word : {"kpsa init", "kpsa train", "kpsa bench"}) EXPECT_NE(bare.out.find(word), std::string::npos);
+  for (const char* word : {"kpsa init", "kpsa train", "kpsa bench"})
+    EXPECT_NE(bare.out.find(word), std::string::npos);
   const ProcessResult help = RunKpsa({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* name : {"init", "validate", "inspect", "eval", "get", "render", "train", "bench", "compile", "profile", "explain", "compare", "graph", "nodes"}) {
+  for (const char* name : {"init", "validate", "inspect", "eval", "get", "render", "train", "bench",
+                           "compile", "profile", "explain", "compare", "graph", "nodes"}) {
     EXPECT_NE(help.out.find(std::string("  ") + name), std::string::npos) << name;
     const ProcessResult one = RunKpsa({name, "--help"});
     EXPECT_EQ(one.exit_code, 0) << name;
