@@ -141,7 +141,9 @@ TEST(Compile, MasksToTheVerticesThatAreWanted) {
     excluded = excluded || (node["name"] == "mush" && node["reason"] == "not needed by the request");
   EXPECT_TRUE(excluded);
   for (const Json& node : all["nodes"]) {
-    if (node["name"] == "mush") EXPECT_EQ(node["points"], node["points_total"]);
+    if (node["name"] == "mush") {
+      EXPECT_EQ(node["points"], node["points_total"]);
+    }
   }
 }
 
@@ -157,7 +159,9 @@ TEST(Profile, TracesNestAndTimesAddUp) {
       EXPECT_GE(node["inclusive_ms"].get<double>(), node["self_ms"].get<double>());
     }
     EXPECT_GT(nodes, 0);
-    if (std::string(threads) == "1") EXPECT_LE(nodes, report["ms_per_frame"].get<double>());
+    if (std::string(threads) == "1") {
+      EXPECT_LE(nodes, report["ms_per_frame"].get<double>());
+    }
     EXPECT_LE(report["critical_path"]["ms"].get<double>(), nodes * 1.0001);
     EXPECT_GE(report["ceiling"]["speedup"].get<double>(), 1);
 
