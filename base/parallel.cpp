@@ -29,4 +29,8 @@ ThreadLimit::~ThreadLimit() { delete static_cast<tbb::global_control*>(impl_); }
 
 int HardwareThreads() { return tbb::info::default_concurrency(); }
 
+int AllowedThreads() {
+  return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+}
+
 }  // namespace kpsa

@@ -37,5 +37,6 @@ class ThreadLimit {
   void* impl_;
 };
 int HardwareThreads();
+int AllowedThreads();  // as limited
 
 }  // namespace kpsa

@@ -38,9 +38,12 @@ struct Tensor {
   std::uint64_t count() const;  // product of the shape; 1 for a scalar
 };
 
-// A file in memory. Move-only in spirit: tensors point into it.
+// A file in memory. Move-only: tensors point into it.
 class SafetensorsFile {
  public:
+  SafetensorsFile() = default;
+  SafetensorsFile(SafetensorsFile&&) = default;
+  SafetensorsFile& operator=(SafetensorsFile&&) = default;
   // Errors (kInvalidInput, each names `name`): not readable, too short, header length beyond the file, header not
   // JSON or not an object of tensors, unknown type, shape overflow, length that differs from shape, data that
   // overlap or leave holes or end before or after the file.

@@ -132,4 +132,18 @@ double Exp(double x) {
   return std::ldexp(sum, static_cast<int>(k));
 }
 
+double Log(double x) {
+  if (std::isnan(x) || x < 0) return std::nan("");
+  if (x == 0) return -HUGE_VAL;
+  if (std::isinf(x)) return x;
+  int exponent;
+  double m = std::frexp(x, &exponent);  // in [0.5, 1)
+  if (m < 0.70710678118654752440) m *= 2, --exponent;
+  // log m = 2 atanh((m - 1) / (m + 1)), |argument| < 0.172
+  const double t = (m - 1) / (m + 1), q = t * t;
+  double s = 0;
+  for (int i = 21; i >= 3; i -= 2) s = (s + 1.0 / i) * q;
+  return exponent * 0.69314718055994530942 + 2 * (t + t * s);
+}
+
 }  // namespace kpsa

@@ -11,6 +11,7 @@ double Atan2(double y, double x);  // (-pi, pi]
 double Acos(double x);             // x clamped to [-1, 1]
 double Asin(double x);             // x clamped to [-1, 1]
 double Exp(double x);
+double Log(double x);              // NaN below 0, -inf at 0
 
 inline constexpr double kPi = 3.14159265358979323846;
 

@@ -42,6 +42,10 @@ class RestDigests {
     for (const Input& input : instance.inputs) {
       hasher.Add(input.position);
       AddSource(hasher, input.rest);
+      if (instance.kind != Instance::Kind::kNode) continue;
+      hasher.Add(input.element);
+      const int attribute = table_.group(instance).inputs[static_cast<std::size_t>(input.position)];
+      hasher.Add(table_.IsSet(instance.node, attribute, input.element));
     }
     for (int child : instance.children) hasher.Add(child);
     if (instance.kind != Instance::Kind::kNode) return hasher.Finish();
@@ -49,16 +53,18 @@ class RestDigests {
     hasher.Add(std::string_view(def.name));
     hasher.Add(def.version);
     hasher.Add(instance.group);
+    hasher.Add(instance.geometry);
     for (int size : instance.output_sizes) hasher.Add(size);
     for (std::size_t i = 0; i < def.attributes.size(); ++i) {
       const AttributeDef& a = def.attributes[i];
       if (!a.structural) continue;
       const int attribute = static_cast<int>(i);
-      const int size = a.array ? table_.graph().ArraySize(instance.node, attribute) : 1;
+      const int size = a.array ? table_.ArraySize(instance.node, attribute) : 1;
+      hasher.Add(size);
       for (int e = 0; e < size; ++e) {
         if (a.per_geometry && instance.geometry >= 0 && e != instance.geometry) continue;
         hasher.Add(OfValue(table_.HeldValue(instance.node, attribute, a.array ? e : -1)));
-        hasher.Add(table_.graph().FindValue({instance.node, attribute, a.array ? e : -1, -1}) != nullptr);
+        hasher.Add(table_.IsSet(instance.node, attribute, a.array ? e : -1));
       }
     }
     for (const StructuralInput& input : instance.structural) {
@@ -131,6 +137,7 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
   impl_->stats = CompileStats();
   InstanceTable table(graph, request);
   for (const PlugRef& plug : request.varying) {
+    KPSA_RETURN_IF_ERROR(graph.CheckPlug(plug));
     if (graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].output) {
       return Status::Invalid("{} is an output and cannot vary by itself", graph.PlugName(plug));
     }
@@ -144,11 +151,17 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
     table.AddVarying(plug);
   }
   std::vector<Source> wanted;
+  for (const RequestedOutput& output : request.outputs) KPSA_RETURN_IF_ERROR(graph.CheckPlug(output.plug));
   for (const RequestedOutput& output : request.outputs) {
+    const AttributeDef& a = graph.def(output.plug.node).attributes[static_cast<std::size_t>(output.plug.attribute)];
+    if (IsPointType(a.type) && !a.array && output.plug.element >= 0) {
+      return Status::Invalid("{}: ask for the points and name a point set instead", graph.PlugName(output.plug));
+    }
     wanted.push_back(table.Reach(output.plug));
     if (SlotSize(wanted.back().type) == 0) return Status::Invalid("{} is structural and has no value at run time", graph.PlugName(output.plug));
   }
 
+  if (!table.status().ok()) return table.status();
   bool binds = false;
   for (const Instance& instance : table.instances()) {
     binds = binds || (instance.kind == Instance::Kind::kNode && table.group(instance).bind);
@@ -186,8 +199,8 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
       ++impl_->stats.kernels_reused;
     } else {
       Result<BoundKernel> kernel = Bind(table, statics, step.instance, step.sets);
+      if (!statics.status().ok()) return statics.status();  // an input's failure rather than what follows from it
       if (!kernel.ok()) return kernel.status();
-      if (!statics.status().ok()) return statics.status();
       kernels[s] = *kernel;
       ++impl_->stats.kernels_bound;
     }
@@ -201,9 +214,11 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
 }
 
 Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
+  KPSA_RETURN_IF_ERROR(graph.CheckPlug(plug));
   Request request;
   InstanceTable table(graph, request);
   const Source source = table.Reach(plug);
+  if (!table.status().ok()) return table.status();
   StaticEvaluator statics(table);
   const std::vector<Index> order = table.Order();
   const RestDigests digests(table, order);
@@ -211,7 +226,7 @@ Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
     if (const auto it = impl_->rest.find(digests[i]); it != impl_->rest.end()) statics.SetRest(i, it->second);
   }
   const Value* value = statics.Get(source, true);
-  if (value == nullptr) return statics.status();
+  if (value == nullptr || !statics.status().ok()) return statics.status();
   return *value;
 }
 

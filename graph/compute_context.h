@@ -29,7 +29,8 @@ class ArrayView {
 class ComputeHost {
  public:
   virtual ~ComputeHost() = default;
-  // Records an error of the node that computes now; its outputs are then taken as not computed.
+  // Records an error of the node that computes now; its outputs are then taken as not computed. Not to be called from
+  // the body of a For: it would depend on the threads which message is kept.
   virtual void Fail(std::string_view message) = 0;
   // As kpsa::ParallelFor where the host evaluates in parallel, inline otherwise.
   virtual void For(std::size_t count, std::size_t grain, RangeBody body) = 0;
@@ -43,7 +44,7 @@ class ComputeContext {
   const void* kernel = nullptr;          // what bind returned, or null
   float* scratch = nullptr;              // as many floats as bind asked for; content undefined; 64-byte aligned
   std::byte* state = nullptr;            // as many bytes as bind asked for; kept from decide to compute; 64-byte aligned
-  std::uint64_t chosen = 0;              // bit i: the i-th lazy input was evaluated
+  std::uint64_t chosen = 0;              // what decide returned: the bits of the lazy inputs that were evaluated
   ComputeHost* host = nullptr;
 
   // Inputs and outputs by their position in the group's lists. T is the slot's type (graph/value.h).
@@ -70,10 +71,11 @@ class ComputeContext {
 static_assert(sizeof(PointsView) == sizeof(ConstPointsView));
 
 using ComputeFn = void (*)(ComputeContext&);
-// Returns which lazy inputs to evaluate: bit i for the i-th in the order of declaration (array elements count).
-// Sees eager inputs only.
+// Returns which lazy inputs to evaluate: bit i for the i-th in the order of declaration. Every element of a lazy array
+// counts, but a lazy_together array counts as one; there are 64 at most. Sees eager inputs only, may write its state.
 using DecideFn = std::uint64_t (*)(ComputeContext&);
-// The same step of several evaluators at once (blocks of frames); same results as one by one.
+// The same step of several evaluators at once (blocks of frames); same results as one by one. None of them has chosen a
+// lazy input. All contexts share one scratch, of the size that bind asked for.
 using ComputeBlockFn = void (*)(ComputeContext* contexts, std::size_t count);
 
 }  // namespace kpsa

@@ -1,7 +1,6 @@
 #include "graph/evaluator.h"
 
 #include <bit>
-#include <chrono>
 #include <cstring>
 #include <thread>
 
@@ -9,10 +8,6 @@
 
 namespace kpsa {
 namespace {
-
-std::uint64_t Now() {
-  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch()).count());
-}
 
 constexpr std::size_t kComparedBytes = 512;    // small outputs beyond are taken as changed
 constexpr float kWorthThreadsNs = 20000;       // a level cheaper than this runs on the calling thread
@@ -22,10 +17,10 @@ constexpr float kWorthThreadsNs = 20000;       // a level cheaper than this runs
 // What a compute may ask for; one on the stack for every run, so that a failure knows its step.
 class Evaluator::StepHost final : public ComputeHost {
  public:
-  StepHost(Evaluator* evaluator, Index step) : evaluator_(evaluator), step_(step) {}
+  StepHost(Evaluator* evaluator, Index step) : step(step), evaluator_(evaluator) {}
   void Fail(std::string_view message) override {
     failed = true;
-    evaluator_->RecordFailure(step_, message);
+    evaluator_->RecordFailure(step, message);
   }
   void For(std::size_t count, std::size_t grain, RangeBody body) override {
     if (evaluator_->options_.parallel) {
@@ -35,10 +30,10 @@ class Evaluator::StepHost final : public ComputeHost {
     }
   }
   bool failed = false;
+  Index step;
 
  private:
   Evaluator* evaluator_;
-  Index step_;
 };
 
 Evaluator::Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options)
@@ -69,6 +64,7 @@ Evaluator::Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options)
   dirty_.assign(steps / 64 + 1, 0);
   wanted_.assign(steps / 64 + 1, 0);
   stack_.reserve(steps);
+  block_host_ = std::make_unique<StepHost>(this, kNoIndex);
   if (options_.parallel) ready_.reserve(steps);
   SetDirty(0, static_cast<Index>(steps));
 }
@@ -144,6 +140,7 @@ void Evaluator::Write(Index varying, const T& value, std::size_t offset) {
 void Evaluator::Set(Index varying, double value, int component) {
   const Type type = plan_->varying()[varying].type;
   KPSA_CHECK(component < 0 ? type == Type::kDouble : type == Type::kDouble3 || type == Type::kQuaternion);
+  KPSA_CHECK_LT(component, static_cast<int>(SlotSize(type) / 8));
   Write(varying, value, component < 0 ? 0 : static_cast<std::size_t>(8 * component));
 }
 void Evaluator::SetInt(Index varying, std::int64_t value) {
@@ -166,12 +163,14 @@ void Evaluator::Set(Index varying, const Matrix4& value) {
 void Evaluator::SetPoints(Index varying, ConstPointsView points) {
   KPSA_CHECK_EQ(points.count, plan_->varying()[varying].points);
   const PointsView to = *reinterpret_cast<const PointsView*>(values() + plan_->varying()[varying].slot);
-  std::memcpy(to.x, points.x, points.count * sizeof(float));
-  if (to.y != nullptr) {
-    std::memcpy(to.y, points.y, points.count * sizeof(float));
-    std::memcpy(to.z, points.z, points.count * sizeof(float));
+  const std::size_t size = points.count * sizeof(float);
+  bool equal = true;
+  for (const auto& [target, source] : {std::pair(to.x, points.x), std::pair(to.y, points.y), std::pair(to.z, points.z)}) {
+    if (target == nullptr || size == 0 || std::memcmp(target, source, size) == 0) continue;
+    std::memcpy(target, source, size);
+    equal = false;
   }
-  Changed(varying);
+  if (!equal) Changed(varying);
 }
 
 // Marks the dirty steps that `step` needs, itself included, as wanted.
@@ -227,7 +226,7 @@ Index Evaluator::NewerLazyDep(Index number) const {
   const std::uint64_t chosen = chosen_[plan_->steps()[number].branch];
   for (std::size_t i = 0; i < branch.lazy_deps.size(); ++i) {
     const Index dep = branch.lazy_deps[i];
-    if ((chosen >> i & 1) != 0 && dep != kNoIndex && changed_[dep] > computed_[number]) return dep;
+    if ((chosen >> branch.bit_of_lazy[i] & 1) != 0 && dep != kNoIndex && changed_[dep] > computed_[number]) return dep;
   }
   return kNoIndex;
 }
@@ -244,7 +243,7 @@ inline bool Evaluator::Compute(Index number, Index cause, bool stale) {
   ComputeContext context = ContextOf(number);
   context.host = &host;
   std::uint64_t begin = 0;
-  if constexpr (kRecord) begin = Now();
+  if constexpr (kRecord) begin = ProfileClock();
   bool changed = stale;
   if (step.value_size == 8) {
     std::uint64_t old, now;
@@ -260,13 +259,18 @@ inline bool Evaluator::Compute(Index number, Index cause, bool stale) {
   } else {
     step.compute(context);
   }
-  if constexpr (kRecord) {
-    const auto thread = static_cast<int>(std::hash<std::thread::id>()(std::this_thread::get_id()) % 1000000);
-    profile_->Add({number, cause, begin, Now(), thread, 0});
+  if constexpr (kRecord) AddEvent(number, cause, begin, ProfileClock());
+  if (host.failed) [[unlikely]] {
+    computed_[number] = 0;  // what it left in its outputs is no value to compare with
+    return false;
   }
-  if (host.failed) [[unlikely]] return false;
   MarkComputed(number, changed);
   return true;
+}
+
+void Evaluator::AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns) {
+  const auto thread = static_cast<int>(std::hash<std::thread::id>()(std::this_thread::get_id()) % 1000000);
+  profile_->Add({step, cause, begin_ns, end_ns, thread, frame_});
 }
 
 template <bool kRecord>
@@ -303,14 +307,17 @@ bool Evaluator::Decide(Index number, Index* cause) {
 
 bool Evaluator::RunChosen(Index number) {
   const Index b = plan_->steps()[number].branch;
-  const std::vector<Index>& segments = plan_->branches()[b].segment_of_lazy;
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    if ((chosen_[b] >> i & 1) == 0 || segments[i] == kNoIndex) continue;
-    const Plan::Segment& segment = plan_->segments()[segments[i]];
+  const Plan::Branch& branch = plan_->branches()[b];
+  Index before = kNoIndex;
+  for (std::size_t i = 0; i < branch.segment_of_lazy.size(); ++i) {
+    const Index g = branch.segment_of_lazy[i];
+    if ((chosen_[b] >> branch.bit_of_lazy[i] & 1) == 0 || g == kNoIndex || g == before) continue;
+    before = g;
+    const Plan::Segment& segment = plan_->segments()[g];
     if (segment.uses_workspace) OwnWorkspace();
     const bool wanted_only = wanted_only_;
     wanted_only_ = false;  // all of a chosen segment is needed
-    const bool fine = Run(segment.begin, segment.end);
+    const bool fine = Run(segment, segment.begin, segment.end);
     wanted_only_ = wanted_only;
     if (!fine) return false;
   }
@@ -332,8 +339,15 @@ void Evaluator::OwnWorkspace() {
 template <bool kRecord>
 bool Evaluator::RunBranch(Index number) {
   Index cause;
-  if (!Decide(number, &cause) || !RunChosen(number)) {
-    computed_[number] = 0;  // decide again next time
+  if (Decide(number, &cause)) return RunDecided<kRecord>(number, cause);
+  computed_[number] = 0;  // decide again next time
+  return false;
+}
+
+template <bool kRecord>
+bool Evaluator::RunDecided(Index number, Index cause) {
+  if (!RunChosen(number)) {
+    computed_[number] = 0;
     return false;
   }
   if (cause == kNoIndex) cause = NewerLazyDep(number);
@@ -433,13 +447,8 @@ bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) 
   return true;
 }
 
-bool Evaluator::Run(Index begin, Index end) {
-  if (options_.parallel) {
-    for (const Plan::Segment& segment : plan_->segments()) {
-      if (begin >= segment.begin && begin < segment.end) return RunLevels(segment, begin, end);
-    }
-    return true;
-  }
+bool Evaluator::Run(const Plan::Segment& segment, Index begin, Index end) {
+  if (options_.parallel) return RunLevels(segment, begin, end);
   return profile_ != nullptr ? RunRange<true>(begin, end) : RunRange<false>(begin, end);
 }
 
@@ -462,33 +471,49 @@ void Evaluator::BeginRun() {
   cursor_ = 0;
 }
 
-bool Evaluator::RunUntil(Index end) {
+void Evaluator::RunUntil(Index end) {
+  if (cursor_ >= end || failed_step_ != kNoIndex) return;
   const Index begin = cursor_;
   cursor_ = end;
-  return begin >= end || Run(begin, end);
+  Run(plan_->segments()[0], begin, end);
 }
 
 bool Evaluator::PrepareBlockStep(Index step, ComputeContext* context) {
-  if (!dirty(step)) return false;
+  if (!dirty(step) || failed_step_ != kNoIndex) return false;
   ClearDirty(step);
   cursor_ = step + 1;
   Index cause;
-  bool fine = Decide(step, &cause);
-  const bool lazy = chosen_[plan_->steps()[step].branch] != 0;
-  if (fine && !lazy) {
-    if (computed_[step] != 0 && cause == kNoIndex) return false;
-    *context = ContextOf(step);
-    return true;
+  if (!Decide(step, &cause)) {
+    computed_[step] = 0;
+    SetDirty(step, step + 1);
+    return false;
   }
-  fine = fine && (profile_ != nullptr ? RunBranch<true>(step) : RunBranch<false>(step));
-  if (!fine) SetDirty(step, step + 1);
-  return false;
+  if (chosen_[plan_->steps()[step].branch] != 0) {
+    const bool fine = profile_ != nullptr ? RunDecided<true>(step, cause) : RunDecided<false>(step, cause);
+    if (!fine) SetDirty(step, step + 1);
+    return false;
+  }
+  if (computed_[step] != 0 && cause == kNoIndex) return false;
+  block_cause_ = cause;
+  block_host_->step = step;
+  block_host_->failed = false;
+  *context = ContextOf(step);
+  context->host = block_host_.get();
+  return true;
 }
 
-void Evaluator::FinishBlockStep(Index step) { MarkComputed(step, true); }
+void Evaluator::FinishBlockStep(Index step, std::uint64_t begin_ns, std::uint64_t end_ns) {
+  if (profile_ != nullptr) AddEvent(step, block_cause_, begin_ns, end_ns);
+  if (block_host_->failed) {
+    computed_[step] = 0;
+    SetDirty(step, step + 1);
+    return;
+  }
+  MarkComputed(step, true);
+}
 
 Status Evaluator::EndRun() {
-  if (failed_step_ == kNoIndex) RunUntil(plan_->segments()[0].end);
+  RunUntil(plan_->segments()[0].end);
   return TakeFailure();
 }
 
@@ -503,7 +528,7 @@ Status Evaluator::Pull(Index output) {
   set_since_run_ = false;
   MarkWanted(producer);
   wanted_only_ = true;
-  Run(plan_->segments()[0].begin, plan_->segments()[0].end);
+  Run(plan_->segments()[0], plan_->segments()[0].begin, plan_->segments()[0].end);
   wanted_only_ = false;
   std::fill(wanted_.begin(), wanted_.end(), 0);
   return TakeFailure();

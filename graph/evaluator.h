@@ -22,7 +22,7 @@ namespace kpsa {
 
 struct EvaluatorOptions {
   bool parallel = false;           // independent steps and wide kernels on the thread pool; the same bytes
-  Workspace* workspace = nullptr;  // shared by evaluators of one thread; null: one of its own
+  Workspace* workspace = nullptr;  // shared by evaluators of one thread, outlives them; null: one of its own
 };
 
 class Evaluator final {
@@ -51,19 +51,21 @@ class Evaluator final {
   const T& Get(Index output) const { return *reinterpret_cast<const T*>(values() + plan_->outputs()[output].slot); }
   ConstPointsView Points(Index output) const { return Get<ConstPointsView>(output); }
 
-  // Recording costs time; without it the evaluator only counts nothing. Null to stop.
-  void Record(Profile* profile) { profile_ = profile; }
+  // Records what runs from now on, as of that frame. Null to stop: then evaluation pays nothing for it.
+  void Record(Profile* profile, int frame = 0) { profile_ = profile, frame_ = frame; }
   // Forgets every computed value (not the set ones): the next pull computes everything.
   void Invalidate();
   std::size_t MemoryBytes() const;
 
-  // For blocks of frames (graph/frames.h): one evaluation cut at the steps that blocks share.
+  // For blocks of frames (graph/frames.h): one evaluation, cut at the steps of segment 0 that blocks share. Serial only.
+  //   BeginRun; for every such step in plan order: RunUntil(step), PrepareBlockStep, FinishBlockStep; EndRun.
+  // After a failure nothing more runs; EndRun tells.
   void BeginRun();
-  bool RunUntil(Index end);              // steps of segment 0 before `end`; false on failure
-  // Decides step `step`. True if it is a stale step whose compute needs no lazy input: then *context is ready for a
-  // block compute, to be followed by FinishBlockStep. Otherwise the step is already done (or failed).
+  void RunUntil(Index end);  // the steps of segment 0 before `end`
+  // Runs the decide of a stale step. True if it needs none of its lazy inputs: then *context is ready for a block compute,
+  // to be followed by FinishBlockStep. Otherwise the step is done: it is fresh, has run by itself, or has failed.
   bool PrepareBlockStep(Index step, ComputeContext* context);
-  void FinishBlockStep(Index step);
+  void FinishBlockStep(Index step, std::uint64_t begin_ns, std::uint64_t end_ns);  // times for the profile
   Status EndRun();
 
  private:
@@ -81,12 +83,14 @@ class Evaluator final {
   template <bool kRecord> bool RunStep(Index step);
   template <bool kRecord> bool RunUnit(Index first);
   template <bool kRecord> bool RunBranch(Index step);
+  template <bool kRecord> bool RunDecided(Index step, Index cause);
   template <bool kRecord> bool Compute(Index step, Index cause, bool stale);
-  bool Run(Index begin, Index end);
+  bool Run(const Plan::Segment& segment, Index begin, Index end);
   bool RunLevels(const Plan::Segment& segment, Index begin, Index end);
   bool Decide(Index step, Index* cause);
   bool RunChosen(Index step);
   void OwnWorkspace();
+  void AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns);
   void RecordFailure(Index step, std::string_view message);
   Status TakeFailure();
   void MarkComputed(Index step, bool changed);
@@ -112,6 +116,9 @@ class Evaluator final {
   std::uint32_t epoch_ = 1;
   bool set_since_run_ = false;
   Profile* profile_ = nullptr;
+  int frame_ = 0;
+  std::unique_ptr<StepHost> block_host_;  // of the step between PrepareBlockStep and FinishBlockStep
+  Index block_cause_ = kNoIndex;
   std::mutex failure_mutex_;             // taken on failures only
   std::string failure_;
   Index failed_step_ = kNoIndex;

@@ -1,12 +1,43 @@
 #include "graph/graph.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <limits>
+#include <tuple>
+#include <unordered_set>
 
 #include "base/check.h"
 
 namespace kpsa {
+namespace {
+
+// Order of plugs within a node.
+auto KeyOf(const PlugRef& plug) { return std::make_tuple(plug.attribute, plug.element, plug.component); }
+
+// Elements of a sorted list whose plugs lie between two keys, both included.
+template <typename List, typename Projection>
+auto Range(List& list, const PlugRef& first, const PlugRef& last, Projection plug_of) {
+  const auto begin = std::lower_bound(list.begin(), list.end(), KeyOf(first), [&](const auto& e, const auto& key) { return KeyOf(plug_of(e)) < key; });
+  const auto end = std::upper_bound(begin, list.end(), KeyOf(last), [&](const auto& key, const auto& e) { return key < KeyOf(plug_of(e)); });
+  return std::make_pair(begin, end);
+}
+
+constexpr int kLast = std::numeric_limits<int>::max();
+const auto kDestination = [](const Connection& c) -> const PlugRef& { return c.destination; };
+const auto kPlug = [](const auto& set) -> const PlugRef& { return set.plug; };
+
+PlugRef At(int attribute, int element, int component) { return {NodeId(), attribute, element, component}; }
+
+// The last plug, in the order above, that could be the plug itself, a point or a component of it.
+PlugRef LastChild(PlugRef plug) {
+  if (plug.component < 0) {
+    plug.component = kLast;
+    if (plug.element < 0) plug.element = kLast;
+  }
+  return plug;
+}
+
+}  // namespace
 
 const Graph::Node& Graph::node(NodeId id) const {
   KPSA_CHECK(IsAlive(id));
@@ -21,6 +52,11 @@ const NodeDef& Graph::def(NodeId id) const { return *node(id).def; }
 const std::string& Graph::name(NodeId id) const { return node(id).name; }
 const std::vector<Connection>& Graph::Inputs(NodeId id) const { return node(id).inputs; }
 const std::vector<Connection>& Graph::Outputs(NodeId id) const { return node(id).outputs; }
+
+std::span<const Connection> Graph::Inputs(NodeId id, int attribute) const {
+  const auto [begin, end] = Range(node(id).inputs, At(attribute, -1, -1), At(attribute, kLast, kLast), kDestination);
+  return {begin, end};
+}
 
 NodeId Graph::IdAt(Index index) const {
   if (index >= nodes_.size() || nodes_[index].def == nullptr) return NodeId();
@@ -41,8 +77,9 @@ Result<NodeId> Graph::AddNode(std::string_view type, std::string_view name) {
     return Status::Invalid("unknown node type \"{}\"{}", type, DidYouMean(type, registry_->Names()));
   }
   std::string key(name);
-  if (by_name_.count(key) != 0 || ambiguous_.count(key) != 0) {
-    return Status::Invalid("a node named \"{}\" exists already", name);
+  if (by_name_.count(key) != 0) return Status::Invalid("a node named \"{}\" exists already", name);
+  if (const auto it = by_alias_.find(key); it != by_alias_.end()) {
+    return Status::Invalid("\"{}\" is another name of node \"{}\" already", name, nodes_[it->second.front()].name);
   }
   const auto index = static_cast<Index>(nodes_.size());
   Node node;
@@ -66,7 +103,12 @@ Status Graph::RemoveNode(NodeId id) {
     auto& list = nodes_[c.destination.node.index].inputs;
     if (!(c.destination.node == id)) list.erase(std::remove_if(list.begin(), list.end(), touches), list.end());
   }
-  for (auto it = by_name_.begin(); it != by_name_.end();) it = it->second == id.index ? by_name_.erase(it) : std::next(it);
+  by_name_.erase(removed.name);
+  for (const std::string& alias : removed.aliases) {
+    const auto it = by_alias_.find(alias);
+    it->second.erase(std::remove(it->second.begin(), it->second.end(), id.index), it->second.end());
+    if (it->second.empty()) by_alias_.erase(it);
+  }
   const std::uint32_t version = removed.version + 1;
   removed = Node();
   removed.version = version;
@@ -98,6 +140,8 @@ std::string Graph::PlugName(const PlugRef& plug) const {
   return text;
 }
 
+int Graph::MaxElements(const AttributeDef& attribute) { return attribute.array ? 1 << 20 : 1 << 24; }
+
 Status Graph::CheckPlug(const PlugRef& plug) const {
   if (!IsAlive(plug.node)) return Status::Invalid("a plug of a node that was removed");
   const NodeDef& d = def(plug.node);
@@ -109,12 +153,41 @@ Status Graph::CheckPlug(const PlugRef& plug) const {
   if (!a.array && plug.element >= 0 && !IsPointType(a.type)) {
     return Status::Invalid("{}.{} is no array", name(plug.node), a.name);
   }
+  if (plug.element >= MaxElements(a)) {
+    return Status::Invalid("{}.{}[{}]: an index must be below {}", name(plug.node), a.name, plug.element, MaxElements(a));
+  }
   if (plug.component >= 0) {
+    KPSA_CHECK_LT(plug.component, 4);
     PlugRef whole = plug;
     whole.component = -1;
     const Type type = PlugType(whole);
     const int components = type == Type::kDouble3 ? 3 : type == Type::kQuaternion ? 4 : 0;
     if (plug.component >= components) return Status::Invalid("{} has no component .{}", PlugName(whole), "xyzw"[plug.component]);
+  }
+  return Status();
+}
+
+// Numbers must be finite, and within the attribute's range.
+Status Graph::CheckNumbers(const PlugRef& plug, const Value& value) const {
+  const AttributeDef& a = def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
+  std::span<const double> numbers;
+  double number = 0;
+  if (value.get_if<double>() != nullptr || value.get_if<std::int64_t>() != nullptr) number = value.AsDouble(), numbers = {&number, 1};
+  if (const auto* v = value.get_if<Double3>()) numbers = {&v->x, 3};
+  if (const auto* v = value.get_if<Quaternion>()) numbers = {&v->x, 4};
+  if (const auto* v = value.get_if<Matrix4>()) numbers = v->m;
+  if (const auto* v = value.get_if<std::vector<double>>()) numbers = *v;
+  for (double v : numbers) {
+    if (!std::isfinite(v)) return Status::Invalid("{} takes finite numbers, not {}", PlugName(plug), value.ToString());
+    if (v < a.min || v > a.max) return Status::Invalid("{} = {} is outside of {} to {}", PlugName(plug), value.ToString(), a.min, a.max);
+  }
+  if (const PointBuffer* points = value.points()) {
+    const ConstPointsView view = points->view();
+    for (const float* component : {view.x, view.y, view.z}) {
+      for (std::size_t i = 0; component != nullptr && i < view.count; ++i) {
+        if (!std::isfinite(component[i])) return Status::Invalid("{}: point {} is not finite", PlugName(plug), i);
+      }
+    }
   }
   return Status();
 }
@@ -139,56 +212,48 @@ Status Graph::Set(const PlugRef& plug, Value value) {
   if (!value.FitsType(type)) {
     return Status::Invalid("{} takes a {}, not {}", PlugName(plug), TypeName(type), value.ToString());
   }
-  if (value.get_if<double>() != nullptr || value.get_if<std::int64_t>() != nullptr) {
-    const double number = value.AsDouble();
-    if (!std::isfinite(number)) return Status::Invalid("{} takes a finite number, not {}", PlugName(plug), number);
-    if (number < a.min || number > a.max) {
-      return Status::Invalid("{} = {} is outside of {} to {}", PlugName(plug), number, a.min, a.max);
-    }
+  KPSA_RETURN_IF_ERROR(CheckNumbers(plug, value));
+  auto& values = node(plug.node).values;
+  const auto [begin, end] = Range(values, plug, LastChild(plug), kPlug);
+  if (begin == end) {
+    values.insert(begin, {plug, std::move(value)});
+  } else {
+    *begin = {plug, std::move(value)};
+    values.erase(begin + 1, end);
   }
-  for (SetValue& set : node(plug.node).values) {
-    if (set.attribute == plug.attribute && set.element == plug.element && set.component == plug.component) {
-      set.value = std::move(value);
-      return Status();
-    }
-  }
-  node(plug.node).values.push_back({plug.attribute, plug.element, plug.component, std::move(value)});
   return Status();
 }
 
 Status Graph::Unset(const PlugRef& plug) {
   KPSA_RETURN_IF_ERROR(CheckPlug(plug));
   auto& values = node(plug.node).values;
-  values.erase(std::remove_if(values.begin(), values.end(),
-                              [&](const SetValue& set) {
-                                return set.attribute == plug.attribute && set.element == plug.element && set.component == plug.component;
-                              }),
-               values.end());
+  const auto [begin, end] = Range(values, plug, plug, kPlug);
+  values.erase(begin, end);
   return Status();
 }
 
 const Value* Graph::FindValue(const PlugRef& plug) const {
-  for (const SetValue& set : node(plug.node).values) {
-    if (set.attribute == plug.attribute && set.element == plug.element && set.component == plug.component) return &set.value;
-  }
-  return nullptr;
+  const auto [begin, end] = Range(node(plug.node).values, plug, plug, kPlug);
+  return begin == end ? nullptr : &begin->value;
+}
+
+std::span<const SetValue> Graph::Values(NodeId id, int attribute) const {
+  const auto [begin, end] = Range(node(id).values, At(attribute, -1, -1), At(attribute, kLast, kLast), kPlug);
+  return {begin, end};
 }
 
 const Connection* Graph::FindConnection(const PlugRef& destination) const {
-  for (const Connection& c : node(destination.node).inputs) {
-    if (c.destination == destination) return &c;
-  }
-  return nullptr;
+  const auto [begin, end] = Range(node(destination.node).inputs, destination, destination, kDestination);
+  return begin == end ? nullptr : &*begin;
 }
 
 int Graph::ArraySize(NodeId id, int attribute) const {
   int size = 0;
   const Node& n = node(id);
-  for (const SetValue& set : n.values) {
-    if (set.attribute == attribute) size = std::max(size, set.element + 1);
-  }
-  for (const Connection& c : n.inputs) {
-    if (c.destination.attribute == attribute) size = std::max(size, c.destination.element + 1);
+  const PlugRef first = At(attribute, -1, -1), last = At(attribute, kLast, kLast);
+  if (const auto [begin, end] = Range(n.values, first, last, kPlug); begin != end) size = std::prev(end)->plug.element + 1;
+  if (const auto [begin, end] = Range(n.inputs, first, last, kDestination); begin != end) {
+    size = std::max(size, std::prev(end)->destination.element + 1);
   }
   if (const auto* names = ElementNames(id, attribute)) size = std::max(size, static_cast<int>(names->size()));
   return size;
@@ -212,14 +277,10 @@ const std::vector<std::string>* Graph::ElementNames(NodeId id, int attribute) co
 }
 
 void Graph::AddAlias(NodeId id, std::string alias) {
-  if (auto it = ambiguous_.find(alias); it != ambiguous_.end()) {
-    it->second.push_back(id.index);
-    return;
-  }
-  auto [it, added] = by_name_.emplace(alias, id.index);
-  if (added || it->second == id.index) return;
-  ambiguous_[alias] = {it->second, id.index};
-  by_name_.erase(it);
+  Node& n = node(id);
+  if (n.name == alias || std::find(n.aliases.begin(), n.aliases.end(), alias) != n.aliases.end()) return;
+  by_alias_[alias].push_back(id.index);
+  n.aliases.push_back(std::move(alias));
 }
 
 void Graph::AddDelegate(NodeId id, NodeId delegate) { node(id).delegates.push_back(delegate); }
@@ -240,75 +301,103 @@ Status Graph::Connect(const PlugRef& source, const PlugRef& destination, bool re
   if (!fits) {
     return Status::Invalid("{} is a {} and cannot drive {}, a {}", PlugName(source), TypeName(a), PlugName(destination), TypeName(b));
   }
-  for (const Connection& c : node(destination.node).inputs) {
-    const PlugRef& d = c.destination;
-    const bool overlaps = d.attribute == destination.attribute && d.element == destination.element &&
-                          (d.component == destination.component || d.component < 0 || destination.component < 0);
-    if (!overlaps) continue;
-    if (!replace || d.component != destination.component) {
-      return Status::Invalid("{} is driven by {} already", PlugName(d), PlugName(c.source));
-    }
-    KPSA_RETURN_IF_ERROR(Disconnect(d));
-    break;
+  KPSA_RETURN_IF_ERROR(CheckOverlap(destination, replace));
+  Connection replaced;
+  if (const Connection* before = FindConnection(destination)) {
+    replaced = *before;
+    KPSA_RETURN_IF_ERROR(Disconnect(destination));
   }
-  KPSA_RETURN_IF_ERROR(CheckCycle(source, destination));
-  node(source.node).outputs.push_back({source, destination});
-  node(destination.node).inputs.push_back({source, destination});
+  Status status = CheckCycle(source, destination);
+  if (status.ok()) {
+    AddConnection({source, destination});
+  } else if (replaced.source.attribute >= 0) {
+    AddConnection(replaced);
+  }
+  return status;
+}
+
+void Graph::AddConnection(const Connection& connection) {
+  node(connection.source.node).outputs.push_back(connection);
+  auto& inputs = node(connection.destination.node).inputs;
+  inputs.insert(Range(inputs, connection.destination, connection.destination, kDestination).first, connection);
+}
+
+// Whether a connection to the plug, to a part of it or to what it is a part of is in the way.
+Status Graph::CheckOverlap(const PlugRef& destination, bool replace) const {
+  const auto& inputs = node(destination.node).inputs;
+  const auto refuse = [&](const Connection& c) {
+    return Status::Invalid("{} is driven by {} already", PlugName(c.destination), PlugName(c.source));
+  };
+  const auto [begin, end] = Range(inputs, destination, LastChild(destination), kDestination);
+  for (auto it = begin; it != end; ++it) {
+    if (!replace || !(it->destination == destination)) return refuse(*it);
+  }
+  for (PlugRef whole : {At(destination.attribute, destination.element, -1), At(destination.attribute, -1, -1)}) {
+    whole.node = destination.node;
+    const Connection* c = whole == destination ? nullptr : FindConnection(whole);
+    if (c != nullptr) return refuse(*c);
+  }
   return Status();
 }
 
 Status Graph::Disconnect(const PlugRef& destination) {
   KPSA_RETURN_IF_ERROR(CheckPlug(destination));
   auto& inputs = node(destination.node).inputs;
-  const auto it = std::find_if(inputs.begin(), inputs.end(), [&](const Connection& c) { return c.destination == destination; });
-  if (it == inputs.end()) return Status::Invalid("{} has no connection", PlugName(destination));
-  auto& outputs = node(it->source.node).outputs;
+  const auto [begin, end] = Range(inputs, destination, destination, kDestination);
+  if (begin == end) return Status::Invalid("{} has no connection", PlugName(destination));
+  auto& outputs = node(begin->source.node).outputs;
   outputs.erase(std::find_if(outputs.begin(), outputs.end(), [&](const Connection& c) { return c.destination == destination; }));
-  inputs.erase(it);
+  inputs.erase(begin, end);
   return Status();
 }
 
 Status Graph::CheckCycle(const PlugRef& source, const PlugRef& destination) const {
   if (source.node != destination.node && (node(destination.node).outputs.empty() || node(source.node).inputs.empty())) return Status();
-  // Walk forward from the destination through the groups that read it, looking for the source. A state is an
-  // attribute of a node, with its element where the group works element by element.
+  // Walk forward from the destination through the groups that read it, looking for the source. A state is a plug; its
+  // element is -1 where a group does not work element by element.
   struct State {
-    Index node;
-    int attribute, element;
+    PlugRef plug;
     std::size_t parent;
   };
-  std::vector<State> states{{destination.node.index, destination.attribute, destination.element, 0}};
-  std::map<std::tuple<Index, int, int>, bool> seen;
-  const auto visit = [&](Index n, int attribute, int element, std::size_t parent) {
-    if (seen.emplace(std::make_tuple(n, attribute, element), true).second) states.push_back({n, attribute, element, parent});
+  struct Hash {
+    std::size_t operator()(const PlugRef& p) const {
+      std::uint64_t h = p.node.index;
+      for (int v : {p.attribute, p.element, p.component}) h = (h ^ static_cast<std::uint32_t>(v)) * 0x9e3779b97f4a7c15ull;
+      return static_cast<std::size_t>(h ^ (h >> 29));
+    }
   };
+  const auto overlap = [](const PlugRef& a, const PlugRef& b) {
+    return a.attribute == b.attribute && (a.element == b.element || a.element < 0 || b.element < 0) &&
+           (a.component == b.component || a.component < 0 || b.component < 0);
+  };
+  std::vector<State> states;
+  std::unordered_set<PlugRef, Hash> seen;
+  const auto visit = [&](const PlugRef& plug, std::size_t parent) {
+    if (seen.insert(plug).second) states.push_back({plug, parent});
+  };
+  visit(destination, 0);
   for (std::size_t at = 0; at < states.size(); ++at) {
-    const State state = states[at];
-    const Node& n = nodes_[state.node];
-    if (state.node == source.node.index && state.attribute == source.attribute &&
-        (state.element == source.element || state.element < 0 || source.element < 0)) {
+    const PlugRef plug = states[at].plug;
+    if (plug.node == source.node && overlap(plug, source)) {
       std::vector<std::string> path;
       for (std::size_t i = at;; i = states[i].parent) {
-        path.push_back(nodes_[states[i].node].name + "." + nodes_[states[i].node].def->attributes[static_cast<std::size_t>(states[i].attribute)].name);
+        path.push_back(PlugName(states[i].plug));
         if (i == 0) break;
       }
       std::reverse(path.begin(), path.end());
-      constexpr std::size_t kShown = 24;
-      if (path.size() > kShown) path = {path.front(), "...", path.back()};
       return Status::Invalid("{} -> {} would make a cycle: {} -> {}", PlugName(source), PlugName(destination),
                              fmt::join(path, " -> "), path.front());
     }
+    const Node& n = nodes_[plug.node.index];
     for (const Connection& c : n.outputs) {  // an output, or an input that is read on as a source
-      if (c.source.attribute == state.attribute && (c.source.element == state.element || state.element < 0)) {
-        visit(c.destination.node.index, c.destination.attribute, c.destination.element, at);
-      }
+      if (overlap(c.source, plug)) visit(c.destination, at);
     }
-    const AttributeDef& a = n.def->attributes[static_cast<std::size_t>(state.attribute)];
+    const AttributeDef& a = n.def->attributes[static_cast<std::size_t>(plug.attribute)];
     if (a.output) continue;
     for (const ComputeGroup& group : n.def->groups) {
-      const bool reads = a.structural || std::find(group.inputs.begin(), group.inputs.end(), state.attribute) != group.inputs.end();
+      const bool reads = a.structural || std::find(group.inputs.begin(), group.inputs.end(), plug.attribute) != group.inputs.end();
       if (!reads) continue;
-      for (int output : group.outputs) visit(state.node, output, group.per_geometry && a.per_geometry ? state.element : -1, at);
+      for (int output : group.outputs) visit({plug.node, output, group.per_geometry && a.per_geometry ? plug.element : -1, -1}, at);
     }
   }
   return Status();

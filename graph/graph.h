@@ -2,7 +2,7 @@
 // a request into a Plan. Every edit is checked. Not thread-safe.
 #pragma once
 
-#include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -34,6 +34,11 @@ struct Connection {
   PlugRef source, destination;
 };
 
+struct SetValue {
+  PlugRef plug;
+  Value value;
+};
+
 class Graph {
  public:
   explicit Graph(const NodeRegistry& registry) : registry_(&registry) {}
@@ -41,19 +46,20 @@ class Graph {
 
   Result<NodeId> AddNode(std::string_view type, std::string_view name);
   Status RemoveNode(NodeId node);  // with its connections and values
-  // Unit of numbers: the runtime's (metres, radians, seconds). The type and the range are checked.
+  // Unit of numbers: the runtime's (metres, radians, seconds). The type and the range are checked, and that numbers are
+  // finite. The latest wins: setting a whole plug forgets what was set on its children (or its single points).
   Status Set(const PlugRef& plug, Value value);
   Status Unset(const PlugRef& plug);
-  // Types must agree (bool, int and enum widen to double); cycles are refused with their whole path. A destination
-  // takes one connection; `replace` takes over an existing one.
+  // Types must agree (numbers convert); cycles are refused with their whole path. A destination takes one connection;
+  // `replace` takes over an existing one. A refused edit changes nothing.
   Status Connect(const PlugRef& source, const PlugRef& destination, bool replace = false);
   Status Disconnect(const PlugRef& destination);
   // Names for the elements of an array (morph targets): plugs may then be written attr[name].
   void SetElementNames(NodeId node, int attribute, std::vector<std::string> names);
-  // Another name for a node (a path, `Head#49`), found by FindNode. A name that several nodes claim becomes
-  // ambiguous: FindNode then names them all.
+  // Another name for a node (a path, `Head#49`), found by FindNode. A node's own name goes before the alias of another.
+  // An alias that several nodes claim becomes ambiguous: FindNode then names them all.
   void AddAlias(NodeId node, std::string alias);
-  // Attributes that `node` lacks are looked for on `delegate` (head_mesh.weight is its blendShape's).
+  // Attributes that `node` lacks are looked for on `delegate` itself (head_mesh.weight is its blendShape's).
   void AddDelegate(NodeId node, NodeId delegate);
 
   // "node.attr", "node.attr[3].x", "node.attrX" for a child, "node.attr[name]", "node.attr[s,t,u]".
@@ -62,6 +68,9 @@ class Graph {
   Result<NodeId> FindNode(std::string_view name) const;
   std::string PlugName(const PlugRef& plug) const;
   Type PlugType(const PlugRef& plug) const;  // of the element or component
+  // Whether the plug names something that exists: its node lives, arrays have an element, others none, ...
+  Status CheckPlug(const PlugRef& plug) const;
+  static int MaxElements(const AttributeDef& attribute);  // of an array, points of a points attribute
 
   bool IsAlive(NodeId node) const;
   const NodeDef& def(NodeId node) const;
@@ -71,38 +80,41 @@ class Graph {
   NodeId IdAt(Index index) const;     // version 0 and kNoIndex for a removed node
 
   const Value* FindValue(const PlugRef& plug) const;  // null where unset
+  // What is set on an attribute, its elements and their components, in that order.
+  std::span<const SetValue> Values(NodeId node, int attribute) const;
   const Connection* FindConnection(const PlugRef& destination) const;
-  const std::vector<Connection>& Inputs(NodeId node) const;    // connections into the node
+  // Connections into the node, by attribute, element and component of the destination.
+  const std::vector<Connection>& Inputs(NodeId node) const;
+  std::span<const Connection> Inputs(NodeId node, int attribute) const;
   const std::vector<Connection>& Outputs(NodeId node) const;   // connections out of it
   int ArraySize(NodeId node, int attribute) const;  // elements set or connected: the highest plus one
   const std::vector<std::string>* ElementNames(NodeId node, int attribute) const;
 
  private:
-  struct SetValue {
-    int attribute, element, component;
-    Value value;
-  };
   struct Node {
     const NodeDef* def = nullptr;  // null: removed
     std::string name;
     std::uint32_t version = 0;
-    std::vector<SetValue> values;
+    std::vector<SetValue> values;            // sorted by plug, as are the inputs
     std::vector<Connection> inputs, outputs;
     std::vector<std::pair<int, std::vector<std::string>>> element_names;
     std::vector<NodeId> delegates;
+    std::vector<std::string> aliases;
   };
   const Node& node(NodeId id) const;
   Node& node(NodeId id);
-  Status CheckPlug(const PlugRef& plug) const;
+  Status CheckNumbers(const PlugRef& plug, const Value& value) const;
+  Status CheckOverlap(const PlugRef& destination, bool replace) const;
+  void AddConnection(const Connection& connection);
   Status CheckCycle(const PlugRef& source, const PlugRef& destination) const;
-  Result<int> ParseElement(const Node& node, int attribute, std::string_view text) const;
-  Result<PlugRef> FindAttribute(NodeId id, std::string_view text) const;
+  Result<int> ParseElement(NodeId id, int attribute, std::string_view text) const;
+  Result<PlugRef> FindAttribute(NodeId id, std::string_view text, bool delegates) const;
   std::vector<std::string> Names() const;
 
   const NodeRegistry* registry_;
   std::vector<Node> nodes_;
   std::unordered_map<std::string, Index> by_name_;
-  std::unordered_map<std::string, std::vector<Index>> ambiguous_;
+  std::unordered_map<std::string, std::vector<Index>> by_alias_;  // several: ambiguous
 };
 
 }  // namespace kpsa

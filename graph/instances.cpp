@@ -9,7 +9,7 @@ namespace kpsa {
 namespace {
 
 // First fields of the keys in by_key_: nodes use b = group, others are told apart by b.
-constexpr int kAssembleKey = -1, kAssembleRestKey = -2, kConvertKey = -100;
+constexpr int kAssembleKey = -1, kAssembleRestKey = -2, kConvertKey = -100, kConvertRestKey = -200;
 
 const Value& EmptyPoints(Type type) {
   static const Value kPoints{PointBufferPtr(std::make_shared<PointBuffer>(0, 3))};
@@ -24,6 +24,16 @@ double* ComponentOf(Value& value, int component) {
   double* parts[4] = {&q->x, &q->y, &q->z, &q->w};
   return parts[component];
 }
+
+// The part of a list, sorted by plug, that belongs to one element.
+template <typename T, typename F>
+std::span<const T> OfElement(std::span<const T> list, int element, F plug_of) {
+  const auto begin = std::partition_point(list.begin(), list.end(), [&](const T& e) { return plug_of(e).element < element; });
+  const auto end = std::partition_point(begin, list.end(), [&](const T& e) { return plug_of(e).element == element; });
+  return {begin, end};
+}
+const PlugRef& PlugOf(const SetValue& value) { return value.plug; }
+const PlugRef& DestinationOf(const Connection& connection) { return connection.destination; }
 
 float* PointComponent(PointsView view, int component) { return component == 0 ? view.x : component == 1 ? view.y : view.z; }
 
@@ -40,8 +50,8 @@ Type InstanceTable::OutputType(const Instance& i, int position) const {
 }
 
 const Value* InstanceTable::Keep(Value value) {
-  made_values_.push_back(std::make_unique<Value>(std::move(value)));
-  return made_values_.back().get();
+  made_values_.push_back(std::move(value));
+  return &made_values_.back();
 }
 
 Index InstanceTable::AddVarying(const PlugRef& plug) {
@@ -51,8 +61,16 @@ Index InstanceTable::AddVarying(const PlugRef& plug) {
   if (!a.array) whole.element = -1;
   const Key key{whole.node.index, whole.attribute, whole.element, 0};
   const auto [it, added] = varying_by_key_.emplace(key, static_cast<Index>(varying_.size()));
-  if (added) varying_.push_back(whole);
+  if (!added) return it->second;
+  varying_.push_back(whole);
+  int& size = varying_sizes_[Key{whole.node.index, whole.attribute, 0, 0}];
+  size = std::max(size, whole.element + 1);
   return it->second;
+}
+
+int InstanceTable::ArraySize(NodeId node, int attribute) const {
+  const auto it = varying_sizes_.find(Key{node.index, attribute, 0, 0});
+  return std::max(graph_.ArraySize(node, attribute), it == varying_sizes_.end() ? 0 : it->second);
 }
 
 const Connection* InstanceTable::FindUsed(const PlugRef& destination, bool rest) const {
@@ -63,12 +81,15 @@ const Connection* InstanceTable::FindUsed(const PlugRef& destination, bool rest)
 
 const Value* InstanceTable::HeldValue(NodeId node, int attribute, int element) {
   const AttributeDef& a = graph_.def(node).attributes[static_cast<std::size_t>(attribute)];
-  const PlugRef whole{node, attribute, element, -1};
-  const Value* value = graph_.FindValue(whole);
-  const bool has_children = a.type == Type::kDouble3 || a.type == Type::kQuaternion || (IsPointType(a.type) && !a.array);
-  if (value != nullptr && !has_children) return value;
+  const Value* value = graph_.FindValue({node, attribute, element, -1});
+  const bool points = IsPointType(a.type) && !a.array;
+  const bool has_children = points || a.type == Type::kDouble3 || a.type == Type::kQuaternion;
+  if (!has_children) {
+    if (value != nullptr) return value;
+    if (!a.default_from && (!a.default_value.empty() || !IsPointType(a.type))) return &a.default_value;
+  }
   const Key key{node.index, attribute, element, 1};
-  if (const auto it = held_by_key_.find(key); it != held_by_key_.end()) return made_values_[it->second].get();
+  if (const auto it = held_by_key_.find(key); it != held_by_key_.end()) return &made_values_[it->second];
   Value made;
   if (value != nullptr) {
     made = *value;
@@ -79,32 +100,44 @@ const Value* InstanceTable::HeldValue(NodeId node, int attribute, int element) {
   } else {
     made = EmptyPoints(a.type);
   }
-  if (has_children && !made.empty()) {  // children that are set one by one
-    if (IsPointType(a.type)) {
-      std::shared_ptr<PointBuffer> edited;
-      const auto count = made.points()->count();
-      for (std::size_t e = 0; e < count; ++e) {
-        for (int component = -1; component < 3; ++component) {
-          const Value* child = graph_.FindValue({node, attribute, static_cast<int>(e), component});
-          if (child == nullptr) continue;
-          if (edited == nullptr) edited = std::make_shared<PointBuffer>(*made.points());
-          for (int c = 0; c < edited->components(); ++c) {
-            if (component >= 0 && c != component) continue;
-            const double v = child->get_if<Double3>() != nullptr ? child->get<Double3>()[c] : child->AsDouble();
-            PointComponent(edited->view(), c)[e] = static_cast<float>(v);
-          }
-        }
-      }
-      if (edited != nullptr) made = Value(PointBufferPtr(edited));
-    } else {
-      for (int component = 0; component < (a.type == Type::kDouble3 ? 3 : 4); ++component) {
-        const Value* child = graph_.FindValue({node, attribute, element, component});
-        if (child != nullptr) *ComponentOf(made, component) = child->AsDouble();
-      }
+  if (points) {
+    made = WithSetPoints(made, graph_.Values(node, attribute));
+  } else if (has_children && !made.empty()) {
+    for (const auto& [plug, child] : OfElement(graph_.Values(node, attribute), element, PlugOf)) {
+      if (plug.component >= 0) *ComponentOf(made, plug.component) = child.AsDouble();
     }
   }
   held_by_key_.emplace(key, static_cast<Index>(made_values_.size()));
   return Keep(std::move(made));
+}
+
+bool InstanceTable::IsSet(NodeId node, int attribute, int element) const {
+  std::span<const SetValue> values = graph_.Values(node, attribute);
+  std::span<const Connection> inputs = graph_.Inputs(node, attribute);
+  if (graph_.def(node).attributes[static_cast<std::size_t>(attribute)].array) {
+    values = OfElement(values, element, PlugOf);
+    inputs = OfElement(inputs, element, DestinationOf);
+  }
+  return !values.empty() || !inputs.empty();
+}
+
+// Points with those replaced that are set one by one.
+Value InstanceTable::WithSetPoints(const Value& whole, std::span<const SetValue> set) {
+  std::shared_ptr<PointBuffer> edited;
+  for (const auto& [plug, value] : set) {
+    if (plug.element < 0) continue;
+    if (edited == nullptr) edited = std::make_shared<PointBuffer>(*whole.points());
+    if (static_cast<std::size_t>(plug.element) >= edited->count()) {
+      if (status_.ok()) status_ = Status::Invalid("{} is set, but there are {} points", graph_.PlugName(plug), edited->count());
+      break;
+    }
+    for (int c = 0; c < edited->components(); ++c) {
+      if (plug.component >= 0 && c != plug.component) continue;
+      const auto* vector = value.get_if<Double3>();
+      PointComponent(edited->view(), c)[plug.element] = static_cast<float>(vector != nullptr ? (*vector)[c] : value.AsDouble());
+    }
+  }
+  return edited == nullptr ? whole : Value(PointBufferPtr(edited));
 }
 
 Source InstanceTable::Take(Source source, int component) {
@@ -123,7 +156,7 @@ Source InstanceTable::Take(Source source, int component) {
   return source;
 }
 
-Source InstanceTable::ConvertTo(Source source, Type type, const PlugRef& plug) {
+Source InstanceTable::ConvertTo(Source source, Type type, const PlugRef& plug, bool rest) {
   const auto is_int = [](Type t) { return t == Type::kBool || t == Type::kInt || t == Type::kEnum; };
   if (source.type == type || (is_int(source.type) && is_int(type) && type != Type::kBool)) return source;
   if (source.kind == Source::Kind::kValue) {
@@ -133,7 +166,7 @@ Source InstanceTable::ConvertTo(Source source, Type type, const PlugRef& plug) {
     source.type = type;
     return source;
   }
-  const Key key{plug.node.index, plug.attribute, plug.element * 8 + plug.component, kConvertKey - static_cast<int>(type)};
+  const Key key{plug.node.index, plug.attribute, plug.element * 8 + plug.component, (rest ? kConvertRestKey : kConvertKey) - static_cast<int>(type)};
   const auto [it, added] = by_key_.emplace(key, static_cast<Index>(instances_.size()));
   if (added) {
     Instance convert;
@@ -165,10 +198,8 @@ Index InstanceTable::InstanceOf(NodeId node, int group, int geometry) {
   return it->second;
 }
 
-Source InstanceTable::Resolve(PlugRef plug, bool rest) {
+Source InstanceTable::ResolveOutput(const PlugRef& plug) {
   const NodeDef& d = graph_.def(plug.node);
-  const AttributeDef& a = d.attributes[static_cast<std::size_t>(plug.attribute)];
-  if (!a.output) return ResolveInput(plug, rest);
   const int group = d.GroupOfOutput(plug.attribute);
   KPSA_CHECK(group >= 0);
   const ComputeGroup& g = d.groups[static_cast<std::size_t>(group)];
@@ -177,73 +208,95 @@ Source InstanceTable::Resolve(PlugRef plug, bool rest) {
   source.instance = InstanceOf(plug.node, group, g.per_geometry ? plug.element : -1);
   source.output = static_cast<int>(std::find(g.outputs.begin(), g.outputs.end(), plug.attribute) - g.outputs.begin());
   source.element = g.per_geometry ? 0 : std::max(plug.element, 0);
-  source.type = a.type;
+  source.type = d.attributes[static_cast<std::size_t>(plug.attribute)].type;
   return Take(source, plug.component);
 }
 
-Source InstanceTable::ResolveInput(PlugRef plug, bool rest) {
+Source InstanceTable::Resolve(PlugRef plug, bool rest) {
+  // Down to an output or to a held value; then up again, converting and taking components as the inputs on the way ask
+  struct Hop {
+    PlugRef source;
+    Type type;
+    int component;
+  };
+  std::vector<Hop> hops;
+  Source source;
+  for (;;) {
+    if (graph_.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].output) {
+      source = ResolveOutput(plug);
+      break;
+    }
+    PlugRef whole = plug;
+    whole.component = -1;
+    const Connection* c = plug.component >= 0 ? FindUsed(plug, rest) : nullptr;
+    const int component = c != nullptr ? -1 : plug.component;
+    if (c == nullptr) c = FindUsed(whole, rest);
+    if (c == nullptr) {
+      source = ResolveHeld(plug, rest);
+      break;
+    }
+    hops.push_back({c->source, graph_.PlugType(c->destination), component});
+    plug = c->source;
+  }
+  for (auto hop = hops.rbegin(); hop != hops.rend(); ++hop) {
+    source = Take(ConvertTo(source, hop->type, hop->source, rest), hop->component);
+  }
+  return source;
+}
+
+Source InstanceTable::ResolveHeld(const PlugRef& plug, bool rest) {
   const AttributeDef& a = graph_.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
   const bool points = IsPointType(a.type) && !a.array;
-  const int component = plug.component;
-  PlugRef whole = plug;
-  whole.component = -1;
-  if (component >= 0) {
-    if (const Connection* c = FindUsed(plug, rest)) return ConvertTo(Resolve(c->source, rest), Type::kDouble, c->source);
-  }
-  if (const Connection* c = FindUsed(whole, rest)) {
-    return Take(ConvertTo(Resolve(c->source, rest), graph_.PlugType(whole), c->source), component);
-  }
-
-  // The value that the plug holds, or that varies
-  Source base;
-  base.type = a.type;
-  base.value = HeldValue(plug.node, plug.attribute, points ? -1 : plug.element);
-  const auto it = varying_by_key_.find(Key{plug.node.index, plug.attribute, points ? -1 : plug.element, 0});
+  const int element = points ? -1 : plug.element;
+  Source whole;
+  whole.type = a.type;
+  whole.value = HeldValue(plug.node, plug.attribute, element);
+  const auto it = varying_by_key_.find(Key{plug.node.index, plug.attribute, element, 0});
   if (!rest && it != varying_by_key_.end()) {
-    base.kind = Source::Kind::kVarying;
-    base.varying = it->second;
+    whole.kind = Source::Kind::kVarying;
+    whole.varying = it->second;
   }
-  if (component >= 0) return Take(base, component);
+  if (plug.component >= 0) return Take(whole, plug.component);
+  if (!points && a.type != Type::kDouble3 && a.type != Type::kQuaternion) return whole;
+  std::vector<const Connection*> children;  // that are driven one by one
+  std::span<const Connection> inputs = graph_.Inputs(plug.node, plug.attribute);
+  if (!points) inputs = OfElement(inputs, plug.element, DestinationOf);
+  for (const Connection& c : inputs) {
+    if (!rest || !graph_.def(c.source.node).animation) children.push_back(&c);
+  }
+  return children.empty() ? whole : Assemble(plug, whole, children, rest);
+}
 
-  // Children that are driven one by one
-  std::vector<const Connection*> children;
-  for (const Connection& c : graph_.Inputs(plug.node)) {
-    if (c.destination.attribute != plug.attribute || c.destination == whole) continue;
-    if (!points && c.destination.element != plug.element) continue;
-    if (rest && graph_.def(c.source.node).animation) continue;
-    children.push_back(&c);
-  }
-  if (children.empty()) return base;
-  const Key key{plug.node.index, plug.attribute, plug.element, rest ? kAssembleRestKey : kAssembleKey};
-  Index number;
-  if (const auto found = by_key_.find(key); found != by_key_.end()) {
-    number = found->second;
-  } else {
-    Instance assemble;
-    assemble.kind = Instance::Kind::kAssemble;
-    assemble.node = plug.node;
-    assemble.attribute = plug.attribute;
-    assemble.type = a.type;
-    assemble.inputs.push_back({0, -1, false, base, base});
-    assemble.output_sizes = {1};
-    assemble.array_sizes = {1};
-    for (const Connection* c : children) {
-      const PlugRef& to = c->destination;
-      Input input;
-      input.position = static_cast<int>(assemble.inputs.size());
-      input.source = input.rest = ConvertTo(Resolve(c->source, rest), graph_.PlugType(to), c->source);
-      assemble.inputs.push_back(input);
-      assemble.array_sizes.push_back(1);
-      assemble.children.push_back((points ? to.element : 0) * 4 + (to.component < 0 ? 3 : to.component));
-    }
-    number = static_cast<Index>(instances_.size());
-    by_key_.emplace(key, number);
-    instances_.push_back(std::move(assemble));
-  }
+// Recursion ends: points are made of vectors, vectors of numbers.
+Source InstanceTable::Assemble(const PlugRef& plug, const Source& whole, const std::vector<const Connection*>& children, bool rest) {
+  const bool points = IsPointType(whole.type);
   Source source;
   source.kind = Source::Kind::kInstance;
-  source.instance = number;
-  source.type = a.type;
+  source.type = whole.type;
+  const Key key{plug.node.index, plug.attribute, plug.element, rest ? kAssembleRestKey : kAssembleKey};
+  if (const auto found = by_key_.find(key); found != by_key_.end()) {
+    source.instance = found->second;
+    return source;
+  }
+  Instance assemble;
+  assemble.kind = Instance::Kind::kAssemble;
+  assemble.node = plug.node;
+  assemble.attribute = plug.attribute;
+  assemble.type = whole.type;
+  assemble.output_sizes = {1};
+  assemble.inputs.push_back({0, -1, false, whole, whole});
+  for (const Connection* c : children) {
+    const PlugRef& to = c->destination;
+    Input input;
+    input.position = static_cast<int>(assemble.inputs.size());
+    input.source = input.rest = ConvertTo(Resolve(c->source, rest), graph_.PlugType(to), c->source, rest);
+    assemble.inputs.push_back(input);
+    assemble.children.push_back((points ? to.element : 0) * 4 + (to.component < 0 ? 3 : to.component));
+  }
+  assemble.array_sizes.assign(assemble.inputs.size(), 1);
+  source.instance = static_cast<Index>(instances_.size());
+  by_key_.emplace(key, source.instance);
+  instances_.push_back(std::move(assemble));
   return source;
 }
 
@@ -259,7 +312,7 @@ void InstanceTable::Expand(Index number) {
     const int attribute = g.inputs[position];
     const AttributeDef& a = d.attributes[static_cast<std::size_t>(attribute)];
     const bool one = !a.array || (a.per_geometry && g.per_geometry);
-    const int count = one ? 1 : graph_.ArraySize(node, attribute);
+    const int count = one ? 1 : ArraySize(node, attribute);
     sizes.push_back(count);
     for (int e = 0; e < count; ++e) {
       Input input;
@@ -267,8 +320,8 @@ void InstanceTable::Expand(Index number) {
       input.element = !a.array ? -1 : one ? geometry : e;
       input.lazy = a.lazy;
       const PlugRef plug{node, attribute, input.element, -1};
-      input.source = ResolveInput(plug, false);
-      input.rest = ResolveInput(plug, true);
+      input.source = Resolve(plug, false);
+      input.rest = Resolve(plug, true);
       inputs.push_back(input);
     }
   }
@@ -277,7 +330,7 @@ void InstanceTable::Expand(Index number) {
     const AttributeDef& a = d.attributes[static_cast<std::size_t>(c.destination.attribute)];
     if (!a.structural) continue;
     structural.push_back({c.destination.attribute, c.destination.element,
-                          ConvertTo(Resolve(c.source, false), graph_.PlugType(c.destination), c.source)});
+                          ConvertTo(Resolve(c.source, false), graph_.PlugType(c.destination), c.source, false)});
   }
   std::vector<int> output_sizes;
   for (int attribute : g.outputs) {

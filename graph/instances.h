@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <deque>
 #include <unordered_map>
 #include <vector>
 
@@ -78,6 +78,11 @@ class InstanceTable {
   Index AddVarying(const PlugRef& plug);  // the number of its whole plug
   // The value that the graph holds for an input: set (children merged in), or the default. Never null.
   const Value* HeldValue(NodeId node, int attribute, int element);
+  // Whether the input, or a part of it, is set or driven.
+  bool IsSet(NodeId node, int attribute, int element) const;
+  // Elements that are set, connected or vary: the highest plus one.
+  int ArraySize(NodeId node, int attribute) const;
+  const Status& status() const { return status_; }  // the first error of set values
 
  private:
   struct Key {
@@ -92,15 +97,19 @@ class InstanceTable {
       return static_cast<std::size_t>(h ^ (h >> 29));
     }
   };
-  // Resolves one plug without descending; new instances are put on the stack.
+  // Resolve a plug without descending; new instances are put on the stack. An input takes over from what drives it,
+  // through any number of inputs that drive each other.
   Source Resolve(PlugRef plug, bool rest);
-  Source ResolveInput(PlugRef plug, bool rest);
+  Source ResolveOutput(const PlugRef& plug);
+  Source ResolveHeld(const PlugRef& plug, bool rest);  // of an input that no connection drives as a whole
+  Source Assemble(const PlugRef& plug, const Source& whole, const std::vector<const Connection*>& children, bool rest);
   Index InstanceOf(NodeId node, int group, int geometry);
   void Expand(Index instance);
   Source Take(Source source, int component);  // the child of a source
-  Source ConvertTo(Source source, Type type, const PlugRef& plug);
+  Source ConvertTo(Source source, Type type, const PlugRef& plug, bool rest);
   const Connection* FindUsed(const PlugRef& destination, bool rest) const;
   const Value* Keep(Value value);
+  Value WithSetPoints(const Value& whole, std::span<const SetValue> set);
 
   const Graph& graph_;
   const Request& request_;
@@ -109,7 +118,9 @@ class InstanceTable {
   std::unordered_map<Key, Index, KeyHash> by_key_;
   std::vector<PlugRef> varying_;
   std::unordered_map<Key, Index, KeyHash> varying_by_key_, held_by_key_;
-  std::vector<std::unique_ptr<Value>> made_values_;
+  std::unordered_map<Key, int, KeyHash> varying_sizes_;  // of arrays with varying elements
+  std::deque<Value> made_values_;
+  Status status_;
 };
 
 }  // namespace kpsa

@@ -178,7 +178,14 @@ Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& stati
     sets->inputs.push_back(PointSet::None(total));
   }
   if (instance.kind == Instance::Kind::kAssemble) {
-    if (IsPointType(instance.type)) sets->inputs[0] = sets->outputs[0][0];
+    if (!IsPointType(instance.type)) return Status();
+    sets->inputs[0] = sets->outputs[0][0];
+    for (int child : instance.children) {
+      if (static_cast<Index>(child / 4) < sets->inputs[0].total()) continue;
+      return Status::Invalid("{} is driven, but there are {} points",
+                             table.graph().PlugName({instance.node, instance.attribute, child / 4, child % 4 == 3 ? -1 : child % 4}),
+                             sets->inputs[0].total());
+    }
     return Status();
   }
   if (instance.kind == Instance::Kind::kConvert) return Status();

@@ -32,7 +32,7 @@ struct AttributeDef {
   bool array = false;         // plugs are name[i]
   bool structural = false;    // read when a plan is made, baked into kernels
   bool lazy = false;          // evaluated only if decide chooses it
-  bool lazy_together = false; // all elements of a lazy array share one decision
+  bool lazy_together = false; // all elements of a lazy array share one decision (one bit)
   bool per_geometry = false;  // array whose element i belongs to the i-th deformed geometry
   std::vector<std::string> enum_names;
   std::vector<std::string> aliases;  // other names under which plugs may be written

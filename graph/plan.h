@@ -46,8 +46,10 @@ class Plan {
   struct Branch {
     DecideFn decide = nullptr;
     ComputeBlockFn compute_block = nullptr;
-    std::vector<Index> segment_of_lazy;  // kNoIndex where a lazy input needs no step
-    std::vector<Index> lazy_deps;        // producers of the lazy inputs, by lazy input; kNoIndex for none
+    // By lazy input, in the order of declaration
+    std::vector<std::uint8_t> bit_of_lazy;  // its bit in what decide returns
+    std::vector<Index> segment_of_lazy;     // kNoIndex where it needs no step
+    std::vector<Index> lazy_deps;           // its producer; kNoIndex for none
   };
   struct Segment {
     Index parent = kNoIndex, owner = kNoIndex;  // owner: the step whose lazy input it serves
@@ -101,6 +103,9 @@ class Plan {
   const std::vector<Output>& outputs() const { return outputs_; }
   const std::vector<StepInfo>& infos() const { return infos_; }
   const std::vector<Excluded>& excluded() const { return excluded_; }
+  // The first node that needs its previous frame (NodeDef::stateful), or "": such a plan is evaluated in ascending
+  // order on one evaluator.
+  const std::string& stateful_node() const { return stateful_node_; }
   const char* step_name(Index step) const { return text_.data() + infos_[step].name; }    // of its node
   const char* step_type(Index step) const { return text_.data() + infos_[step].type; }    // of its node
   const char* step_label(Index step) const { return text_.data() + infos_[step].label; }  // "", "gather", "assemble", ...
@@ -133,7 +138,7 @@ class Plan {
   std::vector<Excluded> excluded_;
   std::vector<std::vector<std::pair<Index, Index>>> closures_;
   std::vector<std::byte> initial_values_;
-  std::string text_;
+  std::string text_, stateful_node_;
   std::vector<std::shared_ptr<const void>> owned_;  // kernels, constant points, gather maps
   std::size_t buffer_floats_ = 0, workspace_floats_ = 0, state_bytes_ = 0;
 };

@@ -13,6 +13,7 @@ std::uint32_t PlanBuilder::AddSlot(std::size_t size) {
   auto& values = plan_->initial_values_;
   const std::size_t at = values.size();
   values.resize(at + (size + 7) / 8 * 8);
+  KPSA_CHECK_LE(values.size(), std::size_t{0xffffffff});
   return static_cast<std::uint32_t>(at);
 }
 
@@ -150,6 +151,7 @@ void PlanBuilder::PlaceOutputs() {
     if (kernel.object != nullptr) plan_->owned_.push_back(kernel.object);
     step.scratch = static_cast<std::uint32_t>(plan_->workspace_floats_);
     plan_->workspace_floats_ += PaddedCount(kernel.scratch_floats);
+    KPSA_CHECK_LE(plan_->workspace_floats_, std::size_t{0xffffffff});
     step.state = static_cast<std::uint32_t>(plan_->state_bytes_);
     plan_->state_bytes_ += (kernel.state_bytes + 63) / 64 * 64;
   }
@@ -246,6 +248,7 @@ void PlanBuilder::FillSteps() {
       Plan::Branch branch;
       branch.decide = group->decide;
       branch.compute_block = group->compute_block;
+      branch.bit_of_lazy = draft.lazy_bits;
       branch.segment_of_lazy = draft.lazy_segments;
       for (const DraftInput& input : draft.inputs) {
         if (input.lazy) branch.lazy_deps.push_back(ProducerOf(input));
@@ -268,8 +271,10 @@ void PlanBuilder::FillSteps() {
       info.segment = draft.segment;
       info.label = AddText("gather");
     } else {
+      const NodeDef& def = table_.graph().def(instance->node);
+      if (def.stateful && plan_->stateful_node_.empty()) plan_->stateful_node_ = table_.graph().name(instance->node);
       info.name = AddText(table_.graph().name(instance->node));
-      info.type = AddText(table_.graph().def(instance->node).name);
+      info.type = AddText(def.name);
       info.label = AddText(instance->kind == Instance::Kind::kAssemble ? "assemble" : instance->kind == Instance::Kind::kConvert ? "convert" : "");
     }
     info.points = info.points_total = 0;

@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 
 #include "base/check.h"
 #include "graph/static_eval.h"
 
 namespace kpsa {
 namespace {
+
+constexpr int kMaxLazyInputs = 64;    // bits of what decide returns
+constexpr int kMaxLazyDepth = 1000;   // the evaluator descends into segments by recursion
 
 class Drafter {
  public:
@@ -110,19 +114,16 @@ class Drafter {
     return Status();
   }
 
-  int Depth(Index segment) const {
-    int depth = 0;
-    for (; segment != 0; segment = draft_.segments[segment].parent) ++depth;
-    return depth;
+  int Depth(Index segment) const { return draft_.segments[segment].depth; }
+  Index AncestorAt(Index segment, int depth) const {
+    while (Depth(segment) > depth) segment = draft_.segments[segment].parent;
+    return segment;
   }
-  bool IsAncestorOrSelf(Index ancestor, Index segment) const {
-    for (;; segment = draft_.segments[segment].parent) {
-      if (segment == ancestor) return true;
-      if (segment == 0) return false;
-    }
-  }
+  bool IsAncestorOrSelf(Index ancestor, Index segment) const { return AncestorAt(segment, Depth(ancestor)) == ancestor; }
   Index CommonAncestor(Index a, Index b) const {
-    while (!IsAncestorOrSelf(a, b)) a = draft_.segments[a].parent;
+    a = AncestorAt(a, Depth(b));
+    b = AncestorAt(b, Depth(a));
+    while (a != b) a = draft_.segments[a].parent, b = draft_.segments[b].parent;
     return a;
   }
 
@@ -197,72 +198,72 @@ class Drafter {
     for (const Use& use : uses) Answer(use, step_number);
 
     Index together = kNoIndex;
-    int together_position = -1;
+    int together_position = -1, bits = 0;
     for (std::size_t i = 0; i < instance.inputs.size(); ++i) {
       const Input& input = instance.inputs[i];
       Index reads_in = segment;
       if (input.lazy) {
+        // The elements of a lazy_together array share a segment and a bit
+        const bool shares = together_position == input.position && table_.input_def(instance, input.position).lazy_together;
+        if (!shares) {
+          together = kNoIndex;
+          together_position = input.position;
+          if (++bits > kMaxLazyInputs) {
+            return Status::Invalid("{} has more than {} lazy inputs", Describe(table_, instance), kMaxLazyInputs);
+          }
+        }
         const Source& s = input.source;
         Index child = kNoIndex;
         if (s.kind == Source::Kind::kInstance && draft_.varying[s.instance]) {
-          const bool shares = table_.input_def(instance, input.position).lazy_together && together_position == input.position;
-          if (shares) {
-            child = together;
-          } else {
-            child = static_cast<Index>(draft_.segments.size());
-            draft_.segments.push_back({segment, step_number});
-            together = child;
-            together_position = input.position;
+          if (together == kNoIndex) {
+            together = static_cast<Index>(draft_.segments.size());
+            draft_.segments.push_back({segment, step_number, Depth(segment) + 1});
+            if (Depth(together) > kMaxLazyDepth) {
+              return Status::Invalid("{}: lazy inputs are nested more than {} deep", Describe(table_, instance), kMaxLazyDepth);
+            }
           }
-          reads_in = child;
+          child = reads_in = together;
         }
         draft_.steps[step_number].lazy_segments.push_back(child);
+        draft_.steps[step_number].lazy_bits.push_back(static_cast<std::uint8_t>(bits - 1));
       }
       DraftInput read;
-      read.lazy = input.lazy;
       const PointSet points = draft_.steps[step_number].sets.inputs[i];
       KPSA_RETURN_IF_ERROR(Read(input.source, points, reads_in, {step_number, static_cast<int>(i)}, &read));
       read.lazy = input.lazy;
       draft_.steps[step_number].inputs[i] = std::move(read);
+    }
+    if (bits > 0 && table_.group(instance).decide == nullptr) {
+      return Status::Invalid("{} has lazy inputs but does not decide about them", Describe(table_, instance));
     }
     return Status();
   }
 
   // A reader whose set is not the buffer's gets a compact copy, shared by readers of one segment.
   void InsertGathers() {
-    struct Made {
-      Index producer, varying, segment;
-      int output, element;
-      Index gather;
-    };
-    std::vector<Made> made;
+    std::map<std::tuple<Index, Index, Index, int, int, Digest>, Index> made;  // by what is read, where, and which points
     const auto serve = [&](DraftInput& input, Index segment) {
       if (!IsPointType(input.type) || input.kind == DraftInput::Kind::kConstant) return;
       const bool varying = input.kind == DraftInput::Kind::kVarying;
       const PointSet held = varying ? PointSet::All(input.points.total())
                                     : draft_.steps[input.step].sets.outputs[static_cast<std::size_t>(input.output)][static_cast<std::size_t>(input.element)];
       if (held == input.points) return;
-      for (const Made& m : made) {
-        if (m.producer == input.step && m.varying == input.varying && m.segment == segment && m.output == input.output &&
-            m.element == input.element && draft_.steps[m.gather].sets.outputs[0][0] == input.points) {
-          input.kind = DraftInput::Kind::kStep;
-          input.step = m.gather, input.output = input.element = 0;
-          return;
-        }
-      }
+      const auto number = static_cast<Index>(draft_.steps.size());
+      const auto [it, added] = made.emplace(
+          std::make_tuple(input.step, input.varying, segment, input.output, input.element, input.points.digest()), number);
+      const DraftInput read = input;
+      input.kind = DraftInput::Kind::kStep;
+      input.step = it->second;
+      input.output = input.element = 0;
+      if (!added) return;
       DraftStep gather;
       gather.segment = segment;
       gather.gather_type = input.type;
       gather.sets.inputs = {held};
       gather.sets.outputs = {{input.points}};
-      DraftInput from = input;
-      from.points = held;
-      from.lazy = false;
-      gather.inputs = {from};
-      const auto number = static_cast<Index>(draft_.steps.size());
-      made.push_back({input.step, input.varying, segment, input.output, input.element, number});
-      input.kind = DraftInput::Kind::kStep;
-      input.step = number, input.output = input.element = 0;
+      gather.inputs = {read};
+      gather.inputs[0].points = held;
+      gather.inputs[0].lazy = false;
       draft_.steps.push_back(std::move(gather));
     };
     for (Index s = 0, end = static_cast<Index>(draft_.steps.size()); s < end; ++s) {

@@ -28,11 +28,13 @@ struct DraftStep {
   InstanceSets sets;          // a gather has one output and one input
   std::vector<DraftInput> inputs;
   std::vector<Index> lazy_segments;  // by lazy input, in order; kNoIndex where nothing has to be evaluated
+  std::vector<std::uint8_t> lazy_bits;  // by lazy input: its bit in what decide returns
   Type gather_type = Type::kPoints;
 };
 
 struct DraftSegment {
   Index parent = kNoIndex, owner = kNoIndex;  // owner: a draft step of the parent
+  int depth = 0;
 };
 
 struct PlanDraft {

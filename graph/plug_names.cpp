@@ -28,7 +28,8 @@ std::vector<std::string> Graph::Names() const {
 Result<NodeId> Graph::FindNode(std::string_view name) const {
   const std::string key(name);
   if (const auto it = by_name_.find(key); it != by_name_.end()) return NodeId{it->second, nodes_[it->second].version};
-  if (const auto it = ambiguous_.find(key); it != ambiguous_.end()) {
+  if (const auto it = by_alias_.find(key); it != by_alias_.end()) {
+    if (it->second.size() == 1) return IdAt(it->second.front());
     std::vector<std::string> names;
     for (Index index : it->second) names.push_back(nodes_[index].name);
     return Status::Invalid("\"{}\" is the name of several nodes: write {}", name, fmt::join(names, " or "));
@@ -40,13 +41,10 @@ Result<PlugRef> Graph::FindPlug(std::string_view text) const {
   // The longest node name that is followed by '.' wins: names may contain dots themselves
   for (std::size_t dot = text.rfind('.'); dot != std::string_view::npos && dot > 0; dot = text.rfind('.', dot - 1)) {
     const std::string key(text.substr(0, dot));
-    if (by_name_.count(key) == 0 && ambiguous_.count(key) == 0) {
-      if (dot == 0) break;
-      continue;
-    }
+    if (by_name_.count(key) == 0 && by_alias_.count(key) == 0) continue;
     Result<NodeId> id = FindNode(key);
     if (!id.ok()) return id.status();
-    return FindAttribute(*id, text.substr(dot + 1));
+    return FindAttribute(*id, text.substr(dot + 1), true);
   }
   const std::size_t dot = text.find('.');
   if (dot == std::string_view::npos) return Status::Invalid("\"{}\" is no plug: expected node.attribute", text);
@@ -54,7 +52,7 @@ Result<PlugRef> Graph::FindPlug(std::string_view text) const {
   return Status::Invalid("unknown node \"{}\" in plug \"{}\"{}", guess, text, DidYouMean(guess, Names()));
 }
 
-Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text) const {
+Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool delegates) const {
   const Node& n = node(id);
   PlugRef plug;
   plug.node = id;
@@ -84,20 +82,17 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text) const {
     }
   }
   if (plug.attribute < 0) {
-    for (NodeId delegate : n.delegates) {
-      if (!IsAlive(delegate)) continue;
-      Result<PlugRef> found = FindAttribute(delegate, text);
-      if (found.ok() || node(delegate).def->FindAttribute(attribute) >= 0) return found;
-    }
     std::vector<std::string> names = n.def->AttributeNames();
-    for (NodeId delegate : n.delegates) {
+    for (NodeId delegate : delegates ? n.delegates : std::vector<NodeId>()) {
       if (!IsAlive(delegate)) continue;
+      Result<PlugRef> found = FindAttribute(delegate, text, false);
+      if (found.ok() || node(delegate).def->FindAttribute(attribute) >= 0) return found;
       for (std::string& name : node(delegate).def->AttributeNames()) names.push_back(std::move(name));
     }
     return Status::Invalid("node \"{}\" ({}) has no attribute \"{}\"{}", n.name, n.def->name, attribute, DidYouMean(attribute, names));
   }
   if (text.find('[') != std::string_view::npos) {
-    Result<int> index = ParseElement(n, plug.attribute, element);
+    Result<int> index = ParseElement(id, plug.attribute, element);
     if (!index.ok()) return index.status();
     plug.element = *index;
   }
@@ -120,9 +115,10 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text) const {
   return plug;
 }
 
-Result<int> Graph::ParseElement(const Node& n, int attribute, std::string_view text) const {
+Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text) const {
+  const Node& n = node(id);
   const AttributeDef& a = n.def->attributes[static_cast<std::size_t>(attribute)];
-  constexpr int kMaxElement = 1 << 24;
+  const int max_elements = MaxElements(a);
   if (!a.array && !IsPointType(a.type)) return Status::Invalid("{}.{} is no array", n.name, a.name);
   for (const auto& [number, names] : n.element_names) {
     if (number != attribute) continue;
@@ -135,13 +131,10 @@ Result<int> Graph::ParseElement(const Node& n, int attribute, std::string_view t
   if (!a.grid.empty() && text.find(',') != std::string_view::npos) {
     const int divisions_attribute = n.def->FindAttribute(a.grid);
     KPSA_CHECK(divisions_attribute >= 0);
-    const Value* set = nullptr;
-    for (const SetValue& v : n.values) {
-      if (v.attribute == divisions_attribute) set = &v.value;
-    }
+    const Value* set = FindValue({id, divisions_attribute, -1, -1});
     const Value& divisions = set != nullptr ? *set : n.def->attributes[static_cast<std::size_t>(divisions_attribute)].default_value;
     const auto* sizes = divisions.get_if<std::vector<std::int64_t>>();
-    int index = 0, stride = 1;
+    std::int64_t index = 0, stride = 1;
     std::size_t axis = 0;
     for (std::string_view left = text;; ++axis) {
       const std::size_t comma = left.find(',');
@@ -150,16 +143,17 @@ Result<int> Graph::ParseElement(const Node& n, int attribute, std::string_view t
         return Status::Invalid("{}.{}[{}]: expected three indices within the divisions {}", n.name, a.name, text, divisions.ToString());
       }
       index += stride * i;
-      stride *= static_cast<int>((*sizes)[axis]);
+      stride *= std::min<std::int64_t>((*sizes)[axis], max_elements);
+      if (index >= max_elements || stride > max_elements) return Status::Invalid("{}.{}[{}]: the grid is too large", n.name, a.name, text);
       if (comma == std::string_view::npos) break;
       left = left.substr(comma + 1);
     }
     if (axis != 2) return Status::Invalid("{}.{}[{}]: expected three indices", n.name, a.name, text);
-    return index;
+    return static_cast<int>(index);
   }
   int index = 0;
-  if (!ParseInt(text, &index) || index < 0 || index >= kMaxElement) {
-    return Status::Invalid("{}.{}[{}]: expected an index of 0 or more", n.name, a.name, text);
+  if (!ParseInt(text, &index) || index < 0 || index >= max_elements) {
+    return Status::Invalid("{}.{}[{}]: expected an index from 0 to {}", n.name, a.name, text, max_elements - 1);
   }
   return index;
 }

@@ -1,6 +1,7 @@
 #include "graph/profile.h"
 
 #include <algorithm>
+#include <chrono>
 #include <mutex>
 
 namespace kpsa {
@@ -13,10 +14,7 @@ void Profile::Add(const ProfileEvent& event) {
   ++counts_[event.step];
   self_ns_[event.step] += event.end_ns - event.begin_ns;
   last_cause_[event.step] = event.cause;
-  if (keep_events && events_.size() < max_events) {
-    events_.push_back(event);
-    events_.back().frame = frame;
-  }
+  if (keep_events && events_.size() < max_events) events_.push_back(event);
 }
 
 void Profile::Clear() {
@@ -24,6 +22,11 @@ void Profile::Clear() {
   std::fill(self_ns_.begin(), self_ns_.end(), 0);
   std::fill(last_cause_.begin(), last_cause_.end(), kNoIndex);
   events_.clear();
+}
+
+std::uint64_t ProfileClock() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count());
 }
 
 std::string CauseName(const Plan& plan, Index cause) {

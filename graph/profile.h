@@ -16,7 +16,7 @@ struct ProfileEvent {
   Index cause = kNoIndex;   // the producer that changed: a step, or steps().size() + varying; kNoIndex: the first time
   std::uint64_t begin_ns = 0, end_ns = 0;
   int thread = 0;
-  int frame = 0;            // as set by Profile::frame
+  int frame = 0;            // as told to Evaluator::Record
 };
 
 class Profile {
@@ -28,9 +28,8 @@ class Profile {
   const std::vector<ProfileEvent>& events() const { return events_; }
   bool keep_events = false;          // for traces; counts and times are kept always
   std::size_t max_events = 1000000;  // no more are kept beyond
-  int frame = 0;
 
-  void Add(const ProfileEvent& event);
+  void Add(const ProfileEvent& event);  // from any thread
   void Clear();
 
  private:
@@ -38,6 +37,8 @@ class Profile {
   std::vector<Index> last_cause_;
   std::vector<ProfileEvent> events_;
 };
+
+std::uint64_t ProfileClock();  // nanoseconds of a steady clock
 
 // "skin_1.envelope" or "node "jaw"" for the cause of an event.
 std::string CauseName(const Plan& plan, Index cause);

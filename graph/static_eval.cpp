@@ -90,18 +90,20 @@ const Value* StaticEvaluator::Ready(const Source& source, bool rest) {
 }
 
 const Value* StaticEvaluator::Get(const Source& source, bool rest) {
+  if (!status_.ok()) return nullptr;
   if (const Value* value = Ready(source, rest)) return value;
   // What is missing, consumers before sources
   std::vector<Index> missing{source.instance};
-  std::vector<std::uint8_t> opened(table_.instances().size(), 0);
+  std::vector<bool>& opened = opened_[rest ? 1 : 0];
+  opened.resize(table_.instances().size(), false);
   while (!missing.empty()) {
     const Index top = missing.back();
     if (slot(top, rest) != nullptr) {
       missing.pop_back();
       continue;
     }
-    if (opened[top] == 0) {
-      opened[top] = 1;
+    if (!opened[top]) {
+      opened[top] = true;
       const Instance& instance = table_.instances()[top];
       const auto need = [&](const Source& s) {
         if (s.kind == Source::Kind::kInstance && slot(s.instance, rest) == nullptr) missing.push_back(s.instance);
@@ -113,7 +115,7 @@ const Value* StaticEvaluator::Get(const Source& source, bool rest) {
     missing.pop_back();
     Status status = Run(top, rest);
     if (!status.ok()) {
-      status_ = std::move(status);
+      if (status_.ok()) status_ = std::move(status);
       return nullptr;
     }
   }

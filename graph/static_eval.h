@@ -13,7 +13,7 @@ namespace kpsa {
 class StaticEvaluator final : public StaticValues {
  public:
   explicit StaticEvaluator(InstanceTable& table) : table_(table), totals_(table, *this) {}
-  // Evaluates what the source needs. Null on failure; status() says why.
+  // Evaluates what the source needs. Null on failure, and ever after; status() says why.
   const Value* Get(const Source& source, bool rest) override;
   PointTotals& totals() { return totals_; }
   const Status& status() const { return status_; }
@@ -31,6 +31,7 @@ class StaticEvaluator final : public StaticValues {
   InstanceTable& table_;
   PointTotals totals_;
   std::vector<std::shared_ptr<const Outputs>> memo_[2];
+  std::vector<bool> opened_[2];  // by instance: its inputs were asked for
   std::vector<std::unique_ptr<Value>> taken_;
   Status status_;
   Index evaluated_ = 0;

@@ -7,6 +7,8 @@
 namespace kpsa {
 namespace {
 
+constexpr std::size_t kMaxUnit = 60000;  // Plan::Step counts the steps of a unit in 16 bits
+
 class Orderer {
  public:
   Orderer(const InstanceTable& table, const PlanDraft& draft) : table_(table), draft_(draft) {}
@@ -54,10 +56,9 @@ class Orderer {
     std::vector<bool> follows(n, false);
     for (Index s = 0; s < n; ++s) {
       const Index source = InPlaceSource(s);
-      if (source == kNoIndex) continue;
+      if (source == kNoIndex || RunsAlone(source)) continue;
       const Readers& r = readers[source];
       if (r.direct != 1 || r.outside || (!copies_inside && !r.gathers.empty())) continue;
-      if (draft_.steps[source].instance == kNoIndex || !draft_.steps[source].lazy_segments.empty()) continue;
       order_.overwrites[s] = source;
       next[source] = s;
       follows[s] = true;
@@ -65,27 +66,44 @@ class Orderer {
     std::vector<bool> placed(n, false);
     for (Index s = 0; s < n; ++s) {
       if (follows[s] || next[s] == kNoIndex) continue;
-      StepOrder::Unit unit;
+      auto& units = order_.segments[draft_.steps[s].segment];
+      units.emplace_back();
       for (Index at = s; at != kNoIndex; at = next[at]) {
-        unit.steps.push_back(at);
+        StepOrder::Unit* unit = &units.back();
+        unit->steps.push_back(at);
         placed[at] = true;
         if (next[at] == kNoIndex) break;
+        if (unit->steps.size() + readers[at].gathers.size() >= kMaxUnit) {  // a new unit, with a buffer of its own
+          order_.overwrites[next[at]] = kNoIndex;
+          units.emplace_back();
+          continue;
+        }
         for (Index gather : readers[at].gathers) {
-          unit.steps.push_back(gather);
+          unit->steps.push_back(gather);
           placed[gather] = true;
         }
       }
-      order_.segments[draft_.steps[s].segment].push_back(std::move(unit));
     }
     for (Index s = 0; s < n; ++s) {
       if (!placed[s]) order_.segments[draft_.steps[s].segment].push_back({{s}, 0});
     }
   }
 
+  bool IsBranch(const DraftStep& step) const {
+    if (step.instance == kNoIndex || table_.instances()[step.instance].kind != Instance::Kind::kNode) return false;
+    const ComputeGroup& group = table_.group(table_.instances()[step.instance]);
+    return group.decide != nullptr || group.compute_block != nullptr;
+  }
+  // Units run again as a whole: not with steps that decide, and not with what must not run twice a frame.
+  bool RunsAlone(Index s) const {
+    const DraftStep& step = draft_.steps[s];
+    return step.instance == kNoIndex || IsBranch(step) || table_.graph().def(table_.instances()[step.instance].node).stateful;
+  }
+
   // The step whose output step s may overwrite, if the definition allows it and the point sets agree.
   Index InPlaceSource(Index s) const {
     const DraftStep& step = draft_.steps[s];
-    if (step.instance == kNoIndex || !step.lazy_segments.empty()) return kNoIndex;
+    if (RunsAlone(s)) return kNoIndex;
     const Instance& instance = table_.instances()[step.instance];
     if (instance.kind != Instance::Kind::kNode) return kNoIndex;
     const ComputeGroup& group = table_.group(instance);
@@ -147,9 +165,12 @@ class Orderer {
         }
       }
       if (done != units.size()) return false;
-      // Draft steps were made consumers first, so descending numbers keep sources near their users
-      std::sort(units.begin(), units.end(), [](const StepOrder::Unit& a, const StepOrder::Unit& b) {
-        return a.level != b.level ? a.level < b.level : a.steps[0] > b.steps[0];
+      // Branches come last in their level: the parallel evaluator runs them after the others. Draft steps were made
+      // consumers first, so descending numbers keep sources near their users.
+      std::sort(units.begin(), units.end(), [&](const StepOrder::Unit& a, const StepOrder::Unit& b) {
+        if (a.level != b.level) return a.level < b.level;
+        const bool branch_a = IsBranch(draft_.steps[a.steps[0]]), branch_b = IsBranch(draft_.steps[b.steps[0]]);
+        return branch_a != branch_b ? branch_b : a.steps[0] > b.steps[0];
       });
     }
     return true;

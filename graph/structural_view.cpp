@@ -31,11 +31,10 @@ const Value& StructuralView::value(std::string_view name, int element) const {
 
 bool StructuralView::is_set(std::string_view name, int element) const {
   const int attribute = Attribute(name);
-  const PlugRef plug{node_, attribute, Element(attribute, element), -1};
-  return table_.graph().FindValue(plug) != nullptr || table_.graph().FindConnection(plug) != nullptr;
+  return table_.IsSet(node_, attribute, Element(attribute, element));
 }
 
-int StructuralView::array_size(std::string_view name) const { return table_.graph().ArraySize(node_, Attribute(name)); }
+int StructuralView::array_size(std::string_view name) const { return table_.ArraySize(node_, Attribute(name)); }
 
 const Value* StructuralView::rest(std::string_view name, int element) const {
   if (instance_ == nullptr || statics_ == nullptr) return nullptr;

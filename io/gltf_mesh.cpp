@@ -171,6 +171,29 @@ Status ReadTargets(const Document& document, const tinygltf::Primitive& in, cons
   return {};
 }
 
+// Appends the colours of this primitive where it has them, white else; nothing while no primitive had any.
+Status ReadColors(const Document& document, const tinygltf::Primitive& in, const std::string& where,
+                  const Primitive& primitive, Mesh* mesh) {
+  const int accessor = FindAttribute(in.attributes, "COLOR_0");
+  if (accessor < 0 && mesh->colors.empty()) return {};
+  KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(12 * (mesh->vertex_count() - mesh->colors.size() / 3), where));
+  if (accessor >= 0) {
+    const std::string place = where + ".COLOR_0";
+    KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
+    const bool with_alpha = document.model->accessors[static_cast<std::size_t>(accessor)].type == TINYGLTF_TYPE_VEC4;
+    const std::size_t components = with_alpha ? 4 : 3;
+    std::vector<float> colors;
+    KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, static_cast<int>(components),
+                                     kFloat | kUnsignedByte | kUnsignedShort, place, &colors));
+    mesh->colors.resize(3 * static_cast<std::size_t>(primitive.first_vertex), 1.0f);
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      if (i % components < 3) mesh->colors.push_back(std::clamp(colors[i], 0.0f, 1.0f));
+    }
+  }
+  mesh->colors.resize(mesh->positions.size(), 1.0f);
+  return {};
+}
+
 Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, const std::string& where,
                      Mesh* mesh) {
   Primitive primitive;
@@ -188,6 +211,7 @@ Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, co
   KPSA_RETURN_IF_ERROR(ReadTriangles(document, in, where, &primitive));
   KPSA_RETURN_IF_ERROR(ReadInfluences(document, in, where, &primitive, mesh));
   KPSA_RETURN_IF_ERROR(ReadTargets(document, in, where, primitive, mesh));
+  KPSA_RETURN_IF_ERROR(ReadColors(document, in, where, primitive, mesh));
   mesh->primitives.push_back(std::move(primitive));
   return {};
 }

@@ -1,10 +1,6 @@
 #include "io/png.h"
 
-#include <unistd.h>
-
-#include <cstdio>
-#include <filesystem>
-#include <system_error>
+#include "io/file.h"
 
 #define STB_IMAGE_WRITE_IMPLEMENTATION
 #define STB_IMAGE_WRITE_STATIC
@@ -13,7 +9,8 @@
 namespace kpsa {
 namespace {
 
-constexpr int kLargestSide = 32768;  // 3 GiB of pixels: stb counts bytes in int, so the product is checked, too
+constexpr int kLargestSide =
+    32768;  // 3 GiB of pixels: stb counts bytes in int, so the product is checked, too
 
 void AppendBytes(void* context, void* data, int size) {
   auto* bytes = static_cast<std::vector<std::uint8_t>*>(context);
@@ -30,8 +27,8 @@ Result<std::vector<std::uint8_t>> EncodePng(int width, int height, std::span<con
   }
   const std::size_t expected = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3;
   if (rgb.size() != expected) {
-    return Status::Invalid("a picture of {} x {} pixels needs {} bytes, there are {}", width, height, expected,
-                           rgb.size());
+    return Status::Invalid("a picture of {} x {} pixels needs {} bytes, there are {}", width, height,
+                           expected, rgb.size());
   }
   std::vector<std::uint8_t> bytes;
   if (stbi_write_png_to_func(&AppendBytes, &bytes, width, height, 3, rgb.data(), 3 * width) == 0) {
@@ -40,22 +37,11 @@ Result<std::vector<std::uint8_t>> EncodePng(int width, int height, std::span<con
   return bytes;
 }
 
-Status WritePng(const std::string& path, int width, int height, std::span<const std::uint8_t> rgb) {
+Status WritePng(const std::string& path, bool force, int width, int height,
+                std::span<const std::uint8_t> rgb) {
   Result<std::vector<std::uint8_t>> bytes = EncodePng(width, height, rgb);
   if (!bytes.ok()) return bytes.status();
-  const std::string temporary = path + "." + std::to_string(getpid()) + ".tmp";
-  std::FILE* file = std::fopen(temporary.c_str(), "wb");
-  if (file == nullptr) return Status::Invalid("cannot write \"{}\": the folder does not exist or is read-only", path);
-  const bool written = std::fwrite(bytes->data(), 1, bytes->size(), file) == bytes->size();
-  const bool closed = std::fclose(file) == 0;
-  std::error_code error;
-  if (written && closed) {
-    std::filesystem::rename(temporary, path, error);
-    if (!error) return {};
-  }
-  std::error_code ignored;
-  std::filesystem::remove(temporary, ignored);
-  return Status::Invalid("cannot write \"{}\": {}", path, error ? error.message() : "the disk is full");
+  return WriteFileAtomically(path, force, *bytes);
 }
 
 }  // namespace kpsa

@@ -91,7 +91,7 @@ class Reader {
     const std::string where = fmt::format("map \"{}\": ", name);
     if (!in.is_object()) return Fail("{}must be an object", where);
     CheckKeys(in, where, {"default", "indices", "values"});
-    WeightMap map;
+    NamedWeights map;
     map.name = name;
     if (const auto found = in.find("default"); found != in.end()) {
       const std::optional<float> number = Number(*found);
@@ -130,14 +130,14 @@ class Reader {
 
 std::vector<std::string> MapNames(const WeightFile& file) {
   std::vector<std::string> names;
-  for (const WeightMap& map : file.maps) names.push_back(map.name);
+  for (const NamedWeights& map : file.maps) names.push_back(map.name);
   return names;
 }
 
 }  // namespace
 
-const WeightMap* WeightFile::Find(std::string_view name) const {
-  for (const WeightMap& map : maps) {
+const NamedWeights* WeightFile::Find(std::string_view name) const {
+  for (const NamedWeights& map : maps) {
     if (map.name == name) return &map;
   }
   return nullptr;
@@ -184,7 +184,7 @@ Result<std::vector<float>> DenseWeights(const WeightFile& file, const std::strin
                            mesh, points)
         .At({path});
   }
-  const WeightMap* map = file.Find(name);
+  const NamedWeights* map = file.Find(name);
   if (map == nullptr) {
     return Status::Invalid("has no map \"{}\"{}", name, DidYouMean(name, MapNames(file))).At({path});
   }
@@ -210,7 +210,7 @@ Result<std::vector<float>> LoadWeights(const std::string& folder, const std::str
 Status WriteWeightFile(const std::string& path, const WeightFile& file, bool force) {
   json root = {{"kpsa", "weights"}, {"version", 1}, {"mesh", file.mesh}, {"points", file.points}};
   json& maps = root["maps"] = json::object();
-  for (const WeightMap& map : file.maps) {
+  for (const NamedWeights& map : file.maps) {
     maps[map.name] = {{"default", map.default_value}, {"indices", map.indices}, {"values", map.values}};
   }
   const std::string text = root.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";

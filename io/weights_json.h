@@ -13,7 +13,7 @@
 namespace kpsa {
 
 // Point i weighs values[k] where indices[k] == i, else `default_value`.
-struct WeightMap {
+struct NamedWeights {
   std::string name;
   float default_value = 0;
   std::vector<Index> indices;  // below WeightFile::points, each once
@@ -23,8 +23,8 @@ struct WeightMap {
 struct WeightFile {
   std::string mesh;  // the name of the mesh node
   std::size_t points = 0;
-  std::vector<WeightMap> maps;  // in the file's order of names
-  const WeightMap* Find(std::string_view name) const;
+  std::vector<NamedWeights> maps;  // in the file's order of names
+  const NamedWeights* Find(std::string_view name) const;
 };
 
 // Errors (collected, at most 20): no such file, no JSON (with line and column), unknown or repeated keys,

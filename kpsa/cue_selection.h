@@ -50,13 +50,12 @@ CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, double diagonal)
 struct CueSelectionOptions {
   std::size_t count = 40;          // cues at most
   double max_cost = 0;             // stop before the summed marginal cost exceeds it; 0: no limit
-  double min_motion = 1e-4;        // points whose RMS motion is below this share of the largest are left out
   double min_distance = 0;         // points nearer than this to a chosen point of the same kind are left out (coincident ones always)
   int swap_passes = 1;             // each pass offers every cue to be exchanged once
-  std::span<const CueRef> fixed;   // taken first, whatever their gain
+  std::span<const CueRef> fixed = {};   // taken first, whatever their gain, candidates or not
   // Cost of adding a candidate to what is chosen, > 0 (ns, say); empty: 1 each. Called for every candidate in every
   // step from one thread, so it should be a look-up.
-  std::function<double(CueRef candidate, std::span<const CueRef> chosen)> marginal_cost;
+  std::function<double(CueRef candidate, std::span<const CueRef> chosen)> marginal_cost = {};
 };
 
 struct CueSelection {
@@ -67,7 +66,8 @@ struct CueSelection {
   int swaps = 0;
 };
 
-// All points and scalars of the layout that may be cues (scalars that never moved and near-static points left out).
+// All points and scalars of the layout that may be cues, without scalars that never moved and points whose RMS motion is
+// below `min_motion` (1e-4, say) of the largest of their kind.
 std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool outputs, bool stages, bool scalars);
 
 // positions: the rest positions of outputs, then stage points, [N + P] (for distances). Candidates: none twice.

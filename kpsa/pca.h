@@ -25,7 +25,7 @@ struct PcaOptions {
   enum class Method : std::uint8_t { kAuto, kSnapshot, kRandomised } method = Method::kAuto;
   int power_iterations = 2;                // of the randomised method
   std::uint64_t seed = 1;                  // of its random start
-  std::span<const double> point_weights;   // [N] e.g. areas, > 0; empty: 1
+  std::span<const double> point_weights = {};   // [N] e.g. areas, > 0; empty: 1
   double stage_weight = 0;                 // weight of the columns of stage points in the decomposition
   double scalar_weight = 0;                // of the scalars, each first divided by its trained deviation
 };

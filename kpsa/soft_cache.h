@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "base/types.h"
 #include "kpsa/estimator.h"
 
 namespace kpsa {

@@ -7,7 +7,7 @@
 // factors are no smaller than the product, the product is stored (a "direct" tile).
 //
 // Layout: panels of 32c rows; a panel holds its columns one after the other, 32c halfs each (x of 32 points, y, z), so
-// a tile is read front to back, in whole cache lines. Rows of V of all tiles form panels of the same shape. A
+// a tile is read front to back, in whole cache lines. Rows of V of all tiles form panels of 96 rows. A
 // power-of-two scale a column keeps halfs in range and is folded into z = V w exactly.
 //
 // Every value is one chain of fused multiply-adds in the order of the columns: single frames, blocks of frames, all
@@ -52,7 +52,7 @@ struct TileData {
   std::size_t inputs = 0;             // r
   std::vector<std::uint32_t> ranks;   // [tiles] k, 1..r (0 for a tile that never moves)
   std::vector<std::uint8_t> direct;   // [tiles] 1: U is the product itself, z = w
-  AlignedArray<std::uint16_t> v;      // [v panels][r][32c] halfs: rows of V of all tiles that are not direct
+  AlignedArray<std::uint16_t> v;      // [v panels][r][96] halfs: rows of V of all tiles that are not direct
   AlignedArray<std::uint16_t> u;      // [tile][panel][k][32c] halfs
   AlignedArray<float> mean;           // [panels][32c]
   AlignedArray<float> scale;          // [z] a power of two for every entry of z
@@ -97,8 +97,15 @@ class TileMap {
 struct TileOptions {
   double rms_budget = 0;  // expected RMS point error that a tile may add, scene units; > 0
 };
+// What the factors cost in accuracy, under the model's covariance; scene units. Where half precision cannot keep the
+// budget, worst_tile_rms exceeds it.
+struct TileReport {
+  double rms = 0, worst_tile_rms = 0;
+  std::size_t direct_tiles = 0;
+};
 // gain: B W^-1 [cN x r] for whitened measurements; mean [cN] interleaved. Rows of one output.
-TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components, const TileOptions& options);
+TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components, const TileOptions& options,
+                   TileReport* report = nullptr);
 
 // The dense float32 twin: the reference, and the choice where half precision or rank does not pay.
 class DenseMap {

@@ -14,11 +14,14 @@ constexpr double kSmallestDelta = 2e-4;   // cm; expressions leave out less
 constexpr double kSmallestWeight = 1e-3;  // of a weight map
 
 Float3 ToMetres(Double3 p) {
-  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres), static_cast<float>(p.z * kMetres)};
+  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
+          static_cast<float>(p.z * kMetres)};
 }
 
 std::array<std::uint8_t, 4> Color(Double3 linear) {
-  const auto byte = [](double v) { return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5)); };
+  const auto byte = [](double v) {
+    return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5));
+  };
   return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
 }
 
@@ -30,10 +33,13 @@ std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadShape& shape) {
   std::vector<Double3> colors;
   for (const Double3& p : shape.points) {
     const Double3 q = {std::fabs(p.x), p.y, p.z};
-    const double cheek = Bump(Length(q - Double3{4.3, 15.2, 6.6}), 2.8), nose = Bump(Length(q - Double3{0, 14.8, 11.0}), 1.8);
-    const double arch = 20.52 + 0.42 * Bump(q.x - 3.9, 2.6);  // the brow's line
-    const double brow = Bump(q.y - arch, 0.62) * Smooth(0.75, 1.5, q.x) * Smooth(5.6, 4.4, q.x) * Smooth(2, 4, p.z);
-    colors.push_back(mix(mix(kSkin, kFlush, std::max(0.55 * cheek, 0.5 * nose)), kBrow, 0.85 * brow));
+    const double cheek = Bump(Length(q - Double3{4.3, 15.2, 6.6}), 2.8),
+                 nose = Bump(Length(q - Double3{0, 14.8, 11.0}), 1.8);
+    const double arch =
+        20.62 + 0.32 * Bump(q.x - 3.7, 2.4) - 0.25 * Smooth(4.2, 5.6, q.x);  // the brow's line
+    const double brow =
+        Bump(q.y - arch, 0.60) * Smooth(0.7, 1.6, q.x) * Smooth(5.7, 4.0, q.x) * Smooth(2, 4, p.z);
+    colors.push_back(mix(mix(kSkin, kFlush, std::max(0.30 * cheek, 0.35 * nose)), kBrow, 0.9 * brow));
   }
   const auto border = static_cast<std::size_t>(shape.border_ring);
   for (std::size_t ring = border; ring < shape.mouth_rings.size(); ++ring) {
@@ -78,7 +84,8 @@ GlbMesh EyesMesh() {
     std::array<double, kJointCount> weights = {};
     weights[side > 0 ? kEyeL : kEyeR] = 1;
     for (std::size_t i = 0; i < eye.points.size(); ++i) {
-      mesh.positions.push_back(ToMetres(eye.points[i] + Double3{side * kEyeCenter.x, kEyeCenter.y, kEyeCenter.z}));
+      mesh.positions.push_back(
+          ToMetres(eye.points[i] + Double3{side * kEyeCenter.x, kEyeCenter.y, kEyeCenter.z}));
       mesh.colors.push_back(Color(kColors[eye.part[i]]));
       mesh.influences.push_back(MakeInfluences(weights));
     }
@@ -88,45 +95,56 @@ GlbMesh EyesMesh() {
   return mesh;
 }
 
-// The point nearest to `at` and its two neighbours in distance: a short curve, for a handle to be put at.
-std::vector<int> Spot(const HeadShape& shape, Double3 at) {
-  std::vector<int> order(shape.points.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
-  const auto distance = [&](int i) { return Length(shape.points[static_cast<std::size_t>(i)] - at); };
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return distance(a) < distance(b); });
-  order.resize(3);
-  return order;
+// The point nearest to `at`; one on the middle of the face where `at` is.
+int Nearest(const HeadShape& shape, Double3 at) {
+  int best = 0;
+  double least = 1e30;
+  for (std::size_t i = 0; i < shape.points.size(); ++i) {
+    const double distance = Length(shape.points[i] - at);
+    if (distance >= least || (at.x == 0 && shape.points[i].x != 0)) continue;
+    least = distance;
+    best = static_cast<int>(i);
+  }
+  return best;
 }
 
 std::string CurvesYaml(const HeadShape& shape) {
-  const auto list = [](const std::vector<int>& points) { return fmt::format("[{}]", fmt::join(points, ", ")); };
   std::string out =
-      "# Written by generate_scenes: the vertices that face.yaml's wires run along and its handles sit at.\n"
+      "# Written by generate_scenes: the vertices that face.yaml's wires run along and its soft handles sit "
+      "at.\n"
       "kpsa: 1\n"
       "nodes:\n";
-  out += fmt::format("  upperLip: {{type: curve, vertices: {}, parent: head}}\n", list(shape.upper_lip_curve));
-  out += fmt::format("  lowerLip: {{type: curve, vertices: {}, parent: jaw}}\n", list(shape.lower_lip_curve));
-  out += fmt::format("  browL: {{type: curve, vertices: {}, parent: head}}\n", list(shape.brow_curve_left));
-  out += fmt::format("  browR: {{type: curve, vertices: {}, parent: head}}\n", list(shape.brow_curve_right));
-  const auto spot = [&](const char* name, Double3 at, const char* parent) {
-    out += fmt::format("  {}: {{type: curve, vertices: {}, parent: {}}}\n", name, list(Spot(shape, at)), parent);
+  const auto curve = [&](const char* name, const std::vector<int>& points, const char* parent) {
+    out += fmt::format("  {}: {{type: curve, mesh: face_mesh, vertices: [{}], parent: {}}}\n", name,
+                       fmt::join(points, ", "), parent);
   };
-  out += "  # places for handles\n";
-  spot("noseSpot", {0, 14.8, 11.6}, "head");
-  spot("chinSpot", {0, 8.9, 8.8}, "jaw");
-  spot("cheekSpotL", {4.4, 14.6, 6.8}, "head");
-  spot("cheekSpotR", {-4.4, 14.6, 6.8}, "head");
+  curve("upperLip", shape.upper_lip_curve, "head");
+  curve("lowerLip", shape.lower_lip_curve, "jaw");
+  curve("browL", shape.brow_curve_left, "head");
+  curve("browR", shape.brow_curve_right, "head");
+  const auto handle = [&](const char* name, int point, const char* parent) {
+    out += fmt::format("  {}: {{type: transform, parent: {}, at: {{vertex: {}, mesh: face_mesh}}}}\n", name,
+                       parent, point);
+  };
+  const int cheek = Nearest(shape, {4.4, 14.6, 6.8});
+  handle("nose", Nearest(shape, {0, 14.8, 11.6}), "head");
+  handle("chin", Nearest(shape, {0, 8.9, 8.8}), "jaw");
+  handle("cheekL", cheek, "head");
+  handle("cheekR", shape.mirror[static_cast<std::size_t>(cheek)], "head");
   return out;
 }
 
 std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, std::size_t points) {
-  std::string out = fmt::format("{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"face_mesh\", \"points\": {}, \"maps\": {{",
-                                points);
+  std::string out = fmt::format(
+      "{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"face_mesh\", \"points\": {}, \"maps\": {{",
+      points);
   bool first = true;
   for (const auto& [name, values] : maps) {
     // The commonest of 0 and 1 is the default
-    const auto ones = std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
-    const auto zeros = std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
+    const auto ones =
+        std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
+    const auto zeros =
+        std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
     const double usual = ones > zeros ? 1 : 0;
     std::vector<std::string> indices, numbers;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -134,8 +152,8 @@ std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, 
       indices.push_back(fmt::format("{}", i));
       numbers.push_back(fmt::format("{:.4g}", values[i]));
     }
-    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}", first ? "" : ",", name,
-                       usual, fmt::join(indices, ","), fmt::join(numbers, ","));
+    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}",
+                       first ? "" : ",", name, usual, fmt::join(indices, ","), fmt::join(numbers, ","));
     first = false;
   }
   return out + "\n}}\n";

@@ -49,8 +49,8 @@ Status BlendShapeTargets::Validate() const {
   for (std::size_t k = 0; k < targets.size(); ++k) {
     const BlendTarget& target = targets[k];
     if (target.deltas.size() != 3 * target.points.size()) {
-      return Status::Invalid("blend shape target {} has {} points and {} delta numbers, expected 3 a point", k,
-                             target.points.size(), target.deltas.size());
+      return Status::Invalid("blend shape target {} has {} points and {} delta numbers, expected 3 a point",
+                             k, target.points.size(), target.deltas.size());
     }
     if (!IsSortedSet(target.points, point_count)) {
       return Status::Invalid("blend shape target {}: expected ascending points below {}", k, point_count);
@@ -73,21 +73,24 @@ BlendShapeKernel::BlendShapeKernel(const BlendShapeTargets& targets, std::span<c
   std::vector<float> deltas;
   for (const BlendTarget& target : targets.targets) {
     first_tile_.push_back(static_cast<Index>(tiles_.size()));
-    // Walk both sorted lists at once; a short list of outputs searches in the target instead of reading all of it
+    // Walk both sorted lists at once; a short list of outputs searches in the target instead of reading all
+    // of it
     const bool search = out_points.size() * 16 < target.points.size();
     std::size_t at = 0;
     for (std::size_t i = 0; i < count_; ++i) {
       if (search) {
-        at = static_cast<std::size_t>(std::lower_bound(target.points.begin() + static_cast<std::ptrdiff_t>(at),
-                                                       target.points.end(), out_points[i]) -
-                                      target.points.begin());
+        at =
+            static_cast<std::size_t>(std::lower_bound(target.points.begin() + static_cast<std::ptrdiff_t>(at),
+                                                      target.points.end(), out_points[i]) -
+                                     target.points.begin());
       } else {
         while (at < target.points.size() && target.points[at] < out_points[i]) ++at;
       }
       if (at == target.points.size()) break;
       if (target.points[at] != out_points[i]) continue;
       const float w = point_weights.empty() ? 1.0f : point_weights[i];
-      const float delta[3] = {w * target.deltas[3 * at], w * target.deltas[3 * at + 1], w * target.deltas[3 * at + 2]};
+      const float delta[3] = {w * target.deltas[3 * at], w * target.deltas[3 * at + 1],
+                              w * target.deltas[3 * at + 2]};
       if (delta[0] == 0 && delta[1] == 0 && delta[2] == 0) continue;
       const Index first_point = static_cast<Index>(i / kTile * kTile);
       if (tiles_.size() == first_tile_.back() || tiles_.back().first_point != first_point) {
@@ -127,12 +130,14 @@ void BlendShapeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
     const auto add_tiles = HWY_DYNAMIC_DISPATCH(AddTiles);
     for (std::size_t b = first; b < last; ++b) {
       const std::size_t begin = b * kBlock, size = std::min(kBlock, count_ - begin);
-      CopyPoints({in.x + begin, in.y + begin, in.z + begin, size}, {out.x + begin, out.y + begin, out.z + begin, size});
+      CopyPoints({in.x + begin, in.y + begin, in.z + begin, size},
+                 {out.x + begin, out.y + begin, out.z + begin, size});
       for (std::size_t k = 0; k < target_count(); ++k) {
         if (scratch[k] == 0) continue;
         const Index* tile = block_tiles_.data() + k * (blocks + 1) + b;
         if (tile[0] == tile[1]) continue;
-        add_tiles(tiles_.data() + tile[0], deltas_.data() + 3 * kTile * tile[0], tile[1] - tile[0], scratch[k], out);
+        add_tiles(tiles_.data() + tile[0], deltas_.data() + 3 * kTile * tile[0], tile[1] - tile[0],
+                  scratch[k], out);
       }
     }
   });

@@ -19,7 +19,8 @@ struct BlendTarget {
 struct BlendShapeTargets {
   std::size_t point_count = 0;
   std::span<const BlendTarget> targets;
-  // Names the first bad target: lengths that differ, points not ascending or out of range, a delta not finite.
+  // Names the first bad target: lengths that differ, points not ascending or out of range, a delta not
+  // finite.
   Status Validate() const;
 };
 
@@ -45,16 +46,16 @@ class BlendShapeKernel {
   static constexpr std::size_t kTile = 16;    // points of a tile of deltas
   static constexpr std::size_t kBlock = 512;  // points that are worked on together, target after target
   struct Tile {
-    Index first_point;     // multiple of kTile
-    std::uint32_t lanes;   // bit i: point first_point + i has a delta
+    Index first_point;    // multiple of kTile
+    std::uint32_t lanes;  // bit i: point first_point + i has a delta
   };
 
  private:
   std::size_t count_ = 0;
-  std::vector<Tile> tiles_;           // target by target, ascending
-  std::vector<Index> first_tile_;     // of each target, and the end
-  std::vector<Index> block_tiles_;    // [target][block + 1]: first tile at or after the block
-  AlignedFloats deltas_;              // per tile: 16 x, 16 y, 16 z
+  std::vector<Tile> tiles_;         // target by target, ascending
+  std::vector<Index> first_tile_;   // of each target, and the end
+  std::vector<Index> block_tiles_;  // [target][block + 1]: first tile at or after the block
+  AlignedFloats deltas_;            // per tile: 16 x, 16 y, 16 z
 };
 
 }  // namespace kpsa

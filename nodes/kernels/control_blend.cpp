@@ -17,7 +17,8 @@ HWY_INLINE void Blend(const Index* points, const Index* controls, const float* w
   if constexpr (kWidth != 0) width = kWidth;
   for (std::size_t i = 0; i < count; ++i, controls += width, weights += width) {
     F4 sum = Mul4(Splat4(weights[0]), Load4(offsets + 4 * controls[0]));
-    for (std::size_t c = 1; c < width; ++c) sum = Fma4(Splat4(weights[c]), Load4(offsets + 4 * controls[c]), sum);
+    for (std::size_t c = 1; c < width; ++c)
+      sum = Fma4(Splat4(weights[c]), Load4(offsets + 4 * controls[c]), sum);
     HWY_ALIGN float xyzw[4];
     Store4(sum, xyzw);
     const Index p = points[i];
@@ -30,10 +31,14 @@ HWY_INLINE void Blend(const Index* points, const Index* controls, const float* w
 void BlendControls(const Index* points, const Index* controls, const float* weights, std::size_t width,
                    std::size_t count, const float* offsets, PointsView out) {
   switch (width) {
-    case 2: return Blend<2>(points, controls, weights, width, count, offsets, out);
-    case 4: return Blend<4>(points, controls, weights, width, count, offsets, out);
-    case 8: return Blend<8>(points, controls, weights, width, count, offsets, out);
-    default: return Blend<0>(points, controls, weights, width, count, offsets, out);
+    case 2:
+      return Blend<2>(points, controls, weights, width, count, offsets, out);
+    case 4:
+      return Blend<4>(points, controls, weights, width, count, offsets, out);
+    case 8:
+      return Blend<8>(points, controls, weights, width, count, offsets, out);
+    default:
+      return Blend<0>(points, controls, weights, width, count, offsets, out);
   }
 }
 
@@ -62,8 +67,9 @@ ControlBlend::ControlBlend(std::size_t width, std::span<const Index> controls, s
 
 void ControlBlend::Run(const float* offsets, PointsView points, const Parallel* parallel) const noexcept {
   ForRanges(parallel, points_.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(BlendControls)(points_.data() + begin, controls_.data() + begin * width_,
-                                        weights_.data() + begin * width_, width_, end - begin, offsets, points);
+    HWY_DYNAMIC_DISPATCH(BlendControls)
+    (points_.data() + begin, controls_.data() + begin * width_, weights_.data() + begin * width_, width_,
+     end - begin, offsets, points);
   });
 }
 

@@ -17,8 +17,8 @@ class ControlBlend {
   ControlBlend(std::size_t width, std::span<const Index> controls, std::span<const float> weights);
 
   std::size_t affected_points() const { return points_.size(); }
-  // Adds to `points` in place, which has the bound count. offsets: x y z 0 of every control, 16-byte aligned, the
-  // envelope multiplied in.
+  // Adds to `points` in place, which has the bound count. offsets: x y z 0 of every control, 16-byte aligned,
+  // the envelope multiplied in.
   void Run(const float* offsets, PointsView points, const Parallel* parallel) const noexcept;
 
  private:

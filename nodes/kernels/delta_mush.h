@@ -1,10 +1,11 @@
-// Delta mush (Mancewicz, Derksen, Rijpkema and Wilson, DigiPro 2014): smooth the points, then give back the detail
-// that the rest shape loses to the same smoothing, turned with a local frame.
+// Delta mush (Mancewicz, Derksen, Rijpkema and Wilson, DigiPro 2014): smooth the points, then give back the
+// detail that the rest shape loses to the same smoothing, turned with a local frame.
 //
 // Smoothing: s' = s + step sum_j w_j (s_j - s), j over the neighbours in ascending order, `iterations` times.
-// Frame: the least-squares tangents of the ring around a point, t = sum_j a_j (s_j - s), b = sum_j b_j (s_j - s)
-// with a, b fixed at rest; n = t x b; orthonormalised (t kept). Detail: the rest point minus its smoothed place, in the
-// frame there. At rest the result is the rest shape up to rounding; with 0 iterations the kernel copies.
+// Frame: the least-squares tangents of the ring around a point, t = sum_j a_j (s_j - s), b = sum_j b_j (s_j -
+// s) with a, b fixed at rest; n = t x b; orthonormalised (t kept). Detail: the rest point minus its smoothed
+// place, in the frame there. At rest the result is the rest shape up to rounding; with 0 iterations the
+// kernel copies.
 #pragma once
 
 #include <span>
@@ -25,18 +26,20 @@ struct DeltaMushSettings {
   Status Validate() const;
 };
 
-// The input points that these output points need, sorted: iterations + 1 rings, not continued through points that
-// do not smooth (pinned, or with fewer than two neighbours); a point of weight 0 needs itself only.
+// The input points that these output points need, sorted: iterations + 1 rings, not continued through points
+// that do not smooth (pinned, or with fewer than two neighbours); a point of weight 0 needs itself only.
 std::vector<Index> DeltaMushDemand(const Topology& topology, const DeltaMushSettings& settings,
-                                   std::span<const Index> out_points, std::span<const float> point_weights = {});
+                                   std::span<const Index> out_points,
+                                   std::span<const float> point_weights = {});
 
-// A ring kernel: `in` holds the points in_points (sorted, a superset of the demand), `out` the out_points. In place
-// only where in_points and out_points are the same.
+// A ring kernel: `in` holds the points in_points (sorted, a superset of the demand), `out` the out_points. In
+// place only where in_points and out_points are the same.
 class DeltaMushKernel {
  public:
   struct Inputs {
     double envelope = 1;
     double displacement = 1;  // scale of the detail that comes back; 0: only smoothed
+    Double3 pivot;  // a place near the points, the same for all bindings; only precision depends on it
   };
 
   // rest: points of the whole mesh. settings must be valid. Cost: that of one Run, and of the demand.
@@ -46,7 +49,7 @@ class DeltaMushKernel {
 
   std::size_t point_count() const { return count_; }
   std::size_t input_count() const { return in_count_; }
-  std::size_t ScratchFloats() const { return 8 * PaddedCount(local_count_); }
+  std::size_t ScratchFloats() const { return 2 * BufferFloats(); }
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
   // Point evaluations of one Run, all iterations together; the price of a binding.
@@ -59,31 +62,37 @@ class DeltaMushKernel {
     Index count;
     Index first_point, first_neighbor;  // in order_ and neighbors_
   };
+  // Floats of one of the two buffers. They lie 3 KiB apart modulo 4 KiB: stores to one would otherwise hold
+  // up loads from the other whose addresses look alike.
+  std::size_t BufferFloats() const { return (4 * local_count_ + 1023) / 1024 * 1024 + 768; }
   void BuildRows(const Topology& topology, ConstPointsView rest, const DeltaMushSettings& settings,
                  std::span<const Index> local, std::span<const int> level, std::span<const Index> local_of);
   void BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
                    std::span<const Index> local_of);
   // Packs `in` and smooths it; the smoothed points, xyzw by local number.
-  const float* Smooth(ConstPointsView in, std::span<float> scratch, const Parallel* parallel) const noexcept;
+  const float* Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
+                      const Parallel* parallel) const noexcept;
 
   std::size_t count_ = 0, in_count_ = 0, local_count_ = 0;
   int iterations_ = 0;
-  // Local numbers: the smoothed part of the demand sorted by (level, mesh index); level = the number of iterations
-  // from the end at which a point is last read, so that what an iteration computes is a prefix.
+  // Local numbers: the smoothed part of the demand sorted by (level, mesh index); level = the number of
+  // iterations from the end at which a point is last read, so that what an iteration computes is a prefix.
   std::vector<Index> source_;        // local -> entry of `in`; empty if the same
   std::vector<Index> out_in_;        // output -> entry of `in`; empty if the same
   std::vector<Index> blocks_;        // first group of each block, and the end
   std::vector<Index> block_counts_;  // [iteration]: blocks that it computes
   std::vector<Group> groups_;
-  std::vector<Index> order_;         // 4 * local number, in the order of groups_
-  std::vector<Index> neighbors_;     // 4 * local number, rows in the order of order_
+  std::vector<Index> order_;             // 4 * local number, in the order of groups_
+  std::vector<Index> neighbors_;         // 4 * local number, rows in the order of order_
   std::vector<float> neighbor_weights_;  // beside neighbors_; empty if all alike
-  std::vector<float> steps_;         // beside order_: step, or step / neighbours
-  std::vector<Index> out_local_;     // output -> 4 * local number
-  std::vector<Index> frame_offsets_, frame_neighbors_;  // per output; empty rows where the detail is 0
-  std::vector<float> frame_weights_;  // a, b of each frame neighbour
-  AlignedFloats detail_;              // 3 rows, padded
-  AlignedFloats masks_;               // point weights, padded; empty if all 1
+  std::vector<float> steps_;             // beside order_: step, or step / neighbours
+  std::vector<std::uint8_t>
+      lanes_;  // outputs in blocks of 64, sorted by their number of neighbours: place in block
+  std::vector<Index> out_local_;                        // beside lanes_: 4 * local number
+  std::vector<Index> frame_offsets_, frame_neighbors_;  // beside lanes_; empty rows where the detail is 0
+  std::vector<float> frame_weights_;                    // a, b of each frame neighbour
+  AlignedFloats detail_;                                // 3 rows, padded
+  AlignedFloats masks_;                                 // point weights, padded; empty if all 1
 };
 
 }  // namespace kpsa

@@ -12,7 +12,8 @@ Status FalloffProfile::Validate() const {
       return Status::Invalid("key {} of a falloff ramp is not a finite number", i);
     }
     if (i > 0 && keys[i].position < keys[i - 1].position) {
-      return Status::Invalid("key {} of a falloff ramp lies before the key in front of it, expected ascending positions", i);
+      return Status::Invalid(
+          "key {} of a falloff ramp lies before the key in front of it, expected ascending positions", i);
     }
   }
   return {};
@@ -21,11 +22,16 @@ Status FalloffProfile::Validate() const {
 double FalloffProfile::Evaluate(double t) const {
   if (t > 1 || (t == 1 && curve != FalloffCurve::kNone)) return 0;
   switch (curve) {
-    case FalloffCurve::kNone: return 1;
-    case FalloffCurve::kLinear: return 1 - t;
-    case FalloffCurve::kSmooth: return 1 - t * t * (3 - 2 * t);
-    case FalloffCurve::kSpline: return (1 - t * t) * (1 - t * t);
-    case FalloffCurve::kRamp: break;
+    case FalloffCurve::kNone:
+      return 1;
+    case FalloffCurve::kLinear:
+      return 1 - t;
+    case FalloffCurve::kSmooth:
+      return 1 - t * t * (3 - 2 * t);
+    case FalloffCurve::kSpline:
+      return (1 - t * t) * (1 - t * t);
+    case FalloffCurve::kRamp:
+      break;
   }
   if (t <= keys.front().position) return keys.front().value;
   for (std::size_t i = 1; i < keys.size(); ++i) {

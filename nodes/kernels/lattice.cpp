@@ -71,7 +71,8 @@ namespace kpsa {
 HWY_EXPORT(BlendTiles);
 
 namespace {
-constexpr double kRim = 1e-6;  // a point this far outside counts as inside: lattices are fitted to bounding boxes
+constexpr double kRim =
+    1e-6;  // a point this far outside counts as inside: lattices are fitted to bounding boxes
 constexpr std::size_t kDenseControls = 13;  // measured: a stored control costs as much as 13 of the dense sum
 }  // namespace
 
@@ -79,8 +80,8 @@ Status LatticeSettings::Validate() const {
   for (int axis = 0; axis < 3; ++axis) {
     const std::size_t a = static_cast<std::size_t>(axis);
     if (divisions[a] < 2 || divisions[a] > 32) {
-      return Status::Invalid("a lattice of {} x {} x {} divisions, expected 2 to 32 along each axis", divisions[0],
-                             divisions[1], divisions[2]);
+      return Status::Invalid("a lattice of {} x {} x {} divisions, expected 2 to 32 along each axis",
+                             divisions[0], divisions[1], divisions[2]);
     }
     if (local && (influence[a] < 2 || influence[a] > 32)) {
       return Status::Invalid("a lattice's local influence of {} {} {}, expected 2 to 32 each", influence[0],
@@ -122,12 +123,14 @@ std::vector<double> LatticeBasis(int divisions, int order, double x) {
     }
     b[static_cast<std::size_t>(k)] = carried;
   }
-  for (int i = 0; i <= degree; ++i) w[static_cast<std::size_t>(span - degree + i)] = b[static_cast<std::size_t>(i)];
+  for (int i = 0; i <= degree; ++i)
+    w[static_cast<std::size_t>(span - degree + i)] = b[static_cast<std::size_t>(i)];
   return w;
 }
 
-LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView rest, const Matrix4& lattice_from_rest,
-                             std::span<const Index> out_points, std::span<const float> point_weights)
+LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView rest,
+                             const Matrix4& lattice_from_rest, std::span<const Index> out_points,
+                             std::span<const float> point_weights)
     : count_(out_points.size()), weights_(PaddedWeights(point_weights, out_points.size())) {
   KPSA_CHECK(IsSortedSet(out_points, rest.count));
   std::array<int, 3> order = {0, 0, 0};
@@ -146,7 +149,8 @@ LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView re
   const std::size_t row_count = divisions_[0] + divisions_[1] + divisions_[2];
   for (std::size_t i = 0; i < count_; ++i) {
     const Index p = out_points[i];
-    const Double3 q = TransformPoint(lattice_from_rest, {rest.x[p], rest.y[p], rest.z[p]}) + Double3{0.5, 0.5, 0.5};
+    const Double3 q =
+        TransformPoint(lattice_from_rest, {rest.x[p], rest.y[p], rest.z[p]}) + Double3{0.5, 0.5, 0.5};
     Double3 nearest = q;
     for (int a = 0; a < 3; ++a) nearest[a] = std::clamp(q[a], 0.0, 1.0);
     const double distance = Length(q - nearest);
@@ -160,8 +164,8 @@ LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView re
     std::array<std::vector<double>, 3> basis;
     if (sparse_ || weight != 0) {
       for (int a = 0; a < 3; ++a) {
-        basis[static_cast<std::size_t>(a)] =
-            LatticeBasis(settings.divisions[static_cast<std::size_t>(a)], order[static_cast<std::size_t>(a)], nearest[a]);
+        basis[static_cast<std::size_t>(a)] = LatticeBasis(settings.divisions[static_cast<std::size_t>(a)],
+                                                          order[static_cast<std::size_t>(a)], nearest[a]);
       }
     }
     if (sparse_) {
@@ -238,8 +242,9 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   }
   const std::size_t row_count = divisions_[0] + divisions_[1] + divisions_[2];
   ForRanges(parallel, tiles_.size(), 32, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(BlendTiles)(tiles_.data() + begin, axis_weights_.data() + begin * 16 * row_count, end - begin,
-                                     divisions_[0], divisions_[1], divisions_[2], scratch.data(), weights_.data(), out);
+    HWY_DYNAMIC_DISPATCH(BlendTiles)
+    (tiles_.data() + begin, axis_weights_.data() + begin * 16 * row_count, end - begin, divisions_[0],
+     divisions_[1], divisions_[2], scratch.data(), weights_.data(), out);
   });
 }
 

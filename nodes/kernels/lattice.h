@@ -1,10 +1,11 @@
 // Free-form deformation (Sederberg and Parry 1986; Maya's ffd): points follow a grid of control points.
 //
-// Lattice space: the undeformed lattice is the cube [-0.5, 0.5]^3, its controls on a regular grid; control (s, t, u)
-// has index s + ds (t + dt u). With q the incoming point in the space of the lattice base,
+// Lattice space: the undeformed lattice is the cube [-0.5, 0.5]^3, its controls on a regular grid; control
+// (s, t, u) has index s + ds (t + dt u). With q the incoming point in the space of the lattice base,
 //     q' = q + sum_c w_c offset_c,   p' = p + w (matrix q' - p),   q = base_matrix^-1 p.
-// The weights w_c come from the REST points, so the kernel is linear and local: an incoming point's detail is kept,
-// and a lattice that moves as a whole moves its points rigidly. Where matrix == base_matrix, only offsets count.
+// The weights w_c come from the REST points, so the kernel is linear and local: an incoming point's detail is
+// kept, and a lattice that moves as a whole moves its points rigidly. Where matrix == base_matrix, only
+// offsets count.
 #pragma once
 
 #include <array>
@@ -36,7 +37,8 @@ struct LatticeSettings {
   Status Validate() const;
 };
 
-// Weights of the controls along one axis at coordinate x in [0, 1] (clamped); they sum to 1. order 0: Bernstein.
+// Weights of the controls along one axis at coordinate x in [0, 1] (clamped); they sum to 1. order 0:
+// Bernstein.
 std::vector<double> LatticeBasis(int divisions, int order, double x);
 
 // A local kernel.
@@ -63,11 +65,11 @@ class LatticeKernel {
  private:
   std::size_t count_ = 0, controls_ = 0;
   std::array<std::size_t, 3> divisions_ = {};
-  AlignedFloats weights_;        // per point: point weight x outside falloff
-  bool sparse_ = false;          // linear and large: 8 controls a point; otherwise all, axis by axis
-  ControlBlend blend_;           // of sparse_
-  std::vector<Index> tiles_;     // of dense: first points of the tiles of 16 that have a weight
-  AlignedFloats axis_weights_;   // of dense: per tile (ds + dt + du) rows of 16
+  AlignedFloats weights_;       // per point: point weight x outside falloff
+  bool sparse_ = false;         // linear and large: 8 controls a point; otherwise all, axis by axis
+  ControlBlend blend_;          // of sparse_
+  std::vector<Index> tiles_;    // of dense: first points of the tiles of 16 that have a weight
+  AlignedFloats axis_weights_;  // of dense: per tile (ds + dt + du) rows of 16
 };
 
 }  // namespace kpsa

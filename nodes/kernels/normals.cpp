@@ -10,6 +10,16 @@
 #include "hwy/foreach_target.h"
 #include "nodes/kernels/xyzw-inl.h"
 
+#ifndef KPSA_NODES_KERNELS_NORMALS_BLOCK_
+#define KPSA_NODES_KERNELS_NORMALS_BLOCK_
+namespace kpsa {
+// Points between two passes: the gathering stores of a block have left the store buffer before
+// the wider loads read them.
+inline constexpr std::size_t kNormalsBlock = 64;
+inline constexpr std::size_t kNormalsGrain = 512;  // points between two lots of triangles
+}  // namespace kpsa
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace kpsa {
 namespace HWY_NAMESPACE {
@@ -19,55 +29,37 @@ void PackPoints(ConstPointsView in, std::size_t begin, std::size_t end, float* x
 }
 
 // (b - a) x (c - a) of the triangles [begin, end), xyzw.
-void CrossTriangles(const Index* triangles, std::size_t begin, std::size_t end, const float* points, float* crosses) {
-  const DLanes d;
-  const std::size_t lanes = hn::Lanes(d);
-  alignas(64) float corner[3][64];
-  for (std::size_t i = begin; i < end; i += lanes) {
-    const std::size_t size = HWY_MIN(lanes, end - i);
-    for (std::size_t k = 0; k < size; ++k) {
-      for (std::size_t c = 0; c < 3; ++c) Store4(Load4(points + 4 * triangles[3 * (i + k) + c]), corner[c] + 4 * k);
-    }
-    for (std::size_t k = size; k < lanes; ++k) {
-      for (std::size_t c = 0; c < 3; ++c) Store4(Zero4(), corner[c] + 4 * k);
-    }
-    VLanes ax, ay, az, bx, by, bz, cx, cy, cz, spare;
-    hn::LoadInterleaved4(d, corner[0], ax, ay, az, spare);
-    hn::LoadInterleaved4(d, corner[1], bx, by, bz, spare);
-    hn::LoadInterleaved4(d, corner[2], cx, cy, cz, spare);
-    bx = hn::Sub(bx, ax), by = hn::Sub(by, ay), bz = hn::Sub(bz, az);
-    cx = hn::Sub(cx, ax), cy = hn::Sub(cy, ay), cz = hn::Sub(cz, az);
-    const VLanes nx = Fma(by, cz, hn::Neg(hn::Mul(bz, cy)));
-    const VLanes ny = Fma(bz, cx, hn::Neg(hn::Mul(bx, cz)));
-    const VLanes nz = Fma(bx, cy, hn::Neg(hn::Mul(by, cx)));
-    alignas(64) float cross[64];
-    hn::StoreInterleaved4(nx, ny, nz, hn::Zero(d), d, cross);
-    for (std::size_t k = 0; k < size; ++k) Store4(Load4(cross + 4 * k), crosses + 4 * (i + k));
+void CrossTriangles(const Index* triangles, std::size_t begin, std::size_t end, const float* points,
+                    float* HWY_RESTRICT crosses) {
+  for (std::size_t t = begin; t < end; ++t) {
+    const Index* corner = triangles + 3 * t;
+    const F4 a = Load4(points + corner[0]);
+    Store4(Cross4(Sub4(Load4(points + corner[1]), a), Sub4(Load4(points + corner[2]), a)), crosses + 4 * t);
   }
 }
 
-void SumNormals(const Index* offsets, const Index* around, std::size_t begin, std::size_t end, const float* crosses,
-                PointsView normals) {
+void SumNormals(const std::uint8_t* lanes, const Index* offsets, const Index* around, std::size_t begin,
+                std::size_t end, const float* crosses, PointsView normals) {
   const DLanes d;
-  const std::size_t lanes = hn::Lanes(d);
-  alignas(64) float sums[64];
-  for (std::size_t i = begin; i < end; i += lanes) {
-    const std::size_t size = HWY_MIN(lanes, end - i);
-    for (std::size_t k = 0; k < lanes; ++k) {
+  alignas(64) float sums[4 * kNormalsBlock] = {};
+  for (std::size_t block = begin; block < end; block += kNormalsBlock) {
+    const std::size_t size = HWY_MIN(kNormalsBlock, end - block);
+    for (std::size_t k = 0; k < size; ++k) {
       F4 sum = Zero4();
-      if (k < size) {
-        for (Index e = offsets[i + k]; e < offsets[i + k + 1]; ++e) sum = Add4(sum, Load4(crosses + 4 * around[e]));
-      }
-      Store4(sum, sums + 4 * k);
+      const Index last = offsets[block + k + 1];
+      for (Index e = offsets[block + k]; e < last; ++e) sum = Add4(sum, Load4(crosses + around[e]));
+      Store4(sum, sums + 4 * lanes[block + k]);
     }
-    VLanes x, y, z, spare;
-    hn::LoadInterleaved4(d, sums, x, y, z, spare);
-    const VLanes square = Fma(x, x, Fma(y, y, hn::Mul(z, z)));
-    const auto some = hn::Gt(square, hn::Zero(d));
-    const VLanes scale = hn::IfThenElseZero(some, hn::Div(hn::Set(d, 1.0f), hn::Sqrt(square)));
-    hn::Store(hn::Mul(x, scale), d, normals.x + i);
-    hn::Store(hn::Mul(y, scale), d, normals.y + i);
-    hn::Store(hn::Mul(z, scale), d, normals.z + i);
+    for (std::size_t k = 0; k < size; k += hn::Lanes(d)) {
+      VLanes x, y, z, spare;
+      hn::LoadInterleaved4(d, sums + 4 * k, x, y, z, spare);
+      const VLanes square = Fma(x, x, Fma(y, y, hn::Mul(z, z)));
+      const auto none = hn::Eq(square, hn::Zero(d));
+      const VLanes scale = hn::IfThenZeroElse(none, hn::Div(hn::Set(d, 1.0f), hn::Sqrt(square)));
+      hn::Store(hn::Mul(x, scale), d, normals.x + block + k);
+      hn::Store(hn::Mul(y, scale), d, normals.y + block + k);
+      hn::Store(hn::Mul(z, scale), d, normals.z + block + k);
+    }
   }
 }
 
@@ -112,21 +104,41 @@ NormalsKernel::NormalsKernel(const Topology& topology, std::span<const Index> ou
     : count_(out_points.size()), in_count_(in_points.size()) {
   KPSA_CHECK(IsSortedSet(out_points, topology.point_count()));
   KPSA_CHECK(IsSortedSet(in_points, topology.point_count()));
+  constexpr std::size_t kLimit = std::size_t{1} << 29;  // indices are stored times 4
+  KPSA_CHECK(topology.point_count() < kLimit && topology.triangle_count() < kLimit);
   const std::vector<Index> needed = TrianglesAround(topology, out_points);
   for (Index t : needed) {
     for (std::size_t c = 0; c < 3; ++c) {
       const Index p = topology.triangles()[3 * t + c];
       const auto at = std::lower_bound(in_points.begin(), in_points.end(), p);
       KPSA_CHECK(at != in_points.end() && *at == p);
-      triangles_.push_back(static_cast<Index>(at - in_points.begin()));
+      triangles_.push_back(static_cast<Index>(4 * (at - in_points.begin())));
     }
   }
+  const auto triangles_of = [&](std::size_t i) { return topology.point_triangles().row(out_points[i]); };
+  for (std::size_t i = 0; i < count_; ++i) lanes_.push_back(static_cast<std::uint8_t>(i % kNormalsBlock));
+  for (std::size_t begin = 0; begin < count_; begin += kNormalsBlock) {
+    const auto first = lanes_.begin() + static_cast<std::ptrdiff_t>(begin);
+    std::stable_sort(first, first + static_cast<std::ptrdiff_t>(std::min(kNormalsBlock, count_ - begin)),
+                     [&](std::uint8_t a, std::uint8_t b) {
+                       return triangles_of(begin + a).size() < triangles_of(begin + b).size();
+                     });
+  }
   offsets_.push_back(0);
-  for (Index p : out_points) {
-    for (Index t : topology.point_triangles().row(p)) {
-      around_.push_back(static_cast<Index>(std::lower_bound(needed.begin(), needed.end(), t) - needed.begin()));
+  for (std::size_t k = 0; k < count_; ++k) {
+    for (Index t : triangles_of(k / kNormalsBlock * kNormalsBlock + lanes_[k])) {
+      const auto at = std::lower_bound(needed.begin(), needed.end(), t);
+      around_.push_back(static_cast<Index>(4 * (at - needed.begin())));
     }
     offsets_.push_back(static_cast<Index>(around_.size()));
+  }
+  std::size_t ready = 0;
+  for (std::size_t begin = 0; begin < count_; begin += kNormalsGrain) {
+    const std::size_t end = std::min(begin + kNormalsGrain, count_);
+    for (Index e = offsets_[begin]; e < offsets_[end]; ++e) {
+      ready = std::max<std::size_t>(ready, around_[e] / 4 + 1);
+    }
+    ready_.push_back(static_cast<Index>(ready));
   }
 }
 
@@ -139,12 +151,23 @@ void NormalsKernel::Run(ConstPointsView in, PointsView normals, std::span<float>
   ForRanges(parallel, in_count_, 8192, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(PackPoints)(in, begin, end, points);
   });
-  ForRanges(parallel, triangles_.size() / 3, 2048, [&](std::size_t begin, std::size_t end) {
+  const auto cross = [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(CrossTriangles)(triangles_.data(), begin, end, points, crosses);
-  });
-  ForRanges(parallel, count_, 2048, [&](std::size_t begin, std::size_t end) {
-    HWY_DYNAMIC_DISPATCH(SumNormals)(offsets_.data(), around_.data(), begin, end, crosses, normals);
-  });
+  };
+  const auto sum = [&](std::size_t begin, std::size_t end) {
+    HWY_DYNAMIC_DISPATCH(SumNormals)
+    (lanes_.data(), offsets_.data(), around_.data(), begin, end, crosses, normals);
+  };
+  if (parallel == nullptr) {  // triangles just before the points that need them: they are still in the cache
+    for (std::size_t done = 0, begin = 0; begin < count_; begin += kNormalsGrain) {
+      const std::size_t ready = ready_[begin / kNormalsGrain];
+      if (ready > done) cross(done, ready), done = ready;
+      sum(begin, std::min(begin + kNormalsGrain, count_));
+    }
+    return;
+  }
+  ForRanges(parallel, triangles_.size() / 3, 2048, cross);
+  ForRanges(parallel, count_, 2048, sum);
 }
 
 }  // namespace kpsa

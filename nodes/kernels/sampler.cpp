@@ -62,14 +62,14 @@ Status SamplerKeys::Validate() const {
   // Divide rather than multiply: the product may overflow
   if (values.size() % components != 0 || values.size() / components % rows != 0 ||
       values.size() / components / rows != times.size()) {
-    return Status::Invalid("an animation sampler of {} keys and {} numbers, expected {} numbers a key", times.size(),
-                           values.size(), rows * components);
+    return Status::Invalid("an animation sampler of {} keys and {} numbers, expected {} numbers a key",
+                           times.size(), values.size(), rows * components);
   }
   for (std::size_t i = 0; i < times.size(); ++i) {
     if (!std::isfinite(times[i])) return Status::Invalid("the time of key {} is not a finite number", i);
     if (i > 0 && !(times[i] > times[i - 1])) {
-      return Status::Invalid("the time of key {} ({} s) does not come after that of key {} ({} s)", i, times[i], i - 1,
-                             times[i - 1]);
+      return Status::Invalid("the time of key {} ({} s) does not come after that of key {} ({} s)", i,
+                             times[i], i - 1, times[i - 1]);
     }
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -93,7 +93,8 @@ Quaternion SampleRotation(const SamplerKeys& keys, double seconds) {
   if (keys.interpolation == Interpolation::kLinear) {
     return Slerp(KeyRotation(keys, span.a), KeyRotation(keys, span.a + 1), span.t);
   }
-  return Normalized({Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
+  return Normalized(
+      {Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
 }
 
 void SampleScalars(const SamplerKeys& keys, double seconds, std::span<double> out) {

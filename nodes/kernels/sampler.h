@@ -18,13 +18,15 @@ struct SamplerKeys {
   std::span<const float> values;
   std::size_t components = 3;
   Interpolation interpolation = Interpolation::kLinear;
-  // Names: no keys, times that do not ascend or are not finite, a number of values that does not fit, values not finite.
+  // Names: no keys, times that do not ascend or are not finite, a number of values that does not fit, values
+  // not finite.
   Status Validate() const;
 };
 
 // All of them want valid keys. Safe from any thread.
-Double3 SampleVec3(const SamplerKeys& keys, double seconds);             // components == 3
-Quaternion SampleRotation(const SamplerKeys& keys, double seconds);      // components == 4; unit length
-void SampleScalars(const SamplerKeys& keys, double seconds, std::span<double> out);  // out.size() == components
+Double3 SampleVec3(const SamplerKeys& keys, double seconds);         // components == 3
+Quaternion SampleRotation(const SamplerKeys& keys, double seconds);  // components == 4; unit length
+void SampleScalars(const SamplerKeys& keys, double seconds,
+                   std::span<double> out);  // out.size() == components
 
 }  // namespace kpsa

@@ -54,7 +54,8 @@ HWY_INLINE void MulColumns(const float* matrix, float weight, M16* m) {
 HWY_INLINE void AddColumns(const float* matrix, float weight, M16* m) {
   const DLanes d;
   const VLanes w = hn::Set(d, weight);
-  for (std::size_t k = 0; k < kParts; ++k) m->part[k] = Fma(w, hn::Load(d, matrix + k * hn::Lanes(d)), m->part[k]);
+  for (std::size_t k = 0; k < kParts; ++k)
+    m->part[k] = Fma(w, hn::Load(d, matrix + k * hn::Lanes(d)), m->part[k]);
 }
 
 // (c0 x + c2 z) + (c1 y + c3) on every target. p: x y z 1.
@@ -71,7 +72,8 @@ HWY_INLINE F4 Transform(const M16& m, const float* p) {
 #elif HWY_MAX_BYTES == 32
 HWY_INLINE F4 Transform(const M16& m, const float* p) {
   const DLanes d;
-  HWY_ALIGN static constexpr std::int32_t kXy[8] = {0, 0, 0, 0, 1, 1, 1, 1}, kZw[8] = {2, 2, 2, 2, 3, 3, 3, 3};
+  HWY_ALIGN static constexpr std::int32_t kXy[8] = {0, 0, 0, 0, 1, 1, 1, 1},
+                                          kZw[8] = {2, 2, 2, 2, 3, 3, 3, 3};
   const VLanes point = hn::LoadDup128(d, p);
   const VLanes xy = hn::TableLookupLanes(point, hn::SetTableIndices(d, kXy));
   const VLanes zw = hn::TableLookupLanes(point, hn::SetTableIndices(d, kZw));
@@ -126,11 +128,33 @@ void SkinBlockLanes(const SkinRun& run, const SkinBlock& block, ConstPointsView 
       case 0:
         for (std::size_t i = 0; i < size; ++i) Store4(Zero4(), result + 4 * lanes[i]);
         break;
-      case 1: SkinGroup<1>(run.palette, n, size, lanes, joints, weights, points, result); break;
-      case 2: SkinGroup<2>(run.palette, n, size, lanes, joints, weights, points, result); break;
-      case 3: SkinGroup<3>(run.palette, n, size, lanes, joints, weights, points, result); break;
-      case 4: SkinGroup<4>(run.palette, n, size, lanes, joints, weights, points, result); break;
-      default: SkinGroup<0>(run.palette, n, size, lanes, joints, weights, points, result); break;
+      case 1:
+        SkinGroup<1>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      case 2:
+        SkinGroup<2>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      case 3:
+        SkinGroup<3>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      case 4:
+        SkinGroup<4>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      case 5:
+        SkinGroup<5>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      case 6:
+        SkinGroup<6>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      case 7:
+        SkinGroup<7>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      case 8:
+        SkinGroup<8>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
+      default:
+        SkinGroup<0>(run.palette, n, size, lanes, joints, weights, points, result);
+        break;
     }
     lanes += size;
     joints += n * size;
@@ -182,7 +206,8 @@ namespace kpsa {
 HWY_EXPORT(SkinBlockLanes);
 
 Status SkinWeights::Validate() const {
-  if (offsets.empty() || offsets.front() != 0 || offsets.back() != joints.size() || joints.size() != weights.size()) {
+  if (offsets.empty() || offsets.front() != 0 || offsets.back() != joints.size() ||
+      joints.size() != weights.size()) {
     return Status::Invalid("skin weights: the rows do not cover the {} joints and {} weights", joints.size(),
                            weights.size());
   }
@@ -197,8 +222,8 @@ Status SkinWeights::Validate() const {
     }
     for (Index i = offsets[p]; i < offsets[p + 1]; ++i) {
       if (joints[i] >= joint_count) {
-        return Status::Invalid("skin weights: point {} names joint {}, expected an index below {}", p, joints[i],
-                               joint_count);
+        return Status::Invalid("skin weights: point {} names joint {}, expected an index below {}", p,
+                               joints[i], joint_count);
       }
       if (!std::isfinite(weights[i])) {
         return Status::Invalid("skin weights: a weight of point {} is not a finite number", p);
@@ -254,7 +279,8 @@ SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_po
                      });
     for (std::size_t i = 0; i < size; ++i) {
       const std::size_t at = begin + lanes_[first_lane + i];
-      if (i == 0 || groups_.back().influences != influence_count[at]) groups_.push_back({influence_count[at], 0});
+      if (i == 0 || groups_.back().influences != influence_count[at])
+        groups_.push_back({influence_count[at], 0});
       ++groups_.back().count;
       for (Index e = weights.offsets[out_points[at]]; e < weights.offsets[out_points[at] + 1]; ++e) {
         if (weights.weights[e] == 0) continue;
@@ -274,7 +300,8 @@ void SkinKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
   if (count_ == 0) return;
 
-  // The palette about the place of the first joint: blending happens in small numbers wherever the character stands
+  // The palette about the place of the first joint: blending happens in small numbers wherever the character
+  // stands
   SkinRun run{};
   double origin[3];
   for (int r = 0; r < 3; ++r) {
@@ -287,7 +314,8 @@ void SkinKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
     const double* m = inputs.palette[joints_[j]].m.data();
     float* to = palette + 16 * j;
     for (int c = 0; c < 4; ++c) {
-      for (int r = 0; r < 3; ++r) to[4 * c + r] = static_cast<float>(c == 3 ? m[12 + r] - origin[r] : m[4 * c + r]);
+      for (int r = 0; r < 3; ++r)
+        to[4 * c + r] = static_cast<float>(c == 3 ? m[12 + r] - origin[r] : m[4 * c + r]);
       to[4 * c + 3] = 0;
     }
   }
@@ -307,13 +335,10 @@ void SkinKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   ForRanges(parallel, blocks, 8, [&](std::size_t first, std::size_t last) {
     for (std::size_t b = first; b < last; ++b) {
       const std::size_t begin = b * kBlock, entry = block_entries_[b];
-      const SkinBlock block{groups_.data() + block_groups_[b],
-                            block_groups_[b + 1] - block_groups_[b],
-                            lanes_.data() + begin,
-                            entry_joints_.data() + entry,
-                            entry_weights_.data() + entry,
-                            begin,
-                            std::min(begin + kBlock, count_)};
+      const SkinBlock block{
+          groups_.data() + block_groups_[b], block_groups_[b + 1] - block_groups_[b], lanes_.data() + begin,
+          entry_joints_.data() + entry,      entry_weights_.data() + entry,           begin,
+          std::min(begin + kBlock, count_)};
       HWY_DYNAMIC_DISPATCH(SkinBlockLanes)(run, block, in, out);
     }
   });

@@ -19,14 +19,14 @@ struct SkinWeights {
   std::span<const float> weights;
   Index joint_count = 0;
   std::size_t point_count() const { return offsets.size() - 1; }
-  // Names the first bad point: offsets that do not ascend, a joint out of range, a weight not finite, more than
-  // 4096 influences.
+  // Names the first bad point: offsets that do not ascend, a joint out of range, a weight not finite, more
+  // than 4096 influences.
   Status Validate() const;
 };
 
-// A local kernel. Weights are used as they are, not normalised; a sum within 1e-5 of 1 counts as 1, which keeps
-// the shape of a character that stands 1,000 m away up to the spacing of float there. A point without influences
-// is carried by world_from_mesh alone.
+// A local kernel. Weights are used as they are, not normalised; a sum within 1e-5 of 1 counts as 1, which
+// keeps the shape of a character that stands 1,000 m away up to the spacing of float there. A point without
+// influences is carried by world_from_mesh alone.
 class SkinKernel {
  public:
   struct Inputs {
@@ -58,14 +58,14 @@ class SkinKernel {
   std::size_t count_ = 0;
   Index joint_count_ = 0;
   std::vector<Index> joints_;
-  std::vector<Group> groups_;              // all blocks in a row
-  std::vector<Index> block_groups_;        // first group of each block, and the end
-  std::vector<Index> block_entries_;       // first entry of each block
-  std::vector<std::uint16_t> lanes_;       // place in its block of each point, in order of the groups
-  std::vector<Index> entry_joints_;        // per influence: 16 * place in joints_
+  std::vector<Group> groups_;         // all blocks in a row
+  std::vector<Index> block_groups_;   // first group of each block, and the end
+  std::vector<Index> block_entries_;  // first entry of each block
+  std::vector<std::uint16_t> lanes_;  // place in its block of each point, in order of the groups
+  std::vector<Index> entry_joints_;   // per influence: 16 * place in joints_
   std::vector<float> entry_weights_;
-  AlignedFloats sums_;                     // sum of weights per point
-  AlignedFloats masks_;                    // point weights, empty if all 1
+  AlignedFloats sums_;   // sum of weights minus 1, per point
+  AlignedFloats masks_;  // point weights, empty if all 1
 };
 
 }  // namespace kpsa

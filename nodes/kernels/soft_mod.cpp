@@ -25,7 +25,8 @@ void ClusterKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   const float envelope = static_cast<float>(inputs.envelope);
   if (delta.is_zero || envelope == 0 || begin_ >= end_) return CopyPoints(in, out);
   const auto copy = [&](std::size_t begin, std::size_t size) {
-    CopyPoints({in.x + begin, in.y + begin, in.z + begin, size}, {out.x + begin, out.y + begin, out.z + begin, size});
+    CopyPoints({in.x + begin, in.y + begin, in.z + begin, size},
+               {out.x + begin, out.y + begin, out.z + begin, size});
   };
   copy(0, begin_);
   ForRanges(parallel, end_ - begin_, kGrain, [&](std::size_t begin, std::size_t end) {

@@ -11,21 +11,25 @@ namespace {
 constexpr std::size_t kMaxIndices = std::size_t{1} << 31;
 
 // Turns counts in offsets[1..] into offsets.
-void Accumulate(std::vector<Index>* offsets) { std::partial_sum(offsets->begin(), offsets->end(), offsets->begin()); }
+void Accumulate(std::vector<Index>* offsets) {
+  std::partial_sum(offsets->begin(), offsets->end(), offsets->begin());
+}
 
 }  // namespace
 
 Result<Topology> Topology::Build(std::size_t point_count, std::span<const Index> triangles) {
   if (point_count >= kMaxIndices || triangles.size() >= kMaxIndices) {
-    return Status::Invalid("a mesh of {} points and {} triangle indices is too large, expected less than 2^31",
-                           point_count, triangles.size());
+    return Status::Invalid(
+        "a mesh of {} points and {} triangle indices is too large, expected less than 2^31", point_count,
+        triangles.size());
   }
   if (triangles.size() % 3 != 0) {
     return Status::Invalid("{} triangle indices, expected a multiple of 3", triangles.size());
   }
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     if (triangles[i] >= point_count) {
-      return Status::Invalid("triangle {} names point {}, expected an index below {}", i / 3, triangles[i], point_count);
+      return Status::Invalid("triangle {} names point {}, expected an index below {}", i / 3, triangles[i],
+                             point_count);
     }
   }
   Topology t;
@@ -34,7 +38,7 @@ Result<Topology> Topology::Build(std::size_t point_count, std::span<const Index>
 
   // Triangles around each point
   const auto degenerate = [&](std::size_t k) {
-    const Index *v = &triangles[3 * k];
+    const Index* v = &triangles[3 * k];
     return v[0] == v[1] || v[1] == v[2] || v[2] == v[0];
   };
   t.triangle_offsets_.assign(point_count + 1, 0);
@@ -95,7 +99,8 @@ std::vector<Index> Topology::Dilate(std::span<const Index> points, int rings) co
   return Dilate(points, rings, nullptr);
 }
 
-std::vector<Index> Topology::Dilate(std::span<const Index> points, int rings, std::vector<int>* ring_of) const {
+std::vector<Index> Topology::Dilate(std::span<const Index> points, int rings,
+                                    std::vector<int>* ring_of) const {
   std::vector<std::uint8_t> seen(point_count(), 0);
   std::vector<Index> found;
   std::vector<int> ring;

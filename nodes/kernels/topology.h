@@ -1,5 +1,5 @@
-// The connectivity of a mesh of welded points: who neighbours whom, which triangles touch a point, what is border.
-// Immutable after Build; every accessor may be called from any thread.
+// The connectivity of a mesh of welded points: who neighbours whom, which triangles touch a point, what is
+// border. Immutable after Build; every accessor may be called from any thread.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@ class Topology {
  public:
   Topology() = default;  // no points
 
-  // `triangles` holds 3 point indices a triangle. Errors: a length that is no multiple of 3, an index that is not
-  // below point_count, more points or indices than 2^31. Triangles that name a point twice (welding makes them)
-  // keep their place in triangles(), connect their distinct points and count for nothing else.
+  // `triangles` holds 3 point indices a triangle. Errors: a length that is no multiple of 3, an index that is
+  // not below point_count, more points or indices than 2^31. Triangles that name a point twice (welding makes
+  // them) keep their place in triangles(), connect their distinct points and count for nothing else.
   static Result<Topology> Build(std::size_t point_count, std::span<const Index> triangles);
 
   std::size_t point_count() const { return border_.size(); }

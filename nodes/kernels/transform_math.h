@@ -18,8 +18,8 @@ Matrix4 ComposeLocal(const Matrix4& offset_parent, const TransformValues& values
 // The rotation of `local` against `rest`: rest_rotation^-1 * local_rotation; scale and shear are dropped.
 Quaternion PoseRotation(const Matrix4& local, const Matrix4& rest);
 
-// q = swing * twist, twist about `axis` (unit length), swing about an axis perpendicular to it. Where q turns the
-// axis around by pi, the twist is the identity.
+// q = swing * twist, twist about `axis` (unit length), swing about an axis perpendicular to it. Where q turns
+// the axis around by pi, the twist is the identity.
 struct SwingTwist {
   Quaternion swing, twist;
 };

@@ -37,7 +37,8 @@ std::vector<Index> PositionsIn(std::span<const Index> points, std::span<const In
 Result<std::vector<float>> WeightsFromMap(std::size_t point_count, std::span<const Index> indices,
                                           std::span<const float> values, float fallback) {
   if (indices.size() != values.size()) {
-    return Status::Invalid("a weight map of {} indices and {} values, expected as many", indices.size(), values.size());
+    return Status::Invalid("a weight map of {} indices and {} values, expected as many", indices.size(),
+                           values.size());
   }
   if (!std::isfinite(fallback)) return Status::Invalid("the default of a weight map is not a finite number");
   std::vector<float> weights(point_count, fallback);
@@ -45,7 +46,8 @@ Result<std::vector<float>> WeightsFromMap(std::size_t point_count, std::span<con
   for (std::size_t i = 0; i < indices.size(); ++i) {
     const Index p = indices[i];
     if (p >= point_count) {
-      return Status::Invalid("entry {} of a weight map names point {}, expected an index below {}", i, p, point_count);
+      return Status::Invalid("entry {} of a weight map names point {}, expected an index below {}", i, p,
+                             point_count);
     }
     if (named[p]) return Status::Invalid("a weight map names point {} twice", p);
     if (!std::isfinite(values[i])) return Status::Invalid("the weight of point {} is not a finite number", p);

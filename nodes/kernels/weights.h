@@ -1,13 +1,13 @@
 // What all deformer kernels share: per-point weights, sets of points, and the conventions of bound kernels.
 //
-// A *bound kernel* is an immutable object that was built from a mesh's constants for a sorted list of output points
-// (all points: the full evaluation). Its Run is const, noexcept and allocates nothing; scratch of ScratchFloats()
-// floats, 64-byte aligned, is passed in. Views are dense: entry i of `out` is mesh point out_points[i]. Local kernels
-// read `in` at the same entries and may work in place (in.x == out.x). The result of a point has the same bits
-// whatever the binding, the SIMD target and the split over threads; per-point sums run in the full mesh's order.
-// Wherever a kernel takes `point_weights`, there is one weight for each output point, in the order of out_points;
-// an empty span means 1 everywhere. The weight of a point is point_weights[i] * envelope, in float; a point of
-// weight 0 comes out as it came in, bit for bit.
+// A *bound kernel* is an immutable object that was built from a mesh's constants for a sorted list of output
+// points (all points: the full evaluation). Its Run is const, noexcept and allocates nothing; scratch of
+// ScratchFloats() floats, 64-byte aligned, is passed in. Views are dense: entry i of `out` is mesh point
+// out_points[i]. Local kernels read `in` at the same entries and may work in place (in.x == out.x). The
+// result of a point has the same bits whatever the binding, the SIMD target and the split over threads;
+// per-point sums run in the full mesh's order. Wherever a kernel takes `point_weights`, there is one weight
+// for each output point, in the order of out_points; an empty span means 1 everywhere. The weight of a point
+// is point_weights[i] * envelope, in float; a point of weight 0 comes out as it came in, bit for bit.
 #pragma once
 
 #include <span>

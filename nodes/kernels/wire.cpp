@@ -16,9 +16,7 @@ struct Cubic {
   Double3 c[4];
   Double3 At(double t) const { return c[0] + (c[1] + (c[2] + c[3] * t) * t) * t; }
   // Half the derivative of the squared distance to p.
-  double Slope(double t, Double3 p) const {
-    return Dot(At(t) - p, c[1] + (c[2] * 2.0 + c[3] * (3 * t)) * t);
-  }
+  double Slope(double t, Double3 p) const { return Dot(At(t) - p, c[1] + (c[2] * 2.0 + c[3] * (3 * t)) * t); }
 };
 
 std::vector<Cubic> Spans(const CurveShape& shape, std::span<const Double3> vertices) {
@@ -129,8 +127,8 @@ double CurveShape::Nearest(std::span<const Double3> curve_vertices, Double3 p) c
 Status WireKernel::Validate(const WireSettings& settings, std::span<const Double3> rest_vertices) {
   const std::size_t least = settings.closed ? 3 : 2;
   if (rest_vertices.size() < least) {
-    return Status::Invalid("a {} curve of {} vertices, expected at least {}", settings.closed ? "closed" : "wire",
-                           rest_vertices.size(), least);
+    return Status::Invalid("a {} curve of {} vertices, expected at least {}",
+                           settings.closed ? "closed" : "wire", rest_vertices.size(), least);
   }
   if (rest_vertices.size() > 100000) {
     return Status::Invalid("a wire curve of {} vertices, expected at most 100000", rest_vertices.size());
@@ -147,8 +145,9 @@ Status WireKernel::Validate(const WireSettings& settings, std::span<const Double
   return settings.profile.Validate();
 }
 
-WireKernel::WireKernel(const WireSettings& settings, std::span<const Double3> rest_vertices, ConstPointsView rest,
-                       std::span<const Index> out_points, std::span<const float> point_weights)
+WireKernel::WireKernel(const WireSettings& settings, std::span<const Double3> rest_vertices,
+                       ConstPointsView rest, std::span<const Index> out_points,
+                       std::span<const float> point_weights)
     : count_(out_points.size()), vertices_(rest_vertices.size()) {
   KPSA_CHECK(Validate(settings, rest_vertices).ok());
   KPSA_CHECK(IsSortedSet(out_points, rest.count));
@@ -156,8 +155,8 @@ WireKernel::WireKernel(const WireSettings& settings, std::span<const Double3> re
   const CurveShape shape{settings.basis, settings.closed, rest_vertices.size()};
   const std::vector<Cubic> spans = Spans(shape, rest_vertices);
 
-  // A Catmull-Rom span, and a reflected end, may leave the box of the vertices by an eighth or two of its size;
-  // points farther than that and the dropoff need no search
+  // A Catmull-Rom span, and a reflected end, may leave the box of the vertices by an eighth or two of its
+  // size; points farther than that and the dropoff need no search
   Double3 low = rest_vertices[0], high = low;
   for (Double3 v : rest_vertices) {
     for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], v[a]), high[a] = std::max(high[a], v[a]);

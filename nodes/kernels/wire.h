@@ -1,5 +1,6 @@
-// wire: points near a curve follow it. p' = p + w (C(u) - C_rest(u)), u the nearest parameter and w the falloff of the
-// distance at rest. C is linear in its control vertices, so a point stores the weights of at most four of them.
+// wire: points near a curve follow it. p' = p + w (C(u) - C_rest(u)), u the nearest parameter and w the
+// falloff of the distance at rest. C is linear in its control vertices, so a point stores the weights of at
+// most four of them.
 #pragma once
 
 #include <span>
@@ -25,7 +26,8 @@ struct CurveShape {
   bool closed = false;
   std::size_t vertices = 0;
   std::size_t spans() const { return closed ? vertices : vertices - 1; }
-  // Four vertices and their weights at u (clamped, or wrapped if closed); weights sum to 1, unused ones are 0.
+  // Four vertices and their weights at u (clamped, or wrapped if closed); weights sum to 1, unused ones are
+  // 0.
   void Weights(double u, Index controls[4], double weights[4]) const;
   Double3 Point(std::span<const Double3> vertices, double u) const;
   // The parameter of the point of the curve nearest to p, to about 1e-9 of a span; the first of equals.
@@ -47,7 +49,8 @@ class WireKernel {
     double envelope = 1;
   };
 
-  // Names too few vertices (2; closed: 3), one that is not finite, a dropoff that is not positive, a bad profile.
+  // Names too few vertices (2; closed: 3), one that is not finite, a dropoff that is not positive, a bad
+  // profile.
   static Status Validate(const WireSettings& settings, std::span<const Double3> rest_vertices);
   // rest: points of the whole mesh, in the space of rest_vertices.
   WireKernel(const WireSettings& settings, std::span<const Double3> rest_vertices, ConstPointsView rest,

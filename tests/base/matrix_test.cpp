@@ -27,6 +27,7 @@ TEST(ScalarMath, AgreesWithTheCLibraryToAFewUlp) {
     EXPECT_NEAR(Acos(u), std::acos(u), 1e-15);
     EXPECT_NEAR(Asin(u), std::asin(u), 1e-15);
     EXPECT_NEAR(Exp(x) / std::exp(x), 1, 2e-15);
+    EXPECT_NEAR(Log(std::fabs(x) + 1e-9), std::log(std::fabs(x) + 1e-9), 1e-14);
   }
   EXPECT_EQ(Atan2(0.0, -1.0), kPi);
   EXPECT_EQ(Atan2(-0.0, -1.0), -kPi);

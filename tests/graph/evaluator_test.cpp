@@ -8,17 +8,8 @@
 namespace kpsa {
 namespace {
 
-const NodeRegistry& Toys() {
-  static const NodeRegistry* registry = [] {
-    auto* r = new NodeRegistry;
-    AddToyNodes(*r);
-    return r;
-  }();
-  return *registry;
-}
-
 TEST(Evaluator, ComputesOnceUntilSomethingChanges) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("add", "a");
   g.add("add", "b", {{"b", 10.0}});
   g.connect("a.out", "b.a");
@@ -37,7 +28,7 @@ TEST(Evaluator, ComputesOnceUntilSomethingChanges) {
 }
 
 TEST(Evaluator, EqualSmallOutputsStopThere) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("floor", "f");
   g.add("add", "b");
   g.connect("f.out", "b.a");
@@ -53,7 +44,7 @@ TEST(Evaluator, EqualSmallOutputsStopThere) {
 }
 
 TEST(Evaluator, PullRunsOnlyWhatThatOutputNeeds) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("add", "root");
   g.add("add", "left");
   g.add("add", "right");
@@ -70,7 +61,7 @@ TEST(Evaluator, PullRunsOnlyWhatThatOutputNeeds) {
 }
 
 TEST(Evaluator, FoldsWhatDependsOnNothingThatVaries) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("add", "constant", {{"a", 2.0}, {"b", 3.0}});
   g.add("add", "varies");
   g.connect("constant.out", "varies.b");
@@ -86,7 +77,7 @@ TEST(Evaluator, FoldsWhatDependsOnNothingThatVaries) {
 }
 
 TEST(Evaluator, ChildrenOfVectorsAsSourcesAndDestinations) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("scale3", "s", {{"input", Double3{1, 2, 3}}, {"factor", 2.0}});
   g.add("scale3", "t", {{"input", Double3{0, 0, 7}}});
   g.connect("s.out.y", "t.input.x");
@@ -100,7 +91,7 @@ TEST(Evaluator, ChildrenOfVectorsAsSourcesAndDestinations) {
 }
 
 TEST(Evaluator, SelectorThatFlipsAfterTenUnpulledFrames) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("add", "time");
   g.add("add", "left");
   g.add("add", "right", {{"b", 100.0}});
@@ -127,7 +118,7 @@ TEST(Evaluator, SelectorThatFlipsAfterTenUnpulledFrames) {
 
 TEST(Evaluator, TwoConsumersWithDifferentSubsetsAndALazyFullBranch) {
   for (bool parallel : {false, true}) {
-    TestGraph g(Toys());
+    TestGraph g(ToyRegistry());
     g.options.parallel = parallel;
     g.add("source", "src", {{"count", 100}});
     g.add("move", "m1");
@@ -162,7 +153,7 @@ TEST(Evaluator, TwoConsumersWithDifferentSubsetsAndALazyFullBranch) {
 TEST(Evaluator, MidStageReaderUnderAnInPlaceChain) {
   std::vector<float> expected;
   for (bool parallel : {false, true}) {
-    TestGraph g(Toys());
+    TestGraph g(ToyRegistry());
     g.options.parallel = parallel;
     g.add("source", "src", {{"count", 64}});
     for (const char* name : {"m1", "m2", "m3"}) g.add("move", name);
@@ -196,7 +187,7 @@ TEST(Evaluator, MidStageReaderUnderAnInPlaceChain) {
 }
 
 TEST(Evaluator, AFailureNamesItsNodeAndHealsWithItsInput) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("fail", "f");
   g.add("add", "after");
   g.add("add", "other");
@@ -217,7 +208,7 @@ TEST(Evaluator, AFailureNamesItsNodeAndHealsWithItsInput) {
 }
 
 TEST(Evaluator, EvaluatorsShareAWorkspace) {
-  TestGraph g(Toys());
+  TestGraph g(ToyRegistry());
   g.add("source", "src", {{"count", 100}});
   g.add("move", "m1");
   g.add("smooth", "ring");

@@ -35,8 +35,8 @@ struct TestMesh {
   std::size_t count() const { return rest.count(); }
 };
 
-// A wavy sheet of nu x nv points, about a metre wide; each quad is split along a random diagonal, so that points have
-// 4 to 8 neighbours.
+// A wavy sheet of nu x nv points, about a metre wide; each quad is split along a random diagonal, so that
+// points have 4 to 8 neighbours.
 inline TestMesh MakeSheet(Index nu, Index nv, std::uint32_t seed = 1) {
   Random random(seed);
   std::vector<float> xyz;
@@ -44,7 +44,8 @@ inline TestMesh MakeSheet(Index nu, Index nv, std::uint32_t seed = 1) {
   for (Index v = 0; v < nv; ++v) {
     for (Index u = 0; u < nu; ++u) {
       const double x = static_cast<double>(u) / nu - 0.5, y = static_cast<double>(v) / nv - 0.5;
-      const double z = 0.2 * std::cos(3 * x) * std::cos(2 * y) + 0.01 * std::sin(40 * x + 3) * std::sin(31 * y);
+      const double z =
+          0.2 * std::cos(3 * x) * std::cos(2 * y) + 0.01 * std::sin(40 * x + 3) * std::sin(31 * y);
       for (double c : {x + 0.1 / nu * random.Signed(), y + 0.1 / nv * random.Signed(), z}) {
         xyz.push_back(static_cast<float>(c));
       }
@@ -67,11 +68,13 @@ struct TestSkin {
   std::vector<Index> offsets = {0}, joints;
   std::vector<float> weights;
 };
-inline TestSkin MakeSkin(std::size_t points, Index joint_count, int influences, bool ragged, std::uint32_t seed = 2) {
+inline TestSkin MakeSkin(std::size_t points, Index joint_count, int influences, bool ragged,
+                         std::uint32_t seed = 2) {
   Random random(seed);
   TestSkin skin;
   for (std::size_t p = 0; p < points; ++p) {
-    const int n = ragged ? 1 + static_cast<int>(random.Below(static_cast<std::size_t>(influences))) : influences;
+    const int n =
+        ragged ? 1 + static_cast<int>(random.Below(static_cast<std::size_t>(influences))) : influences;
     std::vector<double> w;
     double sum = 0;
     for (int i = 0; i < n; ++i) w.push_back(0.05 + random.Unit()), sum += w.back();
@@ -89,7 +92,8 @@ inline std::vector<Matrix4> MakePalette(Index joint_count, Double3 place, std::u
   Random random(seed);
   std::vector<Matrix4> palette;
   for (Index j = 0; j < joint_count; ++j) {
-    palette.push_back(ComposeTrs(place + random.Vector() * 0.2, random.Rotation(), Double3{1, 1, 1} + random.Vector() * 0.2));
+    palette.push_back(ComposeTrs(place + random.Vector() * 0.2, random.Rotation(),
+                                 Double3{1, 1, 1} + random.Vector() * 0.2));
   }
   return palette;
 }
@@ -99,7 +103,8 @@ struct TestTarget {
   std::vector<float> deltas;
 };
 // Targets that each move a run of the points, of the given share of the mesh.
-inline std::vector<TestTarget> MakeTargets(std::size_t points, std::size_t count, double share, std::uint32_t seed = 4) {
+inline std::vector<TestTarget> MakeTargets(std::size_t points, std::size_t count, double share,
+                                           std::uint32_t seed = 4) {
   Random random(seed);
   std::vector<TestTarget> targets(count);
   for (TestTarget& target : targets) {

@@ -1,0 +1,131 @@
+// The kpsa program: parses the command line, runs one subcommand, maps its errors to exit codes.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "base/simd.h"
+#include "cli/command.h"
+#include "cli/common.h"
+
+namespace kpsa {
+namespace {
+
+constexpr char kFirstMinutes[] =
+    "kpsa evaluates character rigs, and learns to skip the slow part of them.\n\n"
+    "The first five minutes, with any animated character:\n"
+    "  kpsa init  head.glb                 write a starter rig, head.yaml\n"
+    "  kpsa train head.yaml                learn a subspace from its clips and controls\n"
+    "  kpsa bench head.yaml                full against accelerated: times, errors, hits\n\n"
+    "  kpsa --help lists all commands, kpsa COMMAND --help explains one.\n";
+
+const std::vector<std::string>& CommandNames(CLI::App& program) {
+  static std::vector<std::string> names;
+  names.clear();
+  for (const CLI::App* command : program.get_subcommands([](CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  return names;
+}
+
+std::vector<std::string> OptionNames(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+  }
+  return names;
+}
+
+// What CLI11 refuses, in our words.
+int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
+  const auto parsed = program.get_subcommands();
+  const CLI::App& command = parsed.empty() ? program : *parsed.front();
+  const std::string name = parsed.empty() ? "kpsa" : "kpsa " + command.get_name();
+  std::string message = error.what();
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  if (parsed.empty() && !arguments.empty()) {
+    const std::string& word = arguments.front();
+    message = word.starts_with('-')
+                  ? fmt::format("unknown option \"{}\"{}", word, DidYouMean(word, OptionNames(program)))
+                  : fmt::format("unknown command \"{}\"{}; kpsa --help lists all", word,
+                                DidYouMean(word, CommandNames(program)));
+  } else if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+    const std::vector<std::string> extras = program.remaining(true);
+    const std::string word = extras.empty() ? "" : extras.front();
+    const std::string bare = word.substr(0, word.find('='));
+    message = word.starts_with('-')
+                  ? fmt::format("unknown option \"{}\"{}", bare, DidYouMean(bare, OptionNames(command)))
+                  : fmt::format("unexpected argument \"{}\"", word);
+  } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
+    message = "expected " + message.substr(0, message.find(" is required"));
+  }
+  PrintErrors(name, Status::Usage("{}; see {} --help", message, name));
+  return 2;
+}
+
+int Main(int argc, char** argv) {
+  InstallInterruptHandler();
+  CLI::App program("kpsa: a runtime for character rigs, with Key Point Subspace Acceleration", "kpsa");
+  program.set_version_flag("--version", "kpsa " KPSA_VERSION);
+  program.set_help_flag("-h,--help", "this help");
+  program.require_subcommand(0, 1);
+  Command chosen;
+  AddInitCommand(&program, &chosen);
+  AddValidateCommand(&program, &chosen);
+  AddInspectCommand(&program, &chosen);
+  AddEvalCommand(&program, &chosen);
+  AddGetCommand(&program, &chosen);
+  AddRenderCommand(&program, &chosen);
+  AddTrainCommand(&program, &chosen);
+  AddBenchCommand(&program, &chosen);
+  AddCompileCommand(&program, &chosen);
+  AddProfileCommand(&program, &chosen);
+  AddExplainCommand(&program, &chosen);
+  AddCompareCommand(&program, &chosen);
+  AddGraphCommand(&program, &chosen);
+  AddNodesCommand(&program, &chosen);
+  program.footer(kFirstMinutes + std::string("\nExit codes: 0 fine, 1 a check failed or things differ, 2 "
+                                             "usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& success) {
+    program.exit(success);
+    return FlushOutput().ok() ? 0 : 3;
+  } catch (const CLI::ParseError& error) {
+    return UsageError(program, error, std::vector<std::string>(argv + 1, argv + argc));
+  }
+  if (chosen == nullptr) {
+    Print(kFirstMinutes);
+    return FlushOutput().ok() ? 0 : 3;
+  }
+  const std::string name = "kpsa " + program.get_subcommands().front()->get_name();
+  if (const std::string problem = ApplySimdChoice(); !problem.empty()) {
+    PrintErrors(name, Status::Usage("{}", problem));
+    return 2;
+  }
+  CommandResult result = Status();
+  try {
+    result = chosen();
+  } catch (const std::bad_alloc&) {
+    result = Status::Invalid("not enough memory");
+  } catch (const std::exception& error) {
+    result = Status::Invalid("{}", error.what());
+  }
+  const Status flushed = FlushOutput();
+  if (!result.ok()) {
+    PrintErrors(name, result.status());
+    return ExitCode(result.status());
+  }
+  if (!flushed.ok()) {
+    PrintErrors(name, flushed);
+    return ExitCode(flushed);
+  }
+  return *result;
+}
+
+}  // namespace
+}  // namespace kpsa
+
+int main(int argc, char** argv) { return kpsa::Main(argc, argv); }

@@ -1,0 +1,30 @@
+// A progress bar on stderr, drawn only if that is a terminal; without colour where NO_COLOR is set.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <string>
+
+namespace kpsa {
+
+class Progress {
+ public:
+  // `quiet`: draw nothing. A total of 0 means unknown: only the label and the count are shown.
+  Progress(std::string label, std::size_t total, bool quiet);
+  ~Progress();  // clears the line
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  // Draws at most ten times a second. One thread at a time.
+  void Set(std::size_t done);
+  void SetLabel(std::string label, std::size_t total);
+
+ private:
+  void Draw(std::size_t done);
+  std::string label_;
+  std::size_t total_;
+  bool shown_, color_, drawn_ = false;
+  std::chrono::steady_clock::time_point begin_, last_;
+};
+
+}  // namespace kpsa

@@ -1,0 +1,70 @@
+#include "cli/rig_training.h"
+
+#include <cmath>
+
+namespace kpsa {
+
+std::vector<PlugRef> VaryingPlugs(const Rig& rig) {
+  std::vector<PlugRef> plugs{rig.scene.time};
+  for (const Control& control : rig.controls) {
+    PlugRef whole = control.plug;
+    whole.component = -1;
+    if (rig.graph->FindConnection(control.plug) != nullptr || rig.graph->FindConnection(whole) != nullptr) continue;
+    plugs.push_back(control.plug);
+  }
+  return plugs;
+}
+
+AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) {
+  AccelerationTarget target;
+  for (const AcceleratedPoints& points : acceleration.points) {
+    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
+    AccelerationTarget::MeshPoints out;
+    for (std::size_t s = 0; s <= points.stage; ++s) {
+      const Stage& stage = mesh.stages[s];
+      out.stages.push_back({stage.name, stage.points, stage.world});
+    }
+    out.name = mesh.name + "@" + mesh.stages[points.stage].name;
+    target.meshes.push_back(std::move(out));
+  }
+  if (acceleration.space) {
+    const NodeDef& def = rig.graph->def(*acceleration.space);
+    target.space.push_back({*acceleration.space, def.FindAttribute("worldMatrix"), -1, -1});
+    target.space_name = rig.graph->name(*acceleration.space);
+  }
+  target.varying = VaryingPlugs(rig);
+  for (const Control& control : rig.controls) target.controls.push_back(control.plug);
+  return target;
+}
+
+TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
+  TrainingRig training;
+  training.graph = rig->graph.get();
+  training.time = rig->scene.time;
+  training.target = MakeTarget(*rig, acceleration);
+  for (const Control& control : rig->controls) {
+    training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip});
+  }
+  training.set_clip = [rig](std::optional<std::string_view> clip) { return SetClip(rig, clip); };
+  return training;
+}
+
+Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips) {
+  std::vector<TrainingClip> frames;
+  for (const std::string& name : clips) {
+    const CharacterClip* found = nullptr;
+    std::vector<std::string> known;
+    for (const CharacterClip& clip : rig.scene.clips) {
+      known.push_back(clip.id);
+      if (clip.id == name) found = &clip;
+    }
+    if (found == nullptr) return Status::Invalid("the character has no clip \"{}\"{}", name, DidYouMean(name, known));
+    TrainingClip clip{name, {}};
+    const auto count = static_cast<std::size_t>(std::floor(found->duration * rig.fps + 1e-6)) + 1;
+    for (std::size_t i = 0; i < count; ++i) clip.times.push_back(static_cast<double>(i) / rig.fps);
+    frames.push_back(std::move(clip));
+  }
+  return frames;
+}
+
+}  // namespace kpsa

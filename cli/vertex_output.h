@@ -1,0 +1,40 @@
+// Animated vertices into a file of any format: .npz frame by frame, the others (.pc2 .mdd .glb .usda) once
+// all frames are there. World space in metres, vertices in the order of the glTF file.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/points.h"
+#include "base/status.h"
+#include "io/rig_builder.h"
+
+namespace kpsa {
+
+struct VertexOutputOptions {
+  bool force = false;
+  bool blender = false;  // .pc2 and .mdd in Blender's axes and vertex order
+};
+
+class VertexOutput {
+ public:
+  virtual ~VertexOutput() = default;
+  // The next frame: for each mesh of the rig, all its points in their order.
+  virtual Status Frame(std::span<const ConstPointsView> meshes) = 0;
+  // Completes the file; without it nothing appears. Returns what a user should know, one line each.
+  virtual Result<std::vector<std::string>> Finish() = 0;
+  virtual std::vector<std::string> paths() const = 0;
+};
+
+// The suffixes that CreateVertexOutput knows.
+std::vector<std::string> VertexSuffixes();
+
+// Refusals: an unknown suffix, another format than .npz for stdout, existing files, more than 4 GB for
+// formats that are collected in memory. The rig must outlive the output.
+Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& output, const Rig& rig,
+                                                         std::vector<double> times,
+                                                         const VertexOutputOptions& options);
+
+}  // namespace kpsa

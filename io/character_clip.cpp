@@ -1,0 +1,151 @@
+// The nodes of a clip: a clipTransform for every animated transform, a clipWeights for every animated mesh node.
+#include <algorithm>
+#include <map>
+
+#include "io/character_graph.h"
+#include "io/graph_editor.h"
+
+namespace kpsa {
+namespace {
+
+constexpr std::size_t kMaxNotes = 200;
+
+AnimationSampler ToSampler(const gltf::Channel& channel) {
+  AnimationSampler sampler;
+  switch (channel.interpolation) {
+    case gltf::Interpolation::kStep: sampler.interpolation = AnimationSampler::Interpolation::kStep; break;
+    case gltf::Interpolation::kLinear: sampler.interpolation = AnimationSampler::Interpolation::kLinear; break;
+    case gltf::Interpolation::kCubicSpline: sampler.interpolation = AnimationSampler::Interpolation::kCubicSpline; break;
+  }
+  sampler.components = channel.components;
+  sampler.times = channel.times;
+  sampler.values = channel.values;
+  return sampler;
+}
+
+// The channels of one node.
+struct NodeKeys {
+  AnimationKeys::Data data;
+  bool moves = false, morphs = false;
+};
+
+void AddNote(std::string note, std::vector<std::string>* notes) {
+  if (std::find(notes->begin(), notes->end(), note) == notes->end() && notes->size() < kMaxNotes) notes->push_back(std::move(note));
+}
+
+std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const gltf::Clip& clip,
+                                     std::vector<std::string>* notes) {
+  std::map<Index, NodeKeys> keys;
+  for (const gltf::Channel& channel : clip.channels) {
+    const gltf::Node& node = character.nodes[channel.node];
+    NodeKeys& of_node = keys[channel.node];
+    AnimationSampler* sampler = nullptr;
+    switch (channel.path) {
+      case gltf::Path::kTranslation: sampler = &of_node.data.translation; break;
+      case gltf::Path::kRotation: sampler = &of_node.data.rotation; break;
+      case gltf::Path::kScale: sampler = &of_node.data.scale; break;
+      case gltf::Path::kWeights: sampler = &of_node.data.weights; break;
+    }
+    if (node.has_matrix && channel.path != gltf::Path::kWeights) {
+      AddNote(fmt::format("clip \"{}\" animates nodes[{}], which has a matrix; it stays at rest (glTF 2.0, 3.5.3)", clip.id, channel.node),
+              notes);
+      continue;
+    }
+    if (!sampler->times.empty()) {
+      AddNote(fmt::format("clip \"{}\" animates one property of nodes[{}] twice; the first is used", clip.id, channel.node), notes);
+      continue;
+    }
+    *sampler = ToSampler(channel);
+    (channel.path == gltf::Path::kWeights ? of_node.morphs : of_node.moves) = true;
+  }
+  for (auto& [index, of_node] : keys) {
+    of_node.data.rest_translation = character.nodes[index].translation;
+    of_node.data.rest_rotation = character.nodes[index].rotation;
+    of_node.data.rest_scale = character.nodes[index].scale;
+  }
+  return keys;
+}
+
+class ClipWriter {
+ public:
+  ClipWriter(CharacterGraph* scene, Graph* graph) : scene_(scene), graph_(graph), edit_(graph) {}
+
+  void AddTransform(Index gltf_node, const std::shared_ptr<const AnimationKeys>& keys) {
+    const NodeId transform = scene_->transforms[gltf_node];
+    const PlugRef offset = edit_.Plug(transform, "offsetParentMatrix");
+    if (!edit_.ok() || IsDriven(offset)) return;
+    const NodeId node = AddNode("clipTransform", graph_->name(transform) + "_clip", keys);
+    if (edit_.ok()) edit_.Connect(edit_.Plug(node, "matrix"), offset);
+    Start(node);
+  }
+  void AddWeights(const CharacterMesh& mesh, const std::shared_ptr<const AnimationKeys>& keys) {
+    const NodeId node = AddNode("clipWeights", mesh.name + "_clipWeights", keys);
+    for (int k = 0; k < keys->data().weights.components && edit_.ok(); ++k) {
+      const PlugRef weight = edit_.Plug(mesh.blend_shape, "weight", k);
+      if (edit_.ok() && !IsDriven(weight)) edit_.Connect(edit_.Plug(node, "output", k), weight);
+    }
+    Start(node);
+  }
+  GraphEditor& edit() { return edit_; }
+
+ private:
+  bool IsDriven(const PlugRef& plug) const { return graph_->FindConnection(plug) != nullptr; }
+  NodeId AddNode(std::string_view type, std::string name, const std::shared_ptr<const AnimationKeys>& keys) {
+    const NodeId node = edit_.AddFresh(type, std::move(name));
+    if (!edit_.ok()) return node;
+    scene_->clip_nodes.push_back(node);
+    edit_.Set(node, "keys", keys);
+    return node;
+  }
+  // Time last: a node without inputs is connected without a search for cycles.
+  void Start(NodeId node) {
+    if (edit_.ok()) edit_.Connect(scene_->time, edit_.Plug(node, "time"));
+  }
+
+  CharacterGraph* scene_;
+  Graph* graph_;
+  GraphEditor edit_;
+};
+
+}  // namespace
+
+Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
+               Graph* graph) {
+  Index index = kNoIndex;
+  if (clip.has_value()) {
+    index = character.FindClip(*clip);
+    if (index == kNoIndex) {
+      std::vector<std::string> ids;
+      for (const CharacterClip& known : scene->clips) ids.push_back(known.id);
+      if (ids.empty()) return Status::Invalid("{} has no clips, so none named \"{}\"", character.path, *clip);
+      constexpr std::size_t kShown = 20;
+      const std::vector<std::string> shown(ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), kShown)));
+      return Status::Invalid("{} has no clip \"{}\"{}; its clips are {}{}", character.path, *clip, DidYouMean(*clip, ids),
+                             fmt::join(shown, ", "), ids.size() > kShown ? ", ..." : "");
+    }
+  }
+  for (NodeId node : scene->clip_nodes) KPSA_RETURN_IF_ERROR(graph->RemoveNode(node));
+  scene->clip_nodes.clear();
+  scene->clip.reset();
+  if (index == kNoIndex) return Status();
+
+  ClipWriter writer(scene, graph);
+  for (auto& [gltf_node, node_keys] : KeysByNode(character, character.clips[index], &scene->notes)) {
+    const auto keys = std::make_shared<const AnimationKeys>(std::move(node_keys.data));
+    if (node_keys.moves) writer.AddTransform(gltf_node, keys);
+    if (!node_keys.morphs) continue;
+    for (const CharacterMesh& mesh : scene->meshes) {
+      if (mesh.gltf_node == gltf_node && mesh.geometry.targets != nullptr) writer.AddWeights(mesh, keys);
+    }
+  }
+  scene->clip = std::string(*clip);
+  return writer.edit().Take();
+}
+
+bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug) {
+  const NodeDef& def = graph.def(plug.node);
+  if (plug.attribute == def.FindAttribute("offsetParentMatrix")) return scene.clip_transforms.count(plug.node.index) != 0;
+  return plug.attribute == def.FindAttribute("weight") && scene.clip_weights.count(plug.node.index) != 0;
+}
+
+}  // namespace kpsa

@@ -1,0 +1,156 @@
+#include "io/rig_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <tuple>
+
+#include "io/rig_build.h"
+
+namespace kpsa {
+namespace {
+
+bool IsCharacterFile(const std::string& path) {
+  std::string lower = path;
+  for (char& c : lower) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  const std::string extension = std::filesystem::path(lower).extension().string();
+  return extension == ".glb" || extension == ".gltf";
+}
+
+// By file, in the order in which they first come up, then by line.
+Status InOrder(const Status& status) {
+  std::map<std::string, std::size_t> files;
+  for (const Error& error : status.errors()) files.emplace(error.where.file, files.size());
+  std::vector<Error> errors = status.errors();
+  std::stable_sort(errors.begin(), errors.end(), [&](const Error& a, const Error& b) {
+    return std::tuple(files[a.where.file], a.where.line, a.where.column) < std::tuple(files[b.where.file], b.where.line, b.where.column);
+  });
+  Status ordered;
+  for (Error& error : errors) ordered.Add(std::move(error));
+  return ordered;
+}
+
+double RestDiagonal(const CharacterGraph& scene, RestPose* rest) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Double3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    for (const Double3& p : rest->WorldPoints(m)) {
+      for (int i = 0; i < 3; ++i) {
+        low[i] = std::min(low[i], p[i]);
+        high[i] = std::max(high[i], p[i]);
+      }
+    }
+  }
+  const double diagonal = Length(high - low);
+  return std::isfinite(diagonal) ? diagonal : 0;
+}
+
+}  // namespace
+
+RigBuild::RigBuild(RigFile* file, Rig* rig, RestPose* rest, YamlErrors* errors)
+    : file_(file), rig_(rig), rest_(rest), errors_(errors), stack_of_mesh_(rig->scene.meshes.size()) {
+  for (std::size_t n = 0; n < file->nodes.size(); ++n) written_.emplace(file->nodes[n].name, n);
+  for (Index i = 0; i < rig->character->nodes.size(); ++i) {
+    const std::string& name = rig->character->nodes[i].name;
+    gltf_by_name_[name.empty() ? fmt::format("node{}", i) : name].push_back(i);
+    gltf_by_node_[rig->scene.transforms[i].index] = i;
+  }
+}
+
+void RigBuild::Run() {
+  ApplySpecialOverrides();
+  AddNodes();
+  for (Made& made : made_) {
+    if (!errors_->full()) ReadAttributes(&made);
+  }
+  ReadOverrides();
+  AddCurves();
+  ConnectParents();
+  if (errors_->ok()) PlaceHandles();
+  ConnectCurves();
+  BuildStacks();
+  MakeConnections();
+  FinishOverrides();
+  AddControls();
+  AddAccelerations();
+}
+
+bool RigBuild::Fail(const SourceLocation& where, Status status) {
+  if (status.ok()) return true;
+  errors_->Append(std::move(status).At(where));
+  return false;
+}
+
+RigBuild::Made* RigBuild::FindMade(const std::string& name) {
+  const auto it = made_by_name_.find(name);
+  return it == made_by_name_.end() ? nullptr : &made_[it->second];
+}
+
+RigBuild::Made* RigBuild::FindMade(NodeId id) {
+  const auto it = made_by_node_.find(id.index);
+  return it == made_by_node_.end() ? nullptr : &made_[it->second];
+}
+
+Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const RigOptions& options) {
+  if (options.variant.has_value()) return Status::Usage("{} has no variants, so none named \"{}\"", path, *options.variant);
+  if (options.fps.has_value() && !(*options.fps > 0 && std::isfinite(*options.fps))) {
+    return Status::Usage("frames a second: expected a number above 0, found {}", *options.fps);
+  }
+  RigFile file;
+  YamlErrors errors;
+  SourceLocation character_at{path, 0, 0};
+  if (IsCharacterFile(path)) {
+    file.sources.push_back({path, "", FileUnits(), {}});
+    file.character = RigString{path, character_at, 0};
+    if (options.fps.has_value()) file.sources[0].units.fps = *options.fps;
+  } else {
+    errors.Append(ReadRigFile(path, options.fps, &file));
+    if (!file.character.has_value()) return errors.Take();
+    character_at = file.character->where;
+  }
+
+  Rig rig;
+  rig.path = path;
+  rig.units = file.sources[0].units;
+  rig.fps = rig.units.fps;
+  for (const RigSource& source : file.sources) rig.files.push_back(source.path);
+  Result<gltf::Character> character = gltf::LoadGltf(file.character->text);
+  if (!character.ok()) {
+    Status status = character.status();
+    if (IsCharacterFile(path)) return status;
+    errors.Append(Status::Invalid("the character cannot be read").At(character_at));
+    errors.Append(std::move(status));
+    return errors.Take();
+  }
+  if (!IsCharacterFile(path)) rig.files.push_back(file.character->text);
+  rig.character = std::make_shared<const gltf::Character>(std::move(*character));
+  rig.graph = std::make_unique<Graph>(registry);
+  CharacterOptions character_options;
+  character_options.clip = options.clip;
+  character_options.rest = options.rest;
+  character_options.weld = file.weld;
+  Result<CharacterGraph> scene = BuildCharacterGraph(*rig.character, character_options, rig.graph.get());
+  if (!scene.ok()) return scene.status();
+  rig.scene = std::move(*scene);
+
+  RestPose rest(*rig.character, rig.scene);
+  rig.rest_diagonal = RestDiagonal(rig.scene, &rest);
+  RigBuild(&file, &rig, &rest, &errors).Run();
+  if (!errors.ok()) return InOrder(errors.Take());
+  rig.notes.insert(rig.notes.begin(), rig.scene.notes.begin(), rig.scene.notes.end());
+  return rig;
+}
+
+Status SetClip(Rig* rig, std::optional<std::string_view> clip) {
+  KPSA_RETURN_IF_ERROR(SetClip(*rig->character, clip, &rig->scene, rig->graph.get()));
+  for (const PlugRef& plug : rig->pinned) {
+    if (rig->graph->FindConnection(plug) != nullptr) KPSA_RETURN_IF_ERROR(rig->graph->Disconnect(plug));
+  }
+  return Status();
+}
+
+}  // namespace kpsa

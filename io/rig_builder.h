@@ -1,0 +1,86 @@
+// From a rig file and its character to a graph that can be compiled: everything of RIG-FORMAT.md is looked up, typed,
+// checked and connected here. A .glb or .gltf alone is a rig, too: what it says is the default graph.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "graph/graph.h"
+#include "io/character_graph.h"
+#include "io/rig_file.h"
+
+namespace kpsa {
+
+struct RigOptions {
+  std::optional<std::string> clip;     // of the character; unset: its first one, if it has any
+  bool rest = false;                   // no clip
+  std::optional<double> fps;           // instead of the rig's
+  std::optional<std::string> variant;  // (version 1 has none)
+};
+
+// A plug that an animator and the trainer may move. It is a number; runtime units.
+struct Control {
+  std::string name;  // as the rig writes it
+  PlugRef plug;
+  double min = 0, max = 0;
+  double value = 0;     // at rest
+  Unit unit = Unit::kNone;
+  bool by_clip = false;  // a morph weight that some clip drives while it plays
+  SourceLocation where;
+};
+
+struct AcceleratedPoints {
+  std::size_t mesh = 0;   // in Rig::scene.meshes
+  std::size_t stage = 0;  // in its stages: up to and including it
+  PlugRef points;
+};
+struct Acceleration {
+  std::string name;
+  std::vector<AcceleratedPoints> points;
+  std::optional<NodeId> space;      // a transform; unset: the world
+  std::string subspace;             // path, "" where the rig names none
+  double tolerance = 0;             // metres; where the rig names none, 1/2000 of the rest pose's diagonal
+  double violation_rate = 0.01;
+  std::vector<std::string> train_clips, test_clips;
+  std::int64_t train_samples = 0;
+  SourceLocation where;
+};
+
+struct Rig {
+  std::string path;
+  std::shared_ptr<const gltf::Character> character;
+  std::unique_ptr<Graph> graph;  // refers to the registry that LoadRig was given
+  CharacterGraph scene;
+  std::vector<Control> controls;
+  std::vector<Acceleration> accelerate;
+  FileUnits units;  // of the file that was opened, fps included
+  double fps = 24;
+  std::vector<std::string> files;  // all that were read
+  std::vector<std::string> notes;  // what may surprise, one line each
+  std::vector<PlugRef> pinned;     // plugs that clips leave alone: overridden or set
+  double rest_diagonal = 0;        // metres, of the bounding box of all meshes at rest
+};
+
+// The registry must outlive the rig. All errors of the rig are collected, each at its place.
+Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const RigOptions& options = {});
+
+// Another clip for a loaded rig (none: the rest pose); nodes and plugs of the rig itself stay as they are.
+Status SetClip(Rig* rig, std::optional<std::string_view> clip);
+
+// A value for a plug, from the command line or a pose file, typed, in runtime units; enums are numbers.
+struct Setting {
+  PlugRef plug;
+  Value value;
+  std::string text;  // "jaw.rotateX=-20", for messages
+};
+// "plug=value" with the value in the units of the rig's file: jaw.rotateX=-20, lipUp.translate=[0, 1mm, 0].
+Result<Setting> ParseSetting(const Rig& rig, std::string_view text);
+// A pose file: {kpsa: 1, units: {...}, pose: {jaw.rotateX: -20, ...}}; units default to the rig's.
+Result<std::vector<Setting>> ReadPoseFile(const Rig& rig, const std::string& path);
+// Sets it in the graph. Takes over from a clip; a plug that the rig itself drives is an error.
+Status ApplySetting(Rig* rig, const Setting& setting);
+
+}  // namespace kpsa

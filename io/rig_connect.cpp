@@ -1,0 +1,155 @@
+// Connections, unit conversions, and names of meshes and transforms.
+#include <algorithm>
+#include <cmath>
+
+#include "io/rig_build.h"
+
+namespace kpsa {
+
+// A wire's `curve: lips`: the rest curve as an asset, and what moves it.
+void RigBuild::ConnectCurves() {
+  for (Made& made : made_) {
+    const auto it = made.special.find("curve");
+    if (it == made.special.end()) continue;
+    const YamlNode& value = it->second->value;
+    std::string name;
+    if (!ReadString(value, "curve", &name, errors_)) continue;
+    const Result<NodeId> curve = graph().FindNode(name);
+    if (!curve.ok()) {
+      errors_->Add(value, curve.status());
+      continue;
+    }
+    if (graph().def(*curve).name != "curve") {
+      errors_->Add(value, "\"{}\" is a {}; expected a curve", name, graph().def(*curve).name);
+      continue;
+    }
+    GraphEditor edit(&graph());
+    const Value* asset = graph().FindValue(edit.Plug(*curve, "curve"));
+    if (asset == nullptr) continue;  // its own error was reported
+    edit.Set(made.id, "curve", *asset);
+    edit.Connect(edit.Plug(*curve, "displacements"), edit.Plug(made.id, "displacements"));
+    Fail(value.where(), edit.Take());
+  }
+}
+
+void RigBuild::MakeConnections() {
+  for (const Pending& pending : pending_) {
+    if (errors_->full()) return;
+    // What the node itself asked for gives way to an override
+    const PlugRef& to = pending.to;
+    if (!pending.overrides && overridden_plugs_.count({to.node.index, to.attribute, to.element, to.component}) != 0) continue;
+    const Result<PlugRef> from = graph().FindPlug(pending.from);
+    if (!from.ok()) {
+      Fail(pending.where, from.status());
+      continue;
+    }
+    if (!pending.overrides) ConnectPlugs(*from, pending.to, pending.where, pending.source, false, false);
+  }
+  for (const RigConnection& connection : file_->connections) {
+    if (errors_->full()) return;
+    const Result<PlugRef> from = graph().FindPlug(connection.from);
+    const Result<PlugRef> to = graph().FindPlug(connection.to);
+    const bool good = Fail(connection.where, from.status());
+    if (!Fail(connection.where, to.status()) || !good) continue;
+    ConnectPlugs(*from, *to, connection.where, connection.source, connection.override_clip, false);
+  }
+  for (const Pending& pending : pending_) {
+    const Result<PlugRef> from = graph().FindPlug(pending.from);
+    if (pending.overrides && from.ok()) ConnectPlugs(*from, pending.to, pending.where, pending.source, true, true);
+  }
+}
+
+// The unit of a plug's numbers; points and matrices as wholes are never converted.
+Unit RigBuild::PlugUnit(const PlugRef& plug) const {
+  const Type type = graph().PlugType(plug);
+  if (type != Type::kDouble && type != Type::kDouble3) return Unit::kNone;
+  return graph().def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].unit;
+}
+
+void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip,
+                            bool replace) {
+  if (IsClipPlug(rig_->scene, graph(), to)) {
+    if (!override_clip) {
+      Fail(where, Status::Invalid("a clip drives {0}: write {{from: {1}, to: {0}, override: true}} to take it over",
+                                  graph().PlugName(to), graph().PlugName(from)));
+      return;
+    }
+    replace = true;
+  }
+  const double factor = units(source).FactorOf(PlugUnit(to)) / units(source).FactorOf(PlugUnit(from));
+  const Type from_type = graph().PlugType(from), to_type = graph().PlugType(to);
+  const bool triple = from_type == Type::kDouble3 && to_type == Type::kDouble3;
+  const bool scalar = to_type == Type::kDouble && (from_type == Type::kDouble || from_type <= Type::kEnum);
+  if (PlugUnit(from) == PlugUnit(to) || factor == 1 || (!triple && !scalar)) {
+    Fail(where, graph().Connect(from, to, replace));
+    return;
+  }
+  // As Maya does: a node that converts, one a component
+  if (replace && graph().FindConnection(to) != nullptr) Fail(where, graph().Disconnect(to));
+  for (int i = triple ? 0 : -1; i < (triple ? 3 : 0); ++i) {
+    PlugRef from_part = from, to_part = to;
+    if (triple) from_part.component = to_part.component = i;
+    GraphEditor edit(&graph());
+    const NodeId conversion = edit.AddFresh("unitConversion", fmt::format("unitConversion{}", ++conversions_));
+    if (edit.ok()) edit.Set(conversion, "conversionFactor", factor);
+    if (edit.ok()) {
+      edit.Connect(from_part, edit.Plug(conversion, "input"));
+      edit.Connect(edit.Plug(conversion, "output"), to_part);
+    }
+    Fail(where, edit.Take());
+  }
+}
+
+// Among mesh nodes only: by glTF name, name in outputs, `name#<index>` or path.
+std::optional<std::size_t> RigBuild::FindMesh(const std::string& name, const SourceLocation& where) {
+  std::vector<std::size_t> found;
+  const auto by_name = gltf_by_name_.find(name);
+  const Result<NodeId> by_plug_name = by_name == gltf_by_name_.end() ? graph().FindNode(name) : Result<NodeId>(NodeId());
+  for (std::size_t m = 0; m < rig_->scene.meshes.size(); ++m) {
+    const CharacterMesh& mesh = rig_->scene.meshes[m];
+    const bool verbatim = by_name != gltf_by_name_.end() &&
+                          std::find(by_name->second.begin(), by_name->second.end(), mesh.gltf_node) != by_name->second.end();
+    if (verbatim || mesh.name == name || (by_plug_name.ok() && *by_plug_name == mesh.transform)) found.push_back(m);
+  }
+  if (found.size() == 1) return found[0];
+  if (found.empty()) {
+    std::vector<std::string> names;
+    for (const CharacterMesh& mesh : rig_->scene.meshes) names.push_back(mesh.name);
+    Fail(where, Status::Invalid("unknown mesh \"{}\"{}", name, DidYouMean(name, names)));
+    return std::nullopt;
+  }
+  std::vector<std::string> several;
+  for (std::size_t m : found) several.push_back(rig_->scene.meshes[m].name);
+  Fail(where, Status::Invalid("\"{}\" is the name of several meshes: write {}", name, fmt::join(several, " or ")));
+  return std::nullopt;
+}
+
+// Among transforms only: glTF nodes without a mesh first, then the rig's own, then mesh nodes.
+std::optional<NodeId> RigBuild::FindTransform(const std::string& name, const SourceLocation& where) {
+  std::vector<std::string> several;
+  NodeId only;
+  if (const auto it = gltf_by_name_.find(name); it != gltf_by_name_.end()) {
+    for (Index i : it->second) {
+      if (rig_->character->nodes[i].mesh != kNoIndex) continue;
+      only = rig_->scene.transforms[i];
+      several.push_back(graph().name(only));
+    }
+  }
+  if (several.size() == 1) return only;
+  if (several.size() > 1) {
+    Fail(where, Status::Invalid("\"{}\" is the name of several transforms: write {}", name, fmt::join(several, " or ")));
+    return std::nullopt;
+  }
+  const Result<NodeId> found = graph().FindNode(name);
+  if (!found.ok()) {
+    Fail(where, found.status());
+    return std::nullopt;
+  }
+  if (graph().def(*found).FindAttribute("worldMatrix") < 0) {
+    Fail(where, Status::Invalid("\"{}\" is a {}; expected a transform", name, graph().def(*found).name));
+    return std::nullopt;
+  }
+  return *found;
+}
+
+}  // namespace kpsa

@@ -1,0 +1,252 @@
+// Deformer stacks: points flow stage by stage, on meshes and on points attributes.
+#include <algorithm>
+#include <limits>
+
+#include "base/matrix.h"
+#include "io/rig_build.h"
+
+namespace kpsa {
+
+void RigBuild::BuildStacks() {
+  // Meshes first: the box of a lattice, whose points may be deformed themselves, depends on its members
+  for (const RigDeform& deform : file_->deform) {
+    std::vector<std::pair<std::size_t, SourceLocation>> meshes;
+    bool any_morphs = false;
+    for (const RigString& name : deform.meshes) {
+      const std::optional<std::size_t> mesh = FindMesh(name.text, name.where);
+      if (!mesh.has_value()) continue;
+      if (const std::optional<SourceLocation>& first = stack_of_mesh_[*mesh]; first.has_value()) {
+        Fail(name.where, Status::Invalid("mesh \"{}\" has a stack already, at {}", name.text, first->ToString()));
+        continue;
+      }
+      stack_of_mesh_[*mesh] = name.where;
+      any_morphs = any_morphs || rig_->scene.meshes[*mesh].geometry.targets != nullptr;
+      meshes.emplace_back(*mesh, name.where);
+    }
+    for (const auto& [mesh, where] : meshes) BuildMeshStack(deform, mesh, any_morphs);
+  }
+  for (Made& made : made_) SetWeights(&made);
+  for (const RigDeform& deform : file_->deform) {
+    if (deform.points.has_value()) BuildPointsStack(deform);
+  }
+  for (Made& made : made_) {
+    SetWeights(&made);
+    const bool deforms = graph().def(made.id).FindAttribute("outPoints") >= 0 && graph().def(made.id).FindAttribute("inPoints") >= 0;
+    if (deforms && made.geometries.empty()) {
+      rig_->notes.push_back(fmt::format("{}: \"{}\" is in no stack and deforms nothing", made.from->where.ToString(), made.from->name));
+    }
+  }
+}
+
+RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
+  const auto deforms = [&](const Made& made) {
+    const NodeDef& def = graph().def(made.id);
+    const int points = def.FindAttribute("inPoints");
+    return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && def.FindAttribute("outPoints") >= 0;
+  };
+  if (Made* made = FindMade(name.text); made != nullptr) {
+    if (deforms(*made)) return made;
+    Fail(name.where, Status::Invalid("\"{}\" is a {}, no deformer", name.text, graph().def(made->id).name));
+    return nullptr;
+  }
+  if (written_.count(name.text) != 0 || errors_->full()) return nullptr;  // its own error was reported
+  std::vector<std::string> names{"gltf", "morph", "skin"};
+  for (const Made& made : made_) {
+    if (deforms(made)) names.push_back(made.from->name);
+  }
+  Fail(name.where, Status::Invalid("unknown deformer \"{}\"{}", name.text, DidYouMean(name.text, names)));
+  return nullptr;
+}
+
+// The next geometry of a deformer. All that one deformer serves lie in one space.
+bool RigBuild::AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage, const SourceLocation& where) {
+  if (!made->geometries.empty() && (made->world != world || !(made->world_from_stage == world_from_stage))) {
+    return Fail(where, Status::Invalid("\"{}\" deforms {} and {} in different spaces (before and after a skin, or under "
+                                       "different ones): give each a deformer of its own",
+                                       made->from->name, made->geometries.front().name, geometry.name));
+  }
+  made->world = world;
+  made->world_from_stage = world_from_stage;
+  GraphEditor edit(&graph());
+  if (!world && edit.Has(made->id, "geometryMatrix")) {
+    edit.Set(made->id, "geometryMatrix", static_cast<int>(made->geometries.size()), world_from_stage);
+  }
+  made->geometries.push_back(std::move(geometry));
+  return Fail(where, edit.Take());
+}
+
+bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, bool any_morphs, std::vector<Stage>* stages) {
+  const CharacterMesh& mesh = rig_->scene.meshes[mesh_index];
+  std::vector<Stage> own = OwnStages(mesh);
+  const Stage* morph = own.front().name == "morph" ? &own.front() : nullptr;
+  const Stage& into_world = own.back();  // skin or transform
+  const bool placed = std::any_of(deform.stack.begin(), deform.stack.end(), [](const RigString& item) {
+    return item.text == "gltf" || item.text == "skin" || item.text == "transform";
+  });
+  bool world = false, good = true;
+  const auto add_own = [&](const Stage& stage, const RigString& item) {
+    for (const Stage& earlier : *stages) {
+      if (earlier.node == stage.node) {
+        good = Fail(item.where, Status::Invalid("\"{}\" brings the stage {} of \"{}\" a second time", item.text, stage.name, mesh.name));
+        return;
+      }
+    }
+    world = world || &stage == &into_world;
+    stages->push_back(stage);
+    stages->back().world = world;
+  };
+  for (const RigString& item : deform.stack) {
+    if (item.text == "gltf" || item.text == "morph") {
+      if (morph != nullptr) add_own(*morph, item);
+      if (morph == nullptr && item.text == "morph" && !any_morphs) {
+        good = Fail(item.where, Status::Invalid("mesh \"{}\" has no morph targets: leave \"morph\" out", mesh.name));
+      }
+    }
+    if (item.text == "gltf" || item.text == "skin" || item.text == "transform") {
+      if (item.text == "transform" && into_world.name == "skin") {
+        good = Fail(item.where, Status::Invalid("mesh \"{}\" has a skin, which ignores its transform: write \"skin\"", mesh.name));
+      } else {
+        add_own(into_world, item);
+      }
+    }
+    if (item.text == "gltf" || item.text == "morph" || item.text == "skin" || item.text == "transform") continue;
+    Made* made = FindDeformer(item);
+    if (made == nullptr) {
+      good = false;
+      continue;
+    }
+    // Unskinned meshes are in world space but for their morphs
+    if (!world && !placed && into_world.name == "transform") add_own(into_world, item);
+    const Matrix4 world_from_stage = world ? Matrix4() : rest_->WorldFromMesh(mesh_index);
+    const int geometry = static_cast<int>(made->geometries.size());
+    good = AddGeometry(made, {mesh.name, mesh_index, mesh.mesh().point_count()}, world, world_from_stage, item.where) && good;
+    stages->push_back({item.text, made->id, geometry, world, {}});
+  }
+  if (!world && !placed && into_world.name == "transform") add_own(into_world, {into_world.name, deform.where, deform.source});
+  return good;
+}
+
+void RigBuild::BuildMeshStack(const RigDeform& deform, std::size_t mesh_index, bool any_morphs) {
+  std::vector<Stage> stages;
+  if (!ResolveStack(deform, mesh_index, any_morphs, &stages)) return;
+  CharacterMesh& mesh = rig_->scene.meshes[mesh_index];
+  Fail(deform.where, ConnectStages(std::move(stages), &mesh, &graph()));
+  if (!mesh.world) {
+    rig_->notes.push_back(fmt::format("{}: the stack of \"{}\" leaves out its skin, so that its points stay in mesh space",
+                                      deform.where.ToString(), mesh.name));
+  }
+}
+
+// {points: cage.points, stack: [cluster1]}: the deformers get the attribute's own value and drive it.
+void RigBuild::BuildPointsStack(const RigDeform& deform) {
+  const RigString& name = *deform.points;
+  const Result<PlugRef> plug = graph().FindPlug(name.text);
+  if (!Fail(name.where, plug.status())) return;
+  const AttributeDef& attribute = graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
+  if (graph().PlugType(*plug) != Type::kPoints || attribute.output) {
+    Fail(name.where, Status::Invalid("{} is no points input, so it cannot be deformed", graph().PlugName(*plug)));
+    return;
+  }
+  Matrix4 world_from_points;
+  const PointBufferPtr points = PointsToDeform(*plug, name, &world_from_points);
+  if (points == nullptr) return;
+  std::optional<PlugRef> last;
+  for (const RigString& item : deform.stack) {
+    for (const char* word : {"gltf", "morph", "skin", "transform"}) {
+      if (item.text == word) Fail(item.where, Status::Invalid("\"{}\" belongs to meshes, not to {}", word, name.text));
+    }
+    Made* made = FindDeformer(item);
+    const int geometry = made == nullptr ? 0 : static_cast<int>(made->geometries.size());
+    if (made == nullptr || !AddGeometry(made, {name.text, std::nullopt, points->count()}, false, world_from_points, item.where)) return;
+    GraphEditor edit(&graph());
+    if (edit.Has(made->id, "space")) edit.Set(made->id, "space", Value("mesh"));
+    if (last.has_value()) {
+      edit.Connect(*last, edit.Plug(made->id, "inPoints", geometry));
+    } else {
+      edit.Set(made->id, "inPoints", geometry, Value(points));
+    }
+    last = edit.Plug(made->id, "outPoints", geometry);
+    if (!Fail(item.where, edit.Take())) return;
+  }
+  if (last.has_value()) Fail(name.where, graph().Connect(*last, *plug));
+}
+
+// The value that a points attribute has without its stack. Lattice points are in the coordinates of the lattice's box.
+PointBufferPtr RigBuild::PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points) {
+  const NodeDef& def = graph().def(plug.node);
+  const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(plug.attribute)];
+  const Value* set = graph().FindValue(plug);
+  PointBufferPtr points;
+  if (set != nullptr && set->points() != nullptr) points = set->get<PointBufferPtr>();
+  if (attribute.grid.empty()) {
+    if (points == nullptr) Fail(name.where, Status::Invalid("{} has no points to deform: set them first", name.text));
+    return points;
+  }
+  Made* lattice = FindMade(plug.node);
+  if (lattice == nullptr || !BoxOfMembers(lattice, name.where, world_from_points)) return nullptr;
+  if (points != nullptr) return points;
+  const int number = def.FindAttribute(attribute.grid);
+  const Value* divisions_set = graph().FindValue({plug.node, number, -1, -1});
+  const Value& divisions = divisions_set != nullptr ? *divisions_set : def.attributes[static_cast<std::size_t>(number)].default_value;
+  const auto* sizes = divisions.get_if<std::vector<std::int64_t>>();
+  constexpr std::int64_t kMaxDivisions = 32;
+  if (sizes == nullptr || sizes->size() != 3 || std::any_of(sizes->begin(), sizes->end(), [](std::int64_t n) { return n < 2 || n > kMaxDivisions; })) {
+    Fail(name.where, Status::Invalid("{}: the divisions {} are not three whole numbers from 2 to {}", name.text, divisions.ToString(), kMaxDivisions));
+    return nullptr;
+  }
+  std::vector<float> grid;
+  for (std::int64_t u = 0; u < (*sizes)[2]; ++u) {
+    for (std::int64_t t = 0; t < (*sizes)[1]; ++t) {
+      for (std::int64_t s = 0; s < (*sizes)[0]; ++s) {
+        const std::int64_t at[3] = {s, t, u};
+        for (std::size_t i = 0; i < 3; ++i) {
+          grid.push_back(static_cast<float>(static_cast<double>(at[i]) / static_cast<double>((*sizes)[i] - 1)));
+        }
+      }
+    }
+  }
+  return std::make_shared<const PointBuffer>(PointBuffer::FromInterleaved(grid));
+}
+
+// The lattice's box at rest, in the axes of its stage. Where the rig does not set it, it is set here to what the members fill.
+bool RigBuild::BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box) {
+  GraphEditor edit(&graph());
+  const PlugRef min_plug = edit.Plug(lattice->id, "boxMin"), max_plug = edit.Plug(lattice->id, "boxMax");
+  if (!edit.ok()) return Fail(where, edit.Take());
+  const Value* min_set = graph().FindValue(min_plug);
+  const Value* max_set = graph().FindValue(max_plug);
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Double3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  const Matrix4 stage_from_world = InverseOrIdentity(lattice->world_from_stage);
+  for (std::size_t g = 0; g < lattice->geometries.size(); ++g) {
+    if (!lattice->geometries[g].mesh.has_value()) continue;
+    const Value* map = graph().FindValue(edit.Plug(lattice->id, "weights", static_cast<int>(g)));
+    const WeightMap* weights = map == nullptr ? nullptr : map->asset<WeightMap>();
+    const Places& points = rest_->WorldPoints(*lattice->geometries[g].mesh);
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      if (weights != nullptr && !(weights->weights()[p] > 0)) continue;
+      const Double3 point = TransformPoint(stage_from_world, points[p]);
+      for (int i = 0; i < 3; ++i) {
+        low[i] = std::min(low[i], point[i]);
+        high[i] = std::max(high[i], point[i]);
+      }
+    }
+  }
+  if (min_set != nullptr) low = min_set->get<Double3>();
+  if (max_set != nullptr) high = max_set->get<Double3>();
+  if (!(low.x <= high.x)) {
+    return Fail(where, Status::Invalid("\"{}\" has no members, so its points have no place: put it in a stack or set boxMin and boxMax",
+                                       lattice->from->name));
+  }
+  if (min_set == nullptr && max_set == nullptr) {
+    // A hair wider than the members, as the lattice makes it by itself
+    const double margin = 1e-4 * Length(high - low) + 1e-9;
+    for (int i = 0; i < 3; ++i) low[i] -= margin, high[i] += margin;
+  }
+  edit.Set(lattice->id, "boxMin", low);
+  edit.Set(lattice->id, "boxMax", high);
+  *world_from_box = lattice->world_from_stage * Translation(low) * Scaling(high - low);
+  return Fail(where, edit.Take());
+}
+
+}  // namespace kpsa

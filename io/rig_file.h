@@ -1,0 +1,112 @@
+// A rig file (RIG-FORMAT.md, version 1) as plain data, its includes merged in. Names are not looked up and values of
+// attributes are not typed yet: that takes a registry and a character (io/rig_builder.h). Keys of later versions
+// (plugins, variants, clips, references, templates, use) are refused by name.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/quantity.h"
+#include "io/yaml_document.h"
+
+namespace kpsa {
+
+// A file of the rig: the one that was opened, or one that it includes.
+struct RigSource {
+  std::string path;
+  std::string folder;  // relative paths in the file start here; "" is the current folder
+  FileUnits units;     // of bare numbers in this file
+  SourceLocation included_at;
+};
+
+// A string or a value with its place. `source` is an index into RigFile::sources.
+struct RigString {
+  std::string text;
+  SourceLocation where;
+  int source = 0;
+};
+
+struct RigAttribute {
+  std::string name;  // "iterations", "rotateX", "input[2]"; common words (parent, at, members, ...) are kept apart
+  YamlNode key, value;
+  int source = 0;
+};
+
+struct RigNode {
+  std::string name, type;
+  SourceLocation where;  // of the name
+  int source = 0;
+  YamlNode type_node;
+  std::vector<RigAttribute> attributes;
+};
+
+struct RigConnection {
+  std::string from, to;
+  bool override_clip = false;  // `override: true`
+  SourceLocation where;
+  int source = 0;
+};
+
+struct RigDeform {
+  std::vector<RigString> meshes;       // either meshes ...
+  std::optional<RigString> points;     // ... or a points attribute
+  std::vector<RigString> stack;
+  SourceLocation where;
+  int source = 0;
+};
+
+struct RigControl {
+  RigString plug;
+  YamlNode min, max;
+};
+
+struct RigAccelerate {
+  std::string name;
+  SourceLocation where;
+  int source = 0;
+  struct Points {
+    std::string mesh, stage;  // "head_mesh@mush"
+    SourceLocation where;
+  };
+  std::vector<Points> points;
+  std::optional<RigString> space;
+  std::string subspace;         // path, resolved; "" where none is named
+  std::optional<double> tolerance;  // metres
+  double violation_rate = 0.01;     // of frames, 0..1
+  std::vector<RigString> train_clips, test_clips;
+  std::int64_t train_samples = 0;
+};
+
+struct RigOverride {
+  RigString plug;
+  YamlNode value;
+};
+
+struct RigFile {
+  std::vector<RigSource> sources;      // [0] is the file that was opened
+  std::optional<RigString> character;  // path, resolved
+  std::optional<double> fps;
+  bool weld = true;
+  std::vector<RigNode> nodes;
+  std::vector<RigConnection> connections;
+  std::vector<RigDeform> deform;
+  std::vector<RigControl> controls;
+  std::vector<RigAccelerate> accelerate;
+  std::vector<RigOverride> overrides;
+};
+
+// Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig then
+// holds what could be read, for finding more of them. `fps` overrides the rig's for the suffix f.
+Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig);
+
+// The units: section into `units`.
+void ReadUnits(const YamlNode& node, FileUnits* units, YamlErrors* errors);
+// Checks `kpsa: 1`.
+void ReadVersion(YamlMap* map, YamlErrors* errors);
+
+// `path` as named by a file in `folder`.
+std::string ResolvePath(const std::string& folder, const std::string& path);
+
+}  // namespace kpsa

@@ -1,0 +1,32 @@
+// Inside of the rig reader: the sections of one file. Nothing outside io/rig_file*.cpp includes this.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "io/rig_file.h"
+
+namespace kpsa {
+
+struct SectionReader {
+  RigFile* rig;
+  YamlErrors* errors;
+  int source;  // of the file that is read
+  // Notes a key of a section; false if it was defined before, in this file or another.
+  std::function<bool(const std::string& section, const std::string& key, const SourceLocation& where)> define;
+
+  void ReadNodes(const YamlNode& node);
+  void ReadConnections(const YamlNode& node);
+  void ReadDeform(const YamlNode& node);
+  void ReadControls(const YamlNode& node);
+  void ReadAccelerate(const YamlNode& node);
+  void ReadOverrides(const YamlNode& node);
+
+ private:
+  bool CheckMap(const YamlNode& node, const char* section) const;
+  bool ReadNames(const YamlNode& node, const std::string& what, std::vector<RigString>* names) const;
+  void ReadAcceleratePoints(const YamlNode& node, RigAccelerate* accelerate) const;
+  const FileUnits& units() const { return rig->sources[static_cast<std::size_t>(source)].units; }
+};
+
+}  // namespace kpsa

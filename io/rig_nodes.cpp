@@ -1,0 +1,187 @@
+// The nodes of a rig file, the values of their attributes, and overrides.
+#include <algorithm>
+
+#include "io/rig_build.h"
+
+namespace kpsa {
+namespace {
+
+// Words of stacks: no node may be called so.
+constexpr const char* kStackWords[] = {"gltf", "morph", "skin", "transform"};
+
+bool HasAttribute(const NodeDef& def, const char* name) { return def.FindAttribute(name) >= 0; }
+
+bool IsDeformer(const NodeDef& def) {
+  const int points = def.FindAttribute("inPoints");
+  return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && HasAttribute(def, "outPoints");
+}
+
+const AttributeDef& AttributeOf(const Graph& graph, const PlugRef& plug) {
+  return graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
+}
+
+}  // namespace
+
+// Keys that a definition does not declare, but that mean something for its kind of node.
+bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
+  if (key == "parent") return HasAttribute(def, "parentMatrix");
+  if (key == "at") return HasAttribute(def, "offsetParentMatrix");
+  if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
+  if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
+  if (key == "curve") return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
+  return false;
+}
+
+// An override of such a key replaces it in the node before anything is read: `wire1.weights`, `lips.vertices`.
+void RigBuild::ApplySpecialOverrides() {
+  std::vector<RigOverride> others;
+  for (RigOverride& override_ : file_->overrides) {
+    RigNode* longest = nullptr;
+    const std::string& text = override_.plug.text;
+    for (std::size_t dot = text.rfind('.'); longest == nullptr && dot != std::string::npos && dot > 0; dot = text.rfind('.', dot - 1)) {
+      const auto it = written_.find(text.substr(0, dot));
+      if (it != written_.end()) longest = &file_->nodes[it->second];
+    }
+    const NodeDef* def = longest == nullptr ? nullptr : graph().registry().Find(longest->type);
+    const std::string key = longest == nullptr ? "" : text.substr(longest->name.size() + 1);
+    if (def == nullptr || !IsSpecial(*def, key)) {
+      others.push_back(std::move(override_));
+      continue;
+    }
+    auto& attributes = longest->attributes;
+    attributes.erase(std::remove_if(attributes.begin(), attributes.end(), [&](const RigAttribute& a) { return a.name == key; }),
+                     attributes.end());
+    YamlNode key_node;
+    key_node.kind = YamlNode::Kind::kScalar;
+    key_node.scalar = key;
+    key_node.file = override_.value.file;
+    key_node.line = override_.plug.where.line;
+    key_node.column = override_.plug.where.column;
+    attributes.push_back({key, key_node, override_.value, override_.plug.source});
+  }
+  file_->overrides = std::move(others);
+}
+
+void RigBuild::AddNodes() {
+  for (const RigNode& node : file_->nodes) {
+    if (errors_->full()) return;
+    if (std::find(std::begin(kStackWords), std::end(kStackWords), node.name) != std::end(kStackWords)) {
+      Fail(node.where, Status::Invalid("\"{}\" is a word of stacks: give the node another name", node.name));
+      continue;
+    }
+    if (graph().registry().Find(node.type) == nullptr) {
+      errors_->Add(node.type_node, "unknown node type \"{}\"{}", node.type, DidYouMean(node.type, graph().registry().Names()));
+      continue;
+    }
+    Result<NodeId> id = graph().AddNode(node.type, node.name);
+    if (!Fail(node.where, id.status())) continue;
+    made_by_node_[id->index] = made_.size();
+    made_by_name_[node.name] = made_.size();
+    made_.push_back({&node, *id, {}});
+  }
+}
+
+void RigBuild::ReadAttributes(Made* made) {
+  const NodeDef& def = graph().def(made->id);
+  for (const RigAttribute& attribute : made->from->attributes) {
+    if (IsSpecial(def, attribute.name)) {
+      made->special[attribute.name] = &attribute;
+    } else {
+      ReadAttribute(*made, attribute, false);
+    }
+  }
+}
+
+void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bool overrides) {
+  const NodeDef& def = graph().def(made.id);
+  // A list for a whole array is one value an element
+  const int number = def.FindAttribute(attribute.name);
+  if (number >= 0) {
+    const AttributeDef& a = def.attributes[static_cast<std::size_t>(number)];
+    if (a.array && !a.per_geometry) {
+      if (!attribute.value.is_sequence()) {
+        errors_->Add(attribute.value, "{}.{} is an array: expected a list, or name one element, \"{}[0]\"", made.from->name, a.name, a.name);
+        return;
+      }
+      for (std::size_t i = 0; i < attribute.value.items.size(); ++i) {
+        ReadPlug({made.id, number, static_cast<int>(i), -1}, attribute.value.items[i], attribute.source, overrides);
+      }
+      return;
+    }
+  }
+  const Result<PlugRef> plug = graph().FindPlug(made.from->name + "." + attribute.name);
+  if (!plug.ok()) {
+    std::string base = attribute.name.substr(0, attribute.name.find_first_of("[."));
+    if (number >= 0 || base != attribute.name) {
+      errors_->Add(attribute.key, plug.status());
+      return;
+    }
+    std::vector<std::string> names;
+    for (const AttributeDef& a : def.attributes) {
+      if (!a.output) names.push_back(a.name);
+    }
+    for (const char* word : {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed", "places"}) {
+      if (IsSpecial(def, word)) names.push_back(word);
+    }
+    errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name, attribute.name,
+                 DidYouMean(attribute.name, names));
+    return;
+  }
+  ReadPlug(*plug, attribute.value, attribute.source, overrides);
+}
+
+// Sets the value, or notes the connection, that is written for one plug.
+void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, bool overrides) {
+  const AttributeDef& attribute = AttributeOf(graph(), plug);
+  const Type type = graph().PlugType(plug);
+  const std::string what = graph().PlugName(plug);
+  if (attribute.output) {
+    errors_->Add(value, "{} is an output and cannot be set", what);
+    return;
+  }
+  const auto is_connection = [&](const YamlNode& node, Type of) { return IsConnection(node, graph(), of, attribute.unit, units(source)); };
+  if (is_connection(value, type)) {
+    pending_.push_back({value.scalar, plug, value.where(), source, overrides});
+    if (overrides) overridden_.emplace_back(plug, false);
+    return;
+  }
+  // [a.x, 0, b.y]: components of their own
+  if (type == Type::kDouble3 && value.is_sequence() && value.items.size() == 3 &&
+      std::any_of(value.items.begin(), value.items.end(), [&](const YamlNode& item) { return is_connection(item, Type::kDouble); })) {
+    for (int i = 0; i < 3; ++i) {
+      PlugRef component = plug;
+      component.component = i;
+      ReadPlug(component, value.items[static_cast<std::size_t>(i)], source, overrides);
+    }
+    return;
+  }
+  Value read;
+  if (!ReadValue(value, what, attribute, type, units(source), &read, errors_)) return;
+  errors_->Add(value, graph().Set(plug, std::move(read)));
+  if (overrides) overridden_.emplace_back(plug, true);
+}
+
+// Values are set at once (others may depend on them, as lattice points on divisions); connections wait.
+void RigBuild::ReadOverrides() {
+  for (const RigOverride& override_ : file_->overrides) {
+    if (errors_->full()) return;
+    const Result<PlugRef> plug = graph().FindPlug(override_.plug.text);
+    if (!plug.ok()) {
+      Fail(override_.plug.where, plug.status());
+      continue;
+    }
+    ReadPlug(*plug, override_.value, override_.plug.source, true);
+  }
+  for (const auto& [plug, by_value] : overridden_) overridden_plugs_.emplace(plug.node.index, plug.attribute, plug.element, plug.component);
+}
+
+// An overriding value also ends what drives the plug.
+void RigBuild::FinishOverrides() {
+  for (const auto& [plug, by_value] : overridden_) {
+    if (!by_value) continue;
+    if (graph().FindConnection(plug) != nullptr) Fail({}, graph().Disconnect(plug));
+    if (IsClipPlug(rig_->scene, graph(), plug)) rig_->pinned.push_back(plug);
+  }
+}
+
+}  // namespace kpsa

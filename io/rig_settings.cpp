@@ -1,0 +1,92 @@
+// Values from outside of the rig: --set and pose files.
+#include <algorithm>
+
+#include "io/rig_builder.h"
+#include "io/rig_values.h"
+
+namespace kpsa {
+namespace {
+
+Result<Setting> ReadSetting(const Rig& rig, const std::string& plug_text, const YamlNode& value, const FileUnits& units) {
+  const Result<PlugRef> plug = rig.graph->FindPlug(plug_text);
+  if (!plug.ok()) return plug.status();
+  const AttributeDef& attribute = rig.graph->def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
+  if (attribute.output) return Status::Invalid("{} is an output and cannot be set", rig.graph->PlugName(*plug));
+  Setting setting;
+  setting.plug = *plug;
+  setting.text = plug_text + "=" + (value.is_scalar() ? value.scalar : "...");
+  YamlErrors errors;
+  if (!ReadValue(value, rig.graph->PlugName(*plug), attribute, rig.graph->PlugType(*plug), units, &setting.value, &errors)) return errors.Take();
+  if (setting.value.get_if<double>() != nullptr || setting.value.get_if<std::int64_t>() != nullptr) {
+    const double number = setting.value.AsDouble();
+    if (number < attribute.min || number > attribute.max) {
+      return Status::Invalid("{} = {} is outside of {} to {}", rig.graph->PlugName(*plug), number, attribute.min, attribute.max);
+    }
+  }
+  return setting;
+}
+
+}  // namespace
+
+Result<Setting> ParseSetting(const Rig& rig, std::string_view text) {
+  const std::size_t equals = text.rfind('=');
+  if (equals == std::string_view::npos || equals == 0 || equals + 1 == text.size()) {
+    return Status::Usage("\"{}\": expected plug=value, as in jaw.rotateX=-20", text);
+  }
+  std::string plug(text.substr(0, equals));
+  while (!plug.empty() && plug.back() == ' ') plug.pop_back();
+  const Result<YamlNode> value = ParseYaml(text.substr(equals + 1), "");
+  if (!value.ok()) return Status::Usage("\"{}\": {}", text, value.status().errors().front().message);
+  Result<Setting> setting = ReadSetting(rig, plug, *value, rig.units);
+  if (!setting.ok()) {
+    Status usage;
+    for (const Error& error : setting.status().errors()) usage.Append(Status::Usage("{}", error.message));
+    return usage;
+  }
+  setting->text = std::string(text);
+  return setting;
+}
+
+Result<std::vector<Setting>> ReadPoseFile(const Rig& rig, const std::string& path) {
+  Result<YamlNode> root = ReadYamlFile(path);
+  if (!root.ok()) return root.status();
+  YamlErrors errors;
+  YamlMap map(*root, "pose file", &errors);
+  ReadVersion(&map, &errors);
+  FileUnits units = rig.units;
+  if (const YamlNode* node = map.Find("units")) ReadUnits(*node, &units, &errors);
+  std::vector<Setting> settings;
+  if (const YamlNode* pose = map.Required("pose")) {
+    if (!pose->is_map()) errors.Add(*pose, "pose: expected a map of plugs and values, found {}", pose->kind_name());
+    for (std::size_t i = 0; i < pose->keys.size(); ++i) {
+      Result<Setting> setting = ReadSetting(rig, pose->keys[i].scalar, pose->items[i], units);
+      if (setting.ok()) {
+        settings.push_back(std::move(*setting));
+      } else {
+        errors.Add(pose->keys[i], setting.status());
+      }
+    }
+  }
+  map.RejectUnread();
+  if (!errors.ok()) return errors.Take();
+  return settings;
+}
+
+Status ApplySetting(Rig* rig, const Setting& setting) {
+  Graph& graph = *rig->graph;
+  PlugRef whole = setting.plug;
+  whole.component = -1;
+  for (const PlugRef& plug : {setting.plug, whole}) {
+    const Connection* driver = graph.FindConnection(plug);
+    if (driver == nullptr) continue;
+    const std::vector<NodeId>& clip_nodes = rig->scene.clip_nodes;
+    if (std::find(clip_nodes.begin(), clip_nodes.end(), driver->source.node) == clip_nodes.end()) {
+      return Status::Usage("{} is driven by {} and cannot be set", graph.PlugName(plug), graph.PlugName(driver->source));
+    }
+    KPSA_RETURN_IF_ERROR(graph.Disconnect(plug));
+  }
+  if (IsClipPlug(rig->scene, graph, setting.plug)) rig->pinned.push_back(setting.plug);
+  return graph.Set(setting.plug, setting.value);
+}
+
+}  // namespace kpsa

@@ -1,0 +1,50 @@
+// The graph rewrite that puts a KPSA node in the place of a stack: consumers of the accelerated points read the node,
+// its cues read the stack where the subspace says, its fullPoints stay connected to the stack, lazily.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "graph/compiler.h"
+#include "kpsa/kpsa_node.h"
+#include "kpsa/signals.h"
+
+namespace kpsa {
+
+// Points to accelerate: of one mesh, up to and including a stage; and the stages before it, where cues may lie.
+struct AccelerationTarget {
+  struct Stage {
+    std::string name;
+    PlugRef points;
+    bool world = true;  // world space; else mesh space
+  };
+  struct MeshPoints {
+    std::string name;           // "head_mesh@mush"
+    std::vector<Stage> stages;  // up to and including the accelerated one, which is the last
+  };
+  std::vector<MeshPoints> meshes;
+  std::vector<PlugRef> space;    // none, or the worldMatrix of the frame
+  std::string space_name;
+  std::vector<PlugRef> varying;  // time, controls: all that may vary
+  std::vector<PlugRef> controls; // of these, the ones whose held value is no part of the rig's identity
+  std::vector<PlugRef> outputs() const;
+};
+
+struct AccelerateOptions {
+  double tolerance = -1;       // metres; below 0: the subspace's own
+  double violation_rate = -1;  // below 0: the subspace's own
+  bool stale_is_miss = false;  // a stale subspace evaluates everything fully instead of being refused
+};
+
+struct Accelerated {
+  NodeId node;
+  std::shared_ptr<const KpsaConfig> config;
+  std::vector<std::string> notes;  // what may surprise
+};
+
+// Errors: a subspace of other meshes or stages, or of a rig that differs (named); nothing is changed then.
+Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const AccelerationTarget& target, std::shared_ptr<const Subspace> subspace,
+                               const std::string& node_name, const AccelerateOptions& options);
+
+}  // namespace kpsa

@@ -1,0 +1,364 @@
+#include "kpsa/kpsa_node.h"
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+
+#include "base/check.h"
+#include "base/matrix.h"
+#include "kpsa/rigid_points.h"
+#include "kpsa/signals.h"
+
+namespace kpsa {
+namespace {
+
+// Inputs and outputs by position.
+enum In { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints };
+enum Out { kOutPoints, kScore, kHit, kMissReason, kOffender };
+
+std::atomic<bool> measure_times{false};
+std::atomic<std::uint64_t> cue_ns{0}, projection_ns{0}, reconstruction_ns{0};
+
+// Adds the time of a scope to a counter, where somebody asked for it.
+class Stopwatch {
+ public:
+  explicit Stopwatch(std::atomic<std::uint64_t>& counter) : counter_(measure_times.load(std::memory_order_relaxed) ? &counter : nullptr) {
+    if (counter_ != nullptr) begin_ = std::chrono::steady_clock::now();
+  }
+  ~Stopwatch() {
+    if (counter_ == nullptr) return;
+    *counter_ += static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - begin_).count());
+  }
+
+ private:
+  std::atomic<std::uint64_t>* counter_;
+  std::chrono::steady_clock::time_point begin_;
+};
+
+// What a plan's binding adds: the threshold, and which points of the outputs are wanted.
+struct KpsaKernel {
+  std::shared_ptr<const KpsaConfig> config;
+  SoftCacheThreshold threshold;
+  struct Output {
+    bool all = true;
+    std::vector<Index> points;  // wanted ones, where not all
+    std::vector<Index> tiles;   // that hold them
+    std::size_t padded = 0;     // floats of a component of the whole mesh, for the scratch
+  };
+  std::vector<Output> outputs;
+  std::size_t tile_scratch = 0;     // floats
+  std::size_t vector_doubles = 0;   // of one measurement
+};
+
+// Kept from decide to compute, per evaluator; the whitened measurement follows it.
+struct KpsaState {
+  Verdict verdict;
+};
+float* Whitened(const ComputeContext& c) { return reinterpret_cast<float*>(c.state + (sizeof(KpsaState) + 63) / 64 * 64); }
+
+Index FirstOutsideGuard(const ComputeContext& c, const KpsaConfig::Data& data) {
+  const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
+  for (std::uint32_t j = 0; j < matrices.size(); ++j) {
+    const double* lo = data.matrix_lo.data() + 12 * j;
+    const double* hi = data.matrix_hi.data() + 12 * j;
+    const Matrix4& m = matrices[j];
+    bool inside = true;  // no branch per entry; NaN is outside
+    for (std::size_t column = 0; column < 4; ++column) {
+      for (std::size_t row = 0; row < 3; ++row) {
+        const double v = m.m[4 * column + row];
+        inside &= (v >= lo[3 * column + row]) & (v <= hi[3 * column + row]);
+      }
+    }
+    if (!inside) return j;
+  }
+  const ArrayView<double> scalars = c.array<double>(kScalars);
+  for (std::uint32_t k = 0; k < scalars.size(); ++k) {
+    if (!(scalars[k] >= data.scalar_lo[k] && scalars[k] <= data.scalar_hi[k])) return matrices.size() + k;
+  }
+  return kNoIndex;
+}
+
+// The raw measurement, in the order of the subspace's rows.
+void Gather(const ComputeContext& c, const KpsaConfig::Data& data, std::span<double> raw) {
+  Matrix4 space_from_world;
+  if (!(c.get<Matrix4>(kSpaceMatrix) == Matrix4())) space_from_world = InverseOrIdentity(c.get<Matrix4>(kSpaceMatrix));
+  const ArrayView<ConstPointsView> cues = c.array<ConstPointsView>(kCues);
+  const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
+  const ArrayView<double> scalars = c.array<double>(kScalars);
+  std::size_t r = 0;
+  for (const KpsaConfig::Row& row : data.rows) {
+    switch (row.kind) {
+      case KpsaConfig::Row::Kind::kPoint: {
+        const ConstPointsView& points = cues[row.input];
+        Double3 p{points.x[row.element], points.y[row.element], points.z[row.element]};
+        if (data.cues[row.input].in_space) p = TransformPoint(space_from_world, p);
+        raw[r] = p.x, raw[r + 1] = p.y, raw[r + 2] = p.z;
+        r += 3;
+        break;
+      }
+      case KpsaConfig::Row::Kind::kMatrix:
+        raw[r++] = matrices[row.input](static_cast<int>(row.element % 3), static_cast<int>(row.element / 3));
+        break;
+      case KpsaConfig::Row::Kind::kScalar: raw[r++] = scalars[row.input]; break;
+    }
+  }
+}
+
+std::uint64_t Decide(ComputeContext& c) {
+  const auto& kernel = c.kernel_as<KpsaKernel>();
+  const KpsaConfig::Data& data = kernel.config->data();
+  const Subspace& subspace = *data.subspace;
+  KpsaState& state = c.state_as<KpsaState>();
+  state.verdict = Verdict{};
+  std::uint64_t all = 0;
+  for (std::size_t m = 0; m < subspace.outputs.size(); ++m) all |= std::uint64_t{1} << m;
+  const auto miss = [&](MissReason reason, Index offender) {
+    state.verdict.hit = false;
+    state.verdict.full_weight = 1;
+    state.verdict.score = std::numeric_limits<double>::infinity();
+    state.verdict.reason = reason;
+    state.verdict.offender = offender;
+    return all;
+  };
+  if (data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
+  const std::size_t r = subspace.rows();
+  auto* doubles = reinterpret_cast<double*>(c.scratch);
+  const std::span<double> raw(doubles, r), y(doubles + kernel.vector_doubles, r), g(doubles + 2 * kernel.vector_doubles, r);
+  {
+    const Stopwatch watch(cue_ns);
+    if (const Index outside = FirstOutsideGuard(c, data); outside != kNoIndex) return miss(MissReason::kOutOfRange, outside);
+    Gather(c, data, raw);
+  }
+  const Stopwatch watch(projection_ns);
+  for (std::size_t i = 0; i < r; ++i) y[i] = (raw[i] - subspace.cue_mean[i]) * subspace.cue_scale[i];
+  state.verdict = Judge(subspace.soft_cache, kernel.threshold, y, g);
+  if (state.verdict.full_weight < 1) {
+    MultiplyVector(subspace.whitening, y, true, g);
+    float* w = Whitened(c);
+    for (std::size_t i = 0; i < r; ++i) w[i] = static_cast<float>(g[i]);
+  }
+  return state.verdict.hit ? 0 : all;
+}
+
+void WriteVerdict(const ComputeContext& c) {
+  const Verdict& v = c.state_as<KpsaState>().verdict;
+  c.out_value<double>(kScore) = v.score;
+  c.out_value<std::int64_t>(kHit) = v.hit;
+  c.out_value<std::int64_t>(kMissReason) = static_cast<std::int64_t>(v.reason);
+  c.out_value<std::int64_t>(kOffender) = v.offender == kNoIndex ? -1 : static_cast<std::int64_t>(v.offender);
+}
+
+// Reconstructs output m into `out` (the wanted points only) and takes it to world space.
+void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
+  const Subspace& subspace = *kernel.config->data().subspace;
+  const KpsaKernel::Output& wanted = kernel.outputs[m];
+  const std::span<const float> w(Whitened(c), subspace.rows());
+  const std::span<float> scratch(c.scratch, kernel.tile_scratch);
+  const TileMap& tiles = subspace.tiles[m];
+  if (wanted.all) {
+    tiles.Reconstruct(w, scratch, out);
+  } else {
+    float* whole = c.scratch + kernel.tile_scratch;
+    const PointsView mesh{whole, whole + wanted.padded, whole + 2 * wanted.padded, tiles.points()};
+    tiles.ReconstructTiles(w, wanted.tiles, scratch, mesh);
+    for (std::size_t i = 0; i < wanted.points.size(); ++i) {
+      out.x[i] = mesh.x[wanted.points[i]];
+      out.y[i] = mesh.y[wanted.points[i]];
+      out.z[i] = mesh.z[wanted.points[i]];
+    }
+  }
+  const Matrix4& space = c.get<Matrix4>(kSpaceMatrix);
+  if (!(space == Matrix4())) TransformPoints(space, out);
+}
+
+void CopyFull(ConstPointsView from, PointsView to) {
+  std::memcpy(to.x, from.x, from.count * sizeof(float));
+  std::memcpy(to.y, from.y, from.count * sizeof(float));
+  std::memcpy(to.z, from.z, from.count * sizeof(float));
+}
+
+void Compute(ComputeContext& c) {
+  const auto& kernel = c.kernel_as<KpsaKernel>();
+  WriteVerdict(c);
+  const Verdict& verdict = c.state_as<KpsaState>().verdict;
+  const ArrayView<ConstPointsView> full = c.array<ConstPointsView>(kFullPoints);
+  for (std::uint32_t m = 0; m < kernel.outputs.size(); ++m) {
+    const PointsView& out = c.out_points(kOutPoints, m);
+    if (out.count == 0) continue;
+    if (verdict.full_weight >= 1) {
+      CopyFull(full[m], out);
+      continue;
+    }
+    const Stopwatch watch(reconstruction_ns);
+    Reconstruct(c, kernel, m, out);
+    if (!verdict.hit) BlendPoints(verdict.full_weight, full[m], out);
+  }
+}
+
+// Hits only: the engine evaluates misses one by one.
+void ComputeBlock(ComputeContext* contexts, std::size_t count) {
+  const auto& kernel = contexts[0].kernel_as<KpsaKernel>();
+  const Subspace& subspace = *kernel.config->data().subspace;
+  for (std::size_t i = 0; i < count; ++i) WriteVerdict(contexts[i]);
+  for (std::size_t m = 0; m < kernel.outputs.size(); ++m) {
+    if (!kernel.outputs[m].all) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const PointsView& out = contexts[i].out_points(kOutPoints, static_cast<std::uint32_t>(m));
+        if (out.count > 0) Reconstruct(contexts[i], kernel, m, out);
+      }
+      continue;
+    }
+    // Frames that share a pass over the subspace
+    const Stopwatch watch(reconstruction_ns);
+    const std::size_t r = subspace.rows();
+    for (std::size_t first = 0; first < count; first += kBlockFrames) {
+      const std::size_t frames = std::min(kBlockFrames, count - first);
+      float* w = contexts[first].scratch;
+      PointsView outs[kBlockFrames];
+      for (std::size_t f = 0; f < frames; ++f) {
+        std::memcpy(w + f * r, Whitened(contexts[first + f]), r * sizeof(float));
+        outs[f] = contexts[first + f].out_points(kOutPoints, static_cast<std::uint32_t>(m));
+      }
+      const std::size_t used = PaddedCount(frames * r);
+      subspace.tiles[m].ReconstructBlock({w, frames * r}, {outs, frames}, {}, {w + used, kernel.tile_scratch - used});
+      for (std::size_t f = 0; f < frames; ++f) {
+        const Matrix4& space = contexts[first + f].get<Matrix4>(kSpaceMatrix);
+        if (!(space == Matrix4())) TransformPoints(space, outs[f]);
+      }
+    }
+  }
+}
+
+void DemandKpsa(Demand& demand) {
+  const auto* config = demand.structural().asset<KpsaConfig>("config");
+  if (config == nullptr) return;
+  for (std::size_t c = 0; c < config->data().cues.size(); ++c) {
+    const int element = static_cast<int>(c);
+    const Index total = demand.input_total("cues", element);
+    const std::vector<Index>& points = config->data().cues[c].points;
+    if (points.empty() || points.back() >= total) continue;  // bind reports it
+    demand.Require("cues", element, PointSet::Of(points, total));
+  }
+  for (std::size_t m = 0; m < config->data().subspace->outputs.size(); ++m) {
+    demand.Require("fullPoints", static_cast<int>(m), demand.output("outPoints", static_cast<int>(m)));
+  }
+}
+
+Result<BoundKernel> BindKpsa(const Binding& binding) {
+  const Structural& s = binding.structural();
+  if (s.asset<KpsaConfig>("config") == nullptr) return Status::Invalid("config is not set");
+  KpsaKernel kernel;
+  kernel.config = std::dynamic_pointer_cast<const KpsaConfig>(s.value("config").get<AssetPtr>());
+  const KpsaConfig::Data& data = kernel.config->data();
+  const Subspace& subspace = *data.subspace;
+  for (std::size_t c = 0; c < data.cues.size(); ++c) {
+    if (binding.input("cues", static_cast<int>(c)).size() != data.cues[c].points.size()) {
+      return Status::Invalid("cues[{}] has too few points for the subspace's cues", c);
+    }
+  }
+  const Calibration calibration = Calibrate(subspace.calibration, s.get_double("tolerance"), s.get_double("violationRate"), subspace.blend_start);
+  kernel.threshold = calibration.threshold;
+  std::size_t whole = 0;
+  for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
+    const PointSet& wanted = binding.output("outPoints", static_cast<int>(m));
+    KpsaKernel::Output output;
+    output.all = wanted.is_all();
+    if (!output.all) {
+      output.points = wanted.ToVector();
+      for (Index point : output.points) {
+        const auto tile = static_cast<Index>(point / kTilePoints);
+        if (output.tiles.empty() || output.tiles.back() != tile) output.tiles.push_back(tile);
+      }
+      output.padded = PaddedCount(subspace.outputs[m].points);
+      whole = std::max(whole, 3 * output.padded);
+    }
+    kernel.outputs.push_back(std::move(output));
+    kernel.tile_scratch = std::max(kernel.tile_scratch, subspace.tiles[m].scratch_floats(kBlockFrames));
+  }
+  kernel.vector_doubles = (subspace.rows() + 7) / 8 * 8;
+  kernel.tile_scratch = PaddedCount(std::max(kernel.tile_scratch + PaddedCount(kBlockFrames * subspace.rows()), 6 * kernel.vector_doubles));
+  const std::size_t scratch = kernel.tile_scratch + whole;
+  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 + PaddedCount(subspace.rows()) * sizeof(float);
+  return BoundKernel{std::make_shared<const KpsaKernel>(std::move(kernel)), scratch, state};
+}
+
+}  // namespace
+
+KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
+  Hasher hasher;
+  const Subspace& s = *data_.subspace;
+  hasher.Add(std::string_view(s.rig_hash));
+  hasher.Add(std::string_view(s.training));
+  hasher.Add(std::span<const double>(s.cue_mean));
+  hasher.Add(std::span<const double>(s.whitening));
+  for (const TileMap& tiles : s.tiles) {
+    hasher.Add(std::span<const std::uint16_t>(tiles.data().u.span()));
+    hasher.Add(std::span<const float>(tiles.data().mean.span()));
+  }
+  for (const PointCues& cues : data_.cues) {
+    hasher.Add(std::span<const Index>(cues.points));
+    hasher.Add(cues.in_space);
+  }
+  for (const Row& row : data_.rows) {
+    hasher.Add(row.kind);
+    hasher.Add(row.input);
+    hasher.Add(row.element);
+  }
+  for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.scalar_lo, &data_.scalar_hi}) hasher.Add(std::span<const double>(*range));
+  for (const CalibrationPair& pair : s.calibration) {
+    hasher.Add(pair.score);
+    hasher.Add(pair.error);
+  }
+  hasher.Add(data_.always_miss);
+  digest_ = hasher.Finish();
+}
+
+void AddKpsaNode(NodeRegistry& registry) {
+  registry.add("kpsa", "Stands in for a deformer stack: measures a few cues, reconstructs all points from a trained subspace, and lets "
+                       "the full stack run where that is not good enough (KPSA, Meyer and Anderson 2007, with SoftCache).")
+      .category("acceleration")
+      .points_in("cues", "points of a mesh at a stage; only the cue points are evaluated").array()
+      .in("matrices", Matrix4(), {.doc = "local matrices of transforms: guards and cues"}).array()
+      .in("scalars", 0.0, {.doc = "other values: guards and cues"}).array()
+      .in("spaceMatrix", Matrix4(), {.doc = "the frame that the subspace lives in"})
+      .points_in("fullPoints", "the full evaluation").array().lazy(true)
+      .structural("config", Type::kAsset)
+      .structural("tolerance", 1e-4, {.min = 0, .unit = Unit::kLength, .doc = "largest point error that may pass"})
+      .structural("violationRate", 0.01, {.min = 0, .max = 1, .doc = "share of frames that may pass although they exceed it"})
+      .out("outPoints", Type::kPoints).array().out("score", Type::kDouble).out("hit", Type::kBool)
+      .out("missReason", Type::kInt).out("offender", Type::kInt)
+      .compute(&Compute).decide(&Decide).block(&ComputeBlock).demand(DemandKpsa).bind(BindKpsa)
+      .point_count([](const Structural& s, std::string_view, int element) -> Result<Index> {
+        const auto* config = s.asset<KpsaConfig>("config");
+        if (config == nullptr) return Status::Invalid("config is not set");
+        const auto& outputs = config->data().subspace->outputs;
+        return element < static_cast<int>(outputs.size()) ? static_cast<Index>(outputs[static_cast<std::size_t>(element)].points) : 0;
+      })
+      .cost(20000, 5);
+}
+
+std::string MissText(const KpsaConfig& config, MissReason reason, Index offender) {
+  const KpsaConfig::Data& data = config.data();
+  switch (reason) {
+    case MissReason::kNone: return "hit";
+    case MissReason::kNeverHit: return data.always_miss ? "the subspace is stale" : "the tolerance allows no hit";
+    case MissReason::kOutOfRange:
+      return fmt::format("{} is outside its trained range", offender < data.guard_names.size() ? data.guard_names[offender] : "a control");
+    case MissReason::kNotFinite:
+    case MissReason::kScore: {
+      std::string cue = "a cue";
+      if (offender < data.subspace->cues.size()) {
+        const CueDescription& d = data.subspace->cues[offender];
+        cue = d.kind == CueDescription::Kind::kScalar ? d.plug : fmt::format("{}@{} point {}", data.subspace->outputs[d.mesh].name, d.stage, d.point);
+      }
+      return reason == MissReason::kScore ? fmt::format("unlike the trained poses (most at {})", cue) : fmt::format("{} is not a number", cue);
+    }
+  }
+  return "";
+}
+
+void MeasureKpsaTimes(bool on) { measure_times = on; }
+KpsaTimes TakeKpsaTimes() { return {cue_ns.exchange(0), projection_ns.exchange(0), reconstruction_ns.exchange(0)}; }
+
+}  // namespace kpsa

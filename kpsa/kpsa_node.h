@@ -1,0 +1,69 @@
+// The KPSA node: stands in for a deformer stack. It measures its cues, asks SoftCache for a verdict, and either
+// reconstructs all points from a trained subspace or lets the full stack run and passes it on bit for bit.
+//
+// Attributes (arrays in the order of KpsaConfig):
+//   cues[c]         points of a mesh at a stage, of which only the cue points are demanded
+//   matrices[j]     local matrices of transforms: guards and cues
+//   scalars[k]      other values: guards and cues
+//   spaceMatrix     the frame that the subspace lives in, world space (identity: none)
+//   fullPoints[m]   the full evaluation of each mesh; lazy, all together
+//   config          KpsaConfig (structural)
+//   tolerance       metres, violationRate (structural): SoftCache's threshold follows from the calibration poses
+//   outPoints[m], score, hit, missReason, offender
+// The engine has no special case for it: everything here could come from a plugin.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "graph/node_registry.h"
+#include "kpsa/subspace.h"
+
+namespace kpsa {
+
+// What ties a subspace to the inputs of a node.
+class KpsaConfig final : public Asset {
+ public:
+  struct PointCues {  // of input cues[c]
+    std::vector<Index> points;  // ascending
+    bool in_space = true;       // measured in spaceMatrix's frame; false: as they are (mesh space)
+  };
+  // Where row r of the measurement comes from. Points take three rows in a row.
+  struct Row {
+    enum class Kind : std::uint8_t { kPoint, kMatrix, kScalar } kind = Kind::kPoint;
+    Index input = 0;    // which cues[], matrices[] or scalars[]
+    Index element = 0;  // position among the cue points; entry of the matrix
+  };
+  struct Data {
+    std::shared_ptr<const Subspace> subspace;
+    std::vector<PointCues> cues;
+    std::vector<Row> rows;  // one a cue, in the order of the subspace's
+    std::vector<double> matrix_lo, matrix_hi;  // [12 * matrices] trained ranges; see MatrixEntries
+    std::vector<double> scalar_lo, scalar_hi;  // [scalars]
+    std::vector<std::string> guard_names;      // matrices, then scalars
+    bool always_miss = false;                  // the subspace is stale, and the user asked for the full evaluation
+  };
+  explicit KpsaConfig(Data data);
+  const char* kind() const override { return "kpsaConfig"; }
+  Digest digest() const override { return digest_; }
+  const Data& data() const { return data_; }
+
+ private:
+  Data data_;
+  Digest digest_;
+};
+
+void AddKpsaNode(NodeRegistry& registry);
+
+// What the node decided, for reports: from its outputs missReason and offender.
+std::string MissText(const KpsaConfig& config, MissReason reason, Index offender);
+
+// Times of the node's parts, in nanoseconds, summed since the last call; only where the process asked for it.
+struct KpsaTimes {
+  std::uint64_t cues = 0, projection = 0, reconstruction = 0;
+};
+void MeasureKpsaTimes(bool on);  // process-wide; not while evaluations run
+KpsaTimes TakeKpsaTimes();
+
+}  // namespace kpsa

@@ -1,0 +1,43 @@
+#include "kpsa/rigid_points.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kpsa/rigid_points.cpp"
+#include "hwy/foreach_target.h"
+#include "base/simd-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace kpsa {
+namespace HWY_NAMESPACE {
+
+void TransformAll(const float* m, PointsView p) {
+  const hn::CappedTag<float, 16> d;
+  using V = hn::Vec<decltype(d)>;
+  V a[12];
+  for (int i = 0; i < 12; ++i) a[i] = hn::Set(d, m[i]);
+  for (std::size_t i = 0; i < p.count; i += hn::Lanes(d)) {  // the padding may be written
+    const V x = hn::Load(d, p.x + i), y = hn::Load(d, p.y + i), z = hn::Load(d, p.z + i);
+    hn::Store(Fma(a[0], x, Fma(a[3], y, Fma(a[6], z, a[9]))), d, p.x + i);
+    hn::Store(Fma(a[1], x, Fma(a[4], y, Fma(a[7], z, a[10]))), d, p.y + i);
+    hn::Store(Fma(a[2], x, Fma(a[5], y, Fma(a[8], z, a[11]))), d, p.z + i);
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace kpsa
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace kpsa {
+
+HWY_EXPORT(TransformAll);
+
+void TransformPoints(const Matrix4& matrix, PointsView points) {
+  float m[12];
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 3; ++row) m[3 * column + row] = static_cast<float>(matrix(row, column));
+  }
+  HWY_DYNAMIC_DISPATCH(TransformAll)(m, points);
+}
+
+}  // namespace kpsa
+#endif

@@ -1,0 +1,103 @@
+#include "kpsa/signals.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "base/check.h"
+
+namespace kpsa {
+namespace {
+
+bool IsTransform(const NodeDef& def) {
+  return def.FindAttribute("worldMatrix") >= 0 && def.FindAttribute("parentMatrix") >= 0 && def.FindAttribute("matrix") >= 0;
+}
+
+// The nodes of the chain from `node` up through parentMatrix.
+std::set<Index> ParentChain(const Graph& graph, NodeId node) {
+  std::set<Index> chain;
+  while (graph.IsAlive(node) && chain.insert(node.index).second) {
+    const int parent = graph.def(node).FindAttribute("parentMatrix");
+    if (parent < 0) break;
+    const Connection* c = graph.FindConnection({node, parent, -1, -1});
+    if (c == nullptr) break;
+    node = c->source.node;
+  }
+  return chain;
+}
+
+}  // namespace
+
+void MatrixEntries(const Matrix4& m, double entries[12]) {
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 3; ++row) entries[3 * column + row] = m(row, column);
+  }
+}
+
+std::string EntryName(const Signal& signal, std::size_t entry) {
+  return signal.matrix ? fmt::format("{}/{}", signal.name, entry) : signal.name;
+}
+
+Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, const std::vector<PlugRef>& outputs,
+                                        const std::vector<PlugRef>& varying, const PlugRef* space_world,
+                                        std::vector<std::string>* unguarded) {
+  Request request;
+  for (const PlugRef& output : outputs) request.outputs.push_back({output, {}});
+  request.varying = varying;
+  Result<std::shared_ptr<const Plan>> plan = compiler->Compile(graph, request);
+  if (!plan.ok()) return plan.status();
+  const std::set<Index> chain = space_world == nullptr ? std::set<Index>() : ParentChain(graph, space_world->node);
+
+  // Nodes that have a varying step, and whether one of them has points
+  std::map<Index, bool> nodes;
+  for (const Plan::StepInfo& info : (*plan)->infos()) {
+    if (info.node.index != kNoIndex) nodes[info.node.index] |= info.points_total > 0;
+  }
+  std::set<Index> varying_nodes;
+  for (const PlugRef& plug : varying) varying_nodes.insert(plug.node.index);
+
+  std::map<std::string, Signal> signals;
+  const auto add = [&](const PlugRef& plug, Type type) {
+    if (type == Type::kDouble3 || type == Type::kQuaternion) {
+      for (int c = 0; c < (type == Type::kDouble3 ? 3 : 4); ++c) {
+        PlugRef child = plug;
+        child.component = c;
+        signals.emplace(graph.PlugName(child), Signal{graph.PlugName(child), child, false});
+      }
+    } else if (IsSmallType(type) && type != Type::kMatrix) {
+      signals.emplace(graph.PlugName(plug), Signal{graph.PlugName(plug), plug, false});
+    } else if (IsPointType(type) && unguarded != nullptr && varying_nodes.count(plug.node.index) != 0) {
+      unguarded->push_back(graph.PlugName(plug));
+    }
+  };
+  for (const auto& [index, has_points] : nodes) {
+    const NodeId node = graph.IdAt(index);
+    const NodeDef& def = graph.def(node);
+    if (IsTransform(def) && !has_points) {
+      if (chain.count(index) != 0) continue;
+      const PlugRef plug{node, def.FindAttribute("matrix"), -1, -1};
+      signals.emplace(graph.PlugName(plug), Signal{graph.PlugName(plug), plug, true});
+    }
+    if (!has_points) continue;
+    for (const Connection& c : graph.Inputs(node)) {
+      const Type type = graph.PlugType(c.destination);
+      if (type == Type::kMatrix || IsPointType(type)) continue;
+      if (nodes.count(c.source.node.index) == 0 && varying_nodes.count(c.source.node.index) == 0) continue;
+      // A single point of an array has no plug to read: its driver stands for it
+      const AttributeDef& to = def.attributes[static_cast<std::size_t>(c.destination.attribute)];
+      if (IsPointType(to.type)) {
+        add(c.source, graph.PlugType(c.source));
+      } else {
+        add(c.destination, type);
+      }
+    }
+    for (const PlugRef& plug : varying) {
+      if (plug.node == node) add(plug, graph.PlugType(plug));
+    }
+  }
+  std::vector<Signal> sorted;
+  for (auto& [name, signal] : signals) sorted.push_back(std::move(signal));
+  return sorted;
+}
+
+}  // namespace kpsa

@@ -1,0 +1,34 @@
+// What can move a set of points besides points themselves: the local matrices of the transforms upstream, and the small
+// values (morph weights, envelopes, drivers) that enter steps with points. They guard a subspace (a value outside its
+// trained range is a miss) and serve as cheap cues.
+//
+// A matrix is measured as 12 entries (its upper three rows, column by column: three axes and the translation), so no
+// angle has to be computed; a value as one entry.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "graph/compiler.h"
+
+namespace kpsa {
+
+struct Signal {
+  std::string name;  // "jaw.matrix", "head_mesh_blendShape.weight[smile]", "cage.points[3].y"
+  PlugRef plug;      // a matrix or a double (children of vectors are signals of their own)
+  bool matrix = false;
+  std::size_t entries() const { return matrix ? 12 : 1; }
+};
+// The entries of a matrix, in the order above.
+void MatrixEntries(const Matrix4& m, double entries[12]);
+// "jaw.matrix/3": entry 3 of a matrix; a value's name is its signal's.
+std::string EntryName(const Signal& signal, std::size_t entry);
+
+// All signals of the points `outputs` under the varying plugs `varying`, sorted by name. The chain of transforms from
+// the root to `space` (a node whose frame the points are taken in) is left out, if one is given.
+// `unguarded` receives varying inputs that are no signals (arrays of points that are set from outside).
+Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, const std::vector<PlugRef>& outputs,
+                                        const std::vector<PlugRef>& varying, const PlugRef* space_world,
+                                        std::vector<std::string>* unguarded);
+
+}  // namespace kpsa

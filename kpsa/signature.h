@@ -1,0 +1,21 @@
+// The identity of the rig that a subspace was trained on: one digest for every node and attribute that its points
+// depend on. Controls and clips are no part of it; their ranges are (kpsa/signals.h).
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "graph/graph.h"
+
+namespace kpsa {
+
+using Signature = std::map<std::string, std::string>;  // "mush.iterations" -> digest; "mush" -> type and connections
+
+// Everything upstream of `outputs`. Values of the plugs in `controls` are left out, and clips with what they drive.
+Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, const std::vector<PlugRef>& controls);
+// "" if they agree, else what differs, at most three entries by name.
+std::string SignatureDifference(const Signature& trained, const Signature& now);
+std::string SignatureDigest(const Signature& signature);
+
+}  // namespace kpsa

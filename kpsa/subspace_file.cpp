@@ -1,0 +1,257 @@
+// The .kpsa file: lists as JSON in the metadata, numbers as tensors. See kpsa/subspace.h and base/safetensors.h.
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <cstring>
+
+#include "base/safetensors.h"
+#include "kpsa/subspace.h"
+
+namespace kpsa {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr char kKind[] = "kpsa-subspace";
+constexpr std::size_t kMaxCues = 1u << 16, kMaxOutputs = 1u << 12;
+constexpr std::uint64_t kMaxPoints = 1u << 28;
+
+// Reads typed members of a JSON object; the first failure is kept, and everything after it gives defaults.
+class Reader {
+ public:
+  Reader(std::string place, const Json& object, Status* status) : place_(std::move(place)), object_(object), status_(status) {}
+  std::string Text(const char* key) {
+    const Json* value = Find(key);
+    if (value != nullptr && value->is_string()) return value->get<std::string>();
+    return Fail(key, "a string"), std::string();
+  }
+  double Number(const char* key) {
+    const Json* value = Find(key);
+    if (value != nullptr && value->is_number() && std::isfinite(value->get<double>())) return value->get<double>();
+    return Fail(key, "a number"), 0.0;
+  }
+  std::uint64_t Count(const char* key, std::uint64_t limit) {
+    const Json* value = Find(key);
+    if (value != nullptr && value->is_number_unsigned() && value->get<std::uint64_t>() <= limit) return value->get<std::uint64_t>();
+    return Fail(key, "a whole number within bounds"), std::uint64_t{0};
+  }
+
+ private:
+  const Json* Find(const char* key) const {
+    if (!object_.is_object()) return nullptr;
+    const auto found = object_.find(key);
+    return found == object_.end() ? nullptr : &*found;
+  }
+  void Fail(const char* key, const char* expected) {
+    if (status_->ok()) *status_ = Status::Invalid("{}: \"{}\" should be {}", place_, key, expected);
+  }
+  std::string place_;
+  const Json& object_;
+  Status* status_;
+};
+
+// A metadata entry that holds JSON of the wanted kind.
+Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, bool list, std::size_t limit) {
+  const Result<std::string> text = file.Metadata(key);
+  if (!text.ok()) return text.status();
+  int depth_reached = 0;
+  const auto callback = [&](int depth, Json::parse_event_t, Json&) {
+    depth_reached = std::max(depth_reached, depth);
+    return depth <= 8;
+  };
+  Json json = Json::parse(*text, callback, false);
+  if (json.is_discarded() || depth_reached > 8 || json.is_array() != list || (!list && !json.is_object()) || json.size() > limit) {
+    return Status::Invalid("{}: \"{}\" is not a JSON {} of at most {} entries", file.name(), key, list ? "list" : "object", limit);
+  }
+  return json;
+}
+
+template <typename T>
+Status Assign(Result<std::vector<T>> values, std::vector<T>* target) {
+  if (!values.ok()) return values.status();
+  *target = std::move(*values);
+  return {};
+}
+template <typename T>
+Status Assign(const Result<std::vector<T>>& values, AlignedArray<T>* target) {
+  if (!values.ok()) return values.status();
+  *target = AlignedArray<T>(values->size());
+  if (!values->empty()) std::memcpy(target->data(), values->data(), values->size() * sizeof(T));
+  return {};
+}
+
+template <typename T>
+void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> values, bool half = false) {
+  writer->Add<T>(key, {values.size()}, values, half);
+}
+
+void WriteHeader(const Subspace& s, SafetensorsWriter* writer) {
+  Json outputs = Json::array(), cues = Json::array(), ranges = Json::array();
+  for (const SubspaceOutput& output : s.outputs) outputs.push_back({{"name", output.name}, {"points", output.points}});
+  for (const CueDescription& cue : s.cues) {
+    if (cue.kind == CueDescription::Kind::kScalar) {
+      cues.push_back({{"kind", "scalar"}, {"plug", cue.plug}});
+    } else {
+      cues.push_back({{"kind", "point"}, {"stage", cue.stage}, {"mesh", cue.mesh}, {"point", cue.point}});
+    }
+  }
+  for (const TrainedRange& range : s.ranges) ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}});
+  const Json summary = {{"mode", s.mode == EstimatorMode::kMap ? "map" : "paper"},
+                        {"components", s.components},
+                        {"modes", s.modes},
+                        {"quantile1", s.soft_cache.quantile1},
+                        {"quantile2", s.soft_cache.quantile2},
+                        {"tolerance", s.tolerance},
+                        {"violationRate", s.violation_rate},
+                        {"blendStart", s.blend_start}};
+  writer->SetMetadata("kind", kKind);
+  writer->SetMetadata("version", std::to_string(kSubspaceVersion));
+  writer->SetMetadata("summary", summary.dump());
+  writer->SetMetadata("outputs", outputs.dump());
+  writer->SetMetadata("cues", cues.dump());
+  writer->SetMetadata("ranges", ranges.dump());
+  writer->SetMetadata("rigHash", s.rig_hash);
+  writer->SetMetadata("units", s.units);
+  writer->SetMetadata("space", s.space);
+  writer->SetMetadata("training", s.training);
+}
+
+Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
+  const Result<Json> summary = JsonMetadata(file, "summary", false, 64), outputs = JsonMetadata(file, "outputs", true, kMaxOutputs),
+                     cues = JsonMetadata(file, "cues", true, kMaxCues), ranges = JsonMetadata(file, "ranges", true, kMaxCues),
+                     training = JsonMetadata(file, "training", false, 1u << 16);
+  for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &training}) KPSA_RETURN_IF_ERROR(part->status());
+  Status status;
+  Reader reader(file.name() + ": summary", *summary, &status);
+  const std::string mode = reader.Text("mode");
+  if (status.ok() && mode != "map" && mode != "paper") return Status::Invalid("{}: the mode is \"{}\", expected map or paper", file.name(), mode);
+  s->mode = s->soft_cache.mode = mode == "paper" ? EstimatorMode::kPaper : EstimatorMode::kMap;
+  s->components = static_cast<int>(reader.Count("components", 3));
+  s->modes = reader.Count("modes", 1u << 20);
+  s->soft_cache.quantile1 = reader.Number("quantile1");
+  s->soft_cache.quantile2 = reader.Number("quantile2");
+  s->tolerance = reader.Number("tolerance");
+  s->violation_rate = reader.Number("violationRate");
+  s->blend_start = reader.Number("blendStart");
+  for (const Json& entry : *outputs) {
+    Reader output(file.name() + ": an output", entry, &status);
+    s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints)});
+  }
+  for (const Json& entry : *cues) {
+    Reader reader_of_cue(file.name() + ": a cue", entry, &status);
+    CueDescription cue;
+    const std::string kind = reader_of_cue.Text("kind");
+    if (kind == "scalar") {
+      cue.kind = CueDescription::Kind::kScalar;
+      cue.plug = reader_of_cue.Text("plug");
+    } else if (kind == "point") {
+      cue.stage = reader_of_cue.Text("stage");
+      cue.mesh = static_cast<Index>(reader_of_cue.Count("mesh", kMaxOutputs));
+      cue.point = static_cast<Index>(reader_of_cue.Count("point", kMaxPoints));
+    } else if (status.ok()) {
+      return Status::Invalid("{}: a cue is of kind \"{}\", expected point or scalar", file.name(), kind);
+    }
+    s->cues.push_back(std::move(cue));
+  }
+  for (const Json& entry : *ranges) {
+    Reader range(file.name() + ": a trained range", entry, &status);
+    s->ranges.push_back({range.Text("plug"), range.Number("lo"), range.Number("hi")});
+  }
+  for (const auto& [key, target] : {std::pair{"rigHash", &s->rig_hash}, {"units", &s->units}, {"space", &s->space}, {"training", &s->training}}) {
+    const Result<std::string> text = file.Metadata(key);
+    KPSA_RETURN_IF_ERROR(text.status());
+    *target = *text;
+  }
+  return status;
+}
+
+Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
+  constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
+  for (std::size_t i = 0; i < s->outputs.size(); ++i) {
+    const std::string prefix = fmt::format("tiles.{}.", i);
+    TileData data;
+    data.points = s->outputs[i].points;
+    data.components = s->components;
+    data.inputs = s->rows();
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "ranks", {kAny}), &data.ranks));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "direct", {kAny}), &data.direct));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "v", {kAny}, true), &data.v));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "u", {kAny}, true), &data.u));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "mean", {kAny}), &data.mean));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "scale", {kAny}), &data.scale));
+    Result<TileMap> map = TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
+    if (!map.ok()) return map.status();
+    s->tiles.push_back(std::move(*map));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status WriteSubspace(const Subspace& s, const std::string& path) {
+  KPSA_RETURN_IF_ERROR(ValidateSubspace(s));
+  SafetensorsWriter writer;
+  WriteHeader(s, &writer);
+  const std::uint64_t rows = s.rows();
+  Add<double>(&writer, "cueMean", s.cue_mean);
+  Add<double>(&writer, "cueScale", s.cue_scale);
+  Add<std::uint32_t>(&writer, "cueOffsets", s.soft_cache.offsets);
+  writer.Add<double>("whitening", {rows, rows}, s.whitening);
+  writer.Add<double>("judge", {rows, rows}, s.soft_cache.judge);
+  Add<double>(&writer, "leaveOneOut", s.soft_cache.leave_one_out);
+  std::vector<double> calibration;
+  for (const CalibrationPair& pair : s.calibration) calibration.insert(calibration.end(), {pair.score, pair.error});
+  writer.Add<double>("calibration", {s.calibration.size(), 2}, calibration);
+  for (std::size_t i = 0; i < s.tiles.size(); ++i) {
+    const TileData& data = s.tiles[i].data();
+    const std::string prefix = fmt::format("tiles.{}.", i);
+    Add<std::uint32_t>(&writer, prefix + "ranks", data.ranks);
+    Add<std::uint8_t>(&writer, prefix + "direct", data.direct);
+    Add<std::uint16_t>(&writer, prefix + "v", data.v.span(), true);
+    Add<std::uint16_t>(&writer, prefix + "u", data.u.span(), true);
+    Add<float>(&writer, prefix + "mean", data.mean.span());
+    Add<float>(&writer, prefix + "scale", data.scale.span());
+  }
+  return writer.Write(path);
+}
+
+Result<Subspace> ReadSubspace(const std::string& path) {
+  const Result<SafetensorsFile> read = SafetensorsFile::Read(path);
+  if (!read.ok()) return read.status();
+  const SafetensorsFile& file = *read;
+  const auto kind = file.metadata().find("kind");
+  if (kind == file.metadata().end() || kind->second != kKind) {
+    return Status::Invalid("{}: a file of tensors, but not a subspace (write one with `kpsa train`)", path);
+  }
+  const Result<std::string> version = file.Metadata("version");
+  if (!version.ok()) return version.status();
+  if (*version != std::to_string(kSubspaceVersion)) {
+    return Status::Invalid("{}: the subspace has format version {}, this program reads version {}; train it again or use the program "
+                           "that wrote it",
+                           path, *version, kSubspaceVersion);
+  }
+  Subspace s;
+  KPSA_RETURN_IF_ERROR(ReadHeader(file, &s));
+  constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("cueMean", {kAny}), &s.cue_mean));
+  const std::uint64_t rows = s.rows();
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("cueScale", {rows}), &s.cue_scale));
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>("cueOffsets", {s.cues.size() + 1}), &s.soft_cache.offsets));
+  for (std::size_t k = 0; k <= s.cues.size(); ++k) {
+    const Index offset = s.soft_cache.offsets[k];
+    if (offset > rows || (k == 0 ? offset != 0 : offset < s.soft_cache.offsets[k - 1])) {
+      return Status::Invalid("{}: cue {} begins at row {} of {}", path, k, offset, rows);
+    }
+  }
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("whitening", {rows, rows}), &s.whitening));
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("judge", {rows, rows}), &s.soft_cache.judge));
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
+  const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 2});
+  if (!calibration.ok()) return calibration.status();
+  for (std::size_t i = 0; i + 1 < calibration->size(); i += 2) s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
+  KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
+  if (Status status = ValidateSubspace(s); !status.ok()) return Status::Invalid("{}: {}", path, status.ToString());
+  return s;
+}
+
+}  // namespace kpsa

@@ -1,0 +1,341 @@
+#include "kpsa/trainer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "base/check.h"
+#include "kpsa/pca.h"
+#include "kpsa/pose_recorder.h"
+#include "kpsa/varimax.h"
+
+namespace kpsa {
+namespace {
+
+constexpr std::size_t kProbePoints = 20;    // of a stage, to see what a cue there would drag in
+constexpr double kMaxPointsPerCue = 1.5;    // points of a step that a local cue may cost
+constexpr double kTileShare = 0.04;          // of the tolerance: RMS error that tiles and half precision may add
+constexpr double kMinMotion = 1e-3;         // of the largest: points that move less are no cues
+
+// Count of indices, evenly spread.
+std::vector<Index> Spread(std::size_t total, std::size_t count) {
+  std::vector<Index> points;
+  count = std::min(count, total);
+  for (std::size_t i = 0; i < count; ++i) points.push_back(static_cast<Index>((2 * i + 1) * total / (2 * count)));
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  return points;
+}
+
+class Trainer {
+ public:
+  Trainer(const TrainingRig& rig, const std::vector<TrainingClip>& clips, const TrainOptions& options)
+      : rig_(rig), clips_(clips), options_(options) {}
+
+  Result<Subspace> Run() {
+    const auto begin = std::chrono::steady_clock::now();
+    record_.seed = options_.seed;
+    record_.mode = options_.mode == EstimatorMode::kMap ? "map" : "paper";
+    for (const TrainingClip& clip : clips_) record_.clips.push_back(clip.name);
+    KPSA_RETURN_IF_ERROR(Prepare());
+    PoseMatrix poses(layout_), held_out(layout_);
+    KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &held_out));
+    KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
+    KPSA_RETURN_IF_ERROR(FindRanges(poses));
+    KPSA_RETURN_IF_ERROR(FindModes(&poses));
+    KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
+    KPSA_RETURN_IF_ERROR(ChooseCues());
+    KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
+    Result<Subspace> subspace = Assemble(poses);
+    if (!subspace.ok()) return subspace;
+    KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
+    Judge(held_out, &*subspace);
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+    record_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    std::vector<PlugRef> upstream = rig_.target.outputs();
+    upstream.insert(upstream.end(), rig_.target.space.begin(), rig_.target.space.end());
+    record_.signature = RigSignature(*rig_.graph, upstream, rig_.target.controls);
+    subspace->rig_hash = SignatureDigest(record_.signature);
+    subspace->training = TrainingJson(record_);
+    KPSA_RETURN_IF_ERROR(ValidateSubspace(*subspace));
+    return subspace;
+  }
+
+ private:
+  Status Say(const char* what, double share) {
+    if (options_.progress && !options_.progress(what, share)) return Status::Make(ErrorKind::kInterrupted, "interrupted");
+    return Status();
+  }
+
+  // The latest stage at which a cue point costs little more than itself, and candidate points there.
+  Result<CandidateStage> ChooseStage(const AccelerationTarget::MeshPoints& mesh, Index total, std::size_t budget) {
+    CandidateStage chosen;
+    for (std::size_t stage = mesh.stages.size(); stage-- > 0;) {
+      Request request;
+      const std::vector<Index> probe = Spread(total, kProbePoints);
+      request.outputs.push_back({mesh.stages[stage].points, PointSet::Of(probe, total)});
+      request.varying = {rig_.time};
+      for (const ControlRange& control : rig_.controls) {
+        if (!control.by_clip) request.varying.push_back(control.plug);
+      }
+      Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
+      if (!plan.ok()) return plan.status();
+      Index largest = 0;
+      for (const Plan::StepInfo& info : (*plan)->infos()) {
+        if (info.points_total == total) largest = std::max(largest, info.points);
+      }
+      chosen.stage = stage;
+      if (static_cast<double>(largest) <= kMaxPointsPerCue * static_cast<double>(probe.size())) break;
+    }
+    if (chosen.stage + 1 < mesh.stages.size()) chosen.points = Spread(total, budget);
+    return chosen;
+  }
+
+  Status Prepare() {
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+    std::vector<Index> totals;
+    std::size_t all = 0;
+    for (const auto& mesh : rig_.target.meshes) {
+      Request request;
+      request.outputs.push_back({mesh.stages.back().points, {}});
+      Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
+      if (!plan.ok()) return plan.status();
+      totals.push_back((*plan)->outputs()[0].points.total());
+      all += totals.back();
+    }
+    std::vector<CandidateStage> candidates;
+    for (std::size_t m = 0; m < totals.size(); ++m) {
+      if (options_.mode == EstimatorMode::kPaper) {  // key points are output points
+        candidates.push_back({rig_.target.meshes[m].stages.size() - 1, {}});
+        continue;
+      }
+      const std::size_t budget = std::max<std::size_t>(1, options_.max_candidates * totals[m] / std::max<std::size_t>(1, all));
+      Result<CandidateStage> stage = ChooseStage(rig_.target.meshes[m], totals[m], budget);
+      if (!stage.ok()) return stage.status();
+      candidates.push_back(std::move(*stage));
+    }
+
+    // Signals: under the controls, and under each clip
+    std::vector<Signal> signals;
+    for (int clip = -1; clip < static_cast<int>(clips_.size()); ++clip) {
+      if (clip >= 0) KPSA_RETURN_IF_ERROR(rig_.set_clip(clips_[static_cast<std::size_t>(clip)].name));
+      std::vector<PlugRef> varying{rig_.time};
+      for (const ControlRange& control : rig_.controls) {
+        if (clip < 0 || !control.by_clip) varying.push_back(control.plug);
+      }
+      Result<std::vector<Signal>> found = FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying,
+                                                           rig_.target.space.empty() ? nullptr : &rig_.target.space[0], nullptr);
+      if (!found.ok()) return found.status();
+      for (Signal& signal : *found) {
+        const bool known = std::any_of(signals.begin(), signals.end(), [&](const Signal& s) { return s.name == signal.name; });
+        if (!known) signals.push_back(std::move(signal));
+      }
+    }
+    std::sort(signals.begin(), signals.end(), [](const Signal& a, const Signal& b) { return a.name < b.name; });
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+    recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals));
+    Result<PoseLayout> layout = recorder_->Layout();
+    if (!layout.ok()) return layout.status();
+    layout_ = *layout;
+    totals_ = totals;
+    return Status();
+  }
+
+  Status RecordPoses(PoseMatrix* poses, PoseMatrix* held_out) {
+    for (std::size_t c = 0; c < clips_.size(); ++c) {
+      KPSA_RETURN_IF_ERROR(Say("poses", 0.2 * static_cast<double>(c) / static_cast<double>(clips_.size())));
+      KPSA_RETURN_IF_ERROR(recorder_->AddClip(clips_[c], poses));
+    }
+    record_.clip_poses = poses->poses();
+    KPSA_RETURN_IF_ERROR(Say("poses", 0.2));
+    KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SamplePoses(rig_.controls, clips_.size(), options_.samples, options_.seed), clips_, poses));
+    record_.sampled_poses = poses->poses() - record_.clip_poses;
+    if (poses->poses() < 3) return Status::Invalid("{} training poses are too few: name clips or samples to train on", poses->poses());
+    KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
+    std::size_t calibration = options_.calibration_poses;
+    if (calibration == 0) calibration = static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 100.0, 1000.0));
+    KPSA_RETURN_IF_ERROR(recorder_->AddSamples(
+        SamplePoses(rig_.controls, clips_.size(), calibration, options_.seed ^ 0x5deece66dull), clips_, held_out));
+    record_.calibration_poses = held_out->poses();
+    return Status();
+  }
+
+  Status FindRanges(const PoseMatrix& poses) {
+    std::size_t column = layout_.scalar_begin();
+    for (const Signal& signal : recorder_->signals()) {
+      for (std::size_t e = 0; e < signal.entries(); ++e, ++column) {
+        double lo = poses.row(0)[column], hi = lo;
+        for (std::size_t t = 0; t < poses.poses(); ++t) {
+          lo = std::min<double>(lo, poses.row(t)[column]);
+          hi = std::max<double>(hi, poses.row(t)[column]);
+        }
+        ranges_.push_back(MakeTrainedRange(EntryName(signal, e), lo, hi, options_.range_margin));
+      }
+    }
+    return Status();
+  }
+
+  Status FindModes(PoseMatrix* poses) {
+    const Eigen::VectorXd mean = poses->Mean();
+    // The model's size, from the mean shape
+    Double3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+    for (std::size_t i = 0; i < layout_.points + layout_.stage_points; ++i) {
+      const auto at = static_cast<Eigen::Index>(3 * i);
+      positions_.push_back({mean[at], mean[at + 1], mean[at + 2]});
+      if (i >= layout_.points) continue;
+      for (int a = 0; a < 3; ++a) {
+        lo[a] = std::min(lo[a], positions_.back()[a]);
+        hi[a] = std::max(hi[a], positions_.back()[a]);
+      }
+    }
+    diagonal_ = Length(hi - lo);
+    poses->Subtract(mean);
+    PcaOptions pca_options;
+    pca_options.max_modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2) : options_.max_modes;
+    pca_options.seed = options_.seed;
+    Result<Pca> pca = ComputePca(*poses, mean, pca_options);
+    if (!pca.ok()) return pca.status();
+    pca_ = std::move(*pca);
+    record_.diagonal = diagonal_;
+    record_.motion_rms = std::sqrt(pca_.total_energy / static_cast<double>(poses->poses() * layout_.points));
+    return Status();
+  }
+
+  Status ChooseCues() {
+    std::vector<CueRef> chosen;
+    if (options_.mode == EstimatorMode::kPaper) {
+      Eigen::MatrixXd rotated = pca_.output_modes();
+      Varimax({}, 3, &rotated);
+      chosen = SelectKeyPoints(rotated, 3, positions_, 2, 0.05 * diagonal_);
+    } else {
+      // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them
+      const bool stages = layout_.stage_points > 0;
+      const std::vector<CueRef> candidates = AllCandidates(pca_, kMinMotion, !stages, stages, true);
+      std::vector<CueRef> points;
+      for (const CueRef& cue : candidates) {
+        if (cue.kind != CueKind::kScalar) points.push_back(cue);
+      }
+      CueSelectionOptions selection;
+      selection.count = options_.rows;
+      selection.max_cost = static_cast<double>(options_.rows);
+      selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) { return cue.kind == CueKind::kScalar ? 1.0 : 3.0; };
+      chosen = SelectCues(pca_, candidates, positions_, diagonal_, selection).cues;
+      // Points see what no scalar does: keep some of them to judge by
+      std::size_t have = 0;
+      for (const CueRef& cue : chosen) have += cue.kind != CueKind::kScalar;
+      if (have < options_.min_points) {
+        CueSelectionOptions more;
+        more.fixed = chosen;
+        more.count = chosen.size() + options_.min_points - have;
+        more.swap_passes = 0;
+        chosen = SelectCues(pca_, points, positions_, diagonal_, more).cues;
+      }
+    }
+    if (chosen.empty()) return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
+    cues_ = MakeCueSet(pca_, chosen, diagonal_);
+    return Status();
+  }
+
+  Result<Subspace> Assemble(const PoseMatrix& poses) {
+    const Estimator estimator = options_.mode == EstimatorMode::kPaper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_);
+    record_.warning = estimator.warning;
+    Eigen::MatrixXd training(cues_.rows(), static_cast<Eigen::Index>(poses.poses()));
+    for (std::size_t t = 0; t < poses.poses(); ++t) {
+      training.col(static_cast<Eigen::Index>(t)) = MeasuredCues(layout_, cues_, poses.row(t));
+    }
+    std::vector<SubspaceOutput> outputs;
+    for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m) outputs.push_back({rig_.target.meshes[m].name, totals_[m]});
+    Subspace subspace = MakeSubspace(pca_, cues_, estimator, training, std::move(outputs), TileOptions{kTileShare * options_.tolerance});
+    subspace.mode = estimator.mode;
+    subspace.ranges = ranges_;
+    subspace.space = rig_.target.space_name;
+    subspace.tolerance = options_.tolerance;
+    subspace.violation_rate = options_.violation_rate;
+    subspace.cues.clear();
+    for (const CueRef& cue : cues_.cues) subspace.cues.push_back(Describe(cue));
+    return subspace;
+  }
+
+  CueDescription Describe(CueRef cue) const {
+    CueDescription d;
+    Index index = cue.index;
+    if (cue.kind == CueKind::kScalar) {
+      d.kind = CueDescription::Kind::kScalar;
+      d.plug = ranges_[index].plug;
+      return d;
+    }
+    for (std::size_t m = 0; m < totals_.size(); ++m) {
+      const CandidateStage& candidate = recorder_->candidates()[m];
+      const auto count = cue.kind == CueKind::kOutput ? totals_[m] : static_cast<Index>(candidate.points.size());
+      if (index >= count) {
+        index -= count;
+        continue;
+      }
+      const auto& stages = rig_.target.meshes[m].stages;
+      d.mesh = static_cast<Index>(m);
+      d.stage = cue.kind == CueKind::kOutput ? stages.back().name : stages[candidate.stage].name;
+      d.point = cue.kind == CueKind::kOutput ? index : candidate.points[index];
+      return d;
+    }
+    KPSA_CHECK(false);
+    return d;
+  }
+
+  // Scores and errors of the held-out poses, through the same code that runs in the graph.
+  void Judge(const PoseMatrix& held_out, Subspace* subspace) {
+    SubspaceScratch scratch(*subspace);
+    SoftCacheThreshold always;
+    always.tau = std::numeric_limits<double>::infinity();
+    std::vector<double> raw(subspace->rows());
+    std::vector<PointBuffer> buffers;
+    for (const SubspaceOutput& output : subspace->outputs) buffers.emplace_back(output.points);
+    double sum = 0;
+    for (std::size_t t = 0; t < held_out.poses(); ++t) {
+      const std::span<const float> row = held_out.row(t);
+      std::size_t r = 0;
+      for (const CueRef& cue : cues_.cues) {
+        const std::size_t column = CueColumn(layout_, cue);
+        for (std::size_t k = 0; k < CueHeight(layout_, cue); ++k) raw[r++] = row[column + k];
+      }
+      Measure(*subspace, raw, &scratch);
+      const Verdict verdict = kpsa::Judge(*subspace, always, &scratch);
+      double largest = 0;
+      std::size_t column = 0;
+      for (std::size_t m = 0; m < buffers.size(); ++m) {
+        ReconstructOutput(*subspace, m, &scratch, buffers[m].view());
+        const ConstPointsView p = std::as_const(buffers[m]).view();
+        for (std::size_t i = 0; i < p.count; ++i, column += 3) {
+          const Double3 d{p.x[i] - static_cast<double>(row[column]), p.y[i] - static_cast<double>(row[column + 1]),
+                          p.z[i] - static_cast<double>(row[column + 2])};
+          const double squared = Dot(d, d);
+          sum += squared;
+          largest = std::max(largest, squared);
+        }
+      }
+      subspace->calibration.push_back({verdict.score, std::sqrt(largest)});
+      record_.held_out_max = std::max(record_.held_out_max, std::sqrt(largest));
+    }
+    if (held_out.poses() > 0) record_.held_out_rms = std::sqrt(sum / static_cast<double>(held_out.poses() * layout_.points));
+  }
+
+  const TrainingRig& rig_;
+  const std::vector<TrainingClip>& clips_;
+  const TrainOptions& options_;
+  Compiler compiler_;
+  std::unique_ptr<PoseRecorder> recorder_;
+  PoseLayout layout_;
+  std::vector<Index> totals_;
+  std::vector<Double3> positions_;
+  std::vector<TrainedRange> ranges_;
+  Pca pca_;
+  CueSet cues_;
+  double diagonal_ = 0;
+  TrainingRecord record_;
+};
+
+}  // namespace
+
+Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& clips, const TrainOptions& options) {
+  return Trainer(rig, clips, options).Run();
+}
+
+}  // namespace kpsa

@@ -1,0 +1,65 @@
+#include "kpsa/training_record.h"
+
+#include <nlohmann/json.hpp>
+
+namespace kpsa {
+
+using nlohmann::json;
+
+std::string TrainingJson(const TrainingRecord& r) {
+  const json object = {{"clips", r.clips},
+                       {"clip_poses", r.clip_poses},
+                       {"sampled_poses", r.sampled_poses},
+                       {"calibration_poses", r.calibration_poses},
+                       {"seed", r.seed},
+                       {"motion_rms", r.motion_rms},
+                       {"diagonal", r.diagonal},
+                       {"held_out", {{"rms", r.held_out_rms}, {"max", r.held_out_max}}},
+                       {"tile_rms", r.tile_rms},
+                       {"mode", r.mode},
+                       {"warning", r.warning},
+                       {"seconds", r.seconds},
+                       {"signature", r.signature}};
+  return object.dump();
+}
+
+TrainingRecord ParseTraining(const std::string& text) {
+  TrainingRecord r;
+  const json object = json::parse(text, nullptr, false);
+  if (!object.is_object()) return r;
+  const auto number = [&](const json& from, const char* name) { return from.contains(name) && from[name].is_number() ? from[name].get<double>() : 0.0; };
+  const auto count = [&](const char* name) {
+    const double v = number(object, name);
+    return v > 0 && v < 1e15 ? static_cast<std::size_t>(v) : std::size_t{0};
+  };
+  const auto words = [&](const char* name) { return object.contains(name) && object[name].is_string() ? object[name].get<std::string>() : std::string(); };
+  if (object.contains("clips") && object["clips"].is_array()) {
+    for (const json& clip : object["clips"]) {
+      if (clip.is_string()) r.clips.push_back(clip.get<std::string>());
+    }
+  }
+  r.clip_poses = count("clip_poses");
+  r.sampled_poses = count("sampled_poses");
+  r.calibration_poses = count("calibration_poses");
+  r.seed = count("seed");
+  r.motion_rms = number(object, "motion_rms");
+  r.diagonal = number(object, "diagonal");
+  if (object.contains("held_out") && object["held_out"].is_object()) {
+    r.held_out_rms = number(object["held_out"], "rms");
+    r.held_out_max = number(object["held_out"], "max");
+  }
+  r.tile_rms = number(object, "tile_rms");
+  r.mode = words("mode");
+  r.warning = words("warning");
+  r.seconds = number(object, "seconds");
+  if (object.contains("signature") && object["signature"].is_object()) {
+    for (const auto& [name, digest] : object["signature"].items()) {
+      if (digest.is_string()) r.signature[name] = digest.get<std::string>();
+    }
+  }
+  return r;
+}
+
+Signature TrainedSignature(const Subspace& subspace) { return ParseTraining(subspace.training).signature; }
+
+}  // namespace kpsa

@@ -1,0 +1,31 @@
+// What a subspace remembers of its training, as the JSON text in Subspace::training: counts, seeds, held-out errors and
+// the rig's signature.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "kpsa/signature.h"
+#include "kpsa/subspace.h"
+
+namespace kpsa {
+
+struct TrainingRecord {
+  std::vector<std::string> clips;
+  std::size_t clip_poses = 0, sampled_poses = 0, calibration_poses = 0;
+  std::uint64_t seed = 1;
+  double motion_rms = 0, diagonal = 0;        // metres
+  double held_out_rms = 0, held_out_max = 0;  // of the pure reconstruction on the calibration poses, metres
+  double tile_rms = 0;                        // what tiles and half precision add
+  std::string mode;                           // "map" or "paper"
+  std::string warning;
+  double seconds = 0;
+  Signature signature;
+};
+
+std::string TrainingJson(const TrainingRecord& record);
+// Missing parts come out empty; a text that is no JSON object gives an empty record.
+TrainingRecord ParseTraining(const std::string& json);
+Signature TrainedSignature(const Subspace& subspace);
+
+}  // namespace kpsa

@@ -1,0 +1,88 @@
+#include "nodes/deformer.h"
+#include "nodes/kernels/delta_mush.h"
+#include "nodes/mesh_topology.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+DeltaMushSettings Settings(const Structural& s) {
+  return {s.get_int("iterations"), s.get_double("smoothingStep"), s.get_double("distanceWeight"), s.get_bool("pinBorderVertices")};
+}
+
+std::vector<float> WeightsAt(const Structural& s, const PointSet& out) {
+  const auto* map = s.asset<WeightMap>("weights");
+  std::vector<float> weights;
+  if (map == nullptr) return weights;
+  for (Index i = 0; i < out.size(); ++i) weights.push_back(out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f);
+  return weights;
+}
+
+// iterations + 1 rings: the frames read smoothed neighbours.
+void DemandMush(Demand& demand) {
+  const Structural& s = demand.structural();
+  const PointSet& out = demand.output("outPoints");
+  Status error;
+  const Topology* topology = TopologyOf(s.asset<Mesh>("mesh"), &error);
+  if (topology == nullptr || topology->point_count() != out.total() || out.is_all()) {
+    demand.Require("inPoints", 0, PointSet::All(out.total()));  // bind reports what is wrong
+    return;
+  }
+  demand.Require("inPoints", 0, PointSet::Of(DeltaMushDemand(*topology, Settings(s), out.ToVector(), WeightsAt(s, out)), out.total()));
+}
+
+// The pivot, for precision far from the origin: the middle of the rest shape, carried by parentMatrix. It does not
+// depend on the binding.
+struct MushBound {
+  DeltaMushKernel kernel;
+  CarriedFrame frame;
+  Double3 middle;
+};
+
+Double3 Middle(ConstPointsView rest) {
+  Double3 sum;
+  for (std::size_t i = 0; i < rest.count; ++i) sum = sum + Double3{rest.x[i], rest.y[i], rest.z[i]};
+  return rest.count == 0 ? sum : sum * (1.0 / static_cast<double>(rest.count));
+}
+
+Result<BoundKernel> BindMush(const Binding& binding) {
+  const Structural& s = binding.structural();
+  const DeltaMushSettings settings = Settings(s);
+  KPSA_RETURN_IF_ERROR(settings.Validate());
+  const PointSet &out = binding.output("outPoints"), &in = binding.input("inPoints");
+  Status error;
+  const Topology* topology = TopologyOf(s.asset<Mesh>("mesh"), &error);
+  if (topology == nullptr) return error;
+  if (topology->point_count() != out.total()) {
+    return Status::Invalid("its mesh has {} points, the geometry {}", topology->point_count(), out.total());
+  }
+  Result<ConstPointsView> rest = RestPoints(s);
+  if (!rest.ok()) return rest.status();
+  Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  MushBound bound{DeltaMushKernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out)), *frame, Middle(*rest)};
+  const std::size_t scratch = bound.kernel.ScratchFloats();
+  return MakeBound(std::move(bound), scratch);
+}
+
+void ComputeMush(ComputeContext& c) {
+  const auto& bound = c.kernel_as<MushBound>();
+  const Double3 pivot = TransformPoint(bound.frame.Motion(c.get<Matrix4>(kParentMatrix)), bound.middle);
+  const Parallel parallel = HostParallel(c);
+  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput), pivot}, c.points(kInPoints), c.out_points(0),
+                   {c.scratch, bound.kernel.ScratchFloats()}, &parallel);
+}
+
+}  // namespace
+
+void AddDeltaMushNode(NodeRegistry& registry) {
+  NodeBuilder b = AddDeformer(registry, "deltaMush", "Smooths the points and gives the rest shape's detail back.");
+  b.in("displacement", 1.0, {.min = 0, .max = 2, .doc = "how much of the detail comes back"});
+  b.structural("iterations", 10, {.min = 0, .max = 200, .doc = "smoothing steps"});
+  b.structural("smoothingStep", 0.5, {.min = 0, .max = 1, .doc = "how far a point goes to its neighbours' mean in a step"});
+  b.structural("distanceWeight", 0.0, {.min = 0, .max = 1, .doc = "0: all neighbours alike; 1: near ones weigh more"});
+  b.structural("pinBorderVertices", true, {.doc = "points on borders keep their place"});
+  FinishDeformer(b, &ComputeMush, BindMush, DemandMush).cost(500, 80);
+}
+
+}  // namespace kpsa

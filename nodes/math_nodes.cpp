@@ -1,0 +1,67 @@
+#include <algorithm>
+#include <cmath>
+
+#include "base/scalar_math.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+double Remap(double value, double in_min, double in_max, double out_min, double out_max) {
+  if (in_max == in_min) return out_min;
+  const double t = std::clamp((value - in_min) / (in_max - in_min), 0.0, 1.0);
+  return out_min + t * (out_max - out_min);
+}
+
+// x^y for whole y by multiplication, otherwise by exp and log of the base's ratio; NaN where Maya has none, either.
+double Power(double x, double y) {
+  if (y == std::floor(y) && std::fabs(y) <= 64) {
+    double result = 1;
+    for (int i = 0; i < static_cast<int>(std::fabs(y)); ++i) result *= x;
+    return y < 0 ? 1 / result : result;
+  }
+  return x > 0 ? Exp(y * Log(x)) : std::nan("");
+}
+
+Double3 MultiplyDivide(Double3 a, Double3 b, std::int64_t operation) {
+  Double3 out = a;
+  for (int i = 0; i < 3; ++i) {
+    if (operation == 1) out[i] = a[i] * b[i];
+    if (operation == 2) out[i] = b[i] == 0 ? 0 : a[i] / b[i];
+    if (operation == 3) out[i] = Power(a[i], b[i]);
+  }
+  return out;
+}
+
+double PlusMinusAverage(ArrayView<double> input, std::int64_t operation) {
+  if (input.size() == 0) return 0;
+  double sum = input[0];
+  if (operation == 0) return sum;
+  for (std::uint32_t i = 1; i < input.size(); ++i) sum += operation == 2 ? -input[i] : input[i];
+  return operation == 3 ? sum / input.size() : sum;
+}
+
+}  // namespace
+
+void AddMathNodes(NodeRegistry& registry) {
+  registry.add("remapValue", "Maps a value from one range to another, clamped to it.")
+      .in("inputValue", 0.0).alias("input").in("inputMin", 0.0).in("inputMax", 1.0).in("outputMin", 0.0).in("outputMax", 1.0)
+      .out("outValue", Type::kDouble)
+      .compute([](double value, double in_min, double in_max, double out_min, double out_max) {
+        return Remap(value, in_min, in_max, out_min, out_max);
+      });
+  registry.add("multiplyDivide", "Multiplies, divides or raises to a power, component by component. Dividing by 0 gives 0.")
+      .in("input1", Double3()).in("input2", Double3{1, 1, 1})
+      .enumeration("operation", {"noOperation", "multiply", "divide", "power"}, false)
+      .out("output", Type::kDouble3)
+      .compute([](Double3 a, Double3 b, std::int64_t operation) { return MultiplyDivide(a, b, operation); });
+  registry.add("plusMinusAverage", "Adds, subtracts from the first, or averages any number of inputs.")
+      .in("input", 0.0).array().alias("input1D").enumeration("operation", {"noOperation", "sum", "subtract", "average"}, false)
+      .out("output", Type::kDouble).alias("output1D")
+      .compute([](ArrayView<double> input, std::int64_t operation) { return PlusMinusAverage(input, operation); });
+  registry.add("unitConversion", "Multiplies by a fixed factor: between the runtime's units and a rig file's.")
+      .in("input", 0.0).in("conversionFactor", 1.0).out("output", Type::kDouble)
+      .compute([](double input, double factor) { return input * factor; });
+}
+
+}  // namespace kpsa

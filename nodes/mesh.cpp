@@ -1,0 +1,36 @@
+#include "graph/geometry.h"
+#include "nodes/deformer.h"
+#include "nodes/kernels/weights.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+struct MeshKernel {
+  PointBuffer points;  // at the output points
+};
+
+Result<BoundKernel> BindMesh(const Binding& binding) {
+  const auto* mesh = binding.structural().asset<Mesh>("mesh");
+  if (mesh == nullptr) return Status::Invalid("mesh is not set");
+  const PointSet& out = binding.output("points");
+  MeshKernel kernel{PointBuffer(out.size())};
+  GatherPoints(mesh->data().rest.view(), out.ToVector(), kernel.points.view());
+  return MakeBound(std::move(kernel), 0);
+}
+
+}  // namespace
+
+void AddMeshNode(NodeRegistry& registry) {
+  registry.add("mesh", "A mesh of the character: its rest points.").category("geometry")
+      .structural("mesh", Type::kMesh).out("points", Type::kPoints, "mesh space")
+      .compute([](ComputeContext& c) { CopyPoints(c.kernel_as<MeshKernel>().points.view(), c.out_points(0)); })
+      .bind(BindMesh)
+      .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
+        const auto* mesh = s.asset<Mesh>("mesh");
+        if (mesh == nullptr) return Status::Invalid("mesh is not set");
+        return mesh->point_count();
+      });
+}
+
+}  // namespace kpsa

@@ -1,0 +1,18 @@
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+
+void AddTimeNode(NodeRegistry& registry) {
+  registry.add("time", "The time of the scene. Read `time.time` as a source.").category("time")
+      .in("time", 0.0, {.unit = Unit::kTime, .doc = "seconds"});
+}
+
+void AddStandardNodes(NodeRegistry& registry) {
+  for (auto* add : {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode, AddSkinClusterNode,
+                    AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode, AddCurveNodes, AddTripwireNode,
+                    AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
+    add(registry);
+  }
+}
+
+}  // namespace kpsa

@@ -1,0 +1,93 @@
+// transform and joint: local = offsetParentMatrix . T . R(rotateOrder) . S, in Maya's sense. The rest pose or the clip
+// feeds offsetParentMatrix; translate, rotate and scale are the controls on top of it.
+#include "base/scalar_math.h"
+#include "nodes/deformer.h"
+#include "nodes/kernels/transform_math.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+struct TransformKernel {
+  RotateOrder order;
+  Matrix4 rest;
+  Double3 twist_axis;
+};
+
+Result<BoundKernel> BindTransform(const Binding& binding) {
+  const Structural& s = binding.structural();
+  TransformKernel kernel{static_cast<RotateOrder>(s.get_int("rotateOrder")), s.value("restMatrix").get<Matrix4>(), {}};
+  kernel.twist_axis[s.get_int("twistAxis")] = 1;
+  return MakeBound(kernel, 0);
+}
+
+// Inputs in the order of the groups below: translate, rotate, scale, offsetParentMatrix.
+Matrix4 Local(const ComputeContext& c) {
+  const Double3 &translate = c.get<Double3>(0), &rotate = c.get<Double3>(1), &scale = c.get<Double3>(2);
+  const Matrix4& offset = c.get<Matrix4>(3);
+  if (translate == Double3() && rotate == Double3() && scale == Double3{1, 1, 1}) return offset;
+  return ComposeLocal(offset, {translate, rotate, c.kernel_as<TransformKernel>().order, scale});
+}
+
+void ComputeMatrices(ComputeContext& c) {
+  c.out_value<Matrix4>(0) = Local(c);
+  c.out_value<Matrix4>(1) = c.get<Matrix4>(4) * c.out_value<Matrix4>(0);
+}
+void ComputeWorldInverse(ComputeContext& c) { c.out_value<Matrix4>(0) = InverseOrIdentity(c.get<Matrix4>(4) * Local(c)); }
+
+void ComputePose(ComputeContext& c) {
+  const auto& kernel = c.kernel_as<TransformKernel>();
+  const Quaternion q = PoseRotation(Local(c), kernel.rest);
+  c.out_value<Double3>(0) = EulerFromRotation(RotationFromQuaternion(q), kernel.order);
+}
+void ComputePoseVector(ComputeContext& c) {
+  c.out_value<Double3>(0) = RotationVector(PoseRotation(Local(c), c.kernel_as<TransformKernel>().rest));
+}
+void ComputePoseTranslate(ComputeContext& c) {
+  const Matrix4 local = Local(c);
+  const Matrix4& rest = c.kernel_as<TransformKernel>().rest;
+  c.out_value<Double3>(0) = {local(0, 3) - rest(0, 3), local(1, 3) - rest(1, 3), local(2, 3) - rest(2, 3)};
+}
+void ComputeSwingTwist(ComputeContext& c) {
+  const auto& kernel = c.kernel_as<TransformKernel>();
+  const SwingTwist parts = DecomposeSwingTwist(PoseRotation(Local(c), kernel.rest), kernel.twist_axis);
+  c.out_value<Double3>(0) = RotationVector(parts.swing);
+  c.out_value<double>(1) = TwistAngle(parts.twist, kernel.twist_axis);
+}
+
+void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
+  const std::vector<std::string> local = {"translate", "rotate", "scale", "offsetParentMatrix"};
+  std::vector<std::string> world = local;
+  world.push_back("parentMatrix");
+  NodeBuilder b = registry.add(name, doc);
+  b.category("transform")
+      .in("translate", Double3(), {.unit = Unit::kLength, .doc = "control, on top of offsetParentMatrix"})
+      .in("rotate", Double3(), {.unit = Unit::kAngle, .doc = "control, applied in rotateOrder"})
+      .in("scale", Double3{1, 1, 1}, {.doc = "control"})
+      .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "xyz turns about X first")
+      .in("offsetParentMatrix", Matrix4(), {.doc = "the rest pose, or what the clip makes of it"})
+      .in("parentMatrix", Matrix4(), {.doc = "the parent's worldMatrix"})
+      .structural("restMatrix", Matrix4(), {.doc = "the local matrix at rest, for poseRotate, swing and twist"})
+      .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")
+      .out("matrix", Type::kMatrix, "local").out("worldMatrix", Type::kMatrix).out("worldInverseMatrix", Type::kMatrix)
+      .out("poseRotate", Type::kDouble3, "rotation against rest, as angles in rotateOrder; includes the clip").unit(Unit::kAngle)
+      .out("poseRotateVector", Type::kDouble3, "the same as axis times angle").unit(Unit::kAngle)
+      .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip").unit(Unit::kLength)
+      .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist").unit(Unit::kAngle)
+      .out("twist", Type::kDouble, "angle about twistAxis").unit(Unit::kAngle);
+  b.compute_for({"matrix", "worldMatrix"}, world, &ComputeMatrices).bind(BindTransform).cost(90, 0);
+  b.compute_for({"worldInverseMatrix"}, world, &ComputeWorldInverse).bind(BindTransform).cost(150, 0);
+  b.compute_for({"poseRotate"}, local, &ComputePose).bind(BindTransform).cost(250, 0);
+  b.compute_for({"poseRotateVector"}, local, &ComputePoseVector).bind(BindTransform).cost(200, 0);
+  b.compute_for({"poseTranslate"}, local, &ComputePoseTranslate).bind(BindTransform).cost(60, 0);
+  b.compute_for({"swing", "twist"}, local, &ComputeSwingTwist).bind(BindTransform).cost(300, 0);
+}
+
+}  // namespace
+
+void AddTransformNodes(NodeRegistry& registry) {
+  AddTransform(registry, "transform", "A coordinate frame under a parent.");
+  AddTransform(registry, "joint", "A transform that moves a skin.");
+}
+
+}  // namespace kpsa
