@@ -151,7 +151,8 @@ Status WriteFileAtomically(const std::string& path, bool force,
   if (file == nullptr) return Status::Invalid("cannot be written: {}", Reason(errno)).At({path});
   const auto failed = [&] { return Status::Invalid("cannot be written: {}", Reason(errno)).At({path}); };
   KPSA_RETURN_IF_ERROR(writer([&](std::span<const std::uint8_t> bytes) -> Status {
-    if (std::fwrite(bytes.data(), 1, bytes.size(), file.get()) != bytes.size()) return failed();
+    if (!bytes.empty() && std::fwrite(bytes.data(), 1, bytes.size(), file.get()) != bytes.size())
+      return failed();
     return {};
   }));
   if (std::fclose(file.release()) != 0) return failed();

@@ -84,6 +84,7 @@ struct NpzWriter::Impl {
   std::map<std::string, ArrayId> names;
 
   Status Write(Array* array, std::span<const std::uint8_t> bytes) {
+    if (bytes.empty()) return {};
     if (array->spool == nullptr) {
       array->bytes.insert(array->bytes.end(), bytes.begin(), bytes.end());
     } else if (std::fwrite(bytes.data(), 1, bytes.size(), array->spool.get()) != bytes.size()) {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <chrono>
+#include <ctime>
 #include <functional>
 #include <limits>
 #include <random>
@@ -329,7 +329,7 @@ TEST(GltfHostile, SharingCannotMultiplyMemoryOrTime) {
   json primitives = json::array();
   for (int i = 0; i < 2000; ++i) primitives.push_back({{"attributes", {{"POSITION", zeros}}}});
   b.Push("meshes", {{"primitives", primitives}});
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();  // processor time: the machine may be busy
   ExpectError(b.Text(), "far more than the file's own data");
   // As many targets of zeros cost nothing
   b.root["accessors"][0]["count"] = 1000;
@@ -337,7 +337,7 @@ TEST(GltfHostile, SharingCannotMultiplyMemoryOrTime) {
   for (int i = 0; i < 20000; ++i) targets.push_back({{"POSITION", zeros}});
   b.root["meshes"][0]["primitives"] = {{{"attributes", {{"POSITION", zeros}}}, {"targets", targets}}};
   EXPECT_TRUE(Load(b.Text()).ok());
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  EXPECT_LT(std::clock() - start, 20 * CLOCKS_PER_SEC);
 }
 
 // Random damage of valid documents: any outcome but a crash (run under sanitizers, too).
