@@ -6,6 +6,7 @@
 // each. The same input gives the same picture at any number of threads.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -15,13 +16,14 @@
 
 namespace kpsa {
 
-// One surface. The spans must outlive the call that is given the part.
+// One surface. The spans must outlive the calls that are given the part, by `owner` or otherwise.
 struct RenderPart {
   std::span<const float> points;       // 3 a point (x y z), metres, world space
   std::span<const Index> triangles;    // 3 indices each, counter-clockwise from outside
   std::span<const float> colors;       // 3 a point, linear light 0 .. 1; or empty: `color` everywhere
   std::span<const float> scalars;      // 1 a point, metres; or empty: the part is drawn as clay
   Double3 color = {0.62, 0.43, 0.35};  // linear light
+  std::shared_ptr<const void> owner;   // keeps alive what the spans refer to, where nobody else does
 };
 
 struct RenderInput {

@@ -1,8 +1,34 @@
 #include "cli/rig_picture.h"
 
 #include <algorithm>
+#include <array>
+#include <memory>
 
 namespace kpsa {
+namespace {
+
+// COLOR_0 times the materials' colours (glTF 2.0, 3.7.2.1) by point of a mesh; null where the file has no
+// COLOR_0.
+std::shared_ptr<const std::vector<float>> PointColors(const Rig& rig, std::size_t m) {
+  const CharacterMesh& mesh = rig.scene.meshes[m];
+  const gltf::Mesh& file = rig.character->meshes[rig.character->nodes[mesh.gltf_node].mesh];
+  if (file.colors.empty()) return nullptr;
+  const auto& point_of = mesh.mesh().data().vertex_to_point;
+  auto colors = std::make_shared<std::vector<float>>(3 * std::size_t{mesh.mesh().point_count()}, 1.0f);
+  for (const gltf::Primitive& primitive : file.primitives) {
+    std::array<double, 4> base = {1, 1, 1, 1};
+    if (primitive.material != kNoIndex) base = rig.character->materials[primitive.material].base_color;
+    for (std::size_t v = primitive.first_vertex;
+         v < std::size_t{primitive.first_vertex} + primitive.vertex_count; ++v) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        (*colors)[3 * std::size_t{point_of[v]} + k] = static_cast<float>(file.colors[3 * v + k] * base[k]);
+      }
+    }
+  }
+  return colors;
+}
+
+}  // namespace
 
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
                                         const RigFrameOptions& options) {
@@ -28,6 +54,13 @@ RenderInput MakeInput(const Rig& rig, const Pose& pose) {
   for (std::size_t m = 0; m < pose.size(); ++m) {
     const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
     const std::span<const Index> triangles(mesh.triangles);
+    if (const auto colors = PointColors(rig, m); colors != nullptr) {
+      RenderPart part;
+      part.points = pose[m], part.triangles = triangles;
+      part.colors = *colors, part.owner = colors;
+      input.parts.push_back(part);
+      continue;
+    }
     const bool colored =
         std::any_of(mesh.primitives.begin(), mesh.primitives.end(), [](const Mesh::Primitive& p) {
           return p.base_color[0] != p.base_color[1] || p.base_color[1] != p.base_color[2];

@@ -37,8 +37,8 @@ std::vector<std::array<double, kJointCount>> FaceWeights(const HeadShape& shape)
     const double inner = std::min(1.0, static_cast<double>(ring) / shape.border_ring);
     for (int k = 0; k < n; ++k) {
       const auto i = static_cast<std::size_t>(shape.mouth_rings[ring][static_cast<std::size_t>(k)]);
-      const int from_corner = std::min(std::min(k % half, half - k % half), 4);
-      const double side = shape.lip[i] * Smooth(0, 4, from_corner);
+      const int from_corner = std::min(std::min(k % half, half - k % half), 8);
+      const double side = shape.lip[i] * Smooth(-1, 8, from_corner);
       jaw[i] +=
           (0.46 - 0.54 * std::min(side, 0.0) - 0.46 * std::max(side, 0.0) - jaw[i]) * Smooth(0, 1, inner);
     }
