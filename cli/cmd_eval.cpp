@@ -1,13 +1,14 @@
 // kpsa eval: a rig or character to a vertex cache.
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
+#include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/frames_range.h"
+#include "cli/options.h"
 #include "cli/output.h"
 #include "cli/rig_frames.h"
 #include "cli/vertex_output.h"
@@ -16,6 +17,7 @@ namespace kpsa {
 namespace {
 
 struct EvalFlags : Flags {
+  AccelerationFlags acceleration;
   bool blender = false;
 };
 
@@ -24,8 +26,11 @@ CommandResult Eval(const EvalFlags& flags) {
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
   const Result<int> threads = ThreadCount(flags);
   if (!threads.ok()) return threads.status();
-  if (!flags.output.has_value()) return Status::Usage("expected -o with a name that ends in {}, or - for .npz to stdout", fmt::join(VertexSuffixes(), ", "));
+  if (!flags.output.has_value())
+    return Status::Usage("expected -o with a name that ends in {}, or - for .npz to stdout",
+                         fmt::join(VertexSuffixes(), ", "));
   KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, VertexSuffixes()));
+  KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
   if (*flags.output == "-" && flags.json) return Status::Usage("-o - and --json: stdout takes one of them");
   if (flags.blender && Suffix(*flags.output) != ".pc2" && Suffix(*flags.output) != ".mdd") {
     return Status::Usage("--blender is for .pc2 and .mdd files, found {}", *flags.output);
@@ -35,26 +40,37 @@ CommandResult Eval(const EvalFlags& flags) {
   const auto begin = std::chrono::steady_clock::now();
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
-  const Rig& rig = (*open)->rig;
+  Rig& rig = (*open)->rig;
   const Result<std::vector<double>> times = SampleTimes(flags, rig);
   if (!times.ok()) return times.status();
   KPSA_RETURN_IF_ERROR(CheckNotInput(*flags.output, rig.files));
   Compiler compiler;
-  const auto plan = CompileFor(rig, &compiler, AllMeshes(rig));
+  std::vector<AppliedSubspace> applied;
+  if (flags.acceleration.wanted()) {
+    Result<std::vector<AppliedSubspace>> result = ApplyAcceleration(&rig, &compiler, flags.acceleration);
+    if (!result.ok()) return result.status();
+    applied = std::move(*result);
+  }
+  Request request = AllMeshes(rig);
+  Verdicts verdicts(applied, rig, &request);
+  const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
 
   const InterruptScope interruptible;
-  Result<std::unique_ptr<VertexOutput>> output = CreateVertexOutput(*flags.output, rig, *times, {flags.force, flags.blender});
+  Result<std::unique_ptr<VertexOutput>> output =
+      CreateVertexOutput(*flags.output, rig, *times, {flags.force, flags.blender});
   if (!output.ok()) return output.status();
   std::vector<ConstPointsView> meshes(rig.scene.meshes.size());
   RigFrameOptions options;
   options.threads = *threads;
   options.label = "frames";
   options.quiet = flags.quiet;
-  KPSA_RETURN_IF_ERROR(EvaluateTimes(rig, *plan, *times, options, [&](std::size_t, const Evaluator& evaluator) {
-    for (Index m = 0; m < meshes.size(); ++m) meshes[m] = evaluator.Points(m);
-    return (*output)->Frame(meshes);
-  }));
+  KPSA_RETURN_IF_ERROR(
+      EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
+        if (!applied.empty()) verdicts.Add(frame, evaluator);
+        for (Index m = 0; m < meshes.size(); ++m) meshes[m] = evaluator.Points(m);
+        return (*output)->Frame(meshes);
+      }));
   if (Interrupted()) return InterruptedStatus();
   const Result<std::vector<std::string>> notes = (*output)->Finish();
   if (!notes.ok()) return notes.status();
@@ -63,14 +79,33 @@ CommandResult Eval(const EvalFlags& flags) {
   for (const CharacterMesh& mesh : rig.scene.meshes) vertices += mesh.vertex_count;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (flags.json) {
-    PrintJson(nlohmann::ordered_json{{"schema", "kpsa.eval/1"}, {"outputs", (*output)->paths()}, {"clip", rig.scene.clip.value_or("")}, {"frames", times->size()},
-                                     {"meshes", rig.scene.meshes.size()}, {"vertices", vertices}, {"seconds", seconds}, {"notes", *notes}});
+    nlohmann::ordered_json document = nlohmann::ordered_json{{"schema", "kpsa.eval/1"},
+                                                             {"outputs", (*output)->paths()},
+                                                             {"clip", rig.scene.clip.value_or("")},
+                                                             {"frames", times->size()},
+                                                             {"meshes", rig.scene.meshes.size()},
+                                                             {"vertices", vertices},
+                                                             {"seconds", seconds},
+                                                             {"notes", *notes}};
+    if (!applied.empty()) {
+      document["accelerated"] = {{"hits", verdicts.hits()},
+                                 {"misses", verdicts.frames() - verdicts.hits()},
+                                 {"hit_rate", verdicts.hit_rate()},
+                                 {"worst_score", verdicts.worst_score()},
+                                 {"worst_miss", verdicts.WorstMiss()}};
+    }
+    PrintJson(document);
   }
   if (!flags.quiet) {
+    for (const AppliedSubspace& one : applied) {
+      for (const std::string& note : one.notes) Say("note: " + note);
+    }
     for (const std::string& note : *notes) Say("note: " + note);
+    if (!applied.empty()) Say(verdicts.Text());
     const std::vector<std::string> paths = (*output)->paths();
-    Say(fmt::format("{}{}: {} of {}, {:.2f} s", paths.front(), paths.size() > 1 ? fmt::format(" and {} more", paths.size() - 1) : "", Plural(times->size(), "frame"), Plural(vertices, "vertex"),
-                    seconds));
+    Say(fmt::format("{}{}: {} of {}, {:.2f} s", paths.front(),
+                    paths.size() > 1 ? fmt::format(" and {} more", paths.size() - 1) : "",
+                    Plural(times->size(), "frame"), Plural(vertices, "vertex"), seconds));
   }
   return 0;
 }
@@ -79,21 +114,26 @@ CommandResult Eval(const EvalFlags& flags) {
 
 void AddEvalCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<EvalFlags>();
-  CLI::App* command = program->add_subcommand("eval", "Evaluate a rig or a character to a vertex cache");
+  CLI::App* command =
+      AddCommand(program, "eval", "Evaluate a rig or a character to a vertex cache",
+                 "Every frame of the first clip where neither --frames nor --times is given. Exact, unless "
+                 "--accelerate or --kpsa is.\n"
+                 "Examples:\n"
+                 "  kpsa eval head.glb --clip face_talk -o talk.npz\n"
+                 "  kpsa eval head.yaml --frames 0:48:2 --set jaw.rotateX=-20 -o open.pc2 --blender\n"
+                 "  kpsa eval head.yaml --accelerate -o fast.npz\n"
+                 "  kpsa eval head.glb --times 0.5,1.25 -o - | python3 read.py",
+                 chosen, [flags] { return Eval(*flags); });
   AddRigFlags(command, flags.get());
   AddTimeFlags(command, flags.get());
-  AddOutputFlags(command, flags.get(), "the vertex cache: .npz .pc2 .mdd .glb .usda, or - for .npz to stdout");
-  command->add_flag("--blender", flags->blender, ".pc2 and .mdd for Blender's Mesh Cache: its axes and vertex order");
+  AddOutputFlags(command, flags.get(),
+                 "the vertex cache: .npz .pc2 .mdd .glb .usda, or - for .npz to stdout");
+  AddSwitch(command, "--blender", &flags->blender,
+            ".pc2 and .mdd for Blender's Mesh Cache: its axes and vertex order");
+  AddAccelerationFlags(command, &flags->acceleration);
   AddThreadsFlag(command, flags.get());
   AddQuietFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
-  command->footer(
-      "Every frame of the first clip where neither --frames nor --times is given.\n"
-      "Examples:\n"
-      "  kpsa eval head.glb --clip face_talk -o talk.npz\n"
-      "  kpsa eval head.yaml --frames 0:48:2 --set jaw.rotateX=-20 -o open.pc2 --blender\n"
-      "  kpsa eval head.glb --times 0.5,1.25 -o - | python3 read.py");
-  command->callback([flags, chosen] { *chosen = [flags] { return Eval(*flags); }; });
 }
 
 }  // namespace kpsa

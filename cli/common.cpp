@@ -2,13 +2,14 @@
 
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 
 #include "cli/frames_range.h"
+#include "cli/options.h"
 #include "io/quantity.h"
+#include "kpsa/kpsa_node.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
@@ -28,43 +29,49 @@ void OnInterrupt(int) {
 }  // namespace
 
 void AddRigFlags(CLI::App* command, Flags* flags) {
-  command->add_option("FILE", flags->file, "a rig (.yaml) or a character (.glb, .gltf)")->required();
-  command->add_option("--set", flags->sets, "plug=value in the rig's units, as in jaw.rotateX=-20; may be repeated")
-      ->allow_extra_args(false)
-      ->type_name("PLUG=VALUE");
-  command->add_option("--pose", flags->pose, "a pose file: plugs and their values")->type_name("FILE");
-  command->add_option("--clip", flags->clip, "a clip of the character; its first one if none is named")->type_name("NAME");
-  command->add_flag("--rest", flags->rest, "no clip: the file's transforms and default weights");
-  command->add_option("--fps", flags->fps, "frames a second; the rig's, else 24")->type_name("N");
-  command->add_option("--variant", flags->variant, "a variant of the rig")->type_name("NAME");
+  AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf)");
+  AddRepeated(command, "--set", "PLUG=VALUE", &flags->sets,
+              "plug=value in the rig's units, as in jaw.rotateX=-20; may be repeated");
+  AddOption(command, "--pose", "FILE", &flags->pose, "a pose file: plugs and their values");
+  AddOption(command, "--clip", "NAME", &flags->clip,
+            "a clip of the character; its first one if none is named");
+  AddSwitch(command, "--rest", &flags->rest, "no clip: the file's transforms and default weights");
+  AddOption(command, "--fps", "N", &flags->fps, "frames a second; the rig's, else 24");
+  AddOption(command, "--variant", "NAME", &flags->variant, "a variant of the rig");
 }
 
 void AddTimeFlags(CLI::App* command, Flags* flags) {
-  command->add_option("--frames", flags->frames, "frames A to B, both included, every S-th; frame f is at f / fps")
-      ->type_name("A:B[:S]");
-  command->add_option("--times", flags->times, "times in seconds")->type_name("T,T,...");
+  AddOption(command, "--frames", "A:B[:S]", &flags->frames,
+            "frames A to B, both included, every S-th; frame f is at f / fps");
+  AddOption(command, "--times", "T,T,...", &flags->times, "times in seconds");
 }
 
 void AddOutputFlags(CLI::App* command, Flags* flags, const std::string& doc) {
-  command->add_option("-o,--output", flags->output, doc)->type_name("FILE");
-  command->add_flag("--force", flags->force, "replace an existing output");
+  AddOption(command, "-o,--output", "FILE", &flags->output, doc);
+  AddSwitch(command, "--force", &flags->force, "replace an existing output");
 }
 
 void AddThreadsFlag(CLI::App* command, Flags* flags) {
-  command->add_option("--threads", flags->threads, "threads to use; as many as there are cores if not given")->type_name("N");
+  AddOption(command, "--threads", "N", &flags->threads,
+            "threads to use; as many as there are cores if not given");
 }
 
 void AddQuietFlag(CLI::App* command, Flags* flags) {
-  command->add_flag("-q,--quiet", flags->quiet, "no messages but errors");
+  AddSwitch(command, "-q,--quiet", &flags->quiet, "no messages but errors");
 }
 
 void AddJsonFlag(CLI::App* command, Flags* flags) {
-  command->add_flag("--json", flags->json, "print JSON to stdout");
+  AddSwitch(command, "--json", &flags->json, "print JSON to stdout");
 }
 
 Result<int> ThreadCount(const Flags& flags) {
   if (!flags.threads.has_value()) return 0;
   return ParseCount("--threads", *flags.threads, 1, 1024);
+}
+
+void AddAllNodes(NodeRegistry& registry) {
+  AddStandardNodes(registry);
+  AddKpsaNode(registry);
 }
 
 Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
@@ -73,25 +80,30 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   if (flags.fps.has_value()) {
     const Result<double> fps = ParseNumber("--fps", *flags.fps);
     if (!fps.ok()) return fps.status();
-    if (*fps < 1e-3 || *fps > 1e6) return Status::Usage("--fps {}: expected a number of frames from 0.001 to 1,000,000 a second", *flags.fps);
+    if (*fps < 1e-3 || *fps > 1e6)
+      return Status::Usage("--fps {}: expected a number of frames from 0.001 to 1,000,000 a second",
+                           *flags.fps);
     options.fps = *fps;
   }
-  if (flags.rest && flags.clip.has_value()) return Status::Usage("--rest and --clip {}: expected one of them", *flags.clip);
+  if (flags.rest && flags.clip.has_value())
+    return Status::Usage("--rest and --clip {}: expected one of them", *flags.clip);
   options.rest = flags.rest;
   auto open = std::make_unique<OpenRig>();
-  AddStandardNodes(open->registry);
+  AddAllNodes(open->registry);
   Result<Rig> rig = LoadRig(open->registry, flags.file, options);
   if (!rig.ok()) return rig.status();
   open->rig = std::move(*rig);
-  if (flags.clip.has_value()) KPSA_RETURN_IF_ERROR(AsUsage(SetClip(&open->rig, *flags.clip).At({flags.file})));
+  if (flags.clip.has_value())
+    KPSA_RETURN_IF_ERROR(AsUsage(SetClip(&open->rig, *flags.clip).At({flags.file})));
   if (flags.pose.has_value()) {
     const Result<std::vector<Setting>> settings = ReadPoseFile(open->rig, *flags.pose);
     if (!settings.ok()) return settings.status();
-    for (const Setting& setting : *settings) KPSA_RETURN_IF_ERROR(ApplySetting(&open->rig, setting).At({*flags.pose}));
+    for (const Setting& setting : *settings)
+      KPSA_RETURN_IF_ERROR(ApplySetting(&open->rig, setting).At({*flags.pose}));
   }
   for (const std::string& text : flags.sets) {
     const Result<Setting> setting = ParseSetting(open->rig, text);
-    if (!setting.ok()) return AsUsage(setting.status().At({"--set " + text}));
+    if (!setting.ok()) return AsUsage(Status(setting.status()).At({"--set " + text}));
     KPSA_RETURN_IF_ERROR(AsUsage(ApplySetting(&open->rig, *setting).At({"--set " + text})));
   }
   return open;
@@ -109,11 +121,16 @@ Status AsUsage(Status status) {
 int ExitCode(const Status& status) {
   if (status.ok()) return 0;
   switch (status.kind()) {
-    case ErrorKind::kDiffers: return 1;
-    case ErrorKind::kUsage: return 2;
-    case ErrorKind::kInvalidInput: return 3;
-    case ErrorKind::kEvaluation: return 4;
-    case ErrorKind::kInterrupted: return 130;
+    case ErrorKind::kDiffers:
+      return 1;
+    case ErrorKind::kUsage:
+      return 2;
+    case ErrorKind::kInvalidInput:
+      return 3;
+    case ErrorKind::kEvaluation:
+      return 4;
+    case ErrorKind::kInterrupted:
+      return 130;
   }
   return 3;
 }
@@ -127,7 +144,7 @@ void PrintErrors(const std::string& program, const Status& status, std::size_t m
       if (c != '\n' && c != '\t' && (static_cast<unsigned char>(c) < 32 || c == 127)) c = '?';
     }
     std::size_t begin = 0;
-    for (std::size_t end = text.find('\n'); ; end = text.find('\n', begin)) {
+    for (std::size_t end = text.find('\n');; end = text.find('\n', begin)) {
       std::string line = text.substr(begin, end == std::string::npos ? end : end - begin);
       if (line.size() > 600) line = line.substr(0, 597) + "...";
       lines.push_back(begin == 0 ? program + ": " + line : "  " + line);
@@ -137,7 +154,9 @@ void PrintErrors(const std::string& program, const Status& status, std::size_t m
   }
   const std::size_t shown = lines.size() <= most_lines ? lines.size() : most_lines - 1;
   for (std::size_t i = 0; i < shown; ++i) Say(lines[i]);
-  if (shown < lines.size()) Say(fmt::format("{}: ... and {} more lines (kpsa validate lists all errors)", program, lines.size() - shown));
+  if (shown < lines.size())
+    Say(fmt::format("{}: ... and {} more lines (kpsa validate lists all errors)", program,
+                    lines.size() - shown));
 }
 
 void Say(const std::string& line) {
@@ -148,13 +167,14 @@ void Say(const std::string& line) {
 void Print(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stdout); }
 
 Status FlushOutput() {
-  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) return Status::Invalid("stdout cannot be written");
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+    return Status::Invalid("stdout cannot be written");
   return Status();
 }
 
 std::string Thousands(std::uint64_t number) {
   std::string text = std::to_string(number);
-  for (std::size_t i = text.size(); i > 3; ) text.insert(i -= 3, ",");
+  for (std::size_t i = text.size(); i > 3;) text.insert(i -= 3, ",");
   return text;
 }
 
@@ -188,6 +208,8 @@ void InstallInterruptHandler() {
 
 bool Interrupted() { return interrupted.load(std::memory_order_relaxed); }
 const std::atomic<bool>* InterruptFlag() { return &interrupted; }
-Status InterruptedStatus() { return Status::Make(ErrorKind::kInterrupted, "interrupted; nothing was written"); }
+Status InterruptedStatus() {
+  return Status::Make(ErrorKind::kInterrupted, "interrupted; nothing was written");
+}
 
 }  // namespace kpsa

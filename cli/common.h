@@ -1,7 +1,7 @@
 // What the subcommands share: flags, loading a rig with them, exit codes, and printing.
 //
-// Data goes to stdout, everything else to stderr. Exit codes: 0 fine, 1 a check failed or things differ, 2 usage,
-// 3 invalid input, 4 evaluation error, 130 interrupted.
+// Data goes to stdout, everything else to stderr. Exit codes: 0 fine, 1 a check failed or things differ, 2
+// usage, 3 invalid input, 4 evaluation error, 130 interrupted.
 #pragma once
 
 #include <atomic>
@@ -23,8 +23,8 @@ namespace kpsa {
 
 // The flags that several subcommands have, as they were typed; unset where they were not given.
 struct Flags {
-  std::string file;                // the rig or character
-  std::vector<std::string> sets;   // --set plug=value
+  std::string file;               // the rig or character
+  std::vector<std::string> sets;  // --set plug=value
   std::optional<std::string> pose, clip, fps, variant;
   bool rest = false;
   std::optional<std::string> frames, times;
@@ -33,8 +33,8 @@ struct Flags {
   bool force = false, quiet = false, json = false;
 };
 
-void AddRigFlags(CLI::App* command, Flags* flags);     // FILE --set --pose --clip --rest --fps --variant
-void AddTimeFlags(CLI::App* command, Flags* flags);    // --frames --times
+void AddRigFlags(CLI::App* command, Flags* flags);   // FILE --set --pose --clip --rest --fps --variant
+void AddTimeFlags(CLI::App* command, Flags* flags);  // --frames --times
 void AddOutputFlags(CLI::App* command, Flags* flags, const std::string& doc);  // -o --force
 void AddThreadsFlag(CLI::App* command, Flags* flags);
 void AddQuietFlag(CLI::App* command, Flags* flags);
@@ -43,13 +43,16 @@ void AddJsonFlag(CLI::App* command, Flags* flags);
 // --threads as a number, 0 where it was not given.
 Result<int> ThreadCount(const Flags& flags);
 
+// Every node type of the program: the standard ones and KPSA's.
+void AddAllNodes(NodeRegistry& registry);
+
 // The registry and the rig that refers to it.
 struct OpenRig {
   NodeRegistry registry;
   Rig rig;
 };
-// Loads the rig of the flags, with the clip, the pose file and the settings that they name. Mistakes in flags are
-// usage errors.
+// Loads the rig of the flags, with the clip, the pose file and the settings that they name. Mistakes in flags
+// are usage errors.
 Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags);
 
 // The same errors as errors of usage: their cause stands on the command line.
@@ -69,14 +72,14 @@ void PrintJson(const Json& json) {
   Print(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
-std::string Thousands(std::uint64_t number);      // 17,121
-std::string ByteText(std::uint64_t bytes);        // 3.1 MB
-std::string LengthText(double metres);            // 0.213 mm
+std::string Thousands(std::uint64_t number);                       // 17,121
+std::string ByteText(std::uint64_t bytes);                         // 3.1 MB
+std::string LengthText(double metres);                             // 0.213 mm
 std::string Plural(std::uint64_t count, const std::string& noun);  // "1 frame", "12 frames"
 
-// From here to the end of the scope an interrupt (Ctrl-C) only sets the flag that Interrupted() reads, so that what is
-// being written can be removed; outside of such scopes, where nothing is half-written, and at the second interrupt, it
-// ends the program.
+// From here to the end of the scope an interrupt (Ctrl-C) only sets the flag that Interrupted() reads, so
+// that what is being written can be removed; outside of such scopes, where nothing is half-written, and at
+// the second interrupt, it ends the program.
 class InterruptScope {
  public:
   InterruptScope();

@@ -39,7 +39,8 @@ Result<double> ParseNumber(std::string_view what, std::string_view text) {
   double value = 0;
   const std::string_view trimmed = Trim(text);
   const auto [end, error] = std::from_chars(trimmed.data(), trimmed.data() + trimmed.size(), value);
-  if (trimmed.empty() || error != std::errc() || end != trimmed.data() + trimmed.size() || !std::isfinite(value)) {
+  if (trimmed.empty() || error != std::errc() || end != trimmed.data() + trimmed.size() ||
+      !std::isfinite(value)) {
     return Status::Usage("{} \"{}\": expected a finite number", what, Quote(text));
   }
   return value;
@@ -56,19 +57,25 @@ Result<int> ParseCount(std::string_view what, std::string_view text, int low, in
 Result<std::vector<std::int64_t>> ParseFrames(std::string_view text) {
   const std::vector<std::string_view> parts = Split(text, ':');
   std::int64_t numbers[3] = {0, 0, 1};
-  if (parts.size() > 3) return Status::Usage("--frames \"{}\": expected A:B or A:B:S, found {} parts", Quote(text), parts.size());
+  if (parts.size() > 3)
+    return Status::Usage("--frames \"{}\": expected A:B or A:B:S, found {} parts", Quote(text), parts.size());
   for (std::size_t i = 0; i < parts.size(); ++i) {
     if (!ParseWhole(parts[i], &numbers[i]) || std::abs(static_cast<double>(numbers[i])) > 1e12) {
-      return Status::Usage("--frames \"{}\": expected A:B or A:B:S with whole numbers, found \"{}\"", Quote(text), Quote(parts[i]));
+      return Status::Usage("--frames \"{}\": expected A:B or A:B:S with whole numbers, found \"{}\"",
+                           Quote(text), Quote(parts[i]));
     }
   }
   if (parts.size() == 1) numbers[1] = numbers[0];
   const auto [first, last, step] = numbers;
-  if (step < 1) return Status::Usage("--frames \"{}\": expected a step of 1 or more, found {}", Quote(text), step);
-  if (last < first) return Status::Usage("--frames \"{}\": the last frame, {}, is before the first, {}", Quote(text), last, first);
+  if (step < 1)
+    return Status::Usage("--frames \"{}\": expected a step of 1 or more, found {}", Quote(text), step);
+  if (last < first)
+    return Status::Usage("--frames \"{}\": the last frame, {}, is before the first, {}", Quote(text), last,
+                         first);
   const std::int64_t count = (last - first) / step + 1;
   if (count > static_cast<std::int64_t>(kMaxSamples)) {
-    return Status::Usage("--frames \"{}\": {} frames are more than {}, the most of one evaluation", Quote(text), Thousands(static_cast<std::uint64_t>(count)), Thousands(kMaxSamples));
+    return Status::Usage("--frames \"{}\": {} frames are more than {}, the most of one evaluation",
+                         Quote(text), Thousands(static_cast<std::uint64_t>(count)), Thousands(kMaxSamples));
   }
   std::vector<std::int64_t> frames(static_cast<std::size_t>(count));
   for (std::size_t i = 0; i < frames.size(); ++i) frames[i] = first + static_cast<std::int64_t>(i) * step;
@@ -81,7 +88,8 @@ Result<std::vector<double>> ParseTimes(std::string_view text) {
     const Result<double> time = ParseNumber("--times", part);
     if (!time.ok()) return time.status();
     times.push_back(*time);
-    if (times.size() > kMaxSamples) return Status::Usage("--times: more than {} times", Thousands(kMaxSamples));
+    if (times.size() > kMaxSamples)
+      return Status::Usage("--times: more than {} times", Thousands(kMaxSamples));
   }
   return times;
 }
@@ -91,14 +99,17 @@ Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view 
   for (std::string_view part : Split(text, ',')) {
     const std::vector<std::string_view> ends = Split(part, ':');
     std::int64_t low = 0, high = 0;
-    if (ends.size() > 2 || !ParseWhole(ends.front(), &low) || !ParseWhole(ends.back(), &high) || low < 0 || high < low) {
+    if (ends.size() > 2 || !ParseWhole(ends.front(), &low) || !ParseWhole(ends.back(), &high) || low < 0 ||
+        high < low) {
       return Status::Usage("{} \"{}\": expected indices and ranges, as in 0:99,120", what, Quote(text));
     }
     if (high >= static_cast<std::int64_t>(total)) {
-      return Status::Usage("{} \"{}\": {} is out of range, expected 0 to {}", what, Quote(text), high, static_cast<std::int64_t>(total) - 1);
+      return Status::Usage("{} \"{}\": {} is out of range, expected 0 to {}", what, Quote(text), high,
+                           static_cast<std::int64_t>(total) - 1);
     }
     for (std::int64_t i = low; i <= high; ++i) indices.push_back(static_cast<Index>(i));
-    if (indices.size() > 2 * static_cast<std::size_t>(total)) return Status::Usage("{} \"{}\": ranges overlap", what, Quote(text));
+    if (indices.size() > 2 * static_cast<std::size_t>(total))
+      return Status::Usage("{} \"{}\": ranges overlap", what, Quote(text));
   }
   std::sort(indices.begin(), indices.end());
   indices.erase(std::unique(indices.begin(), indices.end()), indices.end());
@@ -106,7 +117,8 @@ Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view 
 }
 
 Status CheckTimeFlags(const Flags& flags) {
-  if (flags.frames.has_value() && flags.times.has_value()) return Status::Usage("--frames and --times: expected one of them");
+  if (flags.frames.has_value() && flags.times.has_value())
+    return Status::Usage("--frames and --times: expected one of them");
   if (flags.frames.has_value()) {
     if (const auto frames = ParseFrames(*flags.frames); !frames.ok()) return frames.status();
   }
@@ -132,7 +144,8 @@ Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig) {
   // A clip that was made at this rate ends on a frame, but for rounding
   const double last = std::floor(duration * rig.fps + 1e-3);
   if (!(last < static_cast<double>(kMaxSamples))) {
-    return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames: choose some with --frames", rig.scene.clip.value_or(""), duration, Thousands(kMaxSamples));
+    return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames: choose some with --frames",
+                         rig.scene.clip.value_or(""), duration, Thousands(kMaxSamples));
   }
   for (double frame = 0; frame <= last; ++frame) times.push_back(frame / rig.fps);
   return times;

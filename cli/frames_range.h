@@ -1,5 +1,5 @@
-// Numbers, frame ranges and lists of times as they are typed. All refusals are errors of usage that say what was
-// expected.
+// Numbers, frame ranges and lists of times as they are typed. All refusals are errors of usage that say what
+// was expected.
 #pragma once
 
 #include <cstddef>
@@ -26,8 +26,8 @@ Result<std::vector<double>> ParseTimes(std::string_view text);
 // "0:99,120": indices and ranges with both ends, ascending and each once, below `total`.
 Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view text, Index total);
 
-// The times of --frames or --times in seconds. Without them: every frame of the clip that plays, from 0 to its end;
-// time 0 alone if none plays.
+// The times of --frames or --times in seconds. Without them: every frame of the clip that plays, from 0 to
+// its end; time 0 alone if none plays.
 Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig);
 // Whether all refusals of --frames and --times pass, before a rig is loaded.
 Status CheckTimeFlags(const Flags& flags);

@@ -1,12 +1,11 @@
 #include "cli/image.h"
 
 #include <fmt/format.h>
+#include <stb/stb_easy_font.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-
-#include <stb/stb_easy_font.h>
 
 namespace kpsa {
 namespace {
@@ -32,13 +31,15 @@ Image::Image(int w, int h, Rgb fill) : width(w), height(h) {
 }
 
 Rgb Image::At(int x, int y) const {
-  const std::size_t i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+  const std::size_t i =
+      3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
   return {rgb[i], rgb[i + 1], rgb[i + 2]};
 }
 
 void Image::Set(int x, int y, Rgb color) {
   if (x < 0 || y < 0 || x >= width || y >= height) return;
-  const std::size_t i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+  const std::size_t i =
+      3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
   std::copy(color.begin(), color.end(), rgb.begin() + static_cast<std::ptrdiff_t>(i));
 }
 
@@ -52,7 +53,8 @@ void DrawText(Image& image, int x, int y, int scale, Rgb color, std::string_view
   std::string line = Printable(text);
   // The font comes as axis-aligned rectangles: four corners of 16 bytes (x, y, z floats, colour) each
   std::vector<char> quads(line.size() * 400 + 400);
-  const int count = stb_easy_font_print(0, 0, line.data(), nullptr, quads.data(), static_cast<int>(quads.size()));
+  const int count =
+      stb_easy_font_print(0, 0, line.data(), nullptr, quads.data(), static_cast<int>(quads.size()));
   for (int q = 0; q < count; ++q) {
     float low[2], high[2];
     std::memcpy(low, quads.data() + q * 64, sizeof(low));
@@ -74,10 +76,15 @@ Rgb TurboColor(double t) {
   if (std::isnan(t)) return {128, 128, 128};
   t = std::clamp(t, 0.0, 1.0);
   const double t2 = t * t, t3 = t2 * t, t4 = t2 * t2, t5 = t4 * t;
-  const double r = 0.13572138 + 4.61539260 * t - 42.66032258 * t2 + 132.13108234 * t3 - 152.94239396 * t4 + 59.28637943 * t5;
-  const double g = 0.09140261 + 2.19418839 * t + 4.84296658 * t2 - 14.18503333 * t3 + 4.27729857 * t4 + 2.82956604 * t5;
-  const double b = 0.10667330 + 12.64194608 * t - 60.58204836 * t2 + 110.36276771 * t3 - 89.90310912 * t4 + 27.34824973 * t5;
-  const auto byte = [](double v) { return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0, 1.0))); };
+  const double r = 0.13572138 + 4.61539260 * t - 42.66032258 * t2 + 132.13108234 * t3 - 152.94239396 * t4 +
+                   59.28637943 * t5;
+  const double g =
+      0.09140261 + 2.19418839 * t + 4.84296658 * t2 - 14.18503333 * t3 + 4.27729857 * t4 + 2.82956604 * t5;
+  const double b = 0.10667330 + 12.64194608 * t - 60.58204836 * t2 + 110.36276771 * t3 - 89.90310912 * t4 +
+                   27.34824973 * t5;
+  const auto byte = [](double v) {
+    return static_cast<std::uint8_t>(std::lround(255 * std::clamp(v, 0.0, 1.0)));
+  };
   return {byte(r), byte(g), byte(b)};
 }
 

@@ -20,8 +20,8 @@ struct Image {
 
   Image() = default;
   Image(int width, int height, Rgb fill);
-  Rgb At(int x, int y) const;         // within the picture
-  void Set(int x, int y, Rgb color);  // outside: ignored
+  Rgb At(int x, int y) const;                        // within the picture
+  void Set(int x, int y, Rgb color);                 // outside: ignored
   void Fill(int x, int y, int w, int h, Rgb color);  // clipped
 };
 
@@ -31,8 +31,9 @@ void DrawText(Image& image, int x, int y, int scale, Rgb color, std::string_view
 int TextWidth(std::string_view text, int scale);  // pixels
 int TextHeight(int scale);
 
-// A rainbow of rising brightness order (polynomial fit of Google's Turbo, Apache 2.0, A. Mikhailov 2019), from dark
-// blue at 0 over green to dark red at 1; t is clamped, a NaN is grey. Linear-light output is up to the caller.
+// A rainbow of rising brightness order (polynomial fit of Google's Turbo, Apache 2.0, A. Mikhailov 2019),
+// from dark blue at 0 over green to dark red at 1; t is clamped, a NaN is grey. Linear-light output is up to
+// the caller.
 Rgb TurboColor(double t);
 
 // The scale of a heat map along the right side: a bar with ticks 0 .. max_metres, numbers in mm.

@@ -23,7 +23,8 @@ constexpr char kFirstMinutes[] =
 const std::vector<std::string>& CommandNames(CLI::App& program) {
   static std::vector<std::string> names;
   names.clear();
-  for (const CLI::App* command : program.get_subcommands([](CLI::App*) { return true; })) names.push_back(command->get_name());
+  for (const CLI::App* command : program.get_subcommands([](CLI::App*) { return true; }))
+    names.push_back(command->get_name());
   return names;
 }
 
@@ -45,14 +46,17 @@ int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vecto
   std::replace(message.begin(), message.end(), '\n', ' ');
   if (parsed.empty() && !arguments.empty()) {
     const std::string& word = arguments.front();
-    message = word.starts_with('-') ? fmt::format("unknown option \"{}\"{}", word, DidYouMean(word, OptionNames(program)))
-                                    : fmt::format("unknown command \"{}\"{}; kpsa --help lists all", word, DidYouMean(word, CommandNames(program)));
+    message = word.starts_with('-')
+                  ? fmt::format("unknown option \"{}\"{}", word, DidYouMean(word, OptionNames(program)))
+                  : fmt::format("unknown command \"{}\"{}; kpsa --help lists all", word,
+                                DidYouMean(word, CommandNames(program)));
   } else if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
     const std::vector<std::string> extras = program.remaining(true);
     const std::string word = extras.empty() ? "" : extras.front();
     const std::string bare = word.substr(0, word.find('='));
-    message = word.starts_with('-') ? fmt::format("unknown option \"{}\"{}", bare, DidYouMean(bare, OptionNames(command)))
-                                    : fmt::format("unexpected argument \"{}\"", word);
+    message = word.starts_with('-')
+                  ? fmt::format("unknown option \"{}\"{}", bare, DidYouMean(bare, OptionNames(command)))
+                  : fmt::format("unexpected argument \"{}\"", word);
   } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
     message = "expected " + message.substr(0, message.find(" is required"));
   }
@@ -73,12 +77,16 @@ int Main(int argc, char** argv) {
   AddEvalCommand(&program, &chosen);
   AddGetCommand(&program, &chosen);
   AddRenderCommand(&program, &chosen);
+  AddTrainCommand(&program, &chosen);
+  AddBenchCommand(&program, &chosen);
   AddCompileCommand(&program, &chosen);
   AddProfileCommand(&program, &chosen);
+  AddExplainCommand(&program, &chosen);
   AddCompareCommand(&program, &chosen);
   AddGraphCommand(&program, &chosen);
   AddNodesCommand(&program, &chosen);
-  program.footer(kFirstMinutes + std::string("\nExit codes: 0 fine, 1 a check failed or things differ, 2 usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
+  program.footer(kFirstMinutes + std::string("\nExit codes: 0 fine, 1 a check failed or things differ, 2 "
+                                             "usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
 
   try {
     program.parse(argc, argv);

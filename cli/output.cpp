@@ -31,7 +31,8 @@ Status CheckOutput(const std::string& path, bool force, const std::vector<std::s
   if (!suffixes.empty() && std::find(suffixes.begin(), suffixes.end(), Suffix(path)) == suffixes.end()) {
     return Status::Usage("expected a name that ends in {}", fmt::join(suffixes, ", ")).At({path});
   }
-  if (fs::path(path).lexically_normal().string().starts_with("/dev/std")) return Status::Usage("write - for stdout").At({path});
+  if (fs::path(path).lexically_normal().string().starts_with("/dev/std"))
+    return Status::Usage("write - for stdout").At({path});
   // Asks the writer itself: it knows all reasons. What it made is removed at once.
   const Result<OutputFile> file = OutputFile::Create(path, force);
   return file.ok() ? Status() : AsUsage(file.status());
@@ -58,7 +59,8 @@ Result<OutputPath> OutputPath::Create(const std::string& output) {
   const int descriptor = ::mkstemp(place.path_.data());
   if (descriptor < 0) {
     const std::string name = std::exchange(place.path_, "");
-    return Status::Usage("no temporary file for stdout: {}", std::generic_category().message(errno)).At({name});
+    return Status::Usage("no temporary file for stdout: {}", std::generic_category().message(errno))
+        .At({name});
   }
   ::close(descriptor);
   return place;
@@ -74,10 +76,12 @@ OutputPath::~OutputPath() {
 Status OutputPath::Finish() {
   if (!stdout_) return Status();
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(path_.c_str(), "rb"), std::fclose);
-  if (in == nullptr) return Status::Invalid("cannot be read again: {}", std::generic_category().message(errno)).At({path_});
+  if (in == nullptr)
+    return Status::Invalid("cannot be read again: {}", std::generic_category().message(errno)).At({path_});
   std::vector<char> block(1 << 20);
   while (const std::size_t size = std::fread(block.data(), 1, block.size(), in.get())) {
-    if (std::fwrite(block.data(), 1, size, stdout) != size) return Status::Invalid("stdout cannot be written");
+    if (std::fwrite(block.data(), 1, size, stdout) != size)
+      return Status::Invalid("stdout cannot be written");
   }
   return FlushOutput();
 }
@@ -87,7 +91,8 @@ Status WriteText(const std::string& output, bool force, const std::string& text)
     Print(text);
     return FlushOutput();
   }
-  return WriteFileAtomically(output, force, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  return WriteFileAtomically(output, force,
+                             {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
 }  // namespace kpsa

@@ -1,5 +1,6 @@
-// Where results go: a file chosen by its suffix, or stdout. Everything that can be refused is refused before any work:
-// an existing file without --force, a folder, a place that cannot be written, an output that is an input.
+// Where results go: a file chosen by its suffix, or stdout. Everything that can be refused is refused before
+// any work: an existing file without --force, a folder, a place that cannot be written, an output that is an
+// input.
 #pragma once
 
 #include <span>
@@ -13,13 +14,14 @@ namespace kpsa {
 // The lower-case suffix of a path with its dot, "" where there is none.
 std::string Suffix(const std::string& path);
 
-// All refusals for an output at `path` with one of the suffixes (".npz", ...; empty: any). "-" is stdout and passes.
+// All refusals for an output at `path` with one of the suffixes (".npz", ...; empty: any). "-" is stdout and
+// passes.
 Status CheckOutput(const std::string& path, bool force, const std::vector<std::string>& suffixes);
 // Refuses an output that is one of the inputs, also under another name.
 Status CheckNotInput(const std::string& path, std::span<const std::string> inputs);
 
-// A path for a writer that wants one: the output itself, or for "-" a temporary file whose bytes Finish copies to
-// stdout. The temporary file is removed in any case.
+// A path for a writer that wants one: the output itself, or for "-" a temporary file whose bytes Finish
+// copies to stdout. The temporary file is removed in any case.
 class OutputPath {
  public:
   static Result<OutputPath> Create(const std::string& output);

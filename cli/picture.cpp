@@ -13,8 +13,8 @@
 namespace kpsa {
 namespace {
 
-constexpr int kSkyRays = 64;    // ambient occlusion rays a point
-constexpr int kLightRays = 12;  // shadow rays a point towards the key light's disc
+constexpr int kSkyRays = 64;           // ambient occlusion rays a point
+constexpr int kLightRays = 12;         // shadow rays a point towards the key light's disc
 constexpr double kLightRadius = 0.22;  // of the key light's disc at distance 1
 constexpr int kLargestSide = 8192;
 
@@ -39,10 +39,13 @@ void DiscPoint(int k, int n, double* x, double* y) {
   *y = radius * Sin(angle);
 }
 
-// Both directions of sRGB's curve by roots and powers alone, good to half a byte (I. Taylor, "sRGB approximations").
+// Both directions of sRGB's curve by roots and powers alone, good to half a byte (I. Taylor, "sRGB
+// approximations").
 std::uint8_t SrgbByte(double linear) {
   const double s1 = std::sqrt(std::clamp(linear, 0.0, 1.0)), s2 = std::sqrt(s1), s3 = std::sqrt(s2);
-  const double encoded = linear <= 0.0031308 ? 12.92 * linear : 0.662002687 * s1 + 0.684122060 * s2 - 0.323583601 * s3 - 0.0225411470 * linear;
+  const double encoded = linear <= 0.0031308
+                             ? 12.92 * linear
+                             : 0.662002687 * s1 + 0.684122060 * s2 - 0.323583601 * s3 - 0.0225411470 * linear;
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(encoded, 0.0, 1.0)));
 }
 
@@ -57,10 +60,10 @@ Double3 LinearFromRgb(Rgb c) { return {LinearFromSrgb(c[0]), LinearFromSrgb(c[1]
 struct Surface {
   PointBuffer points;
   std::vector<Index> triangles;
-  std::vector<Double3> normals;    // unit, area-weighted
-  std::vector<Double3> colors;     // linear
-  std::vector<float> sky;          // 0 .. 1, share of the sky seen
-  std::vector<float> key;          // 0 .. 1, share of the key light seen
+  std::vector<Double3> normals;     // unit, area-weighted
+  std::vector<Double3> colors;      // linear
+  std::vector<float> sky;           // 0 .. 1, share of the sky seen
+  std::vector<float> key;           // 0 .. 1, share of the key light seen
   std::vector<std::uint8_t> matte;  // 1: heat map, without highlights
 };
 
@@ -73,8 +76,8 @@ Result<Surface> Gather(const RenderInput& input) {
     const std::size_t n = part.points.size() / 3;
     if (part.points.size() % 3 != 0 || (!part.colors.empty() && part.colors.size() != 3 * n) ||
         (!part.scalars.empty() && part.scalars.size() != n)) {
-      return Status::Invalid("a picture's part has {} coordinates, {} colour values and {} scalars", part.points.size(),
-                             part.colors.size(), part.scalars.size());
+      return Status::Invalid("a picture's part has {} coordinates, {} colour values and {} scalars",
+                             part.points.size(), part.colors.size(), part.scalars.size());
     }
     count += n;
   }
@@ -149,8 +152,8 @@ void LightPoints(const RayScene& scene, Double3 to_key, double diagonal, Surface
       for (int k = 0; k < kSkyRays; ++k) {  // cosine-weighted: the disc lifted to the hemisphere
         double x, y;
         DiscPoint(k, kSkyRays, &x, &y);
-        aim(rays[static_cast<std::size_t>(k)], s * x + t * y + n * std::sqrt(std::max(0.0, 1 - x * x - y * y)),
-            diagonal * 0.35);
+        aim(rays[static_cast<std::size_t>(k)],
+            s * x + t * y + n * std::sqrt(std::max(0.0, 1 - x * x - y * y)), diagonal * 0.35);
       }
       scene.Occluded(rays, blocked);
       int seen = 0;
@@ -159,7 +162,8 @@ void LightPoints(const RayScene& scene, Double3 to_key, double diagonal, Surface
       for (int k = 0; k < kLightRays; ++k) {
         double x, y;
         DiscPoint(k, kLightRays, &x, &y);
-        aim(rays[static_cast<std::size_t>(k)], to_key + key_s * (x * kLightRadius) + key_t * (y * kLightRadius), 1e30);
+        aim(rays[static_cast<std::size_t>(k)],
+            to_key + key_s * (x * kLightRadius) + key_t * (y * kLightRadius), 1e30);
       }
       scene.Occluded(std::span(rays).first(kLightRays), std::span(blocked).first(kLightRays));
       seen = 0;
@@ -189,14 +193,17 @@ Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lig
   n = Unit(n);
   // An open surface seen from behind; the smooth normal alone may turn away at a silhouette, too
   const ConstPointsView p = surface.points.view();
-  const Double3 a = PointOf(p, corner[0]), facet = Cross(PointOf(p, corner[1]) - a, PointOf(p, corner[2]) - a);
+  const Double3 a = PointOf(p, corner[0]),
+                facet = Cross(PointOf(p, corner[1]) - a, PointOf(p, corner[2]) - a);
   if (Dot(facet, view) < 0) n = n * -1.0;
   // Sky from above, ground bounce from below, key with a soft terminator, weak fill
   const double up = 0.5 + 0.5 * n.y;
-  const Double3 ambient = (Double3{0.50, 0.54, 0.60} * up + Double3{0.34, 0.29, 0.26} * (1 - up)) * (sky * sky);
+  const Double3 ambient =
+      (Double3{0.50, 0.54, 0.60} * up + Double3{0.34, 0.29, 0.26} * (1 - up)) * (sky * sky);
   const double wrapped = std::max(0.0, (Dot(n, lights.key) + 0.12) / 1.12);
   const Double3 diffuse = Double3{1.0, 0.96, 0.90} * (1.02 * wrapped * key) +
-                          Double3{0.62, 0.74, 0.95} * (0.22 * std::max(0.0, Dot(n, lights.fill)) * sky) + ambient * 0.82;
+                          Double3{0.62, 0.74, 0.95} * (0.22 * std::max(0.0, Dot(n, lights.fill)) * sky) +
+                          ambient * 0.82;
   Double3 out = Times(color, diffuse);
   if (matte < 0.5) {
     const double facing = 1 - std::max(0.0, Dot(n, view)), fresnel = facing * facing * facing * facing;
@@ -251,9 +258,10 @@ Camera FrameCamera(const RenderInput& input, const RenderOptions& options, doubl
 }
 
 Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const RenderOptions& options) {
-  if (options.width < 1 || options.height < 1 || options.width > kLargestSide || options.height > kLargestSide) {
-    return Status::Usage("a picture of {} x {} pixels: each side must be from 1 to {}", options.width, options.height,
-                         kLargestSide);
+  if (options.width < 1 || options.height < 1 || options.width > kLargestSide ||
+      options.height > kLargestSide) {
+    return Status::Usage("a picture of {} x {} pixels: each side must be from 1 to {}", options.width,
+                         options.height, kLargestSide);
   }
   Result<Surface> surface = Gather(input);
   if (!surface.ok()) return surface.status();
@@ -265,14 +273,16 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
   const Double3 back = Unit(camera.eye - camera.target);
   const Double3 right = Unit(Cross(camera.up, back)), up = Cross(back, right);
   // The lights belong to the camera, so that every view is lit well
-  const Lights lights = {Unit(right * -0.62 + up * 0.70 + back * 0.80), Unit(right * 0.9 + up * 0.05 + back * 0.5),
+  const Lights lights = {Unit(right * -0.62 + up * 0.70 + back * 0.80),
+                         Unit(right * 0.9 + up * 0.05 + back * 0.5),
                          Unit(right * 0.7 + up * 0.5 + back * -0.6)};
   LightPoints(*scene, lights.key, diagonal, &*surface);
 
   Image image(options.width, options.height, options.background_bottom);
   const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2);
   const double aspect = static_cast<double>(options.width) / options.height;
-  const Double3 top = LinearFromRgb(options.background_top), bottom = LinearFromRgb(options.background_bottom);
+  const Double3 top = LinearFromRgb(options.background_top),
+                bottom = LinearFromRgb(options.background_bottom);
   ParallelFor(static_cast<std::size_t>(options.height), 8, [&](std::size_t begin, std::size_t end) {
     std::array<Ray, 4> rays;
     std::array<RayHit, 4> hits;
@@ -283,10 +293,12 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
         std::array<Double3, 4> directions;
         for (std::size_t k = 0; k < 4; ++k) {
           const double x = (column + 0.25 + 0.5 * static_cast<double>(k % 2)) / options.width * 2 - 1;
-          const double y = 1 - (static_cast<double>(row) + 0.25 + 0.5 * static_cast<double>(k / 2)) / options.height * 2;
+          const double y =
+              1 - (static_cast<double>(row) + 0.25 + 0.5 * static_cast<double>(k / 2)) / options.height * 2;
           const Double3 d = Unit(right * (x * slope * aspect) + up * (y * slope) - back);
           directions[k] = d;
-          rays[k] = {{static_cast<float>(camera.eye.x), static_cast<float>(camera.eye.y), static_cast<float>(camera.eye.z)},
+          rays[k] = {{static_cast<float>(camera.eye.x), static_cast<float>(camera.eye.y),
+                      static_cast<float>(camera.eye.z)},
                      {static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)},
                      0,
                      1e30f};
@@ -294,9 +306,11 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
         scene->ClosestHits(rays, hits);
         Double3 sum = {};
         for (std::size_t k = 0; k < 4; ++k) {
-          sum = sum + (hits[k].triangle == kNoIndex ? ground : Shade(*surface, hits[k], directions[k] * -1.0, lights));
+          sum = sum + (hits[k].triangle == kNoIndex ? ground
+                                                    : Shade(*surface, hits[k], directions[k] * -1.0, lights));
         }
-        image.Set(column, static_cast<int>(row), {SrgbByte(sum.x / 4), SrgbByte(sum.y / 4), SrgbByte(sum.z / 4)});
+        image.Set(column, static_cast<int>(row),
+                  {SrgbByte(sum.x / 4), SrgbByte(sum.y / 4), SrgbByte(sum.z / 4)});
       }
     }
   });
@@ -336,8 +350,8 @@ Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accel
   float largest = 0;
   for (std::size_t i = 0; i < full.parts.size(); ++i) {
     if (full.parts[i].points.size() != accelerated.parts[i].points.size()) {
-      return Status::Usage("part {} has {} coordinates in one pose and {} in the other", i, full.parts[i].points.size(),
-                           accelerated.parts[i].points.size());
+      return Status::Usage("part {} has {} coordinates in one pose and {} in the other", i,
+                           full.parts[i].points.size(), accelerated.parts[i].points.size());
     }
     distances[i] = PointDistances(full.parts[i].points, accelerated.parts[i].points);
     for (float d : distances[i]) largest = std::max(largest, d);

@@ -1,8 +1,9 @@
-// Pictures of meshes: shaded clay with soft light, or a heat map of a number a point. What `kpsa render` draws.
+// Pictures of meshes: shaded clay with soft light, or a heat map of a number a point. What `kpsa render`
+// draws.
 //
-// Light is computed at the points (ambient occlusion and the shadow of the key light, by rays) and interpolated, so
-// that pictures are free of noise; pixels are shaded with smooth normals, 2 x 2 samples each. The same input gives
-// the same picture at any number of threads.
+// Light is computed at the points (ambient occlusion and the shadow of the key light, by rays) and
+// interpolated, so that pictures are free of noise; pixels are shaded with smooth normals, 2 x 2 samples
+// each. The same input gives the same picture at any number of threads.
 #pragma once
 
 #include <span>
@@ -16,10 +17,10 @@ namespace kpsa {
 
 // One surface. The spans must outlive the call that is given the part.
 struct RenderPart {
-  std::span<const float> points;     // 3 a point (x y z), metres, world space
-  std::span<const Index> triangles;  // 3 indices each, counter-clockwise from outside
-  std::span<const float> colors;     // 3 a point, linear light 0 .. 1; or empty: `color` everywhere
-  std::span<const float> scalars;    // 1 a point, metres; or empty: the part is drawn as clay
+  std::span<const float> points;       // 3 a point (x y z), metres, world space
+  std::span<const Index> triangles;    // 3 indices each, counter-clockwise from outside
+  std::span<const float> colors;       // 3 a point, linear light 0 .. 1; or empty: `color` everywhere
+  std::span<const float> scalars;      // 1 a point, metres; or empty: the part is drawn as clay
   Double3 color = {0.62, 0.43, 0.35};  // linear light
 };
 
@@ -47,7 +48,8 @@ struct RenderOptions {
 // `elevation` above the horizon, in radians. For animations, frame one pose and keep the camera.
 Camera FrameCamera(const RenderInput& input, const RenderOptions& options, double azimuth, double elevation);
 
-// The picture of the parts. Errors: those of RayScene::Build; a size below 1 or above 8192; a span of wrong length.
+// The picture of the parts. Errors: those of RayScene::Build; a size below 1 or above 8192; a span of wrong
+// length.
 Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const RenderOptions& options = {});
 
 // `count` pictures from all around, the camera of FrameCamera at the azimuths 2 pi i / count.
@@ -57,8 +59,8 @@ Result<std::vector<Image>> RenderTurntable(const RenderInput& input, int count, 
 // distances[i] = |a_i - b_i| of two sets of points (3 floats each): the scalars of a heat map.
 std::vector<float> PointDistances(std::span<const float> a, std::span<const float> b);
 
-// Three pictures side by side from one camera: "full", "accelerated" and the heat map of their distance, titled
-// with its maximum. `full` and `accelerated` hold the same parts with different points.
+// Three pictures side by side from one camera: "full", "accelerated" and the heat map of their distance,
+// titled with its maximum. `full` and `accelerated` hold the same parts with different points.
 Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accelerated, const Camera& camera,
                                const RenderOptions& options = {});
 

@@ -10,8 +10,12 @@
 namespace kpsa {
 
 Progress::Progress(std::string label, std::size_t total, bool quiet)
-    : label_(std::move(label)), total_(total), shown_(!quiet && ::isatty(STDERR_FILENO) == 1),
-      color_(std::getenv("NO_COLOR") == nullptr), begin_(std::chrono::steady_clock::now()), last_(begin_) {}
+    : label_(std::move(label)),
+      total_(total),
+      shown_(!quiet && ::isatty(STDERR_FILENO) == 1),
+      color_(std::getenv("NO_COLOR") == nullptr),
+      begin_(std::chrono::steady_clock::now()),
+      last_(begin_) {}
 
 Progress::~Progress() {
   if (drawn_) std::fputs("\r\033[K", stderr);
@@ -42,8 +46,11 @@ void Progress::Draw(std::size_t done) {
     const std::size_t full = std::min(kWidth, done * kWidth / total_);
     std::string bar(full, '=');
     bar.resize(kWidth, ' ');
-    const double left = done > 0 ? seconds * static_cast<double>(total_ - std::min(done, total_)) / static_cast<double>(done) : 0;
-    line = fmt::format("{} {}[{}]{} {}/{}  {:.0f} s left", label_, color_ ? "\033[36m" : "", bar, color_ ? "\033[0m" : "", done, total_, left);
+    const double left =
+        done > 0 ? seconds * static_cast<double>(total_ - std::min(done, total_)) / static_cast<double>(done)
+                 : 0;
+    line = fmt::format("{} {}[{}]{} {}/{}  {:.0f} s left", label_, color_ ? "\033[36m" : "", bar,
+                       color_ ? "\033[0m" : "", done, total_, left);
   }
   std::fprintf(stderr, "\r\033[K%s", line.c_str());
   std::fflush(stderr);

@@ -18,8 +18,9 @@ Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compile
   return plan;
 }
 
-Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan, const std::vector<double>& times,
-                     const RigFrameOptions& options, const RigFrameSink& sink) {
+Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
+                     const std::vector<double>& times, const RigFrameOptions& options,
+                     const RigFrameSink& sink) {
   Progress progress(options.label, times.size(), options.quiet || options.label.empty());
   const Index time = plan->FindVarying(rig.scene.time);
   FrameOptions frame_options;
@@ -33,7 +34,8 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan, co
       },
       [&](std::size_t frame, const Evaluator& evaluator, const Status& evaluated) -> Status {
         if (!evaluated.ok()) {
-          return Status::Evaluation("at {} s: {}", times[frame], evaluated.errors().front().message).At({rig.path});
+          return Status::Evaluation("at {} s: {}", times[frame], evaluated.errors().front().message)
+              .At({rig.path});
         }
         progress.Set(frame + 1);
         return sink(frame, evaluator);

@@ -14,15 +14,16 @@
 
 namespace kpsa {
 
-// What the command line asks for: the final points of all meshes, in the order of rig.scene.meshes; time varies.
+// What the command line asks for: the final points of all meshes, in the order of rig.scene.meshes; time
+// varies.
 Request AllMeshes(const Rig& rig);
 
 // Compiles the request; errors are located at the rig's file.
 Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compiler, const Request& request);
 
 struct RigFrameOptions {
-  int threads = 0;           // 0: all
-  std::string label;         // of the progress bar; "": none
+  int threads = 0;    // 0: all
+  std::string label;  // of the progress bar; "": none
   bool quiet = false;
   Profile* profile = nullptr;
 };
@@ -30,9 +31,10 @@ struct RigFrameOptions {
 // Takes a frame whose outputs are up to date. In ascending order, one call at a time.
 using RigFrameSink = std::function<Status(std::size_t frame, const Evaluator& evaluator)>;
 
-// Evaluates all outputs of the plan at the times. The first frame that fails ends it, with its time in the message; so
-// does an interrupt.
-Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan, const std::vector<double>& times,
-                     const RigFrameOptions& options, const RigFrameSink& sink);
+// Evaluates all outputs of the plan at the times. The first frame that fails ends it, with its time in the
+// message; so does an interrupt.
+Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
+                     const std::vector<double>& times, const RigFrameOptions& options,
+                     const RigFrameSink& sink);
 
 }  // namespace kpsa

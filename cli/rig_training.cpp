@@ -1,6 +1,7 @@
 #include "cli/rig_training.h"
 
 #include <cmath>
+#include <set>
 
 namespace kpsa {
 
@@ -42,8 +43,15 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
   training.graph = rig->graph.get();
   training.time = rig->scene.time;
   training.target = MakeTarget(*rig, acceleration);
+  // The transforms from the space up to the root
+  std::set<Index> carriers;
+  for (NodeId node = acceleration.space.value_or(NodeId()); rig->graph->IsAlive(node) && carriers.insert(node.index).second;) {
+    const Connection* parent = rig->graph->FindConnection({node, rig->graph->def(node).FindAttribute("parentMatrix"), -1, -1});
+    if (parent == nullptr) break;
+    node = parent->source.node;
+  }
   for (const Control& control : rig->controls) {
-    training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip});
+    training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip, carriers.count(control.plug.node.index) != 0});
   }
   training.set_clip = [rig](std::optional<std::string_view> clip) { return SetClip(rig, clip); };
   return training;

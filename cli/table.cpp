@@ -7,7 +7,8 @@ namespace {
 
 // Characters, not bytes, of UTF-8 text.
 std::size_t Width(const std::string& text) {
-  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; }));
 }
 
 }  // namespace
@@ -60,7 +61,8 @@ std::string Table::Markdown() const {
     text += "|";
     for (const std::string& cell : row) {
       std::string safe;
-      for (char c : cell) safe += c == '|' ? std::string("\\|") : c == '\n' ? std::string(" ") : std::string(1, c);
+      for (char c : cell)
+        safe += c == '|' ? std::string("\\|") : c == '\n' ? std::string(" ") : std::string(1, c);
       text += " " + safe + " |";
     }
     text += "\n";

@@ -25,13 +25,15 @@ void Interleave(const Mesh& mesh, ConstPointsView points, Index first, Index cou
 
 class NpzOutput final : public VertexOutput {
  public:
-  NpzOutput(OutputPath path, NpzWriter writer, const Rig& rig) : path_(std::move(path)), writer_(std::move(writer)), rig_(rig) {}
+  NpzOutput(OutputPath path, NpzWriter writer, const Rig& rig)
+      : path_(std::move(path)), writer_(std::move(writer)), rig_(rig) {}
 
   Status Declare(const std::vector<double>& times) {
     KPSA_RETURN_IF_ERROR(writer_.Add("times", {times.size()}, times));
     for (const CharacterMesh& mesh : rig_.scene.meshes) {
       for (const OutputPrimitive& primitive : mesh.primitives) {
-        const Result<NpzWriter::ArrayId> id = writer_.Declare(primitive.key, NpzType::kFloat32, {times.size(), primitive.vertex_count, 3});
+        const Result<NpzWriter::ArrayId> id =
+            writer_.Declare(primitive.key, NpzType::kFloat32, {times.size(), primitive.vertex_count, 3});
         if (!id.ok()) return id.status();
         arrays_.push_back(*id);
       }
@@ -81,17 +83,21 @@ class CacheOutput final : public VertexOutput {
 
   Status Check() {
     std::uint64_t bytes = 0;
-    for (const PointCacheMesh& mesh : cache_.meshes) bytes += std::uint64_t{12} * mesh.vertex_count * cache_.times.size();
+    for (const PointCacheMesh& mesh : cache_.meshes)
+      bytes += std::uint64_t{12} * mesh.vertex_count * cache_.times.size();
     if (bytes > kMaxCacheBytes) {
-      return Status::Usage("{} frames take {}, more than the {} that a {} file is given; expected fewer frames, or .npz", cache_.times.size(), ByteText(bytes), ByteText(kMaxCacheBytes), suffix_)
-          .At({path_});
+      return Status::
+          Usage("{} frames take {}, more than the {} that a {} file is given; expected fewer frames, or .npz",
+                cache_.times.size(), ByteText(bytes), ByteText(kMaxCacheBytes), suffix_)
+              .At({path_});
     }
     if (cache_.meshes.empty()) return Status::Invalid("has no mesh to write").At({rig_.path});
     for (const std::string& path : paths()) {
       KPSA_RETURN_IF_ERROR(CheckOutput(path, options_.force, {}));
       KPSA_RETURN_IF_ERROR(CheckNotInput(path, rig_.files));
     }
-    for (PointCacheMesh& mesh : cache_.meshes) mesh.frames.reserve(3 * mesh.vertex_count * cache_.times.size());
+    for (PointCacheMesh& mesh : cache_.meshes)
+      mesh.frames.reserve(3 * mesh.vertex_count * cache_.times.size());
     return Status();
   }
 
@@ -100,7 +106,8 @@ class CacheOutput final : public VertexOutput {
       std::vector<float>& frames = cache_.meshes[m].frames;
       const std::size_t before = frames.size();
       frames.resize(before + 3 * cache_.meshes[m].vertex_count);
-      Interleave(rig_.scene.meshes[m].mesh(), meshes[m], 0, rig_.scene.meshes[m].vertex_count, frames.data() + before);
+      Interleave(rig_.scene.meshes[m].mesh(), meshes[m], 0, rig_.scene.meshes[m].vertex_count,
+                 frames.data() + before);
     }
     return Status();
   }
@@ -116,18 +123,21 @@ class CacheOutput final : public VertexOutput {
       if (!report.ok()) return report.status();
       int most = 0;
       for (int targets : report->targets) most = std::max(most, targets);
-      notes.push_back(fmt::format("at most {} morph targets a mesh; against the frames: max {}, RMS {} (diagonal {})", most, LengthText(report->max_residual), LengthText(report->rms_residual),
-                                  LengthText(report->diagonal)));
+      notes.push_back(fmt::format(
+          "at most {} morph targets a mesh; against the frames: max {}, RMS {} (diagonal {})", most,
+          LengthText(report->max_residual), LengthText(report->rms_residual), LengthText(report->diagonal)));
     } else {
       for (std::size_t m = 0; m < cache_.meshes.size(); ++m) {
         CacheOptions options;
         options.force = options_.force;
         if (options_.blender) {
           options.axes = CacheAxes::kBlender;
-          options.order = BlenderVertexOrder(rig_.character->meshes[rig_.character->nodes[rig_.scene.meshes[m].gltf_node].mesh]);
+          options.order = BlenderVertexOrder(
+              rig_.character->meshes[rig_.character->nodes[rig_.scene.meshes[m].gltf_node].mesh]);
         }
         const std::string path = CachePathForMesh(path_, cache_, m);
-        KPSA_RETURN_IF_ERROR(suffix_ == ".pc2" ? WritePc2(path, cache_, m, options, &notes) : WriteMdd(path, cache_, m, options));
+        KPSA_RETURN_IF_ERROR(suffix_ == ".pc2" ? WritePc2(path, cache_, m, options, &notes)
+                                               : WriteMdd(path, cache_, m, options));
       }
     }
     return notes;
@@ -136,7 +146,8 @@ class CacheOutput final : public VertexOutput {
   std::vector<std::string> paths() const override {
     if (!one_file_a_mesh()) return {path_};
     std::vector<std::string> paths;
-    for (std::size_t m = 0; m < cache_.meshes.size(); ++m) paths.push_back(CachePathForMesh(path_, cache_, m));
+    for (std::size_t m = 0; m < cache_.meshes.size(); ++m)
+      paths.push_back(CachePathForMesh(path_, cache_, m));
     return paths;
   }
 
@@ -151,7 +162,8 @@ class CacheOutput final : public VertexOutput {
 
 std::vector<std::string> VertexSuffixes() { return {".npz", ".pc2", ".mdd", ".glb", ".usda"}; }
 
-Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& output, const Rig& rig, std::vector<double> times,
+Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& output, const Rig& rig,
+                                                         std::vector<double> times,
                                                          const VertexOutputOptions& options) {
   if (output == "-" || Suffix(output) == ".npz") {
     KPSA_RETURN_IF_ERROR(CheckNotInput(output, rig.files));

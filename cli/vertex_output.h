@@ -1,5 +1,5 @@
-// Animated vertices into a file of any format: .npz frame by frame, the others (.pc2 .mdd .glb .usda) once all frames
-// are there. World space in metres, vertices in the order of the glTF file.
+// Animated vertices into a file of any format: .npz frame by frame, the others (.pc2 .mdd .glb .usda) once
+// all frames are there. World space in metres, vertices in the order of the glTF file.
 #pragma once
 
 #include <memory>
@@ -31,9 +31,10 @@ class VertexOutput {
 // The suffixes that CreateVertexOutput knows.
 std::vector<std::string> VertexSuffixes();
 
-// Refusals: an unknown suffix, another format than .npz for stdout, existing files, more than 4 GB for formats that are
-// collected in memory. The rig must outlive the output.
-Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& output, const Rig& rig, std::vector<double> times,
+// Refusals: an unknown suffix, another format than .npz for stdout, existing files, more than 4 GB for
+// formats that are collected in memory. The rig must outlive the output.
+Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& output, const Rig& rig,
+                                                         std::vector<double> times,
                                                          const VertexOutputOptions& options);
 
 }  // namespace kpsa

@@ -37,9 +37,23 @@ class NodeBuilder {
 
   // An animatable input; its type follows from the default (bool, int, double, Double3, Quaternion, Matrix4).
   NodeBuilder& in(std::string name, Value default_value, AttributeOptions options = {});
+  template <typename T>
+    requires std::is_same_v<T, bool>  // a Value does not tell a bool from an int
+  NodeBuilder& in(std::string name, T default_value, AttributeOptions options = {}) {
+    in(std::move(name), Value(default_value), std::move(options));
+    attribute().type = Type::kBool;
+    return *this;
+  }
   // A structural input. The type is given where no default tells it.
   NodeBuilder& structural(std::string name, Value default_value, AttributeOptions options = {});
   NodeBuilder& structural(std::string name, Type type, AttributeOptions options = {});
+  template <typename T>
+    requires std::is_same_v<T, bool>
+  NodeBuilder& structural(std::string name, T default_value, AttributeOptions options = {}) {
+    in(std::move(name), default_value, std::move(options));
+    attribute().structural = true;
+    return *this;
+  }
   // An enum input; the default is its first name.
   NodeBuilder& enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc = {});
   // A points, colors or weights input.

@@ -9,7 +9,8 @@
 namespace kpsa {
 namespace {
 
-constexpr int kLargestSide = 32768;  // 3 GiB of pixels: stb counts bytes in int, so the product is checked, too
+constexpr int kLargestSide =
+    32768;  // 3 GiB of pixels: stb counts bytes in int, so the product is checked, too
 
 void AppendBytes(void* context, void* data, int size) {
   auto* bytes = static_cast<std::vector<std::uint8_t>*>(context);
@@ -26,8 +27,8 @@ Result<std::vector<std::uint8_t>> EncodePng(int width, int height, std::span<con
   }
   const std::size_t expected = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3;
   if (rgb.size() != expected) {
-    return Status::Invalid("a picture of {} x {} pixels needs {} bytes, there are {}", width, height, expected,
-                           rgb.size());
+    return Status::Invalid("a picture of {} x {} pixels needs {} bytes, there are {}", width, height,
+                           expected, rgb.size());
   }
   std::vector<std::uint8_t> bytes;
   if (stbi_write_png_to_func(&AppendBytes, &bytes, width, height, 3, rgb.data(), 3 * width) == 0) {
@@ -36,7 +37,8 @@ Result<std::vector<std::uint8_t>> EncodePng(int width, int height, std::span<con
   return bytes;
 }
 
-Status WritePng(const std::string& path, bool force, int width, int height, std::span<const std::uint8_t> rgb) {
+Status WritePng(const std::string& path, bool force, int width, int height,
+                std::span<const std::uint8_t> rgb) {
   Result<std::vector<std::uint8_t>> bytes = EncodePng(width, height, rgb);
   if (!bytes.ok()) return bytes.status();
   return WriteFileAtomically(path, force, *bytes);

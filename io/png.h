@@ -14,8 +14,9 @@ namespace kpsa {
 // Errors: a size below 1 or above 32768; rgb of another length.
 Result<std::vector<std::uint8_t>> EncodePng(int width, int height, std::span<const std::uint8_t> rgb);
 
-// Writes EncodePng's bytes to `path`, whole or not at all (io/file.h). Errors also: those of WriteFileAtomically; the
-// file exists and `force` is false.
-Status WritePng(const std::string& path, bool force, int width, int height, std::span<const std::uint8_t> rgb);
+// Writes EncodePng's bytes to `path`, whole or not at all (io/file.h). Errors also: those of
+// WriteFileAtomically; the file exists and `force` is false.
+Status WritePng(const std::string& path, bool force, int width, int height,
+                std::span<const std::uint8_t> rgb);
 
 }  // namespace kpsa

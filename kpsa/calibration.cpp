@@ -71,7 +71,7 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   std::sort(limits.begin(), limits.end());
   const double admitted = std::floor(result.attainable_alpha * (n + 1) * (1 + 1e-12) - 1);
   const auto k = static_cast<std::size_t>(std::clamp(admitted, 0.0, n));
-  const double cap = largest_score / result.threshold.blend_start;
+  const double cap = largest_score / result.threshold.blend_start * (1 + 1e-12);
   const double tau = k < limits.size() ? std::min(limits[k], cap) : cap;
   if (tau > 0) result.threshold.tau = tau;
   if (!(tau > 0)) result.warning = "no threshold keeps the violation rate, so nothing is ever a hit";

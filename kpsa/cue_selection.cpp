@@ -215,10 +215,14 @@ std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool output
   return candidates;
 }
 
-CueSelection SelectCues(const Pca& pca, std::span<const CueRef> candidates, std::span<const Double3> positions,
+CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::span<const Double3> positions,
                         double diagonal, const CueSelectionOptions& options) {
   KPSA_CHECK_EQ(positions.size(), pca.layout.points + pca.layout.stage_points);
   CueSelection selection;
+  std::vector<CueRef> candidates(wanted.begin(), wanted.end());
+  for (const CueRef cue : options.fixed) {
+    if (std::find(candidates.begin(), candidates.end(), cue) == candidates.end()) candidates.push_back(cue);
+  }
   if (candidates.empty()) return selection;
   Selector selector(pca, candidates, positions, diagonal, options);
   double refreshed = selector.ExpectedRms();
@@ -235,9 +239,7 @@ CueSelection SelectCues(const Pca& pca, std::span<const CueRef> candidates, std:
   const auto budget = [&] { return options.max_cost > 0 ? options.max_cost - cost : std::numeric_limits<double>::infinity(); };
 
   for (const CueRef cue : options.fixed) {
-    const std::size_t candidate = selector.Find(cue);
-    KPSA_CHECK_LT(candidate, candidates.size());
-    take(candidate);
+    take(selector.Find(cue));
   }
   while (selector.chosen().size() < options.count) {
     const std::size_t best = selector.Best(budget());

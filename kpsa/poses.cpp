@@ -47,11 +47,17 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
       if (random.Unit() < 0.5) move(random.Below(n), random.Unit());
       continue;
     }
-    // Few controls or many: real poses are both. Many at once stay smaller, as they do on a rig.
+    // Few controls or many: real poses are both. Many at once stay smaller, and so does what is laid over a clip, whose
+    // own motion is there already.
     const double share = random.Unit();
-    const std::size_t active = 1 + static_cast<std::size_t>(share * share * 0.5 * static_cast<double>(n));
-    const double reach = active > 12 ? 0.7 : 1.0;
+    const std::size_t most = pose.clip >= 0 ? 4 : std::max<std::size_t>(4, n / 5);
+    const std::size_t active = 1 + static_cast<std::size_t>(share * share * static_cast<double>(most));
+    const double reach = pose.clip >= 0 ? 0.35 : active > 8 ? 0.6 : 1.0;
     for (std::size_t k = 0; k < active; ++k) move(random.Below(n), reach * random.Unit());
+    if (random.Unit() < 0.5) continue;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (controls[i].often) move(i, random.Unit());
+    }
   }
   return poses;
 }

@@ -12,6 +12,7 @@ struct ControlRange {
   PlugRef plug;
   double min = 0, max = 0, rest = 0;
   bool by_clip = false;  // a clip drives it while it plays
+  bool often = false;    // it carries the space of the points: half of the mixtures move it
 };
 
 // Control values of one pose (by control), and where in the training clips it plays: clip < 0 is the rest pose.

@@ -82,7 +82,14 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, 
     for (const Connection& c : graph.Inputs(node)) {
       const Type type = graph.PlugType(c.destination);
       if (type == Type::kMatrix || IsPointType(type)) continue;
-      if (nodes.count(c.source.node.index) != 0 || varying_nodes.count(c.source.node.index) != 0) add(c.destination, type);
+      if (nodes.count(c.source.node.index) == 0 && varying_nodes.count(c.source.node.index) == 0) continue;
+      // A single point of an array has no plug to read: its driver stands for it
+      const AttributeDef& to = def.attributes[static_cast<std::size_t>(c.destination.attribute)];
+      if (IsPointType(to.type)) {
+        add(c.source, graph.PlugType(c.source));
+      } else {
+        add(c.destination, type);
+      }
     }
     for (const PlugRef& plug : varying) {
       if (plug.node == node) add(plug, graph.PlugType(plug));

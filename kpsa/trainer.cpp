@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::size_t kProbePoints = 20;    // of a stage, to see what a cue there would drag in
 constexpr double kMaxPointsPerCue = 1.5;    // points of a step that a local cue may cost
+constexpr double kTileShare = 0.01;          // of the tolerance: RMS error that tiles and half precision may add
 constexpr double kMinMotion = 1e-3;         // of the largest: points that move less are no cues
 
 // Count of indices, evenly spread.
@@ -242,7 +243,7 @@ class Trainer {
     }
     std::vector<SubspaceOutput> outputs;
     for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m) outputs.push_back({rig_.target.meshes[m].name, totals_[m]});
-    Subspace subspace = MakeSubspace(pca_, cues_, estimator, training, std::move(outputs), TileOptions{0.05 * options_.tolerance});
+    Subspace subspace = MakeSubspace(pca_, cues_, estimator, training, std::move(outputs), TileOptions{kTileShare * options_.tolerance});
     subspace.mode = estimator.mode;
     subspace.ranges = ranges_;
     subspace.space = rig_.target.space_name;

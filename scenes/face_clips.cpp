@@ -17,7 +17,7 @@ struct Turn {
   int axis;
   double low, high;
 };
-constexpr Turn kTurns[] = {{kJaw, 0, 0, 20},  {kJaw, 1, -5, 5},   {kHead, 0, -14, 14}, {kHead, 1, -22, 22},
+constexpr Turn kTurns[] = {{kJaw, 0, 0, 20},    {kJaw, 1, -5, 5},    {kHead, 0, -14, 14}, {kHead, 1, -22, 22},
                            {kHead, 2, -12, 12}, {kNeck, 0, -10, 10}, {kNeck, 1, -15, 15}, {kNeck, 2, -8, 8}};
 constexpr Turn kEyeTurns[] = {{kEyeL, 0, -14, 16}, {kEyeL, 1, -24, 24}};  // both eyes look the same way
 
@@ -25,7 +25,9 @@ constexpr Turn kEyeTurns[] = {{kEyeL, 0, -14, 16}, {kEyeL, 1, -24, 24}};  // bot
 class Track {
  public:
   Track(std::vector<std::string> expressions, int frames)
-      : names_(std::move(expressions)), frames_(frames), weights_(Size(frames) * names_.size()),
+      : names_(std::move(expressions)),
+        frames_(frames),
+        weights_(Size(frames) * names_.size()),
         turns_(Size(frames) * kJointCount) {}
 
   int frames() const { return frames_; }
@@ -35,8 +37,12 @@ class Track {
     KPSA_CHECK(it != names_.end());
     return static_cast<int>(it - names_.begin());
   }
-  double& Weight(int frame, int expression) { return weights_[Size(frame) * names_.size() + Size(expression)]; }
-  double& Degrees(int frame, Joint joint, int axis) { return turns_[Size(frame) * kJointCount + Size(joint)][axis]; }
+  double& Weight(int frame, int expression) {
+    return weights_[Size(frame) * names_.size() + Size(expression)];
+  }
+  double& Degrees(int frame, Joint joint, int axis) {
+    return turns_[Size(frame) * kJointCount + Size(joint)][axis];
+  }
   void Look(int frame, int axis, double degrees) {
     Degrees(frame, kEyeL, axis) += degrees;
     Degrees(frame, kEyeR, axis) += degrees;
@@ -48,7 +54,8 @@ class Track {
       GlbChannel channel = {joint, false, {}};
       for (int f = 0; f < frames_; ++f) {
         const Double3 degrees = turns_[Size(f) * kJointCount + Size(joint)];
-        const Quaternion q = QuaternionFromRotation(RotationFromEuler(degrees * (kPi / 180), RotateOrder::kXyz));
+        const Quaternion q =
+            QuaternionFromRotation(RotationFromEuler(degrees * (kPi / 180), RotateOrder::kXyz));
         for (double v : {q.x, q.y, q.z, q.w}) channel.values.push_back(static_cast<float>(v));
       }
       clip.channels.push_back(std::move(channel));
@@ -94,14 +101,16 @@ double SweepShare(int k) { return 1 - std::fabs(k - kSweep / 2.0) / (kSweep / 2.
 
 GlbClip Extreme(const std::vector<std::string>& names, int mesh_node) {
   constexpr int kPairs = 48;
-  const int weights = static_cast<int>(names.size()), turns = static_cast<int>(std::size(kTurns) + std::size(kEyeTurns));
+  const int weights = static_cast<int>(names.size()),
+            turns = static_cast<int>(std::size(kTurns) + std::size(kEyeTurns));
   const int sweeps = weights + 2 * turns + kPairs;
   Track track(names, sweeps * kSweep + 1);
   const std::vector<Control> controls = AllControls(track);
   int frame = 0;
   const auto sweep = [&](const std::vector<std::pair<int, double>>& moved) {
     for (int k = 0; k < kSweep; ++k, ++frame) {
-      for (const auto& [control, share] : moved) controls[static_cast<std::size_t>(control)](track, frame, share * SweepShare(k));
+      for (const auto& [control, share] : moved)
+        controls[static_cast<std::size_t>(control)](track, frame, share * SweepShare(k));
     }
   };
   for (int c = 0; c < weights; ++c) sweep({{c, 1.0}});
@@ -150,10 +159,10 @@ GlbClip TalkTrain(const std::vector<std::string>& names, int mesh_node) {
 // Syllables: the jaw opens and closes four to six times a second in phrases, with a shape of the lips each.
 void Speak(Track& track, Random& random) {
   const int open = track.Find("mouthOpen");
-  const int shapes[] = {track.Find("pucker"),         track.Find("funnel"),         track.Find("lipPress"),
-                        track.Find("stretch.L"),      track.Find("lipUpperUp.L"),   track.Find("lipLowerDown.L"),
-                        track.Find("lipLowerRoll"),   track.Find("lipUpperRoll"),   track.Find("dimple.L"),
-                        track.Find("chinUp"),         track.Find("smile.L")};
+  const int shapes[] = {track.Find("pucker"),       track.Find("funnel"),       track.Find("lipPress"),
+                        track.Find("stretch.L"),    track.Find("lipUpperUp.L"), track.Find("lipLowerDown.L"),
+                        track.Find("lipLowerRoll"), track.Find("lipUpperRoll"), track.Find("dimple.L"),
+                        track.Find("chinUp"),       track.Find("smile.L")};
   int frame = 4;
   while (frame + 12 < track.frames()) {
     const int syllables = 5 + random.Below(7);
@@ -162,8 +171,9 @@ void Speak(Track& track, Random& random) {
       const double jaw = random.Uniform(1, 8), lips = random.Uniform(0.0, 0.3);
       const int shape = shapes[random.Below(static_cast<int>(std::size(shapes)))];
       const double amount = random.Uniform(0.2, 0.8);
-      const bool paired = shape + 1 < track.expressions() && (shape == shapes[3] || shape == shapes[4] || shape == shapes[5] ||
-                                                              shape == shapes[8] || shape == shapes[10]);
+      const bool paired = shape + 1 < track.expressions() &&
+                          (shape == shapes[3] || shape == shapes[4] || shape == shapes[5] ||
+                           shape == shapes[8] || shape == shapes[10]);
       for (int k = -2; k < length + 2; ++k) {
         const double arc = Bump(k - length / 2.0, length / 2.0 + 2);
         track.Degrees(frame + k, kJaw, 0) += jaw * arc;
@@ -195,7 +205,10 @@ GlbClip Talk(const std::vector<std::string>& names, int mesh_node) {
     if (static_cast<int>(c) == left_blink || static_cast<int>(c) == right_blink) continue;
     const bool turn = c >= names.size();
     const bool jaw = turn && c - names.size() < 2;
-    Wander(track, controls[c], random, turn ? 12 : 7, turn ? 30 : 20, turn ? 0.2 : 0.6, jaw ? 0.12 : turn ? 0.4 : 0.7,
+    Wander(track, controls[c], random, turn ? 12 : 7, turn ? 30 : 20, turn ? 0.2 : 0.6,
+           jaw    ? 0.12
+           : turn ? 0.4
+                  : 0.7,
            turn && !(jaw && c == names.size()));
   }
   for (int f = 0; f < track.frames(); ++f) {

@@ -89,8 +89,8 @@ class Maker {
   std::vector<Expression> expressions_;
 };
 
-// The left lids towards each other (1, 0: the upper one comes down to the lower one; negative: open wider). Points
-// go around the eyeball, never through it.
+// The left lids towards each other (1, 0: the upper one comes down to the lower one; negative: open wider).
+// Points go around the eyeball, never through it.
 Expression Maker::Lids(double close_upper, double close_lower) const {
   Expression e = {"", std::vector<Double3>(points_.size())};
   const int n = static_cast<int>(shape_.eye_rings[0].size());
@@ -120,7 +120,8 @@ void Maker::Eyes() {
   Expression squint = Lids(0.18, 0.34);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const Point& q = points_[i];
-    squint.deltas[i] = squint.deltas[i] + Double3{-0.05, 0.28, 0.10} * (Ball(q.p, {3.9, 16.9, 7.2}, {2.4, 1.5, 2.4}) * (1 - q.ear));
+    squint.deltas[i] = squint.deltas[i] + Double3{-0.05, 0.28, 0.10} *
+                                              (Ball(q.p, {3.9, 16.9, 7.2}, {2.4, 1.5, 2.4}) * (1 - q.ear));
   }
   PairOf("squint", std::move(squint));
 }
@@ -143,7 +144,8 @@ void Maker::Cheeks() {
     return Double3{0.75, 0.0, 0.50} * w;
   });
   Pair("cheekSuck", [](const Point& q) {
-    return Double3{-0.55, 0.0, -0.30} * (Ball(q.p, {4.4, 12.8, 5.6}, {2.3, 2.4, 3.0}) * q.left * (1 - q.inside));
+    return Double3{-0.55, 0.0, -0.30} *
+           (Ball(q.p, {4.4, 12.8, 5.6}, {2.3, 2.4, 3.0}) * q.left * (1 - q.inside));
   });
   Pair("cheekRaise", [](const Point& q) {
     return Double3{0.08, 0.55, 0.30} * (Ball(q.p, {4.2, 15.6, 6.6}, {2.5, 2.3, 3.0}) * q.left * (1 - q.ear));
@@ -160,17 +162,20 @@ void Maker::Cheeks() {
 
 void Maker::Lips() {
   Pair("smile", [](const Point& q) {
-    const double corner = Ball(q.p, kCorner, {3.0, 2.5, 3.4}), cheek = Ball(q.p, {4.1, 14.9, 6.6}, {2.4, 2.3, 3.0});
+    const double corner = Ball(q.p, kCorner, {3.0, 2.5, 3.4}),
+                 cheek = Ball(q.p, {4.1, 14.9, 6.6}, {2.4, 2.3, 3.0});
     return (Double3{0.80, 0.70, -0.68} * corner + Double3{0.20, 0.32, 0.28} * cheek) * (q.left * (1 - q.ear));
   });
   Pair("frown", [](const Point& q) {
     return Double3{0.22, -0.85, -0.22} * (Ball(q.p, kCorner + Double3{0, -0.3, 0}, {2.7, 2.4, 3.2}) * q.left);
   });
   Pair("stretch", [](const Point& q) {
-    return Double3{0.95, -0.18, -0.80} * (Ball(q.p, kCorner + Double3{0.1, -0.2, 0}, {3.1, 2.6, 3.4}) * q.left);
+    return Double3{0.95, -0.18, -0.80} *
+           (Ball(q.p, kCorner + Double3{0.1, -0.2, 0}, {3.1, 2.6, 3.4}) * q.left);
   });
   Pair("dimple", [](const Point& q) {
-    return Double3{0.30, 0.12, -0.55} * (Ball(q.p, kCorner + Double3{0.35, 0.1, -0.1}, {1.7, 1.5, 2.2}) * q.left);
+    return Double3{0.30, 0.12, -0.55} *
+           (Ball(q.p, kCorner + Double3{0.35, 0.1, -0.1}, {1.7, 1.5, 2.2}) * q.left);
   });
   Pair("lipUpperUp", [](const Point& q) {
     const double w = Ball(q.p, {1.1, 12.2, 9.4}, {2.1, 1.9, 2.6}) * q.upper;

@@ -30,8 +30,8 @@ struct Expression {
 };
 std::vector<Expression> FaceExpressions(const HeadShape& shape);
 
-// The clips `extreme`, `talk_train` and `talk` for expressions of these names; node indices as FaceJoints, the mesh
-// node is `mesh_node`.
+// The clips `extreme`, `talk_train` and `talk` for expressions of these names; node indices as FaceJoints,
+// the mesh node is `mesh_node`.
 std::vector<GlbClip> FaceClips(const std::vector<std::string>& expressions, int mesh_node);
 
 // Maps of weights for the rig's deformers: name -> one value a point.

@@ -10,8 +10,8 @@ namespace {
 
 constexpr Double3 kJawJoint = {0, 14.4, 0.6};
 
-// Share of the jaw in a point of the skin outside the mouth: by its angle about the jaw's axis, from the mouth's
-// line down to the chin, ending at the throat.
+// Share of the jaw in a point of the skin outside the mouth: by its angle about the jaw's axis, from the
+// mouth's line down to the chin, ending at the throat.
 double JawField(Double3 p) {
   const double degrees = Atan2(p.y - kJawJoint.y, p.z - kJawJoint.z) * 180 / kPi;
   return Smooth(-10, -40, degrees) * Smooth(-82, -58, degrees) * Smooth(-1.0, 2.5, p.z);
@@ -21,8 +21,9 @@ double JawField(Double3 p) {
 
 const std::vector<JointRest>& FaceJoints() {
   static const std::vector<JointRest> joints = {
-      {"root", -1, {0, 0, 0}},        {"neck", kRoot, {0, 1.5, -2.6}}, {"head", kNeck, {0, 10.5, -2.0}},
-      {"jaw", kHead, kJawJoint},      {"eye.L", kHead, kEyeCenter},    {"eye.R", kHead, {-kEyeCenter.x, kEyeCenter.y, kEyeCenter.z}}};
+      {"root", -1, {0, 0, 0}},          {"neck", kRoot, {0, 1.5, -2.6}},
+      {"head", kNeck, {0, 10.5, -2.0}}, {"jaw", kHead, kJawJoint},
+      {"eye.L", kHead, kEyeCenter},     {"eye.R", kHead, {-kEyeCenter.x, kEyeCenter.y, kEyeCenter.z}}};
   return joints;
 }
 
@@ -38,7 +39,8 @@ std::vector<std::array<double, kJointCount>> FaceWeights(const HeadShape& shape)
       const auto i = static_cast<std::size_t>(shape.mouth_rings[ring][static_cast<std::size_t>(k)]);
       const int from_corner = std::min(std::min(k % half, half - k % half), 4);
       const double side = shape.lip[i] * Smooth(0, 4, from_corner);
-      jaw[i] += (0.46 - 0.54 * std::min(side, 0.0) - 0.46 * std::max(side, 0.0) - jaw[i]) * Smooth(0, 1, inner);
+      jaw[i] +=
+          (0.46 - 0.54 * std::min(side, 0.0) - 0.46 * std::max(side, 0.0) - jaw[i]) * Smooth(0, 1, inner);
     }
   }
   // Lids follow the eyeball a little
@@ -46,7 +48,8 @@ std::vector<std::array<double, kJointCount>> FaceWeights(const HeadShape& shape)
     const int m = static_cast<int>(shape.eye_rings[ring].size());
     for (int k = 0; k < m; ++k) {
       const double middle = Sin(kPi * (k % (m / 2)) / (m / 2.0));
-      const double share = (k <= m / 2 ? 0.16 : 0.08) * middle * std::min(1.0, (static_cast<double>(ring) - 2) / 3);
+      const double share =
+          (k <= m / 2 ? 0.16 : 0.08) * middle * std::min(1.0, (static_cast<double>(ring) - 2) / 3);
       const auto i = static_cast<std::size_t>(shape.eye_rings[ring][static_cast<std::size_t>(k)]);
       eye[i] = share;
       eye[static_cast<std::size_t>(shape.mirror[i])] = share;
@@ -98,12 +101,15 @@ std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadShape& shape
     maps["lowerLip"][i] = (1 - upper[i]) * near;
   }
   // Thin edges keep their shape: less smoothing at the lids' edges and inside the lips
-  for (std::size_t ring = static_cast<std::size_t>(shape.lid_ring) - 1; ring < shape.eye_rings.size(); ++ring) {
+  for (std::size_t ring = static_cast<std::size_t>(shape.lid_ring) - 1; ring < shape.eye_rings.size();
+       ++ring) {
     for (int i : shape.eye_rings[ring]) {
-      for (int j : {i, shape.mirror[static_cast<std::size_t>(i)]}) maps["mush"][static_cast<std::size_t>(j)] = 0.35;
+      for (int j : {i, shape.mirror[static_cast<std::size_t>(i)]})
+        maps["mush"][static_cast<std::size_t>(j)] = 0.35;
     }
   }
-  for (std::size_t ring = static_cast<std::size_t>(shape.contact_ring); ring < shape.mouth_rings.size(); ++ring) {
+  for (std::size_t ring = static_cast<std::size_t>(shape.contact_ring); ring < shape.mouth_rings.size();
+       ++ring) {
     for (int i : shape.mouth_rings[ring]) maps["mush"][static_cast<std::size_t>(i)] = 0.5;
   }
   return maps;

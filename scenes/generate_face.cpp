@@ -14,11 +14,14 @@ constexpr double kSmallestDelta = 2e-4;   // cm; expressions leave out less
 constexpr double kSmallestWeight = 1e-3;  // of a weight map
 
 Float3 ToMetres(Double3 p) {
-  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres), static_cast<float>(p.z * kMetres)};
+  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
+          static_cast<float>(p.z * kMetres)};
 }
 
 std::array<std::uint8_t, 4> Color(Double3 linear) {
-  const auto byte = [](double v) { return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5)); };
+  const auto byte = [](double v) {
+    return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5));
+  };
   return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
 }
 
@@ -30,9 +33,12 @@ std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadShape& shape) {
   std::vector<Double3> colors;
   for (const Double3& p : shape.points) {
     const Double3 q = {std::fabs(p.x), p.y, p.z};
-    const double cheek = Bump(Length(q - Double3{4.3, 15.2, 6.6}), 2.8), nose = Bump(Length(q - Double3{0, 14.8, 11.0}), 1.8);
-    const double arch = 20.62 + 0.32 * Bump(q.x - 3.7, 2.4) - 0.25 * Smooth(4.2, 5.6, q.x);  // the brow's line
-    const double brow = Bump(q.y - arch, 0.60) * Smooth(0.7, 1.6, q.x) * Smooth(5.7, 4.0, q.x) * Smooth(2, 4, p.z);
+    const double cheek = Bump(Length(q - Double3{4.3, 15.2, 6.6}), 2.8),
+                 nose = Bump(Length(q - Double3{0, 14.8, 11.0}), 1.8);
+    const double arch =
+        20.62 + 0.32 * Bump(q.x - 3.7, 2.4) - 0.25 * Smooth(4.2, 5.6, q.x);  // the brow's line
+    const double brow =
+        Bump(q.y - arch, 0.60) * Smooth(0.7, 1.6, q.x) * Smooth(5.7, 4.0, q.x) * Smooth(2, 4, p.z);
     colors.push_back(mix(mix(kSkin, kFlush, std::max(0.30 * cheek, 0.35 * nose)), kBrow, 0.9 * brow));
   }
   const auto border = static_cast<std::size_t>(shape.border_ring);
@@ -78,7 +84,8 @@ GlbMesh EyesMesh() {
     std::array<double, kJointCount> weights = {};
     weights[side > 0 ? kEyeL : kEyeR] = 1;
     for (std::size_t i = 0; i < eye.points.size(); ++i) {
-      mesh.positions.push_back(ToMetres(eye.points[i] + Double3{side * kEyeCenter.x, kEyeCenter.y, kEyeCenter.z}));
+      mesh.positions.push_back(
+          ToMetres(eye.points[i] + Double3{side * kEyeCenter.x, kEyeCenter.y, kEyeCenter.z}));
       mesh.colors.push_back(Color(kColors[eye.part[i]]));
       mesh.influences.push_back(MakeInfluences(weights));
     }
@@ -103,7 +110,8 @@ int Nearest(const HeadShape& shape, Double3 at) {
 
 std::string CurvesYaml(const HeadShape& shape) {
   std::string out =
-      "# Written by generate_scenes: the vertices that face.yaml's wires run along and its soft handles sit at.\n"
+      "# Written by generate_scenes: the vertices that face.yaml's wires run along and its soft handles sit "
+      "at.\n"
       "kpsa: 1\n"
       "nodes:\n";
   const auto curve = [&](const char* name, const std::vector<int>& points, const char* parent) {
@@ -115,7 +123,8 @@ std::string CurvesYaml(const HeadShape& shape) {
   curve("browL", shape.brow_curve_left, "head");
   curve("browR", shape.brow_curve_right, "head");
   const auto handle = [&](const char* name, int point, const char* parent) {
-    out += fmt::format("  {}: {{type: transform, parent: {}, at: {{vertex: {}, mesh: face_mesh}}}}\n", name, parent, point);
+    out += fmt::format("  {}: {{type: transform, parent: {}, at: {{vertex: {}, mesh: face_mesh}}}}\n", name,
+                       parent, point);
   };
   const int cheek = Nearest(shape, {4.4, 14.6, 6.8});
   handle("nose", Nearest(shape, {0, 14.8, 11.6}), "head");
@@ -126,13 +135,16 @@ std::string CurvesYaml(const HeadShape& shape) {
 }
 
 std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, std::size_t points) {
-  std::string out = fmt::format("{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"face_mesh\", \"points\": {}, \"maps\": {{",
-                                points);
+  std::string out = fmt::format(
+      "{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"face_mesh\", \"points\": {}, \"maps\": {{",
+      points);
   bool first = true;
   for (const auto& [name, values] : maps) {
     // The commonest of 0 and 1 is the default
-    const auto ones = std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
-    const auto zeros = std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
+    const auto ones =
+        std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
+    const auto zeros =
+        std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
     const double usual = ones > zeros ? 1 : 0;
     std::vector<std::string> indices, numbers;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -140,8 +152,8 @@ std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, 
       indices.push_back(fmt::format("{}", i));
       numbers.push_back(fmt::format("{:.4g}", values[i]));
     }
-    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}", first ? "" : ",", name,
-                       usual, fmt::join(indices, ","), fmt::join(numbers, ","));
+    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}",
+                       first ? "" : ",", name, usual, fmt::join(indices, ","), fmt::join(numbers, ","));
     first = false;
   }
   return out + "\n}}\n";

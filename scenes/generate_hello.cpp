@@ -18,7 +18,8 @@ SceneFiles GenerateHello() {
   std::vector<std::array<int, 4>> quads;
   const auto add = [&](Double3 p) {
     mesh.positions.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
-    const double upper = Smooth(0.42, 0.58, p.y / kHeight);  // a tight elbow, so that smoothing has work to do
+    const double upper =
+        Smooth(0.42, 0.58, p.y / kHeight);  // a tight elbow, so that smoothing has work to do
     const double weights[] = {1 - upper, upper};
     mesh.influences.push_back(MakeInfluences(weights));
   };

@@ -1,5 +1,5 @@
-// generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face and FOLDER/hello. The bytes are
-// the same on every machine; a test compares them with the files of the source tree.
+// generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face and FOLDER/hello. The
+// bytes are the same on every machine; a test compares them with the files of the source tree.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>

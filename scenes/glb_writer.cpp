@@ -12,7 +12,9 @@
 namespace kpsa::scenes {
 namespace {
 
-std::string Quoted(std::string_view text) { return fmt::format("\"{}\"", text); }  // names here need no escapes
+std::string Quoted(std::string_view text) {
+  return fmt::format("\"{}\"", text);
+}  // names here need no escapes
 
 std::string Joined(const std::vector<std::string>& items) {
   std::string out = "[";
@@ -33,16 +35,19 @@ class Writer {
   int View(std::span<const T> data, int target = 0) {
     while (binary_.size() % 4 != 0) binary_.push_back('\0');
     views_.push_back(fmt::format("{{\"buffer\":0,\"byteOffset\":{},\"byteLength\":{}{}}}", binary_.size(),
-                                 data.size_bytes(), target == 0 ? "" : fmt::format(",\"target\":{}", target)));
+                                 data.size_bytes(),
+                                 target == 0 ? "" : fmt::format(",\"target\":{}", target)));
     const std::size_t at = binary_.size();
     binary_.resize(at + data.size_bytes());
     if (!data.empty()) std::memcpy(binary_.data() + at, data.data(), data.size_bytes());
     return static_cast<int>(views_.size()) - 1;
   }
 
-  int Accessor(int view, int component_type, std::size_t count, std::string_view type, std::string_view more = "") {
-    accessors_.push_back(fmt::format("{{\"bufferView\":{},\"componentType\":{},\"count\":{},\"type\":\"{}\"{}}}", view,
-                                     component_type, count, type, more));
+  int Accessor(int view, int component_type, std::size_t count, std::string_view type,
+               std::string_view more = "") {
+    accessors_.push_back(
+        fmt::format("{{\"bufferView\":{},\"componentType\":{},\"count\":{},\"type\":\"{}\"{}}}", view,
+                    component_type, count, type, more));
     return static_cast<int>(accessors_.size()) - 1;
   }
 
@@ -60,10 +65,10 @@ class Writer {
     KPSA_CHECK_LT(points, std::size_t{65536});
     const int index_view = View(std::span<const std::uint16_t>(indices));
     const int value_view = View(std::span<const Float3>(target.deltas));
-    accessors_.push_back(
-        fmt::format("{{\"componentType\":5126,\"count\":{},\"type\":\"VEC3\"{},\"sparse\":{{\"count\":{},\"indices\":"
-                    "{{\"bufferView\":{},\"componentType\":5123}},\"values\":{{\"bufferView\":{}}}}}}}",
-                    points, Bounds(target.deltas, true), indices.size(), index_view, value_view));
+    accessors_.push_back(fmt::format(
+        "{{\"componentType\":5126,\"count\":{},\"type\":\"VEC3\"{},\"sparse\":{{\"count\":{},\"indices\":"
+        "{{\"bufferView\":{},\"componentType\":5123}},\"values\":{{\"bufferView\":{}}}}}}}",
+        points, Bounds(target.deltas, true), indices.size(), index_view, value_view));
     return static_cast<int>(accessors_.size()) - 1;
   }
 
@@ -85,16 +90,18 @@ std::string Writer::Mesh(const GlbMesh& mesh) {
   std::vector<std::array<std::uint8_t, 4>> joints;
   std::vector<std::array<float, 4>> weights;
   for (const Influences& i : mesh.influences) joints.push_back(i.joints), weights.push_back(i.weights);
-  const int joint = Accessor(View(std::span<const std::array<std::uint8_t, 4>>(joints), kArray), 5121, count, "VEC4");
-  const int weight = Accessor(View(std::span<const std::array<float, 4>>(weights), kArray), 5126, count, "VEC4");
+  const int joint =
+      Accessor(View(std::span<const std::array<std::uint8_t, 4>>(joints), kArray), 5121, count, "VEC4");
+  const int weight =
+      Accessor(View(std::span<const std::array<float, 4>>(weights), kArray), 5126, count, "VEC4");
   std::string color;
   if (!mesh.colors.empty()) {
     color = fmt::format(",\"COLOR_0\":{}",
-                        Accessor(View(std::span<const std::array<std::uint8_t, 4>>(mesh.colors), kArray), 5121, count,
-                                 "VEC4", ",\"normalized\":true"));
+                        Accessor(View(std::span<const std::array<std::uint8_t, 4>>(mesh.colors), kArray),
+                                 5121, count, "VEC4", ",\"normalized\":true"));
   }
-  const int indices = Accessor(View(std::span<const Index>(mesh.triangles), kElements), 5125, mesh.triangles.size(),
-                               "SCALAR");
+  const int indices = Accessor(View(std::span<const Index>(mesh.triangles), kElements), 5125,
+                               mesh.triangles.size(), "SCALAR");
   std::vector<std::string> targets, names, zeros;
   for (const SparseTarget& target : mesh.targets) {
     targets.push_back(fmt::format("{{\"POSITION\":{}}}", Target(target, count)));
@@ -107,7 +114,8 @@ std::string Writer::Mesh(const GlbMesh& mesh) {
     more = fmt::format(",\"weights\":{},\"extras\":{{\"targetNames\":{}}}", Joined(zeros), Joined(names));
   }
   return fmt::format(
-      "{{\"name\":\"{}\",\"primitives\":[{{\"attributes\":{{\"POSITION\":{},\"NORMAL\":{},\"JOINTS_0\":{},\"WEIGHTS_0\":{}"
+      "{{\"name\":\"{}\",\"primitives\":[{{\"attributes\":{{\"POSITION\":{},\"NORMAL\":{},\"JOINTS_0\":{},"
+      "\"WEIGHTS_0\":{}"
       "{}}},\"indices\":{},\"material\":0{}}}]{}}}",
       mesh.name, position, normal, joint, weight, color, indices, morph, more);
 }
@@ -122,11 +130,13 @@ std::string Writer::Clip(const GlbClip& clip) {
     const int view = View(std::span<const float>(channel.values));
     const std::size_t count = channel.weights ? channel.values.size() : channel.values.size() / 4;
     const int output = Accessor(view, 5126, count, channel.weights ? "SCALAR" : "VEC4");
-    channels.push_back(fmt::format("{{\"sampler\":{},\"target\":{{\"node\":{},\"path\":\"{}\"}}}}", samplers.size(),
-                                   channel.node, channel.weights ? "weights" : "rotation"));
-    samplers.push_back(fmt::format("{{\"input\":{},\"output\":{},\"interpolation\":\"LINEAR\"}}", input, output));
+    channels.push_back(fmt::format("{{\"sampler\":{},\"target\":{{\"node\":{},\"path\":\"{}\"}}}}",
+                                   samplers.size(), channel.node, channel.weights ? "weights" : "rotation"));
+    samplers.push_back(
+        fmt::format("{{\"input\":{},\"output\":{},\"interpolation\":\"LINEAR\"}}", input, output));
   }
-  return fmt::format("{{\"name\":\"{}\",\"samplers\":{},\"channels\":{}}}", clip.name, Joined(samplers), Joined(channels));
+  return fmt::format("{{\"name\":\"{}\",\"samplers\":{},\"channels\":{}}}", clip.name, Joined(samplers),
+                     Joined(channels));
 }
 
 std::string Writer::Finish(const GlbScene& scene) {
@@ -140,11 +150,11 @@ std::string Writer::Finish(const GlbScene& scene) {
     for (int n = joint; n >= 0; n = scene.nodes[static_cast<std::size_t>(n)].parent) {
       at = at + scene.nodes[static_cast<std::size_t>(n)].translation;
     }
-    inverse_binds.push_back({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, static_cast<float>(-at.x), static_cast<float>(-at.y),
-                             static_cast<float>(-at.z), 1});
+    inverse_binds.push_back({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, static_cast<float>(-at.x),
+                             static_cast<float>(-at.y), static_cast<float>(-at.z), 1});
   }
-  const int inverse = Accessor(View(std::span<const std::array<float, 16>>(inverse_binds)), 5126, inverse_binds.size(),
-                               "MAT4");
+  const int inverse = Accessor(View(std::span<const std::array<float, 16>>(inverse_binds)), 5126,
+                               inverse_binds.size(), "MAT4");
   for (std::size_t i = 0; i < scene.nodes.size(); ++i) {
     const GlbNode& node = scene.nodes[i];
     std::vector<std::string> children;
@@ -165,13 +175,15 @@ std::string Writer::Finish(const GlbScene& scene) {
   }
   while (binary_.size() % 4 != 0) binary_.push_back('\0');
   std::string json = fmt::format(
-      "{{\"asset\":{{\"version\":\"2.0\",\"generator\":\"kpsa generate_scenes\"}},\"scene\":0,\"scenes\":[{{\"nodes\":{}}}],"
+      "{{\"asset\":{{\"version\":\"2.0\",\"generator\":\"kpsa "
+      "generate_scenes\"}},\"scene\":0,\"scenes\":[{{\"nodes\":{}}}],"
       "\"nodes\":{},\"meshes\":{},\"skins\":[{{\"joints\":{},\"inverseBindMatrices\":{},\"skeleton\":{}}}],"
-      "\"materials\":[{{\"name\":\"surface\",\"pbrMetallicRoughness\":{{\"metallicFactor\":0,\"roughnessFactor\":0.6}}}}],",
+      "\"materials\":[{{\"name\":\"surface\",\"pbrMetallicRoughness\":{{\"metallicFactor\":0,"
+      "\"roughnessFactor\":0.6}}}}],",
       Joined(roots), Joined(nodes), Joined(meshes), Joined(joints), inverse, joints.front());
   if (!clips.empty()) json += fmt::format("\"animations\":{},", Joined(clips));
-  json += fmt::format("\"accessors\":{},\"bufferViews\":{},\"buffers\":[{{\"byteLength\":{}}}]}}", Joined(accessors_),
-                      Joined(views_), binary_.size());
+  json += fmt::format("\"accessors\":{},\"bufferViews\":{},\"buffers\":[{{\"byteLength\":{}}}]}}",
+                      Joined(accessors_), Joined(views_), binary_.size());
   while (json.size() % 4 != 0) json.push_back(' ');
 
   std::string out;
@@ -232,7 +244,8 @@ Influences MakeInfluences(std::span<const double> weight_of_joint) {
   Influences out;
   int rest = 4096;
   for (std::size_t k = order.size(); k-- > 0;) {  // the largest comes last and takes what is left
-    const int share = k == 0 ? rest : static_cast<int>(std::floor(weight_of_joint[order[k]] / sum * 4096 + 0.5));
+    const int share =
+        k == 0 ? rest : static_cast<int>(std::floor(weight_of_joint[order[k]] / sum * 4096 + 0.5));
     rest -= share;
     out.joints[k] = share > 0 ? static_cast<std::uint8_t>(order[k]) : 0;
     out.weights[k] = static_cast<float>(share) / 4096;

@@ -1,5 +1,5 @@
-// Writes the few parts of glTF 2.0 that the generated characters need: a binary file with one buffer, meshes with
-// sparse morph targets, a skin, LINEAR clips. The same calls give the same bytes.
+// Writes the few parts of glTF 2.0 that the generated characters need: a binary file with one buffer, meshes
+// with sparse morph targets, a skin, LINEAR clips. The same calls give the same bytes.
 #pragma once
 
 #include <array>

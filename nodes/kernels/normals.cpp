@@ -13,9 +13,10 @@
 #ifndef KPSA_NODES_KERNELS_NORMALS_BLOCK_
 #define KPSA_NODES_KERNELS_NORMALS_BLOCK_
 namespace kpsa {
-// Points or triangles between two passes: the gathering stores of a block have left the store buffer before
+// Points between two passes: the gathering stores of a block have left the store buffer before
 // the wider loads read them.
 inline constexpr std::size_t kNormalsBlock = 64;
+inline constexpr std::size_t kNormalsGrain = 512;  // points between two lots of triangles
 }  // namespace kpsa
 #endif
 
@@ -27,29 +28,13 @@ void PackPoints(ConstPointsView in, std::size_t begin, std::size_t end, float* x
   PackXyzw(in.x, in.y, in.z, begin, end, 0.0f, xyzw);
 }
 
-// (b - a) x (c - a) of the triangles [begin, end), xyzw; begin a multiple of 16, writes whole vectors.
+// (b - a) x (c - a) of the triangles [begin, end), xyzw.
 void CrossTriangles(const Index* triangles, std::size_t begin, std::size_t end, const float* points,
-                    float* crosses) {
-  const DLanes d;
-  alignas(64) float corner[3][4 * kNormalsBlock] = {};
-  for (std::size_t block = begin; block < end; block += kNormalsBlock) {
-    const std::size_t size = HWY_MIN(kNormalsBlock, end - block);
-    for (std::size_t k = 0; k < size; ++k) {
-      const Index* triangle = triangles + 3 * (block + k);
-      for (std::size_t c = 0; c < 3; ++c) Store4(Load4(points + 4 * triangle[c]), corner[c] + 4 * k);
-    }
-    for (std::size_t k = 0; k < size; k += hn::Lanes(d)) {
-      VLanes ax, ay, az, bx, by, bz, cx, cy, cz, spare;
-      hn::LoadInterleaved4(d, corner[0] + 4 * k, ax, ay, az, spare);
-      hn::LoadInterleaved4(d, corner[1] + 4 * k, bx, by, bz, spare);
-      hn::LoadInterleaved4(d, corner[2] + 4 * k, cx, cy, cz, spare);
-      bx = hn::Sub(bx, ax), by = hn::Sub(by, ay), bz = hn::Sub(bz, az);
-      cx = hn::Sub(cx, ax), cy = hn::Sub(cy, ay), cz = hn::Sub(cz, az);
-      const VLanes nx = Fma(by, cz, hn::Neg(hn::Mul(bz, cy)));
-      const VLanes ny = Fma(bz, cx, hn::Neg(hn::Mul(bx, cz)));
-      const VLanes nz = Fma(bx, cy, hn::Neg(hn::Mul(by, cx)));
-      hn::StoreInterleaved4(nx, ny, nz, hn::Zero(d), d, crosses + 4 * (block + k));
-    }
+                    float* HWY_RESTRICT crosses) {
+  for (std::size_t t = begin; t < end; ++t) {
+    const Index* corner = triangles + 3 * t;
+    const F4 a = Load4(points + corner[0]);
+    Store4(Cross4(Sub4(Load4(points + corner[1]), a), Sub4(Load4(points + corner[2]), a)), crosses + 4 * t);
   }
 }
 
@@ -119,14 +104,15 @@ NormalsKernel::NormalsKernel(const Topology& topology, std::span<const Index> ou
     : count_(out_points.size()), in_count_(in_points.size()) {
   KPSA_CHECK(IsSortedSet(out_points, topology.point_count()));
   KPSA_CHECK(IsSortedSet(in_points, topology.point_count()));
-  KPSA_CHECK_LT(topology.triangle_count(), std::size_t{1} << 29);
+  constexpr std::size_t kLimit = std::size_t{1} << 29;  // indices are stored times 4
+  KPSA_CHECK(topology.point_count() < kLimit && topology.triangle_count() < kLimit);
   const std::vector<Index> needed = TrianglesAround(topology, out_points);
   for (Index t : needed) {
     for (std::size_t c = 0; c < 3; ++c) {
       const Index p = topology.triangles()[3 * t + c];
       const auto at = std::lower_bound(in_points.begin(), in_points.end(), p);
       KPSA_CHECK(at != in_points.end() && *at == p);
-      triangles_.push_back(static_cast<Index>(at - in_points.begin()));
+      triangles_.push_back(static_cast<Index>(4 * (at - in_points.begin())));
     }
   }
   const auto triangles_of = [&](std::size_t i) { return topology.point_triangles().row(out_points[i]); };
@@ -146,6 +132,14 @@ NormalsKernel::NormalsKernel(const Topology& topology, std::span<const Index> ou
     }
     offsets_.push_back(static_cast<Index>(around_.size()));
   }
+  std::size_t ready = 0;
+  for (std::size_t begin = 0; begin < count_; begin += kNormalsGrain) {
+    const std::size_t end = std::min(begin + kNormalsGrain, count_);
+    for (Index e = offsets_[begin]; e < offsets_[end]; ++e) {
+      ready = std::max<std::size_t>(ready, around_[e] / 4 + 1);
+    }
+    ready_.push_back(static_cast<Index>(ready));
+  }
 }
 
 void NormalsKernel::Run(ConstPointsView in, PointsView normals, std::span<float> scratch,
@@ -157,13 +151,23 @@ void NormalsKernel::Run(ConstPointsView in, PointsView normals, std::span<float>
   ForRanges(parallel, in_count_, 8192, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(PackPoints)(in, begin, end, points);
   });
-  ForRanges(parallel, triangles_.size() / 3, 2048, [&](std::size_t begin, std::size_t end) {
+  const auto cross = [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(CrossTriangles)(triangles_.data(), begin, end, points, crosses);
-  });
-  ForRanges(parallel, count_, 2048, [&](std::size_t begin, std::size_t end) {
+  };
+  const auto sum = [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(SumNormals)
     (lanes_.data(), offsets_.data(), around_.data(), begin, end, crosses, normals);
-  });
+  };
+  if (parallel == nullptr) {  // triangles just before the points that need them: they are still in the cache
+    for (std::size_t done = 0, begin = 0; begin < count_; begin += kNormalsGrain) {
+      const std::size_t ready = ready_[begin / kNormalsGrain];
+      if (ready > done) cross(done, ready), done = ready;
+      sum(begin, std::min(begin + kNormalsGrain, count_));
+    }
+    return;
+  }
+  ForRanges(parallel, triangles_.size() / 3, 2048, cross);
+  ForRanges(parallel, count_, 2048, sum);
 }
 
 }  // namespace kpsa

@@ -20,19 +20,18 @@ class NormalsKernel {
   NormalsKernel(const Topology& topology, std::span<const Index> out_points,
                 std::span<const Index> in_points);
   std::size_t point_count() const { return count_; }
-  std::size_t ScratchFloats() const {
-    return 4 * (PaddedCount(triangles_.size() / 3) + PaddedCount(in_count_));
-  }
+  std::size_t ScratchFloats() const { return 4 * (triangles_.size() / 3 + PaddedCount(in_count_)); }
   void Run(ConstPointsView in, PointsView normals, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
 
  private:
   std::size_t count_ = 0, in_count_ = 0;
-  std::vector<Index> triangles_;  // entries of `in`, 3 a triangle that is needed
+  std::vector<Index> triangles_;  // 4 * entry of `in`, 3 a triangle that is needed
   // Outputs in blocks of 64, sorted by their number of triangles: place in the block, and 4 * needed
   // triangle.
   std::vector<std::uint8_t> lanes_;
   std::vector<Index> offsets_, around_;
+  std::vector<Index> ready_;  // triangles that the first 512, 1024, .. outputs need
 };
 
 }  // namespace kpsa

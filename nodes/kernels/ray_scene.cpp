@@ -68,10 +68,11 @@ Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> 
   rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_MEDIUM);  // no spatial splits: one layout an input
   if (!triangles.empty()) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* xyz = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                            3 * sizeof(float), points.count));
-    auto* corner = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size() / 3));
+    auto* xyz = static_cast<float*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points.count));
+    auto* corner = static_cast<std::uint32_t*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                3 * sizeof(std::uint32_t), triangles.size() / 3));
     if (xyz == nullptr || corner == nullptr) {
       rtcReleaseGeometry(geometry);
       return Status::Evaluation("no memory for {} triangles in the ray tracer", triangles.size() / 3);

@@ -1,8 +1,8 @@
 // Rays against triangles: what the pictures, and nodes that look along directions, need of Embree.
 //
-// This file is the only door to Embree (3.13); its header appears in ray_scene.cpp alone. Every ray is answered on
-// its own (no packets whose lanes could influence each other), and edges are watertight (robust mode), so that the
-// answers depend neither on the number of threads nor on how rays are grouped into calls.
+// This file is the only door to Embree (3.13); its header appears in ray_scene.cpp alone. Every ray is
+// answered on its own (no packets whose lanes could influence each other), and edges are watertight (robust
+// mode), so that the answers depend neither on the number of threads nor on how rays are grouped into calls.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@
 
 namespace kpsa {
 
-// The part of the line origin + t * direction with near <= t <= far. direction need not be unit length; t counts
-// in its lengths.
+// The part of the line origin + t * direction with near <= t <= far. direction need not be unit length; t
+// counts in its lengths.
 struct Ray {
   float origin[3] = {0, 0, 0};
   float direction[3] = {0, 0, 1};
@@ -32,7 +32,8 @@ struct RayHit {
   float v = 0;
 };
 
-// An immutable search structure over a copy of the triangles. Movable; queries may run on any threads at once.
+// An immutable search structure over a copy of the triangles. Movable; queries may run on any threads at
+// once.
 class RayScene {
  public:
   // points: positions of any unit. triangles: three indices into points each.

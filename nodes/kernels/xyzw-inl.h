@@ -35,6 +35,8 @@ HWY_INLINE F4 Fma4(F4 a, F4 b, F4 c) {
   return {{std::fma(a.v[0], b.v[0], c.v[0]), std::fma(a.v[1], b.v[1], c.v[1]),
            std::fma(a.v[2], b.v[2], c.v[2]), std::fma(a.v[3], b.v[3], c.v[3])}};
 }
+HWY_INLINE F4 Neg4(F4 a) { return {{-a.v[0], -a.v[1], -a.v[2], -a.v[3]}}; }
+HWY_INLINE F4 Yzx4(F4 a) { return {{a.v[1], a.v[2], a.v[0], a.v[3]}}; }
 #else
 using D4 = hn::FixedTag<float, 4>;
 using F4 = hn::Vec<D4>;
@@ -46,7 +48,15 @@ HWY_INLINE F4 Add4(F4 a, F4 b) { return hn::Add(a, b); }
 HWY_INLINE F4 Sub4(F4 a, F4 b) { return hn::Sub(a, b); }
 HWY_INLINE F4 Mul4(F4 a, F4 b) { return hn::Mul(a, b); }
 HWY_INLINE F4 Fma4(F4 a, F4 b, F4 c) { return Fma(a, b, c); }
+HWY_INLINE F4 Neg4(F4 a) { return hn::Neg(a); }
+HWY_INLINE F4 Yzx4(F4 a) {
+  HWY_ALIGN static constexpr std::int32_t kYzxw[4] = {1, 2, 0, 3};
+  return hn::TableLookupLanes(a, hn::SetTableIndices(D4(), kYzxw));
+}
 #endif
+
+// a x b
+HWY_INLINE F4 Cross4(F4 a, F4 b) { return Yzx4(Fma4(a, Yzx4(b), Neg4(Mul4(Yzx4(a), b)))); }
 
 // Lanes of one block of points in structure-of-arrays form: at most 16, a divisor of 16.
 using DLanes = hn::CappedTag<float, 16>;

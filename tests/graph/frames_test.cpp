@@ -46,7 +46,7 @@ class FramesTest : public testing::Test {
 
   static void Set(std::size_t frame, Evaluator& evaluator) {
     const auto f = static_cast<double>(frame);
-    evaluator.Set(0, 10.0 * static_cast<double>(frame % 7) - 30);      // moves the points: hits and misses
+    evaluator.Set(0, 10.0 * static_cast<double>(frame % 7) - 30 + f / 16);  // moves the points: hits and misses
     evaluator.Set(1, frame % 3 == 0 ? -1e9 : 60.0);                    // every third frame misses in any case
     evaluator.Set(2, frame % 10 == 4 ? -1.0 : f / 8);                  // some frames fail, here before the second cache
     evaluator.Set(3, frame % 13 == 5 ? 1e9 : -1e30);                   // and some in its compute

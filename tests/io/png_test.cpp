@@ -37,7 +37,8 @@ TEST(Png, DecodesToTheSamePixels) {
     const auto bytes = EncodePng(width, height, rgb);
     ASSERT_TRUE(bytes.ok());
     int w = 0, h = 0, channels = 0;
-    std::uint8_t* pixels = stbi_load_from_memory(bytes->data(), static_cast<int>(bytes->size()), &w, &h, &channels, 0);
+    std::uint8_t* pixels =
+        stbi_load_from_memory(bytes->data(), static_cast<int>(bytes->size()), &w, &h, &channels, 0);
     ASSERT_NE(pixels, nullptr);
     EXPECT_EQ(w, width);
     EXPECT_EQ(h, height);
@@ -52,7 +53,8 @@ TEST(Png, RefusesSizesThatDoNotFitThePixels) {
   EXPECT_FALSE(EncodePng(-1, -1, Pattern(1, 1)).ok());
   EXPECT_FALSE(EncodePng(40000, 1, Pattern(1, 1)).ok());
   EXPECT_FALSE(EncodePng(32768, 32768, Pattern(1, 1)).ok());
-  EXPECT_NE(EncodePng(2, 2, Pattern(1, 1)).status().ToString().find("needs 12 bytes, there are 3"), std::string::npos);
+  EXPECT_NE(EncodePng(2, 2, Pattern(1, 1)).status().ToString().find("needs 12 bytes, there are 3"),
+            std::string::npos);
 }
 
 TEST_F(PngFolder, IsWrittenWholeAndLeavesNothingBeside) {

@@ -138,6 +138,11 @@ TEST(CueSelection, BudgetFixedCuesAndDistances) {
       EXPECT_GT(Length(sheet.rest()[selection.cues[i].index] - sheet.rest()[selection.cues[j].index]), 0.06);
     }
   }
+  // Fixed cues need not be candidates
+  const CueSelection points = SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(), sheet.diagonal(),
+                                         {.count = 5, .fixed = std::span<const CueRef>(fixed).subspan(1)});
+  EXPECT_EQ(points.cues[0], fixed[1]);
+  EXPECT_EQ(points.cues.size(), 5u);
   // A large minimum distance leaves few points; without scalars the selection ends early
   const CueSelection few = SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(), sheet.diagonal(),
                                       {.count = 30, .min_distance = 0.4});

@@ -135,7 +135,8 @@ TEST(RayScene, RaysThroughSharedEdgesNeverSlipThrough) {
   Soup sheet;  // a grid in the plane z = 0
   constexpr int kSide = 17;
   for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) sheet.xyz.insert(sheet.xyz.end(), {x * 0.1f, y * 0.1f, 0.01f * ((x * 7 + y * 3) % 5)});
+    for (int x = 0; x < kSide; ++x)
+      sheet.xyz.insert(sheet.xyz.end(), {x * 0.1f, y * 0.1f, 0.01f * ((x * 7 + y * 3) % 5)});
   }
   for (Index y = 0; y + 1 < kSide; ++y) {
     for (Index x = 0; x + 1 < kSide; ++x) {
@@ -150,7 +151,8 @@ TEST(RayScene, RaysThroughSharedEdgesNeverSlipThrough) {
   for (int i = 1; i < 150; ++i) {
     for (int row = 1; row + 1 < kSide; ++row) {
       Ray ray;
-      ray.origin[0] = 0.0107f * static_cast<float>(i), ray.origin[1] = 0.1f * static_cast<float>(row), ray.origin[2] = -3;
+      ray.origin[0] = 0.0107f * static_cast<float>(i), ray.origin[1] = 0.1f * static_cast<float>(row),
+      ray.origin[2] = -3;
       if (ray.origin[0] > 1.59f) continue;
       rays.push_back(ray);
     }
@@ -183,7 +185,8 @@ TEST(RayScene, SaysWhatIsWrongWithTheTriangles) {
   EXPECT_NE(RayScene::Build(points.view(), two).status().ToString().find("multiple of 3"), std::string::npos);
   EXPECT_NE(RayScene::Build(points.view(), far).status().ToString().find("point 3"), std::string::npos);
   points.view().y[1] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_NE(RayScene::Build(points.view(), good).status().ToString().find("point 1 is not finite"), std::string::npos);
+  EXPECT_NE(RayScene::Build(points.view(), good).status().ToString().find("point 1 is not finite"),
+            std::string::npos);
 }
 
 }  // namespace

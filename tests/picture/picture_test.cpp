@@ -60,7 +60,8 @@ TEST(Picture, ASquareCoversItsPixelsAndNoOthers) {
   ASSERT_TRUE(image.ok());
   for (int y = 0; y < 80; ++y) {
     for (int x = 0; x < 80; ++x) {
-      const bool inside = x >= 21 && x < 59 && y >= 21 && y < 59, outside = x < 19 || x > 60 || y < 19 || y > 60;
+      const bool inside = x >= 21 && x < 59 && y >= 21 && y < 59,
+                 outside = x < 19 || x > 60 || y < 19 || y > 60;
       if (inside || outside) {
         EXPECT_EQ(IsGround(image->At(x, y)), outside) << x << " " << y;
       }
@@ -104,7 +105,8 @@ TEST(Picture, IsTheSameWithOneThreadAndMany) {
 TEST(Picture, ACoveredPlaceIsDarker) {
   Mesh scene = Square();
   // A lid over the right half, just above it; only the sky and the key light change below
-  for (float v : {0.2f, -1.f, 0.15f, 1.f, -1.f, 0.15f, 1.f, 1.f, 0.15f, 0.2f, 1.f, 0.15f}) scene.points.push_back(v);
+  for (float v : {0.2f, -1.f, 0.15f, 1.f, -1.f, 0.15f, 1.f, 1.f, 0.15f, 0.2f, 1.f, 0.15f})
+    scene.points.push_back(v);
   RenderInput open, covered;
   const Mesh square = Square();
   open.parts = {square.Part()};
@@ -151,7 +153,8 @@ TEST(Picture, AComparisonShowsThreePicturesAndTheLargestError) {
   EXPECT_EQ(image->height, 150);
   const std::vector<float> distances = PointDistances(head.points, moved);
   EXPECT_NEAR(*std::max_element(distances.begin(), distances.end()), 0.8e-3, 1e-7);
-  EXPECT_EQ(std::count(distances.begin(), distances.end(), 0.0f), static_cast<std::ptrdiff_t>(distances.size()) - 1);
+  EXPECT_EQ(std::count(distances.begin(), distances.end(), 0.0f),
+            static_cast<std::ptrdiff_t>(distances.size()) - 1);
   accelerated.parts[0].points = std::span(moved).first(moved.size() - 3);
   EXPECT_FALSE(RenderComparison(full, accelerated, {}, options).ok());
 }

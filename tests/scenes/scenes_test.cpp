@@ -30,7 +30,8 @@ std::string FileBytes(const std::string& path) {
 }
 
 TEST(Scenes, TheCommittedFilesAreWhatTheGeneratorWrites) {
-  for (const auto& [folder, files] : {std::pair<std::string, SceneFiles>{"face/", Face()}, {"hello/", GenerateHello()}}) {
+  for (const auto& [folder, files] :
+       {std::pair<std::string, SceneFiles>{"face/", Face()}, {"hello/", GenerateHello()}}) {
     for (const auto& [name, bytes] : files) {
       EXPECT_TRUE(FileBytes(std::string(KPSA_SCENES_DIR) + "/" + folder + name) == bytes)
           << folder << name << " differs: run generate_scenes " << KPSA_SCENES_DIR;
@@ -51,7 +52,8 @@ TEST(Scenes, TheFilesAreGlb) {
 
 gltf::Character Load(const SceneFiles& files, const std::string& name) {
   const std::string& glb = files.at(name);
-  auto character = gltf::LoadGltfFromMemory(std::span(reinterpret_cast<const std::uint8_t*>(glb.data()), glb.size()), "", name);
+  auto character = gltf::LoadGltfFromMemory(
+      std::span(reinterpret_cast<const std::uint8_t*>(glb.data()), glb.size()), "", name);
   EXPECT_TRUE(character.ok()) << character.status().ToString();
   return character.ok() ? *character : gltf::Character();
 }
@@ -77,7 +79,9 @@ TEST(Scenes, TheFaceLoadsAsItWasMade) {
   EXPECT_TRUE(skin.skinned() && eyes.skinned());
   for (const char* clip : {"extreme", "talk_train", "talk"}) EXPECT_NE(face.FindClip(clip), kNoIndex);
   for (const char* joint : {"root", "neck", "head", "jaw", "eye.L", "eye.R", "face_mesh", "eyes"}) {
-    EXPECT_TRUE(std::any_of(face.nodes.begin(), face.nodes.end(), [&](const gltf::Node& n) { return n.name == joint; })) << joint;
+    EXPECT_TRUE(std::any_of(face.nodes.begin(), face.nodes.end(), [&](const gltf::Node& n) {
+      return n.name == joint;
+    })) << joint;
   }
   EXPECT_TRUE(face.warnings.empty());
 }
@@ -111,7 +115,8 @@ TEST(Head, IsSymmetricToTheBit) {
   }
 }
 
-// Every edge has two quads that run along it in opposite directions, but for three borders: the neck and the sockets.
+// Every edge has two quads that run along it in opposite directions, but for three borders: the neck and the
+// sockets.
 TEST(Head, IsAManifoldWithThreeBorders) {
   std::map<std::pair<int, int>, int> directed;
   for (const auto& q : Shape().quads) {
@@ -142,7 +147,8 @@ TEST(Head, NoTwoPointsCoincideAndNoTriangleIsFlat) {
   EXPECT_EQ(places.size(), Shape().points.size());
   const std::vector<Index> triangles = Triangulate(Shape().quads);
   for (std::size_t t = 0; t < triangles.size(); t += 3) {
-    const Double3 a = Shape().points[triangles[t]], b = Shape().points[triangles[t + 1]], c = Shape().points[triangles[t + 2]];
+    const Double3 a = Shape().points[triangles[t]], b = Shape().points[triangles[t + 1]],
+                  c = Shape().points[triangles[t + 2]];
     EXPECT_GT(Length(Cross(b - a, c - a)), 1e-5) << "triangle " << t / 3;
   }
 }
@@ -187,8 +193,10 @@ TEST(Expressions, AreManyNamedLocalAndMirrored) {
     EXPECT_GT(largest, 0.15) << e.name;
     EXPECT_LT(largest, 2.0) << e.name;
   }
-  for (const char* name : {"smile", "frown", "browInnerUp", "browOuterUp", "browDown", "blink", "squint", "sneer", "cheekPuff"}) {
-    const Expression *left = by_name.at(std::string(name) + ".L"), *right = by_name.at(std::string(name) + ".R");
+  for (const char* name : {"smile", "frown", "browInnerUp", "browOuterUp", "browDown", "blink", "squint",
+                           "sneer", "cheekPuff"}) {
+    const Expression *left = by_name.at(std::string(name) + ".L"),
+                     *right = by_name.at(std::string(name) + ".R");
     for (std::size_t i = 0; i < left->deltas.size(); ++i) {
       const Double3 d = left->deltas[i], m = right->deltas[static_cast<std::size_t>(Shape().mirror[i])];
       EXPECT_EQ(d, (Double3{-m.x, m.y, m.z})) << name;
@@ -199,7 +207,8 @@ TEST(Expressions, AreManyNamedLocalAndMirrored) {
 
 TEST(Expressions, ABlinkClosesTheEyeWithoutCuttingTheEyeball) {
   const std::vector<Expression> expressions = FaceExpressions(Shape());
-  const auto blink = std::find_if(expressions.begin(), expressions.end(), [](const Expression& e) { return e.name == "blink.L"; });
+  const auto blink = std::find_if(expressions.begin(), expressions.end(),
+                                  [](const Expression& e) { return e.name == "blink.L"; });
   const std::vector<int>& edge = Shape().eye_rings[static_cast<std::size_t>(Shape().lid_ring)];
   const std::size_t n = edge.size(), top = n / 4;
   const auto at = [&](std::size_t k) { return static_cast<std::size_t>(edge[k]); };
@@ -244,7 +253,8 @@ TEST(Clips, HaveUnitRotationsAndWeightsInRange) {
     bool alone = false;
     for (int f = 0; f < clips[0].frames && !alone; ++f) {
       const float* row = &weights.values[static_cast<std::size_t>(f) * names.size()];
-      alone = row[e] == 1 && std::count(row, row + names.size(), 0.0f) == static_cast<std::ptrdiff_t>(names.size()) - 1;
+      alone = row[e] == 1 &&
+              std::count(row, row + names.size(), 0.0f) == static_cast<std::ptrdiff_t>(names.size()) - 1;
     }
     EXPECT_TRUE(alone) << names[e];
   }
@@ -253,8 +263,8 @@ TEST(Clips, HaveUnitRotationsAndWeightsInRange) {
   EXPECT_FALSE(std::equal(test.begin(), test.end(), train.begin()));
 }
 
-// The test clip is rich: its principal modes are counted in expression space with the skin left out, which is a
-// lower bound of what the whole stack does.
+// The test clip is rich: its principal modes are counted in expression space with the skin left out, which is
+// a lower bound of what the whole stack does.
 TEST(Clips, TheTestClipNeedsManyModes) {
   const std::vector<Expression> expressions = FaceExpressions(Shape());
   std::vector<std::string> names;
@@ -262,7 +272,8 @@ TEST(Clips, TheTestClipNeedsManyModes) {
   const GlbClip talk = FaceClips(names, 6).back();
   const GlbChannel& weights = talk.channels.back();
   const std::size_t n = names.size(), frames = static_cast<std::size_t>(talk.frames);
-  // Covariance of the weights and Gram matrix of the shapes; the eigenvalues of their product are the variances
+  // Covariance of the weights and Gram matrix of the shapes; the eigenvalues of their product are the
+  // variances
   std::vector<double> mean(n), covariance(n * n), gram(n * n);
   for (std::size_t f = 0; f < frames; ++f) {
     for (std::size_t e = 0; e < n; ++e) mean[e] += weights.values[f * n + e] / static_cast<double>(frames);
@@ -270,9 +281,11 @@ TEST(Clips, TheTestClipNeedsManyModes) {
   for (std::size_t a = 0; a < n; ++a) {
     for (std::size_t b = 0; b < n; ++b) {
       for (std::size_t f = 0; f < frames; ++f) {
-        covariance[a * n + b] += (weights.values[f * n + a] - mean[a]) * (weights.values[f * n + b] - mean[b]);
+        covariance[a * n + b] +=
+            (weights.values[f * n + a] - mean[a]) * (weights.values[f * n + b] - mean[b]);
       }
-      for (std::size_t i = 0; i < Shape().points.size(); ++i) gram[a * n + b] += Dot(expressions[a].deltas[i], expressions[b].deltas[i]);
+      for (std::size_t i = 0; i < Shape().points.size(); ++i)
+        gram[a * n + b] += Dot(expressions[a].deltas[i], expressions[b].deltas[i]);
     }
   }
   // gram = L L^T (Cholesky), S = L^T covariance L, then Jacobi rotations
@@ -313,7 +326,8 @@ TEST(Clips, TheTestClipNeedsManyModes) {
   }
   std::vector<double> variances;
   double total = 0;
-  for (std::size_t k = 0; k < n; ++k) variances.push_back(std::max(s[k * n + k], 0.0)), total += variances.back();
+  for (std::size_t k = 0; k < n; ++k)
+    variances.push_back(std::max(s[k * n + k], 0.0)), total += variances.back();
   std::sort(variances.rbegin(), variances.rend());
   double sum = 0;
   int modes = 0;

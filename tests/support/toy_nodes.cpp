@@ -75,7 +75,7 @@ void AddToyNodes(NodeRegistry& registry) {
     double sum = 0;
     for (std::uint32_t i = 0; i < values.size(); ++i) sum += values[i];
     return sum;
-  });
+  }).cost(20000, 0);
   registry.add("select", "Takes one of two.").in("which", false).in("a", 0.0).lazy().in("b", 0.0).lazy().out("out", Type::kDouble)
       .compute([](bool which, double a, double b) { return which ? b : a; })
       .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 2 : 1; });
@@ -102,7 +102,7 @@ void AddToyNodes(NodeRegistry& registry) {
           c.out_points(0).z[i] = c.points(0).z[i];
         }
       })
-      .in_place("points").cost(20, 2);
+      .in_place("points").cost(20000, 2);
   registry.add("smooth", "Means over a ring.").structural("rings", 1).points_in("points").out("outPoints", Type::kPoints)
       .compute([](ComputeContext& c) {
         const auto& kernel = c.kernel_as<SmoothKernel>();
@@ -113,7 +113,7 @@ void AddToyNodes(NodeRegistry& registry) {
           c.out_points(0).y[i] = c.out_points(0).z[i] = 0;
         }
       })
-      .demand(DemandSmooth).bind(BindSmooth).cost(20, 10);
+      .demand(DemandSmooth).bind(BindSmooth).cost(20000, 10);
   registry.add("measure", "Sum of x.").points_in("points").out("out", Type::kDouble).compute([](ComputeContext& c) {
     double sum = 0;
     for (std::size_t i = 0; i < c.points(0).count; ++i) sum += c.points(0).x[i];
@@ -147,6 +147,56 @@ void AddToyNodes(NodeRegistry& registry) {
         c.out_value<double>(0) = at;
       })
       .bind([](const Binding&) -> Result<BoundKernel> { return BoundKernel{nullptr, 0, sizeof(double)}; });
+  registry.add("twoWays", "Two values side by side.").in("a", 0.0).in("b", 0.0).out("outA", Type::kDouble).out("outB", Type::kDouble)
+      .compute_for({"outA"}, {"a"}, [](double v) { return v + 1; })
+      .compute_for({"outB"}, {"b"}, [](double v) { return v * 2; });
+  registry.add("choice", "Takes one of many.").in("selector", 0).in("input", 0.0).array().lazy().out("out", Type::kDouble)
+      .compute([](std::int64_t selector, ArrayView<double> input) {
+        return selector < input.size() ? input[static_cast<std::uint32_t>(selector)] : 0;
+      })
+      .decide([](ComputeContext& c) -> std::uint64_t { return std::uint64_t{1} << c.get<std::int64_t>(0); });
+  registry.add("together", "Adds all, or none.").in("wanted", false).in("input", 0.0).array().lazy(true).in("other", 0.0).lazy()
+      .out("out", Type::kDouble)
+      .compute([](ComputeContext& c) {
+        const ArrayView<double> input = c.array<double>(1);
+        double sum = (c.chosen & 2) != 0 ? c.get<double>(2) : 0;
+        for (std::uint32_t i = 0; (c.chosen & 1) != 0 && i < input.size(); ++i) sum += input[i];
+        c.out_value<double>(0) = sum;
+      })
+      .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 1 : 2; });
+  registry.add("picky", "Fails where it is told to.").structural("where", 0).structural("factor", 2.0).points_in("points").out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        if (c.kernel == nullptr) return c.host->Fail("cannot compute");
+        for (std::size_t i = 0; i < c.points(0).count; ++i) {
+          c.out_points(0).x[i] = c.points(0).x[i] * c.kernel_as<float>();
+          c.out_points(0).y[i] = c.out_points(0).z[i] = 0;
+        }
+      })
+      .bind([](const Binding& b) -> Result<BoundKernel> {
+        const int where = b.structural().get_int("where");
+        if (where == 1) return Status::Invalid("cannot bind");
+        if (where == 4) return BoundKernel();
+        return BoundKernel{std::make_shared<float>(static_cast<float>(b.structural().get_double("factor"))), 0, 0};
+      })
+      .demand([](Demand& d) {
+        d.Require("points", 0, d.structural().get_int("where") == 2 ? PointSet::All(3) : d.output("outPoints"));
+      })
+      .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
+        if (s.get_int("where") == 3) return Status::Invalid("cannot count");
+        return Index{10};
+      });
+  registry.add("grid", "Attributes of many kinds.").structural("divisions", std::vector<std::int64_t>{2, 3, 2})
+      .enumeration("mode", {"linear", "smooth"}, true).in("size", 1.0, {.min = 0, .max = 10}).in("weight", 0.0).array()
+      .in("matrix", Matrix4()).in("center", Double3()).alias("pivot").points_in("points").grid("divisions")
+      .default_from([](const Structural& s) {
+        Index count = 1;
+        for (std::int64_t n : s.value("divisions").get<std::vector<std::int64_t>>()) count *= static_cast<Index>(n);
+        return Value(PointBufferPtr(std::make_shared<PointBuffer>(count)));
+      })
+      .out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        for (std::size_t i = 0; i < c.points(4).count; ++i) c.out_points(0).x[i] = c.points(4).x[i];
+      });
 }
 
 }  // namespace kpsa

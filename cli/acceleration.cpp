@@ -1,0 +1,221 @@
+#include "cli/acceleration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "cli/frames_range.h"
+#include "cli/options.h"
+#include "cli/request.h"
+#include "cli/rig_training.h"
+#include "io/quantity.h"
+#include "kpsa/accelerate.h"
+
+namespace kpsa {
+namespace {
+
+std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
+  std::vector<std::string> names;
+  for (const AcceleratedPoints& points : entry.points) {
+    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
+    names.push_back(mesh.name + "@" + mesh.stages[points.stage].name);
+  }
+  return names;
+}
+
+std::vector<std::string> PointNames(const Subspace& subspace) {
+  std::vector<std::string> names;
+  for (const SubspaceOutput& output : subspace.outputs) names.push_back(output.name);
+  return names;
+}
+
+// An entry for a rig that has none: what the subspace says of itself.
+Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std::string& path) {
+  Acceleration entry;
+  entry.name = std::filesystem::path(path).stem().string();
+  for (const SubspaceOutput& output : subspace.outputs) {
+    const Result<MeshStage> found = FindMeshStage(rig, output.name);
+    if (!found.ok())
+      return Status::Invalid("the subspace is for {}; {}", output.name,
+                             found.status().errors().front().message)
+          .At({path});
+    AcceleratedPoints points;
+    points.mesh = static_cast<std::size_t>(found->mesh - rig.scene.meshes.data());
+    points.points = found->points;
+    while (!(found->mesh->stages[points.stage].points == found->points)) ++points.stage;
+    entry.points.push_back(points);
+  }
+  if (!subspace.space.empty()) {
+    const Result<NodeId> space = rig.graph->FindNode(subspace.space);
+    if (!space.ok()) return Status(space.status()).At({path});
+    entry.space = *space;
+  }
+  return entry;
+}
+
+Result<std::shared_ptr<const Subspace>> LoadSubspace(const Rig& rig, const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error))
+    return Status::Invalid("no such file; kpsa train {} writes it", rig.path).At({path});
+  Result<Subspace> subspace = ReadSubspace(path);
+  if (!subspace.ok()) return subspace.status();
+  return std::make_shared<const Subspace>(std::move(*subspace));
+}
+
+}  // namespace
+
+void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags, bool optional) {
+  if (optional) AddSwitch(command, "--accelerate", &flags->accelerate, "with the rig's own subspaces");
+  AddOption(command, "--kpsa", "FILE.kpsa", &flags->kpsa, "with this subspace");
+  AddOption(command, "--stale", "refuse|miss", &flags->stale,
+            "a subspace that was trained on another version of the rig: refuse it (if not given), or miss: "
+            "evaluate everything fully");
+  AddOption(command, "--tolerance", "LENGTH", &flags->tolerance,
+            "the largest error of a point, as in 0.2mm; the subspace's own if not given");
+  AddOption(command, "--violation-rate", "SHARE", &flags->violation_rate,
+            "share of frames that may exceed it, as in 1%; the subspace's own if not given");
+}
+
+Result<double> ParseTolerance(const std::string& text) {
+  const Result<double> value = ParseQuantity(text, Unit::kLength, FileUnits());
+  if (!value.ok() || *value < 0)
+    return Status::Usage(
+        "--tolerance \"{}\": expected a length of 0 or more, as in 0.2mm (a bare number is metres)", text);
+  return value;
+}
+
+Result<double> ParseRate(const std::string& text) {
+  const Result<double> value = ParseQuantity(text, Unit::kNone, FileUnits());
+  if (!value.ok() || *value < 0 || *value > 1)
+    return Status::Usage("--violation-rate \"{}\": expected a share from 0 to 1, as in 1%", text);
+  return value;
+}
+
+Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted) {
+  if (flags.accelerate && flags.kpsa.has_value())
+    return Status::Usage("--accelerate and --kpsa {}: expected one of them", *flags.kpsa);
+  if (!wanted) {
+    const char* const given = flags.stale.has_value()            ? "--stale"
+                              : flags.tolerance.has_value()      ? "--tolerance"
+                              : flags.violation_rate.has_value() ? "--violation-rate"
+                                                                 : nullptr;
+    if (given != nullptr) return Status::Usage("{} is of no use without --accelerate or --kpsa", given);
+  }
+  if (flags.stale.has_value() && *flags.stale != "refuse" && *flags.stale != "miss")
+    return Status::Usage("--stale {}: expected refuse or miss", *flags.stale);
+  if (flags.tolerance.has_value()) KPSA_RETURN_IF_ERROR(ParseTolerance(*flags.tolerance).status());
+  if (flags.violation_rate.has_value()) KPSA_RETURN_IF_ERROR(ParseRate(*flags.violation_rate).status());
+  return Status();
+}
+
+Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compiler,
+                                                       const AccelerationFlags& flags) {
+  std::vector<AppliedSubspace> applied;
+  if (flags.kpsa.has_value()) {
+    const auto subspace = LoadSubspace(*rig, *flags.kpsa);
+    if (!subspace.ok()) return subspace.status();
+    AppliedSubspace one;
+    one.subspace = *subspace;
+    one.path = *flags.kpsa;
+    const auto found = std::find_if(
+        rig->accelerate.begin(), rig->accelerate.end(),
+        [&](const Acceleration& entry) { return PointNames(*rig, entry) == PointNames(**subspace); });
+    if (found != rig->accelerate.end()) {
+      one.entry = *found;
+    } else {
+      Result<Acceleration> entry = EntryOf(*rig, **subspace, *flags.kpsa);
+      if (!entry.ok()) return entry.status();
+      one.entry = std::move(*entry);
+    }
+    applied.push_back(std::move(one));
+  } else {
+    if (rig->accelerate.empty())
+      return Status::Invalid("has no accelerate section, so nothing to accelerate; --kpsa names a subspace")
+          .At({rig->path});
+    for (const Acceleration& entry : rig->accelerate) {
+      if (entry.subspace.empty())
+        return Status::Invalid("accelerate: \"{}\" names no subspace file; --kpsa names one", entry.name)
+            .At(entry.where);
+      const auto subspace = LoadSubspace(*rig, entry.subspace);
+      if (!subspace.ok()) return subspace.status();
+      AppliedSubspace one;
+      one.path = entry.subspace;
+      one.entry = entry;
+      one.subspace = *subspace;
+      applied.push_back(std::move(one));
+    }
+  }
+  for (AppliedSubspace& one : applied) {
+    one.name = one.entry.name;
+    AccelerateOptions options;
+    options.stale_is_miss = flags.stale.has_value() && *flags.stale == "miss";
+    if (flags.tolerance.has_value()) options.tolerance = *ParseTolerance(*flags.tolerance);
+    if (flags.violation_rate.has_value()) options.violation_rate = *ParseRate(*flags.violation_rate);
+    one.tolerance = options.tolerance < 0 ? one.subspace->tolerance : options.tolerance;
+    one.violation_rate = options.violation_rate < 0 ? one.subspace->violation_rate : options.violation_rate;
+    std::string node_name = one.name + "_kpsa";
+    while (rig->graph->FindNode(node_name).ok()) node_name += "_";
+    Result<Accelerated> accelerated =
+        Accelerate(rig->graph.get(), compiler, MakeTarget(*rig, one.entry), one.subspace, node_name, options);
+    if (!accelerated.ok()) return Status(accelerated.status()).At({one.path});
+    one.node = accelerated->node;
+    one.config = accelerated->config;
+    one.notes = std::move(accelerated->notes);
+    const NodeDef& def = rig->graph->def(one.node);
+    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
+      CharacterMesh& mesh = rig->scene.meshes[one.entry.points[p].mesh];
+      if (mesh.points == mesh.stages[one.entry.points[p].stage].points) {
+        mesh.points = {one.node, def.FindAttribute("outPoints"), static_cast<int>(p), -1};
+      }
+    }
+  }
+  return applied;
+}
+
+Verdicts::Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, Request* request)
+    : applied_(&applied), first_output_(static_cast<Index>(request->outputs.size())) {
+  for (const AppliedSubspace& one : applied) {
+    const NodeDef& def = rig.graph->def(one.node);
+    for (const char* name : {"hit", "score", "missReason", "offender"}) {
+      request->outputs.push_back({{one.node, def.FindAttribute(name), -1, -1}, {}});
+    }
+  }
+}
+
+void Verdicts::Add(std::size_t frame, const Evaluator& evaluator) {
+  ++frames_;
+  last_hit_ = true;
+  last_score_ = 0;
+  for (Index n = 0; n < applied_->size(); ++n) {
+    const Index output = first_output_ + 4 * n;
+    const double score = evaluator.Get<double>(output + 1);
+    last_score_ = std::max(last_score_, score);
+    if (score > worst_score_) worst_score_ = score, worst_frame_ = frame;
+    if (evaluator.Get<std::int64_t>(output) != 0) continue;
+    last_hit_ = false;
+    const std::int64_t offender = evaluator.Get<std::int64_t>(output + 3);
+    const std::string text =
+        MissText(*(*applied_)[n].config, static_cast<MissReason>(evaluator.Get<std::int64_t>(output + 2)),
+                 offender < 0 ? kNoIndex : static_cast<Index>(offender));
+    auto reason =
+        std::find_if(reasons_.begin(), reasons_.end(), [&](const Reason& r) { return r.text == text; });
+    if (reason == reasons_.end()) reason = reasons_.insert(reasons_.end(), Reason{text, 0, frame});
+    ++reason->count;
+  }
+  if (last_hit_) ++hits_;
+}
+
+std::string Verdicts::Text() const {
+  const std::string worst = std::isfinite(worst_score_) ? fmt::format("{:.3g}", worst_score_) : "infinite";
+  return fmt::format("{} hits, {} misses of {}; worst score {} at frame {}", hits_, frames_ - hits_,
+                     Plural(frames_, "frame"), worst, worst_frame_);
+}
+
+std::string Verdicts::WorstMiss() const {
+  const auto most = std::max_element(reasons_.begin(), reasons_.end(),
+                                     [](const Reason& a, const Reason& b) { return a.count < b.count; });
+  if (most == reasons_.end()) return "";
+  return fmt::format("most misses ({}, first at frame {}): {}", most->count, most->first_frame, most->text);
+}
+
+}  // namespace kpsa

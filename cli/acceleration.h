@@ -1,0 +1,83 @@
+// A rig with subspaces in the place of its stacks, as --accelerate and --kpsa ask for.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/common.h"
+#include "graph/compiler.h"
+#include "graph/evaluator.h"
+
+namespace kpsa {
+
+class KpsaConfig;
+struct Subspace;
+
+struct AccelerationFlags {
+  bool accelerate = false;
+  std::optional<std::string> kpsa, stale, tolerance, violation_rate;
+  bool wanted() const { return accelerate || kpsa.has_value(); }
+};
+// --accelerate --kpsa --stale --tolerance --violation-rate; without the first one where a command accelerates
+// anyway.
+void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags, bool optional = true);
+// All refusals that need no rig. Where nothing is accelerated, the other flags are refused.
+Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted);
+
+// "0.2mm" as metres, "1%" or "0.01" as a share.
+Result<double> ParseTolerance(const std::string& text);
+Result<double> ParseRate(const std::string& text);
+
+// One accelerate entry of the rig with its subspace in place.
+struct AppliedSubspace {
+  std::string name;  // of the entry
+  std::string path;  // of the subspace file
+  Acceleration entry;
+  std::shared_ptr<const Subspace> subspace;
+  NodeId node;                               // the KPSA node
+  std::shared_ptr<const KpsaConfig> config;  // of the node
+  std::vector<std::string> notes;            // what may surprise
+  double tolerance = 0, violation_rate = 0;  // in force
+};
+
+// Rewrites the rig's graph; final points that are accelerated are then those of the KPSA node
+// (CharacterMesh::points). Call it with the clip and the settings in place that will be evaluated. --kpsa M
+// replaces the file of the entry that has the same points; a rig without entries gets one from the subspace.
+// Errors: no such file (and which command makes it), a stale subspace (unless `stale` is "miss").
+Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compiler,
+                                                       const AccelerationFlags& flags);
+
+// What the KPSA nodes decided, frame after frame. Asks for four more outputs a node.
+class Verdicts {
+ public:
+  Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, Request* request);
+  void Add(std::size_t frame, const Evaluator& evaluator);
+
+  std::size_t frames() const { return frames_; }
+  std::size_t hits() const { return hits_; }  // frames in which all nodes hit
+  double hit_rate() const {
+    return frames_ == 0 ? 0 : static_cast<double>(hits_) / static_cast<double>(frames_);
+  }
+  bool last_hit() const { return last_hit_; }
+  double last_score() const { return last_score_; }
+  double worst_score() const { return worst_score_; }
+  std::string Text() const;  // one line: hits, misses, worst score
+  std::string WorstMiss()
+      const;  // why the first miss of the most frequent reason happened; "" without misses
+
+ private:
+  struct Reason {
+    std::string text;
+    std::size_t count = 0, first_frame = 0;
+  };
+  const std::vector<AppliedSubspace>* applied_;
+  Index first_output_;
+  std::size_t frames_ = 0, hits_ = 0, worst_frame_ = 0;
+  double worst_score_ = 0, last_score_ = 0;
+  bool last_hit_ = false;
+  std::vector<Reason> reasons_;
+};
+
+}  // namespace kpsa

@@ -1,0 +1,129 @@
+#include "cli/bench_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "cli/table.h"
+
+namespace kpsa {
+namespace {
+
+double Finite(double value) { return std::isfinite(value) ? value : -1; }
+
+}  // namespace
+
+std::string BenchJson(const BenchResult& r, const BenchContext& context) {
+  nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
+  for (const BenchNode& n : r.full_nodes) {
+    nodes.push_back({{"name", n.name},
+                     {"type", n.type},
+                     {"ms_per_frame", n.ms_per_frame},
+                     {"points", n.points},
+                     {"ns_per_point", n.points == 0 ? 0 : n.ms_per_frame * 1e6 / n.points}});
+  }
+  const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
+  const std::string bound =
+      fmt::format("the graph above the points ({:.4f} ms){}", r.bound_graph_ms,
+                  r.bound_points_ms > 0
+                      ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
+                      : "");
+  const nlohmann::ordered_json document = {
+      {"schema", "kpsa.bench/1"},
+      {"rig", context.rig},
+      {"clip", fmt::format("{}", fmt::join(r.clips, ", "))},
+      {"clips", r.clips},
+      {"trained_on", r.trained_on},
+      {"points", r.points},
+      {"output_points", r.output_points},
+      {"cues", r.cues},
+      {"cue_stages", r.cue_stages},
+      {"modes", r.modes},
+      {"frames", r.frames},
+      {"threads", context.options.threads},
+      {"runs", context.options.runs},
+      {"tolerance", r.tolerance},
+      {"full",
+       {{"ms_per_frame", r.full_ms},
+        {"ns_per_point", r.output_points == 0 ? 0 : r.full_ms * 1e6 / static_cast<double>(r.output_points)},
+        {"nodes", nodes}}},
+      {"accelerated",
+       {{"ms_per_frame", r.accelerated_ms},
+        {"graph", r.graph_ms},
+        {"cues", r.cues_ms},
+        {"projection", r.projection_ms},
+        {"reconstruction", r.reconstruction_ms},
+        {"downstream", r.downstream_ms},
+        {"misses", r.misses_ms}}},
+      {"speedup", r.speedup()},
+      {"speedup_on_hits",
+       r.hits == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(r.speedup_on_hits())},
+      {"ceiling", {{"speedup", r.ceiling()}, {"ms_per_frame", r.bound_ms}, {"bound_by", bound}}},
+      {"hit_rate", static_cast<double>(r.hits) / frames},
+      {"violation_rate", static_cast<double>(r.violations) / frames},
+      {"violation_limit", r.violation_limit},
+      {"error",
+       {{"rms", Finite(r.error_rms)},
+        {"max", Finite(r.error_max)},
+        {"p99", Finite(r.error_p99)},
+        {"bbox_diagonal", r.diagonal},
+        {"worst_clip", r.worst_clip},
+        {"worst_frame", r.worst_frame}}},
+      {"motion", {{"rms", r.motion_rms}}},
+      {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
+      {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
+      {"notes", r.notes}};
+  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::string BenchText(const BenchResult& r, const BenchContext& context) {
+  std::string text;
+  const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
+  text += fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
+                      Plural(r.cues, "cue"), fmt::join(r.cue_stages, ", "), r.modes);
+  text += fmt::format("trained on {}; tested on {}: {}, {}, medians of {}\n\n", fmt::join(r.trained_on, ", "),
+                      fmt::join(r.clips, ", "), Plural(r.frames, "frame"),
+                      Plural(static_cast<std::uint64_t>(context.options.threads), "thread"),
+                      Plural(static_cast<std::uint64_t>(context.options.runs), "run"));
+  std::string heaviest;
+  for (std::size_t i = 0; i < std::min<std::size_t>(4, r.full_nodes.size()); ++i)
+    heaviest +=
+        fmt::format("{}{} {:.3f}", i == 0 ? "" : ", ", r.full_nodes[i].name, r.full_nodes[i].ms_per_frame);
+  std::string parts = fmt::format("graph {:.3f}, cues {:.3f}, projection {:.3f}, reconstruction {:.3f}",
+                                  r.graph_ms, r.cues_ms, r.projection_ms, r.reconstruction_ms);
+  if (r.downstream_ms > 0) parts += fmt::format(", later stages {:.3f}", r.downstream_ms);
+  if (r.misses_ms > 0) parts += fmt::format(", misses {:.3f}", r.misses_ms);
+  Table times({"", ">ms/frame", "of which"});
+  times.Row({"full", fmt::format("{:.3f}", r.full_ms), heaviest});
+  times.Row({"accelerated", fmt::format("{:.3f}", r.accelerated_ms), parts});
+  text += times.Text();
+  text += fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
+                      r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
+                      r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  text += fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}\n",
+                      100 * static_cast<double>(r.hits) / frames,
+                      100 * static_cast<double>(r.violations) / frames, LengthText(r.tolerance));
+  text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
+                      LengthText(r.error_rms), LengthText(r.error_p99), LengthText(r.error_max),
+                      r.worst_frame, r.worst_clip, LengthText(r.motion_rms), LengthText(r.diagonal));
+  text += fmt::format(
+      "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
+      Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),
+      Thousands(static_cast<std::uint64_t>(std::llround(r.points_full))), r.never_evaluated.size(),
+      r.nodes_total,
+      r.never_evaluated.empty()
+          ? ""
+          : fmt::format(
+                ": {}{}",
+                fmt::join(r.never_evaluated.begin(),
+                          r.never_evaluated.begin() +
+                              static_cast<std::ptrdiff_t>(std::min<std::size_t>(6, r.never_evaluated.size())),
+                          ", "),
+                r.never_evaluated.size() > 6 ? ", ..." : ""));
+  if (!r.worst_miss.empty()) text += r.worst_miss + "\n";
+  const std::string with = context.kpsa.has_value() ? "--kpsa " + *context.kpsa : "--accelerate";
+  text += fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
+  return text;
+}
+
+}  // namespace kpsa

@@ -1,0 +1,70 @@
+// kpsa init: a starter rig for a character.
+#include <filesystem>
+#include <memory>
+
+#include "cli/common.h"
+#include "cli/frames_range.h"
+#include "cli/options.h"
+#include "cli/output.h"
+#include "io/rig_writer.h"
+
+namespace kpsa {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct InitFlags : Flags {
+  std::optional<std::string> iterations, samples;
+};
+
+CommandResult Init(const InitFlags& flags) {
+  StarterOptions options;
+  const Result<int> iterations = ParseCount("--iterations", flags.iterations.value_or("10"), 0, 200);
+  if (!iterations.ok()) return iterations.status();
+  const Result<int> samples = ParseCount("--samples", flags.samples.value_or("2000"), 0, 1'000'000);
+  if (!samples.ok()) return samples.status();
+  options.iterations = *iterations;
+  options.samples = *samples;
+  const std::string suffix = Suffix(flags.file);
+  if (suffix != ".glb" && suffix != ".gltf")
+    return Status::Usage("expected a character, .glb or .gltf").At({flags.file});
+  const std::string stem = fs::path(flags.file).stem().string();
+  const std::string place = flags.output.value_or(stem + ".yaml");
+  KPSA_RETURN_IF_ERROR(CheckOutput(place, flags.force, {".yaml", ".yml"}));
+  // The rig names its character relative to itself
+  std::error_code error;
+  const fs::path folder = place == "-" ? fs::path() : fs::path(place).parent_path();
+  const fs::path relative = fs::relative(flags.file, folder.empty() ? fs::path(".") : folder, error);
+  options.character = error || relative.empty() ? flags.file : relative.string();
+  options.subspace = (place == "-" ? stem : fs::path(place).stem().string()) + ".kpsa";
+  NodeRegistry registry;
+  AddAllNodes(registry);
+  const Result<std::string> text = StarterRig(registry, flags.file, options);
+  if (!text.ok()) return text.status();
+  KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, *text));
+  if (!flags.quiet && place != "-")
+    Say(fmt::format("{}: a starter rig; read it, it says what to change\nnext: kpsa train {}", place, place));
+  return 0;
+}
+
+}  // namespace
+
+void AddInitCommand(CLI::App* program, Command* chosen) {
+  auto flags = std::make_shared<InitFlags>();
+  CLI::App* command = AddCommand(
+      program, "init", "Write a starter rig for a character",
+      "Controls are ranged by the character's clips; its own deformers are followed by a deltaMush.\n"
+      "Examples:\n"
+      "  kpsa init head.glb\n"
+      "  kpsa init characters/head.glb -o rigs/head.yaml",
+      chosen, [flags] { return Init(*flags); });
+  AddRequired(command, "CHARACTER", &flags->file, "a character, .glb or .gltf");
+  AddOutputFlags(command, flags.get(),
+                 "the rig; the character's name with .yaml, in this folder, if not given");
+  AddOption(command, "--iterations", "N", &flags->iterations, "of the deltaMush; 10 if not given");
+  AddOption(command, "--samples", "N", &flags->samples,
+            "training poses drawn from the controls; 2000 if not given");
+  AddQuietFlag(command, flags.get());
+}
+
+}  // namespace kpsa

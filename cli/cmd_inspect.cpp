@@ -1,0 +1,110 @@
+// kpsa inspect: what is in a file.
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/command.h"
+#include "cli/common.h"
+#include "cli/file_facts.h"
+#include "cli/frames_range.h"
+#include "cli/options.h"
+#include "cli/table.h"
+
+namespace kpsa {
+namespace {
+
+std::string CellText(const FactTable::Cell& cell) {
+  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
+  if (const auto* count = std::get_if<std::uint64_t>(&cell)) return Thousands(*count);
+  return fmt::format("{:.6g}", std::get<double>(cell));
+}
+
+nlohmann::ordered_json CellJson(const FactTable::Cell& cell) {
+  return std::visit([](const auto& value) { return nlohmann::ordered_json(value); }, cell);
+}
+
+// "mesh node" -> "mesh_node".
+std::string Key(std::string name) {
+  if (name.starts_with('>')) name.erase(0, 1);
+  for (char& c : name) {
+    if (c == ' ') c = '_';
+  }
+  return name;
+}
+
+nlohmann::ordered_json Json(const std::string& path, const FileFacts& facts) {
+  nlohmann::ordered_json json = {{"schema", "kpsa.inspect/1"}, {"file", path}, {"kind", facts.kind}};
+  for (const auto& [name, value] : facts.facts) {
+    json[Key(name)] = CellJson(value);
+    if (name == "training") {
+      // It is JSON in the file already
+      const auto training = nlohmann::ordered_json::parse(std::get<std::string>(value), nullptr, false);
+      if (!training.is_discarded()) json["training"] = training;
+    }
+  }
+  for (const FactTable& table : facts.tables) {
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    for (const auto& row : table.rows) {
+      nlohmann::ordered_json object = nlohmann::ordered_json::object();
+      for (std::size_t c = 0; c < row.size(); ++c) object[Key(table.columns[c])] = CellJson(row[c]);
+      rows.push_back(std::move(object));
+    }
+    json[Key(table.name)] = std::move(rows);
+  }
+  json["notes"] = facts.notes;
+  return json;
+}
+
+CommandResult Inspect(const Flags& flags) {
+  double fps = 24;
+  if (flags.fps.has_value()) {
+    const Result<double> parsed = ParseNumber("--fps", *flags.fps);
+    if (!parsed.ok()) return parsed.status();
+    if (!(*parsed > 0)) return Status::Usage("--fps {}: expected a number above 0", *flags.fps);
+    fps = *parsed;
+  }
+  const Result<FileFacts> facts = InspectFile(flags.file, fps);
+  if (!facts.ok()) return facts.status();
+  if (flags.json) {
+    PrintJson(Json(flags.file, *facts));
+    return 0;
+  }
+  Print(fmt::format("{}: {}\n", flags.file, facts->kind));
+  for (const auto& [name, value] : facts->facts) {
+    const auto* bytes = std::get_if<std::uint64_t>(&value);
+    const std::string text = bytes != nullptr && name.ends_with("bytes") ? ByteText(*bytes) : CellText(value);
+    Print(fmt::format("  {:<18} {}\n",
+                      name.ends_with(" bytes") ? name.substr(0, name.size() - 6)
+                      : name == "bytes"        ? "size"
+                                               : name,
+                      text));
+  }
+  for (const FactTable& facts_table : facts->tables) {
+    if (facts_table.rows.empty()) continue;
+    Table table(facts_table.columns);
+    for (const auto& row : facts_table.rows) {
+      std::vector<std::string> cells;
+      for (const FactTable::Cell& cell : row) cells.push_back(CellText(cell));
+      table.Row(std::move(cells));
+    }
+    Print(fmt::format("\n{} ({})\n{}", facts_table.name, facts_table.rows.size(), table.Text()));
+  }
+  for (const std::string& note : facts->notes) Print("note: " + note + "\n");
+  return 0;
+}
+
+}  // namespace
+
+void AddInspectCommand(CLI::App* program, Command* chosen) {
+  auto flags = std::make_shared<Flags>();
+  CLI::App* command = AddCommand(program, "inspect", "What is in any file that kpsa reads or writes",
+                                 "Examples:\n"
+                                 "  kpsa inspect head.glb\n"
+                                 "  kpsa inspect head.kpsa --json",
+                                 chosen, [flags] { return Inspect(*flags); });
+  AddRequired(command, "FILE", &flags->file, ".glb .gltf .yaml .npz .pc2 .mdd .kpsa, or .json (weight maps)");
+  AddOption(command, "--fps", "N", &flags->fps, "frames a second of .pc2 files; 24 if not given");
+  AddJsonFlag(command, flags.get());
+}
+
+}  // namespace kpsa

@@ -1,0 +1,175 @@
+// kpsa train: a rig to a subspace.
+#include <algorithm>
+#include <memory>
+
+#include "base/parallel.h"
+#include "cli/acceleration.h"
+#include "cli/command.h"
+#include "cli/frames_range.h"
+#include "cli/options.h"
+#include "cli/output.h"
+#include "cli/progress.h"
+#include "cli/rig_training.h"
+#include "cli/train_report.h"
+
+namespace kpsa {
+namespace {
+
+constexpr std::size_t kCheckPoses = 60;
+
+struct TrainFlags : Flags {
+  std::optional<std::string> name, samples, clips, seed, rows, modes, key_points, tolerance, violation_rate;
+  bool paper = false;
+};
+
+// All numbers of the flags, over those of the rig's entry.
+Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
+  const auto count = [](const char* what, const std::optional<std::string>& text, int low, int high,
+                        auto* to) -> Status {
+    if (!text.has_value()) return Status();
+    const Result<int> value = ParseCount(what, *text, low, high);
+    if (!value.ok()) return value.status();
+    *to = static_cast<std::remove_pointer_t<decltype(to)>>(*value);
+    return Status();
+  };
+  KPSA_RETURN_IF_ERROR(count("--samples", flags.samples, 0, 1'000'000, &options->samples));
+  KPSA_RETURN_IF_ERROR(count("--seed", flags.seed, 0, 2'000'000'000, &options->seed));
+  KPSA_RETURN_IF_ERROR(count("--rows", flags.rows, 3, 3000, &options->rows));
+  KPSA_RETURN_IF_ERROR(count("--modes", flags.modes, 1, 2000, &options->max_modes));
+  KPSA_RETURN_IF_ERROR(count("--key-points", flags.key_points, 2, 2000, &options->key_points));
+  if (flags.key_points.has_value() && !flags.paper)
+    return Status::Usage(
+        "--key-points is for --paper; otherwise --rows says how many measurements there are");
+  if (flags.paper) options->mode = EstimatorMode::kPaper;
+  if (flags.tolerance.has_value()) {
+    const Result<double> value = ParseTolerance(*flags.tolerance);
+    if (!value.ok()) return value.status();
+    options->tolerance = *value;
+  }
+  if (flags.violation_rate.has_value()) {
+    const Result<double> value = ParseRate(*flags.violation_rate);
+    if (!value.ok()) return value.status();
+    options->violation_rate = *value;
+  }
+  return Status();
+}
+
+// The entry of the rig's accelerate section, by name where there are several.
+Result<Acceleration> ChooseEntry(const Rig& rig, const TrainFlags& flags) {
+  if (rig.accelerate.empty())
+    return Status::Invalid(
+               "has no accelerate section, so nothing to train; kpsa init writes a rig that has one")
+        .At({rig.path});
+  std::vector<std::string> names;
+  for (const Acceleration& entry : rig.accelerate) names.push_back(entry.name);
+  if (!flags.name.has_value()) {
+    if (names.size() == 1) return rig.accelerate.front();
+    return Status::Usage("the rig accelerates {}: expected one of them with --name", fmt::join(names, ", "));
+  }
+  const auto found = std::find(names.begin(), names.end(), *flags.name);
+  if (found == names.end())
+    return Status::Usage("--name {}: the rig accelerates {}{}", *flags.name, fmt::join(names, ", "),
+                         DidYouMean(*flags.name, names));
+  return rig.accelerate[static_cast<std::size_t>(found - names.begin())];
+}
+
+std::vector<std::string> SplitNames(const std::string& text) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    if (end > begin) names.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return names;
+}
+
+CommandResult RunTrain(const TrainFlags& flags) {
+  const Result<int> threads = ThreadCount(flags);
+  if (!threads.ok()) return threads.status();
+  TrainOptions options;
+  KPSA_RETURN_IF_ERROR(ReadOptions(flags, &options));
+  if (flags.output.has_value()) KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, {".kpsa"}));
+  if (flags.output == "-") return Status::Usage("-o -: expected a file name that ends in .kpsa");
+  const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
+  if (!open.ok()) return open.status();
+  Rig& rig = (*open)->rig;
+  const Result<Acceleration> entry = ChooseEntry(rig, flags);
+  if (!entry.ok()) return entry.status();
+  const std::string path = flags.output.value_or(entry->subspace);
+  if (path.empty())
+    return Status::Usage("accelerate: \"{}\" names no subspace file: expected -o FILE.kpsa", entry->name);
+  KPSA_RETURN_IF_ERROR(CheckOutput(path, flags.force, {".kpsa"}));
+  if (!flags.samples.has_value()) options.samples = static_cast<std::size_t>(entry->train_samples);
+  if (!flags.tolerance.has_value()) options.tolerance = entry->tolerance;
+  if (!flags.violation_rate.has_value()) options.violation_rate = entry->violation_rate;
+  const Result<std::vector<TrainingClip>> clips =
+      ClipFrames(rig, flags.clips.has_value() ? SplitNames(*flags.clips) : entry->train_clips);
+  if (!clips.ok()) return flags.clips.has_value() ? AsUsage(clips.status()) : clips.status();
+
+  // Nothing is written before the end, so an interrupt may end the program at any time
+  const ThreadLimit limit(*threads);
+  Progress progress("train", 100, flags.quiet);
+  std::string stage;
+  options.progress = [&](const char* what, double share) {
+    if (stage != what) progress.SetLabel(fmt::format("train: {}", what), 100);
+    stage = what;
+    progress.Set(static_cast<std::size_t>(100 * share));
+    return true;
+  };
+  Result<Subspace> trained = Train(MakeTrainingRig(&rig, *entry), *clips, options);
+  if (!trained.ok()) return Status(trained.status()).At({rig.path});
+  const auto subspace = std::make_shared<const Subspace>(std::move(*trained));
+  const TrainingRecord record = ParseTraining(subspace->training);
+  const Calibration calibration =
+      Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
+  const Result<SubspaceCheck> check =
+      CheckSubspace(&rig, *entry, subspace, kCheckPoses, options.seed ^ 0x9e3779b97f4a7c15ull);
+  if (!check.ok()) return check.status();
+  const InterruptScope writing;
+  KPSA_RETURN_IF_ERROR(WriteSubspace(*subspace, path));
+  const TrainResult result{flags.file,  path,  !flags.output.has_value(), subspace, record,
+                           calibration, *check};
+  Print(flags.json ? TrainJson(result) : TrainText(result));
+  if (!flags.quiet) {
+    for (const std::string& warning : {record.warning, calibration.warning}) {
+      if (!warning.empty()) Say("warning: " + warning);
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+void AddTrainCommand(CLI::App* program, Command* chosen) {
+  auto flags = std::make_shared<TrainFlags>();
+  CLI::App* command = AddCommand(
+      program, "train", "Learn a subspace from a rig's clips and controls",
+      "Test clips of the rig are never trained on. An existing subspace is replaced with --force only.\n"
+      "Examples:\n"
+      "  kpsa train head.yaml\n"
+      "  kpsa train head.yaml --samples 4000 --tolerance 0.1mm -o fine.kpsa\n"
+      "  kpsa train head.yaml --paper --key-points 80 -o paper.kpsa",
+      chosen, [flags] { return RunTrain(*flags); });
+  AddRigFlags(command, flags.get());
+  AddOutputFlags(command, flags.get(), "the subspace, .kpsa; the one that the rig names if not given");
+  AddOption(command, "--name", "NAME", &flags->name,
+            "an entry of the rig's accelerate section, where it has several");
+  AddOption(command, "--clips", "A,B,...", &flags->clips, "train on these clips instead of the rig's");
+  AddOption(command, "--samples", "N", &flags->samples,
+            "poses drawn from the controls; the rig's number if not given");
+  AddOption(command, "--seed", "N", &flags->seed, "of the sampled poses; 1 if not given");
+  AddOption(command, "--rows", "N", &flags->rows,
+            "numbers measured a frame (a point has three); 240 if not given");
+  AddOption(command, "--modes", "N", &flags->modes, "modes at most; 250 if not given");
+  AddOption(command, "--tolerance", "LENGTH", &flags->tolerance, "the largest error of a point, as in 0.2mm");
+  AddOption(command, "--violation-rate", "SHARE", &flags->violation_rate,
+            "share of frames that may exceed it, as in 1%");
+  AddSwitch(command, "--paper", &flags->paper,
+            "the method of the paper: key points of varimax modes, least squares");
+  AddOption(command, "--key-points", "N", &flags->key_points, "key points of --paper; 80 if not given");
+  AddThreadsFlag(command, flags.get());
+  AddQuietFlag(command, flags.get());
+  AddJsonFlag(command, flags.get());
+}
+
+}  // namespace kpsa

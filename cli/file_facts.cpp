@@ -1,0 +1,262 @@
+#include "cli/file_facts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <map>
+
+#include "cli/common.h"
+#include "cli/output.h"
+#include "io/npz.h"
+#include "io/point_cache.h"
+#include "io/weights_json.h"
+#include "kpsa/subspace.h"
+
+namespace kpsa {
+namespace {
+
+using Cell = FactTable::Cell;
+
+Cell Count(std::size_t count) { return static_cast<std::uint64_t>(count); }
+
+std::uint64_t FileSize(const std::string& path) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path, error);
+  return error ? 0 : size;
+}
+
+// The box around x y z values: "0.1 x 0.3 x 0.2 m", or that some are not finite.
+std::string BoxText(const std::vector<float>& xyz) {
+  double low[3], high[3];
+  for (int c = 0; c < 3; ++c) low[c] = std::numeric_limits<double>::infinity(), high[c] = -low[c];
+  for (std::size_t i = 0; i + 2 < xyz.size(); i += 3) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double v = static_cast<double>(xyz[i + c]);
+      if (!std::isfinite(v)) return "values that are not finite";
+      low[c] = std::min(low[c], v), high[c] = std::max(high[c], v);
+    }
+  }
+  return xyz.empty() ? "empty"
+                     : fmt::format("{:.4g} x {:.4g} x {:.4g} m", high[0] - low[0], high[1] - low[1],
+                                   high[2] - low[2]);
+}
+
+const char* NpzTypeName(NpzType type) {
+  static const char* const kNames[] = {"float32", "float64", "int8",   "int16",  "int32", "int64",
+                                       "uint8",   "uint16",  "uint32", "uint64", "bool"};
+  return kNames[static_cast<std::size_t>(type)];
+}
+
+}  // namespace
+
+Result<FileFacts> InspectCharacter(const std::string& path) {
+  const Result<gltf::Character> character = gltf::LoadGltf(path);
+  if (!character.ok()) return character.status();
+  FileFacts facts;
+  facts.kind = "character";
+  facts.facts = {{"bytes", FileSize(path)},
+                 {"nodes", Count(character->nodes.size())},
+                 {"skins", Count(character->skins.size())},
+                 {"materials", Count(character->materials.size())}};
+  FactTable meshes{
+      "meshes",
+      {"mesh node", ">primitives", ">vertices", ">triangles", ">joints", ">influences", ">targets"},
+      {}};
+  const std::vector<std::string> names = character->UniqueNames();
+  std::uint64_t memory = 0;
+  for (Index n : character->MeshNodes()) {
+    const gltf::Node& node = character->nodes[n];
+    const gltf::Mesh& mesh = character->meshes[node.mesh];
+    std::size_t triangles = 0, most = 0;
+    for (const gltf::Primitive& primitive : mesh.primitives) triangles += primitive.triangles.size() / 3;
+    if (mesh.skinned()) {
+      for (std::size_t v = 0; v < mesh.vertex_count(); ++v)
+        most = std::max(most, mesh.influence_rows().row(v).size());
+    }
+    memory += mesh.positions.size() * 4 + mesh.influences.size() * sizeof(gltf::Influence);
+    for (const gltf::MorphTarget& target : mesh.targets)
+      memory += target.deltas.size() * 4 + target.vertices.size() * 4;
+    meshes.rows.push_back({names[n], Count(mesh.primitives.size()), Count(mesh.vertex_count()),
+                           Count(triangles),
+                           Count(node.skin == kNoIndex ? 0 : character->skins[node.skin].joints.size()),
+                           Count(most), Count(mesh.targets.size())});
+  }
+  FactTable clips{"clips", {"clip", ">seconds", ">channels", ">keys"}, {}};
+  for (const gltf::Clip& clip : character->clips) {
+    std::size_t keys = 0;
+    for (const gltf::Channel& channel : clip.channels) {
+      keys += channel.times.size();
+      memory += (channel.times.size() + channel.values.size()) * 8;
+    }
+    clips.rows.push_back({clip.id, clip.duration, Count(clip.channels.size()), Count(keys)});
+  }
+  facts.facts.emplace_back("memory bytes", memory);
+  facts.tables = {std::move(meshes), std::move(clips)};
+  facts.notes = character->warnings;
+  return facts;
+}
+
+Result<FileFacts> InspectRig(const std::string& path) {
+  Flags flags;
+  flags.file = path;
+  const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
+  if (!open.ok()) return open.status();
+  const Rig& rig = (*open)->rig;
+  FileFacts facts;
+  facts.kind = "rig";
+  facts.facts = {{"character", rig.character->path},
+                 {"fps", rig.fps},
+                 {"length", rig.units.length_name},
+                 {"angle", rig.units.angle_name},
+                 {"nodes", Count(rig.graph->Nodes().size())}};
+  FactTable meshes{"meshes", {"mesh", ">vertices", ">points", "stack"}, {}};
+  for (const CharacterMesh& mesh : rig.scene.meshes) {
+    std::vector<std::string> stages;
+    for (const Stage& stage : mesh.stages) stages.push_back(stage.name);
+    meshes.rows.push_back({mesh.name, Count(mesh.vertex_count), Count(mesh.mesh().point_count()),
+                           fmt::format("{}", fmt::join(stages, " > "))});
+  }
+  FactTable types{"node types", {"type", ">nodes"}, {}};
+  std::map<std::string, std::size_t> counts;
+  for (NodeId node : rig.graph->Nodes()) ++counts[rig.graph->def(node).name];
+  for (const auto& [type, count] : counts) types.rows.push_back({type, Count(count)});
+  FactTable clips{"clips", {"clip", ">seconds"}, {}};
+  for (const CharacterClip& clip : rig.scene.clips) clips.rows.push_back({clip.id, clip.duration});
+  FactTable controls{"controls", {"control", ">min", ">max", ">rest"}, {}};
+  for (const Control& control : rig.controls) {
+    const double factor = 1 / rig.units.FactorOf(control.unit);
+    controls.rows.push_back(
+        {control.name, control.min * factor, control.max * factor, control.value * factor});
+  }
+  FactTable accelerate{
+      "accelerate", {"name", "points", "subspace", ">tolerance", "train clips", "test clips"}, {}};
+  for (const Acceleration& a : rig.accelerate) {
+    std::vector<std::string> points;
+    for (const AcceleratedPoints& p : a.points)
+      points.push_back(rig.scene.meshes[p.mesh].name + "@" + rig.scene.meshes[p.mesh].stages[p.stage].name);
+    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(points, ", ")), a.subspace,
+                               LengthText(a.tolerance), fmt::format("{}", fmt::join(a.train_clips, ", ")),
+                               fmt::format("{}", fmt::join(a.test_clips, ", "))});
+  }
+  FactTable files{"files", {"file"}, {}};
+  for (const std::string& file : rig.files) files.rows.push_back({file});
+  facts.tables = {std::move(meshes),   std::move(types),      std::move(clips),
+                  std::move(controls), std::move(accelerate), std::move(files)};
+  facts.notes = rig.notes;
+  return facts;
+}
+
+Result<FileFacts> InspectNpz(const std::string& path) {
+  const Result<Npz> npz = ReadNpz(path, std::uint64_t{8} << 30);
+  if (!npz.ok()) return npz.status();
+  FileFacts facts;
+  facts.kind = "npz";
+  facts.facts = {{"bytes", FileSize(path)}};
+  FactTable arrays{"arrays", {"array", "type", "shape", "box of all frames"}, {}};
+  for (const NpzArray& array : npz->arrays) {
+    const bool vertices = array.shape.size() == 3 && array.shape[2] == 3;
+    arrays.rows.push_back({array.name, std::string(NpzTypeName(array.type)),
+                           fmt::format("({})", fmt::join(array.shape, ", ")),
+                           vertices ? BoxText(array.Floats()) : ""});
+    if (array.name == "times" && array.size() > 0) {
+      const std::vector<double> times = array.Doubles();
+      facts.facts.emplace_back("frames", Count(times.size()));
+      facts.facts.emplace_back("first time", times.front());
+      facts.facts.emplace_back("last time", times.back());
+    }
+  }
+  facts.tables = {std::move(arrays)};
+  return facts;
+}
+
+Result<FileFacts> InspectPointCache(const std::string& path, double fps) {
+  const bool pc2 = Suffix(path) == ".pc2";
+  const Result<PointCache> cache = pc2 ? ReadPc2(path, fps) : ReadMdd(path, fps);
+  if (!cache.ok()) return cache.status();
+  FileFacts facts;
+  facts.kind = pc2 ? "pc2" : "mdd";
+  facts.facts = {{"bytes", FileSize(path)}, {"frames", Count(cache->times.size())}};
+  if (!cache->times.empty())
+    facts.facts.insert(facts.facts.end(),
+                       {{"first time", cache->times.front()}, {"last time", cache->times.back()}});
+  for (const PointCacheMesh& mesh : cache->meshes) {
+    facts.facts.emplace_back("vertices", Count(mesh.vertex_count));
+    facts.facts.emplace_back("box of all frames", BoxText(mesh.frames));
+  }
+  return facts;
+}
+
+Result<FileFacts> InspectSubspace(const std::string& path) {
+  const Result<Subspace> subspace = ReadSubspace(path);
+  if (!subspace.ok()) return subspace.status();
+  FileFacts facts;
+  facts.kind = "subspace";
+  std::uint64_t memory = (subspace->whitening.size() + subspace->cue_mean.size() * 2) * 8;
+  for (const TileMap& tiles : subspace->tiles) memory += tiles.bytes();
+  facts.facts = {{"bytes", FileSize(path)},
+                 {"estimator",
+                  std::string(subspace->mode == EstimatorMode::kMap ? "MAP" : "least squares (paper mode)")},
+                 {"modes", Count(subspace->modes)},
+                 {"components", static_cast<std::uint64_t>(subspace->components)},
+                 {"space", subspace->space.empty() ? "world or mesh" : subspace->space},
+                 {"tolerance", LengthText(subspace->tolerance)},
+                 {"violation rate", subspace->violation_rate},
+                 {"calibration poses", Count(subspace->calibration.size())},
+                 {"rig", subspace->rig_hash},
+                 {"memory bytes", memory},
+                 {"training", subspace->training}};
+  FactTable outputs{"outputs", {"points", ">count"}, {}};
+  for (const SubspaceOutput& output : subspace->outputs)
+    outputs.rows.push_back({output.name, Count(output.points)});
+  FactTable cues{"cues", {"kind", "where", ">point"}, {}};
+  for (const CueDescription& cue : subspace->cues) {
+    if (cue.kind == CueDescription::Kind::kScalar) {
+      cues.rows.push_back({std::string("scalar"), cue.plug, std::string()});
+    } else {
+      cues.rows.push_back(
+          {std::string("point"),
+           fmt::format("{}, stage {}",
+                       cue.mesh < subspace->outputs.size() ? subspace->outputs[cue.mesh].name : "?",
+                       cue.stage),
+           Count(cue.point)});
+    }
+  }
+  FactTable ranges{"trained ranges", {"plug", ">min", ">max"}, {}};
+  for (const TrainedRange& range : subspace->ranges) ranges.rows.push_back({range.plug, range.lo, range.hi});
+  facts.tables = {std::move(outputs), std::move(cues), std::move(ranges)};
+  return facts;
+}
+
+Result<FileFacts> InspectWeights(const std::string& path) {
+  const Result<WeightFile> file = ReadWeightFile(path);
+  if (!file.ok()) return file.status();
+  FileFacts facts;
+  facts.kind = "weights";
+  facts.facts = {{"mesh", file->mesh}, {"points", Count(file->points)}};
+  FactTable maps{"maps", {"map", ">entries", ">default", ">min", ">max"}, {}};
+  for (const auto& map : file->maps) {
+    const auto [low, high] = std::minmax_element(map.values.begin(), map.values.end());
+    const double none = static_cast<double>(map.default_value);
+    maps.rows.push_back({map.name, Count(map.values.size()), none,
+                         map.values.empty() ? none : static_cast<double>(*low),
+                         map.values.empty() ? none : static_cast<double>(*high)});
+  }
+  facts.tables = {std::move(maps)};
+  return facts;
+}
+
+Result<FileFacts> InspectFile(const std::string& path, double fps) {
+  const std::string suffix = Suffix(path);
+  if (suffix == ".glb" || suffix == ".gltf") return InspectCharacter(path);
+  if (suffix == ".yaml" || suffix == ".yml") return InspectRig(path);
+  if (suffix == ".npz") return InspectNpz(path);
+  if (suffix == ".pc2" || suffix == ".mdd") return InspectPointCache(path, fps);
+  if (suffix == ".kpsa") return InspectSubspace(path);
+  if (suffix == ".json") return InspectWeights(path);
+  return Status::
+      Usage("expected a file that ends in .glb, .gltf, .yaml, .npz, .pc2, .mdd, .kpsa or .json (weight maps)")
+          .At({path});
+}
+
+}  // namespace kpsa

@@ -1,0 +1,88 @@
+#include "cli/request.h"
+
+#include "cli/frames_range.h"
+#include "cli/rig_frames.h"
+
+namespace kpsa {
+namespace {
+
+std::vector<std::string> MeshNames(const Rig& rig) {
+  std::vector<std::string> names;
+  for (const CharacterMesh& mesh : rig.scene.meshes) names.push_back(mesh.name);
+  return names;
+}
+
+const CharacterMesh* FindMesh(const Rig& rig, std::string_view name) {
+  for (const CharacterMesh& mesh : rig.scene.meshes) {
+    if (mesh.name == name) return &mesh;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Result<MeshStage> FindMeshStage(const Rig& rig, std::string_view text) {
+  if (const CharacterMesh* mesh = FindMesh(rig, text)) return MeshStage{mesh, mesh->points};
+  const std::size_t at = text.rfind('@');
+  const std::string_view name = text.substr(0, at);
+  const CharacterMesh* mesh = FindMesh(rig, name);
+  if (mesh == nullptr)
+    return Status::Usage("\"{}\": no mesh is called \"{}\"{}", text, name, DidYouMean(name, MeshNames(rig)));
+  const std::string_view stage_name = text.substr(at + 1);
+  const Stage* stage = mesh->FindStage(stage_name);
+  if (stage == nullptr) {
+    std::vector<std::string> stages;
+    for (const Stage& s : mesh->stages) stages.push_back(s.name);
+    return Status::Usage("\"{}\": the mesh has no stage \"{}\"; it has {}", text, stage_name,
+                         fmt::join(stages, ", "));
+  }
+  return MeshStage{mesh, stage->points};
+}
+
+Result<WantedPlug> FindWanted(const Rig& rig, std::string_view text) {
+  const bool mesh_like = text.find('@') != std::string_view::npos || FindMesh(rig, text) != nullptr;
+  const Result<PlugRef> plug = rig.graph->FindPlug(text);
+  if (plug.ok()) return WantedPlug{*plug, nullptr};
+  if (mesh_like) {
+    const Result<MeshStage> stage = FindMeshStage(rig, text);
+    if (!stage.ok()) return stage.status();
+    return WantedPlug{stage->points, stage->mesh};
+  }
+  Status usage;
+  for (const Error& error : plug.status().errors()) usage.Append(Status::Usage("{}", error.message));
+  return usage;
+}
+
+Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wanted,
+                             const std::optional<std::string>& vertices) {
+  std::vector<WantedPlug> plugs;
+  for (const std::string& text : wanted) {
+    Result<WantedPlug> plug = FindWanted(rig, text);
+    if (!plug.ok()) return plug.status();
+    plugs.push_back(*plug);
+  }
+  if (wanted.empty()) {
+    for (const CharacterMesh& mesh : rig.scene.meshes) plugs.push_back({mesh.points, &mesh});
+  }
+  Request request;
+  request.varying.push_back(rig.scene.time);
+  for (const WantedPlug& plug : plugs) {
+    RequestedOutput output{plug.plug, {}};
+    output.plug.component = -1;
+    if (vertices.has_value()) {
+      if (plug.mesh == nullptr)
+        return Status::Usage("--vertices is for the points of meshes, not for {}",
+                             rig.graph->PlugName(plug.plug));
+      const Result<std::vector<Index>> indices =
+          ParseIndices("--vertices", *vertices, plug.mesh->vertex_count);
+      if (!indices.ok()) return indices.status();
+      std::vector<Index> points;
+      for (Index vertex : *indices) points.push_back(plug.mesh->mesh().data().vertex_to_point[vertex]);
+      output.points = PointSet::Of(std::move(points), plug.mesh->mesh().point_count());
+    }
+    request.outputs.push_back(std::move(output));
+  }
+  return request;
+}
+
+}  // namespace kpsa

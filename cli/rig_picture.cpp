@@ -1,0 +1,78 @@
+#include "cli/rig_picture.h"
+
+#include <algorithm>
+
+namespace kpsa {
+
+Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
+                                        const RigFrameOptions& options) {
+  const auto plan = CompileFor(rig, compiler, AllMeshes(rig));
+  if (!plan.ok()) return plan.status();
+  std::vector<Pose> poses(times.size(), Pose(rig.scene.meshes.size()));
+  KPSA_RETURN_IF_ERROR(
+      EvaluateTimes(rig, *plan, times, options, [&](std::size_t frame, const Evaluator& evaluator) {
+        for (Index m = 0; m < rig.scene.meshes.size(); ++m) {
+          const ConstPointsView points = evaluator.Points(m);
+          std::vector<float>& xyz = poses[frame][m];
+          xyz.resize(3 * points.count);
+          for (std::size_t i = 0; i < points.count; ++i)
+            xyz[3 * i] = points.x[i], xyz[3 * i + 1] = points.y[i], xyz[3 * i + 2] = points.z[i];
+        }
+        return Status();
+      }));
+  return poses;
+}
+
+RenderInput MakeInput(const Rig& rig, const Pose& pose) {
+  RenderInput input;
+  for (std::size_t m = 0; m < pose.size(); ++m) {
+    const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
+    const std::span<const Index> triangles(mesh.triangles);
+    const bool colored =
+        std::any_of(mesh.primitives.begin(), mesh.primitives.end(), [](const Mesh::Primitive& p) {
+          return p.base_color[0] != p.base_color[1] || p.base_color[1] != p.base_color[2];
+        });
+    if (!colored) {
+      RenderPart part;
+      part.points = pose[m], part.triangles = triangles;
+      input.parts.push_back(part);
+      continue;
+    }
+    for (const Mesh::Primitive& primitive : mesh.primitives) {
+      RenderPart part;
+      part.points = pose[m], part.triangles = triangles.subspan(std::size_t{3} * primitive.first_triangle,
+                                                                std::size_t{3} * primitive.triangle_count);
+      part.color = {double{primitive.base_color[0]}, double{primitive.base_color[1]},
+                    double{primitive.base_color[2]}};
+      if (!part.triangles.empty()) input.parts.push_back(part);
+    }
+  }
+  return input;
+}
+
+double WorstDistance(const Pose& a, const Pose& b) {
+  double worst = 0;
+  for (std::size_t m = 0; m < a.size(); ++m) {
+    for (float distance : PointDistances(a[m], b[m])) worst = std::max(worst, double{distance});
+  }
+  return worst;
+}
+
+Image StackRows(const std::vector<Image>& rows) {
+  if (rows.size() == 1) return rows.front();
+  constexpr int kGap = 4;
+  int width = 0, height = -kGap;
+  for (const Image& row : rows) width = std::max(width, row.width), height += row.height + kGap;
+  Image all(width, height, {255, 255, 255});
+  int y = 0;
+  for (const Image& row : rows) {
+    for (int i = 0; i < row.height; ++i)
+      std::copy_n(row.rgb.begin() + std::ptrdiff_t{3} * i * row.width,
+                  std::size_t{3} * static_cast<std::size_t>(row.width),
+                  all.rgb.begin() + std::ptrdiff_t{3} * (y + i) * width);
+    y += row.height + kGap;
+  }
+  return all;
+}
+
+}  // namespace kpsa

@@ -1,0 +1,23 @@
+// From a rig's evaluated points to pictures.
+#pragma once
+
+#include <vector>
+
+#include "cli/picture.h"
+#include "cli/rig_frames.h"
+
+namespace kpsa {
+
+// The points of all meshes at one time, x y z interleaved.
+using Pose = std::vector<std::vector<float>>;
+
+// The final points of all meshes at the times.
+Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
+                                        const RigFrameOptions& options);
+// One part a mesh, or one a primitive where materials have colours. Refers to both arguments.
+RenderInput MakeInput(const Rig& rig, const Pose& pose);
+double WorstDistance(const Pose& a, const Pose& b);  // metres
+// Pictures below each other.
+Image StackRows(const std::vector<Image>& rows);
+
+}  // namespace kpsa

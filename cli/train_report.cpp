@@ -1,0 +1,91 @@
+#include "cli/train_report.h"
+
+#include <nlohmann/json.hpp>
+
+#include "cli/common.h"
+#include "cli/table.h"
+
+namespace kpsa {
+
+std::size_t TrainResult::points() const {
+  std::size_t points = 0;
+  for (const SubspaceOutput& output : subspace->outputs) points += output.points;
+  return points;
+}
+
+std::string TrainJson(const TrainResult& r) {
+  nlohmann::ordered_json poses = nlohmann::ordered_json::array(), regions = poses;
+  for (const auto& pose : r.check.worst_poses)
+    poses.push_back(
+        {{"controls", pose.controls}, {"region", pose.region}, {"max", pose.max}, {"rms", pose.rms}});
+  for (const auto& region : r.check.worst_regions)
+    regions.push_back({{"name", region.name}, {"rms", region.rms}, {"max", region.max}});
+  const nlohmann::ordered_json document =
+      nlohmann::ordered_json{{"schema", "kpsa.train/1"},
+                             {"subspace", r.path},
+                             {"points", r.points()},
+                             {"cues", r.subspace->cues.size()},
+                             {"rows", r.subspace->rows()},
+                             {"modes", r.subspace->modes},
+                             {"trained_on",
+                              {{"clips", r.record.clips},
+                               {"clip_poses", r.record.clip_poses},
+                               {"sampled_poses", r.record.sampled_poses}}},
+                             {"seconds", r.record.seconds},
+                             {"held_out",
+                              {{"poses", r.record.calibration_poses},
+                               {"rms", r.record.held_out_rms},
+                               {"max", r.record.held_out_max}}},
+                             {"motion", {{"rms", r.record.motion_rms}}},
+                             {"calibration",
+                              {{"tolerance", r.subspace->tolerance},
+                               {"violation_rate", r.calibration.alpha},
+                               {"hit_rate", r.calibration.hit_rate},
+                               {"violations", r.calibration.violations},
+                               {"warning", r.calibration.warning}}},
+                             {"check",
+                              {{"poses", r.check.poses},
+                               {"rms", r.check.rms},
+                               {"max", r.check.max},
+                               {"worst_poses", poses},
+                               {"worst_regions", regions}}},
+                             {"predicted",
+                              {{"full_ms", r.check.full_ms},
+                               {"accelerated_ms", r.check.accelerated_ms},
+                               {"speedup", r.check.PredictedSpeedup(r.calibration.hit_rate)}}}};
+  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::string TrainText(const TrainResult& r) {
+  std::string text;
+  text += fmt::format("{}: {}, {} ({} numbers), {} modes, {:.1f} s\n", r.path, Plural(r.points(), "point"),
+                      Plural(r.subspace->cues.size(), "cue"), r.subspace->rows(), r.subspace->modes,
+                      r.record.seconds);
+  text += fmt::format("trained on {} of {} and {}\n", Plural(r.record.clip_poses, "frame"),
+                      r.record.clips.empty() ? "no clip" : fmt::format("{}", fmt::join(r.record.clips, ", ")),
+                      Plural(r.record.sampled_poses, "sampled pose"));
+  text += fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n",
+                      Plural(r.record.calibration_poses, "pose"), LengthText(r.record.held_out_rms),
+                      LengthText(r.record.held_out_max), LengthText(r.record.motion_rms));
+  text += fmt::format("calibrated for {} in {:.3g} % of poses: {:.1f} % of held-out poses hit\n",
+                      LengthText(r.subspace->tolerance), 100 * (1 - r.calibration.alpha),
+                      100 * r.calibration.hit_rate);
+  if (r.check.poses > 0) {
+    text += fmt::format(
+        "tried on {} of the controls: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "
+        "{:.1f}x with these hits\n",
+        Plural(r.check.poses, "new pose"), r.check.full_ms, r.check.accelerated_ms,
+        r.check.PredictedSpeedup(r.calibration.hit_rate));
+    Table poses({"worst poses (controls)", "where", ">max", ">RMS"});
+    for (const auto& pose : r.check.worst_poses)
+      poses.Row({pose.controls, pose.region, LengthText(pose.max), LengthText(pose.rms)});
+    Table regions({"worst regions", ">RMS", ">max"});
+    for (const auto& region : r.check.worst_regions)
+      regions.Row({region.name, LengthText(region.rms), LengthText(region.max)});
+    text += "\n" + poses.Text() + "\n" + regions.Text();
+  }
+  text += fmt::format("\nnext: kpsa bench {}{}\n", r.rig, r.own_path ? "" : " --kpsa " + r.path);
+  return text;
+}
+
+}  // namespace kpsa

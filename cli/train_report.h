@@ -1,0 +1,28 @@
+// What training gave, as text and as JSON.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "cli/subspace_check.h"
+#include "kpsa/calibration.h"
+#include "kpsa/training_record.h"
+
+namespace kpsa {
+
+struct TrainResult {
+  std::string rig, path;  // of the files
+  bool own_path = true;   // the rig names this subspace itself
+  std::shared_ptr<const Subspace> subspace;
+  TrainingRecord record;
+  Calibration calibration;
+  SubspaceCheck check;
+  std::size_t points() const;
+};
+
+// Times in milliseconds, lengths in metres.
+std::string TrainJson(const TrainResult& r);
+// For people, with the next command.
+std::string TrainText(const TrainResult& r);
+
+}  // namespace kpsa

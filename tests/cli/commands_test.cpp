@@ -1,0 +1,310 @@
+// What the commands do with sound input, on the smallest rig.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "io/npz.h"
+#include "tests/cli/process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace kpsa {
+namespace {
+
+using Json = nlohmann::json;
+const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
+const std::string kHelloGlb = KPSA_SCENES_DIR "/hello/hello.glb";
+
+std::string Ok(const std::vector<std::string>& arguments) {
+  const ProcessResult run = RunKpsa(arguments);
+  std::string line;
+  for (const std::string& word : arguments) line += word + " ";
+  EXPECT_EQ(run.exit_code, 0) << line << "\n" << run.err;
+  return run.out;
+}
+
+Json OkJson(const std::vector<std::string>& arguments) {
+  const Json document = Json::parse(Ok(arguments), nullptr, false);
+  EXPECT_FALSE(document.is_discarded());
+  return document;
+}
+
+TEST(Eval, AllFormatsHoldTheSameFrames) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.npz", "a.pc2", "a.mdd", "a.usda", "a.glb"})
+    Ok({"eval", kHello, "--frames", "0:12", "-o", folder / name, "-q"});
+  EXPECT_EQ(folder.FileCount(), 5u);
+  EXPECT_NE(Ok({"compare", folder / "a.npz", folder / "a.pc2"}).find("same"), std::string::npos);
+  EXPECT_NE(Ok({"compare", folder / "a.mdd", folder / "a.npz"}).find("same"), std::string::npos);
+  EXPECT_EQ(TemporaryFolder::Read(folder / "a.usda").substr(0, 5), "#usda");
+  // What was written as morph targets can be evaluated, and comes close
+  Ok({"eval", folder / "a.glb", "--fps", "24", "--frames", "0:12", "-o", folder / "b.npz"});
+  const Json close = Json::parse(
+      RunKpsa({"compare", folder / "a.pc2", folder / "b.npz", "--tolerance", "1mm", "--json"}).out, nullptr,
+      false);
+  EXPECT_EQ(close["same"], true) << close.dump();
+}
+
+TEST(Eval, StdoutGetsTheSameBytes) {
+  const TemporaryFolder folder;
+  Ok({"eval", kHello, "--frames", "0:3", "-o", folder / "a.npz"});
+  EXPECT_EQ(Ok({"eval", kHello, "--frames", "0:3", "-o", "-"}), TemporaryFolder::Read(folder / "a.npz"));
+}
+
+TEST(Eval, SameBytesForAnyThreadsAndWaysToSayTimes) {
+  const TemporaryFolder folder;
+  Ok({"eval", kHello, "--frames", "0:24:12", "--threads", "1", "-o", folder / "a.npz"});
+  Ok({"eval", kHello, "--times", "0,0.5,1", "--threads", "3", "-o", folder / "b.npz"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "a.npz"), TemporaryFolder::Read(folder / "b.npz"));
+  Ok({"eval", kHello, "--times", "1,0,0.5", "-o", folder / "c.npz"});
+  const Result<Npz> forward = ReadNpz(folder / "a.npz"), shuffled = ReadNpz(folder / "c.npz");
+  ASSERT_TRUE(forward.ok() && shuffled.ok());
+  const std::vector<float> a = forward->arrays[1].Floats(), c = shuffled->arrays[1].Floats();
+  const std::size_t frame = a.size() / 3;
+  EXPECT_TRUE(std::equal(a.begin(), a.begin() + static_cast<std::ptrdiff_t>(frame),
+                         c.begin() + static_cast<std::ptrdiff_t>(frame)));
+}
+
+TEST(Eval, ExistingFilesAreKeptWithoutForce) {
+  const TemporaryFolder folder;
+  folder.Write("a.npz", "mine");
+  EXPECT_EQ(RunKpsa({"eval", kHello, "--times", "0", "-o", folder / "a.npz"}).exit_code, 2);
+  EXPECT_EQ(TemporaryFolder::Read(folder / "a.npz"), "mine");
+  Ok({"eval", kHello, "--times", "0", "-o", folder / "a.npz", "--force"});
+  EXPECT_TRUE(ReadNpz(folder / "a.npz").ok());
+}
+
+TEST(Eval, SettingsAndPosesMovePoints) {
+  const TemporaryFolder folder;
+  Ok({"eval", kHello, "--rest", "-o", folder / "rest.npz"});
+  Ok({"eval", kHello, "--rest", "--set", "upper.rotateZ=-20", "-o", folder / "set.npz"});
+  folder.Write("pose.yaml", "kpsa: 1\npose: {upper.rotateZ: -20}\n");
+  Ok({"eval", kHello, "--rest", "--pose", folder / "pose.yaml", "-o", folder / "pose.npz"});
+  EXPECT_EQ(RunKpsa({"compare", folder / "rest.npz", folder / "set.npz"}).exit_code, 1);
+  EXPECT_EQ(RunKpsa({"compare", folder / "set.npz", folder / "pose.npz"}).exit_code, 0);
+}
+
+TEST(Eval, AnInterruptLeavesNothing) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.npz", "a.pc2"}) {
+    const ProcessResult run =
+        RunKpsaInterrupted({"eval", kHello, "--frames", "0:400000", "-o", folder / name}, 1.0);
+    EXPECT_EQ(run.exit_code, 130) << name << run.err;
+    EXPECT_NE(run.err.find("interrupted"), std::string::npos);
+    EXPECT_EQ(folder.FileCount(), 0u) << name;
+  }
+}
+
+TEST(Get, CsvAndJsonAgreeWithEval) {
+  const TemporaryFolder folder;
+  Ok({"eval", kHello, "--times", "0.5", "-o", folder / "a.npz"});
+  const Result<Npz> npz = ReadNpz(folder / "a.npz");
+  ASSERT_TRUE(npz.ok());
+  const Json json =
+      OkJson({"get", kHello, "column", "upper.worldMatrix", "upper.poseRotateZ", "--times", "0.5", "--json"});
+  const std::vector<float> points = npz->arrays[1].Floats();
+  const Json& values = json["plugs"][0]["values"][0];
+  ASSERT_EQ(values.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i)
+    EXPECT_EQ(static_cast<float>(values[i].get<double>()), points[i]);
+  EXPECT_EQ(json["plugs"][1]["values"][0].size(), 16u);
+  EXPECT_EQ(json["plugs"][1]["values"][0][15], 1.0);
+  EXPECT_EQ(json["plugs"][2]["unit"], "deg");
+  EXPECT_GT(std::abs(json["plugs"][2]["values"][0].get<double>()), 1.0);  // degrees, mid-clip
+
+  std::istringstream csv(Ok({"get", kHello, "upper.worldMatrix", "upper.poseRotateZ", "--frames", "0:4"}));
+  std::string line;
+  std::size_t lines = 0;
+  while (std::getline(csv, line)) {
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 17) << line;
+    ++lines;
+  }
+  EXPECT_EQ(lines, 6u);
+}
+
+TEST(Compile, MasksToTheVerticesThatAreWanted) {
+  const Json all = OkJson({"compile", kHello, "--json"}),
+             few = OkJson({"compile", kHello, "--want", "column@skin", "--vertices", "0:2", "--json"});
+  std::map<std::string, Json> kept;
+  for (const Json& node : few["nodes"]) kept[node["name"]] = node;
+  const auto skin =
+      std::find_if(kept.begin(), kept.end(), [](const auto& n) { return n.second["type"] == "skinCluster"; });
+  ASSERT_NE(skin, kept.end());
+  EXPECT_EQ(skin->second["points"], 3);
+  EXPECT_FALSE(kept.contains("mush"));
+  bool excluded = false;
+  for (const Json& node : few["excluded"])
+    excluded = excluded || (node["name"] == "mush" && node["reason"] == "not needed by the request");
+  EXPECT_TRUE(excluded);
+  for (const Json& node : all["nodes"]) {
+    if (node["name"] == "mush") {
+      EXPECT_EQ(node["points"], node["points_total"]);
+    }
+  }
+}
+
+TEST(Profile, TracesNestAndTimesAddUp) {
+  const TemporaryFolder folder;
+  for (const char* threads : {"1", "2"}) {
+    const std::string trace_path = folder / (std::string(threads) + ".json");
+    const Json report = OkJson(
+        {"profile", kHello, "--frames", "0:20", "--threads", threads, "--trace", trace_path, "--json"});
+    double nodes = 0;
+    for (const Json& node : report["nodes"]) {
+      nodes += node["self_ms"].get<double>();
+      EXPECT_GE(node["inclusive_ms"].get<double>(), node["self_ms"].get<double>());
+    }
+    EXPECT_GT(nodes, 0);
+    if (std::string(threads) == "1") {
+      EXPECT_LE(nodes, report["ms_per_frame"].get<double>());
+    }
+    EXPECT_LE(report["critical_path"]["ms"].get<double>(), nodes * 1.0001);
+    EXPECT_GE(report["ceiling"]["speedup"].get<double>(), 1);
+
+    const Json trace = Json::parse(TemporaryFolder::Read(trace_path), nullptr, false);
+    ASSERT_FALSE(trace.is_discarded());
+    std::map<int, std::vector<std::pair<double, double>>> tracks;
+    for (const Json& event : trace["traceEvents"]) {
+      if (event["ph"] == "X")
+        tracks[event["tid"]].emplace_back(event["ts"],
+                                          event["ts"].get<double>() + event["dur"].get<double>());
+    }
+    EXPECT_EQ(tracks[0].size(), 21u);
+    EXPECT_GE(tracks.size(), 2u);
+    for (auto& [track, events] : tracks) {
+      std::sort(events.begin(), events.end(), [](const auto& a, const auto& b) {
+        return a.first != b.first ? a.first < b.first : a.second > b.second;
+      });
+      std::vector<double> open;
+      for (const auto& [begin, end] : events) {
+        while (!open.empty() && open.back() <= begin + 1e-6) open.pop_back();
+        EXPECT_TRUE(open.empty() || end <= open.back() + 1e-6)
+            << "track " << track << " overlaps at " << begin;
+        open.push_back(end);
+      }
+    }
+  }
+}
+
+TEST(Compare, DiffersIsNotAnError) {
+  const TemporaryFolder folder;
+  Ok({"eval", kHello, "--times", "0,0.5", "-o", folder / "a.npz"});
+  Ok({"eval", kHello, "--times", "0,0.6", "-o", folder / "other_times.npz"});
+  Ok({"eval", kHello, "--times", "0", "-o", folder / "one.npz"});
+  Ok({"eval", kHello, "--times", "0,0.5", "--set", "mush.envelope=0", "-o", folder / "b.npz"});
+  EXPECT_EQ(RunKpsa({"compare", folder / "a.npz", folder / "a.npz"}).exit_code, 0);
+  const ProcessResult differ = RunKpsa({"compare", folder / "a.npz", folder / "b.npz", "--json"});
+  EXPECT_EQ(differ.exit_code, 1);
+  const Json report = Json::parse(differ.out, nullptr, false);
+  ASSERT_EQ(report["frames"].size(), 2u);
+  const double max = report["max"];
+  EXPECT_GT(max, 0);
+  for (const Json& frame : report["frames"]) {
+    EXPECT_LE(frame["rms"], frame["max"]);
+    EXPECT_LE(frame["p99"], frame["max"]);
+  }
+  EXPECT_EQ(
+      RunKpsa({"compare", folder / "a.npz", folder / "b.npz", "--tolerance", fmt::format("{}m", max * 1.001)})
+          .exit_code,
+      0);
+  EXPECT_EQ(
+      RunKpsa({"compare", folder / "a.npz", folder / "b.npz", "--tolerance", fmt::format("{}m", max * 0.999)})
+          .exit_code,
+      1);
+  EXPECT_EQ(RunKpsa({"compare", folder / "a.npz", folder / "other_times.npz"}).exit_code, 1);
+  EXPECT_EQ(RunKpsa({"compare", folder / "a.npz", folder / "one.npz"}).exit_code, 1);
+}
+
+TEST(Nodes, EveryTypeIsDocumented) {
+  const Json reference = OkJson({"nodes", "--json"});
+  EXPECT_GT(reference["nodes"].size(), 20u);
+  for (const Json& node : reference["nodes"]) {
+    EXPECT_NE(node["doc"], "") << node["name"];
+    EXPECT_FALSE(node["attributes"].empty()) << node["name"];
+  }
+  EXPECT_NE(Ok({"nodes", "deltaMush"}).find("iterations"), std::string::npos);
+  EXPECT_NE(Ok({"nodes", "--markdown"}).find("### deltaMush"), std::string::npos);
+}
+
+TEST(Inspect, KnowsWhatItWrites) {
+  const TemporaryFolder folder;
+  Ok({"eval", kHello, "--frames", "0:4", "-o", folder / "a.npz"});
+  Ok({"eval", kHello, "--frames", "0:4", "-o", folder / "a.mdd"});
+  EXPECT_EQ(OkJson({"inspect", kHello, "--json"})["kind"], "rig");
+  EXPECT_EQ(OkJson({"inspect", kHelloGlb, "--json"})["kind"], "character");
+  EXPECT_EQ(OkJson({"inspect", folder / "a.npz", "--json"})["frames"], 5);
+  EXPECT_EQ(OkJson({"inspect", folder / "a.mdd", "--json"})["frames"], 5);
+  EXPECT_EQ(OkJson({"inspect", KPSA_SCENES_DIR "/face/w/face.json", "--json"})["kind"], "weights");
+}
+
+// The first five minutes: init, train, bench, and what follows from them.
+TEST(Acceleration, FirstFiveMinutes) {
+  const TemporaryFolder folder;
+  const std::string rig = folder / "hello.yaml", subspace = folder / "hello.kpsa";
+  Ok({"init", kHelloGlb, "-o", rig});
+  Ok({"validate", rig});
+  EXPECT_EQ(RunKpsa({"bench", rig}).exit_code, 3) << "no subspace yet";
+  const Json trained = OkJson({"train", rig, "--samples", "120", "--json", "-q"});
+  EXPECT_TRUE(std::filesystem::exists(subspace));
+  EXPECT_GT(trained["cues"], 0);
+  EXPECT_GE(trained["check"]["worst_poses"].size(), 1u);
+  EXPECT_EQ(RunKpsa({"train", rig, "--samples", "120"}).exit_code, 2) << "an existing subspace";
+  EXPECT_EQ(OkJson({"inspect", subspace, "--json"})["kind"], "subspace");
+
+  const Json bench = OkJson({"bench", rig, "--runs", "2", "--json", "-q"});
+  for (const char* key : {"clip", "trained_on", "points", "cues", "cue_stages", "modes", "frames", "threads",
+                          "speedup", "speedup_on_hits", "ceiling", "hit_rate", "violation_rate", "motion"}) {
+    EXPECT_TRUE(bench.contains(key)) << key;
+  }
+  EXPECT_EQ(bench["schema"], "kpsa.bench/1");
+  const Json& fast = bench["accelerated"];
+  const double parts = fast["graph"].get<double>() + fast["cues"].get<double>() +
+                       fast["projection"].get<double>() + fast["reconstruction"].get<double>() +
+                       fast["downstream"].get<double>() + fast["misses"].get<double>();
+  EXPECT_NEAR(parts, fast["ms_per_frame"].get<double>(), 0.25 * fast["ms_per_frame"].get<double>());
+  EXPECT_GT(bench["full"]["ms_per_frame"], 0);
+  EXPECT_TRUE(bench["nodes"]["never_evaluated"].is_array());
+  EXPECT_LE(bench["error"]["rms"], bench["error"]["max"]);
+
+  // Tolerance 0: the exact rig, bit for bit
+  Ok({"eval", rig, "-o", folder / "full.npz"});
+  Ok({"eval", rig, "--accelerate", "--tolerance", "0", "-o", folder / "zero.npz"});
+  EXPECT_EQ(RunKpsa({"compare", folder / "full.npz", folder / "zero.npz"}).exit_code, 0);
+  const Json evaluated = OkJson({"eval", rig, "--accelerate", "--json", "-o", folder / "fast.npz"});
+  EXPECT_EQ(evaluated["accelerated"]["hits"].get<int>() + evaluated["accelerated"]["misses"].get<int>(),
+            evaluated["frames"].get<int>());
+  EXPECT_NE(RunKpsa({"eval", rig, "--kpsa", subspace, "-o", folder / "own.npz"}).err.find("hits"),
+            std::string::npos);
+  EXPECT_EQ(RunKpsa({"compare", folder / "fast.npz", folder / "own.npz"}).exit_code, 0);
+
+  // Another rig than the trained one is refused, or evaluated fully
+  const ProcessResult stale =
+      RunKpsa({"eval", rig, "--accelerate", "--set", "mush.iterations=3", "-o", folder / "stale.npz"});
+  EXPECT_EQ(stale.exit_code, 3);
+  EXPECT_NE(stale.err.find("mush.iterations"), std::string::npos) << stale.err;
+  Ok({"eval", rig, "--accelerate", "--stale", "miss", "--set", "mush.iterations=3", "-o",
+      folder / "stale.npz"});
+  Ok({"eval", rig, "--set", "mush.iterations=3", "-o", folder / "exact.npz"});
+  EXPECT_EQ(RunKpsa({"compare", folder / "stale.npz", folder / "exact.npz"}).exit_code, 0);
+
+  EXPECT_NE(Ok({"compile", rig, "--accelerate"}).find("kpsa"), std::string::npos);
+  EXPECT_NE(Ok({"explain", rig, "mush", "--accelerate"}).find("only if"), std::string::npos);
+  EXPECT_EQ(Ok({"graph", rig, "--accelerate"}).substr(0, 7), "digraph");
+  Ok({"render", rig, "--accelerate", "--size", "64x64", "-o", folder / "error.png"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "error.png").substr(1, 3), "PNG");
+}
+
+TEST(Render, PicturesOfFrames) {
+  const TemporaryFolder folder;
+  Ok({"render", kHello, "--frames", "0:24:8", "--size", "48x64", "-o", folder / "frames.png"});
+  Ok({"render", kHello, "--turntable", "3", "--size", "48x64", "-o", folder / "around.png"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "around.png").substr(1, 3), "PNG");
+  EXPECT_EQ(folder.FileCount(), 2u);
+}
+
+}  // namespace
+}  // namespace kpsa

@@ -1,0 +1,84 @@
+#include "tests/cli/process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "tests/support/temporary_folder.h"
+
+extern char** environ;
+
+namespace kpsa {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+ProcessResult Run(const std::vector<std::string>& arguments, double limit_seconds, double interrupt_after,
+                  const std::string& folder, const std::vector<std::string>& more_environment) {
+  ProcessResult result;
+  const TemporaryFolder streams;
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 1, (streams / "out").c_str(), O_WRONLY | O_CREAT, 0600);
+  posix_spawn_file_actions_addopen(&actions, 2, (streams / "err").c_str(), O_WRONLY | O_CREAT, 0600);
+  if (!folder.empty()) posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+  std::vector<std::string> words = {KPSA_PROGRAM};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv, environment;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  std::vector<std::string> entries = more_environment;
+  for (std::string& entry : entries) environment.push_back(entry.data());
+  for (char** entry = environ; *entry != nullptr; ++entry) environment.push_back(*entry);
+  environment.push_back(nullptr);
+  pid_t process = 0;
+  const int spawned = posix_spawn(&process, KPSA_PROGRAM, &actions, nullptr, argv.data(), environment.data());
+  posix_spawn_file_actions_destroy(&actions);
+  if (spawned != 0) {
+    result.err = "cannot be started";
+    return result;
+  }
+  const auto begin = Clock::now();
+  bool interrupted = false, ended = false;
+  int status = 0;
+  while (::waitpid(process, &status, WNOHANG) == 0) {
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    if (interrupt_after >= 0 && !interrupted && seconds > interrupt_after) {
+      ::kill(process, SIGINT);
+      interrupted = true;
+    }
+    if (seconds > limit_seconds && !ended) {
+      ::kill(process, SIGKILL);
+      ended = true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  if (!ended) result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.out = TemporaryFolder::Read(streams / "out");
+  result.err = TemporaryFolder::Read(streams / "err");
+  return result;
+}
+
+}  // namespace
+
+std::size_t ProcessResult::error_lines() const {
+  return static_cast<std::size_t>(std::count(err.begin(), err.end(), '\n'));
+}
+
+ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds,
+                      const std::string& folder, const std::vector<std::string>& environment) {
+  return Run(arguments, limit_seconds, -1, folder, environment);
+}
+
+ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds) {
+  return Run(arguments, 60, delay_seconds, "", {});
+}
+
+}  // namespace kpsa

@@ -1,0 +1,21 @@
+// Runs the kpsa program as a user does, and gives what it printed.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace kpsa {
+
+struct ProcessResult {
+  int exit_code = -1;  // 128 + signal where one ended it; -1: it ran longer than the limit and was ended
+  std::string out, err;
+  std::size_t error_lines() const;
+};
+
+// Without a terminal; `environment` entries ("NO_COLOR=1") are added to the test's.
+ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds = 60,
+                      const std::string& folder = "", const std::vector<std::string>& environment = {});
+// Starts it, sends SIGINT after the delay, and waits.
+ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds);
+
+}  // namespace kpsa

@@ -1,0 +1,193 @@
+#include "kpsa/soft_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <cmath>
+
+#include "base/simd.h"
+#include "kpsa/eigen_solvers.h"
+#include "tests/kpsa/synthetic.h"
+
+namespace kpsa {
+namespace {
+
+using test::Sheet;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+class SoftCacheTest : public testing::Test {
+ protected:
+  SoftCacheTest() : sheet_(200, 15, 1), training_(sheet_.RandomPoses(200, 2, sheet_.Layout(false, true))), test_(sheet_.RandomPoses(100, 3, sheet_.Layout(false, true))) {
+    const Eigen::VectorXd mean = training_.Mean();
+    training_.Subtract(mean);
+    test_.Subtract(mean);
+    pca_ = std::move(*ComputePca(training_, mean, {.max_modes = 30}));
+    const std::vector<CueRef> cues = {{CueKind::kOutput, 20}, {CueKind::kOutput, 70}, {CueKind::kScalar, 15}, {CueKind::kOutput, 130},
+                                      {CueKind::kScalar, 3},  {CueKind::kOutput, 190}, {CueKind::kOutput, 100}};
+    cues_ = MakeCueSet(pca_, cues, sheet_.diagonal());
+    estimator_ = MapEstimator(pca_, cues_);
+    model_ = MakeSoftCacheModel(estimator_, cues_, test::AllMeasured(training_, cues_, MeasuredCues));
+  }
+  RawScores Raw(const SoftCacheModel& model, const Eigen::VectorXd& y) const {
+    std::vector<double> scratch(model.rows());
+    return ComputeRawScores(model, {y.data(), model.rows()}, scratch);
+  }
+  Verdict Verdicts(const Eigen::VectorXd& y, double tau) const {
+    std::vector<double> scratch(model_.rows());
+    return Judge(model_, {.tau = tau}, {y.data(), model_.rows()}, scratch);
+  }
+
+  Sheet sheet_;
+  PoseMatrix training_, test_;
+  Pca pca_;
+  CueSet cues_;
+  Estimator estimator_;
+  SoftCacheModel model_;
+};
+
+TEST_F(SoftCacheTest, ScoresAgreeWithLeavingEachCueOut) {
+  const Eigen::MatrixXd& g = estimator_.covariance;
+  for (std::size_t t = 0; t < 10; ++t) {
+    const Eigen::VectorXd y = MeasuredCues(pca_.layout, cues_, test_.row(t));
+    const RawScores raw = Raw(model_, y);
+    EXPECT_NEAR(raw.score1 / y.dot(g.llt().solve(y)), 1, 1e-8);
+
+    // The naive twin predicts every cue from the others
+    double largest = 0;
+    Index worst = 0;
+    for (std::size_t k = 0; k < cues_.cues.size(); ++k) {
+      std::vector<Eigen::Index> in, out;
+      for (Eigen::Index j = 0; j < cues_.rows(); ++j) (j >= cues_.offsets[k] && j < cues_.offsets[k + 1] ? in : out).push_back(j);
+      const Eigen::MatrixXd others = g(out, out), cross = g(in, out);
+      const Eigen::VectorXd error = y(in) - cross * others.llt().solve(Eigen::VectorXd(y(out)));
+      // A scalar counts by the displacement of its column of the gain
+      const double weight = cues_.cues[k].kind == CueKind::kScalar ? estimator_.gain.col(in[0]).cwiseAbs().maxCoeff() : 1;
+      if (weight * error.norm() > largest) largest = weight * error.norm(), worst = static_cast<Index>(k);
+    }
+    EXPECT_NEAR(raw.score2 / largest, 1, 1e-6);
+    EXPECT_EQ(raw.worst_cue, worst);
+  }
+}
+
+TEST_F(SoftCacheTest, OneInAHundredTrainingPosesExceedsEachQuantile) {
+  int above1 = 0, above2 = 0;
+  for (std::size_t t = 0; t < training_.poses(); ++t) {
+    const RawScores raw = Raw(model_, MeasuredCues(pca_.layout, cues_, training_.row(t)));
+    above1 += raw.score1 > model_.quantile1;
+    above2 += raw.score2 > model_.quantile2;
+  }
+  EXPECT_EQ(above1, 2);
+  EXPECT_EQ(above2, 2);
+}
+
+TEST_F(SoftCacheTest, PaperModeScoresTheResidual) {
+  const Pca pca = TruncatedPca(pca_, 6);
+  const CueSet cues = MakeCueSet(pca, std::vector<CueRef>{{CueKind::kOutput, 20}, {CueKind::kOutput, 70}, {CueKind::kOutput, 130}, {CueKind::kOutput, 190}},
+                                 sheet_.diagonal());
+  const Estimator estimator = LeastSquaresEstimator(pca, cues);
+  ASSERT_EQ(estimator.mode, EstimatorMode::kPaper) << estimator.warning;
+  const SoftCacheModel model = MakeSoftCacheModel(estimator, cues, test::AllMeasured(training_, cues, MeasuredCues));
+  for (std::size_t t = 0; t < 10; ++t) {
+    const Eigen::VectorXd y = MeasuredCues(pca.layout, cues, test_.row(t));
+    const Eigen::VectorXd p = cues.loadings.householderQr().solve(y);
+    const RawScores raw = Raw(model, y);
+    EXPECT_NEAR(raw.score1, (y - cues.loadings * p).norm(), 1e-12);
+    EXPECT_EQ(raw.score2, 0);
+  }
+}
+
+TEST_F(SoftCacheTest, AnUntrainedDeformationScoresHigher) {
+  double trained = 0;
+  for (std::size_t t = 0; t < test_.poses(); ++t) trained = std::max(trained, Verdicts(MeasuredCues(pca_.layout, cues_, test_.row(t)), 1).score);
+  // One point is pulled out by a centimetre
+  Eigen::VectorXd y = MeasuredCues(pca_.layout, cues_, test_.row(0));
+  y[cues_.offsets[3] + 1] += 0.01;
+  const Verdict verdict = Verdicts(y, trained);
+  EXPECT_GT(verdict.score, 1.5 * trained);
+  EXPECT_FALSE(verdict.hit);
+  EXPECT_EQ(verdict.full_weight, 1);
+  EXPECT_EQ(verdict.reason, MissReason::kScore);
+  EXPECT_LT(verdict.offender, model_.cues());
+}
+
+TEST_F(SoftCacheTest, NotFiniteMeasurementsAreMissesThatNameTheirCue) {
+  for (const double bad : {std::nan(""), kInfinity, -kInfinity}) {
+    for (const double tau : {1.0, kInfinity, -1.0}) {
+      Eigen::VectorXd y = MeasuredCues(pca_.layout, cues_, test_.row(0));
+      y[cues_.offsets[2]] = bad;
+      const Verdict verdict = Verdicts(y, tau);
+      EXPECT_FALSE(verdict.hit);
+      EXPECT_EQ(verdict.full_weight, 1);
+      EXPECT_EQ(verdict.reason, MissReason::kNotFinite);
+      EXPECT_EQ(verdict.offender, 2u);
+    }
+  }
+  // Finite, but so large that the score overflows
+  const Verdict huge = Verdicts(Eigen::VectorXd::Constant(cues_.rows(), 1e200), kInfinity);
+  EXPECT_FALSE(huge.hit);
+  EXPECT_EQ(huge.reason, MissReason::kNotFinite);
+}
+
+TEST_F(SoftCacheTest, ThresholdsAtTheirEnds) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(cues_.rows());
+  EXPECT_EQ(Verdicts(zero, -1).reason, MissReason::kNeverHit);
+  EXPECT_FALSE(Verdicts(zero, 0).hit);
+  EXPECT_TRUE(Verdicts(zero, 1e-9).hit);
+  EXPECT_TRUE(Verdicts(Eigen::VectorXd::Constant(cues_.rows(), 1e3), kInfinity).hit);
+}
+
+TEST(SoftCache, TheBlendIsSmoothAndMonotone) {
+  const SoftCacheThreshold threshold{.tau = 2, .blend_start = 0.75};
+  EXPECT_EQ(FullWeight(0, threshold), 0);
+  EXPECT_EQ(FullWeight(1.5, threshold), 0);
+  EXPECT_DOUBLE_EQ(FullWeight(1.75, threshold), 0.5);
+  EXPECT_EQ(FullWeight(2, threshold), 1);
+  EXPECT_EQ(FullWeight(kInfinity, threshold), 1);
+  EXPECT_EQ(FullWeight(std::nan(""), threshold), 1);
+  double last = 0;
+  for (int i = 0; i <= 1000; ++i) {
+    const double weight = FullWeight(1.5 + 0.5 * i / 1000, threshold);
+    EXPECT_GE(weight, last);
+    EXPECT_LT(weight - last, 0.0016);  // the slope of a smoothstep is at most 1.5
+    last = weight;
+  }
+  EXPECT_EQ(FullWeight(1, {.tau = 1, .blend_start = 1}), 1);  // no blend zone
+  EXPECT_EQ(FullWeight(0.999, {.tau = 1, .blend_start = 1}), 0);
+}
+
+TEST(SoftCache, RangesNameTheControlThatLeavesThem) {
+  const std::vector<TrainedRange> ranges = {MakeTrainedRange("head.rotateX", -0.5, 0.5, 0.05), MakeTrainedRange("jaw.open", 0, 1, 0.05),
+                                            MakeTrainedRange("still", 3, 3, 0.05)};
+  EXPECT_NEAR(ranges[0].hi, 0.55, 1e-5);
+  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{0.54, -0.04, 3}), kNoIndex);
+  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{0.54, -0.06, 3}), 1u);
+  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{0.5, 0.5, 3.001}), 2u);
+  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{std::nan(""), 0.5, 3}), 0u);
+  EXPECT_EQ(OutsideMessage(ranges[1], 1.25), "jaw.open = 1.25 is outside its trained range [-0.050001, 1.05]");
+}
+
+TEST(SoftCache, VectorProductIsTheSameOnEveryTargetAndAgreesWithTheNaiveTwin) {
+  for (const std::size_t n : {1, 3, 15, 16, 32, 33, 64, 95, 240}) {
+    const auto size = static_cast<Eigen::Index>(n);
+    Eigen::MatrixXd full = RandomNormal(size, size, n), lower = full.triangularView<Eigen::Lower>();
+    const Eigen::VectorXd x = RandomNormal(size, 1, n + 1);
+    for (const bool is_lower : {false, true}) {
+      const Eigen::MatrixXd& matrix = is_lower ? lower : full;
+      std::vector<double> naive(n, 0.0);
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t j = 0; j < n; ++j) naive[i] = naive[i] + matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * x[static_cast<Eigen::Index>(j)];
+      }
+      for (const char* target : {"avx512", "avx2", "scalar"}) {
+        if (!SelectSimdTarget(target)) continue;
+        std::vector<double> y(n);
+        MultiplyVector({matrix.data(), n * n}, {x.data(), n}, is_lower, y);
+        EXPECT_EQ(y, naive) << target << " " << n;
+      }
+      SelectSimdTarget("");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kpsa

@@ -1,0 +1,240 @@
+#include "kpsa/subspace.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "base/safetensors.h"
+#include "base/simd.h"
+#include "tests/kpsa/synthetic.h"
+
+namespace kpsa {
+namespace {
+
+using test::Sheet;
+
+// A trained subspace over two meshes of 150 and 90 points, with point cues and a scalar.
+class SubspaceTest : public testing::TestWithParam<EstimatorMode> {
+ protected:
+  SubspaceTest() : sheet_(240, 15, 1), training_(sheet_.RandomPoses(200, 2, sheet_.Layout(false, true))), test_(sheet_.RandomPoses(30, 3, sheet_.Layout(false, true))) {
+    const Eigen::VectorXd mean = training_.Mean();
+    training_.Subtract(mean);
+    pca_ = std::move(*ComputePca(training_, mean, {.max_modes = 7}));
+    const std::vector<CueRef> cues = {{CueKind::kOutput, 20}, {CueKind::kOutput, 170}, {CueKind::kScalar, 15}, {CueKind::kOutput, 130}, {CueKind::kOutput, 220}};
+    cues_ = MakeCueSet(pca_, cues, sheet_.diagonal());
+    estimator_ = GetParam() == EstimatorMode::kMap ? MapEstimator(pca_, cues_) : LeastSquaresEstimator(pca_, cues_);
+    EXPECT_EQ(estimator_.mode, GetParam()) << estimator_.warning;
+    subspace_ = MakeSubspace(pca_, cues_, estimator_, test::AllMeasured(training_, cues_, MeasuredCues), {{"head@mush", 150}, {"teeth", 90}},
+                             {.rms_budget = 1e-6});
+    for (const CueRef cue : cues) {
+      if (cue.kind == CueKind::kScalar) {
+        subspace_.cues.push_back({.kind = CueDescription::Kind::kScalar, .plug = "twist.amount", .stage = "", .mesh = 0, .point = 0});
+      } else {
+        subspace_.cues.push_back({.kind = CueDescription::Kind::kPoint, .plug = "", .stage = "mush", .mesh = cue.index >= 150 ? 1u : 0u, .point = cue.index % 150});
+      }
+    }
+    subspace_.calibration = {{0.5, 1e-4}, {1.5, 3e-3}};
+    subspace_.ranges = {MakeTrainedRange("a.b", -1, 1, 0.05), MakeTrainedRange("c.d", 0, 0, 0.05)};
+    subspace_.rig_hash = "0123456789abcdef";
+    subspace_.space = "head";
+    subspace_.training = R"({"poses": 200})";
+    subspace_.tolerance = 2e-4;
+    path_ = testing::TempDir() + "kpsa_subspace_test_" + testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::replace(path_.begin() + static_cast<std::ptrdiff_t>(testing::TempDir().size()), path_.end(), '/', '_');
+  }
+  ~SubspaceTest() override { std::filesystem::remove(path_); }
+
+  std::vector<double> RawCues(std::size_t pose) const {
+    std::vector<double> raw;
+    for (std::size_t k = 0; k < cues_.cues.size(); ++k) {
+      const std::size_t column = CueColumn(pca_.layout, cues_.cues[k]);
+      for (std::size_t j = 0; j < CueHeight(pca_.layout, cues_.cues[k]); ++j) raw.push_back(static_cast<double>(test_.row(pose)[column + j]));
+    }
+    return raw;
+  }
+
+  Sheet sheet_;
+  PoseMatrix training_, test_;  // test_ is not centred
+  Pca pca_;
+  CueSet cues_;
+  Estimator estimator_;
+  Subspace subspace_;
+  std::string path_;
+};
+INSTANTIATE_TEST_SUITE_P(Modes, SubspaceTest, testing::Values(EstimatorMode::kMap, EstimatorMode::kPaper));
+
+TEST_P(SubspaceTest, ReconstructsWhatTheEstimatorSays) {
+  SubspaceScratch scratch(subspace_);
+  for (std::size_t t = 0; t < test_.poses(); ++t) {
+    Measure(subspace_, RawCues(t), &scratch);
+    const Eigen::VectorXd expected = pca_.mean.head(720) + estimator_.gain * Eigen::Map<const Eigen::VectorXd>(scratch.y.data(), cues_.rows());
+    std::size_t first = 0;
+    for (std::size_t output = 0; output < 2; ++output) {
+      PointBuffer points(subspace_.outputs[output].points);
+      ReconstructOutput(subspace_, output, &scratch, points.view());
+      const std::vector<float> xyz = points.Interleaved();
+      double sum = 0;
+      for (std::size_t i = 0; i < xyz.size(); ++i) sum += std::pow(static_cast<double>(xyz[i]) - expected[static_cast<Eigen::Index>(first + i)], 2);
+      EXPECT_LT(std::sqrt(sum / static_cast<double>(points.count())), 2e-5);
+      first += xyz.size();
+
+      // A list of all tiles, and a block of two frames of which row 0 is this one, give the same bits
+      PointBuffer again(points.count());
+      const std::vector<Index> tiles = output == 0 ? std::vector<Index>{0, 1} : std::vector<Index>{0};
+      ReconstructOutputTiles(subspace_, output, tiles, &scratch, again.view());
+      EXPECT_EQ(again.Interleaved(), xyz);
+      SubspaceScratch block(subspace_, 2);
+      Measure(subspace_, RawCues(t), &block, 0);
+      Measure(subspace_, RawCues((t + 1) % test_.poses()), &block, 1);
+      PointBuffer one(points.count()), two(points.count());
+      const PointsView views[] = {one.view(), two.view()};
+      ReconstructOutputBlock(subspace_, output, {}, &block, views);
+      EXPECT_EQ(one.Interleaved(), xyz);
+    }
+  }
+}
+
+TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
+  const Result<Subspace> read = ReadSubspace(path_);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->mode, subspace_.mode);
+  EXPECT_EQ(read->modes, 7u);
+  EXPECT_EQ(read->outputs, subspace_.outputs);
+  EXPECT_EQ(read->cues, subspace_.cues);
+  EXPECT_EQ(read->cue_mean, subspace_.cue_mean);
+  EXPECT_EQ(read->whitening, subspace_.whitening);
+  EXPECT_EQ(read->soft_cache.quantile1, subspace_.soft_cache.quantile1);
+  EXPECT_EQ(read->soft_cache.quantile2, subspace_.soft_cache.quantile2);
+  EXPECT_EQ(read->soft_cache.leave_one_out, subspace_.soft_cache.leave_one_out);
+  EXPECT_EQ(read->ranges[0].lo, subspace_.ranges[0].lo);
+  EXPECT_EQ(read->calibration[1].error, 3e-3);
+  EXPECT_EQ(read->tolerance, 2e-4);
+  EXPECT_EQ(read->rig_hash, subspace_.rig_hash);
+  EXPECT_EQ(read->space, "head");
+  EXPECT_EQ(read->training, subspace_.training);
+
+  SubspaceScratch a(subspace_), b(*read);
+  PointBuffer x(150), y(150);
+  Measure(subspace_, RawCues(4), &a);
+  Measure(*read, RawCues(4), &b);
+  ReconstructOutput(subspace_, 0, &a, x.view());
+  ReconstructOutput(*read, 0, &b, y.view());
+  EXPECT_EQ(x.Interleaved(), y.Interleaved());
+  const SoftCacheThreshold threshold{.tau = 1};
+  EXPECT_EQ(Judge(subspace_, threshold, &a).score, Judge(*read, threshold, &b).score);
+
+  // Written again, the file has the same bytes
+  const auto bytes = [](const std::string& path) {
+    std::ifstream stream(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  const std::string first = bytes(path_);
+  ASSERT_TRUE(WriteSubspace(*read, path_).ok());
+  EXPECT_EQ(bytes(path_), first);
+}
+
+TEST_P(SubspaceTest, EveryTargetGivesTheSameFrames) {
+  std::vector<float> first;
+  double score = 0;
+  for (const char* target : {"avx512", "avx2", "scalar"}) {
+    if (!SelectSimdTarget(target)) continue;
+    SubspaceScratch scratch(subspace_);
+    PointBuffer points(150);
+    Measure(subspace_, RawCues(0), &scratch);
+    ReconstructOutput(subspace_, 0, &scratch, points.view());
+    const double now = Judge(subspace_, {.tau = 1}, &scratch).score;
+    if (first.empty()) first = points.Interleaved(), score = now;
+    EXPECT_EQ(points.Interleaved(), first) << target;
+    EXPECT_EQ(now, score) << target;
+  }
+  SelectSimdTarget("");
+}
+
+TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok());
+  std::ifstream stream(path_, std::ios::binary);
+  const std::string good(std::istreambuf_iterator<char>(stream), {});
+  std::uint64_t header_size;
+  std::memcpy(&header_size, good.data(), 8);
+  const std::string header = good.substr(8, header_size), data = good.substr(8 + header_size);
+  const auto message = [&](const std::string& text) {
+    const std::uint64_t size = text.size();
+    std::ofstream out(path_, std::ios::binary | std::ios::trunc);
+    out.write(reinterpret_cast<const char*>(&size), 8);
+    out << text << data;
+    out.close();
+    const Result<Subspace> read = ReadSubspace(path_);
+    if (read.ok()) return std::string("no error");
+    EXPECT_EQ(read.status().errors().size(), 1u);
+    EXPECT_NE(read.status().ToString().find(path_), std::string::npos);
+    return read.status().ToString();
+  };
+  const auto edited = [&](auto edit) {
+    nlohmann::json json = nlohmann::json::parse(header);
+    edit(&json);
+    return message(json.dump());
+  };
+  using Json = nlohmann::json;
+  const auto metadata = [&](const char* key, auto edit) {
+    return edited([&](Json* json) {
+      Json value = Json::parse((*json)["__metadata__"][key].get<std::string>());
+      edit(&value);
+      (*json)["__metadata__"][key] = value.dump();
+    });
+  };
+  EXPECT_EQ(message(header), "no error");
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["version"] = "2"; }).find("format version 2, this program reads version 1"), std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"), std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"].erase("cues"); }).find("no \"cues\""), std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["ranges"] = "[[[["; }).find("not a JSON list"), std::string::npos);
+  EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["point"] = 150; }).find("point 150"), std::string::npos);
+  EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["point"] = -1; }).find("whole number"), std::string::npos);
+  EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["mesh"] = 2; }).find("mesh 2"), std::string::npos);
+  EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["kind"] = "smell"; }).find("smell"), std::string::npos);
+  EXPECT_NE(metadata("cues", [](Json* j) { j->erase(0); }).find("cueOffsets"), std::string::npos);
+  EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0] = {{"kind", "scalar"}, {"plug", "x"}}; }).find("cue 0 is a scalar"), std::string::npos);
+  EXPECT_NE(metadata("outputs", [](Json* j) { (*j)[0]["points"] = 90; }).find("tiles of \"head@mush\""), std::string::npos);
+  EXPECT_NE(metadata("outputs", [](Json* j) { (*j)[0]["points"] = 1e12; }).find("\"points\""), std::string::npos);
+  EXPECT_NE(metadata("summary", [](Json* j) { (*j)["mode"] = "guess"; }).find("guess"), std::string::npos);
+  EXPECT_NE(metadata("summary", [](Json* j) { (*j)["quantile1"] = 0; }).find("quantiles"), std::string::npos);
+  EXPECT_NE(metadata("summary", [](Json* j) { (*j)["blendStart"] = nullptr; }).find("blendStart"), std::string::npos);
+  EXPECT_NE(metadata("ranges", [](Json* j) { (*j)[0]["lo"] = 9; }).find("a.b"), std::string::npos);
+  EXPECT_NE(edited([](Json* j) {
+              (*j)["tiles.0.w"] = (*j)["tiles.0.v"];
+              j->erase("tiles.0.v");
+            }).find("no tensor \"tiles.0.v\""), std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["tiles.0.v"]["dtype"] = "U16"; }).find("expected F16"), std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["whitening"]["shape"] = {(*j)["whitening"]["shape"][0], 1}; }).find("needs"), std::string::npos);
+
+  // Any flipped byte or cut: either still a valid subspace (a number changed) or one message; never a crash
+  std::mt19937 random(1);
+  for (int i = 0; i < 400; ++i) {
+    std::string bad = good;
+    bad[i % 2 == 0 ? random() % bad.size() : random() % header_size] ^= static_cast<char>(1 + random() % 255);
+    if (i % 5 == 0) bad.resize(random() % bad.size());
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << bad;
+    const Result<Subspace> read = ReadSubspace(path_);
+    EXPECT_TRUE(read.ok() || read.status().errors().size() == 1);
+    EXPECT_FALSE(i % 5 == 0 && read.ok());
+  }
+}
+
+TEST_P(SubspaceTest, InconsistentSubspacesAreNotWritten) {
+  subspace_.cue_scale.pop_back();
+  EXPECT_FALSE(WriteSubspace(subspace_, path_).ok());
+  EXPECT_FALSE(std::filesystem::exists(path_));
+}
+
+TEST(Subspace, BlendMixesPoints) {
+  PointBuffer full = PointBuffer::FromInterleaved(std::vector<float>{1, 2, 3, 4, 5, 6}), points(2);
+  BlendPoints(0.25, full.view(), points.view());
+  EXPECT_EQ(points.Interleaved(), (std::vector<float>{0.25f, 0.5f, 0.75f, 1, 1.25f, 1.5f}));
+}
+
+}  // namespace
+}  // namespace kpsa

@@ -1,0 +1,8 @@
+#!/bin/sh
+# Builds everything and runs all tests.
+set -e
+cd "$(dirname "$0")/.."
+sh cmake/dependencies.sh
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release > /dev/null
+cmake --build build
+ctest --test-dir build --output-on-failure -j "$(nproc)"
