@@ -37,7 +37,6 @@ std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const glt
                                      std::vector<std::string>* notes) {
   std::map<Index, NodeKeys> keys;
   for (const gltf::Channel& channel : clip.channels) {
-    const gltf::Node& node = character.nodes[channel.node];
     NodeKeys& of_node = keys[channel.node];
     AnimationSampler* sampler = nullptr;
     switch (channel.path) {
@@ -45,11 +44,6 @@ std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const glt
       case gltf::Path::kRotation: sampler = &of_node.data.rotation; break;
       case gltf::Path::kScale: sampler = &of_node.data.scale; break;
       case gltf::Path::kWeights: sampler = &of_node.data.weights; break;
-    }
-    if (node.has_matrix && channel.path != gltf::Path::kWeights) {
-      AddNote(fmt::format("clip \"{}\" animates nodes[{}], which has a matrix; it stays at rest (glTF 2.0, 3.5.3)", clip.id, channel.node),
-              notes);
-      continue;
     }
     if (!sampler->times.empty()) {
       AddNote(fmt::format("clip \"{}\" animates one property of nodes[{}] twice; the first is used", clip.id, channel.node), notes);

@@ -114,7 +114,6 @@ class Writer {
 
   void Measure(const gltf::Channel& channel) {
     const gltf::Node& node = character_.nodes[channel.node];
-    if (node.has_matrix && channel.path != gltf::Path::kWeights) return;
     Motion& motion = motions_[channel.node];
     const auto width = static_cast<std::size_t>(channel.components);
     const bool cubic = channel.interpolation == gltf::Interpolation::kCubicSpline;
