@@ -179,7 +179,7 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
   Status status;
   const auto note = [&](Status s) { status.Append(std::move(s)); };
   note(graph->Set(plug("config"), Value(result.config)));
-  note(graph->Set(plug("tolerance"), options.tolerance < 0 ? subspace->tolerance : options.tolerance));
+  note(graph->Set(plug("tolerance"), std::min(options.tolerance < 0 ? subspace->tolerance : options.tolerance, kAnyError)));
   note(graph->Set(plug("violationRate"), options.violation_rate < 0 ? subspace->violation_rate : options.violation_rate));
   for (std::size_t i = 0; i < inputs.size(); ++i) {
     note(graph->Connect(target.meshes[inputs[i].mesh].stages[inputs[i].stage].points, plug("cues", static_cast<int>(i))));

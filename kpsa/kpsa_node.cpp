@@ -257,7 +257,8 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
       return Status::Invalid("cues[{}] has too few points for the subspace's cues", c);
     }
   }
-  const Calibration calibration = Calibrate(subspace.calibration, s.get_double("tolerance"), s.get_double("violationRate"), subspace.blend_start);
+  const double tolerance = s.get_double("tolerance") >= kAnyError ? std::numeric_limits<double>::infinity() : s.get_double("tolerance");
+  const Calibration calibration = Calibrate(subspace.calibration, tolerance, s.get_double("violationRate"), subspace.blend_start);
   kernel.threshold = calibration.threshold;
   std::size_t whole = 0;
   for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {

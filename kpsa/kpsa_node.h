@@ -54,6 +54,9 @@ class KpsaConfig final : public Asset {
   Digest digest_;
 };
 
+// A tolerance from here on accepts everything that is finite and within the trained ranges.
+inline constexpr double kAnyError = 1e30;
+
 void AddKpsaNode(NodeRegistry& registry);
 
 // What the node decided, for reports: from its outputs missReason and offender.

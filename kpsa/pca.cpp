@@ -80,7 +80,8 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
   }
   Eigen::Index kept = 0;
   while (kept < wanted && energy[kept] > options.min_ratio * options.min_ratio * energy[0]) ++kept;
-  vectors = vectors.leftCols(kept) * energy.head(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  // eval: a product with a diagonal is lazy, and the assignment resizes what it reads
+  vectors = (vectors.leftCols(kept) * energy.head(kept).cwiseSqrt().cwiseInverse().asDiagonal()).eval();
   return Multiply(x.Transposed(), GemmOperand::Dense(vectors));
 }
 
