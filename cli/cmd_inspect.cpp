@@ -71,6 +71,7 @@ CommandResult Inspect(const Flags& flags) {
   }
   Print(fmt::format("{}: {}\n", flags.file, facts->kind));
   for (const auto& [name, value] : facts->facts) {
+    if (name == "training") continue;  // JSON, for --json
     const auto* bytes = std::get_if<std::uint64_t>(&value);
     const std::string text = bytes != nullptr && name.ends_with("bytes") ? ByteText(*bytes) : CellText(value);
     Print(fmt::format("  {:<18} {}\n",

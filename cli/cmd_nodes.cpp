@@ -50,6 +50,8 @@ std::string DefaultText(const AttributeDef& a) {
   if (a.default_value.empty()) return "";
   const auto choice = static_cast<std::size_t>(a.default_value.AsInt());
   if (a.type == Type::kEnum && choice < a.enum_names.size()) return a.enum_names[choice];
+  if (const Matrix4* matrix = a.default_value.get_if<Matrix4>(); matrix != nullptr && *matrix == Matrix4())
+    return "identity";
   return a.default_value.ToString();
 }
 

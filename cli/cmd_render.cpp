@@ -112,8 +112,8 @@ CommandResult Render(const RenderFlags& flags) {
       if (WorstDistance((*full)[f], (*fast)[f]) > WorstDistance((*full)[worst], (*fast)[worst])) worst = f;
     }
     if (!chosen) frames = {worst};
-    const Camera camera =
-        FrameCamera(MakeInput(rig, (*full)[frames.front()]), view->options, view->azimuth, view->elevation);
+    const Camera camera = FramePoses(rig, chosen ? *full : std::vector<Pose>{(*full)[worst]}, view->options,
+                                     view->azimuth, view->elevation);
     for (std::size_t f : frames) {
       RenderInput exact = MakeInput(rig, (*full)[f]), emitted = MakeInput(rig, (*fast)[f]);
       exact.scalar_max = emitted.scalar_max =
@@ -129,8 +129,7 @@ CommandResult Render(const RenderFlags& flags) {
     if (!images.ok()) return images.status();
     rows.push_back(SideBySide(*images));
   } else {
-    const Camera camera =
-        FrameCamera(MakeInput(rig, full->front()), view->options, view->azimuth, view->elevation);
+    const Camera camera = FramePoses(rig, *full, view->options, view->azimuth, view->elevation);
     std::vector<Image> row;
     for (const Pose& pose : *full) {
       Result<Image> image = RenderMesh(MakeInput(rig, pose), camera, view->options);

@@ -192,7 +192,9 @@ std::string LengthText(double metres) {
 }
 
 std::string Plural(std::uint64_t count, const std::string& noun) {
-  return Thousands(count) + " " + noun + (count == 1 ? "" : noun.ends_with('x') ? "es" : "s");
+  if (count == 1) return "1 " + noun;
+  if (noun.ends_with("vertex")) return Thousands(count) + " " + noun.substr(0, noun.size() - 2) + "ices";
+  return Thousands(count) + " " + noun + (noun.ends_with("sh") ? "es" : "s");
 }
 
 InterruptScope::InterruptScope() { ++scopes; }

@@ -75,7 +75,7 @@ void PrintJson(const Json& json) {
 std::string Thousands(std::uint64_t number);                       // 17,121
 std::string ByteText(std::uint64_t bytes);                         // 3.1 MB
 std::string LengthText(double metres);                             // 0.213 mm
-std::string Plural(std::uint64_t count, const std::string& noun);  // "1 frame", "12 frames"
+std::string Plural(std::uint64_t count, const std::string& noun);  // "1 mesh", "12 vertices"
 
 // From here to the end of the scope an interrupt (Ctrl-C) only sets the flag that Interrupted() reads, so
 // that what is being written can be removed; outside of such scopes, where nothing is half-written, and at

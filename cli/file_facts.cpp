@@ -12,6 +12,7 @@
 #include "io/point_cache.h"
 #include "io/weights_json.h"
 #include "kpsa/subspace.h"
+#include "kpsa/training_record.h"
 
 namespace kpsa {
 namespace {
@@ -206,6 +207,16 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
                  {"rig", subspace->rig_hash},
                  {"memory bytes", memory},
                  {"training", subspace->training}};
+  const TrainingRecord record = ParseTraining(subspace->training);
+  facts.facts.insert(
+      facts.facts.end(),
+      {{"trained on",
+        fmt::format("{} of {}, {}", Plural(record.clip_poses, "frame"),
+                    record.clips.empty() ? "no clip" : fmt::format("{}", fmt::join(record.clips, ", ")),
+                    Plural(record.sampled_poses, "sampled pose"))},
+       {"held-out RMS", LengthText(record.held_out_rms)},
+       {"held-out max", LengthText(record.held_out_max)},
+       {"motion RMS", LengthText(record.motion_rms)}});
   FactTable outputs{"outputs", {"points", ">count"}, {}};
   for (const SubspaceOutput& output : subspace->outputs)
     outputs.rows.push_back({output.name, Count(output.points)});

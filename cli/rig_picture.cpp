@@ -83,6 +83,16 @@ RenderInput MakeInput(const Rig& rig, const Pose& pose) {
   return input;
 }
 
+Camera FramePoses(const Rig& rig, const std::vector<Pose>& poses, const RenderOptions& options,
+                  double azimuth, double elevation) {
+  RenderInput all;
+  for (const Pose& pose : poses) {
+    const RenderInput one = MakeInput(rig, pose);
+    all.parts.insert(all.parts.end(), one.parts.begin(), one.parts.end());
+  }
+  return FrameCamera(all, options, azimuth, elevation);
+}
+
 double WorstDistance(const Pose& a, const Pose& b) {
   double worst = 0;
   for (std::size_t m = 0; m < a.size(); ++m) {

@@ -17,6 +17,9 @@ Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, cons
 // One part a mesh, with the file's vertex colours if it has them; or one a primitive where materials have colours.
 // Refers to both arguments.
 RenderInput MakeInput(const Rig& rig, const Pose& pose);
+// A camera that sees all of the poses.
+Camera FramePoses(const Rig& rig, const std::vector<Pose>& poses, const RenderOptions& options,
+                  double azimuth, double elevation);
 double WorstDistance(const Pose& a, const Pose& b);  // metres
 // Pictures below each other.
 Image StackRows(const std::vector<Image>& rows);

@@ -183,7 +183,7 @@ Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, 
 }
 
 TrainedRange MakeTrainedRange(std::string plug, double min, double max, double margin) {
-  const double widened = margin * (max - min) + 1e-6 * std::max(std::fabs(min), std::fabs(max));
+  const double widened = margin * (max - min) + 1e-6 * std::max({1.0, std::fabs(min), std::fabs(max)});
   return {std::move(plug), min - widened, max + widened};
 }
 

@@ -76,7 +76,8 @@ struct TrainedRange {
   std::string plug;
   double lo = 0, hi = 0;
 };
-// [min, max] widened by `margin` of its extent on both sides (and by rounding, 1e-6 of the magnitude).
+// [min, max] widened by `margin` of its extent on both sides (and by rounding, 1e-6 of the magnitude, of at least 1: an entry that
+// rested at 0 in training may come out as 1e-11).
 TrainedRange MakeTrainedRange(std::string plug, double min, double max, double margin);
 // Index of the first value outside its range (NaN is outside), or kNoIndex.
 Index FirstOutside(std::span<const TrainedRange> ranges, std::span<const double> values);

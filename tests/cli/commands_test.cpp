@@ -99,6 +99,23 @@ TEST(Eval, AnInterruptLeavesNothing) {
   }
 }
 
+TEST(Eval, AFailingNodeIsAnEvaluationError) {
+  const TemporaryFolder folder;
+  folder.Write(
+      "trip.yaml",
+      "kpsa: 1\ncharacter: " + kHelloGlb +
+          "\nnodes:\n  trip: {type: tripwire, armed: true}\ndeform:\n  - {meshes: [column], stack: [skin, "
+          "trip]}\n");
+  for (const char* output : {"out.npz", "out.mdd"}) {
+    const ProcessResult run =
+        RunKpsa({"eval", folder / "trip.yaml", "--frames", "0:30", "-o", folder / output});
+    EXPECT_EQ(run.exit_code, 4) << run.err;
+    EXPECT_NE(run.err.find("trip"), std::string::npos) << run.err;
+    EXPECT_LE(run.error_lines(), 5u);
+    EXPECT_EQ(folder.FileCount(), 1u);
+  }
+}
+
 TEST(Get, CsvAndJsonAgreeWithEval) {
   const TemporaryFolder folder;
   Ok({"eval", kHello, "--times", "0.5", "-o", folder / "a.npz"});
