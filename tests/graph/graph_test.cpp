@@ -233,7 +233,6 @@ TEST_F(GraphTest, PlugsByName) {
 }
 
 TEST_F(GraphTest, GridsOfHostileSizesAreRefused) {
-  GTEST_SKIP() << "not met yet";
   g.add("grid", "g", {{"divisions", std::vector<std::int64_t>{4000000000, 4000000000, 4000000000}}});
   EXPECT_FALSE(g.graph.FindPlug("g.points[2000000000,2000000000,2]").ok());
   EXPECT_FALSE(g.graph.FindPlug("g.points[0,9,9]").ok());
