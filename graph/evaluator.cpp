@@ -192,8 +192,12 @@ void Evaluator::MarkWanted(Index step) {
     if (s.branch != kNoIndex) {
       for (Index producer : plan_->branches()[s.branch].lazy_deps) want(producer);
     }
-    const Index first = top - s.unit_offset;  // a unit runs as a whole
-    for (Index member = first; member < first + plan_->steps()[first].unit_size; ++member) want(member);
+    // A unit runs as a whole: the first of its members to come here wants all of them, and marks the unit's first step
+    const Index first = top - s.unit_offset;
+    const Index size = plan_->steps()[first].unit_size;
+    if (size == 1 || (top != first && wanted(first))) continue;
+    for (Index member = first; member < first + size; ++member) want(member);
+    wanted_[first / 64] |= std::uint64_t{1} << (first % 64);
   }
 }
 
@@ -399,8 +403,7 @@ bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) 
       const Index size = s.unit_size;
       bool run = false;
       for (Index member = step; member < step + size; ++member) {
-        const bool wanted = !wanted_only_ || (wanted_[member / 64] >> (member % 64) & 1) != 0;
-        run = run || (dirty(member) && wanted);
+        run = run || (dirty(member) && (!wanted_only_ || wanted(member)));
       }
       if (run && s.branch == kNoIndex) {
         for (Index member = step; member < step + size; ++member) {
@@ -435,7 +438,7 @@ bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) 
     }
     for (Index step = first; step < last; ++step) {
       if (plan_->steps()[step].branch == kNoIndex || !dirty(step)) continue;
-      if (wanted_only_ && (wanted_[step / 64] >> (step % 64) & 1) == 0) continue;
+      if (wanted_only_ && !wanted(step)) continue;
       ClearDirty(step);
       const bool fine = profile_ != nullptr ? RunBranch<true>(step) : RunBranch<false>(step);
       if (!fine) {

@@ -95,6 +95,7 @@ class Evaluator final {
   Status TakeFailure();
   void MarkComputed(Index step, bool changed);
   bool dirty(Index step) const { return (dirty_[step / 64] >> (step % 64) & 1) != 0; }
+  bool wanted(Index step) const { return (wanted_[step / 64] >> (step % 64) & 1) != 0; }
   void SetDirty(Index begin, Index end);
   void ClearDirty(Index step) { dirty_[step / 64] &= ~(std::uint64_t{1} << (step % 64)); }
 

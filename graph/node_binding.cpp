@@ -91,6 +91,15 @@ std::string Describe(const InstanceTable& table, const Instance& instance) {
   return fmt::format("node \"{}\" ({})", table.graph().name(instance.node), table.graph().def(instance.node).name);
 }
 
+Status CheckChildren(const InstanceTable& table, const Instance& instance, std::size_t count) {
+  for (int child : instance.children) {
+    if (static_cast<std::size_t>(child / 4) < count) continue;
+    const PlugRef plug{instance.node, instance.attribute, child / 4, child % 4 == 3 ? -1 : child % 4};
+    return Status::Invalid("{} is driven, but there are {} points", table.graph().PlugName(plug), count);
+  }
+  return Status();
+}
+
 Result<Index> PointTotals::OfSource(const Source& source) {
   if (source.kind == Source::Kind::kInstance) return OfOutput(source.instance, source.output, source.element);
   const PointBuffer* points = source.value->points();
@@ -180,13 +189,7 @@ Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& stati
   if (instance.kind == Instance::Kind::kAssemble) {
     if (!IsPointType(instance.type)) return Status();
     sets->inputs[0] = sets->outputs[0][0];
-    for (int child : instance.children) {
-      if (static_cast<Index>(child / 4) < sets->inputs[0].total()) continue;
-      return Status::Invalid("{} is driven, but there are {} points",
-                             table.graph().PlugName({instance.node, instance.attribute, child / 4, child % 4 == 3 ? -1 : child % 4}),
-                             sets->inputs[0].total());
-    }
-    return Status();
+    return CheckChildren(table, instance, sets->inputs[0].total());
   }
   if (instance.kind == Instance::Kind::kConvert) return Status();
   const ComputeGroup& group = table.group(instance);

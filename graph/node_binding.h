@@ -31,6 +31,8 @@ class PointTotals {
 Result<InstanceSets> FullOutputs(InstanceTable& table, PointTotals& totals, Index instance);
 // Fills sets.inputs from sets.outputs.
 Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& statics, Index instance, InstanceSets* sets);
+// Of an assembly of points: an error if a child is driven that the array of `count` points does not have.
+Status CheckChildren(const InstanceTable& table, const Instance& instance, std::size_t count);
 Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index instance, const InstanceSets& sets);
 // "node "mush" (deltaMush)"
 std::string Describe(const InstanceTable& table, const Instance& instance);

@@ -143,8 +143,8 @@ Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text)
         return Status::Invalid("{}.{}[{}]: expected three indices within the divisions {}", n.name, a.name, text, divisions.ToString());
       }
       index += stride * i;
-      stride *= std::min<std::int64_t>((*sizes)[axis], max_elements);
-      if (index >= max_elements || stride > max_elements) return Status::Invalid("{}.{}[{}]: the grid is too large", n.name, a.name, text);
+      stride = std::min<std::int64_t>(stride * std::min<std::int64_t>((*sizes)[axis], max_elements), max_elements);
+      if (index >= max_elements) return Status::Invalid("{}.{}[{}]: the grid is too large", n.name, a.name, text);
       if (comma == std::string_view::npos) break;
       left = left.substr(comma + 1);
     }

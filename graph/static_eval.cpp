@@ -141,6 +141,7 @@ Status StaticEvaluator::Run(Index number, bool rest) {
     return Status();
   }
   if (instance.kind == Instance::Kind::kAssemble) {
+    if (values[0]->points() != nullptr) KPSA_RETURN_IF_ERROR(CheckChildren(table_, instance, values[0]->points()->count()));
     outputs->push_back({AssembleValue(*values[0], instance.children, {values.begin() + 1, values.end()})});
     slot(number, rest) = outputs;
     return Status();

@@ -231,6 +231,7 @@ TEST_F(CompilerTest, AChoiceOf64AndNotOneMore) {
     g.connect(name + ".out", "c.input[" + std::to_string(i) + "]");
     g.vary(name + ".a");
   }
+  g.want("c.out");
   for (int i : {63, 0, 31}) {
     g.set("c.selector", i);
     EXPECT_DOUBLE_EQ(g.pull<double>("c.out"), i);
@@ -355,6 +356,7 @@ TEST(DeepGraphs, DeformersInPlaceBeyondOneUnit) {
   g.vary("src.step");
   g.vary("n70000.offset");
   const std::string last = "n" + std::to_string(kCount - 1) + ".outPoints";
+  g.want(last);
   g.set("src.step", 2.0);
   EXPECT_EQ(g.pull_points(last)[3], 2.0f + kCount);
   const std::uint64_t first_unit = g.computes("n5");
@@ -380,6 +382,7 @@ TEST(DeepGraphs, LazyInputsNestDeepButNotWithoutEnd) {
     }
     g.request.varying.resize(1);
     g.vary("s0.which");
+    g.want(from);
     if (count == 900) {
       g.set("root.a", 5.0);
       EXPECT_DOUBLE_EQ(g.pull<double>(from), 5);
