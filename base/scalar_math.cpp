@@ -83,12 +83,14 @@ void SinCos(double radians, double* sine, double* cosine) {
 }
 
 double Sin(double radians) {
+  if (std::fabs(radians) < 0.785) return SinSeries(radians);  // what follows gives the same bits
   double s, c;
   SinCos(radians, &s, &c);
   return s;
 }
 
 double Cos(double radians) {
+  if (std::fabs(radians) < 0.785) return CosSeries(radians);
   double s, c;
   SinCos(radians, &s, &c);
   return c;

@@ -2,7 +2,6 @@
 // the rig's own.
 #include <algorithm>
 
-#include "base/scalar_math.h"
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/sampler.h"
@@ -11,73 +10,143 @@
 namespace kpsa {
 namespace {
 
-// A sampler's keys as the kernel wants them.
+// A sampler's keys as the kernels want them.
 struct Keys {
   std::vector<float> times, values;
-  SamplerKeys view;
+  SamplerKeys view;  // of these; moving a Keys keeps it valid
   bool empty() const { return times.empty(); }
 };
 
-Result<std::unique_ptr<Keys>> MakeKeys(const AnimationSampler& sampler, const char* what) {
-  auto keys = std::make_unique<Keys>();
-  keys->times.assign(sampler.times.begin(), sampler.times.end());
-  keys->values.assign(sampler.values.begin(), sampler.values.end());
-  if (keys->empty()) return keys;
+Result<Keys> MakeKeys(const AnimationSampler& sampler, const char* what) {
+  Keys keys;
+  keys.times.assign(sampler.times.begin(), sampler.times.end());
+  keys.values.assign(sampler.values.begin(), sampler.values.end());
+  if (keys.empty()) return keys;
   using From = AnimationSampler::Interpolation;
-  keys->view = {keys->times, keys->values, static_cast<std::size_t>(sampler.components),
-                sampler.interpolation == From::kStep          ? Interpolation::kStep
-                : sampler.interpolation == From::kCubicSpline ? Interpolation::kCubicSpline
-                                                              : Interpolation::kLinear};
-  const Status status = keys->view.Validate();
+  keys.view = {keys.times, keys.values, static_cast<std::size_t>(sampler.components),
+               sampler.interpolation == From::kStep          ? Interpolation::kStep
+               : sampler.interpolation == From::kCubicSpline ? Interpolation::kCubicSpline
+                                                             : Interpolation::kLinear};
+  const Status status = keys.view.Validate();
   if (!status.ok()) return Status::Invalid("{}: {}", what, status.ToString());
   return keys;
 }
 
+// Whether a vector channel gives the same value, its first key's, at any time.
+bool IsConstant(const SamplerKeys& keys) {
+  if (keys.interpolation == Interpolation::kCubicSpline) return false;
+  for (std::size_t i = keys.components; i < keys.values.size(); ++i) {
+    if (!(keys.values[i] == keys.values[i - keys.components])) return false;
+  }
+  return true;
+}
+
 struct ClipTransformKernel {
-  std::unique_ptr<Keys> translation, rotation, scale;
-  Double3 rest_translation, rest_scale;
-  Quaternion rest_rotation;
+  // Which of the times a channel follows; kConstant: its value is in `constant`
+  static constexpr int kConstant = -1;
+  std::vector<KeyTimes> times;
+  int translation_times = kConstant, rotation_times = kConstant, scale_times = kConstant;
+  Keys translation, scale;
+  RotationTrack rotation;
+  Double3 constant_translation, constant_scale;
+  Quaternion constant_rotation;
+  Matrix4 constant;  // of the constant channels; all of it where no other moves
+
+  int AddTimes(std::vector<float> added) {
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      if (times[i].times() == added) return static_cast<int>(i);
+    }
+    times.emplace_back(std::move(added));
+    return static_cast<int>(times.size() - 1);
+  }
 };
+
+Status AddVectorChannel(const AnimationSampler& sampler, const char* what, ClipTransformKernel* kernel, Keys* channel, int* times, Double3* constant) {
+  Result<Keys> keys = MakeKeys(sampler, what);
+  if (!keys.ok()) return keys.status();
+  if (keys->empty()) return Status();
+  if (keys->view.components != 3) return Status::Invalid("{} has {} components, expected 3", what, keys->view.components);
+  if (IsConstant(keys->view)) {
+    *constant = SampleVec3(keys->view, KeySpan());
+    return Status();
+  }
+  *times = kernel->AddTimes(std::move(keys->times));
+  keys->view.times = {};
+  *channel = std::move(*keys);
+  return Status();
+}
 
 Result<BoundKernel> BindClipTransform(const Binding& binding) {
   const auto* asset = binding.structural().asset<AnimationKeys>("keys");
   if (asset == nullptr) return Status::Invalid("keys are not set");
   const AnimationKeys::Data& data = asset->data();
-  ClipTransformKernel kernel;
-  kernel.rest_translation = data.rest_translation;
-  kernel.rest_rotation = data.rest_rotation;
-  kernel.rest_scale = data.rest_scale;
-  for (auto [sampler, keys, what] : {std::tuple{&data.translation, &kernel.translation, "translation"},
-                                     std::tuple{&data.rotation, &kernel.rotation, "rotation"}, std::tuple{&data.scale, &kernel.scale, "scale"}}) {
-    Result<std::unique_ptr<Keys>> made = MakeKeys(*sampler, what);
-    if (!made.ok()) return made.status();
-    *keys = std::move(*made);
+  ClipTransformKernel k;
+  k.constant_translation = data.rest_translation;
+  k.constant_rotation = data.rest_rotation;
+  k.constant_scale = data.rest_scale;
+  KPSA_RETURN_IF_ERROR(AddVectorChannel(data.translation, "translation", &k, &k.translation, &k.translation_times, &k.constant_translation));
+  KPSA_RETURN_IF_ERROR(AddVectorChannel(data.scale, "scale", &k, &k.scale, &k.scale_times, &k.constant_scale));
+  Result<Keys> rotation = MakeKeys(data.rotation, "rotation");
+  if (!rotation.ok()) return rotation.status();
+  if (!rotation->empty()) {
+    if (rotation->view.components != 4) return Status::Invalid("rotation has {} components, expected 4", rotation->view.components);
+    k.rotation = RotationTrack(rotation->view);
+    if (k.rotation.constant()) {
+      k.constant_rotation = k.rotation.At(KeySpan());
+      k.rotation = RotationTrack();
+    } else {
+      k.rotation_times = k.AddTimes(std::move(rotation->times));
+    }
   }
-  return BoundKernel{std::make_shared<const ClipTransformKernel>(std::move(kernel)), 0, 0};
+  k.constant = ComposeTrs(k.constant_translation, k.constant_rotation, k.constant_scale);
+  return MakeBound(std::move(k), 0);
 }
 
 void ComputeClipTransform(ComputeContext& c) {
   const auto& k = c.kernel_as<ClipTransformKernel>();
+  constexpr int kConstant = ClipTransformKernel::kConstant;
   const double time = c.get<double>(0);
-  const Double3 translation = k.translation->empty() ? k.rest_translation : SampleVec3(k.translation->view, time);
-  const Quaternion rotation = k.rotation->empty() ? k.rest_rotation : SampleRotation(k.rotation->view, time);
-  const Double3 scale = k.scale->empty() ? k.rest_scale : SampleVec3(k.scale->view, time);
-  c.out_value<Matrix4>(0) = ComposeTrs(translation, rotation, scale);
+  KeySpan span;
+  int found = kConstant;  // the times that `span` was found in
+  const auto find = [&](int times) -> const KeySpan& {
+    if (times != found) span = k.times[static_cast<std::size_t>(times)].Find(time);
+    found = times;
+    return span;
+  };
+  Double3 translation = k.constant_translation;
+  if (k.translation_times != kConstant) translation = SampleVec3(k.translation.view, find(k.translation_times));
+  Matrix4& matrix = c.out_value<Matrix4>(0);
+  if (k.rotation_times == kConstant && k.scale_times == kConstant) {
+    matrix = k.constant;
+    matrix(0, 3) = translation.x, matrix(1, 3) = translation.y, matrix(2, 3) = translation.z;
+    return;
+  }
+  const Quaternion rotation = k.rotation_times == kConstant ? k.constant_rotation : k.rotation.At(find(k.rotation_times));
+  const Double3 scale = k.scale_times == kConstant ? k.constant_scale : SampleVec3(k.scale.view, find(k.scale_times));
+  matrix = ComposeTrs(translation, rotation, scale);
 }
+
+struct ClipWeightsKernel {
+  Keys keys;
+  KeyTimes times;
+};
 
 Result<BoundKernel> BindClipWeights(const Binding& binding) {
   const auto* asset = binding.structural().asset<AnimationKeys>("keys");
   if (asset == nullptr) return Status::Invalid("keys are not set");
-  Result<std::unique_ptr<Keys>> keys = MakeKeys(asset->data().weights, "weights");
+  Result<Keys> keys = MakeKeys(asset->data().weights, "weights");
   if (!keys.ok()) return keys.status();
-  const std::size_t components = (*keys)->view.components;
-  return BoundKernel{std::shared_ptr<const Keys>(std::move(*keys)), 2 * components, 0};
+  ClipWeightsKernel kernel;
+  const std::size_t components = keys->view.components;
+  if (!keys->empty()) kernel.times = KeyTimes(keys->times);
+  kernel.keys = std::move(*keys);
+  return MakeBound(std::move(kernel), 2 * components);
 }
 
 void ComputeClipWeights(ComputeContext& c) {
-  const auto& keys = c.kernel_as<Keys>();
+  const auto& [keys, times] = c.kernel_as<ClipWeightsKernel>();
   const std::span<double> values(reinterpret_cast<double*>(c.scratch), keys.view.components);
-  if (!keys.empty()) SampleScalars(keys.view, c.get<double>(0), values);
+  if (!keys.empty()) SampleScalars(keys.view, times.Find(c.get<double>(0)), values);
   const std::uint32_t* table = c.out + c.out[0];
   for (std::uint32_t i = 0; i < table[0]; ++i) {
     *reinterpret_cast<double*>(c.values + table[1 + i]) = !keys.empty() && i < values.size() ? values[i] : 0.0;

@@ -4,27 +4,21 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "base/scalar_math.h"
 
 namespace kpsa {
 namespace {
 
-// Between which keys a time lies: value = key `a` at t = 0 to key `a + 1` at t = 1, `width` seconds apart.
-struct Span {
-  std::size_t a = 0;
-  double t = 0, width = 0;
-};
+KeySpan SpanFrom(std::span<const float> times, std::size_t key, double seconds) {
+  const double start = times[key], width = static_cast<double>(times[key + 1]) - start;
+  return {key, (seconds - start) / width, width};
+}
 
-Span Find(const SamplerKeys& keys, double seconds) {
-  const auto& times = keys.times;
+KeySpan Find(std::span<const float> times, double seconds) {
   if (!(seconds > static_cast<double>(times.front()))) return {};  // NaN goes to the first key
   if (seconds >= static_cast<double>(times.back())) return {times.size() - 1, 0, 0};
-  std::size_t low = 0, high = times.size() - 1;  // times[low] <= seconds < times[high]
-  while (high - low > 1) {
-    const std::size_t middle = (low + high) / 2;
-    (static_cast<double>(times[middle]) <= seconds ? low : high) = middle;
-  }
-  const double start = times[low], width = static_cast<double>(times[high]) - start;
-  return {low, (seconds - start) / width, width};
+  const auto next = std::upper_bound(times.begin(), times.end(), seconds, [](double s, float t) { return s < static_cast<double>(t); });
+  return SpanFrom(times, static_cast<std::size_t>(next - times.begin()) - 1, seconds);
 }
 
 // Which of the three parts of a cubic key.
@@ -36,17 +30,19 @@ double At(const SamplerKeys& keys, std::size_t key, Part part, std::size_t compo
   return keys.values[row * keys.components + component];
 }
 
-double Sample(const SamplerKeys& keys, const Span& span, std::size_t component) {
-  const double v0 = At(keys, span.a, kValue, component);
+double Sample(const SamplerKeys& keys, const KeySpan& span, std::size_t component) {
+  const double v0 = At(keys, span.key, kValue, component);
   if (span.t == 0 || keys.interpolation == Interpolation::kStep) return v0;
-  const double v1 = At(keys, span.a + 1, kValue, component), t = span.t;
+  const double v1 = At(keys, span.key + 1, kValue, component), t = span.t;
   if (keys.interpolation == Interpolation::kLinear) return v0 + (v1 - v0) * t;
   // glTF 2.0, appendix C.5: Hermite with tangents a second
-  const double b0 = At(keys, span.a, kOutTangent, component) * span.width;
-  const double a1 = At(keys, span.a + 1, kInTangent, component) * span.width;
+  const double b0 = At(keys, span.key, kOutTangent, component) * span.width;
+  const double a1 = At(keys, span.key + 1, kInTangent, component) * span.width;
   const double t2 = t * t, t3 = t2 * t;
   return (2 * t3 - 3 * t2 + 1) * v0 + (t3 - 2 * t2 + t) * b0 + (3 * t2 - 2 * t3) * v1 + (t3 - t2) * a1;
 }
+
+double Dot(const Quaternion& a, const Quaternion& b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
 
 Quaternion KeyRotation(const SamplerKeys& keys, std::size_t key) {
   return Normalized({At(keys, key, kValue, 0), At(keys, key, kValue, 1), At(keys, key, kValue, 2),
@@ -80,27 +76,99 @@ Status SamplerKeys::Validate() const {
   return {};
 }
 
-Double3 SampleVec3(const SamplerKeys& keys, double seconds) {
+KeyTimes::KeyTimes(std::vector<float> times) : times_(std::move(times)) {
+  KPSA_CHECK(!times_.empty());
+  first_ = times_.front();
+  last_ = times_.back();
+  if (last_ > first_) rate_ = static_cast<double>(times_.size() - 1) / (last_ - first_);
+}
+
+KeySpan KeyTimes::Find(double seconds) const {
+  if (!(seconds > first_)) return {};
+  if (seconds >= last_) return {times_.size() - 1, 0, 0};
+  const auto at = [&](std::size_t key) { return static_cast<double>(times_[key]); };
+  const std::size_t guess = std::min(static_cast<std::size_t>((seconds - first_) * rate_), times_.size() - 2);
+  if (at(guess) <= seconds && seconds < at(guess + 1)) return SpanFrom(times_, guess, seconds);
+  // at(low) <= seconds < at(high); close in from the guess by doubling steps, then by halves
+  std::size_t low = 0, high = times_.size() - 1;
+  for (std::size_t from = guess, step = 1; from > low && from < high; step *= 2) {
+    const bool below = at(from) <= seconds;
+    (below ? low : high) = from;
+    from = below ? from + step : from - std::min(step, from);
+  }
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    (at(middle) <= seconds ? low : high) = middle;
+  }
+  return SpanFrom(times_, low, seconds);
+}
+
+RotationTrack::RotationTrack(const SamplerKeys& keys) : step_(keys.interpolation == Interpolation::kStep) {
+  KPSA_CHECK_EQ(keys.components, 4u);
+  if (keys.interpolation == Interpolation::kCubicSpline) {
+    cubic_.assign(keys.values.begin(), keys.values.end());
+    return;
+  }
+  keys_.resize(keys.times.size());
+  for (std::size_t k = 0; k < keys_.size(); ++k) {
+    Quaternion q = KeyRotation(keys, k);
+    if (k > 0) {
+      Key& before = keys_[k - 1];
+      double cosine = Dot(before.rotation, q);
+      if (cosine < 0) q = {-q.x, -q.y, -q.z, -q.w}, cosine = -cosine;
+      if (cosine < 1 - 1e-9) {  // as Slerp does
+        before.angle = Acos(cosine);
+        before.inverse = 1 / std::sqrt((1 - cosine) * (1 + cosine));
+      }
+    }
+    keys_[k].rotation = q;
+  }
+}
+
+Quaternion RotationTrack::At(const KeySpan& span) const {
+  if (!cubic_.empty()) {
+    const SamplerKeys keys{{}, cubic_, 4, Interpolation::kCubicSpline};
+    return Normalized({Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
+  }
+  const Key& from = keys_[span.key];
+  const Quaternion& a = from.rotation;
+  if (span.t == 0 || step_) return a;
+  const Quaternion& b = keys_[span.key + 1].rotation;
+  double wa = 1 - span.t, wb = span.t;
+  if (from.inverse != 0) {
+    wa = Sin(wa * from.angle) * from.inverse;
+    wb = Sin(wb * from.angle) * from.inverse;
+  }
+  return {a.x * wa + b.x * wb, a.y * wa + b.y * wb, a.z * wa + b.z * wb, a.w * wa + b.w * wb};
+}
+
+bool RotationTrack::constant() const {
+  return cubic_.empty() && std::all_of(keys_.begin(), keys_.end(), [&](const Key& k) { return k.rotation == keys_.front().rotation; });
+}
+
+Double3 SampleVec3(const SamplerKeys& keys, const KeySpan& span) {
   KPSA_CHECK_EQ(keys.components, 3u);
-  const Span span = Find(keys, seconds);
   return {Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2)};
 }
+Double3 SampleVec3(const SamplerKeys& keys, double seconds) { return SampleVec3(keys, Find(keys.times, seconds)); }
 
 Quaternion SampleRotation(const SamplerKeys& keys, double seconds) {
   KPSA_CHECK_EQ(keys.components, 4u);
-  const Span span = Find(keys, seconds);
-  if (span.t == 0 || keys.interpolation == Interpolation::kStep) return KeyRotation(keys, span.a);
+  const KeySpan span = Find(keys.times, seconds);
+  if (span.t == 0 || keys.interpolation == Interpolation::kStep) return KeyRotation(keys, span.key);
   if (keys.interpolation == Interpolation::kLinear) {
-    return Slerp(KeyRotation(keys, span.a), KeyRotation(keys, span.a + 1), span.t);
+    return Slerp(KeyRotation(keys, span.key), KeyRotation(keys, span.key + 1), span.t);
   }
   return Normalized(
       {Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
 }
 
-void SampleScalars(const SamplerKeys& keys, double seconds, std::span<double> out) {
+void SampleScalars(const SamplerKeys& keys, const KeySpan& span, std::span<double> out) {
   KPSA_CHECK_EQ(keys.components, out.size());
-  const Span span = Find(keys, seconds);
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = Sample(keys, span, c);
+}
+void SampleScalars(const SamplerKeys& keys, double seconds, std::span<double> out) {
+  SampleScalars(keys, Find(keys.times, seconds), out);
 }
 
 }  // namespace kpsa

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -68,6 +69,64 @@ TEST(Sampler, RotationsTakeTheShortWayAndStayUnit) {
   ASSERT_TRUE(spline.Validate().ok());
   const Quaternion q = SampleRotation(spline, 0.3);
   EXPECT_NEAR(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w, 1, 1e-14);
+}
+
+TEST(Sampler, KeysAreFoundHoweverTheyAreSpaced) {
+  Random random(9);
+  for (int shape = 0; shape < 4; ++shape) {
+    for (int count : {1, 2, 3, 100, 1001}) {
+      std::vector<float> times;
+      double t = random.Signed();
+      for (int i = 0; i < count; ++i) {
+        times.push_back(static_cast<float>(t));
+        const double gaps[4] = {1.0 / 24, 0.01 + random.Unit(), i < count / 2 ? 1e-3 : 5.0, i % 50 == 49 ? 100.0 : 1e-3};
+        t += gaps[shape];
+      }
+      const KeyTimes keys(times);
+      for (int i = 0; i < 2000; ++i) {
+        double at = times.front() - 1 + random.Unit() * (times.back() - times.front() + 2);
+        if (i % 3 == 0) at = times[static_cast<std::size_t>(i) % times.size()];  // a key itself
+        if (i % 3 == 1) at = std::nextafter(static_cast<double>(times[static_cast<std::size_t>(i) % times.size()]), -1e9);
+        const KeySpan span = keys.Find(at);
+        const auto next = std::upper_bound(times.begin(), times.end(), at, [](double a, float b) { return a < static_cast<double>(b); });
+        const auto expected = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, next - times.begin() - 1));
+        ASSERT_EQ(span.key, expected) << at << " in " << count << " of shape " << shape;
+        const bool between = at > static_cast<double>(times.front()) && at < static_cast<double>(times.back());
+        const double start = times[expected], width = between ? static_cast<double>(times[expected + 1]) - start : 0;
+        ASSERT_EQ(span.t, between ? (at - start) / width : 0);
+        ASSERT_EQ(span.width, width);
+      }
+      EXPECT_EQ(keys.Find(std::nan("")).key, 0u);
+    }
+  }
+}
+
+TEST(Sampler, RotationTracksTurnAsTheSamplerDoes) {
+  Random random(10);
+  for (Interpolation interpolation : {Interpolation::kStep, Interpolation::kLinear, Interpolation::kCubicSpline}) {
+    std::vector<float> times, values;
+    const std::size_t rows = interpolation == Interpolation::kCubicSpline ? 3 : 1;
+    for (int i = 0; i < 50; ++i) {
+      times.push_back(static_cast<float>(i) / 10);
+      for (std::size_t c = 0; c < 4 * rows; ++c) {
+        const bool hold = i % 7 == 6 && rows == 1;  // two keys of the same rotation
+        values.push_back(hold ? -2 * values[values.size() - 4] : static_cast<float>(random.Signed()));
+      }
+    }
+    const SamplerKeys keys{times, values, 4, interpolation};
+    ASSERT_TRUE(keys.Validate().ok());
+    const RotationTrack track(keys);
+    const KeyTimes key_times(times);
+    EXPECT_FALSE(track.constant());
+    for (int i = 0; i < 2000; ++i) {
+      const double at = i < 50 ? times[static_cast<std::size_t>(i)] : random.Unit() * 6 - 0.5;
+      const Matrix4 got = RotationFromQuaternion(track.At(key_times.Find(at))), expected = RotationFromQuaternion(SampleRotation(keys, at));
+      for (std::size_t e = 0; e < 16; ++e) ASSERT_NEAR(got.m[e], expected.m[e], 1e-14) << at;
+    }
+  }
+  const std::array<float, 2> times = {0, 1};
+  const std::array<float, 8> still = {0, 0.6f, 0, 0.8f, 0, -0.6f, 0, -0.8f};
+  EXPECT_TRUE(RotationTrack(SamplerKeys{times, still, 4, Interpolation::kLinear}).constant());
 }
 
 TEST(Sampler, AgreesWithALinearSearch) {
