@@ -76,10 +76,11 @@ class Evaluator final {
   void Write(Index varying, const T& value, std::size_t offset);
   void Changed(Index varying);
   void MarkWanted(Index step);
-  ComputeContext ContextOf(Index step);
+  ComputeContext ContextOf(const Plan::Step& step);
   Index NewerDep(Index step) const;
   Index NewerLazyDep(Index step) const;
   template <bool kRecord> bool RunRange(Index begin, Index end);
+  template <bool kRecord> bool RunPlain(Index step);
   template <bool kRecord> bool RunStep(Index step);
   template <bool kRecord> bool RunUnit(Index first);
   template <bool kRecord> bool RunBranch(Index step);
@@ -116,6 +117,7 @@ class Evaluator final {
   Index cursor_ = 0;                     // of RunUntil
   std::uint32_t epoch_ = 1;
   bool set_since_run_ = false;
+  bool clean_ = false;                   // nothing is dirty that Evaluate would run
   Profile* profile_ = nullptr;
   int frame_ = 0;
   std::unique_ptr<StepHost> block_host_;  // of the step between PrepareBlockStep and FinishBlockStep

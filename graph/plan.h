@@ -42,6 +42,7 @@ class Plan {
     std::uint32_t branch = kNoIndex;          // into branches(), for steps with lazy inputs
     std::uint16_t unit_size = 1;              // steps that run together; at the first of them
     std::uint16_t unit_offset = 0;            // how far the first of the unit is before this step
+    bool runs_plainly() const { return branch == kNoIndex && unit_size == 1 && unit_offset == 0; }
   };
   struct Branch {
     DecideFn decide = nullptr;

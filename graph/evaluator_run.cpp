@@ -1,0 +1,342 @@
+// How an Evaluator runs: one step, a unit, a segment; serially, by levels on threads, or cut at the steps of blocks.
+#include <bit>
+#include <cstring>
+#include <thread>
+
+#include "base/check.h"
+#include "graph/step_host.h"
+
+namespace kpsa {
+namespace {
+
+constexpr std::size_t kComparedBytes = 512;  // small outputs beyond are taken as changed
+constexpr float kWorthThreadsNs = 20000;     // a level cheaper than this runs on the calling thread
+
+}  // namespace
+
+inline ComputeContext Evaluator::ContextOf(const Plan::Step& step) {
+  ComputeContext context;
+  context.values = values();
+  context.in = plan_->tables().data() + step.in;
+  context.out = plan_->tables().data() + step.out;
+  context.kernel = step.kernel;
+  context.scratch = workspace_->data() + step.scratch;
+  context.state = reinterpret_cast<std::byte*>(state_.data()) + step.state;
+  if (step.branch != kNoIndex) context.chosen = chosen_[step.branch];
+  return context;
+}
+
+// A dependency that changed after the step computed, or kNoIndex.
+inline Index Evaluator::NewerDep(Index number) const {
+  const Plan::Step& step = plan_->steps()[number];
+  const Index* deps = plan_->deps().data() + step.deps;
+  const std::uint32_t computed = computed_[number];
+  for (Index d = 0; d < step.deps_count; ++d) {
+    if (changed_[deps[d]] > computed) return deps[d];
+  }
+  return kNoIndex;
+}
+
+Index Evaluator::NewerLazyDep(Index number) const {
+  const Plan::Branch& branch = plan_->branches()[plan_->steps()[number].branch];
+  const std::uint64_t chosen = chosen_[plan_->steps()[number].branch];
+  for (std::size_t i = 0; i < branch.lazy_deps.size(); ++i) {
+    const Index dep = branch.lazy_deps[i];
+    if ((chosen >> branch.bit_of_lazy[i] & 1) != 0 && dep != kNoIndex && changed_[dep] > computed_[number]) return dep;
+  }
+  return kNoIndex;
+}
+
+void Evaluator::MarkComputed(Index step, bool changed) {
+  computed_[step] = epoch_;
+  if (changed) changed_[step] = epoch_;
+}
+
+// Runs the compute of a step; whether the bytes of its small outputs differ from what they were.
+template <std::size_t kBytes>
+inline bool ComputeAndCompare(const Plan::Step& step, ComputeContext& context) {
+  std::uint64_t old[kBytes / 8], now[kBytes / 8], difference = 0;
+  std::memcpy(old, context.values + step.value, kBytes);
+  step.compute(context);
+  std::memcpy(now, context.values + step.value, kBytes);
+  for (std::size_t i = 0; i < kBytes / 8; ++i) difference |= old[i] ^ now[i];
+  return difference != 0;
+}
+inline bool ComputeAndCompare(const Plan::Step& step, ComputeContext& context) {
+  switch (step.value_size) {
+    case 8: return ComputeAndCompare<8>(step, context);
+    case sizeof(Double3): return ComputeAndCompare<sizeof(Double3)>(step, context);
+    case sizeof(Matrix4): return ComputeAndCompare<sizeof(Matrix4)>(step, context);
+    default: break;
+  }
+  std::byte old[kComparedBytes];
+  std::memcpy(old, context.values + step.value, step.value_size);
+  step.compute(context);
+  return std::memcmp(old, context.values + step.value, step.value_size) != 0;
+}
+
+template <bool kRecord>
+inline bool Evaluator::Compute(Index number, Index cause, bool stale) {
+  const Plan::Step& step = plan_->steps()[number];
+  StepHost host(this, number);
+  ComputeContext context = ContextOf(step);
+  context.host = &host;
+  std::uint64_t begin = 0;
+  if constexpr (kRecord) begin = ProfileClock();
+  bool changed = stale;
+  if (step.value_size > 0 && step.value_size <= kComparedBytes) {
+    changed = ComputeAndCompare(step, context) || computed_[number] == 0;
+  } else {
+    step.compute(context);
+  }
+  if constexpr (kRecord) AddEvent(number, cause, begin, ProfileClock());
+  if (host.failed) [[unlikely]] {
+    computed_[number] = 0;  // what it left in its outputs is no value to compare with
+    return false;
+  }
+  MarkComputed(number, changed);
+  return true;
+}
+
+void Evaluator::AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns) {
+  const auto thread = static_cast<int>(std::hash<std::thread::id>()(std::this_thread::get_id()) % 1000000);
+  profile_->Add({step, cause, begin_ns, end_ns, thread, frame_});
+}
+
+template <bool kRecord>
+bool Evaluator::RunUnit(Index first) {
+  // One buffer goes through all members: if one of them is stale, all run, from the first. Members before the stale
+  // one give what they gave before, so their stamps stay.
+  const Index end = first + plan_->steps()[first].unit_size;
+  bool run = false;
+  for (Index s = first; s < end; ++s) run = run || computed_[s] == 0 || NewerDep(s) != kNoIndex;
+  if (!run) return true;
+  bool stale = false;
+  for (Index s = first; s < end; ++s) {
+    const Index cause = NewerDep(s);
+    stale = stale || computed_[s] == 0 || cause != kNoIndex;
+    if (!Compute<kRecord>(s, cause, stale)) {
+      for (Index member = first; member < end; ++member) computed_[member] = 0;  // the buffer is torn
+      return false;
+    }
+  }
+  return true;
+}
+
+bool Evaluator::Decide(Index number, Index* cause) {
+  const Plan::Branch& branch = plan_->branches()[plan_->steps()[number].branch];
+  *cause = NewerDep(number);
+  if (computed_[number] != 0 && *cause == kNoIndex) return true;  // the choice stands
+  if (branch.decide == nullptr) return true;
+  StepHost host(this, number);
+  ComputeContext context = ContextOf(plan_->steps()[number]);
+  context.host = &host;
+  chosen_[plan_->steps()[number].branch] = branch.decide(context);
+  return !host.failed;
+}
+
+bool Evaluator::RunChosen(Index number) {
+  const Index b = plan_->steps()[number].branch;
+  const Plan::Branch& branch = plan_->branches()[b];
+  Index before = kNoIndex;
+  for (std::size_t i = 0; i < branch.segment_of_lazy.size(); ++i) {
+    const Index g = branch.segment_of_lazy[i];
+    if ((chosen_[b] >> branch.bit_of_lazy[i] & 1) == 0 || g == kNoIndex || g == before) continue;
+    before = g;
+    const Plan::Segment& segment = plan_->segments()[g];
+    if (segment.uses_workspace) OwnWorkspace();
+    const bool wanted_only = wanted_only_;
+    wanted_only_ = false;  // all of a chosen segment is needed
+    const bool fine = Run(segment, segment.begin, segment.end);
+    wanted_only_ = wanted_only;
+    if (!fine) return false;
+  }
+  return true;
+}
+
+void Evaluator::OwnWorkspace() {
+  if (workspace_->owner_ == this) return;
+  // Another evaluator used these buffers since: what this one left in them is gone
+  workspace_->owner_ = this;
+  for (std::size_t g = 1; g < plan_->segments().size(); ++g) {
+    const Plan::Segment& segment = plan_->segments()[g];
+    if (!segment.uses_workspace) continue;
+    std::fill(computed_.begin() + segment.begin, computed_.begin() + segment.end, 0);
+    SetDirty(segment.begin, segment.end);
+  }
+}
+
+template <bool kRecord>
+bool Evaluator::RunBranch(Index number) {
+  Index cause;
+  if (Decide(number, &cause)) return RunDecided<kRecord>(number, cause);
+  computed_[number] = 0;  // decide again next time
+  return false;
+}
+
+template <bool kRecord>
+bool Evaluator::RunDecided(Index number, Index cause) {
+  if (!RunChosen(number)) {
+    computed_[number] = 0;
+    return false;
+  }
+  if (cause == kNoIndex) cause = NewerLazyDep(number);
+  if (computed_[number] != 0 && cause == kNoIndex) return true;
+  return Compute<kRecord>(number, cause, true);
+}
+
+// A step that neither decides nor belongs to a unit.
+template <bool kRecord>
+inline bool Evaluator::RunPlain(Index number) {
+  const Index cause = NewerDep(number);
+  if (computed_[number] != 0 && cause == kNoIndex) return true;
+  return Compute<kRecord>(number, cause, true);
+}
+
+template <bool kRecord>
+bool Evaluator::RunStep(Index number) {
+  const Plan::Step& step = plan_->steps()[number];
+  if (step.branch != kNoIndex) return RunBranch<kRecord>(number);
+  return step.unit_size > 1 ? RunUnit<kRecord>(number) : RunPlain<kRecord>(number);
+}
+
+template <bool kRecord>
+bool Evaluator::RunRange(Index begin, Index end) {
+  const Plan::Step* const steps = plan_->steps().data();
+  for (Index w = begin / 64; w * 64 < end; ++w) {
+    std::uint64_t bits = dirty_[w];
+    if (wanted_only_) bits &= wanted_[w];
+    if (w == begin / 64) bits &= ~std::uint64_t{0} << (begin % 64);
+    if ((w + 1) * 64 > end) bits &= ~std::uint64_t{0} >> ((64 - end % 64) % 64);
+    for (; bits != 0; bits &= bits - 1) {
+      Index step = w * 64 + static_cast<Index>(std::countr_zero(bits));
+      if (steps[step].runs_plainly()) [[likely]] {
+        dirty_[w] &= ~(bits & (~bits + 1));
+        if (RunPlain<kRecord>(step)) [[likely]] continue;
+        SetDirty(step, step + 1);
+        return false;
+      }
+      if (!dirty(step)) continue;  // done with its unit
+      step -= steps[step].unit_offset;
+      const Index size = steps[step].unit_size;
+      for (Index member = step; member < step + size; ++member) ClearDirty(member);
+      if (!RunStep<kRecord>(step)) {
+        SetDirty(step, step + size);
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) {
+  for (std::size_t level = 0; level + 1 < segment.levels.size(); ++level) {
+    const Index first = std::max(begin, segment.levels[level]), last = std::min(end, segment.levels[level + 1]);
+    if (first >= last) continue;
+    // The stale units of the level; branches come after, one by one: their segments use the pool themselves
+    ready_.clear();
+    float cost = 0;
+    for (Index step = first; step < last;) {
+      const Plan::Step& s = plan_->steps()[step];
+      const Index size = s.unit_size;
+      bool run = false;
+      for (Index member = step; member < step + size; ++member) {
+        run = run || (dirty(member) && (!wanted_only_ || wanted(member)));
+      }
+      if (run && s.branch == kNoIndex) {
+        for (Index member = step; member < step + size; ++member) {
+          ClearDirty(member);
+          cost += plan_->infos()[member].cost_ns;
+        }
+        ready_.push_back(step);
+      }
+      step += size;
+    }
+    const std::size_t count = ready_.size();
+    const auto run_some = [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i) {
+        const bool fine = profile_ != nullptr ? RunStep<true>(ready_[i]) : RunStep<false>(ready_[i]);
+        if (!fine) continue;  // recorded; the level is finished all the same
+      }
+    };
+    const float each = count == 0 ? 0 : cost / static_cast<float>(count);
+    const auto grain = static_cast<std::size_t>(each > 0 ? kWorthThreadsNs / 2 / each : 64) + 1;
+    if (cost > kWorthThreadsNs && count > 1) {
+      ParallelFor(count, grain, run_some);
+    } else {
+      run_some(0, count);
+    }
+    if (failed_step_ != kNoIndex) {  // what did not compute stays dirty
+      for (Index step : ready_) {
+        for (Index member = step; member < step + plan_->steps()[step].unit_size; ++member) {
+          if (computed_[member] == 0 || NewerDep(member) != kNoIndex) SetDirty(member, member + 1);
+        }
+      }
+      return false;
+    }
+    for (Index step = first; step < last; ++step) {
+      if (plan_->steps()[step].branch == kNoIndex || !dirty(step)) continue;
+      if (wanted_only_ && !wanted(step)) continue;
+      ClearDirty(step);
+      const bool fine = profile_ != nullptr ? RunBranch<true>(step) : RunBranch<false>(step);
+      if (!fine) {
+        SetDirty(step, step + 1);
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool Evaluator::Run(const Plan::Segment& segment, Index begin, Index end) {
+  if (options_.parallel) return RunLevels(segment, begin, end);
+  return profile_ != nullptr ? RunRange<true>(begin, end) : RunRange<false>(begin, end);
+}
+
+void Evaluator::BeginRun() {
+  set_since_run_ = false;
+  cursor_ = 0;
+}
+
+void Evaluator::RunUntil(Index end) {
+  if (cursor_ >= end || failed_step_ != kNoIndex) return;
+  const Index begin = cursor_;
+  cursor_ = end;
+  Run(plan_->segments()[0], begin, end);
+}
+
+bool Evaluator::PrepareBlockStep(Index step, ComputeContext* context) {
+  if (!dirty(step) || failed_step_ != kNoIndex) return false;
+  ClearDirty(step);
+  cursor_ = step + 1;
+  Index cause;
+  if (!Decide(step, &cause)) {
+    computed_[step] = 0;
+    SetDirty(step, step + 1);
+    return false;
+  }
+  if (chosen_[plan_->steps()[step].branch] != 0) {
+    const bool fine = profile_ != nullptr ? RunDecided<true>(step, cause) : RunDecided<false>(step, cause);
+    if (!fine) SetDirty(step, step + 1);
+    return false;
+  }
+  if (computed_[step] != 0 && cause == kNoIndex) return false;
+  block_cause_ = cause;
+  block_host_->step = step;
+  block_host_->failed = false;
+  *context = ContextOf(plan_->steps()[step]);
+  context->host = block_host_.get();
+  return true;
+}
+
+void Evaluator::FinishBlockStep(Index step, std::uint64_t begin_ns, std::uint64_t end_ns) {
+  if (profile_ != nullptr) AddEvent(step, block_cause_, begin_ns, end_ns);
+  if (block_host_->failed) {
+    computed_[step] = 0;
+    SetDirty(step, step + 1);
+    return;
+  }
+  MarkComputed(step, true);
+}
+
+}  // namespace kpsa

@@ -1,0 +1,30 @@
+// What a compute may ask the evaluator for. Internal to graph/.
+#pragma once
+
+#include "graph/evaluator.h"
+
+namespace kpsa {
+
+// One on the stack for every run, so that a failure knows its step.
+class Evaluator::StepHost final : public ComputeHost {
+ public:
+  StepHost(Evaluator* evaluator, Index step) : step(step), evaluator_(evaluator) {}
+  void Fail(std::string_view message) override {
+    failed = true;
+    evaluator_->RecordFailure(step, message);
+  }
+  void For(std::size_t count, std::size_t grain, RangeBody body) override {
+    if (evaluator_->options_.parallel) {
+      ParallelFor(count, grain, body);
+    } else {
+      body(0, count);
+    }
+  }
+  bool failed = false;
+  Index step;
+
+ private:
+  Evaluator* evaluator_;
+};
+
+}  // namespace kpsa
