@@ -127,8 +127,9 @@ Double3 EulerFromRotation(const Matrix4& m, RotateOrder order) {
   return angles;
 }
 
-Matrix4 RotationFromQuaternion(Quaternion q) {
-  q = Normalized(q);
+Matrix4 RotationFromQuaternion(Quaternion q) { return RotationFromUnit(Normalized(q)); }
+
+Matrix4 RotationFromUnit(Quaternion q) {
   Matrix4 m;
   m(0, 0) = 1 - 2 * (q.y * q.y + q.z * q.z), m(0, 1) = 2 * (q.x * q.y - q.z * q.w), m(0, 2) = 2 * (q.x * q.z + q.y * q.w);
   m(1, 0) = 2 * (q.x * q.y + q.z * q.w), m(1, 1) = 1 - 2 * (q.x * q.x + q.z * q.z), m(1, 2) = 2 * (q.y * q.z - q.x * q.w);

@@ -21,6 +21,7 @@ Matrix4 Translation(Double3 t);
 Matrix4 Scaling(Double3 s);
 Matrix4 RotationFromEuler(Double3 radians, RotateOrder order);
 Matrix4 RotationFromQuaternion(Quaternion q);  // q need not be unit length; it is normalised
+Matrix4 RotationFromUnit(Quaternion q);        // of unit length
 // T * R * S, the glTF composition (glTF 2.0, 3.5.3).
 Matrix4 ComposeTrs(Double3 translation, Quaternion rotation, Double3 scale);
 

@@ -42,10 +42,13 @@ std::uint32_t PlanBuilder::AddBuffer(std::uint32_t slot, const PointSet& points,
 
 std::uint32_t PlanBuilder::ConstantSlot(const Value& value, Type type, const PointSet& points) {
   if (!IsPointType(type)) {
-    const auto [it, added] = small_constants_.emplace(&value, 0);
+    // Equal bytes share a slot, whatever they mean
+    std::byte bytes[sizeof(Matrix4)];
+    value.WriteSlot(type, bytes);
+    const auto [it, added] = small_constants_.emplace(std::string(reinterpret_cast<const char*>(bytes), SlotSize(type)), 0);
     if (added) {
       it->second = AddSlot(SlotSize(type));
-      value.WriteSlot(type, plan_->initial_values_.data() + it->second);
+      std::memcpy(plan_->initial_values_.data() + it->second, bytes, SlotSize(type));
     }
     return it->second;
   }

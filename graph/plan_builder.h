@@ -47,7 +47,7 @@ class PlanBuilder {
   std::vector<Index> placed_;        // draft step by plan step
   std::vector<Slots> slots_;         // by draft step
   std::vector<std::uint32_t> buffer_of_step_;  // by draft step: number of the buffer of its first output
-  std::unordered_map<const Value*, std::uint32_t> small_constants_;
+  std::unordered_map<std::string, std::uint32_t> small_constants_;  // slots by their bytes
   std::map<std::pair<const Value*, Digest>, std::uint32_t> point_constants_;
   std::unordered_map<std::string, std::uint32_t> texts_;
 };

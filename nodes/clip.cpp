@@ -121,9 +121,17 @@ void ComputeClipTransform(ComputeContext& c) {
     matrix(0, 3) = translation.x, matrix(1, 3) = translation.y, matrix(2, 3) = translation.z;
     return;
   }
-  const Quaternion rotation = k.rotation_times == kConstant ? k.constant_rotation : k.rotation.At(find(k.rotation_times));
   const Double3 scale = k.scale_times == kConstant ? k.constant_scale : SampleVec3(k.scale.view, find(k.scale_times));
-  matrix = ComposeTrs(translation, rotation, scale);
+  if (k.rotation_times == kConstant) {
+    matrix = ComposeTrs(translation, k.constant_rotation, scale);
+    return;
+  }
+  Matrix4 m = RotationFromUnit(k.rotation.At(find(k.rotation_times)));
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) m(row, column) *= scale[column];
+  }
+  m(0, 3) = translation.x, m(1, 3) = translation.y, m(2, 3) = translation.z;
+  matrix = m;
 }
 
 struct ClipWeightsKernel {

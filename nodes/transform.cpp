@@ -22,16 +22,19 @@ Result<BoundKernel> BindTransform(const Binding& binding) {
 }
 
 // Inputs in the order of the groups below: translate, rotate, scale, offsetParentMatrix.
+bool HasControls(const ComputeContext& c) {
+  return !(c.get<Double3>(0) == Double3() && c.get<Double3>(1) == Double3() && c.get<Double3>(2) == Double3{1, 1, 1});
+}
 Matrix4 Local(const ComputeContext& c) {
-  const Double3 &translate = c.get<Double3>(0), &rotate = c.get<Double3>(1), &scale = c.get<Double3>(2);
   const Matrix4& offset = c.get<Matrix4>(3);
-  if (translate == Double3() && rotate == Double3() && scale == Double3{1, 1, 1}) return offset;
-  return ComposeLocal(offset, {translate, rotate, c.kernel_as<TransformKernel>().order, scale});
+  if (!HasControls(c)) return offset;
+  return ComposeLocal(offset, {c.get<Double3>(0), c.get<Double3>(1), c.kernel_as<TransformKernel>().order, c.get<Double3>(2)});
 }
 
-void ComputeMatrices(ComputeContext& c) {
-  c.out_value<Matrix4>(0) = Local(c);
-  c.out_value<Matrix4>(1) = c.get<Matrix4>(4) * c.out_value<Matrix4>(0);
+void ComputeMatrix(ComputeContext& c) { c.out_value<Matrix4>(0) = Local(c); }
+void ComputeWorld(ComputeContext& c) {
+  const Matrix4 &parent = c.get<Matrix4>(4), &offset = c.get<Matrix4>(3);
+  c.out_value<Matrix4>(0) = HasControls(c) ? parent * Local(c) : parent * offset;
 }
 void ComputeWorldInverse(ComputeContext& c) { c.out_value<Matrix4>(0) = InverseOrIdentity(c.get<Matrix4>(4) * Local(c)); }
 
@@ -75,7 +78,8 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip").unit(Unit::kLength)
       .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist").unit(Unit::kAngle)
       .out("twist", Type::kDouble, "angle about twistAxis").unit(Unit::kAngle);
-  b.compute_for({"matrix", "worldMatrix"}, world, &ComputeMatrices).bind(BindTransform).cost(90, 0);
+  b.compute_for({"matrix"}, local, &ComputeMatrix).bind(BindTransform).cost(60, 0);
+  b.compute_for({"worldMatrix"}, world, &ComputeWorld).bind(BindTransform).cost(70, 0);
   b.compute_for({"worldInverseMatrix"}, world, &ComputeWorldInverse).bind(BindTransform).cost(150, 0);
   b.compute_for({"poseRotate"}, local, &ComputePose).bind(BindTransform).cost(250, 0);
   b.compute_for({"poseRotateVector"}, local, &ComputePoseVector).bind(BindTransform).cost(200, 0);
