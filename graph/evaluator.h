@@ -52,7 +52,9 @@ class Evaluator final {
   ConstPointsView Points(Index output) const { return Get<ConstPointsView>(output); }
 
   // Records what runs from now on, as of that frame. Null to stop: then evaluation pays nothing for it.
+#ifndef KPSA_WITHOUT_RECORDING  // defined by the test that compares the two
   void Record(Profile* profile, int frame = 0) { profile_ = profile, frame_ = frame; }
+#endif
   // Forgets every computed value (not the set ones): the next pull computes everything.
   void Invalidate();
   std::size_t MemoryBytes() const;
@@ -118,7 +120,11 @@ class Evaluator final {
   std::uint32_t epoch_ = 1;
   bool set_since_run_ = false;
   bool clean_ = false;                   // nothing is dirty that Evaluate would run
+#ifndef KPSA_WITHOUT_RECORDING
   Profile* profile_ = nullptr;
+#else
+  static constexpr Profile* profile_ = nullptr;
+#endif
   int frame_ = 0;
   std::unique_ptr<StepHost> block_host_;  // of the step between PrepareBlockStep and FinishBlockStep
   Index block_cause_ = kNoIndex;
