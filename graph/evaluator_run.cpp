@@ -1,10 +1,11 @@
 // How an Evaluator runs: one step, a unit, a segment; serially, by levels on threads, or cut at the steps of blocks.
+#include "graph/step_host.h"
+
 #include <bit>
 #include <cstring>
 #include <thread>
 
 #include "base/check.h"
-#include "graph/step_host.h"
 
 namespace kpsa {
 namespace {

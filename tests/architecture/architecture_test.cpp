@@ -1,0 +1,101 @@
+// The rooms know only whom they may know, and every header stands by itself. Each check has a canary: a small bad tree
+// that it must find fault with.
+#include <gtest/gtest.h>
+
+#include "tests/architecture/source_tree.h"
+#include "tests/support/temporary_folder.h"
+
+namespace kpsa {
+namespace {
+
+std::string Lines(const std::vector<std::string>& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += text + "\n";
+  return all;
+}
+
+TEST(IncludeArrows, PointAsTheyMay) {
+  const std::vector<SourceFile> files = ReadSourceTree(KPSA_SOURCE_DIR);
+  ASSERT_GT(files.size(), 200u) << "the tree was not found";
+  std::size_t includes = 0;
+  for (const SourceFile& file : files) includes += file.includes.size();
+  ASSERT_GT(includes, 1000u);
+  EXPECT_EQ(Lines(FindBreaches(files)), "");
+}
+
+TEST(IncludeArrows, CanaryOfEveryArrow) {
+  TemporaryFolder tree;
+  const std::pair<const char*, const char*> bad[] = {
+      {"base/a.h", "graph/a.h"},         {"graph/a.cpp", "nodes/a.h"},   {"graph/b.h", "kpsa/a.h"},      {"graph/c.h", "io/a.h"},
+      {"nodes/a.h", "kpsa/a.h"},         {"nodes/b.h", "io/a.h"},        {"kpsa/a.h", "nodes/a.h"},      {"kpsa/b.cpp", "io/a.h"},
+      {"io/a.h", "nodes/a.h"},           {"io/b.h", "kpsa/a.h"},         {"nodes/kernels/a.h", "graph/a.h"}, {"nodes/kernels/b.h", "nodes/a.h"},
+      {"base/b.cpp", "cli/a.h"},         {"io/c.h", "tests/support/a.h"}, {"kpsa/c.cpp", "nodes/kernels/a.h"}, {"graph/d.h", "bench/a.h"},
+  };
+  for (const auto& [file, include] : bad) tree.Write(file, std::string("#pragma once\n  #  include \"") + include + "\"\n");
+  const std::vector<std::string> breaches = FindBreaches(ReadSourceTree(tree.path()));
+  EXPECT_EQ(breaches.size(), std::size(bad)) << Lines(breaches);
+  for (const auto& [file, include] : bad) {
+    EXPECT_NE(Lines(breaches).find(std::string(file) + ":2: "), std::string::npos) << file << " includes " << include << "\n" << Lines(breaches);
+  }
+}
+
+TEST(IncludeArrows, CanaryOfEveryDoor) {
+  TemporaryFolder tree;
+  const char* const libraries[] = {"tbb/parallel_for.h", "oneapi/tbb.h", "yaml-cpp/yaml.h", "tiny_gltf.h", "nlohmann/json.hpp", "embree3/rtcore.h", "hwy/highway.h", "zip.h"};
+  for (std::size_t i = 0; i < std::size(libraries); ++i) {
+    for (const char* room : {"base", "graph", "nodes", "nodes/kernels", "kpsa", "io", "cli"}) {
+      tree.Write(std::string(room) + "/h" + std::to_string(i) + ".h", std::string("#include <") + libraries[i] + ">\n");
+    }
+  }
+  const std::vector<std::string> breaches = FindBreaches(ReadSourceTree(tree.path()));
+  EXPECT_EQ(breaches.size(), 7 * std::size(libraries)) << Lines(breaches);
+
+  TemporaryFolder sources;
+  sources.Write("graph/a.cpp", "#include <tbb/task_arena.h>\n#include <nlohmann/json.hpp>\n");
+  sources.Write("io/other.cpp", "#include <yaml-cpp/yaml.h>\n");
+  sources.Write("base/parallel.cpp", "#include <tbb/task_arena.h>\n");
+  sources.Write("kpsa/a.cpp", "#include \"../base/types.h\"\n#include \"types.h\"\n");
+  const std::vector<std::string> found = FindBreaches(ReadSourceTree(sources.path()));
+  ASSERT_EQ(found.size(), 4u) << Lines(found);
+  EXPECT_EQ(found[0], "graph/a.cpp:1: <tbb/task_arena.h> belongs behind base/parallel.cpp");
+  EXPECT_EQ(found[1], "io/other.cpp:1: <yaml-cpp/yaml.h> belongs behind io/yaml_document.cpp");
+}
+
+TEST(IncludeArrows, AGoodTreeHasNoBreach) {
+  TemporaryFolder tree;
+  tree.Write("graph/a.h", "#include \"base/types.h\"\n#include <vector>\n// #include \"io/a.h\"\n");
+  tree.Write("nodes/kernels/a.cpp", "#include \"nodes/kernels/a.h\"\n#include \"base/types.h\"\n");
+  tree.Write("nodes/a.cpp", "#include \"nodes/kernels/a.h\"\n#include \"graph/a.h\"\n");
+  tree.Write("cli/a.cpp", "#include \"io/a.h\"\n#include \"kpsa/a.h\"\n#include <nlohmann/json.hpp>\n");
+  tree.Write("build-x/a.h", "#include \"io/a.h\"\n");
+  EXPECT_EQ(Lines(FindBreaches(ReadSourceTree(tree.path()))), "");
+}
+
+// A header that some source file includes first was compiled alone by the build; the others are compiled here.
+TEST(Headers, CompileAlone) {
+  const std::vector<SourceFile> files = ReadSourceTree(KPSA_SOURCE_DIR);
+  const std::vector<std::string> unproven = UnprovenHeaders(files);
+  EXPECT_FALSE(unproven.empty());
+  EXPECT_LT(unproven.size(), 40u) << "too many to compile in a test: let each .cpp include its own header first\n" << Lines(unproven);
+  EXPECT_EQ(Lines(CompileAlone(KPSA_SOURCE_DIR, unproven)), "");
+}
+
+TEST(Headers, CanaryOfOneThatDoesNot) {
+  TemporaryFolder tree;
+  tree.Write("base/good.h", "#pragma once\n#include <vector>\ninline std::vector<int> Good() { return {}; }\n");
+  tree.Write("base/bad.h", "#pragma once\ninline std::vector<int> Bad() { return {}; }\n");
+  tree.Write("base/proven.h", "#pragma once\n");
+  tree.Write("base/proven.cpp", "// A comment\n#include \"base/proven.h\"\n#include \"base/bad.h\"\n");
+  tree.Write("base/late.h", "#pragma once\n");
+  tree.Write("base/late.cpp", "#define SOMETHING\n#include \"base/late.h\"\n");
+  tree.Write("base/later.cpp", "#include <vector>\n#include \"base/bad.h\"\n");
+  const std::vector<std::string> unproven = UnprovenHeaders(ReadSourceTree(tree.path()));
+  EXPECT_EQ(unproven, (std::vector<std::string>{"base/bad.h", "base/good.h", "base/late.h"}));
+  const std::vector<std::string> errors = CompileAlone(tree.path(), unproven);
+  ASSERT_EQ(errors.size(), 1u) << Lines(errors);
+  EXPECT_TRUE(errors[0].starts_with("base/bad.h does not compile by itself:\n")) << errors[0];
+  EXPECT_EQ(CompileAlone(tree.path(), {"base/missing.h"}).size(), 1u);
+}
+
+}  // namespace
+}  // namespace kpsa
