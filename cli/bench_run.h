@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/acceleration.h"
-#include "cli/plan_report.h"
+#include "graph/plan_report.h"
 
 namespace kpsa {
 

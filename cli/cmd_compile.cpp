@@ -7,11 +7,11 @@
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/options.h"
-#include "cli/plan_report.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
 #include "cli/rig_training.h"
 #include "cli/table.h"
+#include "graph/plan_report.h"
 
 namespace kpsa {
 namespace {

@@ -6,10 +6,10 @@
 #include "cli/acceleration.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
-#include "cli/plan_reasons.h"
-#include "cli/plan_report.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
+#include "graph/explain.h"
+#include "graph/plan_report.h"
 
 namespace kpsa {
 namespace {

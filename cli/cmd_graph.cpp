@@ -1,16 +1,13 @@
 // kpsa graph: the rig as a drawing, for Graphviz.
-#include <algorithm>
-#include <map>
 #include <memory>
-#include <set>
 
 #include "cli/acceleration.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "cli/plan_report.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
+#include "graph/dot.h"
 
 namespace kpsa {
 namespace {
@@ -21,95 +18,6 @@ struct GraphFlags : Flags {
   std::optional<std::string> vertices;
   bool time = false, all = false;
 };
-
-// Within a quoted string of the DOT language.
-std::string Escaped(const std::string& text) {
-  std::string escaped;
-  for (char c : text) {
-    if (c == '"' || c == '\\') escaped += '\\';
-    escaped += c == '\n' ? ' ' : c;
-  }
-  return escaped;
-}
-std::string Quoted(const std::string& text) { return "\"" + Escaped(text) + "\""; }
-
-struct NodeLook {
-  bool kept = false, lazy_only = true;
-  Index points = 0, points_total = 0;
-  double ns = 0;
-  std::string left_out;  // reason
-};
-
-// From pale yellow (nothing) to red (all the time).
-std::string HeatColor(double share) {
-  const auto level = static_cast<int>(255 * (1 - std::min(1.0, std::max(0.0, share))));
-  return fmt::format("#ff{:02x}{:02x}", 60 + level * 190 / 255, 40 + level * 160 / 255);
-}
-
-std::string Dot(const Rig& rig, const Plan& plan, const Profile* profile, std::size_t frames, bool all) {
-  const Graph& graph = *rig.graph;
-  std::map<std::string, NodeLook> looks;
-  double total = 0;
-  for (Index s = 0; s < plan.steps().size(); ++s) {
-    NodeLook& look = looks[plan.step_name(s)];
-    const Plan::StepInfo& info = plan.infos()[s];
-    look.kept = true;
-    look.lazy_only = look.lazy_only && info.segment != 0;
-    if (info.points > look.points) look.points = info.points, look.points_total = info.points_total;
-    if (profile != nullptr)
-      look.ns += static_cast<double>(profile->self_ns()[s]),
-          total += static_cast<double>(profile->self_ns()[s]);
-  }
-  for (const Plan::Excluded& e : plan.excluded()) looks[e.node_name].left_out = e.reason;
-  for (const Plan::Varying& v : plan.varying()) looks[graph.name(v.plug.node)].kept = true;
-
-  std::string text =
-      "digraph rig {\n  rankdir=LR;\n  node [shape=box, style=filled, fillcolor=white, "
-      "fontname=\"sans-serif\"];\n";
-  std::set<Index> drawn;
-  for (NodeId id : graph.Nodes()) {
-    const NodeLook& look = looks[graph.name(id)];
-    if (!look.kept && !all) continue;
-    drawn.insert(id.index);
-    std::vector<std::string> lines = {graph.name(id), graph.def(id).name};
-    std::string style;
-    if (look.points_total > 0)
-      lines.push_back(fmt::format("{} of {} points", Thousands(look.points), Thousands(look.points_total)));
-    if (profile != nullptr && look.kept)
-      lines.push_back(fmt::format("{:.1f} us", look.ns / static_cast<double>(frames) / 1e3));
-    if (!look.kept) {
-      style = fmt::format("style=\"filled,dashed\", fillcolor=\"#eeeeee\", fontcolor=\"#888888\", tooltip={}",
-                          Quoted(look.left_out));
-    } else if (profile != nullptr) {
-      style = fmt::format("fillcolor={}", Quoted(HeatColor(total > 0 ? look.ns / total * 3 : 0)));
-    } else {
-      style = look.lazy_only && look.points_total > 0 ? "fillcolor=\"#ffe9b3\", tooltip=\"only on demand\""
-                                                      : "fillcolor=\"#d8f0d8\"";
-    }
-    std::string label;
-    for (const std::string& line : lines) label += (label.empty() ? "" : "\\n") + Escaped(line);
-    text += fmt::format("  n{} [label=\"{}\", {}];\n", id.index, label, style);
-  }
-  // One arrow for all connections between two nodes
-  std::map<std::pair<Index, Index>, std::pair<std::string, std::size_t>> arrows;
-  for (NodeId id : graph.Nodes()) {
-    if (!drawn.contains(id.index)) continue;
-    for (const Connection& c : graph.Inputs(id)) {
-      if (!drawn.contains(c.source.node.index)) continue;
-      auto& [label, count] = arrows[{c.source.node.index, id.index}];
-      const auto attribute = [&](const PlugRef& plug) {
-        return graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].name;
-      };
-      if (count++ == 0) label = attribute(c.source) + " > " + attribute(c.destination);
-    }
-  }
-  for (const auto& [ends, arrow] : arrows) {
-    text += fmt::format("  n{} -> n{} [tooltip={}];\n", ends.first, ends.second,
-                        Quoted(arrow.second > 1 ? fmt::format("{} and {} more", arrow.first, arrow.second - 1)
-                                                : arrow.first));
-  }
-  return text + "}\n";
-}
 
 CommandResult DrawGraph(const GraphFlags& flags) {
   const std::string place = flags.output.value_or("-");
@@ -139,8 +47,8 @@ CommandResult DrawGraph(const GraphFlags& flags) {
     KPSA_RETURN_IF_ERROR(
         EvaluateTimes(rig, *plan, *times, options, [](std::size_t, const Evaluator&) { return Status(); }));
   }
-  KPSA_RETURN_IF_ERROR(
-      WriteText(place, flags.force, Dot(rig, **plan, flags.time ? &profile : nullptr, frames, flags.all)));
+  const DotOptions options{flags.time ? &profile : nullptr, frames, flags.all};
+  KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, DrawDot(*rig.graph, **plan, options)));
   return 0;
 }
 

@@ -10,9 +10,9 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "cli/plan_report.h"
 #include "cli/profile_run.h"
 #include "cli/table.h"
+#include "graph/plan_report.h"
 
 namespace kpsa {
 namespace {

@@ -172,12 +172,6 @@ Status FlushOutput() {
   return Status();
 }
 
-std::string Thousands(std::uint64_t number) {
-  std::string text = std::to_string(number);
-  for (std::size_t i = text.size(); i > 3;) text.insert(i -= 3, ",");
-  return text;
-}
-
 std::string ByteText(std::uint64_t bytes) {
   const char* const kUnits[] = {"B", "KB", "MB", "GB", "TB"};
   double value = static_cast<double>(bytes);

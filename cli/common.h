@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/status.h"
+#include "base/text.h"
 #include "graph/node_registry.h"
 #include "io/rig_builder.h"
 
@@ -72,7 +73,6 @@ void PrintJson(const Json& json) {
   Print(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
-std::string Thousands(std::uint64_t number);                       // 17,121
 std::string ByteText(std::uint64_t bytes);                         // 3.1 MB
 std::string LengthText(double metres);                             // 0.213 mm
 std::string Plural(std::uint64_t count, const std::string& noun);  // "1 mesh", "12 vertices"

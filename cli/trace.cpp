@@ -4,7 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "cli/plan_report.h"
+#include "graph/plan_report.h"
 
 namespace kpsa {
 namespace {

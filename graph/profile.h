@@ -13,7 +13,7 @@ namespace kpsa {
 // One evaluation of a step.
 struct ProfileEvent {
   Index step = 0;
-  Index cause = kNoIndex;   // the producer that changed: a step, or steps().size() + varying; kNoIndex: the first time
+  Index cause = kNoIndex;   // the producer that changed: a step, or steps().size() + varying; kNoIndex: none, it never ran
   std::uint64_t begin_ns = 0, end_ns = 0;
   int thread = 0;
   int frame = 0;            // as told to Evaluator::Record

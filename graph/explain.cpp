@@ -1,9 +1,9 @@
-#include "cli/plan_reasons.h"
+#include "graph/explain.h"
 
 #include <algorithm>
 
-#include "cli/common.h"
-#include "cli/plan_report.h"
+#include "base/text.h"
+#include "graph/plan_report.h"
 
 namespace kpsa {
 

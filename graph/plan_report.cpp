@@ -1,4 +1,4 @@
-#include "cli/plan_report.h"
+#include "graph/plan_report.h"
 
 #include <algorithm>
 #include <map>
