@@ -1,4 +1,5 @@
-// What the small nodes of a character cost a frame: all world matrices and morph weights of a clip, without points.
+// What the small nodes of a character cost a frame, without points: all world matrices (as skins read them) and morph
+// weights of a clip; and local matrices instead (as KPSA nodes read them).
 //   bench_joints CHARACTER [frames]       a .glb, .gltf or rig; 240 frames if not given
 #include <fmt/format.h>
 
@@ -37,42 +38,30 @@ double MicrosecondsAFrame(Evaluator& evaluator, Index time, const std::vector<do
   return best / static_cast<double>(times.size());
 }
 
-int Main(int argc, char** argv) {
-  if (argc < 2) {
-    fmt::print(stderr, "usage: bench_joints CHARACTER [frames]\n");
-    return 2;
-  }
-  NodeRegistry registry;
-  AddStandardNodes(registry);
-  Result<Rig> rig = LoadRig(registry, argv[1]);
-  if (!rig.ok()) {
-    fmt::print(stderr, "{}\n", rig.status().ToString());
-    return 3;
-  }
+int Report(const Rig& rig, const std::string& matrices, long frames) {
   Request request;
-  request.varying = {rig->scene.time};
+  request.varying = {rig.scene.time};
   const auto ask = [&](const std::string& plug) {
-    Result<PlugRef> found = rig->graph->FindPlug(plug);
+    Result<PlugRef> found = rig.graph->FindPlug(plug);
     if (found.ok()) request.outputs.push_back({*found, {}});
   };
-  for (NodeId node : rig->scene.transforms) {
-    if (rig->graph->IsAlive(node)) ask(rig->graph->name(node) + ".worldMatrix");
+  for (NodeId node : rig.scene.transforms) {
+    if (rig.graph->IsAlive(node)) ask(rig.graph->name(node) + "." + matrices);
   }
-  for (NodeId node : rig->scene.clip_nodes) {
-    if (rig->graph->def(node).name == "clipWeights") ask(rig->graph->name(node) + ".output[0]");
+  for (NodeId node : rig.scene.clip_nodes) {
+    if (rig.graph->def(node).name == "clipWeights") ask(rig.graph->name(node) + ".output[0]");
   }
   Compiler compiler;
-  Result<std::shared_ptr<const Plan>> plan = compiler.Compile(*rig->graph, request);
+  Result<std::shared_ptr<const Plan>> plan = compiler.Compile(*rig.graph, request);
   if (!plan.ok()) {
     fmt::print(stderr, "{}\n", plan.status().ToString());
     return 3;
   }
-  const Index time = (*plan)->FindVarying(rig->scene.time);
+  const Index time = (*plan)->FindVarying(rig.scene.time);
   if (time == kNoIndex) {
-    fmt::print(stderr, "nothing of {} moves with time\n", argv[1]);
+    fmt::print(stderr, "{}: nothing moves with time\n", rig.path);
     return 3;
   }
-  const long frames = argc > 2 ? std::clamp(std::strtol(argv[2], nullptr, 10), 1L, 1000000L) : 240;
   std::vector<double> forward, scattered;
   for (long f = 0; f < frames; ++f) {
     forward.push_back(static_cast<double>(f) / 24);
@@ -90,7 +79,7 @@ int Main(int argc, char** argv) {
   Profile profile(**plan);
   evaluator.Record(&profile);
   const double recorded = MicrosecondsAFrame(evaluator, time, forward, nothing);
-  fmt::print("{} steps: {:.2f} us a frame in order, {:.2f} in any order, {:.2f} with cold caches, {:.2f} while recording\n",
+  fmt::print("{}, {} steps: {:.2f} us a frame in order, {:.2f} in any order, {:.2f} with cold caches, {:.2f} while recording\n", matrices,
              (*plan)->steps().size(), in_order, out_of_order, cold, recorded);
   struct Row {
     std::uint64_t steps = 0, count = 0, ns = 0;
@@ -101,11 +90,28 @@ int Main(int argc, char** argv) {
     ++row.steps, row.count += profile.counts()[s], row.ns += profile.self_ns()[s];
   }
   for (const auto& [type, row] : by_type) {
-    fmt::print("  {:<20} {:>5} steps, {:>5.1f} % of them a frame, {:>6.0f} ns each (recorded: the clock's own time is in it)\n", type, row.steps,
+    fmt::print("  {:<20} {:>5} steps, {:>5.1f} % of them a frame, {:>6.0f} ns each (the clock's own time is in it)\n", type, row.steps,
                100.0 * static_cast<double>(row.count) / static_cast<double>(row.steps * kPasses * forward.size()),
                static_cast<double>(row.ns) / static_cast<double>(std::max<std::uint64_t>(row.count, 1)));
   }
   return 0;
+}
+
+int Main(int argc, char** argv) {
+  if (argc < 2) {
+    fmt::print(stderr, "usage: bench_joints CHARACTER [frames]\n");
+    return 2;
+  }
+  NodeRegistry registry;
+  AddStandardNodes(registry);
+  const Result<Rig> rig = LoadRig(registry, argv[1]);
+  if (!rig.ok()) {
+    fmt::print(stderr, "{}\n", rig.status().ToString());
+    return 3;
+  }
+  const long frames = argc > 2 ? std::clamp(std::strtol(argv[2], nullptr, 10), 1L, 1000000L) : 240;
+  const int world = Report(*rig, "worldMatrix", frames);
+  return world != 0 ? world : Report(*rig, "matrix", frames);
 }
 
 }  // namespace
