@@ -109,7 +109,7 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
     if (options.fps.has_value()) file.sources[0].units.fps = *options.fps;
   } else {
     errors.Append(ReadRigFile(path, options.fps, &file));
-    if (!file.character.has_value()) return errors.Take();
+    if (!file.character.has_value() || !file.complete) return InOrder(errors.Take());
     character_at = file.character->where;
   }
 

@@ -37,8 +37,11 @@ class Reader {
     read_.emplace(identity, included_at);
     Result<YamlNode> root = ReadYamlFile(path);
     if (!root.ok()) {
-      Status status = root.status();
-      errors_->Append(std::move(status).At(included_at));
+      rig_->complete = false;
+      for (const Error& error : root.status().errors()) {
+        const bool unread = error.where.line == 0 && included_at.line > 0;  // nothing of it: the place that asks for it says more
+        errors_->Append(unread ? Status::Invalid("include: {} {}", path, error.message).At(included_at) : Status(error));
+      }
       return;
     }
     RigSource source;
