@@ -62,6 +62,8 @@ class RigBuild {
   void AddCurves();
   void ConnectParents();
   void PlaceHandles();
+  void ConnectPivots();
+  std::optional<NodeId> CommonAncestor(const Made& made) const;
   bool Place(Made* made, int depth);
   bool RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world);
   bool ReadPlace(const YamlNode& node, int source, int depth, Double3* place);

@@ -74,6 +74,7 @@ void RigBuild::Run() {
   ConnectCurves();
   BuildStacks();
   MakeConnections();
+  ConnectPivots();
   FinishOverrides();
   AddControls();
   AddAccelerations();
