@@ -146,6 +146,19 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   return rig;
 }
 
+SourceLocation PlaceOfMessage(const Rig& rig, std::string_view message) {
+  constexpr std::string_view kNode = "node \"", kType = "\" (";
+  SourceLocation place{rig.path, 0, 0};
+  if (!message.starts_with(kNode)) return place;
+  message.remove_prefix(kNode.size());
+  // Names may hold anything: the longest one that fits
+  for (std::size_t end = message.find(kType); end != std::string_view::npos; end = message.find(kType, end + 1)) {
+    const auto it = rig.node_places.find(std::string(message.substr(0, end)));
+    if (it != rig.node_places.end()) place = it->second;
+  }
+  return place;
+}
+
 Status SetClip(Rig* rig, std::optional<std::string_view> clip) {
   KPSA_RETURN_IF_ERROR(SetClip(*rig->character, clip, &rig->scene, rig->graph.get()));
   for (const PlugRef& plug : rig->pinned) {

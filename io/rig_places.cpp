@@ -50,8 +50,10 @@ void RigBuild::AddCurves() {
       }
       if (!good) continue;
     }
-    if (cvs.size() < 2 || cvs.size() > kMaxCvs) {
-      Fail(made.from->where, Status::Invalid("curve \"{}\" has {} points; expected 2 to {}", made.from->name, cvs.size(), kMaxCvs));
+    const std::size_t fewest = is_closed ? 3 : 2;
+    if (cvs.size() < fewest || cvs.size() > kMaxCvs) {
+      Fail(made.from->where, Status::Invalid("{}curve \"{}\" has {} points; expected {} to {}", is_closed ? "closed " : "", made.from->name,
+                                             cvs.size(), fewest, kMaxCvs));
       continue;
     }
     GraphEditor edit(&graph());

@@ -106,7 +106,6 @@ TEST_F(BadCharacters, BuffersStayInTheFolder) {
     builder.root["buffers"] = {{{"byteLength", builder.buffer.size()}, {"uri", uri}}};
     ExpectBadFile("in/c.gltf", builder.Text(), {"in/c.gltf: ", "buffers[0]", "leaves the document's folder"});
   }
-  std::filesystem::create_symlink(folder / "secret.bin", folder / "in/link.bin");
   GltfBuilder builder = GltfBuilder::Character();
   builder.root["buffers"] = {{{"byteLength", builder.buffer.size()}, {"uri", "http://example.org/a.bin"}}};
   ExpectBadFile("in/c.gltf", builder.Text(), {"in/c.gltf: ", "buffers[0]", "URI"});

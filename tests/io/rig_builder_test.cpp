@@ -163,7 +163,7 @@ TEST_F(RigBuilderTest, PlacesHandles) {
   const Rig rig = Loaded(R"(units: {length: cm}
 nodes:
   c: {type: curve, vertices: [0, 1, 2], parent: root}
-  d: {type: curve, places: [[0, 0, 0], [100, 0, 0]], closed: true}
+  d: {type: curve, places: [[0, 0, 0], [100, 0, 0], [0, 100, 0]], closed: true}
   mid: {type: transform, at: c, parent: tip}
   third: {type: transform, at: "c[2]", parent: root}
   cv: {type: transform, at: "d.cv[1]"}
