@@ -300,6 +300,19 @@ TEST_F(OddRigs, OnePlugHasOneValueHoweverItIsSpelled) {
   EXPECT_TRUE(Has(text, "t.yaml:7:20: tip.translate.x is overridden twice: here and at t.yaml:6:19")) << text;
 }
 
+TEST_F(OddRigs, SettingsDoNotHideBehindConnections) {
+  Plain();
+  Rig rig = Loaded("nodes:\n  t: {type: transform, translate: [tip.translateX, 0, 0], rotate: tip.rotate}\n");
+  for (const char* text : {"t.translate=[1, 2, 3]", "t.translateX=1", "t.rotateY=2", "t.rotate=[1, 2, 3]"}) {
+    const Result<Setting> setting = ParseSetting(rig, text);
+    ASSERT_TRUE(setting.ok()) << setting.status().ToString();
+    EXPECT_TRUE(Has(ApplySetting(&rig, *setting).ToString(), "is driven by tip.")) << text;
+  }
+  const Result<Setting> free = ParseSetting(rig, "t.translateY=1");
+  ASSERT_TRUE(free.ok());
+  EXPECT_TRUE(ApplySetting(&rig, *free).ok());
+}
+
 // --- Stacks, points, spaces
 TEST_F(OddRigs, TheFilesOwnDeformersHaveWordsInStacks) {
   Plain();
