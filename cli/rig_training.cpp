@@ -16,6 +16,23 @@ std::vector<PlugRef> VaryingPlugs(const Rig& rig) {
   return plugs;
 }
 
+namespace {
+
+// Where the value of a control can be read that would give what a clip does: a clip drives morph weights themselves, and
+// moves joints underneath their rotate and translate.
+std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
+  if (control.by_clip) return control.plug;
+  const NodeDef& def = graph.def(control.plug.node);
+  const std::string& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)].name;
+  if (attribute != "rotate" && attribute != "translate") return std::nullopt;
+  PlugRef shown = control.plug;
+  shown.attribute = def.FindAttribute(attribute == "rotate" ? "poseRotate" : "poseTranslate");
+  if (shown.attribute < 0) return std::nullopt;
+  return shown;
+}
+
+}  // namespace
+
 AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) {
   AccelerationTarget target;
   for (const AcceleratedPoints& points : acceleration.points) {
@@ -51,7 +68,8 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
     node = parent->source.node;
   }
   for (const Control& control : rig->controls) {
-    training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip, carriers.count(control.plug.node.index) != 0});
+    training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip,
+                                 carriers.count(control.plug.node.index) != 0, ShownByClip(*rig->graph, control)});
   }
   training.set_clip = [rig](std::optional<std::string_view> clip) { return SetClip(rig, clip); };
   return training;

@@ -128,7 +128,7 @@ Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
   std::vector<double> full_ns, fast_ns;
   double squares = 0;
   std::size_t count = 0;
-  for (const SampledPose& pose : SamplePoses(ranges, 0, poses, seed)) {
+  for (const SampledPose& pose : SamplePoses(ranges, {}, {}, 0, poses, seed)) {
     if (Interrupted()) return InterruptedStatus();
     for (Evaluator* evaluator : {&full, &fast}) {
       SetControls(*rig, pose.values, evaluator);

@@ -19,10 +19,17 @@ Double3 Position(CueRef cue, const PoseLayout& layout, std::span<const Double3> 
   return positions[cue.kind == CueKind::kStage ? layout.points + cue.index : cue.index];
 }
 
-// Root of W = A_out^T A_out; empty where that is the identity.
-Eigen::MatrixXd OutputRoot(const Pca& pca) {
-  if (pca.output_orthonormal) return {};
-  const Eigen::MatrixXd a = pca.output_modes();
+// Root of W = A_out^T D A_out, D the weights of the points; empty where that is the identity.
+Eigen::MatrixXd OutputRoot(const Pca& pca, std::span<const double> point_weights) {
+  if (pca.output_orthonormal && point_weights.empty()) return {};
+  Eigen::MatrixXd a = pca.output_modes();
+  if (!point_weights.empty()) {
+    Eigen::VectorXd root(a.rows());
+    for (Eigen::Index i = 0; i < a.rows(); ++i) {
+      root[i] = std::sqrt(point_weights[static_cast<std::size_t>(i) / static_cast<std::size_t>(pca.layout.components)]);
+    }
+    a = (root.asDiagonal() * a).eval();
+  }
   const SymmetricEigen eigen = AllEigen(Gram(GemmOperand::Dense(a).Transposed()));
   return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
 }
@@ -32,9 +39,9 @@ class Selector {
  public:
   Selector(const Pca& pca, std::span<const CueRef> candidates, std::span<const Double3> positions, double diagonal,
            const CueSelectionOptions& options)
-      : pca_(pca), candidates_(candidates), positions_(positions), options_(options), gains_(MakeGains(pca, candidates, diagonal)) {
+      : pca_(pca), candidates_(candidates), positions_(positions), options_(options), gains_(MakeGains(pca, candidates, diagonal, options.point_weights)) {
     sigma_ = pca.mode_variance().asDiagonal();
-    const Eigen::MatrixXd root = OutputRoot(pca);
+    const Eigen::MatrixXd root = OutputRoot(pca, options.point_weights);
     weight_ = root.size() == 0 ? Eigen::MatrixXd() : Eigen::MatrixXd(root.transpose() * root);
     blocked_.resize(candidates.size());
     gains_.Reset(sigma_);
@@ -96,12 +103,13 @@ class Selector {
   double gain(std::size_t candidate) const { return gains_.gains()[candidate]; }
 
  private:
-  static CandidateGains MakeGains(const Pca& pca, std::span<const CueRef> candidates, double diagonal) {
+  static CandidateGains MakeGains(const Pca& pca, std::span<const CueRef> candidates, double diagonal,
+                                  std::span<const double> point_weights) {
     const CueSet set = MakeCueSet(pca, candidates, diagonal);
     std::vector<float> loadings(static_cast<std::size_t>(set.loadings.size()));
     Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
         loadings.data(), set.loadings.rows(), set.loadings.cols()) = set.loadings.cast<float>();
-    return CandidateGains(set.offsets, std::move(loadings), {set.noise.data(), set.noise.data() + set.noise.size()}, OutputRoot(pca));
+    return CandidateGains(set.offsets, std::move(loadings), {set.noise.data(), set.noise.data() + set.noise.size()}, OutputRoot(pca, point_weights));
   }
 
   // U [h x M] with Sigma' = Sigma - U^T U after measuring (sign -1), or Sigma + U^T U after forgetting (sign +1).
@@ -218,6 +226,7 @@ std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool output
 CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::span<const Double3> positions,
                         double diagonal, const CueSelectionOptions& options) {
   KPSA_CHECK_EQ(positions.size(), pca.layout.points + pca.layout.stage_points);
+  KPSA_CHECK(options.point_weights.empty() || options.point_weights.size() == pca.layout.points);
   CueSelection selection;
   std::vector<CueRef> candidates(wanted.begin(), wanted.end());
   for (const CueRef cue : options.fixed) {

@@ -52,6 +52,7 @@ struct CueSelectionOptions {
   double max_cost = 0;             // stop before the summed marginal cost exceeds it; 0: no limit
   double min_distance = 0;         // points nearer than this to a chosen point of the same kind are left out (coincident ones always)
   int swap_passes = 1;             // each pass offers every cue to be exchanged once
+  std::span<const double> point_weights = {};  // [N] of the squared errors of the output points; empty: 1 each
   std::span<const CueRef> fixed = {};   // taken first, whatever their gain, candidates or not
   // Cost of adding a candidate to what is chosen, > 0 (ns, say); empty: 1 each. Called for every candidate in every
   // step from one thread, so it should be a look-up.

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/check.h"
+#include "base/parallel.h"
 #include "kpsa/eigen_solvers.h"
 #include "kpsa/gemm.h"
 
@@ -118,6 +119,39 @@ std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const
     }
   }
   return errors;
+}
+
+std::vector<double> LargestPointErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
+                                       std::size_t stride) {
+  KPSA_CHECK(poses.centered() && poses.layout() == pca.layout && stride > 0);
+  const std::size_t points = pca.layout.points, kChunk = 384;
+  const auto components = static_cast<std::size_t>(pca.layout.components);
+  const Eigen::MatrixXd a = pca.output_modes();
+  std::vector<double> largest(points);
+  for (std::size_t first = 0; first < poses.poses(); first += kChunk * stride) {
+    std::vector<std::size_t> chosen;
+    for (std::size_t t = first; t < poses.poses() && chosen.size() < kChunk; t += stride) chosen.push_back(t);
+    Eigen::MatrixXd y(cues.rows(), static_cast<Eigen::Index>(chosen.size()));
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      y.col(static_cast<Eigen::Index>(k)) = MeasuredCues(pca.layout, cues, poses.row(chosen[k]));
+    }
+    const Eigen::MatrixXd reached = Multiply(a, Multiply(estimator.coordinates, y));
+    ParallelFor(points, 512, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = 0; k < chosen.size(); ++k) {
+        const float* pose = poses.row(chosen[k]).data();
+        const double* estimate = reached.col(static_cast<Eigen::Index>(k)).data();
+        for (std::size_t i = begin; i < end; ++i) {
+          double squared = 0;
+          for (std::size_t c = components * i; c < components * (i + 1); ++c) {
+            squared += (static_cast<double>(pose[c]) - estimate[c]) * (static_cast<double>(pose[c]) - estimate[c]);
+          }
+          largest[i] = std::max(largest[i], squared);
+        }
+      }
+    });
+  }
+  for (double& value : largest) value = std::sqrt(value);
+  return largest;
 }
 
 double RmsError(const std::vector<PoseErrors>& errors, std::size_t points) {

@@ -47,6 +47,9 @@ struct PoseErrors {
 };
 // For all poses (centred with pca.mean). RMS of a pose = error / sqrt(N).
 std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses);
+// The largest error of every point over every `stride`-th pose. [N]
+std::vector<double> LargestPointErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
+                                       std::size_t stride);
 // Root of the mean over poses and points of the squared total error, scene units.
 double RmsError(const std::vector<PoseErrors>& errors, std::size_t points);
 

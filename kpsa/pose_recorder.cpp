@@ -111,6 +111,49 @@ Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
                 [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
 }
 
+Result<ClipPoses> PoseRecorder::ControlsOfClips(const std::vector<TrainingClip>& clips) {
+  ClipPoses poses;
+  for (const TrainingClip& clip : clips) {
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
+    Request request;
+    request.varying = {rig_.time};
+    std::vector<std::size_t> shown;
+    for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
+      if (!rig_.controls[c].shown) continue;
+      PlugRef plug = *rig_.controls[c].shown;
+      if (!rig_.graph->def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].output) {
+        const Connection* connection = rig_.graph->FindConnection(plug);
+        if (connection == nullptr) continue;
+        plug = connection->source;
+      }
+      plug.component = -1;
+      request.outputs.push_back({plug, {}});
+      shown.push_back(c);
+    }
+    Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
+    if (!plan.ok()) return plan.status();
+    const Index time = (*plan)->FindVarying(rig_.time);
+    Evaluator evaluator(*plan);
+    for (const double t : clip.times) {
+      if (time != kNoIndex) evaluator.Set(time, t);
+      KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
+      std::vector<double>& pose = poses.emplace_back();
+      for (const ControlRange& control : rig_.controls) pose.push_back(control.rest);
+      for (std::size_t i = 0; i < shown.size(); ++i) {
+        const auto output = static_cast<Index>(i);
+        const int component = rig_.controls[shown[i]].shown->component;
+        if ((*plan)->outputs()[i].type == Type::kDouble3) {
+          pose[shown[i]] = evaluator.Get<Double3>(output)[std::max(0, component)];
+        } else if ((*plan)->outputs()[i].type == Type::kDouble) {
+          pose[shown[i]] = evaluator.Get<double>(output);
+        }
+      }
+    }
+  }
+  KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+  return poses;
+}
+
 Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples, const std::vector<TrainingClip>& clips, PoseMatrix* poses) {
   for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
     std::vector<const SampledPose*> mine;

@@ -23,6 +23,8 @@ class PoseRecorder {
   Status AddClip(const TrainingClip& clip, PoseMatrix* poses);
   // Appends a row for each sampled pose.
   Status AddSamples(const std::vector<SampledPose>& samples, const std::vector<TrainingClip>& clips, PoseMatrix* poses);
+  // The controls that would give the poses of the clips (ControlRange::shown), at rest where nothing shows them.
+  Result<ClipPoses> ControlsOfClips(const std::vector<TrainingClip>& clips);
   const std::vector<Signal>& signals() const { return signals_; }
   const std::vector<CandidateStage>& candidates() const { return candidates_; }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "base/check.h"
 #include "kpsa/pca.h"
@@ -15,6 +16,12 @@ namespace {
 constexpr std::size_t kProbePoints = 20;    // of a stage, to see what a cue there would drag in
 constexpr double kMaxPointsPerCue = 1.5;    // points of a step that a local cue may cost
 constexpr double kTileShare = 0.01;          // of the tolerance: RMS error that tiles and half precision may add
+constexpr std::size_t kGroupPoints = 400;    // where the trainer looks which controls act together
+constexpr double kGroupShare = 0.2;          // of a control's largest displacement: it acts on a point
+constexpr std::size_t kGroupSize = 8;        // controls that move a point most
+constexpr std::size_t kSelectionRounds = 4;  // shares of the cues, each chosen for what the last ones left
+constexpr std::size_t kErrorPoses = 800;     // training poses that say where errors are left
+constexpr double kErrorPower = 3;            // of a point's largest error in its weight
 constexpr double kMinMotion = 1e-3;         // of the largest: points that move less are no cues
 
 // Count of indices, evenly spread.
@@ -43,7 +50,7 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(FindRanges(poses));
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
     KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
-    KPSA_RETURN_IF_ERROR(ChooseCues());
+    KPSA_RETURN_IF_ERROR(ChooseCues(poses));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
     Result<Subspace> subspace = Assemble(poses);
     if (!subspace.ok()) return subspace;
@@ -145,17 +152,68 @@ class Trainer {
       KPSA_RETURN_IF_ERROR(recorder_->AddClip(clips_[c], poses));
     }
     record_.clip_poses = poses->poses();
+    const Result<ClipPoses> clip_poses = recorder_->ControlsOfClips(clips_);
+    if (!clip_poses.ok()) return clip_poses.status();
     KPSA_RETURN_IF_ERROR(Say("poses", 0.2));
-    KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SamplePoses(rig_.controls, clips_.size(), options_.samples, options_.seed), clips_, poses));
+    ControlGroups groups;
+    if (options_.samples > 0) {
+      const std::size_t first = poses->poses();
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, poses));
+      groups = FindGroups(*poses, first);
+    }
+    const auto sample = [&](std::size_t count, std::uint64_t seed, PoseMatrix* to) {
+      return recorder_->AddSamples(SamplePoses(rig_.controls, *clip_poses, groups, clips_.size(), count, seed), clips_, to);
+    };
+    KPSA_RETURN_IF_ERROR(sample(options_.samples, options_.seed, poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3) return Status::Invalid("{} training poses are too few: name clips or samples to train on", poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
     std::size_t calibration = options_.calibration_poses;
     if (calibration == 0) calibration = static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 100.0, 1000.0));
-    KPSA_RETURN_IF_ERROR(recorder_->AddSamples(
-        SamplePoses(rig_.controls, clips_.size(), calibration, options_.seed ^ 0x5deece66dull), clips_, held_out));
+    KPSA_RETURN_IF_ERROR(sample(calibration, options_.seed ^ 0x5deece66dull, held_out));
     record_.calibration_poses = held_out->poses();
     return Status();
+  }
+
+  // Which controls move the same points, from the sweeps: rows [first, first + 2 controls) of the poses. What moves a point by
+  // a good part of what it moves any point acts there.
+  ControlGroups FindGroups(const PoseMatrix& poses, std::size_t first) const {
+    const std::vector<Index> points = Spread(static_cast<Index>(layout_.points), kGroupPoints);
+    std::vector<float> rest(3 * points.size());  // the mean of all sweeps, since most of them leave a point at rest
+    const std::size_t n = rig_.controls.size();
+    const auto at = [&](std::size_t row, std::size_t p, std::size_t k) { return poses.row(row)[3 * points[p] + k]; };
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+      std::vector<float> values;
+      for (std::size_t s = 0; s < 2 * n; ++s) values.push_back(at(first + s, i / 3, i % 3));
+      std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n), values.end());
+      rest[i] = values[n];
+    }
+    std::vector<std::vector<std::pair<double, std::size_t>>> movers(points.size());  // by point: displacement, control
+    for (std::size_t c = 0; c < n; ++c) {
+      std::vector<double> moved(points.size());
+      for (std::size_t p = 0; p < points.size(); ++p) {
+        for (std::size_t s = first + 2 * c; s < first + 2 * c + 2; ++s) {
+          const Double3 d{at(s, p, 0) - rest[3 * p], at(s, p, 1) - rest[3 * p + 1], at(s, p, 2) - rest[3 * p + 2]};
+          moved[p] = std::max(moved[p], Length(d));
+        }
+      }
+      const double most = *std::max_element(moved.begin(), moved.end());
+      for (std::size_t p = 0; p < points.size() && most > 0; ++p) {
+        if (moved[p] > kGroupShare * most) movers[p].emplace_back(moved[p], c);
+      }
+    }
+    ControlGroups groups;
+    for (auto& of_point : movers) {
+      std::sort(of_point.rbegin(), of_point.rend());
+      if (of_point.size() > kGroupSize) of_point.resize(kGroupSize);
+      if (of_point.size() < 2) continue;
+      std::vector<std::size_t>& group = groups.emplace_back();
+      for (const auto& [displacement, control] : of_point) group.push_back(control);
+      std::sort(group.begin(), group.end());
+    }
+    std::sort(groups.begin(), groups.end());
+    groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
+    return groups;
   }
 
   Status FindRanges(const PoseMatrix& poses) {
@@ -199,7 +257,7 @@ class Trainer {
     return Status();
   }
 
-  Status ChooseCues() {
+  Status ChooseCues(const PoseMatrix& poses) {
     std::vector<CueRef> chosen;
     if (options_.mode == EstimatorMode::kPaper) {
       Eigen::MatrixXd rotated = pca_.output_modes();
@@ -213,11 +271,24 @@ class Trainer {
       for (const CueRef& cue : candidates) {
         if (cue.kind != CueKind::kScalar) points.push_back(cue);
       }
-      CueSelectionOptions selection;
-      selection.count = options_.rows;
-      selection.max_cost = static_cast<double>(options_.rows);
-      selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) { return cue.kind == CueKind::kScalar ? 1.0 : 3.0; };
-      chosen = SelectCues(pca_, candidates, positions_, diagonal_, selection).cues;
+      // The least expected squared error over all points leaves small regions to chance (a tongue behind teeth): after
+      // each share of the rows, points count by the largest errors that training poses still have there.
+      std::vector<double> weights;
+      for (std::size_t round = 1; round <= kSelectionRounds; ++round) {
+        CueSelectionOptions selection;
+        selection.fixed = chosen;
+        selection.count = options_.rows;
+        selection.max_cost = static_cast<double>(options_.rows * round) / static_cast<double>(kSelectionRounds);
+        selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) { return cue.kind == CueKind::kScalar ? 1.0 : 3.0; };
+        selection.point_weights = weights;
+        chosen = SelectCues(pca_, candidates, positions_, diagonal_, selection).cues;
+        if (round == kSelectionRounds || chosen.empty()) break;
+        const CueSet cues = MakeCueSet(pca_, chosen, diagonal_);
+        weights = LargestPointErrors(pca_, cues, MapEstimator(pca_, cues), poses, std::max<std::size_t>(1, poses.poses() / kErrorPoses));
+        double mean = 0;
+        for (const double error : weights) mean += error / static_cast<double>(weights.size());
+        for (double& weight : weights) weight = std::pow(weight / std::max(mean, 1e-300), kErrorPower) + 1e-3;
+      }
       // Points see what no scalar does: keep some of them to judge by
       std::size_t have = 0;
       for (const CueRef& cue : chosen) have += cue.kind != CueKind::kScalar;
