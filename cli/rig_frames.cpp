@@ -14,8 +14,10 @@ Request AllMeshes(const Rig& rig) {
 
 Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compiler, const Request& request) {
   Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
-  if (!plan.ok()) return Status(plan.status()).At({rig.path});
-  return plan;
+  if (plan.ok()) return plan;
+  Status located;
+  for (const Error& error : plan.status().errors()) located.Append(Status(error).At(PlaceOfMessage(rig, error.message)));
+  return located;
 }
 
 Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
@@ -34,8 +36,8 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
       },
       [&](std::size_t frame, const Evaluator& evaluator, const Status& evaluated) -> Status {
         if (!evaluated.ok()) {
-          return Status::Evaluation("at {} s: {}", times[frame], evaluated.errors().front().message)
-              .At({rig.path});
+          const std::string& message = evaluated.errors().front().message;
+          return Status::Evaluation("at {} s: {}", times[frame], message).At(PlaceOfMessage(rig, message));
         }
         progress.Set(frame + 1);
         return sink(frame, evaluator);

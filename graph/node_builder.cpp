@@ -50,11 +50,12 @@ NodeBuilder& NodeBuilder::structural(std::string name, Type type, AttributeOptio
   return add(std::move(a));
 }
 
-NodeBuilder& NodeBuilder::enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc) {
+NodeBuilder& NodeBuilder::enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc,
+                                     int default_choice) {
   AttributeDef a;
   a.name = std::move(name);
   a.type = Type::kEnum;
-  a.default_value = Value(0);
+  a.default_value = Value(default_choice);
   a.enum_names = std::move(names);
   a.structural = structural;
   a.doc = std::move(doc);

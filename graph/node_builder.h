@@ -55,7 +55,7 @@ class NodeBuilder {
     return *this;
   }
   // An enum input; the default is its first name.
-  NodeBuilder& enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc = {});
+  NodeBuilder& enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc = {}, int default_choice = 0);
   // A points, colors or weights input.
   NodeBuilder& points_in(std::string name, std::string doc = {}, Type type = Type::kPoints);
   NodeBuilder& out(std::string name, Type type, std::string doc = {});

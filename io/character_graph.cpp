@@ -125,6 +125,11 @@ class Builder {
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (names[i] != verbatim[i] && verbatim[i] != "time") graph_->AddAlias(scene_.transforms[i], verbatim[i]);
     }
+    // `time` is the node of the time; what that lacks may be said of the only transform of that name
+    if (std::count(verbatim.begin(), verbatim.end(), "time") == 1) {
+      const auto at = std::find(verbatim.begin(), verbatim.end(), "time") - verbatim.begin();
+      graph_->AddDelegate(scene_.time.node, scene_.transforms[static_cast<std::size_t>(at)]);
+    }
     std::vector<std::string> paths(names.size());
     std::size_t bytes = 0;
     for (Index i : character_.order) {

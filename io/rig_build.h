@@ -1,6 +1,7 @@
 // Inside of the rig builder: the steps from RigFile to Rig. Nothing outside io/rig_*.cpp includes this.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <set>
 #include <optional>
@@ -56,12 +57,15 @@ class RigBuild {
   void ReadAttribute(const Made& made, const RigAttribute& attribute, bool overrides);
   void ReadPlug(const PlugRef& plug, const YamlNode& value, int source, bool overrides);
   void ReadOverrides();
+  void ReadOverride(const RigOverride& override_);
   void FinishOverrides();
 
   // rig_places.cpp: parents, handles, curves
   void AddCurves();
   void ConnectParents();
   void PlaceHandles();
+  void ConnectPivots();
+  std::optional<NodeId> CommonAncestor(const Made& made) const;
   bool Place(Made* made, int depth);
   bool RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world);
   bool ReadPlace(const YamlNode& node, int source, int depth, Double3* place);
@@ -71,6 +75,8 @@ class RigBuild {
   // rig_connect.cpp: connections, names
   void ConnectCurves();
   void MakeConnections();
+  bool IsOverridden(const PlugRef& plug) const;
+  void ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip);
   void ConnectPlugs(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip,
                     bool replace);
   Unit PlugUnit(const PlugRef& plug) const;
@@ -85,12 +91,14 @@ class RigBuild {
   Made* FindDeformer(const RigString& name);
   bool AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage, const SourceLocation& where);
   PointBufferPtr PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points);
+  PointBufferPtr RegularGrid(const PlugRef& plug, const RigString& name);
   bool BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box);
 
   // rig_members.cpp: members, weights, falloffs
   void SetWeights(Made* made);
   const Geometry* GeometryOf(const Made& made, const WeightFile& file) const;
   bool AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of, std::vector<float>* weights);
+  bool AnyOther(const Made& made, const Geometry& of, const std::function<bool(const CharacterMesh&)>& has) const;
   bool ReadVertices(const YamlNode& node, std::size_t count, const std::string& of, std::vector<Index>* vertices);
   bool MultiplyByMaps(const RigAttribute& attribute, const Made& made, std::vector<std::vector<float>>* weights);
   bool MultiplyByFalloff(const RigAttribute& attribute, const Geometry& of, std::vector<float>* weights);
@@ -125,7 +133,11 @@ class RigBuild {
   int conversions_ = 0;
   std::vector<Pending> pending_;
   std::vector<std::pair<PlugRef, bool>> overridden_;                  // plug; whether by a value
-  std::set<std::tuple<Index, int, int, int>> overridden_plugs_;       // the same
+  using PlugKey = std::tuple<Index, int, int, int>;                   // node, attribute, element, component
+  static PlugKey KeyOf(const PlugRef& plug) { return {plug.node.index, plug.attribute, plug.element, plug.component}; }
+  std::map<PlugKey, SourceLocation> written_plugs_[2];                // by nodes, by overrides: a plug has several spellings
+  std::set<PlugKey> overridden_plugs_;                                // the same
+  std::set<PlugKey> stacked_;                                         // points attributes that a stack drives
   std::unordered_map<Index, Places> curves_;          // by graph node: rest cvs in the world
   std::vector<std::optional<SourceLocation>> stack_of_mesh_;
   std::map<std::string, std::optional<WeightFile>> weight_files_;   // by path; none: it could not be read

@@ -74,6 +74,7 @@ void RigBuild::Run() {
   ConnectCurves();
   BuildStacks();
   MakeConnections();
+  ConnectPivots();
   FinishOverrides();
   AddControls();
   AddAccelerations();
@@ -109,7 +110,7 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
     if (options.fps.has_value()) file.sources[0].units.fps = *options.fps;
   } else {
     errors.Append(ReadRigFile(path, options.fps, &file));
-    if (!file.character.has_value()) return errors.Take();
+    if (!file.character.has_value() || !file.complete) return InOrder(errors.Take());
     character_at = file.character->where;
   }
 
@@ -143,6 +144,19 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   if (!errors.ok()) return InOrder(errors.Take());
   rig.notes.insert(rig.notes.begin(), rig.scene.notes.begin(), rig.scene.notes.end());
   return rig;
+}
+
+SourceLocation PlaceOfMessage(const Rig& rig, std::string_view message) {
+  constexpr std::string_view kNode = "node \"", kType = "\" (";
+  SourceLocation place{rig.path, 0, 0};
+  if (!message.starts_with(kNode)) return place;
+  message.remove_prefix(kNode.size());
+  // Names may hold anything: the longest one that fits
+  for (std::size_t end = message.find(kType); end != std::string_view::npos; end = message.find(kType, end + 1)) {
+    const auto it = rig.node_places.find(std::string(message.substr(0, end)));
+    if (it != rig.node_places.end()) place = it->second;
+  }
+  return place;
 }
 
 Status SetClip(Rig* rig, std::optional<std::string_view> clip) {

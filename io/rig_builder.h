@@ -2,6 +2,7 @@
 // checked and connected here. A .glb or .gltf alone is a rig, too: what it says is the default graph.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,12 +61,17 @@ struct Rig {
   double fps = 24;
   std::vector<std::string> files;  // all that were read
   std::vector<std::string> notes;  // what may surprise, one line each
+  std::map<std::string, SourceLocation> node_places;  // where the rig's own nodes are written, by name
   std::vector<PlugRef> pinned;     // plugs that clips leave alone: overridden or set
   double rest_diagonal = 0;        // metres, of the bounding box of all meshes at rest
 };
 
 // The registry must outlive the rig. All errors of the rig are collected, each at its place.
 Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const RigOptions& options = {});
+
+// Where the node stands that a message of the compiler or an evaluation begins with ("node \"mush\" (deltaMush): ...");
+// the rig itself where that is a node of the character, or none.
+SourceLocation PlaceOfMessage(const Rig& rig, std::string_view message);
 
 // Another clip for a loaded rig (none: the rest pose); nodes and plugs of the rig itself stay as they are.
 Status SetClip(Rig* rig, std::optional<std::string_view> clip);

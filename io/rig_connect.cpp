@@ -35,15 +35,12 @@ void RigBuild::ConnectCurves() {
 void RigBuild::MakeConnections() {
   for (const Pending& pending : pending_) {
     if (errors_->full()) return;
-    // What the node itself asked for gives way to an override
-    const PlugRef& to = pending.to;
-    if (!pending.overrides && overridden_plugs_.count({to.node.index, to.attribute, to.element, to.component}) != 0) continue;
     const Result<PlugRef> from = graph().FindPlug(pending.from);
     if (!from.ok()) {
       Fail(pending.where, from.status());
       continue;
     }
-    if (!pending.overrides) ConnectPlugs(*from, pending.to, pending.where, pending.source, false, false);
+    if (!pending.overrides) ConnectUnlessOverridden(*from, pending.to, pending.where, pending.source, false);
   }
   for (const RigConnection& connection : file_->connections) {
     if (errors_->full()) return;
@@ -51,11 +48,53 @@ void RigBuild::MakeConnections() {
     const Result<PlugRef> to = graph().FindPlug(connection.to);
     const bool good = Fail(connection.where, from.status());
     if (!Fail(connection.where, to.status()) || !good) continue;
-    ConnectPlugs(*from, *to, connection.where, connection.source, connection.override_clip, false);
+    ConnectUnlessOverridden(*from, *to, connection.where, connection.source, connection.override_clip);
   }
   for (const Pending& pending : pending_) {
     const Result<PlugRef> from = graph().FindPlug(pending.from);
     if (pending.overrides && from.ok()) ConnectPlugs(*from, pending.to, pending.where, pending.source, true, true);
+  }
+}
+
+// Whether an override sets or connects the plug, or what it is a part of.
+bool RigBuild::IsOverridden(const PlugRef& plug) const {
+  for (const int element : {plug.element, -1}) {
+    for (const int component : {plug.component, -1}) {
+      if (overridden_plugs_.count({plug.node.index, plug.attribute, element, component}) != 0) return true;
+    }
+  }
+  return false;
+}
+
+// What a node or a connection asked for gives way to overrides: of the whole plug, or of single components.
+void RigBuild::ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip) {
+  if (IsOverridden(to)) return;
+  bool by_component = false, by_element = false;
+  for (auto it = overridden_plugs_.lower_bound({to.node.index, to.attribute, to.element, -1}); it != overridden_plugs_.end(); ++it) {
+    const auto& [node, attribute, element, component] = *it;
+    if (node != to.node.index || attribute != to.attribute) break;
+    if (to.element >= 0 && element != to.element) break;
+    if (to.component >= 0 && component != to.component) continue;
+    by_component = by_component || element == to.element;
+    by_element = by_element || element != to.element;
+  }
+  if (by_element) {
+    Fail(where, Status::Invalid("{} drives {} as a whole, and an override changes a part of it: override {} itself", graph().PlugName(from),
+                                graph().PlugName(to), graph().PlugName(to)));
+    return;
+  }
+  if (!by_component) {
+    ConnectPlugs(from, to, where, source, override_clip, false);
+    return;
+  }
+  if (graph().PlugType(from) != graph().PlugType(to)) {
+    Fail(where, graph().Connect(from, to));  // says what does not fit
+    return;
+  }
+  for (int i = 0; i < (graph().PlugType(to) == Type::kQuaternion ? 4 : 3); ++i) {
+    PlugRef from_part = from, to_part = to;
+    from_part.component = to_part.component = i;
+    if (!IsOverridden(to_part)) ConnectPlugs(from_part, to_part, where, source, override_clip, false);
   }
 }
 

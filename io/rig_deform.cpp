@@ -50,6 +50,13 @@ RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
     return nullptr;
   }
   if (written_.count(name.text) != 0 || errors_->full()) return nullptr;  // its own error was reported
+  for (const CharacterMesh& mesh : rig_->scene.meshes) {
+    for (const Stage& own : OwnStages(mesh)) {
+      if (graph().name(own.node) != name.text) continue;
+      Fail(name.where, Status::Invalid("\"{}\" is the file's own: in stacks it is written \"{}\"", name.text, own.name));
+      return nullptr;
+    }
+  }
   std::vector<std::string> names{"gltf", "morph", "skin"};
   for (const Made& made : made_) {
     if (deforms(made)) names.push_back(made.from->name);
@@ -156,6 +163,10 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
       if (item.text == word) Fail(item.where, Status::Invalid("\"{}\" belongs to meshes, not to {}", word, name.text));
     }
     Made* made = FindDeformer(item);
+    if (made != nullptr && graph().def(made->id).name == "deltaMush") {
+      Fail(item.where, Status::Invalid("\"{}\" smooths along the edges of a mesh, and {} has none", item.text, name.text));
+      return;
+    }
     const int geometry = made == nullptr ? 0 : static_cast<int>(made->geometries.size());
     if (made == nullptr || !AddGeometry(made, {name.text, std::nullopt, points->count()}, false, world_from_points, item.where)) return;
     GraphEditor edit(&graph());
@@ -168,23 +179,52 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
     last = edit.Plug(made->id, "outPoints", geometry);
     if (!Fail(item.where, edit.Take())) return;
   }
-  if (last.has_value()) Fail(name.where, graph().Connect(*last, *plug));
+  if (!last.has_value()) return;
+  stacked_.insert(KeyOf(*plug));
+  Fail(name.where, graph().Connect(*last, *plug));
 }
 
 // The value that a points attribute has without its stack. Lattice points are in the coordinates of the lattice's box.
 PointBufferPtr RigBuild::PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points) {
-  const NodeDef& def = graph().def(plug.node);
-  const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(plug.attribute)];
+  const AttributeDef& attribute = graph().def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
   const Value* set = graph().FindValue(plug);
   PointBufferPtr points;
   if (set != nullptr && set->points() != nullptr) points = set->get<PointBufferPtr>();
-  if (attribute.grid.empty()) {
-    if (points == nullptr) Fail(name.where, Status::Invalid("{} has no points to deform: set them first", name.text));
-    return points;
+  if (!attribute.grid.empty()) {
+    Made* lattice = FindMade(plug.node);
+    if (lattice == nullptr || !BoxOfMembers(lattice, name.where, world_from_points)) return nullptr;
+    if (points == nullptr) points = RegularGrid(plug, name);
+    if (points == nullptr) return nullptr;
+  } else if (const auto curve = curves_.find(plug.node.index); points == nullptr && curve != curves_.end()) {
+    points = std::make_shared<const PointBuffer>(curve->second.size());  // offsets of its vertices
   }
-  Made* lattice = FindMade(plug.node);
-  if (lattice == nullptr || !BoxOfMembers(lattice, name.where, world_from_points)) return nullptr;
-  if (points != nullptr) return points;
+  if (points == nullptr) {
+    Fail(name.where, Status::Invalid("{} has no points to deform: set them first", name.text));
+    return nullptr;
+  }
+  // Single points that are set, too, go into the stack
+  std::shared_ptr<PointBuffer> changed;
+  for (const SetValue& single : graph().Values(plug.node, plug.attribute)) {
+    if (single.plug.element < 0) continue;
+    if (static_cast<std::size_t>(single.plug.element) >= points->count()) {
+      Fail(name.where, Status::Invalid("{}: {} is set, but there are {} points", name.text, graph().PlugName(single.plug), points->count()));
+      return nullptr;
+    }
+    if (changed == nullptr) changed = std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(points->Interleaved()));
+    float* rows[3] = {changed->view().x, changed->view().y, changed->view().z};
+    for (int i = 0; i < 3; ++i) {
+      if (single.plug.component >= 0 && single.plug.component != i) continue;
+      const double value = single.plug.component >= 0 ? single.value.AsDouble() : single.value.get<Double3>()[i];
+      rows[i][single.plug.element] = static_cast<float>(value);
+    }
+  }
+  return changed == nullptr ? points : changed;
+}
+
+// The control points of a lattice at rest.
+PointBufferPtr RigBuild::RegularGrid(const PlugRef& plug, const RigString& name) {
+  const NodeDef& def = graph().def(plug.node);
+  const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(plug.attribute)];
   const int number = def.FindAttribute(attribute.grid);
   const Value* divisions_set = graph().FindValue({plug.node, number, -1, -1});
   const Value& divisions = divisions_set != nullptr ? *divisions_set : def.attributes[static_cast<std::size_t>(number)].default_value;

@@ -37,8 +37,11 @@ class Reader {
     read_.emplace(identity, included_at);
     Result<YamlNode> root = ReadYamlFile(path);
     if (!root.ok()) {
-      Status status = root.status();
-      errors_->Append(std::move(status).At(included_at));
+      rig_->complete = false;
+      for (const Error& error : root.status().errors()) {
+        const bool unread = error.where.line == 0 && included_at.line > 0;  // nothing of it: the place that asks for it says more
+        errors_->Append(unread ? Status::Invalid("include: {} {}", path, error.message).At(included_at) : Status(error));
+      }
       return;
     }
     RigSource source;
@@ -102,17 +105,22 @@ class Reader {
     if (const YamlNode* node = map.Find("weld"); node != nullptr && Define("weld", "weld", node->where())) {
       ReadBool(*node, "weld", &rig_->weld, errors_);
     }
-    if (const YamlNode* node = map.Find("include")) ReadIncludes(*node, here.folder);
+    if (const YamlNode* node = map.Find("include"); node != nullptr && !node->is_null()) ReadIncludes(*node, here.folder);
 
+    // A section whose lines are all comments is empty
+    const auto section = [&](const char* key) {
+      const YamlNode* node = map.Find(key);
+      return node == nullptr || node->is_null() ? nullptr : node;
+    };
     SectionReader sections{rig_, errors_, source, [this](const std::string& section, const std::string& key, const SourceLocation& where) {
                              return Define(section, key, where);
                            }};
-    if (const YamlNode* node = map.Find("nodes")) sections.ReadNodes(*node);
-    if (const YamlNode* node = map.Find("connections")) sections.ReadConnections(*node);
-    if (const YamlNode* node = map.Find("deform")) sections.ReadDeform(*node);
-    if (const YamlNode* node = map.Find("controls")) sections.ReadControls(*node);
-    if (const YamlNode* node = map.Find("accelerate")) sections.ReadAccelerate(*node);
-    if (const YamlNode* node = map.Find("overrides")) sections.ReadOverrides(*node);
+    if (const YamlNode* node = section("nodes")) sections.ReadNodes(*node);
+    if (const YamlNode* node = section("connections")) sections.ReadConnections(*node);
+    if (const YamlNode* node = section("deform")) sections.ReadDeform(*node);
+    if (const YamlNode* node = section("controls")) sections.ReadControls(*node);
+    if (const YamlNode* node = section("accelerate")) sections.ReadAccelerate(*node);
+    if (const YamlNode* node = section("overrides")) sections.ReadOverrides(*node);
     for (const char* later : {"plugins", "variants", "clips", "references", "templates", "use"}) {
       const YamlNode* node = map.Find(later);
       if (node == nullptr) continue;

@@ -89,6 +89,7 @@ struct RigFile {
   std::optional<RigString> character;  // path, resolved
   std::optional<double> fps;
   bool weld = true;
+  bool complete = true;                // false: some file could not be read, so that names may be missing
   std::vector<RigNode> nodes;
   std::vector<RigConnection> connections;
   std::vector<RigDeform> deform;

@@ -152,8 +152,9 @@ void SectionReader::ReadAcceleratePoints(const YamlNode& node, RigAccelerate* ac
   ReadNames(node, "points", &names);
   if (names.empty()) errors->Add(node, "points: name at least one mesh@stage");
   for (const RigString& name : names) {
-    const std::size_t at = name.text.rfind('@');
-    if (at == std::string::npos || at == 0 || at + 1 == name.text.size()) {
+    // Names may hold an @, too: the builder, who knows the meshes, looks again
+    const std::size_t at = name.text.size() < 3 ? std::string::npos : name.text.rfind('@', name.text.size() - 2);
+    if (at == std::string::npos || at == 0) {
       errors->Append(Status::Invalid("points \"{}\": expected mesh@stage, as in head_mesh@skin", name.text).At(name.where));
       continue;
     }

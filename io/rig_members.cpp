@@ -98,6 +98,13 @@ bool RigBuild::ReadVertices(const YamlNode& node, std::size_t count, const std::
   return true;
 }
 
+// Whether another mesh of the deformer has what this one lacks: then this one has no such members, and nobody erred.
+bool RigBuild::AnyOther(const Made& made, const Geometry& of, const std::function<bool(const CharacterMesh&)>& has) const {
+  return std::any_of(made.geometries.begin(), made.geometries.end(), [&](const Geometry& other) {
+    return &other != &of && other.mesh.has_value() && has(rig_->scene.meshes[*other.mesh]);
+  });
+}
+
 // Raises the weights of the members to 1.
 bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of, std::vector<float>* weights) {
   if (node.is_scalar() && node.scalar == "all") {
@@ -154,6 +161,10 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
     const std::optional<NodeId> node_id = FindTransform(name, joint->where());
     if (!node_id.has_value()) return false;
     const auto it = std::find(mesh.influence_nodes.begin(), mesh.influence_nodes.end(), *node_id);
+    const auto is_joint = [&](const CharacterMesh& other) {
+      return std::find(other.influence_nodes.begin(), other.influence_nodes.end(), *node_id) != other.influence_nodes.end();
+    };
+    if (it == mesh.influence_nodes.end() && AnyOther(made, of, is_joint)) return true;
     if (it == mesh.influence_nodes.end()) return errors_->Add(*joint, "\"{}\" is no joint of the skin of {}", name, of.name);
     const auto j = static_cast<Index>(it - mesh.influence_nodes.begin());
     for (std::size_t p = 0; p < weights->size(); ++p) {
@@ -165,7 +176,12 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
   }
   std::int64_t number = 0;
   std::string name;
-  if (primitive != nullptr && !ReadInteger(*primitive, "primitive", 0, static_cast<std::int64_t>(primitives.size()) - 1, &number, errors_)) return false;
+  std::int64_t most = static_cast<std::int64_t>(primitives.size());
+  AnyOther(made, of, [&](const CharacterMesh& other) {
+    most = std::max(most, static_cast<std::int64_t>(other.mesh().data().primitives.size()));
+    return false;
+  });
+  if (primitive != nullptr && !ReadInteger(*primitive, "primitive", 0, most - 1, &number, errors_)) return false;
   if (material != nullptr && !ReadString(*material, "material", &name, errors_)) return false;
   bool found = false;
   std::vector<std::string> names;
@@ -175,7 +191,12 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
     found = true;
     for (Index v = 0; v < primitives[i].vertex_count; ++v) (*weights)[PointOf(of, primitives[i].first_vertex + v)] = 1;
   }
-  return found || errors_->Add(*material, "{} has no material \"{}\"{}", of.name, name, DidYouMean(name, names));
+  const auto has_material = [&](const CharacterMesh& other) {
+    const auto& theirs = other.mesh().data().primitives;
+    return std::any_of(theirs.begin(), theirs.end(), [&](const auto& p) { return p.material == name; });
+  };
+  if (found || primitive != nullptr || AnyOther(made, of, has_material)) return true;
+  return errors_->Add(*material, "{} has no material \"{}\"{}", of.name, name, DidYouMean(name, names));
 }
 
 const WeightFile* RigBuild::FindWeightFile(const YamlNode& reference, const std::string& path) {
@@ -198,7 +219,9 @@ bool RigBuild::FindMap(const YamlNode& reference, int source, const Made& made, 
                        const NamedWeights** map, const Geometry** of) {
   std::string text;
   if (!ReadString(reference, "weights", &text, errors_)) return false;
-  const std::size_t hash = text.rfind('#');  // without #map the file has one map only
+  // Without #map the file has one map only. Maps may have a # in their names, too
+  const std::size_t suffix = text.find(".json#");
+  const std::size_t hash = suffix == std::string::npos ? text.rfind('#') : suffix + 5;
   const std::string path = ResolvePath(folder(source), text.substr(0, hash));
   *file = FindWeightFile(reference, path);
   if (*file == nullptr) return false;

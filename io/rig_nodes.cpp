@@ -77,17 +77,23 @@ void RigBuild::AddNodes() {
     if (!Fail(node.where, id.status())) continue;
     made_by_node_[id->index] = made_.size();
     made_by_name_[node.name] = made_.size();
+    rig_->node_places[node.name] = node.where;
     made_.push_back({&node, *id, {}});
   }
 }
 
 void RigBuild::ReadAttributes(Made* made) {
   const NodeDef& def = graph().def(made->id);
-  for (const RigAttribute& attribute : made->from->attributes) {
-    if (IsSpecial(def, attribute.name)) {
-      made->special[attribute.name] = &attribute;
-    } else {
-      ReadAttribute(*made, attribute, false);
+  // Structural ones first, in whatever order they are written: points[s,t,u] needs the divisions
+  for (const bool structural : {true, false}) {
+    for (const RigAttribute& attribute : made->from->attributes) {
+      const int number = def.FindAttribute(attribute.name);
+      if ((number >= 0 && def.attributes[static_cast<std::size_t>(number)].structural) != structural) continue;
+      if (IsSpecial(def, attribute.name)) {
+        made->special[attribute.name] = &attribute;
+      } else {
+        ReadAttribute(*made, attribute, false);
+      }
     }
   }
 }
@@ -139,6 +145,10 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
     errors_->Add(value, "{} is an output and cannot be set", what);
     return;
   }
+  if (const auto [it, added] = written_plugs_[overrides ? 1 : 0].emplace(KeyOf(plug), value.where()); !added) {
+    errors_->Add(value, "{} is {} twice: here and at {}", what, overrides ? "overridden" : "set", it->second.ToString());
+    return;
+  }
   const auto is_connection = [&](const YamlNode& node, Type of) { return IsConnection(node, graph(), of, attribute.unit, units(source)); };
   if (is_connection(value, type)) {
     pending_.push_back({value.scalar, plug, value.where(), source, overrides});
@@ -163,22 +173,54 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
 
 // Values are set at once (others may depend on them, as lattice points on divisions); connections wait.
 void RigBuild::ReadOverrides() {
+  const auto is_structural = [&](const RigOverride& override_) {
+    const Result<PlugRef> plug = graph().FindPlug(override_.plug.text);
+    return plug.ok() && AttributeOf(graph(), *plug).structural;
+  };
+  std::vector<const RigOverride*> others;
   for (const RigOverride& override_ : file_->overrides) {
     if (errors_->full()) return;
-    const Result<PlugRef> plug = graph().FindPlug(override_.plug.text);
-    if (!plug.ok()) {
-      Fail(override_.plug.where, plug.status());
-      continue;
+    if (is_structural(override_)) {
+      ReadOverride(override_);
+    } else {
+      others.push_back(&override_);
     }
-    ReadPlug(*plug, override_.value, override_.plug.source, true);
   }
-  for (const auto& [plug, by_value] : overridden_) overridden_plugs_.emplace(plug.node.index, plug.attribute, plug.element, plug.component);
+  for (const RigOverride* override_ : others) {
+    if (errors_->full()) return;
+    ReadOverride(*override_);
+  }
+  for (const auto& [plug, by_value] : overridden_) overridden_plugs_.insert(KeyOf(plug));
 }
 
-// An overriding value also ends what drives the plug.
+void RigBuild::ReadOverride(const RigOverride& override_) {
+  const Result<PlugRef> plug = graph().FindPlug(override_.plug.text);
+  if (plug.ok()) {
+    ReadPlug(*plug, override_.value, override_.plug.source, true);
+    return;
+  }
+  // A list for a whole array: its elements, and no others
+  const Result<PlugRef> first = graph().FindPlug(override_.plug.text + "[0]");
+  if (!first.ok() || !AttributeOf(graph(), *first).array || !override_.value.is_sequence()) {
+    Fail(override_.plug.where, plug.status());
+    return;
+  }
+  PlugRef element = *first;
+  const int before = graph().ArraySize(element.node, element.attribute), now = static_cast<int>(override_.value.items.size());
+  for (; element.element < now; ++element.element) {
+    if (errors_->full() || !Fail(override_.plug.where, graph().CheckPlug(element))) return;
+    ReadPlug(element, override_.value.items[static_cast<std::size_t>(element.element)], override_.plug.source, true);
+  }
+  for (; element.element < before; ++element.element) {
+    Fail(override_.plug.where, graph().Unset(element));
+    overridden_.emplace_back(element, true);
+  }
+}
+
+// An overriding value also ends what drives the plug; a stack takes it as its input.
 void RigBuild::FinishOverrides() {
   for (const auto& [plug, by_value] : overridden_) {
-    if (!by_value) continue;
+    if (!by_value || stacked_.count(KeyOf(plug)) != 0) continue;
     if (graph().FindConnection(plug) != nullptr) Fail({}, graph().Disconnect(plug));
     if (IsClipPlug(rig_->scene, graph(), plug)) rig_->pinned.push_back(plug);
   }

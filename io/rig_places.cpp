@@ -50,8 +50,10 @@ void RigBuild::AddCurves() {
       }
       if (!good) continue;
     }
-    if (cvs.size() < 2 || cvs.size() > kMaxCvs) {
-      Fail(made.from->where, Status::Invalid("curve \"{}\" has {} points; expected 2 to {}", made.from->name, cvs.size(), kMaxCvs));
+    const std::size_t fewest = is_closed ? 3 : 2;
+    if (cvs.size() < fewest || cvs.size() > kMaxCvs) {
+      Fail(made.from->where, Status::Invalid("{}curve \"{}\" has {} points; expected {} to {}", is_closed ? "closed " : "", made.from->name,
+                                             cvs.size(), fewest, kMaxCvs));
       continue;
     }
     GraphEditor edit(&graph());
@@ -94,6 +96,51 @@ void RigBuild::ConnectParents() {
     edit.Connect(edit.Plug(*parent, "worldMatrix"), edit.Plug(made.id, "parentMatrix"));
     Fail(it->second->value.where(), edit.Take());
   }
+}
+
+// The frame of a deltaMush in world space says only about which place it computes; where the rig names none, it is
+// that which carries the mesh, so that a character keeps its shape far from the origin.
+void RigBuild::ConnectPivots() {
+  for (const Made& made : made_) {
+    if (graph().def(made.id).name != "deltaMush" || !made.world || made.geometries.empty()) continue;
+    GraphEditor edit(&graph());
+    const PlugRef parent = edit.Plug(made.id, "parentMatrix");
+    if (!edit.ok() || graph().FindValue(parent) != nullptr || graph().FindConnection(parent) != nullptr) continue;
+    const std::optional<NodeId> ancestor = CommonAncestor(made);
+    // A transform that depends on the points cannot carry them
+    if (ancestor.has_value()) (void)graph().Connect(edit.Plug(*ancestor, "worldMatrix"), parent).ok();
+  }
+}
+
+// The deepest glTF node above all joints that move the deformer's meshes (and above meshes without a skin), that is not
+// scaled to nothing at rest.
+std::optional<NodeId> RigBuild::CommonAncestor(const Made& made) const {
+  const gltf::Character& character = *rig_->character;
+  std::vector<bool> carries(character.nodes.size(), false);
+  for (const Geometry& geometry : made.geometries) {
+    if (!geometry.mesh.has_value()) continue;
+    const CharacterMesh& mesh = rig_->scene.meshes[*geometry.mesh];
+    if (mesh.influences == nullptr) {
+      carries[mesh.gltf_node] = true;
+      continue;
+    }
+    for (std::size_t i = 0; i < mesh.influences->joints().size(); ++i) {
+      if (mesh.influences->weights()[i] > 0) carries[gltf_by_node_.at(mesh.influence_nodes[mesh.influences->joints()[i]].index)] = true;
+    }
+  }
+  std::vector<std::size_t> below(carries.size(), 0);  // carriers at a node and below it
+  std::size_t total = 0;
+  for (auto it = character.order.rbegin(); it != character.order.rend(); ++it) {  // children first
+    if (carries[*it]) ++below[*it], ++total;
+    const Index parent = character.nodes[*it].parent;
+    if (parent != kNoIndex) below[parent] += below[*it];
+  }
+  std::optional<NodeId> deepest;
+  for (Index node : character.order) {  // parents first: the last one is the deepest
+    Matrix4 inverse;
+    if (total > 0 && below[node] == total && Invert(rest_->NodeWorld(node), &inverse)) deepest = rig_->scene.transforms[node];
+  }
+  return deepest;
 }
 
 void RigBuild::PlaceHandles() {

@@ -91,7 +91,20 @@ void RigBuild::AddAccelerations() {
     read_clips(from.train_clips, &to.train_clips);
     read_clips(from.test_clips, &to.test_clips);
     if (from.space.has_value()) to.space = FindTransform(from.space->text, from.space->where);
-    for (const RigAccelerate::Points& points : from.points) {
+    for (RigAccelerate::Points points : from.points) {
+      // Stages may have an @ in their names, too: the longest mesh that exists wins
+      const std::string whole = points.mesh + "@" + points.stage;
+      const auto is_mesh = [&](const std::string& name) {
+        return std::any_of(rig_->scene.meshes.begin(), rig_->scene.meshes.end(), [&](const CharacterMesh& mesh) {
+          return mesh.name == name || rig_->character->nodes[mesh.gltf_node].name == name;
+        });
+      };
+      for (std::size_t at = whole.rfind('@'); at != std::string::npos && at > 0; at = whole.rfind('@', at - 1)) {
+        if (!is_mesh(whole.substr(0, at))) continue;
+        points.mesh = whole.substr(0, at);
+        points.stage = whole.substr(at + 1);
+        break;
+      }
       const std::optional<std::size_t> mesh_index = FindMesh(points.mesh, points.where);
       if (!mesh_index.has_value()) continue;
       const CharacterMesh& mesh = rig_->scene.meshes[*mesh_index];

@@ -74,17 +74,18 @@ Result<std::vector<Setting>> ReadPoseFile(const Rig& rig, const std::string& pat
 
 Status ApplySetting(Rig* rig, const Setting& setting) {
   Graph& graph = *rig->graph;
-  PlugRef whole = setting.plug;
-  whole.component = -1;
-  for (const PlugRef& plug : {setting.plug, whole}) {
-    const Connection* driver = graph.FindConnection(plug);
-    if (driver == nullptr) continue;
+  const auto overlap = [](int a, int b) { return a == b || a < 0 || b < 0; };
+  std::vector<PlugRef> driven;  // by a clip: the plug, a part of it, or what it is a part of
+  for (const Connection& driver : graph.Inputs(setting.plug.node, setting.plug.attribute)) {
+    const PlugRef& plug = driver.destination;
+    if (!overlap(plug.element, setting.plug.element) || !overlap(plug.component, setting.plug.component)) continue;
     const std::vector<NodeId>& clip_nodes = rig->scene.clip_nodes;
-    if (std::find(clip_nodes.begin(), clip_nodes.end(), driver->source.node) == clip_nodes.end()) {
-      return Status::Usage("{} is driven by {} and cannot be set", graph.PlugName(plug), graph.PlugName(driver->source));
+    if (std::find(clip_nodes.begin(), clip_nodes.end(), driver.source.node) == clip_nodes.end()) {
+      return Status::Usage("{} is driven by {} and cannot be set", graph.PlugName(plug), graph.PlugName(driver.source));
     }
-    KPSA_RETURN_IF_ERROR(graph.Disconnect(plug));
+    driven.push_back(plug);
   }
+  for (const PlugRef& plug : driven) KPSA_RETURN_IF_ERROR(graph.Disconnect(plug));
   if (IsClipPlug(rig->scene, graph, setting.plug)) rig->pinned.push_back(setting.plug);
   return graph.Set(setting.plug, setting.value);
 }

@@ -195,7 +195,8 @@ Result<std::vector<float>> DenseWeights(const WeightFile& file, const std::strin
 
 Result<std::vector<float>> LoadWeights(const std::string& folder, const std::string& reference,
                                        std::string_view mesh, std::size_t points) {
-  const std::size_t hash = reference.rfind('#');
+  const std::size_t suffix = reference.find(".json#");
+  const std::size_t hash = suffix == std::string::npos ? reference.rfind('#') : suffix + 5;
   const std::string path = (std::filesystem::path(folder) / reference.substr(0, hash)).string();
   const Result<WeightFile> file = ReadWeightFile(path);
   if (!file.ok()) return file.status();

@@ -193,9 +193,10 @@ std::string_view LineOf(std::string_view text, int line) {
   return text.substr(0, text.find('\n'));
 }
 
-// Where `[` breaks a flow map: an identifier directly followed by '[' after a '{' of the same line.
+// Where `[` breaks a flow map or list: an identifier directly followed by '[' after a '{' or '[' of the same line.
 bool HasBareBracket(std::string_view line) {
-  std::size_t open = line.find('{');
+  std::size_t open = line.find_first_of("{[");
+  while (open != std::string_view::npos && open > 0 && line[open - 1] != ' ') open = line.find_first_of("{[", open + 1);
   if (open == std::string_view::npos) return false;
   char quote = 0;
   for (std::size_t i = open; i + 1 < line.size(); ++i) {
@@ -223,7 +224,7 @@ Status SyntaxError(const YAML::Exception& error, std::string_view text, const st
   const int line = error.mark.line + 1, column = error.mark.column + 1;
   std::string message = "YAML: " + error.msg;
   if (HasBareBracket(LineOf(text, line)) || (line > 1 && HasBareBracket(LineOf(text, line - 1)))) {
-    message += "; quote plugs that contain [ ] inside { }";
+    message += "; quote plugs that contain [ ] inside { } or [ ]";
   }
   const std::string_view here = LineOf(text, line);
   if (here.substr(0, here.find_first_not_of(" \t")).find('\t') != std::string_view::npos) {

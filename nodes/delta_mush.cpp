@@ -60,7 +60,8 @@ Result<BoundKernel> BindMush(const Binding& binding) {
   if (!rest.ok()) return rest.status();
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
-  MushBound bound{DeltaMushKernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out)), *frame, Middle(*rest)};
+  const Double3 middle = Middle(*rest);
+  MushBound bound{DeltaMushKernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out), middle), *frame, middle};
   const std::size_t scratch = bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
 }

@@ -52,11 +52,11 @@ void AddMathNodes(NodeRegistry& registry) {
       });
   registry.add("multiplyDivide", "Multiplies, divides or raises to a power, component by component. Dividing by 0 gives 0.")
       .in("input1", Double3()).in("input2", Double3{1, 1, 1})
-      .enumeration("operation", {"noOperation", "multiply", "divide", "power"}, false)
+      .enumeration("operation", {"noOperation", "multiply", "divide", "power"}, false, {}, 1)
       .out("output", Type::kDouble3)
       .compute([](Double3 a, Double3 b, std::int64_t operation) { return MultiplyDivide(a, b, operation); });
   registry.add("plusMinusAverage", "Adds, subtracts from the first, or averages any number of inputs.")
-      .in("input", 0.0).array().alias("input1D").enumeration("operation", {"noOperation", "sum", "subtract", "average"}, false)
+      .in("input", 0.0).array().alias("input1D").enumeration("operation", {"noOperation", "sum", "subtract", "average"}, false, {}, 1)
       .out("output", Type::kDouble).alias("output1D")
       .compute([](ArrayView<double> input, std::int64_t operation) { return PlusMinusAverage(input, operation); });
   registry.add("unitConversion", "Multiplies by a fixed factor: between the runtime's units and a rig file's.")

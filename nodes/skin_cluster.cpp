@@ -7,7 +7,8 @@
 namespace kpsa {
 namespace {
 
-// The matrices of the palette that no point needs stay as they are; the kernel reads none of them.
+// The matrices of the palette that no point needs stay as they are. The kernel reads none of them but the first, about
+// whose place it computes, whatever the binding.
 struct SkinBound {
   SkinKernel kernel;
   std::vector<Matrix4> joint_from_bind;
@@ -42,10 +43,9 @@ void ComputeSkin(ComputeContext& c) {
   const auto& bound = c.kernel_as<SkinBound>();
   const ArrayView<Matrix4> matrix = c.array<Matrix4>(kFirstOwnInput);
   auto* palette = reinterpret_cast<Matrix4*>(c.scratch);
-  if (!bound.joint_from_bind.empty()) palette[0] = Matrix4();
-  for (Index j : bound.kernel.joints()) {
-    palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j];
-  }
+  const auto follow = [&](Index j) { palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j]; };
+  if (!bound.joint_from_bind.empty()) follow(0);
+  for (Index j : bound.kernel.joints()) follow(j);
   const Parallel parallel = HostParallel(c);
   bound.kernel.Run({{palette, bound.joint_from_bind.size()}, c.get<double>(kEnvelope), Matrix4()}, c.points(kInPoints), c.out_points(0),
                    {c.scratch + bound.palette_floats, bound.kernel.ScratchFloats()}, &parallel);

@@ -148,8 +148,10 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
       const float* row = incoming + at;
       x = hn::Load(d, row), y = hn::Load(d, row + kFinishBlock), z = hn::Load(d, row + 2 * kFinishBlock);
     }
-    if constexpr (kBind) {  // with a pivot of 0
-      x = hn::Sub(x, sx), y = hn::Sub(y, sy), z = hn::Sub(z, sz);
+    if constexpr (kBind) {
+      x = hn::Sub(hn::Sub(x, hn::Set(d, run.pivot[0])), sx);
+      y = hn::Sub(hn::Sub(y, hn::Set(d, run.pivot[1])), sy);
+      z = hn::Sub(hn::Sub(z, hn::Set(d, run.pivot[2])), sz);
       hn::Store(Fma(ux, x, Fma(uy, y, hn::Mul(uz, z))), d, run.detail_x + i);
       hn::Store(Fma(vx, x, Fma(vy, y, hn::Mul(vz, z))), d, run.detail_y + i);
       hn::Store(Fma(nx, x, Fma(ny, y, hn::Mul(nz, z))), d, run.detail_z + i);

@@ -42,10 +42,11 @@ class DeltaMushKernel {
     Double3 pivot;  // a place near the points, the same for all bindings; only precision depends on it
   };
 
-  // rest: points of the whole mesh. settings must be valid. Cost: that of one Run, and of the demand.
+  // rest: points of the whole mesh. settings must be valid. rest_pivot: the pivot that Run gets at rest; the
+  // frames of the rest shape are then those of a Run, bit for bit. Cost: that of one Run, and of the demand.
   DeltaMushKernel(const Topology& topology, ConstPointsView rest, const DeltaMushSettings& settings,
                   std::span<const Index> out_points, std::span<const Index> in_points,
-                  std::span<const float> point_weights = {});
+                  std::span<const float> point_weights = {}, Double3 rest_pivot = {});
 
   std::size_t point_count() const { return count_; }
   std::size_t input_count() const { return in_count_; }
@@ -68,7 +69,7 @@ class DeltaMushKernel {
   void BuildRows(const Topology& topology, ConstPointsView rest, const DeltaMushSettings& settings,
                  std::span<const Index> local, std::span<const int> level, std::span<const Index> local_of);
   void BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
-                   std::span<const Index> local_of);
+                   std::span<const Index> local_of, Double3 rest_pivot);
   // Packs `in` and smooths it; the smoothed points, xyzw by local number.
   const float* Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
                       const Parallel* parallel) const noexcept;

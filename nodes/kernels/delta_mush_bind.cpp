@@ -108,7 +108,8 @@ std::vector<Index> DeltaMushDemand(const Topology& topology, const DeltaMushSett
 
 DeltaMushKernel::DeltaMushKernel(const Topology& topology, ConstPointsView rest,
                                  const DeltaMushSettings& settings, std::span<const Index> out_points,
-                                 std::span<const Index> in_points, std::span<const float> point_weights)
+                                 std::span<const Index> in_points, std::span<const float> point_weights,
+                                 Double3 rest_pivot)
     : count_(out_points.size()), in_count_(in_points.size()), iterations_(settings.iterations) {
   KPSA_CHECK(settings.Validate().ok());
   KPSA_CHECK_EQ(rest.count, topology.point_count());
@@ -146,7 +147,7 @@ DeltaMushKernel::DeltaMushKernel(const Topology& topology, ConstPointsView rest,
   BuildRows(topology, rest, settings, local, level, local_of);
   PointBuffer rest_in(in_count_);
   GatherPoints(rest, in_points, rest_in.view());
-  BuildFrames(topology, rest_in.view(), out_points, local_of);
+  BuildFrames(topology, rest_in.view(), out_points, local_of, rest_pivot);
 }
 
 void DeltaMushKernel::BuildRows(const Topology& topology, ConstPointsView rest,
@@ -199,10 +200,12 @@ void DeltaMushKernel::BuildRows(const Topology& topology, ConstPointsView rest,
 }
 
 void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest,
-                                  std::span<const Index> out_points, std::span<const Index> local_of) {
-  constexpr float kNoPivot[3] = {0, 0, 0};
+                                  std::span<const Index> out_points, std::span<const Index> local_of,
+                                  Double3 rest_pivot) {
+  const float pivot[3] = {static_cast<float>(rest_pivot.x), static_cast<float>(rest_pivot.y),
+                          static_cast<float>(rest_pivot.z)};
   AlignedFloats scratch(ScratchFloats());
-  const float* smoothed = Smooth(rest, kNoPivot, scratch.span(), nullptr);
+  const float* smoothed = Smooth(rest, pivot, scratch.span(), nullptr);
   const auto point = [&](Index local4) {
     return Double3{smoothed[local4], smoothed[local4 + 1], smoothed[local4 + 2]};
   };
@@ -258,7 +261,7 @@ void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest
                        detail + 2 * row,
                        1,
                        1,
-                       {}};
+                       {pivot[0], pivot[1], pivot[2]}};
   ComputeMushDetail(run, rest, 0, count_);
 }
 

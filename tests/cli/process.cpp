@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -48,7 +49,8 @@ ProcessResult Run(const std::vector<std::string>& arguments, double limit_second
   const auto begin = Clock::now();
   bool interrupted = false, ended = false;
   int status = 0;
-  while (::waitpid(process, &status, WNOHANG) == 0) {
+  struct rusage usage = {};
+  while (::wait4(process, &status, WNOHANG, &usage) == 0) {
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     if (interrupt_after >= 0 && !interrupted && seconds > interrupt_after) {
       ::kill(process, SIGINT);
@@ -61,6 +63,7 @@ ProcessResult Run(const std::vector<std::string>& arguments, double limit_second
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   if (!ended) result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  result.peak_bytes = 1024 * static_cast<std::uint64_t>(usage.ru_maxrss);
   result.out = TemporaryFolder::Read(streams / "out");
   result.err = TemporaryFolder::Read(streams / "err");
   return result;

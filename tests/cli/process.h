@@ -1,6 +1,7 @@
 // Runs the kpsa program as a user does, and gives what it printed.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@ namespace kpsa {
 struct ProcessResult {
   int exit_code = -1;  // 128 + signal where one ended it; -1: it ran longer than the limit and was ended
   std::string out, err;
+  std::uint64_t peak_bytes = 0;  // of memory
   std::size_t error_lines() const;
 };
 
