@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::size_t kProbePoints = 20;  // of a stage, to see what a cue there would drag in
 constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
-constexpr double kTileShare = 0.025;      // of the tolerance: RMS error that tiles and half precision may add
-constexpr double kTileMaxShare = 0.25;    // of the tolerance: the largest error that they may add
+constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that tiles and half precision may add
+constexpr double kTileMaxShare = 0.45;    // of the tolerance: the largest error that they may add
 constexpr std::size_t kGroupPoints = 400;    // where the trainer looks which controls act together
 constexpr double kGroupShare = 0.2;          // of a control's largest displacement: it acts on a point
 constexpr std::size_t kGroupSize = 8;        // controls that move a point most
@@ -182,7 +182,7 @@ class Trainer {
     std::size_t calibration = options_.calibration_poses;
     if (calibration == 0)
       calibration =
-          static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 100.0, 1000.0));
+          static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
     KPSA_RETURN_IF_ERROR(sample(calibration, options_.seed ^ 0x5deece66dull, held_out));
     record_.calibration_poses = held_out->poses();
     return Status();
