@@ -17,6 +17,8 @@ constexpr std::size_t kProbePoints = 20;  // of a stage, to see what a cue there
 constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
 constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that tiles and half precision may add
 constexpr double kTileMaxShare = 0.45;    // of the tolerance: the largest error that they may add
+constexpr double kStillTurn = 5e-4;          // a turn (radians) and a shift (of the tolerance) of a joint that are none
+constexpr double kStillShare = 0.1;
 constexpr std::size_t kGroupPoints = 400;    // where the trainer looks which controls act together
 constexpr double kGroupShare = 0.2;          // of a control's largest displacement: it acts on a point
 constexpr std::size_t kGroupSize = 8;        // controls that move a point most
@@ -243,7 +245,9 @@ class Trainer {
           lo = std::min<double>(lo, poses.row(t)[column]);
           hi = std::max<double>(hi, poses.row(t)[column]);
         }
-        ranges_.push_back(MakeTrainedRange(EntryName(signal, e), lo, hi, options_.range_margin));
+        // Clips turn joints a little about axes that no control has: what moves no point noticeably is no new pose
+        const double still = !signal.matrix ? 0 : e < 9 ? kStillTurn : kStillShare * options_.tolerance;
+        ranges_.push_back(MakeTrainedRange(EntryName(signal, e), lo - still, hi + still, options_.range_margin));
       }
     }
     return Status();
