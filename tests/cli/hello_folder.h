@@ -43,12 +43,13 @@ class HelloFolder : public TemporaryFolder {
   }
 };
 
-// A second of training.
+// A second of training, at a tolerance that most poses keep.
+inline constexpr double kQuickTolerance = 2e-3;
 inline TrainOptions QuickTraining() {
   TrainOptions options;
   options.samples = 300;
   options.calibration_poses = 100;
-  options.tolerance = 5e-4;
+  options.tolerance = kQuickTolerance;
   options.violation_rate = 0.05;
   return options;
 }

@@ -1,7 +1,6 @@
 // A tripwire is a node that fails when it is evaluated while armed. Armed behind what a subspace stands in for, it must
 // never fire on a hit, and must fire on everything else. It proves what counts of evaluations only report.
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "graph/frames.h"
@@ -171,8 +170,8 @@ TEST_F(Tripwire, TheProgramReportsItAsNeverEvaluated) {
   };
   EXPECT_EQ(never("1000"), (std::vector<std::string>{"mush", "trip"}));
   EXPECT_EQ(never("0"), std::vector<std::string>());
-  // Armed from outside, the rig is another one, and says so
-  const ProcessResult armed = RunKpsa({"eval", "hello.yaml", "--set", "trip.armed=1", "-o", "x.npz"}, 60, folder.path());
+  // The canary: armed from outside, the rig itself fails
+  const ProcessResult armed = RunKpsa({"eval", "hello.yaml", "--set", "trip.armed=true", "-o", "x.npz"}, 60, folder.path());
   EXPECT_EQ(armed.exit_code, 4) << armed.err;
   EXPECT_NE(armed.err.find(kArmed), std::string::npos) << armed.err;
 }
