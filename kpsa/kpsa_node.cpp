@@ -121,7 +121,8 @@ std::uint64_t Decide(ComputeContext& c) {
     state.verdict.offender = offender;
     return all;
   };
-  if (data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
+  // What comes after it binds to the rest points: to the exact ones
+  if (c.at_rest || data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
   const std::size_t r = subspace.rows();
   auto* doubles = reinterpret_cast<double*>(c.scratch);
   const std::span<double> raw(doubles, r), y(doubles + kernel.vector_doubles, r), g(doubles + 2 * kernel.vector_doubles, r);
