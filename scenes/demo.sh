@@ -6,7 +6,7 @@ sh cmake/dependencies.sh
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release > /dev/null
 cmake --build build --target kpsa
 mkdir -p out
-build/kpsa train scenes/face/face.yaml -o out/face.kpsa --rows 160 --force
+build/kpsa train scenes/face/face.yaml -o out/face.kpsa --rows 96 --force
 build/kpsa bench scenes/face/face.yaml --kpsa out/face.kpsa
 build/kpsa render scenes/face/face.yaml --kpsa out/face.kpsa -o out/face.png --force
 echo
