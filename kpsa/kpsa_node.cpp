@@ -126,7 +126,8 @@ std::uint64_t Decide(ComputeContext& c) {
     state.verdict.offender = offender;
     return all;
   };
-  if (data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
+  // What comes after it binds to the rest points: to the exact ones
+  if (c.at_rest || data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
   const std::size_t r = subspace.rows();
   const std::span<double> raw(reinterpret_cast<double*>(c.scratch), r);
   const std::size_t padded = subspace.soft_cache.padded_rows();
