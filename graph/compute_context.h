@@ -68,6 +68,25 @@ class ComputeContext {
   S& state_as() const { return *reinterpret_cast<S*>(state); }
 };
 
+// What a batch sees: steps of one kind, each with inputs of its own. Their outputs (one small value each) are not slots
+// but stand in a row, so that the host can compare them with what they were.
+class BatchContext {
+ public:
+  const std::byte* values = nullptr;  // the evaluator's slots
+  const std::uint32_t* in = nullptr;  // slot offsets of the first step's inputs
+  std::size_t stride = 0;             // from a step's to the next one's
+  const void* kernel = nullptr;       // what bind_batch returned
+  std::byte* out = nullptr;           // 64-byte aligned
+  std::size_t count = 0;
+
+  template <typename T>
+  const T& get(std::size_t step, int i) const { return *reinterpret_cast<const T*>(values + in[step * stride + static_cast<std::size_t>(i)]); }
+  template <typename T>
+  T& out_value(std::size_t step) const { return reinterpret_cast<T*>(out)[step]; }
+  template <typename K>
+  const K& kernel_as() const { return *static_cast<const K*>(kernel); }
+};
+
 // Slot types agree between views: points are written as PointsView and read as ConstPointsView.
 static_assert(sizeof(PointsView) == sizeof(ConstPointsView));
 
@@ -78,5 +97,7 @@ using DecideFn = std::uint64_t (*)(ComputeContext&);
 // The same step of several evaluators at once (blocks of frames); same results as one by one. None of them has chosen a
 // lazy input. All contexts share one scratch, of the size that bind asked for.
 using ComputeBlockFn = void (*)(ComputeContext* contexts, std::size_t count);
+// Several steps of one evaluator at once; gives the bytes that their computes give one by one. Cannot fail.
+using ComputeBatchFn = void (*)(const BatchContext&);
 
 }  // namespace kpsa

@@ -83,6 +83,7 @@ class Evaluator final {
   Index NewerLazyDep(Index step) const;
   template <bool kRecord> bool RunRange(Index begin, Index end);
   template <bool kRecord> bool RunPlain(Index step);
+  bool TryBatch(Index step, Index end);
   template <bool kRecord> bool RunStep(Index step);
   template <bool kRecord> bool RunUnit(Index first);
   template <bool kRecord> bool RunBranch(Index step);

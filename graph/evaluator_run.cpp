@@ -194,6 +194,34 @@ inline bool Evaluator::RunPlain(Index number) {
   return Compute<kRecord>(number, cause, true);
 }
 
+// Runs the batch that begins with this step, if it ends before `end` and all of it is stale.
+bool Evaluator::TryBatch(Index number, Index end) {
+  const Plan::Batch& batch = plan_->batches()[plan_->steps()[number].batch];
+  const Index last = batch.first + batch.count;
+  if (number != batch.first || last > end || wanted_only_) return false;
+  for (Index s = number; s < last; ++s) {
+    if (!dirty(s) || (computed_[s] != 0 && NewerDep(s) == kNoIndex)) return false;
+  }
+  BatchContext context;
+  context.values = values();
+  context.in = plan_->tables().data() + plan_->steps()[number].in;
+  context.stride = batch.stride;
+  context.kernel = batch.kernel;
+  context.out = reinterpret_cast<std::byte*>(workspace_->data() + batch.scratch);
+  context.count = batch.count;
+  batch.compute(context);
+  const std::size_t size = plan_->steps()[number].value_size;
+  const std::byte* now = context.out;
+  for (Index s = number; s < last; ++s, now += size) {
+    std::byte* slot = values() + plan_->steps()[s].value;
+    const bool changed = std::memcmp(slot, now, size) != 0;
+    if (changed) std::memcpy(slot, now, size);
+    MarkComputed(s, changed || computed_[s] == 0);
+    ClearDirty(s);
+  }
+  return true;
+}
+
 template <bool kRecord>
 bool Evaluator::RunStep(Index number) {
   const Plan::Step& step = plan_->steps()[number];
@@ -217,7 +245,8 @@ bool Evaluator::RunRange(Index begin, Index end) {
         SetDirty(step, step + 1);
         return false;
       }
-      if (!dirty(step)) continue;  // done with its unit
+      if (!dirty(step)) continue;  // done with its unit or batch
+      if (!kRecord && steps[step].batch != kNoIndex && TryBatch(step, end)) continue;
       step -= steps[step].unit_offset;
       const Index size = steps[step].unit_size;
       for (Index member = step; member < step + size; ++member) ClearDirty(member);
@@ -239,6 +268,10 @@ bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) 
     float cost = 0;
     for (Index step = first; step < last;) {
       const Plan::Step& s = plan_->steps()[step];
+      if (s.batch != kNoIndex && profile_ == nullptr && TryBatch(step, last)) {
+        step += plan_->batches()[s.batch].count;
+        continue;
+      }
       const Index size = s.unit_size;
       bool run = false;
       for (Index member = step; member < step + size; ++member) {

@@ -55,6 +55,14 @@ class DemandOf final : public Demand {
       mismatch = fmt::format("{} asks for points of an array of {}, its input has {}", name, points.total(), set.total());
     }
   }
+  void Skip(std::string_view name, int element) override {
+    const int i = InputNumber(table_, instance_, name, element);
+    if (i < 0) return;
+    const Input& input = instance_.inputs[static_cast<std::size_t>(i)];
+    KPSA_CHECK(!input.lazy && IsSmallType(table_.input_def(instance_, input.position).type));
+    sets_->skipped.resize(instance_.inputs.size(), false);
+    sets_->skipped[static_cast<std::size_t>(i)] = true;
+  }
   std::string mismatch;
 
  private:
@@ -177,6 +185,7 @@ Result<InstanceSets> FullOutputs(InstanceTable& table, PointTotals& totals, Inde
 Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& statics, Index number, InstanceSets* sets) {
   const Instance& instance = table.instances()[number];
   sets->inputs.clear();
+  sets->skipped.clear();
   for (const Input& input : instance.inputs) {
     Index total = 0;
     if (IsPointType(input.source.type)) {

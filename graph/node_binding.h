@@ -12,6 +12,7 @@ namespace kpsa {
 struct InstanceSets {
   std::vector<PointSet> inputs;
   std::vector<std::vector<PointSet>> outputs;
+  std::vector<bool> skipped;  // by input: not needed for these outputs; empty: all are
 };
 
 // Points of an output's array: from the definition, or as many as the first points input.

@@ -1,5 +1,7 @@
 #include "graph/node_builder.h"
 
+#include <algorithm>
+
 #include "base/check.h"
 
 namespace kpsa {
@@ -136,12 +138,38 @@ void NodeBuilder::finish_group() {
   }
 }
 
+int NodeBuilder::input_position(std::string_view input) {
+  const auto& inputs = group().inputs;
+  const auto it = std::find(inputs.begin(), inputs.end(), def_->FindAttribute(input));
+  KPSA_CHECK(it != inputs.end());
+  return static_cast<int>(it - inputs.begin());
+}
+
 NodeBuilder& NodeBuilder::in_place(std::string_view input) {
-  const int number = def_->FindAttribute(input);
-  for (std::size_t i = 0; i < group().inputs.size(); ++i) {
-    if (group().inputs[i] == number) group().in_place_input = static_cast<int>(i);
+  group().in_place_input = input_position(input);
+  return *this;
+}
+
+NodeBuilder& NodeBuilder::batch(BindBatchFn bind, ComputeBatchFn f) {
+  KPSA_CHECK_EQ(group().outputs.size(), std::size_t{1});
+  KPSA_CHECK(group().decide == nullptr && group().compute_block == nullptr);
+  for (const std::vector<int>* numbers : {&group().inputs, &group().outputs}) {
+    for (int number : *numbers) {
+      const AttributeDef& a = def_->attributes[static_cast<std::size_t>(number)];
+      KPSA_CHECK(!a.array && IsSmallType(a.type));
+    }
   }
-  KPSA_CHECK(group().in_place_input >= 0);
+  group().bind_batch = std::move(bind);
+  group().compute_batch = f;
+  return *this;
+}
+
+NodeBuilder& NodeBuilder::passes(std::string_view input, const std::vector<std::string>& held) {
+  KPSA_CHECK_EQ(group().outputs.size(), std::size_t{1});
+  group().passed_input = input_position(input);
+  const auto type_of = [&](int number) { return def_->attributes[static_cast<std::size_t>(number)].type; };
+  KPSA_CHECK(type_of(group().inputs[static_cast<std::size_t>(group().passed_input)]) == type_of(group().outputs[0]));
+  for (const std::string& name : held) group().held_inputs.push_back(input_position(name));
   return *this;
 }
 

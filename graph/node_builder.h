@@ -91,6 +91,10 @@ class NodeBuilder {
   // Change the group that was closed last.
   NodeBuilder& decide(DecideFn f) { group().decide = f; return *this; }
   NodeBuilder& block(ComputeBlockFn f) { group().compute_block = f; return *this; }
+  // Many steps of the group run as one: `bind` (or null) makes its kernel of theirs, `f` computes all of them.
+  NodeBuilder& batch(BindBatchFn bind, ComputeBatchFn f);
+  // The output equals `input`, bit for bit, while the inputs `held` hold their defaults: then plans do without the step.
+  NodeBuilder& passes(std::string_view input, const std::vector<std::string>& held);
   NodeBuilder& demand(DemandFn f) { group().demand = std::move(f); return *this; }
   NodeBuilder& bind(BindFn f) { group().bind = std::move(f); return *this; }
   NodeBuilder& point_count(PointCountFn f) { group().point_count = std::move(f); return *this; }
@@ -144,6 +148,7 @@ class NodeBuilder {
   AttributeDef& attribute() { return def_->attributes.back(); }
   ComputeGroup& group() { return def_->groups.back(); }
   NodeBuilder& add(AttributeDef attribute);
+  int input_position(std::string_view input);
   NodeBuilder& group_compute(ComputeFn compute);
   NodeBuilder& group_for(std::vector<std::string> outputs, std::vector<std::string> inputs, ComputeFn compute);
   void finish_group();

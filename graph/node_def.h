@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -70,6 +71,8 @@ class Demand {
   virtual const PointSet& output(std::string_view name, int element = 0) const = 0;
   virtual Index input_total(std::string_view name, int element = 0) const = 0;  // points of that input's array
   virtual void Require(std::string_view name, int element, const PointSet& points) = 0;
+  // This output does not depend on a small input: it need not be evaluated, and holds its default.
+  virtual void Skip(std::string_view name, int element) = 0;
 };
 
 // Everything of Demand, answered: the point sets of both sides.
@@ -89,6 +92,8 @@ struct BoundKernel {
 
 using DemandFn = std::function<void(Demand&)>;
 using BindFn = std::function<Result<BoundKernel>(const Binding&)>;
+// From the kernels of the steps of a batch, which outlive it.
+using BindBatchFn = std::function<std::shared_ptr<const void>(std::span<const void* const> kernels)>;
 using PointCountFn = std::function<Result<Index>(const Structural&, std::string_view output, int element)>;
 
 // Outputs that are computed together, and from what.
@@ -99,10 +104,14 @@ struct ComputeGroup {
   ComputeFn compute = nullptr;
   DecideFn decide = nullptr;         // with lazy inputs
   ComputeBlockFn compute_block = nullptr;
+  ComputeBatchFn compute_batch = nullptr;  // of groups with one small output and no arrays
+  BindBatchFn bind_batch;
   DemandFn demand;                   // null: the same points of every points input
   BindFn bind;                       // null: no kernel
   PointCountFn point_count;          // null: as many as the first points input has
   int in_place_input = -1;           // position in inputs whose buffer the first output may overwrite
+  int passed_input = -1;             // position in inputs of what the only output equals, bit for bit, while
+  std::vector<int> held_inputs;      // these (positions) hold their defaults
   float cost_ns = 20;                // rough; decides what is worth a thread
   float cost_ns_per_point = 0;
 };

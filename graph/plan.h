@@ -40,9 +40,19 @@ class Plan {
     std::uint32_t scratch = 0;                // floats into the workspace
     std::uint32_t state = 0;                  // bytes into the evaluator's state
     std::uint32_t branch = kNoIndex;          // into branches(), for steps with lazy inputs
+    std::uint32_t batch = kNoIndex;           // into batches(), for steps that can run together
     std::uint16_t unit_size = 1;              // steps that run together; at the first of them
     std::uint16_t unit_offset = 0;            // how far the first of the unit is before this step
-    bool runs_plainly() const { return branch == kNoIndex && unit_size == 1 && unit_offset == 0; }
+    bool runs_plainly() const { return branch == kNoIndex && batch == kNoIndex && unit_size == 1 && unit_offset == 0; }
+  };
+  static_assert(sizeof(Step) == 64);
+  // Steps [first, first + count) of one kind and level: where all of them are stale, one call computes them.
+  struct Batch {
+    ComputeBatchFn compute = nullptr;
+    const void* kernel = nullptr;
+    Index first = 0, count = 0;
+    std::uint32_t stride = 0;   // between the inputs of its steps, in tables()
+    std::uint32_t scratch = 0;  // floats into the workspace, for the outputs
   };
   struct Branch {
     DecideFn decide = nullptr;
@@ -98,6 +108,7 @@ class Plan {
   const std::vector<std::uint32_t>& tables() const { return tables_; }
   const std::vector<Index>& deps() const { return deps_; }
   const std::vector<Branch>& branches() const { return branches_; }
+  const std::vector<Batch>& batches() const { return batches_; }
   const std::vector<Segment>& segments() const { return segments_; }
   const std::vector<Buffer>& buffers() const { return buffers_; }
   const std::vector<Varying>& varying() const { return varying_; }
@@ -131,6 +142,7 @@ class Plan {
   std::vector<std::uint32_t> tables_;
   std::vector<Index> deps_, consumers_, consumer_offsets_;
   std::vector<Branch> branches_;
+  std::vector<Batch> batches_;
   std::vector<Segment> segments_;
   std::vector<Buffer> buffers_;
   std::vector<Varying> varying_;

@@ -8,6 +8,11 @@
 #include "graph/static_eval.h"
 
 namespace kpsa {
+namespace {
+
+constexpr Index kLeastBatch = 4;  // steps that are worth a batch
+
+}  // namespace
 
 std::uint32_t PlanBuilder::AddSlot(std::size_t size) {
   auto& values = plan_->initial_values_;
@@ -292,6 +297,41 @@ void PlanBuilder::FillSteps() {
   }
 }
 
+const ComputeGroup* PlanBuilder::BatchGroup(Index number) const {
+  const DraftStep& draft = draft_.steps[placed_[number]];
+  if (draft.instance == kNoIndex || table_.instances()[draft.instance].kind != Instance::Kind::kNode) return nullptr;
+  const ComputeGroup& group = table_.group(table_.instances()[draft.instance]);
+  return group.compute_batch != nullptr && plan_->steps_[number].unit_size == 1 ? &group : nullptr;
+}
+
+void PlanBuilder::MakeBatches() {
+  for (const Plan::Segment& segment : plan_->segments_) {
+    for (std::size_t level = 0; level + 1 < segment.levels.size(); ++level) {
+      const Index end = segment.levels[level + 1];
+      for (Index first = segment.levels[level], last; first < end; first = last) {
+        const ComputeGroup* group = BatchGroup(first);
+        for (last = first + 1; last < end && group != nullptr && BatchGroup(last) == group;) ++last;
+        if (last - first < kLeastBatch) continue;
+        std::vector<const void*> kernels;
+        for (Index s = first; s < last; ++s) {
+          plan_->steps_[s].batch = static_cast<std::uint32_t>(plan_->batches_.size());
+          kernels.push_back(plan_->steps_[s].kernel);
+        }
+        Plan::Batch batch;
+        batch.compute = group->compute_batch;
+        if (group->bind_batch) plan_->owned_.push_back(group->bind_batch(kernels)), batch.kernel = plan_->owned_.back().get();
+        batch.first = first;
+        batch.count = last - first;
+        batch.stride = plan_->steps_[first + 1].in - plan_->steps_[first].in;
+        batch.scratch = static_cast<std::uint32_t>(plan_->workspace_floats_);
+        plan_->workspace_floats_ += PaddedCount(batch.count * plan_->steps_[first].value_size / sizeof(float));
+        KPSA_CHECK_LE(plan_->workspace_floats_, std::size_t{0xffffffff});
+        plan_->batches_.push_back(batch);
+      }
+    }
+  }
+}
+
 void PlanBuilder::FillRequestOutputs() {
   for (std::size_t i = 0; i < request_.outputs.size(); ++i) {
     const DraftInput& input = draft_.outputs[i];
@@ -357,18 +397,21 @@ void PlanBuilder::CacheClosures() {
 }
 
 void PlanBuilder::Explain() {
-  std::vector<char> kept(table_.graph().node_capacity(), 0), folded = kept;
+  std::vector<char> kept(table_.graph().node_capacity(), 0), folded = kept, passed = kept;
   for (const Plan::StepInfo& info : plan_->infos_) {
     if (info.node.index != kNoIndex) kept[info.node.index] = 1;
   }
   for (std::size_t i = 0; i < table_.instances().size(); ++i) {
     if (!draft_.varying[i]) folded[table_.instances()[i].node.index] = 1;
+    if (draft_.passed[i]) passed[table_.instances()[i].node.index] = 1;
   }
   for (const PlugRef& plug : table_.varying()) kept[plug.node.index] = 1;
   for (NodeId node : table_.graph().Nodes()) {
     if (kept[node.index]) continue;
-    plan_->excluded_.push_back({table_.graph().name(node), folded[node.index] ? "constant: depends on nothing that varies"
-                                                                                : "not needed by the request"});
+    const char* reason = passed[node.index]   ? "hands on what drives it, unchanged"
+                         : folded[node.index] ? "constant: depends on nothing that varies"
+                                              : "not needed by the request";
+    plan_->excluded_.push_back({table_.graph().name(node), reason});
   }
 }
 
@@ -378,6 +421,7 @@ std::shared_ptr<const Plan> PlanBuilder::Build() {
   AddVarying();
   PlaceOutputs();
   FillSteps();
+  MakeBatches();
   FillRequestOutputs();
   Connect();
   CacheClosures();

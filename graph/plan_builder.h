@@ -25,12 +25,14 @@ class PlanBuilder {
   void AddVarying();
   void PlaceOutputs();
   void FillSteps();
+  void MakeBatches();
   void FillRequestOutputs();
   void Connect();
   void CacheClosures();
   void Explain();
   std::uint32_t SlotOf(const DraftInput& input);
   Index ProducerOf(const DraftInput& input) const;
+  const ComputeGroup* BatchGroup(Index number) const;  // of a step that can run in a batch; or null
   std::uint32_t AddSlot(std::size_t size);
   std::uint32_t AddBuffer(std::uint32_t slot, const PointSet& points, Type type, bool workspace, std::uint32_t reuse);
   std::uint32_t ConstantSlot(const Value& value, Type type, const PointSet& points);

@@ -1,6 +1,7 @@
 #include "graph/plan_draft.h"
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <tuple>
 
@@ -23,6 +24,7 @@ class Drafter {
     MarkVarying(order);
     KPSA_RETURN_IF_ERROR(CheckStructural());
     uses_.resize(table_.instances().size());
+    draft_.passed.assign(table_.instances().size(), false);
     draft_.segments.emplace_back();
 
     // The request's own reads
@@ -96,7 +98,35 @@ class Drafter {
     return Status();
   }
 
-  Status Read(const Source& source, const PointSet& points, Index segment, Reader reader, DraftInput* input) {
+  // The source that an instance hands on unchanged; null if it computes something.
+  const Source* PassedBy(Index number) {
+    const Instance& instance = table_.instances()[number];
+    if (instance.kind != Instance::Kind::kNode || table_.group(instance).passed_input < 0) return nullptr;
+    const ComputeGroup& group = table_.group(instance);
+    const Source* passed = nullptr;
+    for (const Input& input : instance.inputs) {
+      const Source& s = input.source;
+      if (input.position == group.passed_input) passed = &s;
+      if (std::find(group.held_inputs.begin(), group.held_inputs.end(), input.position) == group.held_inputs.end()) continue;
+      if (s.kind == Source::Kind::kVarying || (s.kind == Source::Kind::kInstance && draft_.varying[s.instance])) return nullptr;
+      const Value* value = statics_.Get(s, false);
+      const AttributeDef& a = table_.input_def(instance, input.position);
+      std::byte now[sizeof(Matrix4)], held[sizeof(Matrix4)];
+      if (value == nullptr) return nullptr;
+      value->WriteSlot(a.type, now);
+      a.default_value.WriteSlot(a.type, held);
+      if (std::memcmp(now, held, SlotSize(a.type)) != 0) return nullptr;
+    }
+    return passed;
+  }
+
+  Status Read(Source source, const PointSet& points, Index segment, Reader reader, DraftInput* input) {
+    while (source.kind == Source::Kind::kInstance && draft_.varying[source.instance]) {
+      const Source* passed = PassedBy(source.instance);
+      if (passed == nullptr || passed->type != source.type) break;
+      draft_.passed[source.instance] = true;
+      source = *passed;
+    }
     input->component = source.component;
     input->type = source.type;
     input->points = points;
@@ -201,6 +231,13 @@ class Drafter {
     int together_position = -1, bits = 0;
     for (std::size_t i = 0; i < instance.inputs.size(); ++i) {
       const Input& input = instance.inputs[i];
+      const std::vector<bool>& skipped = draft_.steps[step_number].sets.skipped;
+      if (!skipped.empty() && skipped[i]) {
+        const AttributeDef& a = table_.input_def(instance, input.position);
+        draft_.steps[step_number].inputs[i].type = a.type;
+        draft_.steps[step_number].inputs[i].value = &a.default_value;
+        continue;
+      }
       Index reads_in = segment;
       if (input.lazy) {
         // The elements of a lazy_together array share a segment and a bit

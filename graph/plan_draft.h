@@ -42,6 +42,7 @@ struct PlanDraft {
   std::vector<DraftSegment> segments;
   std::vector<DraftInput> outputs;  // by request output
   std::vector<bool> varying;        // by instance
+  std::vector<bool> passed;         // by instance: its readers read its input instead (ComputeGroup::passed_input)
 };
 
 // Decides segments and point sets backward from the request, and connects steps; inserts gathers where a reader

@@ -90,9 +90,8 @@ class Orderer {
   }
 
   bool IsBranch(const DraftStep& step) const {
-    if (step.instance == kNoIndex || table_.instances()[step.instance].kind != Instance::Kind::kNode) return false;
-    const ComputeGroup& group = table_.group(table_.instances()[step.instance]);
-    return group.decide != nullptr || group.compute_block != nullptr;
+    const ComputeGroup* group = GroupOf(step);
+    return group != nullptr && (group->decide != nullptr || group->compute_block != nullptr);
   }
   // Units run again as a whole: not with steps that decide, and not with what must not run twice a frame.
   bool RunsAlone(Index s) const {
@@ -119,6 +118,24 @@ class Orderer {
     return kNoIndex;
   }
 
+  const ComputeGroup* GroupOf(const DraftStep& step) const {
+    if (step.instance == kNoIndex || table_.instances()[step.instance].kind != Instance::Kind::kNode) return nullptr;
+    return &table_.group(table_.instances()[step.instance]);
+  }
+  // Numbers the groups whose steps can run together, by their first step; 0 for all others.
+  std::vector<Index> BatchKinds() const {
+    std::vector<Index> kinds(draft_.steps.size(), 0);
+    std::vector<const ComputeGroup*> known;
+    for (Index s = 0; s < draft_.steps.size(); ++s) {
+      const ComputeGroup* group = GroupOf(draft_.steps[s]);
+      if (group == nullptr || group->compute_batch == nullptr) continue;
+      const auto it = std::find(known.begin(), known.end(), group);
+      kinds[s] = static_cast<Index>(it - known.begin()) + 1;
+      if (it == known.end()) known.push_back(group);
+    }
+    return kinds;
+  }
+
   // Kahn's algorithm over units, segment by segment; false on a cycle.
   bool Levels() {
     std::vector<std::pair<Index, Index>> unit_of(draft_.steps.size());
@@ -127,6 +144,7 @@ class Orderer {
         for (Index s : order_.segments[g][u].steps) unit_of[s] = {g, u};
       }
     }
+    const std::vector<Index> kinds = BatchKinds();
     std::vector<std::vector<std::vector<Index>>> consumers(order_.segments.size());
     std::vector<std::vector<Index>> waiting(order_.segments.size());
     for (Index g = 0; g < order_.segments.size(); ++g) {
@@ -165,12 +183,14 @@ class Orderer {
         }
       }
       if (done != units.size()) return false;
-      // Branches come last in their level: the parallel evaluator runs them after the others. Draft steps were made
-      // consumers first, so descending numbers keep sources near their users.
+      // Branches come last in their level: the parallel evaluator runs them after the others. Steps of a batch lie side
+      // by side. Draft steps were made consumers first, so descending numbers keep sources near their users.
       std::sort(units.begin(), units.end(), [&](const StepOrder::Unit& a, const StepOrder::Unit& b) {
         if (a.level != b.level) return a.level < b.level;
         const bool branch_a = IsBranch(draft_.steps[a.steps[0]]), branch_b = IsBranch(draft_.steps[b.steps[0]]);
-        return branch_a != branch_b ? branch_b : a.steps[0] > b.steps[0];
+        if (branch_a != branch_b) return branch_b;
+        const Index kind_a = kinds[a.steps[0]], kind_b = kinds[b.steps[0]];
+        return kind_a != kind_b ? kind_a < kind_b : a.steps[0] > b.steps[0];
       });
     }
     return true;

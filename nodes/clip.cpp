@@ -2,6 +2,7 @@
 // the rig's own.
 #include <algorithm>
 
+#include "base/prefetch.h"
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/sampler.h"
@@ -102,28 +103,20 @@ Result<BoundKernel> BindClipTransform(const Binding& binding) {
   return MakeBound(std::move(k), 0);
 }
 
-void ComputeClipTransform(ComputeContext& c) {
-  const auto& k = c.kernel_as<ClipTransformKernel>();
+// The local matrix where find(t) gives the place among the kernel's times[t].
+template <typename Find>
+void LocalMatrix(const ClipTransformKernel& k, const Find& find, Matrix4* matrix) {
   constexpr int kConstant = ClipTransformKernel::kConstant;
-  const double time = c.get<double>(0);
-  KeySpan span;
-  int found = kConstant;  // the times that `span` was found in
-  const auto find = [&](int times) -> const KeySpan& {
-    if (times != found) span = k.times[static_cast<std::size_t>(times)].Find(time);
-    found = times;
-    return span;
-  };
   Double3 translation = k.constant_translation;
   if (k.translation_times != kConstant) translation = SampleVec3(k.translation.view, find(k.translation_times));
-  Matrix4& matrix = c.out_value<Matrix4>(0);
   if (k.rotation_times == kConstant && k.scale_times == kConstant) {
-    matrix = k.constant;
-    matrix(0, 3) = translation.x, matrix(1, 3) = translation.y, matrix(2, 3) = translation.z;
+    *matrix = k.constant;
+    (*matrix)(0, 3) = translation.x, (*matrix)(1, 3) = translation.y, (*matrix)(2, 3) = translation.z;
     return;
   }
   const Double3 scale = k.scale_times == kConstant ? k.constant_scale : SampleVec3(k.scale.view, find(k.scale_times));
   if (k.rotation_times == kConstant) {
-    matrix = ComposeTrs(translation, k.constant_rotation, scale);
+    *matrix = ComposeTrs(translation, k.constant_rotation, scale);
     return;
   }
   Matrix4 m = RotationFromUnit(k.rotation.At(find(k.rotation_times)));
@@ -131,7 +124,87 @@ void ComputeClipTransform(ComputeContext& c) {
     for (int row = 0; row < 3; ++row) m(row, column) *= scale[column];
   }
   m(0, 3) = translation.x, m(1, 3) = translation.y, m(2, 3) = translation.z;
-  matrix = m;
+  *matrix = m;
+}
+
+void ComputeClipTransform(ComputeContext& c) {
+  const auto& k = c.kernel_as<ClipTransformKernel>();
+  const double time = c.get<double>(0);
+  KeySpan span;
+  int found = ClipTransformKernel::kConstant;  // the times that `span` was found in
+  LocalMatrix(k, [&](int times) -> const KeySpan& {
+    if (times != found) span = k.times[static_cast<std::size_t>(times)].Find(time);
+    found = times;
+    return span;
+  }, &c.out_value<Matrix4>(0));
+}
+
+// The transforms of a clip together: those with equal times look their keys up once.
+struct ClipBatchKernel {
+  struct Member {
+    const ClipTransformKernel* kernel;
+    Index times[3];  // for each of the kernel's: which of `times`
+  };
+  std::vector<Member> members;
+  std::vector<const KeyTimes*> times;  // no two are equal
+};
+
+std::shared_ptr<const void> BindClipBatch(std::span<const void* const> kernels) {
+  ClipBatchKernel batch;
+  for (const void* kernel : kernels) {
+    ClipBatchKernel::Member member{static_cast<const ClipTransformKernel*>(kernel), {}};
+    for (std::size_t i = 0; i < member.kernel->times.size(); ++i) {
+      const KeyTimes& times = member.kernel->times[i];
+      const auto equal = [&](const KeyTimes* known) { return known->times() == times.times(); };
+      const auto it = std::find_if(batch.times.begin(), batch.times.end(), equal);
+      member.times[i] = static_cast<Index>(it - batch.times.begin());
+      if (it == batch.times.end()) batch.times.push_back(&times);
+    }
+    batch.members.push_back(member);
+  }
+  return std::make_shared<const ClipBatchKernel>(std::move(batch));
+}
+
+// Remembers the last few places in key times.
+class FoundKeys {
+ public:
+  explicit FoundKeys(const ClipBatchKernel& batch) : batch_(batch) {}
+  const KeySpan& Find(Index times, double time) {
+    Entry& entry = entries_[times % kEntries];
+    if (entry.times != times || !(entry.time == time)) entry = {times, time, batch_.times[times]->Find(time)};
+    return entry.span;
+  }
+
+ private:
+  static constexpr Index kEntries = 8;
+  struct Entry {
+    Index times = kNoIndex;
+    double time = 0;
+    KeySpan span;
+  };
+  const ClipBatchKernel& batch_;
+  Entry entries_[kEntries];
+};
+
+void ComputeClipBatch(const BatchContext& c) {
+  const auto& batch = c.kernel_as<ClipBatchKernel>();
+  for (const auto& member : batch.members) Prefetch(member.kernel, sizeof(ClipTransformKernel));
+  FoundKeys found(batch);
+  const auto each = [&](auto&& visit) {
+    for (std::size_t i = 0; i < batch.members.size(); ++i) {
+      const ClipBatchKernel::Member& member = batch.members[i];
+      const double time = c.get<double>(i, 0);
+      visit(i, *member.kernel, [&](int times) -> const KeySpan& { return found.Find(member.times[times], time); });
+    }
+  };
+  // All keys are on their way before the first one is used
+  each([](std::size_t, const ClipTransformKernel& k, auto&& find) {
+    constexpr int kConstant = ClipTransformKernel::kConstant;
+    if (k.rotation_times != kConstant) k.rotation.PrefetchKeys(find(k.rotation_times));
+    if (k.translation_times != kConstant) PrefetchKeys(k.translation.view, find(k.translation_times));
+    if (k.scale_times != kConstant) PrefetchKeys(k.scale.view, find(k.scale_times));
+  });
+  each([&](std::size_t i, const ClipTransformKernel& k, auto&& find) { LocalMatrix(k, find, &c.out_value<Matrix4>(i)); });
 }
 
 struct ClipWeightsKernel {
@@ -202,7 +275,7 @@ void ComputeAnimCurve(ComputeContext& c) {
 void AddClipNodes(NodeRegistry& registry) {
   registry.add("clipTransform", "A transform's part of a clip: its local matrix over time.").category("time").animation()
       .in("time", 0.0, {.unit = Unit::kTime}).structural("keys", Type::kAsset).out("matrix", Type::kMatrix)
-      .compute(&ComputeClipTransform).bind(BindClipTransform).cost(120, 0);
+      .compute(&ComputeClipTransform).bind(BindClipTransform).batch(BindClipBatch, &ComputeClipBatch).cost(120, 0);
   registry.add("clipWeights", "A mesh's part of a clip: its morph weights over time.").category("time").animation()
       .in("time", 0.0, {.unit = Unit::kTime}).structural("keys", Type::kAsset).out("output", Type::kDouble).array()
       .compute(&ComputeClipWeights).bind(BindClipWeights).cost(100, 0);

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/skin.h"
@@ -7,8 +9,26 @@
 namespace kpsa {
 namespace {
 
-// The matrices of the palette that no point needs stay as they are. The kernel reads none of them but the first, about
-// whose place it computes, whatever the binding.
+// The joints that move none of the points need no world matrix, but for the first one: the kernel computes about its
+// place, whatever the binding.
+void DemandSkin(Demand& demand) {
+  const PointSet& out = demand.output("outPoints");
+  demand.Require("inPoints", 0, out);
+  const auto* influences = demand.structural().asset<Influences>("influences");
+  if (influences == nullptr || influences->offsets().size() != std::size_t{out.total()} + 1) return;  // bind reports it
+  std::vector<bool> moves(influences->joint_count(), false);
+  for (Index i = 0; i < out.size(); ++i) {
+    const std::size_t end = std::min<std::size_t>(influences->offsets()[out[i] + 1], influences->joints().size());
+    for (std::size_t e = influences->offsets()[out[i]]; e < end; ++e) {
+      if (influences->joints()[e] < moves.size()) moves[influences->joints()[e]] = true;
+    }
+  }
+  for (std::size_t j = 1; j < moves.size(); ++j) {
+    if (!moves[j]) demand.Skip("matrix", static_cast<int>(j));
+  }
+}
+
+// The matrices of the palette that no point needs stay as they are: nobody reads them.
 struct SkinBound {
   SkinKernel kernel;
   std::vector<Matrix4> joint_from_bind;
@@ -74,7 +94,7 @@ void AddSkinClusterNode(NodeRegistry& registry) {
   b.structural("influences", Type::kAsset, {.doc = "joints and weights of every point"}).per_geometry();
   b.in("matrix", Matrix4(), {.doc = "the joints' world matrices"}).array();
   b.structural("bindPreMatrix", Matrix4(), {.doc = "the joints' inverse bind matrices"}).array();
-  FinishDeformer(b, &ComputeSkin, BindSkin).cost(1000, 8);
+  FinishDeformer(b, &ComputeSkin, BindSkin, DemandSkin).cost(1000, 8);
 }
 
 void AddTransformGeometryNode(NodeRegistry& registry) {

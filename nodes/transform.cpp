@@ -78,7 +78,7 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip").unit(Unit::kLength)
       .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist").unit(Unit::kAngle)
       .out("twist", Type::kDouble, "angle about twistAxis").unit(Unit::kAngle);
-  b.compute_for({"matrix"}, local, &ComputeMatrix).bind(BindTransform).cost(60, 0);
+  b.compute_for({"matrix"}, local, &ComputeMatrix).passes("offsetParentMatrix", {"translate", "rotate", "scale"}).bind(BindTransform).cost(60, 0);
   b.compute_for({"worldMatrix"}, world, &ComputeWorld).bind(BindTransform).cost(70, 0);
   b.compute_for({"worldInverseMatrix"}, world, &ComputeWorldInverse).bind(BindTransform).cost(150, 0);
   b.compute_for({"poseRotate"}, local, &ComputePose).bind(BindTransform).cost(250, 0);

@@ -1,6 +1,8 @@
 #include "nodes/kernels/lattice.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 #include "base/check.h"
@@ -17,18 +19,21 @@ namespace kpsa {
 namespace HWY_NAMESPACE {
 
 // out += weight * sum_u wu sum_t wt sum_s ws offset(s, t, u) for tiles of 16 points.
-// axis: per tile the rows ws, wt, wu of 16; offsets: x y z 0 of each control.
+// axis: per tile the rows ws, wt, wu of 16; offsets: x y z 0 of each control. rows: for each u, a bit for every t whose
+// controls move. The others would add 0 to sums that begin with +0, which changes no bit.
 void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, std::size_t ds, std::size_t dt,
-                std::size_t du, const float* offsets, const float* weights, PointsView out) {
+                std::size_t du, const float* offsets, const std::uint32_t* rows, const float* weights, PointsView out) {
   const DLanes d;
   for (std::size_t tile = 0; tile < tile_count; ++tile, axis += 16 * (ds + dt + du)) {
     for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {
       const float *ws = axis + lane, *wt = ws + 16 * ds, *wu = wt + 16 * dt;
-      const float* control = offsets;
       VLanes x = hn::Zero(d), y = x, z = x;
       for (std::size_t u = 0; u < du; ++u) {
+        if (rows[u] == 0) continue;
         VLanes ux = hn::Zero(d), uy = ux, uz = ux;
-        for (std::size_t t = 0; t < dt; ++t) {
+        for (std::uint32_t left = rows[u]; left != 0; left &= left - 1) {
+          const auto t = static_cast<std::size_t>(std::countr_zero(left));
+          const float* control = offsets + 4 * ds * (t + dt * u);
           VLanes w = hn::Load(d, ws);
           VLanes tx = hn::Mul(w, hn::Set(d, control[0]));
           VLanes ty = hn::Mul(w, hn::Set(d, control[1]));
@@ -225,15 +230,23 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   }
 
   // The moves of the controls, in the points' space
+  const Double3 still = TransformVector(inputs.matrix, {});  // of most controls; not a number where the matrix is none
+  std::array<std::uint32_t, 32> rows{};
   bool any = false;
-  for (std::size_t c = 0; c < controls_; ++c) {
-    const Double3 offset = TransformVector(inputs.matrix, inputs.offsets[c]);
-    float* to = scratch.data() + 4 * c;
-    for (int a = 0; a < 3; ++a) {
-      to[a] = static_cast<float>(offset[a] * inputs.envelope);
-      any |= to[a] != 0;
+  for (std::size_t row = 0, c = 0; c < controls_; ++row) {
+    bool moves = false;
+    for (const std::size_t end = c + divisions_[0]; c < end; ++c) {
+      float* to = scratch.data() + 4 * c;
+      const bool has_moved = !(inputs.offsets[c] == Double3());
+      const Double3 offset = has_moved ? TransformVector(inputs.matrix, inputs.offsets[c]) : still;
+      for (int a = 0; a < 3; ++a) {
+        to[a] = static_cast<float>(offset[a] * inputs.envelope);
+        moves |= to[a] != 0;
+      }
+      to[3] = 0;
     }
-    to[3] = 0;
+    if (moves) rows[row / divisions_[1]] |= std::uint32_t{1} << (row % divisions_[1]);
+    any |= moves;
   }
   if (!any) return;
   if (sparse_) {
@@ -244,7 +257,7 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   ForRanges(parallel, tiles_.size(), 32, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(BlendTiles)
     (tiles_.data() + begin, axis_weights_.data() + begin * 16 * row_count, end - begin, divisions_[0],
-     divisions_[1], divisions_[2], scratch.data(), weights_.data(), out);
+     divisions_[1], divisions_[2], scratch.data(), rows.data(), weights_.data(), out);
   });
 }
 

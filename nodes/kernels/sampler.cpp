@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "base/scalar_math.h"
 
 namespace kpsa {
@@ -140,6 +141,16 @@ Quaternion RotationTrack::At(const KeySpan& span) const {
     wb = Sin(wb * from.angle) * from.inverse;
   }
   return {a.x * wa + b.x * wb, a.y * wa + b.y * wb, a.z * wa + b.z * wb, a.w * wa + b.w * wb};
+}
+
+void RotationTrack::PrefetchKeys(const KeySpan& span) const {
+  if (!cubic_.empty()) return Prefetch(cubic_.data() + 12 * span.key, 24 * sizeof(float));
+  Prefetch(keys_.data() + span.key, 2 * sizeof(Key));
+}
+
+void PrefetchKeys(const SamplerKeys& keys, const KeySpan& span) {
+  const std::size_t row = keys.components * (keys.interpolation == Interpolation::kCubicSpline ? 3 : 1);
+  Prefetch(keys.values.data() + span.key * row, 2 * row * sizeof(float));
 }
 
 bool RotationTrack::constant() const {

@@ -53,6 +53,7 @@ class RotationTrack {
   // Unit length but for rounding; the same turn as SampleRotation's.
   Quaternion At(const KeySpan& span) const;
   bool constant() const;  // the same rotation at any time
+  void PrefetchKeys(const KeySpan& span) const;
 
  private:
   struct Key {  // of kLinear and kStep
@@ -63,6 +64,9 @@ class RotationTrack {
   std::vector<float> cubic_;
   bool step_ = false;
 };
+
+// Asks the caches for what At and SampleVec3 will read.
+void PrefetchKeys(const SamplerKeys& keys, const KeySpan& span);
 
 // All of them want valid keys. Safe from any thread.
 Double3 SampleVec3(const SamplerKeys& keys, const KeySpan& span);  // components == 3; keys.times are not looked at

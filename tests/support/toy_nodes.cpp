@@ -40,7 +40,7 @@ void DemandSmooth(Demand& demand) {
   demand.Require("points", 0, PointSet::Of(needed, out.total()));
 }
 
-std::atomic<int> block_computes{0}, block_frames{0};
+std::atomic<int> block_computes{0}, block_frames{0}, batch_computes{0};
 
 void ComputeCached(ComputeContext& c) {
   const PointsView& out = c.out_points(0);
@@ -64,13 +64,19 @@ const NodeRegistry& ToyRegistry() {
   return *registry;
 }
 
+int TakeBatchComputes() { return batch_computes.exchange(0); }
+
 BlockComputes TakeBlockComputes() { return {block_computes.exchange(0), block_frames.exchange(0)}; }
 
 void AddToyNodes(NodeRegistry& registry) {
   registry.add("add", "Adds.").in("a", 0.0).in("b", 0.0).out("out", Type::kDouble).compute([](double a, double b) { return a + b; });
   registry.add("scale3", "Scales a vector.").in("input", Double3()).in("factor", 1.0).out("out", Type::kDouble3)
-      .compute([](Double3 v, double f) { return v * f; });
-  registry.add("floor", "Rounds down.").in("input", 0.0).out("out", Type::kDouble).compute([](double v) { return std::floor(v); });
+      .compute([](Double3 v, double f) { return v * f; }).passes("input", {"factor"});
+  registry.add("floor", "Rounds down.").in("input", 0.0).out("out", Type::kDouble).compute([](double v) { return std::floor(v); })
+      .batch(nullptr, [](const BatchContext& c) {
+        ++batch_computes;
+        for (std::size_t i = 0; i < c.count; ++i) c.out_value<double>(i) = std::floor(c.get<double>(i, 0));
+      });
   registry.add("sum", "Adds many.").in("input", 0.0).array().out("out", Type::kDouble).compute([](ArrayView<double> values) {
     double sum = 0;
     for (std::uint32_t i = 0; i < values.size(); ++i) sum += values[i];

@@ -5,8 +5,8 @@
 
 namespace kpsa {
 
-// add (a, b -> out), scale3 (input double3, factor -> out), pick3 (x of a double3 -> out), sum (input[i] -> out),
-// select (which, a lazy, b lazy -> out), floor (input -> out), fail (input -> out; fails where input < 0),
+// add (a, b -> out), scale3 (input double3, factor -> out; passes its input at factor 1), pick3 (x of a double3 -> out), sum (input[i] -> out),
+// select (which, a lazy, b lazy -> out), floor (input -> out; in batches), fail (input -> out; fails where input < 0),
 // source (count S -> points i * step), move (points, offset -> points + offset, in place),
 // smooth (points on a ring, rings S -> mean of neighbours within `rings`), measure (points -> sum of x),
 // cached (cue points [S: cue list], full points lazy, threshold, floor -> points: where the cues' sum of x stays below
@@ -24,5 +24,7 @@ struct BlockComputes {
   int calls = 0, frames = 0;
 };
 BlockComputes TakeBlockComputes();
+// How often several "floor" nodes computed together since the last call.
+int TakeBatchComputes();
 
 }  // namespace kpsa
