@@ -194,6 +194,17 @@ inline bool Evaluator::RunPlain(Index number) {
   return Compute<kRecord>(number, cause, true);
 }
 
+// Copies the bytes where they differ; whether they did.
+template <std::size_t kBytes>
+inline bool Update(std::byte* slot, const std::byte* now) {
+  std::uint64_t a[kBytes / 8], b[kBytes / 8], difference = 0;
+  std::memcpy(a, slot, kBytes);
+  std::memcpy(b, now, kBytes);
+  for (std::size_t i = 0; i < kBytes / 8; ++i) difference |= a[i] ^ b[i];
+  if (difference != 0) std::memcpy(slot, b, kBytes);
+  return difference != 0;
+}
+
 // Runs the batch that begins with this step, if it ends before `end` and all of it is stale.
 bool Evaluator::TryBatch(Index number, Index end) {
   const Plan::Batch& batch = plan_->batches()[plan_->steps()[number].batch];
@@ -214,8 +225,13 @@ bool Evaluator::TryBatch(Index number, Index end) {
   const std::byte* now = context.out;
   for (Index s = number; s < last; ++s, now += size) {
     std::byte* slot = values() + plan_->steps()[s].value;
-    const bool changed = std::memcmp(slot, now, size) != 0;
-    if (changed) std::memcpy(slot, now, size);
+    bool changed;
+    if (size == sizeof(Matrix4)) {
+      changed = Update<sizeof(Matrix4)>(slot, now);
+    } else {
+      changed = std::memcmp(slot, now, size) != 0;
+      if (changed) std::memcpy(slot, now, size);
+    }
     MarkComputed(s, changed || computed_[s] == 0);
     ClearDirty(s);
   }

@@ -103,6 +103,16 @@ Result<BoundKernel> BindClipTransform(const Binding& binding) {
   return MakeBound(std::move(k), 0);
 }
 
+// Of a rotation of unit length.
+void WriteTrs(const Double3& translation, Quaternion rotation, const Double3& scale, Matrix4* matrix) {
+  Matrix4 m = RotationFromUnit(rotation);
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) m(row, column) *= scale[column];
+  }
+  m(0, 3) = translation.x, m(1, 3) = translation.y, m(2, 3) = translation.z;
+  *matrix = m;
+}
+
 // The local matrix where find(t) gives the place among the kernel's times[t].
 template <typename Find>
 void LocalMatrix(const ClipTransformKernel& k, const Find& find, Matrix4* matrix) {
@@ -119,12 +129,7 @@ void LocalMatrix(const ClipTransformKernel& k, const Find& find, Matrix4* matrix
     *matrix = ComposeTrs(translation, k.constant_rotation, scale);
     return;
   }
-  Matrix4 m = RotationFromUnit(k.rotation.At(find(k.rotation_times)));
-  for (int column = 0; column < 3; ++column) {
-    for (int row = 0; row < 3; ++row) m(row, column) *= scale[column];
-  }
-  m(0, 3) = translation.x, m(1, 3) = translation.y, m(2, 3) = translation.z;
-  *matrix = m;
+  WriteTrs(translation, k.rotation.At(find(k.rotation_times)), scale, matrix);
 }
 
 void ComputeClipTransform(ComputeContext& c) {
@@ -141,26 +146,39 @@ void ComputeClipTransform(ComputeContext& c) {
 
 // The transforms of a clip together: those with equal times look their keys up once.
 struct ClipBatchKernel {
-  struct Member {
+  // Turns by linear keys about a constant place: what most joints do. One line of the caches.
+  struct alignas(64) Turn {
+    const RotationTrack::Key* keys;
+    Double3 translation, scale;
+    Index times, position;  // in `times` and in the batch
+  };
+  struct Other {
     const ClipTransformKernel* kernel;
     Index times[3];  // for each of the kernel's: which of `times`
+    Index position;
   };
-  std::vector<Member> members;
+  std::vector<Turn> turns;
+  std::vector<Other> others;
   std::vector<const KeyTimes*> times;  // no two are equal
 };
 
 std::shared_ptr<const void> BindClipBatch(std::span<const void* const> kernels) {
+  constexpr int kConstant = ClipTransformKernel::kConstant;
   ClipBatchKernel batch;
-  for (const void* kernel : kernels) {
-    ClipBatchKernel::Member member{static_cast<const ClipTransformKernel*>(kernel), {}};
-    for (std::size_t i = 0; i < member.kernel->times.size(); ++i) {
-      const KeyTimes& times = member.kernel->times[i];
-      const auto equal = [&](const KeyTimes* known) { return known->times() == times.times(); };
+  for (std::size_t at = 0; at < kernels.size(); ++at) {
+    const auto& k = *static_cast<const ClipTransformKernel*>(kernels[at]);
+    ClipBatchKernel::Other other{&k, {}, static_cast<Index>(at)};
+    for (std::size_t i = 0; i < k.times.size(); ++i) {
+      const auto equal = [&](const KeyTimes* known) { return known->times() == k.times[i].times(); };
       const auto it = std::find_if(batch.times.begin(), batch.times.end(), equal);
-      member.times[i] = static_cast<Index>(it - batch.times.begin());
-      if (it == batch.times.end()) batch.times.push_back(&times);
+      other.times[i] = static_cast<Index>(it - batch.times.begin());
+      if (it == batch.times.end()) batch.times.push_back(&k.times[i]);
     }
-    batch.members.push_back(member);
+    if (k.rotation_times != kConstant && k.rotation.linear_keys() != nullptr && k.translation_times == kConstant && k.scale_times == kConstant) {
+      batch.turns.push_back({k.rotation.linear_keys(), k.constant_translation, k.constant_scale, other.times[k.rotation_times], other.position});
+    } else {
+      batch.others.push_back(other);
+    }
   }
   return std::make_shared<const ClipBatchKernel>(std::move(batch));
 }
@@ -188,23 +206,24 @@ class FoundKeys {
 
 void ComputeClipBatch(const BatchContext& c) {
   const auto& batch = c.kernel_as<ClipBatchKernel>();
-  for (const auto& member : batch.members) Prefetch(member.kernel, sizeof(ClipTransformKernel));
   FoundKeys found(batch);
-  const auto each = [&](auto&& visit) {
-    for (std::size_t i = 0; i < batch.members.size(); ++i) {
-      const ClipBatchKernel::Member& member = batch.members[i];
-      const double time = c.get<double>(i, 0);
-      visit(i, *member.kernel, [&](int times) -> const KeySpan& { return found.Find(member.times[times], time); });
-    }
-  };
-  // All keys are on their way before the first one is used
-  each([](std::size_t, const ClipTransformKernel& k, auto&& find) {
-    constexpr int kConstant = ClipTransformKernel::kConstant;
-    if (k.rotation_times != kConstant) k.rotation.PrefetchKeys(find(k.rotation_times));
-    if (k.translation_times != kConstant) PrefetchKeys(k.translation.view, find(k.translation_times));
-    if (k.scale_times != kConstant) PrefetchKeys(k.scale.view, find(k.scale_times));
-  });
-  each([&](std::size_t i, const ClipTransformKernel& k, auto&& find) { LocalMatrix(k, find, &c.out_value<Matrix4>(i)); });
+  const auto span_of = [&](const ClipBatchKernel::Turn& turn) -> const KeySpan& { return found.Find(turn.times, c.get<double>(turn.position, 0)); };
+  // The keys of each are on their way some turns before they are used
+  constexpr std::size_t kAhead = 12;
+  const std::size_t turns = batch.turns.size();
+  const auto prefetch = [&](std::size_t i) { Prefetch(batch.turns[i].keys + span_of(batch.turns[i]).key, 2 * sizeof(RotationTrack::Key)); };
+  for (std::size_t i = 0; i < std::min(kAhead, turns); ++i) prefetch(i);
+  for (std::size_t i = 0; i < turns; ++i) {
+    if (i + kAhead < turns) prefetch(i + kAhead);
+    const ClipBatchKernel::Turn& turn = batch.turns[i];
+    const KeySpan& span = span_of(turn);
+    const RotationTrack::Key* key = turn.keys + span.key;
+    WriteTrs(turn.translation, span.t == 0 ? key->rotation : RotationTrack::Between(key, span.t), turn.scale, &c.out_value<Matrix4>(turn.position));
+  }
+  for (const ClipBatchKernel::Other& other : batch.others) {
+    const double time = c.get<double>(other.position, 0);
+    LocalMatrix(*other.kernel, [&](int times) -> const KeySpan& { return found.Find(other.times[times], time); }, &c.out_value<Matrix4>(other.position));
+  }
 }
 
 struct ClipWeightsKernel {

@@ -12,7 +12,7 @@ struct LatticeBound {
   LatticeKernel kernel;
   CarriedFrame frame;
   Matrix4 stage_from_lattice;       // at rest; the lattice is the cube [-0.5, 0.5]^3
-  std::vector<Double3> grid;        // the controls' places at rest, in [0, 1]^3
+  std::vector<Double3> grid;        // the controls' places at rest, as the attribute holds them (in float)
   std::size_t offset_floats = 0;
 };
 
@@ -106,6 +106,9 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
   if (controls == nullptr || controls->points() == nullptr || controls->points()->count() != grid.size()) {
     return Status::Invalid("points: expected {} control points", grid.size());
   }
+  for (Double3& place : grid) {  // controls at rest give offsets of exactly 0
+    for (int a = 0; a < 3; ++a) place[a] = static_cast<float>(place[a]);
+  }
   LatticeBound bound{LatticeKernel(settings, *rest, InverseOrIdentity(*box), binding.output("outPoints").ToVector(), BoundWeights(binding)),
                      *frame, *box, std::move(grid), 0};
   bound.offset_floats = (bound.grid.size() * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
@@ -118,10 +121,8 @@ void ComputeLattice(ComputeContext& c) {
   const ConstPointsView& controls = c.points(kFirstOwnInput);
   auto* offsets = reinterpret_cast<Double3*>(c.scratch);
   for (std::size_t i = 0; i < bound.grid.size(); ++i) {
-    // The grid as the attribute holds it, in float: controls at rest give offsets of exactly 0
-    offsets[i] = {static_cast<double>(controls.x[i]) - static_cast<float>(bound.grid[i].x),
-                  static_cast<double>(controls.y[i]) - static_cast<float>(bound.grid[i].y),
-                  static_cast<double>(controls.z[i]) - static_cast<float>(bound.grid[i].z)};
+    const Double3& rest = bound.grid[i];
+    offsets[i] = {controls.x[i] - rest.x, controls.y[i] - rest.y, controls.z[i] - rest.z};
   }
   const Matrix4 now = bound.frame.Motion(c.get<Matrix4>(kParentMatrix)) * bound.stage_from_lattice;
   const Parallel parallel = HostParallel(c);

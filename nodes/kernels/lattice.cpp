@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "base/check.h"
 #include "nodes/kernels/affine_delta.h"
@@ -230,20 +231,27 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   }
 
   // The moves of the controls, in the points' space
-  const Double3 still = TransformVector(inputs.matrix, {});  // of most controls; not a number where the matrix is none
+  const auto move = [&](Double3 offset, float* to) {
+    offset = TransformVector(inputs.matrix, offset);
+    for (int a = 0; a < 3; ++a) to[a] = static_cast<float>(offset[a] * inputs.envelope);
+    to[3] = 0;
+    return (to[0] != 0) | (to[1] != 0) | (to[2] != 0);
+  };
+  float resting[4];  // most controls; not numbers where the matrix is none
+  const bool rest_moves = move({}, resting);
   std::array<std::uint32_t, 32> rows{};
   bool any = false;
   for (std::size_t row = 0, c = 0; c < controls_; ++row) {
     bool moves = false;
     for (const std::size_t end = c + divisions_[0]; c < end; ++c) {
       float* to = scratch.data() + 4 * c;
-      const bool has_moved = !(inputs.offsets[c] == Double3());
-      const Double3 offset = has_moved ? TransformVector(inputs.matrix, inputs.offsets[c]) : still;
-      for (int a = 0; a < 3; ++a) {
-        to[a] = static_cast<float>(offset[a] * inputs.envelope);
-        moves |= to[a] != 0;
+      const Double3& offset = inputs.offsets[c];
+      if ((offset.x != 0) | (offset.y != 0) | (offset.z != 0)) {
+        moves |= move(offset, to);
+      } else {
+        std::memcpy(to, resting, sizeof(resting));
+        moves |= rest_moves;
       }
-      to[3] = 0;
     }
     if (moves) rows[row / divisions_[1]] |= std::uint32_t{1} << (row % divisions_[1]);
     any |= moves;

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "base/prefetch.h"
 #include "base/scalar_math.h"
 
 namespace kpsa {
@@ -131,26 +130,18 @@ Quaternion RotationTrack::At(const KeySpan& span) const {
     const SamplerKeys keys{{}, cubic_, 4, Interpolation::kCubicSpline};
     return Normalized({Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
   }
-  const Key& from = keys_[span.key];
-  const Quaternion& a = from.rotation;
-  if (span.t == 0 || step_) return a;
-  const Quaternion& b = keys_[span.key + 1].rotation;
-  double wa = 1 - span.t, wb = span.t;
-  if (from.inverse != 0) {
-    wa = Sin(wa * from.angle) * from.inverse;
-    wb = Sin(wb * from.angle) * from.inverse;
+  if (span.t == 0 || step_) return keys_[span.key].rotation;
+  return Between(keys_.data() + span.key, span.t);
+}
+
+Quaternion RotationTrack::Between(const Key* from, double t) {
+  const Quaternion &a = from[0].rotation, &b = from[1].rotation;
+  double wa = 1 - t, wb = t;
+  if (from->inverse != 0) {
+    wa = Sin(wa * from->angle) * from->inverse;
+    wb = Sin(wb * from->angle) * from->inverse;
   }
   return {a.x * wa + b.x * wb, a.y * wa + b.y * wb, a.z * wa + b.z * wb, a.w * wa + b.w * wb};
-}
-
-void RotationTrack::PrefetchKeys(const KeySpan& span) const {
-  if (!cubic_.empty()) return Prefetch(cubic_.data() + 12 * span.key, 24 * sizeof(float));
-  Prefetch(keys_.data() + span.key, 2 * sizeof(Key));
-}
-
-void PrefetchKeys(const SamplerKeys& keys, const KeySpan& span) {
-  const std::size_t row = keys.components * (keys.interpolation == Interpolation::kCubicSpline ? 3 : 1);
-  Prefetch(keys.values.data() + span.key * row, 2 * row * sizeof(float));
 }
 
 bool RotationTrack::constant() const {

@@ -53,20 +53,21 @@ class RotationTrack {
   // Unit length but for rounding; the same turn as SampleRotation's.
   Quaternion At(const KeySpan& span) const;
   bool constant() const;  // the same rotation at any time
-  void PrefetchKeys(const KeySpan& span) const;
 
- private:
   struct Key {  // of kLinear and kStep
     Quaternion rotation;         // unit length, on the side of the key before: the short way without a sign
     double angle = 0, inverse = 0;  // to the next key, and 1 / sin(angle); 0 where they are nearly equal
   };
+  // The keys of kLinear, null for others. At(span) is keys[span.key] where span.t is 0, and Between(&keys[span.key],
+  // span.t) elsewhere.
+  const Key* linear_keys() const { return cubic_.empty() && !step_ ? keys_.data() : nullptr; }
+  static Quaternion Between(const Key* from, double t);  // of from[0] and from[1]
+
+ private:
   std::vector<Key> keys_;
   std::vector<float> cubic_;
   bool step_ = false;
 };
-
-// Asks the caches for what At and SampleVec3 will read.
-void PrefetchKeys(const SamplerKeys& keys, const KeySpan& span);
 
 // All of them want valid keys. Safe from any thread.
 Double3 SampleVec3(const SamplerKeys& keys, const KeySpan& span);  // components == 3; keys.times are not looked at
