@@ -215,10 +215,11 @@ TEST_F(BadRigs, Weights) {
 }
 
 TEST_F(BadRigs, NumbersThatWouldTakeForever) {
+  const std::string deform = "deform: [{meshes: [body], stack: [gltf, a]}]\n";
   ExpectBad("nodes: {a: {type: deltaMush, iterations: 1000000000}}\n", {"t.yaml:3:42: ", "a.iterations", "outside of 0 to"});
   ExpectBad("nodes: {a: {type: deltaMush, iterations: 99999999999999999999}}\n", {"t.yaml:3:42: ", "whole number"});
-  ExpectBad("nodes: {a: {type: lattice, divisions: [2000000000, 2000000000, 2]}}\n", {"t.yaml:3:9: ", "divisions", "2 to 32"});
-  ExpectBad("nodes: {a: {type: lattice, 'points[99999999999999999999,0,0]': [1, 2, 3]}}\n", {"t.yaml:3:28: ", "divisions"});
+  ExpectBad("nodes: {a: {type: lattice, divisions: [2000000000, 2000000000, 2]}}\n" + deform, {"t.yaml:3:9: ", "divisions", "2 to 32"});
+  ExpectBad("nodes: {a: {type: lattice, 'points[99999999999999999999,0,0]': [1, 2, 3]}}\n" + deform, {"t.yaml:3:28: ", "three indices"});
   ExpectBad("nodes: {a: {type: blendShape, 'weight[4000000000]': 1}}\n", {"t.yaml:3:31: ", "expected an index from 0 to"});
   ExpectBad("accelerate: {a: {points: [body@skin], tolerance: 1mm, train: {samples: 1e12}}}\n", {"t.yaml:3:72: ", "samples"});
   ExpectBad("accelerate: {a: {points: [body@skin], tolerance: .nan}}\n", {"t.yaml:3:50: ", "not finite"});

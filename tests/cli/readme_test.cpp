@@ -56,7 +56,7 @@ std::string ScriptProblem(const fs::path& script) {
     const std::vector<std::string> words = Words(WithoutComment(line));
     if (words.size() < 2 || words[0] != "build/kpsa") continue;
     const ProcessResult help = RunKpsa({words[1], "--help"});
-    if (help.exit_code != 0) return fmt::format("no command {}", words[1]);
+    if (help.out.find("kpsa " + words[1] + " ") == std::string::npos) return fmt::format("no command {}", words[1]);  // the help of all
     for (std::size_t i = 2; i < words.size(); ++i) {
       const std::string& word = words[i];
       if (word.starts_with("scenes/") && !fs::exists(kProject / word)) return fmt::format("no file {}", word);
