@@ -27,8 +27,9 @@ class HelloFolder : public TemporaryFolder {
     Write("hello.yaml", Yaml());
     Write("hello.glb", Glb());
   }
-  static std::string Yaml() { return Read(KPSA_SCENES_DIR "/hello/hello.yaml"); }
-  static std::string Glb() { return Read(KPSA_SCENES_DIR "/hello/hello.glb"); }
+  // The files of scenes/hello.
+  static std::string Yaml();
+  static std::string Glb();
   // Writes hello.yaml with one place changed; its path.
   std::string Edit(const std::string& from, const std::string& to) const { return Write("hello.yaml", Replaced(Read(*this / "hello.yaml"), from, to)); }
   std::string rig() const { return *this / "hello.yaml"; }
