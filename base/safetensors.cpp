@@ -20,6 +20,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::uint64_t kMaxHeader = 64u << 20;   // bytes of JSON
+constexpr std::uint64_t kMaxFile = std::uint64_t{4} << 30;
 constexpr std::size_t kMaxDimensions = 16;
 constexpr std::size_t kAlignment = 64;            // of the data within the file, so that it maps well
 
@@ -183,7 +184,8 @@ Result<SafetensorsFile> SafetensorsFile::Parse(std::vector<std::byte> bytes, con
 
 Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return Status::Invalid("{}: no such file", path);
+  if (!std::filesystem::exists(path, error)) return Status::Invalid("{}: no such file", path);
+  if (!std::filesystem::is_regular_file(path, error)) return Status::Invalid("{}: is a folder, a pipe or a device, expected a file", path);
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   std::ifstream stream(path, std::ios::binary);
   if (error || !stream) return Status::Invalid("{}: cannot be opened", path);
@@ -193,6 +195,7 @@ Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   if (!stream || header_size > size - 8 || header_size > kMaxHeader) {
     return Status::Invalid("{}: not a safetensors file, or cut short", path);
   }
+  if (size > kMaxFile) return Status::Invalid("{}: is larger than {} bytes, the most that is read", path, kMaxFile);
   std::vector<std::byte> bytes(size);
   stream.seekg(0);
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));

@@ -193,7 +193,7 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
   if (!subspace.ok()) return subspace.status();
   FileFacts facts;
   facts.kind = "subspace";
-  std::uint64_t memory = (subspace->whitening.size() + subspace->cue_mean.size() * 2) * 8;
+  std::uint64_t memory = subspace->soft_cache.factor.size() * 4 + subspace->cue_mean.size() * 16;
   for (const TileMap& tiles : subspace->tiles) memory += tiles.bytes();
   facts.facts = {{"bytes", FileSize(path)},
                  {"estimator",

@@ -109,7 +109,8 @@ void DrawLegend(Image& image, double max_metres) {
     number.resize(number.size() - 3);  // the unit stands above the bar once
     DrawText(image, right + 2 * scale, y - 4 * scale, scale, kInk, number);
   }
-  DrawText(image, left, top - 14 * scale, scale, kInk, "error, mm");
+  constexpr std::string_view kLabel = "error, mm";
+  DrawText(image, std::min(left, image.width - 4 * scale - TextWidth(kLabel, scale)), top - 14 * scale, scale, kInk, kLabel);
 }
 
 void DrawTitle(Image& image, std::string_view title) {

@@ -225,8 +225,8 @@ Camera FrameCamera(const RenderInput& input, const RenderOptions& options, doubl
   Double3 right = Cross(camera.up, back);
   right = Length(right) > 1e-9 ? Unit(right) : Double3{1, 0, 0};
   const Double3 up = Cross(back, right);
-  // As near as possible with all points inside: tan(fov / 2) from sine and cosine
-  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.92;
+  // As near as possible with all points inside and below the title: tan(fov / 2) from sine and cosine
+  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.88;
   const double aspect = static_cast<double>(options.width) / options.height;
   // Centre the projection of the box of the points, too: a head's middle is not its picture's middle
   double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};

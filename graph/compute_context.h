@@ -46,6 +46,7 @@ class ComputeContext {
   std::byte* state = nullptr;            // as many bytes as bind asked for; kept from decide to compute; 64-byte aligned
   std::uint64_t chosen = 0;              // what decide returned: the bits of the lazy inputs that were evaluated
   ComputeHost* host = nullptr;
+  bool at_rest = false;                  // the rest state is computed while compiling: all lazy inputs are there, whatever decide says
 
   // Inputs and outputs by their position in the group's lists. T is the slot's type (graph/value.h).
   template <typename T>

@@ -221,6 +221,7 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   context.scratch = scratch.data();
   context.state = reinterpret_cast<std::byte*>(state.data());
   context.host = &host;
+  context.at_rest = rest;
   if (group.decide != nullptr) context.chosen = group.decide(context);
   if (host.error.empty()) group.compute(context);
   if (!host.error.empty()) return Status::Evaluation("{}: {}", Describe(table_, instance), host.error);

@@ -63,14 +63,14 @@ Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::ui
   const auto too_large = [&] {
     return Status::Invalid("is larger than {} bytes, the most that is read", max_bytes).At({path});
   };
-  if (S_ISREG(info.st_mode) && static_cast<std::uint64_t>(info.st_size) > max_bytes) return too_large();
+  if (!S_ISREG(info.st_mode)) return Status::Invalid("is a pipe or a device, expected a file").At({path});
+  if (static_cast<std::uint64_t>(info.st_size) > max_bytes) return too_large();
   FilePointer file(std::fopen(path.c_str(), "rb"));
   if (file == nullptr) return Status::Invalid("cannot be read: {}", Reason(errno)).At({path});
 
-  // The size is a hint only: pipes have none, and a file may grow
+  // The size is a hint only: the file may grow
   std::vector<std::uint8_t> bytes;
-  std::size_t step =
-      S_ISREG(info.st_mode) ? static_cast<std::size_t>(info.st_size) + 1 : std::size_t{1} << 16;
+  std::size_t step = static_cast<std::size_t>(info.st_size) + 1;
   for (;;) {
     const std::size_t before = bytes.size();
     bytes.resize(before + step);

@@ -12,7 +12,7 @@
 namespace kpsa::gltf {
 namespace {
 
-constexpr std::uint64_t kLargestFile = std::uint64_t{16} << 30;
+constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30;  // as the lengths in a GLB
 constexpr std::uint64_t kLargestJson = std::uint64_t{512} << 20;
 constexpr int kDeepestJson = 500;  // a schema-conforming document needs 10; extras may want more
 

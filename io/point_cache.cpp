@@ -13,7 +13,8 @@
 namespace kpsa {
 namespace {
 
-constexpr std::uint64_t kLargestCache = std::uint64_t{64} << 30;
+constexpr std::uint64_t kLargestCache = std::uint64_t{64} << 30;  // written, frame by frame
+constexpr std::uint64_t kLargestRead = std::uint64_t{8} << 30;    // read, as a whole
 constexpr std::size_t kPc2Header = 32;
 constexpr char kPc2Magic[12] = {'P', 'O', 'I', 'N', 'T', 'C', 'A', 'C', 'H', 'E', '2', '\0'};
 
@@ -158,7 +159,7 @@ Status WriteMdd(const std::string& path, const PointCache& cache, std::size_t me
 }
 
 Result<PointCache> ReadPc2(const std::string& path, double fps) {
-  const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kLargestCache);
+  const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kLargestRead);
   if (!bytes.ok()) return bytes.status();
   if (bytes->size() < kPc2Header || std::memcmp(bytes->data(), kPc2Magic, sizeof(kPc2Magic)) != 0) {
     return Status::Invalid("is no PC2 file").At({path});
@@ -186,7 +187,7 @@ Result<PointCache> ReadPc2(const std::string& path, double fps) {
 }
 
 Result<PointCache> ReadMdd(const std::string& path, double fps) {
-  const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kLargestCache);
+  const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kLargestRead);
   if (!bytes.ok()) return bytes.status();
   if (bytes->size() < 8) return Status::Invalid("is no MDD file").At({path});
   const std::uint32_t frames = ReadWord(*bytes, 0, true), points = ReadWord(*bytes, 4, true);

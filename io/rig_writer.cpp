@@ -13,7 +13,8 @@ namespace kpsa {
 namespace {
 
 constexpr double kGuessDegrees = 15;       // where no clip tells a range
-constexpr double kLeastDegrees = 0.1;      // smaller motion is noise
+constexpr double kLeastDegrees = 0.1;      // smaller motion is noise,
+constexpr double kLeastBesides = 0.01;     // unless the joint turns about another axis
 constexpr double kLeastTranslation = 1e-4; // of the rest diagonal
 constexpr double kSpaceShare = 0.9;        // of the skin that the space's subtree carries
 
@@ -197,13 +198,16 @@ class Writer {
         for (Range& range : motion.rotate) range = {-kGuessDegrees, kGuessDegrees};
       }
       bool moves = false;
+      double turn = 0;
+      for (const Range& range : motion.rotate) turn = std::max(turn, range.size());
+      const double least = turn >= kLeastDegrees ? kLeastBesides : kLeastDegrees;
       for (int axis = 0; axis < 3; ++axis) {
         const std::string letter(1, "XYZ"[axis]);
-        const bool rotates = motion.rotate[axis].size() >= kLeastDegrees;
+        const bool rotates = motion.rotate[axis].size() >= least;
         const bool shifts = motion.translate[axis].size() > kLeastTranslation * rig_.rest_diagonal;
         moves = moves || rotates || shifts;
         if (!(carries_[i] > 0)) continue;
-        if (rotates) AddControl(name, "rotate" + letter, {node, def.FindAttribute("rotate"), -1, axis}, RoundedOut(motion.rotate[axis], 1));
+        if (rotates) AddControl(name, "rotate" + letter, {node, def.FindAttribute("rotate"), -1, axis}, RoundedOut(motion.rotate[axis], motion.rotate[axis].size() < 1 ? 0.1 : 1));
         if (shifts) {
           const Range in_cm{motion.translate[axis].min * 100, motion.translate[axis].max * 100};
           AddControl(name, "translate" + letter, {node, def.FindAttribute("translate"), -1, axis}, RoundedOut(in_cm, step));
@@ -260,8 +264,8 @@ class Writer {
       }
     }
     const std::string stem = std::filesystem::path(character_.path).stem().string();
-    // 1/2000 of the size or a bit less, as one round number
-    const double raw = rig_.rest_diagonal * 1000 / 2000;
+    // 0.3 % of the size or a bit less, as one round number: what lets most frames of a face be hits
+    const double raw = rig_.rest_diagonal * 1000 * 0.003;
     const double power = std::pow(10.0, std::floor(std::log10(std::max(raw, 1e-9))));
     const double tolerance = power * (raw >= 5 * power ? 5 : raw >= 2 * power ? 2 : 1);
     text_ += fmt::format("\naccelerate:\n  {}:\n", Quoted(stem.empty() ? "character" : stem, false));
@@ -271,7 +275,7 @@ class Writer {
     }
     text_ += fmt::format("    subspace: {}  # `kpsa train` writes it\n", Quoted(options_.subspace.empty() ? stem + ".kpsa" : options_.subspace, false));
     text_ += fmt::format("    tolerance: {}mm  # the largest error of a point that is accepted\n", Rounded(tolerance));
-    text_ += "    violationRate: 1%  # of frames that may exceed it\n";
+    text_ += "    violationRate: 3%  # of frames that may exceed it\n";
     text_ += fmt::format("    train: {{{}samples: {}}}  # clips, and poses drawn from the controls\n",
                          train.empty() ? "" : "clips: " + QuotedList(train) + ", ", options_.samples);
     if (!test.empty()) text_ += fmt::format("    test: {{clips: {}}}  # never trained on; what `kpsa bench` runs\n", QuotedList(test));

@@ -34,7 +34,7 @@ struct Calibration {
 
 // tolerance 0 or less: never hit; infinite: always. blend_start is c in (0, 1]. Where no pose forbids it, tau ends at the
 // largest calibration score / c: beyond what was seen nothing is promised. Pairs with a NaN count as violations.
-Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha, double blend_start = 0.7);
+Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha, double blend_start = 0.85);
 
 // Largest point error of what is emitted at this score.
 double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& threshold);

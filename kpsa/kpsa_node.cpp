@@ -7,7 +7,6 @@
 
 #include "base/check.h"
 #include "base/matrix.h"
-#include "kpsa/rigid_points.h"
 #include "kpsa/signals.h"
 
 namespace kpsa {
@@ -23,12 +22,15 @@ std::atomic<std::uint64_t> cue_ns{0}, projection_ns{0}, reconstruction_ns{0};
 // Adds the time of a scope to a counter, where somebody asked for it.
 class Stopwatch {
  public:
-  explicit Stopwatch(std::atomic<std::uint64_t>& counter) : counter_(measure_times.load(std::memory_order_relaxed) ? &counter : nullptr) {
+  explicit Stopwatch(std::atomic<std::uint64_t>& counter)
+      : counter_(measure_times.load(std::memory_order_relaxed) ? &counter : nullptr) {
     if (counter_ != nullptr) begin_ = std::chrono::steady_clock::now();
   }
   ~Stopwatch() {
     if (counter_ == nullptr) return;
-    *counter_ += static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - begin_).count());
+    *counter_ += static_cast<std::uint64_t>(
+        std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - begin_)
+            .count());
   }
 
  private:
@@ -47,15 +49,15 @@ struct KpsaKernel {
     std::size_t padded = 0;     // floats of a component of the whole mesh, for the scratch
   };
   std::vector<Output> outputs;
-  std::size_t tile_scratch = 0;     // floats
-  std::size_t vector_doubles = 0;   // of one measurement
 };
 
-// Kept from decide to compute, per evaluator; the whitened measurement follows it.
+// Kept from decide to compute, per evaluator; the normalised measurement y follows it, padded to 16.
 struct KpsaState {
   Verdict verdict;
 };
-float* Whitened(const ComputeContext& c) { return reinterpret_cast<float*>(c.state + (sizeof(KpsaState) + 63) / 64 * 64); }
+float* Measured(const ComputeContext& c) {
+  return reinterpret_cast<float*>(c.state + (sizeof(KpsaState) + 63) / 64 * 64);
+}
 
 Index FirstOutsideGuard(const ComputeContext& c, const KpsaConfig::Data& data) {
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
@@ -82,7 +84,8 @@ Index FirstOutsideGuard(const ComputeContext& c, const KpsaConfig::Data& data) {
 // The raw measurement, in the order of the subspace's rows.
 void Gather(const ComputeContext& c, const KpsaConfig::Data& data, std::span<double> raw) {
   Matrix4 space_from_world;
-  if (!(c.get<Matrix4>(kSpaceMatrix) == Matrix4())) space_from_world = InverseOrIdentity(c.get<Matrix4>(kSpaceMatrix));
+  if (!(c.get<Matrix4>(kSpaceMatrix) == Matrix4()))
+    space_from_world = InverseOrIdentity(c.get<Matrix4>(kSpaceMatrix));
   const ArrayView<ConstPointsView> cues = c.array<ConstPointsView>(kCues);
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
   const ArrayView<double> scalars = c.array<double>(kScalars);
@@ -100,7 +103,9 @@ void Gather(const ComputeContext& c, const KpsaConfig::Data& data, std::span<dou
       case KpsaConfig::Row::Kind::kMatrix:
         raw[r++] = matrices[row.input](static_cast<int>(row.element % 3), static_cast<int>(row.element / 3));
         break;
-      case KpsaConfig::Row::Kind::kScalar: raw[r++] = scalars[row.input]; break;
+      case KpsaConfig::Row::Kind::kScalar:
+        raw[r++] = scalars[row.input];
+        break;
     }
   }
 }
@@ -121,23 +126,22 @@ std::uint64_t Decide(ComputeContext& c) {
     state.verdict.offender = offender;
     return all;
   };
-  if (data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
+  // What comes after it binds to the rest points: to the exact ones
+  if (c.at_rest || data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
   const std::size_t r = subspace.rows();
-  auto* doubles = reinterpret_cast<double*>(c.scratch);
-  const std::span<double> raw(doubles, r), y(doubles + kernel.vector_doubles, r), g(doubles + 2 * kernel.vector_doubles, r);
+  const std::span<double> raw(reinterpret_cast<double*>(c.scratch), r);
+  const std::size_t padded = subspace.soft_cache.padded_rows();
+  const std::span<float> y(Measured(c), padded), g(c.scratch + 2 * padded, padded);
   {
     const Stopwatch watch(cue_ns);
-    if (const Index outside = FirstOutsideGuard(c, data); outside != kNoIndex) return miss(MissReason::kOutOfRange, outside);
+    if (const Index outside = FirstOutsideGuard(c, data); outside != kNoIndex)
+      return miss(MissReason::kOutOfRange, outside);
     Gather(c, data, raw);
   }
   const Stopwatch watch(projection_ns);
-  for (std::size_t i = 0; i < r; ++i) y[i] = (raw[i] - subspace.cue_mean[i]) * subspace.cue_scale[i];
+  Normalize(subspace, raw, y);
+  for (std::size_t j = r; j < padded; ++j) y[j] = 0;
   state.verdict = Judge(subspace.soft_cache, kernel.threshold, y, g);
-  if (state.verdict.full_weight < 1) {
-    MultiplyVector(subspace.whitening, y, true, g);
-    float* w = Whitened(c);
-    for (std::size_t i = 0; i < r; ++i) w[i] = static_cast<float>(g[i]);
-  }
   return state.verdict.hit ? 0 : all;
 }
 
@@ -149,27 +153,22 @@ void WriteVerdict(const ComputeContext& c) {
   c.out_value<std::int64_t>(kOffender) = v.offender == kNoIndex ? -1 : static_cast<std::int64_t>(v.offender);
 }
 
-// Reconstructs output m into `out` (the wanted points only) and takes it to world space.
+// Reconstructs output m into `out` (the wanted points only), in world space.
 void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
   const Subspace& subspace = *kernel.config->data().subspace;
   const KpsaKernel::Output& wanted = kernel.outputs[m];
-  const std::span<const float> w(Whitened(c), subspace.rows());
-  const std::span<float> scratch(c.scratch, kernel.tile_scratch);
+  const std::span<const float> y(Measured(c), subspace.rows());
+  const Matrix4& matrix = c.get<Matrix4>(kSpaceMatrix);
+  const Matrix4* space = matrix == Matrix4() ? nullptr : &matrix;
   const TileMap& tiles = subspace.tiles[m];
-  if (wanted.all) {
-    tiles.Reconstruct(w, scratch, out);
-  } else {
-    float* whole = c.scratch + kernel.tile_scratch;
-    const PointsView mesh{whole, whole + wanted.padded, whole + 2 * wanted.padded, tiles.points()};
-    tiles.ReconstructTiles(w, wanted.tiles, scratch, mesh);
-    for (std::size_t i = 0; i < wanted.points.size(); ++i) {
-      out.x[i] = mesh.x[wanted.points[i]];
-      out.y[i] = mesh.y[wanted.points[i]];
-      out.z[i] = mesh.z[wanted.points[i]];
-    }
+  if (wanted.all) return tiles.Reconstruct(y, out, space);
+  const PointsView mesh{c.scratch, c.scratch + wanted.padded, c.scratch + 2 * wanted.padded, tiles.points()};
+  tiles.ReconstructTiles(y, wanted.tiles, mesh, space);
+  for (std::size_t i = 0; i < wanted.points.size(); ++i) {
+    out.x[i] = mesh.x[wanted.points[i]];
+    out.y[i] = mesh.y[wanted.points[i]];
+    out.z[i] = mesh.z[wanted.points[i]];
   }
-  const Matrix4& space = c.get<Matrix4>(kSpaceMatrix);
-  if (!(space == Matrix4())) TransformPoints(space, out);
 }
 
 void CopyFull(ConstPointsView from, PointsView to) {
@@ -214,18 +213,17 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
     const std::size_t r = subspace.rows();
     for (std::size_t first = 0; first < count; first += kBlockFrames) {
       const std::size_t frames = std::min(kBlockFrames, count - first);
-      float* w = contexts[first].scratch;
+      float* y = contexts[first].scratch;
       PointsView outs[kBlockFrames];
+      Matrix4 spaces[kBlockFrames];
+      bool moved = false;
       for (std::size_t f = 0; f < frames; ++f) {
-        std::memcpy(w + f * r, Whitened(contexts[first + f]), r * sizeof(float));
+        std::memcpy(y + f * r, Measured(contexts[first + f]), r * sizeof(float));
         outs[f] = contexts[first + f].out_points(kOutPoints, static_cast<std::uint32_t>(m));
+        spaces[f] = contexts[first + f].get<Matrix4>(kSpaceMatrix);
+        moved = moved || !(spaces[f] == Matrix4());
       }
-      const std::size_t used = PaddedCount(frames * r);
-      subspace.tiles[m].ReconstructBlock({w, frames * r}, {outs, frames}, {}, {w + used, kernel.tile_scratch - used});
-      for (std::size_t f = 0; f < frames; ++f) {
-        const Matrix4& space = contexts[first + f].get<Matrix4>(kSpaceMatrix);
-        if (!(space == Matrix4())) TransformPoints(space, outs[f]);
-      }
+      subspace.tiles[m].ReconstructBlock({y, frames * r}, {outs, frames}, {}, {spaces, moved ? frames : 0});
     }
   }
 }
@@ -257,8 +255,10 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
       return Status::Invalid("cues[{}] has too few points for the subspace's cues", c);
     }
   }
-  const double tolerance = s.get_double("tolerance") >= kAnyError ? std::numeric_limits<double>::infinity() : s.get_double("tolerance");
-  const Calibration calibration = Calibrate(subspace.calibration, tolerance, s.get_double("violationRate"), subspace.blend_start);
+  const double tolerance = s.get_double("tolerance") >= kAnyError ? std::numeric_limits<double>::infinity()
+                                                                  : s.get_double("tolerance");
+  const Calibration calibration =
+      Calibrate(subspace.calibration, tolerance, s.get_double("violationRate"), subspace.blend_start);
   kernel.threshold = calibration.threshold;
   std::size_t whole = 0;
   for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
@@ -275,12 +275,11 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
       whole = std::max(whole, 3 * output.padded);
     }
     kernel.outputs.push_back(std::move(output));
-    kernel.tile_scratch = std::max(kernel.tile_scratch, subspace.tiles[m].scratch_floats(kBlockFrames));
   }
-  kernel.vector_doubles = (subspace.rows() + 7) / 8 * 8;
-  kernel.tile_scratch = PaddedCount(std::max(kernel.tile_scratch + PaddedCount(kBlockFrames * subspace.rows()), 6 * kernel.vector_doubles));
-  const std::size_t scratch = kernel.tile_scratch + whole;
-  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 + PaddedCount(subspace.rows()) * sizeof(float);
+  const std::size_t padded = subspace.soft_cache.padded_rows();
+  // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles) and g
+  const std::size_t scratch = std::max({whole, PaddedCount(kBlockFrames * subspace.rows()), 3 * padded});
+  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 + padded * sizeof(float);
   return BoundKernel{std::make_shared<const KpsaKernel>(std::move(kernel)), scratch, state};
 }
 
@@ -292,9 +291,12 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   hasher.Add(std::string_view(s.rig_hash));
   hasher.Add(std::string_view(s.training));
   hasher.Add(std::span<const double>(s.cue_mean));
-  hasher.Add(std::span<const double>(s.whitening));
+  hasher.Add(std::span<const float>(s.soft_cache.factor.span()));
   for (const TileMap& tiles : s.tiles) {
-    hasher.Add(std::span<const std::uint16_t>(tiles.data().u.span()));
+    hasher.Add(std::span<const std::uint8_t>(tiles.data().u.span()));
+    hasher.Add(std::span<const std::uint16_t>(tiles.data().v.span()));
+    hasher.Add(std::span<const float>(tiles.data().scale.span()));
+    hasher.Add(std::span<const std::uint32_t>(tiles.data().columns));
     hasher.Add(std::span<const float>(tiles.data().mean.span()));
   }
   for (const PointCues& cues : data_.cues) {
@@ -306,7 +308,8 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(row.input);
     hasher.Add(row.element);
   }
-  for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.scalar_lo, &data_.scalar_hi}) hasher.Add(std::span<const double>(*range));
+  for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.scalar_lo, &data_.scalar_hi})
+    hasher.Add(std::span<const double>(*range));
   for (const CalibrationPair& pair : s.calibration) {
     hasher.Add(pair.score);
     hasher.Add(pair.error);
@@ -316,25 +319,46 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
 }
 
 void AddKpsaNode(NodeRegistry& registry) {
-  registry.add("kpsa", "Stands in for a deformer stack: measures a few cues, reconstructs all points from a trained subspace, and lets "
-                       "the full stack run where that is not good enough (KPSA, Meyer and Anderson 2007, with SoftCache).")
+  registry
+      .add(
+          "kpsa",
+          "Stands in for a deformer stack: measures a few cues, reconstructs all points from a trained "
+          "subspace, and lets "
+          "the full stack run where that is not good enough (KPSA, Meyer and Anderson 2007, with SoftCache).")
       .category("acceleration")
-      .points_in("cues", "points of a mesh at a stage; only the cue points are evaluated").array()
-      .in("matrices", Matrix4(), {.doc = "local matrices of transforms: guards and cues"}).array()
-      .in("scalars", 0.0, {.doc = "other values: guards and cues"}).array()
+      .points_in("cues", "points of a mesh at a stage; only the cue points are evaluated")
+      .array()
+      .in("matrices", Matrix4(), {.doc = "local matrices of transforms: guards and cues"})
+      .array()
+      .in("scalars", 0.0, {.doc = "other values: guards and cues"})
+      .array()
       .in("spaceMatrix", Matrix4(), {.doc = "the frame that the subspace lives in"})
-      .points_in("fullPoints", "the full evaluation").array().lazy(true)
+      .points_in("fullPoints", "the full evaluation")
+      .array()
+      .lazy(true)
       .structural("config", Type::kAsset)
-      .structural("tolerance", 1e-4, {.min = 0, .unit = Unit::kLength, .doc = "largest point error that may pass"})
-      .structural("violationRate", 0.01, {.min = 0, .max = 1, .doc = "share of frames that may pass although they exceed it"})
-      .out("outPoints", Type::kPoints).array().out("score", Type::kDouble).out("hit", Type::kBool)
-      .out("missReason", Type::kInt).out("offender", Type::kInt)
-      .compute(&Compute).decide(&Decide).block(&ComputeBlock).demand(DemandKpsa).bind(BindKpsa)
+      .structural("tolerance", 1e-4,
+                  {.min = 0, .unit = Unit::kLength, .doc = "largest point error that may pass"})
+      .structural("violationRate", 0.01,
+                  {.min = 0, .max = 1, .doc = "share of frames that may pass although they exceed it"})
+      .out("outPoints", Type::kPoints)
+      .array()
+      .out("score", Type::kDouble)
+      .out("hit", Type::kBool)
+      .out("missReason", Type::kInt)
+      .out("offender", Type::kInt)
+      .compute(&Compute)
+      .decide(&Decide)
+      .block(&ComputeBlock)
+      .demand(DemandKpsa)
+      .bind(BindKpsa)
       .point_count([](const Structural& s, std::string_view, int element) -> Result<Index> {
         const auto* config = s.asset<KpsaConfig>("config");
         if (config == nullptr) return Status::Invalid("config is not set");
         const auto& outputs = config->data().subspace->outputs;
-        return element < static_cast<int>(outputs.size()) ? static_cast<Index>(outputs[static_cast<std::size_t>(element)].points) : 0;
+        return element < static_cast<int>(outputs.size())
+                   ? static_cast<Index>(outputs[static_cast<std::size_t>(element)].points)
+                   : 0;
       })
       .cost(20000, 5);
 }
@@ -342,24 +366,32 @@ void AddKpsaNode(NodeRegistry& registry) {
 std::string MissText(const KpsaConfig& config, MissReason reason, Index offender) {
   const KpsaConfig::Data& data = config.data();
   switch (reason) {
-    case MissReason::kNone: return "hit";
-    case MissReason::kNeverHit: return data.always_miss ? "the subspace is stale" : "the tolerance allows no hit";
+    case MissReason::kNone:
+      return "hit";
+    case MissReason::kNeverHit:
+      return data.always_miss ? "the subspace is stale" : "the tolerance allows no hit";
     case MissReason::kOutOfRange:
-      return fmt::format("{} is outside its trained range", offender < data.guard_names.size() ? data.guard_names[offender] : "a control");
+      return fmt::format("{} is outside its trained range",
+                         offender < data.guard_names.size() ? data.guard_names[offender] : "a control");
     case MissReason::kNotFinite:
     case MissReason::kScore: {
       std::string cue = "a cue";
       if (offender < data.subspace->cues.size()) {
         const CueDescription& d = data.subspace->cues[offender];
-        cue = d.kind == CueDescription::Kind::kScalar ? d.plug : fmt::format("{}@{} point {}", data.subspace->outputs[d.mesh].name, d.stage, d.point);
+        cue = d.kind == CueDescription::Kind::kScalar
+                  ? d.plug
+                  : fmt::format("{}@{} point {}", data.subspace->outputs[d.mesh].name, d.stage, d.point);
       }
-      return reason == MissReason::kScore ? fmt::format("unlike the trained poses (most at {})", cue) : fmt::format("{} is not a number", cue);
+      return reason == MissReason::kScore ? fmt::format("unlike the trained poses (most at {})", cue)
+                                          : fmt::format("{} is not a number", cue);
     }
   }
   return "";
 }
 
 void MeasureKpsaTimes(bool on) { measure_times = on; }
-KpsaTimes TakeKpsaTimes() { return {cue_ns.exchange(0), projection_ns.exchange(0), reconstruction_ns.exchange(0)}; }
+KpsaTimes TakeKpsaTimes() {
+  return {cue_ns.exchange(0), projection_ns.exchange(0), reconstruction_ns.exchange(0)};
+}
 
 }  // namespace kpsa

@@ -36,10 +36,10 @@ using ControlGroups = std::vector<std::vector<std::size_t>>;
 std::vector<SampledPose> Sweeps(const std::vector<ControlRange>& controls);
 
 // `count` poses, in shares (the first two where there are such):
-//   0.3  a frame of the clips, exaggerated or weakened, each node's controls from one or the other of two frames, and a few
+//   0.45 a frame of the clips, exaggerated or weakened, each node's controls from one or the other of two frames, and a few
 //        controls on top;
-//   0.4  a group of controls that act together, and a few controls on top;
-//   0.3  mixtures of several controls at random values, every second one laid over a random frame of a random clip.
+//   0.2  a group of controls that act together, and a few controls on top;
+//   0.35 mixtures of several controls at random values, every second one laid over a random frame of a random clip.
 std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses,
                                      const ControlGroups& groups, std::size_t clips, std::size_t count, std::uint64_t seed);
 

@@ -3,41 +3,70 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kpsa/soft_cache.cpp"
 #include "hwy/foreach_target.h"
+
 #include "base/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace kpsa {
 namespace HWY_NAMESPACE {
 
-// y = matrix * x, column-major [n x n], from column to column; multiply and add are separate, so that a scalar tail
-// and every vector width round alike. Blocks of 4 vectors of rows stay in registers over all columns.
-void ColumnProduct(const double* HWY_RESTRICT matrix, const double* HWY_RESTRICT x, std::size_t n, bool lower,
-                   double* HWY_RESTRICT y) {
-  const hn::ScalableTag<double> d;
-  const std::size_t lanes = hn::Lanes(d);
-  std::size_t row = 0;
-  for (; row + 4 * lanes <= n; row += 4 * lanes) {
-    auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0;
-    const std::size_t columns = lower ? row + 4 * lanes : n;  // beyond its diagonal a lower triangle holds zeros
-    for (std::size_t j = 0; j < columns; ++j) {
-      const double* column = matrix + j * n + row;
-      const auto factor = hn::Set(d, x[j]);
-      s0 = hn::Add(s0, hn::Mul(hn::LoadU(d, column), factor));
-      s1 = hn::Add(s1, hn::Mul(hn::LoadU(d, column + lanes), factor));
-      s2 = hn::Add(s2, hn::Mul(hn::LoadU(d, column + 2 * lanes), factor));
-      s3 = hn::Add(s3, hn::Mul(hn::LoadU(d, column + 3 * lanes), factor));
+// Four rows of F against y, sixteen columns at a time whatever the width of the target: w, and g += F_rows^T
+// w. Returns |w|^2. The sums of sixteen are added in halves.
+float FourRows(const float* HWY_RESTRICT rows, std::size_t groups, const float* HWY_RESTRICT y,
+               float* HWY_RESTRICT g) {
+  const hn::CappedTag<float, 16> d;
+  constexpr std::size_t kLanes = HWY_MIN(HWY_LANES(float), 16), kVectors = 16 / kLanes;
+  hn::Vec<decltype(d)> sum[4][kVectors];
+#pragma GCC unroll 4
+  for (int row = 0; row < 4; ++row) {
+#pragma GCC unroll 16
+    for (std::size_t i = 0; i < kVectors; ++i) sum[row][i] = hn::Zero(d);
+  }
+  for (std::size_t group = 0; group < groups; ++group) {
+#pragma GCC unroll 16
+    for (std::size_t i = 0; i < kVectors; ++i) {
+      const auto values = hn::LoadU(d, y + 16 * group + i * kLanes);
+#pragma GCC unroll 4
+      for (std::size_t row = 0; row < 4; ++row) {
+        sum[row][i] = Fma(hn::Load(d, rows + 64 * group + 16 * row + i * kLanes), values, sum[row][i]);
+      }
     }
-    hn::StoreU(s0, d, y + row);
-    hn::StoreU(s1, d, y + row + lanes);
-    hn::StoreU(s2, d, y + row + 2 * lanes);
-    hn::StoreU(s3, d, y + row + 3 * lanes);
   }
-  for (; row < n; ++row) {
-    double sum = 0;
-    const std::size_t columns = lower ? row + 1 : n;
-    for (std::size_t j = 0; j < columns; ++j) sum = sum + matrix[j * n + row] * x[j];
-    y[row] = sum;
+  HWY_ALIGN float lanes[4][16];
+  for (int row = 0; row < 4; ++row) {
+    for (std::size_t i = 0; i < kVectors; ++i) hn::Store(sum[row][i], d, lanes[row] + i * kLanes);
   }
+  float w[4];
+  for (int row = 0; row < 4; ++row) {
+    for (int half = 8; half >= 1; half /= 2) {
+      for (int k = 0; k < half; ++k) lanes[row][k] = lanes[row][k] + lanes[row][k + half];
+    }
+    w[row] = lanes[row][0];
+  }
+  const auto w0 = hn::Set(d, w[0]), w1 = hn::Set(d, w[1]), w2 = hn::Set(d, w[2]), w3 = hn::Set(d, w[3]);
+  for (std::size_t at = 0; at < 16 * groups; at += kLanes) {
+    const float* column = rows + 64 * (at / 16) + at % 16;
+    auto value = hn::LoadU(d, g + at);
+    value = Fma(hn::Load(d, column), w0, value);
+    value = Fma(hn::Load(d, column + 16), w1, value);
+    value = Fma(hn::Load(d, column + 32), w2, value);
+    value = Fma(hn::Load(d, column + 48), w3, value);
+    hn::StoreU(value, d, g + at);
+  }
+  return (w[0] * w[0] + w[1] * w[1]) + (w[2] * w[2] + w[3] * w[3]);
+}
+
+// g = F^T F y; returns |F y|^2.
+double Project(const float* factor, std::size_t rows, bool lower, const float* y, float* g) {
+  const std::size_t all = (rows + 15) / 16;
+  for (std::size_t j = 0; j < 16 * all; ++j) g[j] = 0;
+  double sum = 0;
+  for (std::size_t row = 0; row < rows; row += 4) {
+    const std::size_t groups = lower ? row / 16 + 1 : all;
+    sum += static_cast<double>(FourRows(factor, groups, y, g));
+    factor += 64 * groups;
+  }
+  return sum;
 }
 
 }  // namespace HWY_NAMESPACE
@@ -53,7 +82,7 @@ HWY_AFTER_NAMESPACE();
 
 namespace kpsa {
 
-HWY_EXPORT(ColumnProduct);
+HWY_EXPORT(Project);
 
 namespace {
 
@@ -66,18 +95,19 @@ double Quantile(std::vector<double> values, double share) {
   return *nth;
 }
 
-// |block * g| for a block of h x h, column-major.
-double BlockNorm(const double* block, const double* g, std::size_t h) {
-  double sum = 0;
+// |block * g|^2 for a block of h x h, column-major.
+float BlockNorm(const float* block, const float* g, std::size_t h) {
+  if (h == 1) return block[0] * g[0] * (block[0] * g[0]);
+  float sum = 0;
   for (std::size_t i = 0; i < h; ++i) {
-    double value = 0;
+    float value = 0;
     for (std::size_t j = 0; j < h; ++j) value = value + block[j * h + i] * g[j];
     sum = sum + value * value;
   }
-  return std::sqrt(sum);
+  return sum;
 }
 
-Index FirstNotFinite(const SoftCacheModel& model, std::span<const double> y) {
+Index FirstNotFinite(const SoftCacheModel& model, std::span<const float> y) {
   for (std::size_t k = 0; k < model.cues(); ++k) {
     for (Index j = model.offsets[k]; j < model.offsets[k + 1]; ++j) {
       if (!std::isfinite(y[j])) return static_cast<Index>(k);
@@ -86,11 +116,31 @@ Index FirstNotFinite(const SoftCacheModel& model, std::span<const double> y) {
   return kNoIndex;
 }
 
+// F in the layout of SoftCacheModel::factor.
+AlignedArray<float> PackFactor(const Eigen::MatrixXd& matrix, bool lower, std::size_t size) {
+  AlignedArray<float> factor(size);
+  const Eigen::Index n = matrix.rows(), all = (n + 15) / 16;
+  float* to = factor.data();
+  for (Eigen::Index row = 0; row < n; row += 4) {
+    const Eigen::Index groups = lower ? row / 16 + 1 : all;
+    for (Eigen::Index group = 0; group < groups; ++group) {
+      for (Eigen::Index i = row; i < row + 4; ++i) {
+        for (Eigen::Index j = 16 * group; j < 16 * group + 16; ++j)
+          *to++ = i < n && j < n ? static_cast<float>(matrix(i, j)) : 0.0f;
+      }
+    }
+  }
+  return factor;
+}
+
 }  // namespace
 
-void MultiplyVector(std::span<const double> matrix, std::span<const double> x, bool lower, std::span<double> y) {
-  KPSA_DCHECK(matrix.size() == x.size() * x.size() && y.size() >= x.size());
-  HWY_DYNAMIC_DISPATCH(ColumnProduct)(matrix.data(), x.data(), x.size(), lower, y.data());
+std::size_t SoftCacheModel::factor_size() const {
+  const std::size_t all = padded_rows() / 16;
+  std::size_t size = 0;
+  for (std::size_t row = 0; row < rows(); row += 4)
+    size += 64 * (mode == EstimatorMode::kMap ? row / 16 + 1 : all);
+  return size;
 }
 
 double FullWeight(double score, const SoftCacheThreshold& threshold) {
@@ -102,12 +152,14 @@ double FullWeight(double score, const SoftCacheThreshold& threshold) {
   return t * t * (3 - 2 * t);
 }
 
-SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues, const Eigen::MatrixXd& training) {
+SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
+                                  const Eigen::MatrixXd& training) {
   KPSA_CHECK_EQ(training.rows(), cues.rows());
   SoftCacheModel model;
   model.mode = estimator.mode;
   model.offsets = cues.offsets;
-  model.judge.assign(estimator.judge.data(), estimator.judge.data() + estimator.judge.size());
+  const bool map = model.mode == EstimatorMode::kMap;
+  model.factor = PackFactor(map ? estimator.whitening : estimator.judge, map, model.factor_size());
   for (std::size_t k = 0; k < cues.cues.size() && model.mode == EstimatorMode::kMap; ++k) {
     const auto begin = static_cast<Eigen::Index>(cues.offsets[k]);
     const Eigen::Index height = static_cast<Eigen::Index>(cues.offsets[k + 1]) - begin;
@@ -115,57 +167,63 @@ SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues
     block = block.llt().solve(Eigen::MatrixXd::Identity(height, height)).eval();
     // The error of a scalar counts by the displacement it stands for, so that all cues speak of lengths
     if (cues.cues[k].kind == CueKind::kScalar) block *= estimator.gain.col(begin).cwiseAbs().maxCoeff();
-    model.leave_one_out.insert(model.leave_one_out.end(), block.data(), block.data() + block.size());
+    for (Eigen::Index i = 0; i < block.size(); ++i)
+      model.leave_one_out.push_back(static_cast<float>(block.data()[i]));
   }
 
   // Quantiles over the training poses; the floors keep a score of pure rounding from becoming a large one
-  std::vector<double> scores1, scores2, scratch(model.rows());
+  std::vector<double> scores1, scores2;
+  std::vector<float> y(model.padded_rows()), g(model.padded_rows());
   for (Eigen::Index t = 0; t < training.cols(); ++t) {
-    const RawScores raw = ComputeRawScores(model, {training.col(t).data(), model.rows()}, scratch);
+    for (Eigen::Index j = 0; j < training.rows(); ++j)
+      y[static_cast<std::size_t>(j)] = static_cast<float>(training(j, t));
+    const RawScores raw = ComputeRawScores(model, y, g);
     scores1.push_back(raw.score1);
     scores2.push_back(raw.score2);
   }
   const double noise = cues.rows() == 0 ? 0 : std::sqrt(cues.noise.minCoeff());
-  const double floor1 = model.mode == EstimatorMode::kPaper ? noise : 1e-6 * static_cast<double>(model.rows());
-  model.quantile1 = std::max({scores1.empty() ? 0 : Quantile(scores1, kQuantile), floor1, std::numeric_limits<double>::min()});
-  model.quantile2 = std::max({scores2.empty() ? 0 : Quantile(scores2, kQuantile), noise, std::numeric_limits<double>::min()});
+  const double floor1 =
+      model.mode == EstimatorMode::kPaper ? noise : 1e-6 * static_cast<double>(model.rows());
+  model.quantile1 = std::max(
+      {scores1.empty() ? 0 : Quantile(scores1, kQuantile), floor1, std::numeric_limits<double>::min()});
+  model.quantile2 = std::max(
+      {scores2.empty() ? 0 : Quantile(scores2, kQuantile), noise, std::numeric_limits<double>::min()});
   return model;
 }
 
-RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const double> y, std::span<double> scratch) {
-  const std::size_t rows = model.rows();
-  KPSA_DCHECK(y.size() >= rows && scratch.size() >= rows);
-  MultiplyVector(model.judge, y.first(rows), false, scratch);
+RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g) {
+  KPSA_DCHECK(y.size() >= model.padded_rows() && g.size() >= model.padded_rows());
+  const bool map = model.mode == EstimatorMode::kMap;
+  const double squared =
+      HWY_DYNAMIC_DISPATCH(Project)(model.factor.data(), model.rows(), map, y.data(), g.data());
   RawScores raw;
-  double largest = -1;
-  const double* block = model.leave_one_out.data();
+  float largest = -1;
+  const float* block = model.leave_one_out.data();
   for (std::size_t k = 0; k < model.cues(); ++k) {
     const std::size_t begin = model.offsets[k], height = model.offsets[k + 1] - begin;
-    double norm;
-    if (model.mode == EstimatorMode::kMap) {
-      norm = BlockNorm(block, scratch.data() + begin, height);
+    float norm = 0;
+    if (map) {
+      norm = BlockNorm(block, g.data() + begin, height);
       block += height * height;
-      raw.score2 = std::max(raw.score2, norm);
     } else {
-      norm = 0;
-      for (std::size_t j = begin; j < begin + height; ++j) norm = norm + scratch[j] * scratch[j];
+      for (std::size_t j = begin; j < begin + height; ++j) norm = norm + g[j] * g[j];
     }
     if (norm > largest) largest = norm, raw.worst_cue = static_cast<Index>(k);
   }
-  double sum = 0;
-  for (std::size_t j = 0; j < rows; ++j) sum = sum + (model.mode == EstimatorMode::kMap ? y[j] : scratch[j]) * scratch[j];
-  raw.score1 = model.mode == EstimatorMode::kMap ? std::max(0.0, sum) : std::sqrt(sum);
+  raw.score1 = map ? squared : std::sqrt(squared);
+  raw.score2 = map && largest > 0 ? std::sqrt(static_cast<double>(largest)) : 0;
   return raw;
 }
 
-Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const double> y,
-              std::span<double> scratch) {
+Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
+              std::span<float> g) {
   Verdict verdict;
-  verdict.offender = FirstNotFinite(model, y);
-  RawScores raw;
-  if (verdict.offender == kNoIndex) raw = ComputeRawScores(model, y, scratch);
+  const RawScores raw = ComputeRawScores(model, y, g);
+  // A NaN or an infinity anywhere in y spoils score 1
+  if (!std::isfinite(raw.score1)) verdict.offender = FirstNotFinite(model, y);
   verdict.score = std::max(raw.score1 / model.quantile1, raw.score2 / model.quantile2);
-  if (verdict.offender != kNoIndex || !std::isfinite(verdict.score)) {  // huge measurements overflow the score
+  if (verdict.offender != kNoIndex ||
+      !std::isfinite(verdict.score)) {  // huge measurements overflow the score
     verdict.score = std::numeric_limits<double>::infinity();
     verdict.full_weight = 1;
     verdict.hit = false;
@@ -196,7 +254,8 @@ Index FirstOutside(std::span<const TrainedRange> ranges, std::span<const double>
 }
 
 std::string OutsideMessage(const TrainedRange& range, double value) {
-  return fmt::format("{} = {:.6g} is outside its trained range [{:.6g}, {:.6g}]", range.plug, value, range.lo, range.hi);
+  return fmt::format("{} = {:.6g} is outside its trained range [{:.6g}, {:.6g}]", range.plug, value, range.lo,
+                     range.hi);
 }
 
 }  // namespace kpsa

@@ -1,12 +1,16 @@
 // SoftCache: how far a measurement is from what the subspace was trained on, and what to do about it.
-// Glossary: y the r normalised measurements, g = J y with J the estimator's `judge` matrix.
+// Glossary: y the r normalised measurements, G their covariance, F the factor: W with W^T W = G^-1, lower
+// triangular (map), or the projector on the residual I - C C^+ (paper); g = F^T F y.
 //
-// map:   score 1 = y . g (residual and Mahalanobis distance in one); score 2 = the largest leave-one-out error of a
-//        cue, |([G^-1]_ii)^-1 g_i| with the block of the cue; each over its 99 % training quantile; the larger counts.
-// paper: |y - C p| over its 99 % training quantile.
+// map:   score 1 = |F y|^2 (residual and Mahalanobis distance in one); score 2 = the largest leave-one-out
+// error of a
+//        cue, |([G^-1]_ii)^-1 g_i| with the block of the cue; each over its 99 % training quantile; the
+//        larger counts.
+// paper: |F y| = |y - C p| over its 99 % training quantile.
+// F is read once, four rows at a time: w = F y gives the four values that the same rows then add to g.
 //
-// Below tau_lo = c tau: a hit. Between tau_lo and tau: a stateless smoothstep blends the full evaluation in. Above: the
-// full evaluation alone. Frames therefore do not depend on their order.
+// Below tau_lo = c tau: a hit. Between tau_lo and tau: a stateless smoothstep blends the full evaluation in.
+// Above: the full evaluation alone. Frames therefore do not depend on their order.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,6 +20,7 @@
 #include <vector>
 
 #include "base/types.h"
+#include "kpsa/aligned_array.h"
 #include "kpsa/estimator.h"
 
 namespace kpsa {
@@ -40,7 +45,7 @@ struct Verdict {
 // What decides; from kpsa/calibration.h. tau < 0: nothing is ever a hit; infinity: everything finite is.
 struct SoftCacheThreshold {
   double tau = -1;
-  double blend_start = 0.7;  // c
+  double blend_start = 0.85;  // c
   double tau_lo() const { return tau * blend_start; }
 };
 
@@ -50,42 +55,44 @@ double FullWeight(double score, const SoftCacheThreshold& threshold);
 // The immutable data. Plain arrays: it is stored in the subspace file.
 struct SoftCacheModel {
   EstimatorMode mode = EstimatorMode::kMap;
-  std::vector<Index> offsets;         // [K + 1] rows of each cue
-  std::vector<double> judge;          // [r x r] J, column-major, symmetric
-  std::vector<double> leave_one_out;  // blocks ([J]_ii)^-1, h x h each, one after the other (map mode; else empty)
+  std::vector<Index> offsets;  // [K + 1] rows of each cue
+  AlignedArray<float>
+      factor;  // F: for every 4 rows their groups of 16 columns (map: up to the diagonal), 4 x 16 each
+  std::vector<float>
+      leave_one_out;  // blocks ([G^-1]_ii)^-1, h x h each, one after the other (map mode; else empty)
   double quantile1 = 1, quantile2 = 1;  // 99 % training quantiles of the raw scores, > 0
   std::size_t rows() const { return offsets.empty() ? 0 : offsets.back(); }
+  std::size_t padded_rows() const { return (rows() + 15) / 16 * 16; }
+  std::size_t factor_size() const;  // what `factor` has to hold
   std::size_t cues() const { return offsets.empty() ? 0 : offsets.size() - 1; }
 };
 
 // From an estimator; the quantiles from training measurements, one a column [r x T].
-SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues, const Eigen::MatrixXd& training);
+SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
+                                  const Eigen::MatrixXd& training);
 
 struct RawScores {
   double score1 = 0, score2 = 0;  // before division by the quantiles; score2 is 0 in paper mode
   Index worst_cue = kNoIndex;     // of score 2; in paper mode of the largest residual
 };
-// Run time. y [r]; scratch of at least r doubles; allocates nothing; the same bits on every SIMD target.
-RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const double> y, std::span<double> scratch);
+// Run time. y and g of at least padded_rows() floats, y with zeros beyond its rows; allocates nothing; the
+// same bits on every SIMD target.
+RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g);
 // The score and what follows from it. NaN or infinity in y is a miss.
-Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const double> y,
-              std::span<double> scratch);
+Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
+              std::span<float> g);
 
 // The trained range of a plug that may vary, margin included.
 struct TrainedRange {
   std::string plug;
   double lo = 0, hi = 0;
 };
-// [min, max] widened by `margin` of its extent on both sides (and by rounding, 1e-6 of the magnitude, of at least 1: an entry that
-// rested at 0 in training may come out as 1e-11).
+// [min, max] widened by `margin` of its extent on both sides (and by rounding, 1e-6 of the magnitude, of at
+// least 1: an entry that rested at 0 in training may come out as 1e-11).
 TrainedRange MakeTrainedRange(std::string plug, double min, double max, double margin);
 // Index of the first value outside its range (NaN is outside), or kNoIndex.
 Index FirstOutside(std::span<const TrainedRange> ranges, std::span<const double> values);
 // "head.rotateX = 1.2 is outside its trained range [-0.5, 0.5]"
 std::string OutsideMessage(const TrainedRange& range, double value);
-
-// y = matrix * x for a column-major [n x n] matrix; sums in the order of the columns, the same bits on every target.
-// lower: the matrix is lower triangular; only that part is read.
-void MultiplyVector(std::span<const double> matrix, std::span<const double> x, bool lower, std::span<double> y);
 
 }  // namespace kpsa

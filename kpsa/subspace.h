@@ -1,9 +1,9 @@
 // The trained object: immutable, shared by all threads and evaluators, and its file (.kpsa). At run time:
 //
 //   SubspaceScratch scratch(subspace);                    // once a thread
-//   Measure(subspace, raw, &scratch);                     // raw cue values -> y, w
+//   Measure(subspace, raw, &scratch);                     // raw cue values -> y
 //   Verdict v = Judge(subspace, threshold, scratch);      // SoftCache
-//   ReconstructOutput(subspace, output, &scratch, points) // w -> points
+//   ReconstructOutput(subspace, output, &scratch, points) // y -> points
 //
 // None of these allocates. The file is safetensors (base/safetensors.h) with kind "kpsa-subspace".
 #pragma once
@@ -33,60 +33,66 @@ struct CueDescription {
 };
 
 struct SubspaceOutput {
-  std::string name;   // "head_mesh@mush"
+  std::string name;  // "head_mesh@mush"
   std::size_t points = 0;
   friend bool operator==(const SubspaceOutput&, const SubspaceOutput&) = default;
 };
 
 struct Subspace {
   EstimatorMode mode = EstimatorMode::kMap;
-  int components = 3;                         // of the outputs: 3 or 1
-  std::size_t modes = 0;                      // M
+  int components = 3;     // of the outputs: 3 or 1
+  std::size_t modes = 0;  // M
   std::vector<SubspaceOutput> outputs;
-  std::vector<CueDescription> cues;           // [K]
-  std::vector<double> cue_mean, cue_scale;    // [r] y = (raw - mean) * scale
-  std::vector<double> whitening;              // [r x r] column-major, lower triangular: w = whitening * y
+  std::vector<CueDescription> cues;         // [K]
+  std::vector<double> cue_mean, cue_scale;  // [r] y = (raw - mean) * scale
   SoftCacheModel soft_cache;
-  std::vector<CalibrationPair> calibration;   // held-out poses; the threshold follows from a tolerance (Calibrate)
-  double tolerance = 0, violation_rate = 0.01, blend_start = 0.7;  // the trained defaults; scene units
-  std::vector<TileMap> tiles;                 // [outputs]
-  std::vector<TrainedRange> ranges;           // every varying plug upstream
-  std::string rig_hash;                       // what it was trained on (KPSA.md, section 3)
+  std::vector<CalibrationPair>
+      calibration;  // held-out poses; the threshold follows from a tolerance (Calibrate)
+  double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
+  std::vector<TileMap> tiles;                                       // [outputs]
+  std::vector<TrainedRange> ranges;                                 // every varying plug upstream
+  std::string rig_hash;  // what it was trained on (KPSA.md, section 3)
   std::string units = "m";
-  std::string space;                          // "" world or mesh space, else the joint
-  std::string training = "{}";                // JSON: summary of the training, shown by `inspect`
+  std::string space;                                    // "" world or mesh space, else the joint
+  std::string training = "{}";                          // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r
 };
 
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
 Status ValidateSubspace(const Subspace& subspace);
 
-// Tiles, whitening and SoftCache of a trained estimator; rows of the PCA's outputs are split over `outputs`.
+// Tiles and SoftCache of a trained estimator; rows of the PCA's outputs are split over `outputs`.
 // training: y of the training poses [r x T]. The caller fills cues, calibration, ranges and names.
-Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator, const Eigen::MatrixXd& training,
-                      std::vector<SubspaceOutput> outputs, const TileOptions& options);
+Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
+                      const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
+                      const TileOptions& options);
 
 Status WriteSubspace(const Subspace& subspace, const std::string& path);
-// Errors: as SafetensorsFile::Read; another kind of file; a newer version; any part that is missing or inconsistent.
+// Errors: as SafetensorsFile::Read; another kind of file; a newer version; any part that is missing or
+// inconsistent.
 Result<Subspace> ReadSubspace(const std::string& path);
 
 // Everything that changes while a subspace is used. One a thread.
 struct SubspaceScratch {
   explicit SubspaceScratch(const Subspace& subspace, std::size_t frames = 1);
-  std::vector<double> y, g, w;  // [r]
-  AlignedFloats whitened;       // [frames x r]
-  AlignedFloats tiles;
+  AlignedFloats y;      // [r, padded to 16]
+  AlignedFloats g;      // the same size
+  AlignedFloats block;  // [frames x r] y of each frame
 };
 
-// raw [r] in scene units -> scratch->y, and w into row `frame` of scratch->whitened.
-void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch, std::size_t frame = 0);
+// y[j] = (raw[j] - mean) * scale, in float32.
+void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y);
+// raw [r] in scene units -> scratch->y, and into row `frame` of scratch->block.
+void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch,
+             std::size_t frame = 0);
 // The verdict on scratch->y. Ranges are checked by the caller (FirstOutside), before this.
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);
-// Points of one output from row 0 of scratch->whitened.
-void ReconstructOutput(const Subspace& subspace, std::size_t output, SubspaceScratch* scratch, PointsView points);
+// Points of one output from scratch->y.
+void ReconstructOutput(const Subspace& subspace, std::size_t output, SubspaceScratch* scratch,
+                       PointsView points);
 void ReconstructOutputTiles(const Subspace& subspace, std::size_t output, std::span<const Index> tiles,
                             SubspaceScratch* scratch, PointsView points);
-// Points of one output for the first outs.size() rows of scratch->whitened.
+// Points of one output for the first outs.size() rows of scratch->block.
 void ReconstructOutputBlock(const Subspace& subspace, std::size_t output, std::span<const Index> tiles,
                             SubspaceScratch* scratch, std::span<const PointsView> outs);
 // points = (1 - full_weight) * points + full_weight * full, where Verdict::full_weight is in (0, 1).

@@ -174,11 +174,14 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
     data.components = s->components;
     data.inputs = s->rows();
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "ranks", {kAny}), &data.ranks));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "wide", {kAny}), &data.wide));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "direct", {kAny}), &data.direct));
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "v", {kAny}, true), &data.v));
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "u", {kAny}, true), &data.u));
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "mean", {kAny}), &data.mean));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "counts", {kAny}), &data.counts));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "columns", {kAny}), &data.columns));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "scale", {kAny}), &data.scale));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "v", {kAny}, true), &data.v));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "u", {kAny}), &data.u));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "mean", {kAny}), &data.mean));
     Result<TileMap> map = TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
     if (!map.ok()) return map.status();
     s->tiles.push_back(std::move(*map));
@@ -192,13 +195,11 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
   KPSA_RETURN_IF_ERROR(ValidateSubspace(s));
   SafetensorsWriter writer;
   WriteHeader(s, &writer);
-  const std::uint64_t rows = s.rows();
   Add<double>(&writer, "cueMean", s.cue_mean);
   Add<double>(&writer, "cueScale", s.cue_scale);
   Add<std::uint32_t>(&writer, "cueOffsets", s.soft_cache.offsets);
-  writer.Add<double>("whitening", {rows, rows}, s.whitening);
-  writer.Add<double>("judge", {rows, rows}, s.soft_cache.judge);
-  Add<double>(&writer, "leaveOneOut", s.soft_cache.leave_one_out);
+  Add<float>(&writer, "factor", s.soft_cache.factor.span());
+  Add<float>(&writer, "leaveOneOut", s.soft_cache.leave_one_out);
   std::vector<double> calibration;
   for (const CalibrationPair& pair : s.calibration) calibration.insert(calibration.end(), {pair.score, pair.error});
   writer.Add<double>("calibration", {s.calibration.size(), 2}, calibration);
@@ -206,11 +207,14 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     const TileData& data = s.tiles[i].data();
     const std::string prefix = fmt::format("tiles.{}.", i);
     Add<std::uint32_t>(&writer, prefix + "ranks", data.ranks);
+    Add<std::uint32_t>(&writer, prefix + "wide", data.wide);
     Add<std::uint8_t>(&writer, prefix + "direct", data.direct);
-    Add<std::uint16_t>(&writer, prefix + "v", data.v.span(), true);
-    Add<std::uint16_t>(&writer, prefix + "u", data.u.span(), true);
-    Add<float>(&writer, prefix + "mean", data.mean.span());
+    Add<std::uint32_t>(&writer, prefix + "counts", data.counts);
+    Add<std::uint32_t>(&writer, prefix + "columns", data.columns);
     Add<float>(&writer, prefix + "scale", data.scale.span());
+    Add<std::uint16_t>(&writer, prefix + "v", data.v.span(), true);
+    Add<std::uint8_t>(&writer, prefix + "u", data.u.span());
+    Add<float>(&writer, prefix + "mean", data.mean.span());
   }
   return writer.Write(path);
 }
@@ -243,9 +247,8 @@ Result<Subspace> ReadSubspace(const std::string& path) {
       return Status::Invalid("{}: cue {} begins at row {} of {}", path, k, offset, rows);
     }
   }
-  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("whitening", {rows, rows}), &s.whitening));
-  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("judge", {rows, rows}), &s.soft_cache.judge));
-  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("factor", {s.soft_cache.factor_size()}), &s.soft_cache.factor));
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
   const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 2});
   if (!calibration.ok()) return calibration.status();
   for (std::size_t i = 0; i + 1 < calibration->size(); i += 2) s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});

@@ -1,83 +1,52 @@
-// Factors the map of each tile; see kpsa/tiles.h.
-#include <Eigen/Cholesky>
+// Lays the factors of all tiles out; see kpsa/tiles.h.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
 #include "base/check.h"
 #include "base/parallel.h"
-#include "kpsa/eigen_solvers.h"
+#include "kpsa/tile_factorer.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kVPanelRows = 96;
+std::size_t Padded16(std::size_t count) { return (count + 15) / 16 * 16; }
 
-// One tile before it is laid out: product ~ u * v with u and v as halfs times 2^-exponent.
-struct Factors {
-  bool direct = false;
-  Eigen::MatrixXd u;           // [c * points x k] values that are exact in half precision
-  Eigen::MatrixXd v;           // [k x r] likewise; empty for a direct tile
-  std::vector<float> scale;    // [k] power of two
-  double squared_error = 0;    // expected, summed over the points of the tile
-};
-
-double RoundToHalf(double value) { return static_cast<double>(FloatFromHalf(HalfFromFloat(static_cast<float>(value)))); }
-
-// Scales every column so that its largest entry lies in [2^13, 2^14), and rounds it to half precision.
-void Quantize(Factors* f) {
-  f->scale.clear();
-  for (Eigen::Index k = 0; k < f->u.cols(); ++k) {
-    const double largest = f->u.rows() == 0 ? 0 : f->u.col(k).cwiseAbs().maxCoeff();
-    int exponent = 0;
-    if (largest > 0) std::frexp(largest, &exponent);
-    exponent = std::clamp(14 - exponent, -100, 100);
-    f->scale.push_back(static_cast<float>(std::ldexp(1.0, -exponent)));
-    f->u.col(k) = (f->u.col(k) * std::ldexp(1.0, exponent)).unaryExpr(&RoundToHalf);
-  }
+// Byte column k of a row: the high bytes of the wide columns, their low bytes, the other columns.
+int ByteOf(const TileFactors& f, Eigen::Index row, Eigen::Index k) {
+  if (k >= 2 * f.wide) return static_cast<int>(f.u(row, k - f.wide));
+  const int value = static_cast<int>(f.u(row, k % f.wide)),
+            high = static_cast<int>(std::floor((value + 128) / 256.0));
+  return k < f.wide ? high : value - 256 * high;
 }
 
-Eigen::MatrixXd Product(const Factors& f) {
-  const Eigen::VectorXd scale = Eigen::Map<const Eigen::VectorXf>(f.scale.data(), static_cast<Eigen::Index>(f.scale.size())).cast<double>();
-  const Eigen::MatrixXd u = f.u * scale.asDiagonal();
-  return f.direct ? u : Eigen::MatrixXd(u * f.v);
-}
-
-Factors FactorTile(const Eigen::MatrixXd& b, std::size_t padded_rows, int components, double rms_budget) {
-  const double points = static_cast<double>(b.rows() / components);
-  const double budget = rms_budget * rms_budget * points;
-  const Eigen::Index r = b.cols();
-  const SymmetricEigen eigen = AllEigen(b.transpose() * b);  // values are squared singular values
-  double rest = eigen.values.cwiseMax(0.0).sum();
-  Eigen::Index rank = 0;
-  while (rank < r && rest > 0.8 * budget) rest -= std::max(0.0, eigen.values[rank++]);
-
-  // Rounding to halfs takes a part of the budget, too: more columns where that leaves too little
-  Factors best;
-  for (;; ++rank) {
-    const auto columns = static_cast<std::size_t>(rank), inputs = static_cast<std::size_t>(r);
-    Factors f;
-    f.direct = columns * (padded_rows + inputs) >= inputs * padded_rows;
-    if (f.direct) {
-      f.u = b;
-    } else {
-      f.v = eigen.vectors.leftCols(rank).transpose().unaryExpr(&RoundToHalf);
-      // The best U for V as rounded
-      if (rank > 0) f.u = (f.v * f.v.transpose()).llt().solve(f.v * b.transpose()).transpose();
-      if (rank == 0) f.u.resize(b.rows(), 0);
+// U of a tile, panel after panel. Returns the end.
+std::uint8_t* WriteColumns(const TileFactors& f, std::size_t components, std::size_t panels,
+                           std::uint8_t* to) {
+  const std::size_t rows = kPanelPoints * components;
+  const Eigen::Index columns = f.u.cols() + f.wide, padded = (columns + 3) / 4 * 4;
+  for (std::size_t panel = 0; panel < panels; ++panel) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      const std::size_t point = panel * kPanelPoints + row % kPanelPoints;
+      const auto i = static_cast<Eigen::Index>(point * components + row / kPanelPoints);
+      for (Eigen::Index k = 0; k < padded; ++k) {
+        // Bytes 0 and 2 of the four meet the first two inputs
+        constexpr std::size_t kPlace[4] = {0, 2, 1, 3};
+        const int value = i < f.u.rows() && k < columns ? ByteOf(f, i, k) : 0;
+        to[(static_cast<std::size_t>(k / 4) * rows + row) * 4 + kPlace[k % 4]] =
+            static_cast<std::uint8_t>(value + 128);
+      }
     }
-    Quantize(&f);
-    f.squared_error = rank == 0 ? b.squaredNorm() : (b - Product(f)).squaredNorm();
-    const bool better = best.scale.empty() || f.squared_error < 0.9 * best.squared_error;
-    if (better || f.squared_error <= budget) best = std::move(f);
-    if (best.squared_error <= budget || best.direct || !better) return best;
+    to += static_cast<std::size_t>(padded) * rows;
   }
+  return to;
 }
 
 }  // namespace
 
-TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components, const TileOptions& options, TileReport* report) {
+TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components,
+                   const TileInputs& inputs, const TileOptions& options, TileReport* report) {
   KPSA_CHECK(components == 1 || components == 3);
   KPSA_CHECK_EQ(gain.rows(), mean.size());
   TileData data;
@@ -89,61 +58,67 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
   const auto panels = [&](std::size_t tile) {
     return (std::min(kTilePoints, data.points - tile * kTilePoints) + kPanelPoints - 1) / kPanelPoints;
   };
-  std::vector<Factors> factors(tiles);
+  const Eigen::MatrixXd covariance =
+      inputs.covariance.size() > 0 ? inputs.covariance
+                                   : Eigen::MatrixXd(Eigen::MatrixXd::Identity(gain.cols(), gain.cols()));
+  std::vector<TileFactors> factors(tiles);
   ParallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      const std::size_t first = t * kTilePoints * c, height = std::min(kTilePoints * c, data.points * c - first);
-      factors[t] = FactorTile(gain.middleRows(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height)), panels(t) * rows,
-                              components, options.rms_budget);
+      const std::size_t first = t * kTilePoints * c,
+                        height = std::min(kTilePoints * c, data.points * c - first);
+      const Eigen::MatrixXd part =
+          gain.middleRows(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height));
+      factors[t] = FactorTile(part, covariance, inputs.samples, components, options);
     }
   });
 
-  // Sizes, then the layout of kpsa/tiles.h
-  std::size_t v_rows = 0, direct_rows = 0, u_size = 0;
+  // Sizes, then the layout
+  std::size_t scales = 0, v_size = 0, u_size = 0;
   double squared_error = 0;
   TileReport found;
   for (std::size_t t = 0; t < tiles; ++t) {
-    const std::size_t rank = factors[t].scale.size();
+    const TileFactors& f = factors[t];
+    const auto rank = static_cast<std::size_t>(f.u.cols()), wide = static_cast<std::size_t>(f.wide);
     const std::size_t points = std::min(kTilePoints, data.points - t * kTilePoints);
     data.ranks.push_back(static_cast<std::uint32_t>(rank));
-    data.direct.push_back(factors[t].direct ? 1 : 0);
-    (factors[t].direct ? direct_rows : v_rows) += rank;
-    u_size += panels(t) * rank * rows;
-    squared_error += factors[t].squared_error;
-    found.worst_tile_rms = std::max(found.worst_tile_rms, std::sqrt(factors[t].squared_error / static_cast<double>(points)));
-    found.direct_tiles += factors[t].direct ? 1 : 0;
+    data.wide.push_back(static_cast<std::uint32_t>(wide));
+    data.counts.push_back(static_cast<std::uint32_t>(f.columns.size()));
+    data.direct.push_back(f.direct ? 1 : 0);
+    data.columns.insert(data.columns.end(), f.columns.begin(), f.columns.end());
+    scales += Padded16(rank);
+    v_size += f.direct ? 0 : f.columns.size() * Padded16(rank);
+    u_size += panels(t) * ((rank + wide + 3) / 4 * 4) * rows;
+    squared_error += f.squared_error;
+    found.worst_tile_rms =
+        std::max(found.worst_tile_rms, std::sqrt(f.squared_error / static_cast<double>(points)));
+    found.largest = std::max(found.largest, f.largest);
+    found.direct_tiles += f.direct ? 1 : 0;
   }
   found.rms = data.points == 0 ? 0 : std::sqrt(squared_error / static_cast<double>(data.points));
-  v_rows = (v_rows + kVPanelRows - 1) / kVPanelRows * kVPanelRows;
-  data.v = AlignedArray<std::uint16_t>(v_rows * data.inputs);
-  data.u = AlignedArray<std::uint16_t>(u_size);
+  data.scale = AlignedArray<float>(scales);
+  data.v = AlignedArray<std::uint16_t>(v_size);
+  data.u = AlignedArray<std::uint8_t>(u_size);
   data.mean = AlignedArray<float>((data.points + kPanelPoints - 1) / kPanelPoints * rows);
-  data.scale = AlignedArray<float>(v_rows + direct_rows);
-  std::fill_n(data.scale.data(), data.scale.size(), 1.0f);
   for (std::size_t i = 0; i < data.points * c; ++i) {
     const std::size_t point = i / c;
-    data.mean.data()[point / kPanelPoints * rows + i % c * kPanelPoints + point % kPanelPoints] = static_cast<float>(mean[static_cast<Eigen::Index>(i)]);
+    data.mean.data()[point / kPanelPoints * rows + i % c * kPanelPoints + point % kPanelPoints] =
+        static_cast<float>(mean[static_cast<Eigen::Index>(i)]);
   }
-  std::size_t v_row = 0, direct_row = v_rows;
-  std::uint16_t* u = data.u.data();
+  float* scale = data.scale.data();
+  std::uint16_t* v = data.v.data();
+  std::uint8_t* u = data.u.data();
   for (std::size_t t = 0; t < tiles; ++t) {
-    const Factors& f = factors[t];
-    const std::size_t rank = f.scale.size();
-    for (std::size_t k = 0; k < rank; ++k) {
-      const auto column = static_cast<Eigen::Index>(k);
-      const std::size_t z = f.direct ? direct_row++ : v_row++;
-      data.scale.data()[z] = f.scale[k];
-      for (std::size_t j = 0; j < data.inputs && !f.direct; ++j) {
-        data.v.data()[(z / kVPanelRows * data.inputs + j) * kVPanelRows + z % kVPanelRows] =
-            HalfFromFloat(static_cast<float>(f.v(column, static_cast<Eigen::Index>(j))));
-      }
-      for (Eigen::Index i = 0; i < f.u.rows(); ++i) {
-        const std::size_t point = static_cast<std::size_t>(i) / c, panel = point / kPanelPoints;
-        u[(panel * rank + k) * rows + static_cast<std::size_t>(i) % c * kPanelPoints + point % kPanelPoints] =
-            HalfFromFloat(static_cast<float>(f.u(i, column)));
-      }
+    const TileFactors& f = factors[t];
+    const std::size_t k16 = Padded16(static_cast<std::size_t>(f.u.cols()));
+    for (Eigen::Index k = 0; k < f.u.cols(); ++k) {
+      scale[k] = static_cast<float>(f.scale[k]);
+      for (Eigen::Index j = 0; j < f.v.cols(); ++j)
+        v[static_cast<std::size_t>(j) * k16 + static_cast<std::size_t>(k)] =
+            HalfFromFloat(static_cast<float>(f.v(k, j)));
     }
-    u += panels(t) * rank * rows;
+    scale += k16;
+    v += static_cast<std::size_t>(f.v.cols()) * k16;
+    u = WriteColumns(f, c, panels(t), u);
   }
   if (report != nullptr) *report = found;
   Result<TileMap> map = TileMap::Make(std::move(data), "tiles");
@@ -160,7 +135,8 @@ std::uint16_t HalfFromFloat(float value) {
   if (bits < 0x38800000u) {  // below 2^-14: a multiple of 2^-24
     float magnitude;
     std::memcpy(&magnitude, &bits, 4);
-    return static_cast<std::uint16_t>(sign | static_cast<std::uint16_t>(std::nearbyint(magnitude * 16777216.0f)));
+    return static_cast<std::uint16_t>(sign |
+                                      static_cast<std::uint16_t>(std::nearbyint(magnitude * 16777216.0f)));
   }
   bits += 0xfffu + (bits >> 13 & 1u);  // to nearest, ties to even; the carry may raise the exponent
   const std::uint32_t half = (bits - 0x38000000u) >> 13;

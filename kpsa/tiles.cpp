@@ -1,15 +1,30 @@
 #include "kpsa/tiles.h"
 
+#include <cstring>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kpsa/tiles.cpp"
 #include "hwy/foreach_target.h"
+
 #include "base/simd-inl.h"
 
-#ifndef KPSA_TILES_CONSTANTS
-#define KPSA_TILES_CONSTANTS
+#ifndef KPSA_TILES_STEP
+#define KPSA_TILES_STEP
 namespace kpsa {
 namespace {
-constexpr std::size_t kVPanelRows = 96;  // rows of V in a panel, whatever the number of components
+
+constexpr float kInputRange = 32639;  // 127 * 256 + 127: both bytes of a wide column's input stay in 16 bits
+constexpr float kSmallestInput = 1e-30f;  // inputs below are zeros; their inverse stays finite
+
+// The inputs of one tile and frame: x = mean + step * (U q), U's bytes being 128 too large each: bias = 128
+// sum(q).
+struct TileStep {
+  alignas(64) float t[2 * kMaxTileRank + 16];
+  alignas(64) std::int16_t q[2 * kMaxTileRank + 16];
+  float step;
+  std::int32_t bias;
+};
+
 }  // namespace
 }  // namespace kpsa
 #endif
@@ -18,136 +33,230 @@ HWY_BEFORE_NAMESPACE();
 namespace kpsa {
 namespace HWY_NAMESPACE {
 
-template <class D>
-HWY_INLINE hn::Vec<D> LoadNumbers(D d, const std::uint16_t* halfs) {
-  const hn::Rebind<hwy::float16_t, D> dh;
-  return hn::PromoteTo(d, hn::Load(dh, reinterpret_cast<const hwy::float16_t*>(halfs)));
-}
-template <class D>
-HWY_INLINE hn::Vec<D> LoadNumbers(D d, const float* floats) {
-  return hn::Load(d, floats);
-}
-
-// kVectors vectors of rows of a panel [columns][kRows], times kFrames inputs (input_stride apart): sums in registers,
-// one fused multiply-add a column and row, in the order of the columns.
-template <std::size_t kRows, int kVectors, int kFrames, typename T, class V>
-HWY_INLINE void SumColumns(const T* HWY_RESTRICT panel, std::size_t columns, const float* HWY_RESTRICT input,
-                           std::size_t input_stride, V (&sum)[kFrames][kVectors]) {
-  const hn::ScalableTag<float> d;
-  const std::size_t lanes = hn::Lanes(d);
-#pragma GCC unroll 8
-  for (int f = 0; f < kFrames; ++f) {
-#pragma GCC unroll 24
-    for (int v = 0; v < kVectors; ++v) sum[f][v] = hn::Zero(d);
-  }
-  for (std::size_t k = 0; k < columns; ++k, panel += kRows) {
-    V factor[kFrames];
-#pragma GCC unroll 8
-    for (int f = 0; f < kFrames; ++f) factor[f] = hn::Set(d, input[static_cast<std::size_t>(f) * input_stride + k]);
-#pragma GCC unroll 24
-    for (int v = 0; v < kVectors; ++v) {
-      const V numbers = LoadNumbers(d, panel + static_cast<std::size_t>(v) * lanes);
-#pragma GCC unroll 8
-      for (int f = 0; f < kFrames; ++f) sum[f][v] = Fma(numbers, factor[f], sum[f][v]);
-    }
-  }
-}
-
-// How many vectors of rows fit the registers of the target.
-template <std::size_t kRows, int kFrames>
+// How many vectors of rows are summed in registers at a time.
+template <std::size_t kRows, int kFrames, std::size_t kBudget>
 constexpr int VectorsAtOnce() {
   constexpr std::size_t kAll = kRows / HWY_LANES(float);
-  constexpr std::size_t kBudget = HWY_LANES(float) >= 16 ? 24 : 12;
-  return static_cast<int>(kAll * kFrames <= kBudget ? kAll : kAll % (kBudget / kFrames) == 0 ? kBudget / kFrames : 1);
+  return static_cast<int>(kAll * kFrames <= kBudget         ? kAll
+                          : kAll % (kBudget / kFrames) == 0 ? kBudget / kFrames
+                                                            : 1);
 }
+constexpr bool kManyRegisters = HWY_LANES(float) >= 16;
 
-// A panel of V: z = scale * (V w).
-template <int kFrames>
-HWY_INLINE void VPanel(const std::uint16_t* panel, std::size_t columns, const float* w, std::size_t w_stride,
-                       const float* scale, float* z, std::size_t z_stride) {
-  const hn::ScalableTag<float> d;
+// z[0, k16) = scale V y_J for one tile, 16 rows at a time: four sums in turn hide the latency of the
+// multiply-add.
+void Inputs(const std::uint16_t* HWY_RESTRICT v, const float* HWY_RESTRICT scale, std::size_t k16,
+            const std::uint32_t* HWY_RESTRICT columns, std::size_t count, const float* HWY_RESTRICT y,
+            float* HWY_RESTRICT z) {
+  const hn::CappedTag<float, 16> d;
+  const hn::Rebind<hwy::float16_t, decltype(d)> dh;
+  constexpr int kVectors = static_cast<int>(16 / HWY_MIN(HWY_LANES(float), 16));
   const std::size_t lanes = hn::Lanes(d);
-  constexpr int kVectors = VectorsAtOnce<kVPanelRows, kFrames>();
-  for (std::size_t row = 0; row < kVPanelRows; row += kVectors * lanes) {
-    hn::Vec<decltype(d)> sum[kFrames][kVectors];
-    SumColumns<kVPanelRows>(panel + row, columns, w, w_stride, sum);
-    for (int f = 0; f < kFrames; ++f) {
-      for (int v = 0; v < kVectors; ++v) {
-        const std::size_t at = row + static_cast<std::size_t>(v) * lanes;
-        hn::StoreU(hn::Mul(sum[f][v], hn::Load(d, scale + at)), d, z + static_cast<std::size_t>(f) * z_stride + at);
+  const auto* halfs = reinterpret_cast<const hwy::float16_t*>(v);
+  for (std::size_t group = 0; group < k16; group += 16) {
+    hn::Vec<decltype(d)> sum[4][kVectors];
+#pragma GCC unroll 4
+    for (int q = 0; q < 4; ++q) {
+#pragma GCC unroll 16
+      for (int i = 0; i < kVectors; ++i) sum[q][i] = hn::Zero(d);
+    }
+    const hwy::float16_t* column = halfs + group;
+    std::size_t j = 0;
+    for (; j + 4 <= count; j += 4, column += 4 * k16) {
+#pragma GCC unroll 4
+      for (std::size_t q = 0; q < 4; ++q) {
+        const auto factor = hn::Set(d, y[columns[j + q]]);
+#pragma GCC unroll 16
+        for (int i = 0; i < kVectors; ++i) {
+          sum[q][i] =
+              Fma(hn::PromoteTo(d, hn::LoadU(dh, column + q * k16 + static_cast<std::size_t>(i) * lanes)),
+                  factor, sum[q][i]);
+        }
       }
+    }
+    for (std::size_t q = 0; j + q < count; ++q) {
+      const auto factor = hn::Set(d, y[columns[j + q]]);
+      for (int i = 0; i < kVectors; ++i) {
+        sum[q][i] =
+            Fma(hn::PromoteTo(d, hn::LoadU(dh, column + q * k16 + static_cast<std::size_t>(i) * lanes)),
+                factor, sum[q][i]);
+      }
+    }
+#pragma GCC unroll 16
+    for (int i = 0; i < kVectors; ++i) {
+      const std::size_t at = group + static_cast<std::size_t>(i) * lanes;
+      const auto all = hn::Add(hn::Add(sum[0][i], sum[1][i]), hn::Add(sum[2][i], sum[3][i]));
+      hn::StoreU(hn::Mul(all, hn::LoadU(d, scale + at)), d, z + at);
     }
   }
 }
 
-// A panel of points: x = mean + U z, written to the component arrays of each frame.
-template <int kComponents, int kFrames, typename T>
-HWY_INLINE void PointPanel(const T* panel, std::size_t columns, const float* z, std::size_t z_stride, const float* mean,
-                           std::size_t first, std::size_t padded, const PointsView* outs) {
+// The inputs of the byte columns: q = round(t / step) of 16 bits, with the step that the largest asks for. z
+// [rank, padded to 16 with zeros] is overwritten.
+void QuantizeInputs(std::size_t wide, std::size_t rank, float* HWY_RESTRICT t, TileStep* step) {
+  const hn::CappedTag<float, 16> d;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  const hn::Rebind<std::int16_t, decltype(d)> ds;
+  const std::size_t lanes = hn::Lanes(d);
+  // High bytes of the wide columns, their low bytes, the narrow columns
+  if (wide > 0) {
+    std::memmove(t + wide, t, rank * sizeof(float));
+    for (std::size_t k = 0; k < wide; ++k) t[k] = 256.0f * t[k];
+  }
+  const std::size_t count = wide + rank, padded = (count + 15) / 16 * 16;
+  for (std::size_t k = count; k < padded; ++k) t[k] = 0;
+  auto most = hn::Zero(d);
+  for (std::size_t k = 0; k < padded; k += lanes) most = hn::Max(most, hn::Abs(hn::Load(d, t + k)));
+  // NaNs are lost in maxima, but not in sums
+  auto sum = hn::Zero(d);
+  for (std::size_t k = 0; k < padded; k += lanes)
+    sum = hn::Add(sum, hn::Mul(hn::Zero(d), hn::Load(d, t + k)));
+  const float largest = hn::GetLane(hn::MaxOfLanes(d, most)), spoiled = hn::GetLane(hn::SumOfLanes(d, sum));
+  step->step = spoiled == 0 ? largest / kInputRange : spoiled;
+  const auto inverse = hn::Set(d, spoiled == 0 && largest > kSmallestInput ? kInputRange / largest : 0.0f);
+  auto total = hn::Zero(di);
+  for (std::size_t k = 0; k < padded; k += lanes) {
+    const auto q = hn::NearestInt(hn::Mul(hn::Load(d, t + k), inverse));
+    total = hn::Add(total, q);
+    hn::StoreU(hn::DemoteTo(ds, q), ds, step->q + k);
+  }
+  step->bias = 128 * hn::GetLane(hn::SumOfLanes(di, total));
+}
+
+// sum + the product of pairs of signed 16-bit numbers, added for each 32-bit lane (modulo 2^32).
+template <class V>
+HWY_INLINE V AddPairs(V a, V b, V sum) {
+#if HWY_TARGET == HWY_AVX3
+  return V{_mm512_add_epi32(sum.raw, _mm512_madd_epi16(a.raw, b.raw))};
+#elif HWY_TARGET == HWY_AVX2
+  return V{_mm256_add_epi32(sum.raw, _mm256_madd_epi16(a.raw, b.raw))};
+#else
+  const auto low = [](V v) HWY_ATTR { return hn::ShiftRight<16>(hn::ShiftLeft<16>(v)); };
+  const auto high = [](V v) HWY_ATTR { return hn::ShiftRight<16>(v); };
+  return hn::Add(sum, hn::Add(hn::Mul(low(a), low(b)), hn::Mul(high(a), high(b))));
+#endif
+}
+
+// A panel of points: x = mean + step (U q), written to the component arrays of each frame. u:
+// [groups][32c][4] bytes.
+template <int kComponents, int kFrames>
+HWY_INLINE void PointPanel(const std::uint8_t* HWY_RESTRICT u, std::size_t groups, const TileStep* steps,
+                           const float* mean, std::size_t first, std::size_t padded, const PointsView* outs) {
   const hn::ScalableTag<float> d;
+  const hn::Rebind<std::int32_t, decltype(d)> di;
+  using V = hn::Vec<decltype(di)>;
   const std::size_t lanes = hn::Lanes(d);
   constexpr std::size_t kRows = kPanelPoints * kComponents;
-  constexpr int kVectors = VectorsAtOnce<kRows, kFrames>();
+  constexpr int kVectors = VectorsAtOnce < kRows, kFrames, kManyRegisters ? 12 : 6 > ();
+  const auto* numbers = reinterpret_cast<const std::int32_t*>(u);
+  const V mask = hn::Set(di, 0x00ff00ff);
   for (std::size_t row = 0; row < kRows; row += kVectors * lanes) {
-    hn::Vec<decltype(d)> sum[kFrames][kVectors];
-    SumColumns<kRows>(panel + row, columns, z, z_stride, sum);
+    V sum[kFrames][kVectors];
+#pragma GCC unroll 8
+    for (int f = 0; f < kFrames; ++f) {
+#pragma GCC unroll 24
+      for (int v = 0; v < kVectors; ++v) sum[f][v] = hn::Set(di, -steps[f].bias);
+    }
+    for (std::size_t g = 0; g < groups; ++g) {
+      V q0[kFrames], q1[kFrames];
+#pragma GCC unroll 8
+      for (int f = 0; f < kFrames; ++f) {
+        std::int32_t pairs[2];
+        std::memcpy(pairs, steps[f].q + 4 * g, sizeof(pairs));
+        q0[f] = hn::Set(di, pairs[0]);
+        q1[f] = hn::Set(di, pairs[1]);
+      }
+#pragma GCC unroll 24
+      for (int v = 0; v < kVectors; ++v) {
+        const V bytes = hn::Load(di, numbers + g * kRows + row + static_cast<std::size_t>(v) * lanes);
+        const V even = hn::And(bytes, mask);
+        const V odd = hn::And(hn::ShiftRight<8>(bytes), mask);
+#pragma GCC unroll 8
+        for (int f = 0; f < kFrames; ++f) sum[f][v] = AddPairs(odd, q1[f], AddPairs(even, q0[f], sum[f][v]));
+      }
+    }
     for (int f = 0; f < kFrames; ++f) {
       float* const components[3] = {outs[f].x, outs[f].y, outs[f].z};
+      const auto step = hn::Set(d, steps[f].step);
 #pragma GCC unroll 24
       for (int v = 0; v < kVectors; ++v) {
         const std::size_t at = row + static_cast<std::size_t>(v) * lanes;
         const std::size_t point = first + at % kPanelPoints;
         if (point >= padded) continue;
-        hn::Store(hn::Add(hn::Load(d, mean + at), sum[f][v]), d, components[at / kPanelPoints] + point);
+        hn::Store(Fma(hn::ConvertTo(d, sum[f][v]), step, hn::Load(d, mean + at)), d,
+                  components[at / kPanelPoints] + point);
       }
     }
   }
 }
 
-void VPanels(const std::uint16_t* panel, std::size_t columns, const float* w, std::size_t frames, const float* scale,
-             float* z, std::size_t z_stride) {
-  std::size_t f = 0;
-  for (; f + kBlockFrames <= frames; f += kBlockFrames) {
-    VPanel<kBlockFrames>(panel, columns, w + f * columns, columns, scale, z + f * z_stride, z_stride);
-  }
-  for (; f < frames; ++f) VPanel<1>(panel, columns, w + f * columns, columns, scale, z + f * z_stride, z_stride);
-}
-
 template <int kComponents>
-HWY_INLINE void TilePanels(const std::uint16_t* panels, std::size_t count, std::size_t columns, const float* z,
-                           std::size_t z_stride, std::size_t frames, const float* mean, std::size_t first, const PointsView* outs) {
+HWY_INLINE void TilePanels(const std::uint8_t* u, std::size_t count, std::size_t groups,
+                           const TileStep* steps, std::size_t frames, const float* mean, std::size_t first,
+                           const PointsView* outs) {
   const std::size_t padded = PaddedCount(outs[0].count);
   constexpr std::size_t kRows = kPanelPoints * kComponents;
   for (std::size_t p = 0; p < count; ++p) {
-    std::size_t f = 0;
-    for (; f + kBlockFrames <= frames; f += kBlockFrames) {
-      PointPanel<kComponents, kBlockFrames>(panels, columns, z + f * z_stride, z_stride, mean, first, padded, outs + f);
+    if (frames == kBlockFrames) {
+      PointPanel<kComponents, kBlockFrames>(u, groups, steps, mean, first, padded, outs);
+    } else {
+      for (std::size_t f = 0; f < frames; ++f)
+        PointPanel<kComponents, 1>(u, groups, steps + f, mean, first, padded, outs + f);
     }
-    for (; f < frames; ++f) {
-      PointPanel<kComponents, 1>(panels, columns, z + f * z_stride, z_stride, mean, first, padded, outs + f);
-    }
-    panels += columns * kRows;
+    u += 4 * groups * kRows;
     mean += kRows;
     first += kPanelPoints;
   }
 }
 
-void TilePanels3(const std::uint16_t* panels, std::size_t count, std::size_t columns, const float* z, std::size_t z_stride,
+void TilePanels3(const std::uint8_t* u, std::size_t count, std::size_t groups, const TileStep* steps,
                  std::size_t frames, const float* mean, std::size_t first, const PointsView* outs) {
-  TilePanels<3>(panels, count, columns, z, z_stride, frames, mean, first, outs);
+  TilePanels<3>(u, count, groups, steps, frames, mean, first, outs);
 }
-void TilePanels1(const std::uint16_t* panels, std::size_t count, std::size_t columns, const float* z, std::size_t z_stride,
+void TilePanels1(const std::uint8_t* u, std::size_t count, std::size_t groups, const TileStep* steps,
                  std::size_t frames, const float* mean, std::size_t first, const PointsView* outs) {
-  TilePanels<1>(panels, count, columns, z, z_stride, frames, mean, first, outs);
+  TilePanels<1>(u, count, groups, steps, frames, mean, first, outs);
 }
 
-void DensePanels(const float* panels, std::size_t columns, const float* w, int components, const float* mean, const PointsView& out) {
-  const std::size_t rows = kPanelPoints * static_cast<std::size_t>(components), padded = PaddedCount(out.count);
+template <int kComponents>
+HWY_INLINE void DensePanel(const float* panel, std::size_t columns, const float* y, const float* mean,
+                           std::size_t first, std::size_t padded, const PointsView& out) {
+  const hn::ScalableTag<float> d;
+  const std::size_t lanes = hn::Lanes(d);
+  constexpr std::size_t kRows = kPanelPoints * kComponents;
+  constexpr int kVectors = VectorsAtOnce < kRows, 1, kManyRegisters ? 24 : 12 > ();
+  float* const components[3] = {out.x, out.y, out.z};
+  for (std::size_t row = 0; row < kRows; row += kVectors * lanes) {
+    hn::Vec<decltype(d)> sum[kVectors];
+#pragma GCC unroll 24
+    for (int v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
+    for (std::size_t k = 0; k < columns; ++k) {
+      const auto factor = hn::Set(d, y[k]);
+#pragma GCC unroll 24
+      for (int v = 0; v < kVectors; ++v) {
+        sum[v] =
+            Fma(hn::Load(d, panel + k * kRows + row + static_cast<std::size_t>(v) * lanes), factor, sum[v]);
+      }
+    }
+#pragma GCC unroll 24
+    for (int v = 0; v < kVectors; ++v) {
+      const std::size_t at = row + static_cast<std::size_t>(v) * lanes;
+      const std::size_t point = first + at % kPanelPoints;
+      if (point < padded)
+        hn::Store(hn::Add(hn::Load(d, mean + at), sum[v]), d, components[at / kPanelPoints] + point);
+    }
+  }
+}
+
+void DensePanels(const float* panels, std::size_t columns, const float* y, int components, const float* mean,
+                 const PointsView& out) {
+  const std::size_t rows = kPanelPoints * static_cast<std::size_t>(components),
+                    padded = PaddedCount(out.count);
   for (std::size_t first = 0; first < out.count; first += kPanelPoints) {
     if (components == 3) {
-      PointPanel<3, 1>(panels, columns, w, 0, mean, first, padded, &out);
+      DensePanel<3>(panels, columns, y, mean, first, padded, out);
     } else {
-      PointPanel<1, 1>(panels, columns, w, 0, mean, first, padded, &out);
+      DensePanel<1>(panels, columns, y, mean, first, padded, out);
     }
     panels += columns * rows;
     mean += rows;
@@ -160,14 +269,14 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 
 #include "base/check.h"
+#include "kpsa/rigid_points.h"
 
 namespace kpsa {
 
-HWY_EXPORT(VPanels);
+HWY_EXPORT(Inputs);
+HWY_EXPORT(QuantizeInputs);
 HWY_EXPORT(TilePanels3);
 HWY_EXPORT(TilePanels1);
 HWY_EXPORT(DensePanels);
@@ -178,117 +287,124 @@ std::size_t Panels(std::size_t points) { return (points + kPanelPoints - 1) / kP
 std::size_t TilePanelCount(std::size_t points, std::size_t tile) {
   return Panels(std::min(kTilePoints, points - tile * kTilePoints));
 }
-bool IsPowerOfTwo(float value) {
-  int exponent;
-  return std::isfinite(value) && value > 0 && std::frexp(value, &exponent) == 0.5f;
-}
+std::size_t Padded16(std::size_t count) { return (count + 15) / 16 * 16; }
+// Four byte columns each.
+std::size_t Groups(std::size_t rank, std::size_t wide) { return (rank + wide + 3) / 4; }
 
 }  // namespace
 
 Result<TileMap> TileMap::Make(TileData data, const std::string& what) {
   TileMap map;
   const std::size_t tiles = (data.points + kTilePoints - 1) / kTilePoints;
-  if (data.components != 1 && data.components != 3) return Status::Invalid("{}: {} components, expected 1 or 3", what, data.components);
+  if (data.components != 1 && data.components != 3)
+    return Status::Invalid("{}: {} components, expected 1 or 3", what, data.components);
   const std::size_t rows = kPanelPoints * static_cast<std::size_t>(data.components);
-  if (data.ranks.size() != tiles || data.direct.size() != tiles) {
-    return Status::Invalid("{}: {} ranks and {} flags for {} tiles", what, data.ranks.size(), data.direct.size(), tiles);
+  if (data.ranks.size() != tiles || data.wide.size() != tiles || data.counts.size() != tiles ||
+      data.direct.size() != tiles) {
+    return Status::Invalid("{}: {} ranks, {} wide, {} counts and {} flags for {} tiles", what,
+                           data.ranks.size(), data.wide.size(), data.counts.size(), data.direct.size(),
+                           tiles);
   }
-  std::size_t v_rows = 0, direct_rows = 0, u_size = 0;
+  std::size_t columns = 0, v_size = 0, u_size = 0, scales = 0;
   for (std::size_t t = 0; t < tiles; ++t) {
-    const std::size_t rank = data.ranks[t];
-    if (rank > data.inputs || data.direct[t] > 1 || (data.direct[t] == 1 && rank != data.inputs)) {
-      return Status::Invalid("{}: tile {} has rank {}, expected at most {}", what, t, rank, data.inputs);
+    const std::size_t rank = data.ranks[t], wide = data.wide[t], count = data.counts[t];
+    if (rank > count || rank > kMaxTileRank || count > data.inputs || wide > rank || data.direct[t] > 1 ||
+        (data.direct[t] == 1 && rank != count)) {
+      return Status::Invalid("{}: tile {} has rank {} ({} wide) of {} cues, expected at most {}", what, t,
+                             rank, wide, count, std::min(data.inputs, kMaxTileRank));
     }
-    map.v_begin_.push_back(v_rows);
-    map.z_begin_.push_back(data.direct[t] == 1 ? direct_rows : v_rows);
+    map.column_begin_.push_back(columns);
+    map.scale_begin_.push_back(scales);
+    map.v_begin_.push_back(v_size);
     map.u_begin_.push_back(u_size);
-    (data.direct[t] == 1 ? direct_rows : v_rows) += rank;
-    u_size += TilePanelCount(data.points, t) * rank * rows;
+    columns += count;
+    scales += Padded16(rank);
+    v_size += data.direct[t] == 1 ? 0 : count * Padded16(rank);
+    u_size += TilePanelCount(data.points, t) * Groups(rank, wide) * 4 * rows;
   }
-  const std::size_t v_panels = (v_rows + kVPanelRows - 1) / kVPanelRows;
-  map.v_rows_ = v_panels * kVPanelRows;
-  map.z_count_ = map.v_rows_ + direct_rows;
-  for (std::size_t t = 0; t < tiles; ++t) {
-    if (data.direct[t] == 1) map.z_begin_[t] += map.v_rows_;
+  if (data.columns.size() != columns || data.scale.size() != scales || data.v.size() != v_size ||
+      data.u.size() != u_size || data.mean.size() != Panels(data.points) * rows) {
+    return Status::Invalid("{}: arrays of {}, {}, {}, {}, {} values, expected {}, {}, {}, {}, {}", what,
+                           data.columns.size(), data.scale.size(), data.v.size(), data.u.size(),
+                           data.mean.size(), columns, scales, v_size, u_size, Panels(data.points) * rows);
   }
-  if (data.v.size() != map.v_rows_ * data.inputs || data.u.size() != u_size ||
-      data.mean.size() != Panels(data.points) * rows || data.scale.size() != map.z_count_) {
-    return Status::Invalid("{}: arrays of {}, {}, {}, {} values, expected {}, {}, {}, {}", what, data.v.size(), data.u.size(),
-                           data.mean.size(), data.scale.size(), map.v_rows_ * data.inputs, u_size,
-                           Panels(data.points) * rows, map.z_count_);
-  }
-  for (const float scale : data.scale.span()) {
-    if (!IsPowerOfTwo(scale)) return Status::Invalid("{}: a scale is {}, expected a power of two", what, scale);
+  for (const std::uint32_t column : data.columns) {
+    if (column >= data.inputs)
+      return Status::Invalid("{}: a tile reads cue row {} of {}", what, column, data.inputs);
   }
   map.data_ = std::move(data);
   return map;
 }
 
 std::size_t TileMap::bytes() const {
-  return 2 * (data_.v.size() + data_.u.size()) + 4 * (data_.mean.size() + data_.scale.size());
+  return data_.u.size() + 2 * data_.v.size() +
+         4 * (data_.scale.size() + data_.columns.size() + data_.mean.size());
 }
-double TileMap::numbers_per_point() const {
-  return data_.points == 0 ? 0 : static_cast<double>(data_.v.size() + data_.u.size()) / static_cast<double>(data_.points);
+double TileMap::bytes_per_point() const {
+  return data_.points == 0 ? 0 : static_cast<double>(bytes()) / static_cast<double>(data_.points);
 }
 double TileMap::mean_rank() const {
   double sum = 0;
   for (const std::uint32_t rank : data_.ranks) sum += rank;
   return data_.ranks.empty() ? 0 : sum / static_cast<double>(data_.ranks.size());
 }
-std::size_t TileMap::scratch_floats(std::size_t frames) const { return frames * ((z_count_ + 15) / 16 * 16); }
-
-void TileMap::Run(const float* w, std::size_t frames, const Index* tiles, std::size_t tile_count, float* scratch,
-                  const PointsView* outs) const {
-  const std::size_t z_stride = (z_count_ + 15) / 16 * 16, inputs = data_.inputs;
-  const std::size_t rows = kPanelPoints * static_cast<std::size_t>(data_.components);
-  const auto v_panels = HWY_DYNAMIC_DISPATCH(VPanels);
-  const auto tile_panels = data_.components == 3 ? HWY_DYNAMIC_DISPATCH(TilePanels3) : HWY_DYNAMIC_DISPATCH(TilePanels1);
-
-  // First all of z, so that V and U are each read front to back
-  std::size_t next_panel = 0;
-  for (std::size_t i = 0; i < tile_count; ++i) {
-    const std::size_t tile = tiles == nullptr ? i : tiles[i];
-    const std::size_t rank = data_.ranks[tile];
-    if (rank == 0) continue;
-    if (data_.direct[tile] == 1) {
-      for (std::size_t f = 0; f < frames; ++f) {
-        const float* scale = data_.scale.data() + z_begin_[tile];
-        float* z = scratch + f * z_stride + z_begin_[tile];
-        for (std::size_t k = 0; k < rank; ++k) z[k] = w[f * inputs + k] * scale[k];
-      }
-      continue;
-    }
-    const std::size_t last = (v_begin_[tile] + rank - 1) / kVPanelRows;
-    for (std::size_t panel = std::max(next_panel, v_begin_[tile] / kVPanelRows); panel <= last; ++panel) {
-      v_panels(data_.v.data() + panel * inputs * kVPanelRows, inputs, w, frames, data_.scale.data() + panel * kVPanelRows,
-               scratch + panel * kVPanelRows, z_stride);
-      next_panel = panel + 1;
-    }
-  }
-  for (std::size_t i = 0; i < tile_count; ++i) {
-    const std::size_t tile = tiles == nullptr ? i : tiles[i];
-    tile_panels(data_.u.data() + u_begin_[tile], TilePanelCount(data_.points, tile), data_.ranks[tile], scratch + z_begin_[tile],
-                z_stride, frames, data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows, tile * kTilePoints, outs);
-  }
+double TileMap::mean_cues() const {
+  return data_.ranks.empty()
+             ? 0
+             : static_cast<double>(data_.columns.size()) / static_cast<double>(data_.ranks.size());
 }
 
-void TileMap::Reconstruct(std::span<const float> w, std::span<float> scratch, PointsView out) const {
-  ReconstructBlock(w, {&out, 1}, {}, scratch);
+void TileMap::Reconstruct(std::span<const float> y, PointsView out, const Matrix4* space) const {
+  ReconstructBlock(y, {&out, 1}, {}, {space, space == nullptr ? 0u : 1u});
 }
 
-void TileMap::ReconstructTiles(std::span<const float> w, std::span<const Index> tiles, std::span<float> scratch, PointsView out) const {
-  if (!tiles.empty()) ReconstructBlock(w, {&out, 1}, tiles, scratch);
+void TileMap::ReconstructTiles(std::span<const float> y, std::span<const Index> tiles, PointsView out,
+                               const Matrix4* space) const {
+  if (!tiles.empty()) ReconstructBlock(y, {&out, 1}, tiles, {space, space == nullptr ? 0u : 1u});
 }
 
-void TileMap::ReconstructBlock(std::span<const float> w, std::span<const PointsView> outs, std::span<const Index> tiles,
-                               std::span<float> scratch) const {
+void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
+                               std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
   if (outs.empty()) return;
-  KPSA_CHECK_LE(outs.size() * data_.inputs, w.size());
-  KPSA_CHECK_LE(scratch_floats(outs.size()), scratch.size());
+  KPSA_CHECK_LE(outs.size() * data_.inputs, y.size());
   for (const PointsView& out : outs) KPSA_CHECK_EQ(out.count, data_.points);
-  for (std::size_t i = 0; i < tiles.size(); ++i) KPSA_CHECK(tiles[i] < this->tiles() && (i == 0 || tiles[i - 1] < tiles[i]));
-  Run(w.data(), outs.size(), tiles.empty() ? nullptr : tiles.data(), tiles.empty() ? this->tiles() : tiles.size(),
-      scratch.data(), outs.data());
+  KPSA_CHECK(spaces.empty() || (spaces.size() == outs.size() && data_.components == 3));
+  for (std::size_t i = 0; i < tiles.size(); ++i)
+    KPSA_CHECK(tiles[i] < this->tiles() && (i == 0 || tiles[i - 1] < tiles[i]));
+  const std::size_t rows = kPanelPoints * static_cast<std::size_t>(data_.components);
+  const auto inputs = HWY_DYNAMIC_DISPATCH(Inputs);
+  const auto quantize = HWY_DYNAMIC_DISPATCH(QuantizeInputs);
+  const auto tile_panels =
+      data_.components == 3 ? HWY_DYNAMIC_DISPATCH(TilePanels3) : HWY_DYNAMIC_DISPATCH(TilePanels1);
+  const std::size_t count = tiles.empty() ? this->tiles() : tiles.size();
+  TileStep steps[kBlockFrames];
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t tile = tiles.empty() ? i : tiles[i], rank = data_.ranks[tile], wide = data_.wide[tile];
+    const float* scale = data_.scale.data() + scale_begin_[tile];
+    const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
+    for (std::size_t first = 0; first < outs.size(); first += kBlockFrames) {
+      const std::size_t frames = std::min(kBlockFrames, outs.size() - first);
+      for (std::size_t f = 0; f < frames; ++f) {
+        const float* frame = y.data() + (first + f) * data_.inputs;
+        if (data_.direct[tile] == 1) {
+          for (std::size_t k = 0; k < rank; ++k) steps[f].t[k] = frame[columns[k]] * scale[k];
+        } else {
+          inputs(data_.v.data() + v_begin_[tile], scale, Padded16(rank), columns, data_.counts[tile], frame,
+                 steps[f].t);
+        }
+        quantize(wide, rank, steps[f].t, &steps[f]);
+      }
+      tile_panels(data_.u.data() + u_begin_[tile], TilePanelCount(data_.points, tile), Groups(rank, wide),
+                  steps, frames, data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows,
+                  tile * kTilePoints, outs.data() + first);
+      for (std::size_t f = first; f < first + frames && !spaces.empty(); ++f) {
+        const std::size_t begin = tile * kTilePoints;
+        const PointsView& out = outs[f];
+        TransformPoints(spaces[f], {out.x + begin, out.y + begin, out.z + begin,
+                                    std::min(kTilePoints, out.count - begin)});
+      }
+    }
+  }
 }
 
 DenseMap::DenseMap(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components)
@@ -306,16 +422,17 @@ DenseMap::DenseMap(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
       const std::size_t at = x * kPanelPoints + i % kPanelPoints;
       mean_.data()[panel * rows + at] = static_cast<float>(mean[row]);
       for (std::size_t k = 0; k < inputs_; ++k) {
-        matrix_.data()[(panel * inputs_ + k) * rows + at] = static_cast<float>(gain(row, static_cast<Eigen::Index>(k)));
+        matrix_.data()[(panel * inputs_ + k) * rows + at] =
+            static_cast<float>(gain(row, static_cast<Eigen::Index>(k)));
       }
     }
   }
 }
 
-void DenseMap::Reconstruct(std::span<const float> w, PointsView out) const {
+void DenseMap::Reconstruct(std::span<const float> y, PointsView out) const {
   KPSA_CHECK_EQ(out.count, points_);
-  KPSA_CHECK_LE(inputs_, w.size());
-  HWY_DYNAMIC_DISPATCH(DensePanels)(matrix_.data(), inputs_, w.data(), components_, mean_.data(), out);
+  KPSA_CHECK_LE(inputs_, y.size());
+  HWY_DYNAMIC_DISPATCH(DensePanels)(matrix_.data(), inputs_, y.data(), components_, mean_.data(), out);
 }
 
 }  // namespace kpsa

@@ -1,111 +1,118 @@
-// Reconstruction at run time: x = mean + U (V w), tile by tile, in half precision with float32 accumulation.
-// Glossary: w the r whitened measurements (unit covariance: Estimator::whitening * y), a tile 128 points in the order
-// given, k its rank, P panels of 32 points, c components (3 or 1).
+// Reconstruction at run time: x = mean + U (V y_J), tile by tile, with float32 accumulation. Glossary: y the
+// r normalised measurements (kpsa/cue_selection.h), a tile 128 points in the order given, J the cues that the
+// tile reads, k its rank, P panels of 32 points, c components (3 or 1).
 //
-// The map B W^-1 [cN x r] of each tile is factored by a truncated SVD in output units: the rank is the smallest that
-// leaves the tile's expected RMS below a budget (w has unit covariance, so singular values are RMS errors). Where the
-// factors are no smaller than the product, the product is stored (a "direct" tile).
+// The estimator's map B [cN x r] is dense, but the points of a tile hardly depend on most cues. For each tile
+// the few cues J are chosen that predict what B says (greedy, by the fall of the expected squared error under
+// the covariance of y), the best linear map from those is computed anew, and factored by a truncated SVD in
+// output units. Budgets: the RMS that this may add under the covariance of y, and the largest error that it
+// may add in sample poses: covariances say little about controls that move rarely, but far, so poses with too
+// large an error are given weight until they fit. Where the factors are no smaller than their product, that
+// is stored (a "direct" tile).
 //
-// Layout: panels of 32c rows; a panel holds its columns one after the other, 32c halfs each (x of 32 points, y, z), so
-// a tile is read front to back, in whole cache lines. Rows of V of all tiles form panels of 96 rows. A
-// power-of-two scale a column keeps halfs in range and is folded into z = V w exactly.
+// The bytes that are read, and their conversions, bound the speed. So U is stored in bytes, and summed in
+// integers: column k of U is a scale and whole numbers in [-127, 127], or in [-32639, 32639] where the budget
+// sees the rounding (a "wide" column, stored as two: high and low bytes). The inputs z of the bytes are
+// rounded to 16 bits with a step that follows from the largest of them in this frame, and the sums are exact.
+// V is stored in halfs. Layout of U: panels of 32c rows (32 points' x, then y, z), groups of four byte
+// columns, and the four bytes of a row together, each 128 too large. Everything is read front to back, tile
+// after tile.
 //
-// Every value is one chain of fused multiply-adds in the order of the columns: single frames, blocks of frames, all
-// tiles or a list, and every SIMD target give the same bits. Allocates nothing; const functions may run on any thread.
+// All floating-point values are computed in a fixed order: single frames, blocks of frames, all tiles or a
+// list, and every SIMD target give the same bits. Allocates nothing; const functions may run on any thread. A
+// NaN or an infinity in a cue that a tile reads spoils the points of the tile.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
 #include "base/points.h"
 #include "base/status.h"
+#include "base/types.h"
+#include "kpsa/aligned_array.h"
 
 namespace kpsa {
 
 inline constexpr std::size_t kTilePoints = 128;
 inline constexpr std::size_t kPanelPoints = 32;
+inline constexpr std::size_t kMaxTileRank = 256;
 inline constexpr std::size_t kBlockFrames = 4;  // frames that the kernel takes at a time
-
-// 64-byte aligned storage of halfs or floats.
-template <typename T>
-class AlignedArray {
- public:
-  AlignedArray() = default;
-  explicit AlignedArray(std::size_t size) : floats_((size * sizeof(T) + 3) / 4), size_(size) {}
-  T* data() { return reinterpret_cast<T*>(floats_.data()); }
-  const T* data() const { return reinterpret_cast<const T*>(floats_.data()); }
-  std::size_t size() const { return size_; }
-  std::span<const T> span() const { return {data(), size_}; }
-  std::span<T> span() { return {data(), size_}; }
-
- private:
-  AlignedFloats floats_;
-  std::size_t size_ = 0;
-};
 
 // The stored form of one output (one mesh). Plain arrays, as in the subspace file.
 struct TileData {
-  std::size_t points = 0;             // N
-  int components = 3;                 // c
-  std::size_t inputs = 0;             // r
-  std::vector<std::uint32_t> ranks;   // [tiles] k, 1..r (0 for a tile that never moves)
-  std::vector<std::uint8_t> direct;   // [tiles] 1: U is the product itself, z = w
-  AlignedArray<std::uint16_t> v;      // [v panels][r][96] halfs: rows of V of all tiles that are not direct
-  AlignedArray<std::uint16_t> u;      // [tile][panel][k][32c] halfs
-  AlignedArray<float> mean;           // [panels][32c]
-  AlignedArray<float> scale;          // [z] a power of two for every entry of z
+  std::size_t points = 0;            // N
+  int components = 3;                // c
+  std::size_t inputs = 0;            // r
+  std::vector<std::uint32_t> ranks;  // [tiles] k, at most kMaxTileRank (0 for a tile that never moves)
+  std::vector<std::uint32_t> wide;  // [tiles] columns of U with two bytes a number, the first ones; at most k
+  std::vector<std::uint32_t> counts;  // [tiles] |J|, at most r
+  std::vector<std::uint8_t>
+      direct;  // [tiles] 1: U is the product itself, k = |J|, z = scale y_J entry by entry
+  std::vector<std::uint32_t>
+      columns;                // [sum of counts] J of each tile, in the order of V's (direct: of U's) columns
+  AlignedArray<float> scale;  // [tile][k16], k16 = k to the next multiple of 16: z = scale V y_J
+  AlignedArray<std::uint16_t> v;  // [tile][|J|][k16] halfs; nothing for direct tiles
+  AlignedArray<std::uint8_t> u;   // [tile][panel][(k + wide) / 4, rounded up][32c][4] U + 128: high bytes of
+                                 // the wide columns, their low bytes, the other columns
+  AlignedArray<float> mean;  // [panels][32c]
 };
 
 class TileMap {
  public:
   TileMap() = default;
-  // Checks all sizes, ranks and scales; errors name `what`.
+  // Checks all sizes, ranks and columns; errors name `what`.
   static Result<TileMap> Make(TileData data, const std::string& what);
 
   const TileData& data() const { return data_; }
   std::size_t points() const { return data_.points; }
   std::size_t inputs() const { return data_.inputs; }
   std::size_t tiles() const { return data_.ranks.size(); }
-  std::size_t bytes() const;         // read for one frame
-  double numbers_per_point() const;  // halfs of U and V
+  std::size_t bytes() const;  // read for one frame
+  double bytes_per_point() const;
   double mean_rank() const;
+  double mean_cues() const;  // |J|
 
-  // Floats of scratch that `frames` frames need (any float buffer; 64-byte alignment is faster).
-  std::size_t scratch_floats(std::size_t frames = 1) const;
-
-  // w [r] -> all points.
-  void Reconstruct(std::span<const float> w, std::span<float> scratch, PointsView out) const;
+  // y [r] -> all points, in the space of the mean, or through `space`: a tile at a time, as long as it is in
+  // the cache.
+  void Reconstruct(std::span<const float> y, PointsView out, const Matrix4* space = nullptr) const;
   // Only the tiles listed (ascending, none twice); other points are not touched.
-  void ReconstructTiles(std::span<const float> w, std::span<const Index> tiles, std::span<float> scratch, PointsView out) const;
-  // Frames: w [frames x r] row-major, one output each. `tiles` empty: all.
-  void ReconstructBlock(std::span<const float> w, std::span<const PointsView> outs, std::span<const Index> tiles,
-                        std::span<float> scratch) const;
+  void ReconstructTiles(std::span<const float> y, std::span<const Index> tiles, PointsView out,
+                        const Matrix4* space = nullptr) const;
+  // Frames: y [frames x r] row-major, one output each, and one space each or none. `tiles` empty: all.
+  void ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
+                        std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
 
  private:
-  void Run(const float* w, std::size_t frames, const Index* tiles, std::size_t tile_count, float* scratch,
-           const PointsView* outs) const;
-
   TileData data_;
-  std::vector<std::size_t> z_begin_;  // [tiles] first entry of z
-  std::vector<std::size_t> v_begin_;  // [tiles] first row among the V panels (not direct)
-  std::vector<std::size_t> u_begin_;  // [tiles] first half of U
-  std::size_t v_rows_ = 0, z_count_ = 0;
+  std::vector<std::size_t> column_begin_;  // [tiles] first of columns
+  std::vector<std::size_t> scale_begin_;   // [tiles] first of scale
+  std::vector<std::size_t> v_begin_;       // [tiles] first half of V
+  std::vector<std::size_t> u_begin_;       // [tiles] first byte of U
 };
 
 struct TileOptions {
   double rms_budget = 0;  // expected RMS point error that a tile may add, scene units; > 0
+  double max_budget =
+      std::numeric_limits<double>::infinity();  // largest point error that it may add in the samples
 };
-// What the factors cost in accuracy, under the model's covariance; scene units. Where half precision cannot keep the
-// budget, worst_tile_rms exceeds it.
+// What is known of y.
+struct TileInputs {
+  Eigen::MatrixXd covariance;  // [r x r]; empty: the identity
+  Eigen::MatrixXd samples;     // [r x S] y of some poses, for max_budget; may be empty
+};
+// What the tiles cost in accuracy; scene units. Where precision or the number of attempts do not allow the
+// budgets, these exceed them.
 struct TileReport {
-  double rms = 0, worst_tile_rms = 0;
+  double rms = 0, worst_tile_rms = 0;  // expected
+  double largest = 0;                  // in the samples
   std::size_t direct_tiles = 0;
 };
-// gain: B W^-1 [cN x r] for whitened measurements; mean [cN] interleaved. Rows of one output.
-TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components, const TileOptions& options,
-                   TileReport* report = nullptr);
+// gain: B [cN x r]; mean [cN] interleaved. Rows of one output.
+TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components,
+                   const TileInputs& inputs, const TileOptions& options, TileReport* report = nullptr);
 
 // The dense float32 twin: the reference, and the choice where half precision or rank does not pay.
 class DenseMap {
@@ -115,7 +122,7 @@ class DenseMap {
   std::size_t points() const { return points_; }
   std::size_t inputs() const { return inputs_; }
   std::size_t bytes() const { return (matrix_.size() + mean_.size()) * sizeof(float); }
-  void Reconstruct(std::span<const float> w, PointsView out) const;
+  void Reconstruct(std::span<const float> y, PointsView out) const;
 
  private:
   std::size_t points_ = 0, inputs_ = 0;

@@ -13,22 +13,26 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kProbePoints = 20;    // of a stage, to see what a cue there would drag in
-constexpr double kMaxPointsPerCue = 1.5;    // points of a step that a local cue may cost
-constexpr double kTileShare = 0.01;          // of the tolerance: RMS error that tiles and half precision may add
+constexpr std::size_t kProbePoints = 20;  // of a stage, to see what a cue there would drag in
+constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
+constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that tiles and half precision may add
+constexpr double kTileMaxShare = 0.45;    // of the tolerance: the largest error that they may add
+constexpr double kStillTurn = 5e-4;          // a turn (radians) and a shift (of the tolerance) of a joint that are none
+constexpr double kStillShare = 0.1;
 constexpr std::size_t kGroupPoints = 400;    // where the trainer looks which controls act together
 constexpr double kGroupShare = 0.2;          // of a control's largest displacement: it acts on a point
 constexpr std::size_t kGroupSize = 8;        // controls that move a point most
 constexpr std::size_t kSelectionRounds = 4;  // shares of the cues, each chosen for what the last ones left
 constexpr std::size_t kErrorPoses = 800;     // training poses that say where errors are left
 constexpr double kErrorPower = 3;            // of a point's largest error in its weight
-constexpr double kMinMotion = 1e-3;         // of the largest: points that move less are no cues
+constexpr double kMinMotion = 1e-3;          // of the largest: points that move less are no cues
 
 // Count of indices, evenly spread.
 std::vector<Index> Spread(std::size_t total, std::size_t count) {
   std::vector<Index> points;
   count = std::min(count, total);
-  for (std::size_t i = 0; i < count; ++i) points.push_back(static_cast<Index>((2 * i + 1) * total / (2 * count)));
+  for (std::size_t i = 0; i < count; ++i)
+    points.push_back(static_cast<Index>((2 * i + 1) * total / (2 * count)));
   points.erase(std::unique(points.begin(), points.end()), points.end());
   return points;
 }
@@ -69,12 +73,14 @@ class Trainer {
 
  private:
   Status Say(const char* what, double share) {
-    if (options_.progress && !options_.progress(what, share)) return Status::Make(ErrorKind::kInterrupted, "interrupted");
+    if (options_.progress && !options_.progress(what, share))
+      return Status::Make(ErrorKind::kInterrupted, "interrupted");
     return Status();
   }
 
   // The latest stage at which a cue point costs little more than itself, and candidate points there.
-  Result<CandidateStage> ChooseStage(const AccelerationTarget::MeshPoints& mesh, Index total, std::size_t budget) {
+  Result<CandidateStage> ChooseStage(const AccelerationTarget::MeshPoints& mesh, Index total,
+                                     std::size_t budget) {
     CandidateStage chosen;
     for (std::size_t stage = mesh.stages.size(); stage-- > 0;) {
       Request request;
@@ -115,7 +121,8 @@ class Trainer {
         candidates.push_back({rig_.target.meshes[m].stages.size() - 1, {}});
         continue;
       }
-      const std::size_t budget = std::max<std::size_t>(1, options_.max_candidates * totals[m] / std::max<std::size_t>(1, all));
+      const std::size_t budget =
+          std::max<std::size_t>(1, options_.max_candidates * totals[m] / std::max<std::size_t>(1, all));
       Result<CandidateStage> stage = ChooseStage(rig_.target.meshes[m], totals[m], budget);
       if (!stage.ok()) return stage.status();
       candidates.push_back(std::move(*stage));
@@ -129,14 +136,17 @@ class Trainer {
       for (const ControlRange& control : rig_.controls) {
         if (clip < 0 || !control.by_clip) varying.push_back(control.plug);
       }
-      Result<std::vector<Signal>> found = FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, nullptr, nullptr);
+      Result<std::vector<Signal>> found =
+          FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, nullptr, nullptr);
       if (!found.ok()) return found.status();
       for (Signal& signal : *found) {
-        const bool known = std::any_of(signals.begin(), signals.end(), [&](const Signal& s) { return s.name == signal.name; });
+        const bool known = std::any_of(signals.begin(), signals.end(),
+                                       [&](const Signal& s) { return s.name == signal.name; });
         if (!known) signals.push_back(std::move(signal));
       }
     }
-    std::sort(signals.begin(), signals.end(), [](const Signal& a, const Signal& b) { return a.name < b.name; });
+    std::sort(signals.begin(), signals.end(),
+              [](const Signal& a, const Signal& b) { return a.name < b.name; });
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals));
     Result<PoseLayout> layout = recorder_->Layout();
@@ -162,38 +172,48 @@ class Trainer {
       groups = FindGroups(*poses, first);
     }
     const auto sample = [&](std::size_t count, std::uint64_t seed, PoseMatrix* to) {
-      return recorder_->AddSamples(SamplePoses(rig_.controls, *clip_poses, groups, clips_.size(), count, seed), clips_, to);
+      return recorder_->AddSamples(
+          SamplePoses(rig_.controls, *clip_poses, groups, clips_.size(), count, seed), clips_, to);
     };
     KPSA_RETURN_IF_ERROR(sample(options_.samples, options_.seed, poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
-    if (poses->poses() < 3) return Status::Invalid("{} training poses are too few: name clips or samples to train on", poses->poses());
+    if (poses->poses() < 3)
+      return Status::Invalid("{} training poses are too few: name clips or samples to train on",
+                             poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
     std::size_t calibration = options_.calibration_poses;
-    if (calibration == 0) calibration = static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 100.0, 1000.0));
+    if (calibration == 0)
+      calibration =
+          static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
     KPSA_RETURN_IF_ERROR(sample(calibration, options_.seed ^ 0x5deece66dull, held_out));
     record_.calibration_poses = held_out->poses();
     return Status();
   }
 
-  // Which controls move the same points, from the sweeps: rows [first, first + 2 controls) of the poses. What moves a point by
-  // a good part of what it moves any point acts there.
+  // Which controls move the same points, from the sweeps: rows [first, first + 2 controls) of the poses. What
+  // moves a point by a good part of what it moves any point acts there.
   ControlGroups FindGroups(const PoseMatrix& poses, std::size_t first) const {
     const std::vector<Index> points = Spread(static_cast<Index>(layout_.points), kGroupPoints);
-    std::vector<float> rest(3 * points.size());  // the mean of all sweeps, since most of them leave a point at rest
+    std::vector<float> rest(
+        3 * points.size());  // the mean of all sweeps, since most of them leave a point at rest
     const std::size_t n = rig_.controls.size();
-    const auto at = [&](std::size_t row, std::size_t p, std::size_t k) { return poses.row(row)[3 * points[p] + k]; };
+    const auto at = [&](std::size_t row, std::size_t p, std::size_t k) {
+      return poses.row(row)[3 * points[p] + k];
+    };
     for (std::size_t i = 0; i < rest.size(); ++i) {
       std::vector<float> values;
       for (std::size_t s = 0; s < 2 * n; ++s) values.push_back(at(first + s, i / 3, i % 3));
       std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n), values.end());
       rest[i] = values[n];
     }
-    std::vector<std::vector<std::pair<double, std::size_t>>> movers(points.size());  // by point: displacement, control
+    std::vector<std::vector<std::pair<double, std::size_t>>> movers(
+        points.size());  // by point: displacement, control
     for (std::size_t c = 0; c < n; ++c) {
       std::vector<double> moved(points.size());
       for (std::size_t p = 0; p < points.size(); ++p) {
         for (std::size_t s = first + 2 * c; s < first + 2 * c + 2; ++s) {
-          const Double3 d{at(s, p, 0) - rest[3 * p], at(s, p, 1) - rest[3 * p + 1], at(s, p, 2) - rest[3 * p + 2]};
+          const Double3 d{at(s, p, 0) - rest[3 * p], at(s, p, 1) - rest[3 * p + 1],
+                          at(s, p, 2) - rest[3 * p + 2]};
           moved[p] = std::max(moved[p], Length(d));
         }
       }
@@ -225,7 +245,9 @@ class Trainer {
           lo = std::min<double>(lo, poses.row(t)[column]);
           hi = std::max<double>(hi, poses.row(t)[column]);
         }
-        ranges_.push_back(MakeTrainedRange(EntryName(signal, e), lo, hi, options_.range_margin));
+        // Clips turn joints a little about axes that no control has: what moves no point noticeably is no new pose
+        const double still = !signal.matrix ? 0 : e < 9 ? kStillTurn : kStillShare * options_.tolerance;
+        ranges_.push_back(MakeTrainedRange(EntryName(signal, e), lo - still, hi + still, options_.range_margin));
       }
     }
     return Status();
@@ -247,7 +269,8 @@ class Trainer {
     diagonal_ = Length(hi - lo);
     poses->Subtract(mean);
     PcaOptions pca_options;
-    pca_options.max_modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2) : options_.max_modes;
+    pca_options.max_modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2)
+                                                                   : options_.max_modes;
     pca_options.seed = options_.seed;
     Result<Pca> pca = ComputePca(*poses, mean, pca_options);
     if (!pca.ok()) return pca.status();
@@ -271,20 +294,25 @@ class Trainer {
       for (const CueRef& cue : candidates) {
         if (cue.kind != CueKind::kScalar) points.push_back(cue);
       }
-      // The least expected squared error over all points leaves small regions to chance (a tongue behind teeth): after
-      // each share of the rows, points count by the largest errors that training poses still have there.
+      // The least expected squared error over all points leaves small regions to chance (a tongue behind
+      // teeth): after each share of the rows, points count by the largest errors that training poses still
+      // have there.
       std::vector<double> weights;
       for (std::size_t round = 1; round <= kSelectionRounds; ++round) {
         CueSelectionOptions selection;
         selection.fixed = chosen;
         selection.count = options_.rows;
-        selection.max_cost = static_cast<double>(options_.rows * round) / static_cast<double>(kSelectionRounds);
-        selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) { return cue.kind == CueKind::kScalar ? 1.0 : 3.0; };
+        selection.max_cost =
+            static_cast<double>(options_.rows * round) / static_cast<double>(kSelectionRounds);
+        selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) {
+          return cue.kind == CueKind::kScalar ? 1.0 : 3.0;
+        };
         selection.point_weights = weights;
         chosen = SelectCues(pca_, candidates, positions_, diagonal_, selection).cues;
         if (round == kSelectionRounds || chosen.empty()) break;
         const CueSet cues = MakeCueSet(pca_, chosen, diagonal_);
-        weights = LargestPointErrors(pca_, cues, MapEstimator(pca_, cues), poses, std::max<std::size_t>(1, poses.poses() / kErrorPoses));
+        weights = LargestPointErrors(pca_, cues, MapEstimator(pca_, cues), poses,
+                                     std::max<std::size_t>(1, poses.poses() / kErrorPoses));
         double mean = 0;
         for (const double error : weights) mean += error / static_cast<double>(weights.size());
         for (double& weight : weights) weight = std::pow(weight / std::max(mean, 1e-300), kErrorPower) + 1e-3;
@@ -306,15 +334,19 @@ class Trainer {
   }
 
   Result<Subspace> Assemble(const PoseMatrix& poses) {
-    const Estimator estimator = options_.mode == EstimatorMode::kPaper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_);
+    const Estimator estimator = options_.mode == EstimatorMode::kPaper ? LeastSquaresEstimator(pca_, cues_)
+                                                                       : MapEstimator(pca_, cues_);
     record_.warning = estimator.warning;
     Eigen::MatrixXd training(cues_.rows(), static_cast<Eigen::Index>(poses.poses()));
     for (std::size_t t = 0; t < poses.poses(); ++t) {
       training.col(static_cast<Eigen::Index>(t)) = MeasuredCues(layout_, cues_, poses.row(t));
     }
     std::vector<SubspaceOutput> outputs;
-    for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m) outputs.push_back({rig_.target.meshes[m].name, totals_[m]});
-    Subspace subspace = MakeSubspace(pca_, cues_, estimator, training, std::move(outputs), TileOptions{kTileShare * options_.tolerance});
+    for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m)
+      outputs.push_back({rig_.target.meshes[m].name, totals_[m]});
+    Subspace subspace =
+        MakeSubspace(pca_, cues_, estimator, training, std::move(outputs),
+                     TileOptions{kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance});
     subspace.mode = estimator.mode;
     subspace.ranges = ranges_;
     subspace.space = rig_.target.space_name;
@@ -335,7 +367,8 @@ class Trainer {
     }
     for (std::size_t m = 0; m < totals_.size(); ++m) {
       const CandidateStage& candidate = recorder_->candidates()[m];
-      const auto count = cue.kind == CueKind::kOutput ? totals_[m] : static_cast<Index>(candidate.points.size());
+      const auto count =
+          cue.kind == CueKind::kOutput ? totals_[m] : static_cast<Index>(candidate.points.size());
       if (index >= count) {
         index -= count;
         continue;
@@ -374,7 +407,8 @@ class Trainer {
         ReconstructOutput(*subspace, m, &scratch, buffers[m].view());
         const ConstPointsView p = std::as_const(buffers[m]).view();
         for (std::size_t i = 0; i < p.count; ++i, column += 3) {
-          const Double3 d{p.x[i] - static_cast<double>(row[column]), p.y[i] - static_cast<double>(row[column + 1]),
+          const Double3 d{p.x[i] - static_cast<double>(row[column]),
+                          p.y[i] - static_cast<double>(row[column + 1]),
                           p.z[i] - static_cast<double>(row[column + 2])};
           const double squared = Dot(d, d);
           sum += squared;
@@ -384,7 +418,8 @@ class Trainer {
       subspace->calibration.push_back({verdict.score, std::sqrt(largest)});
       record_.held_out_max = std::max(record_.held_out_max, std::sqrt(largest));
     }
-    if (held_out.poses() > 0) record_.held_out_rms = std::sqrt(sum / static_cast<double>(held_out.poses() * layout_.points));
+    if (held_out.poses() > 0)
+      record_.held_out_rms = std::sqrt(sum / static_cast<double>(held_out.poses() * layout_.points));
   }
 
   const TrainingRig& rig_;
@@ -404,7 +439,8 @@ class Trainer {
 
 }  // namespace
 
-Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& clips, const TrainOptions& options) {
+Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
+                       const TrainOptions& options) {
   return Trainer(rig, clips, options).Run();
 }
 

@@ -1,8 +1,16 @@
 #!/bin/sh
-# Builds everything under the address and undefined-behaviour sanitizers and runs all tests there.
+# Builds the program and its tests under sanitizers and runs all tests there: the address and undefined-behaviour
+# sanitizers, or with `sh tests/sanitize.sh tsan` the thread sanitizer. Tests that measure what sanitizers change
+# (label "native" in CMakeLists.txt) are left out.
 set -e
 cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh
-cmake -S . -B build-asan -G Ninja -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" -DKPSA_SANITIZE=ON > /dev/null
-cmake --build build-asan
-ctest --test-dir build-asan --output-on-failure -j "$(nproc)"
+if [ "${1:-asan}" = tsan ]; then
+  folder=build-tsan sanitizer=KPSA_TSAN
+  export TSAN_OPTIONS=halt_on_error=1
+else
+  folder=build-asan sanitizer=KPSA_SANITIZE
+fi
+cmake -S . -B $folder -G Ninja -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g0" -D$sanitizer=ON -DKPSA_COMPILE_ONCE=ON > /dev/null
+cmake --build $folder
+ctest --test-dir $folder --output-on-failure -LE native -j "$(nproc)"

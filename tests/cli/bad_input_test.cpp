@@ -1,5 +1,6 @@
 // The program on everything that may be wrong with a character, a rig or an argument.
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <cstring>
 #include <functional>
@@ -213,6 +214,91 @@ TEST_F(BadRigs, Weights) {
   expect(std::string(100000, '['), {"w.json"});
 }
 
+TEST_F(BadRigs, NumbersThatWouldTakeForever) {
+  const std::string deform = "deform: [{meshes: [body], stack: [gltf, a]}]\n";
+  ExpectBad("nodes: {a: {type: deltaMush, iterations: 1000000000}}\n", {"t.yaml:3:42: ", "a.iterations", "outside of 0 to"});
+  ExpectBad("nodes: {a: {type: deltaMush, iterations: 99999999999999999999}}\n", {"t.yaml:3:42: ", "whole number"});
+  ExpectBad("nodes: {a: {type: lattice, divisions: [2000000000, 2000000000, 2]}}\n" + deform, {"t.yaml:3:9: ", "divisions", "2 to 32"});
+  ExpectBad("nodes: {a: {type: lattice, 'points[99999999999999999999,0,0]': [1, 2, 3]}}\n" + deform, {"t.yaml:3:28: ", "three indices"});
+  ExpectBad("nodes: {a: {type: blendShape, 'weight[4000000000]': 1}}\n", {"t.yaml:3:31: ", "expected an index from 0 to"});
+  ExpectBad("accelerate: {a: {points: [body@skin], tolerance: 1mm, train: {samples: 1e12}}}\n", {"t.yaml:3:72: ", "samples"});
+  ExpectBad("accelerate: {a: {points: [body@skin], tolerance: .nan}}\n", {"t.yaml:3:50: ", "not finite"});
+  ExpectBad("accelerate: {a: {points: [body@skin], tolerance: 1mm, violationRate: 200%}}\n", {"t.yaml:3:70: ", "0% to 100%"});
+  ExpectBad("fps: 0\n", {"t.yaml:3:6: ", "above 0"});
+  ExpectBad("controls: {tip.rotateX: {min: -.inf, max: 0}}\n", {"t.yaml:3:31: ", "not finite"});
+  for (int i = 0; i < 400; ++i) folder.Write(fmt::format("i{}.yaml", i), fmt::format("kpsa: 1\ninclude: i{}.yaml\n", i + 1));
+  ExpectBad("include: i0.yaml\n", {"more than 256 files"});
+  // Many nodes are fine
+  std::string chain = "kpsa: 1\ncharacter: c.gltf\nnodes:\n  n0: {type: transform}\n";
+  for (int i = 1; i < 5000; ++i) chain += fmt::format("  n{}: {{type: transform, parent: n{}}}\n", i, i - 1);
+  folder.Write("chain.yaml", chain);
+  ExpectGood({"get", "chain.yaml", "n4999.worldMatrix", "--times", "0"});
+}
+
+TEST_F(BadRigs, TextThatIsNotWhatItSeems) {
+  ExpectBadFile("t.yaml", std::string("\xff\xfek\0p\0s\0a\0:\0 \0001\0\n\0", 18), {"t.yaml:1:1: ", "UTF-8"});
+  ExpectBad("x: &b {type: transform}\nnodes: {a: {<<: *b}}\n", {"t.yaml:4:13: ", "merges"});
+  ExpectBad("include: t.yaml\n", {"t.yaml:3:10: ", "cycle"});
+  ExpectBad("include: c.gltf\n", {"c.gltf:1:"});
+  ExpectBadFile("t.yaml", "kpsa: one\ncharacter: c.gltf\n", {"t.yaml:1:7: ", "no number"});
+  ExpectBadFile("t.yaml", "kpsa: 1.5\ncharacter: c.gltf\n", {"t.yaml:1:7: ", "whole number"});
+  ExpectBadFile("t.yaml", "kpsa: 1\n", {"t.yaml:1:1: ", "names no character"});
+  ExpectBadFile("t.yaml", "kpsa: 1\ncharacter: [a, b]\n", {"t.yaml:2:12: ", "expected a string, found a list"});
+  folder.Write("other.yaml", "kpsa: 1\n");
+  ExpectBadFile("t.yaml", "kpsa: 1\ncharacter: other.yaml\n", {"t.yaml:2:12: ", "other.yaml: is no glTF file"});
+  // What a terminal would obey is not printed
+  folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\nnodes: {a: {type: \"\\e[31mred\"}}\n");
+  const ProcessResult run = RunKpsa({"validate", "t.yaml"}, kMostSeconds, folder.path());
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("[31mred"), std::string::npos) << run.err;
+  EXPECT_EQ(run.err.find('\x1b'), std::string::npos);
+}
+
+// Nobody writes to these pipes, and the device never ends.
+TEST_F(BadRigs, PipesDevicesAndHugeFiles) {
+  for (const char* kind : {"pipe", "device", "huge"}) {
+    const auto make = [&](const std::string& suffix) {
+      const std::string name = kind + suffix, path = folder / name;
+      if (name.starts_with("pipe")) {
+        EXPECT_EQ(::mkfifo(path.c_str(), 0600), 0);
+      } else if (name.starts_with("device")) {
+        std::filesystem::create_symlink("/dev/zero", path);
+      } else {
+        folder.Write(name, "");
+        std::filesystem::resize_file(path, std::uintmax_t{40} << 30);  // takes no room
+      }
+      return name;
+    };
+    // The folder is not compared here: its files cannot be read
+    const auto expect = [&](const std::vector<std::string>& arguments, const std::string& name) {
+      SCOPED_TRACE(arguments[0] + " " + name);
+      const ProcessResult run = RunKpsa(arguments, kMostSeconds, folder.path());
+      ExpectBounded(run);
+      EXPECT_EQ(run.exit_code, 3) << run.err;
+      EXPECT_NE(run.err.find(name), std::string::npos) << run.err;
+      EXPECT_LE(run.error_lines(), 5u) << run.err;
+    };
+    for (const char* suffix : {".yaml", ".glb", ".gltf", ".npz", ".pc2", ".kpsa", ".json"}) {
+      const std::string name = make(suffix);
+      expect({"inspect", name}, name);
+    }
+    const std::string k = kind;
+    expect({"eval", kHello, "--pose", k + ".yaml", "-o", "out.npz"}, k + ".yaml");
+    expect({"eval", kHello, "--kpsa", k + ".kpsa", "-o", "out.npz"}, k + ".kpsa");
+    folder.Write("t.yaml", "kpsa: 1\ncharacter: " + k + ".glb\n");
+    expect({"validate", "t.yaml"}, k + ".glb");
+    folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\ninclude: " + k + ".yaml\n");
+    expect({"validate", "t.yaml"}, k + ".yaml");
+    folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\nnodes: {l: {type: cluster, weights: '" + k + ".json#m'}}\n"
+                           "deform: [{meshes: [body], stack: [gltf, l]}]\n");
+    expect({"validate", "t.yaml"}, k + ".json");
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+      if (entry.path().filename().string().starts_with(kind)) std::filesystem::remove(entry.path());
+    }
+  }
+  EXPECT_EQ(folder.FileCount(), 2u);  // c.gltf and t.yaml
+}
+
 using BadArguments = RefusalTest;
 
 TEST_F(BadArguments, AreRefusedBeforeAnythingIsWritten) {
@@ -232,6 +318,11 @@ TEST_F(BadArguments, AreRefusedBeforeAnythingIsWritten) {
   ExpectRefused({"eval", "hello.glb", "-o", "hello.glb", "--force"}, 2, {"hello.glb", "is the input"});
   ExpectRefused({"eval", "hello.yaml", "-o", "hello.glb", "--force"}, 2, {"hello.glb", "is the input"});
   ExpectRefused({"eval", "hello.yaml", "-o", "./hello.glb", "--force"}, 2, {"hello.glb", "is the input"});
+  ExpectRefused({"get", "hello.yaml", "column", "-o", "hello.yaml", "--force"}, 2, {"hello.yaml", "is the input"});
+  std::filesystem::create_hard_link(folder / "hello.glb", folder / "hard.glb");
+  ExpectRefused({"eval", "hello.yaml", "-o", "hard.glb", "--force"}, 2, {"hard.glb", "is the input"});
+  std::filesystem::create_symlink("hello.glb", folder / "soft.glb");
+  ExpectRefused({"eval", "hello.yaml", "-o", "soft.glb", "--force"}, 2, {"soft.glb", "is the input"});
   ExpectRefused({"init", "hello.glb", "-o", "hello.yaml"}, 2, {"hello.yaml", "--force"});
   std::filesystem::create_directory(folder / "out.npz");
   eval({}, {"out.npz", "folder"});
@@ -240,6 +331,11 @@ TEST_F(BadArguments, AreRefusedBeforeAnythingIsWritten) {
   folder.Write("out.npz", "precious");
   eval({}, {"out.npz", "--force"});
   ExpectRefused({"eval", kHello, "-o", "none/out.npz"}, 2, {"none/out.npz", "no folder"});
+  for (const std::string& command : {std::string("eval '") + kHello + "' -o -", "get '" + kHello + "' column", std::string("nodes")}) {
+    const ProcessResult run = RunShell("'" KPSA_PROGRAM "' " + command + " > /dev/full", kMostSeconds, folder.path());
+    EXPECT_EQ(run.exit_code, 3) << command;
+    EXPECT_NE(run.err.find("stdout cannot be written"), std::string::npos) << run.err;
+  }
   ExpectRefused({"eval", kHello, "-o", "/proc/out.npz"}, 2, {"/proc/out.npz", "cannot be written"});
 }
 

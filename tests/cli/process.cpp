@@ -20,7 +20,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-ProcessResult Run(const std::vector<std::string>& arguments, double limit_seconds, double interrupt_after,
+ProcessResult Run(std::vector<std::string> words, double limit_seconds, double interrupt_after,
                   const std::string& folder, const std::vector<std::string>& more_environment) {
   ProcessResult result;
   const TemporaryFolder streams;
@@ -30,8 +30,6 @@ ProcessResult Run(const std::vector<std::string>& arguments, double limit_second
   posix_spawn_file_actions_addopen(&actions, 1, (streams / "out").c_str(), O_WRONLY | O_CREAT, 0600);
   posix_spawn_file_actions_addopen(&actions, 2, (streams / "err").c_str(), O_WRONLY | O_CREAT, 0600);
   if (!folder.empty()) posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
-  std::vector<std::string> words = {KPSA_PROGRAM};
-  words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv, environment;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -40,7 +38,7 @@ ProcessResult Run(const std::vector<std::string>& arguments, double limit_second
   for (char** entry = environ; *entry != nullptr; ++entry) environment.push_back(*entry);
   environment.push_back(nullptr);
   pid_t process = 0;
-  const int spawned = posix_spawn(&process, KPSA_PROGRAM, &actions, nullptr, argv.data(), environment.data());
+  const int spawned = posix_spawn(&process, words.front().c_str(), &actions, nullptr, argv.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
   if (spawned != 0) {
     result.err = "cannot be started";
@@ -69,6 +67,12 @@ ProcessResult Run(const std::vector<std::string>& arguments, double limit_second
   return result;
 }
 
+std::vector<std::string> Kpsa(const std::vector<std::string>& arguments) {
+  std::vector<std::string> words = {KPSA_PROGRAM};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return words;
+}
+
 }  // namespace
 
 std::size_t ProcessResult::error_lines() const {
@@ -77,11 +81,15 @@ std::size_t ProcessResult::error_lines() const {
 
 ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds,
                       const std::string& folder, const std::vector<std::string>& environment) {
-  return Run(arguments, limit_seconds, -1, folder, environment);
+  return Run(Kpsa(arguments), limit_seconds, -1, folder, environment);
+}
+
+ProcessResult RunShell(const std::string& line, double limit_seconds, const std::string& folder) {
+  return Run({"/bin/sh", "-c", line}, limit_seconds, -1, folder, {});
 }
 
 ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds) {
-  return Run(arguments, 60, delay_seconds, "", {});
+  return Run(Kpsa(arguments), 60, delay_seconds, "", {});
 }
 
 }  // namespace kpsa

@@ -1,4 +1,4 @@
-// Runs the kpsa program as a user does, and gives what it printed.
+// Runs the kpsa program as a user does, or lines of shell, and gives what was printed.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,8 @@ struct ProcessResult {
 // Without a terminal; `environment` entries ("NO_COLOR=1") are added to the test's.
 ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds = 60,
                       const std::string& folder = "", const std::vector<std::string>& environment = {});
+// A line of shell, as /bin/sh runs it in the folder.
+ProcessResult RunShell(const std::string& line, double limit_seconds, const std::string& folder);
 // Starts it, sends SIGINT after the delay, and waits.
 ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds);
 

@@ -1,0 +1,27 @@
+// Storage of numbers for SIMD kernels.
+#pragma once
+
+#include <span>
+
+#include "base/points.h"
+
+namespace kpsa {
+
+// 64-byte aligned storage of halfs or floats.
+template <typename T>
+class AlignedArray {
+ public:
+  AlignedArray() = default;
+  explicit AlignedArray(std::size_t size) : floats_((size * sizeof(T) + 3) / 4), size_(size) {}
+  T* data() { return reinterpret_cast<T*>(floats_.data()); }
+  const T* data() const { return reinterpret_cast<const T*>(floats_.data()); }
+  std::size_t size() const { return size_; }
+  std::span<const T> span() const { return {data(), size_}; }
+  std::span<T> span() { return {data(), size_}; }
+
+ private:
+  AlignedFloats floats_;
+  std::size_t size_ = 0;
+};
+
+}  // namespace kpsa

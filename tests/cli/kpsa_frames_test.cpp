@@ -1,0 +1,241 @@
+// What a frame of an accelerated rig is: a hit, a blend or the full evaluation, whatever came before it and whoever
+// evaluates it. On the bundled hello rig with thresholds that make all three happen.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "graph/frames.h"
+#include "tests/cli/hello_folder.h"
+#include "tests/cli/rig_run.h"
+
+namespace kpsa {
+namespace {
+
+const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+class KpsaFrames : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    trained_ = TrainRig(kHello, QuickTraining());
+    ASSERT_NE(trained_, nullptr);
+    // Poses of which some leave the trained ranges; thresholds among the scores of the others
+    RigRun run(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+    ASSERT_TRUE(run.ok()) << run.error;
+    poses_ = SmoothPoses(run.rig, 60, 1.3);
+    std::vector<double> scores;
+    for (const auto& pose : poses_) {
+      run.Pose(pose);
+      const RunFrame frame = run.Evaluate();
+      if (frame.hit) scores.push_back(frame.score);
+    }
+    ASSERT_GT(scores.size(), 12u);
+    std::sort(scores.begin(), scores.end());
+    tau_lo_ = scores[scores.size() / 3], tau_ = scores[2 * scores.size() / 3];
+    mixed_ = WithThreshold(*trained_, tau_lo_, tau_);
+  }
+  static void TearDownTestSuite() { trained_.reset(), mixed_.reset(), poses_.clear(); }
+
+  static std::vector<RunFrame> InOrder() {
+    RigRun run(kHello, {.subspace = mixed_});
+    EXPECT_TRUE(run.ok()) << run.error;
+    std::vector<RunFrame> frames;
+    for (const auto& pose : poses_) {
+      run.Pose(pose);
+      frames.push_back(run.Evaluate());
+    }
+    return frames;
+  }
+  static bool IsBlend(const RunFrame& frame) { return !frame.hit && frame.score > tau_lo_ && frame.score < tau_; }
+
+  static inline std::shared_ptr<const Subspace> trained_, mixed_;
+  static inline std::vector<std::vector<double>> poses_;
+  static inline double tau_lo_ = 0, tau_ = 0;
+};
+
+TEST_F(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
+  RigRun full(kHello), pure(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+  std::size_t hits = 0, blends = 0, misses = 0, outside = 0;
+  const std::vector<RunFrame> frames = InOrder();
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    SCOPED_TRACE(f);
+    const RunFrame& frame = frames[f];
+    full.Pose(poses_[f]);
+    pure.Pose(poses_[f]);
+    const std::vector<float> exact = full.Evaluate().points, reconstructed = pure.Evaluate().points;
+    if (frame.reason == MissReason::kOutOfRange) {
+      ++outside;
+      EXPECT_TRUE(SameBytes(frame.points, exact));
+      continue;
+    }
+    ASSERT_FALSE(SameBytes(exact, reconstructed));  // so that equality below says something
+    if (frame.hit) {
+      ++hits;
+      EXPECT_TRUE(SameBytes(frame.points, reconstructed));
+    } else if (IsBlend(frame)) {
+      ++blends;
+      const double u = (frame.score - tau_lo_) / (tau_ - tau_lo_), weight = u * u * (3 - 2 * u);
+      for (std::size_t i = 0; i < exact.size(); ++i) {
+        ASSERT_NEAR(frame.points[i], reconstructed[i] + weight * (static_cast<double>(exact[i]) - reconstructed[i]), 1e-7);
+      }
+    } else {
+      ++misses;
+      EXPECT_TRUE(SameBytes(frame.points, exact));  // the full evaluation, bit for bit
+      EXPECT_EQ(frame.reason, MissReason::kScore);
+    }
+  }
+  EXPECT_GE(hits, 5u);
+  EXPECT_GE(blends, 5u);
+  EXPECT_GE(misses, 5u);
+  EXPECT_GE(outside, 3u);
+}
+
+TEST_F(KpsaFrames, DoNotDependOnWhatCameBefore) {
+  const std::vector<RunFrame> expected = InOrder();
+  EXPECT_FALSE(SameBytes(expected[0].points, expected[1].points));  // mixing them up would show
+  std::vector<std::size_t> order(2 * poses_.size());                // every frame twice
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i % poses_.size();
+  std::shuffle(order.begin(), order.end(), std::mt19937(3));
+  RigRun run(kHello, {.subspace = mixed_});
+  ASSERT_TRUE(run.ok()) << run.error;
+  for (std::size_t f : order) {
+    run.Pose(poses_[f]);
+    const RunFrame frame = run.Evaluate();
+    ASSERT_TRUE(SameBytes(frame.points, expected[f].points)) << f;
+    ASSERT_EQ(frame.hit, expected[f].hit);
+    ASSERT_EQ(frame.text, expected[f].text);
+    ASSERT_TRUE(SameBytes(run.Evaluate().points, expected[f].points)) << f << " asked again";
+  }
+}
+
+TEST_F(KpsaFrames, AnyThreadsBlocksAndOrderGiveTheSameBytes) {
+  const std::vector<RunFrame> expected = InOrder();
+  RigRun run(kHello, {.subspace = mixed_});
+  ASSERT_TRUE(run.ok()) << run.error;
+  std::vector<std::size_t> forward(poses_.size());
+  std::iota(forward.begin(), forward.end(), 0u);
+  std::vector<std::size_t> shuffled = forward;
+  shuffled.insert(shuffled.end(), forward.rbegin(), forward.rend());
+  std::shuffle(shuffled.begin(), shuffled.end(), std::mt19937(5));
+  for (const auto& order : {forward, shuffled}) {
+    for (const auto& [threads, block] : {std::pair{1, 1}, {1, 8}, {1, 5}, {2, 1}, {3, 4}, {4, 8}, {4, 64}}) {
+      SCOPED_TRACE(testing::Message() << threads << " threads, blocks of " << block);
+      FrameOptions options;
+      options.threads = threads;
+      options.block = block;
+      std::size_t seen = 0, wrong = 0;
+      const Status status = EvaluateFrames(
+          run.plan, order.size(), options, [&](std::size_t f, Evaluator& evaluator) { run.Pose(poses_[order[f]], &evaluator); },
+          [&](std::size_t f, const Evaluator& evaluator, const Status& evaluated) -> Status {
+            if (!evaluated.ok()) return evaluated;
+            const RunFrame frame = run.Frame(evaluator);
+            wrong += !SameBytes(frame.points, expected[order[f]].points) || frame.hit != expected[order[f]].hit ||
+                     std::memcmp(&frame.score, &expected[order[f]].score, sizeof(double)) != 0;
+            ++seen;
+            return Status();
+          });
+      EXPECT_TRUE(status.ok()) << status.ToString();
+      EXPECT_EQ(seen, order.size());
+      EXPECT_EQ(wrong, 0u);
+    }
+  }
+  RigRun parallel(kHello, {.subspace = mixed_, .evaluator = {.parallel = true}});
+  for (std::size_t f = 0; f < poses_.size(); ++f) {
+    parallel.Pose(poses_[f]);
+    ASSERT_TRUE(SameBytes(parallel.Evaluate().points, expected[f].points)) << f;
+  }
+}
+
+// From a hit through the blend zone to a miss, slowly: what is emitted minus the exact points goes to nothing without a
+// jump. With a zone of no width, it jumps by the whole error.
+TEST_F(KpsaFrames, NothingPopsInTheBlendZone) {
+  RigRun full(kHello), pure(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+  constexpr std::size_t kSteps = 400;
+  std::vector<std::vector<double>> path;
+  std::vector<double> scores;
+  for (std::size_t s = 0; s <= kSteps; ++s) {
+    const double t = static_cast<double>(s) / kSteps;
+    std::vector<double>& pose = path.emplace_back();
+    for (const Control& control : full.rig.controls) pose.push_back(t * control.min);
+    pure.Pose(pose);
+    const RunFrame frame = pure.Evaluate();
+    ASSERT_TRUE(frame.hit) << t << " " << frame.text;
+    scores.push_back(frame.score);
+  }
+  // The zone lies where the path crosses it, from well below to well above
+  const double lo = scores[2 * kSteps / 5], hi = scores[9 * kSteps / 10];
+  ASSERT_LT(1.2 * lo, hi);
+  pure.Pose(path[9 * kSteps / 10]);
+  full.Pose(path[9 * kSteps / 10]);
+  const double error_at_end = LargestDistance(pure.Evaluate().points, full.Evaluate().points);
+  const auto largest_pop = [&](double tau_lo, double tau) {
+    RigRun run(kHello, {.subspace = WithThreshold(*trained_, tau_lo, tau)});
+    std::vector<float> before;
+    double pop = 0;
+    std::size_t hits = 0, blends = 0;
+    for (const std::vector<double>& pose : path) {
+      run.Pose(pose);
+      full.Pose(pose);
+      const RunFrame frame = run.Evaluate();
+      hits += frame.hit;
+      blends += !frame.hit && frame.score < tau;
+      std::vector<float> difference = full.Evaluate().points;
+      for (std::size_t i = 0; i < difference.size(); ++i) difference[i] = frame.points[i] - difference[i];
+      if (!before.empty()) pop = std::max(pop, LargestDistance(before, difference));
+      before = difference;
+    }
+    EXPECT_GT(hits, kSteps / 5);
+    EXPECT_LT(hits + blends, kSteps);
+    return pop;
+  };
+  const double soft = largest_pop(lo, hi), hard = largest_pop(0.999999 * hi, hi);
+  EXPECT_LT(soft, 0.1 * error_at_end);
+  EXPECT_GT(hard, 0.7 * error_at_end);
+  EXPECT_GT(hard, 5 * soft);
+}
+
+TEST_F(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
+  RigRun run(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}}), full(kHello);
+  const std::vector<double> rest(run.rig.controls.size(), 0.0);
+  for (std::size_t c = 0; c < run.rig.controls.size(); ++c) {
+    for (const double share : {1.0, 1.5}) {
+      std::vector<double> pose = rest;
+      pose[c] = share * run.rig.controls[c].max;
+      run.Pose(pose);
+      full.Pose(pose);
+      const RunFrame frame = run.Evaluate();
+      if (share == 1.0) {
+        EXPECT_TRUE(frame.hit) << frame.text;
+        EXPECT_EQ(frame.text, "hit");
+        continue;
+      }
+      EXPECT_FALSE(frame.hit);
+      EXPECT_EQ(frame.reason, MissReason::kOutOfRange);
+      EXPECT_NE(frame.text.find("upper.matrix is outside its trained range"), std::string::npos) << frame.text;
+      EXPECT_TRUE(SameBytes(frame.points, full.Evaluate().points));
+    }
+  }
+}
+
+TEST_F(KpsaFrames, AControlThatIsNoNumberMissesAndLeavesNothingBehind) {
+  RigRun run(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+  const std::vector<double> rest(run.rig.controls.size(), 0.0);
+  run.Pose(rest);
+  const RunFrame before = run.Evaluate();
+  EXPECT_TRUE(before.hit);
+  for (const double bad : {std::nan(""), kInfinity, -kInfinity}) {
+    run.Set("upper.rotateX", bad);
+    const RunFrame frame = run.Evaluate();
+    EXPECT_FALSE(frame.hit);
+    EXPECT_EQ(frame.reason, MissReason::kOutOfRange);
+    EXPECT_NE(frame.text.find("upper.matrix"), std::string::npos) << frame.text;
+    run.Pose(rest);
+    const RunFrame after = run.Evaluate();
+    EXPECT_TRUE(after.hit);
+    EXPECT_TRUE(SameBytes(after.points, before.points));
+  }
+}
+
+}  // namespace
+}  // namespace kpsa
