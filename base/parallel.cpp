@@ -5,7 +5,7 @@
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 
-#if defined(__SANITIZE_THREAD__)
+#if defined(KPSA_WITH_TSAN)
 // The library of TBB is not instrumented: the sanitizer does not see how it hands tasks to threads and waits for them.
 // What it orders is told below (before the loop, in each range, after the loop); its own objects (tasks with the range
 // and the lambda in them) are left out by the functions that read them. Everything that a body does is checked.
@@ -23,7 +23,7 @@ namespace kpsa {
 namespace {
 
 // What a thread did before Publish, another one sees after Observe.
-#if defined(__SANITIZE_THREAD__)
+#if defined(KPSA_WITH_TSAN)
 void Publish(char* place) { __tsan_release(place); }
 void Observe(char* place) { __tsan_acquire(place); }
 #else

@@ -217,9 +217,13 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
        {"held-out RMS", LengthText(record.held_out_rms)},
        {"held-out max", LengthText(record.held_out_max)},
        {"motion RMS", LengthText(record.motion_rms)}});
-  FactTable outputs{"outputs", {"points", ">count"}, {}};
-  for (const SubspaceOutput& output : subspace->outputs)
-    outputs.rows.push_back({output.name, Count(output.points)});
+  // What a frame reads, and what of the cues and modes its tiles keep (kpsa/tiles.h)
+  FactTable outputs{"outputs", {"points", ">count", ">bytes/point", ">rank", ">cue rows"}, {}};
+  for (std::size_t m = 0; m < subspace->outputs.size(); ++m) {
+    const TileMap& tiles = subspace->tiles[m];
+    outputs.rows.push_back({subspace->outputs[m].name, Count(subspace->outputs[m].points),
+                            tiles.bytes_per_point(), tiles.mean_rank(), tiles.mean_cues()});
+  }
   FactTable cues{"cues", {"kind", "where", ">point"}, {}};
   for (const CueDescription& cue : subspace->cues) {
     if (cue.kind == CueDescription::Kind::kScalar) {

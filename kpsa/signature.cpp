@@ -43,6 +43,8 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, 
       const AttributeDef& a = def.attributes[i];
       if (a.output || a.name == "time") continue;
       const auto attribute = static_cast<int>(i);
+      // What is written as it is anyway changes nothing (nodes may ask whether a structural one is set)
+      const bool plain = !a.structural && !a.default_from && !a.array && !IsPointType(a.type);
       Hasher values;
       bool any = false;
       const int elements = a.array || IsPointType(a.type) ? std::max(graph.ArraySize(node, attribute), 1) : 1;
@@ -51,6 +53,7 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, 
         for (int component = -1; component < 4; ++component) {
           const Value* value = graph.FindValue({node, attribute, e, component});
           if (value == nullptr) continue;
+          if (plain && component == -1 && value->digest() == a.default_value.digest()) continue;
           values.Add(e);
           values.Add(component);
           values.Add(value->digest());
@@ -64,23 +67,26 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, 
 }
 
 std::string SignatureDifference(const Signature& trained, const Signature& now) {
-  std::vector<std::string> changed;
-  for (const auto& [name, digest] : trained) {
-    const auto it = now.find(name);
-    if (it == now.end()) {
-      changed.push_back(name + " (gone)");
-    } else if (it->second != digest) {
-      changed.push_back(name);
+  std::vector<std::string> nodes, attributes, rewired;  // by what they say: an attribute says more than its node
+  const auto compare = [&](const Signature& here, const Signature& there, const char* how, bool both) {
+    for (const auto& [name, digest] : here) {
+      const auto it = there.find(name);
+      const std::string node = name.substr(0, name.find('.'));
+      if (there.find(node) == there.end()) {
+        if (node == name) nodes.push_back(name + how);  // its attributes went or came with it
+      } else if (it == there.end()) {
+        attributes.push_back(name + how);
+      } else if (both && it->second != digest) {
+        (node == name ? rewired : attributes).push_back(name);
+      }
     }
-  }
-  for (const auto& [name, digest] : now) {
-    if (trained.find(name) == trained.end()) changed.push_back(name + " (new)");
-  }
+  };
+  compare(trained, now, " (gone)", true);
+  compare(now, trained, " (new)", false);
+  std::vector<std::string> changed = std::move(nodes);
+  changed.insert(changed.end(), attributes.begin(), attributes.end());
+  changed.insert(changed.end(), rewired.begin(), rewired.end());
   if (changed.empty()) return "";
-  // An attribute says more than its node
-  std::stable_sort(changed.begin(), changed.end(), [](const std::string& a, const std::string& b) {
-    return (a.find('.') != std::string::npos) > (b.find('.') != std::string::npos);
-  });
   const std::size_t count = changed.size();
   if (count > 3) changed.resize(3);
   return fmt::format("{}{}", fmt::join(changed, ", "), count > 3 ? fmt::format(" and {} more", count - 3) : "");

@@ -119,41 +119,21 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   return s;
 }
 
-SubspaceScratch::SubspaceScratch(const Subspace& subspace, std::size_t frames)
-    : y(subspace.soft_cache.padded_rows()),
-      g(subspace.soft_cache.padded_rows()),
-      block(frames * subspace.rows()) {}
+SubspaceScratch::SubspaceScratch(const Subspace& subspace)
+    : y(subspace.soft_cache.padded_rows()), g(subspace.soft_cache.padded_rows()) {}
 
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y) {
   for (std::size_t j = 0; j < raw.size(); ++j)
     y[j] = static_cast<float>((raw[j] - subspace.cue_mean[j]) * subspace.cue_scale[j]);
 }
 
-void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch,
-             std::size_t frame) {
+void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch) {
   KPSA_CHECK_EQ(raw.size(), subspace.rows());
-  KPSA_CHECK_LE((frame + 1) * subspace.rows(), scratch->block.size());
   Normalize(subspace, raw, scratch->y.span());
-  std::copy_n(scratch->y.data(), raw.size(), scratch->block.data() + frame * subspace.rows());
 }
 
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch) {
   return Judge(subspace.soft_cache, threshold, scratch->y.span(), scratch->g.span());
-}
-
-void ReconstructOutput(const Subspace& subspace, std::size_t output, SubspaceScratch* scratch,
-                       PointsView points) {
-  subspace.tiles[output].Reconstruct(scratch->y.span(), points);
-}
-
-void ReconstructOutputTiles(const Subspace& subspace, std::size_t output, std::span<const Index> tiles,
-                            SubspaceScratch* scratch, PointsView points) {
-  subspace.tiles[output].ReconstructTiles(scratch->y.span(), tiles, points);
-}
-
-void ReconstructOutputBlock(const Subspace& subspace, std::size_t output, std::span<const Index> tiles,
-                            SubspaceScratch* scratch, std::span<const PointsView> outs) {
-  subspace.tiles[output].ReconstructBlock(scratch->block.span(), outs, tiles);
 }
 
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points) {

@@ -1,9 +1,9 @@
 // The trained object: immutable, shared by all threads and evaluators, and its file (.kpsa). At run time:
 //
-//   SubspaceScratch scratch(subspace);                    // once a thread
-//   Measure(subspace, raw, &scratch);                     // raw cue values -> y
-//   Verdict v = Judge(subspace, threshold, scratch);      // SoftCache
-//   ReconstructOutput(subspace, output, &scratch, points) // y -> points
+//   SubspaceScratch scratch(subspace);                     // once a thread
+//   Measure(subspace, raw, &scratch);                      // raw cue values -> y
+//   Verdict v = Judge(subspace, threshold, &scratch);      // SoftCache
+//   subspace.tiles[output].Reconstruct(scratch.y, points)  // y -> points (kpsa/tiles.h)
 //
 // None of these allocates. The file is safetensors (base/safetensors.h) with kind "kpsa-subspace".
 #pragma once
@@ -74,27 +74,17 @@ Result<Subspace> ReadSubspace(const std::string& path);
 
 // Everything that changes while a subspace is used. One a thread.
 struct SubspaceScratch {
-  explicit SubspaceScratch(const Subspace& subspace, std::size_t frames = 1);
-  AlignedFloats y;      // [r, padded to 16]
-  AlignedFloats g;      // the same size
-  AlignedFloats block;  // [frames x r] y of each frame
+  explicit SubspaceScratch(const Subspace& subspace);
+  AlignedFloats y;  // [r, padded to 16]
+  AlignedFloats g;  // the same size
 };
 
 // y[j] = (raw[j] - mean) * scale, in float32.
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y);
-// raw [r] in scene units -> scratch->y, and into row `frame` of scratch->block.
-void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch,
-             std::size_t frame = 0);
+// raw [r] in scene units -> scratch->y.
+void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch);
 // The verdict on scratch->y. Ranges are checked by the caller (FirstOutside), before this.
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);
-// Points of one output from scratch->y.
-void ReconstructOutput(const Subspace& subspace, std::size_t output, SubspaceScratch* scratch,
-                       PointsView points);
-void ReconstructOutputTiles(const Subspace& subspace, std::size_t output, std::span<const Index> tiles,
-                            SubspaceScratch* scratch, PointsView points);
-// Points of one output for the first outs.size() rows of scratch->block.
-void ReconstructOutputBlock(const Subspace& subspace, std::size_t output, std::span<const Index> tiles,
-                            SubspaceScratch* scratch, std::span<const PointsView> outs);
 // points = (1 - full_weight) * points + full_weight * full, where Verdict::full_weight is in (0, 1).
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points);
 

@@ -120,7 +120,7 @@ void QuantizeInputs(std::size_t wide, std::size_t rank, float* HWY_RESTRICT t, T
     total = hn::Add(total, q);
     hn::StoreU(hn::DemoteTo(ds, q), ds, step->q + k);
   }
-  step->bias = 128 * hn::GetLane(hn::SumOfLanes(di, total));
+  step->bias = spoiled == 0 ? 128 * hn::GetLane(hn::SumOfLanes(di, total)) : 0;
 }
 
 // sum + the product of pairs of signed 16-bit numbers, added for each 32-bit lane (modulo 2^32).

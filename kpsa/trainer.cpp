@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kProbePoints = 20;  // of a stage, to see what a cue there would drag in
 constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
-constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that tiles and half precision may add
+constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that tiles and bytes may add
 constexpr double kTileMaxShare = 0.45;    // of the tolerance: the largest error that they may add
 constexpr double kStillTurn = 5e-4;          // a turn (radians) and a shift (of the tolerance) of a joint that are none
 constexpr double kStillShare = 0.1;
@@ -404,7 +404,7 @@ class Trainer {
       double largest = 0;
       std::size_t column = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
-        ReconstructOutput(*subspace, m, &scratch, buffers[m].view());
+        subspace->tiles[m].Reconstruct(scratch.y.span(), buffers[m].view());
         const ConstPointsView p = std::as_const(buffers[m]).view();
         for (std::size_t i = 0; i < p.count; ++i, column += 3) {
           const Double3 d{p.x[i] - static_cast<double>(row[column]),

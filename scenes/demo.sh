@@ -4,7 +4,7 @@ set -e
 cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh
 echo "== building kpsa (minutes, the first time)"
-cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release > /dev/null
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
 cmake --build build --target kpsa
 mkdir -p out
 printf '\n== training on the face (half a minute)\n'

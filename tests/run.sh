@@ -3,6 +3,6 @@
 set -e
 cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh
-cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release > /dev/null
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
 cmake --build build
 ctest --test-dir build --output-on-failure -j "$(nproc)"

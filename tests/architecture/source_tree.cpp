@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <cstdio>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
+#include <map>
 #include <set>
-#include <thread>
+#include <string_view>
 
 namespace kpsa {
 namespace {
@@ -51,6 +50,66 @@ const std::array<Door, 9> kDoors = {{
     {"zip", {"io/npz.cpp"}},
 }};
 
+// A name, and the header that declares it: or, for other libraries, how their headers begin.
+struct Use {
+  const char* name;
+  const char* header;
+  bool whole_library = false;
+};
+const std::array<Use, 40> kUses = {{
+    {"std::array", "array"},
+    {"std::atomic", "atomic"},
+    {"std::clamp", "algorithm"},
+    {"std::copy_n", "algorithm"},
+    {"std::fill", "algorithm"},
+    {"std::function", "functional"},
+    {"std::int16_t", "cstdint"},
+    {"std::int64_t", "cstdint"},
+    {"std::invocable", "concepts"},
+    {"std::isfinite", "cmath"},
+    {"std::make_shared", "memory"},
+    {"std::make_unique", "memory"},
+    {"std::map", "map"},
+    {"std::max", "algorithm"},
+    {"std::memcpy", "cstring"},
+    {"std::min", "algorithm"},
+    {"std::mt19937", "random"},
+    {"std::mutex", "mutex"},
+    {"std::numeric_limits", "limits"},
+    {"std::optional", "optional"},
+    {"std::ostream", "iosfwd"},
+    {"std::pair", "utility"},
+    {"std::set", "set"},
+    {"std::shared_ptr", "memory"},
+    {"std::sort", "algorithm"},
+    {"std::span", "span"},
+    {"std::sqrt", "cmath"},
+    {"std::string", "string"},
+    {"std::string_view", "string_view"},
+    {"std::uint16_t", "cstdint"},
+    {"std::uint32_t", "cstdint"},
+    {"std::uint64_t", "cstdint"},
+    {"std::uint8_t", "cstdint"},
+    {"std::unique_ptr", "memory"},
+    {"std::unordered_map", "unordered_map"},
+    {"std::variant", "variant"},
+    {"std::vector", "vector"},
+    {"Eigen", "Eigen/", true},
+    {"fmt", "fmt/", true},
+    {"nlohmann", "nlohmann/", true},
+}};
+
+// Whether the line uses the name, followed by no further letters; for libraries, as a namespace.
+bool UsesWord(std::string_view line, std::string_view name) {
+  for (std::size_t at = line.find(name); at != std::string_view::npos; at = line.find(name, at + 1)) {
+    const auto letter = [&](std::size_t i) { return i < line.size() && (std::isalnum(static_cast<unsigned char>(line[i])) != 0 || line[i] == '_'); };
+    const std::size_t end = at + name.size();
+    if ((at > 0 && (letter(at - 1) || line[at - 1] == '<' || line[at - 1] == '/')) || letter(end)) continue;
+    if (name.starts_with("std::") || line.substr(end).starts_with("::")) return true;
+  }
+  return false;
+}
+
 bool Matches(std::string_view pattern, std::string_view path) {
   return pattern.ends_with('*') ? path.starts_with(pattern.substr(0, pattern.size() - 1)) : path == pattern;
 }
@@ -65,23 +124,18 @@ SourceFile ReadSource(const std::filesystem::path& file, std::string path) {
   source.path = std::move(path);
   std::ifstream in(file);
   std::string line;
-  bool directive_before = false;
   for (int number = 1; std::getline(in, line); ++number) {
+    source.code.push_back(line.substr(0, line.find("//")));
     std::size_t at = line.find_first_not_of(" \t");
     if (at == std::string::npos || line[at] != '#') continue;
     at = line.find_first_not_of(" \t", at + 1);
     if (at == std::string::npos) continue;
     const std::string_view directive = std::string_view(line).substr(at);
-    if (directive.starts_with("pragma once")) continue;
-    if (!directive.starts_with("include")) {
-      directive_before = true;
-      continue;
-    }
+    if (!directive.starts_with("include")) continue;
     const std::size_t open = line.find_first_of("\"<", at);
     if (open == std::string::npos) continue;
     const std::size_t close = line.find(line[open] == '<' ? '>' : '"', open + 1);
     if (close == std::string::npos) continue;
-    if (source.includes.empty()) source.include_comes_first = !directive_before;
     source.includes.push_back({line.substr(open + 1, close - open - 1), line[open] == '"', number});
   }
   return source;
@@ -136,42 +190,36 @@ std::vector<std::string> FindBreaches(const std::vector<SourceFile>& files) {
   return breaches;
 }
 
-std::vector<std::string> UnprovenHeaders(const std::vector<SourceFile>& files) {
-  std::set<std::string> proven;
+std::vector<std::string> FindMissingIncludes(const std::vector<SourceFile>& files) {
+  std::map<std::string, const SourceFile*> by_path;
+  for (const SourceFile& file : files) by_path[file.path] = &file;
+  std::vector<std::string> missing;
   for (const SourceFile& file : files) {
-    if (!file.is_header() && file.include_comes_first && file.includes.front().quoted) proven.insert(file.includes.front().text);
-  }
-  std::vector<std::string> unproven;
-  for (const SourceFile& file : files) {
-    // *-inl.h are parts of one translation unit for each vector unit (Highway's foreach_target.h), and no headers
-    if (file.is_header() && !file.path.ends_with("-inl.h") && !proven.contains(file.path)) unproven.push_back(file.path);
-  }
-  return unproven;
-}
-
-std::vector<std::string> CompileAlone(const std::string& root, const std::vector<std::string>& headers) {
-  std::vector<std::string> errors;
-  std::mutex mutex;
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < headers.size(); i = next++) {
-      const std::string command = fmt::format("echo '#include \"{}\"' | \"{}\" -std=c++20 -w -fsyntax-only -I\"{}\" -isystem \"{}\" -x c++ - 2>&1",
-                                              headers[i], KPSA_COMPILER, root, KPSA_EIGEN);
-      std::string output;
-      std::FILE* pipe = popen(command.c_str(), "r");
-      std::array<char, 4096> buffer;
-      for (std::size_t size; pipe != nullptr && (size = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;) output.append(buffer.data(), size);
-      const int status = pipe == nullptr ? -1 : pclose(pipe);
-      if (status == 0) continue;
-      std::lock_guard<std::mutex> lock(mutex);
-      errors.push_back(fmt::format("{} does not compile by itself:\n{}", headers[i], output.substr(0, 2000)));
+    if (!file.is_header() || file.path.ends_with("-inl.h")) continue;  // parts of a source file (Highway's targets)
+    // What it includes, through our headers as well
+    std::set<std::string> libraries, seen = {file.path};
+    std::vector<const SourceFile*> stack = {&file};
+    while (!stack.empty()) {
+      const SourceFile& from = *stack.back();
+      stack.pop_back();
+      for (const Include& include : from.includes) {
+        const auto ours = by_path.find(include.text);
+        if (ours == by_path.end()) libraries.insert(include.text);
+        if (ours != by_path.end() && seen.insert(include.text).second) stack.push_back(ours->second);
+      }
     }
-  };
-  std::thread other(work);
-  work();
-  other.join();
-  std::sort(errors.begin(), errors.end());
-  return errors;
+    for (const Use& use : kUses) {
+      const bool there = std::any_of(libraries.begin(), libraries.end(), [&](const std::string& library) {
+        return use.whole_library ? library.starts_with(use.header) : library == use.header;
+      });
+      for (std::size_t i = 0; !there && i < file.code.size(); ++i) {
+        if (!UsesWord(file.code[i], use.name)) continue;
+        missing.push_back(fmt::format("{}:{}: uses {}, but includes no <{}>", file.path, i + 1, use.name, use.header));
+        break;
+      }
+    }
+  }
+  return missing;
 }
 
 }  // namespace kpsa

@@ -15,7 +15,7 @@ struct Include {
 struct SourceFile {
   std::string path;  // from the root, with slashes
   std::vector<Include> includes;
-  bool include_comes_first = false;  // no other directive is before the first include
+  std::vector<std::string> code;  // lines, without comments
   bool is_header() const { return path.ends_with(".h"); }
 };
 
@@ -26,10 +26,9 @@ std::vector<SourceFile> ReadSourceTree(const std::string& root);
 //   base <- graph <- {nodes, kpsa, io} <- {cli, bench, tests, ...}; kernels know base only; siblings never each other.
 std::vector<std::string> FindBreaches(const std::vector<SourceFile>& files);
 
-// Headers that no source file includes before anything else: the build does not prove that they compile alone.
-std::vector<std::string> UnprovenHeaders(const std::vector<SourceFile>& files);
-
-// Compiles each header of the root by itself (syntax only, two at a time). The errors of those that do not compile.
-std::vector<std::string> CompileAlone(const std::string& root, const std::vector<std::string>& headers);
+// Names of the standard library and of other libraries that a header uses without including, directly or through the
+// project's own headers, what declares them: "path:line: what is missing". Precompiled headers hide such gaps from the
+// compiler; gaps in the project's own headers it sees, since each source includes its own header first.
+std::vector<std::string> FindMissingIncludes(const std::vector<SourceFile>& files);
 
 }  // namespace kpsa

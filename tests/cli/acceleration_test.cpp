@@ -9,11 +9,11 @@
 #include "cli/rig_training.h"
 #include "graph/evaluator.h"
 #include "nodes/standard_nodes.h"
+#include "tests/cli/rig_run.h"
 
 namespace kpsa {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class TrainedRig : public ::testing::Test {
  protected:

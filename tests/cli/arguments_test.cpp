@@ -11,8 +11,6 @@
 namespace kpsa {
 namespace {
 
-const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
-const std::string kHelloGlb = KPSA_SCENES_DIR "/hello/hello.glb";
 
 struct Refusal {
   std::vector<std::string> arguments;

@@ -13,8 +13,6 @@ namespace kpsa {
 namespace {
 
 using nlohmann::json;
-const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
-const std::string kHelloGlb = KPSA_SCENES_DIR "/hello/hello.glb";
 
 class BadCharacters : public RefusalTest {
  protected:

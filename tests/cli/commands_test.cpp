@@ -16,8 +16,6 @@ namespace kpsa {
 namespace {
 
 using Json = nlohmann::json;
-const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
-const std::string kHelloGlb = KPSA_SCENES_DIR "/hello/hello.glb";
 
 std::string Ok(const std::vector<std::string>& arguments) {
   const ProcessResult run = RunKpsa(arguments);

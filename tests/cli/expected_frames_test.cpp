@@ -7,33 +7,11 @@
 
 #include "io/npz.h"
 #include "tests/cli/process.h"
-#include "tests/support/shared_files.h"
+#include "tests/support/expected_files.h"
 #include "tests/support/temporary_folder.h"
 
 namespace kpsa {
 namespace {
-
-struct ExpectedFile {
-  std::string path, stem, character, clip;  // clip "rest": none
-};
-
-std::vector<ExpectedFile> ExpectedFiles() {
-  std::vector<ExpectedFile> files;
-  const std::string folder = SharedFile("expected");
-  if (folder.empty()) return files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string stem = entry.path().stem().string();
-    const std::size_t split = stem.find("__");
-    if (entry.path().extension() != ".npz" || split == std::string::npos || stem.ends_with(".alt")) continue;
-    const std::string name = stem.substr(0, split);
-    for (const std::string& path : {name + ".glb", name + ".gltf", name + "/" + name + ".gltf"}) {
-      const std::string found = SharedFile("assets/" + path);
-      if (!found.empty()) files.push_back({entry.path().string(), stem, found, stem.substr(split + 2)});
-    }
-  }
-  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
-  return files;
-}
 
 // The largest distance of two points as a share of the diagonal of all expected positions.
 double RelativeError(const Npz& expected, const Npz& actual) {

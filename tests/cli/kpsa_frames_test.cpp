@@ -12,8 +12,6 @@
 namespace kpsa {
 namespace {
 
-const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class KpsaFrames : public ::testing::Test {
  protected:

@@ -8,7 +8,6 @@
 namespace kpsa {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kTolerance = kQuickTolerance;
 
 // The points of mesh m among all (x.., y.., z.. by mesh).
@@ -146,8 +145,8 @@ TEST_F(Travelling, RigidMotionOfTheSpaceKeepsEveryHit) {
   }
   EXPECT_GT(travelled, 1.0);
   EXPECT_GT(hits_still, poses.size() / 2);
-  EXPECT_GE(hits + 1, hits_still);
-  EXPECT_LE(hits, hits_still + 1);
+  // Frames whose score is about the threshold may fall on either side of it
+  EXPECT_NEAR(static_cast<double>(hits), static_cast<double>(hits_still), 0.1 * static_cast<double>(poses.size()));
 }
 
 TEST_F(Travelling, WithoutASpaceItMisses) {

@@ -68,7 +68,7 @@ TEST_F(OddGltf, HardlyAnything) {
   EXPECT_EQ(Keys(Evaluate(b)), Keys_{"times"});
   b.Push("nodes", {{"name", "alone"}});  // no scene
   EXPECT_EQ(Keys(Evaluate(b)), Keys_{"times"});
-  b.root["scenes"] = {json::object()};  // an empty one
+  b.root["scenes"] = json::array({json::object()});  // an empty one
   EXPECT_EQ(Keys(Evaluate(b)), Keys_{"times"});
   b.Push("animations", {{"name", "still"}, {"channels", json::array()}, {"samplers", json::array()}});
   EXPECT_EQ(Keys(Evaluate(b)), Keys_{"times"});

@@ -7,6 +7,9 @@
 
 namespace kpsa {
 
+inline const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
+inline const std::string kHelloGlb = KPSA_SCENES_DIR "/hello/hello.glb";
+
 struct ProcessResult {
   int exit_code = -1;  // 128 + signal where one ended it; -1: it ran longer than the limit and was ended
   std::string out, err;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,6 +16,8 @@
 #include "kpsa/accelerate.h"
 
 namespace kpsa {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // All node types and the KPSA node.
 const NodeRegistry& AcceleratedRegistry();

@@ -11,7 +11,6 @@
 namespace kpsa {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const std::string kArmed = "tripwire: evaluated while armed";
 
 // hello with a tripwire in its stack; the accelerated points are the last stage's.

@@ -15,7 +15,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__GLIBC__)
+#if defined(KPSA_WITH_ASAN) || defined(KPSA_WITH_TSAN) || !defined(__GLIBC__)
 #define KPSA_COUNTS_ALLOCATIONS 0  // sanitizers bring allocators of their own
 #else
 #define KPSA_COUNTS_ALLOCATIONS 1

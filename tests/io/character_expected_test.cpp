@@ -6,38 +6,13 @@
 #include "graph/evaluator.h"
 #include "io/npz.h"
 #include "tests/io/rig_fixture.h"
-#include "tests/support/shared_files.h"
+#include "tests/support/expected_files.h"
 
 namespace kpsa {
 namespace {
 
 constexpr double kTolerance = 1e-5;  // of the diagonal, as for `kpsa eval`
 constexpr std::size_t kMaxFrames = 25;
-
-struct ExpectedFile {
-  std::string path, character, clip;
-};
-
-std::vector<ExpectedFile> ExpectedFiles() {
-  std::vector<ExpectedFile> files;
-  const std::string folder = SharedFile("expected");
-  if (folder.empty()) return files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string stem = entry.path().stem().string();
-    const std::size_t split = stem.find("__");
-    if (entry.path().extension() != ".npz" || split == std::string::npos || stem.ends_with(".alt")) continue;
-    files.push_back({entry.path().string(), stem.substr(0, split), stem.substr(split + 2)});
-  }
-  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
-  return files;
-}
-
-std::string CharacterPath(const std::string& name) {
-  for (const std::string& path : {name + ".glb", name + ".gltf", name + "/" + name + ".gltf"}) {
-    if (std::string found = SharedFile("assets/" + path); !found.empty()) return found;
-  }
-  return "";
-}
 
 struct Frames {
   std::vector<double> times;
@@ -115,7 +90,7 @@ TEST(CharacterExpected, EveryFileWithinTolerance) {
   for (const ExpectedFile& file : files) {
     SCOPED_TRACE(file.path);
     if (rigs.count(file.character) == 0) {
-      Result<Rig> rig = LoadRig(StandardRegistry(), CharacterPath(file.character));
+      Result<Rig> rig = LoadRig(StandardRegistry(), file.character);
       ASSERT_TRUE(rig.ok()) << rig.status().ToString();
       rigs.emplace(file.character, std::move(*rig));
     }

@@ -6,36 +6,11 @@
 
 #include "io/gltf_import.h"
 #include "io/npz.h"
+#include "tests/support/expected_files.h"
 #include "tests/support/gltf_reference.h"
-#include "tests/support/shared_files.h"
 
 namespace kpsa {
 namespace {
-
-struct ExpectedFile {
-  std::string path, character, clip;  // clip "rest": none
-};
-
-std::vector<ExpectedFile> ExpectedFiles() {
-  std::vector<ExpectedFile> files;
-  const std::string folder = SharedFile("expected");
-  if (folder.empty()) return files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string stem = entry.path().stem().string();
-    const std::size_t split = stem.find("__");
-    if (entry.path().extension() != ".npz" || split == std::string::npos || stem.ends_with(".alt")) continue;
-    files.push_back({entry.path().string(), stem.substr(0, split), stem.substr(split + 2)});
-  }
-  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
-  return files;
-}
-
-std::string CharacterPath(const std::string& name) {
-  for (const std::string& path : {name + ".glb", name + ".gltf", name + "/" + name + ".gltf"}) {
-    if (std::string found = SharedFile("assets/" + path); !found.empty()) return found;
-  }
-  return "";
-}
 
 // The largest distance of two points as a share of the diagonal of all expected positions.
 double RelativeError(const Npz& expected, const std::map<std::string, std::vector<double>>& actual) {
@@ -68,7 +43,7 @@ TEST(GltfExpected, EveryFileWithinTolerance) {
     SCOPED_TRACE(file.path);
     auto found = characters.find(file.character);
     if (found == characters.end()) {
-      found = characters.emplace(file.character, gltf::LoadGltf(CharacterPath(file.character))).first;
+      found = characters.emplace(file.character, gltf::LoadGltf(file.character)).first;
     }
     ASSERT_TRUE(found->second.ok()) << found->second.status().ToString();
     const gltf::Character& character = *found->second;

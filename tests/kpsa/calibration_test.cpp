@@ -6,10 +6,12 @@
 #include <cmath>
 #include <random>
 
+#include "tests/kpsa/synthetic.h"
+
 namespace kpsa {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 // Scores and errors that go together, with exceptions: a score may be low although the error is large.
 std::vector<CalibrationPair> RandomPairs(std::size_t count, unsigned seed) {

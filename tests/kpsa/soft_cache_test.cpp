@@ -15,7 +15,7 @@ namespace kpsa {
 namespace {
 
 using test::Sheet;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using test::kInfinity;
 
 class SoftCacheTest : public testing::Test {
  protected:

@@ -75,25 +75,12 @@ TEST_P(SubspaceTest, ReconstructsWhatTheEstimatorSays) {
     std::size_t first = 0;
     for (std::size_t output = 0; output < 2; ++output) {
       PointBuffer points(subspace_.outputs[output].points);
-      ReconstructOutput(subspace_, output, &scratch, points.view());
+      subspace_.tiles[output].Reconstruct(scratch.y.span(), points.view());
       const std::vector<float> xyz = points.Interleaved();
       double sum = 0;
       for (std::size_t i = 0; i < xyz.size(); ++i) sum += std::pow(static_cast<double>(xyz[i]) - expected[static_cast<Eigen::Index>(first + i)], 2);
       EXPECT_LT(std::sqrt(sum / static_cast<double>(points.count())), 2e-5);
       first += xyz.size();
-
-      // A list of all tiles, and a block of two frames of which row 0 is this one, give the same bits
-      PointBuffer again(points.count());
-      const std::vector<Index> tiles = output == 0 ? std::vector<Index>{0, 1} : std::vector<Index>{0};
-      ReconstructOutputTiles(subspace_, output, tiles, &scratch, again.view());
-      EXPECT_EQ(again.Interleaved(), xyz);
-      SubspaceScratch block(subspace_, 2);
-      Measure(subspace_, RawCues(t), &block, 0);
-      Measure(subspace_, RawCues((t + 1) % test_.poses()), &block, 1);
-      PointBuffer one(points.count()), two(points.count());
-      const PointsView views[] = {one.view(), two.view()};
-      ReconstructOutputBlock(subspace_, output, {}, &block, views);
-      EXPECT_EQ(one.Interleaved(), xyz);
     }
   }
 }
@@ -122,8 +109,8 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   PointBuffer x(150), y(150);
   Measure(subspace_, RawCues(4), &a);
   Measure(*read, RawCues(4), &b);
-  ReconstructOutput(subspace_, 0, &a, x.view());
-  ReconstructOutput(*read, 0, &b, y.view());
+  subspace_.tiles[0].Reconstruct(a.y.span(), x.view());
+  read->tiles[0].Reconstruct(b.y.span(), y.view());
   EXPECT_EQ(x.Interleaved(), y.Interleaved());
   const SoftCacheThreshold threshold{.tau = 1};
   EXPECT_EQ(Judge(subspace_, threshold, &a).score, Judge(*read, threshold, &b).score);
@@ -146,7 +133,7 @@ TEST_P(SubspaceTest, EveryTargetGivesTheSameFrames) {
     SubspaceScratch scratch(subspace_);
     PointBuffer points(150);
     Measure(subspace_, RawCues(0), &scratch);
-    ReconstructOutput(subspace_, 0, &scratch, points.view());
+    subspace_.tiles[0].Reconstruct(scratch.y.span(), points.view());
     const double now = Judge(subspace_, {.tau = 1}, &scratch).score;
     if (first.empty()) first = points.Interleaved(), score = now;
     EXPECT_EQ(points.Interleaved(), first) << target;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -10,6 +11,8 @@
 #include "kpsa/pose_matrix.h"
 
 namespace kpsa::test {
+
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Points of a square grid of about `count` points, 0.5 m wide, in a blockwise spatial order (so that runs of 128
 // points lie together), and controls: local bumps with a direction each, a bend and a twist that move everything

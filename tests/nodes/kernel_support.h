@@ -1,6 +1,7 @@
 // What the tests and the benchmark of the kernels share: synthetic meshes, and plain loops to compare with.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -123,6 +124,15 @@ inline std::vector<Double3> ToDouble(ConstPointsView points) {
   std::vector<Double3> result;
   for (std::size_t i = 0; i < points.count; ++i) result.push_back({points.x[i], points.y[i], points.z[i]});
   return result;
+}
+
+inline double MaxDistance(const std::vector<Double3>& a, const std::vector<Double3>& b) {
+  double largest = a.size() == b.size() ? 0 : INFINITY;
+  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+    const double distance = Length(a[i] - b[i]);
+    if (!(distance <= largest)) largest = distance;
+  }
+  return largest;
 }
 
 }  // namespace kpsa

@@ -24,15 +24,6 @@ PointBuffer ToFloat(const Points& points) {
   return buffer;
 }
 
-double MaxDistance(const Points& a, const Points& b) {
-  double largest = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const double distance = Length(a[i] - b[i]);
-    if (!(distance <= largest)) largest = distance;
-  }
-  return largest;
-}
-
 bool Pinned(const Topology& topology, const DeltaMushSettings& settings, Index p) {
   return topology.neighbors().row(p).size() < 2 || (settings.pin_borders && topology.is_border(p));
 }

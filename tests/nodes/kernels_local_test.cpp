@@ -16,15 +16,6 @@
 namespace kpsa {
 namespace {
 
-double MaxDistance(const std::vector<Double3>& a, const std::vector<Double3>& b) {
-  double largest = a.size() == b.size() ? 0 : INFINITY;
-  for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
-    const double distance = Length(a[i] - b[i]);
-    if (!(distance <= largest)) largest = distance;
-  }
-  return largest;
-}
-
 bool SameBits(ConstPointsView a, ConstPointsView b, std::size_t i) {
   return std::memcmp(a.x + i, b.x + i, 4) == 0 && std::memcmp(a.y + i, b.y + i, 4) == 0 &&
          std::memcmp(a.z + i, b.z + i, 4) == 0;

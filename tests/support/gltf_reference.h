@@ -3,6 +3,7 @@
 // at a time, libm throughout.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>

@@ -1,6 +1,6 @@
 #include "tests/support/instruction_count.h"
 
-#if defined(__x86_64__) && defined(__linux__) && !defined(__SANITIZE_THREAD__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__x86_64__) && defined(__linux__) && !defined(KPSA_WITH_TSAN) && !defined(KPSA_WITH_ASAN)
 #include <signal.h>
 
 namespace kpsa {
