@@ -31,12 +31,17 @@ namespace kpsa {
 
 HWY_EXPORT(TransformAll);
 
-void TransformPoints(const Matrix4& matrix, PointsView points) {
-  float m[12];
+FloatMatrix ToFloats(const Matrix4& matrix) {
+  FloatMatrix m;
   for (int column = 0; column < 4; ++column) {
-    for (int row = 0; row < 3; ++row) m[3 * column + row] = static_cast<float>(matrix(row, column));
+    for (int row = 0; row < 3; ++row)
+      m[static_cast<std::size_t>(3 * column + row)] = static_cast<float>(matrix(row, column));
   }
-  HWY_DYNAMIC_DISPATCH(TransformAll)(m, points);
+  return m;
+}
+
+void TransformPoints(const FloatMatrix& matrix, PointsView points) {
+  HWY_DYNAMIC_DISPATCH(TransformAll)(matrix.data(), points);
 }
 
 }  // namespace kpsa

@@ -2,12 +2,17 @@
 // their detail up to the spacing of float there.
 #pragma once
 
+#include <array>
+
 #include "base/points.h"
 #include "base/types.h"
 
 namespace kpsa {
 
-// The same bits on every SIMD target.
-void TransformPoints(const Matrix4& matrix, PointsView points);
+using FloatMatrix = std::array<float, 12>;  // 3x4 by columns
+FloatMatrix ToFloats(const Matrix4& matrix);
+
+// The same bits on every SIMD target. Arrays as PointsView has them: the padding is written.
+void TransformPoints(const FloatMatrix& matrix, PointsView points);
 
 }  // namespace kpsa

@@ -10,50 +10,75 @@ HWY_BEFORE_NAMESPACE();
 namespace kpsa {
 namespace HWY_NAMESPACE {
 
-// Four rows of F against y, sixteen columns at a time whatever the width of the target: w, and g += F_rows^T
-// w. Returns |w|^2. The sums of sixteen are added in halves.
-float FourRows(const float* HWY_RESTRICT rows, std::size_t groups, const float* HWY_RESTRICT y,
-               float* HWY_RESTRICT g) {
+// Sums of sixteen are added in halves, whatever the width of the target.
+#if HWY_TARGET == HWY_SCALAR || HWY_TARGET == HWY_EMU128
+template <class D, class V>
+HWY_INLINE float SumInHalves(D d, V v) {
+  HWY_ALIGN float lanes[HWY_MAX_BYTES / sizeof(float)];
+  hn::Store(v, d, lanes);
+  for (std::size_t half = hn::Lanes(d) / 2; half >= 1; half /= 2) {
+    for (std::size_t k = 0; k < half; ++k) lanes[k] = lanes[k] + lanes[k + half];
+  }
+  return lanes[0];
+}
+#else
+template <class D, class V>
+HWY_INLINE float SumInHalves(D d, V v) {
+  if constexpr (hn::MaxLanes(D()) == 1) {
+    return hn::GetLane(v);
+  } else {
+    const hn::Half<D> half;
+    return SumInHalves(half, hn::Add(hn::LowerHalf(half, v), hn::UpperHalf(half, v)));
+  }
+}
+#endif
+
+// Up to 16 rows of F against y, four by four, sixteen columns at a time: w, and g += F_rows^T w. Returns |w|^2.
+float Rows(const float* HWY_RESTRICT rows, std::size_t fours, std::size_t groups, const float* HWY_RESTRICT y,
+           float* HWY_RESTRICT g) {
   const hn::CappedTag<float, 16> d;
   constexpr std::size_t kLanes = HWY_MIN(HWY_LANES(float), 16), kVectors = 16 / kLanes;
-  hn::Vec<decltype(d)> sum[4][kVectors];
+  float w[16], squared = 0;
+  for (std::size_t four = 0; four < fours; ++four) {
+    const float* HWY_RESTRICT at = rows + 64 * groups * four;
+    hn::Vec<decltype(d)> sum[4][kVectors];
 #pragma GCC unroll 4
-  for (int row = 0; row < 4; ++row) {
+    for (int row = 0; row < 4; ++row) {
 #pragma GCC unroll 16
-    for (std::size_t i = 0; i < kVectors; ++i) sum[row][i] = hn::Zero(d);
-  }
-  for (std::size_t group = 0; group < groups; ++group) {
+      for (std::size_t i = 0; i < kVectors; ++i) sum[row][i] = hn::Zero(d);
+    }
+    for (std::size_t group = 0; group < groups; ++group) {
 #pragma GCC unroll 16
-    for (std::size_t i = 0; i < kVectors; ++i) {
-      const auto values = hn::LoadU(d, y + 16 * group + i * kLanes);
+      for (std::size_t i = 0; i < kVectors; ++i) {
+        const auto values = hn::LoadU(d, y + 16 * group + i * kLanes);
 #pragma GCC unroll 4
-      for (std::size_t row = 0; row < 4; ++row) {
-        sum[row][i] = Fma(hn::Load(d, rows + 64 * group + 16 * row + i * kLanes), values, sum[row][i]);
+        for (std::size_t row = 0; row < 4; ++row)
+          sum[row][i] = Fma(hn::Load(d, at + 64 * group + 16 * row + i * kLanes), values, sum[row][i]);
       }
     }
-  }
-  HWY_ALIGN float lanes[4][16];
-  for (int row = 0; row < 4; ++row) {
-    for (std::size_t i = 0; i < kVectors; ++i) hn::Store(sum[row][i], d, lanes[row] + i * kLanes);
-  }
-  float w[4];
-  for (int row = 0; row < 4; ++row) {
-    for (int half = 8; half >= 1; half /= 2) {
-      for (int k = 0; k < half; ++k) lanes[row][k] = lanes[row][k] + lanes[row][k + half];
+#pragma GCC unroll 4
+    for (std::size_t row = 0; row < 4; ++row) {
+#pragma GCC unroll 4
+      for (std::size_t half = kVectors / 2; half >= 1; half /= 2) {
+#pragma GCC unroll 8
+        for (std::size_t i = 0; i < half; ++i) sum[row][i] = hn::Add(sum[row][i], sum[row][i + half]);
+      }
+      w[4 * four + row] = SumInHalves(d, sum[row][0]);
     }
-    w[row] = lanes[row][0];
+    const float* of = w + 4 * four;
+    squared = squared + ((of[0] * of[0] + of[1] * of[1]) + (of[2] * of[2] + of[3] * of[3]));
   }
-  const auto w0 = hn::Set(d, w[0]), w1 = hn::Set(d, w[1]), w2 = hn::Set(d, w[2]), w3 = hn::Set(d, w[3]);
   for (std::size_t at = 0; at < 16 * groups; at += kLanes) {
-    const float* column = rows + 64 * (at / 16) + at % 16;
     auto value = hn::LoadU(d, g + at);
-    value = Fma(hn::Load(d, column), w0, value);
-    value = Fma(hn::Load(d, column + 16), w1, value);
-    value = Fma(hn::Load(d, column + 32), w2, value);
-    value = Fma(hn::Load(d, column + 48), w3, value);
+    for (std::size_t four = 0; four < fours; ++four) {
+      const float* column = rows + 64 * (groups * four + at / 16) + at % 16;
+#pragma GCC unroll 4
+      for (std::size_t row = 0; row < 4; ++row)
+        value = Fma(hn::Load(d, column + 16 * row), hn::Set(d, w[4 * four + row]), value);
+    }
     hn::StoreU(value, d, g + at);
   }
-  return (w[0] * w[0] + w[1] * w[1]) + (w[2] * w[2] + w[3] * w[3]);
+  return squared;
 }
 
 // g = F^T F y; returns |F y|^2.
@@ -61,10 +86,10 @@ double Project(const float* factor, std::size_t rows, bool lower, const float* y
   const std::size_t all = (rows + 15) / 16;
   for (std::size_t j = 0; j < 16 * all; ++j) g[j] = 0;
   double sum = 0;
-  for (std::size_t row = 0; row < rows; row += 4) {
-    const std::size_t groups = lower ? row / 16 + 1 : all;
-    sum += static_cast<double>(FourRows(factor, groups, y, g));
-    factor += 64 * groups;
+  for (std::size_t row = 0; row < rows; row += 16) {
+    const std::size_t groups = lower ? row / 16 + 1 : all, fours = ((rows - row < 16 ? rows - row : 16) + 3) / 4;
+    sum += static_cast<double>(Rows(factor, fours, groups, y, g));
+    factor += 64 * groups * fours;
   }
   return sum;
 }

@@ -1,5 +1,7 @@
 #include "kpsa/tiles.h"
 
+#include <algorithm>
+#include <bit>
 #include <cstring>
 
 #undef HWY_TARGET_INCLUDE
@@ -7,6 +9,7 @@
 #include "hwy/foreach_target.h"
 
 #include "base/simd-inl.h"
+#include "kpsa/tile_panels_vnni.h"
 
 #ifndef KPSA_TILES_STEP
 #define KPSA_TILES_STEP
@@ -16,13 +19,9 @@ namespace {
 constexpr float kInputRange = 32639;  // 127 * 256 + 127: both bytes of a wide column's input stay in 16 bits
 constexpr float kSmallestInput = 1e-30f;  // inputs below are zeros; their inverse stays finite
 
-// The inputs of one tile and frame: x = mean + step * (U q), U's bytes being 128 too large each: bias = 128
-// sum(q).
-struct TileStep {
-  alignas(64) float t[2 * kMaxTileRank + 16];
-  alignas(64) std::int16_t q[2 * kMaxTileRank + 16];
-  float step;
-  std::int32_t bias;
+// The inputs of the bytes of a tile: high bytes of the wide columns, their low bytes, the narrow columns.
+struct TileInput {
+  alignas(64) std::int16_t q[2 * kMaxTileRank + 32];
 };
 
 }  // namespace
@@ -93,7 +92,8 @@ void Inputs(const std::uint16_t* HWY_RESTRICT v, const float* HWY_RESTRICT scale
 
 // The inputs of the byte columns: q = round(t / step) of 16 bits, with the step that the largest asks for. z
 // [rank, padded to 16 with zeros] is overwritten.
-void QuantizeInputs(std::size_t wide, std::size_t rank, float* HWY_RESTRICT t, TileStep* step) {
+void QuantizeInputs(std::size_t wide, std::size_t rank, float* HWY_RESTRICT t, std::int16_t* HWY_RESTRICT q16,
+                    TileFrame* frame) {
   const hn::CappedTag<float, 16> d;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   const hn::Rebind<std::int16_t, decltype(d)> ds;
@@ -105,22 +105,23 @@ void QuantizeInputs(std::size_t wide, std::size_t rank, float* HWY_RESTRICT t, T
   }
   const std::size_t count = wide + rank, padded = (count + 15) / 16 * 16;
   for (std::size_t k = count; k < padded; ++k) t[k] = 0;
-  auto most = hn::Zero(d);
-  for (std::size_t k = 0; k < padded; k += lanes) most = hn::Max(most, hn::Abs(hn::Load(d, t + k)));
-  // NaNs are lost in maxima, but not in sums
-  auto sum = hn::Zero(d);
+  // As integers, magnitudes are in the order of the numbers, and NaNs and infinities come last
+  const auto magnitude = hn::Set(di, 0x7fffffff);
+  auto most = hn::Zero(di);
   for (std::size_t k = 0; k < padded; k += lanes)
-    sum = hn::Add(sum, hn::Mul(hn::Zero(d), hn::Load(d, t + k)));
-  const float largest = hn::GetLane(hn::MaxOfLanes(d, most)), spoiled = hn::GetLane(hn::SumOfLanes(d, sum));
-  step->step = spoiled == 0 ? largest / kInputRange : spoiled;
-  const auto inverse = hn::Set(d, spoiled == 0 && largest > kSmallestInput ? kInputRange / largest : 0.0f);
+    most = hn::Max(most, hn::And(magnitude, hn::BitCast(di, hn::Load(d, t + k))));
+  const std::int32_t bits = hn::GetLane(hn::MaxOfLanes(di, most));
+  const float largest = std::bit_cast<float>(bits);
+  const bool spoiled = bits >= 0x7f800000;
+  frame->step = spoiled ? std::numeric_limits<float>::quiet_NaN() : largest / kInputRange;
+  const auto inverse = hn::Set(d, !spoiled && largest > kSmallestInput ? kInputRange / largest : 0.0f);
   auto total = hn::Zero(di);
   for (std::size_t k = 0; k < padded; k += lanes) {
     const auto q = hn::NearestInt(hn::Mul(hn::Load(d, t + k), inverse));
     total = hn::Add(total, q);
-    hn::StoreU(hn::DemoteTo(ds, q), ds, step->q + k);
+    hn::StoreU(hn::DemoteTo(ds, q), ds, q16 + k);
   }
-  step->bias = spoiled == 0 ? 128 * hn::GetLane(hn::SumOfLanes(di, total)) : 0;
+  frame->bias = !spoiled ? 128 * hn::GetLane(hn::SumOfLanes(di, total)) : 0;
 }
 
 // sum + the product of pairs of signed 16-bit numbers, added for each 32-bit lane (modulo 2^32).
@@ -140,8 +141,8 @@ HWY_INLINE V AddPairs(V a, V b, V sum) {
 // A panel of points: x = mean + step (U q), written to the component arrays of each frame. u:
 // [groups][32c][4] bytes.
 template <int kComponents, int kFrames>
-HWY_INLINE void PointPanel(const std::uint8_t* HWY_RESTRICT u, std::size_t groups, const TileStep* steps,
-                           const float* mean, std::size_t first, std::size_t padded, const PointsView* outs) {
+HWY_INLINE void PointPanel(const std::uint8_t* HWY_RESTRICT u, std::size_t groups, const TileFrame* frames,
+                           const float* mean, std::size_t first, std::size_t padded) {
   const hn::ScalableTag<float> d;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   using V = hn::Vec<decltype(di)>;
@@ -155,14 +156,14 @@ HWY_INLINE void PointPanel(const std::uint8_t* HWY_RESTRICT u, std::size_t group
 #pragma GCC unroll 8
     for (int f = 0; f < kFrames; ++f) {
 #pragma GCC unroll 24
-      for (int v = 0; v < kVectors; ++v) sum[f][v] = hn::Set(di, -steps[f].bias);
+      for (int v = 0; v < kVectors; ++v) sum[f][v] = hn::Set(di, -frames[f].bias);
     }
     for (std::size_t g = 0; g < groups; ++g) {
       V q0[kFrames], q1[kFrames];
 #pragma GCC unroll 8
       for (int f = 0; f < kFrames; ++f) {
         std::int32_t pairs[2];
-        std::memcpy(pairs, steps[f].q + 4 * g, sizeof(pairs));
+        std::memcpy(pairs, frames[f].q + 4 * g, sizeof(pairs));
         q0[f] = hn::Set(di, pairs[0]);
         q1[f] = hn::Set(di, pairs[1]);
       }
@@ -176,8 +177,8 @@ HWY_INLINE void PointPanel(const std::uint8_t* HWY_RESTRICT u, std::size_t group
       }
     }
     for (int f = 0; f < kFrames; ++f) {
-      float* const components[3] = {outs[f].x, outs[f].y, outs[f].z};
-      const auto step = hn::Set(d, steps[f].step);
+      float* const components[3] = {frames[f].out.x, frames[f].out.y, frames[f].out.z};
+      const auto step = hn::Set(d, frames[f].step);
 #pragma GCC unroll 24
       for (int v = 0; v < kVectors; ++v) {
         const std::size_t at = row + static_cast<std::size_t>(v) * lanes;
@@ -191,76 +192,40 @@ HWY_INLINE void PointPanel(const std::uint8_t* HWY_RESTRICT u, std::size_t group
 }
 
 template <int kComponents>
-HWY_INLINE void TilePanels(const std::uint8_t* u, std::size_t count, std::size_t groups,
-                           const TileStep* steps, std::size_t frames, const float* mean, std::size_t first,
-                           const PointsView* outs) {
-  const std::size_t padded = PaddedCount(outs[0].count);
+HWY_INLINE void TilePanels(const std::uint8_t* u, std::size_t panels, std::size_t groups, const float* mean,
+                           std::size_t first, const TileFrame* frames, std::size_t frame_count) {
+#if HWY_TARGET == HWY_AVX3
+  if (HasVnni()) return TilePanelsVnni(u, panels, groups, kComponents, mean, first, frames, frame_count);
+#endif
+  const std::size_t padded = PaddedCount(frames[0].out.count);
   constexpr std::size_t kRows = kPanelPoints * kComponents;
-  for (std::size_t p = 0; p < count; ++p) {
-    if (frames == kBlockFrames) {
-      PointPanel<kComponents, kBlockFrames>(u, groups, steps, mean, first, padded, outs);
+  for (std::size_t p = 0; p < panels; ++p) {
+    if (frame_count == kBlockFrames) {
+      PointPanel<kComponents, kBlockFrames>(u, groups, frames, mean, first, padded);
     } else {
-      for (std::size_t f = 0; f < frames; ++f)
-        PointPanel<kComponents, 1>(u, groups, steps + f, mean, first, padded, outs + f);
+      for (std::size_t f = 0; f < frame_count; ++f)
+        PointPanel<kComponents, 1>(u, groups, frames + f, mean, first, padded);
     }
     u += 4 * groups * kRows;
     mean += kRows;
     first += kPanelPoints;
   }
-}
-
-void TilePanels3(const std::uint8_t* u, std::size_t count, std::size_t groups, const TileStep* steps,
-                 std::size_t frames, const float* mean, std::size_t first, const PointsView* outs) {
-  TilePanels<3>(u, count, groups, steps, frames, mean, first, outs);
-}
-void TilePanels1(const std::uint8_t* u, std::size_t count, std::size_t groups, const TileStep* steps,
-                 std::size_t frames, const float* mean, std::size_t first, const PointsView* outs) {
-  TilePanels<1>(u, count, groups, steps, frames, mean, first, outs);
-}
-
-template <int kComponents>
-HWY_INLINE void DensePanel(const float* panel, std::size_t columns, const float* y, const float* mean,
-                           std::size_t first, std::size_t padded, const PointsView& out) {
-  const hn::ScalableTag<float> d;
-  const std::size_t lanes = hn::Lanes(d);
-  constexpr std::size_t kRows = kPanelPoints * kComponents;
-  constexpr int kVectors = VectorsAtOnce < kRows, 1, kManyRegisters ? 24 : 12 > ();
-  float* const components[3] = {out.x, out.y, out.z};
-  for (std::size_t row = 0; row < kRows; row += kVectors * lanes) {
-    hn::Vec<decltype(d)> sum[kVectors];
-#pragma GCC unroll 24
-    for (int v = 0; v < kVectors; ++v) sum[v] = hn::Zero(d);
-    for (std::size_t k = 0; k < columns; ++k) {
-      const auto factor = hn::Set(d, y[k]);
-#pragma GCC unroll 24
-      for (int v = 0; v < kVectors; ++v) {
-        sum[v] =
-            Fma(hn::Load(d, panel + k * kRows + row + static_cast<std::size_t>(v) * lanes), factor, sum[v]);
-      }
-    }
-#pragma GCC unroll 24
-    for (int v = 0; v < kVectors; ++v) {
-      const std::size_t at = row + static_cast<std::size_t>(v) * lanes;
-      const std::size_t point = first + at % kPanelPoints;
-      if (point < padded)
-        hn::Store(hn::Add(hn::Load(d, mean + at), sum[v]), d, components[at / kPanelPoints] + point);
-    }
+  const std::size_t end = first, begin = first - panels * kPanelPoints;
+  for (std::size_t f = 0; f < frame_count && kComponents == 3; ++f) {
+    const PointsView& out = frames[f].out;
+    if (frames[f].space != nullptr)
+      TransformPoints(*frames[f].space,
+                      {out.x + begin, out.y + begin, out.z + begin, std::min(end, out.count) - begin});
   }
 }
 
-void DensePanels(const float* panels, std::size_t columns, const float* y, int components, const float* mean,
-                 const PointsView& out) {
-  const std::size_t rows = kPanelPoints * static_cast<std::size_t>(components),
-                    padded = PaddedCount(out.count);
-  for (std::size_t first = 0; first < out.count; first += kPanelPoints) {
-    if (components == 3) {
-      DensePanel<3>(panels, columns, y, mean, first, padded, out);
-    } else {
-      DensePanel<1>(panels, columns, y, mean, first, padded, out);
-    }
-    panels += columns * rows;
-    mean += rows;
-  }
+void TilePanels3(const std::uint8_t* u, std::size_t panels, std::size_t groups, const float* mean,
+                 std::size_t first, const TileFrame* frames, std::size_t frame_count) {
+  TilePanels<3>(u, panels, groups, mean, first, frames, frame_count);
+}
+void TilePanels1(const std::uint8_t* u, std::size_t panels, std::size_t groups, const float* mean,
+                 std::size_t first, const TileFrame* frames, std::size_t frame_count) {
+  TilePanels<1>(u, panels, groups, mean, first, frames, frame_count);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -268,8 +233,6 @@ void DensePanels(const float* panels, std::size_t columns, const float* y, int c
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-#include <algorithm>
-
 #include "base/check.h"
 #include "kpsa/rigid_points.h"
 
@@ -279,7 +242,6 @@ HWY_EXPORT(Inputs);
 HWY_EXPORT(QuantizeInputs);
 HWY_EXPORT(TilePanels3);
 HWY_EXPORT(TilePanels1);
-HWY_EXPORT(DensePanels);
 
 namespace {
 
@@ -377,62 +339,42 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
   const auto tile_panels =
       data_.components == 3 ? HWY_DYNAMIC_DISPATCH(TilePanels3) : HWY_DYNAMIC_DISPATCH(TilePanels1);
   const std::size_t count = tiles.empty() ? this->tiles() : tiles.size();
-  TileStep steps[kBlockFrames];
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t tile = tiles.empty() ? i : tiles[i], rank = data_.ranks[tile], wide = data_.wide[tile];
-    const float* scale = data_.scale.data() + scale_begin_[tile];
-    const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
-    for (std::size_t first = 0; first < outs.size(); first += kBlockFrames) {
-      const std::size_t frames = std::min(kBlockFrames, outs.size() - first);
-      for (std::size_t f = 0; f < frames; ++f) {
-        const float* frame = y.data() + (first + f) * data_.inputs;
-        if (data_.direct[tile] == 1) {
-          for (std::size_t k = 0; k < rank; ++k) steps[f].t[k] = frame[columns[k]] * scale[k];
-        } else {
-          inputs(data_.v.data() + v_begin_[tile], scale, Padded16(rank), columns, data_.counts[tile], frame,
-                 steps[f].t);
+  // The inputs of some tiles, then their points: short chains of dependent instructions, which overlap
+  constexpr std::size_t kAhead = 4;
+  TileInput input[kAhead][kBlockFrames];
+  TileFrame frames[kAhead][kBlockFrames];
+  alignas(64) float t[2 * kMaxTileRank + 16];
+  for (std::size_t first = 0; first < outs.size(); first += kBlockFrames) {
+    const std::size_t frame_count = std::min(kBlockFrames, outs.size() - first);
+    FloatMatrix space[kBlockFrames];
+    for (std::size_t f = 0; f < frame_count && !spaces.empty(); ++f) space[f] = ToFloats(spaces[first + f]);
+    for (std::size_t next = 0; next < count; next += kAhead) {
+      const std::size_t ahead = std::min(kAhead, count - next);
+      for (std::size_t i = 0; i < ahead; ++i) {
+        const std::size_t tile = tiles.empty() ? next + i : tiles[next + i], rank = data_.ranks[tile];
+        const float* scale = data_.scale.data() + scale_begin_[tile];
+        const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
+        for (std::size_t f = 0; f < frame_count; ++f) {
+          const float* frame = y.data() + (first + f) * data_.inputs;
+          if (data_.direct[tile] == 1) {
+            for (std::size_t k = 0; k < rank; ++k) t[k] = frame[columns[k]] * scale[k];
+          } else {
+            inputs(data_.v.data() + v_begin_[tile], scale, Padded16(rank), columns, data_.counts[tile], frame, t);
+          }
+          frames[i][f].q = input[i][f].q;
+          frames[i][f].out = outs[first + f];
+          frames[i][f].space = spaces.empty() ? nullptr : &space[f];
+          quantize(data_.wide[tile], rank, t, input[i][f].q, &frames[i][f]);
         }
-        quantize(wide, rank, steps[f].t, &steps[f]);
       }
-      tile_panels(data_.u.data() + u_begin_[tile], TilePanelCount(data_.points, tile), Groups(rank, wide),
-                  steps, frames, data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows,
-                  tile * kTilePoints, outs.data() + first);
-      for (std::size_t f = first; f < first + frames && !spaces.empty(); ++f) {
-        const std::size_t begin = tile * kTilePoints;
-        const PointsView& out = outs[f];
-        TransformPoints(spaces[f], {out.x + begin, out.y + begin, out.z + begin,
-                                    std::min(kTilePoints, out.count - begin)});
+      for (std::size_t i = 0; i < ahead; ++i) {
+        const std::size_t tile = tiles.empty() ? next + i : tiles[next + i], begin = tile * kTilePoints;
+        tile_panels(data_.u.data() + u_begin_[tile], TilePanelCount(data_.points, tile),
+                    Groups(data_.ranks[tile], data_.wide[tile]),
+                    data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows, begin, frames[i], frame_count);
       }
     }
   }
-}
-
-DenseMap::DenseMap(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components)
-    : points_(static_cast<std::size_t>(gain.rows() / components)),
-      inputs_(static_cast<std::size_t>(gain.cols())),
-      components_(components) {
-  const auto c = static_cast<std::size_t>(components);
-  const std::size_t rows = kPanelPoints * c;
-  matrix_ = AlignedArray<float>(Panels(points_) * inputs_ * rows);
-  mean_ = AlignedArray<float>(Panels(points_) * rows);
-  for (std::size_t i = 0; i < points_; ++i) {
-    const std::size_t panel = i / kPanelPoints;
-    for (std::size_t x = 0; x < c; ++x) {
-      const auto row = static_cast<Eigen::Index>(i * c + x);
-      const std::size_t at = x * kPanelPoints + i % kPanelPoints;
-      mean_.data()[panel * rows + at] = static_cast<float>(mean[row]);
-      for (std::size_t k = 0; k < inputs_; ++k) {
-        matrix_.data()[(panel * inputs_ + k) * rows + at] =
-            static_cast<float>(gain(row, static_cast<Eigen::Index>(k)));
-      }
-    }
-  }
-}
-
-void DenseMap::Reconstruct(std::span<const float> y, PointsView out) const {
-  KPSA_CHECK_EQ(out.count, points_);
-  KPSA_CHECK_LE(inputs_, y.size());
-  HWY_DYNAMIC_DISPATCH(DensePanels)(matrix_.data(), inputs_, y.data(), components_, mean_.data(), out);
 }
 
 }  // namespace kpsa

@@ -114,23 +114,6 @@ struct TileReport {
 TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components,
                    const TileInputs& inputs, const TileOptions& options, TileReport* report = nullptr);
 
-// The dense float32 twin: the reference, and the choice where half precision or rank does not pay.
-class DenseMap {
- public:
-  DenseMap() = default;
-  DenseMap(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components);
-  std::size_t points() const { return points_; }
-  std::size_t inputs() const { return inputs_; }
-  std::size_t bytes() const { return (matrix_.size() + mean_.size()) * sizeof(float); }
-  void Reconstruct(std::span<const float> y, PointsView out) const;
-
- private:
-  std::size_t points_ = 0, inputs_ = 0;
-  int components_ = 3;
-  AlignedArray<float> matrix_;  // [panels][r][32c]
-  AlignedArray<float> mean_;    // [panels][32c]
-};
-
 // IEEE half precision, round to nearest even; overflow gives infinity.
 std::uint16_t HalfFromFloat(float value);
 float FloatFromHalf(std::uint16_t half);

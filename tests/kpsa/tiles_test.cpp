@@ -1,3 +1,4 @@
+#include "kpsa/dense_map.h"
 #include "kpsa/tiles.h"
 
 #include <gtest/gtest.h>
@@ -296,7 +297,7 @@ TEST(Tiles, ASpaceAppliesToEveryPointOnce) {
   PointBuffer through(points), after(points), tile(points);
   map.Reconstruct(y, through.view(), &space);
   map.Reconstruct(y, after.view());
-  TransformPoints(space, after.view());
+  TransformPoints(ToFloats(space), after.view());
   EXPECT_EQ(through.Interleaved(), after.Interleaved());
   const std::vector<Index> last = {2};
   map.ReconstructTiles(y, last, tile.view(), &space);
