@@ -68,6 +68,8 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
     node = parent->source.node;
   }
   for (const Control& control : rig->controls) {
+    const NodeDef& def = rig->graph->def(control.plug.node);
+    if (def.attributes[static_cast<std::size_t>(control.plug.attribute)].diagnostic) continue;
     training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip,
                                  carriers.count(control.plug.node.index) != 0, ShownByClip(*rig->graph, control)});
   }

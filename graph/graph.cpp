@@ -232,6 +232,29 @@ Status Graph::Unset(const PlugRef& plug) {
   return Status();
 }
 
+Status Graph::Pose(const PlugRef& plug, Value value) {
+  KPSA_RETURN_IF_ERROR(CheckPlug(plug));
+  const bool first = !IsPosed(plug.node, plug.attribute);
+  const std::span<const SetValue> set = Values(plug.node, plug.attribute);
+  std::vector<SetValue> before(set.begin(), set.end());
+  KPSA_RETURN_IF_ERROR(Set(plug, std::move(value)));
+  if (first && !def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].structural)
+    node(plug.node).unposed.emplace_back(plug.attribute, std::move(before));
+  return Status();
+}
+
+bool Graph::IsPosed(NodeId id, int attribute) const {
+  const auto& unposed = node(id).unposed;
+  return std::any_of(unposed.begin(), unposed.end(), [&](const auto& entry) { return entry.first == attribute; });
+}
+
+std::span<const SetValue> Graph::RestValues(NodeId id, int attribute) const {
+  for (const auto& [posed, values] : node(id).unposed) {
+    if (posed == attribute) return values;
+  }
+  return Values(id, attribute);
+}
+
 const Value* Graph::FindValue(const PlugRef& plug) const {
   const auto [begin, end] = Range(node(plug.node).values, plug, plug, kPlug);
   return begin == end ? nullptr : &begin->value;

@@ -50,6 +50,9 @@ class Graph {
   // finite. The latest wins: setting a whole plug forgets what was set on its children (or its single points).
   Status Set(const PlugRef& plug, Value value);
   Status Unset(const PlugRef& plug);
+  // The same for a pose: everything sees the value but rest states (node_def.h, Structural::rest), which keep what was
+  // set on the attribute before its first pose. Structural attributes have no pose: they are set.
+  Status Pose(const PlugRef& plug, Value value);
   // Types must agree (numbers convert); cycles are refused with their whole path. A destination takes one connection;
   // `replace` takes over an existing one. A refused edit changes nothing.
   Status Connect(const PlugRef& source, const PlugRef& destination, bool replace = false);
@@ -82,6 +85,8 @@ class Graph {
   const Value* FindValue(const PlugRef& plug) const;  // null where unset
   // What is set on an attribute, its elements and their components, in that order.
   std::span<const SetValue> Values(NodeId node, int attribute) const;
+  bool IsPosed(NodeId node, int attribute) const;
+  std::span<const SetValue> RestValues(NodeId node, int attribute) const;  // the same without poses
   const Connection* FindConnection(const PlugRef& destination) const;
   // Connections into the node, by attribute, element and component of the destination.
   const std::vector<Connection>& Inputs(NodeId node) const;
@@ -96,6 +101,7 @@ class Graph {
     std::string name;
     std::uint32_t version = 0;
     std::vector<SetValue> values;            // sorted by plug, as are the inputs
+    std::vector<std::pair<int, std::vector<SetValue>>> unposed;  // what was set on posed attributes
     std::vector<Connection> inputs, outputs;
     std::vector<std::pair<int, std::vector<std::string>>> element_names;
     std::vector<NodeId> delegates;

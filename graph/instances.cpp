@@ -79,16 +79,25 @@ const Connection* InstanceTable::FindUsed(const PlugRef& destination, bool rest)
   return c;
 }
 
-const Value* InstanceTable::HeldValue(NodeId node, int attribute, int element) {
+const Value* InstanceTable::HeldValue(NodeId node, int attribute, int element, bool rest) {
   const AttributeDef& a = graph_.def(node).attributes[static_cast<std::size_t>(attribute)];
-  const Value* value = graph_.FindValue({node, attribute, element, -1});
+  rest = rest && graph_.IsPosed(node, attribute);
+  const std::span<const SetValue> values = rest ? graph_.RestValues(node, attribute) : graph_.Values(node, attribute);
+  const Value* value = nullptr;
+  if (!rest) {
+    value = graph_.FindValue({node, attribute, element, -1});
+  } else {
+    for (const SetValue& set : values) {
+      if (set.plug.element == element && set.plug.component < 0) value = &set.value;
+    }
+  }
   const bool points = IsPointType(a.type) && !a.array;
   const bool has_children = points || a.type == Type::kDouble3 || a.type == Type::kQuaternion;
   if (!has_children) {
     if (value != nullptr) return value;
     if (!a.default_from && (!a.default_value.empty() || !IsPointType(a.type))) return &a.default_value;
   }
-  const Key key{node.index, attribute, element, 1};
+  const Key key{node.index, attribute, element, rest ? 2 : 1};
   if (const auto it = held_by_key_.find(key); it != held_by_key_.end()) return &made_values_[it->second];
   Value made;
   if (value != nullptr) {
@@ -101,9 +110,9 @@ const Value* InstanceTable::HeldValue(NodeId node, int attribute, int element) {
     made = EmptyPoints(a.type);
   }
   if (points) {
-    made = WithSetPoints(made, graph_.Values(node, attribute));
+    made = WithSetPoints(made, values);
   } else if (has_children && !made.empty()) {
-    for (const auto& [plug, child] : OfElement(graph_.Values(node, attribute), element, PlugOf)) {
+    for (const auto& [plug, child] : OfElement(values, element, PlugOf)) {
       if (plug.component >= 0) *ComponentOf(made, plug.component) = child.AsDouble();
     }
   }
@@ -250,7 +259,7 @@ Source InstanceTable::ResolveHeld(const PlugRef& plug, bool rest) {
   const int element = points ? -1 : plug.element;
   Source whole;
   whole.type = a.type;
-  whole.value = HeldValue(plug.node, plug.attribute, element);
+  whole.value = HeldValue(plug.node, plug.attribute, element, rest);
   const auto it = varying_by_key_.find(Key{plug.node.index, plug.attribute, element, 0});
   if (!rest && it != varying_by_key_.end()) {
     whole.kind = Source::Kind::kVarying;

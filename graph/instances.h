@@ -77,7 +77,7 @@ class InstanceTable {
   Type OutputType(const Instance& i, int position) const;
   Index AddVarying(const PlugRef& plug);  // the number of its whole plug
   // The value that the graph holds for an input: set (children merged in), or the default. Never null.
-  const Value* HeldValue(NodeId node, int attribute, int element);
+  const Value* HeldValue(NodeId node, int attribute, int element, bool rest = false);
   // Whether the input, or a part of it, is set or driven.
   bool IsSet(NodeId node, int attribute, int element) const;
   // Elements that are set, connected or vary: the highest plus one.

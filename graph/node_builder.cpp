@@ -33,7 +33,7 @@ NodeBuilder& NodeBuilder::in(std::string name, Value default_value, AttributeOpt
   a.name = std::move(name);
   a.type = TypeOfDefault(default_value);
   a.default_value = std::move(default_value);
-  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc);
+  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc), a.diagnostic = options.diagnostic;
   return add(std::move(a));
 }
 
@@ -48,7 +48,7 @@ NodeBuilder& NodeBuilder::structural(std::string name, Type type, AttributeOptio
   a.name = std::move(name);
   a.type = type;
   a.structural = true;
-  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc);
+  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc), a.diagnostic = options.diagnostic;
   return add(std::move(a));
 }
 

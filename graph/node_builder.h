@@ -24,6 +24,7 @@ struct AttributeOptions {
   double max = std::numeric_limits<double>::infinity();
   Unit unit = Unit::kNone;
   std::string doc = {};
+  bool diagnostic = false;
 };
 
 class NodeBuilder {
@@ -34,6 +35,7 @@ class NodeBuilder {
   NodeBuilder& version(int number) { def_->version = number; return *this; }
   NodeBuilder& animation() { def_->animation = true; return *this; }
   NodeBuilder& stateful() { def_->stateful = true; return *this; }
+  NodeBuilder& passes_points() { def_->passes_points = true; return *this; }
 
   // An animatable input; its type follows from the default (bool, int, double, Double3, Quaternion, Matrix4).
   NodeBuilder& in(std::string name, Value default_value, AttributeOptions options = {});

@@ -34,6 +34,7 @@ struct AttributeDef {
   bool structural = false;    // read when a plan is made, baked into kernels
   bool lazy = false;          // evaluated only if decide chooses it
   bool lazy_together = false; // all elements of a lazy array share one decision (one bit)
+  bool diagnostic = false;    // decides whether the node fails, never what it computes
   bool per_geometry = false;  // array whose element i belongs to the i-th deformed geometry
   std::vector<std::string> enum_names;
   std::vector<std::string> aliases;  // other names under which plugs may be written
@@ -123,6 +124,7 @@ struct NodeDef {
   int version = 1;                   // raise it when results change: it invalidates kernels and subspaces
   bool animation = false;            // brings a clip: its connections are ignored in the rest state
   bool stateful = false;             // needs its previous frame
+  bool passes_points = false;        // its points are those that come in, where it succeeds
   std::vector<AttributeDef> attributes;
   std::vector<ComputeGroup> groups;
 

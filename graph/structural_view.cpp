@@ -46,7 +46,7 @@ const Value* StructuralView::rest(std::string_view name, int element) const {
       return statics_->Get(input.rest, true);
     }
   }
-  return table_.HeldValue(node_, attribute, element);
+  return table_.HeldValue(node_, attribute, element, true);
 }
 
 }  // namespace kpsa

@@ -87,7 +87,7 @@ Status ApplySetting(Rig* rig, const Setting& setting) {
   }
   for (const PlugRef& plug : driven) KPSA_RETURN_IF_ERROR(graph.Disconnect(plug));
   if (IsClipPlug(rig->scene, graph, setting.plug)) rig->pinned.push_back(setting.plug);
-  return graph.Set(setting.plug, setting.value);
+  return graph.Pose(setting.plug, setting.value);  // rest states are those of the rig
 }
 
 }  // namespace kpsa

@@ -10,6 +10,7 @@
 namespace kpsa {
 namespace {
 
+constexpr double kShareOfHits = 2;  // in alphas: violations among the hits
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // u in [0, 1] with smoothstep(u) = w.
@@ -70,9 +71,16 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   }
   std::sort(limits.begin(), limits.end());
   const double admitted = std::floor(result.attainable_alpha * (n + 1) * (1 + 1e-12) - 1);
-  const auto k = static_cast<std::size_t>(std::clamp(admitted, 0.0, n));
   const double cap = largest_score / result.threshold.blend_start * (1 + 1e-12);
-  const double tau = k < limits.size() ? std::min(limits[k], cap) : cap;
+  const auto limit = [&](std::size_t k) { return k < limits.size() ? std::min(limits[k], cap) : cap; };
+  const auto hits_below = [&](double tau) {
+    const double tau_lo = tau * result.threshold.blend_start;
+    return std::count_if(pairs.begin(), pairs.end(), [&](const CalibrationPair& pair) { return pair.score <= tau_lo; });
+  };
+  auto k = static_cast<std::size_t>(std::clamp(admitted, 0.0, n));
+  const double share = kShareOfHits * result.attainable_alpha;
+  while (k > 0 && static_cast<double>(k) > share * static_cast<double>(hits_below(limit(k)))) --k;
+  const double tau = limit(k);
   if (tau > 0) result.threshold.tau = tau;
   if (!(tau > 0)) result.warning = "no threshold keeps the violation rate, so nothing is ever a hit";
 

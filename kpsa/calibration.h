@@ -1,7 +1,8 @@
 // The SoftCache threshold from a tolerance in scene units: conformal risk control (Angelopoulos et al. 2022, arXiv
 // 2208.02814). A frame violates if it is accepted although a point of what is emitted, blend included, is farther than
 // the tolerance from the exact result. Among n calibration poses the largest tau is taken for which
-//   (violations(tau) + 1) / (n + 1) <= alpha.
+//   (violations(tau) + 1) / (n + 1) <= alpha   and   violations(tau) <= 2 alpha hits(tau).
+// The second keeps a subspace that hardly ever hits from spending the whole allowance on its few hits.
 // The rate then holds in expectation for poses that are exchangeable with the calibration poses (held-out sampled
 // poses, or blocks of a second or more with gaps); for single neighbouring frames it claims nothing.
 #pragma once

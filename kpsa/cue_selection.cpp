@@ -37,9 +37,9 @@ Eigen::MatrixXd OutputRoot(const Pca& pca, std::span<const double> point_weights
 // The state of a greedy selection.
 class Selector {
  public:
-  Selector(const Pca& pca, std::span<const CueRef> candidates, std::span<const Double3> positions, double diagonal,
+  Selector(const Pca& pca, std::span<const CueRef> candidates, std::span<const Double3> positions, const CueNoise& noise,
            const CueSelectionOptions& options)
-      : pca_(pca), candidates_(candidates), positions_(positions), options_(options), gains_(MakeGains(pca, candidates, diagonal, options.point_weights)) {
+      : pca_(pca), candidates_(candidates), positions_(positions), options_(options), gains_(MakeGains(pca, candidates, noise, options.point_weights)) {
     sigma_ = pca.mode_variance().asDiagonal();
     const Eigen::MatrixXd root = OutputRoot(pca, options.point_weights);
     weight_ = root.size() == 0 ? Eigen::MatrixXd() : Eigen::MatrixXd(root.transpose() * root);
@@ -103,9 +103,9 @@ class Selector {
   double gain(std::size_t candidate) const { return gains_.gains()[candidate]; }
 
  private:
-  static CandidateGains MakeGains(const Pca& pca, std::span<const CueRef> candidates, double diagonal,
+  static CandidateGains MakeGains(const Pca& pca, std::span<const CueRef> candidates, const CueNoise& noise,
                                   std::span<const double> point_weights) {
-    const CueSet set = MakeCueSet(pca, candidates, diagonal);
+    const CueSet set = MakeCueSet(pca, candidates, noise);
     std::vector<float> loadings(static_cast<std::size_t>(set.loadings.size()));
     Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
         loadings.data(), set.loadings.rows(), set.loadings.cols()) = set.loadings.cast<float>();
@@ -174,7 +174,7 @@ std::size_t CueHeight(const PoseLayout& layout, CueRef cue) {
   return cue.kind == CueKind::kOutput ? static_cast<std::size_t>(layout.components) : cue.kind == CueKind::kStage ? 3 : 1;
 }
 
-CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, double diagonal) {
+CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, const CueNoise& noise) {
   CueSet set;
   set.cues.assign(cues.begin(), cues.end());
   set.offsets.push_back(0);
@@ -184,7 +184,8 @@ CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, double diagonal)
   set.mean.resize(rows);
   set.scale = Eigen::VectorXd::Ones(rows);
   set.noise.resize(rows);
-  const double floor = std::max({pca.output_noise(), 1e-12 * diagonal * diagonal, std::numeric_limits<double>::min()});
+  KPSA_CHECK(noise.scalars.empty() || noise.scalars.size() == pca.layout.scalars);
+  const double floor = std::max({pca.output_noise(), noise.point, std::numeric_limits<double>::min()});
   for (std::size_t k = 0; k < cues.size(); ++k) {
     for (Index j = set.offsets[k]; j < set.offsets[k + 1]; ++j) {
       const auto row = static_cast<Eigen::Index>(j);
@@ -195,7 +196,9 @@ CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, double diagonal)
       const double scale = set.scale[row];
       set.loadings.row(row) = pca.modes.row(column) * scale;
       set.mean[row] = pca.mean[column];
-      set.noise[row] = std::max(scalar ? kScalarNoise : floor, pca.row_residual[column] * scale * scale);
+      const double raw = scalar && !noise.scalars.empty() ? noise.scalars[cues[k].index] : 0;
+      set.noise[row] =
+          std::max(scalar ? kScalarNoise : floor, std::max(pca.row_residual[column], raw) * scale * scale);
     }
   }
   return set;
@@ -224,7 +227,7 @@ std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool output
 }
 
 CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::span<const Double3> positions,
-                        double diagonal, const CueSelectionOptions& options) {
+                        const CueNoise& noise, const CueSelectionOptions& options) {
   KPSA_CHECK_EQ(positions.size(), pca.layout.points + pca.layout.stage_points);
   KPSA_CHECK(options.point_weights.empty() || options.point_weights.size() == pca.layout.points);
   CueSelection selection;
@@ -233,7 +236,7 @@ CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::spa
     if (std::find(candidates.begin(), candidates.end(), cue) == candidates.end()) candidates.push_back(cue);
   }
   if (candidates.empty()) return selection;
-  Selector selector(pca, candidates, positions, diagonal, options);
+  Selector selector(pca, candidates, positions, noise, options);
   double refreshed = selector.ExpectedRms();
   double cost = 0;
   const auto take = [&](std::size_t candidate) {

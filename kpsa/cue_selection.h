@@ -43,9 +43,18 @@ struct CueSet {
   Eigen::VectorXd noise;      // [r] variance, in units of y
   Eigen::Index rows() const { return mean.size(); }
 };
-// noise of a row: max(pca.output_noise(), (1e-6 diagonal)^2, what the modes leave unexplained of that row); for
-// scalars, in their normalised unit, at least 1e-6. `diagonal`: of the model's bounding box, scene units.
-CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, double diagonal);
+// What a measurement is not trusted below: variances of a coordinate (scene units) and of each scalar (raw units).
+// Differences that no one would see are no information, however well the training poses agree on them: rounding far
+// from the origin, a joint that a clip turns a little about an axis that no control has.
+struct CueNoise {
+  // Rounding alone; diagonal: of the model's bounding box, scene units.
+  CueNoise(double diagonal) : point(1e-12 * diagonal * diagonal) {}  // NOLINT: a model's size is its noise
+  double point = 0;
+  std::vector<double> scalars = {};  // [scalars of the layout]; empty: none
+};
+// noise of a row: the largest of pca.output_noise(), that of CueNoise, and what the modes leave unexplained of that
+// row; for scalars, in their normalised unit, at least 1e-6.
+CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, const CueNoise& noise);
 
 struct CueSelectionOptions {
   std::size_t count = 40;          // cues at most
@@ -73,7 +82,7 @@ std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool output
 
 // positions: the rest positions of outputs, then stage points, [N + P] (for distances). Candidates: none twice.
 CueSelection SelectCues(const Pca& pca, std::span<const CueRef> candidates, std::span<const Double3> positions,
-                        double diagonal, const CueSelectionOptions& options);
+                        const CueNoise& noise, const CueSelectionOptions& options);
 
 // The paper's rule. rotated [cN x M] (kpsa/varimax.h); per_mode 1 or 2; the second point of a mode lies outside
 // exclusion_radius of the first. A point that another mode has taken already, or one that coincides with it, gives way

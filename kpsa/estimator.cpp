@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -121,13 +122,15 @@ std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const
   return errors;
 }
 
-std::vector<double> LargestPointErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
-                                       std::size_t stride) {
+PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
+                         std::size_t stride, double limit) {
   KPSA_CHECK(poses.centered() && poses.layout() == pca.layout && stride > 0);
   const std::size_t points = pca.layout.points, kChunk = 384;
   const auto components = static_cast<std::size_t>(pca.layout.components);
   const Eigen::MatrixXd a = pca.output_modes();
-  std::vector<double> largest(points);
+  PointSurvey survey;
+  survey.largest.resize(points);
+  survey.beyond.resize(points);
   for (std::size_t first = 0; first < poses.poses(); first += kChunk * stride) {
     std::vector<std::size_t> chosen;
     for (std::size_t t = first; t < poses.poses() && chosen.size() < kChunk; t += stride) chosen.push_back(t);
@@ -136,6 +139,7 @@ std::vector<double> LargestPointErrors(const Pca& pca, const CueSet& cues, const
       y.col(static_cast<Eigen::Index>(k)) = MeasuredCues(pca.layout, cues, poses.row(chosen[k]));
     }
     const Eigen::MatrixXd reached = Multiply(a, Multiply(estimator.coordinates, y));
+    std::vector<std::atomic<bool>> beyond(chosen.size());
     ParallelFor(points, 512, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = 0; k < chosen.size(); ++k) {
         const float* pose = poses.row(chosen[k]).data();
@@ -145,13 +149,18 @@ std::vector<double> LargestPointErrors(const Pca& pca, const CueSet& cues, const
           for (std::size_t c = components * i; c < components * (i + 1); ++c) {
             squared += (static_cast<double>(pose[c]) - estimate[c]) * (static_cast<double>(pose[c]) - estimate[c]);
           }
-          largest[i] = std::max(largest[i], squared);
+          survey.largest[i] = std::max(survey.largest[i], squared);
+          if (squared <= limit * limit) continue;
+          ++survey.beyond[i];
+          beyond[k] = true;
         }
       }
     });
+    survey.poses += chosen.size();
+    for (const auto& is : beyond) survey.poses_beyond += is;
   }
-  for (double& value : largest) value = std::sqrt(value);
-  return largest;
+  for (double& value : survey.largest) value = std::sqrt(value);
+  return survey;
 }
 
 double RmsError(const std::vector<PoseErrors>& errors, std::size_t points) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 
 #include "kpsa/cue_selection.h"
@@ -47,9 +48,15 @@ struct PoseErrors {
 };
 // For all poses (centred with pca.mean). RMS of a pose = error / sqrt(N).
 std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses);
-// The largest error of every point over every `stride`-th pose. [N]
-std::vector<double> LargestPointErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
-                                       std::size_t stride);
+// Errors by point, over every `stride`-th pose.
+struct PointSurvey {
+  std::vector<double> largest;    // [N] scene units
+  std::vector<Index> beyond;      // [N] poses in which the point is farther off than `limit`
+  std::size_t poses = 0;          // that were looked at
+  std::size_t poses_beyond = 0;   // in which any point is
+};
+PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
+                         std::size_t stride, double limit = std::numeric_limits<double>::infinity());
 // Root of the mean over poses and points of the squared total error, scene units.
 double RmsError(const std::vector<PoseErrors>& errors, std::size_t points);
 

@@ -85,6 +85,7 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, 
       if (nodes.count(c.source.node.index) == 0 && varying_nodes.count(c.source.node.index) == 0) continue;
       // A single point of an array has no plug to read: its driver stands for it
       const AttributeDef& to = def.attributes[static_cast<std::size_t>(c.destination.attribute)];
+      if (to.diagnostic) continue;
       if (IsPointType(to.type)) {
         add(c.source, graph.PlugType(c.source));
       } else {
@@ -92,7 +93,8 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, 
       }
     }
     for (const PlugRef& plug : varying) {
-      if (plug.node == node) add(plug, graph.PlugType(plug));
+      if (plug.node == node && !def.attributes[static_cast<std::size_t>(plug.attribute)].diagnostic)
+        add(plug, graph.PlugType(plug));
     }
   }
   std::vector<Signal> sorted;

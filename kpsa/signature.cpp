@@ -41,7 +41,7 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, 
     signature[name] = Short(hasher.Finish());
     for (std::size_t i = 0; i < def.attributes.size(); ++i) {
       const AttributeDef& a = def.attributes[i];
-      if (a.output || a.name == "time") continue;
+      if (a.output || a.diagnostic || a.name == "time") continue;
       const auto attribute = static_cast<int>(i);
       // What is written as it is anyway changes nothing (nodes may ask whether a structural one is set)
       const bool plain = !a.structural && !a.default_from && !a.array && !IsPointType(a.type);

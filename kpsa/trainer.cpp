@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "base/check.h"
+#include "kpsa/cue_choice.h"
 #include "kpsa/pca.h"
 #include "kpsa/pose_recorder.h"
-#include "kpsa/varimax.h"
 
 namespace kpsa {
 namespace {
@@ -19,13 +19,11 @@ constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that til
 constexpr double kTileMaxShare = 0.45;    // of the tolerance: the largest error that they may add
 constexpr double kStillTurn = 5e-4;          // a turn (radians) and a shift (of the tolerance) of a joint that are none
 constexpr double kStillShare = 0.1;
+constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
+constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
 constexpr std::size_t kGroupPoints = 400;    // where the trainer looks which controls act together
 constexpr double kGroupShare = 0.2;          // of a control's largest displacement: it acts on a point
 constexpr std::size_t kGroupSize = 8;        // controls that move a point most
-constexpr std::size_t kSelectionRounds = 4;  // shares of the cues, each chosen for what the last ones left
-constexpr std::size_t kErrorPoses = 800;     // training poses that say where errors are left
-constexpr double kErrorPower = 3;            // of a point's largest error in its weight
-constexpr double kMinMotion = 1e-3;          // of the largest: points that move less are no cues
 
 // Count of indices, evenly spread.
 std::vector<Index> Spread(std::size_t total, std::size_t count) {
@@ -275,61 +273,35 @@ class Trainer {
     Result<Pca> pca = ComputePca(*poses, mean, pca_options);
     if (!pca.ok()) return pca.status();
     pca_ = std::move(*pca);
+    noise_ = MakeNoise();
     record_.diagonal = diagonal_;
     record_.motion_rms = std::sqrt(pca_.total_energy / static_cast<double>(poses->poses() * layout_.points));
     return Status();
   }
 
-  Status ChooseCues(const PoseMatrix& poses) {
-    std::vector<CueRef> chosen;
-    if (options_.mode == EstimatorMode::kPaper) {
-      Eigen::MatrixXd rotated = pca_.output_modes();
-      Varimax({}, 3, &rotated);
-      chosen = SelectKeyPoints(rotated, 3, positions_, 2, 0.05 * diagonal_);
-    } else {
-      // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them
-      const bool stages = layout_.stage_points > 0;
-      const std::vector<CueRef> candidates = AllCandidates(pca_, kMinMotion, !stages, stages, true);
-      std::vector<CueRef> points;
-      for (const CueRef& cue : candidates) {
-        if (cue.kind != CueKind::kScalar) points.push_back(cue);
-      }
-      // The least expected squared error over all points leaves small regions to chance (a tongue behind
-      // teeth): after each share of the rows, points count by the largest errors that training poses still
-      // have there.
-      std::vector<double> weights;
-      for (std::size_t round = 1; round <= kSelectionRounds; ++round) {
-        CueSelectionOptions selection;
-        selection.fixed = chosen;
-        selection.count = options_.rows;
-        selection.max_cost =
-            static_cast<double>(options_.rows * round) / static_cast<double>(kSelectionRounds);
-        selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) {
-          return cue.kind == CueKind::kScalar ? 1.0 : 3.0;
-        };
-        selection.point_weights = weights;
-        chosen = SelectCues(pca_, candidates, positions_, diagonal_, selection).cues;
-        if (round == kSelectionRounds || chosen.empty()) break;
-        const CueSet cues = MakeCueSet(pca_, chosen, diagonal_);
-        weights = LargestPointErrors(pca_, cues, MapEstimator(pca_, cues), poses,
-                                     std::max<std::size_t>(1, poses.poses() / kErrorPoses));
-        double mean = 0;
-        for (const double error : weights) mean += error / static_cast<double>(weights.size());
-        for (double& weight : weights) weight = std::pow(weight / std::max(mean, 1e-300), kErrorPower) + 1e-3;
-      }
-      // Points see what no scalar does: keep some of them to judge by
-      std::size_t have = 0;
-      for (const CueRef& cue : chosen) have += cue.kind != CueKind::kScalar;
-      if (have < options_.min_points) {
-        CueSelectionOptions more;
-        more.fixed = chosen;
-        more.count = chosen.size() + options_.min_points - have;
-        more.swap_passes = 0;
-        chosen = SelectCues(pca_, points, positions_, diagonal_, more).cues;
+  CueNoise MakeNoise() const {
+    CueNoise noise(diagonal_);
+    const double shift = kNoiseShare * options_.tolerance;
+    noise.point = std::max(noise.point, shift * shift);
+    for (const Signal& signal : recorder_->signals()) {
+      for (std::size_t e = 0; e < signal.entries(); ++e) {
+        const double still = !signal.matrix ? 0 : e < 9 ? kNoiseTurn : shift;
+        noise.scalars.push_back(still * still);
       }
     }
+    return noise;
+  }
+
+  Status ChooseCues(const PoseMatrix& poses) {
+    CueChoiceOptions choice;
+    choice.rows = options_.rows;
+    choice.min_points = options_.min_points;
+    choice.tolerance = options_.tolerance;
+    const std::vector<CueRef> chosen = options_.mode == EstimatorMode::kPaper
+                                           ? ChoosePaperCues(pca_, positions_, diagonal_)
+                                           : kpsa::ChooseCues(pca_, positions_, noise_, poses, choice);
     if (chosen.empty()) return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
-    cues_ = MakeCueSet(pca_, chosen, diagonal_);
+    cues_ = MakeCueSet(pca_, chosen, noise_);
     return Status();
   }
 
@@ -357,6 +329,13 @@ class Trainer {
     return subspace;
   }
 
+  // Where output points are measured: stages that pass points through need not run.
+  const AccelerationTarget::Stage& OutputStage(const std::vector<AccelerationTarget::Stage>& stages) const {
+    std::size_t last = stages.size() - 1;
+    while (last > 0 && rig_.graph->def(stages[last].points.node).passes_points) --last;
+    return stages[last];
+  }
+
   CueDescription Describe(CueRef cue) const {
     CueDescription d;
     Index index = cue.index;
@@ -375,7 +354,7 @@ class Trainer {
       }
       const auto& stages = rig_.target.meshes[m].stages;
       d.mesh = static_cast<Index>(m);
-      d.stage = cue.kind == CueKind::kOutput ? stages.back().name : stages[candidate.stage].name;
+      d.stage = cue.kind == CueKind::kOutput ? OutputStage(stages).name : stages[candidate.stage].name;
       d.point = cue.kind == CueKind::kOutput ? index : candidate.points[index];
       return d;
     }
@@ -434,6 +413,7 @@ class Trainer {
   Pca pca_;
   CueSet cues_;
   double diagonal_ = 0;
+  CueNoise noise_{0};
   TrainingRecord record_;
 };
 

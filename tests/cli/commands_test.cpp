@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fmt/format.h>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -84,6 +85,28 @@ TEST(Eval, SettingsAndPosesMovePoints) {
   Ok({"eval", kHello, "--rest", "--pose", folder / "pose.yaml", "-o", folder / "pose.npz"});
   EXPECT_EQ(RunKpsa({"compare", folder / "rest.npz", folder / "set.npz"}).exit_code, 1);
   EXPECT_EQ(RunKpsa({"compare", folder / "set.npz", folder / "pose.npz"}).exit_code, 0);
+}
+
+// A pose is not the rest state: what deformers remember of the rest (the detail that deltaMush gives back, where a
+// lattice was bound) is the same whether a value is set or animated.
+TEST(Eval, ASettingIsTheSameAsAClipThatHoldsIt) {
+  const TemporaryFolder folder;
+  // The clip's rotation at one time, set on the control while no clip plays
+  const std::string bend = folder / "bend.yaml";
+  folder.Write("bend.yaml", fmt::format("kpsa: 1\ncharacter: {}/hello/hello.glb\n"
+                                        "nodes: {{mush: {{type: deltaMush}}}}\n"
+                                        "deform: [{{meshes: [column], stack: [gltf, mush]}}]\n",
+                                        KPSA_SCENES_DIR));
+  const ProcessResult matrix = RunKpsa({"get", bend, "upper.matrix", "--times", "0.8", "--json"});
+  ASSERT_EQ(matrix.exit_code, 0) << matrix.err;
+  const std::string values = nlohmann::json::parse(matrix.out).at("plugs").at(0).at("values").at(0).dump();
+  Ok({"eval", bend, "--times", "0.8", "-o", folder / "clip.npz"});
+  Ok({"eval", bend, "--rest", "--times", "0.8", "--set", "upper.offsetParentMatrix=" + values, "-o", folder / "set.npz"});
+  const ProcessResult compared =
+      RunKpsa({"compare", folder / "clip.npz", folder / "set.npz", "--tolerance", "0.001mm"});
+  EXPECT_EQ(compared.exit_code, 0) << compared.out;
+  Ok({"eval", bend, "--rest", "--times", "0.8", "--set", "upper.offsetParentMatrix=" + values, "--set", "mush.iterations=0", "-o", folder / "skin.npz"});
+  EXPECT_EQ(RunKpsa({"compare", folder / "set.npz", folder / "skin.npz", "--tolerance", "0.1mm"}).exit_code, 1);
 }
 
 TEST(Eval, AnInterruptLeavesNothing) {

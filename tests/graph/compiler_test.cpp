@@ -282,6 +282,25 @@ TEST_F(CompilerTest, TheRestStateIgnoresClips) {
   EXPECT_DOUBLE_EQ(c.pull<double>("n.out"), 5);
 }
 
+TEST_F(CompilerTest, TheRestStateIgnoresPoses) {
+  TestGraph c(ToyRegistry());
+  c.add("scale3", "s", {{"input", Double3{1, 2, 3}}, {"factor", 2.0}});
+  c.add("add", "n", {{"a", 3.0}});
+  const auto rest = [&](const char* plug) { return *c.compiler.Rest(c.graph, c.plug(plug)); };
+  ASSERT_TRUE(c.graph.Pose(c.plug("s.input.y"), Value(10.0)).ok());
+  ASSERT_TRUE(c.graph.Pose(c.plug("n.a"), Value(5.0)).ok());
+  ASSERT_TRUE(c.graph.Pose(c.plug("n.b"), Value(1.0)).ok());  // was not set
+  EXPECT_EQ(c.pull<Double3>("s.out"), (Double3{2, 20, 6}));
+  EXPECT_DOUBLE_EQ(c.pull<double>("n.out"), 6);
+  EXPECT_EQ(rest("s.out").get<Double3>(), (Double3{2, 4, 6}));
+  EXPECT_DOUBLE_EQ(rest("n.out").AsDouble(), 3);
+  ASSERT_TRUE(c.graph.Pose(c.plug("n.a"), Value(7.0)).ok());  // another pose
+  c.plan = nullptr;
+  EXPECT_DOUBLE_EQ(c.pull<double>("n.out"), 8);
+  EXPECT_DOUBLE_EQ(rest("n.out").AsDouble(), 3);
+  EXPECT_FALSE(c.graph.Pose(c.plug("n.out"), Value(7.0)).ok());
+}
+
 // ---- Depth: nothing recurses over the graph
 
 TEST(DeepGraphs, AChainOf100000Nodes) {

@@ -39,7 +39,9 @@ TEST(Calibration, IsTheLargestThresholdThatABruteForceSearchFinds) {
       double best = -1;
       for (int i = 1; i <= 10000; ++i) {
         const double tau = 20.0 * i / 10000;
-        if (static_cast<double>(Violations(pairs, {.tau = tau, .blend_start = 0.7}, 0.0015) + 1) / 151 <= alpha) best = tau;
+        const auto violations = static_cast<double>(Violations(pairs, {.tau = tau, .blend_start = 0.7}, 0.0015));
+        const auto hits = static_cast<double>(std::count_if(pairs.begin(), pairs.end(), [&](const CalibrationPair& p) { return p.score <= 0.7 * tau; }));
+        if ((violations + 1) / 151 <= alpha && violations <= 2 * alpha * hits) best = tau;
       }
       const double cap = std::max_element(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.score < b.score; })->score / 0.7;
       EXPECT_NEAR(c.threshold.tau, std::min(best, cap), 0.0021) << seed << " " << alpha;
@@ -77,11 +79,12 @@ TEST(Calibration, LooserDemandsGiveLargerThresholds) {
     last = tau;
   }
   last = -1;
-  for (const double alpha : {0.005, 0.02, 0.1}) {
+  for (const double alpha : {0.005, 0.02, 0.1, 0.3}) {
     const double tau = Calibrate(pairs, 0.001, alpha).threshold.tau;
-    EXPECT_GT(tau, last);
+    EXPECT_GE(tau, last);
     last = tau;
   }
+  EXPECT_GT(last, Calibrate(pairs, 0.001, 0.005).threshold.tau);
 }
 
 TEST(Calibration, TooFewPosesSayWhatTheyCanPromise) {
@@ -112,6 +115,19 @@ TEST(Calibration, TheEnds) {
   const Calibration none = Calibrate(blind, 0.001, 0.01);
   EXPECT_LT(none.threshold.tau, 0);
   EXPECT_FALSE(none.warning.empty());
+}
+
+TEST(Calibration, AFewHitsMayNotAllBeViolations) {
+  // Eight poses with small scores and large errors: 2 % of all, and all that would hit
+  std::vector<CalibrationPair> pairs(400, CalibrationPair{10, 0.01});
+  for (int i = 0; i < 8; ++i) pairs[static_cast<std::size_t>(50 * i)] = {1, 0.005};
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.03).hit_rate, 0);
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.03).violations, 0u);
+  // Where most poses are good ones, the same eight are within the rate
+  for (std::size_t i = 0; i < 400; ++i) {
+    if (pairs[i].score > 1) pairs[i] = {2, 0.0005};
+  }
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.03).hit_rate, 1);
 }
 
 TEST(Calibration, PosesWithoutANumberCountAsViolations) {

@@ -1,0 +1,135 @@
+#include "kpsa/cue_choice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "kpsa/estimator.h"
+#include "kpsa/varimax.h"
+
+namespace kpsa {
+namespace {
+
+constexpr std::size_t kSelectionRounds = 4;  // shares of the cues, each chosen for what the last ones left
+constexpr std::size_t kErrorPoses = 800;     // training poses that say where errors are left
+constexpr double kErrorPower = 3;            // of a point's largest error in its weight
+constexpr double kMinMotion = 1e-3;          // of the largest: points that move less are no cues
+constexpr double kHopeless = 0.15;           // share of poses beyond the tolerance from which worst points are measured
+constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
+constexpr double kWorstShare = 0.1;                        // and of all points
+constexpr double kWorthwhile = 0.5;                        // of the poses beyond the tolerance that must be left by them
+
+// Values that move more than they are trusted.
+std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise) {
+  const bool stages = pca.layout.stage_points > 0;
+  std::vector<CueRef> candidates = AllCandidates(pca, kMinMotion, !stages, stages, true);
+  std::erase_if(candidates, [&](const CueRef& cue) {
+    const auto column = static_cast<Eigen::Index>(CueColumn(pca.layout, cue));
+    return cue.kind == CueKind::kScalar && !noise.scalars.empty() &&
+           pca.row_variance[column] <= noise.scalars[cue.index];
+  });
+  return candidates;
+}
+
+class Chooser {
+ public:
+  Chooser(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise, const PoseMatrix& poses,
+          const CueChoiceOptions& options)
+      : pca_(pca), positions_(positions), noise_(noise), poses_(poses), options_(options) {}
+
+  std::vector<CueRef> Run() {
+    SelectInRounds();
+    if (!chosen_.empty()) AddPoints();
+    if (!chosen_.empty() && pca_.layout.stage_points > 0) AddWorstPoints();
+    return std::move(chosen_);
+  }
+
+ private:
+  PointSurvey Survey(const std::vector<CueRef>& chosen) const {
+    const CueSet cues = MakeCueSet(pca_, chosen, noise_);
+    return SurveyPoints(pca_, cues, MapEstimator(pca_, cues), poses_,
+                        std::max<std::size_t>(1, poses_.poses() / kErrorPoses), options_.tolerance);
+  }
+
+  // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them.
+  void SelectInRounds() {
+    const std::vector<CueRef> candidates = Candidates(pca_, noise_);
+    std::vector<double> weights;
+    for (std::size_t round = 1; round <= kSelectionRounds; ++round) {
+      CueSelectionOptions selection;
+      selection.fixed = chosen_;
+      selection.count = options_.rows;
+      selection.max_cost = static_cast<double>(options_.rows * round) / static_cast<double>(kSelectionRounds);
+      selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) {
+        return cue.kind == CueKind::kScalar ? 1.0 : 3.0;
+      };
+      selection.point_weights = weights;
+      chosen_ = SelectCues(pca_, candidates, positions_, noise_, selection).cues;
+      if (round == kSelectionRounds || chosen_.empty()) break;
+      weights = Survey(chosen_).largest;
+      double mean = 0;
+      for (const double error : weights) mean += error / static_cast<double>(weights.size());
+      for (double& weight : weights) weight = std::pow(weight / std::max(mean, 1e-300), kErrorPower) + 1e-3;
+    }
+  }
+
+  void AddPoints() {
+    std::vector<CueRef> points = Candidates(pca_, noise_);
+    std::erase_if(points, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
+    std::size_t have = 0;
+    for (const CueRef& cue : chosen_) have += cue.kind != CueKind::kScalar;
+    if (have >= options_.min_points) return;
+    CueSelectionOptions more;
+    more.fixed = chosen_;
+    more.count = chosen_.size() + options_.min_points - have;
+    more.swap_passes = 0;
+    chosen_ = SelectCues(pca_, points, positions_, noise_, more).cues;
+  }
+
+  void AddWorstPoints() {
+    PointSurvey survey = Survey(chosen_);
+    const std::size_t before = survey.poses_beyond;
+    if (static_cast<double>(before) < kHopeless * static_cast<double>(survey.poses)) return;
+    const auto most = static_cast<std::size_t>(kWorstShare * static_cast<double>(pca_.layout.points));
+    std::vector<CueRef> more = chosen_;
+    for (std::size_t round = 0; round < kWorstRounds && survey.poses_beyond > 0; ++round) {
+      std::vector<Index> order(pca_.layout.points);
+      std::iota(order.begin(), order.end(), Index{0});
+      std::stable_sort(order.begin(), order.end(),
+                       [&](Index a, Index b) { return survey.beyond[a] > survey.beyond[b]; });
+      std::size_t added = 0;
+      for (const Index point : order) {
+        if (added == kWorstPoints || more.size() == chosen_.size() + most || survey.beyond[point] == 0) break;
+        const CueRef cue{CueKind::kOutput, point};
+        if (std::find(more.begin(), more.end(), cue) != more.end()) continue;
+        more.push_back(cue);
+        ++added;
+      }
+      if (added == 0) break;
+      survey = Survey(more);
+    }
+    if (static_cast<double>(survey.poses_beyond) <= kWorthwhile * static_cast<double>(before)) chosen_ = std::move(more);
+  }
+
+  const Pca& pca_;
+  std::span<const Double3> positions_;
+  const CueNoise& noise_;
+  const PoseMatrix& poses_;
+  const CueChoiceOptions& options_;
+  std::vector<CueRef> chosen_;
+};
+
+}  // namespace
+
+std::vector<CueRef> ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
+                               const PoseMatrix& poses, const CueChoiceOptions& options) {
+  return Chooser(pca, positions, noise, poses, options).Run();
+}
+
+std::vector<CueRef> ChoosePaperCues(const Pca& pca, std::span<const Double3> positions, double diagonal) {
+  Eigen::MatrixXd rotated = pca.output_modes();
+  Varimax({}, 3, &rotated);
+  return SelectKeyPoints(rotated, 3, positions, 2, 0.05 * diagonal);
+}
+
+}  // namespace kpsa

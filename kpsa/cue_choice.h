@@ -1,0 +1,30 @@
+// The cues of a subspace: which values are measured, by the training poses.
+#pragma once
+
+#include <vector>
+
+#include "kpsa/cue_selection.h"
+#include "kpsa/pose_matrix.h"
+
+namespace kpsa {
+
+struct CueChoiceOptions {
+  std::size_t rows = 300;       // of measurements: a point takes 3, a scalar 1
+  std::size_t min_points = 16;  // points see what no scalar does: some of them are kept to judge by
+  double tolerance = 1e-4;      // scene units
+};
+
+// A-optimal cues (kpsa/cue_selection.h): points of the candidate stages (of the outputs, where there are none) and
+// scalars, in rounds: after each share of the rows, points count by the largest errors that training poses still have
+// there. The least expected squared error alone leaves small regions to chance (a tongue behind teeth).
+//
+// Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
+// deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are measured
+// themselves, besides `rows`; not if that does not help.
+std::vector<CueRef> ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
+                               const PoseMatrix& poses, const CueChoiceOptions& options);
+
+// The paper's: two points for each varimax-rotated mode.
+std::vector<CueRef> ChoosePaperCues(const Pca& pca, std::span<const Double3> positions, double diagonal);
+
+}  // namespace kpsa

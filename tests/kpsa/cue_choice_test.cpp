@@ -1,0 +1,109 @@
+#include "kpsa/cue_choice.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "kpsa/estimator.h"
+#include "kpsa/pca.h"
+
+namespace kpsa {
+namespace {
+
+constexpr std::size_t kPoints = 60, kPoses = 400;
+constexpr double kTolerance = 1e-3;
+
+// A row of points that two controls bend; the outputs follow the stage but for the first `folded` ones, which jump to
+// the other side where the first control is large.
+struct Fold {
+  explicit Fold(std::size_t folded, double jump = 0.01) : poses({.points = kPoints, .components = 3, .stage_points = kPoints, .scalars = 3}) {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (std::size_t t = 0; t < kPoses; ++t) {
+      const std::span<float> row = poses.AddPose();
+      const double a = uniform(random), b = uniform(random), c = uniform(random);
+      for (std::size_t i = 0; i < kPoints; ++i) {
+        const double u = static_cast<double>(i) / kPoints;
+        const double p[3] = {u, 0.1 * a * u, 0.1 * b * (1 - u)};
+        for (std::size_t k = 0; k < 3; ++k) {
+          row[3 * i + k] = static_cast<float>(p[k]);
+          row[3 * (kPoints + i) + k] = static_cast<float>(p[k]);
+        }
+        if (i < folded && c > 0.2) row[3 * i + 2] += static_cast<float>(jump);
+      }
+      row[6 * kPoints] = static_cast<float>(a);
+      row[6 * kPoints + 1] = static_cast<float>(b);
+      row[6 * kPoints + 2] = static_cast<float>(1e-7 * c);  // noise that happens to say when points jump
+    }
+    for (std::size_t i = 0; i < 2 * kPoints; ++i) positions.push_back({static_cast<double>(i % kPoints) / kPoints, 0, 0});
+    const Eigen::VectorXd mean = poses.Mean();
+    poses.Subtract(mean);
+    pca = *ComputePca(poses, mean, {.max_modes = 20});
+    noise.scalars = {0, 0, 1e-8};
+  }
+  std::vector<CueRef> Choose() const { return ChooseCues(pca, positions, noise, poses, {.rows = 20, .min_points = 4, .tolerance = kTolerance}); }
+  double LargestError(const std::vector<CueRef>& chosen) const {
+    const CueSet cues = MakeCueSet(pca, chosen, noise);
+    const PointSurvey survey = SurveyPoints(pca, cues, MapEstimator(pca, cues), poses, 1);
+    return *std::max_element(survey.largest.begin(), survey.largest.end());
+  }
+
+  PoseMatrix poses;
+  std::vector<Double3> positions;
+  Pca pca;
+  CueNoise noise{1.0};
+};
+
+std::vector<Index> Outputs(const std::vector<CueRef>& cues) {
+  std::vector<Index> outputs;
+  for (const CueRef& cue : cues) {
+    if (cue.kind == CueKind::kOutput) outputs.push_back(cue.index);
+  }
+  return outputs;
+}
+
+TEST(CueChoice, PointsThatNoEarlierStageTellsOfAreMeasured) {
+  const Fold fold(3);
+  std::vector<CueRef> chosen = fold.Choose();
+  ASSERT_FALSE(Outputs(chosen).empty());
+  for (const Index point : Outputs(chosen)) EXPECT_LT(point, 3u);
+  EXPECT_LT(fold.LargestError(chosen), kTolerance);
+  std::erase_if(chosen, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
+  EXPECT_GT(fold.LargestError(chosen), 3 * kTolerance);
+}
+
+TEST(CueChoice, NothingIsMeasuredBehindTheStageWhereTheToleranceIsKeptAnyway) {
+  EXPECT_TRUE(Outputs(Fold(0).Choose()).empty());
+  EXPECT_TRUE(Outputs(Fold(3, 0.5 * kTolerance).Choose()).empty());
+}
+
+TEST(CueChoice, ValuesThatMoveLessThanTheyAreTrustedAreNoCues) {
+  const std::vector<CueRef> chosen = Fold(3).Choose();
+  EXPECT_EQ(std::count(chosen.begin(), chosen.end(), CueRef{CueKind::kScalar, 2}), 0);
+}
+
+// A joint that hardly turned in training, and turns a little more in use: nothing noticeable.
+TEST(CueChoice, NoiseKeepsSmallSurprisesSmall) {
+  const Fold fold(3);
+  const std::vector<CueRef> cues = {{CueKind::kScalar, 0}, {CueKind::kScalar, 1}, {CueKind::kScalar, 2}};
+  const auto moved = [&](const CueNoise& noise) {
+    const CueSet set = MakeCueSet(fold.pca, cues, noise);
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(3);
+    y[2] = 1e-4 * set.scale[2];  // a thousand times what it did in training
+    return (MapEstimator(fold.pca, set).gain * y).cwiseAbs().maxCoeff();
+  };
+  EXPECT_GT(moved(CueNoise(1.0)), 1);  // the canary: jumps by metres
+  EXPECT_LT(moved(fold.noise), kTolerance);
+}
+
+TEST(CueChoice, PaperModeTakesTwoPointsAMode) {
+  const Fold fold(0);
+  const std::vector<CueRef> cues = ChoosePaperCues(fold.pca, fold.positions, 1.0);
+  EXPECT_LE(cues.size(), static_cast<std::size_t>(2 * fold.pca.mode_count()));
+  for (const CueRef& cue : cues) EXPECT_EQ(cue.kind, CueKind::kOutput);
+}
+
+}  // namespace
+}  // namespace kpsa
