@@ -16,6 +16,14 @@
 namespace kpsa {
 namespace {
 
+// RFC 4180
+std::string CsvField(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
 constexpr std::size_t kMaxNumbers = 20'000'000;  // printed
 
 struct GetFlags : Flags {
@@ -62,11 +70,9 @@ CommandResult Get(const GetFlags& flags) {
     text = "time";
     for (const Column& column : *columns) {
       for (const std::string& suffix : column.suffixes) {
-        std::string name = column.name + suffix;
-        if (name.find_first_of(",\"\n") != std::string::npos) name = "\"" + name + "\"";
-        text += "," + name;
+        text += "," + CsvField(column.name + suffix);
       }
-      if (column.output == kNoIndex) text += "," + column.name;
+      if (column.output == kNoIndex) text += "," + CsvField(column.name);
     }
     text += "\n";
   }

@@ -43,7 +43,8 @@ CommandResult Init(const InitFlags& flags) {
   if (!text.ok()) return text.status();
   KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, *text));
   if (!flags.quiet && place != "-")
-    Say(fmt::format("{}: a starter rig; read it, it says what to change\nnext: kpsa train {}", place, place));
+    Say(fmt::format("{}: a starter rig; read it, it says what to change\nnext: kpsa {} {}", place,
+                    text->find("\naccelerate:") != std::string::npos ? "train" : "eval", place));
   return 0;
 }
 

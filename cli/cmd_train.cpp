@@ -102,6 +102,12 @@ CommandResult RunTrain(const TrainFlags& flags) {
   if (!flags.samples.has_value()) options.samples = static_cast<std::size_t>(entry->train_samples);
   if (!flags.tolerance.has_value()) options.tolerance = entry->tolerance;
   if (!flags.violation_rate.has_value()) options.violation_rate = entry->violation_rate;
+  if (flags.clips.has_value()) {
+    for (const std::string& clip : SplitNames(*flags.clips)) {
+      if (std::find(entry->test_clips.begin(), entry->test_clips.end(), clip) != entry->test_clips.end())
+        return Status::Usage("--clips {}: a test clip of the rig, which is never trained on (test: in its accelerate section)", clip);
+    }
+  }
   const Result<std::vector<TrainingClip>> clips =
       ClipFrames(rig, flags.clips.has_value() ? SplitNames(*flags.clips) : entry->train_clips);
   if (!clips.ok()) return flags.clips.has_value() ? AsUsage(clips.status()) : clips.status();

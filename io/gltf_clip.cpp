@@ -114,6 +114,10 @@ Status ReadClips(const Document& document, Character* character) {
     Clip clip;
     clip.name = in.name;
     clip.id = in.name.empty() ? fmt::format("anim{}", a) : in.name;
+    const auto taken = [&] {
+      return std::any_of(character->clips.begin(), character->clips.end(), [&](const Clip& other) { return other.id == clip.id; });
+    };
+    if (taken()) clip.id += fmt::format("#{}", a);  // legal; nodes of one name are told apart in the same way
     std::set<std::pair<Index, Path>> seen;
     for (std::size_t c = 0; c < in.channels.size(); ++c) {
       const std::string where = fmt::format("{}.channels[{}]", animation_place, c);

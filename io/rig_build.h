@@ -136,6 +136,7 @@ class RigBuild {
   using PlugKey = std::tuple<Index, int, int, int>;                   // node, attribute, element, component
   static PlugKey KeyOf(const PlugRef& plug) { return {plug.node.index, plug.attribute, plug.element, plug.component}; }
   std::map<PlugKey, SourceLocation> written_plugs_[2];                // by nodes, by overrides: a plug has several spellings
+  std::set<PlugKey> connected_plugs_;                                 // of those, the ones that name another plug
   std::set<PlugKey> overridden_plugs_;                                // the same
   std::set<PlugKey> stacked_;                                         // points attributes that a stack drives
   std::unordered_map<Index, Places> curves_;          // by graph node: rest cvs in the world

@@ -104,7 +104,14 @@ bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, boo
   };
   for (const RigString& item : deform.stack) {
     if (item.text == "gltf" || item.text == "morph") {
-      if (morph != nullptr) add_own(*morph, item);
+      const bool again = morph != nullptr && std::any_of(stages->begin(), stages->end(), [&](const Stage& s) { return s.node == morph->node; });
+      if (morph != nullptr && world && !again) {
+        good = Fail(item.where, Status::Invalid("\"{}\" of mesh \"{}\" moves points in mesh space, and those of \"{}\" are in world "
+                                                "space: put it before that stage",
+                                                item.text, mesh.name, stages->back().name));
+      } else if (morph != nullptr) {
+        add_own(*morph, item);
+      }
       if (morph == nullptr && item.text == "morph" && !any_morphs) {
         good = Fail(item.where, Status::Invalid("mesh \"{}\" has no morph targets: leave \"morph\" out", mesh.name));
       }

@@ -145,12 +145,28 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
     errors_->Add(value, "{} is an output and cannot be set", what);
     return;
   }
-  if (const auto [it, added] = written_plugs_[overrides ? 1 : 0].emplace(KeyOf(plug), value.where()); !added) {
+  auto& written = written_plugs_[overrides ? 1 : 0];
+  if (const auto [it, added] = written.emplace(KeyOf(plug), value.where()); !added) {
     errors_->Add(value, "{} is {} twice: here and at {}", what, overrides ? "overridden" : "set", it->second.ToString());
     return;
   }
   const auto is_connection = [&](const YamlNode& node, Type of) { return IsConnection(node, graph(), of, attribute.unit, units(source)); };
-  if (is_connection(value, type)) {
+  // A vector and one of its components: the order of a map decides nothing. A value whose component is driven is fine
+  const bool connected = is_connection(value, type);
+  if (connected) connected_plugs_.insert(KeyOf(plug));
+  for (int component = -1; component < 3; ++component) {
+    PlugRef other = plug;
+    other.component = component;
+    if ((component < 0) == (plug.component < 0)) continue;
+    const auto it = written.find(KeyOf(other));
+    if (it == written.end()) continue;
+    const bool other_connected = connected_plugs_.count(KeyOf(other)) != 0;
+    if (component < 0 ? connected && !other_connected : !connected && other_connected) continue;
+    errors_->Add(value, "{} is {} here, and {} at {}: give the components or the whole", what, overrides ? "overridden" : "set",
+                 graph().PlugName(other), it->second.ToString());
+    return;
+  }
+  if (connected) {
     pending_.push_back({value.scalar, plug, value.where(), source, overrides});
     if (overrides) overridden_.emplace_back(plug, false);
     return;
@@ -158,6 +174,7 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
   // [a.x, 0, b.y]: components of their own
   if (type == Type::kDouble3 && value.is_sequence() && value.items.size() == 3 &&
       std::any_of(value.items.begin(), value.items.end(), [&](const YamlNode& item) { return is_connection(item, Type::kDouble); })) {
+    written.erase(KeyOf(plug));
     for (int i = 0; i < 3; ++i) {
       PlugRef component = plug;
       component.component = i;

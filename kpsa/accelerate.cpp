@@ -1,6 +1,7 @@
 #include "kpsa/accelerate.h"
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 
 #include "base/check.h"
@@ -67,9 +68,10 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
     }
   }
   const Signature trained = TrainedSignature(*subspace);
-  std::vector<PlugRef> upstream = target.outputs();
-  upstream.insert(upstream.end(), target.space.begin(), target.space.end());
-  const std::string difference = SignatureDifference(trained, RigSignature(*graph, upstream, target.controls));
+  if (SignatureDigest(trained) != subspace->rig_hash)
+    return Status::Invalid("the subspace is corrupt: its rig hash is not that of the rig that it describes");
+  const std::string difference =
+      SignatureDifference(trained, RigSignature(*graph, target.outputs(), target.space, target.controls));
   if (!difference.empty()) {
     if (!options.stale_is_miss) {
       return Status::Invalid("the subspace is stale: since it was trained, {} changed; train it again, or use --stale miss", difference);
@@ -130,6 +132,7 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
   }
   for (CueInput& input : inputs) {
     std::sort(input.points.begin(), input.points.end());
+    input.points.erase(std::unique(input.points.begin(), input.points.end()), input.points.end());
     data.cues.push_back({input.points, target.meshes[input.mesh].stages[input.stage].world});
   }
   for (const CueDescription& cue : subspace->cues) {
@@ -144,8 +147,13 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
       const std::size_t slash = cue.plug.rfind('/');
       Result<Signal> signal = FindSignal(*graph, cue.plug.substr(0, slash));
       if (!signal.ok()) return signal.status();
+      Index entry = 0;
+      const char* const end = cue.plug.data() + cue.plug.size();
+      const char* const number = slash == std::string::npos ? end : cue.plug.data() + slash + 1;
+      if (signal->matrix && (std::from_chars(number, end, entry).ptr != end || number == end || entry > 11))
+        return Status::Invalid("the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", cue.plug);
       row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
-      if (signal->matrix) row.element = static_cast<Index>(std::stoi("0" + (slash == std::string::npos ? "" : cue.plug.substr(slash + 1))) % 12);
+      row.element = entry;
       auto& list = signal->matrix ? guards.matrices : guards.scalars;
       const std::size_t before = list.size();
       row.input = Place(&list, *signal);
@@ -157,6 +165,8 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
     }
     data.rows.push_back(row);
   }
+  for (const AccelerationTarget::MeshPoints& mesh : target.meshes)
+    data.outputs_in_space.push_back(mesh.stages.back().world);
   for (const auto* list : {&guards.matrices, &guards.scalars}) {
     for (const Signal& signal : *list) data.guard_names.push_back(signal.name);
   }

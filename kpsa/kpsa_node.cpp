@@ -153,13 +153,14 @@ void WriteVerdict(const ComputeContext& c) {
   c.out_value<std::int64_t>(kOffender) = v.offender == kNoIndex ? -1 : static_cast<std::int64_t>(v.offender);
 }
 
-// Reconstructs output m into `out` (the wanted points only), in world space.
+// Reconstructs output m into `out` (the wanted points only), in the space of its stage.
 void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
   const Subspace& subspace = *kernel.config->data().subspace;
   const KpsaKernel::Output& wanted = kernel.outputs[m];
   const std::span<const float> y(Measured(c), subspace.rows());
   const Matrix4& matrix = c.get<Matrix4>(kSpaceMatrix);
-  const Matrix4* space = matrix == Matrix4() ? nullptr : &matrix;
+  const bool in_space = kernel.config->data().outputs_in_space[m] != 0;
+  const Matrix4* space = !in_space || matrix == Matrix4() ? nullptr : &matrix;
   const TileMap& tiles = subspace.tiles[m];
   if (wanted.all) return tiles.Reconstruct(y, out, space);
   const PointsView mesh{c.scratch, c.scratch + wanted.padded, c.scratch + 2 * wanted.padded, tiles.points()};
@@ -221,7 +222,7 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
         std::memcpy(y + f * r, Measured(contexts[first + f]), r * sizeof(float));
         outs[f] = contexts[first + f].out_points(kOutPoints, static_cast<std::uint32_t>(m));
         spaces[f] = contexts[first + f].get<Matrix4>(kSpaceMatrix);
-        moved = moved || !(spaces[f] == Matrix4());
+        moved = moved || (kernel.config->data().outputs_in_space[m] != 0 && !(spaces[f] == Matrix4()));
       }
       subspace.tiles[m].ReconstructBlock({y, frames * r}, {outs, frames}, {}, {spaces, moved ? frames : 0});
     }
@@ -314,6 +315,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(pair.score);
     hasher.Add(pair.error);
   }
+  hasher.Add(std::span<const char>(data_.outputs_in_space));
   hasher.Add(data_.always_miss);
   digest_ = hasher.Finish();
 }

@@ -39,6 +39,7 @@ class KpsaConfig final : public Asset {
     std::shared_ptr<const Subspace> subspace;
     std::vector<PointCues> cues;
     std::vector<Row> rows;  // one a cue, in the order of the subspace's
+    std::vector<char> outputs_in_space;  // [outputs] as of cues: they are given in spaceMatrix's frame
     std::vector<double> matrix_lo, matrix_hi;  // [12 * matrices] trained ranges; see MatrixEntries
     std::vector<double> scalar_lo, scalar_hi;  // [scalars]
     std::vector<std::string> guard_names;      // matrices, then scalars

@@ -13,7 +13,8 @@ bool IsTransform(const NodeDef& def) {
   return def.FindAttribute("worldMatrix") >= 0 && def.FindAttribute("parentMatrix") >= 0 && def.FindAttribute("matrix") >= 0;
 }
 
-// The nodes of the chain from `node` up through parentMatrix.
+}  // namespace
+
 std::set<Index> ParentChain(const Graph& graph, NodeId node) {
   std::set<Index> chain;
   while (graph.IsAlive(node) && chain.insert(node.index).second) {
@@ -25,8 +26,6 @@ std::set<Index> ParentChain(const Graph& graph, NodeId node) {
   }
   return chain;
 }
-
-}  // namespace
 
 void MatrixEntries(const Matrix4& m, double entries[12]) {
   for (int column = 0; column < 4; ++column) {
@@ -70,6 +69,12 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, 
       unguarded->push_back(graph.PlugName(plug));
     }
   };
+  // A matrix that varies, unless transforms make it, whose own matrices stand for it
+  const auto add_matrix = [&](const PlugRef& source) {
+    if (IsTransform(graph.def(source.node)) || graph.PlugType(source) != Type::kMatrix) return;
+    if (nodes.count(source.node.index) == 0 && varying_nodes.count(source.node.index) == 0) return;
+    signals.emplace(graph.PlugName(source), Signal{graph.PlugName(source), source, true});
+  };
   for (const auto& [index, has_points] : nodes) {
     const NodeId node = graph.IdAt(index);
     const NodeDef& def = graph.def(node);
@@ -77,12 +82,19 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, 
       if (chain.count(index) != 0) continue;
       const PlugRef plug{node, def.FindAttribute("matrix"), -1, -1};
       signals.emplace(graph.PlugName(plug), Signal{graph.PlugName(plug), plug, true});
+      // A parent that is no transform has no local matrix of its own
+      const PlugRef parent{node, def.FindAttribute("parentMatrix"), -1, -1};
+      if (const Connection* c = graph.FindConnection(parent)) add_matrix(c->source);
     }
     if (!has_points) continue;
     for (const Connection& c : graph.Inputs(node)) {
       const Type type = graph.PlugType(c.destination);
-      if (type == Type::kMatrix || IsPointType(type)) continue;
+      if (IsPointType(type)) continue;
       if (nodes.count(c.source.node.index) == 0 && varying_nodes.count(c.source.node.index) == 0) continue;
+      if (type == Type::kMatrix) {
+        add_matrix(c.source);
+        continue;
+      }
       // A single point of an array has no plug to read: its driver stands for it
       const AttributeDef& to = def.attributes[static_cast<std::size_t>(c.destination.attribute)];
       if (to.diagnostic) continue;
@@ -93,6 +105,7 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, 
       }
     }
     for (const PlugRef& plug : varying) {
+      if (plug.node == node && graph.PlugType(plug) == Type::kMatrix) add_matrix(plug);
       if (plug.node == node && !def.attributes[static_cast<std::size_t>(plug.attribute)].diagnostic)
         add(plug, graph.PlugType(plug));
     }

@@ -6,6 +6,7 @@
 // angle has to be computed; a value as one entry.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ struct Signal {
 void MatrixEntries(const Matrix4& m, double entries[12]);
 // "jaw.matrix/3": entry 3 of a matrix; a value's name is its signal's.
 std::string EntryName(const Signal& signal, std::size_t entry);
+
+// The nodes from `node` up through parentMatrix, by index.
+std::set<Index> ParentChain(const Graph& graph, NodeId node);
 
 // All signals of the points `outputs` under the varying plugs `varying`, sorted by name. The chain of transforms from
 // the root to `space` (a node whose frame the points are taken in) is left out, if one is given.

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "base/digest.h"
+#include "kpsa/signals.h"
 
 namespace kpsa {
 namespace {
@@ -12,16 +13,24 @@ std::string Short(const Digest& digest) { return digest.ToHex().substr(0, 12); }
 
 }  // namespace
 
-Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, const std::vector<PlugRef>& controls) {
+Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, const std::vector<PlugRef>& space,
+                       const std::vector<PlugRef>& controls) {
   // All nodes upstream of the outputs, clips left out
   std::vector<NodeId> stack;
-  std::set<Index> seen;
+  std::set<Index> seen, carriers;
   for (const PlugRef& output : outputs) {
     if (seen.insert(output.node.index).second) stack.push_back(output.node);
   }
+  for (const PlugRef& frame : space) {
+    if (seen.insert(frame.node.index).second) stack.push_back(frame.node);
+    carriers.merge(ParentChain(graph, frame.node));
+  }
   Signature signature;
-  std::set<std::tuple<Index, int, int>> moving;  // plugs whose held value says nothing
+  std::set<std::tuple<Index, int, int>> moving;  // plugs whose pose says nothing: guards see it
   for (const PlugRef& control : controls) moving.emplace(control.node.index, control.attribute, control.element);
+  const auto is_moving = [&](const PlugRef& plug) {
+    return carriers.count(plug.node.index) != 0 || moving.count({plug.node.index, plug.attribute, plug.element}) != 0;
+  };
   while (!stack.empty()) {
     const NodeId node = stack.back();
     stack.pop_back();
@@ -47,18 +56,21 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, 
       const bool plain = !a.structural && !a.default_from && !a.array && !IsPointType(a.type);
       Hasher values;
       bool any = false;
-      const int elements = a.array || IsPointType(a.type) ? std::max(graph.ArraySize(node, attribute), 1) : 1;
-      for (int e = -1; e < elements; ++e) {
-        if (moving.count({node.index, attribute, e}) != 0) continue;
-        for (int component = -1; component < 4; ++component) {
-          const Value* value = graph.FindValue({node, attribute, e, component});
-          if (value == nullptr) continue;
-          if (plain && component == -1 && value->digest() == a.default_value.digest()) continue;
-          values.Add(e);
-          values.Add(component);
-          values.Add(value->digest());
-          any = true;
-        }
+      const auto add = [&](const SetValue& set) {
+        if (plain && set.plug.component == -1 && set.value.digest() == a.default_value.digest()) return;
+        values.Add(set.plug.element);
+        values.Add(set.plug.component);
+        values.Add(set.value.digest());
+        any = true;
+      };
+      const std::span<const SetValue> rest = graph.RestValues(node, attribute);
+      for (const SetValue& set : rest) add(set);
+      for (const SetValue& set : graph.Values(node, attribute)) {
+        if (!graph.IsPosed(node, attribute) || is_moving(set.plug)) continue;
+        const bool held = std::any_of(rest.begin(), rest.end(), [&](const SetValue& r) {
+          return r.plug == set.plug && r.value.digest() == set.value.digest();
+        });
+        if (!held) add(set);
       }
       if (any) signature[name + "." + a.name] = Short(values.Finish());
     }

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstring>
+#include <map>
 
+#include "base/digest.h"
 #include "base/safetensors.h"
 #include "kpsa/subspace.h"
 
@@ -85,7 +87,7 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
   writer->Add<T>(key, {values.size()}, values, half);
 }
 
-void WriteHeader(const Subspace& s, SafetensorsWriter* writer) {
+std::map<std::string, std::string> Header(const Subspace& s) {
   Json outputs = Json::array(), cues = Json::array(), ranges = Json::array();
   for (const SubspaceOutput& output : s.outputs) outputs.push_back({{"name", output.name}, {"points", output.points}});
   for (const CueDescription& cue : s.cues) {
@@ -104,16 +106,45 @@ void WriteHeader(const Subspace& s, SafetensorsWriter* writer) {
                         {"tolerance", s.tolerance},
                         {"violationRate", s.violation_rate},
                         {"blendStart", s.blend_start}};
-  writer->SetMetadata("kind", kKind);
-  writer->SetMetadata("version", std::to_string(kSubspaceVersion));
-  writer->SetMetadata("summary", summary.dump());
-  writer->SetMetadata("outputs", outputs.dump());
-  writer->SetMetadata("cues", cues.dump());
-  writer->SetMetadata("ranges", ranges.dump());
-  writer->SetMetadata("rigHash", s.rig_hash);
-  writer->SetMetadata("units", s.units);
-  writer->SetMetadata("space", s.space);
-  writer->SetMetadata("training", s.training);
+  return {{"kind", kKind},
+          {"version", std::to_string(kSubspaceVersion)},
+          {"summary", summary.dump()},
+          {"outputs", outputs.dump()},
+          {"cues", cues.dump()},
+          {"ranges", ranges.dump()},
+          {"rigHash", s.rig_hash},
+          {"units", s.units},
+          {"space", s.space},
+          {"training", s.training}};
+}
+
+// Of all that the file says: a damaged one is refused, as numbers that are only a little wrong would not be seen.
+std::string ContentDigest(const Subspace& s) {
+  Hasher hasher;
+  for (const auto& [key, text] : Header(s)) {
+    hasher.Add(std::string_view(key));
+    hasher.Add(std::string_view(text));
+  }
+  hasher.Add(std::span<const double>(s.cue_mean));
+  hasher.Add(std::span<const double>(s.cue_scale));
+  hasher.Add(std::span<const Index>(s.soft_cache.offsets));
+  hasher.Add(std::span<const float>(s.soft_cache.factor.span()));
+  hasher.Add(std::span<const float>(s.soft_cache.leave_one_out));
+  for (const CalibrationPair& pair : s.calibration) {
+    hasher.Add(pair.score);
+    hasher.Add(pair.error);
+  }
+  for (const TileMap& tiles : s.tiles) {
+    const TileData& data = tiles.data();
+    for (const auto* list : {&data.ranks, &data.wide, &data.counts, &data.columns})
+      hasher.Add(std::span<const std::uint32_t>(*list));
+    hasher.Add(std::span<const std::uint8_t>(data.direct));
+    hasher.Add(std::span<const float>(data.scale.span()));
+    hasher.Add(std::span<const std::uint16_t>(data.v.span()));
+    hasher.Add(std::span<const std::uint8_t>(data.u.span()));
+    hasher.Add(std::span<const float>(data.mean.span()));
+  }
+  return hasher.Finish().ToHex();
 }
 
 Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
@@ -194,7 +225,8 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
 Status WriteSubspace(const Subspace& s, const std::string& path) {
   KPSA_RETURN_IF_ERROR(ValidateSubspace(s));
   SafetensorsWriter writer;
-  WriteHeader(s, &writer);
+  for (const auto& [key, text] : Header(s)) writer.SetMetadata(key, text);
+  writer.SetMetadata("digest", ContentDigest(s));
   Add<double>(&writer, "cueMean", s.cue_mean);
   Add<double>(&writer, "cueScale", s.cue_scale);
   Add<std::uint32_t>(&writer, "cueOffsets", s.soft_cache.offsets);
@@ -254,6 +286,10 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   for (std::size_t i = 0; i + 1 < calibration->size(); i += 2) s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
   if (Status status = ValidateSubspace(s); !status.ok()) return Status::Invalid("{}: {}", path, status.ToString());
+  const Result<std::string> digest = file.Metadata("digest");
+  if (!digest.ok()) return digest.status();
+  if (*digest != ContentDigest(s))
+    return Status::Invalid("{}: the file is damaged: its contents are not those that were written; train it again", path);
   return s;
 }
 

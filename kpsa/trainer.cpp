@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kProbePoints = 20;  // of a stage, to see what a cue there would drag in
 constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
 constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that tiles and bytes may add
-constexpr double kTileMaxShare = 0.45;    // of the tolerance: the largest error that they may add
+constexpr double kTileMaxShare = 0.6;    // of the tolerance: the largest error that they may add
 constexpr double kStillTurn = 5e-4;          // a turn (radians) and a shift (of the tolerance) of a joint that are none
 constexpr double kStillShare = 0.1;
 constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
@@ -60,9 +60,8 @@ class Trainer {
     Judge(held_out, &*subspace);
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::vector<PlugRef> upstream = rig_.target.outputs();
-    upstream.insert(upstream.end(), rig_.target.space.begin(), rig_.target.space.end());
-    record_.signature = RigSignature(*rig_.graph, upstream, rig_.target.controls);
+    record_.signature =
+        RigSignature(*rig_.graph, rig_.target.outputs(), rig_.target.space, rig_.target.controls);
     subspace->rig_hash = SignatureDigest(record_.signature);
     subspace->training = TrainingJson(record_);
     KPSA_RETURN_IF_ERROR(ValidateSubspace(*subspace));

@@ -109,6 +109,14 @@ TEST(Eval, ASettingIsTheSameAsAClipThatHoldsIt) {
   EXPECT_EQ(RunKpsa({"compare", folder / "set.npz", folder / "skin.npz", "--tolerance", "0.1mm"}).exit_code, 1);
 }
 
+TEST(Get, NamesWithQuotesAreQuoted) {
+  const TemporaryFolder folder;
+  folder.Write("a.yaml", fmt::format("kpsa: 1\ncharacter: {}/hello/hello.glb\nnodes: {{'say \"hi\", you': {{type: plusMinusAverage}}}}\n", KPSA_SCENES_DIR));
+  const ProcessResult run = RunKpsa({"get", folder / "a.yaml", "say \"hi\", you.output", "--times", "0"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out.substr(0, run.out.find('\n')), "time,\"say \"\"hi\"\", you.output\"");
+}
+
 TEST(Eval, AnInterruptLeavesNothing) {
   const TemporaryFolder folder;
   for (const char* name : {"a.npz", "a.pc2"}) {

@@ -1,8 +1,10 @@
 // Accelerated rigs of other shapes: several meshes and stages, a rig that travels, and motion that no training pose
 // had. Each hit has to keep the tolerance.
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "tests/cli/hello_folder.h"
+#include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
 namespace kpsa {
@@ -121,6 +123,42 @@ class Travelling : public ::testing::Test {
   }
   const std::vector<std::string> moving_ = {"lower.translateX", "lower.translateZ", "lower.rotateX", "lower.rotateY"};
 };
+
+// What a stage gives in mesh space is not in the space of a joint, whatever that does.
+TEST_F(Travelling, AStageBeforeTheSkinStaysInMeshSpace) {
+  const HelloFolder folder;
+  folder.Edit("  mush: {type: deltaMush, iterations: 10}\n", "  mush: {type: deltaMush, iterations: 10}\n  grip: {type: transform}\n"
+                                                              "  push: {type: softMod, matrix: grip.worldMatrix, falloffRadius: 30}\n");
+  folder.Edit("[skin, cage, mush]", "[push, mush, skin]");
+  folder.Edit("  upper.rotateX:", "  grip.translateX: {min: -5, max: 5}\n  upper.rotateX:");
+  folder.Edit("subspace: hello.kpsa", "space: upper, subspace: hello.kpsa");
+  const auto trained = TrainRig(folder.rig(), QuickTraining());
+  ASSERT_NE(trained, nullptr);
+  RigRun full(folder.rig()), run(folder.rig(), {.subspace = trained});
+  ASSERT_TRUE(run.ok()) << run.error;
+  std::size_t hits = 0;
+  for (const auto& pose : SmoothPoses(run.rig, 20, 0.9)) {
+    full.Pose(pose), run.Pose(pose);
+    const RunFrame frame = run.Evaluate();
+    hits += frame.hit;
+    EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), kTolerance);
+  }
+  EXPECT_GT(hits, 10u);
+}
+
+// A character that is put somewhere else is the same character.
+TEST_F(Travelling, PlacingTheSpaceKeepsTheSubspace) {
+  const HelloFolder folder;
+  Rig(folder, true);
+  const auto run = [&](const std::vector<std::string>& arguments) {
+    const ProcessResult result = RunKpsa(arguments, 60, folder.path());
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  };
+  run({"train", "hello.yaml", "-q", "--tolerance", "10mm"});
+  const auto report = nlohmann::json::parse(run({"eval", "hello.yaml", "--accelerate", "--set", "lower.translateX=5000", "-o", "far.npz", "--json"}));
+  EXPECT_EQ(report["accelerated"]["misses"], 0) << report.dump();
+}
 
 TEST_F(Travelling, RigidMotionOfTheSpaceKeepsEveryHit) {
   const HelloFolder folder;
@@ -295,6 +333,29 @@ TEST_F(Untrained, ANewControlMissesByName) {
   const RunFrame frame = run.Evaluate();
   EXPECT_FALSE(frame.hit);
   EXPECT_EQ(frame.text, "lower.matrix is outside its trained range");
+}
+
+// A matrix that no transform makes guards itself.
+TEST_F(Untrained, ADrivenMatrixMissesByName) {
+  const HelloFolder folder;
+  folder.Edit("nodes:\n", "nodes:\n  m: {type: multiplyDivide}\n  k: {type: composeMatrix, inputTranslate: m.output}\n"
+                         "  grip: {type: cluster, matrix: k.outputMatrix, members: {vertices: \"700:793\"}}\n");
+  folder.Edit("[skin, cage, mush]", "[skin, cage, grip, mush]");
+  folder.Edit("  upper.rotateX:", "  m.input1.x: {min: 0, max: 0.001}\n  upper.rotateX:");
+  const auto trained = TrainRig(folder.rig(), QuickTraining());
+  ASSERT_NE(trained, nullptr);
+  const std::vector<std::string> axis = {"m.input1.y"};
+  RigRun full(folder.rig(), {.varying = axis}), run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .varying = axis});
+  ASSERT_TRUE(run.ok()) << run.error;
+  EXPECT_TRUE(run.Evaluate().hit);
+  for (const char* plug : {"m.input1.x", "m.input1.y"}) {
+    for (RigRun* r : {&full, &run}) r->Set(plug, 1);
+    const RunFrame frame = run.Evaluate();
+    EXPECT_FALSE(frame.hit) << plug;
+    EXPECT_EQ(frame.text, "k.outputMatrix is outside its trained range") << plug;
+    EXPECT_TRUE(SameBytes(frame.points, full.Evaluate().points));
+    for (RigRun* r : {&full, &run}) r->Set(plug, 0);
+  }
 }
 
 // An axis of a trained joint that is no control.

@@ -139,6 +139,11 @@ TEST_F(Stale, ChangesOfTheCharacterAreRefused) {
   }));
 }
 
+// Deformers bind to the rest pose: what a rig sets there is part of it, also on a control.
+TEST_F(Stale, AnotherRestPoseIsAnotherRig) {
+  ExpectRefused("a control's value in the rig", {"upper.rotate"}, Edit("connections:\n", "overrides: {upper.rotateZ: -40}\nconnections:\n"));
+}
+
 TEST_F(Stale, AsMissesTheRigIsExact) {
   ExpectMisses(Edit("iterations: 10", "iterations: 11"));
   ExpectMisses([](const SubspaceFolder& folder) { folder.WriteWeights(0.75); });

@@ -263,6 +263,19 @@ accelerate: {a: {points: ["body@cage"], space: tip, tolerance: 0.5mm, test: {cli
   EXPECT_TRUE(Has(rig.notes[0], "\"idle\" is in no stack")) << rig.notes[0];
 }
 
+TEST_F(RigBuilderTest, AVectorAndItsComponentsAreNotSetTogether) {
+  const std::string a = "nodes:\n  a: {type: transform}\n";
+  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translate: [1, 2, 3], translateY: 7}\n"), "b.translate.y is set here, and b.translate at"));
+  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translateX: 5, translate: [1, 2, 3]}\n"), "b.translate is set here, and b.translate.x at"));
+  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translate: a.translate, translateY: 7}\n"), "b.translate.y is set here, and b.translate at"));
+  // A value of which a component is driven, in either order
+  for (const char* node : {"{type: transform, translate: [1, 2, 3], translateY: a.translateX}", "{type: transform, translateY: a.translateX, translate: [1, 2, 3]}"}) {
+    const Rig rig = Loaded(a + "  b: " + node + "\n");
+    EXPECT_EQ(rig.graph->FindValue(*rig.graph->FindPlug("b.translate"))->get<Double3>(), (Double3{1, 2, 3}));
+    EXPECT_NE(rig.graph->FindConnection(*rig.graph->FindPlug("b.translateY")), nullptr);
+  }
+}
+
 TEST_F(RigBuilderTest, ExplainsBadStacks) {
   const std::string text = Errors(R"(nodes: {mush: {type: deltaMush}, mush2: {type: deltaMush}, t: {type: transform}}
 deform:
@@ -295,6 +308,9 @@ TEST_F(RigBuilderTest, DeformersMayServeSeveralMeshesInOneSpace) {
   EXPECT_EQ(Driver(rig, "mush.inPoints[0]"), "body_skinCluster.outPoints[0]");
   EXPECT_EQ(Driver(rig, "mush.inPoints[1]"), "twin_skinCluster.outPoints[0]");
   EXPECT_EQ(Driver(rig, "mush.inPoints[2]"), "prop_transformGeometry.outPoints[0]");
+  // Morph targets belong to mesh space
+  EXPECT_TRUE(Has(Errors(nodes + "deform: [{meshes: [prop], stack: [l, morph]}]\n"), "those of \"l\" are in world space: put it before"));
+  EXPECT_TRUE(Has(Errors(nodes + "deform: [{meshes: [body], stack: [skin, morph]}]\n"), "those of \"skin\" are in world space: put it before"));
   // Unskinned meshes are in world space but for their morphs
   const Rig props = Loaded(nodes + "deform: [{meshes: [prop], stack: [morph, l]}]\n");
   EXPECT_EQ(Driver(props, "l.inPoints"), "prop_transformGeometry.outPoints[0]");

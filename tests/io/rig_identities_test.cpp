@@ -76,6 +76,17 @@ TEST_F(RigIdentities, MushAtRestIsTheIdentity) {
   }
 }
 
+// The detail grows with the character: at rest the mush stays the identity.
+TEST_F(RigIdentities, MushOfAScaledCharacterIsTheIdentityAtRest) {
+  KPSA_NEEDS("head.glb");
+  RigPlayer player(Write("head.glb", "nodes: {mush: {type: deltaMush}}\n"
+                                     "deform: [{meshes: [head_mesh], stack: [gltf, mush]}]\n"
+                                     "controls: {root.scaleX: {min: 0.1, max: 3}, root.scaleY: {min: 0.1, max: 3}, root.scaleZ: {min: 0.1, max: 3}}\n"));
+  ASSERT_TRUE(player.ok());
+  for (const char* axis : {"root.scaleX", "root.scaleY", "root.scaleZ"}) player.Set(axis, 2);
+  EXPECT_LT(MaxDistance(player.Points(), player.Points("skin")), 2e-6);
+}
+
 TEST_F(RigIdentities, MushCommutesWithRigidMotion) {
   KPSA_NEEDS("human.glb");
   const std::string rig = R"(nodes: {mush: {type: deltaMush}}

@@ -198,7 +198,10 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   EXPECT_NE(edited([](Json* j) { (*j)["tiles.0.v"]["dtype"] = "U16"; }).find("expected F16"), std::string::npos);
   EXPECT_NE(edited([](Json* j) { (*j)["factor"]["shape"] = {(*j)["factor"]["shape"][0], 2}; }).find("needs"), std::string::npos);
 
-  // Any flipped byte or cut: either still a valid subspace (a number changed) or one message; never a crash
+  EXPECT_NE(metadata("ranges", [](Json* j) { j->clear(); }).find("the file is damaged"), std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["units"] = "cm"; }).find("the file is damaged"), std::string::npos);
+
+  // Any flipped byte or cut: one message, never a crash; but for padding and how the header is written
   std::mt19937 random(1);
   for (int i = 0; i < 400; ++i) {
     std::string bad = good;
@@ -208,6 +211,11 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
     const Result<Subspace> read = ReadSubspace(path_);
     EXPECT_TRUE(read.ok() || read.status().errors().size() == 1);
     EXPECT_FALSE(i % 5 == 0 && read.ok());
+    if (read.ok()) {
+      EXPECT_EQ(read->tiles[0].data().u.span().size(), subspace_.tiles[0].data().u.span().size());
+      EXPECT_TRUE(std::ranges::equal(read->tiles[0].data().u.span(), subspace_.tiles[0].data().u.span()));
+      EXPECT_EQ(read->cue_mean, subspace_.cue_mean);
+    }
   }
 }
 
