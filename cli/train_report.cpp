@@ -76,7 +76,7 @@ std::string TrainText(const TrainResult& r) {
         "{:.1f}x with these hits\n",
         Plural(r.check.poses, "new pose"), r.check.full_ms, r.check.accelerated_ms,
         r.check.PredictedSpeedup(r.calibration.hit_rate));
-    Table poses({"worst poses (controls)", "where", ">max", ">RMS"});
+    Table poses({"worst of these poses (controls)", "where", ">max", ">RMS"});
     for (const auto& pose : r.check.worst_poses)
       poses.Row({pose.controls, pose.region, LengthText(pose.max), LengthText(pose.rms)});
     Table regions({"worst regions", ">RMS", ">max"});

@@ -103,11 +103,7 @@ bool IsConnection(const YamlNode& node, const Graph& graph, Type type, Unit unit
   if (!node.is_scalar() || node.scalar.empty()) return false;
   const bool numeric = (IsSmallType(type) && type != Type::kEnum) || IsPointType(type);
   if (!numeric) return false;
-  if (type == Type::kBool) {
-    for (const char* word : {"true", "false", "on", "off", "yes", "no"}) {
-      if (node.scalar == word) return false;
-    }
-  }
+  if (type == Type::kBool && ParseBool(node.scalar).has_value()) return false;
   if (ParseQuantity(node.scalar, unit, units).ok()) return false;
   // "3rdJoint.tx" looks like a number but is a plug; "0.2 parsec" is a number gone wrong
   return !LooksNumeric(node.scalar) || graph.FindPlug(node.scalar).ok();

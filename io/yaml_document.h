@@ -7,6 +7,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -73,6 +74,8 @@ class YamlErrors {
 };
 
 bool ReadString(const YamlNode& node, std::string_view what, std::string* value, YamlErrors* errors);
+// true, on, yes, false, off or no, as "on", "On" or "ON".
+std::optional<bool> ParseBool(std::string_view text);
 bool ReadBool(const YamlNode& node, std::string_view what, bool* value, YamlErrors* errors);  // true/false, on/off, yes/no
 bool ReadNumber(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units, double* value,
                 YamlErrors* errors);

@@ -20,16 +20,23 @@ bool ReadString(const YamlNode& node, std::string_view what, std::string* value,
   return true;
 }
 
+std::optional<bool> ParseBool(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  std::string upper(text), title = lower;
+  for (char& c : upper) c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+  if (!title.empty()) title[0] = upper[0];
+  if (text != lower && text != upper && text != title) return std::nullopt;
+  if (lower == "true" || lower == "on" || lower == "yes") return true;
+  if (lower == "false" || lower == "off" || lower == "no") return false;
+  return std::nullopt;
+}
+
 bool ReadBool(const YamlNode& node, std::string_view what, bool* value, YamlErrors* errors) {
   if (!CheckScalar(node, what, "true or false", errors)) return false;
-  const std::string& text = node.scalar;
-  if (text == "true" || text == "on" || text == "yes") {
-    *value = true;
-  } else if (text == "false" || text == "off" || text == "no") {
-    *value = false;
-  } else {
-    return errors->Add(node, "{}: expected true or false, found \"{}\"", what, text);
-  }
+  const std::optional<bool> read = ParseBool(node.scalar);
+  if (!read.has_value()) return errors->Add(node, "{}: expected true or false, found \"{}\"", what, node.scalar);
+  *value = *read;
   return true;
 }
 

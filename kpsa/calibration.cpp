@@ -58,8 +58,10 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   }
   if (!result.enough_poses) {
     result.warning = fmt::format("{} calibration poses cannot promise a violation rate of {:g}; the threshold keeps {:.3g} "
-                                 "(at least {:.0f} poses are needed)",
-                                 pairs.size(), alpha, result.attainable_alpha, alpha > 0 ? std::ceil(1 / alpha - 1) : kInfinity);
+                                 "({})",
+                                 pairs.size(), alpha, result.attainable_alpha,
+                                 alpha > 0 ? fmt::format("at least {:.0f} poses are needed", std::ceil(1 / alpha - 1))
+                                           : "no number of poses can");
   }
 
   // A pose violates where tau exceeds its limit, so the limit number k + 1 admits k violations

@@ -168,5 +168,11 @@ TEST(Quantity, SaysWhatIsWrong) {
   EXPECT_TRUE(Has(failure("1_000", Unit::kNone), "unknown unit"));
 }
 
+TEST(ParseBool, TakesTheUsualSpellings) {
+  for (const char* text : {"true", "True", "TRUE", "on", "On", "yes", "YES"}) EXPECT_EQ(ParseBool(text), true) << text;
+  for (const char* text : {"false", "False", "FALSE", "off", "OFF", "no", "No"}) EXPECT_EQ(ParseBool(text), false) << text;
+  for (const char* text : {"", "tRUE", "1", "y", "truth"}) EXPECT_EQ(ParseBool(text), std::nullopt) << text;
+}
+
 }  // namespace
 }  // namespace kpsa
