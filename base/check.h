@@ -1,5 +1,5 @@
-// Checks of what only a programmer can get wrong. A failed check prints both values and aborts; it is active in
-// every build type, so keep it out of per-point loops (KPSA_DCHECK is for those).
+// Checks of what only a programmer can get wrong. A failed check prints both values and aborts; it is active
+// in every build type, so keep it out of per-point loops (KPSA_DCHECK is for those).
 #pragma once
 
 #include <fmt/format.h>
@@ -21,18 +21,18 @@ std::string CheckText(const T& value) {
 
 }  // namespace kpsa
 
-#define KPSA_CHECK(condition) \
-  do {                        \
+#define KPSA_CHECK(condition)                                                  \
+  do {                                                                         \
     if (!(condition)) ::kpsa::CheckFailed(__FILE__, __LINE__, #condition, ""); \
   } while (false)
 
-#define KPSA_CHECK_OP(a, op, b)                                                                       \
-  do {                                                                                                \
-    const auto& kpsa_a = (a);                                                                         \
-    const auto& kpsa_b = (b);                                                                         \
-    if (!(kpsa_a op kpsa_b))                                                                          \
-      ::kpsa::CheckFailed(__FILE__, __LINE__, #a " " #op " " #b,                                      \
-                          ::kpsa::CheckText(kpsa_a) + " against " + ::kpsa::CheckText(kpsa_b));       \
+#define KPSA_CHECK_OP(a, op, b)                                                                 \
+  do {                                                                                          \
+    const auto& kpsa_a = (a);                                                                   \
+    const auto& kpsa_b = (b);                                                                   \
+    if (!(kpsa_a op kpsa_b))                                                                    \
+      ::kpsa::CheckFailed(__FILE__, __LINE__, #a " " #op " " #b,                                \
+                          ::kpsa::CheckText(kpsa_a) + " against " + ::kpsa::CheckText(kpsa_b)); \
   } while (false)
 
 #define KPSA_CHECK_EQ(a, b) KPSA_CHECK_OP(a, ==, b)

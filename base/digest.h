@@ -17,25 +17,27 @@ struct Digest {
   std::string ToHex() const;  // 32 digits
 };
 
-// Feeds bytes in and gives their digest. Two different sequences of Add calls over the same bytes give the same
-// digest for raw bytes; strings and spans are fed with their length, so that ("ab","c") and ("a","bc") differ.
+// Feeds bytes in and gives their digest. Two different sequences of Add calls over the same bytes give the
+// same digest for raw bytes; strings and spans are fed with their length, so that ("ab","c") and ("a","bc")
+// differ.
 class Hasher {
  public:
   void AddBytes(const void* data, std::size_t size);
   void Add(std::string_view text);
   void Add(const char* text) { Add(std::string_view(text)); }
   template <typename T>
-    requires std::is_arithmetic_v<T> || std::is_enum_v<T>
-  void Add(T value) {
-    AddBytes(&value, sizeof(value));
-  }
+  requires std::is_arithmetic_v<T> || std::is_enum_v<T>
+  void Add(T value) { AddBytes(&value, sizeof(value)); }
   template <typename T>
-    requires std::is_trivially_copyable_v<T>
+  requires std::is_trivially_copyable_v<T>
   void Add(std::span<const T> values) {
     Add(static_cast<std::uint64_t>(values.size()));
     AddBytes(values.data(), values.size_bytes());
   }
-  void Add(const Digest& digest) { Add(digest.lo); Add(digest.hi); }
+  void Add(const Digest& digest) {
+    Add(digest.lo);
+    Add(digest.hi);
+  }
   Digest Finish() const;
 
  private:

@@ -29,7 +29,8 @@ Double3 TransformVector(const Matrix4& m, Double3 v) {
 }
 
 double Determinant3(const Matrix4& m) {
-  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) - m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
+  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
+         m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
          m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
 }
 
@@ -105,7 +106,8 @@ constexpr int kOrders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {1, 0
 Matrix4 RotationFromEuler(Double3 radians, RotateOrder order) {
   if (radians == Double3()) return Matrix4();
   const int* axes = kOrders[static_cast<int>(order)];
-  return AxisRotation(axes[2], radians[axes[2]]) * (AxisRotation(axes[1], radians[axes[1]]) * AxisRotation(axes[0], radians[axes[0]]));
+  return AxisRotation(axes[2], radians[axes[2]]) *
+         (AxisRotation(axes[1], radians[axes[1]]) * AxisRotation(axes[0], radians[axes[0]]));
 }
 
 Double3 EulerFromRotation(const Matrix4& m, RotateOrder order) {
@@ -131,9 +133,12 @@ Matrix4 RotationFromQuaternion(Quaternion q) { return RotationFromUnit(Normalize
 
 Matrix4 RotationFromUnit(Quaternion q) {
   Matrix4 m;
-  m(0, 0) = 1 - 2 * (q.y * q.y + q.z * q.z), m(0, 1) = 2 * (q.x * q.y - q.z * q.w), m(0, 2) = 2 * (q.x * q.z + q.y * q.w);
-  m(1, 0) = 2 * (q.x * q.y + q.z * q.w), m(1, 1) = 1 - 2 * (q.x * q.x + q.z * q.z), m(1, 2) = 2 * (q.y * q.z - q.x * q.w);
-  m(2, 0) = 2 * (q.x * q.z - q.y * q.w), m(2, 1) = 2 * (q.y * q.z + q.x * q.w), m(2, 2) = 1 - 2 * (q.x * q.x + q.y * q.y);
+  m(0, 0) = 1 - 2 * (q.y * q.y + q.z * q.z), m(0, 1) = 2 * (q.x * q.y - q.z * q.w),
+       m(0, 2) = 2 * (q.x * q.z + q.y * q.w);
+  m(1, 0) = 2 * (q.x * q.y + q.z * q.w), m(1, 1) = 1 - 2 * (q.x * q.x + q.z * q.z),
+       m(1, 2) = 2 * (q.y * q.z - q.x * q.w);
+  m(2, 0) = 2 * (q.x * q.z - q.y * q.w), m(2, 1) = 2 * (q.y * q.z + q.x * q.w),
+       m(2, 2) = 1 - 2 * (q.x * q.x + q.y * q.y);
   return m;
 }
 
@@ -182,10 +187,18 @@ Quaternion QuaternionFromRotation(const Matrix4& m) {
   if (!(t[largest] > 0)) return Quaternion();
   const double s = 0.5 / std::sqrt(t[largest]);
   switch (largest) {
-    case 0: return Normalized({t[0] * s, (m(1, 0) + m(0, 1)) * s, (m(0, 2) + m(2, 0)) * s, (m(2, 1) - m(1, 2)) * s});
-    case 1: return Normalized({(m(1, 0) + m(0, 1)) * s, t[1] * s, (m(2, 1) + m(1, 2)) * s, (m(0, 2) - m(2, 0)) * s});
-    case 2: return Normalized({(m(0, 2) + m(2, 0)) * s, (m(2, 1) + m(1, 2)) * s, t[2] * s, (m(1, 0) - m(0, 1)) * s});
-    default: return Normalized({(m(2, 1) - m(1, 2)) * s, (m(0, 2) - m(2, 0)) * s, (m(1, 0) - m(0, 1)) * s, t[3] * s});
+    case 0:
+      return Normalized(
+          {t[0] * s, (m(1, 0) + m(0, 1)) * s, (m(0, 2) + m(2, 0)) * s, (m(2, 1) - m(1, 2)) * s});
+    case 1:
+      return Normalized(
+          {(m(1, 0) + m(0, 1)) * s, t[1] * s, (m(2, 1) + m(1, 2)) * s, (m(0, 2) - m(2, 0)) * s});
+    case 2:
+      return Normalized(
+          {(m(0, 2) + m(2, 0)) * s, (m(2, 1) + m(1, 2)) * s, t[2] * s, (m(1, 0) - m(0, 1)) * s});
+    default:
+      return Normalized(
+          {(m(2, 1) - m(1, 2)) * s, (m(0, 2) - m(2, 0)) * s, (m(1, 0) - m(0, 1)) * s, t[3] * s});
   }
 }
 

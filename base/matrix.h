@@ -11,7 +11,8 @@ Matrix4 operator*(const Matrix4& a, const Matrix4& b);
 Double3 TransformPoint(const Matrix4& m, Double3 p);
 Double3 TransformVector(const Matrix4& m, Double3 v);
 
-// General inverse by cofactors; a singular matrix (|det| == 0 or not finite) gives the zero matrix and `false`.
+// General inverse by cofactors; a singular matrix (|det| == 0 or not finite) gives the zero matrix and
+// `false`.
 bool Invert(const Matrix4& m, Matrix4* inverse);
 // As Invert, of a matrix that is known to be regular; a singular one gives the identity.
 Matrix4 InverseOrIdentity(const Matrix4& m);

@@ -6,9 +6,10 @@
 #include <tbb/parallel_for.h>
 
 #if defined(KPSA_WITH_TSAN)
-// The library of TBB is not instrumented: the sanitizer does not see how it hands tasks to threads and waits for them.
-// What it orders is told below (before the loop, in each range, after the loop); its own objects (tasks with the range
-// and the lambda in them) are left out by the functions that read them. Everything that a body does is checked.
+// The library of TBB is not instrumented: the sanitizer does not see how it hands tasks to threads and waits
+// for them. What it orders is told below (before the loop, in each range, after the loop); its own objects
+// (tasks with the range and the lambda in them) are left out by the functions that read them. Everything that
+// a body does is checked.
 #include <sanitizer/tsan_interface.h>
 
 extern "C" const char* __tsan_default_suppressions() {
@@ -43,12 +44,13 @@ void ParallelFor(std::size_t count, std::size_t grain, RangeBody body) {
   const std::size_t chunks = (count + grain - 1) / grain;
   char begins = 0, ends = 0;
   Publish(&begins);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chunks), [&](const tbb::blocked_range<std::size_t>& range) {
-    Observe(&begins);
-    const std::size_t end = range.end() * grain;
-    body(range.begin() * grain, end < count ? end : count);
-    Publish(&ends);
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chunks),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      Observe(&begins);
+                      const std::size_t end = range.end() * grain;
+                      body(range.begin() * grain, end < count ? end : count);
+                      Publish(&ends);
+                    });
   Observe(&ends);
 }
 

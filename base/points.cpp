@@ -37,7 +37,9 @@ AlignedFloats::~AlignedFloats() {
 }
 
 PointBuffer::PointBuffer(std::size_t count, int components)
-    : floats_(PaddedCount(count) * static_cast<std::size_t>(components)), count_(count), components_(components) {
+    : floats_(PaddedCount(count) * static_cast<std::size_t>(components)),
+      count_(count),
+      components_(components) {
   KPSA_CHECK(components == 1 || components == 3);
 }
 

@@ -1,5 +1,5 @@
-// Point data: structure-of-arrays float32, 64-byte aligned, every component padded to a multiple of 16 floats.
-// The padding may be read and written by kernels; its content means nothing.
+// Point data: structure-of-arrays float32, 64-byte aligned, every component padded to a multiple of 16
+// floats. The padding may be read and written by kernels; its content means nothing.
 #pragma once
 
 #include <cstddef>

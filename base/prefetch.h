@@ -8,7 +8,8 @@ namespace kpsa {
 
 inline void Prefetch(const void* begin, std::size_t bytes) {
   const auto at = reinterpret_cast<std::uintptr_t>(begin);
-  for (std::uintptr_t line = at / 64 * 64; line < at + bytes; line += 64) __builtin_prefetch(reinterpret_cast<const void*>(line));
+  for (std::uintptr_t line = at / 64 * 64; line < at + bytes; line += 64)
+    __builtin_prefetch(reinterpret_cast<const void*>(line));
 }
 
 }  // namespace kpsa

@@ -19,10 +19,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::uint64_t kMaxHeader = 64u << 20;   // bytes of JSON
+constexpr std::uint64_t kMaxHeader = 64u << 20;  // bytes of JSON
 constexpr std::uint64_t kMaxFile = std::uint64_t{4} << 30;
 constexpr std::size_t kMaxDimensions = 16;
-constexpr std::size_t kAlignment = 64;            // of the data within the file, so that it maps well
+constexpr std::size_t kAlignment = 64;  // of the data within the file, so that it maps well
 
 struct TypeInfo {
   TensorType type;
@@ -35,12 +35,15 @@ constexpr TypeInfo kTypes[] = {
     {TensorType::kF16, "F16", 2}, {TensorType::kF32, "F32", 4}, {TensorType::kF64, "F64", 8},
 };
 
-bool Multiply(std::uint64_t a, std::uint64_t b, std::uint64_t* product) { return !__builtin_mul_overflow(a, b, product); }
+bool Multiply(std::uint64_t a, std::uint64_t b, std::uint64_t* product) {
+  return !__builtin_mul_overflow(a, b, product);
+}
 
 std::string ShapeText(std::span<const std::uint64_t> shape) {
   std::string text;
   for (const std::uint64_t size : shape) {
-    text += (text.empty() ? "" : ", ") + (size == SafetensorsFile::kAnySize ? std::string("any") : std::to_string(size));
+    text += (text.empty() ? "" : ", ") +
+            (size == SafetensorsFile::kAnySize ? std::string("any") : std::to_string(size));
   }
   return "[" + text + "]";
 }
@@ -61,41 +64,54 @@ Result<Json> ParseHeader(std::string_view text, const std::string& name) {
     return depth <= 4;  // deeper values are dropped; the depth is reported below
   };
   const Json header = Json::parse(text, callback, false);
-  if (header.is_discarded() || !header.is_object()) return Status::Invalid("{}: the header is not a JSON object", name);
-  if (depth_reached > 4) return Status::Invalid("{}: the header is nested deeper than the format allows", name);
+  if (header.is_discarded() || !header.is_object())
+    return Status::Invalid("{}: the header is not a JSON object", name);
+  if (depth_reached > 4)
+    return Status::Invalid("{}: the header is nested deeper than the format allows", name);
   if (!duplicate.empty()) return Status::Invalid("{}: the header names \"{}\" twice", name, duplicate);
   return header;
 }
 
 // One entry of the header -> type, shape and place; begin and end are relative to the data.
-Status ParseTensor(const std::string& name, const std::string& key, const Json& entry, std::uint64_t data_size,
-                   Tensor* tensor, std::uint64_t* begin, std::uint64_t* end) {
-  const auto bad = [&](const char* what) { return Status::Invalid("{}: tensor \"{}\": {}", name, key, what); };
-  if (!entry.is_object() || !entry.contains("dtype") || !entry.contains("shape") || !entry.contains("data_offsets")) {
+Status ParseTensor(const std::string& name, const std::string& key, const Json& entry,
+                   std::uint64_t data_size, Tensor* tensor, std::uint64_t* begin, std::uint64_t* end) {
+  const auto bad = [&](const char* what) {
+    return Status::Invalid("{}: tensor \"{}\": {}", name, key, what);
+  };
+  if (!entry.is_object() || !entry.contains("dtype") || !entry.contains("shape") ||
+      !entry.contains("data_offsets")) {
     return bad("expected an object with dtype, shape and data_offsets");
   }
   const Json &type = entry["dtype"], &shape = entry["shape"], &offsets = entry["data_offsets"];
   if (!type.is_string()) return bad("dtype is not a string");
-  const auto info = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const TypeInfo& t) { return t.name == type.get_ref<const std::string&>(); });
-  if (info == std::end(kTypes)) return Status::Invalid("{}: tensor \"{}\": unknown dtype \"{}\"", name, key, type.get_ref<const std::string&>());
+  const auto info = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const TypeInfo& t) {
+    return t.name == type.get_ref<const std::string&>();
+  });
+  if (info == std::end(kTypes))
+    return Status::Invalid("{}: tensor \"{}\": unknown dtype \"{}\"", name, key,
+                           type.get_ref<const std::string&>());
   tensor->type = info->type;
-  if (!shape.is_array() || shape.size() > kMaxDimensions) return bad("shape is not a list of at most 16 sizes");
+  if (!shape.is_array() || shape.size() > kMaxDimensions)
+    return bad("shape is not a list of at most 16 sizes");
   std::uint64_t size = info->size;
   for (const Json& extent : shape) {
     if (!extent.is_number_unsigned()) return bad("a size in its shape is not a whole number");
     tensor->shape.push_back(extent.get<std::uint64_t>());
     if (!Multiply(size, tensor->shape.back(), &size)) return bad("its shape overflows");
   }
-  if (!offsets.is_array() || offsets.size() != 2 || !offsets[0].is_number_unsigned() || !offsets[1].is_number_unsigned()) {
+  if (!offsets.is_array() || offsets.size() != 2 || !offsets[0].is_number_unsigned() ||
+      !offsets[1].is_number_unsigned()) {
     return bad("data_offsets is not a pair of whole numbers");
   }
   *begin = offsets[0].get<std::uint64_t>();
   *end = offsets[1].get<std::uint64_t>();
   if (*begin > *end || *end > data_size) {
-    return Status::Invalid("{}: tensor \"{}\" lies at bytes {} to {} of {}", name, key, *begin, *end, data_size);
+    return Status::Invalid("{}: tensor \"{}\" lies at bytes {} to {} of {}", name, key, *begin, *end,
+                           data_size);
   }
   if (*end - *begin != size) {
-    return Status::Invalid("{}: tensor \"{}\" of shape {} needs {} bytes, it has {}", name, key, ShapeText(tensor->shape), size, *end - *begin);
+    return Status::Invalid("{}: tensor \"{}\" of shape {} needs {} bytes, it has {}", name, key,
+                           ShapeText(tensor->shape), size, *end - *begin);
   }
   return {};
 }
@@ -133,14 +149,17 @@ Result<SafetensorsFile> SafetensorsFile::Parse(std::vector<std::byte> bytes, con
   SafetensorsFile file;
   file.name_ = name;
   file.bytes_ = std::move(bytes);
-  if (file.bytes_.size() < 8) return Status::Invalid("{}: {} bytes are too few for a header", name, file.bytes_.size());
+  if (file.bytes_.size() < 8)
+    return Status::Invalid("{}: {} bytes are too few for a header", name, file.bytes_.size());
   std::uint64_t header_size;
   std::memcpy(&header_size, file.bytes_.data(), 8);
   if (header_size > file.bytes_.size() - 8 || header_size > kMaxHeader) {
-    return Status::Invalid("{}: the header claims {} bytes, the file has {} (not a safetensors file, or cut short)", name,
-                           header_size, file.bytes_.size());
+    return Status::Invalid(
+        "{}: the header claims {} bytes, the file has {} (not a safetensors file, or cut short)", name,
+        header_size, file.bytes_.size());
   }
-  const Result<Json> header = ParseHeader({reinterpret_cast<const char*>(file.bytes_.data()) + 8, header_size}, name);
+  const Result<Json> header =
+      ParseHeader({reinterpret_cast<const char*>(file.bytes_.data()) + 8, header_size}, name);
   if (!header.ok()) return header.status();
   const std::span<const std::byte> data = std::span<const std::byte>(file.bytes_).subspan(8 + header_size);
 
@@ -173,19 +192,22 @@ Result<SafetensorsFile> SafetensorsFile::Parse(std::vector<std::byte> bytes, con
   std::uint64_t at = 0;
   for (const Extent& extent : extents) {
     if (extent.begin != at) {
-      return Status::Invalid("{}: tensor \"{}\" begins at byte {}, expected {} (tensors overlap or leave a hole)", name,
-                             *extent.key, extent.begin, at);
+      return Status::Invalid(
+          "{}: tensor \"{}\" begins at byte {}, expected {} (tensors overlap or leave a hole)", name,
+          *extent.key, extent.begin, at);
     }
     at = extent.end;
   }
-  if (at != data.size()) return Status::Invalid("{}: {} bytes of data, the tensors account for {}", name, data.size(), at);
+  if (at != data.size())
+    return Status::Invalid("{}: {} bytes of data, the tensors account for {}", name, data.size(), at);
   return file;
 }
 
 Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return Status::Invalid("{}: no such file", path);
-  if (!std::filesystem::is_regular_file(path, error)) return Status::Invalid("{}: is a folder, a pipe or a device, expected a file", path);
+  if (!std::filesystem::is_regular_file(path, error))
+    return Status::Invalid("{}: is a folder, a pipe or a device, expected a file", path);
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   std::ifstream stream(path, std::ios::binary);
   if (error || !stream) return Status::Invalid("{}: cannot be opened", path);
@@ -195,7 +217,8 @@ Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   if (!stream || header_size > size - 8 || header_size > kMaxHeader) {
     return Status::Invalid("{}: not a safetensors file, or cut short", path);
   }
-  if (size > kMaxFile) return Status::Invalid("{}: is larger than {} bytes, the most that is read", path, kMaxFile);
+  if (size > kMaxFile)
+    return Status::Invalid("{}: is larger than {} bytes, the most that is read", path, kMaxFile);
   std::vector<std::byte> bytes(size);
   stream.seekg(0);
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
@@ -211,7 +234,8 @@ Result<std::string> SafetensorsFile::Metadata(const std::string& key) const {
   return Status::Invalid("{}: the header has no \"{}\"{}", name_, key, DidYouMean(key, keys));
 }
 
-Result<const Tensor*> SafetensorsFile::Checked(const std::string& key, TensorType type, std::span<const std::uint64_t> shape) const {
+Result<const Tensor*> SafetensorsFile::Checked(const std::string& key, TensorType type,
+                                               std::span<const std::uint64_t> shape) const {
   const auto found = tensors_.find(key);
   if (found == tensors_.end()) {
     std::vector<std::string> keys;
@@ -220,10 +244,12 @@ Result<const Tensor*> SafetensorsFile::Checked(const std::string& key, TensorTyp
   }
   const Tensor& tensor = found->second;
   bool same = tensor.shape.size() == shape.size();
-  for (std::size_t i = 0; same && i < shape.size(); ++i) same = shape[i] == kAnySize || shape[i] == tensor.shape[i];
+  for (std::size_t i = 0; same && i < shape.size(); ++i)
+    same = shape[i] == kAnySize || shape[i] == tensor.shape[i];
   if (tensor.type != type || !same) {
-    return Status::Invalid("{}: tensor \"{}\" is {} {}, expected {} {}", name_, key, TensorTypeName(tensor.type), ShapeText(tensor.shape),
-                           TensorTypeName(type), ShapeText(shape));
+    return Status::Invalid("{}: tensor \"{}\" is {} {}, expected {} {}", name_, key,
+                           TensorTypeName(tensor.type), ShapeText(tensor.shape), TensorTypeName(type),
+                           ShapeText(shape));
   }
   const bool finite = type == TensorType::kF16   ? AllFiniteHalfs(tensor.bytes)
                       : type == TensorType::kF32 ? AllFinite<float>(tensor.bytes)
@@ -237,7 +263,8 @@ void SafetensorsFile::CopyBytes(std::span<const std::byte> from, void* to) {
   if (!from.empty()) std::memcpy(to, from.data(), from.size());
 }
 
-void SafetensorsWriter::AddBytes(const std::string& key, TensorType type, std::vector<std::uint64_t> shape, std::span<const std::byte> bytes) {
+void SafetensorsWriter::AddBytes(const std::string& key, TensorType type, std::vector<std::uint64_t> shape,
+                                 std::span<const std::byte> bytes) {
   KPSA_CHECK(key != "__metadata__" && !items_.contains(key));
   std::uint64_t size = TensorItemSize(type);
   for (const std::uint64_t extent : shape) KPSA_CHECK(Multiply(size, extent, &size));
@@ -257,7 +284,9 @@ std::vector<std::byte> SafetensorsWriter::Serialize() const {
   std::uint64_t at = 0;
   for (const auto* item : order) {
     const std::uint64_t end = at + item->second.bytes.size();
-    header[item->first] = {{"dtype", TensorTypeName(item->second.type)}, {"shape", item->second.shape}, {"data_offsets", {at, end}}};
+    header[item->first] = {{"dtype", TensorTypeName(item->second.type)},
+                           {"shape", item->second.shape},
+                           {"data_offsets", {at, end}}};
     at = end;
   }
   std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -267,7 +296,8 @@ std::vector<std::byte> SafetensorsWriter::Serialize() const {
   std::memcpy(bytes.data(), &size, 8);
   std::memcpy(bytes.data() + 8, text.data(), text.size());
   std::byte* target = bytes.data() + 8 + text.size();
-  for (const auto* item : order) target = std::copy(item->second.bytes.begin(), item->second.bytes.end(), target);
+  for (const auto* item : order)
+    target = std::copy(item->second.bytes.begin(), item->second.bytes.end(), target);
   return bytes;
 }
 

@@ -75,10 +75,18 @@ void SinCos(double radians, double* sine, double* cosine) {
   const double r = ((radians - k * kHalfPi1) - k * kHalfPi2) - k * kHalfPi3;
   const double s = SinSeries(r), c = CosSeries(r);
   switch (static_cast<std::int64_t>(k) & 3) {
-    case 0: *sine = s, *cosine = c; break;
-    case 1: *sine = c, *cosine = -s; break;
-    case 2: *sine = -s, *cosine = -c; break;
-    default: *sine = -c, *cosine = s; break;
+    case 0:
+      *sine = s, *cosine = c;
+      break;
+    case 1:
+      *sine = c, *cosine = -s;
+      break;
+    case 2:
+      *sine = -s, *cosine = -c;
+      break;
+    default:
+      *sine = -c, *cosine = s;
+      break;
   }
 }
 

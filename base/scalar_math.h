@@ -1,5 +1,6 @@
 // Elementary functions whose bits do not depend on the C library: library versions choose FMA variants at run
-// time, so that the same rig would give different frames on different machines. Accurate to about 1 ulp to 2 ulp.
+// time, so that the same rig would give different frames on different machines. Accurate to about 1 ulp to 2
+// ulp.
 #pragma once
 
 namespace kpsa {
@@ -11,7 +12,7 @@ double Atan2(double y, double x);  // (-pi, pi]
 double Acos(double x);             // x clamped to [-1, 1]
 double Asin(double x);             // x clamped to [-1, 1]
 double Exp(double x);
-double Log(double x);              // NaN below 0, -inf at 0
+double Log(double x);  // NaN below 0, -inf at 0
 
 inline constexpr double kPi = 3.14159265358979323846;
 

@@ -22,7 +22,8 @@ template <class V>
 HWY_INLINE V Fma(V a, V b, V c) {
   using D = hn::DFromV<V>;
   const D d;
-  HWY_ALIGN float aa[HWY_MAX_BYTES / sizeof(float)], bb[HWY_MAX_BYTES / sizeof(float)], cc[HWY_MAX_BYTES / sizeof(float)];
+  HWY_ALIGN float aa[HWY_MAX_BYTES / sizeof(float)], bb[HWY_MAX_BYTES / sizeof(float)],
+      cc[HWY_MAX_BYTES / sizeof(float)];
   hn::Store(a, d, aa);
   hn::Store(b, d, bb);
   hn::Store(c, d, cc);

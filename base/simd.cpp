@@ -30,7 +30,8 @@ bool SelectSimdTarget(const std::string& name) {
 std::string ApplySimdChoice() {
   const char* name = std::getenv("KPSA_SIMD");
   if (name == nullptr || SelectSimdTarget(name)) return "";
-  return std::string("KPSA_SIMD=") + name + ": expected avx512, avx2 or scalar, and one that this processor has";
+  return std::string("KPSA_SIMD=") + name +
+         ": expected avx512, avx2 or scalar, and one that this processor has";
 }
 
 std::string SimdTargetName() {

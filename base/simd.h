@@ -1,4 +1,5 @@
-// Highway's door. A kernel source that wants SIMD is compiled once for every target and dispatches at run time:
+// Highway's door. A kernel source that wants SIMD is compiled once for every target and dispatches at run
+// time:
 //
 //   #undef HWY_TARGET_INCLUDE
 //   #define HWY_TARGET_INCLUDE "nodes/kernels/skin.cpp"

@@ -75,8 +75,8 @@ class [[nodiscard]] Status {
 template <typename T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : value_(std::move(value)) {}                // NOLINT: implicit by design
-  Result(Status status) : status_(std::move(status)) {}        // NOLINT: implicit by design
+  Result(T value) : value_(std::move(value)) {}          // NOLINT: implicit by design
+  Result(Status status) : status_(std::move(status)) {}  // NOLINT: implicit by design
   bool ok() const { return value_.has_value(); }
   const Status& status() const { return status_; }
   T& value() { return *value_; }
@@ -96,7 +96,7 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& ca
 
 }  // namespace kpsa
 
-#define KPSA_RETURN_IF_ERROR(expression)                      \
-  do {                                                        \
+#define KPSA_RETURN_IF_ERROR(expression)                                                  \
+  do {                                                                                    \
     if (::kpsa::Status kpsa_status = (expression); !kpsa_status.ok()) return kpsa_status; \
   } while (false)

@@ -1,8 +1,9 @@
-// What each part of the method is worth, at equal numbers of points: which cues are chosen (the paper's rule, A-optimal,
-// random), where they lie (output points, an earlier stage, scalars besides), and how they are turned into points (least
-// squares, maximum a posteriori). Errors on the rig's test clip in its space, in % of the diagonal; beside them the time
-// of measuring the cues alone.
-//   bench_ablation [rig.yaml] [sampled poses]        the rig's first accelerate entry; scenes/face/face.yaml, 1200
+// What each part of the method is worth, at equal numbers of points: which cues are chosen (the paper's rule,
+// A-optimal, random), where they lie (output points, an earlier stage, scalars besides), and how they are
+// turned into points (least squares, maximum a posteriori). Errors on the rig's test clip in its space, in %
+// of the diagonal; beside them the time of measuring the cues alone.
+//   bench_ablation [rig.yaml] [sampled poses]        the rig's first accelerate entry; scenes/face/face.yaml,
+//   1200
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -42,29 +43,42 @@ class Ablation {
     Result<kpsa::Rig> loaded = LoadRig(registry_, path, rest);
     if (!loaded.ok()) return loaded.status();
     rig_ = std::move(*loaded);
-    if (rig_.accelerate.empty() || rig_.accelerate[0].test_clips.empty()) return Status::Invalid("expected an accelerate entry with a test clip").At({path});
+    if (rig_.accelerate.empty() || rig_.accelerate[0].test_clips.empty())
+      return Status::Invalid("expected an accelerate entry with a test clip").At({path});
     KPSA_RETURN_IF_ERROR(Record(samples));
-    fmt::print("{}: {} points, {} training poses, {} test frames of {}; motion RMS {:.3f} % of the diagonal of {:.3f} m; {} modes\n", path,
-               pca_.layout.points, training_->poses(), test_->poses(), rig_.accelerate[0].test_clips[0], Percent(motion_), diagonal_, pca_.mode_count());
-    fmt::print("stage before the last: {}; a point there computes {:.0f} points, an output point {:.0f}\n\n", stage_name_, stage_cost_, output_cost_);
+    fmt::print(
+        "{}: {} points, {} training poses, {} test frames of {}; motion RMS {:.3f} % of the diagonal of "
+        "{:.3f} m; {} modes\n",
+        path, pca_.layout.points, training_->poses(), test_->poses(), rig_.accelerate[0].test_clips[0],
+        Percent(motion_), diagonal_, pca_.mode_count());
+    fmt::print("stage before the last: {}; a point there computes {:.0f} points, an output point {:.0f}\n\n",
+               stage_name_, stage_cost_, output_cost_);
     fmt::print("{:<44}{:<6}", "cues", "by");
     for (std::size_t k : kPointCounts) fmt::print("{:>30}", fmt::format("{} points", k));
     fmt::print("\n{:<50}", "");
     for ([[maybe_unused]] std::size_t k : kPointCounts) fmt::print("{:>30}", "RMS %   max %   cues us");
     fmt::print("\n");
     for (const int per_mode : {1, 2}) {
-      Row(fmt::format("paper: {} a mode, output points", per_mode), "LS", [&](std::size_t k) { return LeastSquares(KeyPoints(k, per_mode), k / static_cast<std::size_t>(per_mode)); });
+      Row(fmt::format("paper: {} a mode, output points", per_mode), "LS", [&](std::size_t k) {
+        return LeastSquares(KeyPoints(k, per_mode), k / static_cast<std::size_t>(per_mode));
+      });
     }
     Row("paper: 2 a mode, output points", "MAP", [&](std::size_t k) { return Map(KeyPoints(k, 2)); });
-    Row("A-optimal, output points", "LS", [&](std::size_t k) { return LeastSquares(Optimal(k, true, false), k / 2); });
+    Row("A-optimal, output points", "LS",
+        [&](std::size_t k) { return LeastSquares(Optimal(k, true, false), k / 2); });
     Row("A-optimal, output points", "MAP", [&](std::size_t k) { return Map(Optimal(k, true, false)); });
-    Row("A-optimal, points before the last stage", "MAP", [&](std::size_t k) { return Map(Optimal(k, false, true)); });
-    Row("A-optimal by cost, both sorts of points", "MAP", [&](std::size_t k) { return Map(Optimal(k, true, true)); });
-    Row(fmt::format("the same and {} scalars", kScalars), "MAP", [&](std::size_t k) { return Map(Optimal(k, true, true, Scalars())); });
-    Row(fmt::format("points before the last stage, {} scalars", kScalars), "MAP", [&](std::size_t k) { return Map(Optimal(k, false, true, Scalars())); });
+    Row("A-optimal, points before the last stage", "MAP",
+        [&](std::size_t k) { return Map(Optimal(k, false, true)); });
+    Row("A-optimal by cost, both sorts of points", "MAP",
+        [&](std::size_t k) { return Map(Optimal(k, true, true)); });
+    Row(fmt::format("the same and {} scalars", kScalars), "MAP",
+        [&](std::size_t k) { return Map(Optimal(k, true, true, Scalars())); });
+    Row(fmt::format("points before the last stage, {} scalars", kScalars), "MAP",
+        [&](std::size_t k) { return Map(Optimal(k, false, true, Scalars())); });
     Row(fmt::format("{} scalars alone", kScalars), "MAP", [&](std::size_t) { return Map(Scalars()); });
     for (const bool map : {false, true}) {
-      Row(fmt::format("random output points, median of {}", kRandomSeeds), map ? "MAP" : "LS", [&](std::size_t k) { return RandomPoints(k, map); });
+      Row(fmt::format("random output points, median of {}", kRandomSeeds), map ? "MAP" : "LS",
+          [&](std::size_t k) { return RandomPoints(k, map); });
     }
     return Status();
   }
@@ -75,14 +89,17 @@ class Ablation {
   Status Record(std::size_t samples) {
     const Acceleration entry = rig_.accelerate[0];
     training_rig_ = MakeTrainingRig(&rig_, entry);
-    Result<std::vector<TrainingClip>> clips = ClipFrames(rig_, entry.train_clips), test = ClipFrames(rig_, {entry.test_clips[0]});
+    Result<std::vector<TrainingClip>> clips = ClipFrames(rig_, entry.train_clips),
+                                      test = ClipFrames(rig_, {entry.test_clips[0]});
     if (!clips.ok()) return clips.status();
     if (!test.ok()) return test.status();
     for (TrainingClip& clip : *clips) {
-      for (std::size_t i = 0; kFrameStep * i < clip.times.size(); ++i) clip.times[i] = clip.times[kFrameStep * i];
+      for (std::size_t i = 0; kFrameStep * i < clip.times.size(); ++i)
+        clip.times[i] = clip.times[kFrameStep * i];
       clip.times.resize((clip.times.size() + kFrameStep - 1) / kFrameStep);
     }
-    // Candidates before the last stage of the first mesh, evenly spread; signals under the controls and every clip
+    // Candidates before the last stage of the first mesh, evenly spread; signals under the controls and every
+    // clip
     std::vector<CandidateStage> candidates;
     for (const auto& mesh : training_rig_.target.meshes) {
       Request request;
@@ -94,7 +111,8 @@ class Ablation {
       if (mesh.stages.size() > 1) {
         --candidate.stage;
         const std::size_t count = std::min<std::size_t>(kCandidates, totals_.back());
-        for (std::size_t i = 0; i < count; ++i) candidate.points.push_back(static_cast<Index>((2 * i + 1) * totals_.back() / (2 * count)));
+        for (std::size_t i = 0; i < count; ++i)
+          candidate.points.push_back(static_cast<Index>((2 * i + 1) * totals_.back() / (2 * count)));
         stage_name_ = mesh.stages[candidate.stage].name;
       }
       candidates.push_back(std::move(candidate));
@@ -102,14 +120,18 @@ class Ablation {
     std::vector<Signal> signals;
     for (int clip = -1; clip < static_cast<int>(clips->size()); ++clip) {
       if (clip >= 0) KPSA_RETURN_IF_ERROR(SetClip(&rig_, (*clips)[static_cast<std::size_t>(clip)].name));
-      Result<std::vector<Signal>> found = FindSignals(*rig_.graph, &compiler_, training_rig_.target.outputs(), VaryingPlugs(rig_), nullptr, nullptr);
+      Result<std::vector<Signal>> found = FindSignals(*rig_.graph, &compiler_, training_rig_.target.outputs(),
+                                                      VaryingPlugs(rig_), nullptr, nullptr);
       if (!found.ok()) return found.status();
       for (Signal& signal : *found) {
-        if (std::none_of(signals.begin(), signals.end(), [&](const Signal& s) { return s.name == signal.name; })) signals.push_back(std::move(signal));
+        if (std::none_of(signals.begin(), signals.end(),
+                         [&](const Signal& s) { return s.name == signal.name; }))
+          signals.push_back(std::move(signal));
       }
     }
     KPSA_RETURN_IF_ERROR(SetClip(&rig_, std::nullopt));
-    recorder_ = std::make_unique<PoseRecorder>(training_rig_, &compiler_, std::move(candidates), std::move(signals));
+    recorder_ =
+        std::make_unique<PoseRecorder>(training_rig_, &compiler_, std::move(candidates), std::move(signals));
     Result<PoseLayout> layout = recorder_->Layout();
     if (!layout.ok()) return layout.status();
     training_ = std::make_unique<PoseMatrix>(*layout);
@@ -118,7 +140,9 @@ class Ablation {
     Result<ClipPoses> clip_poses = recorder_->ControlsOfClips(*clips);
     if (!clip_poses.ok()) return clip_poses.status();
     KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(training_rig_.controls), *clips, training_.get()));
-    KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SamplePoses(training_rig_.controls, *clip_poses, {}, clips->size(), samples, 1), *clips, training_.get()));
+    KPSA_RETURN_IF_ERROR(
+        recorder_->AddSamples(SamplePoses(training_rig_.controls, *clip_poses, {}, clips->size(), samples, 1),
+                              *clips, training_.get()));
     KPSA_RETURN_IF_ERROR(recorder_->AddClip((*test)[0], test_.get()));
     test_times_ = (*test)[0].times;
     KPSA_RETURN_IF_ERROR(SetClip(&rig_, entry.test_clips[0]));  // the cues are timed on it
@@ -135,12 +159,14 @@ class Ablation {
     for (std::size_t i = 0; i < layout->points + layout->stage_points; ++i) {
       const auto at = static_cast<Eigen::Index>(3 * i);
       positions_.push_back({mean[at], mean[at + 1], mean[at + 2]});
-      for (int a = 0; a < 3 && i < layout->points; ++a) lo[a] = std::min(lo[a], positions_[i][a]), hi[a] = std::max(hi[a], positions_[i][a]);
+      for (int a = 0; a < 3 && i < layout->points; ++a)
+        lo[a] = std::min(lo[a], positions_[i][a]), hi[a] = std::max(hi[a], positions_[i][a]);
     }
     diagonal_ = Length(hi - lo);
     double energy = 0;
     for (std::size_t t = 0; t < test_->poses(); ++t) {
-      for (std::size_t c = 0; c < layout->outputs(); ++c) energy += double{test_->row(t)[c]} * test_->row(t)[c];
+      for (std::size_t c = 0; c < layout->outputs(); ++c)
+        energy += double{test_->row(t)[c]} * test_->row(t)[c];
     }
     motion_ = std::sqrt(energy / static_cast<double>(test_->poses() * layout->points));
     stage_cost_ = PointsComputed({{CueKind::kStage, static_cast<Index>(layout->stage_points / 2)}});
@@ -155,23 +181,29 @@ class Ablation {
     Varimax({}, 3, &rotated);
     return SelectKeyPoints(rotated, 3, positions_, per_mode, 0.05 * diagonal_);
   }
-  // A-optimal points besides what is fixed. Of two sorts they are weighed by the points that each has to compute.
+  // A-optimal points besides what is fixed. Of two sorts they are weighed by the points that each has to
+  // compute.
   Cues Optimal(std::size_t count, bool outputs, bool stages, const Cues& fixed = {}) const {
     CueSelectionOptions options;
     options.fixed = fixed;
     options.count = fixed.size() + count;
     options.swap_passes = 0;
     if (outputs && stages) {
-      options.marginal_cost = [this](CueRef cue, std::span<const CueRef>) { return cue.kind == CueKind::kOutput ? output_cost_ : stage_cost_; };
+      options.marginal_cost = [this](CueRef cue, std::span<const CueRef>) {
+        return cue.kind == CueKind::kOutput ? output_cost_ : stage_cost_;
+      };
     }
-    return SelectCues(pca_, AllCandidates(pca_, 1e-3, outputs, stages, false), positions_, diagonal_, options).cues;
+    return SelectCues(pca_, AllCandidates(pca_, 1e-3, outputs, stages, false), positions_, diagonal_, options)
+        .cues;
   }
   const Cues& Scalars() {
     if (scalars_.empty()) {
       CueSelectionOptions options;
       options.count = kScalars;
       options.swap_passes = 0;
-      scalars_ = SelectCues(pca_, AllCandidates(pca_, 1e-3, false, false, true), positions_, diagonal_, options).cues;
+      scalars_ =
+          SelectCues(pca_, AllCandidates(pca_, 1e-3, false, false, true), positions_, diagonal_, options)
+              .cues;
     }
     return scalars_;
   }
@@ -225,13 +257,20 @@ class Ablation {
       }
       const std::vector<Index>& points = recorder_->candidates()[m].points;
       for (const CueRef& cue : cues) {
-        if (cue.kind == CueKind::kOutput && cue.index >= output_begin && cue.index < output_begin + totals_[m]) outputs.push_back(static_cast<Index>(cue.index - output_begin));
-        if (cue.kind == CueKind::kStage && cue.index >= stage_begin && cue.index < stage_begin + points.size()) stage.push_back(points[cue.index - stage_begin]);
+        if (cue.kind == CueKind::kOutput && cue.index >= output_begin &&
+            cue.index < output_begin + totals_[m])
+          outputs.push_back(static_cast<Index>(cue.index - output_begin));
+        if (cue.kind == CueKind::kStage && cue.index >= stage_begin &&
+            cue.index < stage_begin + points.size())
+          stage.push_back(points[cue.index - stage_begin]);
       }
       std::sort(outputs.begin(), outputs.end());
       std::sort(stage.begin(), stage.end());
-      if (!outputs.empty()) request.outputs.push_back({target.meshes[m].stages.back().points, PointSet::Of(outputs, totals_[m])});
-      if (!stage.empty()) request.outputs.push_back({target.meshes[m].stages[recorder_->candidates()[m].stage].points, PointSet::Of(stage, totals_[m])});
+      if (!outputs.empty())
+        request.outputs.push_back({target.meshes[m].stages.back().points, PointSet::Of(outputs, totals_[m])});
+      if (!stage.empty())
+        request.outputs.push_back({target.meshes[m].stages[recorder_->candidates()[m].stage].points,
+                                   PointSet::Of(stage, totals_[m])});
     }
     std::size_t column = 0;
     for (const Signal& signal : recorder_->signals()) {
@@ -274,7 +313,8 @@ class Ablation {
     fmt::print("{:<44}{:<6}", cues, estimator);
     for (const std::size_t k : kPointCounts) {
       const Score s = score(k);
-      fmt::print("{:>30}", fmt::format("{:.4f}  {:>6.3f}  {:>7.1f}{:1}", Percent(s.rms), Percent(s.max), s.cue_us, s.note));
+      fmt::print("{:>30}", fmt::format("{:.4f}  {:>6.3f}  {:>7.1f}{:1}", Percent(s.rms), Percent(s.max),
+                                       s.cue_us, s.note));
       std::fflush(stdout);
     }
     fmt::print("\n");
@@ -301,7 +341,8 @@ class Ablation {
 int main(int argc, char** argv) {
   kpsa::Ablation ablation;
   const int samples = argc > 2 ? std::clamp(std::atoi(argv[2]), 0, 100000) : 1200;
-  const kpsa::Status status = ablation.Run(argc > 1 ? argv[1] : "scenes/face/face.yaml", static_cast<std::size_t>(samples));
+  const kpsa::Status status =
+      ablation.Run(argc > 1 ? argv[1] : "scenes/face/face.yaml", static_cast<std::size_t>(samples));
   if (!status.ok()) fmt::print(stderr, "{}\n", status.ToString());
   return status.ok() ? 0 : 3;
 }

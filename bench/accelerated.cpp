@@ -1,8 +1,10 @@
-// What comes before the reconstruction of an accelerated frame: the small nodes (clips, transforms, utilities) and the
-// points of the cues, up to the KPSA node's own step.
-//   bench_accelerated RIG SUBSPACE [passes]      20 passes over a second and a half of the rig's first test clip
-// Warm: frame after frame. Cold: between two frames 4 MB of something else go through the caches. Alternating: after the
-// full evaluation of the same frame, as `kpsa bench` measures it; branches and code are cold, too. Times are sums of every frame's least over the passes, so that a busy machine shows little.
+// What comes before the reconstruction of an accelerated frame: the small nodes (clips, transforms,
+// utilities) and the points of the cues, up to the KPSA node's own step.
+//   bench_accelerated RIG SUBSPACE [passes]      20 passes over a second and a half of the rig's first test
+//   clip
+// Warm: frame after frame. Cold: between two frames 4 MB of something else go through the caches.
+// Alternating: after the full evaluation of the same frame, as `kpsa bench` measures it; branches and code
+// are cold, too. Times are sums of every frame's least over the passes, so that a busy machine shows little.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -39,7 +41,8 @@ std::vector<Part> PartsBefore(const Plan& plan, Index end) {
 }
 
 template <typename F>
-Microseconds Measure(Evaluator& evaluator, Index time, const std::vector<Part>& parts, const std::vector<double>& times, int passes, F disturb) {
+Microseconds Measure(Evaluator& evaluator, Index time, const std::vector<Part>& parts,
+                     const std::vector<double>& times, int passes, F disturb) {
   std::vector<Microseconds> least(times.size(), {1e9, 1e9, 1e9});
   const auto since = [](Clock::time_point& from) {
     const Clock::time_point now = Clock::now();
@@ -65,7 +68,8 @@ Microseconds Measure(Evaluator& evaluator, Index time, const std::vector<Part>& 
   }
   Microseconds mean;
   const auto count = static_cast<double>(times.size());
-  for (const Microseconds& us : least) mean.set += us.set / count, mean.small += us.small / count, mean.points += us.points / count;
+  for (const Microseconds& us : least)
+    mean.set += us.set / count, mean.small += us.small / count, mean.points += us.points / count;
   return mean;
 }
 
@@ -96,8 +100,10 @@ int Report(const Rig& rig, const Plan& plan, Evaluator& evaluator, Evaluator& fu
   });
   if (!fine) return 4;
   fmt::print("{} steps before the KPSA node, {} kinds in turn; us a frame\n", kpsa, parts.size());
-  for (const auto& [name, us] : {std::pair("warm", warm), std::pair("cold", cold), std::pair("alternating", alternating)}) {
-    fmt::print("  {:<11} {:6.2f} in all; set {:5.2f}, small nodes {:6.2f}, points of cues {:6.2f}\n", name, us.total(), us.set, us.small, us.points);
+  for (const auto& [name, us] :
+       {std::pair("warm", warm), std::pair("cold", cold), std::pair("alternating", alternating)}) {
+    fmt::print("  {:<11} {:6.2f} in all; set {:5.2f}, small nodes {:6.2f}, points of cues {:6.2f}\n", name,
+               us.total(), us.set, us.small, us.points);
   }
   return 0;
 }

@@ -1,5 +1,6 @@
-// What the engine costs around nodes that do next to nothing: nanoseconds and bytes a node on large graphs, beside
-// naive twins (plain calls in order; a recursive lazy pull over node objects) that compute the same values.
+// What the engine costs around nodes that do next to nothing: nanoseconds and bytes a node on large graphs,
+// beside naive twins (plain calls in order; a recursive lazy pull over node objects) that compute the same
+// values.
 //   bench_graph [nodes]          100,000 if not given
 // Exit status 1 if a goal is missed.
 #include <fmt/format.h>
@@ -27,7 +28,9 @@ constexpr Index kLayer = 1000;
 double Mix(double a, double b) { return a * 0.5 + b * 0.25 + 1; }
 
 using Clock = std::chrono::steady_clock;
-double Since(Clock::time_point start) { return std::chrono::duration<double, std::nano>(Clock::now() - start).count(); }
+double Since(Clock::time_point start) {
+  return std::chrono::duration<double, std::nano>(Clock::now() - start).count();
+}
 
 // The least of several runs, each after a preparation that is not timed.
 double Least(const std::function<void(int)>& prepare, const std::function<void()>& run) {
@@ -55,7 +58,8 @@ struct Shape {
 
 Shape Chain(Index count) {
   Shape shape{"chain", {}};
-  for (Index i = 0; i < count; ++i) shape.inputs.push_back({i == 0 ? -1 : static_cast<int>(i) - 1, -1 - static_cast<int>(i * 7 % kControls)});
+  for (Index i = 0; i < count; ++i)
+    shape.inputs.push_back({i == 0 ? -1 : static_cast<int>(i) - 1, -1 - static_cast<int>(i * 7 % kControls)});
   return shape;
 }
 
@@ -65,10 +69,12 @@ Shape Layered(Index count) {
   for (Index i = 0; i < count; ++i) {
     const Index layer = i / kLayer, at = i % kLayer;
     if (layer == 0) {
-      shape.inputs.push_back({-1 - static_cast<int>(at % kControls), -1 - static_cast<int>(at / kControls % kControls)});
+      shape.inputs.push_back(
+          {-1 - static_cast<int>(at % kControls), -1 - static_cast<int>(at / kControls % kControls)});
     } else {
       const Index before = (layer - 1) * kLayer;
-      shape.inputs.push_back({static_cast<int>(before + at), static_cast<int>(before + (at + layer) % kLayer)});
+      shape.inputs.push_back(
+          {static_cast<int>(before + at), static_cast<int>(before + (at + layer) % kLayer)});
     }
   }
   return shape;
@@ -116,8 +122,9 @@ struct Times {
 };
 
 void PrintRow(const char* name, const Times& times, std::size_t nodes) {
-  fmt::print("  {:<28} cold {:>6.2f} ns a node   warm {:>9.0f} ns   one control moved {:>6.2f} ns a node\n", name,
-             times.cold / static_cast<double>(nodes), times.warm, times.moved / static_cast<double>(nodes));
+  fmt::print("  {:<28} cold {:>6.2f} ns a node   warm {:>9.0f} ns   one control moved {:>6.2f} ns a node\n",
+             name, times.cold / static_cast<double>(nodes), times.warm,
+             times.moved / static_cast<double>(nodes));
 }
 
 // Plain calls in order have no state: they always compute everything.
@@ -128,8 +135,9 @@ double RunPlain(const Shape& shape, const std::vector<double>& controls, Times* 
   const auto all = [&] {
     for (std::size_t i = 0; i < values.size(); ++i) {
       const auto [a, b] = shape.inputs[i];
-      values[i] = mix(a < 0 ? controls[static_cast<std::size_t>(-1 - a)] : values[static_cast<std::size_t>(a)],
-                      b < 0 ? controls[static_cast<std::size_t>(-1 - b)] : values[static_cast<std::size_t>(b)]);
+      values[i] =
+          mix(a < 0 ? controls[static_cast<std::size_t>(-1 - a)] : values[static_cast<std::size_t>(a)],
+              b < 0 ? controls[static_cast<std::size_t>(-1 - b)] : values[static_cast<std::size_t>(b)]);
     }
   };
   times->cold = times->warm = times->moved = Least([](int) {}, all);
@@ -146,7 +154,8 @@ double RunLazy(const Shape& shape, const std::vector<double>& controls, Times* t
     nodes[i].compute = Mix;
     for (std::size_t p = 0; p < 2; ++p) {
       const int from = shape.inputs[i][p];
-      nodes[i].inputs[p] = from < 0 ? &leaves[static_cast<std::size_t>(-1 - from)] : &nodes[static_cast<std::size_t>(from)];
+      nodes[i].inputs[p] =
+          from < 0 ? &leaves[static_cast<std::size_t>(-1 - from)] : &nodes[static_cast<std::size_t>(from)];
       nodes[i].inputs[p]->readers.push_back(&nodes[i]);
     }
   }
@@ -156,14 +165,19 @@ double RunLazy(const Shape& shape, const std::vector<double>& controls, Times* t
   };
   double result = 0;
   OnDeepStack([&] {
-    times->cold = Least([&](int) { for (LazyNode& node : nodes) node.dirty = true; }, pull);
+    times->cold = Least(
+        [&](int) {
+          for (LazyNode& node : nodes) node.dirty = true;
+        },
+        pull);
     result = nodes.back().value;
     times->warm = Least([](int) {}, pull);
     int run = 0;
-    times->moved = Least([](int) {}, [&] {
-      leaves[0].Set(++run);
-      pull();
-    });
+    times->moved = Least([](int) {},
+                         [&] {
+                           leaves[0].Set(++run);
+                           pull();
+                         });
   });
   return result;
 }
@@ -171,7 +185,11 @@ double RunLazy(const Shape& shape, const std::vector<double>& controls, Times* t
 bool Report(const Shape& shape) {
   const std::size_t count = shape.inputs.size();
   NodeRegistry registry;
-  registry.add("mix", "Mixes.").in("a", 0.0).in("b", 0.0).out("out", Type::kDouble).compute([](double a, double b) { return Mix(a, b); });
+  registry.add("mix", "Mixes.")
+      .in("a", 0.0)
+      .in("b", 0.0)
+      .out("out", Type::kDouble)
+      .compute([](double a, double b) { return Mix(a, b); });
   const NodeDef& def = *registry.Find("mix");
   const int a = def.FindAttribute("a"), b = def.FindAttribute("b"), out = def.FindAttribute("out");
 
@@ -188,12 +206,14 @@ bool Report(const Shape& shape) {
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t p = 0; p < 2; ++p) {
       const int from = shape.inputs[i][p];
-      const PlugRef source = from < 0 ? request.varying[static_cast<std::size_t>(-1 - from)]
-                                      : PlugRef{nodes[static_cast<std::size_t>(kControls + from)], out, -1, -1};
+      const PlugRef source = from < 0
+                                 ? request.varying[static_cast<std::size_t>(-1 - from)]
+                                 : PlugRef{nodes[static_cast<std::size_t>(kControls + from)], out, -1, -1};
       must(graph->Connect(source, {nodes[kControls + i], p == 0 ? a : b, -1, -1}));
     }
   }
-  for (std::size_t i = count - std::min<std::size_t>(count, kLayer); i < count; ++i) request.outputs.push_back({{nodes[kControls + i], out, -1, -1}, {}});
+  for (std::size_t i = count - std::min<std::size_t>(count, kLayer); i < count; ++i)
+    request.outputs.push_back({{nodes[kControls + i], out, -1, -1}, {}});
   const double build = Since(start);
 
   start = Clock::now();
@@ -221,18 +241,21 @@ bool Report(const Shape& shape) {
   const double value = evaluator.Get<double>(static_cast<Index>(request.outputs.size() - 1));
   engine.warm = Least([](int) {}, [&] { must(evaluator.Evaluate()); });
   int run = 0;
-  engine.moved = Least([](int) {}, [&] {
-    evaluator.Set(0, ++run);
-    must(evaluator.Evaluate());
-  });
+  engine.moved = Least([](int) {},
+                       [&] {
+                         evaluator.Set(0, ++run);
+                         must(evaluator.Evaluate());
+                       });
   const double plain_value = RunPlain(shape, controls, &plain), lazy_value = RunLazy(shape, controls, &lazy);
   const bool same = value == plain_value && value == lazy_value;
 
   const double cold = engine.cold / static_cast<double>(count);
   const double bytes = static_cast<double>(plan_bytes + evaluator_bytes) / static_cast<double>(count);
-  fmt::print("{}, {} nodes: build {:.0f} ms, compile {:.0f} ms; plan {:.0f} + evaluator {:.0f} bytes a node\n", shape.name, count,
-             build * 1e-6, compile * 1e-6, static_cast<double>(plan_bytes) / static_cast<double>(count),
-             static_cast<double>(evaluator_bytes) / static_cast<double>(count));
+  fmt::print(
+      "{}, {} nodes: build {:.0f} ms, compile {:.0f} ms; plan {:.0f} + evaluator {:.0f} bytes a node\n",
+      shape.name, count, build * 1e-6, compile * 1e-6,
+      static_cast<double>(plan_bytes) / static_cast<double>(count),
+      static_cast<double>(evaluator_bytes) / static_cast<double>(count));
   PrintRow("engine", engine, count);
   PrintRow("naive: plain calls", plain, count);
   PrintRow("naive: recursive lazy pull", lazy, count);

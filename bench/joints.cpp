@@ -1,5 +1,5 @@
-// What the small nodes of a character cost a frame, without points: all world matrices (as skins read them) and morph
-// weights of a clip; and local matrices instead (as KPSA nodes read them).
+// What the small nodes of a character cost a frame, without points: all world matrices (as skins read them)
+// and morph weights of a clip; and local matrices instead (as KPSA nodes read them).
 //   bench_joints CHARACTER [frames]       a .glb, .gltf or rig; 240 frames if not given
 #include <fmt/format.h>
 
@@ -20,7 +20,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kPasses = 30;
 
-// Microseconds a frame, the least of several passes over the frames. `disturb` runs before every frame, not timed.
+// Microseconds a frame, the least of several passes over the frames. `disturb` runs before every frame, not
+// timed.
 template <typename F>
 double MicrosecondsAFrame(Evaluator& evaluator, Index time, const std::vector<double>& times, F disturb) {
   double best = 1e30;
@@ -79,8 +80,10 @@ int Report(const Rig& rig, const std::string& matrices, long frames) {
   Profile profile(**plan);
   evaluator.Record(&profile);
   const double recorded = MicrosecondsAFrame(evaluator, time, forward, nothing);
-  fmt::print("{}, {} steps: {:.2f} us a frame in order, {:.2f} in any order, {:.2f} with cold caches, {:.2f} while recording\n", matrices,
-             (*plan)->steps().size(), in_order, out_of_order, cold, recorded);
+  fmt::print(
+      "{}, {} steps: {:.2f} us a frame in order, {:.2f} in any order, {:.2f} with cold caches, {:.2f} while "
+      "recording\n",
+      matrices, (*plan)->steps().size(), in_order, out_of_order, cold, recorded);
   struct Row {
     std::uint64_t steps = 0, count = 0, ns = 0;
   };
@@ -90,9 +93,12 @@ int Report(const Rig& rig, const std::string& matrices, long frames) {
     ++row.steps, row.count += profile.counts()[s], row.ns += profile.self_ns()[s];
   }
   for (const auto& [type, row] : by_type) {
-    fmt::print("  {:<20} {:>5} steps, {:>5.1f} % of them a frame, {:>6.0f} ns each (the clock's own time is in it)\n", type, row.steps,
-               100.0 * static_cast<double>(row.count) / static_cast<double>(row.steps * kPasses * forward.size()),
-               static_cast<double>(row.ns) / static_cast<double>(std::max<std::uint64_t>(row.count, 1)));
+    fmt::print(
+        "  {:<20} {:>5} steps, {:>5.1f} % of them a frame, {:>6.0f} ns each (the clock's own time is in "
+        "it)\n",
+        type, row.steps,
+        100.0 * static_cast<double>(row.count) / static_cast<double>(row.steps * kPasses * forward.size()),
+        static_cast<double>(row.ns) / static_cast<double>(std::max<std::uint64_t>(row.count, 1)));
   }
   return 0;
 }

@@ -156,7 +156,8 @@ class Bench {
     result_.verdict_text = verdicts.Text();
     if (!verdicts.WorstMiss().empty()) result_.worst_miss = verdicts.WorstMiss();
 
-    // Times. The sides take turns by blocks of frames: each keeps its caches as in playback, and both see the same machine
+    // Times. The sides take turns by blocks of frames: each keeps its caches as in playback, and both see the
+    // same machine
     for (int run = 0; run < options_.runs; ++run) {
       for (std::size_t first = 0, block = 0; first < times->size(); first += kTurnFrames, ++block) {
         const std::size_t end = std::min(first + kTurnFrames, times->size());
@@ -164,7 +165,8 @@ class Bench {
         for (Side* turn : {side, side == &full ? &fast : &full}) {
           for (std::size_t f = first; f < end; ++f) {
             if (Interrupted()) return InterruptedStatus();
-            if (const Status status = turn->Timed(f, (*times)[f]); !status.ok()) return located(status, (*times)[f]);
+            if (const Status status = turn->Timed(f, (*times)[f]); !status.ok())
+              return located(status, (*times)[f]);
           }
         }
         for (std::size_t f = first; f < end; ++f) progress->Set(done_++);
@@ -238,8 +240,8 @@ class Bench {
       result_.cue_stages.push_back(fmt::format("{} {}", count, stage));
   }
 
-  // What the time consists of. A profiled evaluation is slower: what recording costs is taken out, and the parts are
-  // scaled to the timed one.
+  // What the time consists of. A profiled evaluation is slower: what recording costs is taken out, and the
+  // parts are scaled to the timed one.
   Status ProfileClip(const std::vector<AppliedSubspace>& applied, Side* full, Side* fast,
                      const std::vector<double>& times, double full_ns, double fast_ns) {
     Profile full_profile(*full->plan), fast_profile(*fast->plan);

@@ -105,7 +105,9 @@ CommandResult RunTrain(const TrainFlags& flags) {
   if (flags.clips.has_value()) {
     for (const std::string& clip : SplitNames(*flags.clips)) {
       if (std::find(entry->test_clips.begin(), entry->test_clips.end(), clip) != entry->test_clips.end())
-        return Status::Usage("--clips {}: a test clip of the rig, which is never trained on (test: in its accelerate section)", clip);
+        return Status::Usage(
+            "--clips {}: a test clip of the rig, which is never trained on (test: in its accelerate section)",
+            clip);
     }
   }
   const Result<std::vector<TrainingClip>> clips =

@@ -1,4 +1,5 @@
-// What a subcommand is: a function that declares its options on the program, and the work that runs afterwards.
+// What a subcommand is: a function that declares its options on the program, and the work that runs
+// afterwards.
 #pragma once
 
 #include <functional>

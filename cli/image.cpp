@@ -110,7 +110,8 @@ void DrawLegend(Image& image, double max_metres) {
     DrawText(image, right + 2 * scale, y - 4 * scale, scale, kInk, number);
   }
   constexpr std::string_view kLabel = "error, mm";
-  DrawText(image, std::min(left, image.width - 4 * scale - TextWidth(kLabel, scale)), top - 14 * scale, scale, kInk, kLabel);
+  DrawText(image, std::min(left, image.width - 4 * scale - TextWidth(kLabel, scale)), top - 14 * scale, scale,
+           kInk, kLabel);
 }
 
 void DrawTitle(Image& image, std::string_view title) {

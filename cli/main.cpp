@@ -93,7 +93,8 @@ int Main(int argc, char** argv) {
   } catch (const CLI::Success& success) {
     // `kpsa nosuch --help`: help is given before the word is refused
     if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty())
-      return UsageError(program, CLI::ExtrasError({argv[1]}), std::vector<std::string>(argv + 1, argv + argc));
+      return UsageError(program, CLI::ExtrasError({argv[1]}),
+                        std::vector<std::string>(argv + 1, argv + argc));
     program.exit(success);
     return FlushOutput().ok() ? 0 : 3;
   } catch (const CLI::ParseError& error) {

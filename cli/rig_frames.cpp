@@ -16,7 +16,8 @@ Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compile
   Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
   if (plan.ok()) return plan;
   Status located;
-  for (const Error& error : plan.status().errors()) located.Append(Status(error).At(PlaceOfMessage(rig, error.message)));
+  for (const Error& error : plan.status().errors())
+    located.Append(Status(error).At(PlaceOfMessage(rig, error.message)));
   return located;
 }
 

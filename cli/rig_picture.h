@@ -14,8 +14,8 @@ using Pose = std::vector<std::vector<float>>;
 // The final points of all meshes at the times.
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
                                         const RigFrameOptions& options);
-// One part a mesh, with the file's vertex colours if it has them; or one a primitive where materials have colours.
-// Refers to both arguments.
+// One part a mesh, with the file's vertex colours if it has them; or one a primitive where materials have
+// colours. Refers to both arguments.
 RenderInput MakeInput(const Rig& rig, const Pose& pose);
 // A camera that sees all of the poses.
 Camera FramePoses(const Rig& rig, const std::vector<Pose>& poses, const RenderOptions& options,

@@ -10,7 +10,8 @@ std::vector<PlugRef> VaryingPlugs(const Rig& rig) {
   for (const Control& control : rig.controls) {
     PlugRef whole = control.plug;
     whole.component = -1;
-    if (rig.graph->FindConnection(control.plug) != nullptr || rig.graph->FindConnection(whole) != nullptr) continue;
+    if (rig.graph->FindConnection(control.plug) != nullptr || rig.graph->FindConnection(whole) != nullptr)
+      continue;
     plugs.push_back(control.plug);
   }
   return plugs;
@@ -18,8 +19,8 @@ std::vector<PlugRef> VaryingPlugs(const Rig& rig) {
 
 namespace {
 
-// Where the value of a control can be read that would give what a clip does: a clip drives morph weights themselves, and
-// moves joints underneath their rotate and translate.
+// Where the value of a control can be read that would give what a clip does: a clip drives morph weights
+// themselves, and moves joints underneath their rotate and translate.
 std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
   if (control.by_clip) return control.plug;
   const NodeDef& def = graph.def(control.plug.node);
@@ -62,8 +63,10 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
   training.target = MakeTarget(*rig, acceleration);
   // The transforms from the space up to the root
   std::set<Index> carriers;
-  for (NodeId node = acceleration.space.value_or(NodeId()); rig->graph->IsAlive(node) && carriers.insert(node.index).second;) {
-    const Connection* parent = rig->graph->FindConnection({node, rig->graph->def(node).FindAttribute("parentMatrix"), -1, -1});
+  for (NodeId node = acceleration.space.value_or(NodeId());
+       rig->graph->IsAlive(node) && carriers.insert(node.index).second;) {
+    const Connection* parent =
+        rig->graph->FindConnection({node, rig->graph->def(node).FindAttribute("parentMatrix"), -1, -1});
     if (parent == nullptr) break;
     node = parent->source.node;
   }
@@ -71,7 +74,8 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
     const NodeDef& def = rig->graph->def(control.plug.node);
     if (def.attributes[static_cast<std::size_t>(control.plug.attribute)].diagnostic) continue;
     training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip,
-                                 carriers.count(control.plug.node.index) != 0, ShownByClip(*rig->graph, control)});
+                                 carriers.count(control.plug.node.index) != 0,
+                                 ShownByClip(*rig->graph, control)});
   }
   training.set_clip = [rig](std::optional<std::string_view> clip) { return SetClip(rig, clip); };
   return training;
@@ -86,7 +90,8 @@ Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<s
       known.push_back(clip.id);
       if (clip.id == name) found = &clip;
     }
-    if (found == nullptr) return Status::Invalid("the character has no clip \"{}\"{}", name, DidYouMean(name, known));
+    if (found == nullptr)
+      return Status::Invalid("the character has no clip \"{}\"{}", name, DidYouMean(name, known));
     TrainingClip clip{name, {}};
     const auto count = static_cast<std::size_t>(std::floor(found->duration * rig.fps + 1e-6)) + 1;
     for (std::size_t i = 0; i < count; ++i) clip.times.push_back(static_cast<double>(i) / rig.fps);

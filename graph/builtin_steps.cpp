@@ -53,18 +53,25 @@ void ComputeAssemblePoints(ComputeContext& context) {
     } else if (to.y == nullptr) {
       out[0][point] = static_cast<float>(context.get<double>(static_cast<int>(1 + i)));
     } else {
-      for (int c = 0; c < 3; ++c) out[c][point] = static_cast<float>(context.get<Double3>(static_cast<int>(1 + i))[c]);
+      for (int c = 0; c < 3; ++c)
+        out[c][point] = static_cast<float>(context.get<Double3>(static_cast<int>(1 + i))[c]);
     }
   }
 }
 
-void ComputeIntToDouble(ComputeContext& context) { context.out_value<double>(0) = static_cast<double>(context.get<std::int64_t>(0)); }
+void ComputeIntToDouble(ComputeContext& context) {
+  context.out_value<double>(0) = static_cast<double>(context.get<std::int64_t>(0));
+}
 void ComputeDoubleToInt(ComputeContext& context) {
   const double v = context.get<double>(0);
   const bool fits = v > -9.2e18 && v < 9.2e18;  // false for NaN, too
   context.out_value<std::int64_t>(0) = fits ? static_cast<std::int64_t>(v) : 0;
 }
-void ComputeDoubleToBool(ComputeContext& context) { context.out_value<std::int64_t>(0) = context.get<double>(0) != 0; }
-void ComputeIntToBool(ComputeContext& context) { context.out_value<std::int64_t>(0) = context.get<std::int64_t>(0) != 0; }
+void ComputeDoubleToBool(ComputeContext& context) {
+  context.out_value<std::int64_t>(0) = context.get<double>(0) != 0;
+}
+void ComputeIntToBool(ComputeContext& context) {
+  context.out_value<std::int64_t>(0) = context.get<std::int64_t>(0) != 0;
+}
 
 }  // namespace kpsa

@@ -12,8 +12,8 @@ namespace kpsa {
 void ComputeGatherPoints(ComputeContext& context);
 void ComputeGatherWeights(ComputeContext& context);
 
-// Kernel of an assembly: `children` are (element in the output set * 4 + component), or -1 where the element is not
-// in the set; component 3 means the whole double3.
+// Kernel of an assembly: `children` are (element in the output set * 4 + component), or -1 where the element
+// is not in the set; component 3 means the whole double3.
 struct AssembleKernel {
   std::vector<int> children;
   std::size_t value_size = 0;  // of small values
@@ -22,7 +22,7 @@ void ComputeAssembleSmall(ComputeContext& context);
 void ComputeAssemblePoints(ComputeContext& context);
 
 void ComputeIntToDouble(ComputeContext& context);
-void ComputeDoubleToInt(ComputeContext& context);   // toward zero
+void ComputeDoubleToInt(ComputeContext& context);  // toward zero
 void ComputeDoubleToBool(ComputeContext& context);
 void ComputeIntToBool(ComputeContext& context);
 

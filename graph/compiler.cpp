@@ -13,7 +13,8 @@ namespace {
 // Content digests of instances in the rest state: what a kernel or a rest value can depend on.
 class RestDigests {
  public:
-  explicit RestDigests(InstanceTable& table, const std::vector<Index>& order) : table_(table), digests_(table.instances().size()) {
+  explicit RestDigests(InstanceTable& table, const std::vector<Index>& order)
+      : table_(table), digests_(table.instances().size()) {
     for (Index i : order) digests_[i] = Compute(table.instances()[i]);
   }
   const Digest& operator[](Index instance) const { return digests_[instance]; }
@@ -83,7 +84,8 @@ class RestDigests {
 BoundKernel BuiltinKernel(const InstanceTable& table, const DraftStep& draft) {
   BoundKernel kernel;
   if (draft.instance == kNoIndex) {
-    kernel.object = std::make_shared<const std::vector<Index>>(draft.sets.inputs[0].PositionsOf(draft.sets.outputs[0][0]));
+    kernel.object = std::make_shared<const std::vector<Index>>(
+        draft.sets.inputs[0].PositionsOf(draft.sets.outputs[0][0]));
     return kernel;
   }
   const Instance& instance = table.instances()[draft.instance];
@@ -145,7 +147,8 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
     whole.component = -1;
     for (const PlugRef& p : {plug, whole}) {
       if (const Connection* c = graph.FindConnection(p)) {
-        return Status::Invalid("{} is driven by {} and cannot vary by itself", graph.PlugName(plug), graph.PlugName(c->source));
+        return Status::Invalid("{} is driven by {} and cannot vary by itself", graph.PlugName(plug),
+                               graph.PlugName(c->source));
       }
     }
     table.AddVarying(plug);
@@ -153,12 +156,15 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
   std::vector<Source> wanted;
   for (const RequestedOutput& output : request.outputs) KPSA_RETURN_IF_ERROR(graph.CheckPlug(output.plug));
   for (const RequestedOutput& output : request.outputs) {
-    const AttributeDef& a = graph.def(output.plug.node).attributes[static_cast<std::size_t>(output.plug.attribute)];
+    const AttributeDef& a =
+        graph.def(output.plug.node).attributes[static_cast<std::size_t>(output.plug.attribute)];
     if (IsPointType(a.type) && !a.array && output.plug.element >= 0) {
-      return Status::Invalid("{}: ask for the points and name a point set instead", graph.PlugName(output.plug));
+      return Status::Invalid("{}: ask for the points and name a point set instead",
+                             graph.PlugName(output.plug));
     }
     wanted.push_back(table.Reach(output.plug));
-    if (SlotSize(wanted.back().type) == 0) return Status::Invalid("{} is structural and has no value at run time", graph.PlugName(output.plug));
+    if (SlotSize(wanted.back().type) == 0)
+      return Status::Invalid("{} is structural and has no value at run time", graph.PlugName(output.plug));
   }
 
   if (!table.status().ok()) return table.status();
@@ -199,7 +205,8 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
       ++impl_->stats.kernels_reused;
     } else {
       Result<BoundKernel> kernel = Bind(table, statics, step.instance, step.sets);
-      if (!statics.status().ok()) return statics.status();  // an input's failure rather than what follows from it
+      if (!statics.status().ok())
+        return statics.status();  // an input's failure rather than what follows from it
       if (!kernel.ok()) return kernel.status();
       kernels[s] = *kernel;
       ++impl_->stats.kernels_bound;

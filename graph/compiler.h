@@ -1,8 +1,8 @@
-// Request -> plan. Works backward from the request (only needed nodes, only needed points), folds what depends on no
-// varying plug, binds kernels to their point sets, and lays out values.
+// Request -> plan. Works backward from the request (only needed nodes, only needed points), folds what
+// depends on no varying plug, binds kernels to their point sets, and lays out values.
 //
-// A Compiler keeps kernels and rest states between compilations, keyed by content: an edit of the graph rebinds only
-// what it changed. Not thread-safe; the plans that it gives are.
+// A Compiler keeps kernels and rest states between compilations, keyed by content: an edit of the graph
+// rebinds only what it changed. Not thread-safe; the plans that it gives are.
 #pragma once
 
 #include <memory>
@@ -27,7 +27,8 @@ class Compiler {
   // Errors: a structural attribute driven by something that varies (names both ends), a kernel that cannot be
   // bound (the node's reason), a demanded point out of range.
   Result<std::shared_ptr<const Plan>> Compile(const Graph& graph, const Request& request);
-  // The value of a plug with everything at its default and no clip (DESIGN of rest states: node_def.h, Structural::rest).
+  // The value of a plug with everything at its default and no clip (DESIGN of rest states: node_def.h,
+  // Structural::rest).
   Result<Value> Rest(const Graph& graph, const PlugRef& plug);
   const CompileStats& stats() const;
 

@@ -1,6 +1,6 @@
-// What a node's compute sees: its inputs and outputs as typed slots, its bound kernel, scratch and state. It sees
-// no graph and no host. A compute may run on any thread, several at once on different contexts, and must give the
-// same bytes whenever it is given the same inputs.
+// What a node's compute sees: its inputs and outputs as typed slots, its bound kernel, scratch and state. It
+// sees no graph and no host. A compute may run on any thread, several at once on different contexts, and must
+// give the same bytes whenever it is given the same inputs.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ class ArrayView {
 class ComputeHost {
  public:
   virtual ~ComputeHost() = default;
-  // Records an error of the node that computes now; its outputs are then taken as not computed. Not to be called from
-  // the body of a For: it would depend on the threads which message is kept.
+  // Records an error of the node that computes now; its outputs are then taken as not computed. Not to be
+  // called from the body of a For: it would depend on the threads which message is kept.
   virtual void Fail(std::string_view message) = 0;
   // As kpsa::ParallelFor where the host evaluates in parallel, inline otherwise.
   virtual void For(std::size_t count, std::size_t grain, RangeBody body) = 0;
@@ -38,24 +38,33 @@ class ComputeHost {
 
 class ComputeContext {
  public:
-  std::byte* values = nullptr;           // the evaluator's slots
-  const std::uint32_t* in = nullptr;     // by input of the group: slot offset; for arrays: where their table begins
-  const std::uint32_t* out = nullptr;    // by output of the group, likewise
-  const void* kernel = nullptr;          // what bind returned, or null
-  float* scratch = nullptr;              // as many floats as bind asked for; content undefined; 64-byte aligned
-  std::byte* state = nullptr;            // as many bytes as bind asked for; kept from decide to compute; 64-byte aligned
-  std::uint64_t chosen = 0;              // what decide returned: the bits of the lazy inputs that were evaluated
+  std::byte* values = nullptr;  // the evaluator's slots
+  const std::uint32_t* in =
+      nullptr;  // by input of the group: slot offset; for arrays: where their table begins
+  const std::uint32_t* out = nullptr;  // by output of the group, likewise
+  const void* kernel = nullptr;        // what bind returned, or null
+  float* scratch = nullptr;            // as many floats as bind asked for; content undefined; 64-byte aligned
+  std::byte* state =
+      nullptr;               // as many bytes as bind asked for; kept from decide to compute; 64-byte aligned
+  std::uint64_t chosen = 0;  // what decide returned: the bits of the lazy inputs that were evaluated
   ComputeHost* host = nullptr;
-  bool at_rest = false;                  // the rest state is computed while compiling: all lazy inputs are there, whatever decide says
+  bool at_rest =
+      false;  // the rest state is computed while compiling: all lazy inputs are there, whatever decide says
 
   // Inputs and outputs by their position in the group's lists. T is the slot's type (graph/value.h).
   template <typename T>
-  const T& get(int i) const { return *reinterpret_cast<const T*>(values + in[i]); }
+  const T& get(int i) const {
+    return *reinterpret_cast<const T*>(values + in[i]);
+  }
   template <typename T>
-  ArrayView<T> array(int i) const { return ArrayView<T>(values, in + in[i]); }
+  ArrayView<T> array(int i) const {
+    return ArrayView<T>(values, in + in[i]);
+  }
   const ConstPointsView& points(int i) const { return get<ConstPointsView>(i); }
   template <typename T>
-  T& out_value(int i) const { return *reinterpret_cast<T*>(values + out[i]); }
+  T& out_value(int i) const {
+    return *reinterpret_cast<T*>(values + out[i]);
+  }
   const PointsView& out_points(int i) const { return out_value<PointsView>(i); }
   const PointsView& out_points(int i, std::uint32_t element) const {
     return *reinterpret_cast<const PointsView*>(values + (out + out[i])[1 + element]);
@@ -63,13 +72,17 @@ class ComputeContext {
   std::uint32_t out_count(int i) const { return (out + out[i])[0]; }
 
   template <typename K>
-  const K& kernel_as() const { return *static_cast<const K*>(kernel); }
+  const K& kernel_as() const {
+    return *static_cast<const K*>(kernel);
+  }
   template <typename S>
-  S& state_as() const { return *reinterpret_cast<S*>(state); }
+  S& state_as() const {
+    return *reinterpret_cast<S*>(state);
+  }
 };
 
-// What a batch sees: steps of one kind, each with inputs of its own. Their outputs (one small value each) are not slots
-// but stand in a row, so that the host can compare them with what they were.
+// What a batch sees: steps of one kind, each with inputs of its own. Their outputs (one small value each) are
+// not slots but stand in a row, so that the host can compare them with what they were.
 class BatchContext {
  public:
   const std::byte* values = nullptr;  // the evaluator's slots
@@ -80,22 +93,29 @@ class BatchContext {
   std::size_t count = 0;
 
   template <typename T>
-  const T& get(std::size_t step, int i) const { return *reinterpret_cast<const T*>(values + in[step * stride + static_cast<std::size_t>(i)]); }
+  const T& get(std::size_t step, int i) const {
+    return *reinterpret_cast<const T*>(values + in[step * stride + static_cast<std::size_t>(i)]);
+  }
   template <typename T>
-  T& out_value(std::size_t step) const { return reinterpret_cast<T*>(out)[step]; }
+  T& out_value(std::size_t step) const {
+    return reinterpret_cast<T*>(out)[step];
+  }
   template <typename K>
-  const K& kernel_as() const { return *static_cast<const K*>(kernel); }
+  const K& kernel_as() const {
+    return *static_cast<const K*>(kernel);
+  }
 };
 
 // Slot types agree between views: points are written as PointsView and read as ConstPointsView.
 static_assert(sizeof(PointsView) == sizeof(ConstPointsView));
 
 using ComputeFn = void (*)(ComputeContext&);
-// Returns which lazy inputs to evaluate: bit i for the i-th in the order of declaration. Every element of a lazy array
-// counts, but a lazy_together array counts as one; there are 64 at most. Sees eager inputs only, may write its state.
+// Returns which lazy inputs to evaluate: bit i for the i-th in the order of declaration. Every element of a
+// lazy array counts, but a lazy_together array counts as one; there are 64 at most. Sees eager inputs only,
+// may write its state.
 using DecideFn = std::uint64_t (*)(ComputeContext&);
-// The same step of several evaluators at once (blocks of frames); same results as one by one. None of them has chosen a
-// lazy input. All contexts share one scratch, of the size that bind asked for.
+// The same step of several evaluators at once (blocks of frames); same results as one by one. None of them
+// has chosen a lazy input. All contexts share one scratch, of the size that bind asked for.
 using ComputeBlockFn = void (*)(ComputeContext* contexts, std::size_t count);
 // Several steps of one evaluator at once; gives the bytes that their computes give one by one. Cannot fail.
 using ComputeBatchFn = void (*)(const BatchContext&);

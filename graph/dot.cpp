@@ -71,8 +71,10 @@ class Drawing {
       return "style=\"filled,dashed\", fillcolor=\"#eeeeee\", fontcolor=\"#888888\", tooltip=" +
              DotQuoted(reason == left_out_.end() ? "" : reason->second);
     }
-    if (options_.profile != nullptr) return "fillcolor=" + DotQuoted(HeatColor(total_ns_ > 0 ? look.ns / total_ns_ : 0));
-    return look.lazy_only && look.points_total > 0 ? "fillcolor=\"#ffe9b3\", tooltip=\"only on demand\"" : "fillcolor=\"#d8f0d8\"";
+    if (options_.profile != nullptr)
+      return "fillcolor=" + DotQuoted(HeatColor(total_ns_ > 0 ? look.ns / total_ns_ : 0));
+    return look.lazy_only && look.points_total > 0 ? "fillcolor=\"#ffe9b3\", tooltip=\"only on demand\""
+                                                   : "fillcolor=\"#d8f0d8\"";
   }
 
   void DrawNode(NodeId id) {
@@ -80,9 +82,11 @@ class Drawing {
     look.drawn = look.kept || options_.all;
     if (!look.drawn) return;
     std::string label = Escaped(graph_.name(id)) + "\\n" + Escaped(graph_.def(id).name);
-    if (look.points_total > 0) label += fmt::format("\\n{} of {} points", Thousands(look.points), Thousands(look.points_total));
+    if (look.points_total > 0)
+      label += fmt::format("\\n{} of {} points", Thousands(look.points), Thousands(look.points_total));
     if (options_.profile != nullptr && look.kept) {
-      label += fmt::format("\\n{:.1f} us", look.ns / static_cast<double>(std::max<std::size_t>(options_.frames, 1)) / 1e3);
+      label += fmt::format("\\n{:.1f} us",
+                           look.ns / static_cast<double>(std::max<std::size_t>(options_.frames, 1)) / 1e3);
     }
     text_ += fmt::format("  n{} [label=\"{}\", {}];\n", id.index, label, Style(id, look));
   }
@@ -107,14 +111,15 @@ class Drawing {
     }
     for (const auto& [ends, arrow] : arrows) {
       const std::string more = arrow.count > 1 ? fmt::format(" and {} more", arrow.count - 1) : "";
-      text_ += fmt::format("  n{} -> n{} [tooltip={}];\n", ends.first, ends.second, DotQuoted(arrow.first + more));
+      text_ +=
+          fmt::format("  n{} -> n{} [tooltip={}];\n", ends.first, ends.second, DotQuoted(arrow.first + more));
     }
   }
 
   const Graph& graph_;
   const Plan& plan_;
   const DotOptions& options_;
-  std::vector<NodeLook> looks_;  // by node index
+  std::vector<NodeLook> looks_;                            // by node index
   std::unordered_map<std::string, std::string> left_out_;  // reasons by node name
   double total_ns_ = 0;
   std::string text_;
@@ -124,6 +129,8 @@ class Drawing {
 
 std::string DotQuoted(std::string_view text) { return "\"" + Escaped(text) + "\""; }
 
-std::string DrawDot(const Graph& graph, const Plan& plan, const DotOptions& options) { return Drawing(graph, plan, options).Draw(); }
+std::string DrawDot(const Graph& graph, const Plan& plan, const DotOptions& options) {
+  return Drawing(graph, plan, options).Draw();
+}
 
 }  // namespace kpsa

@@ -8,12 +8,16 @@
 namespace kpsa {
 
 Evaluator::Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options)
-    : plan_(std::move(plan)), options_(options), buffers_(plan_->buffer_floats()), state_((plan_->state_bytes() + 3) / 4) {
+    : plan_(std::move(plan)),
+      options_(options),
+      buffers_(plan_->buffer_floats()),
+      state_((plan_->state_bytes() + 3) / 4) {
   if (options_.workspace == nullptr) own_workspace_ = std::make_unique<Workspace>(*plan_);
   workspace_ = options_.workspace != nullptr ? options_.workspace : own_workspace_.get();
   KPSA_CHECK_LE(plan_->workspace_floats(), workspace_->size());
   values_ = std::make_unique<std::uint64_t[]>(plan_->initial_values().size() / 8 + 1);
-  if (!plan_->initial_values().empty()) std::memcpy(values_.get(), plan_->initial_values().data(), plan_->initial_values().size());
+  if (!plan_->initial_values().empty())
+    std::memcpy(values_.get(), plan_->initial_values().data(), plan_->initial_values().size());
   for (const Plan::Buffer& buffer : plan_->buffers()) {
     float* x = (buffer.workspace ? workspace_->data() : buffers_.data()) + buffer.offset;
     const std::size_t padded = PaddedCount(buffer.count);
@@ -137,7 +141,8 @@ void Evaluator::SetPoints(Index varying, ConstPointsView points) {
   const PointsView to = *reinterpret_cast<const PointsView*>(values() + plan_->varying()[varying].slot);
   const std::size_t size = points.count * sizeof(float);
   bool equal = true;
-  for (const auto& [target, source] : {std::pair(to.x, points.x), std::pair(to.y, points.y), std::pair(to.z, points.z)}) {
+  for (const auto& [target, source] :
+       {std::pair(to.x, points.x), std::pair(to.y, points.y), std::pair(to.z, points.z)}) {
     if (target == nullptr || size == 0 || std::memcmp(target, source, size) == 0) continue;
     std::memcpy(target, source, size);
     equal = false;
@@ -164,7 +169,8 @@ void Evaluator::MarkWanted(Index step) {
     if (s.branch != kNoIndex) {
       for (Index producer : plan_->branches()[s.branch].lazy_deps) want(producer);
     }
-    // A unit runs as a whole: the first of its members to come here wants all of them, and marks the unit's first step
+    // A unit runs as a whole: the first of its members to come here wants all of them, and marks the unit's
+    // first step
     const Index first = top - s.unit_offset;
     const Index size = plan_->steps()[first].unit_size;
     if (size == 1 || (top != first && wanted(first))) continue;
@@ -175,14 +181,16 @@ void Evaluator::MarkWanted(Index step) {
 
 void Evaluator::RecordFailure(Index step, std::string_view message) {
   std::lock_guard<std::mutex> lock(failure_mutex_);
-  if (failed_step_ != kNoIndex && failed_step_ <= step) return;  // the first in plan order, for any thread count
+  if (failed_step_ != kNoIndex && failed_step_ <= step)
+    return;  // the first in plan order, for any thread count
   failed_step_ = step;
   failure_ = message;
 }
 
 Status Evaluator::TakeFailure() {
   if (failed_step_ == kNoIndex) return Status();
-  Status status = Status::Evaluation("node \"{}\" ({}): {}", plan_->step_name(failed_step_), plan_->step_type(failed_step_), failure_);
+  Status status = Status::Evaluation("node \"{}\" ({}): {}", plan_->step_name(failed_step_),
+                                     plan_->step_type(failed_step_), failure_);
   failed_step_ = kNoIndex;
   return status;
 }
@@ -213,8 +221,9 @@ Status Evaluator::Pull(Index output) {
 
 std::size_t Evaluator::MemoryBytes() const {
   const auto bytes = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
-  return sizeof(*this) + plan_->initial_values().size() + buffers_.size() * 4 + state_.size() * 4 + bytes(changed_) + bytes(computed_) +
-         bytes(chosen_) + bytes(dirty_) + bytes(wanted_) + bytes(stack_) + bytes(ready_);
+  return sizeof(*this) + plan_->initial_values().size() + buffers_.size() * 4 + state_.size() * 4 +
+         bytes(changed_) + bytes(computed_) + bytes(chosen_) + bytes(dirty_) + bytes(wanted_) +
+         bytes(stack_) + bytes(ready_);
 }
 
 }  // namespace kpsa

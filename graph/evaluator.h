@@ -1,10 +1,10 @@
-// Values, stamps and pulls: everything that changes while a plan is evaluated. One evaluator a thread; the plan is
-// shared.
+// Values, stamps and pulls: everything that changes while a plan is evaluated. One evaluator a thread; the
+// plan is shared.
 //
-// Setting a varying plug marks what depends on it as dirty (bits, no computation). A pull runs the dirty steps that
-// the wanted outputs need, in plan order: a step is stale if an input changed since it last computed; small outputs
-// that come out equal do not make their consumers stale. Lazy segments run only when their owner's decide says so.
-// A warm evaluation allocates nothing and takes no lock.
+// Setting a varying plug marks what depends on it as dirty (bits, no computation). A pull runs the dirty
+// steps that the wanted outputs need, in plan order: a step is stale if an input changed since it last
+// computed; small outputs that come out equal do not make their consumers stale. Lazy segments run only when
+// their owner's decide says so. A warm evaluation allocates nothing and takes no lock.
 #pragma once
 
 #include <cstdint>
@@ -41,14 +41,18 @@ class Evaluator final {
   void Set(Index varying, const Double3& value);
   void Set(Index varying, const Quaternion& value);
   void Set(Index varying, const Matrix4& value);
-  void SetPoints(Index varying, ConstPointsView points);  // as many points as the plug had when the plan was made
+  void SetPoints(Index varying,
+                 ConstPointsView points);  // as many points as the plug had when the plan was made
 
-  // Brings outputs up to date: all of them, or one. On failure the error names the node; other outputs may be fine.
+  // Brings outputs up to date: all of them, or one. On failure the error names the node; other outputs may be
+  // fine.
   Status Evaluate();
   Status Pull(Index output);
   // An output after a pull. T is the slot type. Points are in the order of the request's set.
   template <typename T>
-  const T& Get(Index output) const { return *reinterpret_cast<const T*>(values() + plan_->outputs()[output].slot); }
+  const T& Get(Index output) const {
+    return *reinterpret_cast<const T*>(values() + plan_->outputs()[output].slot);
+  }
   ConstPointsView Points(Index output) const { return Get<ConstPointsView>(output); }
 
   // Records what runs from now on, as of that frame. Null to stop: then evaluation pays nothing for it.
@@ -59,13 +63,15 @@ class Evaluator final {
   void Invalidate();
   std::size_t MemoryBytes() const;
 
-  // For blocks of frames (graph/frames.h): one evaluation, cut at the steps of segment 0 that blocks share. Serial only.
+  // For blocks of frames (graph/frames.h): one evaluation, cut at the steps of segment 0 that blocks share.
+  // Serial only.
   //   BeginRun; for every such step in plan order: RunUntil(step), PrepareBlockStep, FinishBlockStep; EndRun.
   // After a failure nothing more runs; EndRun tells.
   void BeginRun();
   void RunUntil(Index end);  // the steps of segment 0 before `end`
-  // Runs the decide of a stale step. True if it needs none of its lazy inputs: then *context is ready for a block compute,
-  // to be followed by FinishBlockStep. Otherwise the step is done: it is fresh, has run by itself, or has failed.
+  // Runs the decide of a stale step. True if it needs none of its lazy inputs: then *context is ready for a
+  // block compute, to be followed by FinishBlockStep. Otherwise the step is done: it is fresh, has run by
+  // itself, or has failed.
   bool PrepareBlockStep(Index step, ComputeContext* context);
   void FinishBlockStep(Index step, std::uint64_t begin_ns, std::uint64_t end_ns);  // times for the profile
   Status EndRun();
@@ -81,14 +87,21 @@ class Evaluator final {
   ComputeContext ContextOf(const Plan::Step& step);
   Index NewerDep(Index step) const;
   Index NewerLazyDep(Index step) const;
-  template <bool kRecord> bool RunRange(Index begin, Index end);
-  template <bool kRecord> bool RunPlain(Index step);
+  template <bool kRecord>
+  bool RunRange(Index begin, Index end);
+  template <bool kRecord>
+  bool RunPlain(Index step);
   bool TryBatch(Index step, Index end);
-  template <bool kRecord> bool RunStep(Index step);
-  template <bool kRecord> bool RunUnit(Index first);
-  template <bool kRecord> bool RunBranch(Index step);
-  template <bool kRecord> bool RunDecided(Index step, Index cause);
-  template <bool kRecord> bool Compute(Index step, Index cause, bool stale);
+  template <bool kRecord>
+  bool RunStep(Index step);
+  template <bool kRecord>
+  bool RunUnit(Index first);
+  template <bool kRecord>
+  bool RunBranch(Index step);
+  template <bool kRecord>
+  bool RunDecided(Index step, Index cause);
+  template <bool kRecord>
+  bool Compute(Index step, Index cause, bool stale);
   bool Run(const Plan::Segment& segment, Index begin, Index end);
   bool RunLevels(const Plan::Segment& segment, Index begin, Index end);
   bool Decide(Index step, Index* cause);
@@ -110,17 +123,17 @@ class Evaluator final {
   std::unique_ptr<std::uint64_t[]> values_;
   AlignedFloats buffers_;
   AlignedFloats state_;
-  std::vector<std::uint32_t> changed_;   // by producer: the epoch in which its value last changed
-  std::vector<std::uint32_t> computed_;  // by step: the epoch in which it last computed; 0 never
-  std::vector<std::uint64_t> chosen_;    // by branch
+  std::vector<std::uint32_t> changed_;         // by producer: the epoch in which its value last changed
+  std::vector<std::uint32_t> computed_;        // by step: the epoch in which it last computed; 0 never
+  std::vector<std::uint64_t> chosen_;          // by branch
   std::vector<std::uint64_t> dirty_, wanted_;  // bits, by step; wanted_ only during a pull of one output
   bool wanted_only_ = false;
-  std::vector<Index> stack_;             // steps to visit
-  std::vector<Index> ready_;             // first steps of units of a level, for the parallel evaluation
-  Index cursor_ = 0;                     // of RunUntil
+  std::vector<Index> stack_;  // steps to visit
+  std::vector<Index> ready_;  // first steps of units of a level, for the parallel evaluation
+  Index cursor_ = 0;          // of RunUntil
   std::uint32_t epoch_ = 1;
   bool set_since_run_ = false;
-  bool clean_ = false;                   // nothing is dirty that Evaluate would run
+  bool clean_ = false;  // nothing is dirty that Evaluate would run
 #ifndef KPSA_WITHOUT_RECORDING
   Profile* profile_ = nullptr;
 #else
@@ -129,7 +142,7 @@ class Evaluator final {
   int frame_ = 0;
   std::unique_ptr<StepHost> block_host_;  // of the step between PrepareBlockStep and FinishBlockStep
   Index block_cause_ = kNoIndex;
-  std::mutex failure_mutex_;             // taken on failures only
+  std::mutex failure_mutex_;  // taken on failures only
   std::string failure_;
   Index failed_step_ = kNoIndex;
 };

@@ -1,11 +1,11 @@
-// How an Evaluator runs: one step, a unit, a segment; serially, by levels on threads, or cut at the steps of blocks.
-#include "graph/step_host.h"
-
+// How an Evaluator runs: one step, a unit, a segment; serially, by levels on threads, or cut at the steps of
+// blocks.
 #include <bit>
 #include <cstring>
 #include <thread>
 
 #include "base/check.h"
+#include "graph/step_host.h"
 
 namespace kpsa {
 namespace {
@@ -43,7 +43,8 @@ Index Evaluator::NewerLazyDep(Index number) const {
   const std::uint64_t chosen = chosen_[plan_->steps()[number].branch];
   for (std::size_t i = 0; i < branch.lazy_deps.size(); ++i) {
     const Index dep = branch.lazy_deps[i];
-    if ((chosen >> branch.bit_of_lazy[i] & 1) != 0 && dep != kNoIndex && changed_[dep] > computed_[number]) return dep;
+    if ((chosen >> branch.bit_of_lazy[i] & 1) != 0 && dep != kNoIndex && changed_[dep] > computed_[number])
+      return dep;
   }
   return kNoIndex;
 }
@@ -65,10 +66,14 @@ inline bool ComputeAndCompare(const Plan::Step& step, ComputeContext& context) {
 }
 inline bool ComputeAndCompare(const Plan::Step& step, ComputeContext& context) {
   switch (step.value_size) {
-    case 8: return ComputeAndCompare<8>(step, context);
-    case sizeof(Double3): return ComputeAndCompare<sizeof(Double3)>(step, context);
-    case sizeof(Matrix4): return ComputeAndCompare<sizeof(Matrix4)>(step, context);
-    default: break;
+    case 8:
+      return ComputeAndCompare<8>(step, context);
+    case sizeof(Double3):
+      return ComputeAndCompare<sizeof(Double3)>(step, context);
+    case sizeof(Matrix4):
+      return ComputeAndCompare<sizeof(Matrix4)>(step, context);
+    default:
+      break;
   }
   std::byte old[kComparedBytes];
   std::memcpy(old, context.values + step.value, step.value_size);
@@ -106,8 +111,8 @@ void Evaluator::AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::u
 
 template <bool kRecord>
 bool Evaluator::RunUnit(Index first) {
-  // One buffer goes through all members: if one of them is stale, all run, from the first. Members before the stale
-  // one give what they gave before, so their stamps stay.
+  // One buffer goes through all members: if one of them is stale, all run, from the first. Members before the
+  // stale one give what they gave before, so their stamps stay.
   const Index end = first + plan_->steps()[first].unit_size;
   bool run = false;
   for (Index s = first; s < end; ++s) run = run || computed_[s] == 0 || NewerDep(s) != kNoIndex;
@@ -257,7 +262,8 @@ bool Evaluator::RunRange(Index begin, Index end) {
       Index step = w * 64 + static_cast<Index>(std::countr_zero(bits));
       if (steps[step].runs_plainly()) [[likely]] {
         dirty_[w] &= ~(bits & (~bits + 1));
-        if (RunPlain<kRecord>(step)) [[likely]] continue;
+        if (RunPlain<kRecord>(step)) [[likely]]
+          continue;
         SetDirty(step, step + 1);
         return false;
       }
@@ -277,7 +283,8 @@ bool Evaluator::RunRange(Index begin, Index end) {
 
 bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) {
   for (std::size_t level = 0; level + 1 < segment.levels.size(); ++level) {
-    const Index first = std::max(begin, segment.levels[level]), last = std::min(end, segment.levels[level + 1]);
+    const Index first = std::max(begin, segment.levels[level]),
+                last = std::min(end, segment.levels[level + 1]);
     if (first >= last) continue;
     // The stale units of the level; branches come after, one by one: their segments use the pool themselves
     ready_.clear();

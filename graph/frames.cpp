@@ -16,7 +16,8 @@ namespace {
 // The frames of one call: hands out blocks, and turns at the sink.
 class FrameQueue {
  public:
-  FrameQueue(std::size_t frame_count, std::size_t block_size, const FrameSink& sink, const std::atomic<bool>* cancel)
+  FrameQueue(std::size_t frame_count, std::size_t block_size, const FrameSink& sink,
+             const std::atomic<bool>* cancel)
       : frame_count_(frame_count), block_size_(block_size), sink_(sink), cancel_(cancel) {}
 
   // The next block [begin, end); false if there is none or all is over.
@@ -33,7 +34,8 @@ class FrameQueue {
   }
 
   // Waits until all frames before `begin` are handed on, then hands on these.
-  void Sink(std::size_t begin, std::size_t end, const std::vector<std::unique_ptr<Evaluator>>& evaluators, const std::vector<Status>& evaluated) {
+  void Sink(std::size_t begin, std::size_t end, const std::vector<std::unique_ptr<Evaluator>>& evaluators,
+            const std::vector<Status>& evaluated) {
     {
       std::unique_lock<std::mutex> lock(mutex_);
       turn_.wait(lock, [&] { return done_ == begin || stop_.load(std::memory_order_relaxed); });
@@ -51,7 +53,8 @@ class FrameQueue {
   // Once all threads are through.
   Status Result() const {
     if (!error_.ok() || done_ == frame_count_) return error_;
-    return Status::Make(ErrorKind::kInterrupted, fmt::format("interrupted after {} of {} frames", done_, frame_count_));
+    return Status::Make(ErrorKind::kInterrupted,
+                        fmt::format("interrupted after {} of {} frames", done_, frame_count_));
   }
 
  private:
@@ -108,7 +111,8 @@ class BlockEvaluator {
       const std::uint64_t start = profile_ != nullptr ? ProfileClock() : 0;
       plan_.branches()[plan_.steps()[step].branch].compute_block(contexts_.data(), ready);
       const std::uint64_t share = profile_ != nullptr ? (ProfileClock() - start) / ready : 0;
-      for (std::size_t i = 0; i < ready; ++i) prepared_[i]->FinishBlockStep(step, start + i * share, start + (i + 1) * share);
+      for (std::size_t i = 0; i < ready; ++i)
+        prepared_[i]->FinishBlockStep(step, start + i * share, start + (i + 1) * share);
     }
     for (std::size_t i = 0; i < count && !queue.stopped(); ++i) evaluated_[i] = evaluators_[i]->EndRun();
   }
@@ -128,22 +132,24 @@ class BlockEvaluator {
   std::vector<Status> evaluated_;
   std::vector<ComputeContext> contexts_;  // of the frames that are ready for a shared step
   std::vector<Evaluator*> prepared_;
-  std::vector<Index> shared_;             // steps with compute_block
+  std::vector<Index> shared_;  // steps with compute_block
 };
 
 }  // namespace
 
-Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame_count, const FrameOptions& options,
-                      const SetFrame& set, const FrameSink& sink) {
+Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame_count,
+                      const FrameOptions& options, const SetFrame& set, const FrameSink& sink) {
   KPSA_CHECK_LE(1, options.block);
   const bool alone = !plan->stateful_node().empty();
   auto threads = static_cast<std::size_t>(options.threads > 0 ? options.threads : AllowedThreads());
   threads = std::clamp<std::size_t>(frame_count, 1, alone ? 1 : threads);
   const std::size_t share = (frame_count + threads - 1) / threads;
-  const std::size_t block = std::clamp<std::size_t>(share, 1, alone ? 1 : static_cast<std::size_t>(options.block));
+  const std::size_t block =
+      std::clamp<std::size_t>(share, 1, alone ? 1 : static_cast<std::size_t>(options.block));
   FrameQueue queue(frame_count, block, sink, options.cancel);
   const auto work = [&] { BlockEvaluator(plan, block, options.profile).Work(set, queue); };
-  // Threads of its own rather than the pool's: they wait for each other, and a waiting pool thread may not take a block
+  // Threads of its own rather than the pool's: they wait for each other, and a waiting pool thread may not
+  // take a block
   std::vector<std::thread> workers;
   try {
     for (std::size_t i = 1; i < threads; ++i) workers.emplace_back(work);

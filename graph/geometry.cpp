@@ -22,14 +22,19 @@ void AddSampler(Hasher& hasher, const AnimationSampler& sampler) {
 Mesh::Mesh(Data data) : data_(std::move(data)) {
   Hasher hasher;
   const ConstPointsView rest = std::as_const(data_.rest).view();
-  for (const float* component : {rest.x, rest.y, rest.z}) hasher.Add(std::span<const float>(component, rest.count));
+  for (const float* component : {rest.x, rest.y, rest.z})
+    hasher.Add(std::span<const float>(component, rest.count));
   AddVector(hasher, data_.triangles);
   AddVector(hasher, data_.vertex_to_point);
   digest_ = hasher.Finish();
 }
 
-Influences::Influences(std::vector<Index> offsets, std::vector<Index> joints, std::vector<float> weights, Index joint_count)
-    : offsets_(std::move(offsets)), joints_(std::move(joints)), weights_(std::move(weights)), joint_count_(joint_count) {
+Influences::Influences(std::vector<Index> offsets, std::vector<Index> joints, std::vector<float> weights,
+                       Index joint_count)
+    : offsets_(std::move(offsets)),
+      joints_(std::move(joints)),
+      weights_(std::move(weights)),
+      joint_count_(joint_count) {
   KPSA_CHECK(!offsets_.empty());
   KPSA_CHECK_EQ(offsets_.back(), joints_.size());
   KPSA_CHECK_EQ(joints_.size(), weights_.size());
@@ -56,7 +61,8 @@ MorphTargets::MorphTargets(std::vector<Target> targets, Index point_count)
 
 AnimationKeys::AnimationKeys(Data data) : data_(std::move(data)) {
   Hasher hasher;
-  for (const AnimationSampler* sampler : {&data_.translation, &data_.rotation, &data_.scale, &data_.weights}) {
+  for (const AnimationSampler* sampler :
+       {&data_.translation, &data_.rotation, &data_.scale, &data_.weights}) {
     AddSampler(hasher, *sampler);
   }
   hasher.AddBytes(&data_.rest_translation, sizeof(Double3));

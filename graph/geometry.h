@@ -1,5 +1,6 @@
 // The assets that characters bring: meshes, skin weights, morph targets, animation, curves, weight maps.
-// All are immutable after construction, in the runtime's point order (welded, spatially sorted), with a digest.
+// All are immutable after construction, in the runtime's point order (welded, spatially sorted), with a
+// digest.
 #pragma once
 
 #include <string>
@@ -10,9 +11,9 @@
 
 namespace kpsa {
 
-// A mesh node's geometry. `points` are welded: glTF vertices that are equal in rest position, influences and morph
-// deltas are one point. Points are ordered spatially; vertex_to_point maps the file's vertices (all primitives
-// concatenated in their order) to them.
+// A mesh node's geometry. `points` are welded: glTF vertices that are equal in rest position, influences and
+// morph deltas are one point. Points are ordered spatially; vertex_to_point maps the file's vertices (all
+// primitives concatenated in their order) to them.
 class Mesh final : public Asset {
  public:
   struct Primitive {
@@ -22,11 +23,11 @@ class Mesh final : public Asset {
     std::array<float, 3> base_color = {0.8f, 0.8f, 0.8f};
   };
   struct Data {
-    std::string name;                     // of the mesh node, as in plugs
-    PointBuffer rest;                     // [N] mesh space, metres
-    std::vector<Index> triangles;         // 3 a triangle, point indices; degenerate ones left out
-    std::vector<Index> vertex_to_point;   // [V]
-    std::vector<Index> triangle_vertices; // 3 a triangle, vertex indices, same triangles
+    std::string name;                      // of the mesh node, as in plugs
+    PointBuffer rest;                      // [N] mesh space, metres
+    std::vector<Index> triangles;          // 3 a triangle, point indices; degenerate ones left out
+    std::vector<Index> vertex_to_point;    // [V]
+    std::vector<Index> triangle_vertices;  // 3 a triangle, vertex indices, same triangles
     std::vector<Primitive> primitives;
   };
   explicit Mesh(Data data);
@@ -41,11 +42,12 @@ class Mesh final : public Asset {
   Digest digest_;
 };
 
-// Skin weights in compressed rows: point i is moved by joints[offsets[i]..offsets[i+1]) with those weights, in the
-// file's order. Joint indices count within the skin.
+// Skin weights in compressed rows: point i is moved by joints[offsets[i]..offsets[i+1]) with those weights,
+// in the file's order. Joint indices count within the skin.
 class Influences final : public Asset {
  public:
-  Influences(std::vector<Index> offsets, std::vector<Index> joints, std::vector<float> weights, Index joint_count);
+  Influences(std::vector<Index> offsets, std::vector<Index> joints, std::vector<float> weights,
+             Index joint_count);
   const char* kind() const override { return "influences"; }
   Digest digest() const override { return digest_; }
   const std::vector<Index>& offsets() const { return offsets_; }
@@ -65,8 +67,8 @@ class MorphTargets final : public Asset {
  public:
   struct Target {
     std::string name;
-    std::vector<Index> points;   // ascending
-    std::vector<float> deltas;   // xyz, 3 a point
+    std::vector<Index> points;  // ascending
+    std::vector<float> deltas;  // xyz, 3 a point
   };
   MorphTargets(std::vector<Target> targets, Index point_count);
   const char* kind() const override { return "morphTargets"; }
@@ -80,8 +82,8 @@ class MorphTargets final : public Asset {
   Digest digest_;
 };
 
-// The keys of one glTF animation sampler. values: components per key (x3 for cubic splines: in-tangent, value,
-// out-tangent; glTF 2.0, appendix C.5).
+// The keys of one glTF animation sampler. values: components per key (x3 for cubic splines: in-tangent,
+// value, out-tangent; glTF 2.0, appendix C.5).
 struct AnimationSampler {
   enum class Interpolation : std::uint8_t { kLinear, kStep, kCubicSpline };
   Interpolation interpolation = Interpolation::kLinear;
@@ -90,8 +92,8 @@ struct AnimationSampler {
   std::vector<double> values;
 };
 
-// One node's part of a clip: up to three samplers for a transform (the rest value where there is none), or one
-// for the weights of a mesh node.
+// One node's part of a clip: up to three samplers for a transform (the rest value where there is none), or
+// one for the weights of a mesh node.
 class AnimationKeys final : public Asset {
  public:
   struct Data {

@@ -17,8 +17,11 @@ auto KeyOf(const PlugRef& plug) { return std::make_tuple(plug.attribute, plug.el
 // Elements of a sorted list whose plugs lie between two keys, both included.
 template <typename List, typename Projection>
 auto Range(List& list, const PlugRef& first, const PlugRef& last, Projection plug_of) {
-  const auto begin = std::lower_bound(list.begin(), list.end(), KeyOf(first), [&](const auto& e, const auto& key) { return KeyOf(plug_of(e)) < key; });
-  const auto end = std::upper_bound(begin, list.end(), KeyOf(last), [&](const auto& key, const auto& e) { return key < KeyOf(plug_of(e)); });
+  const auto begin =
+      std::lower_bound(list.begin(), list.end(), KeyOf(first),
+                       [&](const auto& e, const auto& key) { return KeyOf(plug_of(e)) < key; });
+  const auto end = std::upper_bound(begin, list.end(), KeyOf(last),
+                                    [&](const auto& key, const auto& e) { return key < KeyOf(plug_of(e)); });
   return std::make_pair(begin, end);
 }
 
@@ -46,7 +49,8 @@ const Graph::Node& Graph::node(NodeId id) const {
 Graph::Node& Graph::node(NodeId id) { return const_cast<Node&>(std::as_const(*this).node(id)); }
 
 bool Graph::IsAlive(NodeId id) const {
-  return id.index < nodes_.size() && nodes_[id.index].def != nullptr && nodes_[id.index].version == id.version;
+  return id.index < nodes_.size() && nodes_[id.index].def != nullptr &&
+         nodes_[id.index].version == id.version;
 }
 const NodeDef& Graph::def(NodeId id) const { return *node(id).def; }
 const std::string& Graph::name(NodeId id) const { return node(id).name; }
@@ -54,7 +58,8 @@ const std::vector<Connection>& Graph::Inputs(NodeId id) const { return node(id).
 const std::vector<Connection>& Graph::Outputs(NodeId id) const { return node(id).outputs; }
 
 std::span<const Connection> Graph::Inputs(NodeId id, int attribute) const {
-  const auto [begin, end] = Range(node(id).inputs, At(attribute, -1, -1), At(attribute, kLast, kLast), kDestination);
+  const auto [begin, end] =
+      Range(node(id).inputs, At(attribute, -1, -1), At(attribute, kLast, kLast), kDestination);
   return {begin, end};
 }
 
@@ -79,7 +84,8 @@ Result<NodeId> Graph::AddNode(std::string_view type, std::string_view name) {
   std::string key(name);
   if (by_name_.count(key) != 0) return Status::Invalid("a node named \"{}\" exists already", name);
   if (const auto it = by_alias_.find(key); it != by_alias_.end()) {
-    return Status::Invalid("\"{}\" is another name of node \"{}\" already", name, nodes_[it->second.front()].name);
+    return Status::Invalid("\"{}\" is another name of node \"{}\" already", name,
+                           nodes_[it->second.front()].name);
   }
   const auto index = static_cast<Index>(nodes_.size());
   Node node;
@@ -101,7 +107,8 @@ Status Graph::RemoveNode(NodeId id) {
   }
   for (const Connection& c : removed.outputs) {
     auto& list = nodes_[c.destination.node.index].inputs;
-    if (!(c.destination.node == id)) list.erase(std::remove_if(list.begin(), list.end(), touches), list.end());
+    if (!(c.destination.node == id))
+      list.erase(std::remove_if(list.begin(), list.end(), touches), list.end());
   }
   by_name_.erase(removed.name);
   for (const std::string& alias : removed.aliases) {
@@ -130,7 +137,8 @@ std::string Graph::PlugName(const PlugRef& plug) const {
   std::string text = n.name + "." + n.def->attributes[static_cast<std::size_t>(plug.attribute)].name;
   if (plug.element >= 0) {
     const std::vector<std::string>* names = ElementNames(plug.node, plug.attribute);
-    if (names != nullptr && plug.element < static_cast<int>(names->size()) && !(*names)[static_cast<std::size_t>(plug.element)].empty()) {
+    if (names != nullptr && plug.element < static_cast<int>(names->size()) &&
+        !(*names)[static_cast<std::size_t>(plug.element)].empty()) {
       text += "[" + (*names)[static_cast<std::size_t>(plug.element)] + "]";
     } else {
       text += fmt::format("[{}]", plug.element);
@@ -154,7 +162,8 @@ Status Graph::CheckPlug(const PlugRef& plug) const {
     return Status::Invalid("{}.{} is no array", name(plug.node), a.name);
   }
   if (plug.element >= MaxElements(a)) {
-    return Status::Invalid("{}.{}[{}]: an index must be below {}", name(plug.node), a.name, plug.element, MaxElements(a));
+    return Status::Invalid("{}.{}[{}]: an index must be below {}", name(plug.node), a.name, plug.element,
+                           MaxElements(a));
   }
   if (plug.component >= 0) {
     KPSA_CHECK_LT(plug.component, 4);
@@ -162,7 +171,8 @@ Status Graph::CheckPlug(const PlugRef& plug) const {
     whole.component = -1;
     const Type type = PlugType(whole);
     const int components = type == Type::kDouble3 ? 3 : type == Type::kQuaternion ? 4 : 0;
-    if (plug.component >= components) return Status::Invalid("{} has no component .{}", PlugName(whole), "xyzw"[plug.component]);
+    if (plug.component >= components)
+      return Status::Invalid("{} has no component .{}", PlugName(whole), "xyzw"[plug.component]);
   }
   return Status();
 }
@@ -172,20 +182,25 @@ Status Graph::CheckNumbers(const PlugRef& plug, const Value& value) const {
   const AttributeDef& a = def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
   std::span<const double> numbers;
   double number = 0;
-  if (value.get_if<double>() != nullptr || value.get_if<std::int64_t>() != nullptr) number = value.AsDouble(), numbers = {&number, 1};
+  if (value.get_if<double>() != nullptr || value.get_if<std::int64_t>() != nullptr)
+    number = value.AsDouble(), numbers = {&number, 1};
   if (const auto* v = value.get_if<Double3>()) numbers = {&v->x, 3};
   if (const auto* v = value.get_if<Quaternion>()) numbers = {&v->x, 4};
   if (const auto* v = value.get_if<Matrix4>()) numbers = v->m;
   if (const auto* v = value.get_if<std::vector<double>>()) numbers = *v;
   for (double v : numbers) {
-    if (!std::isfinite(v)) return Status::Invalid("{} takes finite numbers, not {}", PlugName(plug), value.ToString());
-    if (v < a.min || v > a.max) return Status::Invalid("{} = {} is outside of {} to {}", PlugName(plug), value.ToString(), a.min, a.max);
+    if (!std::isfinite(v))
+      return Status::Invalid("{} takes finite numbers, not {}", PlugName(plug), value.ToString());
+    if (v < a.min || v > a.max)
+      return Status::Invalid("{} = {} is outside of {} to {}", PlugName(plug), value.ToString(), a.min,
+                             a.max);
   }
   if (const PointBuffer* points = value.points()) {
     const ConstPointsView view = points->view();
     for (const float* component : {view.x, view.y, view.z}) {
       for (std::size_t i = 0; component != nullptr && i < view.count; ++i) {
-        if (!std::isfinite(component[i])) return Status::Invalid("{}: point {} is not finite", PlugName(plug), i);
+        if (!std::isfinite(component[i]))
+          return Status::Invalid("{}: point {} is not finite", PlugName(plug), i);
       }
     }
   }
@@ -206,7 +221,8 @@ Status Graph::Set(const PlugRef& plug, Value value) {
       }
       value = Value(static_cast<std::int64_t>(it - a.enum_names.begin()));
     } else if (value.AsInt() < 0 || value.AsInt() >= static_cast<std::int64_t>(a.enum_names.size())) {
-      return Status::Invalid("{} has no choice {}; expected one of {}", PlugName(plug), value.ToString(), fmt::join(a.enum_names, ", "));
+      return Status::Invalid("{} has no choice {}; expected one of {}", PlugName(plug), value.ToString(),
+                             fmt::join(a.enum_names, ", "));
     }
   }
   if (!value.FitsType(type)) {
@@ -245,7 +261,8 @@ Status Graph::Pose(const PlugRef& plug, Value value) {
 
 bool Graph::IsPosed(NodeId id, int attribute) const {
   const auto& unposed = node(id).unposed;
-  return std::any_of(unposed.begin(), unposed.end(), [&](const auto& entry) { return entry.first == attribute; });
+  return std::any_of(unposed.begin(), unposed.end(),
+                     [&](const auto& entry) { return entry.first == attribute; });
 }
 
 std::span<const SetValue> Graph::RestValues(NodeId id, int attribute) const {
@@ -274,7 +291,8 @@ int Graph::ArraySize(NodeId id, int attribute) const {
   int size = 0;
   const Node& n = node(id);
   const PlugRef first = At(attribute, -1, -1), last = At(attribute, kLast, kLast);
-  if (const auto [begin, end] = Range(n.values, first, last, kPlug); begin != end) size = std::prev(end)->plug.element + 1;
+  if (const auto [begin, end] = Range(n.values, first, last, kPlug); begin != end)
+    size = std::prev(end)->plug.element + 1;
   if (const auto [begin, end] = Range(n.inputs, first, last, kDestination); begin != end) {
     size = std::max(size, std::prev(end)->destination.element + 1);
   }
@@ -319,10 +337,13 @@ Status Graph::Connect(const PlugRef& source, const PlugRef& destination, bool re
   }
   const Type a = PlugType(source), b = PlugType(destination);
   const bool integral = a == Type::kBool || a == Type::kInt || a == Type::kEnum;
-  const bool fits = a == b || (integral && (b == Type::kDouble || b == Type::kBool || b == Type::kInt || b == Type::kEnum)) ||
-                    (a == Type::kDouble && (b == Type::kBool || b == Type::kInt || b == Type::kEnum));
+  const bool fits =
+      a == b ||
+      (integral && (b == Type::kDouble || b == Type::kBool || b == Type::kInt || b == Type::kEnum)) ||
+      (a == Type::kDouble && (b == Type::kBool || b == Type::kInt || b == Type::kEnum));
   if (!fits) {
-    return Status::Invalid("{} is a {} and cannot drive {}, a {}", PlugName(source), TypeName(a), PlugName(destination), TypeName(b));
+    return Status::Invalid("{} is a {} and cannot drive {}, a {}", PlugName(source), TypeName(a),
+                           PlugName(destination), TypeName(b));
   }
   KPSA_RETURN_IF_ERROR(CheckOverlap(destination, replace));
   Connection replaced;
@@ -342,7 +363,8 @@ Status Graph::Connect(const PlugRef& source, const PlugRef& destination, bool re
 void Graph::AddConnection(const Connection& connection) {
   node(connection.source.node).outputs.push_back(connection);
   auto& inputs = node(connection.destination.node).inputs;
-  inputs.insert(Range(inputs, connection.destination, connection.destination, kDestination).first, connection);
+  inputs.insert(Range(inputs, connection.destination, connection.destination, kDestination).first,
+                connection);
 }
 
 // Whether a connection to the plug, to a part of it or to what it is a part of is in the way.
@@ -355,7 +377,8 @@ Status Graph::CheckOverlap(const PlugRef& destination, bool replace) const {
   for (auto it = begin; it != end; ++it) {
     if (!replace || !(it->destination == destination)) return refuse(*it);
   }
-  for (PlugRef whole : {At(destination.attribute, destination.element, -1), At(destination.attribute, -1, -1)}) {
+  for (PlugRef whole :
+       {At(destination.attribute, destination.element, -1), At(destination.attribute, -1, -1)}) {
     whole.node = destination.node;
     const Connection* c = whole == destination ? nullptr : FindConnection(whole);
     if (c != nullptr) return refuse(*c);
@@ -369,15 +392,18 @@ Status Graph::Disconnect(const PlugRef& destination) {
   const auto [begin, end] = Range(inputs, destination, destination, kDestination);
   if (begin == end) return Status::Invalid("{} has no connection", PlugName(destination));
   auto& outputs = node(begin->source.node).outputs;
-  outputs.erase(std::find_if(outputs.begin(), outputs.end(), [&](const Connection& c) { return c.destination == destination; }));
+  outputs.erase(std::find_if(outputs.begin(), outputs.end(),
+                             [&](const Connection& c) { return c.destination == destination; }));
   inputs.erase(begin, end);
   return Status();
 }
 
 Status Graph::CheckCycle(const PlugRef& source, const PlugRef& destination) const {
-  if (source.node != destination.node && (node(destination.node).outputs.empty() || node(source.node).inputs.empty())) return Status();
-  // Walk forward from the destination through the groups that read it, looking for the source. A state is a plug; its
-  // element is -1 where a group does not work element by element.
+  if (source.node != destination.node &&
+      (node(destination.node).outputs.empty() || node(source.node).inputs.empty()))
+    return Status();
+  // Walk forward from the destination through the groups that read it, looking for the source. A state is a
+  // plug; its element is -1 where a group does not work element by element.
   struct State {
     PlugRef plug;
     std::size_t parent;
@@ -385,7 +411,8 @@ Status Graph::CheckCycle(const PlugRef& source, const PlugRef& destination) cons
   struct Hash {
     std::size_t operator()(const PlugRef& p) const {
       std::uint64_t h = p.node.index;
-      for (int v : {p.attribute, p.element, p.component}) h = (h ^ static_cast<std::uint32_t>(v)) * 0x9e3779b97f4a7c15ull;
+      for (int v : {p.attribute, p.element, p.component})
+        h = (h ^ static_cast<std::uint32_t>(v)) * 0x9e3779b97f4a7c15ull;
       return static_cast<std::size_t>(h ^ (h >> 29));
     }
   };
@@ -418,9 +445,11 @@ Status Graph::CheckCycle(const PlugRef& source, const PlugRef& destination) cons
     const AttributeDef& a = n.def->attributes[static_cast<std::size_t>(plug.attribute)];
     if (a.output) continue;
     for (const ComputeGroup& group : n.def->groups) {
-      const bool reads = a.structural || std::find(group.inputs.begin(), group.inputs.end(), plug.attribute) != group.inputs.end();
+      const bool reads = a.structural || std::find(group.inputs.begin(), group.inputs.end(),
+                                                   plug.attribute) != group.inputs.end();
       if (!reads) continue;
-      for (int output : group.outputs) visit({plug.node, output, group.per_geometry && a.per_geometry ? plug.element : -1, -1}, at);
+      for (int output : group.outputs)
+        visit({plug.node, output, group.per_geometry && a.per_geometry ? plug.element : -1, -1}, at);
     }
   }
   return Status();

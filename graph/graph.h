@@ -1,5 +1,5 @@
-// The editable graph: nodes, plugs, connections and set values. It holds no computed values; a Compiler turns it and
-// a request into a Plan. Every edit is checked. Not thread-safe.
+// The editable graph: nodes, plugs, connections and set values. It holds no computed values; a Compiler turns
+// it and a request into a Plan. Every edit is checked. Not thread-safe.
 #pragma once
 
 #include <span>
@@ -46,21 +46,22 @@ class Graph {
 
   Result<NodeId> AddNode(std::string_view type, std::string_view name);
   Status RemoveNode(NodeId node);  // with its connections and values
-  // Unit of numbers: the runtime's (metres, radians, seconds). The type and the range are checked, and that numbers are
-  // finite. The latest wins: setting a whole plug forgets what was set on its children (or its single points).
+  // Unit of numbers: the runtime's (metres, radians, seconds). The type and the range are checked, and that
+  // numbers are finite. The latest wins: setting a whole plug forgets what was set on its children (or its
+  // single points).
   Status Set(const PlugRef& plug, Value value);
   Status Unset(const PlugRef& plug);
-  // The same for a pose: everything sees the value but rest states (node_def.h, Structural::rest), which keep what was
-  // set on the attribute before its first pose. Structural attributes have no pose: they are set.
+  // The same for a pose: everything sees the value but rest states (node_def.h, Structural::rest), which keep
+  // what was set on the attribute before its first pose. Structural attributes have no pose: they are set.
   Status Pose(const PlugRef& plug, Value value);
-  // Types must agree (numbers convert); cycles are refused with their whole path. A destination takes one connection;
-  // `replace` takes over an existing one. A refused edit changes nothing.
+  // Types must agree (numbers convert); cycles are refused with their whole path. A destination takes one
+  // connection; `replace` takes over an existing one. A refused edit changes nothing.
   Status Connect(const PlugRef& source, const PlugRef& destination, bool replace = false);
   Status Disconnect(const PlugRef& destination);
   // Names for the elements of an array (morph targets): plugs may then be written attr[name].
   void SetElementNames(NodeId node, int attribute, std::vector<std::string> names);
-  // Another name for a node (a path, `Head#49`), found by FindNode. A node's own name goes before the alias of another.
-  // An alias that several nodes claim becomes ambiguous: FindNode then names them all.
+  // Another name for a node (a path, `Head#49`), found by FindNode. A node's own name goes before the alias
+  // of another. An alias that several nodes claim becomes ambiguous: FindNode then names them all.
   void AddAlias(NodeId node, std::string alias);
   // Attributes that `node` lacks are looked for on `delegate` itself (head_mesh.weight is its blendShape's).
   void AddDelegate(NodeId node, NodeId delegate);
@@ -80,7 +81,7 @@ class Graph {
   const std::string& name(NodeId node) const;
   std::vector<NodeId> Nodes() const;  // in the order of creation
   Index node_capacity() const { return static_cast<Index>(nodes_.size()); }
-  NodeId IdAt(Index index) const;     // version 0 and kNoIndex for a removed node
+  NodeId IdAt(Index index) const;  // version 0 and kNoIndex for a removed node
 
   const Value* FindValue(const PlugRef& plug) const;  // null where unset
   // What is set on an attribute, its elements and their components, in that order.
@@ -91,7 +92,7 @@ class Graph {
   // Connections into the node, by attribute, element and component of the destination.
   const std::vector<Connection>& Inputs(NodeId node) const;
   std::span<const Connection> Inputs(NodeId node, int attribute) const;
-  const std::vector<Connection>& Outputs(NodeId node) const;   // connections out of it
+  const std::vector<Connection>& Outputs(NodeId node) const;  // connections out of it
   int ArraySize(NodeId node, int attribute) const;  // elements set or connected: the highest plus one
   const std::vector<std::string>* ElementNames(NodeId node, int attribute) const;
 
@@ -100,7 +101,7 @@ class Graph {
     const NodeDef* def = nullptr;  // null: removed
     std::string name;
     std::uint32_t version = 0;
-    std::vector<SetValue> values;            // sorted by plug, as are the inputs
+    std::vector<SetValue> values;                                // sorted by plug, as are the inputs
     std::vector<std::pair<int, std::vector<SetValue>>> unposed;  // what was set on posed attributes
     std::vector<Connection> inputs, outputs;
     std::vector<std::pair<int, std::vector<std::string>>> element_names;

@@ -28,22 +28,28 @@ double* ComponentOf(Value& value, int component) {
 // The part of a list, sorted by plug, that belongs to one element.
 template <typename T, typename F>
 std::span<const T> OfElement(std::span<const T> list, int element, F plug_of) {
-  const auto begin = std::partition_point(list.begin(), list.end(), [&](const T& e) { return plug_of(e).element < element; });
-  const auto end = std::partition_point(begin, list.end(), [&](const T& e) { return plug_of(e).element == element; });
+  const auto begin = std::partition_point(list.begin(), list.end(),
+                                          [&](const T& e) { return plug_of(e).element < element; });
+  const auto end =
+      std::partition_point(begin, list.end(), [&](const T& e) { return plug_of(e).element == element; });
   return {begin, end};
 }
 const PlugRef& PlugOf(const SetValue& value) { return value.plug; }
 const PlugRef& DestinationOf(const Connection& connection) { return connection.destination; }
 
-float* PointComponent(PointsView view, int component) { return component == 0 ? view.x : component == 1 ? view.y : view.z; }
+float* PointComponent(PointsView view, int component) {
+  return component == 0 ? view.x : component == 1 ? view.y : view.z;
+}
 
 }  // namespace
 
 const AttributeDef& InstanceTable::input_def(const Instance& i, int position) const {
-  return graph_.def(i.node).attributes[static_cast<std::size_t>(group(i).inputs[static_cast<std::size_t>(position)])];
+  return graph_.def(i.node)
+      .attributes[static_cast<std::size_t>(group(i).inputs[static_cast<std::size_t>(position)])];
 }
 const AttributeDef& InstanceTable::output_def(const Instance& i, int position) const {
-  return graph_.def(i.node).attributes[static_cast<std::size_t>(group(i).outputs[static_cast<std::size_t>(position)])];
+  return graph_.def(i.node)
+      .attributes[static_cast<std::size_t>(group(i).outputs[static_cast<std::size_t>(position)])];
 }
 Type InstanceTable::OutputType(const Instance& i, int position) const {
   return i.kind == Instance::Kind::kNode ? output_def(i, position).type : i.type;
@@ -82,7 +88,8 @@ const Connection* InstanceTable::FindUsed(const PlugRef& destination, bool rest)
 const Value* InstanceTable::HeldValue(NodeId node, int attribute, int element, bool rest) {
   const AttributeDef& a = graph_.def(node).attributes[static_cast<std::size_t>(attribute)];
   rest = rest && graph_.IsPosed(node, attribute);
-  const std::span<const SetValue> values = rest ? graph_.RestValues(node, attribute) : graph_.Values(node, attribute);
+  const std::span<const SetValue> values =
+      rest ? graph_.RestValues(node, attribute) : graph_.Values(node, attribute);
   const Value* value = nullptr;
   if (!rest) {
     value = graph_.FindValue({node, attribute, element, -1});
@@ -137,13 +144,16 @@ Value InstanceTable::WithSetPoints(const Value& whole, std::span<const SetValue>
     if (plug.element < 0) continue;
     if (edited == nullptr) edited = std::make_shared<PointBuffer>(*whole.points());
     if (static_cast<std::size_t>(plug.element) >= edited->count()) {
-      if (status_.ok()) status_ = Status::Invalid("{} is set, but there are {} points", graph_.PlugName(plug), edited->count());
+      if (status_.ok())
+        status_ =
+            Status::Invalid("{} is set, but there are {} points", graph_.PlugName(plug), edited->count());
       break;
     }
     for (int c = 0; c < edited->components(); ++c) {
       if (plug.component >= 0 && c != plug.component) continue;
       const auto* vector = value.get_if<Double3>();
-      PointComponent(edited->view(), c)[plug.element] = static_cast<float>(vector != nullptr ? (*vector)[c] : value.AsDouble());
+      PointComponent(edited->view(), c)[plug.element] =
+          static_cast<float>(vector != nullptr ? (*vector)[c] : value.AsDouble());
     }
   }
   return edited == nullptr ? whole : Value(PointBufferPtr(edited));
@@ -175,7 +185,8 @@ Source InstanceTable::ConvertTo(Source source, Type type, const PlugRef& plug, b
     source.type = type;
     return source;
   }
-  const Key key{plug.node.index, plug.attribute, plug.element * 8 + plug.component, (rest ? kConvertRestKey : kConvertKey) - static_cast<int>(type)};
+  const Key key{plug.node.index, plug.attribute, plug.element * 8 + plug.component,
+                (rest ? kConvertRestKey : kConvertKey) - static_cast<int>(type)};
   const auto [it, added] = by_key_.emplace(key, static_cast<Index>(instances_.size()));
   if (added) {
     Instance convert;
@@ -195,7 +206,8 @@ Source InstanceTable::ConvertTo(Source source, Type type, const PlugRef& plug, b
 }
 
 Index InstanceTable::InstanceOf(NodeId node, int group, int geometry) {
-  const auto [it, added] = by_key_.emplace(Key{node.index, group, geometry, 0}, static_cast<Index>(instances_.size()));
+  const auto [it, added] =
+      by_key_.emplace(Key{node.index, group, geometry, 0}, static_cast<Index>(instances_.size()));
   if (added) {
     Instance instance;
     instance.node = node;
@@ -215,14 +227,16 @@ Source InstanceTable::ResolveOutput(const PlugRef& plug) {
   Source source;
   source.kind = Source::Kind::kInstance;
   source.instance = InstanceOf(plug.node, group, g.per_geometry ? plug.element : -1);
-  source.output = static_cast<int>(std::find(g.outputs.begin(), g.outputs.end(), plug.attribute) - g.outputs.begin());
+  source.output =
+      static_cast<int>(std::find(g.outputs.begin(), g.outputs.end(), plug.attribute) - g.outputs.begin());
   source.element = g.per_geometry ? 0 : std::max(plug.element, 0);
   source.type = d.attributes[static_cast<std::size_t>(plug.attribute)].type;
   return Take(source, plug.component);
 }
 
 Source InstanceTable::Resolve(PlugRef plug, bool rest) {
-  // Down to an output or to a held value; then up again, converting and taking components as the inputs on the way ask
+  // Down to an output or to a held value; then up again, converting and taking components as the inputs on
+  // the way ask
   struct Hop {
     PlugRef source;
     Type type;
@@ -277,7 +291,8 @@ Source InstanceTable::ResolveHeld(const PlugRef& plug, bool rest) {
 }
 
 // Recursion ends: points are made of vectors, vectors of numbers.
-Source InstanceTable::Assemble(const PlugRef& plug, const Source& whole, const std::vector<const Connection*>& children, bool rest) {
+Source InstanceTable::Assemble(const PlugRef& plug, const Source& whole,
+                               const std::vector<const Connection*>& children, bool rest) {
   const bool points = IsPointType(whole.type);
   Source source;
   source.kind = Source::Kind::kInstance;
@@ -338,15 +353,17 @@ void InstanceTable::Expand(Index number) {
   for (const Connection& c : graph_.Inputs(node)) {
     const AttributeDef& a = d.attributes[static_cast<std::size_t>(c.destination.attribute)];
     if (!a.structural) continue;
-    structural.push_back({c.destination.attribute, c.destination.element,
-                          ConvertTo(Resolve(c.source, false), graph_.PlugType(c.destination), c.source, false)});
+    structural.push_back(
+        {c.destination.attribute, c.destination.element,
+         ConvertTo(Resolve(c.source, false), graph_.PlugType(c.destination), c.source, false)});
   }
   std::vector<int> output_sizes;
   for (int attribute : g.outputs) {
     const AttributeDef& a = d.attributes[static_cast<std::size_t>(attribute)];
     int count = 1;
     if (a.array && !g.per_geometry) {
-      if (const auto* names = graph_.ElementNames(node, attribute)) count = std::max(count, static_cast<int>(names->size()));
+      if (const auto* names = graph_.ElementNames(node, attribute))
+        count = std::max(count, static_cast<int>(names->size()));
       for (const Connection& c : graph_.Outputs(node)) {
         if (c.source.attribute == attribute) count = std::max(count, c.source.element + 1);
       }

@@ -1,5 +1,5 @@
-// The compiler's first pass: which groups of which nodes a request reaches, in topological order, with the source of
-// every input resolved. Internal to graph/.
+// The compiler's first pass: which groups of which nodes a request reaches, in topological order, with the
+// source of every input resolved. Internal to graph/.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,12 @@ namespace kpsa {
 struct Source {
   enum class Kind : std::uint8_t { kValue, kVarying, kInstance };
   Kind kind = Kind::kValue;
-  std::int8_t component = -1;      // of the slot, for a child plug of a double3 or quaternion
-  const Value* value = nullptr;    // kValue; also the rest value of kVarying. Never null then.
-  Index varying = kNoIndex;        // kVarying: index into Request::varying's whole plugs
-  Index instance = kNoIndex;       // kInstance
-  int output = 0, element = 0;     // kInstance: position in the group's outputs, element of an array output
-  Type type = Type::kDouble;       // of the source slot, after taking the component
+  std::int8_t component = -1;    // of the slot, for a child plug of a double3 or quaternion
+  const Value* value = nullptr;  // kValue; also the rest value of kVarying. Never null then.
+  Index varying = kNoIndex;      // kVarying: index into Request::varying's whole plugs
+  Index instance = kNoIndex;     // kInstance
+  int output = 0, element = 0;   // kInstance: position in the group's outputs, element of an array output
+  Type type = Type::kDouble;     // of the source slot, after taking the component
 };
 
 // An element of an input attribute, with its sources now and in the rest state.
@@ -50,13 +50,13 @@ struct Instance {
   int group = 0;
   int geometry = -1;
   NodeId node;
-  int attribute = -1;              // kAssemble: which input it serves
-  Type type = Type::kDouble;       // kAssemble, kConvert: of the output
+  int attribute = -1;         // kAssemble: which input it serves
+  Type type = Type::kDouble;  // kAssemble, kConvert: of the output
   std::vector<Input> inputs;
   std::vector<StructuralInput> structural;  // only those that are driven
-  std::vector<int> children;       // kAssemble: for input 1 + i, element * 4 + component (component 3: all three)
-  std::vector<int> array_sizes;    // by position in the group's inputs; 1 where it is no array
-  std::vector<int> output_sizes;   // by position in the group's outputs
+  std::vector<int> children;  // kAssemble: for input 1 + i, element * 4 + component (component 3: all three)
+  std::vector<int> array_sizes;   // by position in the group's inputs; 1 where it is no array
+  std::vector<int> output_sizes;  // by position in the group's outputs
 };
 
 class InstanceTable {
@@ -71,7 +71,9 @@ class InstanceTable {
   std::vector<Instance>& instances() { return instances_; }
   const std::vector<Instance>& instances() const { return instances_; }
   const std::vector<PlugRef>& varying() const { return varying_; }  // whole plugs (components merged)
-  const ComputeGroup& group(const Instance& i) const { return graph_.def(i.node).groups[static_cast<std::size_t>(i.group)]; }
+  const ComputeGroup& group(const Instance& i) const {
+    return graph_.def(i.node).groups[static_cast<std::size_t>(i.group)];
+  }
   const AttributeDef& input_def(const Instance& i, int position) const;
   const AttributeDef& output_def(const Instance& i, int position) const;
   Type OutputType(const Instance& i, int position) const;
@@ -97,12 +99,13 @@ class InstanceTable {
       return static_cast<std::size_t>(h ^ (h >> 29));
     }
   };
-  // Resolve a plug without descending; new instances are put on the stack. An input takes over from what drives it,
-  // through any number of inputs that drive each other.
+  // Resolve a plug without descending; new instances are put on the stack. An input takes over from what
+  // drives it, through any number of inputs that drive each other.
   Source Resolve(PlugRef plug, bool rest);
   Source ResolveOutput(const PlugRef& plug);
   Source ResolveHeld(const PlugRef& plug, bool rest);  // of an input that no connection drives as a whole
-  Source Assemble(const PlugRef& plug, const Source& whole, const std::vector<const Connection*>& children, bool rest);
+  Source Assemble(const PlugRef& plug, const Source& whole, const std::vector<const Connection*>& children,
+                  bool rest);
   Index InstanceOf(NodeId node, int group, int geometry);
   void Expand(Index instance);
   Source Take(Source source, int component);  // the child of a source

@@ -26,7 +26,8 @@ int OutputPosition(const InstanceTable& table, const Instance& instance, std::st
   return -1;
 }
 
-const PointSet& OutputSet(const InstanceTable& table, const Instance& instance, const InstanceSets& sets, std::string_view name, int element) {
+const PointSet& OutputSet(const InstanceTable& table, const Instance& instance, const InstanceSets& sets,
+                          std::string_view name, int element) {
   static const PointSet kNone;
   const auto& elements = sets.outputs[static_cast<std::size_t>(OutputPosition(table, instance, name))];
   const auto e = static_cast<std::size_t>(table.group(instance).per_geometry ? 0 : element);
@@ -52,7 +53,8 @@ class DemandOf final : public Demand {
     if (set.total() == points.total()) {
       set = set.Union(points);
     } else {
-      mismatch = fmt::format("{} asks for points of an array of {}, its input has {}", name, points.total(), set.total());
+      mismatch = fmt::format("{} asks for points of an array of {}, its input has {}", name, points.total(),
+                             set.total());
     }
   }
   void Skip(std::string_view name, int element) override {
@@ -74,7 +76,8 @@ class DemandOf final : public Demand {
 
 class BindingOf final : public Binding {
  public:
-  BindingOf(InstanceTable& table, const Instance& instance, const Structural& structural, const InstanceSets& sets)
+  BindingOf(InstanceTable& table, const Instance& instance, const Structural& structural,
+            const InstanceSets& sets)
       : table_(table), instance_(instance), structural_(structural), sets_(sets) {}
   const Structural& structural() const override { return structural_; }
   const PointSet& output(std::string_view name, int element) const override {
@@ -96,7 +99,8 @@ class BindingOf final : public Binding {
 }  // namespace
 
 std::string Describe(const InstanceTable& table, const Instance& instance) {
-  return fmt::format("node \"{}\" ({})", table.graph().name(instance.node), table.graph().def(instance.node).name);
+  return fmt::format("node \"{}\" ({})", table.graph().name(instance.node),
+                     table.graph().def(instance.node).name);
 }
 
 Status CheckChildren(const InstanceTable& table, const Instance& instance, std::size_t count) {
@@ -139,8 +143,10 @@ Result<Index> PointTotals::OfOutput(Index number, int position, int element) {
       const ComputeGroup& group = table_.group(instance);
       if (group.point_count) {
         const StructuralView view(table_, instance.node, instance.geometry, &instance, &statics_);
-        Result<Index> count = group.point_count(view, table_.output_def(instance, key.position).name, key.element);
-        if (!count.ok()) return Status::Invalid("{}: {}", Describe(table_, instance), count.status().ToString());
+        Result<Index> count =
+            group.point_count(view, table_.output_def(instance, key.position).name, key.element);
+        if (!count.ok())
+          return Status::Invalid("{}: {}", Describe(table_, instance), count.status().ToString());
         total = *count;
         break;
       }
@@ -153,13 +159,16 @@ Result<Index> PointTotals::OfOutput(Index number, int position, int element) {
       }
     }
     if (next == nullptr || next->kind != Source::Kind::kInstance) {
-      total = next == nullptr || next->value->points() == nullptr ? 0 : static_cast<Index>(next->value->points()->count());
+      total = next == nullptr || next->value->points() == nullptr
+                  ? 0
+                  : static_cast<Index>(next->value->points()->count());
       break;
     }
     key = {next->instance, next->output, next->element};
   }
   for (const Key& key : chain) {
-    memo_[key.instance][static_cast<std::size_t>(key.position)][static_cast<std::size_t>(key.element)] = total;
+    memo_[key.instance][static_cast<std::size_t>(key.position)][static_cast<std::size_t>(key.element)] =
+        total;
   }
   return total;
 }
@@ -182,7 +191,8 @@ Result<InstanceSets> FullOutputs(InstanceTable& table, PointTotals& totals, Inde
   return sets;
 }
 
-Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& statics, Index number, InstanceSets* sets) {
+Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& statics, Index number,
+                  InstanceSets* sets) {
   const Instance& instance = table.instances()[number];
   sets->inputs.clear();
   sets->skipped.clear();
@@ -206,7 +216,8 @@ Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& stati
     const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);
     DemandOf demand(table, instance, view, sets);
     group.demand(demand);
-    if (!demand.mismatch.empty()) return Status::Invalid("{}: {}", Describe(table, instance), demand.mismatch);
+    if (!demand.mismatch.empty())
+      return Status::Invalid("{}: {}", Describe(table, instance), demand.mismatch);
     return Status();
   }
   // The default: the same points of every points input
@@ -224,14 +235,16 @@ Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& stati
     }
     if (sets->inputs[i].total() != wanted->total()) {
       return Status::Invalid("{}: {} has {} points, its output {}", Describe(table, instance),
-                             table.input_def(instance, instance.inputs[i].position).name, sets->inputs[i].total(), wanted->total());
+                             table.input_def(instance, instance.inputs[i].position).name,
+                             sets->inputs[i].total(), wanted->total());
     }
     sets->inputs[i] = *wanted;
   }
   return Status();
 }
 
-Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index number, const InstanceSets& sets) {
+Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index number,
+                         const InstanceSets& sets) {
   const Instance& instance = table.instances()[number];
   if (instance.kind != Instance::Kind::kNode || !table.group(instance).bind) return BoundKernel();
   const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);

@@ -1,5 +1,5 @@
-// Point demand and kernel binding of one instance: which points of its inputs an output set needs, and the kernel
-// for exactly those sets. Internal to graph/.
+// Point demand and kernel binding of one instance: which points of its inputs an output set needs, and the
+// kernel for exactly those sets. Internal to graph/.
 #pragma once
 
 #include <vector>
@@ -25,16 +25,19 @@ class PointTotals {
  private:
   InstanceTable& table_;
   StaticValues& statics_;
-  std::vector<std::vector<std::vector<Index>>> memo_;  // by instance, position, element; kNoIndex: not known yet
+  std::vector<std::vector<std::vector<Index>>>
+      memo_;  // by instance, position, element; kNoIndex: not known yet
 };
 
 // All points of every points output.
 Result<InstanceSets> FullOutputs(InstanceTable& table, PointTotals& totals, Index instance);
 // Fills sets.inputs from sets.outputs.
-Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& statics, Index instance, InstanceSets* sets);
+Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& statics, Index instance,
+                  InstanceSets* sets);
 // Of an assembly of points: an error if a child is driven that the array of `count` points does not have.
 Status CheckChildren(const InstanceTable& table, const Instance& instance, std::size_t count);
-Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index instance, const InstanceSets& sets);
+Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index instance,
+                         const InstanceSets& sets);
 // "node "mush" (deltaMush)"
 std::string Describe(const InstanceTable& table, const Instance& instance);
 

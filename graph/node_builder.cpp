@@ -33,7 +33,8 @@ NodeBuilder& NodeBuilder::in(std::string name, Value default_value, AttributeOpt
   a.name = std::move(name);
   a.type = TypeOfDefault(default_value);
   a.default_value = std::move(default_value);
-  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc), a.diagnostic = options.diagnostic;
+  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc),
+  a.diagnostic = options.diagnostic;
   return add(std::move(a));
 }
 
@@ -48,12 +49,13 @@ NodeBuilder& NodeBuilder::structural(std::string name, Type type, AttributeOptio
   a.name = std::move(name);
   a.type = type;
   a.structural = true;
-  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc), a.diagnostic = options.diagnostic;
+  a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc),
+  a.diagnostic = options.diagnostic;
   return add(std::move(a));
 }
 
-NodeBuilder& NodeBuilder::enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc,
-                                     int default_choice) {
+NodeBuilder& NodeBuilder::enumeration(std::string name, std::vector<std::string> names, bool structural,
+                                      std::string doc, int default_choice) {
   AttributeDef a;
   a.name = std::move(name);
   a.type = Type::kEnum;
@@ -83,15 +85,27 @@ NodeBuilder& NodeBuilder::out(std::string name, Type type, std::string doc) {
   return add(std::move(a));
 }
 
-NodeBuilder& NodeBuilder::array() { attribute().array = true; return *this; }
-NodeBuilder& NodeBuilder::per_geometry() { attribute().array = attribute().per_geometry = true; return *this; }
+NodeBuilder& NodeBuilder::array() {
+  attribute().array = true;
+  return *this;
+}
+NodeBuilder& NodeBuilder::per_geometry() {
+  attribute().array = attribute().per_geometry = true;
+  return *this;
+}
 NodeBuilder& NodeBuilder::lazy(bool together) {
   attribute().lazy = true;
   attribute().lazy_together = together;
   return *this;
 }
-NodeBuilder& NodeBuilder::alias(std::string other_name) { attribute().aliases.push_back(std::move(other_name)); return *this; }
-NodeBuilder& NodeBuilder::grid(std::string divisions_attribute) { attribute().grid = std::move(divisions_attribute); return *this; }
+NodeBuilder& NodeBuilder::alias(std::string other_name) {
+  attribute().aliases.push_back(std::move(other_name));
+  return *this;
+}
+NodeBuilder& NodeBuilder::grid(std::string divisions_attribute) {
+  attribute().grid = std::move(divisions_attribute);
+  return *this;
+}
 NodeBuilder& NodeBuilder::default_from(std::function<Value(const Structural&)> f) {
   attribute().default_from = std::move(f);
   return *this;
@@ -111,7 +125,8 @@ NodeBuilder& NodeBuilder::group_compute(ComputeFn compute) {
   return *this;
 }
 
-NodeBuilder& NodeBuilder::group_for(std::vector<std::string> outputs, std::vector<std::string> inputs, ComputeFn compute) {
+NodeBuilder& NodeBuilder::group_for(std::vector<std::string> outputs, std::vector<std::string> inputs,
+                                    ComputeFn compute) {
   ComputeGroup g;
   g.compute = compute;
   for (const std::string& name : outputs) {
@@ -168,7 +183,8 @@ NodeBuilder& NodeBuilder::passes(std::string_view input, const std::vector<std::
   KPSA_CHECK_EQ(group().outputs.size(), std::size_t{1});
   group().passed_input = input_position(input);
   const auto type_of = [&](int number) { return def_->attributes[static_cast<std::size_t>(number)].type; };
-  KPSA_CHECK(type_of(group().inputs[static_cast<std::size_t>(group().passed_input)]) == type_of(group().outputs[0]));
+  KPSA_CHECK(type_of(group().inputs[static_cast<std::size_t>(group().passed_input)]) ==
+             type_of(group().outputs[0]));
   for (const std::string& name : held) group().held_inputs.push_back(input_position(name));
   return *this;
 }

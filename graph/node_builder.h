@@ -5,8 +5,9 @@
 //       .out("outValue", Type::kDouble)
 //       .compute([](double value, double lo, double hi) { return (value - lo) / (hi - lo); });
 //
-// compute() of a captureless function takes its inputs in the order of declaration (structural ones left out) and
-// returns the one output: bool, std::int64_t (int, enum), double, Double3, Quaternion, const Matrix4&, ArrayView<T>.
+// compute() of a captureless function takes its inputs in the order of declaration (structural ones left out)
+// and returns the one output: bool, std::int64_t (int, enum), double, Double3, Quaternion, const Matrix4&,
+// ArrayView<T>.
 #pragma once
 
 #include <limits>
@@ -31,17 +32,32 @@ class NodeBuilder {
  public:
   explicit NodeBuilder(NodeDef* def) : def_(def) {}
 
-  NodeBuilder& category(std::string name) { def_->category = std::move(name); return *this; }
-  NodeBuilder& version(int number) { def_->version = number; return *this; }
-  NodeBuilder& animation() { def_->animation = true; return *this; }
-  NodeBuilder& stateful() { def_->stateful = true; return *this; }
-  NodeBuilder& passes_points() { def_->passes_points = true; return *this; }
+  NodeBuilder& category(std::string name) {
+    def_->category = std::move(name);
+    return *this;
+  }
+  NodeBuilder& version(int number) {
+    def_->version = number;
+    return *this;
+  }
+  NodeBuilder& animation() {
+    def_->animation = true;
+    return *this;
+  }
+  NodeBuilder& stateful() {
+    def_->stateful = true;
+    return *this;
+  }
+  NodeBuilder& passes_points() {
+    def_->passes_points = true;
+    return *this;
+  }
 
   // An animatable input; its type follows from the default (bool, int, double, Double3, Quaternion, Matrix4).
   NodeBuilder& in(std::string name, Value default_value, AttributeOptions options = {});
   template <typename T>
-    requires std::is_same_v<T, bool>  // a Value does not tell a bool from an int
-  NodeBuilder& in(std::string name, T default_value, AttributeOptions options = {}) {
+  requires std::is_same_v<T, bool>  // a Value does not tell a bool from an int
+      NodeBuilder& in(std::string name, T default_value, AttributeOptions options = {}) {
     in(std::move(name), Value(default_value), std::move(options));
     attribute().type = Type::kBool;
     return *this;
@@ -50,14 +66,15 @@ class NodeBuilder {
   NodeBuilder& structural(std::string name, Value default_value, AttributeOptions options = {});
   NodeBuilder& structural(std::string name, Type type, AttributeOptions options = {});
   template <typename T>
-    requires std::is_same_v<T, bool>
-  NodeBuilder& structural(std::string name, T default_value, AttributeOptions options = {}) {
+  requires std::is_same_v<T, bool> NodeBuilder& structural(std::string name, T default_value,
+                                                           AttributeOptions options = {}) {
     in(std::move(name), default_value, std::move(options));
     attribute().structural = true;
     return *this;
   }
   // An enum input; the default is its first name.
-  NodeBuilder& enumeration(std::string name, std::vector<std::string> names, bool structural, std::string doc = {}, int default_choice = 0);
+  NodeBuilder& enumeration(std::string name, std::vector<std::string> names, bool structural,
+                           std::string doc = {}, int default_choice = 0);
   // A points, colors or weights input.
   NodeBuilder& points_in(std::string name, std::string doc = {}, Type type = Type::kPoints);
   NodeBuilder& out(std::string name, Type type, std::string doc = {});
@@ -67,8 +84,14 @@ class NodeBuilder {
   NodeBuilder& per_geometry();  // implies array
   NodeBuilder& lazy(bool together = false);
   NodeBuilder& alias(std::string other_name);
-  NodeBuilder& unit(Unit u) { attribute().unit = u; return *this; }
-  NodeBuilder& doc(std::string text) { attribute().doc = std::move(text); return *this; }
+  NodeBuilder& unit(Unit u) {
+    attribute().unit = u;
+    return *this;
+  }
+  NodeBuilder& doc(std::string text) {
+    attribute().doc = std::move(text);
+    return *this;
+  }
   NodeBuilder& grid(std::string divisions_attribute);
   NodeBuilder& default_from(std::function<Value(const Structural&)> f);
 
@@ -91,17 +114,38 @@ class NodeBuilder {
   }
 
   // Change the group that was closed last.
-  NodeBuilder& decide(DecideFn f) { group().decide = f; return *this; }
-  NodeBuilder& block(ComputeBlockFn f) { group().compute_block = f; return *this; }
-  // Many steps of the group run as one: `bind` (or null) makes its kernel of theirs, `f` computes all of them.
+  NodeBuilder& decide(DecideFn f) {
+    group().decide = f;
+    return *this;
+  }
+  NodeBuilder& block(ComputeBlockFn f) {
+    group().compute_block = f;
+    return *this;
+  }
+  // Many steps of the group run as one: `bind` (or null) makes its kernel of theirs, `f` computes all of
+  // them.
   NodeBuilder& batch(BindBatchFn bind, ComputeBatchFn f);
-  // The output equals `input`, bit for bit, while the inputs `held` hold their defaults: then plans do without the step.
+  // The output equals `input`, bit for bit, while the inputs `held` hold their defaults: then plans do
+  // without the step.
   NodeBuilder& passes(std::string_view input, const std::vector<std::string>& held);
-  NodeBuilder& demand(DemandFn f) { group().demand = std::move(f); return *this; }
-  NodeBuilder& bind(BindFn f) { group().bind = std::move(f); return *this; }
-  NodeBuilder& point_count(PointCountFn f) { group().point_count = std::move(f); return *this; }
+  NodeBuilder& demand(DemandFn f) {
+    group().demand = std::move(f);
+    return *this;
+  }
+  NodeBuilder& bind(BindFn f) {
+    group().bind = std::move(f);
+    return *this;
+  }
+  NodeBuilder& point_count(PointCountFn f) {
+    group().point_count = std::move(f);
+    return *this;
+  }
   NodeBuilder& in_place(std::string_view input);
-  NodeBuilder& cost(float ns, float ns_per_point) { group().cost_ns = ns; group().cost_ns_per_point = ns_per_point; return *this; }
+  NodeBuilder& cost(float ns, float ns_per_point) {
+    group().cost_ns = ns;
+    group().cost_ns_per_point = ns_per_point;
+    return *this;
+  }
 
  private:
   template <typename T>
@@ -152,7 +196,8 @@ class NodeBuilder {
   NodeBuilder& add(AttributeDef attribute);
   int input_position(std::string_view input);
   NodeBuilder& group_compute(ComputeFn compute);
-  NodeBuilder& group_for(std::vector<std::string> outputs, std::vector<std::string> inputs, ComputeFn compute);
+  NodeBuilder& group_for(std::vector<std::string> outputs, std::vector<std::string> inputs,
+                         ComputeFn compute);
   void finish_group();
 
   NodeDef* def_;

@@ -1,5 +1,5 @@
-// A node type as data: its attributes, and how groups of outputs are computed from inputs. Everybody who wants to
-// know about a type (the reader of rig files, the compiler, the reference) reads this declaration.
+// A node type as data: its attributes, and how groups of outputs are computed from inputs. Everybody who
+// wants to know about a type (the reader of rig files, the compiler, the reference) reads this declaration.
 // Definitions are immutable once they are in a registry.
 #pragma once
 
@@ -25,25 +25,25 @@ struct AttributeDef {
   std::string name;
   Type type = Type::kDouble;
   std::string doc;
-  Value default_value;  // of an element, for arrays
+  Value default_value;                                    // of an element, for arrays
   double min = -std::numeric_limits<double>::infinity();  // of numbers; outside is an author's error
   double max = std::numeric_limits<double>::infinity();
   Unit unit = Unit::kNone;
   bool output = false;
-  bool array = false;         // plugs are name[i]
-  bool structural = false;    // read when a plan is made, baked into kernels
-  bool lazy = false;          // evaluated only if decide chooses it
-  bool lazy_together = false; // all elements of a lazy array share one decision (one bit)
-  bool diagnostic = false;    // decides whether the node fails, never what it computes
-  bool per_geometry = false;  // array whose element i belongs to the i-th deformed geometry
+  bool array = false;          // plugs are name[i]
+  bool structural = false;     // read when a plan is made, baked into kernels
+  bool lazy = false;           // evaluated only if decide chooses it
+  bool lazy_together = false;  // all elements of a lazy array share one decision (one bit)
+  bool diagnostic = false;     // decides whether the node fails, never what it computes
+  bool per_geometry = false;   // array whose element i belongs to the i-th deformed geometry
   std::vector<std::string> enum_names;
   std::vector<std::string> aliases;  // other names under which plugs may be written
-  std::string grid;           // elements may be written [s,t,u]; names the structural attribute with the divisions
+  std::string grid;  // elements may be written [s,t,u]; names the structural attribute with the divisions
   std::function<Value(const Structural&)> default_from;  // for defaults that follow from structural values
 };
 
-// The view that compile-time functions of a node receive. Names are attribute names; a name that the definition
-// lacks is a programmer's error.
+// The view that compile-time functions of a node receive. Names are attribute names; a name that the
+// definition lacks is a programmer's error.
 class Structural {
  public:
   virtual ~Structural() = default;
@@ -52,15 +52,17 @@ class Structural {
   virtual int array_size(std::string_view name) const = 0;
   virtual int geometry() const = 0;  // which element, for per-geometry groups; otherwise 0
   virtual const std::string& node_name() const = 0;
-  // The value of an input with everything at its default: controls as set in the graph, no clip. Null where an
-  // upstream node failed. Points come complete.
+  // The value of an input with everything at its default: controls as set in the graph, no clip. Null where
+  // an upstream node failed. Points come complete.
   virtual const Value* rest(std::string_view name, int element = -1) const = 0;
 
   int get_int(std::string_view name) const { return static_cast<int>(value(name).AsInt()); }
   double get_double(std::string_view name) const { return value(name).AsDouble(); }
   bool get_bool(std::string_view name) const { return value(name).AsInt() != 0; }
   template <typename T>
-  const T* asset(std::string_view name, int element = -1) const { return value(name, element).asset<T>(); }
+  const T* asset(std::string_view name, int element = -1) const {
+    return value(name, element).asset<T>();
+  }
 };
 
 // Which points of the inputs an output needs.
@@ -70,7 +72,8 @@ class Demand {
   virtual const Structural& structural() const = 0;
   // The set demanded of an output (empty if nobody wants it).
   virtual const PointSet& output(std::string_view name, int element = 0) const = 0;
-  virtual Index input_total(std::string_view name, int element = 0) const = 0;  // points of that input's array
+  virtual Index input_total(std::string_view name,
+                            int element = 0) const = 0;  // points of that input's array
   virtual void Require(std::string_view name, int element, const PointSet& points) = 0;
   // This output does not depend on a small input: it need not be evaluated, and holds its default.
   virtual void Skip(std::string_view name, int element) = 0;
@@ -99,21 +102,21 @@ using PointCountFn = std::function<Result<Index>(const Structural&, std::string_
 
 // Outputs that are computed together, and from what.
 struct ComputeGroup {
-  std::vector<int> inputs;   // attribute numbers, without the structural ones
+  std::vector<int> inputs;  // attribute numbers, without the structural ones
   std::vector<int> outputs;
   bool per_geometry = false;  // one step for every element of the per-geometry outputs
   ComputeFn compute = nullptr;
-  DecideFn decide = nullptr;         // with lazy inputs
+  DecideFn decide = nullptr;  // with lazy inputs
   ComputeBlockFn compute_block = nullptr;
   ComputeBatchFn compute_batch = nullptr;  // of groups with one small output and no arrays
   BindBatchFn bind_batch;
-  DemandFn demand;                   // null: the same points of every points input
-  BindFn bind;                       // null: no kernel
-  PointCountFn point_count;          // null: as many as the first points input has
-  int in_place_input = -1;           // position in inputs whose buffer the first output may overwrite
-  int passed_input = -1;             // position in inputs of what the only output equals, bit for bit, while
-  std::vector<int> held_inputs;      // these (positions) hold their defaults
-  float cost_ns = 20;                // rough; decides what is worth a thread
+  DemandFn demand;               // null: the same points of every points input
+  BindFn bind;                   // null: no kernel
+  PointCountFn point_count;      // null: as many as the first points input has
+  int in_place_input = -1;       // position in inputs whose buffer the first output may overwrite
+  int passed_input = -1;         // position in inputs of what the only output equals, bit for bit, while
+  std::vector<int> held_inputs;  // these (positions) hold their defaults
+  float cost_ns = 20;            // rough; decides what is worth a thread
   float cost_ns_per_point = 0;
 };
 

@@ -1,5 +1,5 @@
-// Name -> NodeDef. Passed around, never global. Filled at start by the standard nodes and by plugins; read-only and
-// safe to share between threads afterwards.
+// Name -> NodeDef. Passed around, never global. Filled at start by the standard nodes and by plugins;
+// read-only and safe to share between threads afterwards.
 #pragma once
 
 #include <map>

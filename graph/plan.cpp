@@ -5,15 +5,18 @@ namespace kpsa {
 Index Plan::FindVarying(const PlugRef& plug) const {
   for (Index v = 0; v < varying_.size(); ++v) {
     const PlugRef& p = varying_[v].plug;
-    if (p.node == plug.node && p.attribute == plug.attribute && (p.element == plug.element || IsPointType(varying_[v].type))) return v;
+    if (p.node == plug.node && p.attribute == plug.attribute &&
+        (p.element == plug.element || IsPointType(varying_[v].type)))
+      return v;
   }
   return kNoIndex;
 }
 
 std::size_t Plan::MemoryBytes() const {
   const auto bytes = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
-  std::size_t total = sizeof(*this) + bytes(steps_) + bytes(tables_) + bytes(deps_) + bytes(consumers_) + bytes(consumer_offsets_) +
-                      bytes(branches_) + bytes(batches_) + bytes(segments_) + bytes(buffers_) + bytes(varying_) + bytes(outputs_) + bytes(infos_) +
+  std::size_t total = sizeof(*this) + bytes(steps_) + bytes(tables_) + bytes(deps_) + bytes(consumers_) +
+                      bytes(consumer_offsets_) + bytes(branches_) + bytes(batches_) + bytes(segments_) +
+                      bytes(buffers_) + bytes(varying_) + bytes(outputs_) + bytes(infos_) +
                       bytes(initial_values_) + bytes(owned_) + bytes(closures_) + text_.capacity();
   for (const auto& ranges : closures_) total += bytes(ranges);
   for (const Segment& segment : segments_) total += bytes(segment.levels);

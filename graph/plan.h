@@ -1,10 +1,10 @@
-// The compiled form of (graph, request): steps in dependency order, where their values lie, bound kernels, and why
-// each node is or is not part of it. Immutable, shared by all threads and evaluators; it does not refer to the graph
-// that it was made from.
+// The compiled form of (graph, request): steps in dependency order, where their values lie, bound kernels,
+// and why each node is or is not part of it. Immutable, shared by all threads and evaluators; it does not
+// refer to the graph that it was made from.
 //
-// Steps belong to segments. Segment 0 is evaluated whenever asked; every lazy input opens a child segment, evaluated
-// only when its owner's decide chooses it. A segment's steps are a contiguous range, ordered by level: steps of one
-// level do not depend on each other.
+// Steps belong to segments. Segment 0 is evaluated whenever asked; every lazy input opens a child segment,
+// evaluated only when its owner's decide chooses it. A segment's steps are a contiguous range, ordered by
+// level: steps of one level do not depend on each other.
 #pragma once
 
 #include <memory>
@@ -43,7 +43,9 @@ class Plan {
     std::uint32_t batch = kNoIndex;           // into batches(), for steps that can run together
     std::uint16_t unit_size = 1;              // steps that run together; at the first of them
     std::uint16_t unit_offset = 0;            // how far the first of the unit is before this step
-    bool runs_plainly() const { return branch == kNoIndex && batch == kNoIndex && unit_size == 1 && unit_offset == 0; }
+    bool runs_plainly() const {
+      return branch == kNoIndex && batch == kNoIndex && unit_size == 1 && unit_offset == 0;
+    }
   };
   static_assert(sizeof(Step) == 64);
   // Steps [first, first + count) of one kind and level: where all of them are stale, one call computes them.
@@ -72,9 +74,9 @@ class Plan {
     std::uint32_t slot = 0;
     Index count = 0;
     int components = 3;
-    std::size_t offset = 0;        // floats into the evaluator's buffers, or the workspace
+    std::size_t offset = 0;  // floats into the evaluator's buffers, or the workspace
     bool workspace = false;
-    const float* constant = nullptr;  // points of the plan itself
+    const float* constant = nullptr;       // points of the plan itself
     const PointBuffer* initial = nullptr;  // what a varying points plug starts with
   };
   struct Varying {
@@ -82,7 +84,7 @@ class Plan {
     std::string name;
     Type type = Type::kDouble;
     std::uint32_t slot = 0;
-    Index points = 0;                           // of a points plug
+    Index points = 0;  // of a points plug
     double min = 0, max = 0;
   };
   struct Output {
@@ -115,21 +117,28 @@ class Plan {
   const std::vector<Output>& outputs() const { return outputs_; }
   const std::vector<StepInfo>& infos() const { return infos_; }
   const std::vector<Excluded>& excluded() const { return excluded_; }
-  // The first node that needs its previous frame (NodeDef::stateful), or "": such a plan is evaluated in ascending
-  // order on one evaluator.
+  // The first node that needs its previous frame (NodeDef::stateful), or "": such a plan is evaluated in
+  // ascending order on one evaluator.
   const std::string& stateful_node() const { return stateful_node_; }
-  const char* step_name(Index step) const { return text_.data() + infos_[step].name; }    // of its node
-  const char* step_type(Index step) const { return text_.data() + infos_[step].type; }    // of its node
-  const char* step_label(Index step) const { return text_.data() + infos_[step].label; }  // "", "gather", "assemble", ...
+  const char* step_name(Index step) const { return text_.data() + infos_[step].name; }  // of its node
+  const char* step_type(Index step) const { return text_.data() + infos_[step].type; }  // of its node
+  const char* step_label(Index step) const {
+    return text_.data() + infos_[step].label;
+  }  // "", "gather", "assemble", ...
   // Consumers of a producer: steps that read it (all segments).
   std::span<const Index> consumers(Index producer) const {
-    return {consumers_.data() + consumer_offsets_[producer], consumer_offsets_[producer + 1] - consumer_offsets_[producer]};
+    return {consumers_.data() + consumer_offsets_[producer],
+            consumer_offsets_[producer + 1] - consumer_offsets_[producer]};
   }
-  // Closures of the varying plugs as ranges [begin, end) of steps; empty where a walk is cheaper than storing them.
+  // Closures of the varying plugs as ranges [begin, end) of steps; empty where a walk is cheaper than storing
+  // them.
   std::span<const std::pair<Index, Index>> closure(Index varying) const {
-    return varying < closures_.size() ? std::span<const std::pair<Index, Index>>(closures_[varying]) : std::span<const std::pair<Index, Index>>();
+    return varying < closures_.size() ? std::span<const std::pair<Index, Index>>(closures_[varying])
+                                      : std::span<const std::pair<Index, Index>>();
   }
-  const std::vector<std::byte>& initial_values() const { return initial_values_; }  // constants in their slots
+  const std::vector<std::byte>& initial_values() const {
+    return initial_values_;
+  }  // constants in their slots
   std::size_t buffer_floats() const { return buffer_floats_; }
   std::size_t workspace_floats() const { return workspace_floats_; }
   std::size_t state_bytes() const { return state_bytes_; }

@@ -28,7 +28,8 @@ std::uint32_t PlanBuilder::AddText(const std::string& text) {
   return it->second;
 }
 
-std::uint32_t PlanBuilder::AddBuffer(std::uint32_t slot, const PointSet& points, Type type, bool workspace, std::uint32_t reuse) {
+std::uint32_t PlanBuilder::AddBuffer(std::uint32_t slot, const PointSet& points, Type type, bool workspace,
+                                     std::uint32_t reuse) {
   Plan::Buffer buffer;
   buffer.slot = slot;
   buffer.count = points.size();
@@ -50,7 +51,8 @@ std::uint32_t PlanBuilder::ConstantSlot(const Value& value, Type type, const Poi
     // Equal bytes share a slot, whatever they mean
     std::byte bytes[sizeof(Matrix4)];
     value.WriteSlot(type, bytes);
-    const auto [it, added] = small_constants_.emplace(std::string(reinterpret_cast<const char*>(bytes), SlotSize(type)), 0);
+    const auto [it, added] =
+        small_constants_.emplace(std::string(reinterpret_cast<const char*>(bytes), SlotSize(type)), 0);
     if (added) {
       it->second = AddSlot(SlotSize(type));
       std::memcpy(plan_->initial_values_.data() + it->second, bytes, SlotSize(type));
@@ -61,7 +63,8 @@ std::uint32_t PlanBuilder::ConstantSlot(const Value& value, Type type, const Poi
   if (!added) return it->second;
   KPSA_CHECK(value.points() != nullptr);
   std::shared_ptr<const PointBuffer> held = value.get<PointBufferPtr>();
-  if (!points.is_all()) held = std::make_shared<PointBuffer>(GatherPoints(held->view(), held->components(), points));
+  if (!points.is_all())
+    held = std::make_shared<PointBuffer>(GatherPoints(held->view(), held->components(), points));
   plan_->owned_.push_back(held);
   const std::uint32_t slot = AddSlot(sizeof(PointsView));
   it->second = slot;
@@ -89,7 +92,8 @@ void PlanBuilder::NumberSteps() {
     segment.end = static_cast<Index>(placed_.size());
     segment.levels.push_back(segment.end);
   }
-  for (Index g = 1; g < draft_.segments.size(); ++g) plan_->segments_[g].owner = number_[draft_.segments[g].owner];
+  for (Index g = 1; g < draft_.segments.size(); ++g)
+    plan_->segments_[g].owner = number_[draft_.segments[g].owner];
   plan_->steps_.resize(placed_.size());
   plan_->infos_.resize(placed_.size());
   for (const auto& units : order_.segments) {
@@ -116,7 +120,8 @@ void PlanBuilder::AddVarying() {
     varying.slot = AddSlot(SlotSize(varying.type));
     if (IsPointType(varying.type)) {
       varying.points = static_cast<Index>(held->points()->count());
-      const std::uint32_t buffer = AddBuffer(varying.slot, PointSet::All(varying.points), varying.type, false, kNoIndex);
+      const std::uint32_t buffer =
+          AddBuffer(varying.slot, PointSet::All(varying.points), varying.type, false, kNoIndex);
       plan_->owned_.push_back(held->get<PointBufferPtr>());
       plan_->buffers_[buffer].initial = held->points();
     } else {
@@ -133,12 +138,16 @@ void PlanBuilder::PlaceOutputs() {
     const DraftStep& draft = draft_.steps[s];
     Plan::Step& step = plan_->steps_[number_[s]];
     const Instance* instance = draft.instance == kNoIndex ? nullptr : &table_.instances()[draft.instance];
-    const auto type_of = [&](std::size_t p) { return instance == nullptr ? draft.gather_type : table_.OutputType(*instance, static_cast<int>(p)); };
+    const auto type_of = [&](std::size_t p) {
+      return instance == nullptr ? draft.gather_type : table_.OutputType(*instance, static_cast<int>(p));
+    };
     slots_[s].outputs.resize(draft.sets.outputs.size());
     bool has_points = false;
-    for (std::size_t p = 0; p < draft.sets.outputs.size(); ++p) has_points = has_points || IsPointType(type_of(p));
+    for (std::size_t p = 0; p < draft.sets.outputs.size(); ++p)
+      has_points = has_points || IsPointType(type_of(p));
     step.value = static_cast<std::uint32_t>(plan_->initial_values_.size());
-    for (bool small : {true, false}) {  // small outputs first, side by side: they are compared after a compute
+    for (bool small :
+         {true, false}) {  // small outputs first, side by side: they are compared after a compute
       for (std::size_t p = 0; p < draft.sets.outputs.size(); ++p) {
         const Type type = type_of(p);
         if (IsSmallType(type) != small) continue;
@@ -147,12 +156,16 @@ void PlanBuilder::PlaceOutputs() {
           slots_[s].outputs[p].push_back(slot);
           if (small) continue;
           const Index overwritten = p == 0 ? order_.overwrites[s] : kNoIndex;
-          const std::uint32_t buffer = AddBuffer(slot, set, type, draft.segment != 0, overwritten == kNoIndex ? kNoIndex : buffer_of_step_[overwritten]);
+          const std::uint32_t buffer =
+              AddBuffer(slot, set, type, draft.segment != 0,
+                        overwritten == kNoIndex ? kNoIndex : buffer_of_step_[overwritten]);
           if (buffer_of_step_[s] == kNoIndex) buffer_of_step_[s] = buffer;
           if (draft.segment != 0) plan_->segments_[draft.segment].uses_workspace = true;
         }
       }
-      if (small) step.value_size = has_points ? 0 : static_cast<std::uint32_t>(plan_->initial_values_.size()) - step.value;
+      if (small)
+        step.value_size =
+            has_points ? 0 : static_cast<std::uint32_t>(plan_->initial_values_.size()) - step.value;
     }
     const BoundKernel& kernel = kernels_[s];
     step.kernel = kernel.object.get();
@@ -168,17 +181,22 @@ void PlanBuilder::PlaceOutputs() {
 std::uint32_t PlanBuilder::SlotOf(const DraftInput& input) {
   const std::uint32_t component = input.component < 0 ? 0 : static_cast<std::uint32_t>(8 * input.component);
   switch (input.kind) {
-    case DraftInput::Kind::kConstant: return ConstantSlot(*input.value, input.type, input.points);
-    case DraftInput::Kind::kVarying: return plan_->varying_[input.varying].slot + component;
+    case DraftInput::Kind::kConstant:
+      return ConstantSlot(*input.value, input.type, input.points);
+    case DraftInput::Kind::kVarying:
+      return plan_->varying_[input.varying].slot + component;
     case DraftInput::Kind::kStep:
-      return slots_[input.step].outputs[static_cast<std::size_t>(input.output)][static_cast<std::size_t>(input.element)] + component;
+      return slots_[input.step]
+                 .outputs[static_cast<std::size_t>(input.output)][static_cast<std::size_t>(input.element)] +
+             component;
   }
   return 0;
 }
 
 Index PlanBuilder::ProducerOf(const DraftInput& input) const {
   if (input.kind == DraftInput::Kind::kStep) return number_[input.step];
-  if (input.kind == DraftInput::Kind::kVarying) return static_cast<Index>(plan_->steps_.size()) + input.varying;
+  if (input.kind == DraftInput::Kind::kVarying)
+    return static_cast<Index>(plan_->steps_.size()) + input.varying;
   return kNoIndex;
 }
 
@@ -189,7 +207,8 @@ void PlanBuilder::FillSteps() {
     Plan::Step& step = plan_->steps_[n];
     Plan::StepInfo& info = plan_->infos_[n];
     const Instance* instance = draft.instance == kNoIndex ? nullptr : &table_.instances()[draft.instance];
-    const ComputeGroup* group = instance != nullptr && instance->kind == Instance::Kind::kNode ? &table_.group(*instance) : nullptr;
+    const ComputeGroup* group =
+        instance != nullptr && instance->kind == Instance::Kind::kNode ? &table_.group(*instance) : nullptr;
 
     // Inputs: a slot each; arrays as tables behind them
     table.assign(group != nullptr ? group->inputs.size() : draft.inputs.size(), 0);
@@ -216,7 +235,8 @@ void PlanBuilder::FillSteps() {
     const auto& outputs = slots_[placed_[n]].outputs;
     table.assign(outputs.size(), 0);
     for (std::size_t p = 0; p < outputs.size(); ++p) {
-      const bool array = group != nullptr && !group->per_geometry && table_.output_def(*instance, static_cast<int>(p)).array;
+      const bool array =
+          group != nullptr && !group->per_geometry && table_.output_def(*instance, static_cast<int>(p)).array;
       if (!array) {
         table[p] = outputs[p][0];
       } else {
@@ -280,10 +300,13 @@ void PlanBuilder::FillSteps() {
       info.label = AddText("gather");
     } else {
       const NodeDef& def = table_.graph().def(instance->node);
-      if (def.stateful && plan_->stateful_node_.empty()) plan_->stateful_node_ = table_.graph().name(instance->node);
+      if (def.stateful && plan_->stateful_node_.empty())
+        plan_->stateful_node_ = table_.graph().name(instance->node);
       info.name = AddText(table_.graph().name(instance->node));
       info.type = AddText(def.name);
-      info.label = AddText(instance->kind == Instance::Kind::kAssemble ? "assemble" : instance->kind == Instance::Kind::kConvert ? "convert" : "");
+      info.label = AddText(instance->kind == Instance::Kind::kAssemble  ? "assemble"
+                           : instance->kind == Instance::Kind::kConvert ? "convert"
+                                                                        : "");
     }
     info.points = info.points_total = 0;
     for (const auto& elements : draft.sets.outputs) {
@@ -292,14 +315,16 @@ void PlanBuilder::FillSteps() {
         info.points_total += set.total();
       }
     }
-    info.cost_ns = group == nullptr ? 10.0f + 0.5f * static_cast<float>(info.points)
-                                    : group->cost_ns + group->cost_ns_per_point * static_cast<float>(info.points);
+    info.cost_ns = group == nullptr
+                       ? 10.0f + 0.5f * static_cast<float>(info.points)
+                       : group->cost_ns + group->cost_ns_per_point * static_cast<float>(info.points);
   }
 }
 
 const ComputeGroup* PlanBuilder::BatchGroup(Index number) const {
   const DraftStep& draft = draft_.steps[placed_[number]];
-  if (draft.instance == kNoIndex || table_.instances()[draft.instance].kind != Instance::Kind::kNode) return nullptr;
+  if (draft.instance == kNoIndex || table_.instances()[draft.instance].kind != Instance::Kind::kNode)
+    return nullptr;
   const ComputeGroup& group = table_.group(table_.instances()[draft.instance]);
   return group.compute_batch != nullptr && plan_->steps_[number].unit_size == 1 ? &group : nullptr;
 }
@@ -319,12 +344,14 @@ void PlanBuilder::MakeBatches() {
         }
         Plan::Batch batch;
         batch.compute = group->compute_batch;
-        if (group->bind_batch) plan_->owned_.push_back(group->bind_batch(kernels)), batch.kernel = plan_->owned_.back().get();
+        if (group->bind_batch)
+          plan_->owned_.push_back(group->bind_batch(kernels)), batch.kernel = plan_->owned_.back().get();
         batch.first = first;
         batch.count = last - first;
         batch.stride = plan_->steps_[first + 1].in - plan_->steps_[first].in;
         batch.scratch = static_cast<std::uint32_t>(plan_->workspace_floats_);
-        plan_->workspace_floats_ += PaddedCount(batch.count * plan_->steps_[first].value_size / sizeof(float));
+        plan_->workspace_floats_ +=
+            PaddedCount(batch.count * plan_->steps_[first].value_size / sizeof(float));
         KPSA_CHECK_LE(plan_->workspace_floats_, std::size_t{0xffffffff});
         plan_->batches_.push_back(batch);
       }

@@ -34,7 +34,8 @@ class PlanBuilder {
   Index ProducerOf(const DraftInput& input) const;
   const ComputeGroup* BatchGroup(Index number) const;  // of a step that can run in a batch; or null
   std::uint32_t AddSlot(std::size_t size);
-  std::uint32_t AddBuffer(std::uint32_t slot, const PointSet& points, Type type, bool workspace, std::uint32_t reuse);
+  std::uint32_t AddBuffer(std::uint32_t slot, const PointSet& points, Type type, bool workspace,
+                          std::uint32_t reuse);
   std::uint32_t ConstantSlot(const Value& value, Type type, const PointSet& points);
   std::uint32_t AddText(const std::string& text);
   void WriteTable(std::vector<std::uint32_t>& table) const;
@@ -45,9 +46,9 @@ class PlanBuilder {
   const Request& request_;
   std::vector<BoundKernel> kernels_;  // by draft step
   std::shared_ptr<Plan> plan_ = std::make_shared<Plan>();
-  std::vector<Index> number_;        // plan step by draft step
-  std::vector<Index> placed_;        // draft step by plan step
-  std::vector<Slots> slots_;         // by draft step
+  std::vector<Index> number_;                  // plan step by draft step
+  std::vector<Index> placed_;                  // draft step by plan step
+  std::vector<Slots> slots_;                   // by draft step
   std::vector<std::uint32_t> buffer_of_step_;  // by draft step: number of the buffer of its first output
   std::unordered_map<std::string, std::uint32_t> small_constants_;  // slots by their bytes
   std::map<std::pair<const Value*, Digest>, std::uint32_t> point_constants_;

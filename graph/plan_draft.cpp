@@ -11,8 +11,8 @@
 namespace kpsa {
 namespace {
 
-constexpr int kMaxLazyInputs = 64;    // bits of what decide returns
-constexpr int kMaxLazyDepth = 1000;   // the evaluator descends into segments by recursion
+constexpr int kMaxLazyInputs = 64;   // bits of what decide returns
+constexpr int kMaxLazyDepth = 1000;  // the evaluator descends into segments by recursion
 
 class Drafter {
  public:
@@ -36,7 +36,8 @@ class Drafter {
         set = request_.outputs[i].points;
         if (set.total() == 0) set = PointSet::All(*total);
         if (set.total() != *total) {
-          return Status::Invalid("{} has {} points, the request is for an array of {}", table_.graph().PlugName(request_.outputs[i].plug), *total, set.total());
+          return Status::Invalid("{} has {} points, the request is for an array of {}",
+                                 table_.graph().PlugName(request_.outputs[i].plug), *total, set.total());
         }
       }
       draft_.outputs.emplace_back();
@@ -70,21 +71,25 @@ class Drafter {
     for (Index i : order) {
       for (const Input& input : table_.instances()[i].inputs) {
         const Source& s = input.source;
-        if (s.kind == Source::Kind::kVarying || (s.kind == Source::Kind::kInstance && draft_.varying[s.instance])) draft_.varying[i] = true;
+        if (s.kind == Source::Kind::kVarying ||
+            (s.kind == Source::Kind::kInstance && draft_.varying[s.instance]))
+          draft_.varying[i] = true;
       }
     }
   }
 
   Status CheckStructural() {
     const auto refuse = [&](NodeId node, int attribute, int element, const std::string& driver) {
-      return Status::Invalid("{} is structural (it is baked into the plan) and cannot be driven by {}, which varies",
-                             table_.graph().PlugName({node, attribute, element, -1}), driver);
+      return Status::Invalid(
+          "{} is structural (it is baked into the plan) and cannot be driven by {}, which varies",
+          table_.graph().PlugName({node, attribute, element, -1}), driver);
     };
     for (const Instance& instance : table_.instances()) {
       for (const StructuralInput& input : instance.structural) {
         const Source& s = input.source;
         if (s.kind == Source::Kind::kVarying) {
-          return refuse(instance.node, input.attribute, input.element, table_.graph().PlugName(table_.varying()[s.varying]));
+          return refuse(instance.node, input.attribute, input.element,
+                        table_.graph().PlugName(table_.varying()[s.varying]));
         }
         if (s.kind != Source::Kind::kInstance || !draft_.varying[s.instance]) continue;
         return refuse(instance.node, input.attribute, input.element,
@@ -92,8 +97,10 @@ class Drafter {
       }
     }
     for (const PlugRef& plug : table_.varying()) {
-      const AttributeDef& a = table_.graph().def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
-      if (a.structural) return Status::Invalid("{} is structural and cannot vary", table_.graph().PlugName(plug));
+      const AttributeDef& a =
+          table_.graph().def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
+      if (a.structural)
+        return Status::Invalid("{} is structural and cannot vary", table_.graph().PlugName(plug));
     }
     return Status();
   }
@@ -107,8 +114,12 @@ class Drafter {
     for (const Input& input : instance.inputs) {
       const Source& s = input.source;
       if (input.position == group.passed_input) passed = &s;
-      if (std::find(group.held_inputs.begin(), group.held_inputs.end(), input.position) == group.held_inputs.end()) continue;
-      if (s.kind == Source::Kind::kVarying || (s.kind == Source::Kind::kInstance && draft_.varying[s.instance])) return nullptr;
+      if (std::find(group.held_inputs.begin(), group.held_inputs.end(), input.position) ==
+          group.held_inputs.end())
+        continue;
+      if (s.kind == Source::Kind::kVarying ||
+          (s.kind == Source::Kind::kInstance && draft_.varying[s.instance]))
+        return nullptr;
       const Value* value = statics_.Get(s, false);
       const AttributeDef& a = table_.input_def(instance, input.position);
       std::byte now[sizeof(Matrix4)], held[sizeof(Matrix4)];
@@ -149,7 +160,9 @@ class Drafter {
     while (Depth(segment) > depth) segment = draft_.segments[segment].parent;
     return segment;
   }
-  bool IsAncestorOrSelf(Index ancestor, Index segment) const { return AncestorAt(segment, Depth(ancestor)) == ancestor; }
+  bool IsAncestorOrSelf(Index ancestor, Index segment) const {
+    return AncestorAt(segment, Depth(ancestor)) == ancestor;
+  }
   Index CommonAncestor(Index a, Index b) const {
     a = AncestorAt(a, Depth(b));
     b = AncestorAt(b, Depth(a));
@@ -158,8 +171,10 @@ class Drafter {
   }
 
   void Answer(const Use& use, Index step) {
-    DraftInput& input = use.reader.step == kNoIndex ? draft_.outputs[static_cast<std::size_t>(use.reader.input)]
-                                                    : draft_.steps[use.reader.step].inputs[static_cast<std::size_t>(use.reader.input)];
+    DraftInput& input =
+        use.reader.step == kNoIndex
+            ? draft_.outputs[static_cast<std::size_t>(use.reader.input)]
+            : draft_.steps[use.reader.step].inputs[static_cast<std::size_t>(use.reader.input)];
     input.step = step;
     input.output = use.output;
     input.element = use.element;
@@ -177,16 +192,20 @@ class Drafter {
       for (const Use& use : uses) segment = CommonAncestor(segment, use.segment);
       return MakeStep(number, segment, uses);
     }
-    // Demands are unioned within a segment, never across; a segment that holds what a descendant wants serves it
+    // Demands are unioned within a segment, never across; a segment that holds what a descendant wants serves
+    // it
     std::map<std::pair<int, Index>, std::vector<Use>> by_segment;
     for (Use& use : uses) by_segment[{Depth(use.segment), use.segment}].push_back(std::move(use));
     const auto first = static_cast<Index>(draft_.steps.size());
     for (auto& [key, group] : by_segment) {
       Index serving = kNoIndex;
       for (Index s = first; s < draft_.steps.size() && serving == kNoIndex; ++s) {
-        if (draft_.steps[s].instance != number || !IsAncestorOrSelf(draft_.steps[s].segment, key.second)) continue;
+        if (draft_.steps[s].instance != number || !IsAncestorOrSelf(draft_.steps[s].segment, key.second))
+          continue;
         const bool holds = std::all_of(group.begin(), group.end(), [&](const Use& use) {
-          const PointSet& set = draft_.steps[s].sets.outputs[static_cast<std::size_t>(use.output)][static_cast<std::size_t>(use.element)];
+          const PointSet& set =
+              draft_.steps[s]
+                  .sets.outputs[static_cast<std::size_t>(use.output)][static_cast<std::size_t>(use.element)];
           return use.points.total() == 0 || set.Includes(use.points);
         });
         if (holds) serving = s;
@@ -219,7 +238,8 @@ class Drafter {
       }
     }
     for (const Use& use : uses) {
-      PointSet& set = step.sets.outputs[static_cast<std::size_t>(use.output)][static_cast<std::size_t>(use.element)];
+      PointSet& set =
+          step.sets.outputs[static_cast<std::size_t>(use.output)][static_cast<std::size_t>(use.element)];
       if (use.points.total() > 0) set = set.Union(use.points);
     }
     KPSA_RETURN_IF_ERROR(FillDemand(table_, statics_.totals(), statics_, number, &step.sets));
@@ -241,12 +261,14 @@ class Drafter {
       Index reads_in = segment;
       if (input.lazy) {
         // The elements of a lazy_together array share a segment and a bit
-        const bool shares = together_position == input.position && table_.input_def(instance, input.position).lazy_together;
+        const bool shares =
+            together_position == input.position && table_.input_def(instance, input.position).lazy_together;
         if (!shares) {
           together = kNoIndex;
           together_position = input.position;
           if (++bits > kMaxLazyInputs) {
-            return Status::Invalid("{} has more than {} lazy inputs", Describe(table_, instance), kMaxLazyInputs);
+            return Status::Invalid("{} has more than {} lazy inputs", Describe(table_, instance),
+                                   kMaxLazyInputs);
           }
         }
         const Source& s = input.source;
@@ -256,7 +278,8 @@ class Drafter {
             together = static_cast<Index>(draft_.segments.size());
             draft_.segments.push_back({segment, step_number, Depth(segment) + 1});
             if (Depth(together) > kMaxLazyDepth) {
-              return Status::Invalid("{}: lazy inputs are nested more than {} deep", Describe(table_, instance), kMaxLazyDepth);
+              return Status::Invalid("{}: lazy inputs are nested more than {} deep",
+                                     Describe(table_, instance), kMaxLazyDepth);
             }
           }
           child = reads_in = together;
@@ -278,16 +301,20 @@ class Drafter {
 
   // A reader whose set is not the buffer's gets a compact copy, shared by readers of one segment.
   void InsertGathers() {
-    std::map<std::tuple<Index, Index, Index, int, int, Digest>, Index> made;  // by what is read, where, and which points
+    std::map<std::tuple<Index, Index, Index, int, int, Digest>, Index>
+        made;  // by what is read, where, and which points
     const auto serve = [&](DraftInput& input, Index segment) {
       if (!IsPointType(input.type) || input.kind == DraftInput::Kind::kConstant) return;
       const bool varying = input.kind == DraftInput::Kind::kVarying;
-      const PointSet held = varying ? PointSet::All(input.points.total())
-                                    : draft_.steps[input.step].sets.outputs[static_cast<std::size_t>(input.output)][static_cast<std::size_t>(input.element)];
+      const PointSet held =
+          varying ? PointSet::All(input.points.total())
+                  : draft_.steps[input.step].sets.outputs[static_cast<std::size_t>(input.output)]
+                                                         [static_cast<std::size_t>(input.element)];
       if (held == input.points) return;
       const auto number = static_cast<Index>(draft_.steps.size());
-      const auto [it, added] = made.emplace(
-          std::make_tuple(input.step, input.varying, segment, input.output, input.element, input.points.digest()), number);
+      const auto [it, added] = made.emplace(std::make_tuple(input.step, input.varying, segment, input.output,
+                                                            input.element, input.points.digest()),
+                                            number);
       const DraftInput read = input;
       input.kind = DraftInput::Kind::kStep;
       input.step = it->second;
@@ -327,7 +354,8 @@ class Drafter {
 
 }  // namespace
 
-Result<PlanDraft> DraftPlan(InstanceTable& table, StaticEvaluator& statics, const std::vector<Source>& wanted, const Request& request) {
+Result<PlanDraft> DraftPlan(InstanceTable& table, StaticEvaluator& statics, const std::vector<Source>& wanted,
+                            const Request& request) {
   return Drafter(table, statics, request).Run(wanted);
 }
 

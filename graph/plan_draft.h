@@ -19,15 +19,15 @@ struct DraftInput {
   Index varying = kNoIndex;      // kVarying
   Index step = kNoIndex;         // kStep: a draft step
   int output = 0, element = 0;
-  PointSet points;               // what is read, of a points input
+  PointSet points;  // what is read, of a points input
 };
 
 struct DraftStep {
   Index instance = kNoIndex;  // kNoIndex: a gather
   Index segment = 0;
-  InstanceSets sets;          // a gather has one output and one input
+  InstanceSets sets;  // a gather has one output and one input
   std::vector<DraftInput> inputs;
-  std::vector<Index> lazy_segments;  // by lazy input, in order; kNoIndex where nothing has to be evaluated
+  std::vector<Index> lazy_segments;     // by lazy input, in order; kNoIndex where nothing has to be evaluated
   std::vector<std::uint8_t> lazy_bits;  // by lazy input: its bit in what decide returns
   Type gather_type = Type::kPoints;
 };
@@ -42,11 +42,12 @@ struct PlanDraft {
   std::vector<DraftSegment> segments;
   std::vector<DraftInput> outputs;  // by request output
   std::vector<bool> varying;        // by instance
-  std::vector<bool> passed;         // by instance: its readers read its input instead (ComputeGroup::passed_input)
+  std::vector<bool> passed;  // by instance: its readers read its input instead (ComputeGroup::passed_input)
 };
 
-// Decides segments and point sets backward from the request, and connects steps; inserts gathers where a reader
-// wants other points than the buffer holds.
-Result<PlanDraft> DraftPlan(InstanceTable& table, class StaticEvaluator& statics, const std::vector<Source>& wanted, const Request& request);
+// Decides segments and point sets backward from the request, and connects steps; inserts gathers where a
+// reader wants other points than the buffer holds.
+Result<PlanDraft> DraftPlan(InstanceTable& table, class StaticEvaluator& statics,
+                            const std::vector<Source>& wanted, const Request& request);
 
 }  // namespace kpsa

@@ -27,7 +27,8 @@ std::vector<std::string> Graph::Names() const {
 
 Result<NodeId> Graph::FindNode(std::string_view name) const {
   const std::string key(name);
-  if (const auto it = by_name_.find(key); it != by_name_.end()) return NodeId{it->second, nodes_[it->second].version};
+  if (const auto it = by_name_.find(key); it != by_name_.end())
+    return NodeId{it->second, nodes_[it->second].version};
   if (const auto it = by_alias_.find(key); it != by_alias_.end()) {
     if (it->second.size() == 1) return IdAt(it->second.front());
     std::vector<std::string> names;
@@ -39,7 +40,8 @@ Result<NodeId> Graph::FindNode(std::string_view name) const {
 
 Result<PlugRef> Graph::FindPlug(std::string_view text) const {
   // The longest node name that is followed by '.' wins: names may contain dots themselves
-  for (std::size_t dot = text.rfind('.'); dot != std::string_view::npos && dot > 0; dot = text.rfind('.', dot - 1)) {
+  for (std::size_t dot = text.rfind('.'); dot != std::string_view::npos && dot > 0;
+       dot = text.rfind('.', dot - 1)) {
     const std::string key(text.substr(0, dot));
     if (by_name_.count(key) == 0 && by_alias_.count(key) == 0) continue;
     Result<NodeId> id = FindNode(key);
@@ -47,8 +49,11 @@ Result<PlugRef> Graph::FindPlug(std::string_view text) const {
     return FindAttribute(*id, text.substr(dot + 1), true);
   }
   const std::size_t dot = text.find('.');
-  if (dot == std::string_view::npos) return Status::Invalid("\"{}\" is no plug: expected node.attribute", text);
-  const std::string_view guess = text.substr(0, text.find_first_of("[", 0) == std::string_view::npos ? text.rfind('.') : text.substr(0, text.find('[')).rfind('.'));
+  if (dot == std::string_view::npos)
+    return Status::Invalid("\"{}\" is no plug: expected node.attribute", text);
+  const std::string_view guess = text.substr(0, text.find_first_of("[", 0) == std::string_view::npos
+                                                    ? text.rfind('.')
+                                                    : text.substr(0, text.find('[')).rfind('.'));
   return Status::Invalid("unknown node \"{}\" in plug \"{}\"{}", guess, text, DidYouMean(guess, Names()));
 }
 
@@ -89,7 +94,8 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool dele
       if (found.ok() || node(delegate).def->FindAttribute(attribute) >= 0) return found;
       for (std::string& name : node(delegate).def->AttributeNames()) names.push_back(std::move(name));
     }
-    return Status::Invalid("node \"{}\" ({}) has no attribute \"{}\"{}", n.name, n.def->name, attribute, DidYouMean(attribute, names));
+    return Status::Invalid("node \"{}\" ({}) has no attribute \"{}\"{}", n.name, n.def->name, attribute,
+                           DidYouMean(attribute, names));
   }
   if (text.find('[') != std::string_view::npos) {
     Result<int> index = ParseElement(id, plug.attribute, element);
@@ -97,7 +103,8 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool dele
     plug.element = *index;
   }
   if (!rest.empty()) {
-    const std::size_t component = rest.size() == 2 && rest[0] == '.' ? std::string_view("xyzw").find(rest[1]) : std::string_view::npos;
+    const std::size_t component =
+        rest.size() == 2 && rest[0] == '.' ? std::string_view("xyzw").find(rest[1]) : std::string_view::npos;
     if (component == std::string_view::npos || plug.component >= 0) {
       return Status::Invalid("\"{}\": expected .x, .y or .z at \"{}\"", text, rest);
     }
@@ -132,19 +139,25 @@ Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text)
     const int divisions_attribute = n.def->FindAttribute(a.grid);
     KPSA_CHECK(divisions_attribute >= 0);
     const Value* set = FindValue({id, divisions_attribute, -1, -1});
-    const Value& divisions = set != nullptr ? *set : n.def->attributes[static_cast<std::size_t>(divisions_attribute)].default_value;
+    const Value& divisions =
+        set != nullptr ? *set
+                       : n.def->attributes[static_cast<std::size_t>(divisions_attribute)].default_value;
     const auto* sizes = divisions.get_if<std::vector<std::int64_t>>();
     std::int64_t index = 0, stride = 1;
     std::size_t axis = 0;
     for (std::string_view left = text;; ++axis) {
       const std::size_t comma = left.find(',');
       int i = 0;
-      if (sizes == nullptr || axis >= sizes->size() || !ParseInt(left.substr(0, comma), &i) || i < 0 || i >= (*sizes)[axis]) {
-        return Status::Invalid("{}.{}[{}]: expected three indices within the divisions {}", n.name, a.name, text, divisions.ToString());
+      if (sizes == nullptr || axis >= sizes->size() || !ParseInt(left.substr(0, comma), &i) || i < 0 ||
+          i >= (*sizes)[axis]) {
+        return Status::Invalid("{}.{}[{}]: expected three indices within the divisions {}", n.name, a.name,
+                               text, divisions.ToString());
       }
       index += stride * i;
-      stride = std::min<std::int64_t>(stride * std::min<std::int64_t>((*sizes)[axis], max_elements), max_elements);
-      if (index >= max_elements) return Status::Invalid("{}.{}[{}]: the grid is too large", n.name, a.name, text);
+      stride =
+          std::min<std::int64_t>(stride * std::min<std::int64_t>((*sizes)[axis], max_elements), max_elements);
+      if (index >= max_elements)
+        return Status::Invalid("{}.{}[{}]: the grid is too large", n.name, a.name, text);
       if (comma == std::string_view::npos) break;
       left = left.substr(comma + 1);
     }
@@ -153,7 +166,8 @@ Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text)
   }
   int index = 0;
   if (!ParseInt(text, &index) || index < 0 || index >= max_elements) {
-    return Status::Invalid("{}.{}[{}]: expected an index from 0 to {}", n.name, a.name, text, max_elements - 1);
+    return Status::Invalid("{}.{}[{}]: expected an index from 0 to {}", n.name, a.name, text,
+                           max_elements - 1);
   }
   return index;
 }

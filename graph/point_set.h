@@ -18,8 +18,10 @@ class PointSet {
   // Sorts and removes duplicates; every index must be below total. All of them gives All(total).
   static PointSet Of(std::vector<Index> indices, Index total);
 
-  Index total() const { return total_; }                 // points of the array
-  Index size() const { return all_ ? total_ : static_cast<Index>(indices_ == nullptr ? 0 : indices_->size()); }
+  Index total() const { return total_; }  // points of the array
+  Index size() const {
+    return all_ ? total_ : static_cast<Index>(indices_ == nullptr ? 0 : indices_->size());
+  }
   bool is_all() const { return all_; }
   bool empty() const { return size() == 0; }
   Index operator[](Index i) const { return all_ ? i : (*indices_)[i]; }  // the i-th member

@@ -13,15 +13,19 @@ namespace kpsa {
 // One evaluation of a step.
 struct ProfileEvent {
   Index step = 0;
-  Index cause = kNoIndex;   // the producer that changed: a step, or steps().size() + varying; kNoIndex: none, it never ran
+  Index cause = kNoIndex;  // the producer that changed: a step, or steps().size() + varying; kNoIndex: none,
+                           // it never ran
   std::uint64_t begin_ns = 0, end_ns = 0;
   int thread = 0;
-  int frame = 0;            // as told to Evaluator::Record
+  int frame = 0;  // as told to Evaluator::Record
 };
 
 class Profile {
  public:
-  explicit Profile(const Plan& plan) : counts_(plan.steps().size(), 0), self_ns_(plan.steps().size(), 0), last_cause_(plan.steps().size(), kNoIndex) {}
+  explicit Profile(const Plan& plan)
+      : counts_(plan.steps().size(), 0),
+        self_ns_(plan.steps().size(), 0),
+        last_cause_(plan.steps().size(), kNoIndex) {}
   const std::vector<std::uint64_t>& counts() const { return counts_; }    // by step
   const std::vector<std::uint64_t>& self_ns() const { return self_ns_; }  // by step
   const std::vector<Index>& last_cause() const { return last_cause_; }    // by step

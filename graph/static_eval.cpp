@@ -45,7 +45,8 @@ PointBuffer GatherPoints(ConstPointsView from, int components, const PointSet& s
   return buffer;
 }
 
-Value AssembleValue(const Value& whole, const std::vector<int>& children, const std::vector<const Value*>& parts) {
+Value AssembleValue(const Value& whole, const std::vector<int>& children,
+                    const std::vector<const Value*>& parts) {
   if (whole.points() != nullptr) {
     auto buffer = std::make_shared<PointBuffer>(*whole.points());
     const PointsView view = buffer->view();
@@ -56,7 +57,8 @@ Value AssembleValue(const Value& whole, const std::vector<int>& children, const 
       float* components[3] = {view.x, view.y, view.z};
       for (int c = 0; c < buffer->components(); ++c) {
         if (component != 3 && component != c) continue;
-        components[c][point] = static_cast<float>(component == 3 && buffer->components() == 3 ? parts[i]->get<Double3>()[c] : parts[i]->AsDouble());
+        components[c][point] = static_cast<float>(
+            component == 3 && buffer->components() == 3 ? parts[i]->get<Double3>()[c] : parts[i]->AsDouble());
       }
     }
     return Value(PointBufferPtr(buffer));
@@ -81,7 +83,8 @@ const Value* StaticEvaluator::Ready(const Source& source, bool rest) {
   if (source.kind != Source::Kind::kInstance) return source.value;
   const auto& outputs = slot(source.instance, rest);
   if (outputs == nullptr) return nullptr;
-  const Value* value = &(*outputs)[static_cast<std::size_t>(source.output)][static_cast<std::size_t>(source.element)];
+  const Value* value =
+      &(*outputs)[static_cast<std::size_t>(source.output)][static_cast<std::size_t>(source.element)];
   if (source.component < 0) return value;
   std::byte bytes[sizeof(Matrix4)];
   value->WriteSlot(value->get_if<Double3>() != nullptr ? Type::kDouble3 : Type::kQuaternion, bytes);
@@ -106,7 +109,8 @@ const Value* StaticEvaluator::Get(const Source& source, bool rest) {
       opened[top] = true;
       const Instance& instance = table_.instances()[top];
       const auto need = [&](const Source& s) {
-        if (s.kind == Source::Kind::kInstance && slot(s.instance, rest) == nullptr) missing.push_back(s.instance);
+        if (s.kind == Source::Kind::kInstance && slot(s.instance, rest) == nullptr)
+          missing.push_back(s.instance);
       };
       for (const Input& input : instance.inputs) need(rest ? input.rest : input.source);
       for (const StructuralInput& input : instance.structural) need(input.source);
@@ -128,7 +132,8 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   std::vector<const Value*> values;
   for (const Input& input : instance.inputs) {
     values.push_back(Ready(rest ? input.rest : input.source, rest));
-    if (values.back() == nullptr) return Status::Invalid("{}: an input has no value", Describe(table_, instance));
+    if (values.back() == nullptr)
+      return Status::Invalid("{}: an input has no value", Describe(table_, instance));
   }
   auto outputs = std::make_shared<Outputs>();
   if (instance.kind == Instance::Kind::kConvert) {
@@ -141,7 +146,8 @@ Status StaticEvaluator::Run(Index number, bool rest) {
     return Status();
   }
   if (instance.kind == Instance::Kind::kAssemble) {
-    if (values[0]->points() != nullptr) KPSA_RETURN_IF_ERROR(CheckChildren(table_, instance, values[0]->points()->count()));
+    if (values[0]->points() != nullptr)
+      KPSA_RETURN_IF_ERROR(CheckChildren(table_, instance, values[0]->points()->count()));
     outputs->push_back({AssembleValue(*values[0], instance.children, {values.begin() + 1, values.end()})});
     slot(number, rest) = outputs;
     return Status();
@@ -168,14 +174,16 @@ Status StaticEvaluator::Run(Index number, bool rest) {
     } else {
       in[p] = static_cast<std::uint32_t>(in.size());
       in.push_back(static_cast<std::uint32_t>(count));
-      in.insert(in.end(), input_slots.begin() + static_cast<std::ptrdiff_t>(at), input_slots.begin() + static_cast<std::ptrdiff_t>(at + count));
+      in.insert(in.end(), input_slots.begin() + static_cast<std::ptrdiff_t>(at),
+                input_slots.begin() + static_cast<std::ptrdiff_t>(at + count));
     }
     at += count;
   }
   for (std::size_t p = 0; p < group.outputs.size(); ++p) {
     const AttributeDef& a = table_.output_def(instance, static_cast<int>(p));
     output_slots.emplace_back();
-    for (int e = 0; e < instance.output_sizes[p]; ++e) output_slots.back().push_back(arena.Add(SlotSize(a.type)));
+    for (int e = 0; e < instance.output_sizes[p]; ++e)
+      output_slots.back().push_back(arena.Add(SlotSize(a.type)));
     if (!a.array || group.per_geometry) {
       out[p] = output_slots.back()[0];
     } else {
@@ -230,7 +238,8 @@ Status StaticEvaluator::Run(Index number, bool rest) {
     const Type type = table_.OutputType(instance, static_cast<int>(p));
     outputs->emplace_back();
     for (std::uint32_t slot_at : output_slots[p]) {
-      outputs->back().push_back(IsPointType(type) ? Value(PointBufferPtr(made[next++])) : Value::ReadSlot(type, arena.data() + slot_at));
+      outputs->back().push_back(IsPointType(type) ? Value(PointBufferPtr(made[next++]))
+                                                  : Value::ReadSlot(type, arena.data() + slot_at));
     }
   }
   slot(number, rest) = outputs;

@@ -1,5 +1,5 @@
-// Evaluation while compiling: constants, and rest values. Every output is computed over all of its points, once.
-// Internal to graph/.
+// Evaluation while compiling: constants, and rest values. Every output is computed over all of its points,
+// once. Internal to graph/.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,9 @@ class StaticEvaluator final : public StaticValues {
   Index evaluated() const { return evaluated_; }
   // Rest values that are known already (from an earlier compilation), by instance.
   using Outputs = std::vector<std::vector<Value>>;  // by output position and element
-  void SetRest(Index instance, std::shared_ptr<const Outputs> outputs) { slot(instance, true) = std::move(outputs); }
+  void SetRest(Index instance, std::shared_ptr<const Outputs> outputs) {
+    slot(instance, true) = std::move(outputs);
+  }
   std::shared_ptr<const Outputs> FindRest(Index instance) { return slot(instance, true); }
 
  private:
@@ -40,6 +42,7 @@ class StaticEvaluator final : public StaticValues {
 // The points of `set` out of a complete array.
 PointBuffer GatherPoints(ConstPointsView from, int components, const PointSet& set);
 // Replaces children of a value: `children` as in Instance::children.
-Value AssembleValue(const Value& whole, const std::vector<int>& children, const std::vector<const Value*>& parts);
+Value AssembleValue(const Value& whole, const std::vector<int>& children,
+                    const std::vector<const Value*>& parts);
 
 }  // namespace kpsa

@@ -14,7 +14,8 @@ class Orderer {
   Orderer(const InstanceTable& table, const PlanDraft& draft) : table_(table), draft_(draft) {}
 
   StepOrder Run() {
-    // Copies inside of a unit can tie a knot (a later member depends on what the copy feeds): then those stay outside
+    // Copies inside of a unit can tie a knot (a later member depends on what the copy feeds): then those stay
+    // outside
     for (bool copies_inside : {true, false}) {
       Merge(copies_inside);
       if (Levels()) return std::move(order_);
@@ -39,7 +40,8 @@ class Orderer {
     const auto note = [&](const DraftInput& input, Index reader) {
       if (input.kind != DraftInput::Kind::kStep || !IsPointType(input.type)) return;
       Readers& r = readers[input.step];
-      if (reader == kNoIndex || draft_.steps[reader].segment != draft_.steps[input.step].segment || input.lazy) {
+      if (reader == kNoIndex || draft_.steps[reader].segment != draft_.steps[input.step].segment ||
+          input.lazy) {
         r.outside = true;
       } else if (draft_.steps[reader].instance == kNoIndex) {
         r.gathers.push_back(reader);
@@ -73,7 +75,8 @@ class Orderer {
         unit->steps.push_back(at);
         placed[at] = true;
         if (next[at] == kNoIndex) break;
-        if (unit->steps.size() + readers[at].gathers.size() >= kMaxUnit) {  // a new unit, with a buffer of its own
+        if (unit->steps.size() + readers[at].gathers.size() >=
+            kMaxUnit) {  // a new unit, with a buffer of its own
           order_.overwrites[next[at]] = kNoIndex;
           units.emplace_back();
           continue;
@@ -96,7 +99,8 @@ class Orderer {
   // Units run again as a whole: not with steps that decide, and not with what must not run twice a frame.
   bool RunsAlone(Index s) const {
     const DraftStep& step = draft_.steps[s];
-    return step.instance == kNoIndex || IsBranch(step) || table_.graph().def(table_.instances()[step.instance].node).stateful;
+    return step.instance == kNoIndex || IsBranch(step) ||
+           table_.graph().def(table_.instances()[step.instance].node).stateful;
   }
 
   // The step whose output step s may overwrite, if the definition allows it and the point sets agree.
@@ -110,7 +114,8 @@ class Orderer {
     for (std::size_t i = 0; i < instance.inputs.size(); ++i) {
       if (instance.inputs[i].position != group.in_place_input) continue;
       const DraftInput& input = step.inputs[i];
-      if (input.kind != DraftInput::Kind::kStep || draft_.steps[input.step].segment != step.segment) return kNoIndex;
+      if (input.kind != DraftInput::Kind::kStep || draft_.steps[input.step].segment != step.segment)
+        return kNoIndex;
       if (!(input.points == step.sets.outputs[0][0])) return kNoIndex;
       const std::size_t outputs = draft_.steps[input.step].sets.outputs.size();
       return outputs == 1 && draft_.steps[input.step].sets.outputs[0].size() == 1 ? input.step : kNoIndex;
@@ -119,7 +124,8 @@ class Orderer {
   }
 
   const ComputeGroup* GroupOf(const DraftStep& step) const {
-    if (step.instance == kNoIndex || table_.instances()[step.instance].kind != Instance::Kind::kNode) return nullptr;
+    if (step.instance == kNoIndex || table_.instances()[step.instance].kind != Instance::Kind::kNode)
+      return nullptr;
     return &table_.group(table_.instances()[step.instance]);
   }
   // Numbers the groups whose steps can run together, by their first step; 0 for all others.
@@ -165,7 +171,8 @@ class Orderer {
         // What a lazy segment reads from outside must run before the segment's owner does
         const Index home = draft_.steps[input.step].segment;
         Index reader = s;
-        for (Index g = draft_.steps[s].segment; g != home && g != 0; g = draft_.segments[g].parent) reader = draft_.segments[g].owner;
+        for (Index g = draft_.steps[s].segment; g != home && g != 0; g = draft_.segments[g].parent)
+          reader = draft_.segments[g].owner;
         if (draft_.steps[reader].segment == home) depends(reader, input.step);
       }
     }
@@ -183,11 +190,13 @@ class Orderer {
         }
       }
       if (done != units.size()) return false;
-      // Branches come last in their level: the parallel evaluator runs them after the others. Steps of a batch lie side
-      // by side. Draft steps were made consumers first, so descending numbers keep sources near their users.
+      // Branches come last in their level: the parallel evaluator runs them after the others. Steps of a
+      // batch lie side by side. Draft steps were made consumers first, so descending numbers keep sources
+      // near their users.
       std::sort(units.begin(), units.end(), [&](const StepOrder::Unit& a, const StepOrder::Unit& b) {
         if (a.level != b.level) return a.level < b.level;
-        const bool branch_a = IsBranch(draft_.steps[a.steps[0]]), branch_b = IsBranch(draft_.steps[b.steps[0]]);
+        const bool branch_a = IsBranch(draft_.steps[a.steps[0]]),
+                   branch_b = IsBranch(draft_.steps[b.steps[0]]);
         if (branch_a != branch_b) return branch_b;
         const Index kind_a = kinds[a.steps[0]], kind_b = kinds[b.steps[0]];
         return kind_a != kind_b ? kind_a < kind_b : a.steps[0] > b.steps[0];
@@ -203,6 +212,8 @@ class Orderer {
 
 }  // namespace
 
-StepOrder OrderSteps(const InstanceTable& table, const PlanDraft& draft) { return Orderer(table, draft).Run(); }
+StepOrder OrderSteps(const InstanceTable& table, const PlanDraft& draft) {
+  return Orderer(table, draft).Run();
+}
 
 }  // namespace kpsa

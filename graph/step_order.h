@@ -14,11 +14,12 @@ struct StepOrder {
   };
   // By segment: units by level. Levels ascend from 0.
   std::vector<std::vector<Unit>> segments;
-  std::vector<Index> overwrites;  // by draft step: the draft step whose buffer its first output takes over, or kNoIndex
+  std::vector<Index>
+      overwrites;  // by draft step: the draft step whose buffer its first output takes over, or kNoIndex
 };
 
-// Chains of deformers that nobody else reads become units that share one buffer. Small copies for other readers
-// (gathers) run between their members, before the buffer is overwritten.
+// Chains of deformers that nobody else reads become units that share one buffer. Small copies for other
+// readers (gathers) run between their members, before the buffer is overwritten.
 StepOrder OrderSteps(const InstanceTable& table, const PlanDraft& draft);
 
 }  // namespace kpsa

@@ -34,7 +34,9 @@ bool StructuralView::is_set(std::string_view name, int element) const {
   return table_.IsSet(node_, attribute, Element(attribute, element));
 }
 
-int StructuralView::array_size(std::string_view name) const { return table_.ArraySize(node_, Attribute(name)); }
+int StructuralView::array_size(std::string_view name) const {
+  return table_.ArraySize(node_, Attribute(name));
+}
 
 const Value* StructuralView::rest(std::string_view name, int element) const {
   if (instance_ == nullptr || statics_ == nullptr) return nullptr;

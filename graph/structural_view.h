@@ -1,5 +1,5 @@
-// Structural as the compiler gives it to compile-time functions of nodes: set values, driven ones, defaults, and
-// rest values through a callback. Internal to graph/.
+// Structural as the compiler gives it to compile-time functions of nodes: set values, driven ones, defaults,
+// and rest values through a callback. Internal to graph/.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,8 @@ class StaticValues {
 class StructuralView final : public Structural {
  public:
   // Without an instance (defaults before resolution) driven values and rest values are not available.
-  StructuralView(InstanceTable& table, NodeId node, int geometry, const Instance* instance, StaticValues* statics)
+  StructuralView(InstanceTable& table, NodeId node, int geometry, const Instance* instance,
+                 StaticValues* statics)
       : table_(table), node_(node), geometry_(geometry), instance_(instance), statics_(statics) {}
 
   const Value& value(std::string_view name, int element) const override;

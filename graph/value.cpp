@@ -9,19 +9,31 @@
 namespace kpsa {
 
 const char* TypeName(Type type) {
-  constexpr const char* kNames[] = {"bool",   "int",     "enum",   "double", "double3", "quaternion", "matrix", "points",
-                                    "colors", "weights", "string", "ints",   "doubles", "mesh",       "curve",  "asset"};
+  constexpr const char* kNames[] = {"bool",    "int",    "enum",   "double",  "double3", "quaternion",
+                                    "matrix",  "points", "colors", "weights", "string",  "ints",
+                                    "doubles", "mesh",   "curve",  "asset"};
   return kNames[static_cast<int>(type)];
 }
 
 std::size_t SlotSize(Type type) {
   switch (type) {
-    case Type::kBool: case Type::kInt: case Type::kEnum: case Type::kDouble: return 8;
-    case Type::kDouble3: return sizeof(Double3);
-    case Type::kQuaternion: return sizeof(Quaternion);
-    case Type::kMatrix: return sizeof(Matrix4);
-    case Type::kPoints: case Type::kColors: case Type::kWeights: return sizeof(PointsView);
-    default: return 0;
+    case Type::kBool:
+    case Type::kInt:
+    case Type::kEnum:
+    case Type::kDouble:
+      return 8;
+    case Type::kDouble3:
+      return sizeof(Double3);
+    case Type::kQuaternion:
+      return sizeof(Quaternion);
+    case Type::kMatrix:
+      return sizeof(Matrix4);
+    case Type::kPoints:
+    case Type::kColors:
+    case Type::kWeights:
+      return sizeof(PointsView);
+    default:
+      return 0;
   }
 }
 
@@ -39,26 +51,43 @@ std::int64_t Value::AsInt() const {
 
 bool Value::FitsType(Type type) const {
   switch (type) {
-    case Type::kBool: case Type::kInt: case Type::kEnum: return get_if<std::int64_t>() != nullptr;
-    case Type::kDouble: return get_if<double>() != nullptr || get_if<std::int64_t>() != nullptr;
-    case Type::kDouble3: return get_if<Double3>() != nullptr;
-    case Type::kQuaternion: return get_if<Quaternion>() != nullptr;
-    case Type::kMatrix: return get_if<Matrix4>() != nullptr;
-    case Type::kPoints: case Type::kColors: case Type::kWeights:
+    case Type::kBool:
+    case Type::kInt:
+    case Type::kEnum:
+      return get_if<std::int64_t>() != nullptr;
+    case Type::kDouble:
+      return get_if<double>() != nullptr || get_if<std::int64_t>() != nullptr;
+    case Type::kDouble3:
+      return get_if<Double3>() != nullptr;
+    case Type::kQuaternion:
+      return get_if<Quaternion>() != nullptr;
+    case Type::kMatrix:
+      return get_if<Matrix4>() != nullptr;
+    case Type::kPoints:
+    case Type::kColors:
+    case Type::kWeights:
       return points() != nullptr && points()->components() == PointComponents(type);
-    case Type::kString: return get_if<std::string>() != nullptr;
-    case Type::kInts: return get_if<std::vector<std::int64_t>>() != nullptr;
-    case Type::kDoubles: return get_if<std::vector<double>>() != nullptr;
-    case Type::kMesh: return get_if<AssetPtr>() != nullptr && std::strcmp(get<AssetPtr>()->kind(), "mesh") == 0;
-    case Type::kCurve: return get_if<AssetPtr>() != nullptr && std::strcmp(get<AssetPtr>()->kind(), "curve") == 0;
-    case Type::kAsset: return get_if<AssetPtr>() != nullptr;
+    case Type::kString:
+      return get_if<std::string>() != nullptr;
+    case Type::kInts:
+      return get_if<std::vector<std::int64_t>>() != nullptr;
+    case Type::kDoubles:
+      return get_if<std::vector<double>>() != nullptr;
+    case Type::kMesh:
+      return get_if<AssetPtr>() != nullptr && std::strcmp(get<AssetPtr>()->kind(), "mesh") == 0;
+    case Type::kCurve:
+      return get_if<AssetPtr>() != nullptr && std::strcmp(get<AssetPtr>()->kind(), "curve") == 0;
+    case Type::kAsset:
+      return get_if<AssetPtr>() != nullptr;
   }
   return false;
 }
 
 void Value::WriteSlot(Type type, std::byte* slot) const {
   switch (type) {
-    case Type::kBool: case Type::kInt: case Type::kEnum: {
+    case Type::kBool:
+    case Type::kInt:
+    case Type::kEnum: {
       const std::int64_t v = AsInt();
       std::memcpy(slot, &v, 8);
       break;
@@ -68,10 +97,17 @@ void Value::WriteSlot(Type type, std::byte* slot) const {
       std::memcpy(slot, &v, 8);
       break;
     }
-    case Type::kDouble3: std::memcpy(slot, &get<Double3>(), sizeof(Double3)); break;
-    case Type::kQuaternion: std::memcpy(slot, &get<Quaternion>(), sizeof(Quaternion)); break;
-    case Type::kMatrix: std::memcpy(slot, &get<Matrix4>(), sizeof(Matrix4)); break;
-    default: KPSA_CHECK(false);
+    case Type::kDouble3:
+      std::memcpy(slot, &get<Double3>(), sizeof(Double3));
+      break;
+    case Type::kQuaternion:
+      std::memcpy(slot, &get<Quaternion>(), sizeof(Quaternion));
+      break;
+    case Type::kMatrix:
+      std::memcpy(slot, &get<Matrix4>(), sizeof(Matrix4));
+      break;
+    default:
+      KPSA_CHECK(false);
   }
 }
 
@@ -81,12 +117,20 @@ Value Value::ReadSlot(Type type, const std::byte* slot) {
     return v;
   };
   switch (type) {
-    case Type::kBool: case Type::kInt: case Type::kEnum: return Value(read(std::int64_t{}));
-    case Type::kDouble: return Value(read(double{}));
-    case Type::kDouble3: return Value(read(Double3{}));
-    case Type::kQuaternion: return Value(read(Quaternion{}));
-    case Type::kMatrix: return Value(read(Matrix4{}));
-    default: break;
+    case Type::kBool:
+    case Type::kInt:
+    case Type::kEnum:
+      return Value(read(std::int64_t{}));
+    case Type::kDouble:
+      return Value(read(double{}));
+    case Type::kDouble3:
+      return Value(read(Double3{}));
+    case Type::kQuaternion:
+      return Value(read(Quaternion{}));
+    case Type::kMatrix:
+      return Value(read(Matrix4{}));
+    default:
+      break;
   }
   KPSA_CHECK(IsPointType(type));
   const PointsView view = read(PointsView{});
@@ -111,7 +155,8 @@ Digest Value::digest() const {
         if constexpr (std::is_same_v<T, std::monostate>) {
         } else if constexpr (std::is_same_v<T, std::string>) {
           hasher.Add(std::string_view(v));
-        } else if constexpr (std::is_same_v<T, std::vector<std::int64_t>> || std::is_same_v<T, std::vector<double>>) {
+        } else if constexpr (std::is_same_v<T, std::vector<std::int64_t>> ||
+                             std::is_same_v<T, std::vector<double>>) {
           hasher.Add(std::span(v.data(), v.size()));
         } else if constexpr (std::is_same_v<T, AssetPtr>) {
           hasher.Add(std::string_view(v->kind()));
@@ -135,15 +180,23 @@ std::string Value::ToString() const {
   return std::visit(
       [](const auto& v) -> std::string {
         using T = std::decay_t<decltype(v)>;
-        if constexpr (std::is_same_v<T, std::monostate>) return "unset";
-        else if constexpr (std::is_same_v<T, Double3>) return fmt::format("[{}, {}, {}]", v.x, v.y, v.z);
-        else if constexpr (std::is_same_v<T, Quaternion>) return fmt::format("[{}, {}, {}, {}]", v.x, v.y, v.z, v.w);
-        else if constexpr (std::is_same_v<T, Matrix4>) return fmt::format("[{}]", fmt::join(v.m, ", "));
-        else if constexpr (std::is_same_v<T, std::vector<std::int64_t>> || std::is_same_v<T, std::vector<double>>)
+        if constexpr (std::is_same_v<T, std::monostate>)
+          return "unset";
+        else if constexpr (std::is_same_v<T, Double3>)
+          return fmt::format("[{}, {}, {}]", v.x, v.y, v.z);
+        else if constexpr (std::is_same_v<T, Quaternion>)
+          return fmt::format("[{}, {}, {}, {}]", v.x, v.y, v.z, v.w);
+        else if constexpr (std::is_same_v<T, Matrix4>)
+          return fmt::format("[{}]", fmt::join(v.m, ", "));
+        else if constexpr (std::is_same_v<T, std::vector<std::int64_t>> ||
+                           std::is_same_v<T, std::vector<double>>)
           return fmt::format("[{}]", fmt::join(v, ", "));
-        else if constexpr (std::is_same_v<T, AssetPtr>) return fmt::format("<{}>", v->kind());
-        else if constexpr (std::is_same_v<T, PointBufferPtr>) return fmt::format("<{} points>", v->count());
-        else return fmt::format("{}", v);
+        else if constexpr (std::is_same_v<T, AssetPtr>)
+          return fmt::format("<{}>", v->kind());
+        else if constexpr (std::is_same_v<T, PointBufferPtr>)
+          return fmt::format("<{} points>", v->count());
+        else
+          return fmt::format("{}", v);
       },
       storage_);
 }

@@ -1,5 +1,5 @@
-// Typed values. Small ones (bool to matrix) live in 8-byte-aligned slots of an evaluator; points, colors and weights
-// are buffers (base/points.h); everything structural is a string, a list or an immutable Asset.
+// Typed values. Small ones (bool to matrix) live in 8-byte-aligned slots of an evaluator; points, colors and
+// weights are buffers (base/points.h); everything structural is a string, a list or an immutable Asset.
 #pragma once
 
 #include <cstdint>
@@ -43,8 +43,8 @@ inline int PointComponents(Type type) { return type == Type::kWeights ? 1 : 3; }
 // Bytes of a slot (a multiple of 8); 0 for types that never flow at run time.
 std::size_t SlotSize(Type type);
 
-// An immutable structural object: a mesh, skin weights, animation keys, a subspace. Shared between graphs, plans
-// and threads. Derived data that nodes compute from it (adjacency, ...) is cached beside it by type.
+// An immutable structural object: a mesh, skin weights, animation keys, a subspace. Shared between graphs,
+// plans and threads. Derived data that nodes compute from it (adjacency, ...) is cached beside it by type.
 class Asset {
  public:
   Asset() = default;
@@ -77,31 +77,36 @@ using PointBufferPtr = std::shared_ptr<const PointBuffer>;
 // A value that a graph holds for a plug (or that a static evaluation gave). Empty where nothing was set.
 class Value {
  public:
-  using Storage = std::variant<std::monostate, std::int64_t, double, Double3, Quaternion, Matrix4, std::string,
-                               std::vector<std::int64_t>, std::vector<double>, AssetPtr, PointBufferPtr>;
+  using Storage =
+      std::variant<std::monostate, std::int64_t, double, Double3, Quaternion, Matrix4, std::string,
+                   std::vector<std::int64_t>, std::vector<double>, AssetPtr, PointBufferPtr>;
   Value() = default;
-  Value(bool v) : storage_(static_cast<std::int64_t>(v)) {}   // NOLINT: all implicit by design
-  Value(int v) : storage_(static_cast<std::int64_t>(v)) {}    // NOLINT
-  Value(std::int64_t v) : storage_(v) {}                      // NOLINT
-  Value(double v) : storage_(v) {}                            // NOLINT
-  Value(Double3 v) : storage_(v) {}                           // NOLINT
-  Value(Quaternion v) : storage_(v) {}                        // NOLINT
-  Value(const Matrix4& v) : storage_(v) {}                    // NOLINT
-  Value(const char* v) : storage_(std::string(v)) {}          // NOLINT
-  Value(std::string v) : storage_(std::move(v)) {}            // NOLINT
+  Value(bool v) : storage_(static_cast<std::int64_t>(v)) {}       // NOLINT: all implicit by design
+  Value(int v) : storage_(static_cast<std::int64_t>(v)) {}        // NOLINT
+  Value(std::int64_t v) : storage_(v) {}                          // NOLINT
+  Value(double v) : storage_(v) {}                                // NOLINT
+  Value(Double3 v) : storage_(v) {}                               // NOLINT
+  Value(Quaternion v) : storage_(v) {}                            // NOLINT
+  Value(const Matrix4& v) : storage_(v) {}                        // NOLINT
+  Value(const char* v) : storage_(std::string(v)) {}              // NOLINT
+  Value(std::string v) : storage_(std::move(v)) {}                // NOLINT
   Value(std::vector<std::int64_t> v) : storage_(std::move(v)) {}  // NOLINT
   Value(std::vector<double> v) : storage_(std::move(v)) {}        // NOLINT
   Value(PointBufferPtr v) : storage_(std::move(v)) {}             // NOLINT
   template <typename T>
-    requires std::is_base_of_v<Asset, T>
-  Value(std::shared_ptr<T> v) : storage_(AssetPtr(std::move(v))) {}  // NOLINT
+  requires std::is_base_of_v<Asset, T> Value(std::shared_ptr<T> v)
+      : storage_(AssetPtr(std::move(v))) {}  // NOLINT
 
   bool empty() const { return std::holds_alternative<std::monostate>(storage_); }
   template <typename T>
-  const T* get_if() const { return std::get_if<T>(&storage_); }
+  const T* get_if() const {
+    return std::get_if<T>(&storage_);
+  }
   // The value as T; the caller knows that it holds one (the graph checked the type).
   template <typename T>
-  const T& get() const { return std::get<T>(storage_); }
+  const T& get() const {
+    return std::get<T>(storage_);
+  }
   template <typename T>
   const T* asset() const {
     const auto* p = std::get_if<AssetPtr>(&storage_);

@@ -1,5 +1,6 @@
-// Memory that evaluations on one thread share: the buffers of lazy segments and the scratch of kernels. A workspace
-// serves one plan and one evaluation at a time; evaluators that share one must run on the same thread.
+// Memory that evaluations on one thread share: the buffers of lazy segments and the scratch of kernels. A
+// workspace serves one plan and one evaluation at a time; evaluators that share one must run on the same
+// thread.
 #pragma once
 
 #include "base/points.h"

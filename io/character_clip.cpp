@@ -1,4 +1,5 @@
-// The nodes of a clip: a clipTransform for every animated transform, a clipWeights for every animated mesh node.
+// The nodes of a clip: a clipTransform for every animated transform, a clipWeights for every animated mesh
+// node.
 #include <algorithm>
 #include <map>
 
@@ -13,9 +14,15 @@ constexpr std::size_t kMaxNotes = 200;
 AnimationSampler ToSampler(const gltf::Channel& channel) {
   AnimationSampler sampler;
   switch (channel.interpolation) {
-    case gltf::Interpolation::kStep: sampler.interpolation = AnimationSampler::Interpolation::kStep; break;
-    case gltf::Interpolation::kLinear: sampler.interpolation = AnimationSampler::Interpolation::kLinear; break;
-    case gltf::Interpolation::kCubicSpline: sampler.interpolation = AnimationSampler::Interpolation::kCubicSpline; break;
+    case gltf::Interpolation::kStep:
+      sampler.interpolation = AnimationSampler::Interpolation::kStep;
+      break;
+    case gltf::Interpolation::kLinear:
+      sampler.interpolation = AnimationSampler::Interpolation::kLinear;
+      break;
+    case gltf::Interpolation::kCubicSpline:
+      sampler.interpolation = AnimationSampler::Interpolation::kCubicSpline;
+      break;
   }
   sampler.components = channel.components;
   sampler.times = channel.times;
@@ -30,7 +37,8 @@ struct NodeKeys {
 };
 
 void AddNote(std::string note, std::vector<std::string>* notes) {
-  if (std::find(notes->begin(), notes->end(), note) == notes->end() && notes->size() < kMaxNotes) notes->push_back(std::move(note));
+  if (std::find(notes->begin(), notes->end(), note) == notes->end() && notes->size() < kMaxNotes)
+    notes->push_back(std::move(note));
 }
 
 std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const gltf::Clip& clip,
@@ -40,13 +48,23 @@ std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const glt
     NodeKeys& of_node = keys[channel.node];
     AnimationSampler* sampler = nullptr;
     switch (channel.path) {
-      case gltf::Path::kTranslation: sampler = &of_node.data.translation; break;
-      case gltf::Path::kRotation: sampler = &of_node.data.rotation; break;
-      case gltf::Path::kScale: sampler = &of_node.data.scale; break;
-      case gltf::Path::kWeights: sampler = &of_node.data.weights; break;
+      case gltf::Path::kTranslation:
+        sampler = &of_node.data.translation;
+        break;
+      case gltf::Path::kRotation:
+        sampler = &of_node.data.rotation;
+        break;
+      case gltf::Path::kScale:
+        sampler = &of_node.data.scale;
+        break;
+      case gltf::Path::kWeights:
+        sampler = &of_node.data.weights;
+        break;
     }
     if (!sampler->times.empty()) {
-      AddNote(fmt::format("clip \"{}\" animates one property of nodes[{}] twice; the first is used", clip.id, channel.node), notes);
+      AddNote(fmt::format("clip \"{}\" animates one property of nodes[{}] twice; the first is used", clip.id,
+                          channel.node),
+              notes);
       continue;
     }
     *sampler = ToSampler(channel);
@@ -113,9 +131,11 @@ Status SetClip(const gltf::Character& character, std::optional<std::string_view>
       for (const CharacterClip& known : scene->clips) ids.push_back(known.id);
       if (ids.empty()) return Status::Invalid("{} has no clips, so none named \"{}\"", character.path, *clip);
       constexpr std::size_t kShown = 20;
-      const std::vector<std::string> shown(ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), kShown)));
-      return Status::Invalid("{} has no clip \"{}\"{}; its clips are {}{}", character.path, *clip, DidYouMean(*clip, ids),
-                             fmt::join(shown, ", "), ids.size() > kShown ? ", ..." : "");
+      const std::vector<std::string> shown(
+          ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), kShown)));
+      return Status::Invalid("{} has no clip \"{}\"{}; its clips are {}{}", character.path, *clip,
+                             DidYouMean(*clip, ids), fmt::join(shown, ", "),
+                             ids.size() > kShown ? ", ..." : "");
     }
   }
   for (NodeId node : scene->clip_nodes) KPSA_RETURN_IF_ERROR(graph->RemoveNode(node));
@@ -138,7 +158,8 @@ Status SetClip(const gltf::Character& character, std::optional<std::string_view>
 
 bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug) {
   const NodeDef& def = graph.def(plug.node);
-  if (plug.attribute == def.FindAttribute("offsetParentMatrix")) return scene.clip_transforms.count(plug.node.index) != 0;
+  if (plug.attribute == def.FindAttribute("offsetParentMatrix"))
+    return scene.clip_transforms.count(plug.node.index) != 0;
   return plug.attribute == def.FindAttribute("weight") && scene.clip_weights.count(plug.node.index) != 0;
 }
 

@@ -50,11 +50,12 @@ class Builder {
       const gltf::Mesh& mesh = character_.meshes[character_.nodes[n].mesh];
       points += mesh.vertex_count();
       if (points > kMaxCharacterPoints) {
-        return Status::Invalid("{}: the mesh nodes of the scene have more than {} vertices", character_.path, kMaxCharacterPoints);
+        return Status::Invalid("{}: the mesh nodes of the scene have more than {} vertices", character_.path,
+                               kMaxCharacterPoints);
       }
       if (mesh.targets.size() > kMaxMorphTargets) {
-        return Status::Invalid("{}: mesh of nodes[{}] has {} morph targets; at most {} are supported", character_.path, n,
-                               mesh.targets.size(), kMaxMorphTargets);
+        return Status::Invalid("{}: mesh of nodes[{}] has {} morph targets; at most {} are supported",
+                               character_.path, n, mesh.targets.size(), kMaxMorphTargets);
       }
       const Index skin = character_.nodes[n].skin;
       if (skin != kNoIndex && character_.skins[skin].joints.size() > kMaxSkinJoints) {
@@ -112,7 +113,8 @@ class Builder {
       edit_.Set(node, "offsetParentMatrix", local);
       edit_.Set(node, "restMatrix", local);
       if (from.parent != kNoIndex) {
-        edit_.Connect(edit_.Plug(scene_.transforms[from.parent], "worldMatrix"), edit_.Plug(node, "parentMatrix"));
+        edit_.Connect(edit_.Plug(scene_.transforms[from.parent], "worldMatrix"),
+                      edit_.Plug(node, "parentMatrix"));
       }
     }
     AddAliases(verbatim, names);
@@ -123,7 +125,8 @@ class Builder {
     std::unordered_set<std::string> taken(names.begin(), names.end());
     taken.insert("time");
     for (std::size_t i = 0; i < names.size(); ++i) {
-      if (names[i] != verbatim[i] && verbatim[i] != "time") graph_->AddAlias(scene_.transforms[i], verbatim[i]);
+      if (names[i] != verbatim[i] && verbatim[i] != "time")
+        graph_->AddAlias(scene_.transforms[i], verbatim[i]);
     }
     // `time` is the node of the time; what that lacks may be said of the only transform of that name
     if (std::count(verbatim.begin(), verbatim.end(), "time") == 1) {
@@ -157,11 +160,13 @@ class Builder {
     mesh.vertex_count = static_cast<Index>(gltf_mesh.vertex_count());
     mesh.transform = scene_.transforms[gltf_node];
     auto it = welded_.find(from.mesh);  // instances of a mesh share its geometry
-    if (it == welded_.end()) it = welded_.emplace(from.mesh, WeldMesh(character_, from.mesh, name, options_.weld)).first;
+    if (it == welded_.end())
+      it = welded_.emplace(from.mesh, WeldMesh(character_, from.mesh, name, options_.weld)).first;
     mesh.geometry = it->second;
     for (std::size_t p = 0; p < gltf_mesh.primitives.size(); ++p) {
       const gltf::Primitive& primitive = gltf_mesh.primitives[p];
-      mesh.primitives.push_back({fmt::format("{}/{}", name, p), primitive.first_vertex, primitive.vertex_count});
+      mesh.primitives.push_back(
+          {fmt::format("{}/{}", name, p), primitive.first_vertex, primitive.vertex_count});
     }
 
     mesh.rest = AddOwn("mesh", mesh, "mesh");
@@ -172,7 +177,9 @@ class Builder {
       AddSkinCluster(from.skin, gltf_mesh, &mesh);
     } else if (edit_.ok()) {
       mesh.transform_geometry = AddOwn("transformGeometry", mesh, "transformGeometry");
-      if (edit_.ok()) edit_.Connect(edit_.Plug(mesh.transform, "worldMatrix"), edit_.Plug(mesh.transform_geometry, "matrix"));
+      if (edit_.ok())
+        edit_.Connect(edit_.Plug(mesh.transform, "worldMatrix"),
+                      edit_.Plug(mesh.transform_geometry, "matrix"));
     }
     graph_->AddDelegate(mesh.transform, mesh.rest);
     edit_.Check(ConnectStages(OwnStages(mesh), &mesh, graph_));
@@ -191,7 +198,8 @@ class Builder {
     if (!edit_.ok()) return;
     graph_->SetElementNames(mesh->blend_shape, weight.attribute, std::move(names));
     for (std::size_t k = 0; k < mesh->weights.size(); ++k) {
-      if (mesh->weights[k] != 0) edit_.Set(mesh->blend_shape, "weight", static_cast<int>(k), mesh->weights[k]);
+      if (mesh->weights[k] != 0)
+        edit_.Set(mesh->blend_shape, "weight", static_cast<int>(k), mesh->weights[k]);
     }
     graph_->AddDelegate(mesh->transform, mesh->blend_shape);
   }
@@ -202,7 +210,8 @@ class Builder {
     mesh->skin_cluster = AddOwn("skinCluster", *mesh, "skinCluster");
     if (!edit_.ok()) return;
     bool needs_node = false;
-    mesh->influences = PointInfluences(gltf_mesh, mesh->geometry, static_cast<Index>(skin.joints.size()), &needs_node);
+    mesh->influences =
+        PointInfluences(gltf_mesh, mesh->geometry, static_cast<Index>(skin.joints.size()), &needs_node);
     edit_.Set(mesh->skin_cluster, "influences", 0, mesh->influences);
     for (std::size_t j = 0; j < skin.joints.size(); ++j) {
       mesh->influence_nodes.push_back(scene_.transforms[skin.joints[j]]);
@@ -215,7 +224,8 @@ class Builder {
     for (std::size_t j = 0; j < mesh->influence_nodes.size(); ++j) {
       const int element = static_cast<int>(j);
       edit_.Set(mesh->skin_cluster, "bindPreMatrix", element, mesh->inverse_binds[j]);
-      edit_.Connect(edit_.Plug(mesh->influence_nodes[j], "worldMatrix"), edit_.Plug(mesh->skin_cluster, "matrix", element));
+      edit_.Connect(edit_.Plug(mesh->influence_nodes[j], "worldMatrix"),
+                    edit_.Plug(mesh->skin_cluster, "matrix", element));
     }
   }
 
@@ -246,7 +256,8 @@ std::vector<Stage> OwnStages(const CharacterMesh& mesh) {
   std::vector<Stage> stages;
   if (mesh.blend_shape.version != 0) stages.push_back({"morph", mesh.blend_shape, 0, false, {}});
   if (mesh.skin_cluster.version != 0) stages.push_back({"skin", mesh.skin_cluster, 0, true, {}});
-  if (mesh.transform_geometry.version != 0) stages.push_back({"transform", mesh.transform_geometry, 0, true, {}});
+  if (mesh.transform_geometry.version != 0)
+    stages.push_back({"transform", mesh.transform_geometry, 0, true, {}});
   return stages;
 }
 

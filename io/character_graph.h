@@ -1,9 +1,12 @@
-// A glTF character as graph nodes: a transform for every node of the file, and for every mesh node of its scene the
-// chain mesh -> blendShape -> skinCluster (or transformGeometry, where there is no skin), and the nodes of one clip.
+// A glTF character as graph nodes: a transform for every node of the file, and for every mesh node of its
+// scene the chain mesh -> blendShape -> skinCluster (or transformGeometry, where there is no skin), and the
+// nodes of one clip.
 //
-// Names: glTF names stay verbatim; a shared name becomes `name#<glTF index>`, the bare name then being ambiguous;
-// an unnamed node is `node<index>`; every node is also found by its path, /Torso/Head (paths up to 512 bytes).
-// `<mesh>_mesh`, `<mesh>_blendShape` and `<mesh>_skinCluster` carry the mesh's name in outputs (Character::UniqueName);
+// Names: glTF names stay verbatim; a shared name becomes `name#<glTF index>`, the bare name then being
+// ambiguous; an unnamed node is `node<index>`; every node is also found by its path, /Torso/Head (paths up to
+// 512 bytes).
+// `<mesh>_mesh`, `<mesh>_blendShape` and `<mesh>_skinCluster` carry the mesh's name in outputs
+// (Character::UniqueName);
 // `<mesh>.weight[...]` finds the blendShape's.
 #pragma once
 
@@ -28,7 +31,7 @@ struct CharacterOptions {
 
 // A place in a mesh's stack where its points can be named (head_mesh@skin).
 struct Stage {
-  std::string name;    // "morph", "skin", "transform" or the deformer's
+  std::string name;  // "morph", "skin", "transform" or the deformer's
   NodeId node;
   int geometry = 0;    // which of the deformer's geometries
   bool world = false;  // its points are in world space, not in the mesh's
@@ -46,18 +49,19 @@ struct CharacterMesh {
   Index gltf_node = kNoIndex;
   Index vertex_count = 0;
   WeldedMesh geometry;
-  std::shared_ptr<const Influences> influences;  // null without a skin
-  std::vector<NodeId> influence_nodes;           // transform that Influences' joint j follows
-  std::vector<Matrix4> inverse_binds;            // [j] joint_from_mesh at bind time
-  std::vector<double> weights;                   // default morph weights
-  NodeId transform;                              // of the mesh node
+  std::shared_ptr<const Influences> influences;                // null without a skin
+  std::vector<NodeId> influence_nodes;                         // transform that Influences' joint j follows
+  std::vector<Matrix4> inverse_binds;                          // [j] joint_from_mesh at bind time
+  std::vector<double> weights;                                 // default morph weights
+  NodeId transform;                                            // of the mesh node
   NodeId rest, blend_shape, skin_cluster, transform_geometry;  // invalid where absent
-  std::vector<Stage> stages;                     // in order; the last one's points are `points`
+  std::vector<Stage> stages;                                   // in order; the last one's points are `points`
   PlugRef points;
-  bool world = false;                            // whether `points` are in world space
+  bool world = false;  // whether `points` are in world space
   std::vector<OutputPrimitive> primitives;
   const Mesh& mesh() const { return *geometry.mesh; }
-  // By name; `gltf` is the last of the file's own stages, `skin` also an unskinned mesh's transform. Null if none.
+  // By name; `gltf` is the last of the file's own stages, `skin` also an unskinned mesh's transform. Null if
+  // none.
   const Stage* FindStage(std::string_view stage) const;
 };
 
@@ -67,19 +71,20 @@ struct CharacterClip {
 };
 
 struct CharacterGraph {
-  std::vector<CharacterMesh> meshes;   // in the order of their glTF nodes
-  std::vector<NodeId> transforms;      // by glTF node
-  std::vector<CharacterClip> clips;    // all of the file
-  std::optional<std::string> clip;     // the one that plays
+  std::vector<CharacterMesh> meshes;  // in the order of their glTF nodes
+  std::vector<NodeId> transforms;     // by glTF node
+  std::vector<CharacterClip> clips;   // all of the file
+  std::optional<std::string> clip;    // the one that plays
   std::vector<NodeId> clip_nodes;
   PlugRef time;
-  std::vector<std::string> notes;      // what was ignored, one line each
-  std::unordered_set<Index> clip_transforms, clip_weights;  // graph nodes that any clip moves, or whose weights
+  std::vector<std::string> notes;  // what was ignored, one line each
+  std::unordered_set<Index> clip_transforms,
+      clip_weights;  // graph nodes that any clip moves, or whose weights
 };
 
-// Adds the character to an empty graph whose registry has the standard nodes. Works without recursion at any depth of
-// hierarchy. Errors: an unknown clip; a character beyond kMaxCharacterPoints points, or kMaxSkinJoints or
-// kMaxMorphTargets a mesh.
+// Adds the character to an empty graph whose registry has the standard nodes. Works without recursion at any
+// depth of hierarchy. Errors: an unknown clip; a character beyond kMaxCharacterPoints points, or
+// kMaxSkinJoints or kMaxMorphTargets a mesh.
 Result<CharacterGraph> BuildCharacterGraph(const gltf::Character& character, const CharacterOptions& options,
                                            Graph* graph);
 inline constexpr std::uint64_t kMaxCharacterPoints = 100'000'000;
@@ -92,8 +97,9 @@ Status SetClip(const gltf::Character& character, std::optional<std::string_view>
 // Whether any clip of the character drives the plug.
 bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug);
 
-// Chains the deformers from the mesh's rest points on, in place of the stages that it had; `points` of each stage is
-// set, and mesh[g] and space of each node. Deformers may serve several meshes, in different geometries.
+// Chains the deformers from the mesh's rest points on, in place of the stages that it had; `points` of each
+// stage is set, and mesh[g] and space of each node. Deformers may serve several meshes, in different
+// geometries.
 Status ConnectStages(std::vector<Stage> stages, CharacterMesh* mesh, Graph* graph);
 // The file's own stages of a mesh: morph (if it has targets), then skin or transform.
 std::vector<Stage> OwnStages(const CharacterMesh& mesh);

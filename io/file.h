@@ -11,7 +11,8 @@
 
 namespace kpsa {
 
-// The bytes of a file (not of a folder, a pipe or a device). An error where it is missing, unreadable or larger than max_bytes.
+// The bytes of a file (not of a folder, a pipe or a device). An error where it is missing, unreadable or
+// larger than max_bytes.
 Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::uint64_t max_bytes);
 
 // An output that is written under a temporary name beside its place and renamed by Commit, so that nobody

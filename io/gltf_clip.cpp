@@ -115,7 +115,8 @@ Status ReadClips(const Document& document, Character* character) {
     clip.name = in.name;
     clip.id = in.name.empty() ? fmt::format("anim{}", a) : in.name;
     const auto taken = [&] {
-      return std::any_of(character->clips.begin(), character->clips.end(), [&](const Clip& other) { return other.id == clip.id; });
+      return std::any_of(character->clips.begin(), character->clips.end(),
+                         [&](const Clip& other) { return other.id == clip.id; });
     };
     if (taken()) clip.id += fmt::format("#{}", a);  // legal; nodes of one name are told apart in the same way
     std::set<std::pair<Index, Path>> seen;

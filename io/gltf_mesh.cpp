@@ -176,11 +176,13 @@ Status ReadColors(const Document& document, const tinygltf::Primitive& in, const
                   const Primitive& primitive, Mesh* mesh) {
   const int accessor = FindAttribute(in.attributes, "COLOR_0");
   if (accessor < 0 && mesh->colors.empty()) return {};
-  KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(12 * (mesh->vertex_count() - mesh->colors.size() / 3), where));
+  KPSA_RETURN_IF_ERROR(
+      document.budget.TakeMemory(12 * (mesh->vertex_count() - mesh->colors.size() / 3), where));
   if (accessor >= 0) {
     const std::string place = where + ".COLOR_0";
     KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
-    const bool with_alpha = document.model->accessors[static_cast<std::size_t>(accessor)].type == TINYGLTF_TYPE_VEC4;
+    const bool with_alpha =
+        document.model->accessors[static_cast<std::size_t>(accessor)].type == TINYGLTF_TYPE_VEC4;
     const std::size_t components = with_alpha ? 4 : 3;
     std::vector<float> colors;
     KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, static_cast<int>(components),

@@ -38,7 +38,9 @@ class GraphEditor {
     }
     return Add(type, name);
   }
-  bool Has(NodeId node, std::string_view attribute) const { return graph_->def(node).FindAttribute(attribute) >= 0; }
+  bool Has(NodeId node, std::string_view attribute) const {
+    return graph_->def(node).FindAttribute(attribute) >= 0;
+  }
   // `element` is dropped where the attribute is no array.
   PlugRef Plug(NodeId node, std::string_view attribute, int element = -1, int component = -1) {
     if (!ok()) return PlugRef();
@@ -55,7 +57,9 @@ class GraphEditor {
     const PlugRef plug = Plug(node, attribute, element);
     if (ok()) Check(graph_->Set(plug, std::move(value)));
   }
-  void Set(NodeId node, std::string_view attribute, Value value) { Set(node, attribute, -1, std::move(value)); }
+  void Set(NodeId node, std::string_view attribute, Value value) {
+    Set(node, attribute, -1, std::move(value));
+  }
   void Connect(const PlugRef& source, const PlugRef& destination) {
     if (ok()) Check(graph_->Connect(source, destination));
   }

@@ -41,8 +41,8 @@ class NpzWriter {
   NpzWriter& operator=(NpzWriter&&) noexcept;
   ~NpzWriter();  // without Finish: removes what was written
 
-  // `name` is the key in Python; it may contain '/'. An error for an empty name, a zero byte in it, and a name
-  // that was declared before.
+  // `name` is the key in Python; it may contain '/'. An error for an empty name, a zero byte in it, and a
+  // name that was declared before.
   Result<ArrayId> Declare(const std::string& name, NpzType type, std::vector<std::uint64_t> shape);
   // The next elements in C order; the type must be the declared one.
   Status Append(ArrayId array, std::span<const float> values);

@@ -25,10 +25,14 @@ constexpr std::array<Suffix, 8> kSuffixes = {{{"mm", Unit::kLength, 0.001},
 
 const char* Dimension(Unit unit) {
   switch (unit) {
-    case Unit::kLength: return "a length (mm, cm, m)";
-    case Unit::kAngle: return "an angle (deg, rad)";
-    case Unit::kTime: return "a time (s, f)";
-    case Unit::kNone: break;
+    case Unit::kLength:
+      return "a length (mm, cm, m)";
+    case Unit::kAngle:
+      return "an angle (deg, rad)";
+    case Unit::kTime:
+      return "a time (s, f)";
+    case Unit::kNone:
+      break;
   }
   return "a number without a unit";
 }
@@ -86,8 +90,8 @@ bool LooksNumeric(std::string_view text) {
   if (text.empty()) return false;
   if (IsDigit(text[0])) return true;
   if (text[0] != '.' || text.size() < 2) return false;
-  return IsDigit(text[1]) || text == ".nan" || text == ".NaN" || text == ".NAN" || text == ".inf" || text == ".Inf" ||
-         text == ".INF";
+  return IsDigit(text[1]) || text == ".nan" || text == ".NaN" || text == ".NAN" || text == ".inf" ||
+         text == ".Inf" || text == ".INF";
 }
 
 Result<double> ParseQuantity(std::string_view text, Unit unit, const FileUnits& units) {
@@ -95,21 +99,27 @@ Result<double> ParseQuantity(std::string_view text, Unit unit, const FileUnits& 
   std::string_view rest = whole;
   const bool negative = !rest.empty() && rest[0] == '-';
   if (!rest.empty() && (rest[0] == '-' || rest[0] == '+')) rest.remove_prefix(1);
-  const bool decimal = !rest.empty() && (IsDigit(rest[0]) || (rest.size() > 1 && rest[0] == '.' && IsDigit(rest[1])));
+  const bool decimal =
+      !rest.empty() && (IsDigit(rest[0]) || (rest.size() > 1 && rest[0] == '.' && IsDigit(rest[1])));
   if (!decimal) {
-    if (LooksNumeric(whole)) return Status::Invalid("\"{}\" is not finite: expected {}", whole, Dimension(unit));
+    if (LooksNumeric(whole))
+      return Status::Invalid("\"{}\" is not finite: expected {}", whole, Dimension(unit));
     return Status::Invalid("\"{}\" is no number: expected {}", whole, Dimension(unit));
   }
-  if (rest[0] == '0' && rest.size() > 1 && (IsDigit(rest[1]) || rest[1] == 'x' || rest[1] == 'o' || rest[1] == 'b')) {
-    return Status::Invalid("\"{}\": write numbers in decimal and without leading zeros (YAML versions disagree about "
-                           "them)", whole);
+  if (rest[0] == '0' && rest.size() > 1 &&
+      (IsDigit(rest[1]) || rest[1] == 'x' || rest[1] == 'o' || rest[1] == 'b')) {
+    return Status::Invalid(
+        "\"{}\": write numbers in decimal and without leading zeros (YAML versions disagree about "
+        "them)",
+        whole);
   }
   double number = 0;
   const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
   if (error == std::errc::result_out_of_range || !std::isfinite(number)) {
     return Status::Invalid("\"{}\" is outside of the range of numbers", whole);
   }
-  if (error != std::errc()) return Status::Invalid("\"{}\" is no number: expected {}", whole, Dimension(unit));
+  if (error != std::errc())
+    return Status::Invalid("\"{}\" is no number: expected {}", whole, Dimension(unit));
   if (negative) number = -number;
   const std::string_view name = Trim(rest.substr(static_cast<std::size_t>(end - rest.data())));
   if (name.empty()) return number * units.FactorOf(unit);

@@ -46,7 +46,8 @@ const std::vector<Double3>& RestPose::WorldPoints(std::size_t mesh_index) {
     for (std::size_t p = 0; p < points.size(); ++p) {
       Double3 sum;
       for (Index i = influences.offsets()[p]; i < influences.offsets()[p + 1]; ++i) {
-        sum = sum + TransformPoint(influences_[mesh_index][influences.joints()[i]], points[p]) * influences.weights()[i];
+        sum = sum + TransformPoint(influences_[mesh_index][influences.joints()[i]], points[p]) *
+                        influences.weights()[i];
       }
       points[p] = sum;
     }

@@ -3,8 +3,8 @@
 
 #include <functional>
 #include <map>
-#include <set>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -76,9 +76,10 @@ class RigBuild {
   void ConnectCurves();
   void MakeConnections();
   bool IsOverridden(const PlugRef& plug) const;
-  void ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip);
-  void ConnectPlugs(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip,
-                    bool replace);
+  void ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, const SourceLocation& where,
+                               int source, bool override_clip);
+  void ConnectPlugs(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source,
+                    bool override_clip, bool replace);
   Unit PlugUnit(const PlugRef& plug) const;
   std::optional<std::size_t> FindMesh(const std::string& name, const SourceLocation& where);
   std::optional<NodeId> FindTransform(const std::string& name, const SourceLocation& where);
@@ -89,7 +90,8 @@ class RigBuild {
   void BuildPointsStack(const RigDeform& deform);
   bool ResolveStack(const RigDeform& deform, std::size_t mesh, bool any_morphs, std::vector<Stage>* stages);
   Made* FindDeformer(const RigString& name);
-  bool AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage, const SourceLocation& where);
+  bool AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage,
+                   const SourceLocation& where);
   PointBufferPtr PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points);
   PointBufferPtr RegularGrid(const PlugRef& plug, const RigString& name);
   bool BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box);
@@ -97,10 +99,14 @@ class RigBuild {
   // rig_members.cpp: members, weights, falloffs
   void SetWeights(Made* made);
   const Geometry* GeometryOf(const Made& made, const WeightFile& file) const;
-  bool AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of, std::vector<float>* weights);
-  bool AnyOther(const Made& made, const Geometry& of, const std::function<bool(const CharacterMesh&)>& has) const;
-  bool ReadVertices(const YamlNode& node, std::size_t count, const std::string& of, std::vector<Index>* vertices);
-  bool MultiplyByMaps(const RigAttribute& attribute, const Made& made, std::vector<std::vector<float>>* weights);
+  bool AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of,
+                  std::vector<float>* weights);
+  bool AnyOther(const Made& made, const Geometry& of,
+                const std::function<bool(const CharacterMesh&)>& has) const;
+  bool ReadVertices(const YamlNode& node, std::size_t count, const std::string& of,
+                    std::vector<Index>* vertices);
+  bool MultiplyByMaps(const RigAttribute& attribute, const Made& made,
+                      std::vector<std::vector<float>>* weights);
   bool MultiplyByFalloff(const RigAttribute& attribute, const Geometry& of, std::vector<float>* weights);
   bool FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
                const NamedWeights** map, const Geometry** of);
@@ -115,7 +121,9 @@ class RigBuild {
   Graph& graph() { return *rig_->graph; }
   const Graph& graph() const { return *rig_->graph; }
   const FileUnits& units(int source) const { return file_->sources[static_cast<std::size_t>(source)].units; }
-  const std::string& folder(int source) const { return file_->sources[static_cast<std::size_t>(source)].folder; }
+  const std::string& folder(int source) const {
+    return file_->sources[static_cast<std::size_t>(source)].folder;
+  }
   bool Fail(const SourceLocation& where, Status status);
   Made* FindMade(NodeId id);
   Made* FindMade(const std::string& name);
@@ -132,16 +140,19 @@ class RigBuild {
   std::unordered_map<Index, Index> gltf_by_node_;                     // graph node -> glTF node
   int conversions_ = 0;
   std::vector<Pending> pending_;
-  std::vector<std::pair<PlugRef, bool>> overridden_;                  // plug; whether by a value
-  using PlugKey = std::tuple<Index, int, int, int>;                   // node, attribute, element, component
-  static PlugKey KeyOf(const PlugRef& plug) { return {plug.node.index, plug.attribute, plug.element, plug.component}; }
-  std::map<PlugKey, SourceLocation> written_plugs_[2];                // by nodes, by overrides: a plug has several spellings
-  std::set<PlugKey> connected_plugs_;                                 // of those, the ones that name another plug
-  std::set<PlugKey> overridden_plugs_;                                // the same
-  std::set<PlugKey> stacked_;                                         // points attributes that a stack drives
-  std::unordered_map<Index, Places> curves_;          // by graph node: rest cvs in the world
+  std::vector<std::pair<PlugRef, bool>> overridden_;  // plug; whether by a value
+  using PlugKey = std::tuple<Index, int, int, int>;   // node, attribute, element, component
+  static PlugKey KeyOf(const PlugRef& plug) {
+    return {plug.node.index, plug.attribute, plug.element, plug.component};
+  }
+  std::map<PlugKey, SourceLocation>
+      written_plugs_[2];                      // by nodes, by overrides: a plug has several spellings
+  std::set<PlugKey> connected_plugs_;         // of those, the ones that name another plug
+  std::set<PlugKey> overridden_plugs_;        // the same
+  std::set<PlugKey> stacked_;                 // points attributes that a stack drives
+  std::unordered_map<Index, Places> curves_;  // by graph node: rest cvs in the world
   std::vector<std::optional<SourceLocation>> stack_of_mesh_;
-  std::map<std::string, std::optional<WeightFile>> weight_files_;   // by path; none: it could not be read
+  std::map<std::string, std::optional<WeightFile>> weight_files_;  // by path; none: it could not be read
 };
 
 }  // namespace kpsa

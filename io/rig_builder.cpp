@@ -27,7 +27,8 @@ Status InOrder(const Status& status) {
   for (const Error& error : status.errors()) files.emplace(error.where.file, files.size());
   std::vector<Error> errors = status.errors();
   std::stable_sort(errors.begin(), errors.end(), [&](const Error& a, const Error& b) {
-    return std::tuple(files[a.where.file], a.where.line, a.where.column) < std::tuple(files[b.where.file], b.where.line, b.where.column);
+    return std::tuple(files[a.where.file], a.where.line, a.where.column) <
+           std::tuple(files[b.where.file], b.where.line, b.where.column);
   });
   Status ordered;
   for (Error& error : errors) ordered.Add(std::move(error));
@@ -97,7 +98,8 @@ RigBuild::Made* RigBuild::FindMade(NodeId id) {
 }
 
 Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const RigOptions& options) {
-  if (options.variant.has_value()) return Status::Usage("{} has no variants, so none named \"{}\"", path, *options.variant);
+  if (options.variant.has_value())
+    return Status::Usage("{} has no variants, so none named \"{}\"", path, *options.variant);
   if (options.fps.has_value() && !(*options.fps > 0 && std::isfinite(*options.fps))) {
     return Status::Usage("frames a second: expected a number above 0, found {}", *options.fps);
   }
@@ -152,7 +154,8 @@ SourceLocation PlaceOfMessage(const Rig& rig, std::string_view message) {
   if (!message.starts_with(kNode)) return place;
   message.remove_prefix(kNode.size());
   // Names may hold anything: the longest one that fits
-  for (std::size_t end = message.find(kType); end != std::string_view::npos; end = message.find(kType, end + 1)) {
+  for (std::size_t end = message.find(kType); end != std::string_view::npos;
+       end = message.find(kType, end + 1)) {
     const auto it = rig.node_places.find(std::string(message.substr(0, end)));
     if (it != rig.node_places.end()) place = it->second;
   }

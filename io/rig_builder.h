@@ -1,5 +1,6 @@
-// From a rig file and its character to a graph that can be compiled: everything of RIG-FORMAT.md is looked up, typed,
-// checked and connected here. A .glb or .gltf alone is a rig, too: what it says is the default graph.
+// From a rig file and its character to a graph that can be compiled: everything of RIG-FORMAT.md is looked
+// up, typed, checked and connected here. A .glb or .gltf alone is a rig, too: what it says is the default
+// graph.
 #pragma once
 
 #include <map>
@@ -27,7 +28,7 @@ struct Control {
   std::string name;  // as the rig writes it
   PlugRef plug;
   double min = 0, max = 0;
-  double value = 0;     // at rest
+  double value = 0;  // at rest
   Unit unit = Unit::kNone;
   bool by_clip = false;  // a morph weight that some clip drives while it plays
   SourceLocation where;
@@ -41,9 +42,9 @@ struct AcceleratedPoints {
 struct Acceleration {
   std::string name;
   std::vector<AcceleratedPoints> points;
-  std::optional<NodeId> space;      // a transform; unset: the world
-  std::string subspace;             // path, "" where the rig names none
-  double tolerance = 0;             // metres; where the rig names none, 1/2000 of the rest pose's diagonal
+  std::optional<NodeId> space;  // a transform; unset: the world
+  std::string subspace;         // path, "" where the rig names none
+  double tolerance = 0;         // metres; where the rig names none, 1/2000 of the rest pose's diagonal
   double violation_rate = 0.01;
   std::vector<std::string> train_clips, test_clips;
   std::int64_t train_samples = 0;
@@ -59,18 +60,18 @@ struct Rig {
   std::vector<Acceleration> accelerate;
   FileUnits units;  // of the file that was opened, fps included
   double fps = 24;
-  std::vector<std::string> files;  // all that were read
-  std::vector<std::string> notes;  // what may surprise, one line each
+  std::vector<std::string> files;                     // all that were read
+  std::vector<std::string> notes;                     // what may surprise, one line each
   std::map<std::string, SourceLocation> node_places;  // where the rig's own nodes are written, by name
-  std::vector<PlugRef> pinned;     // plugs that clips leave alone: overridden or set
-  double rest_diagonal = 0;        // metres, of the bounding box of all meshes at rest
+  std::vector<PlugRef> pinned;                        // plugs that clips leave alone: overridden or set
+  double rest_diagonal = 0;                           // metres, of the bounding box of all meshes at rest
 };
 
 // The registry must outlive the rig. All errors of the rig are collected, each at its place.
 Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const RigOptions& options = {});
 
-// Where the node stands that a message of the compiler or an evaluation begins with ("node \"mush\" (deltaMush): ...");
-// the rig itself where that is a node of the character, or none.
+// Where the node stands that a message of the compiler or an evaluation begins with ("node \"mush\"
+// (deltaMush): ..."); the rig itself where that is a node of the character, or none.
 SourceLocation PlaceOfMessage(const Rig& rig, std::string_view message);
 
 // Another clip for a loaded rig (none: the rest pose); nodes and plugs of the rig itself stay as they are.

@@ -52,7 +52,8 @@ void RigBuild::MakeConnections() {
   }
   for (const Pending& pending : pending_) {
     const Result<PlugRef> from = graph().FindPlug(pending.from);
-    if (pending.overrides && from.ok()) ConnectPlugs(*from, pending.to, pending.where, pending.source, true, true);
+    if (pending.overrides && from.ok())
+      ConnectPlugs(*from, pending.to, pending.where, pending.source, true, true);
   }
 }
 
@@ -67,10 +68,12 @@ bool RigBuild::IsOverridden(const PlugRef& plug) const {
 }
 
 // What a node or a connection asked for gives way to overrides: of the whole plug, or of single components.
-void RigBuild::ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip) {
+void RigBuild::ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, const SourceLocation& where,
+                                       int source, bool override_clip) {
   if (IsOverridden(to)) return;
   bool by_component = false, by_element = false;
-  for (auto it = overridden_plugs_.lower_bound({to.node.index, to.attribute, to.element, -1}); it != overridden_plugs_.end(); ++it) {
+  for (auto it = overridden_plugs_.lower_bound({to.node.index, to.attribute, to.element, -1});
+       it != overridden_plugs_.end(); ++it) {
     const auto& [node, attribute, element, component] = *it;
     if (node != to.node.index || attribute != to.attribute) break;
     if (to.element >= 0 && element != to.element) break;
@@ -79,8 +82,9 @@ void RigBuild::ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, c
     by_element = by_element || element != to.element;
   }
   if (by_element) {
-    Fail(where, Status::Invalid("{} drives {} as a whole, and an override changes a part of it: override {} itself", graph().PlugName(from),
-                                graph().PlugName(to), graph().PlugName(to)));
+    Fail(where,
+         Status::Invalid("{} drives {} as a whole, and an override changes a part of it: override {} itself",
+                         graph().PlugName(from), graph().PlugName(to), graph().PlugName(to)));
     return;
   }
   if (!by_component) {
@@ -105,12 +109,13 @@ Unit RigBuild::PlugUnit(const PlugRef& plug) const {
   return graph().def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].unit;
 }
 
-void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source, bool override_clip,
-                            bool replace) {
+void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const SourceLocation& where, int source,
+                            bool override_clip, bool replace) {
   if (IsClipPlug(rig_->scene, graph(), to)) {
     if (!override_clip) {
-      Fail(where, Status::Invalid("a clip drives {0}: write {{from: {1}, to: {0}, override: true}} to take it over",
-                                  graph().PlugName(to), graph().PlugName(from)));
+      Fail(where,
+           Status::Invalid("a clip drives {0}: write {{from: {1}, to: {0}, override: true}} to take it over",
+                           graph().PlugName(to), graph().PlugName(from)));
       return;
     }
     replace = true;
@@ -129,7 +134,8 @@ void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const Source
     PlugRef from_part = from, to_part = to;
     if (triple) from_part.component = to_part.component = i;
     GraphEditor edit(&graph());
-    const NodeId conversion = edit.AddFresh("unitConversion", fmt::format("unitConversion{}", ++conversions_));
+    const NodeId conversion =
+        edit.AddFresh("unitConversion", fmt::format("unitConversion{}", ++conversions_));
     if (edit.ok()) edit.Set(conversion, "conversionFactor", factor);
     if (edit.ok()) {
       edit.Connect(from_part, edit.Plug(conversion, "input"));
@@ -143,12 +149,15 @@ void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const Source
 std::optional<std::size_t> RigBuild::FindMesh(const std::string& name, const SourceLocation& where) {
   std::vector<std::size_t> found;
   const auto by_name = gltf_by_name_.find(name);
-  const Result<NodeId> by_plug_name = by_name == gltf_by_name_.end() ? graph().FindNode(name) : Result<NodeId>(NodeId());
+  const Result<NodeId> by_plug_name =
+      by_name == gltf_by_name_.end() ? graph().FindNode(name) : Result<NodeId>(NodeId());
   for (std::size_t m = 0; m < rig_->scene.meshes.size(); ++m) {
     const CharacterMesh& mesh = rig_->scene.meshes[m];
-    const bool verbatim = by_name != gltf_by_name_.end() &&
-                          std::find(by_name->second.begin(), by_name->second.end(), mesh.gltf_node) != by_name->second.end();
-    if (verbatim || mesh.name == name || (by_plug_name.ok() && *by_plug_name == mesh.transform)) found.push_back(m);
+    const bool verbatim =
+        by_name != gltf_by_name_.end() &&
+        std::find(by_name->second.begin(), by_name->second.end(), mesh.gltf_node) != by_name->second.end();
+    if (verbatim || mesh.name == name || (by_plug_name.ok() && *by_plug_name == mesh.transform))
+      found.push_back(m);
   }
   if (found.size() == 1) return found[0];
   if (found.empty()) {
@@ -159,7 +168,8 @@ std::optional<std::size_t> RigBuild::FindMesh(const std::string& name, const Sou
   }
   std::vector<std::string> several;
   for (std::size_t m : found) several.push_back(rig_->scene.meshes[m].name);
-  Fail(where, Status::Invalid("\"{}\" is the name of several meshes: write {}", name, fmt::join(several, " or ")));
+  Fail(where,
+       Status::Invalid("\"{}\" is the name of several meshes: write {}", name, fmt::join(several, " or ")));
   return std::nullopt;
 }
 
@@ -176,7 +186,8 @@ std::optional<NodeId> RigBuild::FindTransform(const std::string& name, const Sou
   }
   if (several.size() == 1) return only;
   if (several.size() > 1) {
-    Fail(where, Status::Invalid("\"{}\" is the name of several transforms: write {}", name, fmt::join(several, " or ")));
+    Fail(where, Status::Invalid("\"{}\" is the name of several transforms: write {}", name,
+                                fmt::join(several, " or ")));
     return std::nullopt;
   }
   const Result<NodeId> found = graph().FindNode(name);

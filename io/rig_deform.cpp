@@ -16,7 +16,8 @@ void RigBuild::BuildStacks() {
       const std::optional<std::size_t> mesh = FindMesh(name.text, name.where);
       if (!mesh.has_value()) continue;
       if (const std::optional<SourceLocation>& first = stack_of_mesh_[*mesh]; first.has_value()) {
-        Fail(name.where, Status::Invalid("mesh \"{}\" has a stack already, at {}", name.text, first->ToString()));
+        Fail(name.where,
+             Status::Invalid("mesh \"{}\" has a stack already, at {}", name.text, first->ToString()));
         continue;
       }
       stack_of_mesh_[*mesh] = name.where;
@@ -31,9 +32,11 @@ void RigBuild::BuildStacks() {
   }
   for (Made& made : made_) {
     SetWeights(&made);
-    const bool deforms = graph().def(made.id).FindAttribute("outPoints") >= 0 && graph().def(made.id).FindAttribute("inPoints") >= 0;
+    const bool deforms = graph().def(made.id).FindAttribute("outPoints") >= 0 &&
+                         graph().def(made.id).FindAttribute("inPoints") >= 0;
     if (deforms && made.geometries.empty()) {
-      rig_->notes.push_back(fmt::format("{}: \"{}\" is in no stack and deforms nothing", made.from->where.ToString(), made.from->name));
+      rig_->notes.push_back(fmt::format("{}: \"{}\" is in no stack and deforms nothing",
+                                        made.from->where.ToString(), made.from->name));
     }
   }
 }
@@ -42,7 +45,8 @@ RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
   const auto deforms = [&](const Made& made) {
     const NodeDef& def = graph().def(made.id);
     const int points = def.FindAttribute("inPoints");
-    return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && def.FindAttribute("outPoints") >= 0;
+    return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry &&
+           def.FindAttribute("outPoints") >= 0;
   };
   if (Made* made = FindMade(name.text); made != nullptr) {
     if (deforms(*made)) return made;
@@ -53,7 +57,8 @@ RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
   for (const CharacterMesh& mesh : rig_->scene.meshes) {
     for (const Stage& own : OwnStages(mesh)) {
       if (graph().name(own.node) != name.text) continue;
-      Fail(name.where, Status::Invalid("\"{}\" is the file's own: in stacks it is written \"{}\"", name.text, own.name));
+      Fail(name.where,
+           Status::Invalid("\"{}\" is the file's own: in stacks it is written \"{}\"", name.text, own.name));
       return nullptr;
     }
   }
@@ -66,11 +71,13 @@ RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
 }
 
 // The next geometry of a deformer. All that one deformer serves lie in one space.
-bool RigBuild::AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage, const SourceLocation& where) {
+bool RigBuild::AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage,
+                           const SourceLocation& where) {
   if (!made->geometries.empty() && (made->world != world || !(made->world_from_stage == world_from_stage))) {
-    return Fail(where, Status::Invalid("\"{}\" deforms {} and {} in different spaces (before and after a skin, or under "
-                                       "different ones): give each a deformer of its own",
-                                       made->from->name, made->geometries.front().name, geometry.name));
+    return Fail(where, Status::Invalid(
+                           "\"{}\" deforms {} and {} in different spaces (before and after a skin, or under "
+                           "different ones): give each a deformer of its own",
+                           made->from->name, made->geometries.front().name, geometry.name));
   }
   made->world = world;
   made->world_from_stage = world_from_stage;
@@ -82,7 +89,8 @@ bool RigBuild::AddGeometry(Made* made, Geometry geometry, bool world, const Matr
   return Fail(where, edit.Take());
 }
 
-bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, bool any_morphs, std::vector<Stage>* stages) {
+bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, bool any_morphs,
+                            std::vector<Stage>* stages) {
   const CharacterMesh& mesh = rig_->scene.meshes[mesh_index];
   std::vector<Stage> own = OwnStages(mesh);
   const Stage* morph = own.front().name == "morph" ? &own.front() : nullptr;
@@ -94,7 +102,8 @@ bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, boo
   const auto add_own = [&](const Stage& stage, const RigString& item) {
     for (const Stage& earlier : *stages) {
       if (earlier.node == stage.node) {
-        good = Fail(item.where, Status::Invalid("\"{}\" brings the stage {} of \"{}\" a second time", item.text, stage.name, mesh.name));
+        good = Fail(item.where, Status::Invalid("\"{}\" brings the stage {} of \"{}\" a second time",
+                                                item.text, stage.name, mesh.name));
         return;
       }
     }
@@ -104,26 +113,34 @@ bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, boo
   };
   for (const RigString& item : deform.stack) {
     if (item.text == "gltf" || item.text == "morph") {
-      const bool again = morph != nullptr && std::any_of(stages->begin(), stages->end(), [&](const Stage& s) { return s.node == morph->node; });
+      const bool again = morph != nullptr && std::any_of(stages->begin(), stages->end(), [&](const Stage& s) {
+                           return s.node == morph->node;
+                         });
       if (morph != nullptr && world && !again) {
-        good = Fail(item.where, Status::Invalid("\"{}\" of mesh \"{}\" moves points in mesh space, and those of \"{}\" are in world "
-                                                "space: put it before that stage",
-                                                item.text, mesh.name, stages->back().name));
+        good = Fail(item.where,
+                    Status::Invalid(
+                        "\"{}\" of mesh \"{}\" moves points in mesh space, and those of \"{}\" are in world "
+                        "space: put it before that stage",
+                        item.text, mesh.name, stages->back().name));
       } else if (morph != nullptr) {
         add_own(*morph, item);
       }
       if (morph == nullptr && item.text == "morph" && !any_morphs) {
-        good = Fail(item.where, Status::Invalid("mesh \"{}\" has no morph targets: leave \"morph\" out", mesh.name));
+        good = Fail(item.where,
+                    Status::Invalid("mesh \"{}\" has no morph targets: leave \"morph\" out", mesh.name));
       }
     }
     if (item.text == "gltf" || item.text == "skin" || item.text == "transform") {
       if (item.text == "transform" && into_world.name == "skin") {
-        good = Fail(item.where, Status::Invalid("mesh \"{}\" has a skin, which ignores its transform: write \"skin\"", mesh.name));
+        good = Fail(item.where,
+                    Status::Invalid("mesh \"{}\" has a skin, which ignores its transform: write \"skin\"",
+                                    mesh.name));
       } else {
         add_own(into_world, item);
       }
     }
-    if (item.text == "gltf" || item.text == "morph" || item.text == "skin" || item.text == "transform") continue;
+    if (item.text == "gltf" || item.text == "morph" || item.text == "skin" || item.text == "transform")
+      continue;
     Made* made = FindDeformer(item);
     if (made == nullptr) {
       good = false;
@@ -133,10 +150,13 @@ bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, boo
     if (!world && !placed && into_world.name == "transform") add_own(into_world, item);
     const Matrix4 world_from_stage = world ? Matrix4() : rest_->WorldFromMesh(mesh_index);
     const int geometry = static_cast<int>(made->geometries.size());
-    good = AddGeometry(made, {mesh.name, mesh_index, mesh.mesh().point_count()}, world, world_from_stage, item.where) && good;
+    good = AddGeometry(made, {mesh.name, mesh_index, mesh.mesh().point_count()}, world, world_from_stage,
+                       item.where) &&
+           good;
     stages->push_back({item.text, made->id, geometry, world, {}});
   }
-  if (!world && !placed && into_world.name == "transform") add_own(into_world, {into_world.name, deform.where, deform.source});
+  if (!world && !placed && into_world.name == "transform")
+    add_own(into_world, {into_world.name, deform.where, deform.source});
   return good;
 }
 
@@ -146,8 +166,9 @@ void RigBuild::BuildMeshStack(const RigDeform& deform, std::size_t mesh_index, b
   CharacterMesh& mesh = rig_->scene.meshes[mesh_index];
   Fail(deform.where, ConnectStages(std::move(stages), &mesh, &graph()));
   if (!mesh.world) {
-    rig_->notes.push_back(fmt::format("{}: the stack of \"{}\" leaves out its skin, so that its points stay in mesh space",
-                                      deform.where.ToString(), mesh.name));
+    rig_->notes.push_back(
+        fmt::format("{}: the stack of \"{}\" leaves out its skin, so that its points stay in mesh space",
+                    deform.where.ToString(), mesh.name));
   }
 }
 
@@ -156,9 +177,11 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
   const RigString& name = *deform.points;
   const Result<PlugRef> plug = graph().FindPlug(name.text);
   if (!Fail(name.where, plug.status())) return;
-  const AttributeDef& attribute = graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
+  const AttributeDef& attribute =
+      graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
   if (graph().PlugType(*plug) != Type::kPoints || attribute.output) {
-    Fail(name.where, Status::Invalid("{} is no points input, so it cannot be deformed", graph().PlugName(*plug)));
+    Fail(name.where,
+         Status::Invalid("{} is no points input, so it cannot be deformed", graph().PlugName(*plug)));
     return;
   }
   Matrix4 world_from_points;
@@ -167,15 +190,19 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
   std::optional<PlugRef> last;
   for (const RigString& item : deform.stack) {
     for (const char* word : {"gltf", "morph", "skin", "transform"}) {
-      if (item.text == word) Fail(item.where, Status::Invalid("\"{}\" belongs to meshes, not to {}", word, name.text));
+      if (item.text == word)
+        Fail(item.where, Status::Invalid("\"{}\" belongs to meshes, not to {}", word, name.text));
     }
     Made* made = FindDeformer(item);
     if (made != nullptr && graph().def(made->id).name == "deltaMush") {
-      Fail(item.where, Status::Invalid("\"{}\" smooths along the edges of a mesh, and {} has none", item.text, name.text));
+      Fail(item.where, Status::Invalid("\"{}\" smooths along the edges of a mesh, and {} has none", item.text,
+                                       name.text));
       return;
     }
     const int geometry = made == nullptr ? 0 : static_cast<int>(made->geometries.size());
-    if (made == nullptr || !AddGeometry(made, {name.text, std::nullopt, points->count()}, false, world_from_points, item.where)) return;
+    if (made == nullptr ||
+        !AddGeometry(made, {name.text, std::nullopt, points->count()}, false, world_from_points, item.where))
+      return;
     GraphEditor edit(&graph());
     if (edit.Has(made->id, "space")) edit.Set(made->id, "space", Value("mesh"));
     if (last.has_value()) {
@@ -191,8 +218,10 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
   Fail(name.where, graph().Connect(*last, *plug));
 }
 
-// The value that a points attribute has without its stack. Lattice points are in the coordinates of the lattice's box.
-PointBufferPtr RigBuild::PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points) {
+// The value that a points attribute has without its stack. Lattice points are in the coordinates of the
+// lattice's box.
+PointBufferPtr RigBuild::PointsToDeform(const PlugRef& plug, const RigString& name,
+                                        Matrix4* world_from_points) {
   const AttributeDef& attribute = graph().def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
   const Value* set = graph().FindValue(plug);
   PointBufferPtr points;
@@ -214,14 +243,17 @@ PointBufferPtr RigBuild::PointsToDeform(const PlugRef& plug, const RigString& na
   for (const SetValue& single : graph().Values(plug.node, plug.attribute)) {
     if (single.plug.element < 0) continue;
     if (static_cast<std::size_t>(single.plug.element) >= points->count()) {
-      Fail(name.where, Status::Invalid("{}: {} is set, but there are {} points", name.text, graph().PlugName(single.plug), points->count()));
+      Fail(name.where, Status::Invalid("{}: {} is set, but there are {} points", name.text,
+                                       graph().PlugName(single.plug), points->count()));
       return nullptr;
     }
-    if (changed == nullptr) changed = std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(points->Interleaved()));
+    if (changed == nullptr)
+      changed = std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(points->Interleaved()));
     float* rows[3] = {changed->view().x, changed->view().y, changed->view().z};
     for (int i = 0; i < 3; ++i) {
       if (single.plug.component >= 0 && single.plug.component != i) continue;
-      const double value = single.plug.component >= 0 ? single.value.AsDouble() : single.value.get<Double3>()[i];
+      const double value =
+          single.plug.component >= 0 ? single.value.AsDouble() : single.value.get<Double3>()[i];
       rows[i][single.plug.element] = static_cast<float>(value);
     }
   }
@@ -234,11 +266,15 @@ PointBufferPtr RigBuild::RegularGrid(const PlugRef& plug, const RigString& name)
   const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(plug.attribute)];
   const int number = def.FindAttribute(attribute.grid);
   const Value* divisions_set = graph().FindValue({plug.node, number, -1, -1});
-  const Value& divisions = divisions_set != nullptr ? *divisions_set : def.attributes[static_cast<std::size_t>(number)].default_value;
+  const Value& divisions = divisions_set != nullptr
+                               ? *divisions_set
+                               : def.attributes[static_cast<std::size_t>(number)].default_value;
   const auto* sizes = divisions.get_if<std::vector<std::int64_t>>();
   constexpr std::int64_t kMaxDivisions = 32;
-  if (sizes == nullptr || sizes->size() != 3 || std::any_of(sizes->begin(), sizes->end(), [](std::int64_t n) { return n < 2 || n > kMaxDivisions; })) {
-    Fail(name.where, Status::Invalid("{}: the divisions {} are not three whole numbers from 2 to {}", name.text, divisions.ToString(), kMaxDivisions));
+  if (sizes == nullptr || sizes->size() != 3 ||
+      std::any_of(sizes->begin(), sizes->end(), [](std::int64_t n) { return n < 2 || n > kMaxDivisions; })) {
+    Fail(name.where, Status::Invalid("{}: the divisions {} are not three whole numbers from 2 to {}",
+                                     name.text, divisions.ToString(), kMaxDivisions));
     return nullptr;
   }
   std::vector<float> grid;
@@ -247,7 +283,8 @@ PointBufferPtr RigBuild::RegularGrid(const PlugRef& plug, const RigString& name)
       for (std::int64_t s = 0; s < (*sizes)[0]; ++s) {
         const std::int64_t at[3] = {s, t, u};
         for (std::size_t i = 0; i < 3; ++i) {
-          grid.push_back(static_cast<float>(static_cast<double>(at[i]) / static_cast<double>((*sizes)[i] - 1)));
+          grid.push_back(
+              static_cast<float>(static_cast<double>(at[i]) / static_cast<double>((*sizes)[i] - 1)));
         }
       }
     }
@@ -255,7 +292,8 @@ PointBufferPtr RigBuild::RegularGrid(const PlugRef& plug, const RigString& name)
   return std::make_shared<const PointBuffer>(PointBuffer::FromInterleaved(grid));
 }
 
-// The lattice's box at rest, in the axes of its stage. Where the rig does not set it, it is set here to what the members fill.
+// The lattice's box at rest, in the axes of its stage. Where the rig does not set it, it is set here to what
+// the members fill.
 bool RigBuild::BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box) {
   GraphEditor edit(&graph());
   const PlugRef min_plug = edit.Plug(lattice->id, "boxMin"), max_plug = edit.Plug(lattice->id, "boxMax");
@@ -282,8 +320,11 @@ bool RigBuild::BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4*
   if (min_set != nullptr) low = min_set->get<Double3>();
   if (max_set != nullptr) high = max_set->get<Double3>();
   if (!(low.x <= high.x)) {
-    return Fail(where, Status::Invalid("\"{}\" has no members, so its points have no place: put it in a stack or set boxMin and boxMax",
-                                       lattice->from->name));
+    return Fail(
+        where,
+        Status::Invalid(
+            "\"{}\" has no members, so its points have no place: put it in a stack or set boxMin and boxMax",
+            lattice->from->name));
   }
   if (min_set == nullptr && max_set == nullptr) {
     // A hair wider than the members, as the lattice makes it by itself

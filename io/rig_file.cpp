@@ -15,7 +15,8 @@ constexpr double kDefaultFps = 24;
 // Reads a file and those that it includes, depth first, and merges them into one RigFile.
 class Reader {
  public:
-  Reader(RigFile* rig, YamlErrors* errors, std::optional<double> fps) : rig_(rig), errors_(errors), fps_(fps) {}
+  Reader(RigFile* rig, YamlErrors* errors, std::optional<double> fps)
+      : rig_(rig), errors_(errors), fps_(fps) {}
 
   void Read(const std::string& path, const SourceLocation& included_at) {
     std::error_code ignored;
@@ -27,11 +28,13 @@ class Reader {
       }
     }
     if (const auto it = read_.find(identity); it != read_.end()) {
-      errors_->Append(Status::Invalid("\"{}\" is included twice: here and at {}", path, it->second.ToString()).At(included_at));
+      errors_->Append(Status::Invalid("\"{}\" is included twice: here and at {}", path, it->second.ToString())
+                          .At(included_at));
       return;
     }
     if (read_.size() >= kMaxFiles) {
-      if (read_.size() == kMaxFiles) errors_->Append(Status::Invalid("more than {} files are included", kMaxFiles).At(included_at));
+      if (read_.size() == kMaxFiles)
+        errors_->Append(Status::Invalid("more than {} files are included", kMaxFiles).At(included_at));
       return;
     }
     read_.emplace(identity, included_at);
@@ -39,8 +42,10 @@ class Reader {
     if (!root.ok()) {
       rig_->complete = false;
       for (const Error& error : root.status().errors()) {
-        const bool unread = error.where.line == 0 && included_at.line > 0;  // nothing of it: the place that asks for it says more
-        errors_->Append(unread ? Status::Invalid("include: {} {}", path, error.message).At(included_at) : Status(error));
+        const bool unread = error.where.line == 0 &&
+                            included_at.line > 0;  // nothing of it: the place that asks for it says more
+        errors_->Append(unread ? Status::Invalid("include: {} {}", path, error.message).At(included_at)
+                               : Status(error));
       }
       return;
     }
@@ -66,7 +71,8 @@ class Reader {
     for (const Opened* open = &first + 1; open != open_.data() + open_.size(); ++open) {
       chain += fmt::format(" -> {} (at {})", open->path, open->included_at.ToString());
     }
-    errors_->Append(Status::Invalid("includes form a cycle: {} -> {} (here)", chain, first.path).At(included_at));
+    errors_->Append(
+        Status::Invalid("includes form a cycle: {} -> {} (here)", chain, first.path).At(included_at));
   }
 
   void ReadRoot(const YamlNode& root, int source) {
@@ -97,7 +103,8 @@ class Reader {
     }
     if (const YamlNode* node = map.Find("character")) {
       RigString character{{}, node->where(), source};
-      if (Define("character", "character", node->where()) && ReadString(*node, "character", &character.text, errors_)) {
+      if (Define("character", "character", node->where()) &&
+          ReadString(*node, "character", &character.text, errors_)) {
         character.text = ResolvePath(here.folder, character.text);
         rig_->character = std::move(character);
       }
@@ -105,16 +112,17 @@ class Reader {
     if (const YamlNode* node = map.Find("weld"); node != nullptr && Define("weld", "weld", node->where())) {
       ReadBool(*node, "weld", &rig_->weld, errors_);
     }
-    if (const YamlNode* node = map.Find("include"); node != nullptr && !node->is_null()) ReadIncludes(*node, here.folder);
+    if (const YamlNode* node = map.Find("include"); node != nullptr && !node->is_null())
+      ReadIncludes(*node, here.folder);
 
     // A section whose lines are all comments is empty
     const auto section = [&](const char* key) {
       const YamlNode* node = map.Find(key);
       return node == nullptr || node->is_null() ? nullptr : node;
     };
-    SectionReader sections{rig_, errors_, source, [this](const std::string& section, const std::string& key, const SourceLocation& where) {
-                             return Define(section, key, where);
-                           }};
+    SectionReader sections{rig_, errors_, source,
+                           [this](const std::string& section, const std::string& key,
+                                  const SourceLocation& where) { return Define(section, key, where); }};
     if (const YamlNode* node = section("nodes")) sections.ReadNodes(*node);
     if (const YamlNode* node = section("connections")) sections.ReadConnections(*node);
     if (const YamlNode* node = section("deform")) sections.ReadDeform(*node);
@@ -152,10 +160,11 @@ class Reader {
   bool Define(const std::string& section, const std::string& key, const SourceLocation& where) {
     const auto [it, added] = defined_.emplace(section + '\n' + key, where);
     if (added) return true;
-    errors_->Append(Status::Invalid("{} is defined twice: here and at {}",
-                                    section == key ? fmt::format("\"{}\"", key) : fmt::format("{} \"{}\"", section, key),
-                                    it->second.ToString())
-                        .At(where));
+    errors_->Append(
+        Status::Invalid("{} is defined twice: here and at {}",
+                        section == key ? fmt::format("\"{}\"", key) : fmt::format("{} \"{}\"", section, key),
+                        it->second.ToString())
+            .At(where));
     return false;
   }
 
@@ -177,10 +186,12 @@ std::string ResolvePath(const std::string& folder, const std::string& path) {
 void ReadUnits(const YamlNode& node, FileUnits* units, YamlErrors* errors) {
   YamlMap map(node, "units", errors);
   std::string name;
-  if (const YamlNode* length = map.Find("length"); length != nullptr && ReadString(*length, "units.length", &name, errors)) {
+  if (const YamlNode* length = map.Find("length");
+      length != nullptr && ReadString(*length, "units.length", &name, errors)) {
     errors->Add(*length, units->SetLength(name));
   }
-  if (const YamlNode* angle = map.Find("angle"); angle != nullptr && ReadString(*angle, "units.angle", &name, errors)) {
+  if (const YamlNode* angle = map.Find("angle");
+      angle != nullptr && ReadString(*angle, "units.angle", &name, errors)) {
     errors->Add(*angle, units->SetAngle(name));
   }
   map.RejectUnread();
@@ -201,7 +212,8 @@ Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* 
   Reader(rig, &errors, fps).Read(path, {path, 0, 0});
   for (RigSource& source : rig->sources) source.units.fps = fps.value_or(rig->fps.value_or(kDefaultFps));
   if (errors.ok() && !rig->character.has_value()) {
-    errors.Append(Status::Invalid("the rig names no character: add \"character: FILE.glb\"").At({path, 1, 1}));
+    errors.Append(
+        Status::Invalid("the rig names no character: add \"character: FILE.glb\"").At({path, 1, 1}));
   }
   return errors.Take();
 }

@@ -1,6 +1,6 @@
-// A rig file (RIG-FORMAT.md, version 1) as plain data, its includes merged in. Names are not looked up and values of
-// attributes are not typed yet: that takes a registry and a character (io/rig_builder.h). Keys of later versions
-// (plugins, variants, clips, references, templates, use) are refused by name.
+// A rig file (RIG-FORMAT.md, version 1) as plain data, its includes merged in. Names are not looked up and
+// values of attributes are not typed yet: that takes a registry and a character (io/rig_builder.h). Keys of
+// later versions (plugins, variants, clips, references, templates, use) are refused by name.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,8 @@ struct RigString {
 };
 
 struct RigAttribute {
-  std::string name;  // "iterations", "rotateX", "input[2]"; common words (parent, at, members, ...) are kept apart
+  std::string
+      name;  // "iterations", "rotateX", "input[2]"; common words (parent, at, members, ...) are kept apart
   YamlNode key, value;
   int source = 0;
 };
@@ -50,8 +51,8 @@ struct RigConnection {
 };
 
 struct RigDeform {
-  std::vector<RigString> meshes;       // either meshes ...
-  std::optional<RigString> points;     // ... or a points attribute
+  std::vector<RigString> meshes;    // either meshes ...
+  std::optional<RigString> points;  // ... or a points attribute
   std::vector<RigString> stack;
   SourceLocation where;
   int source = 0;
@@ -72,7 +73,7 @@ struct RigAccelerate {
   };
   std::vector<Points> points;
   std::optional<RigString> space;
-  std::string subspace;         // path, resolved; "" where none is named
+  std::string subspace;             // path, resolved; "" where none is named
   std::optional<double> tolerance;  // metres
   double violation_rate = 0.01;     // of frames, 0..1
   std::vector<RigString> train_clips, test_clips;
@@ -89,7 +90,7 @@ struct RigFile {
   std::optional<RigString> character;  // path, resolved
   std::optional<double> fps;
   bool weld = true;
-  bool complete = true;                // false: some file could not be read, so that names may be missing
+  bool complete = true;  // false: some file could not be read, so that names may be missing
   std::vector<RigNode> nodes;
   std::vector<RigConnection> connections;
   std::vector<RigDeform> deform;
@@ -98,8 +99,8 @@ struct RigFile {
   std::vector<RigOverride> overrides;
 };
 
-// Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig then
-// holds what could be read, for finding more of them. `fps` overrides the rig's for the suffix f.
+// Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig
+// then holds what could be read, for finding more of them. `fps` overrides the rig's for the suffix f.
 Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig);
 
 // The units: section into `units`.

@@ -14,13 +14,15 @@ bool SectionReader::CheckMap(const YamlNode& node, const char* section) const {
   return node.is_map() || errors->Add(node, "{}: expected a map, found {}", section, node.kind_name());
 }
 
-bool SectionReader::ReadNames(const YamlNode& node, const std::string& what, std::vector<RigString>* names) const {
+bool SectionReader::ReadNames(const YamlNode& node, const std::string& what,
+                              std::vector<RigString>* names) const {
   names->clear();
   if (node.is_scalar()) {
     names->push_back({node.scalar, node.where(), source});
     return true;
   }
-  if (!node.is_sequence()) return errors->Add(node, "{}: expected a list of names, found {}", what, node.kind_name());
+  if (!node.is_sequence())
+    return errors->Add(node, "{}: expected a list of names, found {}", what, node.kind_name());
   bool good = true;
   for (const YamlNode& item : node.items) {
     std::string text;
@@ -57,7 +59,8 @@ void SectionReader::ReadNodes(const YamlNode& node) {
     if (!ReadString(*type, what + ": type", &rig_node.type, errors)) continue;
     rig_node.type_node = *type;
     for (std::size_t k = 0; k < body.keys.size(); ++k) {
-      if (body.keys[k].scalar != "type") rig_node.attributes.push_back({body.keys[k].scalar, body.keys[k], body.items[k], source});
+      if (body.keys[k].scalar != "type")
+        rig_node.attributes.push_back({body.keys[k].scalar, body.keys[k], body.items[k], source});
     }
     rig->nodes.push_back(std::move(rig_node));
   }
@@ -81,7 +84,8 @@ void SectionReader::ReadConnections(const YamlNode& node) {
       if (from == nullptr || to == nullptr) continue;
       bool good = ReadString(*from, "from", &connection.from, errors);
       good = ReadString(*to, "to", &connection.to, errors) && good;
-      if (override_clip != nullptr) good = ReadBool(*override_clip, "override", &connection.override_clip, errors) && good;
+      if (override_clip != nullptr)
+        good = ReadBool(*override_clip, "override", &connection.override_clip, errors) && good;
       if (!good) continue;
     } else {
       std::string text;
@@ -89,7 +93,10 @@ void SectionReader::ReadConnections(const YamlNode& node) {
       constexpr std::string_view kArrow = " -> ";
       const std::size_t arrow = text.find(kArrow);
       if (arrow == std::string::npos || text.find(kArrow, arrow + 1) != std::string::npos) {
-        errors->Add(item, "\"{}\": expected one connection, \"source.attribute -> destination.attribute\" with spaces around ->", text);
+        errors->Add(item,
+                    "\"{}\": expected one connection, \"source.attribute -> destination.attribute\" with "
+                    "spaces around ->",
+                    text);
         continue;
       }
       connection.from = text.substr(0, arrow);
@@ -101,7 +108,8 @@ void SectionReader::ReadConnections(const YamlNode& node) {
 
 void SectionReader::ReadDeform(const YamlNode& node) {
   if (!node.is_sequence()) {
-    errors->Add(node, "deform: expected a list of {{meshes: [...], stack: [...]}}, found {}", node.kind_name());
+    errors->Add(node, "deform: expected a list of {{meshes: [...], stack: [...]}}, found {}",
+                node.kind_name());
     return;
   }
   for (const YamlNode& item : node.items) {
@@ -122,13 +130,16 @@ void SectionReader::ReadDeform(const YamlNode& node) {
     if (meshes != nullptr) ReadNames(*meshes, "meshes", &deform.meshes);
     if (points != nullptr) {
       deform.points = RigString{{}, points->where(), source};
-      if (ReadString(*points, "points", &deform.points->text, errors)) define("the stack of", deform.points->text, points->where());
+      if (ReadString(*points, "points", &deform.points->text, errors))
+        define("the stack of", deform.points->text, points->where());
     }
     std::map<std::string, SourceLocation> seen;
     for (const RigString& deformer : deform.stack) {
       const auto [it, added] = seen.emplace(deformer.text, deformer.where);
       if (added) continue;
-      errors->Append(Status::Invalid("\"{}\" is in this stack twice: first at {}", deformer.text, it->second.ToString()).At(deformer.where));
+      errors->Append(
+          Status::Invalid("\"{}\" is in this stack twice: first at {}", deformer.text, it->second.ToString())
+              .At(deformer.where));
     }
     if (errors->count() == before) rig->deform.push_back(std::move(deform));
   }
@@ -143,7 +154,8 @@ void SectionReader::ReadControls(const YamlNode& node) {
     const YamlNode* min = map.Required("min");
     const YamlNode* max = map.Required("max");
     map.RejectUnread();
-    if (min != nullptr && max != nullptr) rig->controls.push_back({{key.scalar, key.where(), source}, *min, *max});
+    if (min != nullptr && max != nullptr)
+      rig->controls.push_back({{key.scalar, key.where(), source}, *min, *max});
   }
 }
 
@@ -153,15 +165,19 @@ void SectionReader::ReadAcceleratePoints(const YamlNode& node, RigAccelerate* ac
   if (names.empty()) errors->Add(node, "points: name at least one mesh@stage");
   for (const RigString& name : names) {
     // Names may hold an @, too: the builder, who knows the meshes, looks again
-    const std::size_t at = name.text.size() < 3 ? std::string::npos : name.text.rfind('@', name.text.size() - 2);
+    const std::size_t at =
+        name.text.size() < 3 ? std::string::npos : name.text.rfind('@', name.text.size() - 2);
     if (at == std::string::npos || at == 0) {
-      errors->Append(Status::Invalid("points \"{}\": expected mesh@stage, as in head_mesh@skin", name.text).At(name.where));
+      errors->Append(Status::Invalid("points \"{}\": expected mesh@stage, as in head_mesh@skin", name.text)
+                         .At(name.where));
       continue;
     }
     RigAccelerate::Points points{name.text.substr(0, at), name.text.substr(at + 1), name.where};
     for (const RigAccelerate::Points& other : accelerate->points) {
       if (other.mesh == points.mesh) {
-        errors->Append(Status::Invalid("points of \"{}\" are named twice: first at {}", points.mesh, other.where.ToString()).At(name.where));
+        errors->Append(Status::Invalid("points of \"{}\" are named twice: first at {}", points.mesh,
+                                       other.where.ToString())
+                           .At(name.where));
       }
     }
     accelerate->points.push_back(std::move(points));
@@ -183,12 +199,15 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
       accelerate.space = RigString{{}, space->where(), source};
       ReadString(*space, "space", &accelerate.space->text, errors);
     }
-    if (const YamlNode* path = map.Find("subspace"); path != nullptr && ReadString(*path, "subspace", &accelerate.subspace, errors)) {
-      accelerate.subspace = ResolvePath(rig->sources[static_cast<std::size_t>(source)].folder, accelerate.subspace);
+    if (const YamlNode* path = map.Find("subspace");
+        path != nullptr && ReadString(*path, "subspace", &accelerate.subspace, errors)) {
+      accelerate.subspace =
+          ResolvePath(rig->sources[static_cast<std::size_t>(source)].folder, accelerate.subspace);
     }
     double number = 0;
     if (const YamlNode* tolerance = map.Find("tolerance");
-        tolerance != nullptr && ReadNumber(*tolerance, "tolerance", Unit::kLength, units(), &number, errors)) {
+        tolerance != nullptr &&
+        ReadNumber(*tolerance, "tolerance", Unit::kLength, units(), &number, errors)) {
       if (number > 0) {
         accelerate.tolerance = number;
       } else {
@@ -196,15 +215,18 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
       }
     }
     if (const YamlNode* rate = map.Find("violationRate");
-        rate != nullptr && ReadNumber(*rate, "violationRate", Unit::kNone, units(), &accelerate.violation_rate, errors)) {
+        rate != nullptr &&
+        ReadNumber(*rate, "violationRate", Unit::kNone, units(), &accelerate.violation_rate, errors)) {
       if (accelerate.violation_rate < 0 || accelerate.violation_rate > 1) {
         errors->Add(*rate, "violationRate: expected 0% to 100%, found {}", rate->scalar);
       }
     }
     if (const YamlNode* train = map.Find("train")) {
       YamlMap train_map(*train, "train", errors);
-      if (const YamlNode* clips = train_map.Find("clips")) ReadNames(*clips, "clips", &accelerate.train_clips);
-      if (const YamlNode* samples = train_map.Find("samples")) ReadInteger(*samples, "samples", 0, kMaxSamples, &accelerate.train_samples, errors);
+      if (const YamlNode* clips = train_map.Find("clips"))
+        ReadNames(*clips, "clips", &accelerate.train_clips);
+      if (const YamlNode* samples = train_map.Find("samples"))
+        ReadInteger(*samples, "samples", 0, kMaxSamples, &accelerate.train_samples, errors);
       train_map.RejectUnread();
     }
     if (const YamlNode* test = map.Find("test")) {
@@ -216,7 +238,9 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
     for (const RigString& clip : accelerate.test_clips) {
       for (const RigString& train : accelerate.train_clips) {
         if (train.text != clip.text) continue;
-        errors->Append(Status::Invalid("clip \"{}\" is trained on at {}: test clips must be others", clip.text, train.where.ToString()).At(clip.where));
+        errors->Append(Status::Invalid("clip \"{}\" is trained on at {}: test clips must be others",
+                                       clip.text, train.where.ToString())
+                           .At(clip.where));
       }
     }
     rig->accelerate.push_back(std::move(accelerate));

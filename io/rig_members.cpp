@@ -32,25 +32,30 @@ Index RigBuild::PointOf(const Geometry& of, Index vertex) const {
   return of.mesh.has_value() ? rig_->scene.meshes[*of.mesh].mesh().data().vertex_to_point[vertex] : vertex;
 }
 
-// Sets weights[g] of the geometries that were added since the last call. Nothing is set where the rig says nothing.
+// Sets weights[g] of the geometries that were added since the last call. Nothing is set where the rig says
+// nothing.
 void RigBuild::SetWeights(Made* made) {
   if (made->weighted == made->geometries.size()) return;
   const std::size_t first = made->weighted;
   made->weighted = made->geometries.size();
-  const auto find = [&](const char* key) { return made->special.count(key) != 0 ? made->special[key] : nullptr; };
+  const auto find = [&](const char* key) {
+    return made->special.count(key) != 0 ? made->special[key] : nullptr;
+  };
   const RigAttribute* members = find("members");
   const RigAttribute* maps = find("weights");
   const RigAttribute* falloff = find("falloff");
   if (members == nullptr && maps == nullptr && falloff == nullptr) return;
 
   std::vector<std::vector<float>> weights;
-  for (const Geometry& of : made->geometries) weights.emplace_back(of.count, members == nullptr ? 1.0f : 0.0f);
+  for (const Geometry& of : made->geometries)
+    weights.emplace_back(of.count, members == nullptr ? 1.0f : 0.0f);
   bool good = true;
   for (std::size_t g = first; g < weights.size() && members != nullptr; ++g) {
     const Geometry& of = made->geometries[g];
     good = AddMembers(members->value, members->source, *made, of, &weights[g]) && good;
     if (good && std::all_of(weights[g].begin(), weights[g].end(), [](float w) { return w == 0; })) {
-      rig_->notes.push_back(fmt::format("{}: the members of \"{}\" are no point of {}", members->value.where().ToString(), made->from->name, of.name));
+      rig_->notes.push_back(fmt::format("{}: the members of \"{}\" are no point of {}",
+                                        members->value.where().ToString(), made->from->name, of.name));
     }
   }
   if (maps != nullptr) good = MultiplyByMaps(*maps, *made, &weights) && good;
@@ -60,16 +65,19 @@ void RigBuild::SetWeights(Made* made) {
   if (!good) return;
   GraphEditor edit(&graph());
   for (std::size_t g = first; g < weights.size(); ++g) {
-    edit.Set(made->id, "weights", static_cast<int>(g), std::make_shared<const WeightMap>(std::move(weights[g])));
+    edit.Set(made->id, "weights", static_cast<int>(g),
+             std::make_shared<const WeightMap>(std::move(weights[g])));
   }
   Fail(made->from->where, edit.Take());
 }
 
 // "0:99,120" (both ends included), a number, or a list of numbers.
-bool RigBuild::ReadVertices(const YamlNode& node, std::size_t count, const std::string& of, std::vector<Index>* vertices) {
+bool RigBuild::ReadVertices(const YamlNode& node, std::size_t count, const std::string& of,
+                            std::vector<Index>* vertices) {
   const auto refuse = [&](const YamlNode& at, std::string_view text) {
-    return errors_->Add(at, "vertices: \"{}\" is none of {}: expected numbers and ranges from 0 to {}, as in \"0:99,120\"", text, of,
-                        count == 0 ? 0 : count - 1);
+    return errors_->Add(
+        at, "vertices: \"{}\" is none of {}: expected numbers and ranges from 0 to {}, as in \"0:99,120\"",
+        text, of, count == 0 ? 0 : count - 1);
   };
   const auto read = [&](const YamlNode& item) {
     std::string_view left = item.scalar;
@@ -82,7 +90,8 @@ bool RigBuild::ReadVertices(const YamlNode& node, std::size_t count, const std::
       end = begin;
       if (colon != std::string_view::npos) good = ParseVertex(part.substr(colon + 1), &end) && good;
       if (!good || begin > end || end >= count) return refuse(item, part);
-      if (vertices->size() + (end - begin) > 4 * count + 1024) return errors_->Add(item, "vertices: the ranges overlap too often");
+      if (vertices->size() + (end - begin) > 4 * count + 1024)
+        return errors_->Add(item, "vertices: the ranges overlap too often");
       for (std::uint64_t v = begin; v <= end; ++v) vertices->push_back(static_cast<Index>(v));
       if (comma == std::string_view::npos) return true;
       left = left.substr(comma + 1);
@@ -90,23 +99,28 @@ bool RigBuild::ReadVertices(const YamlNode& node, std::size_t count, const std::
   };
   vertices->clear();
   if (node.is_scalar()) return read(node);
-  if (!node.is_sequence()) return errors_->Add(node, "vertices: expected numbers, found {}", node.kind_name());
+  if (!node.is_sequence())
+    return errors_->Add(node, "vertices: expected numbers, found {}", node.kind_name());
   for (const YamlNode& item : node.items) {
-    if (!item.is_scalar()) return errors_->Add(item, "vertices: expected a number, found {}", item.kind_name());
+    if (!item.is_scalar())
+      return errors_->Add(item, "vertices: expected a number, found {}", item.kind_name());
     if (!read(item)) return false;
   }
   return true;
 }
 
-// Whether another mesh of the deformer has what this one lacks: then this one has no such members, and nobody erred.
-bool RigBuild::AnyOther(const Made& made, const Geometry& of, const std::function<bool(const CharacterMesh&)>& has) const {
+// Whether another mesh of the deformer has what this one lacks: then this one has no such members, and nobody
+// erred.
+bool RigBuild::AnyOther(const Made& made, const Geometry& of,
+                        const std::function<bool(const CharacterMesh&)>& has) const {
   return std::any_of(made.geometries.begin(), made.geometries.end(), [&](const Geometry& other) {
     return &other != &of && other.mesh.has_value() && has(rig_->scene.meshes[*other.mesh]);
   });
 }
 
 // Raises the weights of the members to 1.
-bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of, std::vector<float>* weights) {
+bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of,
+                          std::vector<float>* weights) {
   if (node.is_scalar() && node.scalar == "all") {
     std::fill(weights->begin(), weights->end(), 1.0f);
     return true;
@@ -117,8 +131,10 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
     return good;
   }
   if (!node.is_map() || node.keys.empty()) {
-    return errors_->Add(node, "members: expected all, {{vertices: \"0:99\"}}, {{primitive: 1}}, {{material: NAME}}, {{joint: NAME, above: 0}}, "
-                              "{{weights: \"file.json#map\"}} or a list of them");
+    return errors_->Add(node,
+                        "members: expected all, {{vertices: \"0:99\"}}, {{primitive: 1}}, {{material: "
+                        "NAME}}, {{joint: NAME, above: 0}}, "
+                        "{{weights: \"file.json#map\"}} or a list of them");
   }
   YamlMap map(node, "members", errors_);
   const YamlNode* vertices = map.Find("vertices");
@@ -128,9 +144,12 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
   const YamlNode* above = map.Find("above");
   const YamlNode* file_map = map.Find("weights");
   map.RejectUnread();
-  if ((vertices != nullptr) + (primitive != nullptr) + (material != nullptr) + (joint != nullptr) + (file_map != nullptr) != 1 ||
+  if ((vertices != nullptr) + (primitive != nullptr) + (material != nullptr) + (joint != nullptr) +
+              (file_map != nullptr) !=
+          1 ||
       (above != nullptr && joint == nullptr)) {
-    return errors_->Add(node, "members: expected one of vertices, primitive, material, joint (with above) or weights");
+    return errors_->Add(
+        node, "members: expected one of vertices, primitive, material, joint (with above) or weights");
   }
   if (vertices != nullptr) {
     std::vector<Index> list;
@@ -150,22 +169,26 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
     }
     return true;
   }
-  if (!of.mesh.has_value()) return errors_->Add(node, "members: {} is no mesh: only vertices and weights name its points", of.name);
+  if (!of.mesh.has_value())
+    return errors_->Add(node, "members: {} is no mesh: only vertices and weights name its points", of.name);
   const CharacterMesh& mesh = rig_->scene.meshes[*of.mesh];
   const auto& primitives = mesh.mesh().data().primitives;
   if (joint != nullptr) {
     std::string name;
     double threshold = 0;
     if (!ReadString(*joint, "joint", &name, errors_)) return false;
-    if (above != nullptr && !ReadNumber(*above, "above", Unit::kNone, FileUnits(), &threshold, errors_)) return false;
+    if (above != nullptr && !ReadNumber(*above, "above", Unit::kNone, FileUnits(), &threshold, errors_))
+      return false;
     const std::optional<NodeId> node_id = FindTransform(name, joint->where());
     if (!node_id.has_value()) return false;
     const auto it = std::find(mesh.influence_nodes.begin(), mesh.influence_nodes.end(), *node_id);
     const auto is_joint = [&](const CharacterMesh& other) {
-      return std::find(other.influence_nodes.begin(), other.influence_nodes.end(), *node_id) != other.influence_nodes.end();
+      return std::find(other.influence_nodes.begin(), other.influence_nodes.end(), *node_id) !=
+             other.influence_nodes.end();
     };
     if (it == mesh.influence_nodes.end() && AnyOther(made, of, is_joint)) return true;
-    if (it == mesh.influence_nodes.end()) return errors_->Add(*joint, "\"{}\" is no joint of the skin of {}", name, of.name);
+    if (it == mesh.influence_nodes.end())
+      return errors_->Add(*joint, "\"{}\" is no joint of the skin of {}", name, of.name);
     const auto j = static_cast<Index>(it - mesh.influence_nodes.begin());
     for (std::size_t p = 0; p < weights->size(); ++p) {
       for (Index i = mesh.influences->offsets()[p]; i < mesh.influences->offsets()[p + 1]; ++i) {
@@ -181,15 +204,18 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
     most = std::max(most, static_cast<std::int64_t>(other.mesh().data().primitives.size()));
     return false;
   });
-  if (primitive != nullptr && !ReadInteger(*primitive, "primitive", 0, most - 1, &number, errors_)) return false;
+  if (primitive != nullptr && !ReadInteger(*primitive, "primitive", 0, most - 1, &number, errors_))
+    return false;
   if (material != nullptr && !ReadString(*material, "material", &name, errors_)) return false;
   bool found = false;
   std::vector<std::string> names;
   for (std::size_t i = 0; i < primitives.size(); ++i) {
     names.push_back(primitives[i].material);
-    if (primitive != nullptr ? static_cast<std::int64_t>(i) != number : primitives[i].material != name) continue;
+    if (primitive != nullptr ? static_cast<std::int64_t>(i) != number : primitives[i].material != name)
+      continue;
     found = true;
-    for (Index v = 0; v < primitives[i].vertex_count; ++v) (*weights)[PointOf(of, primitives[i].first_vertex + v)] = 1;
+    for (Index v = 0; v < primitives[i].vertex_count; ++v)
+      (*weights)[PointOf(of, primitives[i].first_vertex + v)] = 1;
   }
   const auto has_material = [&](const CharacterMesh& other) {
     const auto& theirs = other.mesh().data().primitives;
@@ -228,19 +254,23 @@ bool RigBuild::FindMap(const YamlNode& reference, int source, const Made& made, 
   std::vector<std::string> maps;
   for (const NamedWeights& each : (*file)->maps) maps.push_back(each.name);
   if (hash == std::string::npos && maps.size() != 1) {
-    return errors_->Add(reference, "weights \"{}\": expected \"{}#MAP\"; the file has the maps {}", text, text, fmt::join(maps, ", "));
+    return errors_->Add(reference, "weights \"{}\": expected \"{}#MAP\"; the file has the maps {}", text,
+                        text, fmt::join(maps, ", "));
   }
   const std::string name = hash == std::string::npos ? maps[0] : text.substr(hash + 1);
   *map = (*file)->Find(name);
-  if (*map == nullptr) return errors_->Add(reference, "{} has no map \"{}\"{}", path, name, DidYouMean(name, maps));
+  if (*map == nullptr)
+    return errors_->Add(reference, "{} has no map \"{}\"{}", path, name, DidYouMean(name, maps));
   *of = GeometryOf(made, **file);
   if (*of == nullptr) {
     std::vector<std::string> names;
     for (const Geometry& geometry : made.geometries) names.push_back(geometry.name);
-    return errors_->Add(reference, "{} is for mesh \"{}\"; \"{}\" deforms {}", path, (*file)->mesh, made.from->name, fmt::join(names, ", "));
+    return errors_->Add(reference, "{} is for mesh \"{}\"; \"{}\" deforms {}", path, (*file)->mesh,
+                        made.from->name, fmt::join(names, ", "));
   }
   if ((*file)->points != VertexCount(**of)) {
-    return errors_->Add(reference, "{} is for {} vertices; {} has {}", path, (*file)->points, (*of)->name, VertexCount(**of));
+    return errors_->Add(reference, "{} is for {} vertices; {} has {}", path, (*file)->points, (*of)->name,
+                        VertexCount(**of));
   }
   return true;
 }
@@ -250,13 +280,16 @@ const RigBuild::Geometry* RigBuild::GeometryOf(const Made& made, const WeightFil
     if (geometry.name == file.mesh) return &geometry;
     if (!geometry.mesh.has_value()) continue;
     const CharacterMesh& mesh = rig_->scene.meshes[*geometry.mesh];
-    if (file.mesh == graph().name(mesh.transform) || file.mesh == rig_->character->nodes[mesh.gltf_node].name) return &geometry;
+    if (file.mesh == graph().name(mesh.transform) || file.mesh == rig_->character->nodes[mesh.gltf_node].name)
+      return &geometry;
   }
   return nullptr;
 }
 
-// One reference or several; each is for the geometry that its file names. A welded point takes its vertices' largest.
-bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made, std::vector<std::vector<float>>* weights) {
+// One reference or several; each is for the geometry that its file names. A welded point takes its vertices'
+// largest.
+bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made,
+                              std::vector<std::vector<float>>* weights) {
   std::vector<const YamlNode*> references;
   if (attribute.value.is_sequence()) {
     for (const YamlNode& item : attribute.value.items) references.push_back(&item);
@@ -286,7 +319,8 @@ bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made, s
 }
 
 // falloff: {at: <place>, radius: 5, curve: smooth}: 1 at the place, 0 at the radius and beyond, at rest.
-bool RigBuild::MultiplyByFalloff(const RigAttribute& attribute, const Geometry& of, std::vector<float>* weights) {
+bool RigBuild::MultiplyByFalloff(const RigAttribute& attribute, const Geometry& of,
+                                 std::vector<float>* weights) {
   YamlMap map(attribute.value, "falloff", errors_);
   const YamlNode* at = map.Required("at");
   const YamlNode* radius_node = map.Required("radius");
@@ -296,10 +330,13 @@ bool RigBuild::MultiplyByFalloff(const RigAttribute& attribute, const Geometry& 
   double radius = 0;
   std::string curve = "smooth";
   if (at == nullptr || radius_node == nullptr || !ReadPlace(*at, attribute.source, 0, &center)) return false;
-  if (!ReadNumber(*radius_node, "radius", Unit::kLength, units(attribute.source), &radius, errors_)) return false;
-  if (!(radius > 0)) return errors_->Add(*radius_node, "radius: expected a length above 0, found {}", radius_node->scalar);
+  if (!ReadNumber(*radius_node, "radius", Unit::kLength, units(attribute.source), &radius, errors_))
+    return false;
+  if (!(radius > 0))
+    return errors_->Add(*radius_node, "radius: expected a length above 0, found {}", radius_node->scalar);
   if (curve_node != nullptr && !ReadString(*curve_node, "curve", &curve, errors_)) return false;
-  if (curve != "smooth" && curve != "linear") return errors_->Add(*curve_node, "curve: expected smooth or linear, found \"{}\"", curve);
+  if (curve != "smooth" && curve != "linear")
+    return errors_->Add(*curve_node, "curve: expected smooth or linear, found \"{}\"", curve);
   if (!of.mesh.has_value()) return errors_->Add(attribute.value, "falloff: {} is no mesh", of.name);
   const Places& points = rest_->WorldPoints(*of.mesh);
   for (std::size_t p = 0; p < points.size(); ++p) {

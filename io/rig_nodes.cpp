@@ -13,7 +13,8 @@ bool HasAttribute(const NodeDef& def, const char* name) { return def.FindAttribu
 
 bool IsDeformer(const NodeDef& def) {
   const int points = def.FindAttribute("inPoints");
-  return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry && HasAttribute(def, "outPoints");
+  return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry &&
+         HasAttribute(def, "outPoints");
 }
 
 const AttributeDef& AttributeOf(const Graph& graph, const PlugRef& plug) {
@@ -32,13 +33,15 @@ bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
   return false;
 }
 
-// An override of such a key replaces it in the node before anything is read: `wire1.weights`, `lips.vertices`.
+// An override of such a key replaces it in the node before anything is read: `wire1.weights`,
+// `lips.vertices`.
 void RigBuild::ApplySpecialOverrides() {
   std::vector<RigOverride> others;
   for (RigOverride& override_ : file_->overrides) {
     RigNode* longest = nullptr;
     const std::string& text = override_.plug.text;
-    for (std::size_t dot = text.rfind('.'); longest == nullptr && dot != std::string::npos && dot > 0; dot = text.rfind('.', dot - 1)) {
+    for (std::size_t dot = text.rfind('.'); longest == nullptr && dot != std::string::npos && dot > 0;
+         dot = text.rfind('.', dot - 1)) {
       const auto it = written_.find(text.substr(0, dot));
       if (it != written_.end()) longest = &file_->nodes[it->second];
     }
@@ -49,7 +52,8 @@ void RigBuild::ApplySpecialOverrides() {
       continue;
     }
     auto& attributes = longest->attributes;
-    attributes.erase(std::remove_if(attributes.begin(), attributes.end(), [&](const RigAttribute& a) { return a.name == key; }),
+    attributes.erase(std::remove_if(attributes.begin(), attributes.end(),
+                                    [&](const RigAttribute& a) { return a.name == key; }),
                      attributes.end());
     YamlNode key_node;
     key_node.kind = YamlNode::Kind::kScalar;
@@ -70,7 +74,8 @@ void RigBuild::AddNodes() {
       continue;
     }
     if (graph().registry().Find(node.type) == nullptr) {
-      errors_->Add(node.type_node, "unknown node type \"{}\"{}", node.type, DidYouMean(node.type, graph().registry().Names()));
+      errors_->Add(node.type_node, "unknown node type \"{}\"{}", node.type,
+                   DidYouMean(node.type, graph().registry().Names()));
       continue;
     }
     Result<NodeId> id = graph().AddNode(node.type, node.name);
@@ -88,7 +93,8 @@ void RigBuild::ReadAttributes(Made* made) {
   for (const bool structural : {true, false}) {
     for (const RigAttribute& attribute : made->from->attributes) {
       const int number = def.FindAttribute(attribute.name);
-      if ((number >= 0 && def.attributes[static_cast<std::size_t>(number)].structural) != structural) continue;
+      if ((number >= 0 && def.attributes[static_cast<std::size_t>(number)].structural) != structural)
+        continue;
       if (IsSpecial(def, attribute.name)) {
         made->special[attribute.name] = &attribute;
       } else {
@@ -106,11 +112,13 @@ void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bo
     const AttributeDef& a = def.attributes[static_cast<std::size_t>(number)];
     if (a.array && !a.per_geometry) {
       if (!attribute.value.is_sequence()) {
-        errors_->Add(attribute.value, "{}.{} is an array: expected a list, or name one element, \"{}[0]\"", made.from->name, a.name, a.name);
+        errors_->Add(attribute.value, "{}.{} is an array: expected a list, or name one element, \"{}[0]\"",
+                     made.from->name, a.name, a.name);
         return;
       }
       for (std::size_t i = 0; i < attribute.value.items.size(); ++i) {
-        ReadPlug({made.id, number, static_cast<int>(i), -1}, attribute.value.items[i], attribute.source, overrides);
+        ReadPlug({made.id, number, static_cast<int>(i), -1}, attribute.value.items[i], attribute.source,
+                 overrides);
       }
       return;
     }
@@ -126,11 +134,12 @@ void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bo
     for (const AttributeDef& a : def.attributes) {
       if (!a.output) names.push_back(a.name);
     }
-    for (const char* word : {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed", "places"}) {
+    for (const char* word :
+         {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed", "places"}) {
       if (IsSpecial(def, word)) names.push_back(word);
     }
-    errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name, attribute.name,
-                 DidYouMean(attribute.name, names));
+    errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name,
+                 attribute.name, DidYouMean(attribute.name, names));
     return;
   }
   ReadPlug(*plug, attribute.value, attribute.source, overrides);
@@ -147,11 +156,15 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
   }
   auto& written = written_plugs_[overrides ? 1 : 0];
   if (const auto [it, added] = written.emplace(KeyOf(plug), value.where()); !added) {
-    errors_->Add(value, "{} is {} twice: here and at {}", what, overrides ? "overridden" : "set", it->second.ToString());
+    errors_->Add(value, "{} is {} twice: here and at {}", what, overrides ? "overridden" : "set",
+                 it->second.ToString());
     return;
   }
-  const auto is_connection = [&](const YamlNode& node, Type of) { return IsConnection(node, graph(), of, attribute.unit, units(source)); };
-  // A vector and one of its components: the order of a map decides nothing. A value whose component is driven is fine
+  const auto is_connection = [&](const YamlNode& node, Type of) {
+    return IsConnection(node, graph(), of, attribute.unit, units(source));
+  };
+  // A vector and one of its components: the order of a map decides nothing. A value whose component is driven
+  // is fine
   const bool connected = is_connection(value, type);
   if (connected) connected_plugs_.insert(KeyOf(plug));
   for (int component = -1; component < 3; ++component) {
@@ -162,8 +175,8 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
     if (it == written.end()) continue;
     const bool other_connected = connected_plugs_.count(KeyOf(other)) != 0;
     if (component < 0 ? connected && !other_connected : !connected && other_connected) continue;
-    errors_->Add(value, "{} is {} here, and {} at {}: give the components or the whole", what, overrides ? "overridden" : "set",
-                 graph().PlugName(other), it->second.ToString());
+    errors_->Add(value, "{} is {} here, and {} at {}: give the components or the whole", what,
+                 overrides ? "overridden" : "set", graph().PlugName(other), it->second.ToString());
     return;
   }
   if (connected) {
@@ -173,7 +186,8 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
   }
   // [a.x, 0, b.y]: components of their own
   if (type == Type::kDouble3 && value.is_sequence() && value.items.size() == 3 &&
-      std::any_of(value.items.begin(), value.items.end(), [&](const YamlNode& item) { return is_connection(item, Type::kDouble); })) {
+      std::any_of(value.items.begin(), value.items.end(),
+                  [&](const YamlNode& item) { return is_connection(item, Type::kDouble); })) {
     written.erase(KeyOf(plug));
     for (int i = 0; i < 3; ++i) {
       PlugRef component = plug;
@@ -223,10 +237,12 @@ void RigBuild::ReadOverride(const RigOverride& override_) {
     return;
   }
   PlugRef element = *first;
-  const int before = graph().ArraySize(element.node, element.attribute), now = static_cast<int>(override_.value.items.size());
+  const int before = graph().ArraySize(element.node, element.attribute),
+            now = static_cast<int>(override_.value.items.size());
   for (; element.element < now; ++element.element) {
     if (errors_->full() || !Fail(override_.plug.where, graph().CheckPlug(element))) return;
-    ReadPlug(element, override_.value.items[static_cast<std::size_t>(element.element)], override_.plug.source, true);
+    ReadPlug(element, override_.value.items[static_cast<std::size_t>(element.element)], override_.plug.source,
+             true);
   }
   for (; element.element < before; ++element.element) {
     Fail(override_.plug.where, graph().Unset(element));

@@ -1,4 +1,5 @@
-// Where the rig's own nodes are at rest: curves through vertices, parents, and handles that are placed `at` something.
+// Where the rig's own nodes are at rest: curves through vertices, parents, and handles that are placed `at`
+// something.
 #include <cmath>
 
 #include "base/matrix.h"
@@ -27,13 +28,18 @@ Double3 SetDouble3(const Graph& graph, NodeId node, const char* name, Double3 fa
 void RigBuild::AddCurves() {
   for (Made& made : made_) {
     if (graph().def(made.id).name != "curve" || errors_->full()) continue;
-    const auto find = [&](const char* key) { return made.special.count(key) != 0 ? made.special[key] : nullptr; };
+    const auto find = [&](const char* key) {
+      return made.special.count(key) != 0 ? made.special[key] : nullptr;
+    };
     const RigAttribute* vertices = find("vertices");
     const RigAttribute* places = find("places");
     const RigAttribute* mesh = find("mesh");
     const RigAttribute* closed = find("closed");
     if ((vertices == nullptr) == (places == nullptr)) {
-      Fail(made.from->where, Status::Invalid("curve \"{}\": expected either \"vertices\" of a mesh or \"places\" [[x, y, z], ...]", made.from->name));
+      Fail(made.from->where,
+           Status::Invalid(
+               "curve \"{}\": expected either \"vertices\" of a mesh or \"places\" [[x, y, z], ...]",
+               made.from->name));
       continue;
     }
     Places cvs;
@@ -42,7 +48,8 @@ void RigBuild::AddCurves() {
     if (vertices != nullptr) {
       if (!VertexPlaces(vertices->value, mesh == nullptr ? nullptr : &mesh->value, &cvs)) continue;
     } else {
-      bool good = places->value.is_sequence() || errors_->Add(places->value, "places: expected a list of points");
+      bool good =
+          places->value.is_sequence() || errors_->Add(places->value, "places: expected a list of points");
       for (const YamlNode& item : places->value.items) {
         std::vector<double> p;
         good = ReadNumbers(item, "places", Unit::kLength, units(places->source), 3, &p, errors_) && good;
@@ -52,8 +59,9 @@ void RigBuild::AddCurves() {
     }
     const std::size_t fewest = is_closed ? 3 : 2;
     if (cvs.size() < fewest || cvs.size() > kMaxCvs) {
-      Fail(made.from->where, Status::Invalid("{}curve \"{}\" has {} points; expected {} to {}", is_closed ? "closed " : "", made.from->name,
-                                             cvs.size(), fewest, kMaxCvs));
+      Fail(made.from->where,
+           Status::Invalid("{}curve \"{}\" has {} points; expected {} to {}", is_closed ? "closed " : "",
+                           made.from->name, cvs.size(), fewest, kMaxCvs));
       continue;
     }
     GraphEditor edit(&graph());
@@ -73,7 +81,9 @@ bool RigBuild::VertexPlaces(const YamlNode& vertices, const YamlNode* mesh_node,
     if (!found.has_value()) return false;
     mesh = *found;
   } else if (rig_->scene.meshes.size() != 1) {
-    return errors_->Add(vertices, "the character has {} meshes: name the one that the vertices are of, \"mesh: NAME\"", rig_->scene.meshes.size());
+    return errors_->Add(vertices,
+                        "the character has {} meshes: name the one that the vertices are of, \"mesh: NAME\"",
+                        rig_->scene.meshes.size());
   }
   const CharacterMesh& of = rig_->scene.meshes[mesh];
   std::vector<Index> list;
@@ -98,22 +108,23 @@ void RigBuild::ConnectParents() {
   }
 }
 
-// The frame of a deltaMush in world space says only about which place it computes; where the rig names none, it is
-// that which carries the mesh, so that a character keeps its shape far from the origin.
+// The frame of a deltaMush in world space says only about which place it computes; where the rig names none,
+// it is that which carries the mesh, so that a character keeps its shape far from the origin.
 void RigBuild::ConnectPivots() {
   for (const Made& made : made_) {
     if (graph().def(made.id).name != "deltaMush" || !made.world || made.geometries.empty()) continue;
     GraphEditor edit(&graph());
     const PlugRef parent = edit.Plug(made.id, "parentMatrix");
-    if (!edit.ok() || graph().FindValue(parent) != nullptr || graph().FindConnection(parent) != nullptr) continue;
+    if (!edit.ok() || graph().FindValue(parent) != nullptr || graph().FindConnection(parent) != nullptr)
+      continue;
     const std::optional<NodeId> ancestor = CommonAncestor(made);
     // A transform that depends on the points cannot carry them
     if (ancestor.has_value()) (void)graph().Connect(edit.Plug(*ancestor, "worldMatrix"), parent).ok();
   }
 }
 
-// The deepest glTF node above all joints that move the deformer's meshes (and above meshes without a skin), that is not
-// scaled to nothing at rest.
+// The deepest glTF node above all joints that move the deformer's meshes (and above meshes without a skin),
+// that is not scaled to nothing at rest.
 std::optional<NodeId> RigBuild::CommonAncestor(const Made& made) const {
   const gltf::Character& character = *rig_->character;
   std::vector<bool> carries(character.nodes.size(), false);
@@ -125,7 +136,8 @@ std::optional<NodeId> RigBuild::CommonAncestor(const Made& made) const {
       continue;
     }
     for (std::size_t i = 0; i < mesh.influences->joints().size(); ++i) {
-      if (mesh.influences->weights()[i] > 0) carries[gltf_by_node_.at(mesh.influence_nodes[mesh.influences->joints()[i]].index)] = true;
+      if (mesh.influences->weights()[i] > 0)
+        carries[gltf_by_node_.at(mesh.influence_nodes[mesh.influences->joints()[i]].index)] = true;
     }
   }
   std::vector<std::size_t> below(carries.size(), 0);  // carriers at a node and below it
@@ -138,7 +150,8 @@ std::optional<NodeId> RigBuild::CommonAncestor(const Made& made) const {
   std::optional<NodeId> deepest;
   for (Index node : character.order) {  // parents first: the last one is the deepest
     Matrix4 inverse;
-    if (total > 0 && below[node] == total && Invert(rest_->NodeWorld(node), &inverse)) deepest = rig_->scene.transforms[node];
+    if (total > 0 && below[node] == total && Invert(rest_->NodeWorld(node), &inverse))
+      deepest = rig_->scene.transforms[node];
   }
   return deepest;
 }
@@ -150,7 +163,8 @@ void RigBuild::PlaceHandles() {
     GraphEditor edit(&graph());
     if (!edit.Has(made.id, "restMatrix")) continue;
     const Value* offset = graph().FindValue(edit.Plug(made.id, "offsetParentMatrix"));
-    if (offset != nullptr && graph().FindValue(edit.Plug(made.id, "restMatrix")) == nullptr) edit.Set(made.id, "restMatrix", *offset);
+    if (offset != nullptr && graph().FindValue(edit.Plug(made.id, "restMatrix")) == nullptr)
+      edit.Set(made.id, "restMatrix", *offset);
     Fail(made.from->where, edit.Take());
   }
 }
@@ -166,24 +180,28 @@ bool RigBuild::Place(Made* made, int depth) {
   const YamlNode& at = it->second->value;
   if (made->placing || depth > kMaxDepth) {
     return errors_->Add(at, "\"{}\" {}", made->from->name,
-                        made->placing ? "is placed at something that is placed at it" : "is placed at the end of too long a chain");
+                        made->placing ? "is placed at something that is placed at it"
+                                      : "is placed at the end of too long a chain");
   }
   GraphEditor edit(&graph());
   const PlugRef offset = edit.Plug(made->id, "offsetParentMatrix");
   made->placed = true;  // reported once, whatever comes
-  if (graph().FindValue(offset) != nullptr) return errors_->Add(at, "\"{}\": either \"at\" or offsetParentMatrix, not both", made->from->name);
+  if (graph().FindValue(offset) != nullptr)
+    return errors_->Add(at, "\"{}\": either \"at\" or offsetParentMatrix, not both", made->from->name);
   made->placing = true;
   made->placed = false;
   Double3 place;
   Matrix4 parent, inverse;
   bool good = ReadPlace(at, it->second->source, depth + 1, &place);
-  if (const Connection* connection = graph().FindConnection(edit.Plug(made->id, "parentMatrix")); good && connection != nullptr) {
+  if (const Connection* connection = graph().FindConnection(edit.Plug(made->id, "parentMatrix"));
+      good && connection != nullptr) {
     good = RestWorld(connection->source.node, at, depth + 1, &parent);
   }
   made->placing = false;
   made->placed = true;
   if (!good) return false;
-  if (!Invert(parent, &inverse)) return errors_->Add(at, "\"{}\": its parent is scaled to nothing at rest", made->from->name);
+  if (!Invert(parent, &inverse))
+    return errors_->Add(at, "\"{}\": its parent is scaled to nothing at rest", made->from->name);
   edit.Set(made->id, "offsetParentMatrix", Translation(TransformPoint(inverse, place)));
   return Fail(at.where(), edit.Take());
 }
@@ -192,11 +210,14 @@ Matrix4 RigBuild::LocalAtRest(NodeId node) const {
   const int offset = graph().def(node).FindAttribute("offsetParentMatrix");
   const int order = graph().def(node).FindAttribute("rotateOrder");
   Matrix4 local;
-  if (const Value* set = offset < 0 ? nullptr : graph().FindValue({node, offset, -1, -1})) local = set->get<Matrix4>();
+  if (const Value* set = offset < 0 ? nullptr : graph().FindValue({node, offset, -1, -1}))
+    local = set->get<Matrix4>();
   const Value* order_value = order < 0 ? nullptr : graph().FindValue({node, order, -1, -1});
-  const RotateOrder rotate_order = order_value == nullptr ? RotateOrder::kXyz : static_cast<RotateOrder>(order_value->AsInt());
+  const RotateOrder rotate_order =
+      order_value == nullptr ? RotateOrder::kXyz : static_cast<RotateOrder>(order_value->AsInt());
   return local * Translation(SetDouble3(graph(), node, "translate", {})) *
-         RotationFromEuler(SetDouble3(graph(), node, "rotate", {}), rotate_order) * Scaling(SetDouble3(graph(), node, "scale", {1, 1, 1}));
+         RotationFromEuler(SetDouble3(graph(), node, "rotate", {}), rotate_order) *
+         Scaling(SetDouble3(graph(), node, "scale", {1, 1, 1}));
 }
 
 // world_from_local of a transform with everything as set and no connection followed but its parent's.
@@ -219,8 +240,8 @@ bool RigBuild::RestWorld(NodeId transform, const YamlNode& asked, int depth, Mat
   }
 }
 
-// A place in the world at rest: a curve (its middle cv), a cv (`lips[2]`), a transform, {vertex: 812, mesh: NAME} or
-// [x, y, z].
+// A place in the world at rest: a curve (its middle cv), a cv (`lips[2]`), a transform, {vertex: 812, mesh:
+// NAME} or [x, y, z].
 bool RigBuild::ReadPlace(const YamlNode& node, int source, int depth, Double3* place) {
   if (node.is_sequence()) {
     std::vector<double> p;
@@ -235,7 +256,8 @@ bool RigBuild::ReadPlace(const YamlNode& node, int source, int depth, Double3* p
     map.RejectUnread();
     Places places;
     if (vertex == nullptr || !VertexPlaces(*vertex, mesh, &places)) return false;
-    if (places.size() != 1) return errors_->Add(*vertex, "place: expected one vertex, found {}", places.size());
+    if (places.size() != 1)
+      return errors_->Add(*vertex, "place: expected one vertex, found {}", places.size());
     *place = places[0];
     return true;
   }
@@ -254,8 +276,10 @@ bool RigBuild::ReadPlace(const YamlNode& node, int source, int depth, Double3* p
     std::string curve = name.substr(0, open);
     if (curve.size() > 3 && curve.compare(curve.size() - 3, 3, ".cv") == 0) curve.resize(curve.size() - 3);
     if (const Places* cvs = curve_of(curve)) {
-      const Result<double> index = ParseQuantity(name.substr(open + 1, name.size() - open - 2), Unit::kNone, FileUnits());
-      if (!index.ok() || *index < 0 || *index != std::floor(*index) || *index >= static_cast<double>(cvs->size())) {
+      const Result<double> index =
+          ParseQuantity(name.substr(open + 1, name.size() - open - 2), Unit::kNone, FileUnits());
+      if (!index.ok() || *index < 0 || *index != std::floor(*index) ||
+          *index >= static_cast<double>(cvs->size())) {
         return errors_->Add(node, "\"{}\": curve \"{}\" has cvs 0 to {}", name, curve, cvs->size() - 1);
       }
       *place = (*cvs)[static_cast<std::size_t>(*index)];

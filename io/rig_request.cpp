@@ -11,16 +11,19 @@ void RigBuild::AddControls() {
     if (errors_->full()) return;
     const Result<PlugRef> plug = graph().FindPlug(from.plug.text);
     if (!Fail(from.plug.where, plug.status())) continue;
-    const AttributeDef& attribute = graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
+    const AttributeDef& attribute =
+        graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
     const Type type = graph().PlugType(*plug);
     const std::string name = graph().PlugName(*plug);
     const auto refuse = [&](Status status) { Fail(from.plug.where, std::move(status)); };
     if (attribute.output || attribute.structural) {
-      refuse(Status::Invalid("{} is {} and cannot be a control", name, attribute.output ? "an output" : "structural (fixed when a plan is made)"));
+      refuse(Status::Invalid("{} is {} and cannot be a control", name,
+                             attribute.output ? "an output" : "structural (fixed when a plan is made)"));
       continue;
     }
     if (type != Type::kDouble && type != Type::kInt && type != Type::kBool && type != Type::kEnum) {
-      refuse(Status::Invalid("{} is a {}; a control is one number{}", name, TypeName(type), type == Type::kDouble3 ? ", as in " + name + ".x" : ""));
+      refuse(Status::Invalid("{} is a {}; a control is one number{}", name, TypeName(type),
+                             type == Type::kDouble3 ? ", as in " + name + ".x" : ""));
       continue;
     }
     const auto key = std::make_tuple(plug->node.index, plug->attribute, plug->element, plug->component);
@@ -34,8 +37,10 @@ void RigBuild::AddControls() {
     const Connection* driver = graph().FindConnection(*plug);
     if (driver == nullptr) driver = graph().FindConnection(whole);
     const std::vector<NodeId>& clip_nodes = rig_->scene.clip_nodes;
-    if (driver != nullptr && std::find(clip_nodes.begin(), clip_nodes.end(), driver->source.node) == clip_nodes.end()) {
-      refuse(Status::Invalid("{} is driven by {} and cannot be a control", name, graph().PlugName(driver->source)));
+    if (driver != nullptr &&
+        std::find(clip_nodes.begin(), clip_nodes.end(), driver->source.node) == clip_nodes.end()) {
+      refuse(Status::Invalid("{} is driven by {} and cannot be a control", name,
+                             graph().PlugName(driver->source)));
       continue;
     }
     Control control;
@@ -45,15 +50,19 @@ void RigBuild::AddControls() {
     control.by_clip = by_clip;
     control.where = from.plug.where;
     const FileUnits& file_units = units(from.plug.source);
-    bool good = ReadNumber(from.min, control.name + ".min", attribute.unit, file_units, &control.min, errors_);
-    good = ReadNumber(from.max, control.name + ".max", attribute.unit, file_units, &control.max, errors_) && good;
+    bool good =
+        ReadNumber(from.min, control.name + ".min", attribute.unit, file_units, &control.min, errors_);
+    good = ReadNumber(from.max, control.name + ".max", attribute.unit, file_units, &control.max, errors_) &&
+           good;
     if (!good) continue;
     if (control.min > control.max) {
-      errors_->Add(from.min, "control \"{}\": min {} is above max {}", control.name, from.min.scalar, from.max.scalar);
+      errors_->Add(from.min, "control \"{}\": min {} is above max {}", control.name, from.min.scalar,
+                   from.max.scalar);
       continue;
     }
     if (control.min < attribute.min || control.max > attribute.max) {
-      errors_->Add(from.min, "control \"{}\": {} only takes {} to {}", control.name, name, attribute.min, attribute.max);
+      errors_->Add(from.min, "control \"{}\": {} only takes {} to {}", control.name, name, attribute.min,
+                   attribute.max);
       continue;
     }
     if (const Value* value = graph().FindValue(*plug)) {
@@ -62,7 +71,8 @@ void RigBuild::AddControls() {
       const Value* set = graph().FindValue(whole);
       const Value& base = set != nullptr ? *set : attribute.default_value;
       const Double3* triple = base.get_if<Double3>();
-      control.value = triple != nullptr && plug->component >= 0 ? (*triple)[plug->component] : base.AsDouble();
+      control.value =
+          triple != nullptr && plug->component >= 0 ? (*triple)[plug->component] : base.AsDouble();
     }
     rig_->controls.push_back(std::move(control));
   }
@@ -74,7 +84,8 @@ void RigBuild::AddAccelerations() {
   const auto read_clips = [&](const std::vector<RigString>& names, std::vector<std::string>* to) {
     for (const RigString& name : names) {
       if (std::find(clips.begin(), clips.end(), name.text) == clips.end()) {
-        Fail(name.where, Status::Invalid("the character has no clip \"{}\"{}", name.text, DidYouMean(name.text, clips)));
+        Fail(name.where,
+             Status::Invalid("the character has no clip \"{}\"{}", name.text, DidYouMean(name.text, clips)));
       }
       to->push_back(name.text);
     }
@@ -95,11 +106,13 @@ void RigBuild::AddAccelerations() {
       // Stages may have an @ in their names, too: the longest mesh that exists wins
       const std::string whole = points.mesh + "@" + points.stage;
       const auto is_mesh = [&](const std::string& name) {
-        return std::any_of(rig_->scene.meshes.begin(), rig_->scene.meshes.end(), [&](const CharacterMesh& mesh) {
-          return mesh.name == name || rig_->character->nodes[mesh.gltf_node].name == name;
-        });
+        return std::any_of(rig_->scene.meshes.begin(), rig_->scene.meshes.end(),
+                           [&](const CharacterMesh& mesh) {
+                             return mesh.name == name || rig_->character->nodes[mesh.gltf_node].name == name;
+                           });
       };
-      for (std::size_t at = whole.rfind('@'); at != std::string::npos && at > 0; at = whole.rfind('@', at - 1)) {
+      for (std::size_t at = whole.rfind('@'); at != std::string::npos && at > 0;
+           at = whole.rfind('@', at - 1)) {
         if (!is_mesh(whole.substr(0, at))) continue;
         points.mesh = whole.substr(0, at);
         points.stage = whole.substr(at + 1);
@@ -112,18 +125,23 @@ void RigBuild::AddAccelerations() {
       if (stage == nullptr) {
         std::vector<std::string> names;
         for (const Stage& s : mesh.stages) names.push_back(s.name);
-        Fail(points.where, Status::Invalid("\"{}\" has no stage \"{}\"{}; its stack is {}", mesh.name, points.stage,
-                                           DidYouMean(points.stage, names), fmt::join(names, ", ")));
+        Fail(points.where,
+             Status::Invalid("\"{}\" has no stage \"{}\"{}; its stack is {}", mesh.name, points.stage,
+                             DidYouMean(points.stage, names), fmt::join(names, ", ")));
         continue;
       }
       if (const auto [it, added] = by_mesh.emplace(*mesh_index, points.where); !added) {
-        Fail(points.where, Status::Invalid("points of \"{}\" are accelerated already, at {}", mesh.name, it->second.ToString()));
+        Fail(points.where, Status::Invalid("points of \"{}\" are accelerated already, at {}", mesh.name,
+                                           it->second.ToString()));
         continue;
       }
       to.points.push_back({*mesh_index, static_cast<std::size_t>(stage - mesh.stages.data()), stage->points});
     }
     if (to.train_samples > 0 && rig_->controls.empty()) {
-      Fail(from.where, Status::Invalid("accelerate \"{}\": train.samples draws poses from the controls, and the rig declares none", from.name));
+      Fail(from.where,
+           Status::Invalid(
+               "accelerate \"{}\": train.samples draws poses from the controls, and the rig declares none",
+               from.name));
     }
     rig_->accelerate.push_back(std::move(to));
   }

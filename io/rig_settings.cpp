@@ -7,20 +7,26 @@
 namespace kpsa {
 namespace {
 
-Result<Setting> ReadSetting(const Rig& rig, const std::string& plug_text, const YamlNode& value, const FileUnits& units) {
+Result<Setting> ReadSetting(const Rig& rig, const std::string& plug_text, const YamlNode& value,
+                            const FileUnits& units) {
   const Result<PlugRef> plug = rig.graph->FindPlug(plug_text);
   if (!plug.ok()) return plug.status();
-  const AttributeDef& attribute = rig.graph->def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
-  if (attribute.output) return Status::Invalid("{} is an output and cannot be set", rig.graph->PlugName(*plug));
+  const AttributeDef& attribute =
+      rig.graph->def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
+  if (attribute.output)
+    return Status::Invalid("{} is an output and cannot be set", rig.graph->PlugName(*plug));
   Setting setting;
   setting.plug = *plug;
   setting.text = plug_text + "=" + (value.is_scalar() ? value.scalar : "...");
   YamlErrors errors;
-  if (!ReadValue(value, rig.graph->PlugName(*plug), attribute, rig.graph->PlugType(*plug), units, &setting.value, &errors)) return errors.Take();
+  if (!ReadValue(value, rig.graph->PlugName(*plug), attribute, rig.graph->PlugType(*plug), units,
+                 &setting.value, &errors))
+    return errors.Take();
   if (setting.value.get_if<double>() != nullptr || setting.value.get_if<std::int64_t>() != nullptr) {
     const double number = setting.value.AsDouble();
     if (number < attribute.min || number > attribute.max) {
-      return Status::Invalid("{} = {} is outside of {} to {}", rig.graph->PlugName(*plug), number, attribute.min, attribute.max);
+      return Status::Invalid("{} = {} is outside of {} to {}", rig.graph->PlugName(*plug), number,
+                             attribute.min, attribute.max);
     }
   }
   return setting;
@@ -57,7 +63,8 @@ Result<std::vector<Setting>> ReadPoseFile(const Rig& rig, const std::string& pat
   if (const YamlNode* node = map.Find("units")) ReadUnits(*node, &units, &errors);
   std::vector<Setting> settings;
   if (const YamlNode* pose = map.Required("pose")) {
-    if (!pose->is_map()) errors.Add(*pose, "pose: expected a map of plugs and values, found {}", pose->kind_name());
+    if (!pose->is_map())
+      errors.Add(*pose, "pose: expected a map of plugs and values, found {}", pose->kind_name());
     for (std::size_t i = 0; i < pose->keys.size(); ++i) {
       Result<Setting> setting = ReadSetting(rig, pose->keys[i].scalar, pose->items[i], units);
       if (setting.ok()) {
@@ -78,10 +85,12 @@ Status ApplySetting(Rig* rig, const Setting& setting) {
   std::vector<PlugRef> driven;  // by a clip: the plug, a part of it, or what it is a part of
   for (const Connection& driver : graph.Inputs(setting.plug.node, setting.plug.attribute)) {
     const PlugRef& plug = driver.destination;
-    if (!overlap(plug.element, setting.plug.element) || !overlap(plug.component, setting.plug.component)) continue;
+    if (!overlap(plug.element, setting.plug.element) || !overlap(plug.component, setting.plug.component))
+      continue;
     const std::vector<NodeId>& clip_nodes = rig->scene.clip_nodes;
     if (std::find(clip_nodes.begin(), clip_nodes.end(), driver.source.node) == clip_nodes.end()) {
-      return Status::Usage("{} is driven by {} and cannot be set", graph.PlugName(plug), graph.PlugName(driver.source));
+      return Status::Usage("{} is driven by {} and cannot be set", graph.PlugName(plug),
+                           graph.PlugName(driver.source));
     }
     driven.push_back(plug);
   }

@@ -8,14 +8,15 @@ namespace {
 
 constexpr std::int64_t kMaxInteger = 1ll << 53;  // exact in a double
 
-bool ReadList(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units, std::vector<double>* values,
-              YamlErrors* errors) {
+bool ReadList(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units,
+              std::vector<double>* values, YamlErrors* errors) {
   values->clear();
   if (node.is_scalar()) {
     values->resize(1);
     return ReadNumber(node, what, unit, units, values->data(), errors);
   }
-  if (!node.is_sequence()) return errors->Add(node, "{}: expected a list of numbers, found {}", what, node.kind_name());
+  if (!node.is_sequence())
+    return errors->Add(node, "{}: expected a list of numbers, found {}", what, node.kind_name());
   bool good = true;
   for (const YamlNode& item : node.items) {
     values->push_back(0);
@@ -31,8 +32,11 @@ bool ReadMatrix(const YamlNode& node, std::string_view what, Value* value, YamlE
   const FileUnits none;
   if (node.is_sequence() && node.items.size() == 4 && node.items[0].is_sequence()) {
     for (int row = 0; row < 4; ++row) {
-      if (!ReadNumbers(node.items[static_cast<std::size_t>(row)], what, Unit::kNone, none, 4, &numbers, errors)) return false;
-      for (int column = 0; column < 4; ++column) matrix(row, column) = numbers[static_cast<std::size_t>(column)];
+      if (!ReadNumbers(node.items[static_cast<std::size_t>(row)], what, Unit::kNone, none, 4, &numbers,
+                       errors))
+        return false;
+      for (int column = 0; column < 4; ++column)
+        matrix(row, column) = numbers[static_cast<std::size_t>(column)];
     }
   } else {
     if (!node.is_sequence() || node.items.size() != 16) {
@@ -45,9 +49,10 @@ bool ReadMatrix(const YamlNode& node, std::string_view what, Value* value, YamlE
   return true;
 }
 
-bool ReadPoints(const YamlNode& node, std::string_view what, const AttributeDef& attribute, int components, const FileUnits& units,
-                Value* value, YamlErrors* errors) {
-  if (!node.is_sequence()) return errors->Add(node, "{}: expected a list of points, found {}", what, node.kind_name());
+bool ReadPoints(const YamlNode& node, std::string_view what, const AttributeDef& attribute, int components,
+                const FileUnits& units, Value* value, YamlErrors* errors) {
+  if (!node.is_sequence())
+    return errors->Add(node, "{}: expected a list of points, found {}", what, node.kind_name());
   std::vector<float> all;
   std::vector<double> numbers;
   bool good = true;
@@ -76,7 +81,8 @@ bool ReadPoints(const YamlNode& node, std::string_view what, const AttributeDef&
   return true;
 }
 
-bool ReadEnum(const YamlNode& node, std::string_view what, const AttributeDef& attribute, Value* value, YamlErrors* errors) {
+bool ReadEnum(const YamlNode& node, std::string_view what, const AttributeDef& attribute, Value* value,
+              YamlErrors* errors) {
   std::string name;
   if (!ReadString(node, what, &name, errors)) return false;
   for (std::size_t i = 0; i < attribute.enum_names.size(); ++i) {
@@ -84,17 +90,18 @@ bool ReadEnum(const YamlNode& node, std::string_view what, const AttributeDef& a
     *value = Value(static_cast<std::int64_t>(i));
     return true;
   }
-  return errors->Add(node, "{} has no choice \"{}\"{}; expected one of {}", what, name, DidYouMean(name, attribute.enum_names),
-                     fmt::join(attribute.enum_names, ", "));
+  return errors->Add(node, "{} has no choice \"{}\"{}; expected one of {}", what, name,
+                     DidYouMean(name, attribute.enum_names), fmt::join(attribute.enum_names, ", "));
 }
 
 }  // namespace
 
-bool ReadNumbers(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units, std::size_t count,
-                 std::vector<double>* values, YamlErrors* errors) {
+bool ReadNumbers(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units,
+                 std::size_t count, std::vector<double>* values, YamlErrors* errors) {
   if (!node.is_sequence() || node.items.size() != count) {
-    return errors->Add(node, "{}: expected a list of {} numbers, found {}", what, count,
-                       node.is_sequence() ? fmt::format("{}", node.items.size()) : std::string(node.kind_name()));
+    return errors->Add(
+        node, "{}: expected a list of {} numbers, found {}", what, count,
+        node.is_sequence() ? fmt::format("{}", node.items.size()) : std::string(node.kind_name()));
   }
   return ReadList(node, what, unit, units, values, errors);
 }
@@ -125,7 +132,8 @@ bool ReadValue(const YamlNode& node, std::string_view what, const AttributeDef& 
       *value = Value(number);
       return true;
     }
-    case Type::kEnum: return ReadEnum(node, what, attribute, value, errors);
+    case Type::kEnum:
+      return ReadEnum(node, what, attribute, value, errors);
     case Type::kDouble: {
       double number = 0;
       if (!ReadNumber(node, what, attribute.unit, units, &number, errors)) return false;
@@ -140,10 +148,12 @@ bool ReadValue(const YamlNode& node, std::string_view what, const AttributeDef& 
       if (!ReadNumbers(node, what, Unit::kNone, units, 4, &numbers, errors)) return false;
       *value = Value(Quaternion{numbers[0], numbers[1], numbers[2], numbers[3]});
       return true;
-    case Type::kMatrix: return ReadMatrix(node, what, value, errors);
+    case Type::kMatrix:
+      return ReadMatrix(node, what, value, errors);
     case Type::kPoints:
     case Type::kColors:
-    case Type::kWeights: return ReadPoints(node, what, attribute, PointComponents(type), units, value, errors);
+    case Type::kWeights:
+      return ReadPoints(node, what, attribute, PointComponents(type), units, value, errors);
     case Type::kString: {
       std::string text;
       if (!ReadString(node, what, &text, errors)) return false;
@@ -168,7 +178,8 @@ bool ReadValue(const YamlNode& node, std::string_view what, const AttributeDef& 
       return true;
     case Type::kMesh:
     case Type::kCurve:
-    case Type::kAsset: break;
+    case Type::kAsset:
+      break;
   }
   return errors->Add(node, "{} is set by the rig itself and cannot be written", what);
 }

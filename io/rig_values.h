@@ -1,4 +1,5 @@
-// YAML to the values of attributes: the type, unit and range come from the node's definition, and from nowhere else.
+// YAML to the values of attributes: the type, unit and range come from the node's definition, and from
+// nowhere else.
 #pragma once
 
 #include "graph/graph.h"
@@ -6,17 +7,17 @@
 
 namespace kpsa {
 
-// Whether a value is a connection: a string that is given to a numeric attribute and is no number. Numbers of a plug
-// type are bool to matrix, points, colors and weights.
+// Whether a value is a connection: a string that is given to a numeric attribute and is no number. Numbers of
+// a plug type are bool to matrix, points, colors and weights.
 bool IsConnection(const YamlNode& node, const Graph& graph, Type type, Unit unit, const FileUnits& units);
 
-// Reads the value of an attribute (of one element, for arrays; of one component, for components). False, with its
-// errors, where it does not fit. Assets cannot be written in a rig.
+// Reads the value of an attribute (of one element, for arrays; of one component, for components). False, with
+// its errors, where it does not fit. Assets cannot be written in a rig.
 bool ReadValue(const YamlNode& node, std::string_view what, const AttributeDef& attribute, Type type,
                const FileUnits& units, Value* value, YamlErrors* errors);
 
 // A list of `count` numbers.
-bool ReadNumbers(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units, std::size_t count,
-                 std::vector<double>* values, YamlErrors* errors);
+bool ReadNumbers(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units,
+                 std::size_t count, std::vector<double>* values, YamlErrors* errors);
 
 }  // namespace kpsa

@@ -12,11 +12,11 @@
 namespace kpsa {
 namespace {
 
-constexpr double kGuessDegrees = 15;       // where no clip tells a range
-constexpr double kLeastDegrees = 0.1;      // smaller motion is noise,
-constexpr double kLeastBesides = 0.01;     // unless the joint turns about another axis
-constexpr double kLeastTranslation = 1e-4; // of the rest diagonal
-constexpr double kSpaceShare = 0.9;        // of the skin that the space's subtree carries
+constexpr double kGuessDegrees = 15;        // where no clip tells a range
+constexpr double kLeastDegrees = 0.1;       // smaller motion is noise,
+constexpr double kLeastBesides = 0.01;      // unless the joint turns about another axis
+constexpr double kLeastTranslation = 1e-4;  // of the rest diagonal
+constexpr double kSpaceShare = 0.9;         // of the skin that the space's subtree carries
 
 struct Range {
   double min = 0, max = 0;  // rest is always inside
@@ -44,10 +44,11 @@ std::string Rounded(double value) { return NumberText(std::round(value * 1e9) / 
 // A plain YAML scalar where that is safe in any context, else a double-quoted one.
 std::string Quoted(const std::string& text, bool in_flow) {
   const auto safe = [&](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.' || c == '-' || c == '@' ||
-           (!in_flow && (c == '[' || c == ']'));
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '.' || c == '-' || c == '@' || (!in_flow && (c == '[' || c == ']'));
   };
-  const bool letter_first = !text.empty() && ((text[0] >= 'a' && text[0] <= 'z') || (text[0] >= 'A' && text[0] <= 'Z') || text[0] == '_');
+  const bool letter_first = !text.empty() && ((text[0] >= 'a' && text[0] <= 'z') ||
+                                              (text[0] >= 'A' && text[0] <= 'Z') || text[0] == '_');
   if (letter_first && std::all_of(text.begin(), text.end(), safe)) return text;
   std::string quoted = "\"";
   for (char c : text) {
@@ -78,7 +79,11 @@ std::string InComment(std::string text) {
 class Writer {
  public:
   Writer(const Rig& rig, const StarterOptions& options)
-      : rig_(rig), character_(*rig.character), options_(options), motions_(character_.nodes.size()), carries_(character_.nodes.size(), 0.0) {}
+      : rig_(rig),
+        character_(*rig.character),
+        options_(options),
+        motions_(character_.nodes.size()),
+        carries_(character_.nodes.size(), 0.0) {}
 
   std::string Write() {
     MeasureCarried();
@@ -104,7 +109,8 @@ class Writer {
         continue;
       }
       for (std::size_t i = 0; i < mesh.influences->joints().size(); ++i) {
-        carries_[gltf_of_node[mesh.influence_nodes[mesh.influences->joints()[i]].index]] += mesh.influences->weights()[i];
+        carries_[gltf_of_node[mesh.influence_nodes[mesh.influences->joints()[i]].index]] +=
+            mesh.influences->weights()[i];
       }
     }
     for (auto it = character_.order.rbegin(); it != character_.order.rend(); ++it) {
@@ -124,7 +130,8 @@ class Writer {
       switch (channel.path) {
         case gltf::Path::kRotation: {
           const Quaternion now{value[0], value[1], value[2], value[3]};
-          const Matrix4 relative = RotationFromQuaternion(Conjugate(Normalized(node.rotation)) * Normalized(now));
+          const Matrix4 relative =
+              RotationFromQuaternion(Conjugate(Normalized(node.rotation)) * Normalized(now));
           const Double3 angles = EulerFromRotation(relative, RotateOrder::kXyz);
           for (int i = 0; i < 3; ++i) motion.rotate[i].Add(angles[i] * 180 / kPi);
           break;
@@ -134,7 +141,8 @@ class Writer {
           for (int i = 0; i < 3; ++i) motion.translate[i].Add(offset[i]);
           break;
         }
-        case gltf::Path::kScale: break;
+        case gltf::Path::kScale:
+          break;
         case gltf::Path::kWeights:
           motion.weights.resize(std::max(motion.weights.size(), width));
           for (std::size_t i = 0; i < width; ++i) motion.weights[i].Add(value[i]);
@@ -150,25 +158,31 @@ class Writer {
       meshes.push_back(mesh.name);
       points += mesh.mesh().point_count();
     }
-    const std::string file = options_.character.empty() ? std::filesystem::path(character_.path).filename().string() : options_.character;
-    text_ += fmt::format("# A starter rig for {}: {} meshes, {} points, {} clips, {:.3g} m from corner to corner.\n"
-                         "# Lengths are in cm and angles in degrees here; write 2mm or 0.1rad for anything else.\n"
-                         "kpsa: 1\n"
-                         "units: {{length: cm, angle: deg}}\n"
-                         "character: {}\n",
-                         InComment(file), meshes.size(), points, character_.clips.size(), rig_.rest_diagonal, Quoted(file, false));
+    const std::string file = options_.character.empty()
+                                 ? std::filesystem::path(character_.path).filename().string()
+                                 : options_.character;
+    text_ += fmt::format(
+        "# A starter rig for {}: {} meshes, {} points, {} clips, {:.3g} m from corner to corner.\n"
+        "# Lengths are in cm and angles in degrees here; write 2mm or 0.1rad for anything else.\n"
+        "kpsa: 1\n"
+        "units: {{length: cm, angle: deg}}\n"
+        "character: {}\n",
+        InComment(file), meshes.size(), points, character_.clips.size(), rig_.rest_diagonal,
+        Quoted(file, false));
     if (meshes.empty()) {
       text_ += "# The scene shows no mesh: there is nothing to deform or to accelerate.\n";
       return;
     }
-    text_ += fmt::format("\nnodes:\n"
-                         "  # Smooths what the skin does to the surface. Other deformers: lattice, cluster, softMod, wire (`kpsa nodes`).\n"
-                         "  mush: {{type: deltaMush, iterations: {}}}\n"
-                         "\ndeform:\n"
-                         "  # gltf is the file's own morph targets and skin; deformers act in this order.\n"
-                         "  - meshes: {}\n"
-                         "    stack: [gltf, mush]\n",
-                         options_.iterations, QuotedList(meshes));
+    text_ += fmt::format(
+        "\nnodes:\n"
+        "  # Smooths what the skin does to the surface. Other deformers: lattice, cluster, softMod, wire "
+        "(`kpsa nodes`).\n"
+        "  mush: {{type: deltaMush, iterations: {}}}\n"
+        "\ndeform:\n"
+        "  # gltf is the file's own morph targets and skin; deformers act in this order.\n"
+        "  - meshes: {}\n"
+        "    stack: [gltf, mush]\n",
+        options_.iterations, QuotedList(meshes));
   }
 
   void AddControl(const std::string& node, const std::string& attribute, const PlugRef& plug, Range range) {
@@ -179,15 +193,19 @@ class Writer {
       return;
     }
     if (control_count_++ == 0) text_ += heading_;
-    text_ += fmt::format("  {}: {{min: {}, max: {}}}\n", Quoted(name, false), Rounded(range.min), Rounded(range.max));
+    text_ += fmt::format("  {}: {{min: {}, max: {}}}\n", Quoted(name, false), Rounded(range.min),
+                         Rounded(range.max));
   }
 
   void WriteControls() {
     const bool guess = character_.clips.empty();
-    heading_ = guess ? "\n# What may move, for animators and for training. The file has no clips: these ranges are guesses.\ncontrols:\n"
-                     : "\n# What may move, for animators and for training: what the clips move, as far as they move it (rounded outwards).\n"
+    heading_ = guess ? "\n# What may move, for animators and for training. The file has no clips: these "
+                       "ranges are guesses.\ncontrols:\n"
+                     : "\n# What may move, for animators and for training: what the clips move, as far as "
+                       "they move it (rounded outwards).\n"
                        "# Each is on top of the rest pose or of the clip that plays.\ncontrols:\n";
-    const double step = std::pow(10.0, std::floor(std::log10(std::max(rig_.rest_diagonal, 1e-6) * 100 / 500)));  // cm
+    const double step =
+        std::pow(10.0, std::floor(std::log10(std::max(rig_.rest_diagonal, 1e-6) * 100 / 500)));  // cm
     std::vector<std::string> idle;
     for (Index i = 0; i < character_.nodes.size(); ++i) {
       Motion& motion = motions_[i];
@@ -207,16 +225,21 @@ class Writer {
         const bool shifts = motion.translate[axis].size() > kLeastTranslation * rig_.rest_diagonal;
         moves = moves || rotates || shifts;
         if (!(carries_[i] > 0)) continue;
-        if (rotates) AddControl(name, "rotate" + letter, {node, def.FindAttribute("rotate"), -1, axis}, RoundedOut(motion.rotate[axis], motion.rotate[axis].size() < 1 ? 0.1 : 1));
+        if (rotates)
+          AddControl(name, "rotate" + letter, {node, def.FindAttribute("rotate"), -1, axis},
+                     RoundedOut(motion.rotate[axis], motion.rotate[axis].size() < 1 ? 0.1 : 1));
         if (shifts) {
           const Range in_cm{motion.translate[axis].min * 100, motion.translate[axis].max * 100};
-          AddControl(name, "translate" + letter, {node, def.FindAttribute("translate"), -1, axis}, RoundedOut(in_cm, step));
+          AddControl(name, "translate" + letter, {node, def.FindAttribute("translate"), -1, axis},
+                     RoundedOut(in_cm, step));
         }
       }
       if (moves && !(carries_[i] > 0)) idle.push_back(name);
     }
     for (const CharacterMesh& mesh : rig_.scene.meshes) WriteWeights(mesh);
-    if (!idle.empty()) text_ += fmt::format("  # Moved by clips, but carrying no point: {}\n", InComment(fmt::format("{}", fmt::join(idle, ", "))));
+    if (!idle.empty())
+      text_ += fmt::format("  # Moved by clips, but carrying no point: {}\n",
+                           InComment(fmt::format("{}", fmt::join(idle, ", "))));
   }
 
   void WriteWeights(const CharacterMesh& mesh) {
@@ -246,7 +269,8 @@ class Writer {
   // The deepest transform that carries nearly everything: in its space only what deforms is left to learn.
   std::optional<std::string> Space() const {
     std::optional<Index> best;
-    for (Index i : character_.order) {  // parents first: later ones are deeper along the one chain that qualifies
+    for (Index i :
+         character_.order) {  // parents first: later ones are deeper along the one chain that qualifies
       if (carries_[i] >= kSpaceShare && character_.nodes[i].mesh == kNoIndex) best = i;
     }
     if (!best.has_value()) return std::nullopt;
@@ -259,7 +283,8 @@ class Writer {
     for (const CharacterMesh& mesh : rig_.scene.meshes) points.push_back(mesh.name + "@mush");
     for (const CharacterClip& clip : rig_.scene.clips) {
       std::vector<std::string>& to = test.empty() ? test : train;
-      if (std::find(test.begin(), test.end(), clip.id) == test.end() && std::find(train.begin(), train.end(), clip.id) == train.end()) {
+      if (std::find(test.begin(), test.end(), clip.id) == test.end() &&
+          std::find(train.begin(), train.end(), clip.id) == train.end()) {
         to.push_back(clip.id);
       }
     }
@@ -269,23 +294,29 @@ class Writer {
     const double power = std::pow(10.0, std::floor(std::log10(std::max(raw, 1e-9))));
     const double tolerance = power * (raw >= 5 * power ? 5 : raw >= 2 * power ? 2 : 1);
     text_ += fmt::format("\naccelerate:\n  {}:\n", Quoted(stem.empty() ? "character" : stem, false));
-    text_ += fmt::format("    points: {}  # up to and including that stage; later stages run exactly\n", QuotedList(points));
+    text_ += fmt::format("    points: {}  # up to and including that stage; later stages run exactly\n",
+                         QuotedList(points));
     if (const std::optional<std::string> space = Space()) {
-      text_ += fmt::format("    space: {}  # the transform in whose space the points are learned\n", Quoted(*space, false));
+      text_ += fmt::format("    space: {}  # the transform in whose space the points are learned\n",
+                           Quoted(*space, false));
     }
-    text_ += fmt::format("    subspace: {}  # `kpsa train` writes it\n", Quoted(options_.subspace.empty() ? stem + ".kpsa" : options_.subspace, false));
-    text_ += fmt::format("    tolerance: {}mm  # the largest error of a point that is accepted\n", Rounded(tolerance));
+    text_ += fmt::format("    subspace: {}  # `kpsa train` writes it\n",
+                         Quoted(options_.subspace.empty() ? stem + ".kpsa" : options_.subspace, false));
+    text_ += fmt::format("    tolerance: {}mm  # the largest error of a point that is accepted\n",
+                         Rounded(tolerance));
     text_ += "    violationRate: 3%  # of frames that may exceed it\n";
     text_ += fmt::format("    train: {{{}samples: {}}}  # clips, and poses drawn from the controls\n",
                          train.empty() ? "" : "clips: " + QuotedList(train) + ", ", options_.samples);
-    if (!test.empty()) text_ += fmt::format("    test: {{clips: {}}}  # never trained on; what `kpsa bench` runs\n", QuotedList(test));
+    if (!test.empty())
+      text_ += fmt::format("    test: {{clips: {}}}  # never trained on; what `kpsa bench` runs\n",
+                           QuotedList(test));
   }
 
   const Rig& rig_;
   const gltf::Character& character_;
   const StarterOptions& options_;
-  std::vector<Motion> motions_;   // by glTF node
-  std::vector<double> carries_;   // by glTF node
+  std::vector<Motion> motions_;  // by glTF node
+  std::vector<double> carries_;  // by glTF node
   std::string text_, heading_;
   int control_count_ = 0;
 };

@@ -1,5 +1,5 @@
-// The starter rig of `kpsa init`: a rig file for a character that loads, trains and benches as it is, with comments
-// that say what to change.
+// The starter rig of `kpsa init`: a rig file for a character that loads, trains and benches as it is, with
+// comments that say what to change.
 #pragma once
 
 #include <string>
@@ -16,11 +16,11 @@ struct StarterOptions {
   int samples = 2000;     // training poses drawn from the controls
 };
 
-// The text of the rig. Controls: every local rotation (degrees, in the rest pose's axes) and translation that a clip
-// moves away from rest, and every morph weight, ranged by the keys of all clips and rounded outwards; joints that
-// carry no point are left out. Without clips: guesses, marked so. Accelerated: the end of every mesh's stack, in the
-// space of the deepest transform that carries 90 % of the skin; trained on all clips but the first, which is kept for
-// the bench. Errors: those of reading the character.
+// The text of the rig. Controls: every local rotation (degrees, in the rest pose's axes) and translation that
+// a clip moves away from rest, and every morph weight, ranged by the keys of all clips and rounded outwards;
+// joints that carry no point are left out. Without clips: guesses, marked so. Accelerated: the end of every
+// mesh's stack, in the space of the deepest transform that carries 90 % of the skin; trained on all clips but
+// the first, which is kept for the bench. Errors: those of reading the character.
 Result<std::string> StarterRig(const NodeRegistry& registry, const std::string& character_path,
                                const StarterOptions& options = {});
 

@@ -18,7 +18,9 @@ struct MorphEntry {
 struct MorphRows {
   std::vector<Index> offsets;
   std::vector<MorphEntry> entries;
-  std::span<const MorphEntry> row(Index v) const { return {entries.data() + offsets[v], offsets[v + 1] - offsets[v]}; }
+  std::span<const MorphEntry> row(Index v) const {
+    return {entries.data() + offsets[v], offsets[v + 1] - offsets[v]};
+  }
 };
 
 MorphRows RowsByVertex(const gltf::Mesh& mesh) {
@@ -33,8 +35,8 @@ MorphRows RowsByVertex(const gltf::Mesh& mesh) {
   for (std::size_t t = 0; t < mesh.targets.size(); ++t) {
     const gltf::MorphTarget& target = mesh.targets[t];
     for (std::size_t i = 0; i < target.vertices.size(); ++i) {
-      rows.entries[next[target.vertices[i]]++] = {static_cast<Index>(t),
-                                                  {target.deltas[3 * i], target.deltas[3 * i + 1], target.deltas[3 * i + 2]}};
+      rows.entries[next[target.vertices[i]]++] = {
+          static_cast<Index>(t), {target.deltas[3 * i], target.deltas[3 * i + 1], target.deltas[3 * i + 2]}};
     }
   }
   return rows;
@@ -43,14 +45,16 @@ MorphRows RowsByVertex(const gltf::Mesh& mesh) {
 // Orders vertices by everything that moves them: first by a hash of it, then by the data itself.
 class VertexOrder {
  public:
-  explicit VertexOrder(const gltf::Mesh& mesh) : mesh_(mesh), morphs_(RowsByVertex(mesh)), hashes_(mesh.vertex_count()) {
+  explicit VertexOrder(const gltf::Mesh& mesh)
+      : mesh_(mesh), morphs_(RowsByVertex(mesh)), hashes_(mesh.vertex_count()) {
     for (Index v = 0; v < hashes_.size(); ++v) hashes_[v] = Hash(v);
   }
   // Negative, zero or positive as a comes before, with or after b.
   int Compare(Index a, Index b) const {
     if (hashes_[a] != hashes_[b]) return hashes_[a] < hashes_[b] ? -1 : 1;
     for (std::size_t i = 0; i < 3; ++i) {
-      if (const int c = CompareFloats(mesh_.positions[3 * a + i], mesh_.positions[3 * b + i]); c != 0) return c;
+      if (const int c = CompareFloats(mesh_.positions[3 * a + i], mesh_.positions[3 * b + i]); c != 0)
+        return c;
     }
     if (mesh_.skinned()) {
       const auto row_a = mesh_.influence_rows().row(a), row_b = mesh_.influence_rows().row(b);
@@ -181,7 +185,8 @@ void AddTriangles(const gltf::Character& character, const gltf::Mesh& mesh, Mesh
   }
 }
 
-std::shared_ptr<const MorphTargets> PointTargets(const gltf::Mesh& mesh, const std::vector<Index>& vertex_to_point,
+std::shared_ptr<const MorphTargets> PointTargets(const gltf::Mesh& mesh,
+                                                 const std::vector<Index>& vertex_to_point,
                                                  const std::vector<Index>& point_to_vertex) {
   std::vector<MorphTargets::Target> targets;
   for (std::size_t t = 0; t < mesh.targets.size(); ++t) {
@@ -224,8 +229,10 @@ WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::str
   Mesh::Data data;
   data.name = std::move(name);
   data.vertex_to_point.resize(representative.size());
-  for (Index p = 0; p < welded.point_to_vertex.size(); ++p) data.vertex_to_point[welded.point_to_vertex[p]] = p;
-  for (Index v = 0; v < representative.size(); ++v) data.vertex_to_point[v] = data.vertex_to_point[representative[v]];
+  for (Index p = 0; p < welded.point_to_vertex.size(); ++p)
+    data.vertex_to_point[welded.point_to_vertex[p]] = p;
+  for (Index v = 0; v < representative.size(); ++v)
+    data.vertex_to_point[v] = data.vertex_to_point[representative[v]];
   std::vector<float> rest;
   rest.reserve(3 * welded.point_to_vertex.size());
   for (Index v : welded.point_to_vertex) {
@@ -233,13 +240,14 @@ WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::str
   }
   data.rest = PointBuffer::FromInterleaved(rest);
   AddTriangles(character, mesh, &data);
-  if (!mesh.targets.empty()) welded.targets = PointTargets(mesh, data.vertex_to_point, welded.point_to_vertex);
+  if (!mesh.targets.empty())
+    welded.targets = PointTargets(mesh, data.vertex_to_point, welded.point_to_vertex);
   welded.mesh = std::make_shared<const Mesh>(std::move(data));
   return welded;
 }
 
-std::shared_ptr<const Influences> PointInfluences(const gltf::Mesh& mesh, const WeldedMesh& welded, Index joint_count,
-                                                  bool* needs_node) {
+std::shared_ptr<const Influences> PointInfluences(const gltf::Mesh& mesh, const WeldedMesh& welded,
+                                                  Index joint_count, bool* needs_node) {
   std::vector<Index> offsets{0}, joints;
   std::vector<float> weights;
   *needs_node = false;

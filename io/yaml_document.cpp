@@ -21,31 +21,37 @@ struct Refusal {
   Status status;
 };
 
-// Builds the tree from yaml-cpp's events. Open collections are kept on a stack and moved into their parents when they
-// end, so that no pointer into a growing vector is held.
+// Builds the tree from yaml-cpp's events. Open collections are kept on a stack and moved into their parents
+// when they end, so that no pointer into a growing vector is held.
 class TreeBuilder final : public YAML::EventHandler {
  public:
   explicit TreeBuilder(std::shared_ptr<const std::string> file) : file_(std::move(file)) {}
 
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { Add(Make(YamlNode::Kind::kNull, mark), anchor); }
-  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor, const std::string& value) override {
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    Add(Make(YamlNode::Kind::kNull, mark), anchor);
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& value) override {
     YamlNode node = Make(YamlNode::Kind::kScalar, mark);
     node.quoted = tag == "!";
     if (tag != "!" && tag != "?") node.tag = tag;
     // A plain ~, null or nothing is null; the schema may still read the text of a plain "null" as a name
-    if (!node.quoted && node.tag.empty() && (value.empty() || value == "~")) node.kind = YamlNode::Kind::kNull;
+    if (!node.quoted && node.tag.empty() && (value.empty() || value == "~"))
+      node.kind = YamlNode::Kind::kNull;
     node.scalar = value;
     Add(std::move(node), anchor);
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto it = anchors_.find(anchor);
-    if (it == anchors_.end()) throw Refusal{Status::Invalid("an alias may not lie within its own anchor").At(Where(mark))};
+    if (it == anchors_.end())
+      throw Refusal{Status::Invalid("an alias may not lie within its own anchor").At(Where(mark))};
     const std::size_t size = it->second.size;
     aliased_ += size;
     if (aliased_ > kMaxAliasNodes) {
-      throw Refusal{Status::Invalid("the aliases of this file expand to more than {} nodes", kMaxAliasNodes).At(Where(mark))};
+      throw Refusal{Status::Invalid("the aliases of this file expand to more than {} nodes", kMaxAliasNodes)
+                        .At(Where(mark))};
     }
     count_ += size;
     CheckCount(mark);
@@ -72,8 +78,8 @@ class TreeBuilder final : public YAML::EventHandler {
   struct Opened {
     YamlNode node;
     YAML::anchor_t anchor;
-    int depth = 1;         // of the deepest child, plus one
-    std::size_t size = 1;  // nodes of the subtree
+    int depth = 1;                                      // of the deepest child, plus one
+    std::size_t size = 1;                               // nodes of the subtree
     std::unordered_map<std::string, std::size_t> seen;  // keys of a map
     bool expects_value = false;
   };
@@ -88,7 +94,8 @@ class TreeBuilder final : public YAML::EventHandler {
     throw Refusal{Status::Invalid("nested deeper than {} levels", kMaxYamlDepth).At(Where(mark))};
   }
   void CheckCount(const YAML::Mark& mark) const {
-    if (count_ > kMaxYamlNodes) throw Refusal{Status::Invalid("more than {} values in one file", kMaxYamlNodes).At(Where(mark))};
+    if (count_ > kMaxYamlNodes)
+      throw Refusal{Status::Invalid("more than {} values in one file", kMaxYamlNodes).At(Where(mark))};
   }
   YamlNode Make(YamlNode::Kind kind, const YAML::Mark& mark) {
     ++count_;
@@ -103,8 +110,11 @@ class TreeBuilder final : public YAML::EventHandler {
   void Open(YamlNode::Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
     if (static_cast<int>(open_.size()) >= kMaxYamlDepth) RefuseDepth(mark);
     if (!open_.empty() && open_.back().node.is_map() && !open_.back().expects_value) {
-      throw Refusal{Status::Invalid("a key is a single word or string here, not a list or a map (quote plugs that contain "
-                                    "[ ] or {{ }})").At(Where(mark))};
+      throw Refusal{
+          Status::Invalid(
+              "a key is a single word or string here, not a list or a map (quote plugs that contain "
+              "[ ] or {{ }})")
+              .At(Where(mark))};
     }
     Opened opened;
     opened.node = Make(kind, mark);
@@ -137,14 +147,17 @@ class TreeBuilder final : public YAML::EventHandler {
       return;
     }
     const SourceLocation where{*file_, node.line, node.column};
-    if (!node.is_scalar()) throw Refusal{Status::Invalid("a key is a single word or string, not {}", node.kind_name()).At(where)};
+    if (!node.is_scalar())
+      throw Refusal{Status::Invalid("a key is a single word or string, not {}", node.kind_name()).At(where)};
     if (node.scalar == "<<" && !node.quoted) {
       throw Refusal{Status::Invalid("\"<<\" merges are not read: repeat the keys, or use include").At(where)};
     }
     const auto [it, added] = parent.seen.emplace(node.scalar, parent.node.keys.size());
     if (!added) {
       const YamlNode& first = parent.node.keys[it->second];
-      duplicates.Append(Status::Invalid("\"{}\" is defined twice in this map: first at line {}", node.scalar, first.line).At(where));
+      duplicates.Append(
+          Status::Invalid("\"{}\" is defined twice in this map: first at line {}", node.scalar, first.line)
+              .At(where));
     }
     parent.node.keys.push_back(std::move(node));
     parent.expects_value = true;
@@ -160,7 +173,8 @@ class TreeBuilder final : public YAML::EventHandler {
   Status duplicates;  // collected: the parse goes on
 };
 
-// The first byte that is not well-formed UTF-8 or a control character; npos if there is none (Unicode 15, table 3-7).
+// The first byte that is not well-formed UTF-8 or a control character; npos if there is none (Unicode 15,
+// table 3-7).
 std::size_t FindBadByte(std::string_view text) {
   const auto at = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
   const auto continues = [&](std::size_t i) { return (at(i) & 0xC0u) == 0x80u; };
@@ -171,8 +185,8 @@ std::size_t FindBadByte(std::string_view text) {
       i += 1;
     } else if (c >= 0xC2 && c <= 0xDF && continues(i + 1)) {
       i += 2;
-    } else if (c >= 0xE0 && c <= 0xEF && continues(i + 1) && continues(i + 2) && !(c == 0xE0 && at(i + 1) < 0xA0) &&
-               !(c == 0xED && at(i + 1) > 0x9F)) {
+    } else if (c >= 0xE0 && c <= 0xEF && continues(i + 1) && continues(i + 2) &&
+               !(c == 0xE0 && at(i + 1) < 0xA0) && !(c == 0xED && at(i + 1) > 0x9F)) {
       i += 3;
     } else if (c >= 0xF0 && c <= 0xF4 && continues(i + 1) && continues(i + 2) && continues(i + 3) &&
                !(c == 0xF0 && at(i + 1) < 0x90) && !(c == 0xF4 && at(i + 1) > 0x8F)) {
@@ -193,10 +207,12 @@ std::string_view LineOf(std::string_view text, int line) {
   return text.substr(0, text.find('\n'));
 }
 
-// Where `[` breaks a flow map or list: an identifier directly followed by '[' after a '{' or '[' of the same line.
+// Where `[` breaks a flow map or list: an identifier directly followed by '[' after a '{' or '[' of the same
+// line.
 bool HasBareBracket(std::string_view line) {
   std::size_t open = line.find_first_of("{[");
-  while (open != std::string_view::npos && open > 0 && line[open - 1] != ' ') open = line.find_first_of("{[", open + 1);
+  while (open != std::string_view::npos && open > 0 && line[open - 1] != ' ')
+    open = line.find_first_of("{[", open + 1);
   if (open == std::string_view::npos) return false;
   char quote = 0;
   for (std::size_t i = open; i + 1 < line.size(); ++i) {
@@ -237,10 +253,14 @@ Status SyntaxError(const YAML::Exception& error, std::string_view text, const st
 
 const char* YamlNode::kind_name() const {
   switch (kind) {
-    case Kind::kNull: return "nothing";
-    case Kind::kScalar: return "a single value";
-    case Kind::kSequence: return "a list";
-    case Kind::kMap: break;
+    case Kind::kNull:
+      return "nothing";
+    case Kind::kScalar:
+      return "a single value";
+    case Kind::kSequence:
+      return "a list";
+    case Kind::kMap:
+      break;
   }
   return "a map";
 }
@@ -255,7 +275,8 @@ const YamlNode* YamlNode::Find(std::string_view key) const {
 Result<YamlNode> ParseYaml(std::string_view text, const std::string& name) {
   const auto file = std::make_shared<const std::string>(name);
   if (text.size() > kMaxYamlBytes) {
-    return Status::Invalid("the file has {} bytes; at most {} are read", text.size(), kMaxYamlBytes).At({name, 0, 0});
+    return Status::Invalid("the file has {} bytes; at most {} are read", text.size(), kMaxYamlBytes)
+        .At({name, 0, 0});
   }
   if (text.substr(0, 3) == "\xEF\xBB\xBF") text.remove_prefix(3);
   if (const std::size_t bad = FindBadByte(text); bad != std::string_view::npos) {

@@ -1,9 +1,10 @@
-// The one door to yaml-cpp: a YAML document as a small tree whose scalars stay text, so that the reader's schema
-// decides what `010`, `no` and `1e999` mean. Every node knows its place.
+// The one door to yaml-cpp: a YAML document as a small tree whose scalars stay text, so that the reader's
+// schema decides what `010`, `no` and `1e999` mean. Every node knows its place.
 //
-// Refused, each at its place: syntax errors, no or several documents, duplicate keys, keys that are no scalars, `<<`
-// merges, aliases that grow the tree beyond kMaxAliasNodes (or contain themselves), invalid UTF-8 and control
-// characters, more than kMaxYamlBytes, kMaxYamlNodes or kMaxYamlDepth. A byte order mark and CRLF are accepted.
+// Refused, each at its place: syntax errors, no or several documents, duplicate keys, keys that are no
+// scalars, `<<` merges, aliases that grow the tree beyond kMaxAliasNodes (or contain themselves), invalid
+// UTF-8 and control characters, more than kMaxYamlBytes, kMaxYamlNodes or kMaxYamlDepth. A byte order mark
+// and CRLF are accepted.
 #pragma once
 
 #include <memory>
@@ -76,18 +77,22 @@ class YamlErrors {
 bool ReadString(const YamlNode& node, std::string_view what, std::string* value, YamlErrors* errors);
 // true, on, yes, false, off or no, as "on", "On" or "ON".
 std::optional<bool> ParseBool(std::string_view text);
-bool ReadBool(const YamlNode& node, std::string_view what, bool* value, YamlErrors* errors);  // true/false, on/off, yes/no
+bool ReadBool(const YamlNode& node, std::string_view what, bool* value,
+              YamlErrors* errors);  // true/false, on/off, yes/no
 bool ReadNumber(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units, double* value,
                 YamlErrors* errors);
-bool ReadInteger(const YamlNode& node, std::string_view what, std::int64_t min, std::int64_t max, std::int64_t* value,
-                 YamlErrors* errors);
+bool ReadInteger(const YamlNode& node, std::string_view what, std::int64_t min, std::int64_t max,
+                 std::int64_t* value, YamlErrors* errors);
 // A list of strings; one string alone is a list of one.
-bool ReadStrings(const YamlNode& node, std::string_view what, std::vector<std::string>* values, YamlErrors* errors);
+bool ReadStrings(const YamlNode& node, std::string_view what, std::vector<std::string>* values,
+                 YamlErrors* errors);
 
-// A map that is read key by key; keys that nobody asked for are errors with the nearest key that was asked for.
+// A map that is read key by key; keys that nobody asked for are errors with the nearest key that was asked
+// for.
 class YamlMap {
  public:
-  // `what` begins messages: "node \"mush\"". A node that is no map is an error; it then reads as an empty map.
+  // `what` begins messages: "node \"mush\"". A node that is no map is an error; it then reads as an empty
+  // map.
   YamlMap(const YamlNode& node, std::string what, YamlErrors* errors);
   const YamlNode* Find(std::string_view key);      // null if absent
   const YamlNode* Required(std::string_view key);  // an error if absent

@@ -35,7 +35,8 @@ std::optional<bool> ParseBool(std::string_view text) {
 bool ReadBool(const YamlNode& node, std::string_view what, bool* value, YamlErrors* errors) {
   if (!CheckScalar(node, what, "true or false", errors)) return false;
   const std::optional<bool> read = ParseBool(node.scalar);
-  if (!read.has_value()) return errors->Add(node, "{}: expected true or false, found \"{}\"", what, node.scalar);
+  if (!read.has_value())
+    return errors->Add(node, "{}: expected true or false, found \"{}\"", what, node.scalar);
   *value = *read;
   return true;
 }
@@ -49,24 +50,28 @@ bool ReadNumber(const YamlNode& node, std::string_view what, Unit unit, const Fi
   return true;
 }
 
-bool ReadInteger(const YamlNode& node, std::string_view what, std::int64_t min, std::int64_t max, std::int64_t* value,
-                 YamlErrors* errors) {
+bool ReadInteger(const YamlNode& node, std::string_view what, std::int64_t min, std::int64_t max,
+                 std::int64_t* value, YamlErrors* errors) {
   double number = 0;
   if (!ReadNumber(node, what, Unit::kNone, FileUnits(), &number, errors)) return false;
-  if (number != std::floor(number) || number < static_cast<double>(min) || number > static_cast<double>(max)) {
-    return errors->Add(node, "{}: expected a whole number from {} to {}, found {}", what, min, max, node.scalar);
+  if (number != std::floor(number) || number < static_cast<double>(min) ||
+      number > static_cast<double>(max)) {
+    return errors->Add(node, "{}: expected a whole number from {} to {}, found {}", what, min, max,
+                       node.scalar);
   }
   *value = static_cast<std::int64_t>(number);
   return true;
 }
 
-bool ReadStrings(const YamlNode& node, std::string_view what, std::vector<std::string>* values, YamlErrors* errors) {
+bool ReadStrings(const YamlNode& node, std::string_view what, std::vector<std::string>* values,
+                 YamlErrors* errors) {
   values->clear();
   if (node.is_scalar()) {
     values->push_back(node.scalar);
     return true;
   }
-  if (!node.is_sequence()) return errors->Add(node, "{}: expected a list of names, found {}", what, node.kind_name());
+  if (!node.is_sequence())
+    return errors->Add(node, "{}: expected a list of names, found {}", what, node.kind_name());
   bool good = true;
   for (const YamlNode& item : node.items) {
     std::string text;
@@ -99,8 +104,8 @@ void YamlMap::RejectUnread() {
   if (!is_map_) return;
   for (const YamlNode& key : node_->keys) {
     if (std::find(asked_.begin(), asked_.end(), key.scalar) != asked_.end()) continue;
-    errors_->Add(key, "{}: unknown key \"{}\"{}; the keys are {}", what_, key.scalar, DidYouMean(key.scalar, asked_),
-                 fmt::join(asked_, ", "));
+    errors_->Add(key, "{}: unknown key \"{}\"{}; the keys are {}", what_, key.scalar,
+                 DidYouMean(key.scalar, asked_), fmt::join(asked_, ", "));
   }
 }
 

@@ -52,19 +52,22 @@ std::vector<PlugRef> AccelerationTarget::outputs() const {
   return plugs;
 }
 
-Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const AccelerationTarget& target, std::shared_ptr<const Subspace> subspace,
-                               const std::string& node_name, const AccelerateOptions& options) {
+Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const AccelerationTarget& target,
+                               std::shared_ptr<const Subspace> subspace, const std::string& node_name,
+                               const AccelerateOptions& options) {
   Accelerated result;
   KpsaConfig::Data data;
   data.subspace = subspace;
 
   // The same rig as in training?
   if (subspace->outputs.size() != target.meshes.size()) {
-    return Status::Invalid("the subspace is for {} meshes, the rig accelerates {}", subspace->outputs.size(), target.meshes.size());
+    return Status::Invalid("the subspace is for {} meshes, the rig accelerates {}", subspace->outputs.size(),
+                           target.meshes.size());
   }
   for (std::size_t m = 0; m < target.meshes.size(); ++m) {
     if (subspace->outputs[m].name != target.meshes[m].name) {
-      return Status::Invalid("the subspace is for {}, the rig accelerates {}", subspace->outputs[m].name, target.meshes[m].name);
+      return Status::Invalid("the subspace is for {}, the rig accelerates {}", subspace->outputs[m].name,
+                             target.meshes[m].name);
     }
   }
   const Signature trained = TrainedSignature(*subspace);
@@ -74,23 +77,30 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
       SignatureDifference(trained, RigSignature(*graph, target.outputs(), target.space, target.controls));
   if (!difference.empty()) {
     if (!options.stale_is_miss) {
-      return Status::Invalid("the subspace is stale: since it was trained, {} changed; train it again, or use --stale miss", difference);
+      return Status::Invalid(
+          "the subspace is stale: since it was trained, {} changed; train it again, or use --stale miss",
+          difference);
     }
     data.always_miss = true;
-    result.notes.push_back(fmt::format("the subspace is stale ({} changed): every frame is evaluated fully", difference));
+    result.notes.push_back(
+        fmt::format("the subspace is stale ({} changed): every frame is evaluated fully", difference));
   }
   if (subspace->space != target.space_name) {
-    return Status::Invalid("the subspace lives in space \"{}\", the rig asks for \"{}\"", subspace->space, target.space_name);
+    return Status::Invalid("the subspace lives in space \"{}\", the rig asks for \"{}\"", subspace->space,
+                           target.space_name);
   }
 
-  // Guards: what was trained, with its range, and what moves here although it never moved there, at its rest value
+  // Guards: what was trained, with its range, and what moves here although it never moved there, at its rest
+  // value
   std::vector<std::string> unguarded;
   Result<std::vector<Signal>> signals =
-      FindSignals(*graph, compiler, target.outputs(), target.varying, target.space.empty() ? nullptr : &target.space[0], &unguarded);
+      FindSignals(*graph, compiler, target.outputs(), target.varying,
+                  target.space.empty() ? nullptr : &target.space[0], &unguarded);
   if (!signals.ok()) return signals.status();
   if (!unguarded.empty()) {
     data.always_miss = true;
-    result.notes.push_back(fmt::format("{} varies and cannot be guarded: every frame is evaluated fully", unguarded[0]));
+    result.notes.push_back(
+        fmt::format("{} varies and cannot be guarded: every frame is evaluated fully", unguarded[0]));
   }
   std::map<std::string, TrainedRange> ranges;
   for (const TrainedRange& range : subspace->ranges) ranges.emplace(range.plug, range);
@@ -123,10 +133,14 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
   for (const CueDescription& cue : subspace->cues) {
     if (cue.kind != CueDescription::Kind::kPoint) continue;
     const auto& stages = target.meshes[cue.mesh].stages;
-    const auto stage = std::find_if(stages.begin(), stages.end(), [&](const auto& s) { return s.name == cue.stage; });
-    if (stage == stages.end()) return Status::Invalid("the subspace measures at stage \"{}\" of {}, which the rig lacks", cue.stage, target.meshes[cue.mesh].name);
+    const auto stage =
+        std::find_if(stages.begin(), stages.end(), [&](const auto& s) { return s.name == cue.stage; });
+    if (stage == stages.end())
+      return Status::Invalid("the subspace measures at stage \"{}\" of {}, which the rig lacks", cue.stage,
+                             target.meshes[cue.mesh].name);
     const auto number = static_cast<std::size_t>(stage - stages.begin());
-    auto input = std::find_if(inputs.begin(), inputs.end(), [&](const CueInput& i) { return i.mesh == cue.mesh && i.stage == number; });
+    auto input = std::find_if(inputs.begin(), inputs.end(),
+                              [&](const CueInput& i) { return i.mesh == cue.mesh && i.stage == number; });
     if (input == inputs.end()) input = inputs.insert(inputs.end(), CueInput{cue.mesh, number, {}});
     input->points.push_back(cue.point);
   }
@@ -139,9 +153,12 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
     KpsaConfig::Row row;
     if (cue.kind == CueDescription::Kind::kPoint) {
       for (std::size_t i = 0; i < inputs.size(); ++i) {
-        if (inputs[i].mesh != cue.mesh || target.meshes[cue.mesh].stages[inputs[i].stage].name != cue.stage) continue;
+        if (inputs[i].mesh != cue.mesh || target.meshes[cue.mesh].stages[inputs[i].stage].name != cue.stage)
+          continue;
         row.input = static_cast<Index>(i);
-        row.element = static_cast<Index>(std::lower_bound(inputs[i].points.begin(), inputs[i].points.end(), cue.point) - inputs[i].points.begin());
+        row.element =
+            static_cast<Index>(std::lower_bound(inputs[i].points.begin(), inputs[i].points.end(), cue.point) -
+                               inputs[i].points.begin());
       }
     } else {
       const std::size_t slash = cue.plug.rfind('/');
@@ -151,7 +168,8 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
       const char* const end = cue.plug.data() + cue.plug.size();
       const char* const number = slash == std::string::npos ? end : cue.plug.data() + slash + 1;
       if (signal->matrix && (std::from_chars(number, end, entry).ptr != end || number == end || entry > 11))
-        return Status::Invalid("the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", cue.plug);
+        return Status::Invalid(
+            "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", cue.plug);
       row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
       row.element = entry;
       auto& list = signal->matrix ? guards.matrices : guards.scalars;
@@ -159,8 +177,10 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
       row.input = Place(&list, *signal);
       if (list.size() != before) {  // a cue that needs no guard (in the chain of the space)
         constexpr double kAnything = std::numeric_limits<double>::infinity();
-        (signal->matrix ? data.matrix_lo : data.scalar_lo).insert((signal->matrix ? data.matrix_lo : data.scalar_lo).end(), signal->entries(), -kAnything);
-        (signal->matrix ? data.matrix_hi : data.scalar_hi).insert((signal->matrix ? data.matrix_hi : data.scalar_hi).end(), signal->entries(), kAnything);
+        (signal->matrix ? data.matrix_lo : data.scalar_lo)
+            .insert((signal->matrix ? data.matrix_lo : data.scalar_lo).end(), signal->entries(), -kAnything);
+        (signal->matrix ? data.matrix_hi : data.scalar_hi)
+            .insert((signal->matrix ? data.matrix_hi : data.scalar_hi).end(), signal->entries(), kAnything);
       }
     }
     data.rows.push_back(row);
@@ -183,19 +203,26 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
   Result<NodeId> node = graph->AddNode("kpsa", node_name);
   if (!node.ok()) return node.status();
   const NodeDef& def = graph->def(*node);
-  const auto plug = [&](const char* name, int element = -1) { return PlugRef{*node, def.FindAttribute(name), element, -1}; };
+  const auto plug = [&](const char* name, int element = -1) {
+    return PlugRef{*node, def.FindAttribute(name), element, -1};
+  };
   result.node = *node;
   result.config = std::make_shared<const KpsaConfig>(std::move(data));
   Status status;
   const auto note = [&](Status s) { status.Append(std::move(s)); };
   note(graph->Set(plug("config"), Value(result.config)));
-  note(graph->Set(plug("tolerance"), std::min(options.tolerance < 0 ? subspace->tolerance : options.tolerance, kAnyError)));
-  note(graph->Set(plug("violationRate"), options.violation_rate < 0 ? subspace->violation_rate : options.violation_rate));
+  note(graph->Set(plug("tolerance"),
+                  std::min(options.tolerance < 0 ? subspace->tolerance : options.tolerance, kAnyError)));
+  note(graph->Set(plug("violationRate"),
+                  options.violation_rate < 0 ? subspace->violation_rate : options.violation_rate));
   for (std::size_t i = 0; i < inputs.size(); ++i) {
-    note(graph->Connect(target.meshes[inputs[i].mesh].stages[inputs[i].stage].points, plug("cues", static_cast<int>(i))));
+    note(graph->Connect(target.meshes[inputs[i].mesh].stages[inputs[i].stage].points,
+                        plug("cues", static_cast<int>(i))));
   }
-  for (std::size_t j = 0; j < guards.matrices.size(); ++j) note(graph->Connect(guards.matrices[j].plug, plug("matrices", static_cast<int>(j))));
-  for (std::size_t k = 0; k < guards.scalars.size(); ++k) note(graph->Connect(guards.scalars[k].plug, plug("scalars", static_cast<int>(k))));
+  for (std::size_t j = 0; j < guards.matrices.size(); ++j)
+    note(graph->Connect(guards.matrices[j].plug, plug("matrices", static_cast<int>(j))));
+  for (std::size_t k = 0; k < guards.scalars.size(); ++k)
+    note(graph->Connect(guards.scalars[k].plug, plug("scalars", static_cast<int>(k))));
   if (!target.space.empty()) note(graph->Connect(target.space[0], plug("spaceMatrix")));
   std::vector<std::string> names;
   for (std::size_t m = 0; m < target.meshes.size(); ++m) {
@@ -204,7 +231,8 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
   }
   graph->SetElementNames(*node, def.FindAttribute("outPoints"), names);
   for (std::size_t m = 0; m < consumers.size(); ++m) {
-    for (const Connection& c : consumers[m]) note(graph->Connect(plug("outPoints", static_cast<int>(m)), c.destination, true));
+    for (const Connection& c : consumers[m])
+      note(graph->Connect(plug("outPoints", static_cast<int>(m)), c.destination, true));
   }
   if (!status.ok()) return status;
   return result;

@@ -1,5 +1,6 @@
-// The graph rewrite that puts a KPSA node in the place of a stack: consumers of the accelerated points read the node,
-// its cues read the stack where the subspace says, its fullPoints stay connected to the stack, lazily.
+// The graph rewrite that puts a KPSA node in the place of a stack: consumers of the accelerated points read
+// the node, its cues read the stack where the subspace says, its fullPoints stay connected to the stack,
+// lazily.
 #pragma once
 
 #include <memory>
@@ -12,7 +13,8 @@
 
 namespace kpsa {
 
-// Points to accelerate: of one mesh, up to and including a stage; and the stages before it, where cues may lie.
+// Points to accelerate: of one mesh, up to and including a stage; and the stages before it, where cues may
+// lie.
 struct AccelerationTarget {
   struct Stage {
     std::string name;
@@ -24,10 +26,10 @@ struct AccelerationTarget {
     std::vector<Stage> stages;  // up to and including the accelerated one, which is the last
   };
   std::vector<MeshPoints> meshes;
-  std::vector<PlugRef> space;    // none, or the worldMatrix of the frame
+  std::vector<PlugRef> space;  // none, or the worldMatrix of the frame
   std::string space_name;
-  std::vector<PlugRef> varying;  // time, controls: all that may vary
-  std::vector<PlugRef> controls; // of these, the ones whose held value is no part of the rig's identity
+  std::vector<PlugRef> varying;   // time, controls: all that may vary
+  std::vector<PlugRef> controls;  // of these, the ones whose held value is no part of the rig's identity
   std::vector<PlugRef> outputs() const;
 };
 
@@ -44,7 +46,8 @@ struct Accelerated {
 };
 
 // Errors: a subspace of other meshes or stages, or of a rig that differs (named); nothing is changed then.
-Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const AccelerationTarget& target, std::shared_ptr<const Subspace> subspace,
-                               const std::string& node_name, const AccelerateOptions& options);
+Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const AccelerationTarget& target,
+                               std::shared_ptr<const Subspace> subspace, const std::string& node_name,
+                               const AccelerateOptions& options);
 
 }  // namespace kpsa

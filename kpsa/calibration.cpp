@@ -23,7 +23,8 @@ double InverseSmoothstep(double w) {
   return hi;
 }
 
-// The largest tau at which the pose does not violate: the blend then takes just enough of the full evaluation.
+// The largest tau at which the pose does not violate: the blend then takes just enough of the full
+// evaluation.
 double LargestHarmless(const CalibrationPair& pair, double tolerance, double blend_start) {
   if (std::isnan(pair.score) || std::isnan(pair.error)) return 0;
   if (pair.error <= tolerance) return kInfinity;
@@ -38,7 +39,8 @@ double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& thres
   return weight == 1 ? 0 : (1 - weight) * pair.error;
 }
 
-Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha, double blend_start) {
+Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
+                      double blend_start) {
   Calibration result;
   const double n = static_cast<double>(pairs.size());
   result.poses = pairs.size();
@@ -57,11 +59,12 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
     return result;
   }
   if (!result.enough_poses) {
-    result.warning = fmt::format("{} calibration poses cannot promise a violation rate of {:g}; the threshold keeps {:.3g} "
-                                 "({})",
-                                 pairs.size(), alpha, result.attainable_alpha,
-                                 alpha > 0 ? fmt::format("at least {:.0f} poses are needed", std::ceil(1 / alpha - 1))
-                                           : "no number of poses can");
+    result.warning = fmt::format(
+        "{} calibration poses cannot promise a violation rate of {:g}; the threshold keeps {:.3g} "
+        "({})",
+        pairs.size(), alpha, result.attainable_alpha,
+        alpha > 0 ? fmt::format("at least {:.0f} poses are needed", std::ceil(1 / alpha - 1))
+                  : "no number of poses can");
   }
 
   // A pose violates where tau exceeds its limit, so the limit number k + 1 admits k violations
@@ -77,7 +80,8 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   const auto limit = [&](std::size_t k) { return k < limits.size() ? std::min(limits[k], cap) : cap; };
   const auto hits_below = [&](double tau) {
     const double tau_lo = tau * result.threshold.blend_start;
-    return std::count_if(pairs.begin(), pairs.end(), [&](const CalibrationPair& pair) { return pair.score <= tau_lo; });
+    return std::count_if(pairs.begin(), pairs.end(),
+                         [&](const CalibrationPair& pair) { return pair.score <= tau_lo; });
   };
   auto k = static_cast<std::size_t>(std::clamp(admitted, 0.0, n));
   const double share = kShareOfHits * result.attainable_alpha;

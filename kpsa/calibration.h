@@ -1,10 +1,11 @@
-// The SoftCache threshold from a tolerance in scene units: conformal risk control (Angelopoulos et al. 2022, arXiv
-// 2208.02814). A frame violates if it is accepted although a point of what is emitted, blend included, is farther than
-// the tolerance from the exact result. Among n calibration poses the largest tau is taken for which
+// The SoftCache threshold from a tolerance in scene units: conformal risk control (Angelopoulos et al. 2022,
+// arXiv 2208.02814). A frame violates if it is accepted although a point of what is emitted, blend included,
+// is farther than the tolerance from the exact result. Among n calibration poses the largest tau is taken for
+// which
 //   (violations(tau) + 1) / (n + 1) <= alpha   and   violations(tau) <= 2 alpha hits(tau).
 // The second keeps a subspace that hardly ever hits from spending the whole allowance on its few hits.
-// The rate then holds in expectation for poses that are exchangeable with the calibration poses (held-out sampled
-// poses, or blocks of a second or more with gaps); for single neighbouring frames it claims nothing.
+// The rate then holds in expectation for poses that are exchangeable with the calibration poses (held-out
+// sampled poses, or blocks of a second or more with gaps); for single neighbouring frames it claims nothing.
 #pragma once
 
 #include <span>
@@ -33,9 +34,11 @@ struct Calibration {
   std::string warning;       // not empty: what could not be met
 };
 
-// tolerance 0 or less: never hit; infinite: always. blend_start is c in (0, 1]. Where no pose forbids it, tau ends at the
-// largest calibration score / c: beyond what was seen nothing is promised. Pairs with a NaN count as violations.
-Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha, double blend_start = 0.85);
+// tolerance 0 or less: never hit; infinite: always. blend_start is c in (0, 1]. Where no pose forbids it, tau
+// ends at the largest calibration score / c: beyond what was seen nothing is promised. Pairs with a NaN count
+// as violations.
+Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
+                      double blend_start = 0.85);
 
 // Largest point error of what is emitted at this score.
 double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& threshold);

@@ -14,10 +14,11 @@ constexpr std::size_t kSelectionRounds = 4;  // shares of the cues, each chosen 
 constexpr std::size_t kErrorPoses = 800;     // training poses that say where errors are left
 constexpr double kErrorPower = 3;            // of a point's largest error in its weight
 constexpr double kMinMotion = 1e-3;          // of the largest: points that move less are no cues
-constexpr double kHopeless = 0.15;           // share of poses beyond the tolerance from which worst points are measured
+constexpr double kHopeless =
+    0.15;  // share of poses beyond the tolerance from which worst points are measured
 constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
 constexpr double kWorstShare = 0.1;                        // and of all points
-constexpr double kWorthwhile = 0.5;                        // of the poses beyond the tolerance that must be left by them
+constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
 // Values that move more than they are trusted.
 std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise) {
@@ -108,7 +109,8 @@ class Chooser {
       if (added == 0) break;
       survey = Survey(more);
     }
-    if (static_cast<double>(survey.poses_beyond) <= kWorthwhile * static_cast<double>(before)) chosen_ = std::move(more);
+    if (static_cast<double>(survey.poses_beyond) <= kWorthwhile * static_cast<double>(before))
+      chosen_ = std::move(more);
   }
 
   const Pca& pca_;

@@ -14,13 +14,14 @@ struct CueChoiceOptions {
   double tolerance = 1e-4;      // scene units
 };
 
-// A-optimal cues (kpsa/cue_selection.h): points of the candidate stages (of the outputs, where there are none) and
-// scalars, in rounds: after each share of the rows, points count by the largest errors that training poses still have
-// there. The least expected squared error alone leaves small regions to chance (a tongue behind teeth).
+// A-optimal cues (kpsa/cue_selection.h): points of the candidate stages (of the outputs, where there are
+// none) and scalars, in rounds: after each share of the rows, points count by the largest errors that
+// training poses still have there. The least expected squared error alone leaves small regions to chance (a
+// tongue behind teeth).
 //
 // Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
-// deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are measured
-// themselves, besides `rows`; not if that does not help.
+// deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are
+// measured themselves, besides `rows`; not if that does not help.
 std::vector<CueRef> ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
                                const PoseMatrix& poses, const CueChoiceOptions& options);
 

@@ -26,7 +26,8 @@ Eigen::MatrixXd OutputRoot(const Pca& pca, std::span<const double> point_weights
   if (!point_weights.empty()) {
     Eigen::VectorXd root(a.rows());
     for (Eigen::Index i = 0; i < a.rows(); ++i) {
-      root[i] = std::sqrt(point_weights[static_cast<std::size_t>(i) / static_cast<std::size_t>(pca.layout.components)]);
+      root[i] = std::sqrt(
+          point_weights[static_cast<std::size_t>(i) / static_cast<std::size_t>(pca.layout.components)]);
     }
     a = (root.asDiagonal() * a).eval();
   }
@@ -37,9 +38,13 @@ Eigen::MatrixXd OutputRoot(const Pca& pca, std::span<const double> point_weights
 // The state of a greedy selection.
 class Selector {
  public:
-  Selector(const Pca& pca, std::span<const CueRef> candidates, std::span<const Double3> positions, const CueNoise& noise,
-           const CueSelectionOptions& options)
-      : pca_(pca), candidates_(candidates), positions_(positions), options_(options), gains_(MakeGains(pca, candidates, noise, options.point_weights)) {
+  Selector(const Pca& pca, std::span<const CueRef> candidates, std::span<const Double3> positions,
+           const CueNoise& noise, const CueSelectionOptions& options)
+      : pca_(pca),
+        candidates_(candidates),
+        positions_(positions),
+        options_(options),
+        gains_(MakeGains(pca, candidates, noise, options.point_weights)) {
     sigma_ = pca.mode_variance().asDiagonal();
     const Eigen::MatrixXd root = OutputRoot(pca, options.point_weights);
     weight_ = root.size() == 0 ? Eigen::MatrixXd() : Eigen::MatrixXd(root.transpose() * root);
@@ -88,7 +93,8 @@ class Selector {
     Change(candidate, 1);
   }
 
-  // Sigma and everything that follows from it, from the chosen cues alone; takes out the rounding of many corrections.
+  // Sigma and everything that follows from it, from the chosen cues alone; takes out the rounding of many
+  // corrections.
   void Refresh() {
     sigma_ = pca_.mode_variance().asDiagonal();
     for (const std::size_t candidate : chosen_) sigma_ += SigmaChange(candidate, -1);
@@ -96,7 +102,8 @@ class Selector {
   }
 
   std::size_t Find(CueRef cue) const {
-    return static_cast<std::size_t>(std::find(candidates_.begin(), candidates_.end(), cue) - candidates_.begin());
+    return static_cast<std::size_t>(std::find(candidates_.begin(), candidates_.end(), cue) -
+                                    candidates_.begin());
   }
   const std::vector<std::size_t>& chosen() const { return chosen_; }
   const std::vector<CueRef>& chosen_cues() const { return chosen_cues_; }
@@ -109,10 +116,13 @@ class Selector {
     std::vector<float> loadings(static_cast<std::size_t>(set.loadings.size()));
     Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
         loadings.data(), set.loadings.rows(), set.loadings.cols()) = set.loadings.cast<float>();
-    return CandidateGains(set.offsets, std::move(loadings), {set.noise.data(), set.noise.data() + set.noise.size()}, OutputRoot(pca, point_weights));
+    return CandidateGains(set.offsets, std::move(loadings),
+                          {set.noise.data(), set.noise.data() + set.noise.size()},
+                          OutputRoot(pca, point_weights));
   }
 
-  // U [h x M] with Sigma' = Sigma - U^T U after measuring (sign -1), or Sigma + U^T U after forgetting (sign +1).
+  // U [h x M] with Sigma' = Sigma - U^T U after measuring (sign -1), or Sigma + U^T U after forgetting (sign
+  // +1).
   Eigen::MatrixXd Factor(std::size_t candidate, double sign) const {
     const Eigen::MatrixXd c = gains_.Loadings(candidate);
     const Eigen::MatrixXd t = c * sigma_;
@@ -135,9 +145,10 @@ class Selector {
     const CueRef cue = candidates_[candidate];
     for (std::size_t i = 0; i < candidates_.size(); ++i) {
       if (candidates_[i].kind != cue.kind) continue;
-      const bool near = i == candidate || (cue.kind != CueKind::kScalar &&
-                                           Length(Position(cue, pca_.layout, positions_) - Position(candidates_[i], pca_.layout, positions_)) <=
-                                               options_.min_distance);
+      const bool near = i == candidate ||
+                        (cue.kind != CueKind::kScalar &&
+                         Length(Position(cue, pca_.layout, positions_) -
+                                Position(candidates_[i], pca_.layout, positions_)) <= options_.min_distance);
       if (near) blocked_[i] += change;
     }
   }
@@ -150,7 +161,7 @@ class Selector {
   Eigen::MatrixXd sigma_, weight_;  // [M x M]; weight_ W, empty for the identity
   std::vector<std::size_t> chosen_;
   std::vector<CueRef> chosen_cues_;
-  std::vector<int> blocked_;        // by how many chosen cues
+  std::vector<int> blocked_;  // by how many chosen cues
 };
 
 double TotalCost(std::span<const CueRef> cues, const CueSelectionOptions& options) {
@@ -164,21 +175,27 @@ double TotalCost(std::span<const CueRef> cues, const CueSelectionOptions& option
 
 std::size_t CueColumn(const PoseLayout& layout, CueRef cue) {
   switch (cue.kind) {
-    case CueKind::kOutput: return cue.index * static_cast<std::size_t>(layout.components);
-    case CueKind::kStage: return layout.stage_begin() + 3 * std::size_t{cue.index};
-    default: return layout.scalar_begin() + cue.index;
+    case CueKind::kOutput:
+      return cue.index * static_cast<std::size_t>(layout.components);
+    case CueKind::kStage:
+      return layout.stage_begin() + 3 * std::size_t{cue.index};
+    default:
+      return layout.scalar_begin() + cue.index;
   }
 }
 
 std::size_t CueHeight(const PoseLayout& layout, CueRef cue) {
-  return cue.kind == CueKind::kOutput ? static_cast<std::size_t>(layout.components) : cue.kind == CueKind::kStage ? 3 : 1;
+  return cue.kind == CueKind::kOutput  ? static_cast<std::size_t>(layout.components)
+         : cue.kind == CueKind::kStage ? 3
+                                       : 1;
 }
 
 CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, const CueNoise& noise) {
   CueSet set;
   set.cues.assign(cues.begin(), cues.end());
   set.offsets.push_back(0);
-  for (const CueRef cue : cues) set.offsets.push_back(set.offsets.back() + static_cast<Index>(CueHeight(pca.layout, cue)));
+  for (const CueRef cue : cues)
+    set.offsets.push_back(set.offsets.back() + static_cast<Index>(CueHeight(pca.layout, cue)));
   const auto rows = static_cast<Eigen::Index>(set.offsets.back());
   set.loadings.resize(rows, pca.mode_count());
   set.mean.resize(rows);
@@ -204,16 +221,21 @@ CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, const CueNoise& 
   return set;
 }
 
-std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool outputs, bool stages, bool scalars) {
+std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool outputs, bool stages,
+                                  bool scalars) {
   const auto motion = [&](CueRef cue) {
-    return pca.row_variance.segment(static_cast<Eigen::Index>(CueColumn(pca.layout, cue)), static_cast<Eigen::Index>(CueHeight(pca.layout, cue))).sum();
+    return pca.row_variance
+        .segment(static_cast<Eigen::Index>(CueColumn(pca.layout, cue)),
+                 static_cast<Eigen::Index>(CueHeight(pca.layout, cue)))
+        .sum();
   };
   std::vector<CueRef> candidates;
   for (const CueKind kind : {CueKind::kOutput, CueKind::kStage}) {
     const std::size_t count = kind == CueKind::kOutput ? pca.layout.points : pca.layout.stage_points;
     if (!(kind == CueKind::kOutput ? outputs : stages)) continue;
     double largest = 0;
-    for (std::size_t i = 0; i < count; ++i) largest = std::max(largest, motion({kind, static_cast<Index>(i)}));
+    for (std::size_t i = 0; i < count; ++i)
+      largest = std::max(largest, motion({kind, static_cast<Index>(i)}));
     for (std::size_t i = 0; i < count; ++i) {
       const CueRef cue{kind, static_cast<Index>(i)};
       if (largest > 0 && motion(cue) >= min_motion * min_motion * largest) candidates.push_back(cue);
@@ -248,7 +270,9 @@ CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::spa
       refreshed = selection.expected_rms.back();
     }
   };
-  const auto budget = [&] { return options.max_cost > 0 ? options.max_cost - cost : std::numeric_limits<double>::infinity(); };
+  const auto budget = [&] {
+    return options.max_cost > 0 ? options.max_cost - cost : std::numeric_limits<double>::infinity();
+  };
 
   for (const CueRef cue : options.fixed) {
     take(selector.Find(cue));
@@ -266,9 +290,12 @@ CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::spa
       const std::size_t old = selector.chosen()[place];
       selector.GiveBack(place);
       const double old_cost = selector.Cost(old), old_gain = selector.gain(old);
-      std::size_t best = selector.Best(options.max_cost > 0 ? budget() + old_cost : std::numeric_limits<double>::infinity());
+      std::size_t best =
+          selector.Best(options.max_cost > 0 ? budget() + old_cost : std::numeric_limits<double>::infinity());
       // Where cost counts, an exchange must gain without costing more
-      if (best == candidates.size() || selector.gain(best) < old_gain * (1 + 1e-6) || selector.Cost(best) > old_cost) best = old;
+      if (best == candidates.size() || selector.gain(best) < old_gain * (1 + 1e-6) ||
+          selector.Cost(best) > old_cost)
+        best = old;
       if (best != old) {
         ++swapped;
         cost += selector.Cost(best) - old_cost;
@@ -284,8 +311,9 @@ CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::spa
   return selection;
 }
 
-std::vector<CueRef> SelectKeyPoints(const Eigen::MatrixXd& rotated, int components, std::span<const Double3> positions,
-                                    int per_mode, double exclusion_radius) {
+std::vector<CueRef> SelectKeyPoints(const Eigen::MatrixXd& rotated, int components,
+                                    std::span<const Double3> positions, int per_mode,
+                                    double exclusion_radius) {
   const Eigen::Index points = rotated.rows() / components;
   KPSA_CHECK_LE(static_cast<std::size_t>(points), positions.size());
   std::vector<CueRef> chosen;
@@ -296,7 +324,8 @@ std::vector<CueRef> SelectKeyPoints(const Eigen::MatrixXd& rotated, int componen
     for (int pick = 0; pick < per_mode; ++pick) {
       Eigen::Index best = -1;
       for (Eigen::Index i = 0; i < points; ++i) {
-        if (!taken[static_cast<std::size_t>(i)] && motion[i] > 0 && (best < 0 || motion[i] > motion[best])) best = i;
+        if (!taken[static_cast<std::size_t>(i)] && motion[i] > 0 && (best < 0 || motion[i] > motion[best]))
+          best = i;
       }
       if (best < 0) break;
       chosen.push_back({CueKind::kOutput, static_cast<Index>(best)});

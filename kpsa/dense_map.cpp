@@ -52,8 +52,7 @@ HWY_INLINE void DensePanel(const float* panel, std::size_t columns, const float*
 
 void DensePanels(const float* panels, std::size_t columns, const float* y, int components, const float* mean,
                  const PointsView& out) {
-  const std::size_t rows = kPanel * static_cast<std::size_t>(components),
-                    padded = PaddedCount(out.count);
+  const std::size_t rows = kPanel * static_cast<std::size_t>(components), padded = PaddedCount(out.count);
   for (std::size_t first = 0; first < out.count; first += kPanel) {
     if (components == 3) {
       DensePanel<3>(panels, columns, y, mean, first, padded, out);

@@ -1,5 +1,5 @@
-// Reconstruction without tiles: x = mean + B y in float32, the twin that kpsa/tiles.h is tested and measured against.
-// Allocates nothing once made; const functions may run on any thread.
+// Reconstruction without tiles: x = mean + B y in float32, the twin that kpsa/tiles.h is tested and measured
+// against. Allocates nothing once made; const functions may run on any thread.
 #pragma once
 
 #include <Eigen/Core>

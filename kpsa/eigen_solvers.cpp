@@ -18,7 +18,8 @@ Eigen::MatrixXd ThinQ(const Eigen::MatrixXd& tall) {
   return qr.householderQ() * Eigen::MatrixXd::Identity(tall.rows(), tall.cols());
 }
 
-Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::Ref<const Eigen::MatrixXd>& b) {
+Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                                  const Eigen::Ref<const Eigen::MatrixXd>& b) {
   return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
 }
 
@@ -64,7 +65,8 @@ SymmetricEigen LargestEigen(const Eigen::MatrixXd& matrix, Eigen::Index m, std::
     SymmetricEigen result;
     result.values = ritz.values.head(m);
     result.vectors = Multiply(space.leftCols(used), ritz.vectors.leftCols(m));
-    const Eigen::MatrixXd residual = Multiply(image.leftCols(used), ritz.vectors.leftCols(m)) - result.vectors * result.values.asDiagonal();
+    const Eigen::MatrixXd residual = Multiply(image.leftCols(used), ritz.vectors.leftCols(m)) -
+                                     result.vectors * result.values.asDiagonal();
     bool converged = true;
     for (Eigen::Index k = 0; k < m && converged; ++k) {
       converged = residual.col(k).norm() <= std::max(1e-7 * result.values[k], 1e-14 * result.values[0]);

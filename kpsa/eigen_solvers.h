@@ -12,13 +12,14 @@ struct SymmetricEigen {
 };
 // All eigenpairs of a symmetric matrix.
 SymmetricEigen AllEigen(const Eigen::MatrixXd& matrix);
-// The m largest of a positive semi-definite matrix. Small matrices, or most of the pairs: all of them; else a block
-// Krylov space with full orthogonalisation (Golub, Underwood 1977), grown until the residuals of all m pairs are
-// small against their eigenvalues, or eight times m long: slow decay leaves the last pairs with a larger residual then.
+// The m largest of a positive semi-definite matrix. Small matrices, or most of the pairs: all of them; else a
+// block Krylov space with full orthogonalisation (Golub, Underwood 1977), grown until the residuals of all m
+// pairs are small against their eigenvalues, or eight times m long: slow decay leaves the last pairs with a
+// larger residual then.
 SymmetricEigen LargestEigen(const Eigen::MatrixXd& matrix, Eigen::Index m, std::uint64_t seed);
 
-// Makes the columns of a tall matrix orthonormal without leaving their span: Cholesky QR, repeated; Householder where
-// the columns are too dependent for that.
+// Makes the columns of a tall matrix orthonormal without leaving their span: Cholesky QR, repeated;
+// Householder where the columns are too dependent for that.
 void Orthonormalize(Eigen::MatrixXd* tall);
 
 struct ThinSvd {

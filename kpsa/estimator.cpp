@@ -15,12 +15,14 @@
 namespace kpsa {
 namespace {
 
-Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::Ref<const Eigen::MatrixXd>& b) {
+Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                                  const Eigen::Ref<const Eigen::MatrixXd>& b) {
   return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
 }
 
 // covariance P [M x M] of the mode coordinates, cues C [r x M] -> G, its factors and B.
-Estimator MapWithCovariance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const Eigen::MatrixXd& p, const Eigen::VectorXd& noise) {
+Estimator MapWithCovariance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const Eigen::MatrixXd& p,
+                            const Eigen::VectorXd& noise) {
   Estimator estimator;
   const Eigen::MatrixXd cp = Multiply(c, p);  // [r x M]
   estimator.covariance = Multiply(cp, c.transpose());
@@ -45,7 +47,8 @@ Estimator MapEstimator(const Pca& pca, const CueSet& cues) {
 
 Estimator RotatedMapEstimator(const Pca& pca, const CueSet& cues, const Eigen::MatrixXd& rotation) {
   const Eigen::MatrixXd covariance = rotation.transpose() * pca.mode_variance().asDiagonal() * rotation;
-  return MapWithCovariance(Multiply(pca.output_modes(), rotation), Multiply(cues.loadings, rotation), covariance, cues.noise);
+  return MapWithCovariance(Multiply(pca.output_modes(), rotation), Multiply(cues.loadings, rotation),
+                           covariance, cues.noise);
 }
 
 Estimator LeastSquaresEstimator(const Pca& pca, const CueSet& cues) {
@@ -53,16 +56,18 @@ Estimator LeastSquaresEstimator(const Pca& pca, const CueSet& cues) {
   const Eigen::Index r = c.rows(), m = c.cols();
   Estimator estimator = MapEstimator(pca, cues);
   if (r < m) {
-    estimator.warning = fmt::format("{} measured values cannot determine {} modes; the MAP estimate is used instead", r, m);
+    estimator.warning =
+        fmt::format("{} measured values cannot determine {} modes; the MAP estimate is used instead", r, m);
     return estimator;
   }
   const ThinSvd svd = TallSvd(c);
   const double smallest = svd.values[m - 1];
   estimator.condition = smallest > 0 ? svd.values[0] / smallest : std::numeric_limits<double>::infinity();
   if (!(estimator.condition <= kMaxCondition)) {
-    estimator.warning = fmt::format("the key points determine the modes badly (condition number {:.3g}, at most {:g} is good); "
-                                    "the MAP estimate is used instead",
-                                    estimator.condition, kMaxCondition);
+    estimator.warning = fmt::format(
+        "the key points determine the modes badly (condition number {:.3g}, at most {:g} is good); "
+        "the MAP estimate is used instead",
+        estimator.condition, kMaxCondition);
     return estimator;
   }
   // p = R^-1 Q^T y, the residual is (I - Q Q^T) y
@@ -76,7 +81,8 @@ Estimator LeastSquaresEstimator(const Pca& pca, const CueSet& cues) {
   return estimator;
 }
 
-Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues, std::span<const float> centered_row) {
+Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues,
+                             std::span<const float> centered_row) {
   Eigen::VectorXd y(cues.rows());
   for (std::size_t k = 0; k < cues.cues.size(); ++k) {
     const std::size_t column = CueColumn(layout, cues.cues[k]);
@@ -88,7 +94,8 @@ Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues, std::
   return y;
 }
 
-std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses) {
+std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator,
+                                       const PoseMatrix& poses) {
   KPSA_CHECK(poses.centered() && poses.layout() == pca.layout);
   const std::size_t outputs = pca.layout.outputs(), kChunk = 384;
   const auto components = static_cast<Eigen::Index>(pca.layout.components);
@@ -102,19 +109,22 @@ std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const
     Eigen::MatrixXd best = Multiply(GemmOperand::Dense(a).Transposed(), x.Transposed());  // [M x count]
     if (!pca.output_orthonormal) best = gram.solve(best);
     Eigen::MatrixXd y(cues.rows(), static_cast<Eigen::Index>(count));
-    for (std::size_t t = 0; t < count; ++t) y.col(static_cast<Eigen::Index>(t)) = MeasuredCues(pca.layout, cues, poses.row(first + t));
+    for (std::size_t t = 0; t < count; ++t)
+      y.col(static_cast<Eigen::Index>(t)) = MeasuredCues(pca.layout, cues, poses.row(first + t));
     const Eigen::MatrixXd estimated = estimator.coordinates * y;
     const Eigen::MatrixXd projected = Multiply(a, best), reached = Multiply(a, estimated);
     for (std::size_t t = 0; t < count; ++t) {
       const auto column = static_cast<Eigen::Index>(t);
       const Eigen::VectorXd f =
-          Eigen::Map<const Eigen::VectorXf>(poses.row(first + t).data(), static_cast<Eigen::Index>(outputs)).cast<double>();
+          Eigen::Map<const Eigen::VectorXf>(poses.row(first + t).data(), static_cast<Eigen::Index>(outputs))
+              .cast<double>();
       const Eigen::VectorXd difference = f - reached.col(column);
       PoseErrors e;
       e.projection = (f - projected.col(column)).norm();
       e.cue = (projected.col(column) - reached.col(column)).norm();
       e.total = difference.norm();
-      const Eigen::Map<const Eigen::MatrixXd> by_point(difference.data(), components, difference.size() / components);
+      const Eigen::Map<const Eigen::MatrixXd> by_point(difference.data(), components,
+                                                       difference.size() / components);
       e.largest = std::sqrt(by_point.colwise().squaredNorm().maxCoeff());
       errors.push_back(e);
     }
@@ -122,8 +132,8 @@ std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const
   return errors;
 }
 
-PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
-                         std::size_t stride, double limit) {
+PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator,
+                         const PoseMatrix& poses, std::size_t stride, double limit) {
   KPSA_CHECK(poses.centered() && poses.layout() == pca.layout && stride > 0);
   const std::size_t points = pca.layout.points, kChunk = 384;
   const auto components = static_cast<std::size_t>(pca.layout.components);
@@ -147,7 +157,8 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
         for (std::size_t i = begin; i < end; ++i) {
           double squared = 0;
           for (std::size_t c = components * i; c < components * (i + 1); ++c) {
-            squared += (static_cast<double>(pose[c]) - estimate[c]) * (static_cast<double>(pose[c]) - estimate[c]);
+            squared +=
+                (static_cast<double>(pose[c]) - estimate[c]) * (static_cast<double>(pose[c]) - estimate[c]);
           }
           survey.largest[i] = std::max(survey.largest[i], squared);
           if (squared <= limit * limit) continue;
@@ -166,7 +177,8 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
 double RmsError(const std::vector<PoseErrors>& errors, std::size_t points) {
   double sum = 0;
   for (const PoseErrors& e : errors) sum += e.total * e.total;
-  return errors.empty() ? 0 : std::sqrt(sum / (static_cast<double>(errors.size()) * static_cast<double>(points)));
+  return errors.empty() ? 0
+                        : std::sqrt(sum / (static_cast<double>(errors.size()) * static_cast<double>(points)));
 }
 
 }  // namespace kpsa

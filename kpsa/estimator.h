@@ -1,8 +1,10 @@
-// From measured cues to the outputs: one linear map, in two modes. Glossary: y the r measurements (normalised, mean
-// free: kpsa/cue_selection.h), A [cN x M] the output rows of the modes, L their variances, C [r x M] the cues' rows.
+// From measured cues to the outputs: one linear map, in two modes. Glossary: y the r measurements
+// (normalised, mean free: kpsa/cue_selection.h), A [cN x M] the output rows of the modes, L their variances,
+// C [r x M] the cues' rows.
 //
-// map:   f = mu + A L C^T G^-1 y,  G = C L C^T + noise   (maximum a posteriori; all modes that training supports)
-// paper: f = mu + A p,  p = argmin |y - C p|             (least squares through a QR of C; M <= r modes)
+// map:   f = mu + A L C^T G^-1 y,  G = C L C^T + noise   (maximum a posteriori; all modes that training
+// supports) paper: f = mu + A p,  p = argmin |y - C p|             (least squares through a QR of C; M <= r
+// modes)
 #pragma once
 
 #include <Eigen/Core>
@@ -17,13 +19,14 @@ enum class EstimatorMode : std::uint8_t { kMap, kPaper };
 
 struct Estimator {
   EstimatorMode mode = EstimatorMode::kMap;
-  Eigen::MatrixXd gain;          // B [cN x r]: f - mu = B y
-  Eigen::MatrixXd coordinates;   // Q [M x r]: mode coordinates p = Q y
-  Eigen::MatrixXd covariance;    // G [r x r] of y under the model (both modes)
-  Eigen::MatrixXd whitening;     // [r x r] lower triangular, inverse Cholesky factor of G: w = whitening * y has unit covariance
-  Eigen::MatrixXd judge;         // [r x r] symmetric: G^-1 (map) or the projector on the residual I - C C^+ (paper)
-  double condition = 0;          // sigma_max / sigma_min of C (paper mode; 0 in map mode)
-  std::string warning;           // not empty: paper mode fell back to map, and why
+  Eigen::MatrixXd gain;         // B [cN x r]: f - mu = B y
+  Eigen::MatrixXd coordinates;  // Q [M x r]: mode coordinates p = Q y
+  Eigen::MatrixXd covariance;   // G [r x r] of y under the model (both modes)
+  Eigen::MatrixXd whitening;  // [r x r] lower triangular, inverse Cholesky factor of G: w = whitening * y has
+                              // unit covariance
+  Eigen::MatrixXd judge;  // [r x r] symmetric: G^-1 (map) or the projector on the residual I - C C^+ (paper)
+  double condition = 0;   // sigma_max / sigma_min of C (paper mode; 0 in map mode)
+  std::string warning;    // not empty: paper mode fell back to map, and why
 };
 
 Estimator MapEstimator(const Pca& pca, const CueSet& cues);
@@ -32,12 +35,14 @@ Estimator MapEstimator(const Pca& pca, const CueSet& cues);
 inline constexpr double kMaxCondition = 1e4;
 Estimator LeastSquaresEstimator(const Pca& pca, const CueSet& cues);
 
-// PCA modes rotated: A R with the variances of the rotated coordinates on the diagonal only when R is a permutation,
-// so the full covariance R^T L R travels with it (MAP gives the same result before and after rotation).
+// PCA modes rotated: A R with the variances of the rotated coordinates on the diagonal only when R is a
+// permutation, so the full covariance R^T L R travels with it (MAP gives the same result before and after
+// rotation).
 Estimator RotatedMapEstimator(const Pca& pca, const CueSet& cues, const Eigen::MatrixXd& rotation);
 
 // Measured values of pose t: y from a row of a centred pose matrix. [r]
-Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues, std::span<const float> centered_row);
+Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues,
+                             std::span<const float> centered_row);
 
 // Errors of one pose in the norm of the outputs: total^2 = projection^2 + cue^2 where A is orthonormal.
 struct PoseErrors {
@@ -47,16 +52,18 @@ struct PoseErrors {
   double largest = 0;     // largest point error
 };
 // For all poses (centred with pca.mean). RMS of a pose = error / sqrt(N).
-std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses);
+std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator,
+                                       const PoseMatrix& poses);
 // Errors by point, over every `stride`-th pose.
 struct PointSurvey {
-  std::vector<double> largest;    // [N] scene units
-  std::vector<Index> beyond;      // [N] poses in which the point is farther off than `limit`
-  std::size_t poses = 0;          // that were looked at
-  std::size_t poses_beyond = 0;   // in which any point is
+  std::vector<double> largest;   // [N] scene units
+  std::vector<Index> beyond;     // [N] poses in which the point is farther off than `limit`
+  std::size_t poses = 0;         // that were looked at
+  std::size_t poses_beyond = 0;  // in which any point is
 };
-PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator, const PoseMatrix& poses,
-                         std::size_t stride, double limit = std::numeric_limits<double>::infinity());
+PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator,
+                         const PoseMatrix& poses, std::size_t stride,
+                         double limit = std::numeric_limits<double>::infinity());
 // Root of the mean over poses and points of the squared total error, scene units.
 double RmsError(const std::vector<PoseErrors>& errors, std::size_t points);
 

@@ -5,13 +5,14 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kpsa/gemm.cpp"
 #include "hwy/foreach_target.h"
+
 #include "base/simd-inl.h"
 
 #ifndef KPSA_GEMM_CONSTANTS
 #define KPSA_GEMM_CONSTANTS
 namespace kpsa {
 namespace {
-constexpr std::size_t kRowStep = 16;    // rows of a micro tile
+constexpr std::size_t kRowStep = 16;     // rows of a micro tile
 constexpr std::size_t kColumnStep = 12;  // columns of a micro tile
 }  // namespace
 }  // namespace kpsa
@@ -37,7 +38,8 @@ HWY_INLINE void MicroTile(const double* HWY_RESTRICT a, const double* HWY_RESTRI
   for (std::size_t k = 0; k < depth; ++k) {
     V column[kVectors];
 #pragma GCC unroll 16
-    for (int v = 0; v < kVectors; ++v) column[v] = hn::LoadU(d, a + k * kRowStep + static_cast<std::size_t>(v) * lanes);
+    for (int v = 0; v < kVectors; ++v)
+      column[v] = hn::LoadU(d, a + k * kRowStep + static_cast<std::size_t>(v) * lanes);
 #pragma GCC unroll 16
     for (int j = 0; j < kCount; ++j) {
       const V factor = hn::Set(d, b[k * kColumnStep + static_cast<std::size_t>(j)]);
@@ -99,8 +101,10 @@ class AlignedDoubles {
 };
 
 // One tile of C, accumulated over the whole depth in a fixed order.
-void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, std::size_t row, std::size_t column, Eigen::MatrixXd* c) {
-  const std::size_t height = std::min(kTile, a.rows() - row), width = std::min(kTile, b_transposed.rows() - column);
+void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, std::size_t row, std::size_t column,
+                 Eigen::MatrixXd* c) {
+  const std::size_t height = std::min(kTile, a.rows() - row),
+                    width = std::min(kTile, b_transposed.rows() - column);
   const std::size_t row_panels = (height + kRowStep - 1) / kRowStep;
   const std::size_t column_panels = (width + kColumnStep - 1) / kColumnStep;
   AlignedDoubles packed_a(row_panels * kRowStep * kDepth), packed_b(column_panels * kColumnStep * kDepth);
@@ -132,7 +136,8 @@ Eigen::MatrixXd Product(const GemmOperand& a, const GemmOperand& b_transposed, b
     for (std::size_t i = symmetric ? j : 0; i < m; i += kTile) tiles.emplace_back(i, j);
   }
   ParallelFor(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) ComputeTile(a, b_transposed, tiles[t].first, tiles[t].second, &c);
+    for (std::size_t t = begin; t < end; ++t)
+      ComputeTile(a, b_transposed, tiles[t].first, tiles[t].second, &c);
   });
   if (symmetric) {
     for (Eigen::Index j = 0; j < c.cols(); ++j) {
@@ -153,8 +158,8 @@ GemmOperand GemmOperand::Dense(const Eigen::Ref<const Eigen::MatrixXd>& matrix) 
   return operand;
 }
 
-GemmOperand GemmOperand::Poses(const PoseMatrix& poses, std::size_t first, std::size_t count, std::size_t begin,
-                               std::size_t end, std::span<const double> column_scale) {
+GemmOperand GemmOperand::Poses(const PoseMatrix& poses, std::size_t first, std::size_t count,
+                               std::size_t begin, std::size_t end, std::span<const double> column_scale) {
   KPSA_CHECK_LE(first + count, poses.poses());
   KPSA_CHECK_LE(end, poses.columns());
   GemmOperand operand;
@@ -172,14 +177,15 @@ GemmOperand GemmOperand::Transposed() const {
   return operand;
 }
 
-void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width, std::size_t step,
-                       double* out) const {
+void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width,
+                       std::size_t step, double* out) const {
   for (std::size_t panel = 0; panel * step < height; ++panel) {
     double* target = out + panel * step * width;  // [width][step]
     const std::size_t first = row + panel * step, count = std::min(step, height - panel * step);
     if (count < step) std::fill_n(target, step * width, 0.0);
     if (dense_ != nullptr && !transposed_) {
-      for (std::size_t k = 0; k < width; ++k) std::copy_n(dense_ + (column + k) * leading_ + first, count, target + k * step);
+      for (std::size_t k = 0; k < width; ++k)
+        std::copy_n(dense_ + (column + k) * leading_ + first, count, target + k * step);
     } else if (dense_ != nullptr) {
       for (std::size_t i = 0; i < count; ++i) {
         const double* source = dense_ + (first + i) * leading_ + column;
@@ -190,7 +196,8 @@ void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, 
       for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i] + column;
       for (std::size_t k = 0; k < width; ++k) {
         const double scale = scale_.empty() ? 1.0 : scale_[column + k];
-        for (std::size_t i = 0; i < count; ++i) target[k * step + i] = static_cast<double>(sources[i][k]) * scale;
+        for (std::size_t i = 0; i < count; ++i)
+          target[k * step + i] = static_cast<double>(sources[i][k]) * scale;
       }
     } else {
       for (std::size_t k = 0; k < width; ++k) {
@@ -204,9 +211,12 @@ void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, 
   }
 }
 
-Eigen::MatrixXd Multiply(const GemmOperand& a, const GemmOperand& b) { return Product(a, b.Transposed(), false); }
+Eigen::MatrixXd Multiply(const GemmOperand& a, const GemmOperand& b) {
+  return Product(a, b.Transposed(), false);
+}
 
-Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::Ref<const Eigen::MatrixXd>& b) {
+Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                         const Eigen::Ref<const Eigen::MatrixXd>& b) {
   return Multiply(GemmOperand::Dense(a), GemmOperand::Dense(b));
 }
 

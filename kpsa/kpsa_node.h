@@ -1,5 +1,6 @@
-// The KPSA node: stands in for a deformer stack. It measures its cues, asks SoftCache for a verdict, and either
-// reconstructs all points from a trained subspace or lets the full stack run and passes it on bit for bit.
+// The KPSA node: stands in for a deformer stack. It measures its cues, asks SoftCache for a verdict, and
+// either reconstructs all points from a trained subspace or lets the full stack run and passes it on bit for
+// bit.
 //
 // Attributes (arrays in the order of KpsaConfig):
 //   cues[c]         points of a mesh at a stage, of which only the cue points are demanded
@@ -8,8 +9,8 @@
 //   spaceMatrix     the frame that the subspace lives in, world space (identity: none)
 //   fullPoints[m]   the full evaluation of each mesh; lazy, all together
 //   config          KpsaConfig (structural)
-//   tolerance       metres, violationRate (structural): SoftCache's threshold follows from the calibration poses
-//   outPoints[m], score, hit, missReason, offender
+//   tolerance       metres, violationRate (structural): SoftCache's threshold follows from the calibration
+//   poses outPoints[m], score, hit, missReason, offender
 // The engine has no special case for it: everything here could come from a plugin.
 #pragma once
 
@@ -25,7 +26,7 @@ namespace kpsa {
 // What ties a subspace to the inputs of a node.
 class KpsaConfig final : public Asset {
  public:
-  struct PointCues {  // of input cues[c]
+  struct PointCues {            // of input cues[c]
     std::vector<Index> points;  // ascending
     bool in_space = true;       // measured in spaceMatrix's frame; false: as they are (mesh space)
   };
@@ -38,12 +39,12 @@ class KpsaConfig final : public Asset {
   struct Data {
     std::shared_ptr<const Subspace> subspace;
     std::vector<PointCues> cues;
-    std::vector<Row> rows;  // one a cue, in the order of the subspace's
-    std::vector<char> outputs_in_space;  // [outputs] as of cues: they are given in spaceMatrix's frame
+    std::vector<Row> rows;                     // one a cue, in the order of the subspace's
+    std::vector<char> outputs_in_space;        // [outputs] as of cues: they are given in spaceMatrix's frame
     std::vector<double> matrix_lo, matrix_hi;  // [12 * matrices] trained ranges; see MatrixEntries
     std::vector<double> scalar_lo, scalar_hi;  // [scalars]
     std::vector<std::string> guard_names;      // matrices, then scalars
-    bool always_miss = false;                  // the subspace is stale, and the user asked for the full evaluation
+    bool always_miss = false;  // the subspace is stale, and the user asked for the full evaluation
   };
   explicit KpsaConfig(Data data);
   const char* kind() const override { return "kpsaConfig"; }

@@ -13,7 +13,8 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kMaxGram = 8000;  // side of the Gram matrix above which kAuto takes the randomised method
+constexpr std::size_t kMaxGram =
+    8000;  // side of the Gram matrix above which kAuto takes the randomised method
 
 // Sum of squares of every column. [D]; the result has a NaN or infinity where the poses have one.
 Eigen::VectorXd ColumnEnergies(const PoseMatrix& poses) {
@@ -22,7 +23,8 @@ Eigen::VectorXd ColumnEnergies(const PoseMatrix& poses) {
     for (std::size_t pose = 0; pose < poses.poses(); ++pose) {
       const std::span<const float> values = poses.row(pose);
       for (std::size_t i = begin; i < end; ++i) {
-        energy[static_cast<Eigen::Index>(i)] += static_cast<double>(values[i]) * static_cast<double>(values[i]);
+        energy[static_cast<Eigen::Index>(i)] +=
+            static_cast<double>(values[i]) * static_cast<double>(values[i]);
       }
     }
   });
@@ -30,12 +32,14 @@ Eigen::VectorXd ColumnEnergies(const PoseMatrix& poses) {
 }
 
 // Square roots of the column weights. [D]
-std::vector<double> ColumnScales(const PoseLayout& layout, const PcaOptions& options, const Eigen::VectorXd& variance) {
+std::vector<double> ColumnScales(const PoseLayout& layout, const PcaOptions& options,
+                                 const Eigen::VectorXd& variance) {
   std::vector<double> scale(layout.columns(), 1.0);
   for (std::size_t i = 0; i < layout.outputs() && !options.point_weights.empty(); ++i) {
     scale[i] = std::sqrt(options.point_weights[i / static_cast<std::size_t>(layout.components)]);
   }
-  for (std::size_t i = layout.stage_begin(); i < layout.scalar_begin(); ++i) scale[i] = std::sqrt(options.stage_weight);
+  for (std::size_t i = layout.stage_begin(); i < layout.scalar_begin(); ++i)
+    scale[i] = std::sqrt(options.stage_weight);
   for (std::size_t i = layout.scalar_begin(); i < layout.columns(); ++i) {
     const double deviation = std::sqrt(variance[static_cast<Eigen::Index>(i)]);
     scale[i] = deviation > 0 ? std::sqrt(options.scalar_weight) / deviation : 0;
@@ -48,15 +52,17 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
                            const PcaOptions& options) {
   const GemmOperand x = GemmOperand::Poses(poses, 0, poses.poses(), 0, columns, scale);  // X [T x columns]
   const std::size_t small = std::min(poses.poses(), columns);
-  const auto wanted = static_cast<Eigen::Index>(std::min<std::size_t>(static_cast<std::size_t>(options.max_modes), small));
+  const auto wanted =
+      static_cast<Eigen::Index>(std::min<std::size_t>(static_cast<std::size_t>(options.max_modes), small));
   const bool randomised = options.method == PcaOptions::Method::kRandomised ||
                           (options.method == PcaOptions::Method::kAuto && small > kMaxGram);
-  Eigen::VectorXd energy;    // S_k^2
-  Eigen::MatrixXd vectors;   // U [T x m]
+  Eigen::VectorXd energy;   // S_k^2
+  Eigen::MatrixXd vectors;  // U [T x m]
   if (randomised) {
     // Range finder on the side of the poses; orthonormalised in every step, or small modes drown
     const Eigen::Index width = std::min<Eigen::Index>(wanted + 20, static_cast<Eigen::Index>(small));
-    Eigen::MatrixXd range = Multiply(x, GemmOperand::Dense(RandomNormal(static_cast<Eigen::Index>(columns), width, options.seed)));
+    Eigen::MatrixXd range = Multiply(
+        x, GemmOperand::Dense(RandomNormal(static_cast<Eigen::Index>(columns), width, options.seed)));
     Orthonormalize(&range);
     for (int i = 0; i < options.power_iterations; ++i) {
       Eigen::MatrixXd image = Multiply(x.Transposed(), GemmOperand::Dense(range));
@@ -75,7 +81,8 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
   } else {
     SymmetricEigen eigen = LargestEigen(Gram(x.Transposed()), wanted, options.seed);
     Eigen::Index kept = 0;
-    while (kept < wanted && eigen.values[kept] > options.min_ratio * options.min_ratio * eigen.values[0]) ++kept;
+    while (kept < wanted && eigen.values[kept] > options.min_ratio * options.min_ratio * eigen.values[0])
+      ++kept;
     return eigen.vectors.leftCols(kept);
   }
   Eigen::Index kept = 0;
@@ -86,16 +93,20 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
 }
 
 Status CheckInput(const PoseMatrix& poses, const Eigen::VectorXd& mean, const PcaOptions& options) {
-  if (poses.poses() < 2) return Status::Invalid("a subspace needs at least 2 training poses, there are {}", poses.poses());
+  if (poses.poses() < 2)
+    return Status::Invalid("a subspace needs at least 2 training poses, there are {}", poses.poses());
   if (poses.layout().outputs() == 0) return Status::Invalid("the training poses have no points");
-  if (options.max_modes < 1) return Status::Invalid("the number of modes is {}, expected at least 1", options.max_modes);
+  if (options.max_modes < 1)
+    return Status::Invalid("the number of modes is {}, expected at least 1", options.max_modes);
   if (!mean.allFinite()) return Status::Invalid("a training pose holds a NaN or an infinity");
   if (!options.point_weights.empty() && options.point_weights.size() != poses.layout().points) {
-    return Status::Invalid("there are {} point weights for {} points", options.point_weights.size(), poses.layout().points);
+    return Status::Invalid("there are {} point weights for {} points", options.point_weights.size(),
+                           poses.layout().points);
   }
   for (std::size_t i = 0; i < options.point_weights.size(); ++i) {
     if (!(options.point_weights[i] > 0) || !std::isfinite(options.point_weights[i])) {
-      return Status::Invalid("the weight of point {} is {}, expected a positive number", i, options.point_weights[i]);
+      return Status::Invalid("the weight of point {} is {}, expected a positive number", i,
+                             options.point_weights[i]);
     }
   }
   return {};
@@ -103,10 +114,13 @@ Status CheckInput(const PoseMatrix& poses, const Eigen::VectorXd& mean, const Pc
 
 }  // namespace
 
-Eigen::VectorXd Pca::mode_variance() const { return singular.array().square() / static_cast<double>(poses - 1); }
+Eigen::VectorXd Pca::mode_variance() const {
+  return singular.array().square() / static_cast<double>(poses - 1);
+}
 
 double Pca::output_noise() const {
-  return std::max(0.0, discarded_energy()) / (static_cast<double>(poses - 1) * static_cast<double>(layout.outputs()));
+  return std::max(0.0, discarded_energy()) /
+         (static_cast<double>(poses - 1) * static_cast<double>(layout.outputs()));
 }
 
 Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, const PcaOptions& options) {
@@ -127,12 +141,15 @@ Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, con
   const std::size_t columns = joint ? pca.layout.columns() : pca.layout.outputs();
   const auto width = static_cast<Eigen::Index>(columns);
   const bool weighted = joint || !options.point_weights.empty();
-  const std::span<const double> used_scale = weighted ? std::span<const double>(scale) : std::span<const double>();
-  for (std::size_t i = 0; i < columns; ++i) pca.total_energy += energies[static_cast<Eigen::Index>(i)] * scale[i] * scale[i];
+  const std::span<const double> used_scale =
+      weighted ? std::span<const double>(scale) : std::span<const double>();
+  for (std::size_t i = 0; i < columns; ++i)
+    pca.total_energy += energies[static_cast<Eigen::Index>(i)] * scale[i] * scale[i];
   if (!(pca.total_energy > 0)) return Status::Invalid("nothing moves in the {} training poses", pca.poses);
   pca.output_orthonormal = !weighted;
 
-  // Modes, then the finish: orthonormal columns A, coordinates P = X A, and the SVD of P turns both into X = U S A^T
+  // Modes, then the finish: orthonormal columns A, coordinates P = X A, and the SVD of P turns both into X =
+  // U S A^T
   Eigen::MatrixXd modes = RoughModes(poses, columns, used_scale, options);
   Orthonormalize(&modes);
   const GemmOperand x = GemmOperand::Poses(poses, 0, pca.poses, 0, columns, used_scale);
@@ -147,13 +164,15 @@ Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, con
   pca.modes.resize(static_cast<Eigen::Index>(pca.layout.columns()), kept);
   pca.modes.topRows(width) = modes;
   if (columns < pca.layout.columns() || joint) {
-    const Eigen::MatrixXd factor = svd.u.leftCols(kept) * pca.singular.cwiseInverse().asDiagonal();  // [T x M]
+    const Eigen::MatrixXd factor =
+        svd.u.leftCols(kept) * pca.singular.cwiseInverse().asDiagonal();  // [T x M]
     const std::size_t begin = pca.layout.outputs(), end = pca.layout.columns();
-    pca.modes.bottomRows(static_cast<Eigen::Index>(end - begin)) =
-        Multiply(GemmOperand::Poses(poses, 0, pca.poses, begin, end).Transposed(), GemmOperand::Dense(factor));
+    pca.modes.bottomRows(static_cast<Eigen::Index>(end - begin)) = Multiply(
+        GemmOperand::Poses(poses, 0, pca.poses, begin, end).Transposed(), GemmOperand::Dense(factor));
   }
   if (weighted) {
-    for (std::size_t i = 0; i < pca.layout.outputs(); ++i) pca.modes.row(static_cast<Eigen::Index>(i)) /= scale[i];
+    for (std::size_t i = 0; i < pca.layout.outputs(); ++i)
+      pca.modes.row(static_cast<Eigen::Index>(i)) /= scale[i];
   }
   const Eigen::VectorXd explained = pca.modes.array().square().matrix() * pca.mode_variance();
   pca.row_residual = (pca.row_variance - explained).cwiseMax(0.0);
@@ -170,13 +189,15 @@ Eigen::VectorXd ProjectionErrors(const Pca& pca, const PoseMatrix& poses) {
   for (std::size_t first = 0; first < poses.poses(); first += kChunk) {
     const std::size_t count = std::min(kChunk, poses.poses() - first);
     const GemmOperand x = GemmOperand::Poses(poses, first, count, 0, outputs);
-    Eigen::MatrixXd coordinates = Multiply(GemmOperand::Dense(a).Transposed(), x.Transposed());  // [M x count]
+    Eigen::MatrixXd coordinates =
+        Multiply(GemmOperand::Dense(a).Transposed(), x.Transposed());  // [M x count]
     if (!pca.output_orthonormal) coordinates = gram.solve(coordinates);
     const Eigen::MatrixXd projected = Multiply(a, coordinates);
     for (std::size_t t = 0; t < count; ++t) {
       const std::span<const float> row = poses.row(first + t);
       const Eigen::Map<const Eigen::VectorXf> f(row.data(), static_cast<Eigen::Index>(outputs));
-      errors[static_cast<Eigen::Index>(first + t)] = (f.cast<double>() - projected.col(static_cast<Eigen::Index>(t))).norm();
+      errors[static_cast<Eigen::Index>(first + t)] =
+          (f.cast<double>() - projected.col(static_cast<Eigen::Index>(t))).norm();
     }
   }
   return errors;

@@ -18,7 +18,9 @@ std::span<float> PoseMatrix::row(std::size_t pose) {
   return {blocks_[pose / kBlockPoses].get() + pose % kBlockPoses * columns(), columns()};
 }
 
-std::span<const float> PoseMatrix::row(std::size_t pose) const { return const_cast<PoseMatrix*>(this)->row(pose); }
+std::span<const float> PoseMatrix::row(std::size_t pose) const {
+  return const_cast<PoseMatrix*>(this)->row(pose);
+}
 
 Eigen::VectorXd PoseMatrix::Mean() const {
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns()));
@@ -26,7 +28,8 @@ Eigen::VectorXd PoseMatrix::Mean() const {
   ParallelFor(columns(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t pose = 0; pose < poses_; ++pose) {
       const std::span<const float> values = row(pose);
-      for (std::size_t i = begin; i < end; ++i) mean[static_cast<Eigen::Index>(i)] += static_cast<double>(values[i]);
+      for (std::size_t i = begin; i < end; ++i)
+        mean[static_cast<Eigen::Index>(i)] += static_cast<double>(values[i]);
     }
   });
   return mean / static_cast<double>(poses_);

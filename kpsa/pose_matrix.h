@@ -1,8 +1,8 @@
-// The training poses: a matrix of T poses by D columns in float32, held once, in blocks of poses (growing copies
-// nothing). Columns of a pose, all interleaved by point:
-//   [0, cN)           the outputs: N points of c components (c = 3: x0 y0 z0 x1 ...; c = 1: scalars, colours of a channel)
-//   [cN, cN + 3P)     P points of earlier stages that may become cues
-//   [cN + 3P, D)      S scalars that may become cues (joint rotations, weights, controls)
+// The training poses: a matrix of T poses by D columns in float32, held once, in blocks of poses (growing
+// copies nothing). Columns of a pose, all interleaved by point:
+//   [0, cN)           the outputs: N points of c components (c = 3: x0 y0 z0 x1 ...; c = 1: scalars, colours
+//   of a channel) [cN, cN + 3P)     P points of earlier stages that may become cues [cN + 3P, D)      S
+//   scalars that may become cues (joint rotations, weights, controls)
 // Values are in scene units, as the graph gives them; Center makes them differences from the mean.
 #pragma once
 
@@ -38,7 +38,8 @@ class PoseMatrix {
   std::size_t poses() const { return poses_; }  // T
   std::size_t columns() const { return layout_.columns(); }
 
-  // Appends a pose of zeros and returns its D values for the caller to fill. Earlier rows stay where they are.
+  // Appends a pose of zeros and returns its D values for the caller to fill. Earlier rows stay where they
+  // are.
   std::span<float> AddPose();
   std::span<float> row(std::size_t pose);
   std::span<const float> row(std::size_t pose) const;

@@ -60,7 +60,8 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
   };
   for (const auto& mesh : target.meshes) store_points(evaluator.Points(o++), mesh.stages.back().world);
   for (std::size_t m = 0; m < target.meshes.size(); ++m) {
-    if (!candidates_[m].points.empty()) store_points(evaluator.Points(o++), target.meshes[m].stages[candidates_[m].stage].world);
+    if (!candidates_[m].points.empty())
+      store_points(evaluator.Points(o++), target.meshes[m].stages[candidates_[m].stage].world);
   }
   for (const Signal& signal : signals_) {
     if (signal.matrix) {
@@ -69,7 +70,8 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
       for (double entry : entries) row[column++] = static_cast<float>(entry);
     } else {
       const Type type = evaluator.plan().outputs()[o].type;
-      const double value = type == Type::kDouble ? evaluator.Get<double>(o) : static_cast<double>(evaluator.Get<std::int64_t>(o));
+      const double value = type == Type::kDouble ? evaluator.Get<double>(o)
+                                                 : static_cast<double>(evaluator.Get<std::int64_t>(o));
       ++o;
       row[column++] = static_cast<float>(value);
     }
@@ -78,13 +80,15 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
 }
 
 Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
-                            const std::function<void(std::size_t, Evaluator&)>& set, const std::function<std::string(std::size_t)>& name) {
+                            const std::function<void(std::size_t, Evaluator&)>& set,
+                            const std::function<std::string(std::size_t)>& name) {
   std::vector<std::span<float>> rows;
   for (std::size_t i = 0; i < count; ++i) rows.push_back(poses->AddPose());
   std::mutex mutex;
   std::size_t failed = count;
   Status failure;
-  const std::size_t grain = std::max<std::size_t>(16, count / static_cast<std::size_t>(4 * HardwareThreads()) + 1);
+  const std::size_t grain =
+      std::max<std::size_t>(16, count / static_cast<std::size_t>(4 * HardwareThreads()) + 1);
   ParallelFor(count, grain, [&](std::size_t begin, std::size_t end) {
     Evaluator evaluator(plan);
     for (std::size_t i = begin; i < end; ++i) {
@@ -107,8 +111,9 @@ Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
   Result<std::shared_ptr<const Plan>> plan = CompileFor({rig_.time});
   if (!plan.ok()) return plan.status();
   const Index time = (*plan)->FindVarying(rig_.time);
-  return Record(*plan, clip.times.size(), poses, [&](std::size_t i, Evaluator& e) { e.Set(time, clip.times[i]); },
-                [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
+  return Record(
+      *plan, clip.times.size(), poses, [&](std::size_t i, Evaluator& e) { e.Set(time, clip.times[i]); },
+      [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
 }
 
 Result<ClipPoses> PoseRecorder::ControlsOfClips(const std::vector<TrainingClip>& clips) {
@@ -154,7 +159,8 @@ Result<ClipPoses> PoseRecorder::ControlsOfClips(const std::vector<TrainingClip>&
   return poses;
 }
 
-Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples, const std::vector<TrainingClip>& clips, PoseMatrix* poses) {
+Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples,
+                                const std::vector<TrainingClip>& clips, PoseMatrix* poses) {
   for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
     std::vector<const SampledPose*> mine;
     for (const SampledPose& sample : samples) {
@@ -162,7 +168,8 @@ Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples, const s
     }
     if (mine.empty()) continue;
     const TrainingClip* playing = clip < 0 ? nullptr : &clips[static_cast<std::size_t>(clip)];
-    KPSA_RETURN_IF_ERROR(rig_.set_clip(playing == nullptr ? std::nullopt : std::optional<std::string_view>(playing->name)));
+    KPSA_RETURN_IF_ERROR(
+        rig_.set_clip(playing == nullptr ? std::nullopt : std::optional<std::string_view>(playing->name)));
     std::vector<PlugRef> varying{rig_.time};
     std::vector<std::size_t> used;
     for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
@@ -179,7 +186,8 @@ Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples, const s
         *plan, mine.size(), poses,
         [&](std::size_t i, Evaluator& e) {
           if (playing != nullptr && !playing->times.empty()) {
-            e.Set(time, playing->times.front() + mine[i]->phase * (playing->times.back() - playing->times.front()));
+            e.Set(time,
+                  playing->times.front() + mine[i]->phase * (playing->times.back() - playing->times.front()));
           }
           for (std::size_t k = 0; k < used.size(); ++k) {
             const double value = mine[i]->values[used[k]];

@@ -1,5 +1,5 @@
-// Evaluates poses of a rig into rows of a pose matrix: output points, candidate points of an earlier stage, and entries
-// of signals, all in the space of the target. Internal to training.
+// Evaluates poses of a rig into rows of a pose matrix: output points, candidate points of an earlier stage,
+// and entries of signals, all in the space of the target. Internal to training.
 #pragma once
 
 #include "graph/evaluator.h"
@@ -10,20 +10,23 @@ namespace kpsa {
 
 // Where candidates lie: a stage of each mesh (the accelerated one itself: outputs are the candidates).
 struct CandidateStage {
-  std::size_t stage = 0;       // in MeshPoints::stages
-  std::vector<Index> points;   // of the mesh; empty if the stage is the accelerated one
+  std::size_t stage = 0;      // in MeshPoints::stages
+  std::vector<Index> points;  // of the mesh; empty if the stage is the accelerated one
 };
 
 class PoseRecorder {
  public:
-  PoseRecorder(const TrainingRig& rig, Compiler* compiler, std::vector<CandidateStage> candidates, std::vector<Signal> signals)
+  PoseRecorder(const TrainingRig& rig, Compiler* compiler, std::vector<CandidateStage> candidates,
+               std::vector<Signal> signals)
       : rig_(rig), compiler_(compiler), candidates_(std::move(candidates)), signals_(std::move(signals)) {}
   Result<PoseLayout> Layout();
   // Appends a row for each time of a clip.
   Status AddClip(const TrainingClip& clip, PoseMatrix* poses);
   // Appends a row for each sampled pose.
-  Status AddSamples(const std::vector<SampledPose>& samples, const std::vector<TrainingClip>& clips, PoseMatrix* poses);
-  // The controls that would give the poses of the clips (ControlRange::shown), at rest where nothing shows them.
+  Status AddSamples(const std::vector<SampledPose>& samples, const std::vector<TrainingClip>& clips,
+                    PoseMatrix* poses);
+  // The controls that would give the poses of the clips (ControlRange::shown), at rest where nothing shows
+  // them.
   Result<ClipPoses> ControlsOfClips(const std::vector<TrainingClip>& clips);
   const std::vector<Signal>& signals() const { return signals_; }
   const std::vector<CandidateStage>& candidates() const { return candidates_; }
@@ -31,7 +34,8 @@ class PoseRecorder {
  private:
   Result<std::shared_ptr<const Plan>> CompileFor(const std::vector<PlugRef>& varying);
   Status Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
-                const std::function<void(std::size_t, Evaluator&)>& set, const std::function<std::string(std::size_t)>& name);
+                const std::function<void(std::size_t, Evaluator&)>& set,
+                const std::function<std::string(std::size_t)>& name);
   void Store(const Evaluator& evaluator, std::span<float> row) const;
 
   const TrainingRig& rig_;

@@ -43,7 +43,8 @@ class Sampler {
     for (std::size_t g = 0; g < count; ++g) {
       const std::vector<std::size_t>& group = groups[random_.Below(groups.size())];
       const std::size_t active = 2 + random_.Below(2);
-      for (std::size_t k = 0; k < active; ++k) Move(group[random_.Below(group.size())], 0.4 + 0.6 * random_.Unit(), pose);
+      for (std::size_t k = 0; k < active; ++k)
+        Move(group[random_.Below(group.size())], 0.4 + 0.6 * random_.Unit(), pose);
     }
   }
 
@@ -57,14 +58,16 @@ class Sampler {
     for (std::size_t i = 0; i < controls_.size(); ++i) {
       const ControlRange& c = controls_[i];
       // A node's controls are neighbours; a mesh's many weights are each on their own
-      if (i == 0 || controls_[i - 1].plug.node != c.plug.node || c.plug.element >= 0) from_b = random_.Unit() < split;
+      if (i == 0 || controls_[i - 1].plug.node != c.plug.node || c.plug.element >= 0)
+        from_b = random_.Unit() < split;
       const double value = c.rest + ((from_b ? b[i] : a[i]) - c.rest) * (from_b ? reach_b : reach_a);
       pose->values[i] = std::clamp(value, c.min, c.max);
     }
     MoveSome(4, 0.6, pose);
   }
 
-  // Few controls or many: real poses are both. What is laid over a clip stays smaller, the clip's own motion is there already.
+  // Few controls or many: real poses are both. What is laid over a clip stays smaller, the clip's own motion
+  // is there already.
   void MoveMany(SampledPose* pose) {
     const std::size_t n = controls_.size();
     const double share = random_.Unit();
@@ -86,7 +89,8 @@ class Sampler {
   }
   void MoveSome(std::size_t most, double reach, SampledPose* pose) {
     const std::size_t active = random_.Below(most + 1);
-    for (std::size_t k = 0; k < active; ++k) Move(random_.Below(controls_.size()), reach * random_.Unit(), pose);
+    for (std::size_t k = 0; k < active; ++k)
+      Move(random_.Below(controls_.size()), reach * random_.Unit(), pose);
   }
 
   const std::vector<ControlRange>& controls_;
@@ -94,8 +98,8 @@ class Sampler {
   Random random_;
 };
 
-// At most `count` of the poses, each as far as possible from those before it: what is rare in a clip (a blink) is not rare
-// among them. Distances in shares of the controls' ranges.
+// At most `count` of the poses, each as far as possible from those before it: what is rare in a clip (a
+// blink) is not rare among them. Distances in shares of the controls' ranges.
 ClipPoses Different(const ClipPoses& poses, const std::vector<ControlRange>& controls, std::size_t count) {
   ClipPoses chosen;
   std::vector<double> distance(poses.size(), std::numeric_limits<double>::max());
@@ -136,7 +140,8 @@ std::vector<SampledPose> Sweeps(const std::vector<ControlRange>& controls) {
 }
 
 std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses,
-                                     const ControlGroups& groups, std::size_t clips, std::size_t count, std::uint64_t seed) {
+                                     const ControlGroups& groups, std::size_t clips, std::size_t count,
+                                     std::uint64_t seed) {
   const ClipPoses frames = Different(clip_poses, controls, kClipFrames);
   Sampler sampler(controls, frames, seed);
   std::vector<SampledPose> poses;

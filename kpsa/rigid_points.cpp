@@ -3,6 +3,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kpsa/rigid_points.cpp"
 #include "hwy/foreach_target.h"
+
 #include "base/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();

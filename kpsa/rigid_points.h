@@ -1,5 +1,5 @@
-// Points through a matrix, in place, in float; the translation is added last so that small shapes far away keep
-// their detail up to the spacing of float there.
+// Points through a matrix, in place, in float; the translation is added last so that small shapes far away
+// keep their detail up to the spacing of float there.
 #pragma once
 
 #include <array>

@@ -3,6 +3,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kpsa/selection_kernel.cpp"
 #include "hwy/foreach_target.h"
+
 #include "base/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -23,7 +24,8 @@ HWY_INLINE double Total(V v) {
 // One row of C against `ranks` rows of the update, then its row of H: h += sum_b sign p_b u_b. p [ranks].
 template <int kRanks>
 HWY_INLINE void CorrectRow(const float* HWY_RESTRICT c, std::size_t stride, const double* HWY_RESTRICT update,
-                           const double* HWY_RESTRICT root_update, double sign, double* HWY_RESTRICT h, double* p) {
+                           const double* HWY_RESTRICT root_update, double sign, double* HWY_RESTRICT h,
+                           double* p) {
   const hn::ScalableTag<double> d;
   const hn::Rebind<float, decltype(d)> df;
   using V = hn::Vec<decltype(d)>;
@@ -32,7 +34,8 @@ HWY_INLINE void CorrectRow(const float* HWY_RESTRICT c, std::size_t stride, cons
   for (int b = 0; b < kRanks; ++b) dot[b] = hn::Zero(d);
   for (std::size_t k = 0; k < stride; k += lanes) {
     const V value = hn::PromoteTo(d, hn::LoadU(df, c + k));
-    for (int b = 0; b < kRanks; ++b) dot[b] = hn::MulAdd(value, hn::Load(d, update + static_cast<std::size_t>(b) * stride + k), dot[b]);
+    for (int b = 0; b < kRanks; ++b)
+      dot[b] = hn::MulAdd(value, hn::Load(d, update + static_cast<std::size_t>(b) * stride + k), dot[b]);
   }
   for (int b = 0; b < kRanks; ++b) {
     p[b] = Total(dot[b]);
@@ -40,13 +43,15 @@ HWY_INLINE void CorrectRow(const float* HWY_RESTRICT c, std::size_t stride, cons
   }
   for (std::size_t k = 0; k < stride; k += lanes) {
     V value = hn::Load(d, h + k);
-    for (int b = 0; b < kRanks; ++b) value = hn::MulAdd(factor[b], hn::Load(d, root_update + static_cast<std::size_t>(b) * stride + k), value);
+    for (int b = 0; b < kRanks; ++b)
+      value =
+          hn::MulAdd(factor[b], hn::Load(d, root_update + static_cast<std::size_t>(b) * stride + k), value);
     hn::Store(value, d, h + k);
   }
 }
 
-void CorrectRows(const float* c, std::size_t rows, std::size_t stride, const double* update, const double* root_update,
-                 std::size_t ranks, double sign, double* h, double* p) {
+void CorrectRows(const float* c, std::size_t rows, std::size_t stride, const double* update,
+                 const double* root_update, std::size_t ranks, double sign, double* h, double* p) {
   for (std::size_t row = 0; row < rows; ++row) {
     const float* c_row = c + row * stride;
     double* h_row = h + row * stride;
@@ -64,7 +69,8 @@ void RowProducts(const double* h, std::size_t rows, std::size_t stride, double* 
   for (std::size_t i = 0; i < rows; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       auto sum = hn::Zero(d);
-      for (std::size_t k = 0; k < stride; k += lanes) sum = hn::MulAdd(hn::Load(d, h + i * stride + k), hn::Load(d, h + j * stride + k), sum);
+      for (std::size_t k = 0; k < stride; k += lanes)
+        sum = hn::MulAdd(hn::Load(d, h + i * stride + k), hn::Load(d, h + j * stride + k), sum);
       products[3 * i + j] = products[3 * j + i] = Total(sum);
     }
   }
@@ -95,8 +101,8 @@ double* Doubles(AlignedFloats& floats) { return reinterpret_cast<double*>(floats
 
 }  // namespace
 
-CandidateGains::CandidateGains(std::vector<Index> offsets, std::vector<float> loadings, std::vector<double> noise,
-                               Eigen::MatrixXd output_root)
+CandidateGains::CandidateGains(std::vector<Index> offsets, std::vector<float> loadings,
+                               std::vector<double> noise, Eigen::MatrixXd output_root)
     : offsets_(std::move(offsets)), noise_(std::move(noise)), output_root_(std::move(output_root)) {
   const std::size_t rows = noise_.size();
   KPSA_CHECK_EQ(static_cast<std::size_t>(offsets_.back()), rows);
@@ -104,7 +110,8 @@ CandidateGains::CandidateGains(std::vector<Index> offsets, std::vector<float> lo
   KPSA_CHECK_EQ(modes_ * rows, loadings.size());
   stride_ = (modes_ + 15) / 16 * 16;
   loadings_.assign(rows * stride_, 0.0f);
-  for (std::size_t row = 0; row < rows; ++row) std::copy_n(loadings.data() + row * modes_, modes_, loadings_.data() + row * stride_);
+  for (std::size_t row = 0; row < rows; ++row)
+    std::copy_n(loadings.data() + row * modes_, modes_, loadings_.data() + row * stride_);
   products_ = AlignedFloats(2 * rows * stride_);
   blocks_.resize(3 * rows);
   gains_.resize(count());
@@ -115,7 +122,8 @@ Eigen::MatrixXd CandidateGains::Loadings(std::size_t candidate) const {
   Eigen::MatrixXd rows(height, static_cast<Eigen::Index>(modes_));
   for (Eigen::Index i = 0; i < height; ++i) {
     const float* row = loadings_.data() + (offsets_[candidate] + static_cast<std::size_t>(i)) * stride_;
-    for (std::size_t k = 0; k < modes_; ++k) rows(i, static_cast<Eigen::Index>(k)) = static_cast<double>(row[k]);
+    for (std::size_t k = 0; k < modes_; ++k)
+      rows(i, static_cast<Eigen::Index>(k)) = static_cast<double>(row[k]);
   }
   return rows;
 }
@@ -148,20 +156,25 @@ void CandidateGains::Reset(const Eigen::MatrixXd& sigma) {
   for (std::size_t first = 0; first < count(); first += kChunk) {
     const std::size_t last = std::min(first + kChunk, count());
     const std::size_t begin = offsets_[first], rows = offsets_[last] - begin;
-    Eigen::MatrixXd c(static_cast<Eigen::Index>(modes_), static_cast<Eigen::Index>(rows));  // C^T of the chunk
+    Eigen::MatrixXd c(static_cast<Eigen::Index>(modes_),
+                      static_cast<Eigen::Index>(rows));  // C^T of the chunk
     for (std::size_t row = 0; row < rows; ++row) {
-      const Eigen::Map<const Eigen::VectorXf> source(loadings_.data() + (begin + row) * stride_, static_cast<Eigen::Index>(modes_));
+      const Eigen::Map<const Eigen::VectorXf> source(loadings_.data() + (begin + row) * stride_,
+                                                     static_cast<Eigen::Index>(modes_));
       c.col(static_cast<Eigen::Index>(row)) = source.cast<double>();
     }
-    const Eigen::MatrixXd h = Multiply(GemmOperand::Dense(root).Transposed(), GemmOperand::Dense(c));  // [M x rows]
+    const Eigen::MatrixXd h =
+        Multiply(GemmOperand::Dense(root).Transposed(), GemmOperand::Dense(c));  // [M x rows]
     const Eigen::MatrixXd t = output_root_.size() == 0 ? h : Multiply(sigma, c);
     for (std::size_t row = 0; row < rows; ++row) {
-      std::copy_n(h.col(static_cast<Eigen::Index>(row)).data(), modes_, Doubles(products_) + (begin + row) * stride_);
+      std::copy_n(h.col(static_cast<Eigen::Index>(row)).data(), modes_,
+                  Doubles(products_) + (begin + row) * stride_);
     }
     for (std::size_t i = first; i < last; ++i) {
       for (std::size_t a = offsets_[i]; a < offsets_[i + 1]; ++a) {
         for (std::size_t b = offsets_[i]; b < offsets_[i + 1]; ++b) {
-          blocks_[a * 3 + b - offsets_[i]] = t.col(static_cast<Eigen::Index>(a - begin)).dot(c.col(static_cast<Eigen::Index>(b - begin)));
+          blocks_[a * 3 + b - offsets_[i]] =
+              t.col(static_cast<Eigen::Index>(a - begin)).dot(c.col(static_cast<Eigen::Index>(b - begin)));
         }
       }
     }
@@ -174,7 +187,8 @@ void CandidateGains::Reset(const Eigen::MatrixXd& sigma) {
 void CandidateGains::Apply(const Eigen::MatrixXd& update, double sign) {
   const auto ranks = static_cast<std::size_t>(update.rows());
   KPSA_CHECK_LE(ranks, std::size_t{3});
-  const Eigen::MatrixXd root = output_root_.size() == 0 ? update : Eigen::MatrixXd(update * output_root_.transpose());
+  const Eigen::MatrixXd root =
+      output_root_.size() == 0 ? update : Eigen::MatrixXd(update * output_root_.transpose());
   AlignedFloats storage(2 * 2 * 3 * stride_);
   double* rows = Doubles(storage);
   double* root_rows = rows + 3 * stride_;
@@ -189,7 +203,8 @@ void CandidateGains::Apply(const Eigen::MatrixXd& update, double sign) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t first = offsets_[i], height = offsets_[i + 1] - first;
       HWY_DYNAMIC_DISPATCH(CorrectRows)
-      (loadings_.data() + first * stride_, height, stride_, rows, root_rows, ranks, sign, Doubles(products_) + first * stride_, p);
+      (loadings_.data() + first * stride_, height, stride_, rows, root_rows, ranks, sign,
+       Doubles(products_) + first * stride_, p);
       for (std::size_t a = 0; a < height; ++a) {
         for (std::size_t b = 0; b < height; ++b) {
           double sum = 0;

@@ -10,7 +10,8 @@ namespace kpsa {
 namespace {
 
 bool IsTransform(const NodeDef& def) {
-  return def.FindAttribute("worldMatrix") >= 0 && def.FindAttribute("parentMatrix") >= 0 && def.FindAttribute("matrix") >= 0;
+  return def.FindAttribute("worldMatrix") >= 0 && def.FindAttribute("parentMatrix") >= 0 &&
+         def.FindAttribute("matrix") >= 0;
 }
 
 }  // namespace
@@ -37,7 +38,8 @@ std::string EntryName(const Signal& signal, std::size_t entry) {
   return signal.matrix ? fmt::format("{}/{}", signal.name, entry) : signal.name;
 }
 
-Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, const std::vector<PlugRef>& outputs,
+Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
+                                        const std::vector<PlugRef>& outputs,
                                         const std::vector<PlugRef>& varying, const PlugRef* space_world,
                                         std::vector<std::string>* unguarded) {
   Request request;
@@ -45,7 +47,8 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, 
   request.varying = varying;
   Result<std::shared_ptr<const Plan>> plan = compiler->Compile(graph, request);
   if (!plan.ok()) return plan.status();
-  const std::set<Index> chain = space_world == nullptr ? std::set<Index>() : ParentChain(graph, space_world->node);
+  const std::set<Index> chain =
+      space_world == nullptr ? std::set<Index>() : ParentChain(graph, space_world->node);
 
   // Nodes that have a varying step, and whether one of them has points
   std::map<Index, bool> nodes;

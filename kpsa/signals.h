@@ -1,9 +1,9 @@
-// What can move a set of points besides points themselves: the local matrices of the transforms upstream, and the small
-// values (morph weights, envelopes, drivers) that enter steps with points. They guard a subspace (a value outside its
-// trained range is a miss) and serve as cheap cues.
+// What can move a set of points besides points themselves: the local matrices of the transforms upstream, and
+// the small values (morph weights, envelopes, drivers) that enter steps with points. They guard a subspace (a
+// value outside its trained range is a miss) and serve as cheap cues.
 //
-// A matrix is measured as 12 entries (its upper three rows, column by column: three axes and the translation), so no
-// angle has to be computed; a value as one entry.
+// A matrix is measured as 12 entries (its upper three rows, column by column: three axes and the
+// translation), so no angle has to be computed; a value as one entry.
 #pragma once
 
 #include <set>
@@ -28,10 +28,12 @@ std::string EntryName(const Signal& signal, std::size_t entry);
 // The nodes from `node` up through parentMatrix, by index.
 std::set<Index> ParentChain(const Graph& graph, NodeId node);
 
-// All signals of the points `outputs` under the varying plugs `varying`, sorted by name. The chain of transforms from
-// the root to `space` (a node whose frame the points are taken in) is left out, if one is given.
-// `unguarded` receives varying inputs that are no signals (arrays of points that are set from outside).
-Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler, const std::vector<PlugRef>& outputs,
+// All signals of the points `outputs` under the varying plugs `varying`, sorted by name. The chain of
+// transforms from the root to `space` (a node whose frame the points are taken in) is left out, if one is
+// given. `unguarded` receives varying inputs that are no signals (arrays of points that are set from
+// outside).
+Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
+                                        const std::vector<PlugRef>& outputs,
                                         const std::vector<PlugRef>& varying, const PlugRef* space_world,
                                         std::vector<std::string>* unguarded);
 

@@ -13,8 +13,8 @@ std::string Short(const Digest& digest) { return digest.ToHex().substr(0, 12); }
 
 }  // namespace
 
-Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, const std::vector<PlugRef>& space,
-                       const std::vector<PlugRef>& controls) {
+Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs,
+                       const std::vector<PlugRef>& space, const std::vector<PlugRef>& controls) {
   // All nodes upstream of the outputs, clips left out
   std::vector<NodeId> stack;
   std::set<Index> seen, carriers;
@@ -27,9 +27,11 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, 
   }
   Signature signature;
   std::set<std::tuple<Index, int, int>> moving;  // plugs whose pose says nothing: guards see it
-  for (const PlugRef& control : controls) moving.emplace(control.node.index, control.attribute, control.element);
+  for (const PlugRef& control : controls)
+    moving.emplace(control.node.index, control.attribute, control.element);
   const auto is_moving = [&](const PlugRef& plug) {
-    return carriers.count(plug.node.index) != 0 || moving.count({plug.node.index, plug.attribute, plug.element}) != 0;
+    return carriers.count(plug.node.index) != 0 ||
+           moving.count({plug.node.index, plug.attribute, plug.element}) != 0;
   };
   while (!stack.empty()) {
     const NodeId node = stack.back();
@@ -79,7 +81,8 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, 
 }
 
 std::string SignatureDifference(const Signature& trained, const Signature& now) {
-  std::vector<std::string> nodes, attributes, rewired;  // by what they say: an attribute says more than its node
+  std::vector<std::string> nodes, attributes,
+      rewired;  // by what they say: an attribute says more than its node
   const auto compare = [&](const Signature& here, const Signature& there, const char* how, bool both) {
     for (const auto& [name, digest] : here) {
       const auto it = there.find(name);
@@ -101,7 +104,8 @@ std::string SignatureDifference(const Signature& trained, const Signature& now) 
   if (changed.empty()) return "";
   const std::size_t count = changed.size();
   if (count > 3) changed.resize(3);
-  return fmt::format("{}{}", fmt::join(changed, ", "), count > 3 ? fmt::format(" and {} more", count - 3) : "");
+  return fmt::format("{}{}", fmt::join(changed, ", "),
+                     count > 3 ? fmt::format(" and {} more", count - 3) : "");
 }
 
 std::string SignatureDigest(const Signature& signature) {

@@ -1,5 +1,5 @@
-// The identity of the rig that a subspace was trained on: one digest for every node and attribute that its points
-// depend on. Controls and clips are no part of it; their ranges are (kpsa/signals.h).
+// The identity of the rig that a subspace was trained on: one digest for every node and attribute that its
+// points depend on. Controls and clips are no part of it; their ranges are (kpsa/signals.h).
 #pragma once
 
 #include <map>
@@ -10,12 +10,14 @@
 
 namespace kpsa {
 
-using Signature = std::map<std::string, std::string>;  // "mush.iterations" -> digest; "mush" -> type and connections
+using Signature =
+    std::map<std::string, std::string>;  // "mush.iterations" -> digest; "mush" -> type and connections
 
-// Everything upstream of `outputs` and `space`. Poses (Graph::Pose) of the plugs in `controls` and of the transforms
-// from `space` up to the root are left out, and clips with what they drive; what is set for the rest state is not.
-Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs, const std::vector<PlugRef>& space,
-                       const std::vector<PlugRef>& controls);
+// Everything upstream of `outputs` and `space`. Poses (Graph::Pose) of the plugs in `controls` and of the
+// transforms from `space` up to the root are left out, and clips with what they drive; what is set for the
+// rest state is not.
+Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs,
+                       const std::vector<PlugRef>& space, const std::vector<PlugRef>& controls);
 // "" if they agree, else what differs, at most three entries by name.
 std::string SignatureDifference(const Signature& trained, const Signature& now);
 std::string SignatureDigest(const Signature& signature);

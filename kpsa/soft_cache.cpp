@@ -33,7 +33,8 @@ HWY_INLINE float SumInHalves(D d, V v) {
 }
 #endif
 
-// Up to 16 rows of F against y, four by four, sixteen columns at a time: w, and g += F_rows^T w. Returns |w|^2.
+// Up to 16 rows of F against y, four by four, sixteen columns at a time: w, and g += F_rows^T w. Returns
+// |w|^2.
 float Rows(const float* HWY_RESTRICT rows, std::size_t fours, std::size_t groups, const float* HWY_RESTRICT y,
            float* HWY_RESTRICT g) {
   const hn::CappedTag<float, 16> d;
@@ -87,7 +88,8 @@ double Project(const float* factor, std::size_t rows, bool lower, const float* y
   for (std::size_t j = 0; j < 16 * all; ++j) g[j] = 0;
   double sum = 0;
   for (std::size_t row = 0; row < rows; row += 16) {
-    const std::size_t groups = lower ? row / 16 + 1 : all, fours = ((rows - row < 16 ? rows - row : 16) + 3) / 4;
+    const std::size_t groups = lower ? row / 16 + 1 : all,
+                      fours = ((rows - row < 16 ? rows - row : 16) + 3) / 4;
     sum += static_cast<double>(Rows(factor, fours, groups, y, g));
     factor += 64 * groups * fours;
   }

@@ -1,9 +1,9 @@
-// The .kpsa file: lists as JSON in the metadata, numbers as tensors. See kpsa/subspace.h and base/safetensors.h.
-#include <nlohmann/json.hpp>
-
+// The .kpsa file: lists as JSON in the metadata, numbers as tensors. See kpsa/subspace.h and
+// base/safetensors.h.
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "base/digest.h"
 #include "base/safetensors.h"
@@ -21,7 +21,8 @@ constexpr std::uint64_t kMaxPoints = 1u << 28;
 // Reads typed members of a JSON object; the first failure is kept, and everything after it gives defaults.
 class Reader {
  public:
-  Reader(std::string place, const Json& object, Status* status) : place_(std::move(place)), object_(object), status_(status) {}
+  Reader(std::string place, const Json& object, Status* status)
+      : place_(std::move(place)), object_(object), status_(status) {}
   std::string Text(const char* key) {
     const Json* value = Find(key);
     if (value != nullptr && value->is_string()) return value->get<std::string>();
@@ -29,12 +30,14 @@ class Reader {
   }
   double Number(const char* key) {
     const Json* value = Find(key);
-    if (value != nullptr && value->is_number() && std::isfinite(value->get<double>())) return value->get<double>();
+    if (value != nullptr && value->is_number() && std::isfinite(value->get<double>()))
+      return value->get<double>();
     return Fail(key, "a number"), 0.0;
   }
   std::uint64_t Count(const char* key, std::uint64_t limit) {
     const Json* value = Find(key);
-    if (value != nullptr && value->is_number_unsigned() && value->get<std::uint64_t>() <= limit) return value->get<std::uint64_t>();
+    if (value != nullptr && value->is_number_unsigned() && value->get<std::uint64_t>() <= limit)
+      return value->get<std::uint64_t>();
     return Fail(key, "a whole number within bounds"), std::uint64_t{0};
   }
 
@@ -62,8 +65,10 @@ Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, b
     return depth <= 8;
   };
   Json json = Json::parse(*text, callback, false);
-  if (json.is_discarded() || depth_reached > 8 || json.is_array() != list || (!list && !json.is_object()) || json.size() > limit) {
-    return Status::Invalid("{}: \"{}\" is not a JSON {} of at most {} entries", file.name(), key, list ? "list" : "object", limit);
+  if (json.is_discarded() || depth_reached > 8 || json.is_array() != list || (!list && !json.is_object()) ||
+      json.size() > limit) {
+    return Status::Invalid("{}: \"{}\" is not a JSON {} of at most {} entries", file.name(), key,
+                           list ? "list" : "object", limit);
   }
   return json;
 }
@@ -89,7 +94,8 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
 
 std::map<std::string, std::string> Header(const Subspace& s) {
   Json outputs = Json::array(), cues = Json::array(), ranges = Json::array();
-  for (const SubspaceOutput& output : s.outputs) outputs.push_back({{"name", output.name}, {"points", output.points}});
+  for (const SubspaceOutput& output : s.outputs)
+    outputs.push_back({{"name", output.name}, {"points", output.points}});
   for (const CueDescription& cue : s.cues) {
     if (cue.kind == CueDescription::Kind::kScalar) {
       cues.push_back({{"kind", "scalar"}, {"plug", cue.plug}});
@@ -97,7 +103,8 @@ std::map<std::string, std::string> Header(const Subspace& s) {
       cues.push_back({{"kind", "point"}, {"stage", cue.stage}, {"mesh", cue.mesh}, {"point", cue.point}});
     }
   }
-  for (const TrainedRange& range : s.ranges) ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}});
+  for (const TrainedRange& range : s.ranges)
+    ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}});
   const Json summary = {{"mode", s.mode == EstimatorMode::kMap ? "map" : "paper"},
                         {"components", s.components},
                         {"modes", s.modes},
@@ -118,7 +125,8 @@ std::map<std::string, std::string> Header(const Subspace& s) {
           {"training", s.training}};
 }
 
-// Of all that the file says: a damaged one is refused, as numbers that are only a little wrong would not be seen.
+// Of all that the file says: a damaged one is refused, as numbers that are only a little wrong would not be
+// seen.
 std::string ContentDigest(const Subspace& s) {
   Hasher hasher;
   for (const auto& [key, text] : Header(s)) {
@@ -148,14 +156,18 @@ std::string ContentDigest(const Subspace& s) {
 }
 
 Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
-  const Result<Json> summary = JsonMetadata(file, "summary", false, 64), outputs = JsonMetadata(file, "outputs", true, kMaxOutputs),
-                     cues = JsonMetadata(file, "cues", true, kMaxCues), ranges = JsonMetadata(file, "ranges", true, kMaxCues),
+  const Result<Json> summary = JsonMetadata(file, "summary", false, 64),
+                     outputs = JsonMetadata(file, "outputs", true, kMaxOutputs),
+                     cues = JsonMetadata(file, "cues", true, kMaxCues),
+                     ranges = JsonMetadata(file, "ranges", true, kMaxCues),
                      training = JsonMetadata(file, "training", false, 1u << 16);
-  for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &training}) KPSA_RETURN_IF_ERROR(part->status());
+  for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &training})
+    KPSA_RETURN_IF_ERROR(part->status());
   Status status;
   Reader reader(file.name() + ": summary", *summary, &status);
   const std::string mode = reader.Text("mode");
-  if (status.ok() && mode != "map" && mode != "paper") return Status::Invalid("{}: the mode is \"{}\", expected map or paper", file.name(), mode);
+  if (status.ok() && mode != "map" && mode != "paper")
+    return Status::Invalid("{}: the mode is \"{}\", expected map or paper", file.name(), mode);
   s->mode = s->soft_cache.mode = mode == "paper" ? EstimatorMode::kPaper : EstimatorMode::kMap;
   s->components = static_cast<int>(reader.Count("components", 3));
   s->modes = reader.Count("modes", 1u << 20);
@@ -188,7 +200,10 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
     Reader range(file.name() + ": a trained range", entry, &status);
     s->ranges.push_back({range.Text("plug"), range.Number("lo"), range.Number("hi")});
   }
-  for (const auto& [key, target] : {std::pair{"rigHash", &s->rig_hash}, {"units", &s->units}, {"space", &s->space}, {"training", &s->training}}) {
+  for (const auto& [key, target] : {std::pair{"rigHash", &s->rig_hash},
+                                    {"units", &s->units},
+                                    {"space", &s->space},
+                                    {"training", &s->training}}) {
     const Result<std::string> text = file.Metadata(key);
     KPSA_RETURN_IF_ERROR(text.status());
     *target = *text;
@@ -213,7 +228,8 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "v", {kAny}, true), &data.v));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "u", {kAny}), &data.u));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "mean", {kAny}), &data.mean));
-    Result<TileMap> map = TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
+    Result<TileMap> map =
+        TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
     if (!map.ok()) return map.status();
     s->tiles.push_back(std::move(*map));
   }
@@ -233,7 +249,8 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
   Add<float>(&writer, "factor", s.soft_cache.factor.span());
   Add<float>(&writer, "leaveOneOut", s.soft_cache.leave_one_out);
   std::vector<double> calibration;
-  for (const CalibrationPair& pair : s.calibration) calibration.insert(calibration.end(), {pair.score, pair.error});
+  for (const CalibrationPair& pair : s.calibration)
+    calibration.insert(calibration.end(), {pair.score, pair.error});
   writer.Add<double>("calibration", {s.calibration.size(), 2}, calibration);
   for (std::size_t i = 0; i < s.tiles.size(); ++i) {
     const TileData& data = s.tiles[i].data();
@@ -262,9 +279,11 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   const Result<std::string> version = file.Metadata("version");
   if (!version.ok()) return version.status();
   if (*version != std::to_string(kSubspaceVersion)) {
-    return Status::Invalid("{}: the subspace has format version {}, this program reads version {}; train it again or use the program "
-                           "that wrote it",
-                           path, *version, kSubspaceVersion);
+    return Status::Invalid(
+        "{}: the subspace has format version {}, this program reads version {}; train it again or use the "
+        "program "
+        "that wrote it",
+        path, *version, kSubspaceVersion);
   }
   Subspace s;
   KPSA_RETURN_IF_ERROR(ReadHeader(file, &s));
@@ -272,24 +291,29 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("cueMean", {kAny}), &s.cue_mean));
   const std::uint64_t rows = s.rows();
   KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("cueScale", {rows}), &s.cue_scale));
-  KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>("cueOffsets", {s.cues.size() + 1}), &s.soft_cache.offsets));
+  KPSA_RETURN_IF_ERROR(
+      Assign(file.Values<std::uint32_t>("cueOffsets", {s.cues.size() + 1}), &s.soft_cache.offsets));
   for (std::size_t k = 0; k <= s.cues.size(); ++k) {
     const Index offset = s.soft_cache.offsets[k];
     if (offset > rows || (k == 0 ? offset != 0 : offset < s.soft_cache.offsets[k - 1])) {
       return Status::Invalid("{}: cue {} begins at row {} of {}", path, k, offset, rows);
     }
   }
-  KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("factor", {s.soft_cache.factor_size()}), &s.soft_cache.factor));
+  KPSA_RETURN_IF_ERROR(
+      Assign(file.Values<float>("factor", {s.soft_cache.factor_size()}), &s.soft_cache.factor));
   KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
   const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 2});
   if (!calibration.ok()) return calibration.status();
-  for (std::size_t i = 0; i + 1 < calibration->size(); i += 2) s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
+  for (std::size_t i = 0; i + 1 < calibration->size(); i += 2)
+    s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
-  if (Status status = ValidateSubspace(s); !status.ok()) return Status::Invalid("{}: {}", path, status.ToString());
+  if (Status status = ValidateSubspace(s); !status.ok())
+    return Status::Invalid("{}: {}", path, status.ToString());
   const Result<std::string> digest = file.Metadata("digest");
   if (!digest.ok()) return digest.status();
   if (*digest != ContentDigest(s))
-    return Status::Invalid("{}: the file is damaged: its contents are not those that were written; train it again", path);
+    return Status::Invalid(
+        "{}: the file is damaged: its contents are not those that were written; train it again", path);
   return s;
 }
 

@@ -12,20 +12,24 @@ namespace {
 
 constexpr std::size_t kMaxGroups = (2 * kMaxTileRank + 32) / 4;
 
-// The two bytes of the inputs of a frame, four to a group in the order of U's bytes: q = 256 high + low, both signed.
+// The two bytes of the inputs of a frame, four to a group in the order of U's bytes: q = 256 high + low, both
+// signed.
 struct InputBytes {
   alignas(64) std::int32_t high[kMaxGroups], low[kMaxGroups];
 };
 
 KPSA_VNNI inline void SplitInputs(const std::int16_t* q, std::size_t groups, InputBytes* bytes) {
   // Bytes 0 and 2 of four meet the first two inputs
-  const __m256i order = _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 2, 1, 3, 4, 6, 5, 7, 8, 10, 9, 11, 12, 14, 13, 15));
+  const __m256i order =
+      _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 2, 1, 3, 4, 6, 5, 7, 8, 10, 9, 11, 12, 14, 13, 15));
   for (std::size_t g = 0; g < groups; g += 8) {
     const __m512i all = _mm512_load_si512(q + 4 * g);
     const __m512i low = _mm512_srai_epi16(_mm512_slli_epi16(all, 8), 8);
     const __m512i high = _mm512_srai_epi16(_mm512_sub_epi16(all, low), 8);
-    _mm256_store_si256(reinterpret_cast<__m256i*>(bytes->low + g), _mm256_shuffle_epi8(_mm512_cvtepi16_epi8(low), order));
-    _mm256_store_si256(reinterpret_cast<__m256i*>(bytes->high + g), _mm256_shuffle_epi8(_mm512_cvtepi16_epi8(high), order));
+    _mm256_store_si256(reinterpret_cast<__m256i*>(bytes->low + g),
+                       _mm256_shuffle_epi8(_mm512_cvtepi16_epi8(low), order));
+    _mm256_store_si256(reinterpret_cast<__m256i*>(bytes->high + g),
+                       _mm256_shuffle_epi8(_mm512_cvtepi16_epi8(high), order));
   }
 }
 
@@ -42,9 +46,9 @@ KPSA_VNNI inline __m512 Position(__m512i high, __m512i low, __m512 step, const f
 
 // A row of kpsa/rigid_points.cpp's product.
 KPSA_VNNI inline __m512 Transformed(const float* m, __m512 x, __m512 y, __m512 z) {
-  return _mm512_fmadd_ps(
-      _mm512_set1_ps(m[0]), x,
-      _mm512_fmadd_ps(_mm512_set1_ps(m[3]), y, _mm512_fmadd_ps(_mm512_set1_ps(m[6]), z, _mm512_set1_ps(m[9]))));
+  return _mm512_fmadd_ps(_mm512_set1_ps(m[0]), x,
+                         _mm512_fmadd_ps(_mm512_set1_ps(m[3]), y,
+                                         _mm512_fmadd_ps(_mm512_set1_ps(m[6]), z, _mm512_set1_ps(m[9]))));
 }
 
 // kVectors of a panel's rows at a time, for some frames.
@@ -123,12 +127,13 @@ KPSA_VNNI void Tile(const std::uint8_t* u, std::size_t panels, std::size_t group
 }  // namespace
 
 bool HasVnni() {
-  static const bool has = __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+  static const bool has = __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("avx512bw") &&
+                          __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
   return has;
 }
 
-void TilePanelsVnni(const std::uint8_t* u, std::size_t panels, std::size_t groups, int components, const float* mean,
-                    std::size_t first, const TileFrame* frames, std::size_t frame_count) {
+void TilePanelsVnni(const std::uint8_t* u, std::size_t panels, std::size_t groups, int components,
+                    const float* mean, std::size_t first, const TileFrame* frames, std::size_t frame_count) {
   KPSA_DCHECK(frame_count <= kBlockFrames && groups <= kMaxGroups);
   components == 3 ? Tile<3>(u, panels, groups, mean, first, frames, frame_count)
                   : Tile<1>(u, panels, groups, mean, first, frames, frame_count);
@@ -138,6 +143,9 @@ void TilePanelsVnni(const std::uint8_t* u, std::size_t panels, std::size_t group
 #else
 namespace kpsa {
 bool HasVnni() { return false; }
-void TilePanelsVnni(const std::uint8_t*, std::size_t, std::size_t, int, const float*, std::size_t, const TileFrame*, std::size_t) { KPSA_CHECK(false); }
+void TilePanelsVnni(const std::uint8_t*, std::size_t, std::size_t, int, const float*, std::size_t,
+                    const TileFrame*, std::size_t) {
+  KPSA_CHECK(false);
+}
 }  // namespace kpsa
 #endif

@@ -6,10 +6,11 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kpsa/tiles.cpp"
+#include "kpsa/tile_panels_vnni.h"
+
 #include "hwy/foreach_target.h"
 
 #include "base/simd-inl.h"
-#include "kpsa/tile_panels_vnni.h"
 
 #ifndef KPSA_TILES_STEP
 #define KPSA_TILES_STEP
@@ -359,7 +360,8 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
           if (data_.direct[tile] == 1) {
             for (std::size_t k = 0; k < rank; ++k) t[k] = frame[columns[k]] * scale[k];
           } else {
-            inputs(data_.v.data() + v_begin_[tile], scale, Padded16(rank), columns, data_.counts[tile], frame, t);
+            inputs(data_.v.data() + v_begin_[tile], scale, Padded16(rank), columns, data_.counts[tile], frame,
+                   t);
           }
           frames[i][f].q = input[i][f].q;
           frames[i][f].out = outs[first + f];
@@ -371,7 +373,8 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
         const std::size_t tile = tiles.empty() ? next + i : tiles[next + i], begin = tile * kTilePoints;
         tile_panels(data_.u.data() + u_begin_[tile], TilePanelCount(data_.points, tile),
                     Groups(data_.ranks[tile], data_.wide[tile]),
-                    data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows, begin, frames[i], frame_count);
+                    data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows, begin, frames[i],
+                    frame_count);
       }
     }
   }

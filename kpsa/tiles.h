@@ -56,8 +56,8 @@ struct TileData {
   AlignedArray<float> scale;  // [tile][k16], k16 = k to the next multiple of 16: z = scale V y_J
   AlignedArray<std::uint16_t> v;  // [tile][|J|][k16] halfs; nothing for direct tiles
   AlignedArray<std::uint8_t> u;   // [tile][panel][(k + wide) / 4, rounded up][32c][4] U + 128: high bytes of
-                                 // the wide columns, their low bytes, the other columns
-  AlignedArray<float> mean;  // [panels][32c]
+                                  // the wide columns, their low bytes, the other columns
+  AlignedArray<float> mean;       // [panels][32c]
 };
 
 class TileMap {

@@ -15,15 +15,16 @@ namespace {
 
 constexpr std::size_t kProbePoints = 20;  // of a stage, to see what a cue there would drag in
 constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
-constexpr double kTileShare = 0.05;      // of the tolerance: RMS error that tiles and bytes may add
-constexpr double kTileMaxShare = 0.6;    // of the tolerance: the largest error that they may add
-constexpr double kStillTurn = 5e-4;          // a turn (radians) and a shift (of the tolerance) of a joint that are none
+constexpr double kTileShare = 0.05;       // of the tolerance: RMS error that tiles and bytes may add
+constexpr double kTileMaxShare = 0.6;     // of the tolerance: the largest error that they may add
+constexpr double kStillTurn =
+    5e-4;  // a turn (radians) and a shift (of the tolerance) of a joint that are none
 constexpr double kStillShare = 0.1;
-constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
-constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
-constexpr std::size_t kGroupPoints = 400;    // where the trainer looks which controls act together
-constexpr double kGroupShare = 0.2;          // of a control's largest displacement: it acts on a point
-constexpr std::size_t kGroupSize = 8;        // controls that move a point most
+constexpr double kNoiseTurn = 1e-4;        // what a cue is not trusted below: a turn of a joint,
+constexpr double kNoiseShare = 5e-3;       // and a shift of a joint or a point, of the tolerance
+constexpr std::size_t kGroupPoints = 400;  // where the trainer looks which controls act together
+constexpr double kGroupShare = 0.2;        // of a control's largest displacement: it acts on a point
+constexpr std::size_t kGroupSize = 8;      // controls that move a point most
 
 // Count of indices, evenly spread.
 std::vector<Index> Spread(std::size_t total, std::size_t count) {
@@ -242,9 +243,11 @@ class Trainer {
           lo = std::min<double>(lo, poses.row(t)[column]);
           hi = std::max<double>(hi, poses.row(t)[column]);
         }
-        // Clips turn joints a little about axes that no control has: what moves no point noticeably is no new pose
+        // Clips turn joints a little about axes that no control has: what moves no point noticeably is no new
+        // pose
         const double still = !signal.matrix ? 0 : e < 9 ? kStillTurn : kStillShare * options_.tolerance;
-        ranges_.push_back(MakeTrainedRange(EntryName(signal, e), lo - still, hi + still, options_.range_margin));
+        ranges_.push_back(
+            MakeTrainedRange(EntryName(signal, e), lo - still, hi + still, options_.range_margin));
       }
     }
     return Status();

@@ -27,12 +27,17 @@ TrainingRecord ParseTraining(const std::string& text) {
   TrainingRecord r;
   const json object = json::parse(text, nullptr, false);
   if (!object.is_object()) return r;
-  const auto number = [&](const json& from, const char* name) { return from.contains(name) && from[name].is_number() ? from[name].get<double>() : 0.0; };
+  const auto number = [&](const json& from, const char* name) {
+    return from.contains(name) && from[name].is_number() ? from[name].get<double>() : 0.0;
+  };
   const auto count = [&](const char* name) {
     const double v = number(object, name);
     return v > 0 && v < 1e15 ? static_cast<std::size_t>(v) : std::size_t{0};
   };
-  const auto words = [&](const char* name) { return object.contains(name) && object[name].is_string() ? object[name].get<std::string>() : std::string(); };
+  const auto words = [&](const char* name) {
+    return object.contains(name) && object[name].is_string() ? object[name].get<std::string>()
+                                                             : std::string();
+  };
   if (object.contains("clips") && object["clips"].is_array()) {
     for (const json& clip : object["clips"]) {
       if (clip.is_string()) r.clips.push_back(clip.get<std::string>());

@@ -1,5 +1,5 @@
-// What a subspace remembers of its training, as the JSON text in Subspace::training: counts, seeds, held-out errors and
-// the rig's signature.
+// What a subspace remembers of its training, as the JSON text in Subspace::training: counts, seeds, held-out
+// errors and the rig's signature.
 #pragma once
 
 #include <string>

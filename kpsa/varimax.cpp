@@ -16,7 +16,8 @@ Eigen::VectorXd SquaredLengths(const double* mode, Eigen::Index points, int comp
 }
 
 // Turns the pair of modes in its plane; returns false where it stands already at its maximum.
-bool PlanarStep(Eigen::Index points, int components, double* j, double* k, Eigen::VectorXd* s_j, Eigen::VectorXd* s_k) {
+bool PlanarStep(Eigen::Index points, int components, double* j, double* k, Eigen::VectorXd* s_j,
+                Eigen::VectorXd* s_k) {
   const double n = static_cast<double>(points);
   double sum_u = 0, sum_v = 0, sum_uv = 0, sum_difference = 0;
   for (Eigen::Index i = 0; i < points; ++i) {
@@ -80,7 +81,8 @@ VarimaxResult Varimax(const VarimaxOptions& options, int components, Eigen::Matr
   // The rotation as one orthonormal matrix; Newton-Schulz takes out what the planar steps rounded
   result.rotation = Multiply(GemmOperand::Dense(original).Transposed(), GemmOperand::Dense(*modes));
   for (int i = 0; i < 2; ++i) {
-    const Eigen::MatrixXd error = result.rotation.transpose() * result.rotation - Eigen::MatrixXd::Identity(m, m);
+    const Eigen::MatrixXd error =
+        result.rotation.transpose() * result.rotation - Eigen::MatrixXd::Identity(m, m);
     result.rotation -= 0.5 * result.rotation * error;
   }
   *modes = Multiply(original, result.rotation);

@@ -1,5 +1,5 @@
-// Keys over time: clipTransform and clipWeights play a node's part of a glTF clip (glTF 2.0, 3.11), animCurve a curve of
-// the rig's own.
+// Keys over time: clipTransform and clipWeights play a node's part of a glTF clip (glTF 2.0, 3.11), animCurve
+// a curve of the rig's own.
 #include <algorithm>
 
 #include "base/prefetch.h"
@@ -62,11 +62,13 @@ struct ClipTransformKernel {
   }
 };
 
-Status AddVectorChannel(const AnimationSampler& sampler, const char* what, ClipTransformKernel* kernel, Keys* channel, int* times, Double3* constant) {
+Status AddVectorChannel(const AnimationSampler& sampler, const char* what, ClipTransformKernel* kernel,
+                        Keys* channel, int* times, Double3* constant) {
   Result<Keys> keys = MakeKeys(sampler, what);
   if (!keys.ok()) return keys.status();
   if (keys->empty()) return Status();
-  if (keys->view.components != 3) return Status::Invalid("{} has {} components, expected 3", what, keys->view.components);
+  if (keys->view.components != 3)
+    return Status::Invalid("{} has {} components, expected 3", what, keys->view.components);
   if (IsConstant(keys->view)) {
     *constant = SampleVec3(keys->view, KeySpan());
     return Status();
@@ -85,12 +87,15 @@ Result<BoundKernel> BindClipTransform(const Binding& binding) {
   k.constant_translation = data.rest_translation;
   k.constant_rotation = data.rest_rotation;
   k.constant_scale = data.rest_scale;
-  KPSA_RETURN_IF_ERROR(AddVectorChannel(data.translation, "translation", &k, &k.translation, &k.translation_times, &k.constant_translation));
-  KPSA_RETURN_IF_ERROR(AddVectorChannel(data.scale, "scale", &k, &k.scale, &k.scale_times, &k.constant_scale));
+  KPSA_RETURN_IF_ERROR(AddVectorChannel(data.translation, "translation", &k, &k.translation,
+                                        &k.translation_times, &k.constant_translation));
+  KPSA_RETURN_IF_ERROR(
+      AddVectorChannel(data.scale, "scale", &k, &k.scale, &k.scale_times, &k.constant_scale));
   Result<Keys> rotation = MakeKeys(data.rotation, "rotation");
   if (!rotation.ok()) return rotation.status();
   if (!rotation->empty()) {
-    if (rotation->view.components != 4) return Status::Invalid("rotation has {} components, expected 4", rotation->view.components);
+    if (rotation->view.components != 4)
+      return Status::Invalid("rotation has {} components, expected 4", rotation->view.components);
     k.rotation = RotationTrack(rotation->view);
     if (k.rotation.constant()) {
       k.constant_rotation = k.rotation.At(KeySpan());
@@ -118,13 +123,15 @@ template <typename Find>
 void LocalMatrix(const ClipTransformKernel& k, const Find& find, Matrix4* matrix) {
   constexpr int kConstant = ClipTransformKernel::kConstant;
   Double3 translation = k.constant_translation;
-  if (k.translation_times != kConstant) translation = SampleVec3(k.translation.view, find(k.translation_times));
+  if (k.translation_times != kConstant)
+    translation = SampleVec3(k.translation.view, find(k.translation_times));
   if (k.rotation_times == kConstant && k.scale_times == kConstant) {
     *matrix = k.constant;
     (*matrix)(0, 3) = translation.x, (*matrix)(1, 3) = translation.y, (*matrix)(2, 3) = translation.z;
     return;
   }
-  const Double3 scale = k.scale_times == kConstant ? k.constant_scale : SampleVec3(k.scale.view, find(k.scale_times));
+  const Double3 scale =
+      k.scale_times == kConstant ? k.constant_scale : SampleVec3(k.scale.view, find(k.scale_times));
   if (k.rotation_times == kConstant) {
     *matrix = ComposeTrs(translation, k.constant_rotation, scale);
     return;
@@ -137,11 +144,14 @@ void ComputeClipTransform(ComputeContext& c) {
   const double time = c.get<double>(0);
   KeySpan span;
   int found = ClipTransformKernel::kConstant;  // the times that `span` was found in
-  LocalMatrix(k, [&](int times) -> const KeySpan& {
-    if (times != found) span = k.times[static_cast<std::size_t>(times)].Find(time);
-    found = times;
-    return span;
-  }, &c.out_value<Matrix4>(0));
+  LocalMatrix(
+      k,
+      [&](int times) -> const KeySpan& {
+        if (times != found) span = k.times[static_cast<std::size_t>(times)].Find(time);
+        found = times;
+        return span;
+      },
+      &c.out_value<Matrix4>(0));
 }
 
 // The transforms of a clip together: those with equal times look their keys up once.
@@ -174,8 +184,10 @@ std::shared_ptr<const void> BindClipBatch(std::span<const void* const> kernels) 
       other.times[i] = static_cast<Index>(it - batch.times.begin());
       if (it == batch.times.end()) batch.times.push_back(&k.times[i]);
     }
-    if (k.rotation_times != kConstant && k.rotation.linear_keys() != nullptr && k.translation_times == kConstant && k.scale_times == kConstant) {
-      batch.turns.push_back({k.rotation.linear_keys(), k.constant_translation, k.constant_scale, other.times[k.rotation_times], other.position});
+    if (k.rotation_times != kConstant && k.rotation.linear_keys() != nullptr &&
+        k.translation_times == kConstant && k.scale_times == kConstant) {
+      batch.turns.push_back({k.rotation.linear_keys(), k.constant_translation, k.constant_scale,
+                             other.times[k.rotation_times], other.position});
     } else {
       batch.others.push_back(other);
     }
@@ -207,22 +219,29 @@ class FoundKeys {
 void ComputeClipBatch(const BatchContext& c) {
   const auto& batch = c.kernel_as<ClipBatchKernel>();
   FoundKeys found(batch);
-  const auto span_of = [&](const ClipBatchKernel::Turn& turn) -> const KeySpan& { return found.Find(turn.times, c.get<double>(turn.position, 0)); };
+  const auto span_of = [&](const ClipBatchKernel::Turn& turn) -> const KeySpan& {
+    return found.Find(turn.times, c.get<double>(turn.position, 0));
+  };
   // The keys of each are on their way some turns before they are used
   constexpr std::size_t kAhead = 12;
   const std::size_t turns = batch.turns.size();
-  const auto prefetch = [&](std::size_t i) { Prefetch(batch.turns[i].keys + span_of(batch.turns[i]).key, 2 * sizeof(RotationTrack::Key)); };
+  const auto prefetch = [&](std::size_t i) {
+    Prefetch(batch.turns[i].keys + span_of(batch.turns[i]).key, 2 * sizeof(RotationTrack::Key));
+  };
   for (std::size_t i = 0; i < std::min(kAhead, turns); ++i) prefetch(i);
   for (std::size_t i = 0; i < turns; ++i) {
     if (i + kAhead < turns) prefetch(i + kAhead);
     const ClipBatchKernel::Turn& turn = batch.turns[i];
     const KeySpan& span = span_of(turn);
     const RotationTrack::Key* key = turn.keys + span.key;
-    WriteTrs(turn.translation, span.t == 0 ? key->rotation : RotationTrack::Between(key, span.t), turn.scale, &c.out_value<Matrix4>(turn.position));
+    WriteTrs(turn.translation, span.t == 0 ? key->rotation : RotationTrack::Between(key, span.t), turn.scale,
+             &c.out_value<Matrix4>(turn.position));
   }
   for (const ClipBatchKernel::Other& other : batch.others) {
     const double time = c.get<double>(other.position, 0);
-    LocalMatrix(*other.kernel, [&](int times) -> const KeySpan& { return found.Find(other.times[times], time); }, &c.out_value<Matrix4>(other.position));
+    LocalMatrix(
+        *other.kernel, [&](int times) -> const KeySpan& { return found.Find(other.times[times], time); },
+        &c.out_value<Matrix4>(other.position));
   }
 }
 
@@ -249,7 +268,8 @@ void ComputeClipWeights(ComputeContext& c) {
   if (!keys.empty()) SampleScalars(keys.view, times.Find(c.get<double>(0)), values);
   const std::uint32_t* table = c.out + c.out[0];
   for (std::uint32_t i = 0; i < table[0]; ++i) {
-    *reinterpret_cast<double*>(c.values + table[1 + i]) = !keys.empty() && i < values.size() ? values[i] : 0.0;
+    *reinterpret_cast<double*>(c.values + table[1 + i]) =
+        !keys.empty() && i < values.size() ? values[i] : 0.0;
   }
 }
 
@@ -266,10 +286,13 @@ Result<BoundKernel> BindAnimCurve(const Binding& binding) {
   kernel.interpolation = s.get_int("interpolation");
   if (kernel.times.empty()) return Status::Invalid("keyTimes holds no key");
   if (kernel.times.size() != kernel.values.size()) {
-    return Status::Invalid("keyTimes has {} entries, keyValues {}", kernel.times.size(), kernel.values.size());
+    return Status::Invalid("keyTimes has {} entries, keyValues {}", kernel.times.size(),
+                           kernel.values.size());
   }
   for (std::size_t i = 1; i < kernel.times.size(); ++i) {
-    if (!(kernel.times[i] > kernel.times[i - 1])) return Status::Invalid("keyTimes must ascend: entry {} is {}, the one before {}", i, kernel.times[i], kernel.times[i - 1]);
+    if (!(kernel.times[i] > kernel.times[i - 1]))
+      return Status::Invalid("keyTimes must ascend: entry {} is {}, the one before {}", i, kernel.times[i],
+                             kernel.times[i - 1]);
   }
   return MakeBound(std::move(kernel), 0);
 }
@@ -277,7 +300,8 @@ Result<BoundKernel> BindAnimCurve(const Binding& binding) {
 void ComputeAnimCurve(ComputeContext& c) {
   const auto& k = c.kernel_as<CurveKernel>();
   const double t = std::clamp(c.get<double>(0), k.times.front(), k.times.back());
-  const auto next = static_cast<std::size_t>(std::upper_bound(k.times.begin(), k.times.end(), t) - k.times.begin());
+  const auto next =
+      static_cast<std::size_t>(std::upper_bound(k.times.begin(), k.times.end(), t) - k.times.begin());
   if (next == k.times.size()) {
     c.out_value<double>(0) = k.values.back();
     return;
@@ -292,16 +316,36 @@ void ComputeAnimCurve(ComputeContext& c) {
 }  // namespace
 
 void AddClipNodes(NodeRegistry& registry) {
-  registry.add("clipTransform", "A transform's part of a clip: its local matrix over time.").category("time").animation()
-      .in("time", 0.0, {.unit = Unit::kTime}).structural("keys", Type::kAsset).out("matrix", Type::kMatrix)
-      .compute(&ComputeClipTransform).bind(BindClipTransform).batch(BindClipBatch, &ComputeClipBatch).cost(120, 0);
-  registry.add("clipWeights", "A mesh's part of a clip: its morph weights over time.").category("time").animation()
-      .in("time", 0.0, {.unit = Unit::kTime}).structural("keys", Type::kAsset).out("output", Type::kDouble).array()
-      .compute(&ComputeClipWeights).bind(BindClipWeights).cost(100, 0);
-  registry.add("animCurve", "A curve through keys, over time or over any other value (a set-driven key).").category("time")
-      .in("input", 0.0).structural("keyTimes", std::vector<double>{}, {.doc = "ascending"}).structural("keyValues", std::vector<double>{})
-      .enumeration("interpolation", {"linear", "step", "smooth"}, true).out("output", Type::kDouble)
-      .compute(&ComputeAnimCurve).bind(BindAnimCurve).cost(30, 0);
+  registry.add("clipTransform", "A transform's part of a clip: its local matrix over time.")
+      .category("time")
+      .animation()
+      .in("time", 0.0, {.unit = Unit::kTime})
+      .structural("keys", Type::kAsset)
+      .out("matrix", Type::kMatrix)
+      .compute(&ComputeClipTransform)
+      .bind(BindClipTransform)
+      .batch(BindClipBatch, &ComputeClipBatch)
+      .cost(120, 0);
+  registry.add("clipWeights", "A mesh's part of a clip: its morph weights over time.")
+      .category("time")
+      .animation()
+      .in("time", 0.0, {.unit = Unit::kTime})
+      .structural("keys", Type::kAsset)
+      .out("output", Type::kDouble)
+      .array()
+      .compute(&ComputeClipWeights)
+      .bind(BindClipWeights)
+      .cost(100, 0);
+  registry.add("animCurve", "A curve through keys, over time or over any other value (a set-driven key).")
+      .category("time")
+      .in("input", 0.0)
+      .structural("keyTimes", std::vector<double>{}, {.doc = "ascending"})
+      .structural("keyValues", std::vector<double>{})
+      .enumeration("interpolation", {"linear", "step", "smooth"}, true)
+      .out("output", Type::kDouble)
+      .compute(&ComputeAnimCurve)
+      .bind(BindAnimCurve)
+      .cost(30, 0);
 }
 
 }  // namespace kpsa

@@ -1,5 +1,5 @@
-// cluster and softMod: a handle moves weighted points. Only the handle's own motion acts, relative to its parent: a
-// handle that hangs under the head does not move the face twice when the head turns.
+// cluster and softMod: a handle moves weighted points. Only the handle's own motion acts, relative to its
+// parent: a handle that hangs under the head does not move the face twice when the head turns.
 #include <cmath>
 
 #include "graph/geometry.h"
@@ -19,7 +19,7 @@ struct ClusterBound {
   bool has_bind_pre = false;
   Matrix4 parent_from_handle_inverse;  // rest(matrix)^-1 . rest(parentMatrix)
   Matrix4 parent_rest_inverse;
-  Double3 pivot;                       // of the handle at rest, stage space
+  Double3 pivot;  // of the handle at rest, stage space
 };
 
 Result<ClusterBound> MakeCluster(const Binding& binding, std::vector<float> weights) {
@@ -28,7 +28,12 @@ Result<ClusterBound> MakeCluster(const Binding& binding, std::vector<float> weig
   if (!frame.ok()) return frame.status();
   Result<Matrix4> handle = RestMatrix(s, "matrix");
   if (!handle.ok()) return handle.status();
-  ClusterBound bound{ClusterKernel(binding.output("outPoints").ToVector(), weights), *frame, s.is_set("bindPreMatrix"), {}, {}, {}};
+  ClusterBound bound{ClusterKernel(binding.output("outPoints").ToVector(), weights),
+                     *frame,
+                     s.is_set("bindPreMatrix"),
+                     {},
+                     {},
+                     {}};
   Matrix4 handle_inverse;
   if (!Invert(*handle, &handle_inverse)) return Status::Invalid("matrix is singular at rest");
   bound.parent_from_handle_inverse = handle_inverse * frame->parent_rest();
@@ -51,15 +56,18 @@ Result<BoundKernel> BindSoftMod(const Binding& binding) {
   if (!handle.ok()) return handle.status();
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
-  const Double3 world = s.is_set("falloffCenter") ? s.value("falloffCenter").get<Double3>() : TransformPoint(*handle, {});
+  const Double3 world =
+      s.is_set("falloffCenter") ? s.value("falloffCenter").get<Double3>() : TransformPoint(*handle, {});
   FalloffProfile profile;
-  constexpr FalloffCurve kCurves[] = {FalloffCurve::kSmooth, FalloffCurve::kLinear, FalloffCurve::kSpline, FalloffCurve::kNone};
+  constexpr FalloffCurve kCurves[] = {FalloffCurve::kSmooth, FalloffCurve::kLinear, FalloffCurve::kSpline,
+                                      FalloffCurve::kNone};
   profile.curve = kCurves[s.get_int("falloffCurve")];
   // Distances are world ones: a stage in mesh space may be scaled
   const double scale = std::cbrt(std::fabs(Determinant3(frame->world_from_stage())));
   const std::vector<Index> out = binding.output("outPoints").ToVector();
   const std::vector<float> falloff =
-      RadialFalloff(*rest, out, TransformPoint(frame->stage_from_world(), world), s.get_double("falloffRadius") / scale, profile);
+      RadialFalloff(*rest, out, TransformPoint(frame->stage_from_world(), world),
+                    s.get_double("falloffRadius") / scale, profile);
   Result<ClusterBound> bound = MakeCluster(binding, MultiplyWeights(falloff, BoundWeights(binding)));
   if (!bound.ok()) return bound.status();
   return MakeBound(std::move(*bound), 0);
@@ -74,17 +82,21 @@ void ComputeCluster(ComputeContext& c) {
   } else if (bound.frame.fixed()) {
     // The handle's motion in its parent's frame, as seen from where the parent rests
     const Matrix4 own = InverseOrIdentity(parent) * handle * bound.parent_from_handle_inverse;
-    delta = bound.frame.stage_from_world() * (bound.frame.parent_rest() * own * bound.parent_rest_inverse) * bound.frame.world_from_stage();
+    delta = bound.frame.stage_from_world() * (bound.frame.parent_rest() * own * bound.parent_rest_inverse) *
+            bound.frame.world_from_stage();
   } else {
     delta = handle * bound.parent_from_handle_inverse * InverseOrIdentity(parent);
   }
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({delta, TransformPoint(motion, bound.pivot), c.get<double>(kEnvelope)}, c.points(kInPoints), c.out_points(0), {}, &parallel);
+  bound.kernel.Run({delta, TransformPoint(motion, bound.pivot), c.get<double>(kEnvelope)},
+                   c.points(kInPoints), c.out_points(0), {}, &parallel);
 }
 
 void AddHandle(NodeBuilder& b) {
   b.in("matrix", Matrix4(), {.doc = "the handle's world matrix"});
-  b.in("bindPreMatrix", Matrix4(), {.doc = "inverse of the handle's matrix at bind; default: from the rest state, carried by parentMatrix"});
+  b.in("bindPreMatrix", Matrix4(),
+       {.doc =
+            "inverse of the handle's matrix at bind; default: from the rest state, carried by parentMatrix"});
 }
 
 }  // namespace
@@ -94,9 +106,11 @@ void AddClusterNodes(NodeRegistry& registry) {
   AddHandle(cluster);
   FinishDeformer(cluster, &ComputeCluster, BindCluster).cost(200, 3);
 
-  NodeBuilder soft = AddDeformer(registry, "softMod", "Moves points with a handle, fading with the distance from a centre.");
+  NodeBuilder soft =
+      AddDeformer(registry, "softMod", "Moves points with a handle, fading with the distance from a centre.");
   AddHandle(soft);
-  soft.structural("falloffCenter", Double3(), {.unit = Unit::kLength, .doc = "world space at rest; default: the handle"});
+  soft.structural("falloffCenter", Double3(),
+                  {.unit = Unit::kLength, .doc = "world space at rest; default: the handle"});
   soft.structural("falloffRadius", 0.05, {.min = 0, .unit = Unit::kLength});
   soft.enumeration("falloffCurve", {"smooth", "linear", "spline", "none"}, true);
   FinishDeformer(soft, &ComputeCluster, BindSoftMod).cost(200, 3);

@@ -1,4 +1,5 @@
-// curve: control vertices that are offset in the axes of a parent. wire: points near a curve follow its offsets.
+// curve: control vertices that are offset in the axes of a parent. wire: points near a curve follow its
+// offsets.
 #include <cmath>
 
 #include "graph/geometry.h"
@@ -38,8 +39,9 @@ Result<BoundKernel> BindWire(const Binding& binding) {
   const auto* curve = s.asset<Curve>("curve");
   if (curve == nullptr) return Status::Invalid("curve is not set");
   if (binding.input("displacements", -1).size() != curve->cvs().size()) {
-    return Status::Invalid("displacements: {} given for a curve of {} vertices; connect the curve's displacements",
-                           binding.input("displacements", -1).size(), curve->cvs().size());
+    return Status::Invalid(
+        "displacements: {} given for a curve of {} vertices; connect the curve's displacements",
+        binding.input("displacements", -1).size(), curve->cvs().size());
   }
   Result<ConstPointsView> rest = RestPoints(s);
   if (!rest.ok()) return rest.status();
@@ -51,8 +53,9 @@ Result<BoundKernel> BindWire(const Binding& binding) {
   settings.closed = curve->closed();
   settings.dropoff = s.get_double("dropoff") / std::cbrt(std::fabs(Determinant3(frame->world_from_stage())));
   KPSA_RETURN_IF_ERROR(WireKernel::Validate(settings, vertices));
-  WireBound bound{WireKernel(settings, vertices, *rest, binding.output("outPoints").ToVector(), BoundWeights(binding)),
-                  frame->stage_from_world(), *frame, vertices.size(), 0};
+  WireBound bound{
+      WireKernel(settings, vertices, *rest, binding.output("outPoints").ToVector(), BoundWeights(binding)),
+      frame->stage_from_world(), *frame, vertices.size(), 0};
   bound.offset_floats = (vertices.size() * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
   const std::size_t scratch = bound.offset_floats + bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
@@ -63,15 +66,16 @@ void ComputeWire(ComputeContext& c) {
   const ConstPointsView& displacements = c.points(kFirstOwnInput);
   auto* offsets = reinterpret_cast<Double3*>(c.scratch);
   // In mesh space the skin turns offsets later: take the parent's turn out again
-  const Matrix4 turn = bound.frame.fixed()
-                           ? bound.stage_from_world * bound.frame.parent_rest() * InverseOrIdentity(c.get<Matrix4>(kParentMatrix))
-                           : Matrix4();
+  const Matrix4 turn = bound.frame.fixed() ? bound.stage_from_world * bound.frame.parent_rest() *
+                                                 InverseOrIdentity(c.get<Matrix4>(kParentMatrix))
+                                           : Matrix4();
   for (std::size_t i = 0; i < bound.vertices; ++i) {
     offsets[i] = TransformVector(turn, {displacements.x[i], displacements.y[i], displacements.z[i]});
   }
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{offsets, bound.vertices}, c.get<double>(kEnvelope)}, c.points(kInPoints), c.out_points(0),
-                   {c.scratch + bound.offset_floats, bound.kernel.ScratchFloats()}, &parallel);
+  bound.kernel.Run({{offsets, bound.vertices}, c.get<double>(kEnvelope)}, c.points(kInPoints),
+                   c.out_points(0), {c.scratch + bound.offset_floats, bound.kernel.ScratchFloats()},
+                   &parallel);
 }
 
 void DemandWire(Demand& demand) {
@@ -82,16 +86,22 @@ void DemandWire(Demand& demand) {
 }  // namespace
 
 void AddCurveNodes(NodeRegistry& registry) {
-  registry.add("curve", "A curve for wires, through control vertices.").category("geometry")
+  registry.add("curve", "A curve for wires, through control vertices.")
+      .category("geometry")
       .structural("curve", Type::kCurve, {.doc = "the vertices at rest, world space"})
-      .points_in("cv", "offsets of the vertices from rest, in the parent's axes").unit(Unit::kLength).default_from(RestOffsets)
+      .points_in("cv", "offsets of the vertices from rest, in the parent's axes")
+      .unit(Unit::kLength)
+      .default_from(RestOffsets)
       .in("parentMatrix", Matrix4(), {.doc = "turns the offsets; `parent:` connects it"})
-      .out("displacements", Type::kPoints, "the offsets in world axes").unit(Unit::kLength)
+      .out("displacements", Type::kPoints, "the offsets in world axes")
+      .unit(Unit::kLength)
       .compute(&ComputeDisplacements);
   NodeBuilder b = AddDeformer(registry, "wire", "Points near a curve follow it.");
   b.points_in("displacements", "the curve's displacements");
   b.structural("curve", Type::kCurve, {.doc = "the curve at rest"});
-  b.structural("dropoff", 0.02, {.min = 1e-6, .unit = Unit::kLength, .doc = "distance from the curve where its influence ends"});
+  b.structural(
+      "dropoff", 0.02,
+      {.min = 1e-6, .unit = Unit::kLength, .doc = "distance from the curve where its influence ends"});
   FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 6);
 }
 

@@ -10,10 +10,13 @@ NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string do
   builder.points_in("inPoints", "the points to deform").per_geometry();
   builder.in("envelope", 1.0, {.min = 0, .max = 1, .doc = "0 leaves the points alone, 1 deforms them fully"});
   builder.in("parentMatrix", Matrix4(), {.doc = "carries the deformer's frame; `parent:` connects it"});
-  builder.structural("weights", Type::kAsset, {.doc = "weight map times membership; 1 where unset"}).per_geometry();
+  builder.structural("weights", Type::kAsset, {.doc = "weight map times membership; 1 where unset"})
+      .per_geometry();
   builder.structural("mesh", Type::kMesh, {.doc = "the topology of the geometry"}).per_geometry();
-  builder.enumeration("space", {"world", "mesh"}, true, "the space of the stage: mesh space before the skin, world space after it");
-  builder.structural("geometryMatrix", Matrix4(), {.doc = "world from mesh space at rest, for stages in mesh space"});
+  builder.enumeration("space", {"world", "mesh"}, true,
+                      "the space of the stage: mesh space before the skin, world space after it");
+  builder.structural("geometryMatrix", Matrix4(),
+                     {.doc = "world from mesh space at rest, for stages in mesh space"});
   return builder;
 }
 
@@ -30,7 +33,8 @@ std::vector<float> BoundWeights(const Binding& binding) {
   if (map == nullptr) return {};
   const PointSet& out = binding.output("outPoints");
   std::vector<float> weights(out.size());
-  for (Index i = 0; i < out.size(); ++i) weights[i] = out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f;
+  for (Index i = 0; i < out.size(); ++i)
+    weights[i] = out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f;
   return weights;
 }
 
@@ -42,7 +46,8 @@ Result<ConstPointsView> RestPoints(const Structural& structural) {
 
 Result<Matrix4> RestMatrix(const Structural& structural, std::string_view name) {
   const Value* rest = structural.rest(name);
-  if (rest == nullptr || rest->get_if<Matrix4>() == nullptr) return Status::Invalid("{} has no value at rest", name);
+  if (rest == nullptr || rest->get_if<Matrix4>() == nullptr)
+    return Status::Invalid("{} has no value at rest", name);
   return rest->get<Matrix4>();
 }
 
@@ -52,10 +57,12 @@ Result<CarriedFrame> CarriedFrame::Bind(const Structural& structural) {
   if (!parent.ok()) return parent.status();
   frame.fixed_ = structural.get_int("space") == 1;
   frame.parent_rest_ = *parent;
-  if (!Invert(*parent, &frame.parent_rest_inverse_)) return Status::Invalid("parentMatrix is singular at rest");
+  if (!Invert(*parent, &frame.parent_rest_inverse_))
+    return Status::Invalid("parentMatrix is singular at rest");
   if (frame.fixed_) {
     frame.world_from_stage_ = structural.value("geometryMatrix").get<Matrix4>();
-    if (!Invert(frame.world_from_stage_, &frame.stage_from_world_)) return Status::Invalid("geometryMatrix is singular");
+    if (!Invert(frame.world_from_stage_, &frame.stage_from_world_))
+      return Status::Invalid("geometryMatrix is singular");
   }
   return frame;
 }

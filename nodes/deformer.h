@@ -1,9 +1,10 @@
-// What all deformers share: geometry in and out, envelope, weight map and membership, and the frame that `parent:`
-// gives them.
+// What all deformers share: geometry in and out, envelope, weight map and membership, and the frame that
+// `parent:` gives them.
 //
-// A deformer serves several geometries; everything per geometry is an array whose element i belongs to geometry i.
-// Spaces: a stage after skinCluster works in world space, and its frame is carried by parentMatrix. A stage before it
-// works in mesh space; there the frame stays where it is at rest, because the skin carries it later.
+// A deformer serves several geometries; everything per geometry is an array whose element i belongs to
+// geometry i. Spaces: a stage after skinCluster works in world space, and its frame is carried by
+// parentMatrix. A stage before it works in mesh space; there the frame stays where it is at rest, because the
+// skin carries it later.
 #pragma once
 
 #include <span>
@@ -20,25 +21,28 @@ namespace kpsa {
 // Positions of the shared inputs in the group; a deformer's own inputs follow from kFirstOwnInput.
 enum DeformerInput { kInPoints = 0, kEnvelope = 1, kParentMatrix = 2, kFirstOwnInput = 3 };
 
-// Declares inPoints, envelope, parentMatrix, weights, mesh, space, geometryMatrix. Declare the deformer's own inputs
-// next, then close it with FinishDeformer.
+// Declares inPoints, envelope, parentMatrix, weights, mesh, space, geometryMatrix. Declare the deformer's own
+// inputs next, then close it with FinishDeformer.
 NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string doc);
 // Declares outPoints and the group; the output may take over the input's buffer. demand may be null (local).
 NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind, DemandFn demand = nullptr);
 
 // For bind: the weight map at the output points (empty: 1 everywhere).
 std::vector<float> BoundWeights(const Binding& binding);
-// The whole geometry at this stage with everything at its default; an error where upstream could not be evaluated.
+// The whole geometry at this stage with everything at its default; an error where upstream could not be
+// evaluated.
 Result<ConstPointsView> RestPoints(const Structural& structural);
 Result<Matrix4> RestMatrix(const Structural& structural, std::string_view name);
 
-// How the frame of the stage has moved since rest: parentMatrix now times its rest inverse, or the identity for
-// stages in mesh space.
+// How the frame of the stage has moved since rest: parentMatrix now times its rest inverse, or the identity
+// for stages in mesh space.
 class CarriedFrame {
  public:
   CarriedFrame() = default;
   static Result<CarriedFrame> Bind(const Structural& structural);
-  Matrix4 Motion(const Matrix4& parent_now) const { return fixed_ ? Matrix4() : parent_now * parent_rest_inverse_; }
+  Matrix4 Motion(const Matrix4& parent_now) const {
+    return fixed_ ? Matrix4() : parent_now * parent_rest_inverse_;
+  }
   bool fixed() const { return fixed_; }
   const Matrix4& parent_rest() const { return parent_rest_; }
   // world_from_stage at rest; the identity for stages in world space.
@@ -52,7 +56,9 @@ class CarriedFrame {
 
 // The host's threads as kernels want them.
 inline Parallel HostParallel(const ComputeContext& context) {
-  return {[](void* self, std::size_t count, std::size_t grain, RangeBody body) { static_cast<ComputeHost*>(self)->For(count, grain, body); },
+  return {[](void* self, std::size_t count, std::size_t grain, RangeBody body) {
+            static_cast<ComputeHost*>(self)->For(count, grain, body);
+          },
           context.host};
 }
 
@@ -62,6 +68,8 @@ BoundKernel MakeBound(T object, std::size_t scratch_floats, std::size_t state_by
   return BoundKernel{std::make_shared<const T>(std::move(object)), scratch_floats, state_bytes};
 }
 
-inline std::span<float> ScratchSpan(const ComputeContext& context, std::size_t floats) { return {context.scratch, floats}; }
+inline std::span<float> ScratchSpan(const ComputeContext& context, std::size_t floats) {
+  return {context.scratch, floats};
+}
 
 }  // namespace kpsa

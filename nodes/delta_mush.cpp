@@ -1,8 +1,9 @@
+#include "nodes/kernels/delta_mush.h"
+
 #include <cmath>
 
 #include "base/matrix.h"
 #include "nodes/deformer.h"
-#include "nodes/kernels/delta_mush.h"
 #include "nodes/mesh_topology.h"
 #include "nodes/standard_nodes.h"
 
@@ -10,14 +11,16 @@ namespace kpsa {
 namespace {
 
 DeltaMushSettings Settings(const Structural& s) {
-  return {s.get_int("iterations"), s.get_double("smoothingStep"), s.get_double("distanceWeight"), s.get_bool("pinBorderVertices")};
+  return {s.get_int("iterations"), s.get_double("smoothingStep"), s.get_double("distanceWeight"),
+          s.get_bool("pinBorderVertices")};
 }
 
 std::vector<float> WeightsAt(const Structural& s, const PointSet& out) {
   const auto* map = s.asset<WeightMap>("weights");
   std::vector<float> weights;
   if (map == nullptr) return weights;
-  for (Index i = 0; i < out.size(); ++i) weights.push_back(out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f);
+  for (Index i = 0; i < out.size(); ++i)
+    weights.push_back(out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f);
   return weights;
 }
 
@@ -31,11 +34,13 @@ void DemandMush(Demand& demand) {
     demand.Require("inPoints", 0, PointSet::All(out.total()));  // bind reports what is wrong
     return;
   }
-  demand.Require("inPoints", 0, PointSet::Of(DeltaMushDemand(*topology, Settings(s), out.ToVector(), WeightsAt(s, out)), out.total()));
+  demand.Require(
+      "inPoints", 0,
+      PointSet::Of(DeltaMushDemand(*topology, Settings(s), out.ToVector(), WeightsAt(s, out)), out.total()));
 }
 
-// The pivot, for precision far from the origin: the middle of the rest shape, carried by parentMatrix. It does not
-// depend on the binding.
+// The pivot, for precision far from the origin: the middle of the rest shape, carried by parentMatrix. It
+// does not depend on the binding.
 struct MushBound {
   DeltaMushKernel kernel;
   CarriedFrame frame;
@@ -64,7 +69,9 @@ Result<BoundKernel> BindMush(const Binding& binding) {
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
   const Double3 middle = Middle(*rest);
-  MushBound bound{DeltaMushKernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out), middle), *frame, middle};
+  MushBound bound{
+      DeltaMushKernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out), middle),
+      *frame, middle};
   const std::size_t scratch = bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
 }
@@ -80,18 +87,22 @@ void ComputeMush(ComputeContext& c) {
   const Matrix4 motion = bound.frame.Motion(c.get<Matrix4>(kParentMatrix));
   const Double3 pivot = TransformPoint(motion, bound.middle);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput) * Growth(motion), pivot}, c.points(kInPoints), c.out_points(0),
-                   {c.scratch, bound.kernel.ScratchFloats()}, &parallel);
+  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput) * Growth(motion), pivot},
+                   c.points(kInPoints), c.out_points(0), {c.scratch, bound.kernel.ScratchFloats()},
+                   &parallel);
 }
 
 }  // namespace
 
 void AddDeltaMushNode(NodeRegistry& registry) {
-  NodeBuilder b = AddDeformer(registry, "deltaMush", "Smooths the points and gives the rest shape's detail back.");
+  NodeBuilder b =
+      AddDeformer(registry, "deltaMush", "Smooths the points and gives the rest shape's detail back.");
   b.in("displacement", 1.0, {.min = 0, .max = 2, .doc = "how much of the detail comes back"});
   b.structural("iterations", 10, {.min = 0, .max = 200, .doc = "smoothing steps"});
-  b.structural("smoothingStep", 0.5, {.min = 0, .max = 1, .doc = "how far a point goes to its neighbours' mean in a step"});
-  b.structural("distanceWeight", 0.0, {.min = 0, .max = 1, .doc = "0: all neighbours alike; 1: near ones weigh more"});
+  b.structural("smoothingStep", 0.5,
+               {.min = 0, .max = 1, .doc = "how far a point goes to its neighbours' mean in a step"});
+  b.structural("distanceWeight", 0.0,
+               {.min = 0, .max = 1, .doc = "0: all neighbours alike; 1: near ones weigh more"});
   b.structural("pinBorderVertices", true, {.doc = "points on borders keep their place"});
   FinishDeformer(b, &ComputeMush, BindMush, DemandMush).cost(500, 80);
 }

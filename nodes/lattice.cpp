@@ -1,8 +1,9 @@
+#include "nodes/kernels/lattice.h"
+
 #include <algorithm>
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
-#include "nodes/kernels/lattice.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
@@ -11,19 +12,22 @@ namespace {
 struct LatticeBound {
   LatticeKernel kernel;
   CarriedFrame frame;
-  Matrix4 stage_from_lattice;       // at rest; the lattice is the cube [-0.5, 0.5]^3
-  std::vector<Double3> grid;        // the controls' places at rest, as the attribute holds them (in float)
+  Matrix4 stage_from_lattice;  // at rest; the lattice is the cube [-0.5, 0.5]^3
+  std::vector<Double3> grid;   // the controls' places at rest, as the attribute holds them (in float)
   std::size_t offset_floats = 0;
 };
 
-std::vector<std::int64_t> Divisions(const Structural& s) { return s.value("divisions").get<std::vector<std::int64_t>>(); }
+std::vector<std::int64_t> Divisions(const Structural& s) {
+  return s.value("divisions").get<std::vector<std::int64_t>>();
+}
 
 std::vector<Double3> Grid(const std::vector<std::int64_t>& d) {
   std::vector<Double3> grid;
   for (std::int64_t u = 0; u < d[2]; ++u) {
     for (std::int64_t t = 0; t < d[1]; ++t) {
       for (std::int64_t s = 0; s < d[0]; ++s) {
-        grid.push_back({static_cast<double>(s) / static_cast<double>(d[0] - 1), static_cast<double>(t) / static_cast<double>(d[1] - 1),
+        grid.push_back({static_cast<double>(s) / static_cast<double>(d[0] - 1),
+                        static_cast<double>(t) / static_cast<double>(d[1] - 1),
                         static_cast<double>(u) / static_cast<double>(d[2] - 1)});
       }
     }
@@ -70,12 +74,14 @@ Result<Matrix4> RestBox(const Binding& binding, ConstPointsView rest) {
       any = true;
     }
     if (!any) return Status::Invalid("it has no members: nothing gives it a size");
-    // A hair wider than the members, which then lie inside whatever the rounding; flat sides get some thickness
+    // A hair wider than the members, which then lie inside whatever the rounding; flat sides get some
+    // thickness
     const double margin = 1e-4 * Length(hi - lo) + 1e-9;
     for (int a = 0; a < 3; ++a) lo[a] -= margin, hi[a] += margin;
   }
   const Double3 size = hi - lo;
-  if (!(size.x > 0 && size.y > 0 && size.z > 0)) return Status::Invalid("its box is empty: {} x {} x {} m", size.x, size.y, size.z);
+  if (!(size.x > 0 && size.y > 0 && size.z > 0))
+    return Status::Invalid("its box is empty: {} x {} x {} m", size.x, size.y, size.z);
   return Translation((lo + hi) * 0.5) * Scaling(size);
 }
 
@@ -84,13 +90,15 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
   const std::vector<std::int64_t> d = Divisions(s);
   KPSA_RETURN_IF_ERROR(CheckDivisions(d));
   const auto& influence = s.value("localInfluence").get<std::vector<std::int64_t>>();
-  if (influence.size() != 3) return Status::Invalid("localInfluence takes three numbers, not {}", influence.size());
+  if (influence.size() != 3)
+    return Status::Invalid("localInfluence takes three numbers, not {}", influence.size());
   LatticeSettings settings;
   const int interpolation = s.get_int("interpolation");
   settings.local = interpolation != 2;
   for (std::size_t a = 0; a < 3; ++a) {
     settings.divisions[a] = static_cast<int>(d[a]);
-    settings.influence[a] = interpolation == 0 ? 2 : static_cast<int>(std::clamp<std::int64_t>(influence[a], 0, 1000));
+    settings.influence[a] =
+        interpolation == 0 ? 2 : static_cast<int>(std::clamp<std::int64_t>(influence[a], 0, 1000));
   }
   settings.outside = static_cast<LatticeOutside>(s.get_int("outside"));
   settings.falloff_distance = s.get_double("outsideFalloffDist");
@@ -109,7 +117,8 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
   for (Double3& place : grid) {  // controls at rest give offsets of exactly 0
     for (int a = 0; a < 3; ++a) place[a] = static_cast<float>(place[a]);
   }
-  LatticeBound bound{LatticeKernel(settings, *rest, InverseOrIdentity(*box), binding.output("outPoints").ToVector(), BoundWeights(binding)),
+  LatticeBound bound{LatticeKernel(settings, *rest, InverseOrIdentity(*box),
+                                   binding.output("outPoints").ToVector(), BoundWeights(binding)),
                      *frame, *box, std::move(grid), 0};
   bound.offset_floats = (bound.grid.size() * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
   const std::size_t scratch = bound.offset_floats + bound.kernel.ScratchFloats();
@@ -126,8 +135,9 @@ void ComputeLattice(ComputeContext& c) {
   }
   const Matrix4 now = bound.frame.Motion(c.get<Matrix4>(kParentMatrix)) * bound.stage_from_lattice;
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{offsets, bound.grid.size()}, now, now, c.get<double>(kEnvelope)}, c.points(kInPoints), c.out_points(0),
-                   {c.scratch + bound.offset_floats, bound.kernel.ScratchFloats()}, &parallel);
+  bound.kernel.Run({{offsets, bound.grid.size()}, now, now, c.get<double>(kEnvelope)}, c.points(kInPoints),
+                   c.out_points(0), {c.scratch + bound.offset_floats, bound.kernel.ScratchFloats()},
+                   &parallel);
 }
 
 // The points of the geometry one by one; all controls.
@@ -139,16 +149,24 @@ void DemandLattice(Demand& demand) {
 }  // namespace
 
 void AddLatticeNode(NodeRegistry& registry) {
-  NodeBuilder b = AddDeformer(registry, "lattice", "Free-form deformation: points follow a grid of control points.");
-  b.points_in("points", "the control points in lattice coordinates: the rest box is [0, 1]^3; points[s,t,u], s fastest")
-      .grid("divisions").default_from(DefaultControls);
-  b.structural("divisions", std::vector<std::int64_t>{2, 5, 2}, {.doc = "control points along s, t, u; 2 to 32 each"});
-  b.structural("localInfluence", std::vector<std::int64_t>{2, 2, 2}, {.doc = "order of the B-spline along s, t, u; 2 is linear"});
+  NodeBuilder b =
+      AddDeformer(registry, "lattice", "Free-form deformation: points follow a grid of control points.");
+  b.points_in("points",
+              "the control points in lattice coordinates: the rest box is [0, 1]^3; points[s,t,u], s fastest")
+      .grid("divisions")
+      .default_from(DefaultControls);
+  b.structural("divisions", std::vector<std::int64_t>{2, 5, 2},
+               {.doc = "control points along s, t, u; 2 to 32 each"});
+  b.structural("localInfluence", std::vector<std::int64_t>{2, 2, 2},
+               {.doc = "order of the B-spline along s, t, u; 2 is linear"});
   b.enumeration("interpolation", {"linear", "bspline", "bernstein"}, true,
-                "linear between neighbouring controls, B-splines of localInfluence, or Bernstein polynomials over all controls");
+                "linear between neighbouring controls, B-splines of localInfluence, or Bernstein polynomials "
+                "over all controls");
   b.enumeration("outside", {"inside", "all", "falloff"}, true, "what becomes of points outside of the box");
   b.structural("outsideFalloffDist", 1.0, {.min = 1e-6, .doc = "of falloff, in widths of the lattice"});
-  b.structural("boxMin", Double3(), {.unit = Unit::kLength, .doc = "corner of the box in the stage's space at rest; default: around the members"});
+  b.structural("boxMin", Double3(),
+               {.unit = Unit::kLength,
+                .doc = "corner of the box in the stage's space at rest; default: around the members"});
   b.structural("boxMax", Double3(), {.unit = Unit::kLength});
   FinishDeformer(b, &ComputeLattice, BindLattice, DemandLattice).cost(500, 15);
 }

@@ -13,7 +13,8 @@ double Remap(double value, double in_min, double in_max, double out_min, double 
   return out_min + t * (out_max - out_min);
 }
 
-// x^y for whole y by multiplication, otherwise by exp and log of the base's ratio; NaN where Maya has none, either.
+// x^y for whole y by multiplication, otherwise by exp and log of the base's ratio; NaN where Maya has none,
+// either.
 double Power(double x, double y) {
   if (y == std::floor(y) && std::fabs(y) <= 64) {
     double result = 1;
@@ -45,22 +46,38 @@ double PlusMinusAverage(ArrayView<double> input, std::int64_t operation) {
 
 void AddMathNodes(NodeRegistry& registry) {
   registry.add("remapValue", "Maps a value from one range to another, clamped to it.")
-      .in("inputValue", 0.0).alias("input").in("inputMin", 0.0).in("inputMax", 1.0).in("outputMin", 0.0).in("outputMax", 1.0)
+      .in("inputValue", 0.0)
+      .alias("input")
+      .in("inputMin", 0.0)
+      .in("inputMax", 1.0)
+      .in("outputMin", 0.0)
+      .in("outputMax", 1.0)
       .out("outValue", Type::kDouble)
       .compute([](double value, double in_min, double in_max, double out_min, double out_max) {
         return Remap(value, in_min, in_max, out_min, out_max);
       });
-  registry.add("multiplyDivide", "Multiplies, divides or raises to a power, component by component. Dividing by 0 gives 0.")
-      .in("input1", Double3()).in("input2", Double3{1, 1, 1})
+  registry
+      .add("multiplyDivide",
+           "Multiplies, divides or raises to a power, component by component. Dividing by 0 gives 0.")
+      .in("input1", Double3())
+      .in("input2", Double3{1, 1, 1})
       .enumeration("operation", {"noOperation", "multiply", "divide", "power"}, false, {}, 1)
       .out("output", Type::kDouble3)
       .compute([](Double3 a, Double3 b, std::int64_t operation) { return MultiplyDivide(a, b, operation); });
   registry.add("plusMinusAverage", "Adds, subtracts from the first, or averages any number of inputs.")
-      .in("input", 0.0).array().alias("input1D").enumeration("operation", {"noOperation", "sum", "subtract", "average"}, false, {}, 1)
-      .out("output", Type::kDouble).alias("output1D")
-      .compute([](ArrayView<double> input, std::int64_t operation) { return PlusMinusAverage(input, operation); });
-  registry.add("unitConversion", "Multiplies by a fixed factor: between the runtime's units and a rig file's.")
-      .in("input", 0.0).in("conversionFactor", 1.0).out("output", Type::kDouble)
+      .in("input", 0.0)
+      .array()
+      .alias("input1D")
+      .enumeration("operation", {"noOperation", "sum", "subtract", "average"}, false, {}, 1)
+      .out("output", Type::kDouble)
+      .alias("output1D")
+      .compute(
+          [](ArrayView<double> input, std::int64_t operation) { return PlusMinusAverage(input, operation); });
+  registry
+      .add("unitConversion", "Multiplies by a fixed factor: between the runtime's units and a rig file's.")
+      .in("input", 0.0)
+      .in("conversionFactor", 1.0)
+      .out("output", Type::kDouble)
       .compute([](double input, double factor) { return input * factor; });
 }
 

@@ -22,9 +22,12 @@ Result<BoundKernel> BindMesh(const Binding& binding) {
 }  // namespace
 
 void AddMeshNode(NodeRegistry& registry) {
-  registry.add("mesh", "A mesh of the character: its rest points.").category("geometry")
-      .structural("mesh", Type::kMesh).out("points", Type::kPoints, "mesh space")
-      .compute([](ComputeContext& c) { CopyPoints(c.kernel_as<MeshKernel>().points.view(), c.out_points(0)); })
+  registry.add("mesh", "A mesh of the character: its rest points.")
+      .category("geometry")
+      .structural("mesh", Type::kMesh)
+      .out("points", Type::kPoints, "mesh space")
+      .compute(
+          [](ComputeContext& c) { CopyPoints(c.kernel_as<MeshKernel>().points.view(), c.out_points(0)); })
       .bind(BindMesh)
       .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
         const auto* mesh = s.asset<Mesh>("mesh");

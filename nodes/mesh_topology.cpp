@@ -7,7 +7,8 @@ const Topology* TopologyOf(const Mesh* mesh, Status* error) {
     *error = Status::Invalid("mesh is not set");
     return nullptr;
   }
-  const auto& built = mesh->Derived<Result<Topology>>([&] { return Topology::Build(mesh->point_count(), mesh->data().triangles); });
+  const auto& built = mesh->Derived<Result<Topology>>(
+      [&] { return Topology::Build(mesh->point_count(), mesh->data().triangles); });
   if (!built.ok()) {
     *error = built.status();
     return nullptr;

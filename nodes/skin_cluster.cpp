@@ -9,16 +9,18 @@
 namespace kpsa {
 namespace {
 
-// The joints that move none of the points need no world matrix, but for the first one: the kernel computes about its
-// place, whatever the binding.
+// The joints that move none of the points need no world matrix, but for the first one: the kernel computes
+// about its place, whatever the binding.
 void DemandSkin(Demand& demand) {
   const PointSet& out = demand.output("outPoints");
   demand.Require("inPoints", 0, out);
   const auto* influences = demand.structural().asset<Influences>("influences");
-  if (influences == nullptr || influences->offsets().size() != std::size_t{out.total()} + 1) return;  // bind reports it
+  if (influences == nullptr || influences->offsets().size() != std::size_t{out.total()} + 1)
+    return;  // bind reports it
   std::vector<bool> moves(influences->joint_count(), false);
   for (Index i = 0; i < out.size(); ++i) {
-    const std::size_t end = std::min<std::size_t>(influences->offsets()[out[i] + 1], influences->joints().size());
+    const std::size_t end =
+        std::min<std::size_t>(influences->offsets()[out[i] + 1], influences->joints().size());
     for (std::size_t e = influences->offsets()[out[i]]; e < end; ++e) {
       if (influences->joints()[e] < moves.size()) moves[influences->joints()[e]] = true;
     }
@@ -40,13 +42,16 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
   const auto* influences = s.asset<Influences>("influences");
   if (influences == nullptr) return Status::Invalid("influences are not set");
   const PointSet& out = binding.output("outPoints");
-  const SkinWeights weights{influences->offsets(), influences->joints(), influences->weights(), influences->joint_count()};
+  const SkinWeights weights{influences->offsets(), influences->joints(), influences->weights(),
+                            influences->joint_count()};
   if (weights.point_count() != out.total()) {
-    return Status::Invalid("its influences are for {} points, the geometry has {}", weights.point_count(), out.total());
+    return Status::Invalid("its influences are for {} points, the geometry has {}", weights.point_count(),
+                           out.total());
   }
   KPSA_RETURN_IF_ERROR(weights.Validate());
   if (s.array_size("matrix") > static_cast<int>(influences->joint_count())) {
-    return Status::Invalid("matrix has {} elements, its influences name {} joints", s.array_size("matrix"), influences->joint_count());
+    return Status::Invalid("matrix has {} elements, its influences name {} joints", s.array_size("matrix"),
+                           influences->joint_count());
   }
   std::vector<Matrix4> joint_from_bind;
   for (Index j = 0; j < influences->joint_count(); ++j) {
@@ -63,14 +68,16 @@ void ComputeSkin(ComputeContext& c) {
   const auto& bound = c.kernel_as<SkinBound>();
   const ArrayView<Matrix4> matrix = c.array<Matrix4>(kFirstOwnInput);
   auto* palette = reinterpret_cast<Matrix4*>(c.scratch);
-  const auto follow = [&](Index j) { palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j]; };
+  const auto follow = [&](Index j) {
+    palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j];
+  };
   if (!bound.joint_from_bind.empty()) follow(0);
   for (Index j : bound.kernel.joints()) follow(j);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{palette, bound.joint_from_bind.size()}, c.get<double>(kEnvelope), Matrix4()}, c.points(kInPoints), c.out_points(0),
+  bound.kernel.Run({{palette, bound.joint_from_bind.size()}, c.get<double>(kEnvelope), Matrix4()},
+                   c.points(kInPoints), c.out_points(0),
                    {c.scratch + bound.palette_floats, bound.kernel.ScratchFloats()}, &parallel);
 }
-
 
 void ComputeTransformGeometry(ComputeContext& c) {
   const Matrix4& m = c.get<Matrix4>(kFirstOwnInput);
@@ -89,8 +96,9 @@ void ComputeTransformGeometry(ComputeContext& c) {
 }  // namespace
 
 void AddSkinClusterNode(NodeRegistry& registry) {
-  NodeBuilder b = AddDeformer(registry, "skinCluster", "Moves points with joints: linear blend skinning, any number of influences. "
-                                                       "Takes points in mesh space to world space.");
+  NodeBuilder b = AddDeformer(registry, "skinCluster",
+                              "Moves points with joints: linear blend skinning, any number of influences. "
+                              "Takes points in mesh space to world space.");
   b.structural("influences", Type::kAsset, {.doc = "joints and weights of every point"}).per_geometry();
   b.in("matrix", Matrix4(), {.doc = "the joints' world matrices"}).array();
   b.structural("bindPreMatrix", Matrix4(), {.doc = "the joints' inverse bind matrices"}).array();
@@ -98,7 +106,8 @@ void AddSkinClusterNode(NodeRegistry& registry) {
 }
 
 void AddTransformGeometryNode(NodeRegistry& registry) {
-  NodeBuilder b = AddDeformer(registry, "transformGeometry", "Takes the points of a mesh without a skin to world space.");
+  NodeBuilder b =
+      AddDeformer(registry, "transformGeometry", "Takes the points of a mesh without a skin to world space.");
   b.in("matrix", Matrix4(), {.doc = "the mesh node's world matrix"});
   FinishDeformer(b, &ComputeTransformGeometry, nullptr).cost(20, 2);
 }

@@ -3,14 +3,16 @@
 namespace kpsa {
 
 void AddTimeNode(NodeRegistry& registry) {
-  registry.add("time", "The time of the scene. Read `time.time` as a source.").category("time")
+  registry.add("time", "The time of the scene. Read `time.time` as a source.")
+      .category("time")
       .in("time", 0.0, {.unit = Unit::kTime, .doc = "seconds"});
 }
 
 void AddStandardNodes(NodeRegistry& registry) {
-  for (auto* add : {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode, AddSkinClusterNode,
-                    AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode, AddCurveNodes, AddTripwireNode,
-                    AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
+  for (auto* add :
+       {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode, AddSkinClusterNode,
+        AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode, AddCurveNodes,
+        AddTripwireNode, AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
     add(registry);
   }
 }

@@ -1,5 +1,5 @@
-// transform and joint: local = offsetParentMatrix . T . R(rotateOrder) . S, in Maya's sense. The rest pose or the clip
-// feeds offsetParentMatrix; translate, rotate and scale are the controls on top of it.
+// transform and joint: local = offsetParentMatrix . T . R(rotateOrder) . S, in Maya's sense. The rest pose or
+// the clip feeds offsetParentMatrix; translate, rotate and scale are the controls on top of it.
 #include "base/scalar_math.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/transform_math.h"
@@ -16,19 +16,22 @@ struct TransformKernel {
 
 Result<BoundKernel> BindTransform(const Binding& binding) {
   const Structural& s = binding.structural();
-  TransformKernel kernel{static_cast<RotateOrder>(s.get_int("rotateOrder")), s.value("restMatrix").get<Matrix4>(), {}};
+  TransformKernel kernel{
+      static_cast<RotateOrder>(s.get_int("rotateOrder")), s.value("restMatrix").get<Matrix4>(), {}};
   kernel.twist_axis[s.get_int("twistAxis")] = 1;
   return MakeBound(kernel, 0);
 }
 
 // Inputs in the order of the groups below: translate, rotate, scale, offsetParentMatrix.
 bool HasControls(const ComputeContext& c) {
-  return !(c.get<Double3>(0) == Double3() && c.get<Double3>(1) == Double3() && c.get<Double3>(2) == Double3{1, 1, 1});
+  return !(c.get<Double3>(0) == Double3() && c.get<Double3>(1) == Double3() &&
+           c.get<Double3>(2) == Double3{1, 1, 1});
 }
 Matrix4 Local(const ComputeContext& c) {
   const Matrix4& offset = c.get<Matrix4>(3);
   if (!HasControls(c)) return offset;
-  return ComposeLocal(offset, {c.get<Double3>(0), c.get<Double3>(1), c.kernel_as<TransformKernel>().order, c.get<Double3>(2)});
+  return ComposeLocal(offset, {c.get<Double3>(0), c.get<Double3>(1), c.kernel_as<TransformKernel>().order,
+                               c.get<Double3>(2)});
 }
 
 void ComputeMatrix(ComputeContext& c) { c.out_value<Matrix4>(0) = Local(c); }
@@ -36,7 +39,9 @@ void ComputeWorld(ComputeContext& c) {
   const Matrix4 &parent = c.get<Matrix4>(4), &offset = c.get<Matrix4>(3);
   c.out_value<Matrix4>(0) = HasControls(c) ? parent * Local(c) : parent * offset;
 }
-void ComputeWorldInverse(ComputeContext& c) { c.out_value<Matrix4>(0) = InverseOrIdentity(c.get<Matrix4>(4) * Local(c)); }
+void ComputeWorldInverse(ComputeContext& c) {
+  c.out_value<Matrix4>(0) = InverseOrIdentity(c.get<Matrix4>(4) * Local(c));
+}
 
 void ComputePose(ComputeContext& c) {
   const auto& kernel = c.kernel_as<TransformKernel>();
@@ -70,15 +75,26 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "xyz turns about X first")
       .in("offsetParentMatrix", Matrix4(), {.doc = "the rest pose, or what the clip makes of it"})
       .in("parentMatrix", Matrix4(), {.doc = "the parent's worldMatrix"})
-      .structural("restMatrix", Matrix4(), {.doc = "the local matrix at rest, for poseRotate, swing and twist"})
+      .structural("restMatrix", Matrix4(),
+                  {.doc = "the local matrix at rest, for poseRotate, swing and twist"})
       .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")
-      .out("matrix", Type::kMatrix, "local").out("worldMatrix", Type::kMatrix).out("worldInverseMatrix", Type::kMatrix)
-      .out("poseRotate", Type::kDouble3, "rotation against rest, as angles in rotateOrder; includes the clip").unit(Unit::kAngle)
-      .out("poseRotateVector", Type::kDouble3, "the same as axis times angle").unit(Unit::kAngle)
-      .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip").unit(Unit::kLength)
-      .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist").unit(Unit::kAngle)
-      .out("twist", Type::kDouble, "angle about twistAxis").unit(Unit::kAngle);
-  b.compute_for({"matrix"}, local, &ComputeMatrix).passes("offsetParentMatrix", {"translate", "rotate", "scale"}).bind(BindTransform).cost(60, 0);
+      .out("matrix", Type::kMatrix, "local")
+      .out("worldMatrix", Type::kMatrix)
+      .out("worldInverseMatrix", Type::kMatrix)
+      .out("poseRotate", Type::kDouble3, "rotation against rest, as angles in rotateOrder; includes the clip")
+      .unit(Unit::kAngle)
+      .out("poseRotateVector", Type::kDouble3, "the same as axis times angle")
+      .unit(Unit::kAngle)
+      .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip")
+      .unit(Unit::kLength)
+      .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist")
+      .unit(Unit::kAngle)
+      .out("twist", Type::kDouble, "angle about twistAxis")
+      .unit(Unit::kAngle);
+  b.compute_for({"matrix"}, local, &ComputeMatrix)
+      .passes("offsetParentMatrix", {"translate", "rotate", "scale"})
+      .bind(BindTransform)
+      .cost(60, 0);
   b.compute_for({"worldMatrix"}, world, &ComputeWorld).bind(BindTransform).cost(70, 0);
   b.compute_for({"worldInverseMatrix"}, world, &ComputeWorldInverse).bind(BindTransform).cost(150, 0);
   b.compute_for({"poseRotate"}, local, &ComputePose).bind(BindTransform).cost(250, 0);

@@ -5,12 +5,19 @@
 namespace kpsa {
 
 void AddTripwireNode(NodeRegistry& registry) {
-  NodeBuilder b = AddDeformer(registry, "tripwire", "Passes points through; fails when it is armed. Shows that a stack was not evaluated.");
+  NodeBuilder b =
+      AddDeformer(registry, "tripwire",
+                  "Passes points through; fails when it is armed. Shows that a stack was not evaluated.");
   b.in("armed", false, {.doc = "fail instead of passing the points on", .diagnostic = true});
-  FinishDeformer(b, +[](ComputeContext& c) {
-    if (c.get<std::int64_t>(kFirstOwnInput) != 0) return c.host->Fail("tripwire: evaluated while armed");
-    CopyPoints(c.points(kInPoints), c.out_points(0));
-  }, nullptr).cost(20, 0.3f).passes_points();
+  FinishDeformer(
+      b,
+      +[](ComputeContext& c) {
+        if (c.get<std::int64_t>(kFirstOwnInput) != 0) return c.host->Fail("tripwire: evaluated while armed");
+        CopyPoints(c.points(kInPoints), c.out_points(0));
+      },
+      nullptr)
+      .cost(20, 0.3f)
+      .passes_points();
 }
 
 }  // namespace kpsa

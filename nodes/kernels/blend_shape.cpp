@@ -10,6 +10,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nodes/kernels/blend_shape.cpp"
 #include "hwy/foreach_target.h"
+
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();

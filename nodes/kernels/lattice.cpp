@@ -13,6 +13,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nodes/kernels/lattice.cpp"
 #include "hwy/foreach_target.h"
+
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -20,10 +21,11 @@ namespace kpsa {
 namespace HWY_NAMESPACE {
 
 // out += weight * sum_u wu sum_t wt sum_s ws offset(s, t, u) for tiles of 16 points.
-// axis: per tile the rows ws, wt, wu of 16; offsets: x y z 0 of each control. rows: for each u, a bit for every t whose
-// controls move. The others would add 0 to sums that begin with +0, which changes no bit.
+// axis: per tile the rows ws, wt, wu of 16; offsets: x y z 0 of each control. rows: for each u, a bit for
+// every t whose controls move. The others would add 0 to sums that begin with +0, which changes no bit.
 void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, std::size_t ds, std::size_t dt,
-                std::size_t du, const float* offsets, const std::uint32_t* rows, const float* weights, PointsView out) {
+                std::size_t du, const float* offsets, const std::uint32_t* rows, const float* weights,
+                PointsView out) {
   const DLanes d;
   for (std::size_t tile = 0; tile < tile_count; ++tile, axis += 16 * (ds + dt + du)) {
     for (std::size_t lane = 0; lane < 16; lane += hn::Lanes(d)) {

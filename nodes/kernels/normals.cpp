@@ -8,6 +8,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nodes/kernels/normals.cpp"
 #include "hwy/foreach_target.h"
+
 #include "nodes/kernels/xyzw-inl.h"
 
 #ifndef KPSA_NODES_KERNELS_NORMALS_BLOCK_

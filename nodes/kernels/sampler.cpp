@@ -17,7 +17,8 @@ KeySpan SpanFrom(std::span<const float> times, std::size_t key, double seconds) 
 KeySpan Find(std::span<const float> times, double seconds) {
   if (!(seconds > static_cast<double>(times.front()))) return {};  // NaN goes to the first key
   if (seconds >= static_cast<double>(times.back())) return {times.size() - 1, 0, 0};
-  const auto next = std::upper_bound(times.begin(), times.end(), seconds, [](double s, float t) { return s < static_cast<double>(t); });
+  const auto next = std::upper_bound(times.begin(), times.end(), seconds,
+                                     [](double s, float t) { return s < static_cast<double>(t); });
   return SpanFrom(times, static_cast<std::size_t>(next - times.begin()) - 1, seconds);
 }
 
@@ -128,7 +129,8 @@ RotationTrack::RotationTrack(const SamplerKeys& keys) : step_(keys.interpolation
 Quaternion RotationTrack::At(const KeySpan& span) const {
   if (!cubic_.empty()) {
     const SamplerKeys keys{{}, cubic_, 4, Interpolation::kCubicSpline};
-    return Normalized({Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
+    return Normalized(
+        {Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2), Sample(keys, span, 3)});
   }
   if (span.t == 0 || step_) return keys_[span.key].rotation;
   return Between(keys_.data() + span.key, span.t);
@@ -145,14 +147,17 @@ Quaternion RotationTrack::Between(const Key* from, double t) {
 }
 
 bool RotationTrack::constant() const {
-  return cubic_.empty() && std::all_of(keys_.begin(), keys_.end(), [&](const Key& k) { return k.rotation == keys_.front().rotation; });
+  return cubic_.empty() && std::all_of(keys_.begin(), keys_.end(),
+                                       [&](const Key& k) { return k.rotation == keys_.front().rotation; });
 }
 
 Double3 SampleVec3(const SamplerKeys& keys, const KeySpan& span) {
   KPSA_CHECK_EQ(keys.components, 3u);
   return {Sample(keys, span, 0), Sample(keys, span, 1), Sample(keys, span, 2)};
 }
-Double3 SampleVec3(const SamplerKeys& keys, double seconds) { return SampleVec3(keys, Find(keys.times, seconds)); }
+Double3 SampleVec3(const SamplerKeys& keys, double seconds) {
+  return SampleVec3(keys, Find(keys.times, seconds));
+}
 
 Quaternion SampleRotation(const SamplerKeys& keys, double seconds) {
   KPSA_CHECK_EQ(keys.components, 4u);

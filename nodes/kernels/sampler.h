@@ -24,15 +24,16 @@ struct SamplerKeys {
   Status Validate() const;
 };
 
-// Between which keys a time lies: value = key `key` at t = 0 to key `key + 1` at t = 1, `width` seconds apart. At and
-// beyond the ends, and for NaN, t is 0.
+// Between which keys a time lies: value = key `key` at t = 0 to key `key + 1` at t = 1, `width` seconds
+// apart. At and beyond the ends, and for NaN, t is 0.
 struct KeySpan {
   std::size_t key = 0;
   double t = 0, width = 0;
 };
 
-// Ascending times that several channels may share. A look-up starts where the key would be if all were evenly spaced:
-// it reads one or two times of baked clips, and searches otherwise. It remembers nothing between calls.
+// Ascending times that several channels may share. A look-up starts where the key would be if all were evenly
+// spaced: it reads one or two times of baked clips, and searches otherwise. It remembers nothing between
+// calls.
 class KeyTimes {
  public:
   KeyTimes() = default;
@@ -54,12 +55,12 @@ class RotationTrack {
   Quaternion At(const KeySpan& span) const;
   bool constant() const;  // the same rotation at any time
 
-  struct Key {  // of kLinear and kStep
-    Quaternion rotation;         // unit length, on the side of the key before: the short way without a sign
+  struct Key {            // of kLinear and kStep
+    Quaternion rotation;  // unit length, on the side of the key before: the short way without a sign
     double angle = 0, inverse = 0;  // to the next key, and 1 / sin(angle); 0 where they are nearly equal
   };
-  // The keys of kLinear, null for others. At(span) is keys[span.key] where span.t is 0, and Between(&keys[span.key],
-  // span.t) elsewhere.
+  // The keys of kLinear, null for others. At(span) is keys[span.key] where span.t is 0, and
+  // Between(&keys[span.key], span.t) elsewhere.
   const Key* linear_keys() const { return cubic_.empty() && !step_ ? keys_.data() : nullptr; }
   static Quaternion Between(const Key* from, double t);  // of from[0] and from[1]
 
@@ -70,7 +71,8 @@ class RotationTrack {
 };
 
 // All of them want valid keys. Safe from any thread.
-Double3 SampleVec3(const SamplerKeys& keys, const KeySpan& span);  // components == 3; keys.times are not looked at
+Double3 SampleVec3(const SamplerKeys& keys,
+                   const KeySpan& span);  // components == 3; keys.times are not looked at
 void SampleScalars(const SamplerKeys& keys, const KeySpan& span, std::span<double> out);
 Double3 SampleVec3(const SamplerKeys& keys, double seconds);         // components == 3
 Quaternion SampleRotation(const SamplerKeys& keys, double seconds);  // components == 4; unit length

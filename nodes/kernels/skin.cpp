@@ -9,6 +9,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nodes/kernels/skin.cpp"
 #include "hwy/foreach_target.h"
+
 #include "nodes/kernels/xyzw-inl.h"
 
 #ifndef KPSA_NODES_KERNELS_SKIN_RUN_

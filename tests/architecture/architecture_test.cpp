@@ -1,5 +1,5 @@
-// The rooms know only whom they may know, and every header stands by itself. Each check has a canary: a small bad tree
-// that it must find fault with.
+// The rooms know only whom they may know, and every header stands by itself. Each check has a canary: a small
+// bad tree that it must find fault with.
 #include <gtest/gtest.h>
 
 #include "tests/architecture/source_tree.h"
@@ -26,25 +26,32 @@ TEST(IncludeArrows, PointAsTheyMay) {
 TEST(IncludeArrows, CanaryOfEveryArrow) {
   TemporaryFolder tree;
   const std::pair<const char*, const char*> bad[] = {
-      {"base/a.h", "graph/a.h"},         {"graph/a.cpp", "nodes/a.h"},   {"graph/b.h", "kpsa/a.h"},      {"graph/c.h", "io/a.h"},
-      {"nodes/a.h", "kpsa/a.h"},         {"nodes/b.h", "io/a.h"},        {"kpsa/a.h", "nodes/a.h"},      {"kpsa/b.cpp", "io/a.h"},
-      {"io/a.h", "nodes/a.h"},           {"io/b.h", "kpsa/a.h"},         {"nodes/kernels/a.h", "graph/a.h"}, {"nodes/kernels/b.h", "nodes/a.h"},
-      {"base/b.cpp", "cli/a.h"},         {"io/c.h", "tests/support/a.h"}, {"kpsa/c.cpp", "nodes/kernels/a.h"}, {"graph/d.h", "bench/a.h"},
+      {"base/a.h", "graph/a.h"},  {"graph/a.cpp", "nodes/a.h"},       {"graph/b.h", "kpsa/a.h"},
+      {"graph/c.h", "io/a.h"},    {"nodes/a.h", "kpsa/a.h"},          {"nodes/b.h", "io/a.h"},
+      {"kpsa/a.h", "nodes/a.h"},  {"kpsa/b.cpp", "io/a.h"},           {"io/a.h", "nodes/a.h"},
+      {"io/b.h", "kpsa/a.h"},     {"nodes/kernels/a.h", "graph/a.h"}, {"nodes/kernels/b.h", "nodes/a.h"},
+      {"base/b.cpp", "cli/a.h"},  {"io/c.h", "tests/support/a.h"},    {"kpsa/c.cpp", "nodes/kernels/a.h"},
+      {"graph/d.h", "bench/a.h"},
   };
-  for (const auto& [file, include] : bad) tree.Write(file, std::string("#pragma once\n  #  include \"") + include + "\"\n");
+  for (const auto& [file, include] : bad)
+    tree.Write(file, std::string("#pragma once\n  #  include \"") + include + "\"\n");
   const std::vector<std::string> breaches = FindBreaches(ReadSourceTree(tree.path()));
   EXPECT_EQ(breaches.size(), std::size(bad)) << Lines(breaches);
   for (const auto& [file, include] : bad) {
-    EXPECT_NE(Lines(breaches).find(std::string(file) + ":2: "), std::string::npos) << file << " includes " << include << "\n" << Lines(breaches);
+    EXPECT_NE(Lines(breaches).find(std::string(file) + ":2: "), std::string::npos)
+        << file << " includes " << include << "\n"
+        << Lines(breaches);
   }
 }
 
 TEST(IncludeArrows, CanaryOfEveryDoor) {
   TemporaryFolder tree;
-  const char* const libraries[] = {"tbb/parallel_for.h", "oneapi/tbb.h", "yaml-cpp/yaml.h", "tiny_gltf.h", "nlohmann/json.hpp", "embree3/rtcore.h", "hwy/highway.h", "zip.h"};
+  const char* const libraries[] = {"tbb/parallel_for.h", "oneapi/tbb.h",     "yaml-cpp/yaml.h", "tiny_gltf.h",
+                                   "nlohmann/json.hpp",  "embree3/rtcore.h", "hwy/highway.h",   "zip.h"};
   for (std::size_t i = 0; i < std::size(libraries); ++i) {
     for (const char* room : {"base", "graph", "nodes", "nodes/kernels", "kpsa", "io", "cli"}) {
-      tree.Write(std::string(room) + "/h" + std::to_string(i) + ".h", std::string("#include <") + libraries[i] + ">\n");
+      tree.Write(std::string(room) + "/h" + std::to_string(i) + ".h",
+                 std::string("#include <") + libraries[i] + ">\n");
     }
   }
   const std::vector<std::string> breaches = FindBreaches(ReadSourceTree(tree.path()));
@@ -71,14 +78,21 @@ TEST(IncludeArrows, AGoodTreeHasNoBreach) {
   EXPECT_EQ(Lines(FindBreaches(ReadSourceTree(tree.path()))), "");
 }
 
-TEST(Headers, IncludeWhatTheyUse) { EXPECT_EQ(Lines(FindMissingIncludes(ReadSourceTree(KPSA_SOURCE_DIR))), ""); }
+TEST(Headers, IncludeWhatTheyUse) {
+  EXPECT_EQ(Lines(FindMissingIncludes(ReadSourceTree(KPSA_SOURCE_DIR))), "");
+}
 
 TEST(Headers, CanaryOfOnesThatDoNot) {
   TemporaryFolder tree;
-  tree.Write("base/good.h", "#pragma once\n#include <vector>\ninline std::vector<int> Good() { return {}; }\n");
-  tree.Write("base/through.h", "#include \"base/good.h\"\nstd::vector<int> Also();  // no std::string here\n");
-  tree.Write("base/bad.h", "#pragma once\n#include <string_view>\nstd::vector<int> Bad(std::string_view s);\n");
-  tree.Write("kpsa/worse.h", "#include <Eigen/Core>\nvoid Worse(std::string s, Eigen::MatrixXd m,\n           nlohmann::json j);\n");
+  tree.Write("base/good.h",
+             "#pragma once\n#include <vector>\ninline std::vector<int> Good() { return {}; }\n");
+  tree.Write("base/through.h",
+             "#include \"base/good.h\"\nstd::vector<int> Also();  // no std::string here\n");
+  tree.Write("base/bad.h",
+             "#pragma once\n#include <string_view>\nstd::vector<int> Bad(std::string_view s);\n");
+  tree.Write(
+      "kpsa/worse.h",
+      "#include <Eigen/Core>\nvoid Worse(std::string s, Eigen::MatrixXd m,\n           nlohmann::json j);\n");
   tree.Write("base/source.cpp", "std::map<int, int> sources_are_compiled;\n");
   EXPECT_EQ(FindMissingIncludes(ReadSourceTree(tree.path())),
             (std::vector<std::string>{"base/bad.h:3: uses std::vector, but includes no <vector>",

@@ -42,7 +42,9 @@ const std::array<Door, 9> kDoors = {{
     {"tbb/", {"base/parallel.cpp"}},
     {"oneapi/", {"base/parallel.cpp"}},
     {"yaml-cpp/", {"io/yaml_document.cpp"}},
-    {"tiny_gltf", {"io/gltf_accessor.cpp", "io/gltf_clip.cpp", "io/gltf_document.cpp", "io/gltf_mesh.cpp", "io/gltf_scene.cpp"}},
+    {"tiny_gltf",
+     {"io/gltf_accessor.cpp", "io/gltf_clip.cpp", "io/gltf_document.cpp", "io/gltf_mesh.cpp",
+      "io/gltf_scene.cpp"}},
     {"nlohmann/", {}, true},
     {"embree", {"nodes/kernels/ray_scene.cpp"}},
     {"CLI/", {"cli/main.cpp", "cli/options.cpp"}},
@@ -102,7 +104,9 @@ const std::array<Use, 40> kUses = {{
 // Whether the line uses the name, followed by no further letters; for libraries, as a namespace.
 bool UsesWord(std::string_view line, std::string_view name) {
   for (std::size_t at = line.find(name); at != std::string_view::npos; at = line.find(name, at + 1)) {
-    const auto letter = [&](std::size_t i) { return i < line.size() && (std::isalnum(static_cast<unsigned char>(line[i])) != 0 || line[i] == '_'); };
+    const auto letter = [&](std::size_t i) {
+      return i < line.size() && (std::isalnum(static_cast<unsigned char>(line[i])) != 0 || line[i] == '_');
+    };
     const std::size_t end = at + name.size();
     if ((at > 0 && (letter(at - 1) || line[at - 1] == '<' || line[at - 1] == '/')) || letter(end)) continue;
     if (name.starts_with("std::") || line.substr(end).starts_with("::")) return true;
@@ -148,14 +152,16 @@ std::vector<SourceFile> ReadSourceTree(const std::string& root) {
   std::vector<SourceFile> files;
   for (const fs::directory_entry& room : fs::directory_iterator(root)) {
     const std::string name = room.path().filename().string();
-    if (!room.is_directory() || name.starts_with('.') || name.starts_with("build") || kNoRooms.contains(name)) continue;
+    if (!room.is_directory() || name.starts_with('.') || name.starts_with("build") || kNoRooms.contains(name))
+      continue;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(room.path())) {
       const std::string extension = entry.path().extension().string();
       if (!entry.is_regular_file() || (extension != ".h" && extension != ".cpp")) continue;
       files.push_back(ReadSource(entry.path(), fs::relative(entry.path(), root).generic_string()));
     }
   }
-  std::sort(files.begin(), files.end(), [](const SourceFile& a, const SourceFile& b) { return a.path < b.path; });
+  std::sort(files.begin(), files.end(),
+            [](const SourceFile& a, const SourceFile& b) { return a.path < b.path; });
   return files;
 }
 
@@ -166,24 +172,32 @@ std::vector<std::string> FindBreaches(const std::vector<SourceFile>& files) {
   std::vector<std::string> breaches;
   for (const SourceFile& file : files) {
     const std::string room = RoomOf(file.path);
-    const auto rule = std::find_if(kRooms.begin(), kRooms.end(), [&](const RoomRule& r) { return r.room == room; });
+    const auto rule =
+        std::find_if(kRooms.begin(), kRooms.end(), [&](const RoomRule& r) { return r.room == room; });
     for (const Include& include : file.includes) {
-      const auto breach = [&](const std::string& what) { breaches.push_back(fmt::format("{}:{}: {}", file.path, include.line, what)); };
+      const auto breach = [&](const std::string& what) {
+        breaches.push_back(fmt::format("{}:{}: {}", file.path, include.line, what));
+      };
       const std::string target = RoomOf(include.text);
       const bool ours = include.text.find('/') != std::string::npos && rooms.contains(target);
       if (include.quoted && include.text.starts_with("..")) {
         breach(fmt::format("\"{}\": includes start at the project's root", include.text));
       } else if (include.quoted && include.text.find('/') == std::string::npos) {
         breach(fmt::format("\"{}\" names no room: includes start at the project's root", include.text));
-      } else if (ours && rule != kRooms.end() && std::find(rule->may_include.begin(), rule->may_include.end(), target) == rule->may_include.end()) {
-        breach(fmt::format("{} may not know {} (\"{}\"), only {}", room, target, include.text, fmt::join(rule->may_include, ", ")));
+      } else if (ours && rule != kRooms.end() &&
+                 std::find(rule->may_include.begin(), rule->may_include.end(), target) ==
+                     rule->may_include.end()) {
+        breach(fmt::format("{} may not know {} (\"{}\"), only {}", room, target, include.text,
+                           fmt::join(rule->may_include, ", ")));
       }
       if (room == "tests") continue;  // tests may look at what a library says
       for (const Door& door : kDoors) {
         if (!include.text.starts_with(door.library) || (ours && include.quoted)) continue;
-        const bool open = std::any_of(door.files.begin(), door.files.end(), [&](const char* f) { return Matches(f, file.path); });
+        const bool open = std::any_of(door.files.begin(), door.files.end(),
+                                      [&](const char* f) { return Matches(f, file.path); });
         if (open || (door.any_source && !file.is_header())) continue;
-        breach(fmt::format("<{}> belongs behind {}{}", include.text, door.any_source ? "source files" : "", fmt::join(door.files, ", ")));
+        breach(fmt::format("<{}> belongs behind {}{}", include.text, door.any_source ? "source files" : "",
+                           fmt::join(door.files, ", ")));
       }
     }
   }
@@ -195,7 +209,8 @@ std::vector<std::string> FindMissingIncludes(const std::vector<SourceFile>& file
   for (const SourceFile& file : files) by_path[file.path] = &file;
   std::vector<std::string> missing;
   for (const SourceFile& file : files) {
-    if (!file.is_header() || file.path.ends_with("-inl.h")) continue;  // parts of a source file (Highway's targets)
+    if (!file.is_header() || file.path.ends_with("-inl.h"))
+      continue;  // parts of a source file (Highway's targets)
     // What it includes, through our headers as well
     std::set<std::string> libraries, seen = {file.path};
     std::vector<const SourceFile*> stack = {&file};
@@ -214,7 +229,8 @@ std::vector<std::string> FindMissingIncludes(const std::vector<SourceFile>& file
       });
       for (std::size_t i = 0; !there && i < file.code.size(); ++i) {
         if (!UsesWord(file.code[i], use.name)) continue;
-        missing.push_back(fmt::format("{}:{}: uses {}, but includes no <{}>", file.path, i + 1, use.name, use.header));
+        missing.push_back(
+            fmt::format("{}:{}: uses {}, but includes no <{}>", file.path, i + 1, use.name, use.header));
         break;
       }
     }

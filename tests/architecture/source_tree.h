@@ -22,13 +22,16 @@ struct SourceFile {
 // All .h and .cpp files of the rooms below the root, by path; build folders and the like are no rooms.
 std::vector<SourceFile> ReadSourceTree(const std::string& root);
 
-// Breaches of the arrows between rooms and of the doors to libraries: "path:line: what is wrong", by path and line.
-//   base <- graph <- {nodes, kpsa, io} <- {cli, bench, tests, ...}; kernels know base only; siblings never each other.
+// Breaches of the arrows between rooms and of the doors to libraries: "path:line: what is wrong", by path and
+// line.
+//   base <- graph <- {nodes, kpsa, io} <- {cli, bench, tests, ...}; kernels know base only; siblings never
+//   each other.
 std::vector<std::string> FindBreaches(const std::vector<SourceFile>& files);
 
-// Names of the standard library and of other libraries that a header uses without including, directly or through the
-// project's own headers, what declares them: "path:line: what is missing". Precompiled headers hide such gaps from the
-// compiler; gaps in the project's own headers it sees, since each source includes its own header first.
+// Names of the standard library and of other libraries that a header uses without including, directly or
+// through the project's own headers, what declares them: "path:line: what is missing". Precompiled headers
+// hide such gaps from the compiler; gaps in the project's own headers it sees, since each source includes its
+// own header first.
 std::vector<std::string> FindMissingIncludes(const std::vector<SourceFile>& files);
 
 }  // namespace kpsa

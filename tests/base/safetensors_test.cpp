@@ -11,7 +11,8 @@
 namespace kpsa {
 namespace {
 
-std::vector<std::byte> FileOf(const std::string& header, std::size_t data_size, std::uint64_t claimed = ~std::uint64_t{0}) {
+std::vector<std::byte> FileOf(const std::string& header, std::size_t data_size,
+                              std::uint64_t claimed = ~std::uint64_t{0}) {
   const std::uint64_t size = claimed == ~std::uint64_t{0} ? header.size() : claimed;
   std::vector<std::byte> bytes(8 + header.size() + data_size);
   std::memcpy(bytes.data(), &size, 8);
@@ -38,9 +39,11 @@ TEST(Safetensors, RoundTrip) {
   const auto file = SafetensorsFile::Parse(Sample().Serialize(), "sample");
   ASSERT_TRUE(file.ok()) << file.status().ToString();
   EXPECT_EQ(*file->Metadata("greeting"), "h\xc3\xa4llo \"quoted\"");
-  EXPECT_EQ(*file->Values<float>("floats", {2, 3}), (std::vector<float>{1.5f, -2.0f, 0.25f, 3.0f, 4.0f, 5.0f}));
+  EXPECT_EQ(*file->Values<float>("floats", {2, 3}),
+            (std::vector<float>{1.5f, -2.0f, 0.25f, 3.0f, 4.0f, 5.0f}));
   EXPECT_EQ(*file->Values<double>("doubles", {}), std::vector<double>{1e300});
-  EXPECT_EQ(*file->Values<std::uint8_t>("bytes", {SafetensorsFile::kAnySize}), (std::vector<std::uint8_t>{1, 2, 3}));
+  EXPECT_EQ(*file->Values<std::uint8_t>("bytes", {SafetensorsFile::kAnySize}),
+            (std::vector<std::uint8_t>{1, 2, 3}));
   EXPECT_EQ(*file->Values<std::uint16_t>("halfs", {1}, true), std::vector<std::uint16_t>{0x3c00});
   EXPECT_TRUE(file->Values<float>("empty", {0, 3})->empty());
 }
@@ -55,10 +58,14 @@ TEST(Safetensors, DataAreAlignedInTheFile) {
 TEST(Safetensors, WrongTypeShapeOrNameNamesBoth) {
   const auto file = SafetensorsFile::Parse(Sample().Serialize(), "sample");
   ASSERT_TRUE(file.ok());
-  EXPECT_NE(file->Values<double>("floats", {2, 3}).status().ToString().find("is F32 [2, 3], expected F64"), std::string::npos);
-  EXPECT_NE(file->Values<float>("floats", {3, 2}).status().ToString().find("expected F32 [3, 2]"), std::string::npos);
-  EXPECT_NE(file->Values<float>("float", {2, 3}).status().ToString().find("did you mean \"floats\""), std::string::npos);
-  EXPECT_NE(file->Metadata("greetin").status().ToString().find("did you mean \"greeting\""), std::string::npos);
+  EXPECT_NE(file->Values<double>("floats", {2, 3}).status().ToString().find("is F32 [2, 3], expected F64"),
+            std::string::npos);
+  EXPECT_NE(file->Values<float>("floats", {3, 2}).status().ToString().find("expected F32 [3, 2]"),
+            std::string::npos);
+  EXPECT_NE(file->Values<float>("float", {2, 3}).status().ToString().find("did you mean \"floats\""),
+            std::string::npos);
+  EXPECT_NE(file->Metadata("greetin").status().ToString().find("did you mean \"greeting\""),
+            std::string::npos);
 }
 
 TEST(Safetensors, NotFiniteNumbersAreRefused) {
@@ -82,34 +89,48 @@ TEST(Safetensors, EveryKindOfDamageHasOneMessage) {
     std::vector<std::byte> bytes;
     const char* expected;
   };
-  const auto one = [](const std::string& entry, std::size_t data) { return FileOf("{\"a\":" + entry + "}", data); };
+  const auto one = [](const std::string& entry, std::size_t data) {
+    return FileOf("{\"a\":" + entry + "}", data);
+  };
   const std::vector<Case> cases = {
       {"empty", {}, "too few"},
       {"header beyond the file", FileOf("{}", 0, 1000), "the header claims 1000"},
       {"huge header", FileOf("{}", 0, 0xffffffffffffffffull - 1), "the header claims"},
       {"not JSON", FileOf("{\"a\":", 0), "not a JSON object"},
       {"a list", FileOf("[]", 0), "not a JSON object"},
-      {"twice", FileOf(R"({"a":{"dtype":"U8","shape":[1],"data_offsets":[0,1]},"a":{"dtype":"U8","shape":[1],"data_offsets":[0,1]}})", 1), "twice"},
+      {"twice",
+       FileOf(
+           R"({"a":{"dtype":"U8","shape":[1],"data_offsets":[0,1]},"a":{"dtype":"U8","shape":[1],"data_offsets":[0,1]}})",
+           1),
+       "twice"},
       {"too deep", FileOf("{\"a\":[[[[[[[[1]]]]]]]]}", 0), "nested deeper"},
       {"metadata not strings", FileOf("{\"__metadata__\":{\"a\":1}}", 0), "is not a string"},
       {"no shape", one(R"({"dtype":"U8","data_offsets":[0,1]})", 1), "expected an object with"},
       {"unknown type", one(R"({"dtype":"Q8","shape":[1],"data_offsets":[0,1]})", 1), "unknown dtype \"Q8\""},
       {"negative size", one(R"({"dtype":"U8","shape":[-1],"data_offsets":[0,1]})", 1), "whole number"},
       {"fraction", one(R"({"dtype":"U8","shape":[1.5],"data_offsets":[0,1]})", 1), "whole number"},
-      {"overflow", one(R"({"dtype":"F64","shape":[4294967296,4294967296],"data_offsets":[0,0]})", 0), "overflows"},
-      {"offsets reversed", one(R"({"dtype":"U8","shape":[1],"data_offsets":[1,0]})", 1), "lies at bytes 1 to 0"},
-      {"beyond the end", one(R"({"dtype":"U8","shape":[5],"data_offsets":[0,5]})", 1), "lies at bytes 0 to 5 of 1"},
-      {"size differs from shape", one(R"({"dtype":"F32","shape":[1],"data_offsets":[0,3]})", 3), "needs 4 bytes, it has 3"},
+      {"overflow", one(R"({"dtype":"F64","shape":[4294967296,4294967296],"data_offsets":[0,0]})", 0),
+       "overflows"},
+      {"offsets reversed", one(R"({"dtype":"U8","shape":[1],"data_offsets":[1,0]})", 1),
+       "lies at bytes 1 to 0"},
+      {"beyond the end", one(R"({"dtype":"U8","shape":[5],"data_offsets":[0,5]})", 1),
+       "lies at bytes 0 to 5 of 1"},
+      {"size differs from shape", one(R"({"dtype":"F32","shape":[1],"data_offsets":[0,3]})", 3),
+       "needs 4 bytes, it has 3"},
       {"bytes left over", one(R"({"dtype":"U8","shape":[1],"data_offsets":[0,1]})", 2), "account for 1"},
       {"hole", one(R"({"dtype":"U8","shape":[1],"data_offsets":[1,2]})", 2), "overlap or leave a hole"},
-      {"overlap", FileOf(R"({"a":{"dtype":"U8","shape":[2],"data_offsets":[0,2]},"b":{"dtype":"U8","shape":[2],"data_offsets":[1,3]}})", 3),
+      {"overlap",
+       FileOf(
+           R"({"a":{"dtype":"U8","shape":[2],"data_offsets":[0,2]},"b":{"dtype":"U8","shape":[2],"data_offsets":[1,3]}})",
+           3),
        "overlap or leave a hole"},
   };
   for (const Case& c : cases) {
     const auto file = SafetensorsFile::Parse(c.bytes, "x.kpsa");
     ASSERT_FALSE(file.ok()) << c.what;
     ASSERT_EQ(file.status().errors().size(), 1u) << c.what;
-    EXPECT_NE(file.status().ToString().find(c.expected), std::string::npos) << c.what << ": " << file.status().ToString();
+    EXPECT_NE(file.status().ToString().find(c.expected), std::string::npos)
+        << c.what << ": " << file.status().ToString();
     EXPECT_EQ(file.status().ToString().find("x.kpsa"), 0u) << c.what;
   }
 }

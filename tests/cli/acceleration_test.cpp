@@ -1,5 +1,5 @@
-// A trained rig end to end: what must hold of the KPSA node in a graph (tolerance 0, infinity, order of frames, staleness,
-// tripwire). On the bundled hello rig, which trains in a second.
+// A trained rig end to end: what must hold of the KPSA node in a graph (tolerance 0, infinity, order of
+// frames, staleness, tripwire). On the bundled hello rig, which trains in a second.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,7 +13,6 @@
 
 namespace kpsa {
 namespace {
-
 
 class TrainedRig : public ::testing::Test {
  protected:
@@ -54,7 +53,8 @@ class TrainedRig : public ::testing::Test {
     std::unique_ptr<Profile> profile;
   };
   // The rig's points under its controls; accelerated where a tolerance is given.
-  static Run Start(Rig* rig, const double* tolerance, const std::shared_ptr<const Subspace>& subspace = *subspace_) {
+  static Run Start(Rig* rig, const double* tolerance,
+                   const std::shared_ptr<const Subspace>& subspace = *subspace_) {
     Request request;
     request.varying = VaryingPlugs(*rig);
     request.outputs.push_back({rig->scene.meshes[0].points, {}});
@@ -62,7 +62,8 @@ class TrainedRig : public ::testing::Test {
     if (tolerance != nullptr) {
       AccelerateOptions options;
       options.tolerance = *tolerance;
-      Result<Accelerated> accelerated = Accelerate(rig->graph.get(), &compiler, MakeTarget(*rig, rig->accelerate[0]), subspace, "kpsa", options);
+      Result<Accelerated> accelerated = Accelerate(
+          rig->graph.get(), &compiler, MakeTarget(*rig, rig->accelerate[0]), subspace, "kpsa", options);
       EXPECT_TRUE(accelerated.ok()) << accelerated.status().ToString();
       const NodeDef& def = rig->graph->def(accelerated->node);
       request.outputs[0].plug = {accelerated->node, def.FindAttribute("outPoints"), 0, -1};
@@ -177,7 +178,8 @@ TEST_F(TrainedRig, AChangedRigIsRefusedByName) {
   const AccelerationTarget target = MakeTarget(rig, rig.accelerate[0]);
   const Result<Accelerated> refused = Accelerate(rig.graph.get(), &compiler, target, *subspace_, "kpsa", {});
   ASSERT_FALSE(refused.ok());
-  EXPECT_NE(refused.status().ToString().find("mush.iterations"), std::string::npos) << refused.status().ToString();
+  EXPECT_NE(refused.status().ToString().find("mush.iterations"), std::string::npos)
+      << refused.status().ToString();
   AccelerateOptions options;
   options.stale_is_miss = true;
   EXPECT_TRUE(Accelerate(rig.graph.get(), &compiler, target, *subspace_, "kpsa", options).ok());

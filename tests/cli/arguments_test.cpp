@@ -11,7 +11,6 @@
 namespace kpsa {
 namespace {
 
-
 struct Refusal {
   std::vector<std::string> arguments;
   int exit_code;

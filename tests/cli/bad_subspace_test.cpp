@@ -17,7 +17,8 @@ class BadSubspaces : public RefusalTest {
  protected:
   static void SetUpTestSuite() {
     const TemporaryFolder trained;
-    const ProcessResult run = RunKpsa({"train", kHelloFolder + "hello.yaml", "--samples", "80", "--rows", "12", "-q", "-o", trained / "h.kpsa"});
+    const ProcessResult run = RunKpsa({"train", kHelloFolder + "hello.yaml", "--samples", "80", "--rows",
+                                       "12", "-q", "-o", trained / "h.kpsa"});
     EXPECT_EQ(run.exit_code, 0) << run.err;
     good_ = new std::string(TemporaryFolder::Read(trained / "h.kpsa"));
     ASSERT_GT(good_->size(), 1000u);
@@ -63,7 +64,8 @@ TEST_F(BadSubspaces, TheGoodOneIsGood) {
 TEST_F(BadSubspaces, Containers) {
   ExpectBad("", {});
   ExpectBad("short", {});
-  for (std::size_t size : {std::size_t{7}, std::size_t{8}, std::size_t{100}, HeaderSize(), good_->size() / 2, good_->size() - 1}) {
+  for (std::size_t size : {std::size_t{7}, std::size_t{8}, std::size_t{100}, HeaderSize(), good_->size() / 2,
+                           good_->size() - 1}) {
     ExpectBad(good_->substr(0, size), {});
   }
   ExpectBad(*good_ + "x", {});
@@ -116,7 +118,8 @@ TEST_F(BadSubspaces, Headers) {
     json other = header;
     other["__metadata__"].erase(key);
     folder.Write("hello.kpsa", WithHeader(other.dump()));
-    const ProcessResult run = RunKpsa({"eval", "hello.yaml", "--accelerate", "--force", "-o", "out.npz"}, kMostSeconds, folder.path());
+    const ProcessResult run = RunKpsa({"eval", "hello.yaml", "--accelerate", "--force", "-o", "out.npz"},
+                                      kMostSeconds, folder.path());
     ExpectBounded(run);
     EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 3) << key << "\n" << run.err;
     std::filesystem::remove(folder / "out.npz");
@@ -128,7 +131,8 @@ TEST_F(BadSubspaces, OfAnotherStateOfTheRig) {
   std::string rig = TemporaryFolder::Read(folder / "hello.yaml");
   rig.replace(rig.find("iterations: 10"), 14, "iterations: 11");
   folder.Write("hello.yaml", rig);
-  ExpectRefused({"eval", "hello.yaml", "--accelerate", "-o", "out.npz"}, 3, {"hello.kpsa", "mush.iterations"});
+  ExpectRefused({"eval", "hello.yaml", "--accelerate", "-o", "out.npz"}, 3,
+                {"hello.kpsa", "mush.iterations"});
   ExpectRefused({"bench", "hello.yaml"}, 3, {"hello.kpsa", "mush.iterations"});
   ExpectGood({"eval", "hello.yaml", "--accelerate", "--stale", "miss", "-o", "out.npz"});
 }
@@ -154,7 +158,9 @@ TEST_F(BadSubspaces, RandomDamage) {
       byte = static_cast<char>(byte ^ (1 << random() % 8));
     }
     folder.Write("hello.kpsa", bytes);
-    const ProcessResult run = RunKpsa({"eval", "hello.yaml", "--accelerate", "--frames", "0:6:3", "--force", "-o", "out.npz"}, kMostSeconds, folder.path());
+    const ProcessResult run =
+        RunKpsa({"eval", "hello.yaml", "--accelerate", "--frames", "0:6:3", "--force", "-o", "out.npz"},
+                kMostSeconds, folder.path());
     ExpectBounded(run);
     ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 3) << round << "\n" << run.err;
     EXPECT_LE(run.error_lines(), 5u);

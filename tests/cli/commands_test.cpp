@@ -1,10 +1,10 @@
 // What the commands do with sound input, on the smallest rig.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fmt/format.h>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -87,8 +87,8 @@ TEST(Eval, SettingsAndPosesMovePoints) {
   EXPECT_EQ(RunKpsa({"compare", folder / "set.npz", folder / "pose.npz"}).exit_code, 0);
 }
 
-// A pose is not the rest state: what deformers remember of the rest (the detail that deltaMush gives back, where a
-// lattice was bound) is the same whether a value is set or animated.
+// A pose is not the rest state: what deformers remember of the rest (the detail that deltaMush gives back,
+// where a lattice was bound) is the same whether a value is set or animated.
 TEST(Eval, ASettingIsTheSameAsAClipThatHoldsIt) {
   const TemporaryFolder folder;
   // The clip's rotation at one time, set on the control while no clip plays
@@ -101,17 +101,22 @@ TEST(Eval, ASettingIsTheSameAsAClipThatHoldsIt) {
   ASSERT_EQ(matrix.exit_code, 0) << matrix.err;
   const std::string values = nlohmann::json::parse(matrix.out).at("plugs").at(0).at("values").at(0).dump();
   Ok({"eval", bend, "--times", "0.8", "-o", folder / "clip.npz"});
-  Ok({"eval", bend, "--rest", "--times", "0.8", "--set", "upper.offsetParentMatrix=" + values, "-o", folder / "set.npz"});
+  Ok({"eval", bend, "--rest", "--times", "0.8", "--set", "upper.offsetParentMatrix=" + values, "-o",
+      folder / "set.npz"});
   const ProcessResult compared =
       RunKpsa({"compare", folder / "clip.npz", folder / "set.npz", "--tolerance", "0.001mm"});
   EXPECT_EQ(compared.exit_code, 0) << compared.out;
-  Ok({"eval", bend, "--rest", "--times", "0.8", "--set", "upper.offsetParentMatrix=" + values, "--set", "mush.iterations=0", "-o", folder / "skin.npz"});
-  EXPECT_EQ(RunKpsa({"compare", folder / "set.npz", folder / "skin.npz", "--tolerance", "0.1mm"}).exit_code, 1);
+  Ok({"eval", bend, "--rest", "--times", "0.8", "--set", "upper.offsetParentMatrix=" + values, "--set",
+      "mush.iterations=0", "-o", folder / "skin.npz"});
+  EXPECT_EQ(RunKpsa({"compare", folder / "set.npz", folder / "skin.npz", "--tolerance", "0.1mm"}).exit_code,
+            1);
 }
 
 TEST(Get, NamesWithQuotesAreQuoted) {
   const TemporaryFolder folder;
-  folder.Write("a.yaml", fmt::format("kpsa: 1\ncharacter: {}/hello/hello.glb\nnodes: {{'say \"hi\", you': {{type: plusMinusAverage}}}}\n", KPSA_SCENES_DIR));
+  folder.Write("a.yaml", fmt::format("kpsa: 1\ncharacter: {}/hello/hello.glb\nnodes: {{'say \"hi\", you': "
+                                     "{{type: plusMinusAverage}}}}\n",
+                                     KPSA_SCENES_DIR));
   const ProcessResult run = RunKpsa({"get", folder / "a.yaml", "say \"hi\", you.output", "--times", "0"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(run.out.substr(0, run.out.find('\n')), "time,\"say \"\"hi\"\", you.output\"");

@@ -22,15 +22,17 @@ struct GlbParts {
   std::string Bytes() const {
     std::string text = json.dump();
     while (text.size() % 4 != 0) text += ' ';
-    return "glTF" + GltfBuilder::U32(2) + GltfBuilder::U32(28 + text.size() + bin.size()) + GltfBuilder::U32(text.size()) + "JSON" +
-           text + GltfBuilder::U32(bin.size()) + std::string("BIN\0", 4) + bin;
+    return "glTF" + GltfBuilder::U32(2) + GltfBuilder::U32(28 + text.size() + bin.size()) +
+           GltfBuilder::U32(text.size()) + "JSON" + text + GltfBuilder::U32(bin.size()) +
+           std::string("BIN\0", 4) + bin;
   }
   // Element i of an accessor of tightly packed numbers.
   template <typename T>
   T* At(int accessor, std::size_t i, std::size_t width) {
     const nlohmann::json& a = json["accessors"][static_cast<std::size_t>(accessor)];
     const nlohmann::json& view = json["bufferViews"][a["bufferView"].get<std::size_t>()];
-    const std::size_t begin = view.value("byteOffset", std::size_t{0}) + a.value("byteOffset", std::size_t{0});
+    const std::size_t begin =
+        view.value("byteOffset", std::size_t{0}) + a.value("byteOffset", std::size_t{0});
     return reinterpret_cast<T*>(bin.data() + begin + i * width * sizeof(T));
   }
 

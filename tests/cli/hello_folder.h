@@ -31,7 +31,9 @@ class HelloFolder : public TemporaryFolder {
   static std::string Yaml();
   static std::string Glb();
   // Writes hello.yaml with one place changed; its path.
-  std::string Edit(const std::string& from, const std::string& to) const { return Write("hello.yaml", Replaced(Read(*this / "hello.yaml"), from, to)); }
+  std::string Edit(const std::string& from, const std::string& to) const {
+    return Write("hello.yaml", Replaced(Read(*this / "hello.yaml"), from, to));
+  }
   std::string rig() const { return *this / "hello.yaml"; }
   // Adds the clip "sway", in which the lower joint turns as the upper one does in "wave".
   void AddSway() const {

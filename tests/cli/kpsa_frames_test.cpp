@@ -1,5 +1,5 @@
-// What a frame of an accelerated rig is: a hit, a blend or the full evaluation, whatever came before it and whoever
-// evaluates it. On the bundled hello rig with thresholds that make all three happen.
+// What a frame of an accelerated rig is: a hit, a blend or the full evaluation, whatever came before it and
+// whoever evaluates it. On the bundled hello rig with thresholds that make all three happen.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -11,7 +11,6 @@
 
 namespace kpsa {
 namespace {
-
 
 class KpsaFrames : public ::testing::Test {
  protected:
@@ -45,7 +44,9 @@ class KpsaFrames : public ::testing::Test {
     }
     return frames;
   }
-  static bool IsBlend(const RunFrame& frame) { return !frame.hit && frame.score > tau_lo_ && frame.score < tau_; }
+  static bool IsBlend(const RunFrame& frame) {
+    return !frame.hit && frame.score > tau_lo_ && frame.score < tau_;
+  }
 
   static inline std::shared_ptr<const Subspace> trained_, mixed_;
   static inline std::vector<std::vector<double>> poses_;
@@ -75,7 +76,8 @@ TEST_F(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
       ++blends;
       const double u = (frame.score - tau_lo_) / (tau_ - tau_lo_), weight = u * u * (3 - 2 * u);
       for (std::size_t i = 0; i < exact.size(); ++i) {
-        ASSERT_NEAR(frame.points[i], reconstructed[i] + weight * (static_cast<double>(exact[i]) - reconstructed[i]), 1e-7);
+        ASSERT_NEAR(frame.points[i],
+                    reconstructed[i] + weight * (static_cast<double>(exact[i]) - reconstructed[i]), 1e-7);
       }
     } else {
       ++misses;
@@ -124,11 +126,13 @@ TEST_F(KpsaFrames, AnyThreadsBlocksAndOrderGiveTheSameBytes) {
       options.block = block;
       std::size_t seen = 0, wrong = 0;
       const Status status = EvaluateFrames(
-          run.plan, order.size(), options, [&](std::size_t f, Evaluator& evaluator) { run.Pose(poses_[order[f]], &evaluator); },
+          run.plan, order.size(), options,
+          [&](std::size_t f, Evaluator& evaluator) { run.Pose(poses_[order[f]], &evaluator); },
           [&](std::size_t f, const Evaluator& evaluator, const Status& evaluated) -> Status {
             if (!evaluated.ok()) return evaluated;
             const RunFrame frame = run.Frame(evaluator);
-            wrong += !SameBytes(frame.points, expected[order[f]].points) || frame.hit != expected[order[f]].hit ||
+            wrong += !SameBytes(frame.points, expected[order[f]].points) ||
+                     frame.hit != expected[order[f]].hit ||
                      std::memcmp(&frame.score, &expected[order[f]].score, sizeof(double)) != 0;
             ++seen;
             return Status();
@@ -145,8 +149,8 @@ TEST_F(KpsaFrames, AnyThreadsBlocksAndOrderGiveTheSameBytes) {
   }
 }
 
-// From a hit through the blend zone to a miss, slowly: what is emitted minus the exact points goes to nothing without a
-// jump. With a zone of no width, it jumps by the whole error.
+// From a hit through the blend zone to a miss, slowly: what is emitted minus the exact points goes to nothing
+// without a jump. With a zone of no width, it jumps by the whole error.
 TEST_F(KpsaFrames, NothingPopsInTheBlendZone) {
   RigRun full(kHello), pure(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
   constexpr std::size_t kSteps = 400;
@@ -210,7 +214,8 @@ TEST_F(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
       }
       EXPECT_FALSE(frame.hit);
       EXPECT_EQ(frame.reason, MissReason::kOutOfRange);
-      EXPECT_NE(frame.text.find("upper.matrix is outside its trained range"), std::string::npos) << frame.text;
+      EXPECT_NE(frame.text.find("upper.matrix is outside its trained range"), std::string::npos)
+          << frame.text;
       EXPECT_TRUE(SameBytes(frame.points, full.Evaluate().points));
     }
   }

@@ -1,5 +1,5 @@
-// Accelerated rigs of other shapes: several meshes and stages, a rig that travels, and motion that no training pose
-// had. Each hit has to keep the tolerance.
+// Accelerated rigs of other shapes: several meshes and stages, a rig that travels, and motion that no
+// training pose had. Each hit has to keep the tolerance.
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -31,10 +31,12 @@ class TwoMeshes : public ::testing::Test {
     glb.json["scenes"][0]["nodes"].push_back(3);
     folder_->Write("hello.glb", glb.Bytes());
     folder_->Edit("  mush: {type: deltaMush, iterations: 10}\n",
-                  "  mush: {type: deltaMush, iterations: 10}\n  soft: {type: deltaMush, iterations: 4}\n  grip: {type: transform}\n"
+                  "  mush: {type: deltaMush, iterations: 10}\n  soft: {type: deltaMush, iterations: 4}\n  "
+                  "grip: {type: transform}\n"
                   "  push: {type: softMod, matrix: grip.worldMatrix, falloffRadius: 30}\n");
     folder_->Edit("  - {meshes: [column], stack: [skin, cage, mush]}\n",
-                  "  - {meshes: [column], stack: [skin, cage, mush]}\n  - {meshes: [shell], stack: [skin, soft, push]}\n");
+                  "  - {meshes: [column], stack: [skin, cage, mush]}\n  - {meshes: [shell], stack: [skin, "
+                  "soft, push]}\n");
     folder_->Edit("  upper.rotateX:", "  grip.translateX: {min: -3, max: 3}\n  upper.rotateX:");
     folder_->Edit("points: [column@mush]", "points: [column@mush, shell@soft]");
     TrainOptions options = QuickTraining();
@@ -70,7 +72,8 @@ TEST_F(TwoMeshes, HitsKeepTheToleranceAndLaterStagesAreExactOnThem) {
       beyond += LargestDistance(MeshPart(frame.points, m, count), MeshPart(exact.points, m, count)) > kLoose;
     }
     // push moves the shell by what the grip moves, which the subspace knows nothing of
-    pushed = std::max(pushed, LargestDistance(MeshPart(frame.points, 0, count), MeshPart(frame.points, 1, count)));
+    pushed =
+        std::max(pushed, LargestDistance(MeshPart(frame.points, 0, count), MeshPart(frame.points, 1, count)));
   }
   EXPECT_GT(hits, poses.size() / 4);
   EXPECT_LE(beyond, poses.size() / 20);
@@ -121,14 +124,16 @@ class Travelling : public ::testing::Test {
     run->Set("lower.rotateY", 2.5 * t);
     run->Set("lower.rotateX", -0.7 * t);
   }
-  const std::vector<std::string> moving_ = {"lower.translateX", "lower.translateZ", "lower.rotateX", "lower.rotateY"};
+  const std::vector<std::string> moving_ = {"lower.translateX", "lower.translateZ", "lower.rotateX",
+                                            "lower.rotateY"};
 };
 
 // What a stage gives in mesh space is not in the space of a joint, whatever that does.
 TEST_F(Travelling, AStageBeforeTheSkinStaysInMeshSpace) {
   const HelloFolder folder;
-  folder.Edit("  mush: {type: deltaMush, iterations: 10}\n", "  mush: {type: deltaMush, iterations: 10}\n  grip: {type: transform}\n"
-                                                              "  push: {type: softMod, matrix: grip.worldMatrix, falloffRadius: 30}\n");
+  folder.Edit("  mush: {type: deltaMush, iterations: 10}\n",
+              "  mush: {type: deltaMush, iterations: 10}\n  grip: {type: transform}\n"
+              "  push: {type: softMod, matrix: grip.worldMatrix, falloffRadius: 30}\n");
   folder.Edit("[skin, cage, mush]", "[push, mush, skin]");
   folder.Edit("  upper.rotateX:", "  grip.translateX: {min: -5, max: 5}\n  upper.rotateX:");
   folder.Edit("subspace: hello.kpsa", "space: upper, subspace: hello.kpsa");
@@ -156,7 +161,8 @@ TEST_F(Travelling, PlacingTheSpaceKeepsTheSubspace) {
     return result.out;
   };
   run({"train", "hello.yaml", "-q", "--tolerance", "10mm"});
-  const auto report = nlohmann::json::parse(run({"eval", "hello.yaml", "--accelerate", "--set", "lower.translateX=5000", "-o", "far.npz", "--json"}));
+  const auto report = nlohmann::json::parse(run(
+      {"eval", "hello.yaml", "--accelerate", "--set", "lower.translateX=5000", "-o", "far.npz", "--json"}));
   EXPECT_EQ(report["accelerated"]["misses"], 0) << report.dump();
 }
 
@@ -166,7 +172,8 @@ TEST_F(Travelling, RigidMotionOfTheSpaceKeepsEveryHit) {
   const auto trained = TrainRig(path, QuickTraining());
   ASSERT_NE(trained, nullptr);
   EXPECT_EQ(trained->space, "lower");
-  RigRun full(path, {.varying = moving_}), run(path, {.subspace = trained, .varying = moving_}), still(path, {.subspace = trained});
+  RigRun full(path, {.varying = moving_}), run(path, {.subspace = trained, .varying = moving_}),
+      still(path, {.subspace = trained});
   ASSERT_TRUE(run.ok()) << run.error;
   std::size_t hits = 0, hits_still = 0;
   double travelled = 0;
@@ -187,7 +194,8 @@ TEST_F(Travelling, RigidMotionOfTheSpaceKeepsEveryHit) {
   EXPECT_GT(travelled, 1.0);
   EXPECT_GT(hits_still, poses.size() / 2);
   // Frames whose score is about the threshold may fall on either side of it
-  EXPECT_NEAR(static_cast<double>(hits), static_cast<double>(hits_still), 0.1 * static_cast<double>(poses.size()));
+  EXPECT_NEAR(static_cast<double>(hits), static_cast<double>(hits_still),
+              0.1 * static_cast<double>(poses.size()));
 }
 
 TEST_F(Travelling, WithoutASpaceItMisses) {
@@ -230,7 +238,8 @@ TEST_F(Travelling, LeavingADeformerBehindMissesOrKeepsTheTolerance) {
   ASSERT_NE(trained, nullptr);
   const std::vector<std::string> moving = {"lower.translateX", "lower.translateY"};
   constexpr double kTight = 1e-4;
-  RigRun full(folder.rig(), {.varying = moving}), run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kTight}, .varying = moving}),
+  RigRun full(folder.rig(), {.varying = moving}),
+      run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kTight}, .varying = moving}),
       pure(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .varying = moving});
   ASSERT_TRUE(run.ok()) << run.error;
   double unguarded = 0;
@@ -241,7 +250,8 @@ TEST_F(Travelling, LeavingADeformerBehindMissesOrKeepsTheTolerance) {
       for (RigRun* r : {&full, &run, &pure}) r->Set(plug, 0.0025 * step);
       const std::vector<float> exact = full.Evaluate().points;
       const RunFrame frame = run.Evaluate();
-      EXPECT_LE(LargestDistance(frame.points, exact), 1.2 * kTight) << plug << " " << step << " " << frame.score;
+      EXPECT_LE(LargestDistance(frame.points, exact), 1.2 * kTight)
+          << plug << " " << step << " " << frame.score;
       unguarded = std::max(unguarded, LargestDistance(pure.Evaluate().points, exact));
     }
   }
@@ -338,14 +348,16 @@ TEST_F(Untrained, ANewControlMissesByName) {
 // A matrix that no transform makes guards itself.
 TEST_F(Untrained, ADrivenMatrixMissesByName) {
   const HelloFolder folder;
-  folder.Edit("nodes:\n", "nodes:\n  m: {type: multiplyDivide}\n  k: {type: composeMatrix, inputTranslate: m.output}\n"
-                         "  grip: {type: cluster, matrix: k.outputMatrix, members: {vertices: \"700:793\"}}\n");
+  folder.Edit("nodes:\n",
+              "nodes:\n  m: {type: multiplyDivide}\n  k: {type: composeMatrix, inputTranslate: m.output}\n"
+              "  grip: {type: cluster, matrix: k.outputMatrix, members: {vertices: \"700:793\"}}\n");
   folder.Edit("[skin, cage, mush]", "[skin, cage, grip, mush]");
   folder.Edit("  upper.rotateX:", "  m.input1.x: {min: 0, max: 0.001}\n  upper.rotateX:");
   const auto trained = TrainRig(folder.rig(), QuickTraining());
   ASSERT_NE(trained, nullptr);
   const std::vector<std::string> axis = {"m.input1.y"};
-  RigRun full(folder.rig(), {.varying = axis}), run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .varying = axis});
+  RigRun full(folder.rig(), {.varying = axis}),
+      run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .varying = axis});
   ASSERT_TRUE(run.ok()) << run.error;
   EXPECT_TRUE(run.Evaluate().hit);
   for (const char* plug : {"m.input1.x", "m.input1.y"}) {
@@ -372,7 +384,8 @@ TEST_F(Untrained, AnotherAxisOfATrainedJointMisses) {
       for (RigRun* r : {&full, &run}) r->Set(plug, 0.05 * step);
       const RunFrame frame = run.Evaluate();
       hits += frame.hit;
-      EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.2 * kTolerance) << plug << " " << step;
+      EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.2 * kTolerance)
+          << plug << " " << step;
     }
     EXPECT_GE(hits, 1u) << plug;
     EXPECT_LT(hits, 10u) << plug;

@@ -14,8 +14,10 @@ using nlohmann::json;
 
 class OddGltf : public RefusalTest {
  protected:
-  // Evaluates a document at two times. Array `key`, if one is named, must hold these positions at the first of them.
-  Npz Evaluate(const GltfBuilder& builder, const std::vector<std::string>& more = {"--times", "0,0.5"}) const {
+  // Evaluates a document at two times. Array `key`, if one is named, must hold these positions at the first
+  // of them.
+  Npz Evaluate(const GltfBuilder& builder,
+               const std::vector<std::string>& more = {"--times", "0,0.5"}) const {
     folder.Write("c.gltf", builder.Text());
     ExpectGood({"inspect", "c.gltf"});
     ExpectGood({"validate", "c.gltf", "-q"});
@@ -32,7 +34,8 @@ class OddGltf : public RefusalTest {
     if (array == nullptr || array->shape.size() != 3) return {};
     const std::vector<float> all = array->Floats();
     const auto size = static_cast<std::ptrdiff_t>(array->shape[1] * 3);
-    return {all.begin() + static_cast<std::ptrdiff_t>(frame) * size, all.begin() + static_cast<std::ptrdiff_t>(frame + 1) * size};
+    return {all.begin() + static_cast<std::ptrdiff_t>(frame) * size,
+            all.begin() + static_cast<std::ptrdiff_t>(frame + 1) * size};
   }
   static std::vector<std::string> Keys(const Npz& npz) {
     std::vector<std::string> keys;
@@ -89,10 +92,12 @@ TEST_F(OddGltf, AMeshWithoutSkinUnderAJointFollowsIt) {
   GltfBuilder b = GltfBuilder::Character();
   b.root["nodes"].push_back({{"name", "hat"}, {"mesh", 1}});
   b.root["nodes"][2]["children"] = {4};
-  b.Push("meshes", {{"primitives", {{{"attributes", {{"POSITION", b.Accessor<float>({1, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC3")}}}}}}});
+  b.Push("meshes",
+         {{"primitives",
+           {{{"attributes", {{"POSITION", b.Accessor<float>({1, 0, 0, 0, 1, 0, 0, 0, 1}, "VEC3")}}}}}}});
   const Npz npz = Evaluate(b, {"--times", "0,1"});
   EXPECT_EQ(Frame(npz, "hat/0"), (std::vector<float>{1, 1, 5, 0, 2, 5, 0, 1, 6}));  // tip stands at (0, 1, 5)
-  const std::vector<float> turned = Frame(npz, "hat/0", 1);                        // by 180 degrees about Z
+  const std::vector<float> turned = Frame(npz, "hat/0", 1);                         // by 180 degrees about Z
   const std::vector<float> expected = {-1, 1, 5, 0, 0, 5, 0, 1, 6};
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(turned[i], expected[i], 1e-6) << i;
 }
@@ -128,7 +133,9 @@ TEST_F(OddGltf, AccessorsOfAllShapes) {
   GltfBuilder b = Square(4, {0, 1, 2});
   const int indices = b.View<std::uint8_t>({1, 3}), values = b.View<float>({7, 8, 9, -1, -2, -3});
   b.root["accessors"][0].erase("bufferView");
-  b.root["accessors"][0]["sparse"] = {{"count", 2}, {"indices", {{"bufferView", indices}, {"componentType", 5121}}}, {"values", {{"bufferView", values}}}};
+  b.root["accessors"][0]["sparse"] = {{"count", 2},
+                                      {"indices", {{"bufferView", indices}, {"componentType", 5121}}},
+                                      {"values", {{"bufferView", values}}}};
   EXPECT_EQ(Frame(Evaluate(b), "square/0"), (std::vector<float>{0, 0, 0, 7, 8, 9, 0, 0, 0, -1, -2, -3}));
   // Interleaved: position and something else in one view
   GltfBuilder interleaved = Square(4, {0, 1, 2});
@@ -169,8 +176,11 @@ TEST_F(OddGltf, ClipsOfOneKey) {
     GltfBuilder b = GltfBuilder::Character();
     const bool cubic = std::string(interpolation) == "CUBICSPLINE";
     const int time = b.Accessor<float>({0.25f}, "SCALAR");
-    const int turn = b.Accessor<float>(cubic ? std::vector<float>{0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0} : std::vector<float>{0, 0, 1, 0}, "VEC4");
-    b.root["animations"][0]["samplers"][0] = {{"input", time}, {"output", turn}, {"interpolation", interpolation}};
+    const int turn = b.Accessor<float>(
+        cubic ? std::vector<float>{0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0} : std::vector<float>{0, 0, 1, 0},
+        "VEC4");
+    b.root["animations"][0]["samplers"][0] = {
+        {"input", time}, {"output", turn}, {"interpolation", interpolation}};
     const Npz npz = Evaluate(b, {"--times", "0,0.25,9"});
     EXPECT_EQ(Frame(npz, "body/0", 1), Frame(npz, "body/0", 0)) << interpolation;
     // Vertex 1 follows the tip alone, which is turned about Z by 180 degrees; the morph adds at 9 s
@@ -190,11 +200,14 @@ TEST_F(OddGltf, Primitives) {
   for (int mode = 0; mode <= 6; ++mode) {
     SCOPED_TRACE(mode);
     for (const bool indexed : {false, true}) {
-      const GltfBuilder b = Square(mode, indexed ? std::vector<std::uint16_t>{0, 1, 2, 3} : std::vector<std::uint16_t>{});
+      const GltfBuilder b =
+          Square(mode, indexed ? std::vector<std::uint16_t>{0, 1, 2, 3} : std::vector<std::uint16_t>{});
       EXPECT_EQ(Frame(Evaluate(b), "square/0"), kSquare);
       // Points and lines have no surface, and deformers live with that
-      folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\nnodes: {mush: {type: deltaMush, pinBorderVertices: off}, cage: {type: lattice}}\n"
-                             "deform: [{meshes: [square], stack: [gltf, cage, mush]}]\n");
+      folder.Write("t.yaml",
+                   "kpsa: 1\ncharacter: c.gltf\nnodes: {mush: {type: deltaMush, pinBorderVertices: off}, "
+                   "cage: {type: lattice}}\n"
+                   "deform: [{meshes: [square], stack: [gltf, cage, mush]}]\n");
       ExpectGood({"eval", "t.yaml", "--times", "0", "-o", "rig.npz", "--force", "-q"});
       ExpectGood({"render", "t.yaml", "-o", "rig.png", "--force", "-q", "--size", "32x32"});
     }
@@ -202,14 +215,16 @@ TEST_F(OddGltf, Primitives) {
 }
 
 TEST_F(OddGltf, SurfacesWithoutArea) {
-  for (const std::vector<std::uint16_t>& indices : {std::vector<std::uint16_t>{0, 0, 0}, std::vector<std::uint16_t>{0, 1, 1, 2, 2, 3}}) {
+  for (const std::vector<std::uint16_t>& indices :
+       {std::vector<std::uint16_t>{0, 0, 0}, std::vector<std::uint16_t>{0, 1, 1, 2, 2, 3}}) {
     EXPECT_EQ(Frame(Evaluate(Square(4, indices)), "square/0"), kSquare);
   }
   GltfBuilder b = Square(4, {0, 1, 2, 1, 3, 2});
   for (std::size_t i = 0; i < 48; ++i) b.buffer[i] = 0;  // all vertices at the origin: one point
   EXPECT_EQ(Frame(Evaluate(b), "square/0"), std::vector<float>(12, 0.0f));
-  folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\nnodes: {mush: {type: deltaMush}, cage: {type: lattice}}\n"
-                         "deform: [{meshes: [square], stack: [gltf, cage, mush]}]\n");
+  folder.Write("t.yaml",
+               "kpsa: 1\ncharacter: c.gltf\nnodes: {mush: {type: deltaMush}, cage: {type: lattice}}\n"
+               "deform: [{meshes: [square], stack: [gltf, cage, mush]}]\n");
   ExpectGood({"eval", "t.yaml", "--times", "0", "-o", "rig.npz", "--force", "-q"});
 }
 

@@ -38,7 +38,8 @@ ProcessResult Run(std::vector<std::string> words, double limit_seconds, double i
   for (char** entry = environ; *entry != nullptr; ++entry) environment.push_back(*entry);
   environment.push_back(nullptr);
   pid_t process = 0;
-  const int spawned = posix_spawn(&process, words.front().c_str(), &actions, nullptr, argv.data(), environment.data());
+  const int spawned =
+      posix_spawn(&process, words.front().c_str(), &actions, nullptr, argv.data(), environment.data());
   posix_spawn_file_actions_destroy(&actions);
   if (spawned != 0) {
     result.err = "cannot be started";

@@ -47,20 +47,24 @@ std::vector<std::string> ShellLines(const std::string& markdown) {
   return lines;
 }
 
-// What is wrong with a script, which takes minutes when it runs: a kpsa command, option or scene that does not exist.
+// What is wrong with a script, which takes minutes when it runs: a kpsa command, option or scene that does
+// not exist.
 std::string ScriptProblem(const fs::path& script) {
   if (!fs::is_regular_file(script)) return "no such script";
-  if (RunShell("sh -n '" + script.string() + "'", kMostSeconds, "/").exit_code != 0) return "is no shell script";
+  if (RunShell("sh -n '" + script.string() + "'", kMostSeconds, "/").exit_code != 0)
+    return "is no shell script";
   std::istringstream in(TemporaryFolder::Read(script.string()));
   for (std::string line; std::getline(in, line);) {
     const std::vector<std::string> words = Words(WithoutComment(line));
     if (words.size() < 2 || words[0] != "build/kpsa") continue;
     const ProcessResult help = RunKpsa({words[1], "--help"});
-    if (help.out.find("kpsa " + words[1] + " ") == std::string::npos) return fmt::format("no command {}", words[1]);  // the help of all
+    if (help.out.find("kpsa " + words[1] + " ") == std::string::npos)
+      return fmt::format("no command {}", words[1]);  // the help of all
     for (std::size_t i = 2; i < words.size(); ++i) {
       const std::string& word = words[i];
       if (word.starts_with("scenes/") && !fs::exists(kProject / word)) return fmt::format("no file {}", word);
-      if (word.starts_with('-') && help.out.find(word) == std::string::npos) return fmt::format("{} has no option {}", words[1], word);
+      if (word.starts_with('-') && help.out.find(word) == std::string::npos)
+        return fmt::format("{} has no option {}", words[1], word);
     }
   }
   return "";
@@ -87,7 +91,8 @@ class ReadmeTest : public ::testing::Test {
         const ProcessResult run = RunShell(line, kMostSeconds, folder_.path());
         if (run.exit_code != 0) problem = fmt::format("exit {}\n{}", run.exit_code, run.err);
         for (std::size_t i = 0; i + 1 < words.size() && problem.empty(); ++i) {
-          if (words[i] == "-o" && !fs::exists(folder_ / words[i + 1])) problem = words[i + 1] + " was not written";
+          if (words[i] == "-o" && !fs::exists(folder_ / words[i + 1]))
+            problem = words[i + 1] + " was not written";
         }
       }
       if (!problem.empty()) problems.push_back(line + ": " + problem);
@@ -102,7 +107,8 @@ class ReadmeTest : public ::testing::Test {
 TEST_F(ReadmeTest, EveryLineWorks) {
   const std::vector<std::string> lines = ShellLines(Text());
   EXPECT_GE(lines.size(), 8u);
-  for (const char* line : {"sh scenes/demo.sh", "sh tests/run.sh", "build/kpsa train char.yaml", "build/kpsa bench char.yaml"}) {
+  for (const char* line :
+       {"sh scenes/demo.sh", "sh tests/run.sh", "build/kpsa train char.yaml", "build/kpsa bench char.yaml"}) {
     EXPECT_NE(std::find(lines.begin(), lines.end(), line), lines.end()) << line;
   }
   for (const std::string& problem : Problems(Text())) ADD_FAILURE() << problem;
@@ -112,8 +118,9 @@ TEST_F(ReadmeTest, EveryLineWorks) {
 TEST_F(ReadmeTest, CanaryOfInventedLines) {
   // A copy of which no line is right
   std::string copy = Text();
-  for (const auto& [right, wrong] : {std::pair("build/kpsa ", "build/kpsa quickly-"), std::pair("sh scenes/", "sh scenes/no-"),
-                                     std::pair("sh tests/", "sh tests/no-")}) {
+  for (const auto& [right, wrong] :
+       {std::pair("build/kpsa ", "build/kpsa quickly-"), std::pair("sh scenes/", "sh scenes/no-"),
+        std::pair("sh tests/", "sh tests/no-")}) {
     for (std::size_t at = copy.find(right); at != std::string::npos; at = copy.find(right, at + 1)) {
       copy.replace(at, std::string(right).size(), wrong);
     }
@@ -127,10 +134,14 @@ TEST_F(ReadmeTest, CanaryOfInventedLines) {
 }
 
 TEST_F(ReadmeTest, CanaryOfInventedScripts) {
-  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "set -e\nbuild/kpsa bench scenes/hello/hello.yaml --json\n")), "");
-  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa learn scenes/hello/hello.yaml\n")), "no command learn");
-  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa bench scenes/hello/hello.yaml --swift\n")), "bench has no option --swift");
-  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa bench scenes/none.yaml\n")), "no file scenes/none.yaml");
+  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "set -e\nbuild/kpsa bench scenes/hello/hello.yaml --json\n")),
+            "");
+  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa learn scenes/hello/hello.yaml\n")),
+            "no command learn");
+  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa bench scenes/hello/hello.yaml --swift\n")),
+            "bench has no option --swift");
+  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa bench scenes/none.yaml\n")),
+            "no file scenes/none.yaml");
   EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "if\n")), "is no shell script");
   EXPECT_EQ(ScriptProblem(folder_ / "b.sh"), "no such script");
 }

@@ -1,5 +1,5 @@
-// What holds of every refusal, whatever was wrong: the exit code, a message of one to five lines that says where, an
-// empty stdout, no file made or changed, and bounds of time and memory.
+// What holds of every refusal, whatever was wrong: the exit code, a message of one to five lines that says
+// where, an empty stdout, no file made or changed, and bounds of time and memory.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,8 @@ class RefusalTest : public ::testing::Test {
   std::map<std::string, std::string> Files() const {
     std::map<std::string, std::string> files;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder.path())) {
-      files[entry.path().string()] = entry.is_regular_file() ? TemporaryFolder::Read(entry.path().string()) : "";
+      files[entry.path().string()] =
+          entry.is_regular_file() ? TemporaryFolder::Read(entry.path().string()) : "";
     }
     return files;
   }
@@ -39,7 +40,8 @@ class RefusalTest : public ::testing::Test {
     EXPECT_LT(static_cast<double>(run.peak_bytes), kMostBytes);
   }
   // Runs in the folder. Each of `parts` stands in the message.
-  void ExpectRefused(const std::vector<std::string>& arguments, int exit_code, const std::vector<std::string>& parts) const {
+  void ExpectRefused(const std::vector<std::string>& arguments, int exit_code,
+                     const std::vector<std::string>& parts) const {
     std::string line;
     for (const std::string& word : arguments) line += word + " ";
     SCOPED_TRACE(line);
@@ -47,14 +49,16 @@ class RefusalTest : public ::testing::Test {
     const ProcessResult run = RunKpsa(arguments, kMostSeconds, folder.path());
     ExpectBounded(run);
     EXPECT_EQ(run.exit_code, exit_code) << run.err;
-    for (const std::string& part : parts) EXPECT_NE(run.err.find(part), std::string::npos) << "no \"" << part << "\" in:\n" << run.err;
+    for (const std::string& part : parts)
+      EXPECT_NE(run.err.find(part), std::string::npos) << "no \"" << part << "\" in:\n" << run.err;
     EXPECT_GE(run.error_lines(), 1u);
     EXPECT_LE(run.error_lines(), 5u) << run.err;
     EXPECT_EQ(run.out, "");
     EXPECT_TRUE(Files() == before) << "a file was made or changed";
   }
   // A rig or character of that content is refused by all that load one.
-  void ExpectBadFile(const std::string& name, const std::string& content, const std::vector<std::string>& parts, int exit_code = 3) const {
+  void ExpectBadFile(const std::string& name, const std::string& content,
+                     const std::vector<std::string>& parts, int exit_code = 3) const {
     folder.Write(name, content);
     ExpectRefused({"eval", name, "-o", "out.npz"}, exit_code, parts);
   }

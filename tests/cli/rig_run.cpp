@@ -17,7 +17,8 @@ const NodeRegistry& AcceleratedRegistry() {
   return *registry;
 }
 
-std::shared_ptr<const Subspace> TrainRig(const std::string& path, const TrainOptions& options, const std::vector<std::string>& clips) {
+std::shared_ptr<const Subspace> TrainRig(const std::string& path, const TrainOptions& options,
+                                         const std::vector<std::string>& clips) {
   RigOptions rest;
   rest.rest = true;
   Result<Rig> rig = LoadRig(AcceleratedRegistry(), path, rest);
@@ -80,7 +81,8 @@ Status RigRun::Start(const std::string& path, const RigRunOptions& options) {
   std::vector<PlugRef> finals;
   for (const CharacterMesh& mesh : rig.scene.meshes) finals.push_back(mesh.points);
   if (options.subspace != nullptr) {
-    Result<Accelerated> result = Accelerate(rig.graph.get(), &compiler, target, options.subspace, "kpsa", options.accelerate);
+    Result<Accelerated> result =
+        Accelerate(rig.graph.get(), &compiler, target, options.subspace, "kpsa", options.accelerate);
     if (!result.ok()) return result.status();
     accelerated = std::move(*result);
     has_subspace_ = true;
@@ -147,14 +149,16 @@ RunFrame RigRun::Frame(const Evaluator& from) const {
   const auto meshes = static_cast<Index>(rig.scene.meshes.size());
   for (Index m = 0; m < meshes; ++m) {
     const ConstPointsView p = from.Points(m);
-    for (const float* values : {p.x, p.y, p.z}) frame.points.insert(frame.points.end(), values, values + p.count);
+    for (const float* values : {p.x, p.y, p.z})
+      frame.points.insert(frame.points.end(), values, values + p.count);
   }
   if (!has_subspace_) return frame;
   frame.hit = from.Get<std::int64_t>(meshes) != 0;
   frame.score = from.Get<double>(meshes + 1);
   frame.reason = static_cast<MissReason>(from.Get<std::int64_t>(meshes + 2));
   const std::int64_t offender = from.Get<std::int64_t>(meshes + 3);
-  frame.text = MissText(*accelerated.config, frame.reason, offender < 0 ? kNoIndex : static_cast<Index>(offender));
+  frame.text =
+      MissText(*accelerated.config, frame.reason, offender < 0 ? kNoIndex : static_cast<Index>(offender));
   return frame;
 }
 

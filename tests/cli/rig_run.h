@@ -22,9 +22,12 @@ inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // All node types and the KPSA node.
 const NodeRegistry& AcceleratedRegistry();
 
-// Trains the first entry of the rig's accelerate section. Fails the test and gives null where that does not work.
-std::shared_ptr<const Subspace> TrainRig(const std::string& path, const TrainOptions& options, const std::vector<std::string>& clips = {});
-// A copy of the subspace that calls a hit what scores at most `tau_lo`, and blends up to `tau`, at any finite tolerance.
+// Trains the first entry of the rig's accelerate section. Fails the test and gives null where that does not
+// work.
+std::shared_ptr<const Subspace> TrainRig(const std::string& path, const TrainOptions& options,
+                                         const std::vector<std::string>& clips = {});
+// A copy of the subspace that calls a hit what scores at most `tau_lo`, and blends up to `tau`, at any finite
+// tolerance.
 std::shared_ptr<const Subspace> WithThreshold(const Subspace& subspace, double tau_lo, double tau);
 
 // What one evaluation gave.
@@ -33,7 +36,7 @@ struct RunFrame {
   bool hit = false;           // false for a rig without a subspace
   double score = 0;
   MissReason reason = MissReason::kNone;
-  std::string text;           // of the reason
+  std::string text;  // of the reason
 };
 inline bool SameBytes(const std::vector<float>& a, const std::vector<float>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
@@ -44,9 +47,9 @@ double LargestDistance(const std::vector<float>& a, const std::vector<float>& b)
 struct RigRunOptions {
   std::shared_ptr<const Subspace> subspace = {};  // null: the rig itself
   AccelerateOptions accelerate = {};
-  std::optional<std::string> clip = {};           // unset: the rest pose
-  std::vector<std::string> varying = {};          // besides time and the controls, and known to the subspace's guards
-  std::vector<std::string> secret = {};           // the same, but no guard knows of them
+  std::optional<std::string> clip = {};   // unset: the rest pose
+  std::vector<std::string> varying = {};  // besides time and the controls, and known to the subspace's guards
+  std::vector<std::string> secret = {};   // the same, but no guard knows of them
   EvaluatorOptions evaluator = {};
 };
 
@@ -81,6 +84,7 @@ class RigRun {
 };
 
 // Poses along a smooth path through the controls' ranges, `reach` times as far as they go.
-std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, double reach, double speed = 0.37);
+std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, double reach,
+                                             double speed = 0.37);
 
 }  // namespace kpsa

@@ -1,5 +1,6 @@
-// A subspace belongs to the rig that it was trained on. What changes the points refuses it by name (exit 3); what does
-// not (values of controls, clips, the wording of the file) leaves it valid. Through the program, as a user meets it.
+// A subspace belongs to the rig that it was trained on. What changes the points refuses it by name (exit 3);
+// what does not (values of controls, clips, the wording of the file) leaves it valid. Through the program, as
+// a user meets it.
 #include <algorithm>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -16,13 +17,19 @@ using nlohmann::json;
 class SubspaceFolder : public HelloFolder {
  public:
   SubspaceFolder() {
-    Edit("  mush: {type: deltaMush, iterations: 10}\n", "  mush: {type: deltaMush, iterations: 10, weights: \"w.json#soft\"}\n");
+    Edit("  mush: {type: deltaMush, iterations: 10}\n",
+         "  mush: {type: deltaMush, iterations: 10, weights: \"w.json#soft\"}\n");
     WriteWeights(0.5);
   }
   void WriteWeights(double value) const {
-    const json file = {{"kpsa", "weights"}, {"version", 1}, {"mesh", "column"}, {"points", 794},
-                       {"maps", {{"soft", {{"default", 1}, {"indices", {5, 300}}, {"values", {0.25, value}}}},
-                                 {"unused", {{"default", value}, {"indices", json::array()}, {"values", json::array()}}}}}};
+    const json file = {
+        {"kpsa", "weights"},
+        {"version", 1},
+        {"mesh", "column"},
+        {"points", 794},
+        {"maps",
+         {{"soft", {{"default", 1}, {"indices", {5, 300}}, {"values", {0.25, value}}}},
+          {"unused", {{"default", value}, {"indices", json::array()}, {"values", json::array()}}}}}};
     Write("w.json", file.dump());
   }
   void EditGlb(const std::function<void(GlbParts*)>& edit) const {
@@ -43,16 +50,20 @@ class Stale : public ::testing::Test {
   }
   using Change = std::function<void(const SubspaceFolder&)>;
 
-  static void ExpectRefused(const std::string& what, const std::vector<std::string>& parts, const Change& change) {
+  static void ExpectRefused(const std::string& what, const std::vector<std::string>& parts,
+                            const Change& change) {
     SCOPED_TRACE(what);
     const SubspaceFolder folder;
     folder.Write("hello.kpsa", trained_);
     change(folder);
-    ASSERT_EQ(folder.Run({"eval", "hello.yaml", "--frames", "0:4", "-o", "exact.npz", "-q"}).exit_code, 0) << "the change itself is wrong";
-    const ProcessResult run = folder.Run({"eval", "hello.yaml", "--accelerate", "--frames", "0:4", "-o", "out.npz"});
+    ASSERT_EQ(folder.Run({"eval", "hello.yaml", "--frames", "0:4", "-o", "exact.npz", "-q"}).exit_code, 0)
+        << "the change itself is wrong";
+    const ProcessResult run =
+        folder.Run({"eval", "hello.yaml", "--accelerate", "--frames", "0:4", "-o", "out.npz"});
     EXPECT_EQ(run.exit_code, 3) << run.err;
     EXPECT_NE(run.err.find("hello.kpsa"), std::string::npos) << run.err;
-    for (const std::string& part : parts) EXPECT_NE(run.err.find(part), std::string::npos) << "no \"" << part << "\" in:\n" << run.err;
+    for (const std::string& part : parts)
+      EXPECT_NE(run.err.find(part), std::string::npos) << "no \"" << part << "\" in:\n" << run.err;
     EXPECT_LE(run.error_lines(), 5u) << run.err;
     EXPECT_FALSE(std::filesystem::exists(folder / "out.npz"));
   }
@@ -62,17 +73,20 @@ class Stale : public ::testing::Test {
     folder.Write("hello.kpsa", trained_);
     change(folder);
     ASSERT_EQ(folder.Run({"eval", "hello.yaml", "-o", "exact.npz", "-q"}).exit_code, 0);
-    const ProcessResult run = folder.Run({"eval", "hello.yaml", "--accelerate", "--stale", "miss", "-o", "out.npz", "--json"});
+    const ProcessResult run =
+        folder.Run({"eval", "hello.yaml", "--accelerate", "--stale", "miss", "-o", "out.npz", "--json"});
     ASSERT_EQ(run.exit_code, 0) << run.err;
     EXPECT_EQ(json::parse(run.out)["accelerated"]["hits"], 0);
     EXPECT_TRUE(TemporaryFolder::Read(folder / "out.npz") == TemporaryFolder::Read(folder / "exact.npz"));
   }
-  static void ExpectValid(const std::string& what, const Change& change, const std::vector<std::string>& arguments = {}) {
+  static void ExpectValid(const std::string& what, const Change& change,
+                          const std::vector<std::string>& arguments = {}) {
     SCOPED_TRACE(what);
     const SubspaceFolder folder;
     folder.Write("hello.kpsa", trained_);
     change(folder);
-    std::vector<std::string> all = {"eval", "hello.yaml", "--accelerate", "--tolerance", "1", "-o", "out.npz", "--json"};
+    std::vector<std::string> all = {"eval", "hello.yaml", "--accelerate", "--tolerance",
+                                    "1",    "-o",         "out.npz",      "--json"};
     all.insert(all.end(), arguments.begin(), arguments.end());
     const ProcessResult run = folder.Run(all);
     ASSERT_EQ(run.exit_code, 0) << run.err;
@@ -89,12 +103,19 @@ class Stale : public ::testing::Test {
   static inline std::string trained_;
 };
 
-// Two vertices change places, with everything that belongs to them: the same character, another order of its points.
+// Two vertices change places, with everything that belongs to them: the same character, another order of its
+// points.
 void SwapVertices(GlbParts* glb, std::uint32_t a, std::uint32_t b) {
   const json attributes = glb->json["meshes"][0]["primitives"][0]["attributes"];
-  for (const char* name : {"POSITION", "NORMAL"}) std::swap_ranges(glb->At<float>(attributes[name], a, 3), glb->At<float>(attributes[name], a, 3) + 3, glb->At<float>(attributes[name], b, 3));
-  std::swap_ranges(glb->At<float>(attributes["WEIGHTS_0"], a, 4), glb->At<float>(attributes["WEIGHTS_0"], a, 4) + 4, glb->At<float>(attributes["WEIGHTS_0"], b, 4));
-  std::swap_ranges(glb->At<std::uint8_t>(attributes["JOINTS_0"], a, 4), glb->At<std::uint8_t>(attributes["JOINTS_0"], a, 4) + 4, glb->At<std::uint8_t>(attributes["JOINTS_0"], b, 4));
+  for (const char* name : {"POSITION", "NORMAL"})
+    std::swap_ranges(glb->At<float>(attributes[name], a, 3), glb->At<float>(attributes[name], a, 3) + 3,
+                     glb->At<float>(attributes[name], b, 3));
+  std::swap_ranges(glb->At<float>(attributes["WEIGHTS_0"], a, 4),
+                   glb->At<float>(attributes["WEIGHTS_0"], a, 4) + 4,
+                   glb->At<float>(attributes["WEIGHTS_0"], b, 4));
+  std::swap_ranges(glb->At<std::uint8_t>(attributes["JOINTS_0"], a, 4),
+                   glb->At<std::uint8_t>(attributes["JOINTS_0"], a, 4) + 4,
+                   glb->At<std::uint8_t>(attributes["JOINTS_0"], b, 4));
   const int indices = glb->json["meshes"][0]["primitives"][0]["indices"];
   const std::size_t count = glb->json["accessors"][static_cast<std::size_t>(indices)]["count"];
   for (std::size_t i = 0; i < count; ++i) {
@@ -104,44 +125,57 @@ void SwapVertices(GlbParts* glb, std::uint32_t a, std::uint32_t b) {
 }
 
 TEST_F(Stale, ChangesOfTheRigAreRefusedByName) {
-  ExpectRefused("a weight map", {"stale", "mush.weights"}, [](const SubspaceFolder& folder) { folder.WriteWeights(0.75); });
+  ExpectRefused("a weight map", {"stale", "mush.weights"},
+                [](const SubspaceFolder& folder) { folder.WriteWeights(0.75); });
   ExpectRefused("iterations", {"stale", "mush.iterations"}, Edit("iterations: 10", "iterations: 11"));
-  ExpectRefused("an envelope", {"stale", "mush.envelope"}, Edit("iterations: 10", "iterations: 10, envelope: 0.9"));
-  ExpectRefused("a driver's constant", {"stale", "squeeze.outputMax"}, Edit("outputMax: 0.15", "outputMax: 0.16"));
-  ExpectRefused("divisions of a cage", {"stale", "cage.divisions"}, Edit("divisions: [2, 5, 2]", "divisions: [3, 5, 2]"));
-  ExpectRefused("an override", {"stale", "mush.smoothingStep"}, Edit("controls:", "overrides: {mush.smoothingStep: 0.4}\ncontrols:"));
+  ExpectRefused("an envelope", {"stale", "mush.envelope"},
+                Edit("iterations: 10", "iterations: 10, envelope: 0.9"));
+  ExpectRefused("a driver's constant", {"stale", "squeeze.outputMax"},
+                Edit("outputMax: 0.15", "outputMax: 0.16"));
+  ExpectRefused("divisions of a cage", {"stale", "cage.divisions"},
+                Edit("divisions: [2, 5, 2]", "divisions: [3, 5, 2]"));
+  ExpectRefused("an override", {"stale", "mush.smoothingStep"},
+                Edit("controls:", "overrides: {mush.smoothingStep: 0.4}\ncontrols:"));
   ExpectRefused("members", {"stale", "cage"}, Edit("members: all", "members: {joint: upper}"));
-  ExpectRefused("a removed entry of the stack", {"stale", "cage", "(gone)"}, Edit("[skin, cage, mush]", "[skin, mush]"));
-  ExpectRefused("reordered entries of the stack", {"stale", "cage"}, Edit("[skin, cage, mush]", "[cage, skin, mush]"));
+  ExpectRefused("a removed entry of the stack", {"stale", "cage", "(gone)"},
+                Edit("[skin, cage, mush]", "[skin, mush]"));
+  ExpectRefused("reordered entries of the stack", {"stale", "cage"},
+                Edit("[skin, cage, mush]", "[cage, skin, mush]"));
   ExpectRefused("a new entry of the stack", {"stale", "(new)"}, [](const SubspaceFolder& folder) {
     folder.Edit("[skin, cage, mush]", "[skin, cage, wire, mush]");
     folder.Edit("nodes:\n", "nodes:\n  wire: {type: tripwire}\n");
   });
-  ExpectRefused("another connection", {"stale", "cage"}, Edit("  - squeeze.outValue -> cage.points[0,2,1].x\n", ""));
+  ExpectRefused("another connection", {"stale", "cage"},
+                Edit("  - squeeze.outValue -> cage.points[0,2,1].x\n", ""));
   ExpectRefused("another stage", {"column@mush", "column@cage"}, Edit("[column@mush]", "[column@cage]"));
-  ExpectRefused("another space", {"space", "lower"}, Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa"));
+  ExpectRefused("another space", {"space", "lower"},
+                Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa"));
 }
 
 TEST_F(Stale, ChangesOfTheCharacterAreRefused) {
   ExpectRefused("reordered points", {"stale"}, Glb([](GlbParts* glb) { SwapVertices(glb, 100, 500); }));
   ExpectRefused("a moved point", {"stale"}, Glb([](GlbParts* glb) { *glb->At<float>(0, 321, 3) += 1e-4f; }));
-  ExpectRefused("a joint's place", {"stale", "upper"}, Glb([](GlbParts* glb) { glb->json["nodes"][1]["translation"] = {0, 0.21, 0}; }));
-  ExpectRefused("the bind pose", {"stale", "skin"}, Glb([](GlbParts* glb) { *glb->At<float>(7, 1, 16) *= 1.01f; }));
+  ExpectRefused("a joint's place", {"stale", "upper"}, Glb([](GlbParts* glb) {
+                  glb->json["nodes"][1]["translation"] = {0, 0.21, 0};
+                }));
+  ExpectRefused("the bind pose", {"stale", "skin"},
+                Glb([](GlbParts* glb) { *glb->At<float>(7, 1, 16) *= 1.01f; }));
   ExpectRefused("skin weights", {"stale", "skin"}, Glb([](GlbParts* glb) {
-    float* weights = glb->At<float>(3, 400, 4);
-    weights[0] = 0.5f, weights[1] = 0.5f, weights[2] = weights[3] = 0;
-    std::uint8_t* joints = glb->At<std::uint8_t>(2, 400, 4);
-    joints[0] = 0, joints[1] = 1;
-  }));
+                  float* weights = glb->At<float>(3, 400, 4);
+                  weights[0] = 0.5f, weights[1] = 0.5f, weights[2] = weights[3] = 0;
+                  std::uint8_t* joints = glb->At<std::uint8_t>(2, 400, 4);
+                  joints[0] = 0, joints[1] = 1;
+                }));
   ExpectRefused("triangles", {"stale"}, Glb([](GlbParts* glb) {  // one quad split along its other diagonal
-    std::uint32_t* t = glb->At<std::uint32_t>(4, 3 * 1000, 1);
-    std::swap(t[2], t[4]);
-  }));
+                  std::uint32_t* t = glb->At<std::uint32_t>(4, 3 * 1000, 1);
+                  std::swap(t[2], t[4]);
+                }));
 }
 
 // Deformers bind to the rest pose: what a rig sets there is part of it, also on a control.
 TEST_F(Stale, AnotherRestPoseIsAnotherRig) {
-  ExpectRefused("a control's value in the rig", {"upper.rotate"}, Edit("connections:\n", "overrides: {upper.rotateZ: -40}\nconnections:\n"));
+  ExpectRefused("a control's value in the rig", {"upper.rotate"},
+                Edit("connections:\n", "overrides: {upper.rotateZ: -40}\nconnections:\n"));
 }
 
 TEST_F(Stale, AsMissesTheRigIsExact) {
@@ -154,7 +188,8 @@ TEST_F(Stale, WhatDoesNotChangeThePointsKeepsTheSubspace) {
   const Change nothing = [](const SubspaceFolder&) {};
   ExpectValid("nothing", nothing);
   ExpectValid("the value of a control", nothing, {"--rest", "--set", "upper.rotateX=12"});
-  ExpectValid("the value of a control while a clip plays", nothing, {"--set", "upper.rotateX=2", "--frames", "0:12"});
+  ExpectValid("the value of a control while a clip plays", nothing,
+              {"--set", "upper.rotateX=2", "--frames", "0:12"});
   ExpectValid("the rest pose", nothing, {"--rest"});
   ExpectValid("frames of a clip", nothing, {"--frames", "7:20:3"});
   ExpectValid("another rate", nothing, {"--fps", "12"});
@@ -163,18 +198,23 @@ TEST_F(Stale, WhatDoesNotChangeThePointsKeepsTheSubspace) {
     folder.Edit("type: deltaMush, iterations: 10", "type: deltaMush,   iterations:   10");
   });
   ExpectValid("order of keys", [](const SubspaceFolder& folder) {
-    folder.Edit("{type: deltaMush, iterations: 10, weights: \"w.json#soft\"}", "{weights: \"w.json#soft\", iterations: 10, type: deltaMush}");
+    folder.Edit("{type: deltaMush, iterations: 10, weights: \"w.json#soft\"}",
+                "{weights: \"w.json#soft\", iterations: 10, type: deltaMush}");
     folder.Edit("divisions: [2, 5, 2], members: all", "members: all, divisions: [2, 5, 2]");
   });
   ExpectValid("order of sections, nodes and connections", [](const SubspaceFolder& folder) {
     const std::string text = TemporaryFolder::Read(folder.rig());
-    const std::size_t nodes = text.find("nodes:\n"), connections = text.find("connections:\n"), deform = text.find("deform:\n");
-    const std::string a = "  - squeeze.outValue -> cage.points[0,2,0].x\n", b = "  - squeeze.outValue -> cage.points[0,2,1].x\n";
+    const std::size_t nodes = text.find("nodes:\n"), connections = text.find("connections:\n"),
+                      deform = text.find("deform:\n");
+    const std::string a = "  - squeeze.outValue -> cage.points[0,2,0].x\n",
+                      b = "  - squeeze.outValue -> cage.points[0,2,1].x\n";
     ASSERT_EQ(text.substr(connections, deform - connections), "connections:\n" + a + b);
-    folder.Write("hello.yaml", text.substr(0, nodes) + text.substr(deform) + "connections:\n" + b + a + text.substr(nodes, connections - nodes));
+    folder.Write("hello.yaml", text.substr(0, nodes) + text.substr(deform) + "connections:\n" + b + a +
+                                   text.substr(nodes, connections - nodes));
     folder.Edit("  cage: {type: lattice", "  spare: {type: transform}\n  cage: {type: lattice");
   });
-  ExpectValid("ranges of controls", Edit("upper.rotateX: {min: -30, max: 30}", "upper.rotateX: {min: -40, max: 25}"));
+  ExpectValid("ranges of controls",
+              Edit("upper.rotateX: {min: -30, max: 30}", "upper.rotateX: {min: -40, max: 25}"));
   ExpectValid("one control fewer", Edit("  upper.rotateX: {min: -30, max: 30}\n", ""));
   ExpectValid("tolerance and training", Edit("train: {samples: 400}", "train: {samples: 10}"));
   ExpectValid("the entry's name", Edit("  column: {points:", "  another: {points:"));
@@ -189,9 +229,9 @@ TEST_F(Stale, WhatDoesNotChangeThePointsKeepsTheSubspace) {
   });
   ExpectValid("another clip", [](const SubspaceFolder& folder) { folder.AddSway(); }, {"--clip", "wave"});
   ExpectValid("materials and a mesh elsewhere", Glb([](GlbParts* glb) {
-    glb->json["materials"][0]["name"] = "chalk";
-    glb->json["asset"]["generator"] = "another";
-  }));
+                glb->json["materials"][0]["name"] = "chalk";
+                glb->json["asset"]["generator"] = "another";
+              }));
   ExpectValid("a stage after the accelerated one", [](const SubspaceFolder& folder) {
     folder.Edit("[skin, cage, mush]", "[skin, cage, mush, late]");
     folder.Edit("nodes:\n", "nodes:\n  late: {type: tripwire}\n");
@@ -202,13 +242,21 @@ TEST_F(Stale, TrainingWithMoreThreadsGivesTheSameSubspace) {
   std::vector<std::string> results;
   for (const char* threads : {"1", "3"}) {
     const SubspaceFolder folder;
-    ASSERT_EQ(folder.Run({"train", "hello.yaml", "--samples", "150", "--rows", "30", "--threads", threads, "-q"}).exit_code, 0);
+    ASSERT_EQ(
+        folder.Run({"train", "hello.yaml", "--samples", "150", "--rows", "30", "--threads", threads, "-q"})
+            .exit_code,
+        0);
     for (const char* evaluating : {"1", "4"}) {
-      ASSERT_EQ(folder.Run({"eval", "hello.yaml", "--accelerate", "--tolerance", "1e31m", "--threads", evaluating, "-o", "out.npz", "--force", "-q"}).exit_code, 0);
+      ASSERT_EQ(folder
+                    .Run({"eval", "hello.yaml", "--accelerate", "--tolerance", "1e31m", "--threads",
+                          evaluating, "-o", "out.npz", "--force", "-q"})
+                    .exit_code,
+                0);
       results.push_back(TemporaryFolder::Read(folder / "out.npz"));
     }
     ASSERT_EQ(folder.Run({"eval", "hello.yaml", "-o", "out.npz", "--force", "-q"}).exit_code, 0);
-    EXPECT_FALSE(TemporaryFolder::Read(folder / "out.npz") == results[0]);  // accelerated is not exact: the comparison sees that
+    EXPECT_FALSE(TemporaryFolder::Read(folder / "out.npz") ==
+                 results[0]);  // accelerated is not exact: the comparison sees that
   }
   for (const std::string& result : results) EXPECT_TRUE(result == results[0]);
 }

@@ -1,4 +1,5 @@
-// Some points of the face's stack: the same bits as in the full evaluation, at a cost that follows their number.
+// Some points of the face's stack: the same bits as in the full evaluation, at a cost that follows their
+// number.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -35,7 +36,9 @@ class FaceSubset : public ::testing::Test {
     for (std::size_t c = 0; c < rig_->controls.size(); ++c) {
       const PlugRef& plug = rig_->controls[c].plug;
       const Index varying = (*plan)->FindVarying(plug);
-      if (varying != kNoIndex) evaluator->Set(varying, pose_[c], (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
+      if (varying != kNoIndex)
+        evaluator->Set(varying, pose_[c],
+                       (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
     }
     const Status status = evaluator->Evaluate();
     EXPECT_TRUE(status.ok()) << status.ToString();
@@ -81,13 +84,15 @@ TEST_F(FaceSubset, HasTheBitsOfTheWhole) {
       ASSERT_EQ(part.count, size);
       std::size_t different = 0;
       for (std::size_t i = 0; i < size; ++i) {
-        const float whole[] = {all.x[points[i]], all.y[points[i]], all.z[points[i]]}, own[] = {part.x[i], part.y[i], part.z[i]};
+        const float whole[] = {all.x[points[i]], all.y[points[i]], all.z[points[i]]},
+                    own[] = {part.x[i], part.y[i], part.z[i]};
         different += std::memcmp(whole, own, sizeof(own)) != 0;
       }
       EXPECT_EQ(different, 0u) << size << " points";
     }
   }
-  for (std::size_t s = 1; s < wholes.size(); ++s) EXPECT_FALSE(SameBytes(wholes[s - 1], wholes[s])) << "stage " << s << " does nothing";
+  for (std::size_t s = 1; s < wholes.size(); ++s)
+    EXPECT_FALSE(SameBytes(wholes[s - 1], wholes[s])) << "stage " << s << " does nothing";
 }
 
 TEST_F(FaceSubset, OnePercentCostsThreePercentOfTheStack) {
@@ -95,14 +100,19 @@ TEST_F(FaceSubset, OnePercentCostsThreePercentOfTheStack) {
   double whole_before = 0;
   for (const std::string stage : {"skin", "cheekModR"}) {
     const auto all = Instructions(Start(stage, {}).get());
-    // The constant: what comes before the points, for the joints and control points that a vector of points needs
+    // The constant: what comes before the points, for the joints and control points that a vector of points
+    // needs
     const auto one = Instructions(Start(stage, PointSet::Of(RandomPoints(16, 7), Total())).get());
     const auto some = Instructions(Start(stage, PointSet::Of(RandomPoints(percent, 8), Total())).get());
     const auto tenth = Instructions(Start(stage, PointSet::Of(RandomPoints(Total() / 10, 9), Total())).get());
     if (!all || !one || !some || !tenth) GTEST_SKIP() << "instructions cannot be counted here";
-    const auto share = [&](std::uint64_t part) { return (static_cast<double>(part) - static_cast<double>(*one)) / (static_cast<double>(*all) - static_cast<double>(*one)); };
-    std::printf("%s: all %zu points %.0f instructions, 16 %.0f; 1 %% costs %.2f %%, 10 %% %.2f %%\n", stage.c_str(), static_cast<std::size_t>(Total()),
-                static_cast<double>(*all), static_cast<double>(*one), 100 * share(*some), 100 * share(*tenth));
+    const auto share = [&](std::uint64_t part) {
+      return (static_cast<double>(part) - static_cast<double>(*one)) /
+             (static_cast<double>(*all) - static_cast<double>(*one));
+    };
+    std::printf("%s: all %zu points %.0f instructions, 16 %.0f; 1 %% costs %.2f %%, 10 %% %.2f %%\n",
+                stage.c_str(), static_cast<std::size_t>(Total()), static_cast<double>(*all),
+                static_cast<double>(*one), 100 * share(*some), 100 * share(*tenth));
     EXPECT_LE(share(*some), 0.03) << stage;
     EXPECT_GT(share(*tenth), 0.03) << stage;  // the measure sees ten times the points
     EXPECT_GT(static_cast<double>(*all), 1.2 * whole_before) << stage;
@@ -113,16 +123,19 @@ TEST_F(FaceSubset, OnePercentCostsThreePercentOfTheStack) {
 // Behind the deltaMush a patch drags its rings in; what it costs follows the points that the plan asks for.
 TEST_F(FaceSubset, APatchBehindTheMushCostsItsRings) {
   const PlugRef iterations = *rig_->graph->FindPlug("mush.iterations");
-  ASSERT_TRUE(rig_->graph->Set(iterations, std::int64_t{3}).ok());  // each instruction takes a microsecond to count
+  ASSERT_TRUE(
+      rig_->graph->Set(iterations, std::int64_t{3}).ok());  // each instruction takes a microsecond to count
   std::vector<Index> patch;
   for (Index p = 2000; p < 2000 + Total() / 100; ++p) patch.push_back(p);
-  const std::unique_ptr<Evaluator> whole = Start("mush", {}), part = Start("mush", PointSet::Of(patch, Total()));
+  const std::unique_ptr<Evaluator> whole = Start("mush", {}),
+                                   part = Start("mush", PointSet::Of(patch, Total()));
   ASSERT_TRUE(rig_->graph->Set(iterations, std::int64_t{10}).ok());
   const auto all = Instructions(whole.get()), some = Instructions(part.get());
   if (!all || !some) GTEST_SKIP() << "instructions cannot be counted here";
   const double cost = static_cast<double>(*some) / static_cast<double>(*all);
   const double points = PointsComputed(part->plan()) / PointsComputed(whole->plan());
-  std::printf("mush: %zu points in a patch compute %.1f %% of the points and cost %.1f %%\n", patch.size(), 100 * points, 100 * cost);
+  std::printf("mush: %zu points in a patch compute %.1f %% of the points and cost %.1f %%\n", patch.size(),
+              100 * points, 100 * cost);
   EXPECT_LT(points, 0.6);
   EXPECT_LE(cost, 1.3 * points + 0.02);
 }

@@ -1,5 +1,6 @@
-// A tripwire is a node that fails when it is evaluated while armed. Armed behind what a subspace stands in for, it must
-// never fire on a hit, and must fire on everything else. It proves what counts of evaluations only report.
+// A tripwire is a node that fails when it is evaluated while armed. Armed behind what a subspace stands in
+// for, it must never fire on a hit, and must fire on everything else. It proves what counts of evaluations
+// only report.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -17,7 +18,8 @@ const std::string kArmed = "tripwire: evaluated while armed";
 class TripwireRig : public HelloFolder {
  public:
   TripwireRig(const std::string& stack, const std::string& last, const std::string& more_nodes = "") {
-    Edit("  mush: {type: deltaMush, iterations: 10}\n", "  mush: {type: deltaMush, iterations: 10}\n  trip: {type: tripwire}\n" + more_nodes);
+    Edit("  mush: {type: deltaMush, iterations: 10}\n",
+         "  mush: {type: deltaMush, iterations: 10}\n  trip: {type: tripwire}\n" + more_nodes);
     Edit("[skin, cage, mush]", stack);
     Edit("column@mush", "column@" + last);
   }
@@ -127,7 +129,8 @@ TEST_F(Tripwire, AtTheEndItFiresOnEverythingButHits) {
 
 TEST_F(Tripwire, BeforeADeltaMushItFiresOnlyWhereCuesAreMeasuredBehindIt) {
   // Behind one mush and before another: cues lie before both, since they would drag half the mesh in
-  const TripwireRig between("[skin, cage, mush, trip, late]", "late", "  late: {type: deltaMush, iterations: 6}\n");
+  const TripwireRig between("[skin, cage, mush, trip, late]", "late",
+                            "  late: {type: deltaMush, iterations: 6}\n");
   auto trained = TrainRig(between.rig(), QuickTraining());
   ASSERT_NE(trained, nullptr);
   RigRunOptions options = Armed(trained, kInfinity);
@@ -144,7 +147,8 @@ TEST_F(Tripwire, BeforeADeltaMushItFiresOnlyWhereCuesAreMeasuredBehindIt) {
   const TripwireRig before("[skin, cage, trip, mush]", "mush");
   trained = TrainRig(before.rig(), QuickTraining());
   ASSERT_NE(trained, nullptr);
-  const bool behind = std::any_of(trained->cues.begin(), trained->cues.end(), [](const CueDescription& cue) { return cue.stage == "trip"; });
+  const bool behind = std::any_of(trained->cues.begin(), trained->cues.end(),
+                                  [](const CueDescription& cue) { return cue.stage == "trip"; });
   ASSERT_TRUE(behind) << "no cue is measured at the tripwire";
   options = Armed(trained, kInfinity);
   options.clip = "wave";
@@ -160,9 +164,11 @@ TEST_F(Tripwire, TheProgramReportsItAsNeverEvaluated) {
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return result.out;
   };
-  run({"train", "hello.yaml", "-q", "--tolerance", "10mm"});  // so much that nothing behind the mush is measured
+  run({"train", "hello.yaml", "-q", "--tolerance",
+       "10mm"});  // so much that nothing behind the mush is measured
   const auto never = [&](const std::string& tolerance) {
-    const auto bench = nlohmann::json::parse(run({"bench", "hello.yaml", "--runs", "1", "--json", "-q", "--tolerance", tolerance}));
+    const auto bench = nlohmann::json::parse(
+        run({"bench", "hello.yaml", "--runs", "1", "--json", "-q", "--tolerance", tolerance}));
     std::vector<std::string> nodes = bench["nodes"]["never_evaluated"];
     std::sort(nodes.begin(), nodes.end());
     return nodes;
@@ -170,13 +176,14 @@ TEST_F(Tripwire, TheProgramReportsItAsNeverEvaluated) {
   EXPECT_EQ(never("1000"), (std::vector<std::string>{"mush", "trip"}));
   EXPECT_EQ(never("0"), std::vector<std::string>());
   // The canary: armed from outside, the rig itself fails
-  const ProcessResult armed = RunKpsa({"eval", "hello.yaml", "--set", "trip.armed=true", "-o", "x.npz"}, 60, folder.path());
+  const ProcessResult armed =
+      RunKpsa({"eval", "hello.yaml", "--set", "trip.armed=true", "-o", "x.npz"}, 60, folder.path());
   EXPECT_EQ(armed.exit_code, 4) << armed.err;
   EXPECT_NE(armed.err.find(kArmed), std::string::npos) << armed.err;
 }
 
-// Where points behind the mush have to be measured, since the inside of the bend turns over there: clips of the rig are
-// hits all the same, and what only passes points through does not run.
+// Where points behind the mush have to be measured, since the inside of the bend turns over there: clips of
+// the rig are hits all the same, and what only passes points through does not run.
 TEST_F(Tripwire, StaysAsleepWherePointsBehindTheMushAreMeasured) {
   const TripwireRig folder("[skin, cage, mush, trip]", "trip");
   const auto run = [&](const std::vector<std::string>& arguments) {
@@ -187,13 +194,18 @@ TEST_F(Tripwire, StaysAsleepWherePointsBehindTheMushAreMeasured) {
   run({"train", "hello.yaml", "-q"});
   const auto bench = nlohmann::json::parse(run({"bench", "hello.yaml", "--runs", "1", "--json", "-q"}));
   std::vector<std::string> stages = bench["cue_stages"];
-  EXPECT_TRUE(std::any_of(stages.begin(), stages.end(), [](const std::string& s) { return s.find("@mush") != std::string::npos; })) << bench["cue_stages"];
+  EXPECT_TRUE(std::any_of(stages.begin(), stages.end(), [](const std::string& s) {
+    return s.find("@mush") != std::string::npos;
+  })) << bench["cue_stages"];
   EXPECT_GE(bench["hit_rate"], 0.9);
   EXPECT_LE(bench["violation_rate"], 0.05);
   EXPECT_EQ(bench["nodes"]["never_evaluated"], nlohmann::json::array({"trip"}));
   // Armed from outside or in the rig, it makes no subspace stale
-  run({"eval", "hello.yaml", "--accelerate", "--tolerance", "1000m", "--set", "trip.armed=true", "-o", "armed.npz"});
-  const ProcessResult exact = RunKpsa({"eval", "hello.yaml", "--accelerate", "--tolerance", "0", "--set", "trip.armed=true", "-o", "exact.npz"}, 60, folder.path());
+  run({"eval", "hello.yaml", "--accelerate", "--tolerance", "1000m", "--set", "trip.armed=true", "-o",
+       "armed.npz"});
+  const ProcessResult exact = RunKpsa({"eval", "hello.yaml", "--accelerate", "--tolerance", "0", "--set",
+                                       "trip.armed=true", "-o", "exact.npz"},
+                                      60, folder.path());
   EXPECT_EQ(exact.exit_code, 4) << exact.err;
   EXPECT_NE(exact.err.find(kArmed), std::string::npos) << exact.err;
 }
@@ -255,7 +267,8 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
 
   // And the program's report of the same
   ASSERT_TRUE(WriteSubspace(*trained, folder / "face.kpsa").ok());
-  const ProcessResult bench = RunKpsa({"bench", folder / "face.yaml", "--tolerance", "1000", "--frames", "0:240:12", "--clip", "talk", "--runs", "1", "--json", "-q"});
+  const ProcessResult bench = RunKpsa({"bench", folder / "face.yaml", "--tolerance", "1000", "--frames",
+                                       "0:240:12", "--clip", "talk", "--runs", "1", "--json", "-q"});
   ASSERT_EQ(bench.exit_code, 0) << bench.err;
   std::vector<std::string> never = nlohmann::json::parse(bench.out)["nodes"]["never_evaluated"];
   std::sort(never.begin(), never.end());

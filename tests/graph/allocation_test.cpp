@@ -1,5 +1,5 @@
-// A warm evaluation allocates nothing, on no thread. Every way into the C library's allocator is interposed here, for
-// the whole test program: operator new ends there, too, and so do TBB's workers.
+// A warm evaluation allocates nothing, on no thread. Every way into the C library's allocator is interposed
+// here, for the whole test program: operator new ends there, too, and so do TBB's workers.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -40,7 +40,9 @@ void* malloc(size_t size) noexcept { return Count(), __libc_malloc(size); }
 void* calloc(size_t count, size_t size) noexcept { return Count(), __libc_calloc(count, size); }
 void* realloc(void* old, size_t size) noexcept { return Count(), __libc_realloc(old, size); }
 void* memalign(size_t alignment, size_t size) noexcept { return Count(), __libc_memalign(alignment, size); }
-void* aligned_alloc(size_t alignment, size_t size) noexcept { return Count(), __libc_memalign(alignment, size); }
+void* aligned_alloc(size_t alignment, size_t size) noexcept {
+  return Count(), __libc_memalign(alignment, size);
+}
 int posix_memalign(void** result, size_t alignment, size_t size) noexcept {
   Count();
   *result = __libc_memalign(alignment, size);
@@ -61,7 +63,8 @@ namespace {
 class Allocations : public testing::Test {
  protected:
   void SetUp() override {
-    if (!KPSA_COUNTS_ALLOCATIONS) GTEST_SKIP() << "allocations are not counted under sanitizers or without glibc";
+    if (!KPSA_COUNTS_ALLOCATIONS)
+      GTEST_SKIP() << "allocations are not counted under sanitizers or without glibc";
   }
   template <typename F>
   int In(F&& f) {
@@ -88,17 +91,20 @@ TEST_F(Allocations, CanaryTheCounterSeesEveryWay) {
   EXPECT_EQ(count([] {
               void* q = nullptr;
               return posix_memalign(&q, 64, 64) == 0 ? q : nullptr;
-            }), 1);
+            }),
+            1);
   EXPECT_EQ(In([&] {
               int* made = new int(1);
               p = made;
               delete made;
-            }), 1);
+            }),
+            1);
   EXPECT_EQ(In([&] {
               void* made = ::operator new(64, std::align_val_t(64));
               p = made;
               ::operator delete(made, std::align_val_t(64));
-            }), 1);
+            }),
+            1);
   EXPECT_EQ(In([&] { p = mmap(nullptr, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0); }), 1);
   munmap(p, 4096);
   // On another thread
@@ -111,7 +117,8 @@ TEST_F(Allocations, CanaryTheCounterSeesEveryWay) {
   EXPECT_EQ(In([&] {
               stage = 1;
               while (stage != 2) std::this_thread::yield();
-            }), 1);
+            }),
+            1);
   other.join();
 }
 
@@ -177,7 +184,8 @@ TEST_F(Allocations, NoneInAWarmSerialEvaluation) {
               }
               a.Invalidate();
               sum += a.Evaluate().ok();
-            }), 0);
+            }),
+            0);
   EXPECT_GT(sum, 0);
 }
 
@@ -211,7 +219,8 @@ TEST_F(Allocations, AFirstMissAllocatesNothing) {
   EXPECT_EQ(In([&] {
               for (Index v = 2; v < g.plan->varying().size(); v += 2) e.Set(v, -1e9);
               if (!e.Evaluate().ok()) std::abort();
-            }), 0);
+            }),
+            0);
 }
 
 TEST_F(Allocations, FramesAllocateByThreadAndNotByFrame) {

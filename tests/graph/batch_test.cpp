@@ -118,7 +118,8 @@ TEST(Passed, PlansDoWithoutStepsThatHandOnTheirInput) {
   g.set("turned.input", Double3{1, 2, 3});
   EXPECT_EQ(g.pull<Double3>("last.out"), (Double3{2, 4, 6}));
   ASSERT_EQ(g.plan->steps().size(), 1u);
-  for (const Plan::Excluded& excluded : g.plan->excluded()) EXPECT_EQ(excluded.reason, "hands on what drives it, unchanged") << excluded.node_name;
+  for (const Plan::Excluded& excluded : g.plan->excluded())
+    EXPECT_EQ(excluded.reason, "hands on what drives it, unchanged") << excluded.node_name;
   EXPECT_EQ(g.plan->excluded().size(), 2u);
   g.hold("held.factor", 0.5);
   g.pull<Double3>("last.out");

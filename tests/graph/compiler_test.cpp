@@ -8,7 +8,9 @@
 namespace kpsa {
 namespace {
 
-bool Says(const Status& status, const std::string& part) { return status.ToString().find(part) != std::string::npos; }
+bool Says(const Status& status, const std::string& part) {
+  return status.ToString().find(part) != std::string::npos;
+}
 
 class CompilerTest : public testing::Test {
  protected:
@@ -54,7 +56,8 @@ TEST_F(CompilerTest, StructuralDrivenByWhatVariesNamesBothEnds) {
   EXPECT_EQ(g.pull_points("src.outPoints").size(), 9u);  // toward zero
   g.vary("frame.a");
   EXPECT_EQ(g.try_pull("src.outPoints").ToString(),
-            "src.count is structural (it is baked into the plan) and cannot be driven by node \"half\", which varies");
+            "src.count is structural (it is baked into the plan) and cannot be driven by node \"half\", "
+            "which varies");
   ASSERT_TRUE(g.graph.Connect(g.plug("frame.a"), g.plug("src.count"), true).ok());
   EXPECT_TRUE(Says(g.try_pull("src.outPoints"), "node \"frame\"")) << g.try_pull("src.outPoints").ToString();
 }
@@ -64,7 +67,8 @@ TEST_F(CompilerTest, FailuresWhileCompilingNameTheirNode) {
   g.add("picky", "p");
   g.connect("src.outPoints", "p.points");
   g.vary("src.step");
-  const char* reasons[] = {"", "node \"p\" (picky): cannot bind", "node \"p\" (picky): points asks for points of an array of 3, its input has 10",
+  const char* reasons[] = {"", "node \"p\" (picky): cannot bind",
+                           "node \"p\" (picky): points asks for points of an array of 3, its input has 10",
                            "node \"p\" (picky): cannot count"};
   for (int where = 1; where <= 3; ++where) {
     g.hold("p.where", where);
@@ -96,7 +100,8 @@ TEST_F(CompilerTest, PointsThatDoNotExist) {
   EXPECT_TRUE(g.try_pull("g.outPoints").ok());
   g.connect("src.outPoints", "m.points");
   g.want("m.outPoints", PointSet::Of({3}, 99));
-  EXPECT_EQ(g.try_pull("g.outPoints").ToString(), "m.outPoints has 10 points, the request is for an array of 99");
+  EXPECT_EQ(g.try_pull("g.outPoints").ToString(),
+            "m.outPoints has 10 points, the request is for an array of 99");
 }
 
 TEST_F(CompilerTest, ReasonsOfWhatIsLeftOut) {
@@ -175,7 +180,8 @@ TEST_F(CompilerTest, SharedStepsOfLazyBranchesAreHoisted) {
   }
   EXPECT_EQ(deepest, 2);
   const auto counts = [&] {
-    return std::vector<std::uint64_t>{g.computes("root"), g.computes("only_a"), g.computes("only_b"), g.computes("deep"), g.computes("inner"), g.computes("outer")};
+    return std::vector<std::uint64_t>{g.computes("root"), g.computes("only_a"), g.computes("only_b"),
+                                      g.computes("deep"), g.computes("inner"),  g.computes("outer")};
   };
   using Counts = std::vector<std::uint64_t>;
   EXPECT_EQ(counts(), (Counts{1, 1, 0, 0, 0, 1}));
@@ -244,11 +250,17 @@ TEST_F(CompilerTest, AChoiceOf64AndNotOneMore) {
 
 TEST_F(CompilerTest, LazyInputsWithoutADecisionAreRefused) {
   NodeRegistry registry;
-  registry.add("forgot", "").in("a", 0.0).in("b", 0.0).lazy().out("out", Type::kDouble).compute([](double a, double b) { return a + b; });
+  registry.add("forgot", "")
+      .in("a", 0.0)
+      .in("b", 0.0)
+      .lazy()
+      .out("out", Type::kDouble)
+      .compute([](double a, double b) { return a + b; });
   TestGraph f(registry);
   f.add("forgot", "n");
   f.vary("n.a");
-  EXPECT_EQ(f.try_pull("n.out").ToString(), "node \"n\" (forgot) has lazy inputs but does not decide about them");
+  EXPECT_EQ(f.try_pull("n.out").ToString(),
+            "node \"n\" (forgot) has lazy inputs but does not decide about them");
 }
 
 TEST_F(CompilerTest, VaryingElementsThatNobodySet) {
@@ -262,7 +274,11 @@ TEST_F(CompilerTest, VaryingElementsThatNobodySet) {
 TEST_F(CompilerTest, TheRestStateIgnoresClips) {
   NodeRegistry registry;
   AddToyNodes(registry);
-  registry.add("clip", "Time, as an animation.").animation().in("time", 0.0).out("out", Type::kDouble).compute([](double t) { return t; });
+  registry.add("clip", "Time, as an animation.")
+      .animation()
+      .in("time", 0.0)
+      .out("out", Type::kDouble)
+      .compute([](double t) { return t; });
   TestGraph c(registry);
   c.add("clip", "clip", {{"time", 5.0}});
   c.add("scale3", "s", {{"input", Double3{1, 2, 3}}, {"factor", 2.0}});
@@ -313,7 +329,8 @@ TEST(DeepGraphs, AChainOf100000Nodes) {
     nodes.push_back(*g.graph.AddNode("add", "n" + std::to_string(i)));
     ASSERT_TRUE(g.graph.Set({nodes.back(), b, -1, -1}, 1.0).ok());
   }
-  for (std::size_t i = 0; i + 1 < kCount; ++i) ASSERT_TRUE(g.graph.Connect({nodes[i], out, -1, -1}, {nodes[i + 1], a, -1, -1}).ok());
+  for (std::size_t i = 0; i + 1 < kCount; ++i)
+    ASSERT_TRUE(g.graph.Connect({nodes[i], out, -1, -1}, {nodes[i + 1], a, -1, -1}).ok());
   const std::string last = "n" + std::to_string(kCount - 1) + ".out";
   EXPECT_DOUBLE_EQ(g.pull<double>(last), kCount);  // folded
   EXPECT_EQ(g.plan->steps().size(), 0u);
@@ -346,7 +363,10 @@ TEST(DeepGraphs, AChainOf100000InputsThatDriveEachOther) {
   for (std::size_t i = 0; i + 1 < kCount; ++i) {
     ASSERT_TRUE(g.graph.Connect({nodes[i], a, -1, -1}, {nodes[i + 1], a, -1, -1}).ok());
     // x of one drives y of the next, so that every vector is assembled; z is driven along
-    ASSERT_TRUE(g.graph.Connect({vectors[i], input, -1, static_cast<int>(i % 2)}, {vectors[i + 1], input, -1, static_cast<int>((i + 1) % 2)}).ok());
+    ASSERT_TRUE(g.graph
+                    .Connect({vectors[i], input, -1, static_cast<int>(i % 2)},
+                             {vectors[i + 1], input, -1, static_cast<int>((i + 1) % 2)})
+                    .ok());
   }
   const std::string last = std::to_string(kCount - 1);
   g.vary("n0.a");
@@ -407,7 +427,8 @@ TEST(DeepGraphs, LazyInputsNestDeepButNotWithoutEnd) {
       EXPECT_DOUBLE_EQ(g.pull<double>(from), 5);
       EXPECT_EQ(g.computes("s0"), 1u);
     } else {
-      EXPECT_TRUE(Says(g.try_pull(from), "lazy inputs are nested more than 1000 deep")) << g.try_pull(from).ToString();
+      EXPECT_TRUE(Says(g.try_pull(from), "lazy inputs are nested more than 1000 deep"))
+          << g.try_pull(from).ToString();
     }
   }
 }

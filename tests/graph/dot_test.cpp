@@ -13,11 +13,12 @@
 namespace kpsa {
 namespace {
 
-// A reader of the part of the DOT language that drawings use (graphviz.org/doc/info/lang.html). What it cannot read is no
-// valid drawing.
+// A reader of the part of the DOT language that drawings use (graphviz.org/doc/info/lang.html). What it
+// cannot read is no valid drawing.
 class DotReader {
  public:
-  struct Attributes : std::map<std::string, std::string> {};  // strings with their escapes resolved, \n as a line break
+  struct Attributes : std::map<std::string, std::string> {
+  };  // strings with their escapes resolved, \n as a line break
   std::map<std::string, Attributes> nodes;
   std::map<std::pair<std::string, std::string>, Attributes> edges;
   std::string error;
@@ -99,7 +100,9 @@ class DotReader {
   bool quoted_ = false;
 };
 
-std::string NodeName(const TestGraph& g, const std::string& name) { return "n" + std::to_string(g.graph.FindNode(name)->index); }
+std::string NodeName(const TestGraph& g, const std::string& name) {
+  return "n" + std::to_string(g.graph.FindNode(name)->index);
+}
 
 class DotTest : public ::testing::Test {
  protected:
@@ -113,7 +116,8 @@ class DotTest : public ::testing::Test {
 };
 
 TEST_F(DotTest, NamesOfAnyKind) {
-  const char* const kNames[] = {"say \"hi\"", "back\\slash", "ends in \\", "two\nlines", "];}", "a -> b", "\xc3\xa4\xe2\x9c\x93", "\\N", "n0"};
+  const char* const kNames[] = {"say \"hi\"", "back\\slash",          "ends in \\", "two\nlines", "];}",
+                                "a -> b",     "\xc3\xa4\xe2\x9c\x93", "\\N",        "n0"};
   std::string from;
   for (const char* name : kNames) {
     const NodeId node = *g.graph.AddNode("add", name);
@@ -141,7 +145,8 @@ TEST_F(DotTest, NamesOfAnyKind) {
 }
 
 TEST_F(DotTest, TheReaderRefusesWhatIsNoDrawing) {
-  for (const char* bad : {"", "digraph g {", "digraph g { n0 [label=\"a\"b\"]; }", "digraph g { n0 -> n1; }", "digraph g { n0 [label=\"\\x\"]; }", "graph g { }"}) {
+  for (const char* bad : {"", "digraph g {", "digraph g { n0 [label=\"a\"b\"]; }", "digraph g { n0 -> n1; }",
+                          "digraph g { n0 [label=\"\\x\"]; }", "graph g { }"}) {
     EXPECT_NE(DotReader(bad).error, "") << bad;
   }
 }
@@ -182,7 +187,9 @@ TEST_F(DotTest, RedIsWhereTheTimeGoes) {
   ASSERT_TRUE(g.compile().ok());
   Profile profile(*g.plan);
   for (Index s = 0; s < 3; ++s) {
-    const std::uint64_t ns = std::string(g.plan->step_name(s)) == "b" ? 80000 : std::string(g.plan->step_name(s)) == "c" ? 20000 : 0;
+    const std::uint64_t ns = std::string(g.plan->step_name(s)) == "b"   ? 80000
+                             : std::string(g.plan->step_name(s)) == "c" ? 20000
+                                                                        : 0;
     profile.Add({s, kNoIndex, 1000, 1000 + ns, 0, 0});
   }
   DotReader dot = Draw({.profile = &profile, .frames = 4});

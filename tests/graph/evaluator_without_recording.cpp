@@ -5,9 +5,10 @@
 #define Evaluator EvaluatorWithoutRecording
 #define EvaluatorOptions EvaluatorOptionsWithoutRecording
 #define Workspace WorkspaceWithoutRecording
+#include "tests/graph/evaluator_without_recording.h"
+
 #include "graph/evaluator.cpp"
 #include "graph/evaluator_run.cpp"
-#include "tests/graph/evaluator_without_recording.h"
 
 namespace kpsa {
 
@@ -16,7 +17,8 @@ struct WithoutRecording::Impl {
   EvaluatorWithoutRecording evaluator;
 };
 
-WithoutRecording::WithoutRecording(std::shared_ptr<const Plan> plan) : impl_(std::make_unique<Impl>(std::move(plan))) {}
+WithoutRecording::WithoutRecording(std::shared_ptr<const Plan> plan)
+    : impl_(std::make_unique<Impl>(std::move(plan))) {}
 WithoutRecording::~WithoutRecording() = default;
 void WithoutRecording::Invalidate() { impl_->evaluator.Invalidate(); }
 Status WithoutRecording::Evaluate() { return impl_->evaluator.Evaluate(); }

@@ -34,7 +34,9 @@ class ExplainTest : public ::testing::Test {
   }
   Index Step(const std::string& name, Index segment_not = kNoIndex) const {
     for (Index s = 0; s < g.plan->steps().size(); ++s) {
-      if (name == g.plan->step_name(s) && *g.plan->step_label(s) == 0 && g.plan->infos()[s].segment != segment_not) return s;
+      if (name == g.plan->step_name(s) && *g.plan->step_label(s) == 0 &&
+          g.plan->infos()[s].segment != segment_not)
+        return s;
     }
     ADD_FAILURE() << "no step of " << name;
     return 0;

@@ -46,10 +46,11 @@ class FramesTest : public testing::Test {
 
   static void Set(std::size_t frame, Evaluator& evaluator) {
     const auto f = static_cast<double>(frame);
-    evaluator.Set(0, 10.0 * static_cast<double>(frame % 7) - 30 + f / 16);  // moves the points: hits and misses
-    evaluator.Set(1, frame % 3 == 0 ? -1e9 : 60.0);                    // every third frame misses in any case
-    evaluator.Set(2, frame % 10 == 4 ? -1.0 : f / 8);                  // some frames fail, here before the second cache
-    evaluator.Set(3, frame % 13 == 5 ? 1e9 : -1e30);                   // and some in its compute
+    evaluator.Set(0,
+                  10.0 * static_cast<double>(frame % 7) - 30 + f / 16);  // moves the points: hits and misses
+    evaluator.Set(1, frame % 3 == 0 ? -1e9 : 60.0);    // every third frame misses in any case
+    evaluator.Set(2, frame % 10 == 4 ? -1.0 : f / 8);  // some frames fail, here before the second cache
+    evaluator.Set(3, frame % 13 == 5 ? 1e9 : -1e30);   // and some in its compute
   }
   // The bytes of a frame's outputs, or its error.
   static std::string Bytes(const Evaluator& evaluator, const Status& status) {
@@ -106,17 +107,19 @@ TEST_F(FramesTest, AFrameThatFailsIsNamedAndTheOthersGoOn) {
   FrameOptions options;
   options.threads = 2;
   int failed = 0, fine = 0;
-  const Status status = EvaluateFrames(g_.plan, kFrames, options, Set, [&](std::size_t frame, const Evaluator&, const Status& evaluated) {
-    EXPECT_EQ(evaluated.ok(), frame % 10 != 4 && frame % 13 != 5) << frame << evaluated.ToString();
-    if (evaluated.ok()) {
-      ++fine;
-    } else {
-      ++failed;
-      EXPECT_EQ(evaluated.kind(), ErrorKind::kEvaluation);
-      EXPECT_NE(evaluated.ToString().find(frame % 10 == 4 ? "\"gate\"" : "\"second\""), std::string::npos) << evaluated.ToString();
-    }
-    return Status();
-  });
+  const Status status = EvaluateFrames(
+      g_.plan, kFrames, options, Set, [&](std::size_t frame, const Evaluator&, const Status& evaluated) {
+        EXPECT_EQ(evaluated.ok(), frame % 10 != 4 && frame % 13 != 5) << frame << evaluated.ToString();
+        if (evaluated.ok()) {
+          ++fine;
+        } else {
+          ++failed;
+          EXPECT_EQ(evaluated.kind(), ErrorKind::kEvaluation);
+          EXPECT_NE(evaluated.ToString().find(frame % 10 == 4 ? "\"gate\"" : "\"second\""), std::string::npos)
+              << evaluated.ToString();
+        }
+        return Status();
+      });
   EXPECT_TRUE(status.ok());
   EXPECT_EQ(failed, 10);  // 4 14 24 34 44 54, 5 18 31 57
   EXPECT_EQ(failed + fine, static_cast<int>(kFrames));
@@ -137,7 +140,9 @@ TEST_F(FramesTest, BlocksComputeHitsTogetherAndMissesAlone) {
     e.Set(0, static_cast<double>(frame));
     e.Set(1, frame % 4 == 3 ? -1e9 : 1e9);
   };
-  ASSERT_TRUE(EvaluateFrames(*plan, 24, options, set, [](std::size_t, const Evaluator&, const Status& s) { return s; }).ok());
+  ASSERT_TRUE(EvaluateFrames(*plan, 24, options, set, [](std::size_t, const Evaluator&, const Status& s) {
+                return s;
+              }).ok());
   const BlockComputes blocks = TakeBlockComputes();
   EXPECT_EQ(blocks.calls, 3);
   EXPECT_EQ(blocks.frames, 18);
@@ -189,11 +194,12 @@ TEST_F(FramesTest, CancellingEndsAfterACompletePrefix) {
     options.threads = threads;
     options.block = 4;
     options.cancel = &cancel;
-    const Status status = EvaluateFrames(g_.plan, kFrames, options, Set, [&](std::size_t frame, const Evaluator&, const Status&) {
-      EXPECT_EQ(frame, seen++);
-      if (seen == 10) cancel = true;
-      return Status();
-    });
+    const Status status = EvaluateFrames(g_.plan, kFrames, options, Set,
+                                         [&](std::size_t frame, const Evaluator&, const Status&) {
+                                           EXPECT_EQ(frame, seen++);
+                                           if (seen == 10) cancel = true;
+                                           return Status();
+                                         });
     EXPECT_EQ(status.kind(), ErrorKind::kInterrupted);
     EXPECT_NE(status.ToString().find("10 of 61"), std::string::npos) << status.ToString();
     EXPECT_EQ(seen, 10u);
@@ -205,9 +211,10 @@ TEST_F(FramesTest, AnErrorOfTheSinkEndsEverything) {
   FrameOptions options;
   options.threads = 3;
   options.block = 2;
-  const Status status = EvaluateFrames(g_.plan, kFrames, options, Set, [&](std::size_t, const Evaluator&, const Status&) {
-    return ++seen == 7 ? Status::Invalid("the disk is full") : Status();
-  });
+  const Status status =
+      EvaluateFrames(g_.plan, kFrames, options, Set, [&](std::size_t, const Evaluator&, const Status&) {
+        return ++seen == 7 ? Status::Invalid("the disk is full") : Status();
+      });
   EXPECT_EQ(seen, 7u);
   EXPECT_EQ(status.ToString(), "the disk is full");
 }
@@ -238,7 +245,8 @@ TEST(Frames, AStatefulNodeKeepsItsFramesInOrderOnOneEvaluator) {
   double at = 0;
   std::vector<const Evaluator*> evaluators;
   const Status status = EvaluateFrames(
-      g.plan, 40, options, [](std::size_t frame, Evaluator& e) { e.Set(0, static_cast<double>(frame * frame)); },
+      g.plan, 40, options,
+      [](std::size_t frame, Evaluator& e) { e.Set(0, static_cast<double>(frame * frame)); },
       [&](std::size_t frame, const Evaluator& e, const Status& evaluated) {
         if (frame > 0 || at > 0) at = (at + static_cast<double>(frame * frame)) / 2;
         EXPECT_EQ(e.Get<double>(0), at + 1) << frame;

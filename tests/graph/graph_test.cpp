@@ -47,7 +47,8 @@ TEST_F(GraphTest, TypesAndRangesOfValues) {
   Matrix4 broken;
   broken.m[5] = NAN;
   EXPECT_TRUE(Says(Why(g.graph.Set(g.plug("g.matrix"), broken)), "finite"));
-  EXPECT_TRUE(Says(Why(g.graph.Set(g.plug("g.mode"), "smoth")), "expected one of linear, smooth (did you mean \"smooth\"?)"));
+  EXPECT_TRUE(Says(Why(g.graph.Set(g.plug("g.mode"), "smoth")),
+                   "expected one of linear, smooth (did you mean \"smooth\"?)"));
   EXPECT_TRUE(Says(Why(g.graph.Set(g.plug("g.mode"), 2)), "has no choice 2"));
   EXPECT_TRUE(g.graph.Set(g.plug("g.mode"), "smooth").ok());
   EXPECT_EQ(g.graph.FindValue(g.plug("g.mode"))->AsInt(), 1);
@@ -55,7 +56,8 @@ TEST_F(GraphTest, TypesAndRangesOfValues) {
   EXPECT_TRUE(Says(Why(g.graph.Set(g.plug("g.outPoints"), 1.0)), "is an output"));
   const auto points = std::make_shared<PointBuffer>(2);
   points->view().y[1] = NAN;
-  EXPECT_EQ(Why(g.graph.Set(g.plug("g.points"), Value(PointBufferPtr(points)))), "g.points: point 1 is not finite");
+  EXPECT_EQ(Why(g.graph.Set(g.plug("g.points"), Value(PointBufferPtr(points)))),
+            "g.points: point 1 is not finite");
 }
 
 TEST_F(GraphTest, TheLatestValueWins) {
@@ -98,9 +100,11 @@ TEST_F(GraphTest, TypesOfConnections) {
 
 TEST_F(GraphTest, ACycleIsToldWithItsWholePath) {
   for (int i = 0; i < 40; ++i) g.add("add", "n" + std::to_string(i));
-  for (int i = 0; i + 1 < 40; ++i) g.connect("n" + std::to_string(i) + ".out", "n" + std::to_string(i + 1) + ".a");
+  for (int i = 0; i + 1 < 40; ++i)
+    g.connect("n" + std::to_string(i) + ".out", "n" + std::to_string(i + 1) + ".a");
   const std::string why = Why(Connect("n39.out", "n0.b"));
-  EXPECT_TRUE(Says(why, "n39.out -> n0.b would make a cycle: n0.b -> n0.out -> n1.a -> n1.out -> n2.a")) << why;
+  EXPECT_TRUE(Says(why, "n39.out -> n0.b would make a cycle: n0.b -> n0.out -> n1.a -> n1.out -> n2.a"))
+      << why;
   for (int i = 0; i < 40; ++i) EXPECT_TRUE(Says(why, "n" + std::to_string(i) + ".out")) << i;
   EXPECT_TRUE(why.ends_with("n39.out -> n0.b")) << why;
   EXPECT_EQ(g.graph.FindConnection(g.plug("n0.b")), nullptr);
@@ -206,7 +210,8 @@ TEST_F(GraphTest, PlugsByName) {
   g.add("scale3", "upperarm01.L");
   g.add("scale3", "upperarm01.L.a b");
   g.add("grid", "Cage 1");
-  g.graph.SetElementNames(g.plug("Cage 1.size").node, g.plug("Cage 1.weight[0]").attribute, {"smile", "jaw.open", "brow up"});
+  g.graph.SetElementNames(g.plug("Cage 1.size").node, g.plug("Cage 1.weight[0]").attribute,
+                          {"smile", "jaw.open", "brow up"});
   EXPECT_EQ(NameOf("upperarm01.L.input.x"), "upperarm01.L.input.x");
   EXPECT_EQ(NameOf("upperarm01.L.a b.inputY"), "upperarm01.L.a b.input.y");  // the longest name wins
   EXPECT_EQ(NameOf("Cage 1.weight[jaw.open]"), "Cage 1.weight[jaw.open]");
@@ -224,10 +229,13 @@ TEST_F(GraphTest, PlugsByName) {
   EXPECT_EQ(NameOf("Cage 1.size[0]"), "Cage 1.size is no array");
   EXPECT_TRUE(Says(NameOf("Cage 1.points[1"), "[ without ]"));
   EXPECT_TRUE(Says(NameOf("Cage 1.center.q"), "expected .x, .y or .z"));
-  EXPECT_EQ(NameOf("Cage 1.sice"), "node \"Cage 1\" (grid) has no attribute \"sice\" (did you mean \"size\"?)");
-  EXPECT_EQ(NameOf("Cgae 1.size"), "unknown node \"Cgae 1\" in plug \"Cgae 1.size\" (did you mean \"Cage 1\"?)");
+  EXPECT_EQ(NameOf("Cage 1.sice"),
+            "node \"Cage 1\" (grid) has no attribute \"sice\" (did you mean \"size\"?)");
+  EXPECT_EQ(NameOf("Cgae 1.size"),
+            "unknown node \"Cgae 1\" in plug \"Cgae 1.size\" (did you mean \"Cage 1\"?)");
   EXPECT_EQ(NameOf("size"), "\"size\" is no plug: expected node.attribute");
-  for (const char* odd : {"", ".", "..", "[", "]", ".[", "Cage 1.", ".size", "Cage 1.[0]", "Cage 1.weight[]", "Cage 1.points[,,]", "Cage 1.center.x.y"}) {
+  for (const char* odd : {"", ".", "..", "[", "]", ".[", "Cage 1.", ".size", "Cage 1.[0]", "Cage 1.weight[]",
+                          "Cage 1.points[,,]", "Cage 1.center.x.y"}) {
     EXPECT_FALSE(g.graph.FindPlug(odd).ok()) << odd;
   }
 }
@@ -240,7 +248,8 @@ TEST_F(GraphTest, GridsOfHostileSizesAreRefused) {
 }
 
 TEST_F(GraphTest, AliasesAndDelegates) {
-  const NodeId a = g.add("add", "Head#3"), b = g.add("add", "Head#49"), grid = g.add("grid", "mesh_lattice"), s = g.add("scale3", "mesh");
+  const NodeId a = g.add("add", "Head#3"), b = g.add("add", "Head#49"), grid = g.add("grid", "mesh_lattice"),
+               s = g.add("scale3", "mesh");
   g.graph.AddAlias(a, "/Torso/Head");
   EXPECT_EQ(NameOf("/Torso/Head.a"), "Head#3.a");
   g.graph.AddAlias(a, "Head");
@@ -259,7 +268,8 @@ TEST_F(GraphTest, AliasesAndDelegates) {
   EXPECT_EQ(NameOf("mesh.weight[4]"), "mesh_lattice.weight[4]");
   EXPECT_EQ(NameOf("mesh.input.x"), "mesh.input.x");
   EXPECT_EQ(NameOf("mesh.size[1]"), "mesh_lattice.size is no array");
-  EXPECT_EQ(NameOf("mesh.weigth[4]"), "node \"mesh\" (scale3) has no attribute \"weigth\" (did you mean \"weight\"?)");
+  EXPECT_EQ(NameOf("mesh.weigth[4]"),
+            "node \"mesh\" (scale3) has no attribute \"weigth\" (did you mean \"weight\"?)");
   ASSERT_TRUE(g.graph.RemoveNode(grid).ok());
   EXPECT_TRUE(Says(NameOf("mesh.weight[4]"), "no attribute"));
 }

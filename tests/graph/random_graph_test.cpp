@@ -1,4 +1,5 @@
-// Random graphs, random edits, random sets and pulls: the engine against a naive twin, serial against parallel.
+// Random graphs, random edits, random sets and pulls: the engine against a naive twin, serial against
+// parallel.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -34,15 +35,24 @@ const std::vector<ToyType>& ToyTypes() {
       {"floor", {{"input", Kind::kNumber}}, "out", Kind::kNumber},
       {"scale3", {{"input", Kind::kVector}, {"factor", Kind::kNumber}}, "out", Kind::kVector},
       {"sum", {{"input", Kind::kNumber, false, true}}, "out", Kind::kNumber},
-      {"select", {{"which", Kind::kNumber}, {"a", Kind::kNumber}, {"b", Kind::kNumber}}, "out", Kind::kNumber},
-      {"select", {{"which", Kind::kNumber}, {"a", Kind::kNumber}, {"b", Kind::kNumber}}, "out", Kind::kNumber},
+      {"select",
+       {{"which", Kind::kNumber}, {"a", Kind::kNumber}, {"b", Kind::kNumber}},
+       "out",
+       Kind::kNumber},
+      {"select",
+       {{"which", Kind::kNumber}, {"a", Kind::kNumber}, {"b", Kind::kNumber}},
+       "out",
+       Kind::kNumber},
       {"source", {{"count", Kind::kNumber, true}, {"step", Kind::kNumber}}, "outPoints", Kind::kPoints},
       {"move", {{"points", Kind::kPoints}, {"offset", Kind::kNumber}}, "outPoints", Kind::kPoints},
       {"move", {{"points", Kind::kPoints}, {"offset", Kind::kNumber}}, "outPoints", Kind::kPoints},
       {"move", {{"points", Kind::kPoints}, {"offset", Kind::kNumber}}, "outPoints", Kind::kPoints},
       {"smooth", {{"rings", Kind::kNumber, true}, {"points", Kind::kPoints}}, "outPoints", Kind::kPoints},
       {"measure", {{"points", Kind::kPoints}}, "out", Kind::kNumber},
-      {"cached", {{"threshold", Kind::kNumber}, {"cuePoints", Kind::kPoints}, {"full", Kind::kPoints}}, "outPoints", Kind::kPoints},
+      {"cached",
+       {{"threshold", Kind::kNumber}, {"cuePoints", Kind::kPoints}, {"full", Kind::kPoints}},
+       "outPoints",
+       Kind::kPoints},
   };
   return types;
 }
@@ -120,7 +130,8 @@ class RandomGraph {
       *plug = {name, type.output};
       Kind found = type.kind;
       if (Chance(15)) {
-        const Attribute& a = type.inputs[static_cast<std::size_t>(Pick(static_cast<int>(type.inputs.size())))];
+        const Attribute& a =
+            type.inputs[static_cast<std::size_t>(Pick(static_cast<int>(type.inputs.size())))];
         if (a.structural) continue;
         *plug = {name, a.name, a.array ? Pick(4) : -1};
         found = a.kind;
@@ -163,7 +174,8 @@ class RandomGraph {
     if (before) twin.drivers.erase(to);
     const bool cycle = !overlaps && twin.DependsOn(from, to);
     const Status status = graph.Connect(Ref(from), Ref(to), replace);
-    EXPECT_EQ(status.ok(), !overlaps && !cycle) << from.Name() << " -> " << to.Name() << ": " << status.ToString();
+    EXPECT_EQ(status.ok(), !overlaps && !cycle)
+        << from.Name() << " -> " << to.Name() << ": " << status.ToString();
     EXPECT_EQ(status.ToString().find("cycle") != std::string::npos, cycle) << status.ToString();
     if (status.ok()) {
       twin.drivers[to] = from;
@@ -209,7 +221,8 @@ std::string Bytes(const double& v) { return std::string(reinterpret_cast<const c
 // The evaluators of one plan, set and pulled alike.
 class Rounds {
  public:
-  Rounds(RandomGraph& g, const std::shared_ptr<const Plan>& plan, const Request& request, const std::vector<Plug>& outputs)
+  Rounds(RandomGraph& g, const std::shared_ptr<const Plan>& plan, const Request& request,
+         const std::vector<Plug>& outputs)
       : g_(g), plan_(plan), request_(request), outputs_(outputs), profile_(*plan) {
     for (bool parallel : {false, true}) {
       EvaluatorOptions options;
@@ -225,7 +238,9 @@ class Rounds {
       const Plan::Varying& varying = plan_->varying()[v];
       const Result<PlugRef> ref = g_.graph.FindPlug(varying.name);
       ASSERT_TRUE(ref.ok());
-      Plug plug{g_.graph.name(ref->node), g_.graph.def(ref->node).attributes[static_cast<std::size_t>(ref->attribute)].name, ref->element};
+      Plug plug{g_.graph.name(ref->node),
+                g_.graph.def(ref->node).attributes[static_cast<std::size_t>(ref->attribute)].name,
+                ref->element};
       const auto index = static_cast<Index>(v);
       if (varying.type == Type::kDouble3) {
         const Double3 value = g_.Vector();
@@ -244,7 +259,8 @@ class Rounds {
         g_.twin.Set(plug, points);
       } else {
         const double value = g_.Value();
-        for (auto& e : evaluators_) varying.type == Type::kBool ? e->SetInt(index, value != 0) : e->Set(index, value);
+        for (auto& e : evaluators_)
+          varying.type == Type::kBool ? e->SetInt(index, value != 0) : e->Set(index, value);
         g_.twin.Set(plug, value);
       }
     }
@@ -271,7 +287,8 @@ class Rounds {
       std::string got;
       if (plan_->outputs()[output].type == Type::kPoints) {
         const ConstPointsView view = e->Points(output);
-        for (std::size_t i = 0; i < view.count; ++i) got += Bytes(view.x[i]) + Bytes(view.y[i]) + Bytes(view.z[i]);
+        for (std::size_t i = 0; i < view.count; ++i)
+          got += Bytes(view.x[i]) + Bytes(view.y[i]) + Bytes(view.z[i]);
       } else if (plan_->outputs()[output].type == Type::kDouble3) {
         for (int c = 0; c < 3; ++c) got += Bytes(e->Get<Double3>(output)[c]);
       } else {
@@ -331,7 +348,8 @@ Request MakeRequest(RandomGraph& g, std::vector<Plug>* outputs) {
       if (a.structural || !g.Chance(40) || g.twin.Overlaps(plug, false)) continue;
       if (a.kind == Kind::kVector && g.Chance(30)) plug.component = 1;
       request.varying.push_back(g.Ref(plug));
-      if (a.array && g.twin.held.count(plug) == 0) g.Set(plug, 0.0);  // now it is an element for the twin, too
+      if (a.array && g.twin.held.count(plug) == 0)
+        g.Set(plug, 0.0);  // now it is an element for the twin, too
     }
   }
   return request;
@@ -358,7 +376,8 @@ TEST_P(RandomGraphTest, AgreesWithTheNaiveTwin) {
       steps += static_cast<int>((*plan)->steps().size());
       for (const Plan::Step& step : (*plan)->steps()) units += step.unit_size > 1;
       lazy += static_cast<int>((*plan)->segments().size()) - 1;
-      for (Index s = 0; s < (*plan)->steps().size(); ++s) gathers += std::string((*plan)->step_label(s)) == "gather";
+      for (Index s = 0; s < (*plan)->steps().size(); ++s)
+        gathers += std::string((*plan)->step_label(s)) == "gather";
       // A varying plug keeps its last value in the twin: so it does in the graph
       for (const auto& [plug, value] : std::map<Plug, NaiveTwin::Held>(g.twin.held)) g.Set(plug, value);
       for (int i = 0; i < 12; ++i) g.Edit();

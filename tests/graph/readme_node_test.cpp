@@ -4,7 +4,9 @@
 
 void AddMix(kpsa::NodeRegistry& registry) {
   registry.add("mix", "Blends two values.")
-      .in("a", 0.0).in("b", 1.0).in("weight", 0.5, {.min = 0, .max = 1})
+      .in("a", 0.0)
+      .in("b", 1.0)
+      .in("weight", 0.5, {.min = 0, .max = 1})
       .out("output", kpsa::Type::kDouble)
       .compute([](double a, double b, double weight) { return a + (b - a) * weight; });
 }

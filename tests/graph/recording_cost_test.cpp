@@ -1,5 +1,5 @@
-// Recording that is off costs nothing: the shipped evaluator executes hardly more instructions than the same code
-// compiled without any recording (evaluator_without_recording.cpp).
+// Recording that is off costs nothing: the shipped evaluator executes hardly more instructions than the same
+// code compiled without any recording (evaluator_without_recording.cpp).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,8 +13,9 @@
 namespace kpsa {
 namespace {
 
-// Counting takes microseconds an instruction. What recording costs once an evaluation shows the more the fewer nodes
-// there are, what it costs a node shows at any number; KPSA_RECORDING_NODES=10000 counts at the size of the goal.
+// Counting takes microseconds an instruction. What recording costs once an evaluation shows the more the
+// fewer nodes there are, what it costs a node shows at any number; KPSA_RECORDING_NODES=10000 counts at the
+// size of the goal.
 int NodeCount() {
   const char* text = std::getenv("KPSA_RECORDING_NODES");
   return text == nullptr ? 1000 : std::clamp(std::atoi(text), 200, 100000);
@@ -70,10 +71,12 @@ TEST(Recording, CostsNothingWhileItIsOff) {
   const std::optional<std::uint64_t> on = instructions(shipped);
   EXPECT_EQ(profile.counts()[static_cast<std::size_t>(count / 2)], 1u);  // it did evaluate
   const auto a_node = [&](std::optional<std::uint64_t> total) { return static_cast<double>(*total) / count; };
-  std::printf("instructions a node: %.1f without recording code, %.1f with recording off, %.1f on\n", a_node(without), a_node(off), a_node(on));
+  std::printf("instructions a node: %.1f without recording code, %.1f with recording off, %.1f on\n",
+              a_node(without), a_node(off), a_node(on));
   EXPECT_GT(a_node(without), 20);
   EXPECT_LE(static_cast<double>(*off), 1.01 * static_cast<double>(*without));
-  EXPECT_GT(static_cast<double>(*on), 1.3 * static_cast<double>(*off));  // the comparison sees recording where there is some
+  EXPECT_GT(static_cast<double>(*on),
+            1.3 * static_cast<double>(*off));  // the comparison sees recording where there is some
 }
 
 }  // namespace

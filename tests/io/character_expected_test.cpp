@@ -1,4 +1,5 @@
-// The default graph of every asset, compiled and evaluated, against frames that independent programs computed.
+// The default graph of every asset, compiled and evaluated, against frames that independent programs
+// computed.
 #include <algorithm>
 #include <filesystem>
 
@@ -72,8 +73,9 @@ void CompareFile(Compiler* compiler, Rig* rig, const ExpectedFile& file) {
         for (Index v = 0; v < primitive.vertex_count; ++v) {
           const Index p = mesh.mesh().data().vertex_to_point[primitive.first_vertex + v];
           const double* e = &found->second[(t * primitive.vertex_count + v) * 3];
-          const double d = std::hypot(e[0] - static_cast<double>(points.x[p]), e[1] - static_cast<double>(points.y[p]),
-                                      e[2] - static_cast<double>(points.z[p]));
+          const double d =
+              std::hypot(e[0] - static_cast<double>(points.x[p]), e[1] - static_cast<double>(points.y[p]),
+                         e[2] - static_cast<double>(points.z[p]));
           worst = std::isfinite(d) ? std::max(worst, d) : 1e300;
         }
       }

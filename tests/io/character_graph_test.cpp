@@ -9,8 +9,8 @@ namespace {
 
 gltf::Character Parse(const GltfBuilder& builder) {
   const std::string text = builder.Text();
-  Result<gltf::Character> character =
-      gltf::LoadGltfFromMemory({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, "", "t.gltf");
+  Result<gltf::Character> character = gltf::LoadGltfFromMemory(
+      {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, "", "t.gltf");
   EXPECT_TRUE(character.ok()) << character.status().ToString();
   return character.ok() ? std::move(*character) : gltf::Character();
 }
@@ -98,9 +98,11 @@ TEST_F(CharacterGraphTest, PlaysAndChangesClips) {
   EXPECT_EQ(Driver("tip.offsetParentMatrix"), "");
   EXPECT_FALSE(scene.clip.has_value());
   EXPECT_FALSE(graph.FindNode("tip_clip").ok());
-  EXPECT_EQ(graph.FindValue(Plug("tip.offsetParentMatrix"))->get<Matrix4>(), character.nodes[2].LocalMatrix());
+  EXPECT_EQ(graph.FindValue(Plug("tip.offsetParentMatrix"))->get<Matrix4>(),
+            character.nodes[2].LocalMatrix());
   const std::string unknown = SetClip(character, "weve", &scene, &graph).ToString();
-  EXPECT_TRUE(Has(unknown, "has no clip \"weve\" (did you mean \"wave\"?); its clips are wave, other")) << unknown;
+  EXPECT_TRUE(Has(unknown, "has no clip \"weve\" (did you mean \"wave\"?); its clips are wave, other"))
+      << unknown;
 }
 
 TEST_F(CharacterGraphTest, WithoutAClipNothingIsAnimated) {
@@ -120,9 +122,11 @@ TEST_F(CharacterGraphTest, SharedNamesAreNumberedAndFoundByPath) {
   builder.root["nodes"].push_back({{"name", "body_mesh"}});
   const gltf::Character character = Parse(builder);
   Build(character);
-  EXPECT_TRUE(Has(Error("root.translateX"), "\"root\" is the name of several nodes: write root#1# or root#2")) << Error("root.translateX");
+  EXPECT_TRUE(Has(Error("root.translateX"), "\"root\" is the name of several nodes: write root#1# or root#2"))
+      << Error("root.translateX");
   EXPECT_EQ(Plug("root#2.translateX").node, Plug("/root/node3/root.translateX").node);
-  EXPECT_NE(Plug("root#1.translateX").node, Plug("/root.translateX").node);  // somebody is really called root#1
+  EXPECT_NE(Plug("root#1.translateX").node,
+            Plug("/root.translateX").node);  // somebody is really called root#1
   EXPECT_EQ(graph.name(Plug("/root.translateX").node), "root#1#");
   EXPECT_EQ(graph.def(Plug("time.time").node).name, "time");
   EXPECT_EQ(graph.def(Plug("time#4.translateX").node).name, "transform");
@@ -228,7 +232,8 @@ TEST_F(CharacterGraphTest, RobotHasMeshesAndJointsOfOneName) {
     EXPECT_LT(mesh.mesh().point_count(), mesh.vertex_count);  // hard edges were split
   }
   EXPECT_TRUE(head);
-  EXPECT_TRUE(Has(Error("Head.translateX"), "is the name of several nodes: write Head#")) << Error("Head.translateX");
+  EXPECT_TRUE(Has(Error("Head.translateX"), "is the name of several nodes: write Head#"))
+      << Error("Head.translateX");
   EXPECT_TRUE(graph.FindNode("Head_skinCluster").ok());
 }
 

@@ -71,7 +71,8 @@ TEST(File, ReadsWithinTheLimit) {
   EXPECT_NE(ReadFileBytes(path, 4).status().ToString().find("larger than 4"), std::string::npos);
   EXPECT_NE(ReadFileBytes(folder.path(), 4).status().ToString().find("is a folder"), std::string::npos);
   EXPECT_NE(ReadFileBytes(folder / "none", 4).status().ToString().find("No such file"), std::string::npos);
-  EXPECT_NE(ReadFileBytes("/dev/zero", 100).status().ToString().find("is a pipe or a device"), std::string::npos);
+  EXPECT_NE(ReadFileBytes("/dev/zero", 100).status().ToString().find("is a pipe or a device"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -23,7 +23,8 @@ TEST_F(RigBuilderTest, ACharacterAloneIsARig) {
   EXPECT_EQ(rig->files, std::vector<std::string>{folder / "c.gltf"});
   RigOptions options;
   options.clip = "nobody";
-  EXPECT_TRUE(Has(LoadRig(StandardRegistry(), folder / "c.gltf", options).status().ToString(), "has no clip \"nobody\""));
+  EXPECT_TRUE(Has(LoadRig(StandardRegistry(), folder / "c.gltf", options).status().ToString(),
+                  "has no clip \"nobody\""));
   options = {};
   options.variant = "game";
   EXPECT_EQ(LoadRig(StandardRegistry(), folder / "c.gltf", options).status().kind(), ErrorKind::kUsage);
@@ -48,7 +49,8 @@ deform: [{meshes: [body], stack: [gltf, mush, soft, cage]}]
   EXPECT_DOUBLE_EQ(Held(rig, "soft.falloffRadius").AsDouble(), 0.025);
   EXPECT_EQ(Held(rig, "mush.iterations").AsInt(), 3);
   EXPECT_EQ(Held(rig, "mush.pinBorderVertices").AsInt(), 0);
-  EXPECT_EQ(Held(rig, "cage.divisions").get<std::vector<std::int64_t>>(), (std::vector<std::int64_t>{3, 4, 2}));
+  EXPECT_EQ(Held(rig, "cage.divisions").get<std::vector<std::int64_t>>(),
+            (std::vector<std::int64_t>{3, 4, 2}));
   EXPECT_EQ(Driver(rig, "m.matrixIn[0]"), "a.worldMatrix");
   EXPECT_EQ(Held(rig, "m.matrixIn[1]").get<Matrix4>(), Translation({7, 0, 0}));  // rows as read
 }
@@ -72,8 +74,12 @@ TEST_F(RigBuilderTest, CollectsErrorsOfNodes) {
   m: {type: transform, at: nobody}
   n: {type: multMatrix, parent: tip}
 )");
-  EXPECT_TRUE(Has(text, "t.yaml:4:13: unknown node type \"deltaMesh\" (did you mean \"deltaMush\"?)")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:5:24: node \"b\" (deltaMush) has no attribute \"iteration\" (did you mean \"iterations\"?)")) << text;
+  EXPECT_TRUE(Has(text, "t.yaml:4:13: unknown node type \"deltaMesh\" (did you mean \"deltaMush\"?)"))
+      << text;
+  EXPECT_TRUE(Has(
+      text,
+      "t.yaml:5:24: node \"b\" (deltaMush) has no attribute \"iteration\" (did you mean \"iterations\"?)"))
+      << text;
   EXPECT_TRUE(Has(text, "t.yaml:6:36: c.iterations: expected a number, found a list")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:7:36: d.iterations = 500 is outside of 0 to 200")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:7:51: d.envelope: \".nan\" is not finite")) << text;
@@ -87,7 +93,8 @@ TEST_F(RigBuilderTest, CollectsErrorsOfNodes) {
   EXPECT_TRUE(Has(text, "t.yaml:12:32: unknown node \"cage\"")) << text;
   EXPECT_TRUE(Has(text, "i.worldMatrix is an output and cannot be set")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:13:3: node \"j\": the key \"type\" is missing")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:14:6: node \"k\": expected a map with its type, found a single value")) << text;
+  EXPECT_TRUE(Has(text, "t.yaml:14:6: node \"k\": expected a map with its type, found a single value"))
+      << text;
   EXPECT_TRUE(Has(text, "t.yaml:15:3: \"skin\" is a word of stacks")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:16:3: a node named \"tip\" exists already")) << text;
   EXPECT_TRUE(Has(text, "l.input is an array: expected a list")) << text;
@@ -138,23 +145,30 @@ connections:
   - r.outValue -> tip.offsetParentMatrix
 )");
   EXPECT_TRUE(Has(text, "t.yaml:9:5: node \"b\" (transform) has no attribute \"nothing\"")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:10:5: r.outValue is a double and cannot drive b.translate, a double3")) << text;
+  EXPECT_TRUE(Has(text, "t.yaml:10:5: r.outValue is a double and cannot drive b.translate, a double3"))
+      << text;
   EXPECT_TRUE(Has(text, "t.yaml:11:5: r.outValue is an output")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:12:5: s.outValue -> r.inputValue would make a cycle: ")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:14:5: b.scale is driven by a.scale already")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:15:5: a clip drives body_blendShape.weight[up]: write {from: r.outValue, to: body_blendShape.weight[up], override: true}")) << text;
+  EXPECT_TRUE(Has(text,
+                  "t.yaml:15:5: a clip drives body_blendShape.weight[up]: write {from: r.outValue, to: "
+                  "body_blendShape.weight[up], override: true}"))
+      << text;
   EXPECT_TRUE(Has(text, "t.yaml:16:5: a clip drives tip.offsetParentMatrix")) << text;
 }
 
 TEST_F(RigBuilderTest, AConnectionMayOverrideAClip) {
-  Rig rig = Loaded("nodes: {r: {type: remapValue}}\nconnections: [{from: r.outValue, to: 'body.weight[up]', override: true}]\n");
+  Rig rig = Loaded(
+      "nodes: {r: {type: remapValue}}\nconnections: [{from: r.outValue, to: 'body.weight[up]', override: "
+      "true}]\n");
   EXPECT_EQ(Driver(rig, "body.weight[up]"), "r.outValue");
   ASSERT_TRUE(SetClip(&rig, "wave").ok());
   EXPECT_EQ(Driver(rig, "body.weight[up]"), "r.outValue");
 }
 
 TEST_F(RigBuilderTest, ParentsThatFormACycle) {
-  const std::string text = Errors("nodes:\n  a: {type: transform, parent: b}\n  b: {type: transform, parent: a}\n");
+  const std::string text =
+      Errors("nodes:\n  a: {type: transform, parent: b}\n  b: {type: transform, parent: a}\n");
   EXPECT_TRUE(Has(text, "t.yaml:5:32: a.worldMatrix -> b.parentMatrix would make a cycle: ")) << text;
 }
 
@@ -191,7 +205,8 @@ nodes:
   EXPECT_TRUE(near(at("joint"), {0, 1, 5}));
   EXPECT_TRUE(near(at("place"), {0.01, 0.02, 0.03}));
   EXPECT_TRUE(near(at("chained"), {0, 0, 0}));
-  EXPECT_EQ(Held(rig, "vertex.restMatrix").get<Matrix4>(), Held(rig, "vertex.offsetParentMatrix").get<Matrix4>());
+  EXPECT_EQ(Held(rig, "vertex.restMatrix").get<Matrix4>(),
+            Held(rig, "vertex.offsetParentMatrix").get<Matrix4>());
   EXPECT_EQ(Driver(rig, "mid.parentMatrix"), "tip.worldMatrix");
   EXPECT_EQ(Driver(rig, "c.parentMatrix"), "root.worldMatrix");
 }
@@ -247,7 +262,8 @@ accelerate: {a: {points: ["body@cage"], space: tip, tolerance: 0.5mm, test: {cli
   EXPECT_EQ(rig.graph->PlugName(mesh.points), "mush.outPoints[0]");
   EXPECT_EQ(Held(rig, "before.space").AsInt(), 1);
   EXPECT_EQ(Held(rig, "cage.space").AsInt(), 0);
-  EXPECT_EQ(Held(rig, "before.geometryMatrix").get<Matrix4>(), Translation({0, 1, 5}));  // tip carries most of it
+  EXPECT_EQ(Held(rig, "before.geometryMatrix").get<Matrix4>(),
+            Translation({0, 1, 5}));  // tip carries most of it
   EXPECT_TRUE(Held(rig, "cage.geometryMatrix").empty());
   EXPECT_EQ(Held(rig, "mush.mesh").asset<Mesh>(), &mesh.mesh());
   EXPECT_EQ(Driver(rig, "before.displacements"), "c.displacements");
@@ -265,11 +281,15 @@ accelerate: {a: {points: ["body@cage"], space: tip, tolerance: 0.5mm, test: {cli
 
 TEST_F(RigBuilderTest, AVectorAndItsComponentsAreNotSetTogether) {
   const std::string a = "nodes:\n  a: {type: transform}\n";
-  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translate: [1, 2, 3], translateY: 7}\n"), "b.translate.y is set here, and b.translate at"));
-  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translateX: 5, translate: [1, 2, 3]}\n"), "b.translate is set here, and b.translate.x at"));
-  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translate: a.translate, translateY: 7}\n"), "b.translate.y is set here, and b.translate at"));
+  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translate: [1, 2, 3], translateY: 7}\n"),
+                  "b.translate.y is set here, and b.translate at"));
+  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translateX: 5, translate: [1, 2, 3]}\n"),
+                  "b.translate is set here, and b.translate.x at"));
+  EXPECT_TRUE(Has(Errors(a + "  b: {type: transform, translate: a.translate, translateY: 7}\n"),
+                  "b.translate.y is set here, and b.translate at"));
   // A value of which a component is driven, in either order
-  for (const char* node : {"{type: transform, translate: [1, 2, 3], translateY: a.translateX}", "{type: transform, translateY: a.translateX, translate: [1, 2, 3]}"}) {
+  for (const char* node : {"{type: transform, translate: [1, 2, 3], translateY: a.translateX}",
+                           "{type: transform, translateY: a.translateX, translate: [1, 2, 3]}"}) {
     const Rig rig = Loaded(a + "  b: " + node + "\n");
     EXPECT_EQ(rig.graph->FindValue(*rig.graph->FindPlug("b.translate"))->get<Double3>(), (Double3{1, 2, 3}));
     EXPECT_NE(rig.graph->FindConnection(*rig.graph->FindPlug("b.translateY")), nullptr);
@@ -277,7 +297,8 @@ TEST_F(RigBuilderTest, AVectorAndItsComponentsAreNotSetTogether) {
 }
 
 TEST_F(RigBuilderTest, ExplainsBadStacks) {
-  const std::string text = Errors(R"(nodes: {mush: {type: deltaMush}, mush2: {type: deltaMush}, t: {type: transform}}
+  const std::string text =
+      Errors(R"(nodes: {mush: {type: deltaMush}, mush2: {type: deltaMush}, t: {type: transform}}
 deform:
   - {meshes: [body], stack: [gltf, mosh, t, morph]}
   - {meshes: [body, bodi, tip], stack: [gltf]}
@@ -309,21 +330,26 @@ TEST_F(RigBuilderTest, DeformersMayServeSeveralMeshesInOneSpace) {
   EXPECT_EQ(Driver(rig, "mush.inPoints[1]"), "twin_skinCluster.outPoints[0]");
   EXPECT_EQ(Driver(rig, "mush.inPoints[2]"), "prop_transformGeometry.outPoints[0]");
   // Morph targets belong to mesh space
-  EXPECT_TRUE(Has(Errors(nodes + "deform: [{meshes: [prop], stack: [l, morph]}]\n"), "those of \"l\" are in world space: put it before"));
-  EXPECT_TRUE(Has(Errors(nodes + "deform: [{meshes: [body], stack: [skin, morph]}]\n"), "those of \"skin\" are in world space: put it before"));
+  EXPECT_TRUE(Has(Errors(nodes + "deform: [{meshes: [prop], stack: [l, morph]}]\n"),
+                  "those of \"l\" are in world space: put it before"));
+  EXPECT_TRUE(Has(Errors(nodes + "deform: [{meshes: [body], stack: [skin, morph]}]\n"),
+                  "those of \"skin\" are in world space: put it before"));
   // Unskinned meshes are in world space but for their morphs
   const Rig props = Loaded(nodes + "deform: [{meshes: [prop], stack: [morph, l]}]\n");
   EXPECT_EQ(Driver(props, "l.inPoints"), "prop_transformGeometry.outPoints[0]");
   EXPECT_EQ(Held(props, "l.space").AsInt(), 0);
   EXPECT_TRUE(props.scene.meshes[2].world);
-  const std::string mixed = Errors(nodes + "deform:\n  - {meshes: [body], stack: [morph, l, skin]}\n  - {meshes: [prop], stack: [gltf, l]}\n");
+  const std::string mixed = Errors(
+      nodes +
+      "deform:\n  - {meshes: [body], stack: [morph, l, skin]}\n  - {meshes: [prop], stack: [gltf, l]}\n");
   EXPECT_TRUE(Has(mixed, "t.yaml:6:36: \"l\" deforms body and prop in different spaces")) << mixed;
   const std::string vertices = Errors("nodes: {c: {type: curve, vertices: [0, 1]}}\n");
   EXPECT_TRUE(Has(vertices, "the character has 3 meshes: name the one that the vertices are of")) << vertices;
 }
 
 TEST_F(RigBuilderTest, AStackWithoutItsSkinIsNoted) {
-  const Rig rig = Loaded("nodes: {mush: {type: deltaMush}}\ndeform: [{meshes: [body], stack: [morph, mush]}]\n");
+  const Rig rig =
+      Loaded("nodes: {mush: {type: deltaMush}}\ndeform: [{meshes: [body], stack: [morph, mush]}]\n");
   EXPECT_FALSE(rig.scene.meshes[0].world);
   ASSERT_EQ(rig.notes.size(), 1u);
   EXPECT_TRUE(Has(rig.notes[0], "leaves out its skin")) << rig.notes[0];
@@ -334,10 +360,12 @@ TEST_F(RigBuilderTest, MembersWeightsAndFalloffs) {
   folder.Write("w.json", R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 3,
     "maps": {"half": {"default": 0.5, "indices": [1], "values": [0.25]}, "one": {"default": 0, "indices": [2], "values": [0.1]}}})");
   const auto weights = [&](const std::string& keys) {
-    const Rig rig = Loaded("units: {length: cm}\nnodes: {l: {type: cluster, " + keys + "}}\ndeform: [{meshes: [body], stack: [gltf, l]}]\n");
+    const Rig rig = Loaded("units: {length: cm}\nnodes: {l: {type: cluster, " + keys +
+                           "}}\ndeform: [{meshes: [body], stack: [gltf, l]}]\n");
     const auto* map = Held(rig, "l.weights").asset<WeightMap>();
     std::vector<float> by_vertex;
-    for (Index v = 0; map != nullptr && v < 3; ++v) by_vertex.push_back(map->weights()[rig.scene.meshes[0].mesh().data().vertex_to_point[v]]);
+    for (Index v = 0; map != nullptr && v < 3; ++v)
+      by_vertex.push_back(map->weights()[rig.scene.meshes[0].mesh().data().vertex_to_point[v]]);
     return by_vertex;
   };
   using V = std::vector<float>;
@@ -361,21 +389,32 @@ TEST_F(RigBuilderTest, MembersWeightsAndFalloffs) {
 }
 
 TEST_F(RigBuilderTest, ExplainsBadMembersAndWeights) {
-  folder.Write("other.json", R"({"kpsa": "weights", "version": 1, "mesh": "head", "points": 3, "maps": {"m": {"default": 0, "indices": [], "values": []}}})");
-  folder.Write("short.json", R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 4, "maps": {"m": {"default": 0, "indices": [], "values": []}}})");
-  folder.Write("bad.json", R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 3, "maps": {"m": {"default": 0, "indices": [7], "values": [1]}}})");
+  folder.Write(
+      "other.json",
+      R"({"kpsa": "weights", "version": 1, "mesh": "head", "points": 3, "maps": {"m": {"default": 0, "indices": [], "values": []}}})");
+  folder.Write(
+      "short.json",
+      R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 4, "maps": {"m": {"default": 0, "indices": [], "values": []}}})");
+  folder.Write(
+      "bad.json",
+      R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 3, "maps": {"m": {"default": 0, "indices": [7], "values": [1]}}})");
   const auto errors = [&](const std::string& keys) {
-    return Errors("nodes: {l: {type: cluster, " + keys + "}}\ndeform: [{meshes: [body], stack: [gltf, l]}]\n");
+    return Errors("nodes: {l: {type: cluster, " + keys +
+                  "}}\ndeform: [{meshes: [body], stack: [gltf, l]}]\n");
   };
-  EXPECT_TRUE(Has(errors("weights: 'other.json#m'"), "other.json is for mesh \"head\"; \"l\" deforms body")) << errors("weights: 'other.json#m'");
+  EXPECT_TRUE(Has(errors("weights: 'other.json#m'"), "other.json is for mesh \"head\"; \"l\" deforms body"))
+      << errors("weights: 'other.json#m'");
   EXPECT_TRUE(Has(errors("weights: 'short.json#m'"), "short.json is for 4 vertices; body has 3"));
   EXPECT_TRUE(Has(errors("weights: 'other.json#n'"), "other.json has no map \"n\""));
   EXPECT_TRUE(Has(errors("weights: 'bad.json#m'"), "bad.json")) << errors("weights: 'bad.json#m'");
   EXPECT_TRUE(Has(errors("weights: 'nobody.json#m'"), "nobody.json")) << errors("weights: 'nobody.json#m'");
-  EXPECT_TRUE(Has(errors("members: {vertices: '0:9'}"), "vertices: \"0:9\" is none of body: expected numbers and ranges from 0 to 2"));
+  EXPECT_TRUE(Has(errors("members: {vertices: '0:9'}"),
+                  "vertices: \"0:9\" is none of body: expected numbers and ranges from 0 to 2"));
   EXPECT_TRUE(Has(errors("members: {vertices: '2:0'}"), "is none of body"));
-  EXPECT_TRUE(Has(errors("members: {primitive: 1}"), "primitive: expected a whole number from 0 to 0, found 1"));
-  EXPECT_TRUE(Has(errors("members: {material: Skim}"), "body has no material \"Skim\" (did you mean \"Skin\"?)"));
+  EXPECT_TRUE(
+      Has(errors("members: {primitive: 1}"), "primitive: expected a whole number from 0 to 0, found 1"));
+  EXPECT_TRUE(
+      Has(errors("members: {material: Skim}"), "body has no material \"Skim\" (did you mean \"Skin\"?)"));
   EXPECT_TRUE(Has(errors("members: {joint: node3}"), "\"node3\" is no joint of the skin of body"));
   EXPECT_TRUE(Has(errors("members: {jiont: tip}"), "unknown key \"jiont\" (did you mean \"joint\"?)"));
   EXPECT_TRUE(Has(errors("members: some"), "members: expected all,"));
@@ -404,12 +443,17 @@ deform:
   const Matrix4 placed = Held(rig, "l.geometryMatrix").get<Matrix4>();
   EXPECT_TRUE(Length(TransformPoint(placed, {1, 1, 1}) - high) < 1e-12);
   EXPECT_EQ(Held(rig, "l.space").AsInt(), 1);
-  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster}}\ndeform: [{points: tip.translate, stack: [l]}]\n"), "tip.translate is no points input"));
-  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster}, cage: {type: lattice}}\ndeform: [{points: cage.points, stack: [l, skin]}]\n"), "\"cage\" has no members"));
+  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster}}\ndeform: [{points: tip.translate, stack: [l]}]\n"),
+                  "tip.translate is no points input"));
+  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster}, cage: {type: lattice}}\ndeform: [{points: cage.points, "
+                         "stack: [l, skin]}]\n"),
+                  "\"cage\" has no members"));
 }
 
 TEST_F(RigBuilderTest, ControlsAreChecked) {
-  const Rig rig = Loaded("units: {length: cm}\ncontrols:\n  tip.rotateX: {min: -90, max: 0.5rad}\n  root.translateY: {min: -1, max: 1}\n  body.weight[up]: {min: 0, max: 1}\n");
+  const Rig rig = Loaded(
+      "units: {length: cm}\ncontrols:\n  tip.rotateX: {min: -90, max: 0.5rad}\n  root.translateY: {min: -1, "
+      "max: 1}\n  body.weight[up]: {min: 0, max: 1}\n");
   ASSERT_EQ(rig.controls.size(), 3u);
   EXPECT_DOUBLE_EQ(rig.controls[0].min, -kPi / 2);
   EXPECT_DOUBLE_EQ(rig.controls[0].max, 0.5);
@@ -417,7 +461,8 @@ TEST_F(RigBuilderTest, ControlsAreChecked) {
   EXPECT_DOUBLE_EQ(rig.controls[1].max, 0.01);
   EXPECT_TRUE(rig.controls[2].by_clip);
   EXPECT_DOUBLE_EQ(rig.controls[2].value, 0.5);  // the file's default weight
-  const std::string text = Errors(R"(nodes: {mush: {type: deltaMush}, r: {type: remapValue, input: tip.rotateY}}
+  const std::string text =
+      Errors(R"(nodes: {mush: {type: deltaMush}, r: {type: remapValue, input: tip.rotateY}}
 connections: [r.outValue -> tip.scaleX]
 deform: [{meshes: [body], stack: [gltf, mush]}]
 controls:
@@ -432,13 +477,15 @@ controls:
   nobody.rotateX: {min: 0, max: 1}
 )");
   EXPECT_TRUE(Has(text, "t.yaml:7:22: control \"tip.rotateX\": min 3 is above max -25")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:8:3: tip.rotate is a double3; a control is one number, as in tip.rotate.x")) << text;
+  EXPECT_TRUE(Has(text, "t.yaml:8:3: tip.rotate is a double3; a control is one number, as in tip.rotate.x"))
+      << text;
   EXPECT_TRUE(Has(text, "t.yaml:9:3: \"tip.rotate.x\" and \"tip.rotateX\" are the same control")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:10:3: tip.scale.x is driven by r.outValue")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:11:3: mush.iterations is structural")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:12:24: control \"mush.envelope\": mush.envelope only takes 0 to 1")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:13:3: tip.matrix is an output")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:14:3: body_blendShape.weight has no element \"upp\" (did you mean \"up\"?)")) << text;
+  EXPECT_TRUE(Has(text, "t.yaml:14:3: body_blendShape.weight has no element \"upp\" (did you mean \"up\"?)"))
+      << text;
   EXPECT_TRUE(Has(text, "t.yaml:15:3: unknown node \"nobody\"")) << text;
 }
 
@@ -478,7 +525,8 @@ overrides:
 }
 
 TEST_F(RigBuilderTest, SettingsFromOutside) {
-  Rig rig = Loaded("units: {length: cm}\nnodes: {r: {type: remapValue, input: tip.translateX}, a: {type: transform}}\n");
+  Rig rig = Loaded(
+      "units: {length: cm}\nnodes: {r: {type: remapValue, input: tip.translateX}, a: {type: transform}}\n");
   Result<Setting> setting = ParseSetting(rig, "tip.rotateX=-90");
   ASSERT_TRUE(setting.ok()) << setting.status().ToString();
   EXPECT_DOUBLE_EQ(setting->value.AsDouble(), -kPi / 2);
@@ -510,11 +558,17 @@ TEST_F(RigBuilderTest, SettingsFromOutside) {
   ASSERT_TRUE(setting.ok());
   EXPECT_TRUE(Has(ApplySetting(&rig, *setting).ToString(), "is driven by"));
 
-  Result<std::vector<Setting>> pose = ReadPoseFile(rig, folder.Write("p.yaml", "kpsa: 1\nunits: {length: mm}\npose: {a.translateX: 5, tip.rotateY: 1rad}\n"));
+  Result<std::vector<Setting>> pose = ReadPoseFile(
+      rig,
+      folder.Write("p.yaml", "kpsa: 1\nunits: {length: mm}\npose: {a.translateX: 5, tip.rotateY: 1rad}\n"));
   ASSERT_TRUE(pose.ok()) << pose.status().ToString();
   ASSERT_EQ(pose->size(), 2u);
   EXPECT_DOUBLE_EQ((*pose)[0].value.AsDouble(), 0.005);
-  const std::string bad = Short(ReadPoseFile(rig, folder.Write("p.yaml", "kpsa: 1\npose:\n  a.translatX: 5\n  a.rotateX: [1]\nposes: 1\n")).status().ToString());
+  const std::string bad =
+      Short(ReadPoseFile(
+                rig, folder.Write("p.yaml", "kpsa: 1\npose:\n  a.translatX: 5\n  a.rotateX: [1]\nposes: 1\n"))
+                .status()
+                .ToString());
   EXPECT_TRUE(Has(bad, "p.yaml:3:3: ")) << bad;
   EXPECT_TRUE(Has(bad, "p.yaml:4:14: ")) << bad;
   EXPECT_TRUE(Has(bad, "unknown key \"poses\" (did you mean \"pose\"?)")) << bad;
@@ -581,10 +635,18 @@ overrides: {mush.iterations: 12, w.dropoff: 3}
     for (unsigned change = 0; change <= random() % 3; ++change) {
       const std::size_t at = random() % text.size();
       switch (random() % 4) {
-        case 0: text[at] = alphabet[random() % alphabet.size()]; break;
-        case 1: text.erase(at, 1 + random() % 8); break;
-        case 2: text.insert(at, 1, alphabet[random() % alphabet.size()]); break;
-        default: text.insert(at, text.substr(random() % text.size(), random() % 40)); break;
+        case 0:
+          text[at] = alphabet[random() % alphabet.size()];
+          break;
+        case 1:
+          text.erase(at, 1 + random() % 8);
+          break;
+        case 2:
+          text.insert(at, 1, alphabet[random() % alphabet.size()]);
+          break;
+        default:
+          text.insert(at, text.substr(random() % text.size(), random() % 40));
+          break;
       }
     }
     const Result<Rig> rig = Load(text);

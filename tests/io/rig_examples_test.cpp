@@ -1,4 +1,5 @@
-// The rigs of this repository, built and evaluated: scenes/ and the example of the rig format on the shared head.
+// The rigs of this repository, built and evaluated: scenes/ and the example of the rig format on the shared
+// head.
 #include "tests/io/rig_player.h"
 #include "tests/support/shared_files.h"
 
@@ -48,7 +49,9 @@ TEST(RigExamples, HeadHandlesMoveWhatTheyShould) {
   EXPECT_TRUE(player.rig.notes.empty()) << fmt::format("{}", fmt::join(player.rig.notes, "\n"));
   constexpr Index kUpperLip = 466, kLowerLip = 496, kChin = 1628, kCrown = 1466;
   const std::vector<Double3> rest = player.Points();
-  const auto moved = [&](Index vertex) { return Length(player.Points()[player.PointOf(vertex)] - rest[player.PointOf(vertex)]); };
+  const auto moved = [&](Index vertex) {
+    return Length(player.Points()[player.PointOf(vertex)] - rest[player.PointOf(vertex)]);
+  };
 
   player.Set("lipUp.translateZ", 0.003);
   EXPECT_GT(moved(kUpperLip), 0.001);

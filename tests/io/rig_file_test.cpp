@@ -1,4 +1,5 @@
-// Every diagnostic of the rig format that needs no registry: grammar, versions, includes, duplicate definitions.
+// Every diagnostic of the rig format that needs no registry: grammar, versions, includes, duplicate
+// definitions.
 #include "io/rig_file.h"
 
 #include "tests/io/rig_fixture.h"
@@ -9,7 +10,9 @@ namespace {
 using RigFileTest = RigFixture;
 
 TEST_F(RigFileTest, ReadsAllSections) {
-  folder.Write("part.yaml", "kpsa: 1\nunits: {length: mm, angle: rad}\nnodes: {a: {type: transform, translate: [1, 0, 0]}}\n");
+  folder.Write(
+      "part.yaml",
+      "kpsa: 1\nunits: {length: mm, angle: rad}\nnodes: {a: {type: transform, translate: [1, 0, 0]}}\n");
   const std::string path = folder.Write("t.yaml", R"(kpsa: 1
 units: {length: cm}
 fps: 48
@@ -72,10 +75,12 @@ TEST_F(RigFileTest, RefusesOtherVersionsAndOtherFiles) {
     const Status status = ReadRigFile(folder.Write("t.yaml", text), std::nullopt, &rig);
     return status.ok() ? "no error" : Short(status.ToString());
   };
-  EXPECT_TRUE(Has(errors("kpsa: 2\nshiny: new\n"), "t.yaml:1:7: the file is of version 2, newer than this kpsa, which reads version 1"));
+  EXPECT_TRUE(Has(errors("kpsa: 2\nshiny: new\n"),
+                  "t.yaml:1:7: the file is of version 2, newer than this kpsa, which reads version 1"));
   EXPECT_FALSE(Has(errors("kpsa: 2\nshiny: new\n"), "unknown key"));
   EXPECT_TRUE(Has(errors("kpsa: one\n"), "\"one\" is no number"));
-  EXPECT_TRUE(Has(errors("character: x.glb\n"), "t.yaml:1:1: not a rig file: it must begin with \"kpsa: 1\""));
+  EXPECT_TRUE(
+      Has(errors("character: x.glb\n"), "t.yaml:1:1: not a rig file: it must begin with \"kpsa: 1\""));
   EXPECT_TRUE(Has(errors("- kpsa\n"), "t.yaml:1:1: rig: expected a map, found a list"));
   EXPECT_TRUE(Has(errors("kpsa: 1\n"), "the rig names no character"));
   EXPECT_TRUE(Has(errors(""), "no YAML document"));
@@ -85,7 +90,9 @@ TEST_F(RigFileTest, RefusesOtherVersionsAndOtherFiles) {
 
 TEST_F(RigFileTest, NamesWhatNeedsANewerVersion) {
   for (const char* key : {"plugins", "variants", "clips", "references", "templates", "use"}) {
-    EXPECT_TRUE(Has(Errors(std::string(key) + ": {}\n"), std::string("t.yaml:3:1: `") + key + "` needs a newer kpsa")) << Errors(std::string(key) + ": {}\n");
+    EXPECT_TRUE(
+        Has(Errors(std::string(key) + ": {}\n"), std::string("t.yaml:3:1: `") + key + "` needs a newer kpsa"))
+        << Errors(std::string(key) + ": {}\n");
   }
 }
 
@@ -118,19 +125,27 @@ accelerate:
   EXPECT_TRUE(Has(text, "points \"body\": expected mesh@stage")) << text;
   EXPECT_TRUE(Has(text, "tolerance: expected a length above 0, found 0")) << text;
   EXPECT_TRUE(Has(text, "violationRate: expected 0% to 100%, found 120%")) << text;
-  EXPECT_TRUE(Has(text, "\"0.2 parsec\": unknown unit \"parsec\"; the units are mm, cm, m, deg, rad, s, f, %")) << text;
+  EXPECT_TRUE(
+      Has(text, "\"0.2 parsec\": unknown unit \"parsec\"; the units are mm, cm, m, deg, rad, s, f, %"))
+      << text;
   EXPECT_TRUE(Has(text, "samples: expected a whole number from 0")) << text;
   EXPECT_TRUE(Has(text, "clip \"wave\" is trained on at")) << text;
 }
 
 TEST_F(RigFileTest, NamesBothPlacesOfWhatIsDefinedTwice) {
-  folder.Write("part.yaml", "kpsa: 1\nnodes: {a: {type: transform}}\ncontrols: {tip.rotateX: {min: 0, max: 1}}\noverrides: {a.translateX: 1}\nfps: 25\n");
-  const std::string text = Errors("include: [part.yaml]\nfps: 30\nnodes:\n  a: {type: curve}\ncontrols: {tip.rotateX: {min: 0, max: 2}}\noverrides: {a.translateX: 2}\n");
+  folder.Write("part.yaml",
+               "kpsa: 1\nnodes: {a: {type: transform}}\ncontrols: {tip.rotateX: {min: 0, max: "
+               "1}}\noverrides: {a.translateX: 1}\nfps: 25\n");
+  const std::string text = Errors(
+      "include: [part.yaml]\nfps: 30\nnodes:\n  a: {type: curve}\ncontrols: {tip.rotateX: {min: 0, max: "
+      "2}}\noverrides: {a.translateX: 2}\n");
   EXPECT_TRUE(Has(text, "t.yaml:6:3: node \"a\" is defined twice: here and at part.yaml:2:9")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:7:12: control \"tip.rotateX\" is defined twice: here and at part.yaml:3:12")) << text;
+  EXPECT_TRUE(Has(text, "t.yaml:7:12: control \"tip.rotateX\" is defined twice: here and at part.yaml:3:12"))
+      << text;
   EXPECT_TRUE(Has(text, "override \"a.translateX\" is defined twice: here and at part.yaml:4:13")) << text;
   EXPECT_TRUE(Has(text, "part.yaml:5:6: \"fps\" is defined twice: here and at t.yaml:4:6")) << text;
-  EXPECT_TRUE(Has(Errors("nodes:\n  a: {type: curve}\n  a: {type: curve}\n"), "t.yaml:5:3: \"a\" is defined twice in this map: first at line 4"));
+  EXPECT_TRUE(Has(Errors("nodes:\n  a: {type: curve}\n  a: {type: curve}\n"),
+                  "t.yaml:5:3: \"a\" is defined twice in this map: first at line 4"));
 }
 
 TEST_F(RigFileTest, RefusesIncludesTwiceAndInCycles) {
@@ -142,12 +157,14 @@ TEST_F(RigFileTest, RefusesIncludesTwiceAndInCycles) {
 
   folder.Write("b.yaml", "kpsa: 1\ninclude: [t.yaml]\n");
   const std::string cycle = Errors("include: [a.yaml]\n");
-  EXPECT_TRUE(Has(cycle, "b.yaml:2:11: includes form a cycle: t.yaml -> a.yaml (at t.yaml:3:11) -> ")) << cycle;
+  EXPECT_TRUE(Has(cycle, "b.yaml:2:11: includes form a cycle: t.yaml -> a.yaml (at t.yaml:3:11) -> "))
+      << cycle;
   EXPECT_TRUE(Has(cycle, "-> t.yaml (here)")) << cycle;
 
   folder.Write("self.yaml", "kpsa: 1\ninclude: self.yaml\n");
   RigFile rig;
-  EXPECT_TRUE(Has(Short(ReadRigFile(folder / "self.yaml", std::nullopt, &rig).ToString()), "self.yaml:2:10: includes form a cycle: self.yaml -> self.yaml (here)"));
+  EXPECT_TRUE(Has(Short(ReadRigFile(folder / "self.yaml", std::nullopt, &rig).ToString()),
+                  "self.yaml:2:10: includes form a cycle: self.yaml -> self.yaml (here)"));
 
   const std::string missing = Errors("include: [nobody.yaml]\n");
   EXPECT_TRUE(Has(missing, "t.yaml:3:11: ") && Has(missing, "nobody.yaml")) << missing;

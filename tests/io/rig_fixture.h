@@ -1,4 +1,5 @@
-// Rigs from text, on a small character: a triangle `body` (joints root and tip, morph target `up`), clip `wave`.
+// Rigs from text, on a small character: a triangle `body` (joints root and tip, morph target `up`), clip
+// `wave`.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,7 +22,9 @@ inline const NodeRegistry& StandardRegistry() {
   return *registry;
 }
 
-inline bool Has(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+inline bool Has(const std::string& text, std::string_view part) {
+  return text.find(part) != std::string::npos;
+}
 
 class RigFixture : public ::testing::Test {
  protected:
@@ -29,7 +32,8 @@ class RigFixture : public ::testing::Test {
 
   // `text` follows the two lines that every rig here has, so that its own first line is line 3.
   Result<Rig> Load(const std::string& text, const RigOptions& options = {}) {
-    return LoadRig(StandardRegistry(), folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\n" + text), options);
+    return LoadRig(StandardRegistry(), folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\n" + text),
+                   options);
   }
   Rig Loaded(const std::string& text, const RigOptions& options = {}) {
     Result<Rig> rig = Load(text, options);
@@ -44,7 +48,8 @@ class RigFixture : public ::testing::Test {
     return rig.ok() ? "no error" : Short(rig.status().ToString());
   }
   std::string Short(std::string text) const {
-    for (std::size_t at; (at = text.find(folder.path() + "/")) != std::string::npos;) text.erase(at, folder.path().size() + 1);
+    for (std::size_t at; (at = text.find(folder.path() + "/")) != std::string::npos;)
+      text.erase(at, folder.path().size() + 1);
     return text;
   }
   static std::string Driver(const Rig& rig, const std::string& name) {

@@ -42,36 +42,49 @@ std::vector<Double3> Moved(const Matrix4& m, std::vector<Double3> points) {
 }
 
 double Spacing(double at) {  // of floats
-  return std::nextafter(static_cast<float>(at), std::numeric_limits<float>::infinity()) - static_cast<float>(at);
+  return std::nextafter(static_cast<float>(at), std::numeric_limits<float>::infinity()) -
+         static_cast<float>(at);
 }
 
 const std::string kRobotMeshes =
-    "[Arm.L, Arm.R, Foot.L, Foot.R, Hand.L, Hand.R, Head, Leg.L, Leg.R, LowerLeg.L, LowerLeg.R, Shoulder.L, Shoulder.R, Torso]";
+    "[Arm.L, Arm.R, Foot.L, Foot.R, Hand.L, Hand.R, Head, Leg.L, Leg.R, LowerLeg.L, LowerLeg.R, Shoulder.L, "
+    "Shoulder.R, Torso]";
 
 TEST_F(RigIdentities, MushWithoutIterationsIsTheIdentity) {
   KPSA_NEEDS("robot.glb");
   const std::vector<std::tuple<std::string, std::string, std::string>> cases = {
-      {"Fox.glb", "[fox]", "Run"}, {"robot.glb", kRobotMeshes, "Robot_Dance"}, {"human.glb", "[body]", "body_move"}};
+      {"Fox.glb", "[fox]", "Run"},
+      {"robot.glb", kRobotMeshes, "Robot_Dance"},
+      {"human.glb", "[body]", "body_move"}};
   for (const auto& [character, meshes, clip] : cases) {
-    RigPlayer player(Write(character, "nodes: {mush: {type: deltaMush, iterations: 0}}\ndeform: [{meshes: " + meshes + ", stack: [gltf, mush]}]\n"),
+    RigPlayer player(Write(character, "nodes: {mush: {type: deltaMush, iterations: 0}}\ndeform: [{meshes: " +
+                                          meshes + ", stack: [gltf, mush]}]\n"),
                      Clip(clip));
     ASSERT_TRUE(player.ok());
     for (double time : {0.0, 0.31, 0.6}) {
       player.Set("time.time", time);
-      for (std::size_t m = 0; m < player.rig.scene.meshes.size(); ++m) EXPECT_TRUE(SameBits(player.Points(m), player.Points("skin", m))) << character << m;
+      for (std::size_t m = 0; m < player.rig.scene.meshes.size(); ++m)
+        EXPECT_TRUE(SameBits(player.Points(m), player.Points("skin", m))) << character << m;
     }
   }
 }
 
 TEST_F(RigIdentities, MushAtRestIsTheIdentity) {
   KPSA_NEEDS("robot.glb");
-  const std::vector<std::tuple<std::string, std::string>> cases = {
-      {"Fox.glb", "[fox]"}, {"robot.glb", kRobotMeshes}, {"human.glb", "[body]"}, {"rigged_simple.gltf", "[Cylinder]"}, {"MorphStressTest.gltf", "[Main]"}};
+  const std::vector<std::tuple<std::string, std::string>> cases = {{"Fox.glb", "[fox]"},
+                                                                   {"robot.glb", kRobotMeshes},
+                                                                   {"human.glb", "[body]"},
+                                                                   {"rigged_simple.gltf", "[Cylinder]"},
+                                                                   {"MorphStressTest.gltf", "[Main]"}};
   for (const auto& [character, meshes] : cases) {
-    RigPlayer player(Write(character, "nodes: {mush: {type: deltaMush, pinBorderVertices: off}}\ndeform: [{meshes: " + meshes + ", stack: [gltf, mush]}]\n"), Rest());
+    RigPlayer player(
+        Write(character, "nodes: {mush: {type: deltaMush, pinBorderVertices: off}}\ndeform: [{meshes: " +
+                             meshes + ", stack: [gltf, mush]}]\n"),
+        Rest());
     ASSERT_TRUE(player.ok());
     for (std::size_t m = 0; m < player.rig.scene.meshes.size(); ++m) {
-      EXPECT_LT(MaxDistance(player.Points(m), player.Points("gltf", m)), 1e-6 * player.rig.rest_diagonal) << character << m;
+      EXPECT_LT(MaxDistance(player.Points(m), player.Points("gltf", m)), 1e-6 * player.rig.rest_diagonal)
+          << character << m;
     }
   }
 }
@@ -79,9 +92,11 @@ TEST_F(RigIdentities, MushAtRestIsTheIdentity) {
 // The detail grows with the character: at rest the mush stays the identity.
 TEST_F(RigIdentities, MushOfAScaledCharacterIsTheIdentityAtRest) {
   KPSA_NEEDS("head.glb");
-  RigPlayer player(Write("head.glb", "nodes: {mush: {type: deltaMush}}\n"
-                                     "deform: [{meshes: [head_mesh], stack: [gltf, mush]}]\n"
-                                     "controls: {root.scaleX: {min: 0.1, max: 3}, root.scaleY: {min: 0.1, max: 3}, root.scaleZ: {min: 0.1, max: 3}}\n"));
+  RigPlayer player(Write("head.glb",
+                         "nodes: {mush: {type: deltaMush}}\n"
+                         "deform: [{meshes: [head_mesh], stack: [gltf, mush]}]\n"
+                         "controls: {root.scaleX: {min: 0.1, max: 3}, root.scaleY: {min: 0.1, max: 3}, "
+                         "root.scaleZ: {min: 0.1, max: 3}}\n"));
   ASSERT_TRUE(player.ok());
   for (const char* axis : {"root.scaleX", "root.scaleY", "root.scaleZ"}) player.Set(axis, 2);
   EXPECT_LT(MaxDistance(player.Points(), player.Points("skin")), 2e-6);
@@ -113,14 +128,17 @@ controls:
 }
 
 constexpr Double3 kLow{-0.8, 1.3, -0.4}, kHigh{0.8, 1.7, 0.5};
-const std::string kCage = "cage: {type: lattice, divisions: [2, 2, 2], outside: all, boxMin: [-0.8, 1.3, -0.4], boxMax: [0.8, 1.7, 0.5]";
+const std::string kCage =
+    "cage: {type: lattice, divisions: [2, 2, 2], outside: all, boxMin: [-0.8, 1.3, -0.4], boxMax: [0.8, 1.7, "
+    "0.5]";
 
 // The 8 controls, moved by `offset` and sheared: x += shear * y.
 std::string Controls(Double3 offset, double shear) {
   std::string text = "points: [";
   for (int u = 0; u < 2; ++u) {
     for (int t = 0; t < 2; ++t) {
-      for (int s = 0; s < 2; ++s) text += fmt::format("[{}, {}, {}], ", s + offset.x + shear * t, t + offset.y, u + offset.z);
+      for (int s = 0; s < 2; ++s)
+        text += fmt::format("[{}, {}, {}], ", s + offset.x + shear * t, t + offset.y, u + offset.z);
     }
   }
   return text + "]";
@@ -132,17 +150,20 @@ TEST_F(RigIdentities, LatticeIsAffineWhereItsControlsAre) {
   const Double3 size = kHigh - kLow;
   for (double shear : {0.0, 0.75}) {
     const Double3 offset{0.125, -0.25, 0.5};
-    RigPlayer player(Write("human.glb", "nodes:\n  " + kCage + ", " + Controls(offset, shear) + "}\n" + deform), Rest());
+    RigPlayer player(
+        Write("human.glb", "nodes:\n  " + kCage + ", " + Controls(offset, shear) + "}\n" + deform), Rest());
     ASSERT_TRUE(player.ok());
     const std::vector<Double3> skinned = player.Points("skin"), moved = player.Points();
     std::size_t inside = 0;
     double worst = 0;
     for (std::size_t i = 0; i < moved.size(); ++i) {
-      const Double3 q{(skinned[i].x - kLow.x) / size.x, (skinned[i].y - kLow.y) / size.y, (skinned[i].z - kLow.z) / size.z};
+      const Double3 q{(skinned[i].x - kLow.x) / size.x, (skinned[i].y - kLow.y) / size.y,
+                      (skinned[i].z - kLow.z) / size.z};
       const bool is_inside = q.x >= 0 && q.x <= 1 && q.y >= 0 && q.y <= 1 && q.z >= 0 && q.z <= 1;
       inside += is_inside;
       const double t = std::clamp(q.y, 0.0, 1.0);  // outside the nearest point of the box tells
-      const Double3 expected = skinned[i] + Double3{size.x * (offset.x + shear * t), size.y * offset.y, size.z * offset.z};
+      const Double3 expected =
+          skinned[i] + Double3{size.x * (offset.x + shear * t), size.y * offset.y, size.z * offset.z};
       worst = std::max(worst, Length(moved[i] - expected));
     }
     EXPECT_GT(inside, 1000u);
@@ -153,13 +174,16 @@ TEST_F(RigIdentities, LatticeIsAffineWhereItsControlsAre) {
 TEST_F(RigIdentities, LatticeTurnsWithItsParent) {
   KPSA_NEEDS("human.glb");
   const Double3 size = kHigh - kLow, offset{0.125, -0.25, 0.5};
-  RigPlayer player(Write("human.glb", "nodes:\n  turner: {type: transform, at: [1, 2, 3]}\n  " + kCage + ", parent: turner, " + Controls(offset, 0) +
+  RigPlayer player(Write("human.glb", "nodes:\n  turner: {type: transform, at: [1, 2, 3]}\n  " + kCage +
+                                          ", parent: turner, " + Controls(offset, 0) +
                                           "}\ndeform: [{meshes: [body], stack: [gltf, cage]}]\ncontrols:\n"
-                                          "  turner.rotateX: {min: -360, max: 360}\n  turner.rotateZ: {min: -360, max: 360}\n  turner.translateX: {min: -9, max: 9}\n"),
+                                          "  turner.rotateX: {min: -360, max: 360}\n  turner.rotateZ: {min: "
+                                          "-360, max: 360}\n  turner.translateX: {min: -9, max: 9}\n"),
                    Clip("body_move"));
   ASSERT_TRUE(player.ok());
   player.Set("time.time", 3);
-  for (const auto& [x, z, along] : {std::tuple{0.0, 0.0, 0.0}, std::tuple{0.7, -2.0, 0.0}, std::tuple{3.1, 1.0, 5.0}}) {
+  for (const auto& [x, z, along] :
+       {std::tuple{0.0, 0.0, 0.0}, std::tuple{0.7, -2.0, 0.0}, std::tuple{3.1, 1.0, 5.0}}) {
     player.Set("turner.rotateX", x);
     player.Set("turner.rotateZ", z);
     player.Set("turner.translateX", along);
@@ -185,7 +209,10 @@ void ExpectSeamsStayClosed(RigPlayer* player, double duration) {
         influences.emplace_back(from.influences[i].joint, from.influences[i].weight);
       }
       std::sort(influences.begin(), influences.end());
-      places[{{from.positions[3 * v] + 0.0f, from.positions[3 * v + 1] + 0.0f, from.positions[3 * v + 2] + 0.0f}, influences}].push_back(v);
+      places[{{from.positions[3 * v] + 0.0f, from.positions[3 * v + 1] + 0.0f,
+               from.positions[3 * v + 2] + 0.0f},
+              influences}]
+          .push_back(v);
     }
     points += places.size();
     for (double at : {0.0, 0.3, 0.62, 1.0}) {
@@ -195,7 +222,8 @@ void ExpectSeamsStayClosed(RigPlayer* player, double duration) {
       for (const auto& [key, vertices] : places) {
         for (Index v : vertices) {
           copies += v != vertices[0];
-          open = std::max(open, Length(result[player->PointOf(v, m)] - result[player->PointOf(vertices[0], m)]));
+          open =
+              std::max(open, Length(result[player->PointOf(v, m)] - result[player->PointOf(vertices[0], m)]));
         }
       }
       EXPECT_EQ(open, 0) << mesh.name;
@@ -210,7 +238,9 @@ TEST_F(RigIdentities, SeamsStayClosed) {
   RigPlayer fox(Write("Fox.glb", nodes + "deform: [{meshes: [fox], stack: [gltf, mush]}]\n"), Clip("Run"));
   ASSERT_TRUE(fox.ok());
   ExpectSeamsStayClosed(&fox, 1.15);
-  RigPlayer robot(Write("robot.glb", nodes + "deform: [{meshes: " + kRobotMeshes + ", stack: [gltf, mush]}]\n"), Clip("Robot_Dance"));
+  RigPlayer robot(
+      Write("robot.glb", nodes + "deform: [{meshes: " + kRobotMeshes + ", stack: [gltf, mush]}]\n"),
+      Clip("Robot_Dance"));
   ASSERT_TRUE(robot.ok());
   ExpectSeamsStayClosed(&robot, 3.3);
 }
@@ -222,7 +252,8 @@ nodes:
   cage: {type: lattice, parent: head, divisions: [3, 3, 3], members: {joint: head, above: 0.5}}
 deform: [{meshes: [body], stack: [gltf, cage]}]
 overrides: {"cage.points[1,1,2].z": 1.4, "cage.points[1,2,1].y": 1.25, "cage.points[0,1,1].x": -0.3}
-)"), Clip("body_move"));
+)"),
+                   Clip("body_move"));
   ASSERT_TRUE(player.ok());
   std::vector<Double3> first;  // what the lattice does, in the head's axes
   double turned = 0;
@@ -242,7 +273,8 @@ overrides: {"cage.points[1,1,2].z": 1.4, "cage.points[1,2,1].y": 1.25, "cage.poi
       first = moves;
       head_first = head;
     }
-    turned = std::max(turned, Length(TransformVector(head, {1, 0, 0}) - TransformVector(head_first, {1, 0, 0})));
+    turned =
+        std::max(turned, Length(TransformVector(head, {1, 0, 0}) - TransformVector(head_first, {1, 0, 0})));
     EXPECT_LT(MaxDistance(moves, first), 1e-6) << time;
   }
   EXPECT_GT(turned, 0.05);  // the head does turn in this clip
@@ -268,7 +300,8 @@ controls:
   root.translateY: {min: -100000, max: 100000}
   nose.translateZ: {min: 0, max: 2}
   hand.rotateY: {min: -90, max: 90}
-)"), Clip("body_move"));
+)"),
+                   Clip("body_move"));
   ASSERT_TRUE(player.ok());
   const std::vector<std::string> stages = {"skin", "wire", "cage", "soft", "grip", "mush"};
   const double spacing = Spacing(1000);  // 6.1e-5 m
@@ -297,13 +330,15 @@ TEST_F(RigIdentities, SkinDoesNotDependOnWhichPointsAreWanted) {
   Result<Rig> rig = LoadRig(StandardRegistry(), folder.Write("t.yaml", R"(kpsa: 1
 character: c.gltf
 overrides: {root.translateX: 0.37, root.translateY: 1000.1, root.translateZ: 3.3, root.rotate: [10, 20, 30], tip.rotate: [41, 7, 3]}
-)"), Rest());
+)"),
+                            Rest());
   ASSERT_TRUE(rig.ok()) << rig.status().ToString();
   const CharacterMesh& mesh = rig->scene.meshes[0];
   Compiler compiler;
   const auto points = [&](const PointSet& set) {
     Request request;
-    request.varying = {*rig->graph->FindPlug("root.translateX")};  // what does not vary is folded for all points
+    request.varying = {
+        *rig->graph->FindPlug("root.translateX")};  // what does not vary is folded for all points
     request.outputs.push_back({mesh.points, set});
     Result<std::shared_ptr<const Plan>> plan = compiler.Compile(*rig->graph, request);
     EXPECT_TRUE(plan.ok()) << plan.status().ToString();

@@ -46,7 +46,8 @@ class OddRigs : public RigFixture {
     const auto* map = value.asset<WeightMap>();
     std::vector<float> by_vertex;
     const auto& points = rig.scene.meshes[mesh].mesh().data().vertex_to_point;
-    for (std::size_t v = 0; map != nullptr && v < points.size(); ++v) by_vertex.push_back(map->weights()[points[v]]);
+    for (std::size_t v = 0; map != nullptr && v < points.size(); ++v)
+      by_vertex.push_back(map->weights()[points[v]]);
     return by_vertex;
   }
 };
@@ -54,7 +55,8 @@ using V = std::vector<float>;
 
 // --- Names
 TEST_F(OddRigs, NamesOfQuotesBracketsDotsAndArrows) {
-  GltfBuilder b = Builder({"The \"body\" [x]", "root.001", "upper arm.L", "upper arm.L.translate", "Körper 骨", "it's", "a -> b"});
+  GltfBuilder b = Builder({"The \"body\" [x]", "root.001", "upper arm.L", "upper arm.L.translate",
+                           "Körper 骨", "it's", "a -> b"});
   b.root["meshes"][0]["extras"]["targetNames"] = {"say \"oh\".b[c]"};
   b.root["animations"][0]["name"] = "walk 'n' [run]";
   folder.Write("c.gltf", b.Text());
@@ -96,7 +98,8 @@ TEST_F(OddRigs, SharedNamesByIndexAndPath) {
 deform: [{meshes: ["x#0", "x#4"], stack: [gltf, m]}, {meshes: ["x#5"], stack: [n]}]
 )");
   EXPECT_EQ(Driver(rig, "t.parentMatrix"), "x#2.worldMatrix");
-  const std::string text = Errors(R"(nodes: {t: {type: transform, parent: x}, r: {type: remapValue, input: x.rotateX}}
+  const std::string text =
+      Errors(R"(nodes: {t: {type: transform, parent: x}, r: {type: remapValue, input: x.rotateX}}
 deform: [{meshes: [x], stack: [gltf]}]
 )");
   EXPECT_TRUE(Has(text, "t.yaml:3:38: \"x\" is the name of several transforms: write x#1# or x#2")) << text;
@@ -140,7 +143,10 @@ controls: {time.translateX: {min: 0, max: 1}}
 TEST_F(OddRigs, MeshesTransformsAndJointsAreLookedUpAmongTheirOwn) {
   if (SharedFile("assets/robot.glb").empty()) GTEST_SKIP() << "no assets beside the checkout";
   const std::string character = SharedFile("assets/robot.glb");
-  const auto load = [&](const std::string& text) { return LoadRig(StandardRegistry(), folder.Write("r.yaml", "kpsa: 1\ncharacter: " + character + "\n" + text)); };
+  const auto load = [&](const std::string& text) {
+    return LoadRig(StandardRegistry(),
+                   folder.Write("r.yaml", "kpsa: 1\ncharacter: " + character + "\n" + text));
+  };
   const Result<Rig> rig = load(R"(nodes:
   h: {type: transform, parent: Head, at: Head}
   c: {type: cluster, matrix: h.worldMatrix, parent: Head, members: {joint: Head}}
@@ -227,7 +233,8 @@ TEST_F(OddRigs, SectionsWithoutContentAreEmpty) {
 
 TEST_F(OddRigs, BracketsInListsAreExplained) {
   Plain();
-  const std::string text = Errors("connections: [tip.rotateX -> body.weight[up], mid.rotate -> tip.rotate]\n");
+  const std::string text =
+      Errors("connections: [tip.rotateX -> body.weight[up], mid.rotate -> tip.rotate]\n");
   EXPECT_TRUE(Has(text, "t.yaml:3:") && Has(text, "quote plugs that contain [ ]")) << text;
 }
 
@@ -270,7 +277,8 @@ overrides:
   "cage.points[1,1,1].z": 1.25
 )");
   EXPECT_EQ(Driver(rig, "t.parentMatrix"), "root.worldMatrix");
-  EXPECT_EQ(Held(rig, "t.offsetParentMatrix").get<Matrix4>(), Translation({1, 1, 3}));  // root stands at (0, 1, 0)
+  EXPECT_EQ(Held(rig, "t.offsetParentMatrix").get<Matrix4>(),
+            Translation({1, 1, 3}));  // root stands at (0, 1, 0)
   EXPECT_EQ(Held(rig, "cage.interpolation").AsInt(), 1);
 }
 
@@ -282,8 +290,9 @@ TEST_F(OddRigs, OverriddenPointsGoThroughTheirStack) {
   c: {type: cluster, parent: root, matrix: h.worldMatrix}
 deform: [{points: cage.points, stack: [c]}, {meshes: [body], stack: [gltf, cage]}]
 )";
-  for (const char* overrides : {"overrides: {\"cage.points[1,1,1].y\": 1.5}\n",
-                                "overrides: {cage.points: [[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[1,1.5,1]]}\n"}) {
+  for (const char* overrides :
+       {"overrides: {\"cage.points[1,1,1].y\": 1.5}\n",
+        "overrides: {cage.points: [[0,0,0],[1,0,0],[0,1,0],[1,1,0],[0,0,1],[1,0,1],[0,1,1],[1,1.5,1]]}\n"}) {
     const Rig rig = Sound(text + overrides);
     EXPECT_EQ(Driver(rig, "cage.points"), "c.outPoints[0]");
     const Value in = Held(rig, "c.inPoints");
@@ -295,7 +304,9 @@ deform: [{points: cage.points, stack: [c]}, {meshes: [body], stack: [gltf, cage]
 
 TEST_F(OddRigs, OnePlugHasOneValueHoweverItIsSpelled) {
   Plain();
-  const std::string text = Errors("nodes:\n  r: {type: remapValue, input: 1, inputValue: 2}\noverrides:\n  tip.translateX: 1\n  tip.translate.x: 2\n  r.inputMax: 2\n");
+  const std::string text = Errors(
+      "nodes:\n  r: {type: remapValue, input: 1, inputValue: 2}\noverrides:\n  tip.translateX: 1\n  "
+      "tip.translate.x: 2\n  r.inputMax: 2\n");
   EXPECT_TRUE(Has(text, "t.yaml:4:47: r.inputValue is set twice: here and at t.yaml:4:32")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:7:20: tip.translate.x is overridden twice: here and at t.yaml:6:19")) << text;
 }
@@ -317,9 +328,15 @@ TEST_F(OddRigs, SettingsDoNotHideBehindConnections) {
 TEST_F(OddRigs, TheFilesOwnDeformersHaveWordsInStacks) {
   Plain();
   const std::string text = Errors("deform: [{meshes: [body], stack: [body_blendShape, body_skinCluster]}]\n");
-  EXPECT_TRUE(Has(text, "t.yaml:3:35: \"body_blendShape\" is the file's own: in stacks it is written \"morph\"")) << text;
-  EXPECT_TRUE(Has(text, "t.yaml:3:52: \"body_skinCluster\" is the file's own: in stacks it is written \"skin\"")) << text;
-  const Rig rig = Sound("controls: {body_skinCluster.envelope: {min: 0, max: 1}, body_blendShape.envelope: {min: 0, max: 100%}}\n");
+  EXPECT_TRUE(
+      Has(text, "t.yaml:3:35: \"body_blendShape\" is the file's own: in stacks it is written \"morph\""))
+      << text;
+  EXPECT_TRUE(
+      Has(text, "t.yaml:3:52: \"body_skinCluster\" is the file's own: in stacks it is written \"skin\""))
+      << text;
+  const Rig rig = Sound(
+      "controls: {body_skinCluster.envelope: {min: 0, max: 1}, body_blendShape.envelope: {min: 0, max: "
+      "100%}}\n");
   EXPECT_EQ(rig.controls.size(), 2u);
 }
 TEST_F(OddRigs, StacksOnPointsOfLatticesAndCurves) {
@@ -339,8 +356,11 @@ deform:
 )");
   EXPECT_EQ(Driver(rig, "line.cv"), "cl2.outPoints[0]");
   EXPECT_EQ(Driver(rig, "cl.inPoints"), "inner.outPoints[0]");
-  const std::string mush = Errors("nodes: {cage: {type: lattice}, m: {type: deltaMush}}\ndeform: [{points: cage.points, stack: [m]}, {meshes: [body], stack: [gltf, cage]}]\n");
-  EXPECT_TRUE(Has(mush, "t.yaml:4:40: \"m\" smooths along the edges of a mesh, and cage.points has none")) << mush;
+  const std::string mush = Errors(
+      "nodes: {cage: {type: lattice}, m: {type: deltaMush}}\ndeform: [{points: cage.points, stack: [m]}, "
+      "{meshes: [body], stack: [gltf, cage]}]\n");
+  EXPECT_TRUE(Has(mush, "t.yaml:4:40: \"m\" smooths along the edges of a mesh, and cage.points has none"))
+      << mush;
 }
 
 TEST_F(OddRigs, StacksInEveryOrder) {
@@ -390,8 +410,9 @@ TEST_F(OddRigs, HandlesUnderEveryKindOfParent) {
   RigPlayer player(folder / "t.yaml", rest);
   ASSERT_TRUE(player.ok());
   const auto place = [&](const char* name) { return TransformPoint(player.World(name), {}); };
-  const std::vector<std::pair<const char*, Double3>> places = {
-      {"h1", {0, 1, 5}}, {"h2", {5, 0, 0}}, {"h3", {5, 1, 0}}, {"h4", {5, 1, 0}}, {"h5", {5, 1, 0}}, {"h6", {0, 1, 5}}};
+  const std::vector<std::pair<const char*, Double3>> places = {{"h1", {0, 1, 5}}, {"h2", {5, 0, 0}},
+                                                               {"h3", {5, 1, 0}}, {"h4", {5, 1, 0}},
+                                                               {"h5", {5, 1, 0}}, {"h6", {0, 1, 5}}};
   for (const auto& [name, expected] : places) EXPECT_LT(Length(place(name) - expected), 1e-12) << name;
 }
 
@@ -407,14 +428,17 @@ TEST_F(OddRigs, CurvesOfEveryKind) {
 connections: ["h.translate -> l2.cv[2]", "h2.translateX -> l1.cv[1].z"]
 deform: [{meshes: [body], stack: [morph, w1, skin, w2]}]
 )");
-  const std::string text = Errors("nodes: {l: {type: curve, places: [[0, 0, 0], [1, 0, 0]], closed: true}}\n");
+  const std::string text =
+      Errors("nodes: {l: {type: curve, places: [[0, 0, 0], [1, 0, 0]], closed: true}}\n");
   EXPECT_TRUE(Has(text, "t.yaml:3:9: closed curve \"l\" has 2 points; expected 3 to")) << text;
 }
 
 // --- Members and weights
 TEST_F(OddRigs, MembersOfEachKind) {
   Plain();
-  folder.Write("w/a b.json", R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 6, "maps": {"m#1": {"default": 0.5, "indices": [1], "values": [0]}}})");
+  folder.Write(
+      "w/a b.json",
+      R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 6, "maps": {"m#1": {"default": 0.5, "indices": [1], "values": [0]}}})");
   const Rig rig = Sound(R"(weld: off
 nodes:
   a1: {type: cluster, members: all}
@@ -426,7 +450,8 @@ nodes:
   a7: {type: cluster, members: [{joint: root, above: 0.9}, {vertices: 0}]}
   a8: {type: cluster, members: [all], weights: ["w/a b.json#m#1"]}
 deform: [{meshes: [body], stack: [gltf, a1, a2, a3, a4, a5, a7, a8]}]
-)", 1);
+)",
+                        1);
   EXPECT_EQ(Weights(rig, "a1.weights"), (V{1, 1, 1, 1, 1, 1}));
   EXPECT_EQ(Weights(rig, "a2.weights"), (V{1, 1, 0, 1, 0, 0}));
   EXPECT_EQ(Weights(rig, "a3.weights"), (V{0, 0, 0, 1, 1, 1}));
@@ -439,8 +464,12 @@ deform: [{meshes: [body], stack: [gltf, a1, a2, a3, a4, a5, a7, a8]}]
 TEST_F(OddRigs, WeightsAndMembersOfSeveralMeshes) {
   Plain();
   const std::string head = R"({"kpsa": "weights", "version": 1, "mesh": )";
-  folder.Write("w.json", head + R"("body", "points": 6, "maps": {"m": {"default": 0.25, "indices": [], "values": []}}})");
-  folder.Write("v.json", head + R"("twin", "points": 6, "maps": {"m": {"default": 0.75, "indices": [], "values": []}}})");
+  folder.Write(
+      "w.json",
+      head + R"("body", "points": 6, "maps": {"m": {"default": 0.25, "indices": [], "values": []}}})");
+  folder.Write(
+      "v.json",
+      head + R"("twin", "points": 6, "maps": {"m": {"default": 0.75, "indices": [], "values": []}}})");
   Rig rig = Sound(R"(nodes: {l: {type: cluster, weights: ["w.json#m", v.json]}}
 deform: [{meshes: [body], stack: [gltf, l]}, {meshes: [twin], stack: [gltf, l]}]
 )");
@@ -453,8 +482,10 @@ deform: [{meshes: [body], stack: [gltf, l]}, {meshes: [twin], stack: [gltf, l]}]
     EXPECT_EQ(Weights(rig, "l.weights[1]", 2), (V{0, 0, 0})) << members;
     EXPECT_TRUE(Has(rig.notes[0], "are no point of prop")) << rig.notes[0];
   }
-  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster, members: {joint: alone}}}\n" + deform), "\"alone\" is no joint of the skin of body"));
-  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster, members: {primitive: 2}}}\n" + deform), "primitive: expected a whole number from 0 to 1, found 2"));
+  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster, members: {joint: alone}}}\n" + deform),
+                  "\"alone\" is no joint of the skin of body"));
+  EXPECT_TRUE(Has(Errors("nodes: {l: {type: cluster, members: {primitive: 2}}}\n" + deform),
+                  "primitive: expected a whole number from 0 to 1, found 2"));
 }
 
 // --- Files and acceleration
@@ -475,7 +506,9 @@ nodes:
 deform: [{meshes: [body], stack: [gltf, w]}]
 accelerate: {f: {points: [body@w], subspace: f.kpsa, tolerance: 1}}
 )");
-  folder.Write("w.json", R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 6, "maps": {"m": {"default": 1, "indices": [], "values": []}}})");
+  folder.Write(
+      "w.json",
+      R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 6, "maps": {"m": {"default": 1, "indices": [], "values": []}}})");
   const Rig rig = Sound("include: [parts/one.yaml]\nconnections: [\"up.translate -> l2.cv[2]\"]\n");
   EXPECT_DOUBLE_EQ(Held(rig, "w.dropoff").AsDouble(), 0.7);
   EXPECT_DOUBLE_EQ(Held(rig, "turn.rotate.x").AsDouble(), 1);
@@ -504,14 +537,18 @@ accelerate:
 
 TEST_F(OddRigs, AnchorsRepeatANode) {
   Plain();
-  const Rig rig = Sound("nodes:\n  m: &mush {type: deltaMush, iterations: 3}\n  n: *mush\ndeform: [{meshes: [body], stack: [gltf, m, n]}]\n");
+  const Rig rig = Sound(
+      "nodes:\n  m: &mush {type: deltaMush, iterations: 3}\n  n: *mush\ndeform: [{meshes: [body], stack: "
+      "[gltf, m, n]}]\n");
   EXPECT_EQ(Held(rig, "n.iterations").AsInt(), 3);
 }
 
 // What only a compiler can find is said of the line that wrote the node.
 TEST_F(OddRigs, ErrorsOfTheCompilerHaveAPlace) {
   Plain();
-  Result<Rig> rig = Load("nodes:\n  \"a\\\" (b\": {type: lattice, divisions: [40, 2, 2]}\ndeform: [{meshes: [body], stack: [gltf, 'a\" (b']}]\n");
+  Result<Rig> rig = Load(
+      "nodes:\n  \"a\\\" (b\": {type: lattice, divisions: [40, 2, 2]}\ndeform: [{meshes: [body], stack: "
+      "[gltf, 'a\" (b']}]\n");
   ASSERT_TRUE(rig.ok()) << rig.status().ToString();
   Compiler compiler;
   Request request;

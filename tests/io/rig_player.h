@@ -40,7 +40,8 @@ class RigPlayer {
     evaluator_->Set(*varying, value, plug->component);
     settings_.emplace_back(name, value);
   }
-  // Points in their own order: of a mesh's last stage, or of one by name (head_mesh@skin is Points("skin", 0)).
+  // Points in their own order: of a mesh's last stage, or of one by name (head_mesh@skin is Points("skin",
+  // 0)).
   std::vector<Double3> Points(std::size_t mesh = 0) { return PointsOf(rig.scene.meshes.at(mesh).points); }
   std::vector<Double3> Points(const std::string& stage, std::size_t mesh = 0) {
     const Stage* found = rig.scene.meshes.at(mesh).FindStage(stage);
@@ -54,7 +55,9 @@ class RigPlayer {
     Pull(output);
     return evaluator_->Get<Matrix4>(static_cast<Index>(output));
   }
-  Index PointOf(Index vertex, std::size_t mesh = 0) const { return rig.scene.meshes.at(mesh).mesh().data().vertex_to_point.at(vertex); }
+  Index PointOf(Index vertex, std::size_t mesh = 0) const {
+    return rig.scene.meshes.at(mesh).mesh().data().vertex_to_point.at(vertex);
+  }
 
   Rig rig;
 

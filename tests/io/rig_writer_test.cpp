@@ -35,11 +35,13 @@ class RigWriterTest : public RigFixture {
 
 TEST_F(RigWriterTest, RangesControlsByTheClips) {
   const std::string text = Starter(folder / "c.gltf");
-  // The clip turns tip by half a turn about Z and takes the weight from its default to 1; rest is always inside
+  // The clip turns tip by half a turn about Z and takes the weight from its default to 1; rest is always
+  // inside
   EXPECT_TRUE(Has(text, "\ncharacter: c.gltf\n")) << text;
   EXPECT_TRUE(Has(text, "  tip.rotateZ: {min: 0, max: 180}\n")) << text;
   EXPECT_FALSE(Has(text, "tip.rotateX")) << text;
-  EXPECT_TRUE(Has(text, "  \"body.weight[up]\"") || Has(text, "  body.weight[up]: {min: 0, max: 1}\n")) << text;
+  EXPECT_TRUE(Has(text, "  \"body.weight[up]\"") || Has(text, "  body.weight[up]: {min: 0, max: 1}\n"))
+      << text;
   EXPECT_TRUE(Has(text, "stack: [gltf, mush]")) << text;
   EXPECT_TRUE(Has(text, "points: [body@mush]")) << text;
   EXPECT_TRUE(Has(text, "test: {clips: [wave]}")) << text;
@@ -86,7 +88,9 @@ TEST_F(RigWriterTest, TranslationsAreInCentimetresAndIdleJointsAreLeftOut) {
   clip["channels"].push_back({{"sampler", 2}, {"target", {{"node", 4}, {"path", "translation"}}}});
   folder.Write("c.gltf", builder.Text());
   const std::string text = Starter(folder / "c.gltf");
-  EXPECT_TRUE(Has(text, "root.translateY: {min: 0, max: 2.1}") || Has(text, "root.translateY: {min: 0, max: 3}")) << text;
+  EXPECT_TRUE(Has(text, "root.translateY: {min: 0, max: 2.1}") ||
+              Has(text, "root.translateY: {min: 0, max: 3}"))
+      << text;
   EXPECT_FALSE(Has(text, "  idle.translate")) << text;
   EXPECT_TRUE(Has(text, "carrying no point: idle")) << text;
 }
@@ -102,8 +106,9 @@ TEST_F(RigWriterTest, ACharacterWithoutMeshesStillLoads) {
 
 TEST_F(RigWriterTest, EveryAssetGetsARigThatLoads) {
   if (SharedFile("assets/head.glb").empty()) GTEST_SKIP() << "no assets beside the checkout";
-  for (const char* name : {"head.glb", "human.glb", "robot.glb", "Fox.glb", "MorphStressTest.gltf", "SimpleSkin.gltf", "rigged_simple.gltf",
-                           "box_animated.gltf", "AnimatedMorphCube/AnimatedMorphCube.gltf"}) {
+  for (const char* name :
+       {"head.glb", "human.glb", "robot.glb", "Fox.glb", "MorphStressTest.gltf", "SimpleSkin.gltf",
+        "rigged_simple.gltf", "box_animated.gltf", "AnimatedMorphCube/AnimatedMorphCube.gltf"}) {
     SCOPED_TRACE(name);
     const Rig rig = Reload(SharedFile(std::string("assets/") + name));
     EXPECT_FALSE(rig.controls.empty());

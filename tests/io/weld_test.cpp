@@ -59,7 +59,8 @@ TEST(Weld, JoinsSeams) {
       EXPECT_EQ(rest.y[p], character.meshes[0].positions[3 * v + 1]);
     }
     ASSERT_EQ(data.triangles.size(), 3u * 24u);
-    for (std::size_t i = 0; i < data.triangles.size(); ++i) EXPECT_EQ(data.triangles[i], data.vertex_to_point[data.triangle_vertices[i]]);
+    for (std::size_t i = 0; i < data.triangles.size(); ++i)
+      EXPECT_EQ(data.triangles[i], data.vertex_to_point[data.triangle_vertices[i]]);
   }
 }
 
@@ -95,7 +96,8 @@ TEST(Weld, KeepsVerticesApartThatMoveApart) {
 
 TEST(Weld, DropsTrianglesThatCollapse) {
   gltf::Character character = SplitGrid(3, 2, 1);
-  character.meshes[0].primitives[0].triangles.insert(character.meshes[0].primitives[0].triangles.end(), {1, 2, 5, 0, 0, 1});
+  character.meshes[0].primitives[0].triangles.insert(character.meshes[0].primitives[0].triangles.end(),
+                                                     {1, 2, 5, 0, 0, 1});
   const WeldedMesh welded = WeldMesh(character, 0, "m", true);
   EXPECT_EQ(welded.mesh->data().triangles.size(), 3u * 4u);
   EXPECT_EQ(welded.mesh->data().primitives[0].triangle_count, 4u);
@@ -202,14 +204,17 @@ TEST(Weld, RandomMeshesAgainstAComparisonOfAllPairs) {
       for (const gltf::Influence& i : mesh.influence_rows().row(v)) k.push_back(static_cast<float>(i.joint));
       for (const gltf::MorphTarget& target : mesh.targets) {
         const auto it = std::find(target.vertices.begin(), target.vertices.end(), v);
-        k.push_back(it == target.vertices.end() ? 0 : target.deltas[static_cast<std::size_t>(3 * (it - target.vertices.begin()))]);
+        k.push_back(it == target.vertices.end()
+                        ? 0
+                        : target.deltas[static_cast<std::size_t>(3 * (it - target.vertices.begin()))]);
       }
       return k;
     };
     const WeldedMesh welded = WeldMesh(character, 0, "m", true);
     const auto& point = welded.mesh->data().vertex_to_point;
     for (Index a = 0; a < count; ++a) {
-      for (Index b = 0; b < a; ++b) EXPECT_EQ(point[a] == point[b], key(a) == key(b)) << round << " " << a << " " << b;
+      for (Index b = 0; b < a; ++b)
+        EXPECT_EQ(point[a] == point[b], key(a) == key(b)) << round << " " << a << " " << b;
     }
   }
 }

@@ -35,7 +35,9 @@ TEST(YamlDocument, KeepsTextOrderAndPlaces) {
 }
 
 TEST(YamlDocument, AcceptsByteOrderMarkAndCrlf) {
-  const YamlNode root = Parse("\xEF\xBB\xBF" "a: 1\r\nb: \"x\"\r\n");
+  const YamlNode root = Parse(
+      "\xEF\xBB\xBF"
+      "a: 1\r\nb: \"x\"\r\n");
   EXPECT_EQ(root.Find("a")->scalar, "1");
   EXPECT_EQ(root.Find("b")->scalar, "x");
   EXPECT_EQ(root.Find("b")->where().ToString(), "t.yaml:2:4");
@@ -59,7 +61,8 @@ TEST(YamlDocument, PlacesSyntaxErrors) {
   const std::string tabs = Failure("a:\n\tb: 1\n");
   EXPECT_TRUE(Has(tabs, "t.yaml:2:3: YAML: ") && Has(tabs, "no tabs there")) << tabs;
   const std::string bracket = Failure("controls: {head.weight[open]: 1}\n");
-  EXPECT_TRUE(Has(bracket, "t.yaml:1:") && Has(bracket, "quote plugs that contain [ ] inside { }")) << bracket;
+  EXPECT_TRUE(Has(bracket, "t.yaml:1:") && Has(bracket, "quote plugs that contain [ ] inside { }"))
+      << bracket;
   const std::string value = Failure("n: {type: x, input: lips.cv[1]}\n");
   EXPECT_TRUE(Has(value, "quote plugs that contain [ ] inside { }")) << value;
   EXPECT_FALSE(Has(Failure("a: [1, 2\n"), "quote plugs"));
@@ -71,7 +74,8 @@ TEST(YamlDocument, BoundsAliases) {
   EXPECT_EQ(root.Find("b")->where().ToString(), "t.yaml:2:4");
   std::string bomb = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
   for (int i = 1; i < 12; ++i) {
-    bomb += fmt::format("a{0}: &a{0} [*a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}]\n", i, i - 1);
+    bomb += fmt::format(
+        "a{0}: &a{0} [*a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}, *a{1}]\n", i, i - 1);
   }
   EXPECT_TRUE(Has(Failure(bomb), "aliases of this file expand to more than 100000")) << Failure(bomb);
   EXPECT_TRUE(Has(Failure("a: &x [1, *x]\n"), "within its own anchor")) << Failure("a: &x [1, *x]\n");
@@ -88,16 +92,17 @@ TEST(YamlDocument, BoundsDepthCountAndSize) {
   EXPECT_TRUE(Has(Failure(nested), "nested deeper than 64")) << Failure(nested);
   // An alias may not deepen the tree, either
   std::string chain = "a0: &a0 [[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]\n";
-  for (int i = 1; i < 5; ++i) chain += fmt::format("a{0}: &a{0} [[[[[[[[[[[[[[[[*a{1}]]]]]]]]]]]]]]]]\n", i, i - 1);
+  for (int i = 1; i < 5; ++i)
+    chain += fmt::format("a{0}: &a{0} [[[[[[[[[[[[[[[[*a{1}]]]]]]]]]]]]]]]]\n", i, i - 1);
   EXPECT_TRUE(Has(Failure(chain), "nested deeper than 64")) << Failure(chain);
   EXPECT_TRUE(Has(Failure(std::string(kMaxYamlBytes + 1, ' ')), "bytes; at most"));
 }
 
 TEST(YamlDocument, RefusesWhatIsNoText) {
   EXPECT_TRUE(Has(Failure("a: 1\nb: \xff\n"), "t.yaml:2:4: the file is not UTF-8 text: byte 0xff"));
-  EXPECT_TRUE(Has(Failure("a: \xC0\x80\n"), "not UTF-8"));          // overlong
-  EXPECT_TRUE(Has(Failure("a: \xED\xA0\x80\n"), "not UTF-8"));      // surrogate
-  EXPECT_TRUE(Has(Failure("a: \xE2\x82"), "not UTF-8"));            // cut off
+  EXPECT_TRUE(Has(Failure("a: \xC0\x80\n"), "not UTF-8"));      // overlong
+  EXPECT_TRUE(Has(Failure("a: \xED\xA0\x80\n"), "not UTF-8"));  // surrogate
+  EXPECT_TRUE(Has(Failure("a: \xE2\x82"), "not UTF-8"));        // cut off
   EXPECT_TRUE(Has(Failure(std::string_view("a: \0b\n", 6)), "not UTF-8"));
   EXPECT_EQ(Parse("a: \xE2\x82\xAC\n").Find("a")->scalar, "\xE2\x82\xAC");
 }
@@ -122,7 +127,8 @@ TEST(YamlMap, CollectsUnknownMissingAndMistypedKeys) {
   EXPECT_FALSE(ReadInteger(*map.Find("count"), "count", 0, 10, &count, &errors));
   map.RejectUnread();
   const std::string all = errors.Take().ToString();
-  EXPECT_TRUE(Has(all, "t.yaml:1:1: node \"m\": unknown key \"envelop\" (did you mean \"envelope\"?)")) << all;
+  EXPECT_TRUE(Has(all, "t.yaml:1:1: node \"m\": unknown key \"envelop\" (did you mean \"envelope\"?)"))
+      << all;
   EXPECT_TRUE(Has(all, "the key \"name\" is missing")) << all;
   EXPECT_TRUE(Has(all, "t.yaml:2:7: type: expected a string, found a list")) << all;
   EXPECT_TRUE(Has(all, "t.yaml:3:7: flag: expected true or false, found \"maybe\"")) << all;
@@ -155,7 +161,8 @@ TEST(Quantity, SaysWhatIsWrong) {
     const Result<double> number = ParseQuantity(text, unit, units);
     return number.ok() ? "no error" : number.status().ToString();
   };
-  EXPECT_TRUE(Has(failure("0.2 parsec", Unit::kLength), "unknown unit \"parsec\"; the units are mm, cm, m, deg, rad, s, f, %"));
+  EXPECT_TRUE(Has(failure("0.2 parsec", Unit::kLength),
+                  "unknown unit \"parsec\"; the units are mm, cm, m, deg, rad, s, f, %"));
   EXPECT_TRUE(Has(failure("3deg", Unit::kLength), "expected a length (mm, cm, m)"));
   EXPECT_TRUE(Has(failure("3mm", Unit::kNone), "expected a number without a unit"));
   EXPECT_TRUE(Has(failure(".nan", Unit::kNone), "not finite"));
@@ -169,8 +176,10 @@ TEST(Quantity, SaysWhatIsWrong) {
 }
 
 TEST(ParseBool, TakesTheUsualSpellings) {
-  for (const char* text : {"true", "True", "TRUE", "on", "On", "yes", "YES"}) EXPECT_EQ(ParseBool(text), true) << text;
-  for (const char* text : {"false", "False", "FALSE", "off", "OFF", "no", "No"}) EXPECT_EQ(ParseBool(text), false) << text;
+  for (const char* text : {"true", "True", "TRUE", "on", "On", "yes", "YES"})
+    EXPECT_EQ(ParseBool(text), true) << text;
+  for (const char* text : {"false", "False", "FALSE", "off", "OFF", "no", "No"})
+    EXPECT_EQ(ParseBool(text), false) << text;
   for (const char* text : {"", "tRUE", "1", "y", "truth"}) EXPECT_EQ(ParseBool(text), std::nullopt) << text;
 }
 

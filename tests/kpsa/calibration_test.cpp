@@ -25,9 +25,11 @@ std::vector<CalibrationPair> RandomPairs(std::size_t count, unsigned seed) {
   return pairs;
 }
 
-std::size_t Violations(std::span<const CalibrationPair> pairs, const SoftCacheThreshold& threshold, double tolerance) {
+std::size_t Violations(std::span<const CalibrationPair> pairs, const SoftCacheThreshold& threshold,
+                       double tolerance) {
   std::size_t count = 0;
-  for (const CalibrationPair& pair : pairs) count += FullWeight(pair.score, threshold) < 1 && EmittedError(pair, threshold) > tolerance * (1 + 1e-9);
+  for (const CalibrationPair& pair : pairs)
+    count += FullWeight(pair.score, threshold) < 1 && EmittedError(pair, threshold) > tolerance * (1 + 1e-9);
   return count;
 }
 
@@ -39,11 +41,16 @@ TEST(Calibration, IsTheLargestThresholdThatABruteForceSearchFinds) {
       double best = -1;
       for (int i = 1; i <= 10000; ++i) {
         const double tau = 20.0 * i / 10000;
-        const auto violations = static_cast<double>(Violations(pairs, {.tau = tau, .blend_start = 0.7}, 0.0015));
-        const auto hits = static_cast<double>(std::count_if(pairs.begin(), pairs.end(), [&](const CalibrationPair& p) { return p.score <= 0.7 * tau; }));
+        const auto violations =
+            static_cast<double>(Violations(pairs, {.tau = tau, .blend_start = 0.7}, 0.0015));
+        const auto hits = static_cast<double>(std::count_if(
+            pairs.begin(), pairs.end(), [&](const CalibrationPair& p) { return p.score <= 0.7 * tau; }));
         if ((violations + 1) / 151 <= alpha && violations <= 2 * alpha * hits) best = tau;
       }
-      const double cap = std::max_element(pairs.begin(), pairs.end(), [](const auto& a, const auto& b) { return a.score < b.score; })->score / 0.7;
+      const double cap = std::max_element(pairs.begin(), pairs.end(),
+                                          [](const auto& a, const auto& b) { return a.score < b.score; })
+                             ->score /
+                         0.7;
       EXPECT_NEAR(c.threshold.tau, std::min(best, cap), 0.0021) << seed << " " << alpha;
       EXPECT_EQ(c.violations, Violations(pairs, c.threshold, 0.0015));
       EXPECT_LE(static_cast<double>(c.violations + 1) / 151, alpha);
@@ -94,7 +101,10 @@ TEST(Calibration, TooFewPosesSayWhatTheyCanPromise) {
   EXPECT_DOUBLE_EQ(c.attainable_alpha, 1.0 / 20);
   EXPECT_EQ(c.violations, 0u);
   EXPECT_GT(c.threshold.tau, 0);
-  EXPECT_NE(c.warning.find("19 calibration poses cannot promise a violation rate of 0.01; the threshold keeps 0.05 (at least 99 poses"), std::string::npos) << c.warning;
+  EXPECT_NE(c.warning.find("19 calibration poses cannot promise a violation rate of 0.01; the threshold "
+                           "keeps 0.05 (at least 99 poses"),
+            std::string::npos)
+      << c.warning;
   EXPECT_TRUE(Calibrate(RandomPairs(99, 10), 0.0015, 0.01).enough_poses);
 }
 

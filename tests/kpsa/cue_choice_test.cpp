@@ -15,10 +15,11 @@ namespace {
 constexpr std::size_t kPoints = 60, kPoses = 400;
 constexpr double kTolerance = 1e-3;
 
-// A row of points that two controls bend; the outputs follow the stage but for the first `folded` ones, which jump to
-// the other side where the first control is large.
+// A row of points that two controls bend; the outputs follow the stage but for the first `folded` ones, which
+// jump to the other side where the first control is large.
 struct Fold {
-  explicit Fold(std::size_t folded, double jump = 0.01) : poses({.points = kPoints, .components = 3, .stage_points = kPoints, .scalars = 3}) {
+  explicit Fold(std::size_t folded, double jump = 0.01)
+      : poses({.points = kPoints, .components = 3, .stage_points = kPoints, .scalars = 3}) {
     std::mt19937 random(1);
     std::uniform_real_distribution<double> uniform(-1, 1);
     for (std::size_t t = 0; t < kPoses; ++t) {
@@ -37,13 +38,16 @@ struct Fold {
       row[6 * kPoints + 1] = static_cast<float>(b);
       row[6 * kPoints + 2] = static_cast<float>(1e-7 * c);  // noise that happens to say when points jump
     }
-    for (std::size_t i = 0; i < 2 * kPoints; ++i) positions.push_back({static_cast<double>(i % kPoints) / kPoints, 0, 0});
+    for (std::size_t i = 0; i < 2 * kPoints; ++i)
+      positions.push_back({static_cast<double>(i % kPoints) / kPoints, 0, 0});
     const Eigen::VectorXd mean = poses.Mean();
     poses.Subtract(mean);
     pca = *ComputePca(poses, mean, {.max_modes = 20});
     noise.scalars = {0, 0, 1e-8};
   }
-  std::vector<CueRef> Choose() const { return ChooseCues(pca, positions, noise, poses, {.rows = 20, .min_points = 4, .tolerance = kTolerance}); }
+  std::vector<CueRef> Choose() const {
+    return ChooseCues(pca, positions, noise, poses, {.rows = 20, .min_points = 4, .tolerance = kTolerance});
+  }
   double LargestError(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca, chosen, noise);
     const PointSurvey survey = SurveyPoints(pca, cues, MapEstimator(pca, cues), poses, 1);

@@ -60,9 +60,12 @@ TEST(CueSelection, GreedyAgreesWithTheNaiveTwin) {
     const std::vector<CueRef> candidates = AllCandidates(pca, 1e-4, true, true, true);
     const std::vector<Double3> positions = Positions(sheet, layout);
     CueSelectionOptions selection_options{.count = 8, .swap_passes = 0};
-    const auto cost = [](CueRef cue, std::span<const CueRef>) { return cue.kind == CueKind::kOutput ? 3.0 : cue.kind == CueKind::kStage ? 1.0 : 0.5; };
+    const auto cost = [](CueRef cue, std::span<const CueRef>) {
+      return cue.kind == CueKind::kOutput ? 3.0 : cue.kind == CueKind::kStage ? 1.0 : 0.5;
+    };
     selection_options.marginal_cost = cost;
-    const CueSelection selection = SelectCues(pca, candidates, positions, sheet.diagonal(), selection_options);
+    const CueSelection selection =
+        SelectCues(pca, candidates, positions, sheet.diagonal(), selection_options);
 
     const Eigen::MatrixXd w = Weight(pca);
     std::vector<CueRef> naive;
@@ -72,7 +75,8 @@ TEST(CueSelection, GreedyAgreesWithTheNaiveTwin) {
       CueRef best_cue;
       for (const CueRef candidate : candidates) {
         if (std::find(naive.begin(), naive.end(), candidate) != naive.end()) continue;
-        const double value = Gain(sigma, w, MakeCueSet(pca, {&candidate, 1}, sheet.diagonal())) / cost(candidate, {});
+        const double value =
+            Gain(sigma, w, MakeCueSet(pca, {&candidate, 1}, sheet.diagonal())) / cost(candidate, {});
         if (value > best) best = value, best_cue = candidate;
       }
       naive.push_back(best_cue);
@@ -89,10 +93,12 @@ TEST(CueSelection, ManyCuesKeepTheGainsExact) {
   const Sheet sheet(120, 20, 3);
   const PoseLayout layout = sheet.Layout();
   const Pca pca = Train(sheet, layout, {.max_modes = 50}, 200);
-  const CueSelection selection = SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(), sheet.diagonal(), {.count = 40});
+  const CueSelection selection = SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(),
+                                            sheet.diagonal(), {.count = 40});
   ASSERT_EQ(selection.cues.size(), 40u);
   EXPECT_NEAR(selection.final_rms / ExpectedRms(pca, selection.cues, sheet.diagonal()), 1, 1e-3);
-  for (std::size_t i = 1; i < selection.expected_rms.size(); ++i) EXPECT_LE(selection.expected_rms[i], selection.expected_rms[i - 1]);
+  for (std::size_t i = 1; i < selection.expected_rms.size(); ++i)
+    EXPECT_LE(selection.expected_rms[i], selection.expected_rms[i - 1]);
   EXPECT_LE(selection.final_rms, selection.expected_rms.back() * (1 + 1e-9));  // swaps never make it worse
   EXPECT_GT(selection.swaps, 0);
   const std::set<Index> distinct = [&] {
@@ -139,13 +145,14 @@ TEST(CueSelection, BudgetFixedCuesAndDistances) {
     }
   }
   // Fixed cues need not be candidates
-  const CueSelection points = SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(), sheet.diagonal(),
-                                         {.count = 5, .fixed = std::span<const CueRef>(fixed).subspan(1)});
+  const CueSelection points =
+      SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(), sheet.diagonal(),
+                 {.count = 5, .fixed = std::span<const CueRef>(fixed).subspan(1)});
   EXPECT_EQ(points.cues[0], fixed[1]);
   EXPECT_EQ(points.cues.size(), 5u);
   // A large minimum distance leaves few points; without scalars the selection ends early
-  const CueSelection few = SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(), sheet.diagonal(),
-                                      {.count = 30, .min_distance = 0.4});
+  const CueSelection few = SelectCues(pca, AllCandidates(pca, 1e-4, true, false, false), sheet.rest(),
+                                      sheet.diagonal(), {.count = 30, .min_distance = 0.4});
   EXPECT_LT(few.cues.size(), 6u);
   EXPECT_GE(few.cues.size(), 2u);
 }
@@ -154,20 +161,23 @@ TEST(CueSelection, CoincidentPointsAreOneChoice) {
   const Sheet sheet(60, 8, 7);
   PoseMatrix poses({.points = 120});  // every point twice
   std::vector<Double3> positions;
-  for (int copy = 0; copy < 2; ++copy) positions.insert(positions.end(), sheet.rest().begin(), sheet.rest().end());
+  for (int copy = 0; copy < 2; ++copy)
+    positions.insert(positions.end(), sheet.rest().begin(), sheet.rest().end());
   std::mt19937 random(8);
   for (int t = 0; t < 60; ++t) {
     const std::vector<double> values = sheet.RandomControls(&random);
     const std::span<float> row = poses.AddPose();
     for (std::size_t i = 0; i < 120; ++i) {
-      for (int c = 0; c < 3; ++c) row[3 * i + static_cast<std::size_t>(c)] = static_cast<float>(sheet.Point(i % 60, values)[c]);
+      for (int c = 0; c < 3; ++c)
+        row[3 * i + static_cast<std::size_t>(c)] = static_cast<float>(sheet.Point(i % 60, values)[c]);
     }
   }
   const Eigen::VectorXd mean = poses.Mean();
   poses.Subtract(mean);
   const Result<Pca> pca = ComputePca(poses, mean, {.max_modes = 12});
   ASSERT_TRUE(pca.ok());
-  const CueSelection selection = SelectCues(*pca, AllCandidates(*pca, 1e-4, true, false, false), positions, sheet.diagonal(), {.count = 12});
+  const CueSelection selection = SelectCues(*pca, AllCandidates(*pca, 1e-4, true, false, false), positions,
+                                            sheet.diagonal(), {.count = 12});
   std::set<Index> places;
   for (const CueRef cue : selection.cues) places.insert(cue.index % 60);
   EXPECT_EQ(places.size(), selection.cues.size());
@@ -177,9 +187,9 @@ TEST(CueSelection, CandidatesThatDoNotMoveAreLeftOut) {
   PoseMatrix poses({.points = 4, .components = 3, .stage_points = 0, .scalars = 2});
   for (int t = 0; t < 10; ++t) {
     const std::span<float> row = poses.AddPose();
-    row[0] = static_cast<float>(t);                 // point 0 moves
-    row[6] = 1e-6f * static_cast<float>(t % 3);     // point 2 hardly does
-    row[12] = 0.3f;                                 // scalar 0 stands still
+    row[0] = static_cast<float>(t);              // point 0 moves
+    row[6] = 1e-6f * static_cast<float>(t % 3);  // point 2 hardly does
+    row[12] = 0.3f;                              // scalar 0 stands still
     row[13] = static_cast<float>(t % 4);
   }
   const Eigen::VectorXd mean = poses.Mean();
@@ -200,7 +210,9 @@ TEST(CueSet, ScalarsAreNormalisedAndCarryTheirOwnNoise) {
   const auto column = static_cast<Eigen::Index>(CueColumn(pca.layout, cues[1]));
   EXPECT_DOUBLE_EQ(set.scale[3] * std::sqrt(pca.row_variance[column]), 1);
   // Its variance splits into what the modes explain and noise
-  EXPECT_NEAR((set.loadings.row(3).array().square() * pca.mode_variance().transpose().array()).sum() + set.noise[3], 1, 1e-6);
+  EXPECT_NEAR(
+      (set.loadings.row(3).array().square() * pca.mode_variance().transpose().array()).sum() + set.noise[3],
+      1, 1e-6);
   EXPECT_GE(set.noise.head(3).minCoeff(), pca.output_noise());
 }
 

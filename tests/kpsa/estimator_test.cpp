@@ -13,7 +13,8 @@ using test::Sheet;
 
 // A sheet with training and test poses, both centred with the training mean.
 struct Fixture {
-  Fixture(std::size_t points, std::size_t controls, std::size_t count, const PcaOptions& options, bool stages = false, bool scalars = false)
+  Fixture(std::size_t points, std::size_t controls, std::size_t count, const PcaOptions& options,
+          bool stages = false, bool scalars = false)
       : sheet(points, controls, 1),
         training(sheet.RandomPoses(count, 2, sheet.Layout(stages, scalars))),
         test(sheet.RandomPoses(60, 3, sheet.Layout(stages, scalars))) {
@@ -29,10 +30,14 @@ struct Fixture {
     Varimax({}, 3, &rotated);
     return SelectKeyPoints(rotated, 3, sheet.rest(), per_mode, 0.05);
   }
-  std::vector<CueRef> Optimal(std::size_t count, bool outputs = true, bool stages = false, bool scalars = false) const {
+  std::vector<CueRef> Optimal(std::size_t count, bool outputs = true, bool stages = false,
+                              bool scalars = false) const {
     std::vector<Double3> positions = sheet.rest();
-    if (pca.layout.stage_points > 0) positions.insert(positions.end(), sheet.rest().begin(), sheet.rest().end());
-    return SelectCues(pca, AllCandidates(pca, 1e-4, outputs, stages, scalars), positions, sheet.diagonal(), {.count = count}).cues;
+    if (pca.layout.stage_points > 0)
+      positions.insert(positions.end(), sheet.rest().begin(), sheet.rest().end());
+    return SelectCues(pca, AllCandidates(pca, 1e-4, outputs, stages, scalars), positions, sheet.diagonal(),
+                      {.count = count})
+        .cues;
   }
   double MapRms(const std::vector<CueRef>& cues) const {
     const CueSet set = MakeCueSet(pca, cues, sheet.diagonal());
@@ -51,7 +56,8 @@ TEST(Estimator, TotalErrorIsProjectionAndCueErrorByPythagoras) {
   const CueSet keys = MakeCueSet(paper, s.KeyPoints(12, 2), s.sheet.diagonal());
   const Estimator map = MapEstimator(s.pca, cues), least_squares = LeastSquaresEstimator(paper, keys);
   ASSERT_EQ(least_squares.mode, EstimatorMode::kPaper) << least_squares.warning;
-  for (const auto& errors : {EstimateErrors(s.pca, cues, map, s.test), EstimateErrors(paper, keys, least_squares, s.test)}) {
+  for (const auto& errors :
+       {EstimateErrors(s.pca, cues, map, s.test), EstimateErrors(paper, keys, least_squares, s.test)}) {
     for (const PoseErrors& e : errors) {
       EXPECT_NEAR(std::hypot(e.projection, e.cue), e.total, 1e-9 * e.total);
       EXPECT_LE(e.largest, e.total * (1 + 1e-12));
@@ -60,7 +66,8 @@ TEST(Estimator, TotalErrorIsProjectionAndCueErrorByPythagoras) {
   }
   // Paper mode: |total| <= |projection| / sigma_min(A_key)
   const double smallest = TallSvd(keys.loadings).values[11];
-  for (const PoseErrors& e : EstimateErrors(paper, keys, least_squares, s.test)) EXPECT_LE(e.total, e.projection / smallest * (1 + 1e-9));
+  for (const PoseErrors& e : EstimateErrors(paper, keys, least_squares, s.test))
+    EXPECT_LE(e.total, e.projection / smallest * (1 + 1e-9));
 }
 
 TEST(Estimator, PaperModeResidualIsOrthogonalToTheKeyPoints) {
@@ -99,7 +106,8 @@ TEST(Estimator, BothModesAreTheSameBeforeAndAfterRotation) {
   const Estimator after = LeastSquaresEstimator(rotated, MakeCueSet(rotated, points, s.sheet.diagonal()));
   ASSERT_EQ(before.mode, EstimatorMode::kPaper);
   EXPECT_LT((before.gain - after.gain).norm(), 1e-10 * before.gain.norm());
-  const Estimator map = MapEstimator(s.pca, cues), map_rotated = RotatedMapEstimator(s.pca, cues, varimax.rotation);
+  const Estimator map = MapEstimator(s.pca, cues),
+                  map_rotated = RotatedMapEstimator(s.pca, cues, varimax.rotation);
   EXPECT_LT((map.gain - map_rotated.gain).norm(), 1e-8 * map.gain.norm());
 }
 
@@ -111,8 +119,11 @@ TEST(Estimator, BadConditionAndTooFewPointsFallBackWithAWarning) {
   EXPECT_EQ(first.mode, EstimatorMode::kMap);
   EXPECT_NE(first.warning.find("6 measured values cannot determine 12 modes"), std::string::npos);
   // Neighbours say the same
-  const CueSet close = MakeCueSet(s.pca, std::vector<CueRef>{{CueKind::kOutput, 40}, {CueKind::kOutput, 41}, {CueKind::kOutput, 42}, {CueKind::kOutput, 43}},
-                                  s.sheet.diagonal());
+  const CueSet close = MakeCueSet(
+      s.pca,
+      std::vector<CueRef>{
+          {CueKind::kOutput, 40}, {CueKind::kOutput, 41}, {CueKind::kOutput, 42}, {CueKind::kOutput, 43}},
+      s.sheet.diagonal());
   const Estimator second = LeastSquaresEstimator(s.pca, close);
   EXPECT_EQ(second.mode, EstimatorMode::kMap);
   EXPECT_NE(second.warning.find("condition number"), std::string::npos);
@@ -123,21 +134,27 @@ TEST(Estimator, WhiteningGivesUnitCovariance) {
   const Fixture s(150, 15, 120, {.max_modes = 12});
   const Estimator e = MapEstimator(s.pca, MakeCueSet(s.pca, s.Optimal(6), s.sheet.diagonal()));
   const Eigen::Index r = e.covariance.rows();
-  EXPECT_LT((e.whitening * e.covariance * e.whitening.transpose() - Eigen::MatrixXd::Identity(r, r)).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((e.whitening * e.covariance * e.whitening.transpose() - Eigen::MatrixXd::Identity(r, r))
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-9);
   EXPECT_LT((e.judge * e.covariance - Eigen::MatrixXd::Identity(r, r)).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_TRUE(e.whitening.isLowerTriangular(0.0));
 }
 
-// KPSA.md, 2.1: the choice and the estimator of this project against the rule of the paper, same number of points.
+// KPSA.md, 2.1: the choice and the estimator of this project against the rule of the paper, same number of
+// points.
 TEST(Estimator, MapOfAnOptimalChoiceBeatsVarimaxAndLeastSquares) {
   const Fixture s(600, 40, 400, {.max_modes = 120});
   for (const auto& [count, factor] : {std::pair<std::size_t, double>{10, 1.5}, {20, 2.0}, {40, 3.0}}) {
     const Pca paper = TruncatedPca(s.pca, static_cast<Eigen::Index>(count / 2));
     const CueSet keys = MakeCueSet(paper, s.KeyPoints(paper.mode_count(), 2), s.sheet.diagonal());
     ASSERT_EQ(keys.cues.size(), count);
-    const double paper_rms = RmsError(EstimateErrors(paper, keys, LeastSquaresEstimator(paper, keys), s.test), s.sheet.points());
+    const double paper_rms =
+        RmsError(EstimateErrors(paper, keys, LeastSquaresEstimator(paper, keys), s.test), s.sheet.points());
     const double map_rms = s.MapRms(s.Optimal(count));
-    RecordProperty("points_" + std::to_string(count), std::to_string(paper_rms) + " against " + std::to_string(map_rms));
+    RecordProperty("points_" + std::to_string(count),
+                   std::to_string(paper_rms) + " against " + std::to_string(map_rms));
     EXPECT_LT(factor * map_rms, paper_rms) << count;
     EXPECT_LE(map_rms, s.MapRms(keys.cues)) << "the choice alone, at " << count;
   }

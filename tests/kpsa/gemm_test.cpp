@@ -11,7 +11,9 @@ namespace kpsa {
 namespace {
 
 // The widest differences of a product from Eigen's, relative to the depth.
-double Difference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) { return (a - b).cwiseAbs().maxCoeff(); }
+double Difference(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return (a - b).cwiseAbs().maxCoeff();
+}
 
 class GemmTest : public testing::TestWithParam<const char*> {
  protected:
@@ -23,12 +25,15 @@ class GemmTest : public testing::TestWithParam<const char*> {
 INSTANTIATE_TEST_SUITE_P(Targets, GemmTest, testing::Values("avx512", "avx2", "scalar"));
 
 TEST_P(GemmTest, AgreesWithTheNaiveProduct) {
-  for (const auto& [m, k, n] : {std::tuple{1, 1, 1}, {17, 5, 13}, {16, 12, 24}, {400, 200, 30}, {33, 401, 390}}) {
+  for (const auto& [m, k, n] :
+       {std::tuple{1, 1, 1}, {17, 5, 13}, {16, 12, 24}, {400, 200, 30}, {33, 401, 390}}) {
     const Eigen::MatrixXd a = RandomNormal(m, k, 1), b = RandomNormal(k, n, 2);
     const double tolerance = 1e-14 * k + 1e-13;
     EXPECT_LT(Difference(Multiply(a, b), a * b), tolerance);
     const Eigen::MatrixXd at = a.transpose(), bt = b.transpose();
-    EXPECT_LT(Difference(Multiply(GemmOperand::Dense(at).Transposed(), GemmOperand::Dense(bt).Transposed()), a * b), tolerance);
+    EXPECT_LT(
+        Difference(Multiply(GemmOperand::Dense(at).Transposed(), GemmOperand::Dense(bt).Transposed()), a * b),
+        tolerance);
     EXPECT_LT(Difference(Gram(GemmOperand::Dense(a)), a * a.transpose()), 10 * tolerance);
   }
 }
@@ -40,13 +45,20 @@ TEST_P(GemmTest, ReadsPosesWithAScaleAColumn) {
   std::vector<double> scale;
   for (int j = 0; j < 123; ++j) scale.push_back(0.5 + 0.01 * j);
   for (int i = 0; i < 150; ++i) {
-    for (int j = 0; j < 123; ++j) x(i, j) = static_cast<double>(poses.row(static_cast<std::size_t>(i))[static_cast<std::size_t>(j)]) * scale[static_cast<std::size_t>(j)];
+    for (int j = 0; j < 123; ++j)
+      x(i, j) = static_cast<double>(poses.row(static_cast<std::size_t>(i))[static_cast<std::size_t>(j)]) *
+                scale[static_cast<std::size_t>(j)];
   }
   EXPECT_LT(Difference(Gram(GemmOperand::Poses(poses, 0, 150, 0, 123, scale)), x * x.transpose()), 1e-11);
-  EXPECT_LT(Difference(Gram(GemmOperand::Poses(poses, 0, 150, 0, 123, scale).Transposed()), x.transpose() * x), 1e-11);
+  EXPECT_LT(
+      Difference(Gram(GemmOperand::Poses(poses, 0, 150, 0, 123, scale).Transposed()), x.transpose() * x),
+      1e-11);
   const Eigen::MatrixXd v = RandomNormal(100, 7, 4);
   const Eigen::MatrixXd part = x.middleRows(30, 100).middleCols(20, 60);
-  EXPECT_LT(Difference(Multiply(GemmOperand::Poses(poses, 30, 100, 20, 80, scale).Transposed(), GemmOperand::Dense(v)), part.transpose() * v), 1e-11);
+  EXPECT_LT(Difference(Multiply(GemmOperand::Poses(poses, 30, 100, 20, 80, scale).Transposed(),
+                                GemmOperand::Dense(v)),
+                       part.transpose() * v),
+            1e-11);
 }
 
 TEST(Gemm, SymmetricAndTheSameWithAnyNumberOfThreads) {
@@ -64,17 +76,20 @@ TEST(EigenSolvers, KrylovFindsTheLargestPairsOfASteepAndOfAFlatSpectrum) {
   // The flat one ends at the limit of the space: its eigenvalues are right to the square of the residuals
   for (const auto& [decay, tolerance] : {std::pair{0.9, 1e-9}, {0.99, 1e-6}}) {
     Eigen::VectorXd values(n);
-    for (Eigen::Index k = 0; k < n; ++k) values[k] = std::pow(decay, static_cast<double>(k / 2));  // every value twice
+    for (Eigen::Index k = 0; k < n; ++k)
+      values[k] = std::pow(decay, static_cast<double>(k / 2));  // every value twice
     const Eigen::MatrixXd matrix = q * values.asDiagonal() * q.transpose();
     const SymmetricEigen eigen = LargestEigen(matrix, m, 1);
     EXPECT_LT((eigen.values - values.head(m)).cwiseAbs().maxCoeff(), tolerance);
-    EXPECT_LT((matrix * eigen.vectors - eigen.vectors * eigen.values.asDiagonal()).norm(), std::sqrt(tolerance));
+    EXPECT_LT((matrix * eigen.vectors - eigen.vectors * eigen.values.asDiagonal()).norm(),
+              std::sqrt(tolerance));
   }
 }
 
 TEST(EigenSolvers, OrthonormalizeKeepsTheSpanOfDependentColumns) {
   Eigen::MatrixXd a = RandomNormal(300, 20, 7);
-  for (Eigen::Index k = 0; k < 20; ++k) a.col(k) *= std::pow(10.0, -static_cast<double>(k) / 2);  // condition 1e9
+  for (Eigen::Index k = 0; k < 20; ++k)
+    a.col(k) *= std::pow(10.0, -static_cast<double>(k) / 2);  // condition 1e9
   a.col(5) = a.col(4) + 1e-7 * a.col(5);
   const Eigen::MatrixXd before = a;
   Orthonormalize(&a);

@@ -14,8 +14,8 @@
 namespace kpsa {
 namespace {
 
-using test::Sheet;
 using test::kInfinity;
+using test::Sheet;
 
 class SoftCacheTest : public testing::Test {
  protected:

@@ -20,21 +20,37 @@ using test::Sheet;
 // A trained subspace over two meshes of 150 and 90 points, with point cues and a scalar.
 class SubspaceTest : public testing::TestWithParam<EstimatorMode> {
  protected:
-  SubspaceTest() : sheet_(240, 15, 1), training_(sheet_.RandomPoses(200, 2, sheet_.Layout(false, true))), test_(sheet_.RandomPoses(30, 3, sheet_.Layout(false, true))) {
+  SubspaceTest()
+      : sheet_(240, 15, 1),
+        training_(sheet_.RandomPoses(200, 2, sheet_.Layout(false, true))),
+        test_(sheet_.RandomPoses(30, 3, sheet_.Layout(false, true))) {
     const Eigen::VectorXd mean = training_.Mean();
     training_.Subtract(mean);
     pca_ = std::move(*ComputePca(training_, mean, {.max_modes = 7}));
-    const std::vector<CueRef> cues = {{CueKind::kOutput, 20}, {CueKind::kOutput, 170}, {CueKind::kScalar, 15}, {CueKind::kOutput, 130}, {CueKind::kOutput, 220}};
+    const std::vector<CueRef> cues = {{CueKind::kOutput, 20},
+                                      {CueKind::kOutput, 170},
+                                      {CueKind::kScalar, 15},
+                                      {CueKind::kOutput, 130},
+                                      {CueKind::kOutput, 220}};
     cues_ = MakeCueSet(pca_, cues, sheet_.diagonal());
-    estimator_ = GetParam() == EstimatorMode::kMap ? MapEstimator(pca_, cues_) : LeastSquaresEstimator(pca_, cues_);
+    estimator_ =
+        GetParam() == EstimatorMode::kMap ? MapEstimator(pca_, cues_) : LeastSquaresEstimator(pca_, cues_);
     EXPECT_EQ(estimator_.mode, GetParam()) << estimator_.warning;
-    subspace_ = MakeSubspace(pca_, cues_, estimator_, test::AllMeasured(training_, cues_, MeasuredCues), {{"head@mush", 150}, {"teeth", 90}},
-                             {.rms_budget = 1e-6});
+    subspace_ = MakeSubspace(pca_, cues_, estimator_, test::AllMeasured(training_, cues_, MeasuredCues),
+                             {{"head@mush", 150}, {"teeth", 90}}, {.rms_budget = 1e-6});
     for (const CueRef cue : cues) {
       if (cue.kind == CueKind::kScalar) {
-        subspace_.cues.push_back({.kind = CueDescription::Kind::kScalar, .plug = "twist.amount", .stage = "", .mesh = 0, .point = 0});
+        subspace_.cues.push_back({.kind = CueDescription::Kind::kScalar,
+                                  .plug = "twist.amount",
+                                  .stage = "",
+                                  .mesh = 0,
+                                  .point = 0});
       } else {
-        subspace_.cues.push_back({.kind = CueDescription::Kind::kPoint, .plug = "", .stage = "mush", .mesh = cue.index >= 150 ? 1u : 0u, .point = cue.index % 150});
+        subspace_.cues.push_back({.kind = CueDescription::Kind::kPoint,
+                                  .plug = "",
+                                  .stage = "mush",
+                                  .mesh = cue.index >= 150 ? 1u : 0u,
+                                  .point = cue.index % 150});
       }
     }
     subspace_.calibration = {{0.5, 1e-4}, {1.5, 3e-3}};
@@ -43,8 +59,10 @@ class SubspaceTest : public testing::TestWithParam<EstimatorMode> {
     subspace_.space = "head";
     subspace_.training = R"({"poses": 200})";
     subspace_.tolerance = 2e-4;
-    path_ = testing::TempDir() + "kpsa_subspace_test_" + testing::UnitTest::GetInstance()->current_test_info()->name();
-    std::replace(path_.begin() + static_cast<std::ptrdiff_t>(testing::TempDir().size()), path_.end(), '/', '_');
+    path_ = testing::TempDir() + "kpsa_subspace_test_" +
+            testing::UnitTest::GetInstance()->current_test_info()->name();
+    std::replace(path_.begin() + static_cast<std::ptrdiff_t>(testing::TempDir().size()), path_.end(), '/',
+                 '_');
   }
   ~SubspaceTest() override { std::filesystem::remove(path_); }
 
@@ -52,7 +70,8 @@ class SubspaceTest : public testing::TestWithParam<EstimatorMode> {
     std::vector<double> raw;
     for (std::size_t k = 0; k < cues_.cues.size(); ++k) {
       const std::size_t column = CueColumn(pca_.layout, cues_.cues[k]);
-      for (std::size_t j = 0; j < CueHeight(pca_.layout, cues_.cues[k]); ++j) raw.push_back(static_cast<double>(test_.row(pose)[column + j]));
+      for (std::size_t j = 0; j < CueHeight(pca_.layout, cues_.cues[k]); ++j)
+        raw.push_back(static_cast<double>(test_.row(pose)[column + j]));
     }
     return raw;
   }
@@ -71,14 +90,17 @@ TEST_P(SubspaceTest, ReconstructsWhatTheEstimatorSays) {
   SubspaceScratch scratch(subspace_);
   for (std::size_t t = 0; t < test_.poses(); ++t) {
     Measure(subspace_, RawCues(t), &scratch);
-    const Eigen::VectorXd expected = pca_.mean.head(720) + estimator_.gain * Eigen::Map<const Eigen::VectorXf>(scratch.y.data(), cues_.rows()).cast<double>();
+    const Eigen::VectorXd expected =
+        pca_.mean.head(720) +
+        estimator_.gain * Eigen::Map<const Eigen::VectorXf>(scratch.y.data(), cues_.rows()).cast<double>();
     std::size_t first = 0;
     for (std::size_t output = 0; output < 2; ++output) {
       PointBuffer points(subspace_.outputs[output].points);
       subspace_.tiles[output].Reconstruct(scratch.y.span(), points.view());
       const std::vector<float> xyz = points.Interleaved();
       double sum = 0;
-      for (std::size_t i = 0; i < xyz.size(); ++i) sum += std::pow(static_cast<double>(xyz[i]) - expected[static_cast<Eigen::Index>(first + i)], 2);
+      for (std::size_t i = 0; i < xyz.size(); ++i)
+        sum += std::pow(static_cast<double>(xyz[i]) - expected[static_cast<Eigen::Index>(first + i)], 2);
       EXPECT_LT(std::sqrt(sum / static_cast<double>(points.count())), 2e-5);
       first += xyz.size();
     }
@@ -175,31 +197,51 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
     });
   };
   EXPECT_EQ(message(header), "no error");
-  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["version"] = "2"; }).find("format version 2, this program reads version 1"), std::string::npos);
-  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"), std::string::npos);
-  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"].erase("cues"); }).find("no \"cues\""), std::string::npos);
-  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["ranges"] = "[[[["; }).find("not a JSON list"), std::string::npos);
+  EXPECT_NE(edited([](Json* j) {
+              (*j)["__metadata__"]["version"] = "2";
+            }).find("format version 2, this program reads version 1"),
+            std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"),
+            std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"].erase("cues"); }).find("no \"cues\""),
+            std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["ranges"] = "[[[["; }).find("not a JSON list"),
+            std::string::npos);
   EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["point"] = 150; }).find("point 150"), std::string::npos);
   EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["point"] = -1; }).find("whole number"), std::string::npos);
   EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["mesh"] = 2; }).find("mesh 2"), std::string::npos);
   EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0]["kind"] = "smell"; }).find("smell"), std::string::npos);
   EXPECT_NE(metadata("cues", [](Json* j) { j->erase(0); }).find("cueOffsets"), std::string::npos);
-  EXPECT_NE(metadata("cues", [](Json* j) { (*j)[0] = {{"kind", "scalar"}, {"plug", "x"}}; }).find("cue 0 is a scalar"), std::string::npos);
-  EXPECT_NE(metadata("outputs", [](Json* j) { (*j)[0]["points"] = 90; }).find("tiles of \"head@mush\""), std::string::npos);
-  EXPECT_NE(metadata("outputs", [](Json* j) { (*j)[0]["points"] = 1e12; }).find("\"points\""), std::string::npos);
+  EXPECT_NE(metadata("cues",
+                     [](Json* j) {
+                       (*j)[0] = {{"kind", "scalar"}, {"plug", "x"}};
+                     })
+                .find("cue 0 is a scalar"),
+            std::string::npos);
+  EXPECT_NE(metadata("outputs", [](Json* j) { (*j)[0]["points"] = 90; }).find("tiles of \"head@mush\""),
+            std::string::npos);
+  EXPECT_NE(metadata("outputs", [](Json* j) { (*j)[0]["points"] = 1e12; }).find("\"points\""),
+            std::string::npos);
   EXPECT_NE(metadata("summary", [](Json* j) { (*j)["mode"] = "guess"; }).find("guess"), std::string::npos);
   EXPECT_NE(metadata("summary", [](Json* j) { (*j)["quantile1"] = 0; }).find("quantiles"), std::string::npos);
-  EXPECT_NE(metadata("summary", [](Json* j) { (*j)["blendStart"] = nullptr; }).find("blendStart"), std::string::npos);
+  EXPECT_NE(metadata("summary", [](Json* j) { (*j)["blendStart"] = nullptr; }).find("blendStart"),
+            std::string::npos);
   EXPECT_NE(metadata("ranges", [](Json* j) { (*j)[0]["lo"] = 9; }).find("a.b"), std::string::npos);
   EXPECT_NE(edited([](Json* j) {
               (*j)["tiles.0.w"] = (*j)["tiles.0.v"];
               j->erase("tiles.0.v");
-            }).find("no tensor \"tiles.0.v\""), std::string::npos);
-  EXPECT_NE(edited([](Json* j) { (*j)["tiles.0.v"]["dtype"] = "U16"; }).find("expected F16"), std::string::npos);
-  EXPECT_NE(edited([](Json* j) { (*j)["factor"]["shape"] = {(*j)["factor"]["shape"][0], 2}; }).find("needs"), std::string::npos);
+            }).find("no tensor \"tiles.0.v\""),
+            std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["tiles.0.v"]["dtype"] = "U16"; }).find("expected F16"),
+            std::string::npos);
+  EXPECT_NE(edited([](Json* j) {
+              (*j)["factor"]["shape"] = {(*j)["factor"]["shape"][0], 2};
+            }).find("needs"),
+            std::string::npos);
 
   EXPECT_NE(metadata("ranges", [](Json* j) { j->clear(); }).find("the file is damaged"), std::string::npos);
-  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["units"] = "cm"; }).find("the file is damaged"), std::string::npos);
+  EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["units"] = "cm"; }).find("the file is damaged"),
+            std::string::npos);
 
   // Any flipped byte or cut: one message, never a crash; but for padding and how the header is written
   std::mt19937 random(1);

@@ -1,4 +1,5 @@
-// A deformable sheet with local controls, for tests of the subspace mathematics: no graph, any number of points.
+// A deformable sheet with local controls, for tests of the subspace mathematics: no graph, any number of
+// points.
 #pragma once
 
 #include <cmath>
@@ -14,9 +15,9 @@ namespace kpsa::test {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Points of a square grid of about `count` points, 0.5 m wide, in a blockwise spatial order (so that runs of 128
-// points lie together), and controls: local bumps with a direction each, a bend and a twist that move everything
-// nonlinearly. Lengths in metres.
+// Points of a square grid of about `count` points, 0.5 m wide, in a blockwise spatial order (so that runs of
+// 128 points lie together), and controls: local bumps with a direction each, a bend and a twist that move
+// everything nonlinearly. Lengths in metres.
 class Sheet {
  public:
   Sheet(std::size_t count, std::size_t controls, unsigned seed) : controls_(controls) {
@@ -26,7 +27,8 @@ class Sheet {
     for (std::size_t block = 0; block < side * side / 64; ++block) {
       for (std::size_t i = 0; i < 64 && rest_.size() < count; ++i) {
         const std::size_t x = block % (side / 8) * 8 + i % 8, y = block / (side / 8) * 8 + i / 8;
-        rest_.push_back({0.5 * static_cast<double>(x) / static_cast<double>(side), 0.5 * static_cast<double>(y) / static_cast<double>(side), 0});
+        rest_.push_back({0.5 * static_cast<double>(x) / static_cast<double>(side),
+                         0.5 * static_cast<double>(y) / static_cast<double>(side), 0});
       }
     }
     for (std::size_t k = 0; k < controls; ++k) {
@@ -51,7 +53,8 @@ class Sheet {
     const double bend = 0.3 * values[controls_], twist = 0.3 * values[controls_ + 1] * (rest_[i].x - 0.25);
     const double a = bend * p.y, c = std::cos(a), s = std::sin(a);
     p = {p.x, p.y * c - p.z * s, p.y * s + p.z * c};
-    return {p.x, 0.25 + (p.y - 0.25) * std::cos(twist) - p.z * std::sin(twist), (p.y - 0.25) * std::sin(twist) + p.z * std::cos(twist)};
+    return {p.x, 0.25 + (p.y - 0.25) * std::cos(twist) - p.z * std::sin(twist),
+            (p.y - 0.25) * std::sin(twist) + p.z * std::cos(twist)};
   }
 
   // A few controls at a time, as training mixtures are.
@@ -64,7 +67,8 @@ class Sheet {
     return values;
   }
 
-  // Appends a pose: outputs, the same points before bend and twist if the layout has stage points, controls as scalars.
+  // Appends a pose: outputs, the same points before bend and twist if the layout has stage points, controls
+  // as scalars.
   void Append(const std::vector<double>& values, PoseMatrix* poses) const {
     const PoseLayout& layout = poses->layout();
     const std::span<float> row = poses->AddPose();
@@ -74,16 +78,19 @@ class Sheet {
       const Double3 p = Point(i, values), q = layout.stage_points > 0 ? Point(i, before) : Double3();
       for (int c = 0; c < 3; ++c) {
         row[3 * i + static_cast<std::size_t>(c)] = static_cast<float>(p[c]);
-        if (layout.stage_points > 0) row[layout.stage_begin() + 3 * i + static_cast<std::size_t>(c)] = static_cast<float>(q[c]);
+        if (layout.stage_points > 0)
+          row[layout.stage_begin() + 3 * i + static_cast<std::size_t>(c)] = static_cast<float>(q[c]);
       }
     }
-    for (std::size_t k = 0; k < layout.scalars; ++k) row[layout.scalar_begin() + k] = static_cast<float>(values[k]);
+    for (std::size_t k = 0; k < layout.scalars; ++k)
+      row[layout.scalar_begin() + k] = static_cast<float>(values[k]);
   }
 
   PoseLayout Layout(bool stages = false, bool scalars = false) const {
     return {points(), 3, stages ? points() : 0, scalars ? controls() : 0};
   }
-  PoseMatrix RandomPoses(std::size_t count, unsigned seed, const PoseLayout& layout, double amplitude = 1) const {
+  PoseMatrix RandomPoses(std::size_t count, unsigned seed, const PoseLayout& layout,
+                         double amplitude = 1) const {
     PoseMatrix poses(layout);
     std::mt19937 random(seed);
     for (std::size_t t = 0; t < count; ++t) Append(RandomControls(&random, amplitude), &poses);
@@ -111,7 +118,8 @@ inline PoseMatrix NoisePoses(std::size_t count, const PoseLayout& layout, unsign
 template <typename Cues, typename Function>
 Eigen::MatrixXd AllMeasured(const PoseMatrix& poses, const Cues& cues, Function measure) {
   Eigen::MatrixXd y(cues.rows(), static_cast<Eigen::Index>(poses.poses()));
-  for (std::size_t t = 0; t < poses.poses(); ++t) y.col(static_cast<Eigen::Index>(t)) = measure(poses.layout(), cues, poses.row(t));
+  for (std::size_t t = 0; t < poses.poses(); ++t)
+    y.col(static_cast<Eigen::Index>(t)) = measure(poses.layout(), cues, poses.row(t));
   return y;
 }
 

@@ -1,4 +1,3 @@
-#include "kpsa/dense_map.h"
 #include "kpsa/tiles.h"
 
 #include <gtest/gtest.h>
@@ -8,6 +7,7 @@
 #include <random>
 
 #include "base/simd.h"
+#include "kpsa/dense_map.h"
 #include "kpsa/eigen_solvers.h"
 #include "kpsa/rigid_points.h"
 

@@ -24,7 +24,8 @@ Eigen::MatrixXd Bumps(Eigen::Index count) {
   for (Eigen::Index k = 0; k < count; ++k) {
     for (Eigen::Index i = 0; i < 40; ++i) {
       const double q = (static_cast<double>(i) - 19) / 8;
-      a.col(k).segment(3 * (40 * k + i), 3) = std::exp(-q * q) * Eigen::Vector3d(1, 0.3 * static_cast<double>(k), -0.5);
+      a.col(k).segment(3 * (40 * k + i), 3) =
+          std::exp(-q * q) * Eigen::Vector3d(1, 0.3 * static_cast<double>(k), -0.5);
     }
     a.col(k).normalize();
   }
@@ -40,7 +41,8 @@ TEST(Varimax, KeepsTheSubspaceAndNeverLowersTheCriterion) {
     EXPECT_LT((after.transpose() * after - Eigen::MatrixXd::Identity(12, 12)).cwiseAbs().maxCoeff(), 1e-12);
     EXPECT_LT((before * result.rotation - after).cwiseAbs().maxCoeff(), 1e-13);
     ASSERT_GT(result.criterion.size(), 2u);
-    for (std::size_t i = 1; i < result.criterion.size(); ++i) EXPECT_GE(result.criterion[i], result.criterion[i - 1] * (1 - 1e-13));
+    for (std::size_t i = 1; i < result.criterion.size(); ++i)
+      EXPECT_GE(result.criterion[i], result.criterion[i - 1] * (1 - 1e-13));
     EXPECT_GT(result.criterion.back(), result.criterion.front() * 1.05);
     EXPECT_NEAR(VarimaxCriterion(after, components), result.criterion.back(), 1e-9 * result.criterion.back());
   }
@@ -113,7 +115,8 @@ TEST(KeyPoints, ASecondPointLiesOutsideTheRadiusAndNoPointComesTwice) {
   const std::vector<CueRef> distinct = SelectKeyPoints(same, 3, positions, 1, 0);
   ASSERT_EQ(distinct.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < i; ++j) EXPECT_NE(positions[distinct[i].index].x, positions[distinct[j].index].x);
+    for (std::size_t j = 0; j < i; ++j)
+      EXPECT_NE(positions[distinct[i].index].x, positions[distinct[j].index].x);
   }
 }
 

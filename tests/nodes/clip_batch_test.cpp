@@ -24,14 +24,16 @@ class ClipBatchTest : public testing::Test {
  protected:
   double Random(double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(random_); }
 
-  AnimationSampler Channel(const std::vector<double>& times, std::size_t components, AnimationSampler::Interpolation interpolation, bool constant) {
+  AnimationSampler Channel(const std::vector<double>& times, std::size_t components,
+                           AnimationSampler::Interpolation interpolation, bool constant) {
     AnimationSampler sampler;
     sampler.interpolation = interpolation;
     sampler.components = static_cast<int>(components);
     sampler.times = times;
     const std::size_t rows = interpolation == AnimationSampler::Interpolation::kCubicSpline ? 3 : 1;
     for (std::size_t i = 0; i < times.size() * rows * components; ++i) {
-      sampler.values.push_back(constant && i >= components ? sampler.values[i - components] : Random(0.2, 1.5));
+      sampler.values.push_back(constant && i >= components ? sampler.values[i - components]
+                                                           : Random(0.2, 1.5));
     }
     return sampler;
   }
@@ -74,7 +76,8 @@ TEST_F(ClipBatchTest, GivesTheSameBytesAsOneByOne) {
   EXPECT_EQ(g.plan->batches()[0].count, static_cast<Index>(kTransforms));
 
   Evaluator together(g.plan);
-  for (double t : {0.0, -3.0, 0.1, 0.25, 0.6, 0.75, 0.7999, 1.1, 1.25, 7.0, std::numeric_limits<double>::quiet_NaN(), 0.3}) {
+  for (double t : {0.0, -3.0, 0.1, 0.25, 0.6, 0.75, 0.7999, 1.1, 1.25, 7.0,
+                   std::numeric_limits<double>::quiet_NaN(), 0.3}) {
     for (Evaluator* evaluator : {&together, g.evaluator.get()}) {  // the latter records: one by one
       evaluator->Set(*evaluator->FindVarying(g.graph, g.plug("time.time")), t);
       evaluator->Set(*evaluator->FindVarying(g.graph, g.plug("late.time")), t - 0.37);

@@ -79,20 +79,25 @@ TEST(Sampler, KeysAreFoundHoweverTheyAreSpaced) {
       double t = random.Signed();
       for (int i = 0; i < count; ++i) {
         times.push_back(static_cast<float>(t));
-        const double gaps[4] = {1.0 / 24, 0.01 + random.Unit(), i < count / 2 ? 1e-3 : 5.0, i % 50 == 49 ? 100.0 : 1e-3};
+        const double gaps[4] = {1.0 / 24, 0.01 + random.Unit(), i < count / 2 ? 1e-3 : 5.0,
+                                i % 50 == 49 ? 100.0 : 1e-3};
         t += gaps[shape];
       }
       const KeyTimes keys(times);
       for (int i = 0; i < 2000; ++i) {
         double at = times.front() - 1 + random.Unit() * (times.back() - times.front() + 2);
         if (i % 3 == 0) at = times[static_cast<std::size_t>(i) % times.size()];  // a key itself
-        if (i % 3 == 1) at = std::nextafter(static_cast<double>(times[static_cast<std::size_t>(i) % times.size()]), -1e9);
+        if (i % 3 == 1)
+          at = std::nextafter(static_cast<double>(times[static_cast<std::size_t>(i) % times.size()]), -1e9);
         const KeySpan span = keys.Find(at);
-        const auto next = std::upper_bound(times.begin(), times.end(), at, [](double a, float b) { return a < static_cast<double>(b); });
+        const auto next = std::upper_bound(times.begin(), times.end(), at,
+                                           [](double a, float b) { return a < static_cast<double>(b); });
         const auto expected = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, next - times.begin() - 1));
         ASSERT_EQ(span.key, expected) << at << " in " << count << " of shape " << shape;
-        const bool between = at > static_cast<double>(times.front()) && at < static_cast<double>(times.back());
-        const double start = times[expected], width = between ? static_cast<double>(times[expected + 1]) - start : 0;
+        const bool between =
+            at > static_cast<double>(times.front()) && at < static_cast<double>(times.back());
+        const double start = times[expected],
+                     width = between ? static_cast<double>(times[expected + 1]) - start : 0;
         ASSERT_EQ(span.t, between ? (at - start) / width : 0);
         ASSERT_EQ(span.width, width);
       }
@@ -103,7 +108,8 @@ TEST(Sampler, KeysAreFoundHoweverTheyAreSpaced) {
 
 TEST(Sampler, RotationTracksTurnAsTheSamplerDoes) {
   Random random(10);
-  for (Interpolation interpolation : {Interpolation::kStep, Interpolation::kLinear, Interpolation::kCubicSpline}) {
+  for (Interpolation interpolation :
+       {Interpolation::kStep, Interpolation::kLinear, Interpolation::kCubicSpline}) {
     std::vector<float> times, values;
     const std::size_t rows = interpolation == Interpolation::kCubicSpline ? 3 : 1;
     for (int i = 0; i < 50; ++i) {
@@ -120,7 +126,8 @@ TEST(Sampler, RotationTracksTurnAsTheSamplerDoes) {
     EXPECT_FALSE(track.constant());
     for (int i = 0; i < 2000; ++i) {
       const double at = i < 50 ? times[static_cast<std::size_t>(i)] : random.Unit() * 6 - 0.5;
-      const Matrix4 got = RotationFromQuaternion(track.At(key_times.Find(at))), expected = RotationFromQuaternion(SampleRotation(keys, at));
+      const Matrix4 got = RotationFromQuaternion(track.At(key_times.Find(at))),
+                    expected = RotationFromQuaternion(SampleRotation(keys, at));
       for (std::size_t e = 0; e < 16; ++e) ASSERT_NEAR(got.m[e], expected.m[e], 1e-14) << at;
     }
   }

@@ -11,13 +11,17 @@ volatile std::uint64_t traps = 0;
 
 void CountTrap(int, siginfo_t*, void*) { traps = traps + 1; }
 
-// The processor traps after every instruction from the end of the first to the end of the second. Both clear the red
-// zone below the stack pointer before they use the stack.
+// The processor traps after every instruction from the end of the first to the end of the second. Both clear
+// the red zone below the stack pointer before they use the stack.
 inline __attribute__((always_inline)) void StartTraps() {
-  asm volatile("lea -128(%%rsp), %%rsp\n pushfq\n orq %0, (%%rsp)\n popfq\n lea 128(%%rsp), %%rsp" ::"i"(kTrapFlag) : "memory", "cc");
+  asm volatile(
+      "lea -128(%%rsp), %%rsp\n pushfq\n orq %0, (%%rsp)\n popfq\n lea 128(%%rsp), %%rsp" ::"i"(kTrapFlag)
+      : "memory", "cc");
 }
 inline __attribute__((always_inline)) void StopTraps() {
-  asm volatile("lea -128(%%rsp), %%rsp\n pushfq\n andq %0, (%%rsp)\n popfq\n lea 128(%%rsp), %%rsp" ::"i"(~kTrapFlag) : "memory", "cc");
+  asm volatile(
+      "lea -128(%%rsp), %%rsp\n pushfq\n andq %0, (%%rsp)\n popfq\n lea 128(%%rsp), %%rsp" ::"i"(~kTrapFlag)
+      : "memory", "cc");
 }
 
 }  // namespace

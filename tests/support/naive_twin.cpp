@@ -8,7 +8,8 @@ namespace kpsa {
 namespace {
 
 bool Overlap(const NaiveTwin::Plug& a, const NaiveTwin::Plug& b) {
-  return a.node == b.node && a.attribute == b.attribute && (a.element == b.element || a.element < 0 || b.element < 0) &&
+  return a.node == b.node && a.attribute == b.attribute &&
+         (a.element == b.element || a.element < 0 || b.element < 0) &&
          (a.component == b.component || a.component < 0 || b.component < 0);
 }
 
@@ -26,13 +27,15 @@ std::string NaiveTwin::Plug::Name() const {
 void NaiveTwin::Remove(const std::string& name) {
   types.erase(name);
   std::erase_if(held, [&](const auto& entry) { return entry.first.node == name; });
-  std::erase_if(drivers, [&](const auto& entry) { return entry.first.node == name || entry.second.node == name; });
+  std::erase_if(drivers,
+                [&](const auto& entry) { return entry.first.node == name || entry.second.node == name; });
 }
 
 void NaiveTwin::Set(const Plug& plug, Held value) {
   std::erase_if(held, [&](const auto& entry) {
     const Plug& p = entry.first;
-    return Overlap(p, plug) && (plug.element < 0 || p.element == plug.element) && (plug.component < 0 || p.component == plug.component);
+    return Overlap(p, plug) && (plug.element < 0 || p.element == plug.element) &&
+           (plug.component < 0 || p.component == plug.component);
   });
   held[plug] = std::move(value);
 }
@@ -71,7 +74,9 @@ double NaiveTwin::Number(const Plug& plug) {
     return std::get<double>(Output(plug));
   }
   const bool is_bool = plug.attribute == "which";
-  double value = plug.attribute == "factor" || plug.attribute == "step" ? 1 : plug.attribute == "floor" ? -1e30 : 0;
+  double value = plug.attribute == "factor" || plug.attribute == "step" ? 1
+                 : plug.attribute == "floor"                            ? -1e30
+                                                                        : 0;
   const Plug whole{plug.node, plug.attribute, plug.element, -1};
   if (const Plug* driver = Driver(plug)) {
     value = Number(*driver);
@@ -104,7 +109,8 @@ NaiveTwin::Points NaiveTwin::AllPoints(const Plug& plug) {
     if (const Plug* driver = Driver(point)) points[i] = Vector(*driver);
     for (int c = 0; c < 3; ++c) {
       const Plug child{plug.node, plug.attribute, static_cast<int>(i), c};
-      if (Driver(point) == nullptr && (held.count(child) != 0 || Driver(child) != nullptr)) points[i][c] = Number(child);
+      if (Driver(point) == nullptr && (held.count(child) != 0 || Driver(child) != nullptr))
+        points[i][c] = Number(child);
       points[i][c] = AsFloat(points[i][c]);
     }
   }
@@ -113,7 +119,9 @@ NaiveTwin::Points NaiveTwin::AllPoints(const Plug& plug) {
 
 NaiveTwin::Held NaiveTwin::Output(const Plug& plug) {
   if (const auto it = memo_.find(plug); it != memo_.end()) return it->second;
-  const auto in = [&](const char* attribute, int element = -1) { return Plug{plug.node, attribute, element, -1}; };
+  const auto in = [&](const char* attribute, int element = -1) {
+    return Plug{plug.node, attribute, element, -1};
+  };
   const std::string& type = types.at(plug.node);
   Held result = 0.0;
   if (type == "add") {
@@ -133,7 +141,8 @@ NaiveTwin::Held NaiveTwin::Output(const Plug& plug) {
     result = Number(in(Number(in("which")) != 0 ? "b" : "a"));
   } else if (type == "source") {
     Points points(static_cast<std::size_t>(Number(in("count"))));
-    for (std::size_t i = 0; i < points.size(); ++i) points[i].x = AsFloat(static_cast<double>(i) * Number(in("step")));
+    for (std::size_t i = 0; i < points.size(); ++i)
+      points[i].x = AsFloat(static_cast<double>(i) * Number(in("step")));
     result = points;
   } else if (type == "move") {
     Points points = AllPoints(in("points"));
@@ -146,7 +155,8 @@ NaiveTwin::Held NaiveTwin::Output(const Plug& plug) {
     Points means(points.size());
     for (int i = 0; i < n; ++i) {
       float x = 0;
-      for (int d = -rings; d <= rings; ++d) x += static_cast<float>(points[static_cast<std::size_t>(((i + d) % n + n) % n)].x);
+      for (int d = -rings; d <= rings; ++d)
+        x += static_cast<float>(points[static_cast<std::size_t>(((i + d) % n + n) % n)].x);
       means[static_cast<std::size_t>(i)].x = x / static_cast<float>(2 * rings + 1);
     }
     result = means;

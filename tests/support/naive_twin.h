@@ -1,5 +1,6 @@
-// A graph of toy nodes evaluated in the most naive way: by name, from the wanted plug backward, recursively, without
-// caches between evaluations, without plans or point sets. What the engine has to agree with, bit by bit.
+// A graph of toy nodes evaluated in the most naive way: by name, from the wanted plug backward, recursively,
+// without caches between evaluations, without plans or point sets. What the engine has to agree with, bit by
+// bit.
 #pragma once
 
 #include <map>
@@ -18,7 +19,8 @@ class NaiveTwin {
     std::string node, attribute;
     int element = -1, component = -1;
     friend auto operator<=>(const Plug& a, const Plug& b) {
-      return std::tie(a.node, a.attribute, a.element, a.component) <=> std::tie(b.node, b.attribute, b.element, b.component);
+      return std::tie(a.node, a.attribute, a.element, a.component) <=>
+             std::tie(b.node, b.attribute, b.element, b.component);
     }
     friend bool operator==(const Plug& a, const Plug& b) { return (a <=> b) == 0; }
     std::string Name() const;
@@ -29,7 +31,8 @@ class NaiveTwin {
   void Add(const std::string& name, const std::string& type) { types[name] = type; }
   void Remove(const std::string& name);
   void Set(const Plug& plug, Held value);
-  // Whether the engine has to refuse: the destination or a part of it is driven (by anything but itself if `replace`).
+  // Whether the engine has to refuse: the destination or a part of it is driven (by anything but itself if
+  // `replace`).
   bool Overlaps(const Plug& destination, bool replace) const;
   // Whether the value of `plug` depends on `target`.
   bool DependsOn(const Plug& plug, const Plug& target) const;
@@ -41,7 +44,7 @@ class NaiveTwin {
 
   std::map<std::string, std::string> types;  // by node
   std::map<Plug, Held> held;
-  std::map<Plug, Plug> drivers;              // by destination
+  std::map<Plug, Plug> drivers;  // by destination
 
  private:
   const Plug* Driver(const Plug& plug) const;

@@ -25,7 +25,8 @@ class TestGraph {
  public:
   explicit TestGraph(const NodeRegistry& registry) : graph(registry) {}
 
-  NodeId add(const std::string& type, const std::string& name, const std::vector<std::pair<std::string, Value>>& values = {}) {
+  NodeId add(const std::string& type, const std::string& name,
+             const std::vector<std::pair<std::string, Value>>& values = {}) {
     Result<NodeId> node = graph.AddNode(type, name);
     EXPECT_TRUE(node.ok()) << node.status().ToString();
     for (const auto& [attribute, value] : values) hold(name + "." + attribute, value);

@@ -69,27 +69,55 @@ int TakeBatchComputes() { return batch_computes.exchange(0); }
 BlockComputes TakeBlockComputes() { return {block_computes.exchange(0), block_frames.exchange(0)}; }
 
 void AddToyNodes(NodeRegistry& registry) {
-  registry.add("add", "Adds.").in("a", 0.0).in("b", 0.0).out("out", Type::kDouble).compute([](double a, double b) { return a + b; });
-  registry.add("scale3", "Scales a vector.").in("input", Double3()).in("factor", 1.0).out("out", Type::kDouble3)
-      .compute([](Double3 v, double f) { return v * f; }).passes("input", {"factor"});
-  registry.add("floor", "Rounds down.").in("input", 0.0).out("out", Type::kDouble).compute([](double v) { return std::floor(v); })
+  registry.add("add", "Adds.")
+      .in("a", 0.0)
+      .in("b", 0.0)
+      .out("out", Type::kDouble)
+      .compute([](double a, double b) { return a + b; });
+  registry.add("scale3", "Scales a vector.")
+      .in("input", Double3())
+      .in("factor", 1.0)
+      .out("out", Type::kDouble3)
+      .compute([](Double3 v, double f) { return v * f; })
+      .passes("input", {"factor"});
+  registry.add("floor", "Rounds down.")
+      .in("input", 0.0)
+      .out("out", Type::kDouble)
+      .compute([](double v) { return std::floor(v); })
       .batch(nullptr, [](const BatchContext& c) {
         ++batch_computes;
         for (std::size_t i = 0; i < c.count; ++i) c.out_value<double>(i) = std::floor(c.get<double>(i, 0));
       });
-  registry.add("sum", "Adds many.").in("input", 0.0).array().out("out", Type::kDouble).compute([](ArrayView<double> values) {
-    double sum = 0;
-    for (std::uint32_t i = 0; i < values.size(); ++i) sum += values[i];
-    return sum;
-  }).cost(20000, 0);
-  registry.add("select", "Takes one of two.").in("which", false).in("a", 0.0).lazy().in("b", 0.0).lazy().out("out", Type::kDouble)
+  registry.add("sum", "Adds many.")
+      .in("input", 0.0)
+      .array()
+      .out("out", Type::kDouble)
+      .compute([](ArrayView<double> values) {
+        double sum = 0;
+        for (std::uint32_t i = 0; i < values.size(); ++i) sum += values[i];
+        return sum;
+      })
+      .cost(20000, 0);
+  registry.add("select", "Takes one of two.")
+      .in("which", false)
+      .in("a", 0.0)
+      .lazy()
+      .in("b", 0.0)
+      .lazy()
+      .out("out", Type::kDouble)
       .compute([](bool which, double a, double b) { return which ? b : a; })
       .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 2 : 1; });
-  registry.add("fail", "Fails below zero.").in("input", 0.0).out("out", Type::kDouble).compute([](ComputeContext& c) {
-    if (c.get<double>(0) < 0) return c.host->Fail("input is below zero");
-    c.out_value<double>(0) = c.get<double>(0);
-  });
-  registry.add("source", "Points on a line.").structural("count", 10).in("step", 1.0).out("outPoints", Type::kPoints)
+  registry.add("fail", "Fails below zero.")
+      .in("input", 0.0)
+      .out("out", Type::kDouble)
+      .compute([](ComputeContext& c) {
+        if (c.get<double>(0) < 0) return c.host->Fail("input is below zero");
+        c.out_value<double>(0) = c.get<double>(0);
+      });
+  registry.add("source", "Points on a line.")
+      .structural("count", 10)
+      .in("step", 1.0)
+      .out("outPoints", Type::kPoints)
       .compute([](ComputeContext& c) {
         const auto& set = c.kernel_as<PointSet>();
         for (Index i = 0; i < set.size(); ++i) {
@@ -97,9 +125,16 @@ void AddToyNodes(NodeRegistry& registry) {
           c.out_points(0).y[i] = c.out_points(0).z[i] = 0;
         }
       })
-      .bind([](const Binding& b) -> Result<BoundKernel> { return BoundKernel{std::make_shared<PointSet>(b.output("outPoints")), 0, 0}; })
-      .point_count([](const Structural& s, std::string_view, int) -> Result<Index> { return static_cast<Index>(s.get_int("count")); });
-  registry.add("move", "Moves points.").points_in("points").in("offset", 0.0).out("outPoints", Type::kPoints)
+      .bind([](const Binding& b) -> Result<BoundKernel> {
+        return BoundKernel{std::make_shared<PointSet>(b.output("outPoints")), 0, 0};
+      })
+      .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
+        return static_cast<Index>(s.get_int("count"));
+      });
+  registry.add("move", "Moves points.")
+      .points_in("points")
+      .in("offset", 0.0)
+      .out("outPoints", Type::kPoints)
       .compute([](ComputeContext& c) {
         const auto offset = static_cast<float>(c.get<double>(1));
         for (std::size_t i = 0; i < c.points(0).count; ++i) {
@@ -108,8 +143,12 @@ void AddToyNodes(NodeRegistry& registry) {
           c.out_points(0).z[i] = c.points(0).z[i];
         }
       })
-      .in_place("points").cost(20000, 2);
-  registry.add("smooth", "Means over a ring.").structural("rings", 1).points_in("points").out("outPoints", Type::kPoints)
+      .in_place("points")
+      .cost(20000, 2);
+  registry.add("smooth", "Means over a ring.")
+      .structural("rings", 1)
+      .points_in("points")
+      .out("outPoints", Type::kPoints)
       .compute([](ComputeContext& c) {
         const auto& kernel = c.kernel_as<SmoothKernel>();
         for (std::size_t i = 0; i < kernel.neighbours.size(); ++i) {
@@ -119,14 +158,24 @@ void AddToyNodes(NodeRegistry& registry) {
           c.out_points(0).y[i] = c.out_points(0).z[i] = 0;
         }
       })
-      .demand(DemandSmooth).bind(BindSmooth).cost(20000, 10);
-  registry.add("measure", "Sum of x.").points_in("points").out("out", Type::kDouble).compute([](ComputeContext& c) {
-    double sum = 0;
-    for (std::size_t i = 0; i < c.points(0).count; ++i) sum += c.points(0).x[i];
-    c.out_value<double>(0) = sum;
-  });
+      .demand(DemandSmooth)
+      .bind(BindSmooth)
+      .cost(20000, 10);
+  registry.add("measure", "Sum of x.")
+      .points_in("points")
+      .out("out", Type::kDouble)
+      .compute([](ComputeContext& c) {
+        double sum = 0;
+        for (std::size_t i = 0; i < c.points(0).count; ++i) sum += c.points(0).x[i];
+        c.out_value<double>(0) = sum;
+      });
   registry.add("cached", "A stand-in for a slow stack.")
-      .structural("cues", Type::kInts).in("threshold", 0.0).in("floor", -1e30).points_in("cuePoints").points_in("full").lazy()
+      .structural("cues", Type::kInts)
+      .in("threshold", 0.0)
+      .in("floor", -1e30)
+      .points_in("cuePoints")
+      .points_in("full")
+      .lazy()
       .out("outPoints", Type::kPoints)
       .compute(ComputeCached)
       .decide([](ComputeContext& c) -> std::uint64_t {
@@ -145,23 +194,45 @@ void AddToyNodes(NodeRegistry& registry) {
         d.Require("cuePoints", 0, PointSet::Of({cues.begin(), cues.end()}, d.input_total("cuePoints")));
         d.Require("full", 0, d.output("outPoints"));
       })
-      .bind([](const Binding&) -> Result<BoundKernel> { return BoundKernel{nullptr, 0, sizeof(double)}; });
-  registry.add("trail", "Moves half of the way to its input, from where it was.").stateful().in("input", 0.0).out("out", Type::kDouble)
+      .bind([](const Binding&) -> Result<BoundKernel> {
+        return BoundKernel{nullptr, 0, sizeof(double)};
+      });
+  registry.add("trail", "Moves half of the way to its input, from where it was.")
+      .stateful()
+      .in("input", 0.0)
+      .out("out", Type::kDouble)
       .compute([](ComputeContext& c) {
         auto& at = c.state_as<double>();
         at = (at + c.get<double>(0)) / 2;
         c.out_value<double>(0) = at;
       })
-      .bind([](const Binding&) -> Result<BoundKernel> { return BoundKernel{nullptr, 0, sizeof(double)}; });
-  registry.add("twoWays", "Two values side by side.").in("a", 0.0).in("b", 0.0).out("outA", Type::kDouble).out("outB", Type::kDouble)
+      .bind([](const Binding&) -> Result<BoundKernel> {
+        return BoundKernel{nullptr, 0, sizeof(double)};
+      });
+  registry.add("twoWays", "Two values side by side.")
+      .in("a", 0.0)
+      .in("b", 0.0)
+      .out("outA", Type::kDouble)
+      .out("outB", Type::kDouble)
       .compute_for({"outA"}, {"a"}, [](double v) { return v + 1; })
       .compute_for({"outB"}, {"b"}, [](double v) { return v * 2; });
-  registry.add("choice", "Takes one of many.").in("selector", 0).in("input", 0.0).array().lazy().out("out", Type::kDouble)
+  registry.add("choice", "Takes one of many.")
+      .in("selector", 0)
+      .in("input", 0.0)
+      .array()
+      .lazy()
+      .out("out", Type::kDouble)
       .compute([](std::int64_t selector, ArrayView<double> input) {
         return selector < input.size() ? input[static_cast<std::uint32_t>(selector)] : 0;
       })
       .decide([](ComputeContext& c) -> std::uint64_t { return std::uint64_t{1} << c.get<std::int64_t>(0); });
-  registry.add("together", "Adds all, or none.").in("wanted", false).in("input", 0.0).array().lazy(true).in("other", 0.0).lazy()
+  registry.add("together", "Adds all, or none.")
+      .in("wanted", false)
+      .in("input", 0.0)
+      .array()
+      .lazy(true)
+      .in("other", 0.0)
+      .lazy()
       .out("out", Type::kDouble)
       .compute([](ComputeContext& c) {
         const ArrayView<double> input = c.array<double>(1);
@@ -170,7 +241,11 @@ void AddToyNodes(NodeRegistry& registry) {
         c.out_value<double>(0) = sum;
       })
       .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 1 : 2; });
-  registry.add("picky", "Fails where it is told to.").structural("where", 0).structural("factor", 2.0).points_in("points").out("outPoints", Type::kPoints)
+  registry.add("picky", "Fails where it is told to.")
+      .structural("where", 0)
+      .structural("factor", 2.0)
+      .points_in("points")
+      .out("outPoints", Type::kPoints)
       .compute([](ComputeContext& c) {
         if (c.kernel == nullptr) return c.host->Fail("cannot compute");
         for (std::size_t i = 0; i < c.points(0).count; ++i) {
@@ -182,21 +257,32 @@ void AddToyNodes(NodeRegistry& registry) {
         const int where = b.structural().get_int("where");
         if (where == 1) return Status::Invalid("cannot bind");
         if (where == 4) return BoundKernel();
-        return BoundKernel{std::make_shared<float>(static_cast<float>(b.structural().get_double("factor"))), 0, 0};
+        return BoundKernel{std::make_shared<float>(static_cast<float>(b.structural().get_double("factor"))),
+                           0, 0};
       })
       .demand([](Demand& d) {
-        d.Require("points", 0, d.structural().get_int("where") == 2 ? PointSet::All(3) : d.output("outPoints"));
+        d.Require("points", 0,
+                  d.structural().get_int("where") == 2 ? PointSet::All(3) : d.output("outPoints"));
       })
       .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
         if (s.get_int("where") == 3) return Status::Invalid("cannot count");
         return Index{10};
       });
-  registry.add("grid", "Attributes of many kinds.").structural("divisions", std::vector<std::int64_t>{2, 3, 2})
-      .enumeration("mode", {"linear", "smooth"}, true).in("size", 1.0, {.min = 0, .max = 10}).in("weight", 0.0).array()
-      .in("matrix", Matrix4()).in("center", Double3()).alias("pivot").points_in("points").grid("divisions")
+  registry.add("grid", "Attributes of many kinds.")
+      .structural("divisions", std::vector<std::int64_t>{2, 3, 2})
+      .enumeration("mode", {"linear", "smooth"}, true)
+      .in("size", 1.0, {.min = 0, .max = 10})
+      .in("weight", 0.0)
+      .array()
+      .in("matrix", Matrix4())
+      .in("center", Double3())
+      .alias("pivot")
+      .points_in("points")
+      .grid("divisions")
       .default_from([](const Structural& s) {
         Index count = 1;
-        for (std::int64_t n : s.value("divisions").get<std::vector<std::int64_t>>()) count *= static_cast<Index>(n);
+        for (std::int64_t n : s.value("divisions").get<std::vector<std::int64_t>>())
+          count *= static_cast<Index>(n);
         return Value(PointBufferPtr(std::make_shared<PointBuffer>(count)));
       })
       .out("outPoints", Type::kPoints)
