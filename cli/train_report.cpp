@@ -76,6 +76,14 @@ std::string TrainText(const TrainResult& r) {
         "{:.1f}x with these hits\n",
         Plural(r.check.poses, "new pose"), r.check.full_ms, r.check.accelerated_ms,
         r.check.PredictedSpeedup(r.calibration.hit_rate));
+    // What the user can do about it
+    if (r.check.PredictedSpeedup(r.calibration.hit_rate) < 1) {
+      text += r.calibration.hit_rate < 0.5
+                  ? "slower than the full evaluation, as so few poses hit: a larger --tolerance, more "
+                    "--samples, or narrower "
+                    "controls help\n"
+                  : "slower than the full evaluation, which costs little here: leave this one as it is\n";
+    }
     Table poses({"worst of these poses (controls)", "where", ">max", ">RMS"});
     for (const auto& pose : r.check.worst_poses)
       poses.Row({pose.controls, pose.region, LengthText(pose.max), LengthText(pose.rms)});
