@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <tuple>
 #include <unordered_set>
 
@@ -301,6 +302,14 @@ int Graph::ArraySize(NodeId id, int attribute) const {
 }
 
 void Graph::SetElementNames(NodeId id, int attribute, std::vector<std::string> names) {
+  // A name that several elements share would name the first of them alone
+  std::map<std::string_view, int> uses;
+  for (const std::string& name : names) ++uses[name];
+  std::vector<std::string> own = names;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (!names[i].empty() && uses[names[i]] > 1) own[i] = fmt::format("{}#{}", names[i], i);
+  }
+  names = std::move(own);
   for (auto& [number, existing] : node(id).element_names) {
     if (number == attribute) {
       existing = std::move(names);

@@ -133,6 +133,14 @@ Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text)
     if (it != names.end()) return static_cast<int>(it - names.begin());
     int index = 0;
     if (ParseInt(text, &index) && index >= 0 && index < static_cast<int>(names.size())) return index;
+    std::vector<std::string> same;  // told apart by their index
+    for (const std::string& name : names) {
+      if (name.size() > text.size() && name.starts_with(text) && name[text.size()] == '#')
+        same.push_back(name);
+    }
+    if (!same.empty())
+      return Status::Invalid("{}.{} has several elements \"{}\": {}", n.name, a.name, text,
+                             fmt::join(same, ", "));
     return Status::Invalid("{}.{} has no element \"{}\"{}", n.name, a.name, text, DidYouMean(text, names));
   }
   if (!a.grid.empty() && text.find(',') != std::string_view::npos) {

@@ -97,6 +97,7 @@ void ComputeMush(ComputeContext& c) {
 void AddDeltaMushNode(NodeRegistry& registry) {
   NodeBuilder b =
       AddDeformer(registry, "deltaMush", "Smooths the points and gives the rest shape's detail back.");
+  b.version(2);  // detail that fades in folds and grows with its parent
   b.in("displacement", 1.0, {.min = 0, .max = 2, .doc = "how much of the detail comes back"});
   b.structural("iterations", 10, {.min = 0, .max = 200, .doc = "smoothing steps"});
   b.structural("smoothingStep", 0.5,

@@ -76,6 +76,8 @@ void SmoothRows(const MushRows& rows, const float* from, float* to) {
   }
 }
 
+constexpr float kFoldBegins = 0.25f;  // of 2s / (e + g), below
+
 // The frames of the outputs [begin, end), and with them either the detail (kBind) or the points.
 // The frame is the rotation of the polar decomposition of the tangents (t b): with C = (t b)^T (t b) = (E F;
 // F G) and s = sqrt(det C) = |t x b|, the root of C is (C + s I) / sqrt(tr C + 2 s).
@@ -158,7 +160,14 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
       hn::Store(Fma(nx, x, Fma(ny, y, hn::Mul(nz, z))), d, run.detail_z + i);
       continue;
     }
-    const VLanes scale_detail = hn::Set(d, run.displacement);
+    // Tangents are orthonormal at rest. Where the surface folds they become parallel, and the frame turns
+    // over from one moment to the next: the detail fades before. 2s / (e + g) is 1 for a frame that was
+    // turned or scaled. Rings that are lines have no tangents, ever
+    const VLanes trace = hn::Add(e, g);
+    const VLanes open = hn::IfThenElse(
+        hn::Gt(trace, zero), hn::Min(one, hn::Div(hn::Mul(hn::Set(d, 2 / kFoldBegins), s), trace)), one);
+    const VLanes scale_detail =
+        hn::Mul(hn::Set(d, run.displacement), hn::Mul(open, hn::Sub(hn::Set(d, 2.0f), open)));
     const VLanes du = hn::Load(d, run.detail_x + i), dv = hn::Load(d, run.detail_y + i);
     const VLanes dn = hn::Load(d, run.detail_z + i);
     const VLanes mx = Fma(scale_detail, Fma(du, ux, Fma(dv, vx, hn::Mul(dn, nx))), sx);

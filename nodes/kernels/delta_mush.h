@@ -3,9 +3,10 @@
 //
 // Smoothing: s' = s + step sum_j w_j (s_j - s), j over the neighbours in ascending order, `iterations` times.
 // Frame: the least-squares tangents of the ring around a point, t = sum_j a_j (s_j - s), b = sum_j b_j (s_j -
-// s) with a, b fixed at rest; n = t x b; orthonormalised (t kept). Detail: the rest point minus its smoothed
-// place, in the frame there. At rest the result is the rest shape up to rounding; with 0 iterations the
-// kernel copies.
+// s) with a, b fixed at rest, orthonormal there; the rotation of their polar decomposition, and n = t x b.
+// Detail: the rest point minus its smoothed place, in the frame there. Where the surface folds over (t and b
+// become parallel) the detail fades before the frame turns over, so the points move continuously. At rest the
+// result is the rest shape up to rounding; with 0 iterations the kernel copies.
 #pragma once
 
 #include <span>

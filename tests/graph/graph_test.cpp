@@ -206,6 +206,16 @@ TEST_F(GraphTest, ARemovedNodeIsGoneAndItsIdIsStale) {
   EXPECT_EQ(g.graph.Nodes().size(), 3u);
 }
 
+TEST_F(GraphTest, ElementsOfOneNameAreToldApart) {
+  g.add("grid", "cage");
+  const PlugRef first = g.plug("cage.weight[0]");
+  g.graph.SetElementNames(first.node, first.attribute, {"smile", "jaw", "smile", ""});
+  EXPECT_EQ(NameOf("cage.weight[0]"), "cage.weight[smile#0]");
+  EXPECT_EQ(NameOf("cage.weight[smile#2]"), "cage.weight[smile#2]");
+  EXPECT_EQ(NameOf("cage.weight[3]"), "cage.weight[3]");
+  EXPECT_EQ(NameOf("cage.weight[smile]"), "cage.weight has several elements \"smile\": smile#0, smile#2");
+}
+
 TEST_F(GraphTest, PlugsByName) {
   g.add("scale3", "upperarm01.L");
   g.add("scale3", "upperarm01.L.a b");

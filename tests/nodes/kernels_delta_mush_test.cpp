@@ -169,6 +169,20 @@ TEST_F(DeltaMush, TheRestShapeComesBack) {
     EXPECT_LT(MaxDistance(Run({iterations, 0.5, 0, false}, mesh_.rest.view()), rest_), 2e-7);
 }
 
+// Pressed flat and through itself, frames turn over: points go on where they were.
+TEST_F(DeltaMush, FoldingOverIsContinuous) {
+  const auto pressed = [&](double amount) {
+    Points points = rest_;
+    for (Double3& p : points) p = {amount * p.x, p.y, p.z};
+    return Run({10, 0.5, 0, false}, ToFloat(points).view());
+  };
+  EXPECT_LT(MaxDistance(pressed(1e-4), pressed(-1e-4)), 2e-4);
+  // The canary: there is detail to turn over, and it is all there on both sides
+  EXPECT_GT(MaxDistance(SmoothTwin(mesh_.topology, {10, 0.5, 0, false}, rest_, rest_), rest_), 2e-3);
+  EXPECT_LT(MaxDistance(pressed(1), rest_), 2e-7);
+  EXPECT_GT(MaxDistance(pressed(0.4), pressed(-0.4)), 2e-3);
+}
+
 TEST_F(DeltaMush, NothingToDoIsBitForBit) {
   EXPECT_EQ(Run({0, 0.5, 0, false}, posed_.view()), pose_);
   EXPECT_EQ(Run({10, 0, 0, false}, posed_.view()), pose_);
