@@ -76,7 +76,7 @@ void SmoothRows(const MushRows& rows, const float* from, float* to) {
   }
 }
 
-constexpr float kFoldBegins = 0.25f;  // of 2s / (e + g), below
+constexpr float kFoldBegins = 0.1f;  // of 2s / (e + g), below
 
 // The frames of the outputs [begin, end), and with them either the detail (kBind) or the points.
 // The frame is the rotation of the polar decomposition of the tangents (t b): with C = (t b)^T (t b) = (E F;
