@@ -176,7 +176,7 @@ TEST_F(BadSubspaces, RandomDamage) {
     }
     std::filesystem::remove(folder / "out.npz");
   }
-  EXPECT_GT(refused, static_cast<std::size_t>(kRounds) * 9 / 10);
+  EXPECT_GT(refused, static_cast<std::size_t>(kRounds) * 3 / 4);
 }
 
 }  // namespace
