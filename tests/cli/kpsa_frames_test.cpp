@@ -193,7 +193,7 @@ TEST_F(KpsaFrames, NothingPopsInTheBlendZone) {
     return pop;
   };
   const double soft = largest_pop(lo, hi), hard = largest_pop(0.999999 * hi, hi);
-  EXPECT_LT(soft, 0.15 * error_at_end);
+  EXPECT_LT(soft, 0.1 * error_at_end);
   EXPECT_GT(hard, 0.7 * error_at_end);
   EXPECT_GT(hard, 5 * soft);
 }
