@@ -129,11 +129,11 @@ Status SetClip(const gltf::Character& character, std::optional<std::string_view>
     if (index == kNoIndex) {
       std::vector<std::string> ids;
       for (const CharacterClip& known : scene->clips) ids.push_back(known.id);
-      if (ids.empty()) return Status::Invalid("{} has no clips, so none named \"{}\"", character.path, *clip);
+      if (ids.empty()) return Status::Invalid("the character has no clips, so none named \"{}\"", *clip);
       constexpr std::size_t kShown = 20;
       const std::vector<std::string> shown(
           ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), kShown)));
-      return Status::Invalid("{} has no clip \"{}\"{}; its clips are {}{}", character.path, *clip,
+      return Status::Invalid("the character has no clip \"{}\"{}; its clips are {}{}", *clip,
                              DidYouMean(*clip, ids), fmt::join(shown, ", "),
                              ids.size() > kShown ? ", ..." : "");
     }
