@@ -28,6 +28,8 @@ class RigBuild {
     std::string name;
     std::optional<std::size_t> mesh;  // in scene.meshes; none: a points attribute
     std::size_t count = 0;            // points
+    bool morphed = true;              // after the mesh's morphs in its stack
+    Matrix4 world_from_stage = {};    // at rest; the identity for stages in world space
   };
   // A node of the rig file, and those of its keys that are no attributes.
   struct Made {
@@ -38,7 +40,6 @@ class RigBuild {
     std::vector<Geometry> geometries = {};                    // that it deforms
     std::size_t weighted = 0;                                 // geometries whose weights are set
     bool world = false;                                       // space of the stages that it is in
-    Matrix4 world_from_stage = {};
   };
   struct Pending {  // a connection to make when all nodes exist
     std::string from;
@@ -90,10 +91,16 @@ class RigBuild {
   void BuildPointsStack(const RigDeform& deform);
   bool ResolveStack(const RigDeform& deform, std::size_t mesh, bool any_morphs, std::vector<Stage>* stages);
   Made* FindDeformer(const RigString& name);
-  bool AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage,
-                   const SourceLocation& where);
+  bool AddGeometry(Made* made, Geometry geometry, bool world, const SourceLocation& where);
   PointBufferPtr PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points);
   PointBufferPtr RegularGrid(const PlugRef& plug, const RigString& name);
+
+  // rig_spaces.cpp: how stages before a skin lie in the world at rest
+  void PlaceStages();
+  void PlaceStagesAtHandles();
+  std::optional<Places> HandlePlaces(const Made& made);
+  const WeightMap* WeightsOf(const Made& made, std::size_t geometry);
+  void SetWorldFromStage(Made* made, std::size_t geometry, const Matrix4& world_from_stage);
   bool BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box);
 
   // rig_members.cpp: members, weights, falloffs

@@ -27,6 +27,7 @@ void RigBuild::BuildStacks() {
     for (const auto& [mesh, where] : meshes) BuildMeshStack(deform, mesh, any_morphs);
   }
   for (Made& made : made_) SetWeights(&made);
+  PlaceStages();
   for (const RigDeform& deform : file_->deform) {
     if (deform.points.has_value()) BuildPointsStack(deform);
   }
@@ -70,20 +71,18 @@ RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
   return nullptr;
 }
 
-// The next geometry of a deformer. All that one deformer serves lie in one space.
-bool RigBuild::AddGeometry(Made* made, Geometry geometry, bool world, const Matrix4& world_from_stage,
-                           const SourceLocation& where) {
-  if (!made->geometries.empty() && (made->world != world || !(made->world_from_stage == world_from_stage))) {
-    return Fail(where, Status::Invalid(
-                           "\"{}\" deforms {} and {} in different spaces (before and after a skin, or under "
-                           "different ones): give each a deformer of its own",
-                           made->from->name, made->geometries.front().name, geometry.name));
+// The next geometry of a deformer. All that one deformer serves lie before a skin or all after one.
+bool RigBuild::AddGeometry(Made* made, Geometry geometry, bool world, const SourceLocation& where) {
+  if (!made->geometries.empty() && made->world != world) {
+    return Fail(where, Status::Invalid("\"{}\" deforms {} and {} in different spaces (before and after a "
+                                       "skin): give each a deformer of its own",
+                                       made->from->name, made->geometries.front().name, geometry.name));
   }
   made->world = world;
-  made->world_from_stage = world_from_stage;
   GraphEditor edit(&graph());
   if (!world && edit.Has(made->id, "geometryMatrix")) {
-    edit.Set(made->id, "geometryMatrix", static_cast<int>(made->geometries.size()), world_from_stage);
+    edit.Set(made->id, "geometryMatrix", static_cast<int>(made->geometries.size()),
+             geometry.world_from_stage);
   }
   made->geometries.push_back(std::move(geometry));
   return Fail(where, edit.Take());
@@ -111,12 +110,13 @@ bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, boo
     stages->push_back(stage);
     stages->back().world = world;
   };
+  const auto morphed = [&] {
+    return morph != nullptr && std::any_of(stages->begin(), stages->end(),
+                                           [&](const Stage& stage) { return stage.node == morph->node; });
+  };
   for (const RigString& item : deform.stack) {
     if (item.text == "gltf" || item.text == "morph") {
-      const bool again = morph != nullptr && std::any_of(stages->begin(), stages->end(), [&](const Stage& s) {
-                           return s.node == morph->node;
-                         });
-      if (morph != nullptr && world && !again) {
+      if (morph != nullptr && world && !morphed()) {
         good = Fail(item.where,
                     Status::Invalid(
                         "\"{}\" of mesh \"{}\" moves points in mesh space, and those of \"{}\" are in world "
@@ -148,11 +148,10 @@ bool RigBuild::ResolveStack(const RigDeform& deform, std::size_t mesh_index, boo
     }
     // Unskinned meshes are in world space but for their morphs
     if (!world && !placed && into_world.name == "transform") add_own(into_world, item);
-    const Matrix4 world_from_stage = world ? Matrix4() : rest_->WorldFromMesh(mesh_index);
     const int geometry = static_cast<int>(made->geometries.size());
-    good = AddGeometry(made, {mesh.name, mesh_index, mesh.mesh().point_count()}, world, world_from_stage,
-                       item.where) &&
-           good;
+    good =
+        AddGeometry(made, {mesh.name, mesh_index, mesh.mesh().point_count(), morphed()}, world, item.where) &&
+        good;
     stages->push_back({item.text, made->id, geometry, world, {}});
   }
   if (!world && !placed && into_world.name == "transform")
@@ -201,7 +200,8 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
     }
     const int geometry = made == nullptr ? 0 : static_cast<int>(made->geometries.size());
     if (made == nullptr ||
-        !AddGeometry(made, {name.text, std::nullopt, points->count()}, false, world_from_points, item.where))
+        !AddGeometry(made, {name.text, std::nullopt, points->count(), true, world_from_points}, false,
+                     item.where))
       return;
     GraphEditor edit(&graph());
     if (edit.Has(made->id, "space")) edit.Set(made->id, "space", Value("mesh"));
@@ -290,51 +290,6 @@ PointBufferPtr RigBuild::RegularGrid(const PlugRef& plug, const RigString& name)
     }
   }
   return std::make_shared<const PointBuffer>(PointBuffer::FromInterleaved(grid));
-}
-
-// The lattice's box at rest, in the axes of its stage. Where the rig does not set it, it is set here to what
-// the members fill.
-bool RigBuild::BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box) {
-  GraphEditor edit(&graph());
-  const PlugRef min_plug = edit.Plug(lattice->id, "boxMin"), max_plug = edit.Plug(lattice->id, "boxMax");
-  if (!edit.ok()) return Fail(where, edit.Take());
-  const Value* min_set = graph().FindValue(min_plug);
-  const Value* max_set = graph().FindValue(max_plug);
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Double3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-  const Matrix4 stage_from_world = InverseOrIdentity(lattice->world_from_stage);
-  for (std::size_t g = 0; g < lattice->geometries.size(); ++g) {
-    if (!lattice->geometries[g].mesh.has_value()) continue;
-    const Value* map = graph().FindValue(edit.Plug(lattice->id, "weights", static_cast<int>(g)));
-    const WeightMap* weights = map == nullptr ? nullptr : map->asset<WeightMap>();
-    const Places& points = rest_->WorldPoints(*lattice->geometries[g].mesh);
-    for (std::size_t p = 0; p < points.size(); ++p) {
-      if (weights != nullptr && !(weights->weights()[p] > 0)) continue;
-      const Double3 point = TransformPoint(stage_from_world, points[p]);
-      for (int i = 0; i < 3; ++i) {
-        low[i] = std::min(low[i], point[i]);
-        high[i] = std::max(high[i], point[i]);
-      }
-    }
-  }
-  if (min_set != nullptr) low = min_set->get<Double3>();
-  if (max_set != nullptr) high = max_set->get<Double3>();
-  if (!(low.x <= high.x)) {
-    return Fail(
-        where,
-        Status::Invalid(
-            "\"{}\" has no members, so its points have no place: put it in a stack or set boxMin and boxMax",
-            lattice->from->name));
-  }
-  if (min_set == nullptr && max_set == nullptr) {
-    // A hair wider than the members, as the lattice makes it by itself
-    const double margin = 1e-4 * Length(high - low) + 1e-9;
-    for (int i = 0; i < 3; ++i) low[i] -= margin, high[i] += margin;
-  }
-  edit.Set(lattice->id, "boxMin", low);
-  edit.Set(lattice->id, "boxMax", high);
-  *world_from_box = lattice->world_from_stage * Translation(low) * Scaling(high - low);
-  return Fail(where, edit.Take());
 }
 
 }  // namespace kpsa

@@ -26,6 +26,13 @@ void RigBuild::AddControls() {
                              type == Type::kDouble3 ? ", as in " + name + ".x" : ""));
       continue;
     }
+    if (attribute.type == Type::kPoints) {
+      refuse(Status::Invalid(
+          "{} is a part of points and cannot be a control: connect a transform's translate to "
+          "the point and make that the control",
+          name));
+      continue;
+    }
     const auto key = std::make_tuple(plug->node.index, plug->attribute, plug->element, plug->component);
     if (const auto [it, added] = seen.emplace(key, from.plug.text); !added) {
       refuse(Status::Invalid("\"{}\" and \"{}\" are the same control", from.plug.text, it->second));

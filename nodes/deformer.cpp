@@ -15,8 +15,10 @@ NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string do
   builder.structural("mesh", Type::kMesh, {.doc = "the topology of the geometry"}).per_geometry();
   builder.enumeration("space", {"world", "mesh"}, true,
                       "the space of the stage: mesh space before the skin, world space after it");
-  builder.structural("geometryMatrix", Matrix4(),
-                     {.doc = "world from mesh space at rest, for stages in mesh space"});
+  builder
+      .structural("geometryMatrix", Matrix4(),
+                  {.doc = "world from mesh space at rest, for stages in mesh space"})
+      .per_geometry();
   return builder;
 }
 

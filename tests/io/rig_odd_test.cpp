@@ -416,6 +416,51 @@ TEST_F(OddRigs, HandlesUnderEveryKindOfParent) {
   for (const auto& [name, expected] : places) EXPECT_LT(Length(place(name) - expected), 1e-12) << name;
 }
 
+// In a file whose rest pose is not its bind pose: what a handle is placed at goes with it, wherever in the
+// stack.
+TEST_F(OddRigs, HandlesBeforeASkinMoveWhatTheyArePlacedAt) {
+  GltfBuilder builder = GltfBuilder::Character();
+  builder.root["nodes"][2]["rotation"] = {0, 0, std::sqrt(0.5), std::sqrt(0.5)};
+  folder.Write("c.gltf", builder.Text());
+  RigOptions rest;
+  rest.rest = true;
+  for (const char* deformer : {"{type: softMod, matrix: h.worldMatrix, falloffRadius: 50}",
+                               "{type: cluster, matrix: h.worldMatrix, falloff: {at: h, radius: 50}}",
+                               "{type: wire, curve: c, dropoff: 50}"}) {
+    for (const char* stack : {"[d, morph, skin]", "[morph, d, skin]", "[gltf, d]"}) {
+      for (const int vertex : {0, 1, 2}) {
+        const std::string v = std::to_string(vertex);
+        folder.Write("t.yaml",
+                     "kpsa: 1\nunits: {length: cm}\ncharacter: c.gltf\nnodes:\n"
+                     "  h: {type: transform, at: {vertex: " +
+                         v +
+                         "}}\n"
+                         "  c: {type: curve, vertices: [" +
+                         v + ", " + v + "]}\n  d: " + deformer +
+                         "\nconnections: [\"h.translate -> c.cv[0]\", \"h.translate -> c.cv[1]\"]\n"
+                         "deform: [{meshes: body, stack: " +
+                         stack + "}]\ncontrols:\n  h.translateX: {min: -10, max: 10}\n");
+        RigPlayer player(folder / "t.yaml", rest);
+        ASSERT_TRUE(player.ok());
+        const std::vector<Double3> before = player.Points();
+        player.Set("h.translateX", 0.1);
+        const std::vector<Double3> after = player.Points();
+        for (Index p = 0; p < 3; ++p) {
+          const Double3 expected{p == player.PointOf(static_cast<Index>(vertex)) ? 0.1 : 0, 0, 0};
+          EXPECT_LT(Length(after[p] - before[p] - expected), 1e-6) << deformer << stack << vertex << p;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(OddRigs, APartOfPointsIsNoControl) {
+  const std::string text = Errors(
+      "nodes: {c: {type: curve, vertices: [0, 1]}}\ncontrols:\n"
+      "  c.cv[1].x: {min: -1, max: 1}\n");
+  EXPECT_TRUE(Has(text, "t.yaml:5:3: c.cv[1].x is a part of points and cannot be a control")) << text;
+}
+
 TEST_F(OddRigs, CurvesOfEveryKind) {
   Plain();
   Sound(R"(nodes:
