@@ -1,6 +1,7 @@
 // Inside of the rig builder: the steps from RigFile to Rig. Nothing outside io/rig_*.cpp includes this.
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <map>
 #include <optional>
@@ -52,6 +53,7 @@ class RigBuild {
 
   // rig_nodes.cpp: nodes, their values, overrides
   void ApplySpecialOverrides();
+  static RigAttribute SpecialOf(const std::string& key, const RigOverride& override_);
   void AddNodes();
   void ReadAttributes(Made* made);
   bool IsSpecial(const NodeDef& def, const std::string& key) const;
@@ -60,6 +62,16 @@ class RigBuild {
   void ReadOverrides();
   void ReadOverride(const RigOverride& override_);
   void FinishOverrides();
+
+  // rig_shapes.cpp: targets, combinations and in-betweens of blend shapes, blend weights of skins
+  bool TakeOwnSpecial(const RigOverride& override_);
+  void NameTargets(const Made& made);
+  void AddShapeRules(Made* made);
+  void AddCombination(const Made& made, const YamlNode& key, const YamlNode& body);
+  void AddInbetweens(const Made& made, const YamlNode& value);
+  bool FindTarget(const Made& made, const YamlNode& at, const std::string& name, PlugRef* weight);
+  void SetTargets(Made* made);
+  void SetBlendWeights(Made* made);
 
   // rig_places.cpp: parents, handles, curves
   void AddCurves();
@@ -75,6 +87,7 @@ class RigBuild {
 
   // rig_connect.cpp: connections, names
   void ConnectCurves();
+  std::optional<NodeId> FindCurve(const YamlNode& name);
   void MakeConnections();
   bool IsOverridden(const PlugRef& plug) const;
   void ConnectUnlessOverridden(const PlugRef& from, const PlugRef& to, const SourceLocation& where,
@@ -140,6 +153,9 @@ class RigBuild {
   RestPose* rest_;
   YamlErrors* errors_;
   std::vector<Made> made_;
+  std::deque<RigNode> own_nodes_;  // the file's own deformers of which overrides set keys that are no
+  std::vector<Made> own_made_;     // attributes
+  std::deque<RigAttribute> own_attributes_;
   std::unordered_map<Index, std::size_t> made_by_node_;
   std::unordered_map<std::string, std::size_t> made_by_name_;
   std::unordered_map<std::string, std::size_t> written_;              // names in the file -> RigFile::nodes

@@ -69,11 +69,16 @@ void RigBuild::Run() {
     if (!errors_->full()) ReadAttributes(&made);
   }
   ReadOverrides();
+  for (std::vector<Made>* all : {&made_, &own_made_}) {
+    for (Made& made : *all) AddShapeRules(&made);
+  }
   AddCurves();
   ConnectParents();
   if (errors_->ok()) PlaceHandles();
   ConnectCurves();
   BuildStacks();
+  for (Made& made : made_) SetTargets(&made);
+  for (Made& made : own_made_) SetBlendWeights(&made);
   MakeConnections();
   PlaceStagesAtHandles();
   ConnectPivots();

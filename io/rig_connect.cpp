@@ -6,29 +6,48 @@
 
 namespace kpsa {
 
-// A wire's `curve: lips`: the rest curve as an asset, and what moves it.
+// The rest of a curve node is set by now, or has its own error.
+std::optional<NodeId> RigBuild::FindCurve(const YamlNode& value) {
+  std::string name;
+  if (!ReadString(value, "curve", &name, errors_)) return std::nullopt;
+  const Result<NodeId> curve = graph().FindNode(name);
+  if (!curve.ok()) {
+    errors_->Add(value, curve.status());
+    return std::nullopt;
+  }
+  if (graph().def(*curve).name != "curve") {
+    errors_->Add(value, "\"{}\" is a {}; expected a curve", name, graph().def(*curve).name);
+    return std::nullopt;
+  }
+  GraphEditor edit(&graph());
+  const bool set = graph().FindValue(edit.Plug(*curve, "curve")) != nullptr;
+  return set ? std::optional(*curve) : std::nullopt;
+}
+
+// A wire's `curve: lips` or `curves: [upper, lower]`: the rest curves as assets, and what moves them.
 void RigBuild::ConnectCurves() {
   for (Made& made : made_) {
-    const auto it = made.special.find("curve");
-    if (it == made.special.end()) continue;
-    const YamlNode& value = it->second->value;
-    std::string name;
-    if (!ReadString(value, "curve", &name, errors_)) continue;
-    const Result<NodeId> curve = graph().FindNode(name);
-    if (!curve.ok()) {
-      errors_->Add(value, curve.status());
-      continue;
-    }
-    if (graph().def(*curve).name != "curve") {
-      errors_->Add(value, "\"{}\" is a {}; expected a curve", name, graph().def(*curve).name);
-      continue;
-    }
+    const auto one = made.special.find("curve"), several = made.special.find("curves");
     GraphEditor edit(&graph());
-    const Value* asset = graph().FindValue(edit.Plug(*curve, "curve"));
-    if (asset == nullptr) continue;  // its own error was reported
-    edit.Set(made.id, "curve", *asset);
-    edit.Connect(edit.Plug(*curve, "displacements"), edit.Plug(made.id, "displacements"));
-    Fail(value.where(), edit.Take());
+    const auto follow = [&](const YamlNode& value, const char* rest, const char* displacements, int element) {
+      const std::optional<NodeId> curve = FindCurve(value);
+      if (!curve.has_value()) return;
+      edit.Set(made.id, rest, element, *graph().FindValue(edit.Plug(*curve, "curve")));
+      edit.Connect(edit.Plug(*curve, "displacements"), edit.Plug(made.id, displacements, element));
+      Fail(value.where(), edit.Take());
+    };
+    if (one != made.special.end()) follow(one->second->value, "curve", "displacements", -1);
+    if (several == made.special.end()) continue;
+    const YamlNode& list = several->second->value;
+    if (one != made.special.end()) {
+      errors_->Add(several->second->key, "\"{}\" has a curve, too: write all of them in curves",
+                   made.from->name);
+    } else if (!list.is_sequence() || list.items.empty()) {
+      errors_->Add(list, "curves: expected a list of curves, as in [lipsUp, lipsLow]");
+    } else {
+      for (std::size_t i = 0; i < list.items.size(); ++i)
+        follow(list.items[i], "baseWire", "deformedWire", static_cast<int>(i));
+    }
   }
 }
 

@@ -193,9 +193,10 @@ void RigBuild::BuildPointsStack(const RigDeform& deform) {
         Fail(item.where, Status::Invalid("\"{}\" belongs to meshes, not to {}", word, name.text));
     }
     Made* made = FindDeformer(item);
-    if (made != nullptr && graph().def(made->id).name == "deltaMush") {
-      Fail(item.where, Status::Invalid("\"{}\" smooths along the edges of a mesh, and {} has none", item.text,
-                                       name.text));
+    const std::string type = made == nullptr ? "" : graph().def(made->id).name;
+    if (type == "deltaMush" || type == "tension") {
+      Fail(item.where, Status::Invalid("\"{}\" {} the edges of a mesh, and {} has none", item.text,
+                                       type == "tension" ? "measures" : "smooths along", name.text));
       return;
     }
     const int geometry = made == nullptr ? 0 : static_cast<int>(made->geometries.size());

@@ -29,8 +29,21 @@ bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
   if (key == "at") return HasAttribute(def, "offsetParentMatrix");
   if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
   if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
-  if (key == "curve") return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
+  if (key == "curve" || key == "curves")
+    return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
+  if (def.name == "blendShape") return key == "targets" || key == "combinations" || key == "inbetweens";
+  if (def.name == "skinCluster") return key == "blendWeights";
   return false;
+}
+
+RigAttribute RigBuild::SpecialOf(const std::string& key, const RigOverride& override_) {
+  YamlNode key_node;
+  key_node.kind = YamlNode::Kind::kScalar;
+  key_node.scalar = key;
+  key_node.file = override_.value.file;
+  key_node.line = override_.plug.where.line;
+  key_node.column = override_.plug.where.column;
+  return {key, key_node, override_.value, override_.plug.source};
 }
 
 // An override of such a key replaces it in the node before anything is read: `wire1.weights`,
@@ -48,6 +61,7 @@ void RigBuild::ApplySpecialOverrides() {
     const NodeDef* def = longest == nullptr ? nullptr : graph().registry().Find(longest->type);
     const std::string key = longest == nullptr ? "" : text.substr(longest->name.size() + 1);
     if (def == nullptr || !IsSpecial(*def, key)) {
+      if (longest == nullptr && TakeOwnSpecial(override_)) continue;
       others.push_back(std::move(override_));
       continue;
     }
@@ -55,13 +69,7 @@ void RigBuild::ApplySpecialOverrides() {
     attributes.erase(std::remove_if(attributes.begin(), attributes.end(),
                                     [&](const RigAttribute& a) { return a.name == key; }),
                      attributes.end());
-    YamlNode key_node;
-    key_node.kind = YamlNode::Kind::kScalar;
-    key_node.scalar = key;
-    key_node.file = override_.value.file;
-    key_node.line = override_.plug.where.line;
-    key_node.column = override_.plug.where.column;
-    attributes.push_back({key, key_node, override_.value, override_.plug.source});
+    attributes.push_back(SpecialOf(key, override_));
   }
   file_->overrides = std::move(others);
 }
@@ -89,6 +97,7 @@ void RigBuild::AddNodes() {
 
 void RigBuild::ReadAttributes(Made* made) {
   const NodeDef& def = graph().def(made->id);
+  if (def.name == "blendShape") NameTargets(*made);
   // Structural ones first, in whatever order they are written: points[s,t,u] needs the divisions
   for (const bool structural : {true, false}) {
     for (const RigAttribute& attribute : made->from->attributes) {
@@ -135,7 +144,8 @@ void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bo
       if (!a.output) names.push_back(a.name);
     }
     for (const char* word :
-         {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed", "places"}) {
+         {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed", "places", "curve",
+          "curves", "targets", "combinations", "inbetweens", "blendWeights"}) {
       if (IsSpecial(def, word)) names.push_back(word);
     }
     errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name,

@@ -108,11 +108,12 @@ void RigBuild::ConnectParents() {
   }
 }
 
-// The frame of a deltaMush in world space says only about which place it computes; where the rig names none,
-// it is that which carries the mesh, so that a character keeps its shape far from the origin.
+// The frame of a deltaMush or tension in world space says only about which place it computes and how large
+// the character is; where the rig names none, it is that which carries the mesh.
 void RigBuild::ConnectPivots() {
   for (const Made& made : made_) {
-    if (graph().def(made.id).name != "deltaMush" || !made.world || made.geometries.empty()) continue;
+    const std::string& type = graph().def(made.id).name;
+    if ((type != "deltaMush" && type != "tension") || !made.world || made.geometries.empty()) continue;
     GraphEditor edit(&graph());
     const PlugRef parent = edit.Plug(made.id, "parentMatrix");
     if (!edit.ok() || graph().FindValue(parent) != nullptr || graph().FindConnection(parent) != nullptr)

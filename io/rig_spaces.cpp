@@ -70,9 +70,17 @@ std::optional<RigBuild::Places> RigBuild::HandlePlaces(const Made& made) {
   const NodeDef& def = graph().def(made.id);
   GraphEditor edit(&graph());
   if (def.name == "wire") {
-    const Value* curve = graph().FindValue(edit.Plug(made.id, "curve"));
-    const Curve* asset = curve == nullptr ? nullptr : curve->asset<Curve>();
-    return asset == nullptr ? std::nullopt : std::optional<Places>(asset->cvs());
+    Places places;
+    const auto add = [&](const PlugRef& plug) {
+      const Value* curve = graph().FindValue(plug);
+      const Curve* asset = curve == nullptr ? nullptr : curve->asset<Curve>();
+      if (asset != nullptr) places.insert(places.end(), asset->cvs().begin(), asset->cvs().end());
+    };
+    const PlugRef several = edit.Plug(made.id, "baseWire", 0);
+    for (int i = 0; i < graph().ArraySize(made.id, several.attribute); ++i)
+      add({several.node, several.attribute, i, -1});
+    if (places.empty()) add(edit.Plug(made.id, "curve"));
+    return places.empty() ? std::nullopt : std::optional(std::move(places));
   }
   if (edit.Has(made.id, "falloffCenter")) {
     if (const Value* center = graph().FindValue(edit.Plug(made.id, "falloffCenter")))

@@ -1,4 +1,9 @@
+// blendShape: weighted displacements, with in-betweens. combinationShape: the weight of a shape that corrects
+// others.
 #include "nodes/kernels/blend_shape.h"
+
+#include <algorithm>
+#include <span>
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
@@ -7,8 +12,69 @@
 namespace kpsa {
 namespace {
 
+constexpr std::size_t kNoShape = static_cast<std::size_t>(-1);
+
+// A target that goes through other shapes on its way: piecewise linear in its weight, its first and last
+// piece going on outside of 0 to 1.
+struct Path {
+  struct Stop {
+    double at;
+    std::size_t shape;
+  };
+  std::size_t target;
+  std::vector<Stop> stops;  // ascending; the first is nothing at 0, the last the target itself at 1
+
+  void Add(double weight, std::span<double> weights) const {
+    std::size_t i = 0;
+    while (i + 2 < stops.size() && weight > stops[i + 1].at) ++i;
+    const double t = (weight - stops[i].at) / (stops[i + 1].at - stops[i].at);
+    if (stops[i].shape != kNoShape) weights[stops[i].shape] += 1 - t;
+    weights[stops[i + 1].shape] += t;
+  }
+};
+
+struct BlendShapeBound {
+  BlendShapeKernel kernel;
+  CarriedFrame frame;
+  std::vector<Path> paths;  // by target
+  std::size_t weight_floats;
+};
+
+Result<std::vector<Path>> ReadPaths(const Structural& s, std::size_t target_count) {
+  const auto& targets = s.value("inbetweenTarget").get<std::vector<std::int64_t>>();
+  const auto& shapes = s.value("inbetweenShape").get<std::vector<std::int64_t>>();
+  const auto& places = s.value("inbetweenWeight").get<std::vector<double>>();
+  if (targets.size() != shapes.size() || targets.size() != places.size()) {
+    return Status::Invalid(
+        "inbetweenTarget, inbetweenShape and inbetweenWeight have {}, {} and {} entries, "
+        "expected as many",
+        targets.size(), shapes.size(), places.size());
+  }
+  std::vector<Path> paths;
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    const auto count = static_cast<std::int64_t>(target_count);
+    if (targets[i] < 0 || targets[i] >= count || shapes[i] < 0 || shapes[i] >= count) {
+      return Status::Invalid("in-between {}: expected numbers of targets from 0 to {}", i, count - 1);
+    }
+    if (targets[i] == shapes[i]) return Status::Invalid("in-between {}: target {} is its own", i, targets[i]);
+    if (!(places[i] > 0 && places[i] < 1))
+      return Status::Invalid("in-between {}: a weight of {}, expected more than 0 and less than 1", i,
+                             places[i]);
+    const auto target = static_cast<std::size_t>(targets[i]);
+    auto path = std::find_if(paths.begin(), paths.end(), [&](const Path& p) { return p.target == target; });
+    if (path == paths.end()) path = paths.insert(path, {target, {{0, kNoShape}, {1, target}}});
+    const auto after = std::find_if(path->stops.begin(), path->stops.end(),
+                                    [&](const Path::Stop& stop) { return stop.at >= places[i]; });
+    if (after->at == places[i])
+      return Status::Invalid("in-between {}: target {} has two at {}", i, target, places[i]);
+    path->stops.insert(after, {places[i], static_cast<std::size_t>(shapes[i])});
+  }
+  return paths;
+}
+
 Result<BoundKernel> BindBlendShape(const Binding& binding) {
-  const auto* asset = binding.structural().asset<MorphTargets>("targets");
+  const Structural& s = binding.structural();
+  const auto* asset = s.asset<MorphTargets>("targets");
   if (asset == nullptr) return Status::Invalid("targets are not set");
   const PointSet& out = binding.output("outPoints");
   if (asset->point_count() != out.total()) {
@@ -20,31 +86,104 @@ Result<BoundKernel> BindBlendShape(const Binding& binding) {
     targets.push_back({target.points, target.deltas});
   const BlendShapeTargets all{out.total(), targets};
   KPSA_RETURN_IF_ERROR(all.Validate());
-  BlendShapeKernel kernel(all, out.ToVector(), BoundWeights(binding));
-  const std::size_t weights = (2 * kernel.target_count() + 15) / 16 * 16;
-  const std::size_t scratch = weights + kernel.ScratchFloats();
-  return MakeBound(std::move(kernel), scratch);
+  Result<std::vector<Path>> paths = ReadPaths(s, targets.size());
+  if (!paths.ok()) return paths.status();
+  Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  BlendShapeBound bound{BlendShapeKernel(all, out.ToVector(), BoundWeights(binding)), *frame,
+                        std::move(*paths), (2 * targets.size() + 15) / 16 * 16};
+  std::size_t scratch = bound.weight_floats + (bound.kernel.ScratchFloats() + 15) / 16 * 16;
+  if (!frame->fixed()) scratch += 3 * PaddedCount(out.size());
+  return MakeBound(std::move(bound), scratch);
+}
+
+bool IsTurned(const Matrix4& motion) {
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      if (motion(r, c) != (r == c ? 1 : 0)) return true;
+    }
+  }
+  return false;
 }
 
 void ComputeBlendShape(ComputeContext& c) {
-  const auto& kernel = c.kernel_as<BlendShapeKernel>();
+  const auto& bound = c.kernel_as<BlendShapeBound>();
   const ArrayView<double> weight = c.array<double>(kFirstOwnInput);
-  const std::span<double> weights(reinterpret_cast<double*>(c.scratch), kernel.target_count());
+  const std::span<double> weights(reinterpret_cast<double*>(c.scratch), bound.kernel.target_count());
   for (std::uint32_t i = 0; i < weights.size(); ++i) weights[i] = i < weight.size() ? weight[i] : 0.0;
+  for (const Path& path : bound.paths) weights[path.target] = 0;
+  for (const Path& path : bound.paths) {
+    const auto target = static_cast<std::uint32_t>(path.target);
+    path.Add(target < weight.size() ? weight[target] : 0.0, weights);
+  }
   const Parallel parallel = HostParallel(c);
-  const std::size_t used = (2 * weights.size() + 15) / 16 * 16;
-  kernel.Run({weights, c.get<double>(kEnvelope)}, c.points(kInPoints), c.out_points(0),
-             {c.scratch + used, kernel.ScratchFloats()}, &parallel);
+  const BlendShapeKernel::Inputs inputs{weights, c.get<double>(kEnvelope)};
+  float* scratch = c.scratch + bound.weight_floats;
+  const std::span<float> kernel_scratch(scratch, bound.kernel.ScratchFloats());
+  const ConstPointsView& in = c.points(kInPoints);
+  const PointsView& out = c.out_points(0);
+  const Matrix4 motion = bound.frame.Motion(c.get<Matrix4>(kParentMatrix));
+  if (!IsTurned(motion)) {
+    bound.kernel.Run(inputs, in, out, kernel_scratch, &parallel);
+    return;
+  }
+  // Displacements alone, then turned with the parent
+  scratch += (kernel_scratch.size() + 15) / 16 * 16;
+  const std::size_t row = PaddedCount(in.count);
+  std::fill_n(scratch, 3 * row, 0.0f);
+  const PointsView sums{scratch, scratch + row, scratch + 2 * row, in.count};
+  bound.kernel.Run(inputs, sums, sums, kernel_scratch, &parallel);
+  c.host->For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Double3 sum{sums.x[i], sums.y[i], sums.z[i]};
+      const Double3 delta = TransformVector(motion, sum);
+      const bool moves = !(sum == Double3());
+      out.x[i] = moves ? static_cast<float>(in.x[i] + delta.x) : in.x[i];
+      out.y[i] = moves ? static_cast<float>(in.y[i] + delta.y) : in.y[i];
+      out.z[i] = moves ? static_cast<float>(in.z[i] + delta.z) : in.z[i];
+    }
+  });
+}
+
+// Of weights below 0 all methods but the product make nothing: a shape that is pulled the other way needs no
+// correction.
+double Combine(ArrayView<double> weights, std::int64_t method) {
+  if (weights.size() == 0) return 0;
+  double product = weights[0], lowest = weights[0], inverses = 0;
+  for (std::uint32_t i = 0; i < weights.size(); ++i) {
+    if (i > 0) product *= weights[i];
+    lowest = std::min(lowest, weights[i]);
+    inverses += 1 / weights[i];
+  }
+  if (method == 0) return product;
+  if (!(lowest > 0)) return 0;
+  return method == 1 ? lowest : weights.size() / inverses;
 }
 
 }  // namespace
 
 void AddBlendShapeNode(NodeRegistry& registry) {
   NodeBuilder b = AddDeformer(registry, "blendShape",
-                              "Adds weighted displacements towards target shapes (morph targets).");
+                              "Adds weighted displacements towards target shapes (morph targets). They are "
+                              "those of the file, in the axes of mesh space, wherever the stage is; after "
+                              "a skin they turn as parentMatrix has turned since the rest pose.");
   b.structural("targets", Type::kAsset, {.doc = "the target shapes"}).per_geometry();
   b.in("weight", 0.0, {.doc = "one for each target; weight[name] works, too"}).array();
+  b.structural("inbetweenTarget", std::vector<std::int64_t>{},
+               {.doc = "targets that go through other shapes; `inbetweens:` sets the three lists"});
+  b.structural("inbetweenShape", std::vector<std::int64_t>{}, {.doc = "the targets that are these shapes"});
+  b.structural("inbetweenWeight", std::vector<double>{},
+               {.doc = "the weights at which the targets are these shapes; more than 0, less than 1"});
   FinishDeformer(b, &ComputeBlendShape, BindBlendShape).cost(100, 3);
+
+  registry.add("combinationShape", "The weight of a shape that acts where others act together.")
+      .category("deformer")
+      .in("inputWeight", 0.0, {.doc = "the weights of the others"})
+      .array()
+      .enumeration("combinationMethod", {"multiply", "lowestWeighting", "smooth"}, false,
+                   "their product, the lowest, or their harmonic mean: as the lowest, without its kink")
+      .out("outputWeight", Type::kDouble)
+      .compute([](ArrayView<double> weights, std::int64_t method) { return Combine(weights, method); });
 }
 
 }  // namespace kpsa

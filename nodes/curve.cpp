@@ -1,6 +1,8 @@
 // curve: control vertices that are offset in the axes of a parent. wire: points near a curve follow its
 // offsets.
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
@@ -27,50 +29,111 @@ void ComputeDisplacements(ComputeContext& c) {
   }
 }
 
+constexpr int kDisplacements = kFirstOwnInput, kDeformedWire = kFirstOwnInput + 1;
+
 struct WireBound {
   WireKernel kernel;
   Matrix4 stage_from_world;  // for stages in mesh space: with the parent's motion taken out
   CarriedFrame frame;
   std::size_t vertices, offset_floats;
+  bool several = false;
 };
+
+// The curves of a wire: its own, or those of baseWire.
+struct WireSource {
+  const Curve* curve = nullptr;
+  double dropoff = 0;
+  std::size_t displacements = 0;
+  std::string input;  // that has them, for messages
+};
+
+std::vector<WireSource> Sources(const Binding& binding) {
+  const Structural& s = binding.structural();
+  const int several = s.array_size("baseWire");
+  if (several == 0) {
+    return {{s.asset<Curve>("curve"), s.get_double("dropoff"), binding.input("displacements", -1).size(),
+             "displacements"}};
+  }
+  std::vector<WireSource> sources;
+  for (int i = 0; i < several; ++i) {
+    const double dropoff =
+        s.is_set("dropoffDistance", i) ? s.value("dropoffDistance", i).AsDouble() : s.get_double("dropoff");
+    sources.push_back({s.asset<Curve>("baseWire", i), dropoff, binding.input("deformedWire", i).size(),
+                       "deformedWire[" + std::to_string(i) + "]"});
+  }
+  return sources;
+}
 
 Result<BoundKernel> BindWire(const Binding& binding) {
   const Structural& s = binding.structural();
-  const auto* curve = s.asset<Curve>("curve");
-  if (curve == nullptr) return Status::Invalid("curve is not set");
-  if (binding.input("displacements", -1).size() != curve->cvs().size()) {
-    return Status::Invalid(
-        "displacements: {} given for a curve of {} vertices; connect the curve's displacements",
-        binding.input("displacements", -1).size(), curve->cvs().size());
-  }
   Result<ConstPointsView> rest = RestPoints(s);
   if (!rest.ok()) return rest.status();
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
-  std::vector<Double3> vertices;
-  for (const Double3& cv : curve->cvs()) vertices.push_back(TransformPoint(frame->stage_from_world(), cv));
-  WireSettings settings;
-  settings.closed = curve->closed();
-  settings.dropoff = s.get_double("dropoff") / std::cbrt(std::fabs(Determinant3(frame->world_from_stage())));
-  KPSA_RETURN_IF_ERROR(WireKernel::Validate(settings, vertices));
-  WireBound bound{
-      WireKernel(settings, vertices, *rest, binding.output("outPoints").ToVector(), BoundWeights(binding)),
-      frame->stage_from_world(), *frame, vertices.size(), 0};
-  bound.offset_floats = (vertices.size() * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
+  const double scale = std::cbrt(std::fabs(Determinant3(frame->world_from_stage())));
+  const std::vector<WireSource> sources = Sources(binding);
+  std::vector<std::vector<Double3>> vertices;
+  std::vector<WireSettings> settings;
+  std::size_t all_vertices = 0;
+  for (const WireSource& source : sources) {
+    if (source.curve == nullptr) return Status::Invalid("curve is not set");
+    if (source.displacements != source.curve->cvs().size()) {
+      return Status::Invalid("{}: {} given for a curve of {} vertices; connect the curve's displacements",
+                             source.input, source.displacements, source.curve->cvs().size());
+    }
+    vertices.emplace_back();
+    for (const Double3& cv : source.curve->cvs())
+      vertices.back().push_back(TransformPoint(frame->stage_from_world(), cv));
+    all_vertices += vertices.back().size();
+    settings.emplace_back();
+    settings.back().closed = source.curve->closed();
+    settings.back().dropoff = source.dropoff / scale;
+    KPSA_RETURN_IF_ERROR(WireKernel::Validate(settings.back(), vertices.back()));
+  }
+  const int curve_count = s.array_size("baseWire");
+  const bool several = curve_count > 0;
+  if (several && s.array_size("deformedWire") != curve_count) {
+    return Status::Invalid("deformedWire has {} elements for {} curves", s.array_size("deformedWire"),
+                           curve_count);
+  }
+  if (several && s.array_size("dropoffDistance") > curve_count) {
+    return Status::Invalid("dropoffDistance has {} elements for {} curves", s.array_size("dropoffDistance"),
+                           curve_count);
+  }
+  const std::vector<Index> out = binding.output("outPoints").ToVector();
+  std::vector<WireCurve> curves;
+  for (std::size_t i = 0; i < sources.size(); ++i) curves.push_back({settings[i], vertices[i]});
+  WireBound bound{several
+                      ? WireKernel(curves, s.get_double("crossingEffect"), *rest, out, BoundWeights(binding))
+                      : WireKernel(settings[0], vertices[0], *rest, out, BoundWeights(binding)),
+                  frame->stage_from_world(),
+                  *frame,
+                  all_vertices,
+                  0,
+                  several};
+  bound.offset_floats = (all_vertices * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
   const std::size_t scratch = bound.offset_floats + bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
 }
 
 void ComputeWire(ComputeContext& c) {
   const auto& bound = c.kernel_as<WireBound>();
-  const ConstPointsView& displacements = c.points(kFirstOwnInput);
   auto* offsets = reinterpret_cast<Double3*>(c.scratch);
   // In mesh space the skin turns offsets later: take the parent's turn out again
   const Matrix4 turn = bound.frame.fixed() ? bound.stage_from_world * bound.frame.parent_rest() *
                                                  InverseOrIdentity(c.get<Matrix4>(kParentMatrix))
                                            : Matrix4();
-  for (std::size_t i = 0; i < bound.vertices; ++i) {
-    offsets[i] = TransformVector(turn, {displacements.x[i], displacements.y[i], displacements.z[i]});
+  Double3* to = offsets;
+  const auto add = [&](const ConstPointsView& displacements) {
+    for (std::size_t i = 0; i < displacements.count; ++i) {
+      *to++ = TransformVector(turn, {displacements.x[i], displacements.y[i], displacements.z[i]});
+    }
+  };
+  if (bound.several) {
+    const ArrayView<ConstPointsView> wires = c.array<ConstPointsView>(kDeformedWire);
+    for (std::uint32_t i = 0; i < wires.size(); ++i) add(wires[i]);
+  } else {
+    add(c.points(kDisplacements));
   }
   const Parallel parallel = HostParallel(c);
   bound.kernel.Run({{offsets, bound.vertices}, c.get<double>(kEnvelope)}, c.points(kInPoints),
@@ -80,7 +143,11 @@ void ComputeWire(ComputeContext& c) {
 
 void DemandWire(Demand& demand) {
   demand.Require("inPoints", 0, demand.output("outPoints"));
-  demand.Require("displacements", -1, PointSet::All(demand.input_total("displacements", -1)));
+  const int several = demand.structural().array_size("baseWire");
+  if (several == 0)
+    demand.Require("displacements", -1, PointSet::All(demand.input_total("displacements", -1)));
+  for (int i = 0; i < std::min(several, demand.structural().array_size("deformedWire")); ++i)
+    demand.Require("deformedWire", i, PointSet::All(demand.input_total("deformedWire", i)));
 }
 
 }  // namespace
@@ -96,12 +163,22 @@ void AddCurveNodes(NodeRegistry& registry) {
       .out("displacements", Type::kPoints, "the offsets in world axes")
       .unit(Unit::kLength)
       .compute(&ComputeDisplacements);
-  NodeBuilder b = AddDeformer(registry, "wire", "Points near a curve follow it.");
+  NodeBuilder b = AddDeformer(registry, "wire", "Points near a curve, or near several, follow it.");
   b.points_in("displacements", "the curve's displacements");
+  b.points_in("deformedWire", "of several curves, in place of displacements; `curves:` connects them")
+      .array();
   b.structural("curve", Type::kCurve, {.doc = "the curve at rest"});
   b.structural(
       "dropoff", 0.02,
       {.min = 1e-6, .unit = Unit::kLength, .doc = "distance from the curve where its influence ends"});
+  b.structural("baseWire", Type::kCurve, {.doc = "several curves at rest, in place of curve"}).array();
+  b.structural(
+       "dropoffDistance", 0.02,
+       {.min = 1e-6, .unit = Unit::kLength, .doc = "dropoff of each of several curves; default: dropoff"})
+      .array();
+  b.structural(
+      "crossingEffect", 0.0,
+      {.min = 0, .max = 1, .doc = "of several curves: 0 near ones take over from far ones, 1 they add up"});
   FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 6);
 }
 

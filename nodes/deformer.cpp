@@ -1,5 +1,7 @@
 #include "nodes/deformer.h"
 
+#include <cmath>
+
 #include "graph/geometry.h"
 
 namespace kpsa {
@@ -67,6 +69,11 @@ Result<CarriedFrame> CarriedFrame::Bind(const Structural& structural) {
       return Status::Invalid("geometryMatrix is singular");
   }
   return frame;
+}
+
+double CarriedFrame::Growth(const Matrix4& parent_now) const {
+  const double growth = std::cbrt(std::fabs(Determinant3(Motion(parent_now))));
+  return std::fabs(growth - 1) < 1e-9 ? 1 : growth;
 }
 
 }  // namespace kpsa

@@ -43,6 +43,8 @@ class CarriedFrame {
   Matrix4 Motion(const Matrix4& parent_now) const {
     return fixed_ ? Matrix4() : parent_now * parent_rest_inverse_;
   }
+  // How much larger the parent has become since rest, along one axis; a rigid motion gives exactly 1.
+  double Growth(const Matrix4& parent_now) const;
   bool fixed() const { return fixed_; }
   const Matrix4& parent_rest() const { return parent_rest_; }
   // world_from_stage at rest; the identity for stages in world space.

@@ -1,7 +1,5 @@
 #include "nodes/kernels/delta_mush.h"
 
-#include <cmath>
-
 #include "base/matrix.h"
 #include "nodes/deformer.h"
 #include "nodes/mesh_topology.h"
@@ -76,20 +74,14 @@ Result<BoundKernel> BindMush(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-// How much larger the parent has become since the rest pose: so much larger is the detail.
-double Growth(const Matrix4& motion) {
-  const double growth = std::cbrt(std::fabs(Determinant3(motion)));
-  return std::fabs(growth - 1) < 1e-9 ? 1 : growth;  // a rigid motion changes no bit
-}
-
 void ComputeMush(ComputeContext& c) {
   const auto& bound = c.kernel_as<MushBound>();
-  const Matrix4 motion = bound.frame.Motion(c.get<Matrix4>(kParentMatrix));
-  const Double3 pivot = TransformPoint(motion, bound.middle);
+  const Matrix4& parent = c.get<Matrix4>(kParentMatrix);
+  const Double3 pivot = TransformPoint(bound.frame.Motion(parent), bound.middle);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput) * Growth(motion), pivot},
-                   c.points(kInPoints), c.out_points(0), {c.scratch, bound.kernel.ScratchFloats()},
-                   &parallel);
+  bound.kernel.Run(
+      {c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput) * bound.frame.Growth(parent), pivot},
+      c.points(kInPoints), c.out_points(0), {c.scratch, bound.kernel.ScratchFloats()}, &parallel);
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <optional>
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
+#include "nodes/kernels/dual_quaternion.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/weights.h"
 #include "nodes/standard_nodes.h"
@@ -30,11 +32,33 @@ void DemandSkin(Demand& demand) {
   }
 }
 
+// The share of the dual quaternions at the output points; 0, Maya's default, where the rig names no map.
+Result<std::vector<float>> BoundBlendWeights(const Binding& binding) {
+  const PointSet& out = binding.output("outPoints");
+  std::vector<float> shares(out.size(), 0.0f);
+  const auto* map = binding.structural().asset<WeightMap>("blendWeights");
+  if (map == nullptr) return shares;
+  if (map->weights().size() != out.total()) {
+    return Status::Invalid("blendWeights are for {} points, the geometry has {}", map->weights().size(),
+                           out.total());
+  }
+  for (Index i = 0; i < out.size(); ++i) {
+    shares[i] = map->weights()[out[i]];
+    if (!(shares[i] >= 0 && shares[i] <= 1))
+      return Status::Invalid("blendWeights of point {}: {} is outside of 0 to 1", out[i], shares[i]);
+  }
+  return shares;
+}
+
+enum SkinningMethod { kClassicLinear, kDualQuaternion, kWeightBlended };
+
 // The matrices of the palette that no point needs stay as they are: nobody reads them.
 struct SkinBound {
-  SkinKernel kernel;
+  std::optional<SkinKernel> linear;          // of classicLinear and weightBlended
+  std::optional<DualQuaternionKernel> dual;  // of dualQuaternion and weightBlended
   std::vector<Matrix4> joint_from_bind;
-  std::size_t palette_floats;
+  std::vector<Double3> centers;  // of dual: the joints at bind, mesh space
+  std::size_t palette_floats = 0;
 };
 
 Result<BoundKernel> BindSkin(const Binding& binding) {
@@ -53,14 +77,32 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
     return Status::Invalid("matrix has {} elements, its influences name {} joints", s.array_size("matrix"),
                            influences->joint_count());
   }
-  std::vector<Matrix4> joint_from_bind;
+  SkinBound bound;
   for (Index j = 0; j < influences->joint_count(); ++j) {
     const Value& bind = s.value("bindPreMatrix", static_cast<int>(j));
-    joint_from_bind.push_back(bind.get_if<Matrix4>() != nullptr ? bind.get<Matrix4>() : Matrix4());
+    bound.joint_from_bind.push_back(bind.get_if<Matrix4>() != nullptr ? bind.get<Matrix4>() : Matrix4());
   }
-  SkinBound bound{SkinKernel(weights, out.ToVector(), BoundWeights(binding)), std::move(joint_from_bind), 0};
   bound.palette_floats = bound.joint_from_bind.size() * sizeof(Matrix4) / sizeof(float);
-  const std::size_t scratch = bound.palette_floats + bound.kernel.ScratchFloats();
+  std::size_t scratch = bound.palette_floats;
+  const int method = s.get_int("skinningMethod");
+  const std::vector<Index> points = out.ToVector();
+  if (method != kDualQuaternion) {
+    bound.linear.emplace(weights, points, BoundWeights(binding));
+    scratch += bound.linear->ScratchFloats();
+  }
+  if (method != kClassicLinear) {
+    std::vector<float> blend;
+    if (method == kWeightBlended) {
+      Result<std::vector<float>> shares = BoundBlendWeights(binding);
+      if (!shares.ok()) return shares.status();
+      blend = std::move(*shares);
+      scratch += 3 * PaddedCount(points.size());
+    }
+    bound.dual.emplace(weights, points, BoundWeights(binding), blend);
+    scratch += bound.dual->ScratchFloats();
+    for (const Matrix4& bind : bound.joint_from_bind)
+      bound.centers.push_back(TransformPoint(InverseOrIdentity(bind), {}));
+  }
   return MakeBound(std::move(bound), scratch);
 }
 
@@ -72,11 +114,30 @@ void ComputeSkin(ComputeContext& c) {
     palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j];
   };
   if (!bound.joint_from_bind.empty()) follow(0);
-  for (Index j : bound.kernel.joints()) follow(j);
+  for (Index j : bound.linear.has_value() ? bound.linear->joints() : bound.dual->joints()) follow(j);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{palette, bound.joint_from_bind.size()}, c.get<double>(kEnvelope), Matrix4()},
-                   c.points(kInPoints), c.out_points(0),
-                   {c.scratch + bound.palette_floats, bound.kernel.ScratchFloats()}, &parallel);
+  const std::span<const Matrix4> all(palette, bound.joint_from_bind.size());
+  const double envelope = c.get<double>(kEnvelope);
+  const ConstPointsView& in = c.points(kInPoints);
+  const PointsView& out = c.out_points(0);
+  float* scratch = c.scratch + bound.palette_floats;
+  if (!bound.dual.has_value()) {
+    bound.linear->Run({all, envelope, Matrix4()}, in, out, {scratch, bound.linear->ScratchFloats()},
+                      &parallel);
+    return;
+  }
+  ConstPointsView linear;
+  if (bound.linear.has_value()) {  // the output may be the input: the linear result waits beside it
+    const std::size_t row = PaddedCount(in.count);
+    const PointsView apart{scratch, scratch + row, scratch + 2 * row, in.count};
+    scratch += 3 * row;
+    bound.linear->Run({all, envelope, Matrix4()}, in, apart, {scratch, bound.linear->ScratchFloats()},
+                      &parallel);
+    scratch += bound.linear->ScratchFloats();
+    linear = apart;
+  }
+  bound.dual->Run({all, bound.centers, envelope, Matrix4(), linear}, in, out,
+                  {scratch, bound.dual->ScratchFloats()}, &parallel);
 }
 
 void ComputeTransformGeometry(ComputeContext& c) {
@@ -96,12 +157,19 @@ void ComputeTransformGeometry(ComputeContext& c) {
 }  // namespace
 
 void AddSkinClusterNode(NodeRegistry& registry) {
-  NodeBuilder b = AddDeformer(registry, "skinCluster",
-                              "Moves points with joints: linear blend skinning, any number of influences. "
-                              "Takes points in mesh space to world space.");
+  NodeBuilder b =
+      AddDeformer(registry, "skinCluster",
+                  "Moves points with joints, any number of influences. Takes points in mesh space to "
+                  "world space.");
   b.structural("influences", Type::kAsset, {.doc = "joints and weights of every point"}).per_geometry();
   b.in("matrix", Matrix4(), {.doc = "the joints' world matrices"}).array();
   b.structural("bindPreMatrix", Matrix4(), {.doc = "the joints' inverse bind matrices"}).array();
+  b.enumeration("skinningMethod", {"classicLinear", "dualQuaternion", "weightBlended"}, true,
+                "how influences are blended: as matrices, as rigid motions (dual quaternions), or between "
+                "the two by blendWeights");
+  b.structural("blendWeights", Type::kAsset,
+               {.doc = "of weightBlended: 0 takes classicLinear, 1 dualQuaternion; 0 where unset"})
+      .per_geometry();
   FinishDeformer(b, &ComputeSkin, BindSkin, DemandSkin).cost(1000, 8);
 }
 

@@ -9,13 +9,15 @@ void AddTimeNode(NodeRegistry& registry);               // time
 void AddTransformNodes(NodeRegistry& registry);         // transform, joint
 void AddClipNodes(NodeRegistry& registry);              // clipTransform, clipWeights, animCurve
 void AddMeshNode(NodeRegistry& registry);               // mesh
-void AddBlendShapeNode(NodeRegistry& registry);         // blendShape
+void AddBlendShapeNode(NodeRegistry& registry);         // blendShape, combinationShape
 void AddSkinClusterNode(NodeRegistry& registry);        // skinCluster
 void AddTransformGeometryNode(NodeRegistry& registry);  // transformGeometry
 void AddLatticeNode(NodeRegistry& registry);            // lattice
 void AddClusterNodes(NodeRegistry& registry);           // cluster, softMod
 void AddDeltaMushNode(NodeRegistry& registry);          // deltaMush
 void AddCurveNodes(NodeRegistry& registry);             // curve, wire
+void AddNonLinearNodes(NodeRegistry& registry);         // bend, twist, squash, flare, sine, wave
+void AddTensionNode(NodeRegistry& registry);            // tension
 void AddTripwireNode(NodeRegistry& registry);           // tripwire
 void AddMathNodes(NodeRegistry& registry);    // remapValue, multiplyDivide, plusMinusAverage, unitConversion
 void AddMatrixNodes(NodeRegistry& registry);  // multMatrix, composeMatrix, decomposeMatrix

@@ -27,4 +27,8 @@ SwingTwist DecomposeSwingTwist(Quaternion q, Double3 axis);
 // The angle of a twist about `axis`, within (-pi, pi].
 double TwistAngle(Quaternion twist, Double3 axis);
 
+// The rotation nearest to the linear part of m (polar decomposition; Higham 1986); of -m where m is a
+// reflection. Where m is singular, that of DecomposeTrs.
+Matrix4 NearestRotation(const Matrix4& m);
+
 }  // namespace kpsa

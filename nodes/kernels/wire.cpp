@@ -1,7 +1,6 @@
 #include "nodes/kernels/wire.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -70,6 +69,41 @@ double NearestOnSpans(std::span<const Cubic> spans, Double3 p, double* distance)
   *distance = std::sqrt(best);
   return best_u;
 }
+
+// A curve at rest, and how near points are to it. A Catmull-Rom span, and a reflected end, may leave the box
+// of the vertices by an eighth or two of its size; points farther than that and the dropoff need no search.
+class RestCurve {
+ public:
+  RestCurve(const WireSettings& settings, std::span<const Double3> vertices)
+      : settings_(settings),
+        shape_{settings.basis, settings.closed, vertices.size()},
+        spans_(Spans(shape_, vertices)),
+        low_(vertices[0]),
+        high_(vertices[0]) {
+    for (Double3 v : vertices) {
+      for (int a = 0; a < 3; ++a) low_[a] = std::min(low_[a], v[a]), high_[a] = std::max(high_[a], v[a]);
+    }
+    margin_ = settings.dropoff + 0.5 * Length(high_ - low_);
+  }
+  const CurveShape& shape() const { return shape_; }
+  // The weight of a point, and the parameter of what is nearest to it.
+  double Falloff(Double3 p, double* u) const {
+    *u = 0;
+    for (int a = 0; a < 3; ++a) {
+      if (!(p[a] >= low_[a] - margin_ && p[a] <= high_[a] + margin_)) return 0;
+    }
+    double distance;
+    *u = NearestOnSpans(spans_, p, &distance);
+    return settings_.profile.Evaluate(distance / settings_.dropoff);
+  }
+
+ private:
+  WireSettings settings_;
+  CurveShape shape_;
+  std::vector<Cubic> spans_;
+  Double3 low_, high_;
+  double margin_;
+};
 
 }  // namespace
 
@@ -152,31 +186,16 @@ WireKernel::WireKernel(const WireSettings& settings, std::span<const Double3> re
   KPSA_CHECK(Validate(settings, rest_vertices).ok());
   KPSA_CHECK(IsSortedSet(out_points, rest.count));
   KPSA_CHECK(point_weights.empty() || point_weights.size() == count_);
-  const CurveShape shape{settings.basis, settings.closed, rest_vertices.size()};
-  const std::vector<Cubic> spans = Spans(shape, rest_vertices);
-
-  // A Catmull-Rom span, and a reflected end, may leave the box of the vertices by an eighth or two of its
-  // size; points farther than that and the dropoff need no search
-  Double3 low = rest_vertices[0], high = low;
-  for (Double3 v : rest_vertices) {
-    for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], v[a]), high[a] = std::max(high[a], v[a]);
-  }
-  const double margin = settings.dropoff + 0.5 * Length(high - low);
-
+  const RestCurve curve(settings, rest_vertices);
   std::vector<Index> controls(4 * count_, 0);
   std::vector<float> weights(4 * count_, 0.0f);
   for (std::size_t i = 0; i < count_; ++i) {
     const Index index = out_points[i];
-    const Double3 p{rest.x[index], rest.y[index], rest.z[index]};
-    bool near = true;
-    for (int a = 0; a < 3; ++a) near &= p[a] >= low[a] - margin && p[a] <= high[a] + margin;
-    if (!near) continue;
-    double distance, basis[4];
-    const double u = NearestOnSpans(spans, p, &distance);
-    const double falloff = settings.profile.Evaluate(distance / settings.dropoff);
+    double u, basis[4];
+    const double falloff = curve.Falloff({rest.x[index], rest.y[index], rest.z[index]}, &u);
     const double w = falloff * static_cast<double>(point_weights.empty() ? 1.0f : point_weights[i]);
     if (w == 0) continue;
-    shape.Weights(u, controls.data() + 4 * i, basis);
+    curve.shape().Weights(u, controls.data() + 4 * i, basis);
     for (std::size_t c = 0; c < 4; ++c) weights[4 * i + c] = static_cast<float>(w * basis[c]);
   }
   if (settings.basis == CurveBasis::kLinear) {  // the outer two are unused
@@ -190,6 +209,47 @@ WireKernel::WireKernel(const WireSettings& settings, std::span<const Double3> re
     weights.resize(2 * count_);
   }
   blend_ = ControlBlend(settings.basis == CurveBasis::kLinear ? 2 : 4, controls, weights);
+}
+
+WireKernel::WireKernel(std::span<const WireCurve> curves, double crossing_effect, ConstPointsView rest,
+                       std::span<const Index> out_points, std::span<const float> point_weights)
+    : count_(out_points.size()) {
+  KPSA_CHECK(IsSortedSet(out_points, rest.count));
+  KPSA_CHECK(point_weights.empty() || point_weights.size() == count_);
+  std::vector<RestCurve> rest_curves;
+  std::vector<std::size_t> first;
+  for (const WireCurve& curve : curves) {
+    KPSA_CHECK(Validate(curve.settings, curve.rest_vertices).ok());
+    rest_curves.emplace_back(curve.settings, curve.rest_vertices);
+    first.push_back(vertices_);
+    vertices_ += curve.rest_vertices.size();
+  }
+  const std::size_t width = 4 * curves.size();
+  std::vector<Index> controls(width * count_, 0);
+  std::vector<float> weights(width * count_, 0.0f);
+  std::vector<double> falloffs(curves.size()), parameters(curves.size());
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Index index = out_points[i];
+    double sum = 0;
+    for (std::size_t k = 0; k < curves.size(); ++k) {
+      falloffs[k] = rest_curves[k].Falloff({rest.x[index], rest.y[index], rest.z[index]}, &parameters[k]);
+      sum += falloffs[k];
+    }
+    for (std::size_t k = 0; k < curves.size(); ++k) {
+      if (!(falloffs[k] > 0)) continue;
+      const double share = crossing_effect + (1 - crossing_effect) * falloffs[k] / sum;
+      const double w =
+          falloffs[k] * share * static_cast<double>(point_weights.empty() ? 1.0f : point_weights[i]);
+      Index* to = controls.data() + width * i + 4 * k;
+      double basis[4];
+      rest_curves[k].shape().Weights(parameters[k], to, basis);
+      for (std::size_t c = 0; c < 4; ++c) {
+        to[c] += static_cast<Index>(first[k]);
+        weights[width * i + 4 * k + c] = static_cast<float>(w * basis[c]);
+      }
+    }
+  }
+  if (width > 0) blend_ = ControlBlend(width, controls, weights);
 }
 
 void WireKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,

@@ -1,6 +1,10 @@
 // wire: points near a curve follow it. p' = p + w (C(u) - C_rest(u)), u the nearest parameter and w the
 // falloff of the distance at rest. C is linear in its control vertices, so a point stores the weights of at
 // most four of them.
+//
+// Several curves: p' = p + sum_i a_i (C_i(u_i) - C_i_rest(u_i)), a_i = w_i (c + (1 - c) w_i / sum_j w_j) with
+// the crossing effect c. With 0 near curves take over from far ones, and curves that lie together move points
+// once; with 1 they add up (Maya's crossingEffect).
 #pragma once
 
 #include <span>
@@ -41,11 +45,18 @@ struct WireSettings {
   FalloffProfile profile;
 };
 
+// One of several curves.
+struct WireCurve {
+  WireSettings settings;
+  std::span<const Double3> rest_vertices;
+};
+
 // A local kernel.
 class WireKernel {
  public:
   struct Inputs {
-    std::span<const Double3> offsets;  // of every vertex from where it rests now; points' space
+    std::span<const Double3>
+        offsets;  // of every vertex from where it rests now; points' space; curve by curve
     double envelope = 1;
   };
 
@@ -54,6 +65,9 @@ class WireKernel {
   static Status Validate(const WireSettings& settings, std::span<const Double3> rest_vertices);
   // rest: points of the whole mesh, in the space of rest_vertices.
   WireKernel(const WireSettings& settings, std::span<const Double3> rest_vertices, ConstPointsView rest,
+             std::span<const Index> out_points, std::span<const float> point_weights = {});
+  // Several curves, each valid.
+  WireKernel(std::span<const WireCurve> curves, double crossing_effect, ConstPointsView rest,
              std::span<const Index> out_points, std::span<const float> point_weights = {});
 
   std::size_t point_count() const { return count_; }

@@ -10,10 +10,13 @@
 #include "base/simd.h"
 #include "nodes/kernels/blend_shape.h"
 #include "nodes/kernels/delta_mush.h"
+#include "nodes/kernels/dual_quaternion.h"
 #include "nodes/kernels/lattice.h"
+#include "nodes/kernels/non_linear.h"
 #include "nodes/kernels/normals.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/soft_mod.h"
+#include "nodes/kernels/tension.h"
 #include "nodes/kernels/weights.h"
 #include "nodes/kernels/wire.h"
 #include "tests/nodes/kernel_support.h"
@@ -144,12 +147,86 @@ class KernelLaw : public testing::Test {
                              kernel.Run({vertex_offsets_, 0.9}, in, out, scratch.span(), parallel);
                            }});
     }
+    AddRingSubjects();
+    AddDualQuaternions();
+    subjects_.push_back(
+        {"wires", true, {}, [this](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+           WireSettings near, far;
+           near.dropoff = 0.3, far.dropoff = 0.5, far.closed = true, far.basis = CurveBasis::kLinear;
+           const WireCurve curves[] = {{near, vertices_}, {far, std::span(vertices_).first(4)}};
+           const WireKernel kernel(curves, 0.3, mesh_.rest.view(), out_points, Masked(out_points));
+           std::vector<Double3> offsets = vertex_offsets_;
+           offsets.insert(offsets.end(), vertex_offsets_.begin(), vertex_offsets_.begin() + 4);
+           AlignedFloats scratch(kernel.ScratchFloats());
+           kernel.Run({offsets, 0.9}, in, out, scratch.span(), parallel);
+         }});
+    for (const NonLinearMap& map : std::vector<NonLinearMap>{
+             Bend{1.2, -0.4, 0.5}, Twist{0.3, -2, -0.3, 0.4}, Squash{-0.7, 1.2, 0.3, 0.4, 0.6, -0.3, 0.5},
+             Flare{1.5, 0.5, 0.7, 1.2, 0.3, -0.4, 0.3}, Sine{0.1, 0.4, 0.05, 0.5, -0.4, 0.5},
+             Wave{0.1, 0.3, 0.05, -0.5, 0.1, 0.5}}) {
+      subjects_.push_back(
+          {"non-linear " + std::to_string(map.index()),
+           true,
+           {},
+           [this, map](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             const Matrix4 frame = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
+             NonLinearKernel(out_points, Masked(out_points)).Run({map, frame, 0.8}, in, out, {}, parallel);
+           }});
+    }
     subjects_.push_back(
         {"normals", false, [this](auto out_points) { return NormalsDemand(mesh_.topology, out_points); },
          [this](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
            const NormalsKernel kernel(mesh_.topology, out_points, in_points);
            AlignedFloats scratch(kernel.ScratchFloats());
            kernel.Run(in, out, scratch.span(), parallel);
+         }});
+  }
+
+  void AddDualQuaternions() {
+    Random random(12);
+    for (int j = 0; j < 30; ++j) centers_.push_back(random.Vector() * 0.5);
+    for (bool blended : {false, true}) {
+      subjects_.push_back(
+          {blended ? "dual quaternions and linear" : "dual quaternions",
+           true,
+           {},
+           [this, blended](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             const SkinWeights weights{skin_.offsets, skin_.joints, skin_.weights, 30};
+             const std::vector<float> mask = Masked(out_points);
+             const SkinKernel linear(weights, out_points);
+             const DualQuaternionKernel kernel(weights, out_points, blended ? std::vector<float>() : mask,
+                                               blended ? mask : std::vector<float>());
+             AlignedFloats scratch(kernel.ScratchFloats()), linear_scratch(linear.ScratchFloats());
+             PointBuffer apart(out_points.size());
+             if (blended) linear.Run({palette_, 1, {}}, in, apart.view(), linear_scratch.span(), parallel);
+             kernel.Run({palette_, centers_, 1, Translation({0.1, 0.2, 0.3}), std::as_const(apart).view()},
+                        in, out, scratch.span(), parallel);
+           }});
+    }
+  }
+
+  void AddRingSubjects() {
+    for (bool masked : {false, true}) {
+      subjects_.push_back(
+          {masked ? "tension with weights" : "tension", false,
+           [this, masked](auto out_points) {
+             return TensionDemand(mesh_.topology, out_points,
+                                  masked ? Masked(out_points) : std::vector<float>());
+           },
+           [this, masked](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
+             const TensionPushKernel kernel(mesh_.topology, mesh_.rest.view(), out_points, in_points,
+                                            masked ? Masked(out_points) : std::vector<float>());
+             AlignedFloats scratch(kernel.ScratchFloats());
+             kernel.Run({1.1, 0.1, -0.2, 0.7}, in, out, scratch.span(), parallel);
+           }});
+    }
+    subjects_.push_back(
+        {"strain", false, [this](auto out_points) { return TensionDemand(mesh_.topology, out_points); },
+         [this](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
+           const StrainKernel kernel(mesh_.topology, mesh_.rest.view(), out_points, in_points);
+           std::vector<float> strain(out_points.size());
+           kernel.Run(1, in, strain.data(), parallel);
+           for (std::size_t i = 0; i < strain.size(); ++i) out.x[i] = strain[i], out.y[i] = 0, out.z[i] = 0;
          }});
   }
 
@@ -183,6 +260,7 @@ class KernelLaw : public testing::Test {
   std::vector<BlendTarget> target_views_;
   std::vector<double> target_weights_;
   std::vector<Matrix4> palette_;
+  std::vector<Double3> centers_;
   std::vector<Double3> vertices_, vertex_offsets_;
   std::vector<Subject> subjects_;
 };

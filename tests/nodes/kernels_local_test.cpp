@@ -527,6 +527,66 @@ TEST_F(LocalKernels, AWireThatMovesAsAWholeMovesThePointsOnIt) {
       2e-7);
 }
 
+TEST_F(LocalKernels, OneOfSeveralCurvesIsTheWire) {
+  const std::vector<Double3> vertices = Curve(6);
+  Random random(8);
+  std::vector<Double3> offsets;
+  for (std::size_t i = 0; i < 6; ++i) offsets.push_back(random.Vector() * 0.1);
+  WireSettings settings;
+  settings.dropoff = 0.3;
+  const WireCurve curve{settings, vertices};
+  const PointBuffer one = Evaluate(WireKernel(settings, vertices, in(), all_, mask_), {offsets, 0.5}, in());
+  for (double crossing : {0.0, 1.0}) {
+    const WireKernel kernel({&curve, 1}, crossing, in(), all_, mask_);
+    const PointBuffer several = Evaluate(kernel, {offsets, 0.5}, in());
+    for (std::size_t i = 0; i < rest_.size(); ++i) ASSERT_TRUE(SameBits(one.view(), several.view(), i));
+  }
+}
+
+TEST_F(LocalKernels, CurvesThatLieTogetherMovePointsOnceUnlessTheyAddUp) {
+  const std::vector<Double3> vertices = Curve(6), offsets(6, Double3{0.1, 0.2, 0.3}),
+                             twice(12, Double3{0.1, 0.2, 0.3});
+  WireSettings settings;
+  settings.dropoff = 0.3;
+  const WireCurve curves[] = {{settings, vertices}, {settings, vertices}};
+  const std::vector<Double3> one =
+      ToDouble(Evaluate(WireKernel(settings, vertices, in(), all_), {offsets, 1}, in()).view());
+  EXPECT_LT(MaxDistance(ToDouble(Evaluate(WireKernel(curves, 0, in(), all_), {twice, 1}, in()).view()), one),
+            1e-6);
+  std::vector<Double3> expected;
+  for (std::size_t i = 0; i < rest_.size(); ++i) expected.push_back(rest_[i] + (one[i] - rest_[i]) * 2.0);
+  EXPECT_LT(
+      MaxDistance(ToDouble(Evaluate(WireKernel(curves, 1, in(), all_), {twice, 1}, in()).view()), expected),
+      1e-6);
+}
+
+// Two straight curves that move up and down: between them points change over from one to the other.
+TEST_F(LocalKernels, NearCurvesTakeOverFromFarOnes) {
+  const std::vector<Double3> left = {{-0.3, -1, 0}, {-0.3, 1, 0}}, right = {{0.3, -1, 0}, {0.3, 1, 0}};
+  WireSettings settings;
+  settings.basis = CurveBasis::kLinear;
+  settings.profile.curve = FalloffCurve::kLinear;
+  settings.dropoff = 0.8;
+  WireSettings wide = settings;
+  wide.dropoff = 1;
+  const WireCurve curves[] = {{settings, left}, {wide, right}};
+  const std::vector<Double3> offsets = {{0, 0, 1}, {0, 0, 1}, {0, 0, -2}, {0, 0, -2}};
+  for (double crossing : {0.0, 0.4, 1.0}) {
+    const WireKernel kernel(curves, crossing, in(), all_, mask_);
+    std::vector<Double3> expected;
+    for (std::size_t i = 0; i < rest_.size(); ++i) {
+      const Double3 p = rest_[i];
+      const double a = std::max(0.0, 1 - std::hypot(p.x + 0.3, p.z) / 0.8);
+      const double b = std::max(0.0, 1 - std::hypot(p.x - 0.3, p.z));
+      const double whole = a + b > 0 ? a + b : 1;
+      const double move =
+          a * (crossing + (1 - crossing) * a / whole) - 2 * b * (crossing + (1 - crossing) * b / whole);
+      expected.push_back(p + Double3{0, 0, 0.9 * mask_[i] * move});
+    }
+    EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {offsets, 0.9}, in()).view()), expected), 1e-6);
+  }
+}
+
 TEST(Wire, BadSettingsAreNamed) {
   const std::vector<Double3> vertices = Curve(3);
   EXPECT_TRUE(WireKernel::Validate({}, vertices).ok());

@@ -1,0 +1,60 @@
+// Dual quaternion skinning (Kavan, Collins, Zara and O'Sullivan, "Geometric skinning with approximate dual
+// quaternion blending", 2008; Maya's skinCluster, dual quaternion).
+//
+// A joint's matrix is a stretch about the joint's own place c at bind, then a rigid motion:
+//     M p = rotation (c + stretch (p - c)) + translation      (polar decomposition).
+// A point takes the linear blend of the stretches, then the rigid motion of the blend of unit dual
+// quaternions, made unit again. Each is blended with the sign that brings it nearest to that of the joint of
+// the largest weight (the first of equals). A point with one influence follows its joint exactly, up to the
+// rounding of floats; stretches below a millionth count as none. Weights are made to sum to 1.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/matrix.h"
+#include "base/points.h"
+#include "nodes/kernels/parallel_hook.h"
+#include "nodes/kernels/skin.h"
+
+namespace kpsa {
+
+// A local kernel.
+class DualQuaternionKernel {
+ public:
+  struct Inputs {
+    std::span<const Matrix4> palette;  // joint_count entries: world_from_joint * joint_from_bind
+    std::span<const Double3> centers;  // of every joint: its place at bind, mesh space
+    double envelope = 1;
+    Matrix4 world_from_mesh;  // as SkinKernel's
+    ConstPointsView linear;   // with blend weights only: what SkinKernel gives; not the output
+  };
+
+  // `weights` must be valid. point_weights: see weights.h. blend_weights: one an output point, 0 takes the
+  // linear result bit for bit, 1 the dual quaternions'; empty: 1 everywhere.
+  DualQuaternionKernel(const SkinWeights& weights, std::span<const Index> out_points,
+                       std::span<const float> point_weights = {}, std::span<const float> blend_weights = {});
+
+  std::size_t point_count() const { return count_; }
+  // The joints that the output points need, ascending: no other entry of the palette but the first is read.
+  std::span<const Index> joints() const { return joints_; }
+  std::size_t ScratchFloats() const { return kJointFloats * (joints_.size() + 1); }
+  // in: bind-space points, out: world-space points; may be the same.
+  void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
+           const Parallel* parallel = nullptr) const noexcept;
+
+  static constexpr std::size_t kBlock = 128;
+  static constexpr std::size_t kJointFloats = 32;  // of a joint in the scratch
+
+ private:
+  std::size_t count_ = 0;
+  Index joint_count_ = 0;
+  std::vector<Index> joints_;
+  std::vector<Index> entry_offsets_;  // of each point, and the end
+  std::vector<Index> entry_joints_;   // kJointFloats * place in joints_; the largest weight's comes first
+  std::vector<float> entry_weights_;
+  AlignedFloats masks_;  // point weights, empty if all 1
+  AlignedFloats blend_;  // empty if all 1
+};
+
+}  // namespace kpsa

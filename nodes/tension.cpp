@@ -1,0 +1,144 @@
+// tension: where the surface is stretched or compressed, and a push along the normals by it.
+#include "nodes/kernels/tension.h"
+
+#include <algorithm>
+
+#include "nodes/deformer.h"
+#include "nodes/mesh_topology.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+constexpr int kCompressScale = kFirstOwnInput, kStretchScale = kFirstOwnInput + 1;
+
+struct PushBound {
+  TensionPushKernel kernel;
+  CarriedFrame frame;
+};
+struct StrainBound {
+  StrainKernel kernel;
+  CarriedFrame frame;
+  std::size_t strain_floats;
+};
+
+std::vector<float> WeightsOf(const Structural& s, const PointSet& out) {
+  const auto* map = s.asset<WeightMap>("weights");
+  std::vector<float> weights;
+  for (Index i = 0; map != nullptr && i < out.size(); ++i)
+    weights.push_back(out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f);
+  return weights;
+}
+
+// One ring of what an output needs; its measures know no weights.
+void DemandRing(Demand& demand, const char* output, bool weighted) {
+  const Structural& s = demand.structural();
+  const PointSet& out = demand.output(output);
+  Status error;
+  const Topology* topology = TopologyOf(s.asset<Mesh>("mesh"), &error);
+  if (topology == nullptr || topology->point_count() != out.total() || out.is_all()) {
+    demand.Require("inPoints", 0, PointSet::All(out.total()));  // bind reports what is wrong
+    return;
+  }
+  demand.Require("inPoints", 0,
+                 PointSet::Of(TensionDemand(*topology, out.ToVector(),
+                                            weighted ? WeightsOf(s, out) : std::vector<float>()),
+                              out.total()));
+}
+
+// What both kernels are made of.
+struct Surface {
+  const Topology* topology = nullptr;
+  ConstPointsView rest;
+  CarriedFrame frame;
+};
+
+Result<Surface> SurfaceOf(const Structural& s, Index points) {
+  Surface surface;
+  Status error;
+  surface.topology = TopologyOf(s.asset<Mesh>("mesh"), &error);
+  if (surface.topology == nullptr) return error;
+  if (surface.topology->point_count() != points) {
+    return Status::Invalid("its mesh has {} points, the geometry {}", surface.topology->point_count(),
+                           points);
+  }
+  Result<ConstPointsView> rest = RestPoints(s);
+  if (!rest.ok()) return rest.status();
+  Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  surface.rest = *rest;
+  surface.frame = *frame;
+  return surface;
+}
+
+Result<BoundKernel> BindPush(const Binding& binding) {
+  const PointSet& out = binding.output("outPoints");
+  Result<Surface> surface = SurfaceOf(binding.structural(), out.total());
+  if (!surface.ok()) return surface.status();
+  PushBound bound{
+      TensionPushKernel(*surface->topology, surface->rest, out.ToVector(),
+                        binding.input("inPoints").ToVector(), WeightsOf(binding.structural(), out)),
+      surface->frame};
+  const std::size_t scratch = bound.kernel.ScratchFloats();
+  return MakeBound(std::move(bound), scratch);
+}
+
+template <bool kStretch>
+Result<BoundKernel> BindStrain(const Binding& binding) {
+  const PointSet& out = binding.output(kStretch ? "stretch" : "compress");
+  Result<Surface> surface = SurfaceOf(binding.structural(), out.total());
+  if (!surface.ok()) return surface.status();
+  const std::size_t scratch = PaddedCount(out.size());
+  return MakeBound(StrainBound{StrainKernel(*surface->topology, surface->rest, out.ToVector(),
+                                            binding.input("inPoints").ToVector()),
+                               surface->frame, scratch},
+                   scratch);
+}
+
+void ComputePush(ComputeContext& c) {
+  const auto& bound = c.kernel_as<PushBound>();
+  const Parallel parallel = HostParallel(c);
+  bound.kernel.Run({bound.frame.Growth(c.get<Matrix4>(kParentMatrix)), c.get<double>(kCompressScale),
+                    c.get<double>(kStretchScale), c.get<double>(kEnvelope)},
+                   c.points(kInPoints), c.out_points(0), ScratchSpan(c, bound.kernel.ScratchFloats()),
+                   &parallel);
+}
+
+template <bool kStretch>
+void ComputeStrain(ComputeContext& c) {
+  const auto& bound = c.kernel_as<StrainBound>();
+  const PointsView& out = c.out_points(0);
+  const Parallel parallel = HostParallel(c);
+  bound.kernel.Run(bound.frame.Growth(c.get<Matrix4>(1)), c.points(0), c.scratch, &parallel);
+  for (std::size_t i = 0; i < out.count; ++i) {
+    const float strain = kStretch ? c.scratch[i] : -c.scratch[i];
+    out.x[i] = strain > 0 ? strain : 0.0f;
+  }
+}
+
+}  // namespace
+
+void AddTensionNode(NodeRegistry& registry) {
+  NodeBuilder b = AddDeformer(registry, "tension",
+                              "Measures how the edges around each point are stretched since the rest pose, "
+                              "and pushes points along their normals by it.");
+  b.in("compressScale", 0.0,
+       {.unit = Unit::kLength, .doc = "along the normal, where the edges have lost all of their length"});
+  b.in("stretchScale", 0.0,
+       {.unit = Unit::kLength, .doc = "along the normal, where the edges are twice as long"});
+  b.out("stretch", Type::kWeights, "how much longer the edges are: 1 is twice as long").per_geometry();
+  b.compute_for({"stretch"}, {"inPoints", "parentMatrix"}, &ComputeStrain<true>)
+      .bind(BindStrain<true>)
+      .demand([](Demand& demand) { DemandRing(demand, "stretch", false); })
+      .cost(300, 30);
+  b.out("compress", Type::kWeights, "how much shorter they are: 1 is no length left").per_geometry();
+  b.compute_for({"compress"}, {"inPoints", "parentMatrix"}, &ComputeStrain<false>)
+      .bind(BindStrain<false>)
+      .demand([](Demand& demand) { DemandRing(demand, "compress", false); })
+      .cost(300, 30);
+  FinishDeformer(b, &ComputePush, BindPush, [](Demand& demand) {
+    DemandRing(demand, "outPoints", true);
+  }).cost(500, 60);
+}
+
+}  // namespace kpsa
