@@ -66,6 +66,16 @@ std::vector<WireSource> Sources(const Binding& binding) {
 
 Result<BoundKernel> BindWire(const Binding& binding) {
   const Structural& s = binding.structural();
+  const int curve_count = s.array_size("baseWire");
+  const bool several = curve_count > 0;
+  if (several && s.array_size("deformedWire") != curve_count) {
+    return Status::Invalid("deformedWire has {} elements for {} curves", s.array_size("deformedWire"),
+                           curve_count);
+  }
+  if (several && s.array_size("dropoffDistance") > curve_count) {
+    return Status::Invalid("dropoffDistance has {} elements for {} curves", s.array_size("dropoffDistance"),
+                           curve_count);
+  }
   Result<ConstPointsView> rest = RestPoints(s);
   if (!rest.ok()) return rest.status();
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
@@ -89,16 +99,6 @@ Result<BoundKernel> BindWire(const Binding& binding) {
     settings.back().closed = source.curve->closed();
     settings.back().dropoff = source.dropoff / scale;
     KPSA_RETURN_IF_ERROR(WireKernel::Validate(settings.back(), vertices.back()));
-  }
-  const int curve_count = s.array_size("baseWire");
-  const bool several = curve_count > 0;
-  if (several && s.array_size("deformedWire") != curve_count) {
-    return Status::Invalid("deformedWire has {} elements for {} curves", s.array_size("deformedWire"),
-                           curve_count);
-  }
-  if (several && s.array_size("dropoffDistance") > curve_count) {
-    return Status::Invalid("dropoffDistance has {} elements for {} curves", s.array_size("dropoffDistance"),
-                           curve_count);
   }
   const std::vector<Index> out = binding.output("outPoints").ToVector();
   std::vector<WireCurve> curves;
