@@ -6,30 +6,10 @@
 #include "base/matrix.h"
 #include "base/scalar_math.h"
 #include "graph/geometry.h"
-#include "nodes/standard_nodes.h"
-#include "tests/support/test_graph.h"
+#include "tests/nodes/node_support.h"
 
 namespace kpsa {
 namespace {
-
-const NodeRegistry& Nodes() {
-  static const NodeRegistry* registry = [] {
-    auto* r = new NodeRegistry;
-    AddStandardNodes(*r);
-    return r;
-  }();
-  return *registry;
-}
-
-Value PointsOf(const std::vector<float>& xyz) {
-  return Value(PointBufferPtr(std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(xyz))));
-}
-
-void ExpectPoints(const std::vector<float>& got, const std::vector<double>& expected,
-                  double tolerance = 1e-6) {
-  ASSERT_EQ(got.size(), expected.size());
-  for (std::size_t i = 0; i < got.size(); ++i) EXPECT_NEAR(got[i], expected[i], tolerance) << i;
-}
 
 // Two points; `full` moves the first to x = 1, `half` to y = 1, `most` the second to z = 1.
 class BlendShapeNode : public testing::Test {
@@ -198,80 +178,6 @@ TEST_F(SkinNode, BadBlendWeightsAreNamed) {
   };
   EXPECT_NE(message({0, 1}).find("blendWeights are for 2 points, the geometry has 3"), std::string::npos);
   EXPECT_NE(message({0, 1, 2}).find("blendWeights of point 2: 2 is outside of 0 to 1"), std::string::npos);
-}
-
-TEST(TensionNode, MeasuresBothWays) {
-  TestGraph g(Nodes());
-  Mesh::Data data;
-  data.rest = PointBuffer::FromInterleaved(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0});
-  data.triangles = {0, 1, 2};
-  data.vertex_to_point = {0, 1, 2};
-  const auto mesh = std::make_shared<const Mesh>(std::move(data));
-  g.add("mesh", "m", {{"mesh", mesh}});
-  g.add("cluster", "c", {{"matrix", Matrix4()}});
-  g.add("tension", "t", {{"mesh[0]", mesh}, {"compressScale", 0.5}, {"stretchScale", -0.25}});
-  g.connect("m.points", "c.inPoints[0]");
-  g.connect("c.outPoints[0]", "t.inPoints[0]");
-  g.vary("c.matrix");
-  ExpectPoints(g.pull_points("t.stretch[0]"), {0, 0, 0}, 0);
-  g.pull_points("t.compress[0]");
-  g.pull_points("t.outPoints[0]");
-  g.set("c.matrix", Scaling({1.5, 1.5, 1.5}));
-  ExpectPoints(g.pull_points("t.stretch[0]"), {0.5, 0.5, 0.5});
-  ExpectPoints(g.pull_points("t.compress[0]"), {0, 0, 0}, 0);
-  ExpectPoints(g.pull_points("t.outPoints[0]"), {0, 0, -0.125, 1.5, 0, -0.125, 0, 1.5, -0.125});
-  g.set("c.matrix", Scaling({0.5, 0.5, 0.5}));
-  ExpectPoints(g.pull_points("t.stretch[0]"), {0, 0, 0}, 0);
-  ExpectPoints(g.pull_points("t.compress[0]"), {0.5, 0.5, 0.5});
-  ExpectPoints(g.pull_points("t.outPoints[0]"), {0, 0, 0.25, 0.5, 0, 0.25, 0, 0.5, 0.25});
-}
-
-// A handle before the skin acts by its motion against its parent; after it, where it stands.
-TEST(NonLinearNode, HandlesMoveAgainstTheirParents) {
-  TestGraph g(Nodes());
-  const Matrix4 parent = Translation({0, 1, 0}) * RotationFromEuler({0.2, 0.3, 0.4}, RotateOrder::kXyz);
-  g.add("twist", "n",
-        {{"inPoints[0]", PointsOf({1, 1, 0, 1, 0, 0, 1, -1, 0})},
-         {"endAngle", kPi / 2},
-         {"lowBound", 0.0},
-         {"matrix", Matrix4()},
-         {"parentMatrix", Matrix4()}});
-  g.vary("n.matrix");
-  g.vary("n.parentMatrix");
-  const std::vector<double> rest = {0, 1, -1, 1, 0, 0, 1, -1, 0};
-  ExpectPoints(g.pull_points("n.outPoints[0]"), rest);
-  g.set("n.matrix", Translation({0, 1, 0}));
-  ExpectPoints(g.pull_points("n.outPoints[0]"), {1, 1, 0, 1, 0, 0, 1, -1, 0});
-  g.hold("n.space", Value("mesh"));
-  g.pull_points("n.outPoints[0]");
-  g.set("n.matrix", parent);
-  g.set("n.parentMatrix", parent);
-  ExpectPoints(g.pull_points("n.outPoints[0]"), rest);
-  g.set("n.matrix", parent * Translation({0, -1, 0}));
-  ExpectPoints(g.pull_points("n.outPoints[0]"), {0, 1, -1, 0, 0, -1, 1, -1, 0});
-}
-
-TEST(WireNode, FollowsSeveralCurves) {
-  TestGraph g(Nodes());
-  const auto left = std::make_shared<const Curve>(std::vector<Double3>{{-1, -1, 0}, {-1, 1, 0}}, false);
-  const auto right = std::make_shared<const Curve>(std::vector<Double3>{{1, -1, 0}, {1, 1, 0}}, false);
-  g.add("curve", "l", {{"curve", left}, {"cv", PointsOf({0, 0, 1, 0, 0, 1})}});
-  g.add("curve", "r", {{"curve", right}, {"cv", PointsOf({0, 0, 4, 0, 0, 4})}});
-  g.add("wire", "w",
-        {{"inPoints[0]", PointsOf({-1, 0, 0, 0, 0, 0, 1, 0, 0, 3, 0, 0})},
-         {"baseWire[0]", left},
-         {"baseWire[1]", right},
-         {"dropoff", 2.0},
-         {"dropoffDistance[1]", 1.5}});
-  EXPECT_NE(g.try_pull("w.outPoints[0]").ToString().find("deformedWire has 0 elements for 2 curves"),
-            std::string::npos);
-  g.connect("l.displacements", "w.deformedWire[0]");
-  g.connect("r.displacements", "w.deformedWire[1]");
-  const double a = 0.5, b = 1 - 4 / 9.0 * (3 - 4 / 3.0);  // of the point in the middle
-  const std::vector<float> blended = g.pull_points("w.outPoints[0]");
-  ExpectPoints(blended, {-1, 0, 1, 0, 0, (a * a + 4 * b * b) / (a + b), 1, 0, 4, 3, 0, 0});
-  g.hold("w.crossingEffect", 1.0);
-  ExpectPoints(g.pull_points("w.outPoints[0]"), {-1, 0, 1, 0, 0, a + 4 * b, 1, 0, 4, 3, 0, 0});
 }
 
 }  // namespace
