@@ -12,6 +12,7 @@
 namespace kpsa {
 namespace {
 
+constexpr int kWeight = kFirstOwnInput, kPointWeights = kFirstOwnInput + 1;
 constexpr std::size_t kNoShape = static_cast<std::size_t>(-1);
 
 // A target that goes through other shapes on its way: piecewise linear in its weight, its first and last
@@ -38,6 +39,7 @@ struct BlendShapeBound {
   CarriedFrame frame;
   std::vector<Path> paths;  // by target
   std::size_t weight_floats;
+  bool weighted;  // by pointWeights
 };
 
 Result<std::vector<Path>> ReadPaths(const Structural& s, std::size_t target_count) {
@@ -91,9 +93,10 @@ Result<BoundKernel> BindBlendShape(const Binding& binding) {
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
   BlendShapeBound bound{BlendShapeKernel(all, out.ToVector(), BoundWeights(binding)), *frame,
-                        std::move(*paths), (2 * targets.size() + 15) / 16 * 16};
+                        std::move(*paths), (2 * targets.size() + 15) / 16 * 16,
+                        binding.input("pointWeights").total() > 0};
   std::size_t scratch = bound.weight_floats + (bound.kernel.ScratchFloats() + 15) / 16 * 16;
-  if (!frame->fixed()) scratch += 3 * PaddedCount(out.size());
+  if (!frame->fixed() || bound.weighted) scratch += 3 * PaddedCount(out.size());
   return MakeBound(std::move(bound), scratch);
 }
 
@@ -108,7 +111,7 @@ bool IsTurned(const Matrix4& motion) {
 
 void ComputeBlendShape(ComputeContext& c) {
   const auto& bound = c.kernel_as<BlendShapeBound>();
-  const ArrayView<double> weight = c.array<double>(kFirstOwnInput);
+  const ArrayView<double> weight = c.array<double>(kWeight);
   const std::span<double> weights(reinterpret_cast<double*>(c.scratch), bound.kernel.target_count());
   for (std::uint32_t i = 0; i < weights.size(); ++i) weights[i] = i < weight.size() ? weight[i] : 0.0;
   for (const Path& path : bound.paths) weights[path.target] = 0;
@@ -123,19 +126,21 @@ void ComputeBlendShape(ComputeContext& c) {
   const ConstPointsView& in = c.points(kInPoints);
   const PointsView& out = c.out_points(0);
   const Matrix4 motion = bound.frame.Motion(c.get<Matrix4>(kParentMatrix));
-  if (!IsTurned(motion)) {
+  if (!bound.weighted && !IsTurned(motion)) {
     bound.kernel.Run(inputs, in, out, kernel_scratch, &parallel);
     return;
   }
-  // Displacements alone, then turned with the parent
+  // Displacements alone, then weighted, and turned with the parent
   scratch += (kernel_scratch.size() + 15) / 16 * 16;
   const std::size_t row = PaddedCount(in.count);
   std::fill_n(scratch, 3 * row, 0.0f);
   const PointsView sums{scratch, scratch + row, scratch + 2 * row, in.count};
   bound.kernel.Run(inputs, sums, sums, kernel_scratch, &parallel);
+  const float* shares = bound.weighted ? c.points(kPointWeights).x : nullptr;
   c.host->For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Double3 sum{sums.x[i], sums.y[i], sums.z[i]};
+      const double share = shares == nullptr ? 1.0 : shares[i];
+      const Double3 sum = Double3{sums.x[i], sums.y[i], sums.z[i]} * share;
       const Double3 delta = TransformVector(motion, sum);
       const bool moves = !(sum == Double3());
       out.x[i] = moves ? static_cast<float>(in.x[i] + delta.x) : in.x[i];
@@ -143,6 +148,11 @@ void ComputeBlendShape(ComputeContext& c) {
       out.z[i] = moves ? static_cast<float>(in.z[i] + delta.z) : in.z[i];
     }
   });
+}
+
+void DemandBlendShape(Demand& demand) {
+  demand.Require("inPoints", 0, demand.output("outPoints"));
+  if (demand.input_total("pointWeights") > 0) demand.Require("pointWeights", 0, demand.output("outPoints"));
 }
 
 // Of weights below 0 all methods but the product make nothing: a shape that is pulled the other way needs no
@@ -169,12 +179,17 @@ void AddBlendShapeNode(NodeRegistry& registry) {
                               "a skin they turn as parentMatrix has turned since the rest pose.");
   b.structural("targets", Type::kAsset, {.doc = "the target shapes"}).per_geometry();
   b.in("weight", 0.0, {.doc = "one for each target; weight[name] works, too"}).array();
+  b.points_in(
+       "pointWeights",
+       "a factor for each point that may vary, as the compress of a tension; 1 where nothing drives it",
+       Type::kWeights)
+      .per_geometry();
   b.structural("inbetweenTarget", std::vector<std::int64_t>{},
                {.doc = "targets that go through other shapes; `inbetweens:` sets the three lists"});
   b.structural("inbetweenShape", std::vector<std::int64_t>{}, {.doc = "the targets that are these shapes"});
   b.structural("inbetweenWeight", std::vector<double>{},
                {.doc = "the weights at which the targets are these shapes; more than 0, less than 1"});
-  FinishDeformer(b, &ComputeBlendShape, BindBlendShape).cost(100, 3);
+  FinishDeformer(b, &ComputeBlendShape, BindBlendShape, DemandBlendShape).cost(100, 3);
 
   registry.add("combinationShape", "The weight of a shape that acts where others act together.")
       .category("deformer")

@@ -234,6 +234,27 @@ controls: {tip.rotateZ: {min: 0, max: 90}}
   }
 }
 
+// A corrective shape where the surface is pressed together.
+TEST_F(RigDeformers, TensionWeighsShapes) {
+  RigPlayer player(Write(R"(nodes:
+  wrinkle: {type: tension}
+  fix: {type: blendShape, targets: [open], 'weight[open]': 1}
+connections: ["wrinkle.compress[0] -> fix.pointWeights[0]"]
+deform: [{meshes: [tube], stack: [gltf, wrinkle, fix]}]
+controls: {tip.scaleY: {min: 0, max: 2}}
+)"));
+  ASSERT_TRUE(player.ok());
+  for (double scale : {1.0, 0.25, 1.5}) {
+    player.Set("tip.scaleY", scale);
+    const std::vector<Double3> before = player.Points("skin"), after = player.Points("fix");
+    for (Index v = 0; v < kRings * kSides; ++v) {
+      const Double3 moved = after[player.PointOf(v)] - before[player.PointOf(v)];
+      const bool corrected = v >= 7 * kSides && scale < 1, still = v < 6 * kSides || scale >= 1;
+      EXPECT_NEAR(moved.y, corrected ? 0.036 : 0, corrected ? 0.006 : still ? 0 : 0.05) << v << " " << scale;
+    }
+  }
+}
+
 TEST_F(RigDeformers, SkinsBlendByAWeightMap) {
   folder.Write("w.json", R"({"kpsa": "weights", "version": 1, "mesh": "tube", "points": 72,
  "maps": {"dq": {"default": 0, "indices": [32], "values": [1]}, "bad": {"default": 2, "indices": [], "values": []}}})");

@@ -84,6 +84,17 @@ TEST_F(BlendShapeNode, DisplacementsTurnWithTheParent) {
   ExpectPoints(g.pull_points("b.outPoints[0]"), {2, 0, 0, 5, 5, 5});
 }
 
+TEST_F(BlendShapeNode, PointsTakeWeightsThatVary) {
+  auto shares = std::make_shared<PointBuffer>(2, 1);
+  shares->view().x[0] = 0.25f, shares->view().x[1] = 0.5f;
+  g.hold("b.pointWeights[0]", Value(PointBufferPtr(shares)));
+  g.hold("b.weight[0]", 2.0);
+  g.hold("b.weight[2]", 1.0);
+  ExpectPoints(g.pull_points("b.outPoints[0]"), {0.5, 0, 0, 5, 5, 5.5});
+  g.hold("b.pointWeights[0]", Value(PointBufferPtr(std::make_shared<PointBuffer>(3, 1))));
+  EXPECT_FALSE(g.try_pull("b.outPoints[0]").ok());
+}
+
 TEST_F(BlendShapeNode, PointsByThemselvesHaveTheBitsOfAll) {
   Inbetweens({0}, {1}, {0.5});
   g.add("transform", "t", {{"rotate", Double3{0.1, 0.2, 0.3}}});
