@@ -12,6 +12,7 @@
 #include "base/simd.h"
 #include "nodes/kernels/blend_shape.h"
 #include "nodes/kernels/delta_mush.h"
+#include "nodes/kernels/dual_quaternion.h"
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/normals.h"
 #include "nodes/kernels/skin.h"
@@ -45,6 +46,29 @@ struct Affine {
   Float3 operator*(Float3 p) const {
     return {m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
             m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]};
+  }
+};
+
+// A rigid motion as a dual quaternion: rotation x y z w, dual part x y z w.
+struct Motion {
+  float m[8] = {};
+  Motion() = default;
+  explicit Motion(const Matrix4& matrix) {
+    const Quaternion q = QuaternionFromRotation(matrix);
+    const Quaternion d = Quaternion{0.5 * matrix(0, 3), 0.5 * matrix(1, 3), 0.5 * matrix(2, 3), 0} * q;
+    const double parts[8] = {q.x, q.y, q.z, q.w, d.x, d.y, d.z, d.w};
+    for (std::size_t i = 0; i < 8; ++i) m[i] = static_cast<float>(parts[i]);
+  }
+  void Add(const Motion& other, float weight) {
+    float cosine = 0;
+    for (std::size_t i = 0; i < 4; ++i) cosine += m[i] * other.m[i];
+    for (std::size_t i = 0; i < 8; ++i) m[i] += (cosine < 0 ? -weight : weight) * other.m[i];
+  }
+  Float3 operator*(Float3 p) const {
+    const float scale = 1 / std::sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2] + m[3] * m[3]);
+    const Float3 v = Float3{m[0], m[1], m[2]} * scale, d = Float3{m[4], m[5], m[6]} * scale;
+    const Float3 turned = Cross(v, Cross(v, p) + p * (m[3] * scale));
+    return p + (turned + d * (m[3] * scale) - v * (m[7] * scale) + Cross(v, d)) * 2.0f;
   }
 };
 
@@ -124,6 +148,32 @@ int Main(int argc, char** argv) {
               sum = sum + (joints[skin.joints[e]] * points[i]) * skin.weights[e];
             }
             result[i] = sum;
+          }
+        });
+  }
+  for (int influences : {4, 8}) {
+    const TestSkin skin = MakeSkin(n, 64, influences, false);
+    const DualQuaternionKernel kernel({skin.offsets, skin.joints, skin.weights, 64}, all);
+    std::vector<Matrix4> palette = MakePalette(64, {});
+    for (Matrix4& m : palette) {
+      Double3 place, scale;
+      Quaternion rotation;
+      DecomposeTrs(m, &place, &rotation, &scale);
+      m = ComposeTrs(place, rotation, {1, 1, 1});
+    }
+    const std::vector<Double3> centers(64);
+    Report(
+        fmt::format("dual quaternions, {} influences", influences).c_str(), n,
+        [&] {
+          kernel.Run({palette, centers, 1, {}, {}}, in, out.view(), scratch.span());
+        },
+        [&] {
+          std::vector<Motion> joints(palette.begin(), palette.end());
+          for (std::size_t i = 0; i < n; ++i) {
+            Motion sum;
+            for (Index e = skin.offsets[i]; e < skin.offsets[i + 1]; ++e)
+              sum.Add(joints[skin.joints[e]], skin.weights[e]);
+            result[i] = sum * points[i];
           }
         });
   }
