@@ -32,6 +32,12 @@ bool RigBuild::TakeOwnSpecial(const RigOverride& override_) {
         fresh.geometries.push_back({mesh.name, m, mesh.mesh().point_count()});
         made = own_made_.insert(own_made_.end(), std::move(fresh));
       }
+      if (const auto earlier = made->special.find(key); earlier != made->special.end()) {
+        Fail(override_.plug.where,
+             Status::Invalid("{}.{} is overridden twice: here and at {}", made->from->name, key,
+                             earlier->second->key.where().ToString()));
+        return true;
+      }
       own_attributes_.push_back(SpecialOf(key, override_));
       made->special[key] = &own_attributes_.back();
       return true;
@@ -140,8 +146,7 @@ void RigBuild::AddCombination(const Made& made, const YamlNode& key, const YamlN
 void RigBuild::AddInbetweens(const Made& made, const YamlNode& value) {
   std::vector<std::int64_t> targets, shapes;
   std::vector<double> weights;
-  const auto shape = [](const YamlNode& node) { return node.is_map() && !node.keys.empty(); };
-  if (!shape(value)) {
+  if (!value.is_map()) {
     errors_->Add(value, "inbetweens: expected {{TARGET: {{0.5: OTHER_TARGET}}}}");
     return;
   }
@@ -150,7 +155,7 @@ void RigBuild::AddInbetweens(const Made& made, const YamlNode& value) {
     const YamlNode &key = value.keys[i], &stops = value.items[i];
     PlugRef target;
     good = FindTarget(made, key, key.scalar, &target) && good;
-    if (!shape(stops)) {
+    if (!stops.is_map()) {
       good = errors_->Add(stops, "inbetweens: expected {{0.5: TARGET}} for \"{}\"", key.scalar);
       continue;
     }

@@ -303,6 +303,7 @@ overrides:
     open: {targets: [smileOpen]}
     smileOpen: {targets: [smile]}
   tube_blendShape.inbetweens: {smile: {0.5: open, 50%: smile_half}}
+  tube.inbetweens: {}
 )");
   EXPECT_TRUE(Has(text, "t.yaml:4:3: blendShape \"a\": the key \"targets\" is missing")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:5:35: targets: \"smlie\" is no target of tube (did you mean \"smile\"?)"))
@@ -320,6 +321,10 @@ overrides:
   EXPECT_TRUE(Has(text, "combination \"both\": the key \"targets\" is missing")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:23:5: ") && Has(text, "would make a cycle: ")) << text;
   EXPECT_TRUE(Has(text, "\"smile\" has two in-betweens at 0.5")) << text;
+  EXPECT_TRUE(
+      Has(text, "t.yaml:25:3: tube_blendShape.inbetweens is overridden twice: here and at t.yaml:24:3"))
+      << text;
+  EXPECT_EQ(Errors("overrides: {tube.inbetweens: {}, tube.combinations: {}}\n"), "no error");
 }
 
 TEST_F(RigDeformers, ExplainsBadWiresAndStacks) {
