@@ -33,6 +33,8 @@ void PolarTwin(const Matrix4& m, Matrix4* rotation, Matrix4* stretch) {
 
 std::vector<Double3> DualTwin(const TestSkin& skin, const std::vector<Matrix4>& palette,
                               const std::vector<Double3>& centers, const std::vector<Double3>& points) {
+  std::vector<Matrix4> rotations(palette.size()), stretches(palette.size());
+  for (std::size_t j = 0; j < palette.size(); ++j) PolarTwin(palette[j], &rotations[j], &stretches[j]);
   std::vector<Double3> result;
   for (std::size_t p = 0; p < points.size(); ++p) {
     Index pivot = skin.offsets[p];
@@ -47,8 +49,7 @@ std::vector<Double3> DualTwin(const TestSkin& skin, const std::vector<Matrix4>& 
       for (Index e = skin.offsets[p]; e < skin.offsets[p + 1]; ++e) {
         const Matrix4& m = palette[skin.joints[e]];
         const Double3 c = centers[skin.joints[e]];
-        Matrix4 rotation, stretch;
-        PolarTwin(m, &rotation, &stretch);
+        const Matrix4 &rotation = rotations[skin.joints[e]], &stretch = stretches[skin.joints[e]];
         const Quaternion q = QuaternionFromRotation(rotation);
         if (pass == 0) {
           if (e == pivot) first = q;
