@@ -84,7 +84,9 @@ class ClipWriter {
 
   void AddTransform(Index gltf_node, const std::shared_ptr<const AnimationKeys>& keys) {
     const NodeId transform = scene_->transforms[gltf_node];
-    const PlugRef offset = edit_.Plug(transform, "offsetParentMatrix");
+    const auto input = scene_->clip_inputs.find(transform.index);
+    const PlugRef offset =
+        input != scene_->clip_inputs.end() ? input->second : edit_.Plug(transform, "offsetParentMatrix");
     if (!edit_.ok() || IsDriven(offset)) return;
     const NodeId node = AddNode("clipTransform", graph_->name(transform) + "_clip", keys);
     if (edit_.ok()) edit_.Connect(edit_.Plug(node, "matrix"), offset);

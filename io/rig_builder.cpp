@@ -75,6 +75,7 @@ void RigBuild::Run() {
   ConnectCurves();
   BuildStacks();
   MakeConnections();
+  AddConstraints();
   PlaceStagesAtHandles();
   ConnectPivots();
   FinishOverrides();
