@@ -1,6 +1,7 @@
 // Constraints and IK from rig files, on an arm with a joint in each bone.
 #include "base/scalar_math.h"
 #include "tests/io/rig_player.h"
+#include "tests/support/shared_files.h"
 
 namespace kpsa {
 namespace {
@@ -337,6 +338,37 @@ TEST_F(RigConstraints, CyclesAreErrorsAtTheConstraint) {
       "  b: {type: pointConstraint, constrained: wrist.L, targets: [head]}\n");
   EXPECT_TRUE(Has(pair, "t.yaml:5:")) << pair;
   EXPECT_TRUE(Has(pair, "would make a cycle: ")) << pair;
+}
+
+TEST_F(RigConstraints, AHumansArmReachesOverItsClip) {
+  const std::string human = SharedFile("assets/human.glb");
+  if (human.empty()) GTEST_SKIP() << "no assets beside the checkout";
+  const std::string character = "kpsa: 1\ncharacter: " + human + "\n";
+  const std::string nodes =
+      "nodes:\n"
+      "  hand: {type: transform, at: wrist.L}\n"
+      "  ik: {type: ikHandle, start: upperarm01.L, mid: lowerarm01.L, end: wrist.L, target: "
+      "hand.worldMatrix}\n"
+      "  turn: {type: orientConstraint, constrained: wrist.L, targets: [hand], maintainOffset: on}\n"
+      "  roll: {type: twistDistribution, start: lowerarm01.L, end: hand, constrained: [lowerarm02.L]}\n"
+      "controls:\n"
+      "  hand.translateX: {min: -1, max: 1}\n"
+      "  hand.rotateY: {min: -90, max: 90}\n";
+  const auto play = [&](const std::string& text, bool rest) {
+    RigOptions options;
+    options.rest = rest;
+    if (!rest) options.clip = "body_move";
+    return RigPlayer(folder.Write("h.yaml", character + text), options);
+  };
+  RigPlayer plain = play("", true), rest = play(nodes, true), moving = play(nodes, false);
+  ASSERT_TRUE(rest.ok() && moving.ok());
+  EXPECT_EQ(rest.Points(), plain.Points());
+  moving.Set("hand.translateX", -0.1);
+  moving.Set("hand.rotateY", 0.5);
+  for (const double time : {0.0, 1.3, 4.0}) {
+    moving.Set("time.time", time);
+    EXPECT_LT(Between(moving.World("wrist.L"), moving.World("hand")), 1e-9) << time;
+  }
 }
 
 }  // namespace

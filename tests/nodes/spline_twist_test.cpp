@@ -98,6 +98,18 @@ TEST(SplineChain, WithoutLengthIsHarmless) {
   }
 }
 
+TEST(SplineChain, MovesWithTheWorld) {
+  RandomFrames random(55);
+  const Chain chain = RandomChain(&random, 5);
+  const Matrix4 world = random.Rigid(3);
+  Chain moved = chain;
+  moved.parent = world * chain.parent;
+  std::vector<Double3> vertices = kBow;
+  for (Double3& v : vertices) v = TransformPoint(world, v);
+  const Chain before = Solved(chain, kBow, 0.3, -0.4), after = Solved(moved, vertices, 0.3, -0.4);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_LT(Apart(after.in[i], before.in[i]), 1e-10) << i;
+}
+
 class SplineNode {
  public:
   SplineNode(const Chain& rest, bool maintain) : g(StandardNodes()) {
@@ -109,8 +121,7 @@ class SplineNode {
     g.connect("c.displacements", "n.displacements");
     for (std::size_t i = 0; i < rest.in.size(); ++i)
       g.hold("n.inMatrix[" + std::to_string(i) + "]", rest.in[i]);
-    for (const char* plug : {"n.parentMatrix", "n.blend", "c.parentMatrix", "n.endTwist"}) g.vary(plug);
-    for (int i = 0; i < 4; ++i) g.vary("c.cv[" + std::to_string(i) + "]");
+    for (const char* plug : {"n.parentMatrix", "n.blend", "c.cv", "n.endTwist"}) g.vary(plug);
     for (std::size_t i = 0; i < rest.in.size(); ++i) g.want("n.outMatrix[" + std::to_string(i) + "]");
   }
   std::vector<Matrix4> Out(std::size_t joints) {
@@ -118,6 +129,12 @@ class SplineNode {
     for (std::size_t i = 0; i < joints; ++i)
       out.push_back(g.pull<Matrix4>("n.outMatrix[" + std::to_string(i) + "]"));
     return out;
+  }
+  // Offsets of the curve's vertices.
+  void Move(const std::vector<float>& xyz) {
+    ASSERT_TRUE(g.compile().ok());
+    const PointBuffer points = PointBuffer::FromInterleaved(xyz);
+    g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("c.cv")), points.view());
   }
   TestGraph g;
 };
@@ -127,6 +144,11 @@ TEST(SplineIk, FollowsTheCurveThatMoves) {
   const Chain rest = RandomChain(&random, 3);
   SplineNode node(rest, false);
   EXPECT_EQ(node.Out(3), Solved(rest, kBow).in);
+  node.Move({0, 0.5f, 0, 0, 0, 0, 0.25f, 0, 0, 0, 0, -1});
+  std::vector<Double3> moved = kBow;
+  moved[0].y += 0.5, moved[2].x += 0.25, moved[3].z -= 1;
+  EXPECT_EQ(node.Out(3), Solved(rest, moved).in);
+  node.Move(std::vector<float>(12, 0.0f));
   node.g.set("n.blend", 0.0);
   EXPECT_EQ(node.Out(3), rest.in);
   node.g.set("n.blend", 0.5);
@@ -143,6 +165,14 @@ TEST(SplineIk, MaintainsTheRestBitForBitAndBendsFromThere) {
   node.g.set("n.endTwist", 1e-9);
   const std::vector<Matrix4> near = node.Out(4);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_LT(Apart(near[i], rest.in[i]), 1e-8);
+  // All of the curve moves: so does the chain, as a whole
+  node.g.set("n.endTwist", 0.0);
+  node.Move({0, 0.5f, 0, 0, 0.5f, 0, 0, 0.5f, 0, 0, 0.5f, 0});
+  Chain lifted = rest;
+  lifted.in = node.Out(4);
+  const std::vector<Double3> before = rest.Places(), after = lifted.Places();
+  for (std::size_t j = 0; j < after.size(); ++j)
+    EXPECT_LT(Apart(after[j], before[j] + Double3{0, 0.5, 0}), 1e-9);
 }
 
 TEST(SplineIk, SaysWhatIsMissing) {
