@@ -162,6 +162,9 @@ bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& 
   const NodeDef& def = graph.def(plug.node);
   if (plug.attribute == def.FindAttribute("offsetParentMatrix"))
     return scene.clip_transforms.count(plug.node.index) != 0;
+  for (const auto& [transform, input] : scene.clip_inputs) {
+    if (input == plug) return scene.clip_transforms.count(transform) != 0;
+  }
   return plug.attribute == def.FindAttribute("weight") && scene.clip_weights.count(plug.node.index) != 0;
 }
 

@@ -212,6 +212,17 @@ TEST_F(RigConstraints, WhatTheRigWritesGoesBelowTheConstraint) {
   }
 }
 
+TEST_F(RigConstraints, WhatIsSetBelowAConstraintStaysThroughClips) {
+  Rig rig = Loaded(kHand);
+  const Result<Setting> setting = ParseSetting(rig, "ik.inMidMatrix=[1,0,0,0, 0,1,0,0, 0,0,1,0, 5,0,0,1]");
+  ASSERT_TRUE(setting.ok()) << setting.status().ToString();
+  ASSERT_TRUE(ApplySetting(&rig, *setting).ok());
+  ASSERT_TRUE(SetClip(&rig, "wave").ok());
+  EXPECT_EQ(Driver(rig, "ik.inMidMatrix"), "");
+  EXPECT_EQ(Held(rig, "ik.inMidMatrix").get<Matrix4>(), Translation({5, 0, 0}));
+  EXPECT_EQ(Driver(rig, "ik.inStartMatrix"), "upperarm01.L_clip.matrix");
+}
+
 TEST_F(RigConstraints, ControlsStayOnTopOfAConstraint) {
   RigPlayer player = Play(
       "nodes:\n"
