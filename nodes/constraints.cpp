@@ -38,7 +38,7 @@ Result<ConstraintKernel<Offset>> BindOffsets(const Structural& s, Offset none, c
 }
 
 template <typename Kernel>
-Result<BoundKernel> Bound(Result<Kernel> kernel) {
+Result<BoundKernel> MakeBoundOr(Result<Kernel> kernel) {
   if (!kernel.ok()) return kernel.status();
   return MakeBound(std::move(*kernel), 0);
 }
@@ -68,12 +68,12 @@ void ComputeConstraint(ComputeContext& c) {
 using PointKernel = ConstraintKernel<Double3>;
 
 Result<BoundKernel> BindPoint(const Binding& binding) {
-  return Bound(BindOffsets(binding.structural(), Double3(),
-                           [](const Matrix4& target, const ConstraintRest& rest, Double3* offset) {
-                             *offset =
-                                 PlaceOf(rest.in()) - TransformPoint(rest.parent_inverse(), PlaceOf(target));
-                             return true;
-                           }));
+  return MakeBoundOr(BindOffsets(binding.structural(), Double3(),
+                                 [](const Matrix4& target, const ConstraintRest& rest, Double3* offset) {
+                                   *offset = PlaceOf(rest.in()) -
+                                             TransformPoint(rest.parent_inverse(), PlaceOf(target));
+                                   return true;
+                                 }));
 }
 
 void ConstrainPoint(const PointKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
@@ -99,7 +99,7 @@ Result<BoundKernel> BindOrient(const Binding& binding) {
                     return true;
                   });
   if (kernel.ok()) kernel->mode = InterpType(binding.structural());
-  return Bound(std::move(kernel));
+  return MakeBoundOr(std::move(kernel));
 }
 
 void ConstrainOrient(const OrientKernel& k, const ComputeContext& c, const Matrix4& parent_inverse, double,
@@ -126,7 +126,7 @@ Result<BoundKernel> BindParent(const Binding& binding) {
                     return true;
                   });
   if (kernel.ok()) kernel->mode = InterpType(binding.structural());
-  return Bound(std::move(kernel));
+  return MakeBoundOr(std::move(kernel));
 }
 
 void ConstrainParent(const ParentKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
@@ -150,14 +150,14 @@ void ConstrainParent(const ParentKernel& k, const ComputeContext& c, const Matri
 using ScaleKernel = ConstraintKernel<Double3>;
 
 Result<BoundKernel> BindScale(const Binding& binding) {
-  return Bound(BindOffsets(binding.structural(), Double3{1, 1, 1},
-                           [](const Matrix4& target, const ConstraintRest& rest, Double3* offset) {
-                             const Double3 own = TakeApart(rest.in()).scale,
-                                           of = TakeApart(rest.parent_inverse() * target).scale;
-                             if (of.x == 0 || of.y == 0 || of.z == 0) return false;
-                             *offset = {own.x / of.x, own.y / of.y, own.z / of.z};
-                             return true;
-                           }));
+  return MakeBoundOr(BindOffsets(binding.structural(), Double3{1, 1, 1},
+                                 [](const Matrix4& target, const ConstraintRest& rest, Double3* offset) {
+                                   const Double3 own = TakeApart(rest.in()).scale,
+                                                 of = TakeApart(rest.parent_inverse() * target).scale;
+                                   if (of.x == 0 || of.y == 0 || of.z == 0) return false;
+                                   *offset = {own.x / of.x, own.y / of.y, own.z / of.z};
+                                   return true;
+                                 }));
 }
 
 void ConstrainScale(const ScaleKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
@@ -175,12 +175,12 @@ void ConstrainScale(const ScaleKernel& k, const ComputeContext& c, const Matrix4
 
 // aim
 enum AimInput { kWorldUpVector = kFirstConstraintInput, kWorldUpMatrix };
-enum WorldUp { kScene, kObject, kObjectRotation, kVector, kNoUp };
+enum WorldUp { kUpScene, kUpObject, kUpObjectRotation, kUpVector, kUpNone };
 
 struct AimKernel {
   ConstraintRest rest;
   Double3 aim, up;
-  int world_up = kVector;
+  int world_up = kUpVector;
   Double3 target_rest, up_vector_rest;
   Matrix4 up_matrix_rest;
   Quaternion offset;
@@ -208,11 +208,11 @@ Quaternion AimLocal(const AimKernel& k, const Matrix4& parent, const MatrixParts
   Double3 direction, aim;
   if (!Direction(target - place, 0, &direction)) return in.rotation;
   Double3 up = up_vector;
-  if (k.world_up == kScene) up = {0, 1, 0};
-  if (k.world_up == kObject) up = PlaceOf(up_matrix) - place;
-  if (k.world_up == kObjectRotation) up = Rotate(TakeApart(up_matrix).rotation, up_vector);
+  if (k.world_up == kUpScene) up = {0, 1, 0};
+  if (k.world_up == kUpObject) up = PlaceOf(up_matrix) - place;
+  if (k.world_up == kUpObjectRotation) up = Rotate(TakeApart(up_matrix).rotation, up_vector);
   Quaternion turn;
-  if (k.world_up == kNoUp || !AimRotation(k.aim, k.up, direction, up, &turn)) {
+  if (k.world_up == kUpNone || !AimRotation(k.aim, k.up, direction, up, &turn)) {
     if (!Direction(Rotate(world, k.aim), 0, &aim)) return in.rotation;
     turn = ShortestArc(aim, direction, Rotate(world, k.up)) * world;
   }
@@ -233,7 +233,7 @@ Result<BoundKernel> BindAim(const Binding& binding) {
               {}};
   Double3 unit;
   if (!Direction(k.aim, 0, &unit)) return Status::Invalid("aimVector has no direction");
-  if (k.world_up != kNoUp && !Direction(Cross(unit, k.up), 1e-12 * Length(k.up), &unit))
+  if (k.world_up != kUpNone && !Direction(Cross(unit, k.up), 1e-12 * Length(k.up), &unit))
     return Status::Invalid("upVector is parallel to aimVector, or has no direction");
   Result<Matrix4> up_matrix = RestMatrix(s, "worldUpMatrix");
   if (!up_matrix.ok()) return up_matrix.status();
@@ -322,7 +322,7 @@ void AddConstraintNodes(NodeRegistry& registry) {
       .enumeration("worldUpType", {"scene", "object", "objectrotation", "vector", "none"}, true,
                    "what is up: world y, the place of an object, its axes, worldUpVector, or nothing (the "
                    "smallest turn from inMatrix)",
-                   kVector)
+                   kUpVector)
       .out("outMatrix", Type::kMatrix, kOutDoc)
       .compute(&ComputeAim)
       .bind(BindAim)

@@ -11,7 +11,7 @@ namespace kpsa {
 namespace {
 
 // Inputs of ikHandle in the group.
-enum IkInput { kTarget, kPole, kTwist, kIkBlend, kInStart, kInMid, kIkParent, kBetween, kBelow };
+enum IkInput { kIkTarget, kIkPole, kIkTwist, kIkBlend, kIkStart, kIkMid, kIkParent, kIkBetween, kIkBelow };
 
 struct IkKernel {
   TwoBoneRest rest;
@@ -46,7 +46,7 @@ Result<Matrix4> RestProduct(const Structural& s, std::string_view name) {
   return product;
 }
 
-Matrix4 Product(ArrayView<Matrix4> matrices) {
+Matrix4 ProductOf(ArrayView<Matrix4> matrices) {
   Matrix4 product;
   for (std::uint32_t i = 0; i < matrices.size(); ++i) product = product * matrices[i];
   return product;
@@ -87,18 +87,18 @@ Matrix4 TurnLocal(const Matrix4& local, const Matrix4& parent, Quaternion turn) 
 
 void ComputeIk(ComputeContext& c) {
   const auto& k = c.kernel_as<IkKernel>();
-  const Matrix4 &start = c.get<Matrix4>(kInStart), &mid = c.get<Matrix4>(kInMid),
+  const Matrix4 &start = c.get<Matrix4>(kIkStart), &mid = c.get<Matrix4>(kIkMid),
                 &parent = c.get<Matrix4>(kIkParent);
   const double blend = c.get<double>(kIkBlend);
   c.out_value<Matrix4>(0) = start;
   c.out_value<Matrix4>(1) = mid;
   if (blend == 0) return;
-  const Arm arm =
-      ArmOf(parent, start, Product(c.array<Matrix4>(kBetween)), mid, Product(c.array<Matrix4>(kBelow)));
+  const Arm arm = ArmOf(parent, start, ProductOf(c.array<Matrix4>(kIkBetween)), mid,
+                        ProductOf(c.array<Matrix4>(kIkBelow)));
   TwoBoneGoal goal;
-  goal.place = TransformPoint(c.get<Matrix4>(kTarget), k.end_from_target);
-  if (k.has_pole) goal.pole = PlaceOf(c.get<Matrix4>(kPole));
-  goal.twist = c.get<double>(kTwist);
+  goal.place = TransformPoint(c.get<Matrix4>(kIkTarget), k.end_from_target);
+  if (k.has_pole) goal.pole = PlaceOf(c.get<Matrix4>(kIkPole));
+  goal.twist = c.get<double>(kIkTwist);
   const TwoBoneTurns turns = SolveTwoBones(arm.pose, k.rest, goal);
   c.out_value<Matrix4>(0) = BlendMatrices(start, TurnLocal(start, parent, turns.start), blend);
   c.out_value<Matrix4>(1) = BlendMatrices(mid, TurnLocal(mid, arm.above_mid, turns.mid), blend);

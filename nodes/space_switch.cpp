@@ -11,7 +11,7 @@
 namespace kpsa {
 namespace {
 
-enum SpaceInput { kSpaces, kSpace, kSpaceIn, kSpaceParent, kSpaceBlend };
+enum SpaceInput { kSpaceTargets, kSpaceNumber, kSpaceIn, kSpaceParent, kSpaceBlend };
 
 struct SpaceKernel {
   bool maintain = false;
@@ -42,11 +42,11 @@ Result<BoundKernel> BindSpaceSwitch(const Binding& binding) {
 
 void ComputeSpaceSwitch(ComputeContext& c) {
   const auto& k = c.kernel_as<SpaceKernel>();
-  const ArrayView<Matrix4> spaces = c.array<Matrix4>(kSpaces);
+  const ArrayView<Matrix4> spaces = c.array<Matrix4>(kSpaceTargets);
   const Matrix4 &in = c.get<Matrix4>(kSpaceIn), &parent = c.get<Matrix4>(kSpaceParent);
   const double blend = c.get<double>(kSpaceBlend);
   c.out_value<Matrix4>(0) = in;
-  const double last = static_cast<double>(spaces.size()) - 1, wanted = c.get<double>(kSpace);
+  const double last = static_cast<double>(spaces.size()) - 1, wanted = c.get<double>(kSpaceNumber);
   if (blend == 0 || spaces.size() == 0 || !(wanted == wanted)) return;
   const double at = std::min(std::max(wanted, 0.0), last), whole = std::floor(at);
   const auto local = [&](std::uint32_t i) {

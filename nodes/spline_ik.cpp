@@ -12,7 +12,15 @@
 namespace kpsa {
 namespace {
 
-enum SplineInput { kDisplacements, kInMatrices, kTip, kSplineParent, kStartTwist, kEndTwist, kSplineBlend };
+enum SplineInput {
+  kSplineOffsets,
+  kSplineJoints,
+  kSplineTip,
+  kSplineParent,
+  kSplineStartTwist,
+  kSplineEndTwist,
+  kSplineBlend
+};
 
 struct SplineKernel {
   CurveShape shape;
@@ -92,17 +100,17 @@ Result<BoundKernel> BindSpline(const Binding& binding) {
 
 void ComputeSpline(ComputeContext& c) {
   const auto& k = c.kernel_as<SplineKernel>();
-  const ConstPointsView& displacements = c.points(kDisplacements);
-  const ArrayView<Matrix4> in = c.array<Matrix4>(kInMatrices);
-  const Matrix4 &parent = c.get<Matrix4>(kSplineParent), &tip = c.get<Matrix4>(kTip);
+  const ConstPointsView& displacements = c.points(kSplineOffsets);
+  const ArrayView<Matrix4> in = c.array<Matrix4>(kSplineJoints);
+  const Matrix4 &parent = c.get<Matrix4>(kSplineParent), &tip = c.get<Matrix4>(kSplineTip);
   const double blend = c.get<double>(kSplineBlend);
   const std::size_t joints = k.in_rest.size();
   auto* solved = reinterpret_cast<Matrix4*>(c.scratch);
   Matrix4* below = solved + joints;
   auto* vertices = reinterpret_cast<Double3*>(below + joints);
   bool at_rest = k.maintain && parent == k.parent_rest && tip == k.tip_rest &&
-                 c.get<double>(kStartTwist) == k.start_twist_rest &&
-                 c.get<double>(kEndTwist) == k.end_twist_rest &&
+                 c.get<double>(kSplineStartTwist) == k.start_twist_rest &&
+                 c.get<double>(kSplineEndTwist) == k.end_twist_rest &&
                  SamePoints(displacements, k.displacements_rest->view());
   for (std::uint32_t i = 0; i < joints; ++i) {
     below[i] = in[i];
@@ -116,8 +124,8 @@ void ComputeSpline(ComputeContext& c) {
                       tip,
                       k.shape,
                       {vertices, k.vertices.size()},
-                      c.get<double>(kStartTwist),
-                      c.get<double>(kEndTwist)},
+                      c.get<double>(kSplineStartTwist),
+                      c.get<double>(kSplineEndTwist)},
                      {solved, joints});
   }
   const std::uint32_t* table = c.out + c.out[0];

@@ -11,7 +11,7 @@
 namespace kpsa {
 namespace {
 
-enum TwistInput { kStart, kEnd, kJoints, kWeights, kTwistBlend };
+enum TwistInput { kTwistStart, kTwistEnd, kTwistJoints, kTwistWeights, kTwistBlend };
 
 struct TwistKernel {
   Quaternion rest;                // of the end against the start
@@ -53,14 +53,14 @@ Result<BoundKernel> BindTwist(const Binding& binding) {
 
 void ComputeTwist(ComputeContext& c) {
   const auto& k = c.kernel_as<TwistKernel>();
-  const Quaternion now =
-      Conjugate(TakeApart(c.get<Matrix4>(kStart)).rotation) * TakeApart(c.get<Matrix4>(kEnd)).rotation;
+  const Quaternion now = Conjugate(TakeApart(c.get<Matrix4>(kTwistStart)).rotation) *
+                         TakeApart(c.get<Matrix4>(kTwistEnd)).rotation;
   // Against rest in the start's axes: now = twisted . rest
   const Quaternion against = Normalized(now * Conjugate(k.rest));
   const double twist =
       TwistAngle(DecomposeSwingTwist(against, k.axis).twist, k.axis) * c.get<double>(kTwistBlend);
-  const ArrayView<Matrix4> joints = c.array<Matrix4>(kJoints);
-  const ArrayView<double> weights = c.array<double>(kWeights);
+  const ArrayView<Matrix4> joints = c.array<Matrix4>(kTwistJoints);
+  const ArrayView<double> weights = c.array<double>(kTwistWeights);
   const auto share = [&](std::uint32_t i) {
     return i < weights.size() ? weights[i] : (i + 1.0) / (joints.size() + 1.0);
   };

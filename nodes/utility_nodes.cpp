@@ -10,7 +10,7 @@ namespace kpsa {
 namespace {
 
 // The maximum wins where the limits are crossed.
-Double3 Clamp(Double3 v, Double3 low, Double3 high) {
+Double3 ClampEach(Double3 v, Double3 low, Double3 high) {
   for (int i = 0; i < 3; ++i) v[i] = std::min(std::max(v[i], low[i]), high[i]);
   return v;
 }
@@ -24,23 +24,23 @@ Double3 SetRange(Double3 value, Double3 low, Double3 high, Double3 old_low, Doub
   return value;
 }
 
-Double3 Unit(Double3 v) {
+Double3 UnitLength(Double3 v) {
   Double3 unit;
   return Direction(v, 0, &unit) ? unit : Double3();
 }
 
-enum Product { kNoOperation, kDot, kCross, kVectorMatrix, kPointMatrix };
+enum VectorOperation { kNoProduct, kDotProduct, kCrossProduct, kVectorMatrixProduct, kPointMatrixProduct };
 
 Double3 VectorProduct(Double3 a, Double3 b, const Matrix4& matrix, std::int64_t operation, bool normalize) {
   Double3 out = a;
-  if (operation == kDot) {
-    const double dot = normalize ? Dot(Unit(a), Unit(b)) : Dot(a, b);
+  if (operation == kDotProduct) {
+    const double dot = normalize ? Dot(UnitLength(a), UnitLength(b)) : Dot(a, b);
     return {dot, dot, dot};
   }
-  if (operation == kCross) out = Cross(a, b);
-  if (operation == kVectorMatrix) out = TransformVector(matrix, a);
-  if (operation == kPointMatrix) out = TransformPoint(matrix, a);
-  return normalize ? Unit(out) : out;
+  if (operation == kCrossProduct) out = Cross(a, b);
+  if (operation == kVectorMatrixProduct) out = TransformVector(matrix, a);
+  if (operation == kPointMatrixProduct) out = TransformPoint(matrix, a);
+  return normalize ? UnitLength(out) : out;
 }
 
 // The smallest turn from one vector to the other; none where one of them is zero.
@@ -65,7 +65,7 @@ void AddUtilityNodes(NodeRegistry& registry) {
       .in("min", Double3())
       .in("max", ones, {.doc = "wins where it is below the minimum"})
       .out("output", Type::kDouble3)
-      .compute([](Double3 input, Double3 low, Double3 high) { return Clamp(input, low, high); });
+      .compute([](Double3 input, Double3 low, Double3 high) { return ClampEach(input, low, high); });
   registry.add("setRange", "Maps each component from an old range to a new one, clamped to it.")
       .in("value", Double3())
       .in("min", Double3())
@@ -107,7 +107,8 @@ void AddUtilityNodes(NodeRegistry& registry) {
       .in("matrix", Matrix4())
       .enumeration("operation",
                    {"noOperation", "dotProduct", "crossProduct", "vectorMatrixProduct", "pointMatrixProduct"},
-                   false, "a dot product is in every component; products with the matrix are of input1", kDot)
+                   false, "a dot product is in every component; products with the matrix are of input1",
+                   kDotProduct)
       .in("normalizeOutput", false, {.doc = "unit length; for dot products the cosine of the angle"})
       .out("output", Type::kDouble3)
       .compute([](Double3 a, Double3 b, const Matrix4& matrix, std::int64_t operation, bool normalize) {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kSamplesPerSpan = 16;  // chords leave the curve between two of them
 
-Double3 PlaceOf(const Matrix4& m) { return {m(0, 3), m(1, 3), m(2, 3)}; }
+Double3 JointPlace(const Matrix4& m) { return {m(0, 3), m(1, 3), m(2, 3)}; }
 
 // Walks along the curve in chords.
 class CurveWalk {
@@ -75,8 +75,8 @@ void SolveSplineChain(const SplineChainPose& pose, std::span<Matrix4> out) {
       local(0, 3) = start.x, local(1, 3) = start.y, local(2, 3) = start.z;
     }
     Matrix4 world = above * local;
-    const Double3 place = PlaceOf(world);
-    const Double3 bone = TransformVector(world, PlaceOf(i + 1 < joints ? pose.in[i + 1] : pose.tip));
+    const Double3 place = JointPlace(world);
+    const Double3 bone = TransformVector(world, JointPlace(i + 1 < joints ? pose.in[i + 1] : pose.tip));
     walk.Step(Length(bone));
     Double3 from, to;
     Quaternion turn;

@@ -114,10 +114,10 @@ class SplineNode {
  public:
   SplineNode(const Chain& rest, bool maintain) : g(StandardNodes()) {
     g.add("curve", "c");
-    g.hold("c.curve", Value(std::make_shared<const Curve>(kBow, false)));
+    g.hold("c.curve", Value(std::make_shared<const class Curve>(kBow, false)));
     g.add("splineIk", "n",
           {{"maintainOffset", Value(maintain)}, {"tipMatrix", rest.tip}, {"parentMatrix", rest.parent}});
-    g.hold("n.curve", Value(std::make_shared<const Curve>(kBow, false)));
+    g.hold("n.curve", Value(std::make_shared<const class Curve>(kBow, false)));
     g.connect("c.displacements", "n.displacements");
     for (std::size_t i = 0; i < rest.in.size(); ++i)
       g.hold("n.inMatrix[" + std::to_string(i) + "]", rest.in[i]);
