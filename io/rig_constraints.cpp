@@ -161,9 +161,16 @@ void RigBuild::ConnectSplineIk(const Made& made) {
 
 // Joints hang under `start` or under one another: `parents` says how.
 void RigBuild::ConnectTwist(const Made& made) {
-  const auto ends = ReadTransforms(made, {"start", "end"});
   const auto it = made.special.find("constrained");
-  if (!ends.has_value() || it == made.special.end()) return;
+  const bool has_ends = made.special.count("start") + made.special.count("end") > 0;
+  if ((it != made.special.end()) != has_ends) {
+    Fail(made.from->where,
+         Status::Invalid("twistDistribution \"{}\": expected all of start, end, constrained",
+                         made.from->name));
+    return;
+  }
+  const auto ends = ReadTransforms(made, {"start", "end"});
+  if (!ends.has_value()) return;
   const YamlNode& list = it->second->value;
   if (!list.is_sequence()) {
     errors_->Add(list, "constrained: expected a list of transforms, found {}", list.kind_name());

@@ -316,6 +316,10 @@ TEST_F(RigConstraints, TwistJointsTakeTheirShare) {
              "[lowerarm01.L]}\n"),
       "t.yaml:4:78: \"lowerarm01.L\" hangs neither under start \"upperarm01.L\" nor under a joint that is "
       "named before it");
+  for (const char* keys : {"start: upperarm01.L, end: head", "constrained: [upperarm02.L]"}) {
+    EXPECT_EQ(Errors(std::string("nodes:\n  t: {type: twistDistribution, ") + keys + "}\n"),
+              "t.yaml:4:3: twistDistribution \"t\": expected all of start, end, constrained");
+  }
 }
 
 TEST_F(RigConstraints, ATransformIsConstrainedOnce) {
