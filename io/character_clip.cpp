@@ -84,7 +84,9 @@ class ClipWriter {
 
   void AddTransform(Index gltf_node, const std::shared_ptr<const AnimationKeys>& keys) {
     const NodeId transform = scene_->transforms[gltf_node];
-    const PlugRef offset = edit_.Plug(transform, "offsetParentMatrix");
+    const auto input = scene_->clip_inputs.find(transform.index);
+    const PlugRef offset =
+        input != scene_->clip_inputs.end() ? input->second : edit_.Plug(transform, "offsetParentMatrix");
     if (!edit_.ok() || IsDriven(offset)) return;
     const NodeId node = AddNode("clipTransform", graph_->name(transform) + "_clip", keys);
     if (edit_.ok()) edit_.Connect(edit_.Plug(node, "matrix"), offset);
@@ -160,6 +162,9 @@ bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& 
   const NodeDef& def = graph.def(plug.node);
   if (plug.attribute == def.FindAttribute("offsetParentMatrix"))
     return scene.clip_transforms.count(plug.node.index) != 0;
+  for (const auto& [transform, input] : scene.clip_inputs) {
+    if (input == plug) return scene.clip_transforms.count(transform) != 0;
+  }
   return plug.attribute == def.FindAttribute("weight") && scene.clip_weights.count(plug.node.index) != 0;
 }
 

@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <unordered_set>
 #include <vector>
 
@@ -80,6 +81,8 @@ struct CharacterGraph {
   std::vector<std::string> notes;  // what was ignored, one line each
   std::unordered_set<Index> clip_transforms,
       clip_weights;  // graph nodes that any clip moves, or whose weights
+  // Where the clip of a transform goes, if not to its offsetParentMatrix (to the constraint that owns that)
+  std::unordered_map<Index, PlugRef> clip_inputs;
 };
 
 // Adds the character to an empty graph whose registry has the standard nodes. Works without recursion at any

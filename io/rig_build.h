@@ -98,6 +98,38 @@ class RigBuild {
   std::optional<std::size_t> FindMesh(const std::string& name, const SourceLocation& where);
   std::optional<NodeId> FindTransform(const std::string& name, const SourceLocation& where);
 
+  // rig_constraints.cpp: constraints and IK
+  struct NamedTransform {
+    NodeId id;
+    std::string name;
+    SourceLocation where;  // of the key's value
+  };
+  // A joint whose local matrix below all constraints a chain (IK) reads: so the end may have one, too.
+  struct ChainJoint {
+    NodeId joint;
+    PlugRef to;
+    SourceLocation where;
+  };
+  void AddConstraints();
+  void ConnectConstraints();
+  std::optional<NamedTransform> ReadTransform(const Made& made, const char* key);
+  std::optional<std::vector<NamedTransform>> ReadTransforms(const Made& made,
+                                                            const std::vector<const char*>& keys);
+  void ConnectTargets(const Made& made);
+  void ConnectIk(const Made& made);
+  void ConnectSplineIk(const Made& made);
+  void ConnectTwist(const Made& made);
+  bool ChainBelow(NodeId top, NodeId bottom, std::vector<NodeId>* chain) const;
+  bool FailNoAncestor(const NamedTransform& above, const char* above_key, const NamedTransform& below,
+                      const char* below_key);
+  bool IsUnwritten(const PlugRef& plug) const;
+  bool TakeOver(const PlugRef& plug, const Made& by, const PlugRef& in, const PlugRef& out,
+                const SourceLocation& where);
+  bool ConnectParentOf(NodeId transform, const Made& by, const SourceLocation& where);
+  bool Constrain(NodeId transform, const Made& by, const char* in_name, const char* out_name, int element,
+                 const SourceLocation& where);
+  void ConstrainPole(const Made& made, const std::string& name, const SourceLocation& where);
+
   // rig_deform.cpp: stacks
   void BuildStacks();
   void BuildMeshStack(const RigDeform& deform, std::size_t mesh, bool any_morphs);
@@ -169,10 +201,13 @@ class RigBuild {
     return {plug.node.index, plug.attribute, plug.element, plug.component};
   }
   std::map<PlugKey, SourceLocation>
-      written_plugs_[2];                      // by nodes, by overrides: a plug has several spellings
-  std::set<PlugKey> connected_plugs_;         // of those, the ones that name another plug
-  std::set<PlugKey> overridden_plugs_;        // the same
-  std::set<PlugKey> stacked_;                 // points attributes that a stack drives
+      written_plugs_[2];                // by nodes, by overrides: a plug has several spellings
+  std::set<PlugKey> connected_plugs_;   // of those, the ones that name another plug
+  std::set<PlugKey> overridden_plugs_;  // the same
+  std::set<PlugKey> stacked_;           // what a stack or a constraint drives
+  // Plugs that constraints own, and which one does so where
+  std::map<PlugKey, std::pair<std::string, SourceLocation>> constrained_;
+  std::vector<ChainJoint> chain_joints_;
   std::unordered_map<Index, Places> curves_;  // by graph node: rest cvs in the world
   std::vector<std::optional<SourceLocation>> stack_of_mesh_;
   std::map<std::string, std::optional<WeightFile>> weight_files_;  // by path; none: it could not be read

@@ -80,6 +80,7 @@ void RigBuild::Run() {
   for (Made& made : made_) SetTargets(&made);
   for (Made& made : own_made_) SetBlendWeights(&made);
   MakeConnections();
+  AddConstraints();
   PlaceStagesAtHandles();
   ConnectPivots();
   FinishOverrides();

@@ -27,6 +27,12 @@ const AttributeDef& AttributeOf(const Graph& graph, const PlugRef& plug) {
 bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
   if (key == "parent") return HasAttribute(def, "parentMatrix");
   if (key == "at") return HasAttribute(def, "offsetParentMatrix");
+  if (key == "constrained")
+    return HasAttribute(def, "inMatrix") && HasAttribute(def, "outMatrix") && def.name != "splineIk";
+  if (key == "targets") return HasAttribute(def, "targetMatrix") && HasAttribute(def, "outMatrix");
+  if (key == "mid") return def.name == "ikHandle";
+  if (key == "start" || key == "end")
+    return def.name == "ikHandle" || def.name == "splineIk" || def.name == "twistDistribution";
   if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
   if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
   if (key == "curve" || key == "curves")
@@ -143,9 +149,9 @@ void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bo
     for (const AttributeDef& a : def.attributes) {
       if (!a.output) names.push_back(a.name);
     }
-    for (const char* word :
-         {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed", "places", "curve",
-          "curves", "targets", "combinations", "inbetweens", "blendWeights"}) {
+    for (const char* word : {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed",
+                             "places", "curve", "curves", "targets", "combinations", "inbetweens",
+                             "blendWeights", "constrained", "start", "mid", "end"}) {
       if (IsSpecial(def, word)) names.push_back(word);
     }
     errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name,

@@ -313,6 +313,20 @@ void ComputeAnimCurve(ComputeContext& c) {
   c.out_value<double>(0) = a + (b - a) * u;
 }
 
+void AddAnimCurve(NodeRegistry& registry, const char* name, const char* doc, Unit unit) {
+  registry.add(name, doc)
+      .category("time")
+      .in("input", 0.0)
+      .structural("keyTimes", std::vector<double>{}, {.doc = "ascending"})
+      .structural("keyValues", std::vector<double>{}, {.unit = unit})
+      .enumeration("interpolation", {"linear", "step", "smooth"}, true)
+      .out("output", Type::kDouble)
+      .unit(unit)
+      .compute(&ComputeAnimCurve)
+      .bind(BindAnimCurve)
+      .cost(30, 0);
+}
+
 }  // namespace
 
 void AddClipNodes(NodeRegistry& registry) {
@@ -336,16 +350,11 @@ void AddClipNodes(NodeRegistry& registry) {
       .compute(&ComputeClipWeights)
       .bind(BindClipWeights)
       .cost(100, 0);
-  registry.add("animCurve", "A curve through keys, over time or over any other value (a set-driven key).")
-      .category("time")
-      .in("input", 0.0)
-      .structural("keyTimes", std::vector<double>{}, {.doc = "ascending"})
-      .structural("keyValues", std::vector<double>{})
-      .enumeration("interpolation", {"linear", "step", "smooth"}, true)
-      .out("output", Type::kDouble)
-      .compute(&ComputeAnimCurve)
-      .bind(BindAnimCurve)
-      .cost(30, 0);
+  AddAnimCurve(registry, "animCurve",
+               "A curve through keys, over time or over any other value (a set-driven key).", Unit::kNone);
+  AddAnimCurve(registry, "animCurveUU", "A set-driven key: a number over a number.", Unit::kNone);
+  AddAnimCurve(registry, "animCurveUA", "A set-driven key: an angle over a number.", Unit::kAngle);
+  AddAnimCurve(registry, "animCurveUL", "A set-driven key: a length over a number.", Unit::kLength);
 }
 
 }  // namespace kpsa

@@ -1,7 +1,6 @@
 #include <algorithm>
-#include <cmath>
 
-#include "base/scalar_math.h"
+#include "nodes/kernels/power.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
@@ -11,17 +10,6 @@ double Remap(double value, double in_min, double in_max, double out_min, double 
   if (in_max == in_min) return out_min;
   const double t = std::clamp((value - in_min) / (in_max - in_min), 0.0, 1.0);
   return out_min + t * (out_max - out_min);
-}
-
-// x^y for whole y by multiplication, otherwise by exp and log of the base's ratio; NaN where Maya has none,
-// either.
-double Power(double x, double y) {
-  if (y == std::floor(y) && std::fabs(y) <= 64) {
-    double result = 1;
-    for (int i = 0; i < static_cast<int>(std::fabs(y)); ++i) result *= x;
-    return y < 0 ? 1 / result : result;
-  }
-  return x > 0 ? Exp(y * Log(x)) : std::nan("");
 }
 
 Double3 MultiplyDivide(Double3 a, Double3 b, std::int64_t operation) {

@@ -1,5 +1,6 @@
 #include "base/matrix.h"
 #include "nodes/deformer.h"
+#include "nodes/kernels/matrix_parts.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
@@ -23,6 +24,25 @@ void ComputeCompose(ComputeContext& c) {
   c.out_value<Matrix4>(0) =
       Translation(c.get<Double3>(0)) *
       (RotationFromEuler(c.get<Double3>(1), c.kernel_as<RotateOrder>()) * Scaling(c.get<Double3>(2)));
+}
+
+// Target after target onto the input, as layers.
+void ComputeBlendMatrix(ComputeContext& c) {
+  const ArrayView<Matrix4> targets = c.array<Matrix4>(1);
+  const ArrayView<double> weights = c.array<double>(2);
+  Matrix4 result = c.get<Matrix4>(0);
+  for (std::uint32_t i = 0; i < targets.size(); ++i) {
+    const double w = (i < weights.size() ? weights[i] : 1.0) * c.get<double>(3);
+    result = BlendMatrices(
+        result, targets[i],
+        {w * c.get<double>(4), w * c.get<double>(5), w * c.get<double>(6), w * c.get<double>(7)});
+  }
+  c.out_value<Matrix4>(0) = result;
+}
+
+Matrix4 PickMatrix(const Matrix4& m, bool translate, bool rotate, bool scale, bool shear) {
+  return BlendMatrices(Matrix4(), m,
+                       {translate ? 1.0 : 0.0, rotate ? 1.0 : 0.0, scale ? 1.0 : 0.0, shear ? 1.0 : 0.0});
 }
 
 }  // namespace
@@ -60,6 +80,38 @@ void AddMatrixNodes(NodeRegistry& registry) {
       .out("outputQuat", Type::kQuaternion)
       .compute(&ComputeDecompose)
       .bind(BindOrder);
+  registry.add("inverseMatrix", "The inverse; of a matrix that has none, the identity.")
+      .category("matrix")
+      .in("inputMatrix", Matrix4())
+      .out("outputMatrix", Type::kMatrix)
+      .compute([](const Matrix4& m) { return InverseOrIdentity(m); });
+  const AttributeOptions share{.min = 0, .max = 1};
+  registry.add("blendMatrix", "Blends matrices onto one another, part by part; rotations by slerp.")
+      .category("matrix")
+      .in("inputMatrix", Matrix4())
+      .in("targetMatrix", Matrix4(), {.doc = "applied in their order, each onto what those before it gave"})
+      .array()
+      .in("targetWeight", 1.0, {.min = 0, .max = 1, .doc = "of the target; 1 where unset"})
+      .array()
+      .in("envelope", 1.0, {.min = 0, .max = 1, .doc = "of all targets"})
+      .in("translateWeight", 1.0, share)
+      .in("rotateWeight", 1.0, share)
+      .in("scaleWeight", 1.0, share)
+      .in("shearWeight", 1.0, share)
+      .out("outputMatrix", Type::kMatrix)
+      .compute(&ComputeBlendMatrix)
+      .cost(300, 0);
+  registry.add("pickMatrix", "The chosen parts of a matrix; the identity in place of the others.")
+      .category("matrix")
+      .in("inputMatrix", Matrix4())
+      .in("useTranslate", true)
+      .in("useRotate", true)
+      .in("useScale", true)
+      .in("useShear", true)
+      .out("outputMatrix", Type::kMatrix)
+      .compute([](const Matrix4& m, bool translate, bool rotate, bool scale, bool shear) {
+        return PickMatrix(m, translate, rotate, scale, shear);
+      });
 }
 
 }  // namespace kpsa

@@ -9,10 +9,30 @@ void AddTimeNode(NodeRegistry& registry) {
 }
 
 void AddStandardNodes(NodeRegistry& registry) {
-  for (auto* add : {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode,
-                    AddSkinClusterNode, AddTransformGeometryNode, AddLatticeNode, AddClusterNodes,
-                    AddDeltaMushNode, AddCurveNodes, AddNonLinearNodes, AddTensionNode, AddTripwireNode,
-                    AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
+  for (auto* add : {AddTimeNode,
+                    AddTransformNodes,
+                    AddClipNodes,
+                    AddMeshNode,
+                    AddBlendShapeNode,
+                    AddSkinClusterNode,
+                    AddTransformGeometryNode,
+                    AddLatticeNode,
+                    AddClusterNodes,
+                    AddDeltaMushNode,
+                    AddCurveNodes,
+                    AddNonLinearNodes,
+                    AddTensionNode,
+                    AddTripwireNode,
+                    AddMathNodes,
+                    AddExpressionNode,
+                    AddUtilityNodes,
+                    AddMatrixNodes,
+                    AddSelectionNodes,
+                    AddConstraintNodes,
+                    AddIkNodes,
+                    AddSpaceSwitchNode,
+                    AddSplineIkNode,
+                    AddTwistDistributionNode}) {
     add(registry);
   }
 }

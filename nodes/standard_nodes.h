@@ -7,7 +7,7 @@ namespace kpsa {
 
 void AddTimeNode(NodeRegistry& registry);               // time
 void AddTransformNodes(NodeRegistry& registry);         // transform, joint
-void AddClipNodes(NodeRegistry& registry);              // clipTransform, clipWeights, animCurve
+void AddClipNodes(NodeRegistry& registry);              // clipTransform, clipWeights, animCurve(UU, UA, UL)
 void AddMeshNode(NodeRegistry& registry);               // mesh
 void AddBlendShapeNode(NodeRegistry& registry);         // blendShape, combinationShape
 void AddSkinClusterNode(NodeRegistry& registry);        // skinCluster
@@ -19,9 +19,18 @@ void AddCurveNodes(NodeRegistry& registry);             // curve, wire
 void AddNonLinearNodes(NodeRegistry& registry);         // bend, twist, squash, flare, sine, wave
 void AddTensionNode(NodeRegistry& registry);            // tension
 void AddTripwireNode(NodeRegistry& registry);           // tripwire
-void AddMathNodes(NodeRegistry& registry);    // remapValue, multiplyDivide, plusMinusAverage, unitConversion
-void AddMatrixNodes(NodeRegistry& registry);  // multMatrix, composeMatrix, decomposeMatrix
-void AddSelectionNodes(NodeRegistry& registry);  // condition, choice
+void AddMathNodes(NodeRegistry& registry);  // remapValue, multiplyDivide, plusMinusAverage, unitConversion
+void AddExpressionNode(NodeRegistry& registry);  // expression
+// clamp, setRange, blendColors, distanceBetween, angleBetween, vectorProduct
+void AddUtilityNodes(NodeRegistry& registry);
+// multMatrix, composeMatrix, decomposeMatrix, inverseMatrix, blendMatrix, pickMatrix
+void AddMatrixNodes(NodeRegistry& registry);
+void AddSelectionNodes(NodeRegistry& registry);   // condition, choice
+void AddConstraintNodes(NodeRegistry& registry);  // pointConstraint, orient..., parent..., scale..., aim...
+void AddIkNodes(NodeRegistry& registry);          // ikHandle, poleVectorConstraint
+void AddSpaceSwitchNode(NodeRegistry& registry);  // spaceSwitch
+void AddSplineIkNode(NodeRegistry& registry);     // splineIk
+void AddTwistDistributionNode(NodeRegistry& registry);  // twistDistribution
 
 // All of them.
 void AddStandardNodes(NodeRegistry& registry);

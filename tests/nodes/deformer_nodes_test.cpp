@@ -12,7 +12,7 @@ namespace kpsa {
 namespace {
 
 TEST(TensionNode, MeasuresBothWays) {
-  TestGraph g(Nodes());
+  TestGraph g(StandardNodes());
   Mesh::Data data;
   data.rest = PointBuffer::FromInterleaved(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0});
   data.triangles = {0, 1, 2};
@@ -39,7 +39,7 @@ TEST(TensionNode, MeasuresBothWays) {
 
 // A handle before the skin acts by its motion against its parent; after it, where it stands.
 TEST(NonLinearNode, HandlesMoveAgainstTheirParents) {
-  TestGraph g(Nodes());
+  TestGraph g(StandardNodes());
   const Matrix4 parent = Translation({0, 1, 0}) * RotationFromEuler({0.2, 0.3, 0.4}, RotateOrder::kXyz);
   g.add("twist", "n",
         {{"inPoints[0]", PointsOf({1, 1, 0, 1, 0, 0, 1, -1, 0})},
@@ -63,7 +63,7 @@ TEST(NonLinearNode, HandlesMoveAgainstTheirParents) {
 }
 
 TEST(WireNode, FollowsSeveralCurves) {
-  TestGraph g(Nodes());
+  TestGraph g(StandardNodes());
   const auto left = std::make_shared<const Curve>(std::vector<Double3>{{-1, -1, 0}, {-1, 1, 0}}, false);
   const auto right = std::make_shared<const Curve>(std::vector<Double3>{{1, -1, 0}, {1, 1, 0}}, false);
   g.add("curve", "l", {{"curve", left}, {"cv", PointsOf({0, 0, 1, 0, 0, 1})}});
@@ -88,7 +88,7 @@ TEST(WireNode, FollowsSeveralCurves) {
 // A row of points along s, in a box from 0 to 1; every control of a slice s is raised by 1 along y.
 std::vector<float> Raised(std::int64_t divisions, int slice, const char* interpolation, const char* outside,
                           const std::vector<double>& places) {
-  TestGraph g(Nodes());
+  TestGraph g(StandardNodes());
   std::vector<float> xyz;
   for (double x : places) xyz.insert(xyz.end(), {static_cast<float>(x), 0.5f, 0.5f});
   g.add("lattice", "l",
@@ -132,7 +132,7 @@ TEST(LatticeNode, PointsOutsideStayFollowOrFade) {
 // A point above the middle of a square of border points, three of them at a distance of 1 and one at 3.
 class DeltaMushNode : public testing::Test {
  protected:
-  DeltaMushNode() : g(Nodes()) {
+  DeltaMushNode() : g(StandardNodes()) {
     Mesh::Data data;
     data.rest =
         PointBuffer::FromInterleaved(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0, -1, 0, 0, 0, -3, 0});

@@ -14,7 +14,7 @@ namespace {
 // Two points; `full` moves the first to x = 1, `half` to y = 1, `most` the second to z = 1.
 class BlendShapeNode : public testing::Test {
  protected:
-  BlendShapeNode() : g(Nodes()) {
+  BlendShapeNode() : g(StandardNodes()) {
     std::vector<MorphTargets::Target> targets = {
         {"full", {0}, {1, 0, 0}}, {"half", {0}, {0, 1, 0}}, {"most", {1}, {0, 0, 1}}};
     g.add("blendShape", "b",
@@ -116,7 +116,7 @@ TEST_F(BlendShapeNode, PointsByThemselvesHaveTheBitsOfAll) {
 }
 
 TEST(CombinationShape, CombinesWeights) {
-  TestGraph g(Nodes());
+  TestGraph g(StandardNodes());
   g.add("combinationShape", "c",
         {{"inputWeight[0]", 0.5}, {"inputWeight[1]", 0.25}, {"inputWeight[2]", 1.0}});
   for (const char* varying : {"c.inputWeight[0]", "c.inputWeight[1]", "c.combinationMethod"}) g.vary(varying);
@@ -143,7 +143,7 @@ TEST(CombinationShape, CombinesWeights) {
 // Two joints, the second turned by `angle` about x; three points: of the first, of both, of the second.
 class SkinNode : public testing::Test {
  protected:
-  SkinNode() : g(Nodes()) {
+  SkinNode() : g(StandardNodes()) {
     g.add("skinCluster", "s",
           {{"inPoints[0]", PointsOf({0, 1, 0, 0.5f, 1, 0, 1, 1, 0})},
            {"influences[0]",
