@@ -28,6 +28,7 @@ bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
   if (key == "parent") return HasAttribute(def, "parentMatrix");
   if (key == "at") return HasAttribute(def, "offsetParentMatrix");
   if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
+  if (key == "driver") return HasAttribute(def, "driverPoints");
   if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
   if (key == "curve") return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
   return false;
@@ -134,8 +135,8 @@ void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bo
     for (const AttributeDef& a : def.attributes) {
       if (!a.output) names.push_back(a.name);
     }
-    for (const char* word :
-         {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed", "places"}) {
+    for (const char* word : {"parent", "at", "members", "weights", "falloff", "driver", "vertices", "mesh",
+                             "closed", "places"}) {
       if (IsSpecial(def, word)) names.push_back(word);
     }
     errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name,

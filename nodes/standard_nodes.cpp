@@ -12,7 +12,7 @@ void AddStandardNodes(NodeRegistry& registry) {
   for (auto* add :
        {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode, AddSkinClusterNode,
         AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode, AddCurveNodes,
-        AddTripwireNode, AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
+        AddWrapNodes, AddShrinkWrapNode, AddTripwireNode, AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
     add(registry);
   }
 }

@@ -16,6 +16,8 @@ void AddLatticeNode(NodeRegistry& registry);            // lattice
 void AddClusterNodes(NodeRegistry& registry);           // cluster, softMod
 void AddDeltaMushNode(NodeRegistry& registry);          // deltaMush
 void AddCurveNodes(NodeRegistry& registry);             // curve, wire
+void AddWrapNodes(NodeRegistry& registry);              // wrap, proximityWrap
+void AddShrinkWrapNode(NodeRegistry& registry);         // shrinkWrap
 void AddTripwireNode(NodeRegistry& registry);           // tripwire
 void AddMathNodes(NodeRegistry& registry);    // remapValue, multiplyDivide, plusMinusAverage, unitConversion
 void AddMatrixNodes(NodeRegistry& registry);  // multMatrix, composeMatrix, decomposeMatrix
