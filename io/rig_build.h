@@ -98,6 +98,8 @@ class RigBuild {
   // rig_drivers.cpp: meshes that drive others
   void ConnectDrivers();
   void ConnectDriver(const Made& made, const RigAttribute& driver);
+  void ReadPoses(const Made& made);
+  void ConnectTime();
   void SplitStage(const std::string& text, std::string* mesh, std::string* stage) const;
   const Stage* FindStage(const CharacterMesh& mesh, const std::string& stage, const SourceLocation& where);
 

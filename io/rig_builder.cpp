@@ -76,6 +76,7 @@ void RigBuild::Run() {
   BuildStacks();
   ConnectDrivers();
   MakeConnections();
+  ConnectTime();
   PlaceStagesAtHandles();
   ConnectPivots();
   FinishOverrides();

@@ -1,5 +1,4 @@
-// `driver: cage_mesh` or `driver: "cage_mesh@skin"`: deformers that follow another mesh at a stage of its
-// stack.
+// `driver:` of deformers that follow another mesh at a stage of its stack, and of poseInterpolators.
 #include <algorithm>
 
 #include "io/rig_build.h"
@@ -40,6 +39,7 @@ const Stage* RigBuild::FindStage(const CharacterMesh& mesh, const std::string& s
 void RigBuild::ConnectDrivers() {
   for (const Made& made : made_) {
     if (errors_->full()) return;
+    if (graph().def(made.id).name == "poseInterpolator") ReadPoses(made);
     if (graph().def(made.id).FindAttribute("driverPoints") < 0) continue;
     if (const auto it = made.special.find("driver"); it != made.special.end()) {
       ConnectDriver(made, *it->second);
@@ -103,6 +103,57 @@ void RigBuild::ConnectDriver(const Made& made, const RigAttribute& driver) {
   if (!world) edit.Set(made.id, "driverMatrix", rest_->WorldFromMesh(*index, {}));
   edit.Connect(points, edit.Plug(made.id, "driverPoints"));
   Fail(where, edit.Take());
+}
+
+// A poseInterpolator's `driver: TRANSFORM` and `poses: {name: [x, y, z], ...}`.
+void RigBuild::ReadPoses(const Made& made) {
+  GraphEditor edit(&graph());
+  if (const auto it = made.special.find("driver"); it != made.special.end()) {
+    const YamlNode& value = it->second->value;
+    std::string name;
+    if (!ReadString(value, "driver", &name, errors_)) return;
+    const std::optional<NodeId> transform = FindTransform(name, value.where());
+    if (!transform.has_value()) return;
+    edit.Connect(edit.Plug(*transform, "matrix"), edit.Plug(made.id, "matrix"));
+    const Value* rest = graph().FindValue(edit.Plug(*transform, "restMatrix"));
+    edit.Set(made.id, "restMatrix", rest != nullptr ? *rest : Value(LocalAtRest(*transform)));
+    if (!Fail(value.where(), edit.Take())) return;
+  }
+  const auto it = made.special.find("poses");
+  if (it == made.special.end()) return;
+  const YamlNode& poses = it->second->value;
+  if (!poses.is_map() || poses.items.empty()) {
+    errors_->Add(poses, "poses: expected a map of rotations, {{open: [-25, 0, 0], ...}}, found {}",
+                 poses.is_map() ? "an empty one" : poses.kind_name());
+    return;
+  }
+  std::vector<double> angles;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < poses.items.size(); ++i) {
+    std::vector<double> one;
+    names.push_back(poses.keys[i].scalar);
+    if (!ReadNumbers(poses.items[i], fmt::format("pose \"{}\"", names.back()), Unit::kAngle,
+                     units(it->second->source), 3, &one, errors_))
+      return;
+    angles.insert(angles.end(), one.begin(), one.end());
+  }
+  edit.Set(made.id, "poses", Value(std::move(angles)));
+  edit.Set(made.id, "poseNames", Value(fmt::format("{}", fmt::join(names, "\n"))));
+  const PlugRef weight = edit.Plug(made.id, "outputWeight", 0);
+  if (edit.ok()) graph().SetElementNames(made.id, weight.attribute, std::move(names));
+  Fail(poses.where(), edit.Take());
+}
+
+// What remembers its previous frame follows the scene's time, unless the rig gives it another one.
+void RigBuild::ConnectTime() {
+  for (const Made& made : made_) {
+    if (!graph().def(made.id).stateful || graph().def(made.id).FindAttribute("time") < 0) continue;
+    GraphEditor edit(&graph());
+    const PlugRef time = edit.Plug(made.id, "time");
+    if (graph().FindValue(time) != nullptr || graph().FindConnection(time) != nullptr) continue;
+    edit.Connect(rig_->scene.time, time);
+    Fail(made.from->where, edit.Take());
+  }
 }
 
 }  // namespace kpsa

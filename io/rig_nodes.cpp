@@ -28,7 +28,8 @@ bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
   if (key == "parent") return HasAttribute(def, "parentMatrix");
   if (key == "at") return HasAttribute(def, "offsetParentMatrix");
   if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
-  if (key == "driver") return HasAttribute(def, "driverPoints");
+  if (def.name == "poseInterpolator" && key == "poses") return true;
+  if (key == "driver") return HasAttribute(def, "driverPoints") || def.name == "poseInterpolator";
   if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
   if (key == "curve") return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
   return false;

@@ -9,10 +9,26 @@ void AddTimeNode(NodeRegistry& registry) {
 }
 
 void AddStandardNodes(NodeRegistry& registry) {
-  for (auto* add :
-       {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode, AddSkinClusterNode,
-        AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode, AddCurveNodes,
-        AddWrapNodes, AddShrinkWrapNode, AddTripwireNode, AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
+  for (auto* add : {AddTimeNode,
+                    AddTransformNodes,
+                    AddClipNodes,
+                    AddMeshNode,
+                    AddBlendShapeNode,
+                    AddSkinClusterNode,
+                    AddTransformGeometryNode,
+                    AddLatticeNode,
+                    AddClusterNodes,
+                    AddDeltaMushNode,
+                    AddCurveNodes,
+                    AddWrapNodes,
+                    AddShrinkWrapNode,
+                    AddSculptNode,
+                    AddJiggleNode,
+                    AddPoseInterpolatorNode,
+                    AddTripwireNode,
+                    AddMathNodes,
+                    AddMatrixNodes,
+                    AddSelectionNodes}) {
     add(registry);
   }
 }
