@@ -79,7 +79,7 @@ void AddPoseInterpolatorNode(NodeRegistry& registry) {
       .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "of the poses' angles")
       .enumeration("poseType", {"swingAndTwist", "swing", "twist"}, true,
                    "what of a rotation counts: all of it, where the twist axis points, or the turn about it")
-      .enumeration("twistAxis", {"x", "y", "z"}, true)
+      .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")
       .enumeration("interpolation", {"gaussian", "thinPlate", "linear"}, true,
                    "the radial function: exp(-(d/r)^2), d^2 log d, or d")
       .structural("radius", 0.0,
