@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "base/simd.h"
@@ -12,6 +14,7 @@
 #include "nodes/kernels/delta_mush.h"
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/normals.h"
+#include "nodes/kernels/shrink_wrap.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/soft_mod.h"
 #include "nodes/kernels/weights.h"
@@ -156,6 +159,7 @@ class KernelLaw : public testing::Test {
            kernel.Run(in, out, scratch.span(), parallel);
          }});
     AddWraps();
+    AddShrinkWraps();
   }
 
   // The points that the law is about are the driver's; a sheet beside it follows.
@@ -185,12 +189,19 @@ class KernelLaw : public testing::Test {
                  {"proximityWrap, snap", WrapMode::kSnap, 0, false},
                  {"wrap", WrapMode::kOffset, 0, true}};
     for (const auto& c : wraps) {
-      const auto influences = [this, c](std::span<const Index> out_points) {
+      const auto search = [this, c](std::span<const Index> out_points) {
         return c.nearest
                    ? NearestInfluences({mesh_.rest.view(), &singles_, singles_boxes_.span()}, wrapped_.view(),
                                        out_points, 0.2, 6, Masked(out_points))
                    : SurfaceInfluences({mesh_.rest.view(), &surface_, surface_boxes_.span()}, mesh_.topology,
                                        wrapped_.view(), out_points, 10, c.smooth, Masked(out_points));
+      };
+      // Those of all points are asked for again and again
+      const auto of_all = std::make_shared<std::optional<WrapInfluences>>();
+      const auto influences = [this, search, of_all](std::span<const Index> out_points) {
+        if (out_points.size() < count()) return search(out_points);
+        if (!of_all->has_value()) *of_all = search(out_points);
+        return **of_all;
       };
       subjects_.push_back({c.name, false,
                            [this, c, influences](auto out_points) {
@@ -208,6 +219,28 @@ class KernelLaw : public testing::Test {
                              CopyPoints(in, driver.view());  // the engine never gives one buffer for both
                              kernel.Run({0.8, driver.view()}, points.view(), out, scratch.span(), parallel);
                            }});
+    }
+  }
+
+  // Onto the sheet that follows in the other subjects.
+  void AddShrinkWraps() {
+    using Projection = ShrinkWrapSettings::Projection;
+    for (const Projection projection : {Projection::kClosest, Projection::kNormals}) {
+      ShrinkWrapSettings settings;
+      settings.projection = projection;
+      settings.bidirectional = true;
+      subjects_.push_back(
+          {projection == Projection::kClosest ? "shrinkWrap" : "shrinkWrap along normals",
+           projection == Projection::kClosest,
+           [this, settings](auto out_points) {
+             return ShrinkWrapDemand(settings, mesh_.topology, out_points, Masked(out_points));
+           },
+           [this, settings](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
+             const ShrinkWrapKernel kernel(settings, mesh_.topology, surface_, Translation({0, 0, 0.01}),
+                                           mesh_.topology, out_points, in_points, Masked(out_points));
+             AlignedFloats scratch(kernel.ScratchFloats());
+             kernel.Run({0.9, 0.002, wrapped_.view()}, in, out, scratch.span(), parallel);
+           }});
     }
   }
 

@@ -207,9 +207,9 @@ TEST(ShrinkWrap, TheNearestPlaceIsThatOfAllTriangles) {
           ClosestOnTriangle(bent.view(), &target->triangles()[3 * t], {in.x[i], in.y[i], in.z[i]});
       if (one.squared < best.squared) best = one;
     }
-    EXPECT_EQ(out.view().x[i], static_cast<float>(best.point.x));
-    EXPECT_EQ(out.view().y[i], static_cast<float>(best.point.y));
-    EXPECT_EQ(out.view().z[i], static_cast<float>(best.point.z));
+    EXPECT_NEAR(out.view().x[i], best.point.x, 1e-6);
+    EXPECT_NEAR(out.view().y[i], best.point.y, 1e-6);
+    EXPECT_NEAR(out.view().z[i], best.point.z, 1e-6);
   }
 }
 
