@@ -130,7 +130,8 @@ TEST_F(RigDrivers, ErrorsAtTheirLine) {
       "nodes:\n  a: {type: proximityWrap, driver: cage}\n  b: {type: wrap, driver: cloth}\ndeform:\n"
       "  - {meshes: [cloth], stack: [a]}\n  - {meshes: [cage], stack: [skin, b]}\n");
   EXPECT_TRUE(Has(cycle, "t.yaml:5:27: ")) << cycle;
-  EXPECT_TRUE(Has(cycle, "a.outPoints[0]") && Has(cycle, "b.outPoints[0]")) << cycle;
+  EXPECT_TRUE(Has(cycle, "b.driverPoints -> b.outPoints -> a.driverPoints -> a.outPoints -> b.driverPoints"))
+      << cycle;
   // At a stage before that, there is none
   Loaded(
       "nodes:\n  a: {type: proximityWrap, driver: cage}\n  b: {type: wrap, driver: "
@@ -221,7 +222,7 @@ class RigFalloffs : public RigDrivers {
       EXPECT_NEAR(weights[v], weight(PlaceOf(v)), 1e-5) << falloff << " at vertex " << v;
       most = std::max<double>(most, weights[v]), least = std::min<double>(least, weights[v]);
     }
-    EXPECT_GT(most, least + 0.05) << falloff;
+    EXPECT_GT(most, least + 0.03) << falloff;
   }
   static double Clamp(double t) { return std::clamp(t, 0.0, 1.0); }
   static double Smooth(double t) { return Clamp(t) * Clamp(t) * (3 - 2 * Clamp(t)); }
