@@ -85,20 +85,21 @@ WrapKernel::Place WrapKernel::PlaceOf(std::size_t point, Double3 tangent, Double
                                       std::span<const Double3> driver,
                                       std::span<const DriverFrame> frames) const noexcept {
   Place place;
+  DriverFrame blend{};
   double framed = 0;
   for (Index e = offsets_[point]; e < offsets_[point + 1]; ++e) {
-    place.anchor = place.anchor + driver[entries_[e]] * shares_[e];
+    const double share = shares_[e];
+    place.anchor = place.anchor + driver[entries_[e]] * share;
     if (frame_of_[e] == kNoIndex) continue;
     const DriverFrame& frame = frames[frame_of_[e]];
-    place.tangent = place.tangent + frame.Apply(tangent) * shares_[e];
-    place.binormal = place.binormal + frame.Apply(binormal) * shares_[e];
-    place.normal = place.normal + frame.normal * shares_[e];
-    framed += shares_[e];
+    for (int c = 0; c < 3; ++c) blend.columns[c] = blend.columns[c] + frame.columns[c] * share;
+    place.normal = place.normal + frame.normal * share;
+    framed += share;
   }
   const double length = Length(place.normal);
   if (framed == 0 || tangent == Double3() || length <= kFolded) return place;
-  place.tangent = place.tangent * (1 / framed);
-  place.binormal = place.binormal * (1 / framed);
+  place.tangent = blend.Apply(tangent) * (1 / framed);
+  place.binormal = blend.Apply(binormal) * (1 / framed);
   const Double3 n = place.normal * (1 / length);
   place.normal = n;
   place.turns = true;
