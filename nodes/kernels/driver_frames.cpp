@@ -115,14 +115,21 @@ void DriverFrames::Run(std::span<const Double3> points, std::span<DriverFrame> f
         normal = normal + Cross(points[triangles_[t + 1]] - a, points[triangles_[t + 2]] - a);
       }
       normal = Unit(normal);
-      DriverFrame& frame = frames[f];
-      for (int c = 0; c < 3; ++c) frame.columns[c] = normal * normal_duals_[f][c];
+      double sums[9];
+      for (int c = 0; c < 3; ++c) {
+        for (int a = 0; a < 3; ++a) sums[3 * c + a] = normal[a] * normal_duals_[f][c];
+      }
       const Double3 own = points[own_[f]];
       for (Index e = edge_offsets_[f]; e < edge_offsets_[f + 1]; ++e) {
-        const Double3 edge = points[edges_[e].point] - own;
-        for (int c = 0; c < 3; ++c) frame.columns[c] = frame.columns[c] + edge * edges_[e].dual[c];
+        const Double3 edge = points[edges_[e].point] - own, dual = edges_[e].dual;
+        const double from[3] = {edge.x, edge.y, edge.z}, to[3] = {dual.x, dual.y, dual.z};
+        for (int c = 0; c < 3; ++c) {
+          for (int a = 0; a < 3; ++a) sums[3 * c + a] += from[a] * to[c];
+        }
       }
-      frame.normal = normal;
+      double* values = frames[f].values;
+      for (int k = 0; k < 9; ++k) values[k] = sums[k];
+      values[9] = normal.x, values[10] = normal.y, values[11] = normal.z;
     }
   });
 }

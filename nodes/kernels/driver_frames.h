@@ -21,11 +21,17 @@ namespace kpsa {
 std::vector<Index> DriverFramesDemand(const Topology& driver, std::span<const Double3> rest,
                                       std::span<const Index> frame_points);
 
-// What a frame is: column k of F is where the rest direction k has gone. Not a rotation: it stretches, too.
+// F column by column (column k is where the rest direction k has gone), then the normal: unit length, or 0.
+// F is no rotation: it stretches, too. Plain numbers in a row, so that blends of frames are loops over them.
 struct DriverFrame {
-  Double3 columns[3];
-  Double3 normal;  // unit length, or 0
-  Double3 Apply(Double3 v) const { return columns[0] * v.x + columns[1] * v.y + columns[2] * v.z; }
+  static constexpr int kSize = 12;
+  double values[kSize];
+  Double3 Apply(Double3 v) const {
+    return {values[0] * v.x + values[3] * v.y + values[6] * v.z,
+            values[1] * v.x + values[4] * v.y + values[7] * v.z,
+            values[2] * v.x + values[5] * v.y + values[8] * v.z};
+  }
+  Double3 normal() const { return {values[9], values[10], values[11]}; }
 };
 
 class DriverFrames {

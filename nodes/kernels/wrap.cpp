@@ -65,7 +65,7 @@ WrapKernel::WrapKernel(WrapMode mode, const Topology& driver, std::span<const Do
     Rest one;
     Double3 normal;
     for (Index e = offsets_[i]; e < offsets_[i + 1]; ++e) {
-      if (frame_of_[e] != kNoIndex) normal = normal + frames[frame_of_[e]].normal * shares_[e];
+      if (frame_of_[e] != kNoIndex) normal = normal + frames[frame_of_[e]].normal() * shares_[e];
     }
     if (Length(normal) > kFolded) {
       normal = normal * (1 / Length(normal));
@@ -91,11 +91,11 @@ WrapKernel::Place WrapKernel::PlaceOf(std::size_t point, Double3 tangent, Double
     const double share = shares_[e];
     place.anchor = place.anchor + driver[entries_[e]] * share;
     if (frame_of_[e] == kNoIndex) continue;
-    const DriverFrame& frame = frames[frame_of_[e]];
-    for (int c = 0; c < 3; ++c) blend.columns[c] = blend.columns[c] + frame.columns[c] * share;
-    place.normal = place.normal + frame.normal * share;
+    const double* values = frames[frame_of_[e]].values;
+    for (int k = 0; k < DriverFrame::kSize; ++k) blend.values[k] += values[k] * share;
     framed += share;
   }
+  place.normal = blend.normal();
   const double length = Length(place.normal);
   if (framed == 0 || tangent == Double3() || length <= kFolded) return place;
   place.tangent = blend.Apply(tangent) * (1 / framed);
