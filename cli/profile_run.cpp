@@ -14,6 +14,7 @@ Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan
   };
   if (time != kNoIndex) evaluator.Set(time, times.back());
   if (const Status warm = evaluator.Evaluate(); !warm.ok()) return located(warm, times.back());
+  if (!plan->stateful_node().empty()) evaluator.Restart();  // it would not go back from there
   Measured measured;
   for (std::size_t f = 0; f < frames; ++f) {
     if (Interrupted()) return InterruptedStatus();

@@ -69,6 +69,11 @@ void Evaluator::Invalidate() {
   SetDirty(0, static_cast<Index>(computed_.size()));
 }
 
+void Evaluator::Restart() {
+  std::fill(state_.data(), state_.data() + state_.size(), 0.0f);
+  Invalidate();
+}
+
 Result<Index> Evaluator::FindVarying(const Graph& graph, const PlugRef& plug) const {
   const Index varying = plan_->FindVarying(plug);
   if (varying != kNoIndex) return varying;

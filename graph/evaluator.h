@@ -61,6 +61,9 @@ class Evaluator final {
 #endif
   // Forgets every computed value (not the set ones): the next pull computes everything.
   void Invalidate();
+  // As Invalidate; nodes that remember their previous frame (NodeDef::stateful) forget it, too, so that frames
+  // may start from the first one again.
+  void Restart();
   std::size_t MemoryBytes() const;
 
   // For blocks of frames (graph/frames.h): one evaluation, cut at the steps of segment 0 that blocks share.

@@ -36,7 +36,7 @@ class RigBuild {
   struct Made {
     const RigNode* from;
     NodeId id;
-    std::map<std::string, const RigAttribute*> special = {};  // parent, at, members, weights, falloff, ...
+    std::map<std::string, const RigAttribute*> special = {};  // parent, at, members, driver, ...
     bool placed = false, placing = false;                     // `at` was followed
     std::vector<Geometry> geometries = {};                    // that it deforms
     std::size_t weighted = 0;                                 // geometries whose weights are set
@@ -140,6 +140,14 @@ class RigBuild {
   PointBufferPtr PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points);
   PointBufferPtr RegularGrid(const PlugRef& plug, const RigString& name);
 
+  // rig_drivers.cpp: meshes that drive others
+  void ConnectDrivers();
+  void ConnectDriver(const Made& made, const RigAttribute& driver);
+  void ReadPoses(const Made& made);
+  void ConnectTime();
+  void SplitStage(const std::string& text, std::string* mesh, std::string* stage) const;
+  const Stage* FindStage(const CharacterMesh& mesh, const std::string& stage, const SourceLocation& where);
+
   // rig_spaces.cpp: how stages before a skin lie in the world at rest
   void PlaceStages();
   void PlaceStagesAtHandles();
@@ -148,7 +156,7 @@ class RigBuild {
   void SetWorldFromStage(Made* made, std::size_t geometry, const Matrix4& world_from_stage);
   bool BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box);
 
-  // rig_members.cpp: members, weights, falloffs
+  // rig_members.cpp: members, weights
   void SetWeights(Made* made);
   const Geometry* GeometryOf(const Made& made, const WeightFile& file) const;
   bool AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of,
@@ -159,12 +167,22 @@ class RigBuild {
                     std::vector<Index>* vertices);
   bool MultiplyByMaps(const RigAttribute& attribute, const Made& made,
                       std::vector<std::vector<float>>* weights);
-  bool MultiplyByFalloff(const RigAttribute& attribute, const Geometry& of, std::vector<float>* weights);
   bool FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
                const NamedWeights** map, const Geometry** of);
+  std::vector<float> ByPoint(const WeightFile& file, const NamedWeights& map, const Geometry& of) const;
   const WeightFile* FindWeightFile(const YamlNode& reference, const std::string& path);
   Index VertexCount(const Geometry& of) const;
   Index PointOf(const Geometry& of, Index vertex) const;
+
+  // rig_falloffs.cpp: falloffs, evaluated at rest; false after an error
+  bool MultiplyByFalloff(const RigAttribute& attribute, const Made& made, const Geometry& of,
+                         std::vector<float>* weights);
+  using Falloff = std::optional<std::vector<double>>;  // by point, 0 to 1; none: says nothing of this mesh
+  bool ReadFalloff(const YamlNode& node, int source, const Made& made, const Geometry& of, Falloff* falloff);
+  bool CombineFalloffs(const YamlNode& list, const std::string& how, int source, const Made& made,
+                       const Geometry& of, Falloff* falloff);
+  bool ReadFalloffShape(const std::string& kind, const YamlNode& node, int source, const Geometry& of,
+                        std::function<double(Double3)>* weight_at);
 
   // rig_request.cpp: controls and acceleration
   void AddControls();

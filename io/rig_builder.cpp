@@ -77,10 +77,12 @@ void RigBuild::Run() {
   if (errors_->ok()) PlaceHandles();
   ConnectCurves();
   BuildStacks();
+  ConnectDrivers();
   for (Made& made : made_) SetTargets(&made);
   for (Made& made : own_made_) SetBlendWeights(&made);
   MakeConnections();
   AddConstraints();
+  ConnectTime();
   PlaceStagesAtHandles();
   ConnectPivots();
   FinishOverrides();

@@ -1,7 +1,7 @@
-// Members, weight maps and falloffs of deformers: one float a point, their product.
+// Members and weight maps of deformers: one float a point, their product.
 #include <algorithm>
 #include <charconv>
-#include <cmath>
+#include <limits>
 
 #include "io/rig_build.h"
 
@@ -20,8 +20,6 @@ std::vector<float> Dense(const WeightFile& file, const NamedWeights& map) {
   for (std::size_t i = 0; i < map.indices.size(); ++i) dense[map.indices[i]] = map.values[i];
   return dense;
 }
-
-double Smooth(double t) { return t * t * (3 - 2 * t); }
 
 }  // namespace
 
@@ -60,7 +58,7 @@ void RigBuild::SetWeights(Made* made) {
   }
   if (maps != nullptr) good = MultiplyByMaps(*maps, *made, &weights) && good;
   for (std::size_t g = first; g < weights.size() && falloff != nullptr; ++g) {
-    good = MultiplyByFalloff(*falloff, made->geometries[g], &weights[g]) && good;
+    good = MultiplyByFalloff(*falloff, *made, made->geometries[g], &weights[g]) && good;
   }
   if (!good) return;
   GraphEditor edit(&graph());
@@ -288,8 +286,19 @@ const RigBuild::Geometry* RigBuild::GeometryOf(const Made& made, const WeightFil
   return nullptr;
 }
 
-// One reference or several; each is for the geometry that its file names. A welded point takes its vertices'
-// largest.
+// A welded point takes its vertices' largest.
+std::vector<float> RigBuild::ByPoint(const WeightFile& file, const NamedWeights& map,
+                                     const Geometry& of) const {
+  const std::vector<float> dense = Dense(file, map);
+  std::vector<float> by_point(of.count, -std::numeric_limits<float>::infinity());
+  for (Index v = 0; v < dense.size(); ++v) {
+    float& weight = by_point[PointOf(of, v)];
+    weight = std::max(weight, dense[v]);
+  }
+  return by_point;
+}
+
+// One reference or several; each is for the geometry that its file names.
 bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made,
                               std::vector<std::vector<float>>* weights) {
   std::vector<const YamlNode*> references;
@@ -307,45 +316,11 @@ bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made,
       good = false;
       continue;
     }
-    const std::vector<float> dense = Dense(*file, *map);
-    constexpr float kNone = -std::numeric_limits<float>::infinity();
-    std::vector<float> by_point(of->count, kNone);
-    for (Index v = 0; v < dense.size(); ++v) {
-      float& weight = by_point[PointOf(*of, v)];
-      weight = std::max(weight, dense[v]);
-    }
+    const std::vector<float> by_point = ByPoint(*file, *map, *of);
     std::vector<float>& product = (*weights)[static_cast<std::size_t>(of - made.geometries.data())];
     for (std::size_t p = 0; p < product.size(); ++p) product[p] *= by_point[p];
   }
   return good;
-}
-
-// falloff: {at: <place>, radius: 5, curve: smooth}: 1 at the place, 0 at the radius and beyond, at rest.
-bool RigBuild::MultiplyByFalloff(const RigAttribute& attribute, const Geometry& of,
-                                 std::vector<float>* weights) {
-  YamlMap map(attribute.value, "falloff", errors_);
-  const YamlNode* at = map.Required("at");
-  const YamlNode* radius_node = map.Required("radius");
-  const YamlNode* curve_node = map.Find("curve");
-  map.RejectUnread();
-  Double3 center;
-  double radius = 0;
-  std::string curve = "smooth";
-  if (at == nullptr || radius_node == nullptr || !ReadPlace(*at, attribute.source, 0, &center)) return false;
-  if (!ReadNumber(*radius_node, "radius", Unit::kLength, units(attribute.source), &radius, errors_))
-    return false;
-  if (!(radius > 0))
-    return errors_->Add(*radius_node, "radius: expected a length above 0, found {}", radius_node->scalar);
-  if (curve_node != nullptr && !ReadString(*curve_node, "curve", &curve, errors_)) return false;
-  if (curve != "smooth" && curve != "linear")
-    return errors_->Add(*curve_node, "curve: expected smooth or linear, found \"{}\"", curve);
-  if (!of.mesh.has_value()) return errors_->Add(attribute.value, "falloff: {} is no mesh", of.name);
-  const Places& points = rest_->WorldPoints(*of.mesh);
-  for (std::size_t p = 0; p < points.size(); ++p) {
-    const double t = std::clamp(1 - Length(points[p] - center) / radius, 0.0, 1.0);
-    (*weights)[p] *= static_cast<float>(curve == "smooth" ? Smooth(t) : t);
-  }
-  return true;
 }
 
 }  // namespace kpsa

@@ -34,6 +34,8 @@ bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
   if (key == "start" || key == "end")
     return def.name == "ikHandle" || def.name == "splineIk" || def.name == "twistDistribution";
   if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
+  if (def.name == "poseInterpolator" && key == "poses") return true;
+  if (key == "driver") return HasAttribute(def, "driverPoints") || def.name == "poseInterpolator";
   if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
   if (key == "curve" || key == "curves")
     return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
@@ -149,9 +151,10 @@ void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bo
     for (const AttributeDef& a : def.attributes) {
       if (!a.output) names.push_back(a.name);
     }
-    for (const char* word : {"parent", "at", "members", "weights", "falloff", "vertices", "mesh", "closed",
-                             "places", "curve", "curves", "targets", "combinations", "inbetweens",
-                             "blendWeights", "constrained", "start", "mid", "end"}) {
+    for (const char* word :
+         {"parent",       "at",         "members",      "weights",     "falloff", "driver", "poses",
+          "vertices",     "mesh",       "closed",       "places",      "curve",   "curves", "targets",
+          "combinations", "inbetweens", "blendWeights", "constrained", "start",   "mid",    "end"}) {
       if (IsSpecial(def, word)) names.push_back(word);
     }
     errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name,

@@ -110,33 +110,12 @@ void RigBuild::AddAccelerations() {
     read_clips(from.test_clips, &to.test_clips);
     if (from.space.has_value()) to.space = FindTransform(from.space->text, from.space->where);
     for (RigAccelerate::Points points : from.points) {
-      // Stages may have an @ in their names, too: the longest mesh that exists wins
-      const std::string whole = points.mesh + "@" + points.stage;
-      const auto is_mesh = [&](const std::string& name) {
-        return std::any_of(rig_->scene.meshes.begin(), rig_->scene.meshes.end(),
-                           [&](const CharacterMesh& mesh) {
-                             return mesh.name == name || rig_->character->nodes[mesh.gltf_node].name == name;
-                           });
-      };
-      for (std::size_t at = whole.rfind('@'); at != std::string::npos && at > 0;
-           at = whole.rfind('@', at - 1)) {
-        if (!is_mesh(whole.substr(0, at))) continue;
-        points.mesh = whole.substr(0, at);
-        points.stage = whole.substr(at + 1);
-        break;
-      }
+      SplitStage(points.mesh + "@" + points.stage, &points.mesh, &points.stage);
       const std::optional<std::size_t> mesh_index = FindMesh(points.mesh, points.where);
       if (!mesh_index.has_value()) continue;
       const CharacterMesh& mesh = rig_->scene.meshes[*mesh_index];
-      const Stage* stage = mesh.FindStage(points.stage);
-      if (stage == nullptr) {
-        std::vector<std::string> names;
-        for (const Stage& s : mesh.stages) names.push_back(s.name);
-        Fail(points.where,
-             Status::Invalid("\"{}\" has no stage \"{}\"{}; its stack is {}", mesh.name, points.stage,
-                             DidYouMean(points.stage, names), fmt::join(names, ", ")));
-        continue;
-      }
+      const Stage* stage = FindStage(mesh, points.stage, points.where);
+      if (stage == nullptr) continue;
       if (const auto [it, added] = by_mesh.emplace(*mesh_index, points.where); !added) {
         Fail(points.where, Status::Invalid("points of \"{}\" are accelerated already, at {}", mesh.name,
                                            it->second.ToString()));

@@ -47,6 +47,12 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
   request.varying = varying;
   Result<std::shared_ptr<const Plan>> plan = compiler->Compile(graph, request);
   if (!plan.ok()) return plan.status();
+  if (const std::string& node = (*plan)->stateful_node(); !node.empty()) {
+    return Status::Invalid(
+        "\"{}\" remembers its previous frame, and a subspace knows poses only: points after it cannot be "
+        "accelerated; accelerate a stage before it",
+        node);
+  }
   const std::set<Index> chain =
       space_world == nullptr ? std::set<Index>() : ParentChain(graph, space_world->node);
 

@@ -31,7 +31,7 @@ std::set<Index> ParentChain(const Graph& graph, NodeId node);
 // All signals of the points `outputs` under the varying plugs `varying`, sorted by name. The chain of
 // transforms from the root to `space` (a node whose frame the points are taken in) is left out, if one is
 // given. `unguarded` receives varying inputs that are no signals (arrays of points that are set from
-// outside).
+// outside). Points that depend on a stateful node (NodeDef::stateful) are an error that names it.
 Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
                                         const std::vector<PlugRef>& outputs,
                                         const std::vector<PlugRef>& varying, const PlugRef* space_world,

@@ -32,14 +32,17 @@ NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind
   return builder;
 }
 
-std::vector<float> BoundWeights(const Binding& binding) {
-  const WeightMap* map = binding.structural().asset<WeightMap>("weights");
+std::vector<float> WeightsAt(const Structural& structural, const PointSet& points) {
+  const WeightMap* map = structural.asset<WeightMap>("weights");
   if (map == nullptr) return {};
-  const PointSet& out = binding.output("outPoints");
-  std::vector<float> weights(out.size());
-  for (Index i = 0; i < out.size(); ++i)
-    weights[i] = out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f;
+  std::vector<float> weights(points.size());
+  for (Index i = 0; i < points.size(); ++i)
+    weights[i] = points[i] < map->weights().size() ? map->weights()[points[i]] : 0.0f;
   return weights;
+}
+
+std::vector<float> BoundWeights(const Binding& binding) {
+  return WeightsAt(binding.structural(), binding.output("outPoints"));
 }
 
 Result<ConstPointsView> RestPoints(const Structural& structural) {

@@ -7,6 +7,7 @@
 // skin carries it later.
 #pragma once
 
+#include <cmath>
 #include <span>
 #include <string>
 #include <utility>
@@ -27,7 +28,8 @@ NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string do
 // Declares outPoints and the group; the output may take over the input's buffer. demand may be null (local).
 NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind, DemandFn demand = nullptr);
 
-// For bind: the weight map at the output points (empty: 1 everywhere).
+// The weight map at these points (empty: 1 everywhere); for bind, at the output points.
+std::vector<float> WeightsAt(const Structural& structural, const PointSet& points);
 std::vector<float> BoundWeights(const Binding& binding);
 // The whole geometry at this stage with everything at its default; an error where upstream could not be
 // evaluated.
@@ -50,6 +52,8 @@ class CarriedFrame {
   // world_from_stage at rest; the identity for stages in world space.
   const Matrix4& world_from_stage() const { return world_from_stage_; }
   const Matrix4& stage_from_world() const { return stage_from_world_; }
+  // World lengths of a length 1 in the stage.
+  double WorldScale() const { return std::cbrt(std::fabs(Determinant3(world_from_stage_))); }
 
  private:
   bool fixed_ = false;

@@ -13,15 +13,6 @@ DeltaMushSettings Settings(const Structural& s) {
           s.get_bool("pinBorderVertices")};
 }
 
-std::vector<float> WeightsAt(const Structural& s, const PointSet& out) {
-  const auto* map = s.asset<WeightMap>("weights");
-  std::vector<float> weights;
-  if (map == nullptr) return weights;
-  for (Index i = 0; i < out.size(); ++i)
-    weights.push_back(out[i] < map->weights().size() ? map->weights()[out[i]] : 0.0f);
-  return weights;
-}
-
 // iterations + 1 rings: the frames read smoothed neighbours.
 void DemandMush(Demand& demand) {
   const Structural& s = demand.structural();

@@ -18,6 +18,11 @@ void AddDeltaMushNode(NodeRegistry& registry);          // deltaMush
 void AddCurveNodes(NodeRegistry& registry);             // curve, wire
 void AddNonLinearNodes(NodeRegistry& registry);         // bend, twist, squash, flare, sine, wave
 void AddTensionNode(NodeRegistry& registry);            // tension
+void AddWrapNodes(NodeRegistry& registry);              // wrap, proximityWrap
+void AddShrinkWrapNode(NodeRegistry& registry);         // shrinkWrap
+void AddSculptNode(NodeRegistry& registry);             // sculpt
+void AddPoseInterpolatorNode(NodeRegistry& registry);   // poseInterpolator
+void AddJiggleNode(NodeRegistry& registry);             // jiggle
 void AddTripwireNode(NodeRegistry& registry);           // tripwire
 void AddMathNodes(NodeRegistry& registry);  // remapValue, multiplyDivide, plusMinusAverage, unitConversion
 void AddExpressionNode(NodeRegistry& registry);  // expression

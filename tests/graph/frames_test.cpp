@@ -256,6 +256,19 @@ TEST(Frames, AStatefulNodeKeepsItsFramesInOrderOnOneEvaluator) {
   EXPECT_TRUE(status.ok());
   for (const Evaluator* e : evaluators) EXPECT_EQ(e, evaluators[0]);
 
+  // From the first frame again
+  Evaluator again(g.plan);
+  std::vector<double> first;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (std::size_t frame = 0; frame < 5; ++frame) {
+      again.Set(0, 1.0 + static_cast<double>(frame));
+      ASSERT_TRUE(again.Evaluate().ok());
+      if (pass == 0) first.push_back(again.Get<double>(0));
+      EXPECT_EQ(again.Get<double>(0), first[frame]);
+    }
+    again.Restart();
+  }
+
   TestGraph plain(ToyRegistry());
   plain.add("add", "a");
   plain.vary("a.a");

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "base/simd.h"
@@ -14,11 +16,13 @@
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/non_linear.h"
 #include "nodes/kernels/normals.h"
+#include "nodes/kernels/shrink_wrap.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/soft_mod.h"
 #include "nodes/kernels/tension.h"
 #include "nodes/kernels/weights.h"
 #include "nodes/kernels/wire.h"
+#include "nodes/kernels/wrap.h"
 #include "tests/nodes/kernel_support.h"
 
 namespace kpsa {
@@ -40,7 +44,10 @@ struct Subject {
 class KernelLaw : public testing::Test {
  protected:
   explicit KernelLaw(Index nu = 45, Index nv = 41)
-      : mesh_(MakeSheet(nu, nv)), skin_(MakeSkin(mesh_.count(), 30, 6, true)), points_(mesh_.count()) {
+      : mesh_(MakeSheet(nu, nv)),
+        skin_(MakeSkin(mesh_.count(), 30, 6, true)),
+        points_(mesh_.count()),
+        wrapped_(mesh_.count()) {
     // A pose that is not the rest; zeros of both signs in all places where a mirror plane would have them
     Random random(11);
     CopyPoints(mesh_.rest.view(), points_.view());
@@ -179,6 +186,90 @@ class KernelLaw : public testing::Test {
            AlignedFloats scratch(kernel.ScratchFloats());
            kernel.Run(in, out, scratch.span(), parallel);
          }});
+    AddWraps();
+    AddShrinkWraps();
+  }
+
+  // The points that the law is about are the driver's; a sheet beside it follows.
+  void AddWraps() {
+    const Matrix4 beside = ComposeTrs({0.01, 0, 0.06}, {0, 0, 0.1, 1}, {0.95, 0.9, 0.8});
+    for (std::size_t i = 0; i < count(); ++i) {
+      driver_rest_.push_back({mesh_.rest.view().x[i], mesh_.rest.view().y[i], mesh_.rest.view().z[i]});
+      const Double3 p = TransformPoint(beside, driver_rest_.back());
+      wrapped_.view().x[i] = static_cast<float>(p.x);
+      wrapped_.view().y[i] = static_cast<float>(p.y);
+      wrapped_.view().z[i] = static_cast<float>(p.z);
+    }
+    surface_ = TriangleTree(mesh_.rest.view(), mesh_.topology.triangles());
+    singles_ = TriangleTree(mesh_.rest.view(), PointTriangles(mesh_.topology));
+    surface_boxes_ = AlignedFloats(surface_.BoxFloats());
+    singles_boxes_ = AlignedFloats(singles_.BoxFloats());
+    surface_.Fit(mesh_.rest.view(), surface_boxes_.span());
+    singles_.Fit(mesh_.rest.view(), singles_boxes_.span());
+    const struct {
+      const char* name;
+      WrapMode mode;
+      int smooth;
+      bool nearest;
+    } wraps[] = {{"proximityWrap, offset", WrapMode::kOffset, 0, false},
+                 {"proximityWrap, smooth", WrapMode::kOffset, 2, false},
+                 {"proximityWrap, surface", WrapMode::kSurface, 0, false},
+                 {"proximityWrap, snap", WrapMode::kSnap, 0, false},
+                 {"wrap", WrapMode::kOffset, 0, true}};
+    for (const auto& c : wraps) {
+      const auto search = [this, c](std::span<const Index> out_points) {
+        return c.nearest
+                   ? NearestInfluences({mesh_.rest.view(), &singles_, singles_boxes_.span()}, wrapped_.view(),
+                                       out_points, 0.2, 6, Masked(out_points))
+                   : SurfaceInfluences({mesh_.rest.view(), &surface_, surface_boxes_.span()}, mesh_.topology,
+                                       wrapped_.view(), out_points, 10, c.smooth, Masked(out_points));
+      };
+      // Those of all points are asked for again and again
+      const auto of_all = std::make_shared<std::optional<WrapInfluences>>();
+      const auto influences = [this, search, of_all](std::span<const Index> out_points) {
+        if (out_points.size() < count()) return search(out_points);
+        if (!of_all->has_value()) *of_all = search(out_points);
+        return **of_all;
+      };
+      subjects_.push_back({c.name, false,
+                           [this, c, influences](auto out_points) {
+                             return WrapDemand(mesh_.topology, driver_rest_, influences(out_points), c.mode);
+                           },
+                           [this, c, influences](auto out_points, auto in_points, auto in, auto out,
+                                                 const Parallel* parallel) {
+                             const WrapKernel kernel(c.mode, mesh_.topology, driver_rest_,
+                                                     Translation({0, 0.01, 0}), influences(out_points),
+                                                     wrapped_.view(), out_points, in_points,
+                                                     Masked(out_points));
+                             AlignedFloats scratch(kernel.ScratchFloats());
+                             PointBuffer points(out_points.size()), driver(in_points.size());
+                             GatherPoints(wrapped_.view(), out_points, points.view());
+                             CopyPoints(in, driver.view());  // the engine never gives one buffer for both
+                             kernel.Run({0.8, driver.view()}, points.view(), out, scratch.span(), parallel);
+                           }});
+    }
+  }
+
+  // Onto the sheet that follows in the other subjects.
+  void AddShrinkWraps() {
+    using Projection = ShrinkWrapSettings::Projection;
+    for (const Projection projection : {Projection::kClosest, Projection::kNormals}) {
+      ShrinkWrapSettings settings;
+      settings.projection = projection;
+      settings.bidirectional = true;
+      subjects_.push_back(
+          {projection == Projection::kClosest ? "shrinkWrap" : "shrinkWrap along normals",
+           projection == Projection::kClosest,
+           [this, settings](auto out_points) {
+             return ShrinkWrapDemand(settings, mesh_.topology, out_points, Masked(out_points));
+           },
+           [this, settings](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
+             const ShrinkWrapKernel kernel(settings, mesh_.topology, surface_, Translation({0, 0, 0.01}),
+                                           mesh_.topology, out_points, in_points, Masked(out_points));
+             AlignedFloats scratch(kernel.ScratchFloats());
+             kernel.Run({0.9, 0.002, wrapped_.view()}, in, out, scratch.span(), parallel);
+           }});
+    }
   }
 
   void AddDualQuaternions() {
@@ -260,7 +351,10 @@ class KernelLaw : public testing::Test {
   std::vector<double> target_weights_;
   std::vector<Matrix4> palette_;
   std::vector<Double3> centers_;
-  std::vector<Double3> vertices_, vertex_offsets_;
+  std::vector<Double3> vertices_, vertex_offsets_, driver_rest_;
+  PointBuffer wrapped_;
+  TriangleTree surface_, singles_;
+  AlignedFloats surface_boxes_, singles_boxes_;
   std::vector<Subject> subjects_;
 };
 

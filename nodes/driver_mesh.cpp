@@ -1,0 +1,109 @@
+#include "nodes/driver_mesh.h"
+
+#include <cmath>
+#include <mutex>
+#include <span>
+#include <utility>
+
+#include "base/digest.h"
+#include "graph/geometry.h"
+#include "nodes/kernels/wrap.h"
+#include "nodes/mesh_topology.h"
+
+namespace kpsa {
+namespace {
+
+// Beside the mesh: its latest rests, the newest one last.
+struct Latest {
+  struct Entry {
+    Digest key;
+    std::shared_ptr<const DriverRest> rest;
+  };
+  struct Shared {
+    std::mutex mutex;
+    std::vector<Entry> entries;
+  };
+  std::shared_ptr<Shared> shared = std::make_shared<Shared>();
+  static constexpr std::size_t kMost = 4;
+};
+
+std::shared_ptr<const DriverRest> MakeRest(ConstPointsView points, const Matrix4& stage_from_driver,
+                                           const Topology& topology, DriverTree tree) {
+  auto rest = std::make_shared<DriverRest>();
+  rest->rounded = PointBuffer(points.count);
+  const PointsView rounded = rest->rounded.view();
+  const bool moved = !(stage_from_driver == Matrix4());
+  for (std::size_t i = 0; i < points.count; ++i) {
+    const Double3 p{points.x[i], points.y[i], points.z[i]};
+    const Double3 placed = moved ? TransformPoint(stage_from_driver, p) : p;
+    rest->points.push_back(placed);
+    rounded.x[i] = static_cast<float>(placed.x);
+    rounded.y[i] = static_cast<float>(placed.y);
+    rounded.z[i] = static_cast<float>(placed.z);
+  }
+  const std::vector<Index> singles =
+      tree == DriverTree::kPoints ? PointTriangles(topology) : std::vector<Index>();
+  rest->tree = TriangleTree(
+      rounded, tree == DriverTree::kPoints ? std::span<const Index>(singles) : topology.triangles());
+  rest->boxes = AlignedFloats(rest->tree.BoxFloats());
+  rest->tree.Fit(rounded, rest->boxes.span());
+  return rest;
+}
+
+}  // namespace
+
+void AddDriver(NodeBuilder& b) {
+  b.points_in("driverPoints", "the driver's points, at any stage of its stack; `driver:` connects them");
+  b.structural("driverMesh", Type::kMesh, {.doc = "the topology of the driver"});
+  b.structural("driverMatrix", Matrix4(),
+               {.doc = "world from the driver's space at rest, where its stage is in mesh space"});
+}
+
+Result<Driver> BindDriver(const Structural& s, DriverTree tree) {
+  const auto* mesh = s.asset<Mesh>("driverMesh");
+  const Value* value = s.rest("driverPoints");
+  if (mesh == nullptr || !s.is_set("driverPoints"))
+    return Status::Invalid("it has no driver: name a mesh, `driver: MESH` or `driver: \"MESH@STAGE\"`");
+  if (value == nullptr || value->points() == nullptr) return Status::Invalid("its driver has no rest shape");
+  Status error;
+  Driver driver;
+  driver.topology = TopologyOf(mesh, &error);
+  if (driver.topology == nullptr) return error;
+  const ConstPointsView points = value->points()->view();
+  if (points.count != driver.topology->point_count()) {
+    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", driver.topology->point_count(),
+                           points.count);
+  }
+  if (driver.topology->triangle_count() == 0)
+    return Status::Invalid("its driver \"{}\" has no faces", mesh->data().name);
+  for (std::size_t i = 0; i < points.count; ++i) {
+    if (!std::isfinite(points.x[i]) || !std::isfinite(points.y[i]) || !std::isfinite(points.z[i]))
+      return Status::Invalid("point {} of its driver is not finite at rest", i);
+  }
+  Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  driver.stage_from_driver = s.value("driverMatrix").get<Matrix4>();
+  Matrix4 inverse;
+  if (!Invert(driver.stage_from_driver, &inverse)) return Status::Invalid("driverMatrix is singular");
+  if (frame->fixed()) driver.stage_from_driver = frame->stage_from_world() * driver.stage_from_driver;
+
+  Hasher hasher;
+  hasher.Add(tree);
+  hasher.Add(std::span<const double>(driver.stage_from_driver.m));
+  for (const float* row : {points.x, points.y, points.z})
+    hasher.Add(std::span<const float>(row, points.count));
+  const Digest key = hasher.Finish();
+  Latest::Shared& latest = *mesh->Derived<Latest>([] { return Latest(); }).shared;
+  const std::lock_guard<std::mutex> lock(latest.mutex);
+  for (const Latest::Entry& entry : latest.entries) {
+    if (entry.key == key) driver.rest = entry.rest;
+  }
+  if (driver.rest == nullptr) {
+    driver.rest = MakeRest(points, driver.stage_from_driver, *driver.topology, tree);
+    if (latest.entries.size() == Latest::kMost) latest.entries.erase(latest.entries.begin());
+    latest.entries.push_back({key, driver.rest});
+  }
+  return driver;
+}
+
+}  // namespace kpsa

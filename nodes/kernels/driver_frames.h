@@ -1,0 +1,63 @@
+// How the surface of a driver mesh has turned and stretched at its points since rest.
+//
+// At a driver point i: the matrix F_i that carries rest edges to present ones, in the least-squares sense
+// over the edges around the point and its normal (area-weighted, of the triangles around it):
+//   F_i = (sum_j e'_j e_j^T + s n' n^T) M^-1,  M = sum_j e_j e_j^T + s n n^T,  e_j = d_j - d_i, s the mean
+//   e^2.
+// A rigid motion of the driver gives its rotation exactly, up to rounding. Where the edges of a point do not
+// span a plane at rest it has no frame, and asks for nothing.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/matrix.h"
+#include "nodes/kernels/parallel_hook.h"
+#include "nodes/kernels/topology.h"
+
+namespace kpsa {
+
+// The driver points that the frames of these points read (each with its ring), sorted.
+std::vector<Index> DriverFramesDemand(const Topology& driver, std::span<const Double3> rest,
+                                      std::span<const Index> frame_points);
+
+// F column by column (column k is where the rest direction k has gone), then the normal: unit length, or 0.
+// F is no rotation: it stretches, too. Plain numbers in a row, so that blends of frames are loops over them.
+struct DriverFrame {
+  static constexpr int kSize = 12;
+  double values[kSize];
+  Double3 Apply(Double3 v) const {
+    return {values[0] * v.x + values[3] * v.y + values[6] * v.z,
+            values[1] * v.x + values[4] * v.y + values[7] * v.z,
+            values[2] * v.x + values[5] * v.y + values[8] * v.z};
+  }
+  Double3 normal() const { return {values[9], values[10], values[11]}; }
+};
+
+class DriverFrames {
+ public:
+  DriverFrames() = default;
+  // rest: all driver points. frame_points, in_points: sorted; in_points holds at least the demand.
+  DriverFrames(const Topology& driver, std::span<const Double3> rest, std::span<const Index> frame_points,
+               std::span<const Index> in_points);
+
+  std::size_t count() const { return edge_offsets_.size() - 1; }
+  // Of one frame: whether it exists.
+  bool exists(std::size_t frame) const { return edge_offsets_[frame + 1] > edge_offsets_[frame]; }
+  // points: the in_points now. frames: count() of them; those that do not exist are left alone.
+  void Run(std::span<const Double3> points, std::span<DriverFrame> frames,
+           const Parallel* parallel = nullptr) const noexcept;
+
+ private:
+  struct Edge {
+    Index point;   // entry of points
+    Double3 dual;  // M^-1 e
+  };
+  std::vector<Index> own_;  // entry of points, a frame
+  std::vector<Index> edge_offsets_ = {0}, triangle_offsets_ = {0};
+  std::vector<Edge> edges_;
+  std::vector<Index> triangles_;  // 3 entries of points a triangle around the point
+  std::vector<Double3> normal_duals_;
+};
+
+}  // namespace kpsa

@@ -1,0 +1,57 @@
+// sculpt: a sphere pushes points out of itself (Maya's sculpt deformer: flip, project, stretch).
+//
+// In units of the sphere, r the distance from its centre, d the dropoff distance, a point goes
+//   flip:    outward along its radius, to 1; with a linear dropoff to 1 + (r / (1 + d)) d, which spreads the
+//            points inside over the shell [1, 1 + d] and ends at 1 + d
+//   project: to 1 along its radius, from inside and outside, as far as |r - 1| < d; linear dropoff: times
+//            1 - |r - 1| / d
+//   stretch: along the direction from the stretch origin to the centre, until it leaves the sphere; points
+//            outside within d go as far as the surface point below them, linear dropoff: times 1 - (r - 1) /
+//            d
+// and never farther than the maximum displacement. At the very centre there is no direction: the point stays
+// (flip, project). Double arithmetic.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/matrix.h"
+#include "base/points.h"
+#include "nodes/kernels/parallel_hook.h"
+
+namespace kpsa {
+
+enum class SculptMode : std::uint8_t { kFlip, kProject, kStretch };
+enum class SculptDropoff : std::uint8_t { kNone, kLinear };
+
+struct SculptShape {
+  SculptMode mode = SculptMode::kFlip;
+  SculptDropoff dropoff = SculptDropoff::kLinear;
+  double dropoff_distance = 0;  // in radii of the sphere, as is the next; 0: none
+  double max_displacement = 0;
+  Double3 stretch;  // kStretch: direction, unit length; 0: points stay
+};
+
+// Where a point goes, both in the space of the unit sphere.
+Double3 SculptPoint(const SculptShape& shape, Double3 p);
+
+// A local kernel.
+class SculptKernel {
+ public:
+  struct Inputs {
+    SculptShape shape;
+    Matrix4 stage_from_sphere;  // from the space in which the sphere is of radius 1 about the origin
+    double envelope = 1;
+  };
+  SculptKernel(std::span<const Index> out_points, std::span<const float> point_weights = {});
+  std::size_t point_count() const { return weights_.size(); }
+  // A singular stage_from_sphere moves nothing.
+  void Run(const Inputs& inputs, ConstPointsView in, PointsView out,
+           const Parallel* parallel = nullptr) const noexcept;
+
+ private:
+  std::vector<float> weights_;
+};
+
+}  // namespace kpsa

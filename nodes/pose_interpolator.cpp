@@ -1,0 +1,99 @@
+// poseInterpolator: weights of named poses of a transform (Maya's node of this name), for shapes and values
+// that belong to poses.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/matrix.h"
+#include "nodes/deformer.h"
+#include "nodes/kernels/pose_weights.h"
+#include "nodes/kernels/transform_math.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+struct PoseBound {
+  PoseWeights weights;
+  Matrix4 rest;
+};
+
+Result<BoundKernel> BindPoses(const Binding& binding) {
+  const Structural& s = binding.structural();
+  const std::vector<double>& angles = s.value("poses").get<std::vector<double>>();
+  if (angles.empty()) return Status::Invalid("poses: there are none");
+  if (angles.size() % 3 != 0)
+    return Status::Invalid("poses: expected three angles a pose, found {} numbers", angles.size());
+  PoseSettings settings;
+  settings.space.part = static_cast<PoseSpace::Part>(s.get_int("poseType"));
+  settings.space.twist_axis = {};
+  settings.space.twist_axis[s.get_int("twistAxis")] = 1;
+  settings.basis = static_cast<PoseBasis>(s.get_int("interpolation"));
+  settings.radius = s.get_double("radius");
+  settings.regularization = s.get_double("regularization");
+  settings.normalize = s.get_bool("normalize");
+  const auto order = static_cast<RotateOrder>(s.get_int("rotateOrder"));
+  std::vector<Quaternion> poses;
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < angles.size(); i += 3) {
+    poses.push_back(
+        QuaternionFromRotation(RotationFromEuler({angles[i], angles[i + 1], angles[i + 2]}, order)));
+    names.push_back(fmt::format("{}", i / 3));
+  }
+  // The poses' names, where the rig gives them: one string, a line each
+  const std::string& lines = s.value("poseNames").get<std::string>();
+  for (std::size_t i = 0, at = 0; i < names.size() && at < lines.size(); ++i) {
+    const std::size_t end = std::min(lines.find('\n', at), lines.size());
+    names[i] = lines.substr(at, end - at);
+    at = end + 1;
+  }
+  Result<PoseWeights> weights = PoseWeights::Bind(settings, poses, names);
+  if (!weights.ok()) return weights.status();
+  const std::size_t floats = 2 * weights->pose_count();
+  return MakeBound(PoseBound{std::move(*weights), s.value("restMatrix").get<Matrix4>()}, floats);
+}
+
+void ComputePoses(ComputeContext& c) {
+  const auto& bound = c.kernel_as<PoseBound>();
+  const std::span<double> weights(reinterpret_cast<double*>(c.scratch), bound.weights.pose_count());
+  bound.weights.Run(PoseRotation(c.get<Matrix4>(0), bound.rest), weights);
+  const std::uint32_t* table = c.out + c.out[0];
+  for (std::uint32_t i = 0; i < table[0]; ++i)
+    *reinterpret_cast<double*>(c.values + table[1 + i]) = i < weights.size() ? weights[i] : 0.0;
+}
+
+}  // namespace
+
+void AddPoseInterpolatorNode(NodeRegistry& registry) {
+  registry
+      .add("poseInterpolator",
+           "How near a transform is to each of a few poses: 1 at a pose itself, 0 at the others.")
+      .in("matrix", Matrix4(), {.doc = "the transform's local matrix; `driver:` connects it"})
+      .structural("restMatrix", Matrix4(), {.doc = "the same at rest: poses are turns from it"})
+      .structural("poses", std::vector<double>{},
+                  {.unit = Unit::kAngle, .doc = "three angles a pose; in rigs a map, name: [x, y, z]"})
+      .structural("poseNames", "", {.doc = "of the poses, one a line; `poses:` sets it"})
+      .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "of the poses' angles")
+      .enumeration("poseType", {"swingAndTwist", "swing", "twist"}, true,
+                   "what of a rotation counts: all of it, where the twist axis points, or the turn about it")
+      .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")
+      .enumeration("interpolation", {"gaussian", "thinPlate", "linear"}, true,
+                   "the radial function: exp(-(d/r)^2), d^2 log d, or d")
+      .structural("radius", 0.0,
+                  {.min = 0,
+                   .unit = Unit::kAngle,
+                   .doc = "of gaussian; 0: the mean distance of the poses from their nearest other"})
+      .structural("regularization", 0.0,
+                  {.min = 0, .doc = "above 0: smoother, and no longer exactly 1 at the poses"})
+      .structural("normalize", false, {.doc = "no weight is below 0, and all sum to 1"})
+      .out("outputWeight", Type::kDouble, "by pose: outputWeight[0], or outputWeight[name]")
+      .array()
+      .compute(&ComputePoses)
+      .bind(BindPoses)
+      .cost(400, 0);
+}
+
+}  // namespace kpsa

@@ -1,0 +1,79 @@
+// sculpt: a sphere pushes points out of itself. The sphere is where its handle is; in mesh space, where the
+// handle would be had its parent not moved, because the skin carries the points later.
+#include "nodes/kernels/sculpt.h"
+
+#include <cmath>
+
+#include "nodes/deformer.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+enum { kMatrix = kFirstOwnInput, kRadius, kMaxDisplacement, kDropoffDistance, kStretchOrigin };
+
+struct SculptBound {
+  SculptKernel kernel;
+  CarriedFrame frame;
+  SculptMode mode;
+  SculptDropoff dropoff;
+};
+
+Result<BoundKernel> BindSculpt(const Binding& binding) {
+  const Structural& s = binding.structural();
+  const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  return MakeBound(SculptBound{SculptKernel(binding.output("outPoints").ToVector(), BoundWeights(binding)),
+                               *frame, static_cast<SculptMode>(s.get_int("mode")),
+                               static_cast<SculptDropoff>(s.get_int("dropoffType"))},
+                   0);
+}
+
+void ComputeSculpt(ComputeContext& c) {
+  const auto& bound = c.kernel_as<SculptBound>();
+  const double radius = c.get<double>(kRadius);
+  const Matrix4& handle = c.get<Matrix4>(kMatrix);
+  // From the world to the stage
+  const Matrix4 stage_from_world = bound.frame.fixed()
+                                       ? bound.frame.stage_from_world() * bound.frame.parent_rest() *
+                                             InverseOrIdentity(c.get<Matrix4>(kParentMatrix))
+                                       : Matrix4();
+  SculptKernel::Inputs inputs{{bound.mode, bound.dropoff, 0, 0, {}},
+                              stage_from_world * handle * Scaling({radius, radius, radius}),
+                              c.get<double>(kEnvelope)};
+  // Lengths are world ones: the mean radius of the sphere as its handle scales it
+  const double size = radius * std::cbrt(std::fabs(Determinant3(handle)));
+  if (size > 0) {
+    inputs.shape.dropoff_distance = c.get<double>(kDropoffDistance) / size;
+    inputs.shape.max_displacement = c.get<double>(kMaxDisplacement) / size;
+  }
+  Matrix4 sphere_from_world;
+  if (bound.mode == SculptMode::kStretch && Invert(handle, &sphere_from_world)) {
+    const Double3 away = TransformPoint(sphere_from_world, c.get<Double3>(kStretchOrigin)) * -1.0;
+    const double length = Length(away);
+    if (length > 0) inputs.shape.stretch = away * (1 / length);
+  }
+  const Parallel parallel = HostParallel(c);
+  bound.kernel.Run(inputs, c.points(kInPoints), c.out_points(0), &parallel);
+}
+
+}  // namespace
+
+void AddSculptNode(NodeRegistry& registry) {
+  NodeBuilder b = AddDeformer(registry, "sculpt", "A sphere pushes points out of itself.");
+  b.in("matrix", Matrix4(), {.doc = "the handle's world matrix: the sphere's centre, axes and scale"});
+  b.in("radius", 0.05, {.min = 0, .unit = Unit::kLength, .doc = "of the sphere, before the handle's scale"});
+  b.in("maximumDisplacement", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "no point moves farther"});
+  b.in("dropoffDistance", 0.0,
+       {.min = 0, .unit = Unit::kLength, .doc = "how far from the sphere's surface points are moved"});
+  b.in("stretchOrigin", Double3(),
+       {.unit = Unit::kLength, .doc = "of mode stretch, world space: points move away from it"});
+  b.enumeration("mode", {"flip", "project", "stretch"}, true,
+                "flip: points inside go out along their radius; project: points near the surface go onto it; "
+                "stretch: points go away from stretchOrigin until they are outside");
+  b.enumeration("dropoffType", {"none", "linear"}, true,
+                "none: full strength up to the dropoff distance; linear: fading towards it", 1);
+  FinishDeformer(b, &ComputeSculpt, BindSculpt).cost(300, 30);
+}
+
+}  // namespace kpsa

@@ -1,0 +1,113 @@
+// shrinkWrap: points go onto another mesh, which may move (Maya's node of this name).
+#include "nodes/kernels/shrink_wrap.h"
+
+#include "graph/geometry.h"
+#include "nodes/driver_mesh.h"
+#include "nodes/mesh_topology.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+constexpr int kOffset = kDriverPoints + 1;
+
+Result<ShrinkWrapSettings> Settings(const Structural& s) {
+  ShrinkWrapSettings settings;
+  settings.projection = static_cast<ShrinkWrapSettings::Projection>(s.get_int("projection"));
+  settings.side = static_cast<ShrinkWrapSettings::Side>(s.get_int("side"));
+  settings.reverse = s.get_bool("reverse");
+  settings.bidirectional = s.get_bool("bidirectional");
+  settings.closest_if_no_intersection = s.get_bool("closestIfNoIntersection");
+  const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  const Double3 axis = TransformVector(frame->stage_from_world(), s.value("axis").get<Double3>());
+  if (!(Length(axis) > 0)) return Status::Invalid("axis: expected a direction, not of length 0");
+  settings.axis = axis * (1 / Length(axis));
+  return settings;
+}
+
+// The faces of the points themselves, for their normals; null where they have none of that number.
+const Topology* OwnTopology(const Structural& s, const PointSet& out, Status* error) {
+  const Topology* own = TopologyOf(s.asset<Mesh>("mesh"), error);
+  if (own != nullptr && own->point_count() != out.total()) {
+    *error = Status::Invalid("its mesh has {} points, the geometry {}", own->point_count(), out.total());
+    return nullptr;
+  }
+  return own;
+}
+
+void DemandShrinkWrap(Demand& demand) {
+  const Structural& s = demand.structural();
+  const PointSet& out = demand.output("outPoints");
+  demand.Require("driverPoints", -1, PointSet::All(demand.input_total("driverPoints", -1)));
+  const Result<ShrinkWrapSettings> settings = Settings(s);
+  Status error;
+  const bool normals = settings.ok() && settings->projection == ShrinkWrapSettings::Projection::kNormals;
+  const Topology* own = normals && !out.is_all() ? OwnTopology(s, out, &error) : nullptr;
+  demand.Require(
+      "inPoints", 0,
+      own == nullptr
+          ? out
+          : PointSet::Of(ShrinkWrapDemand(*settings, *own, out.ToVector(), WeightsAt(s, out)), out.total()));
+}
+
+struct ShrinkWrapBound {
+  ShrinkWrapKernel kernel;
+  double scale;  // stage lengths of a world length 1
+};
+
+Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
+  const Structural& s = binding.structural();
+  const PointSet &out = binding.output("outPoints"), &in = binding.input("inPoints");
+  const Result<ShrinkWrapSettings> settings = Settings(s);
+  if (!settings.ok()) return settings.status();
+  const Result<Driver> driver = BindDriver(s, DriverTree::kTriangles);
+  if (!driver.ok()) return driver.status();
+  static const Topology kNone;
+  const Topology* own = &kNone;
+  if (settings->projection == ShrinkWrapSettings::Projection::kNormals) {
+    Status error;
+    own = OwnTopology(s, out, &error);
+    if (own == nullptr) return error;
+  }
+  const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  ShrinkWrapBound bound{
+      ShrinkWrapKernel(*settings, *driver->topology, driver->rest->tree, driver->stage_from_driver, *own,
+                       out.ToVector(), in.ToVector(), BoundWeights(binding)),
+      1 / frame->WorldScale()};
+  const std::size_t scratch = bound.kernel.ScratchFloats();
+  return MakeBound(std::move(bound), scratch);
+}
+
+void ComputeShrinkWrap(ComputeContext& c) {
+  const auto& bound = c.kernel_as<ShrinkWrapBound>();
+  const Parallel parallel = HostParallel(c);
+  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kOffset) * bound.scale, c.points(kDriverPoints)},
+                   c.points(kInPoints), c.out_points(0), ScratchSpan(c, bound.kernel.ScratchFloats()),
+                   &parallel);
+}
+
+}  // namespace
+
+void AddShrinkWrapNode(NodeRegistry& registry) {
+  NodeBuilder b = AddDeformer(registry, "shrinkWrap", "Points go onto the surface of another mesh.");
+  AddDriver(b);
+  b.in("offset", 0.0,
+       {.unit = Unit::kLength,
+        .doc = "distance from the surface, positive outside (where its normals point)"});
+  b.enumeration("projection", {"closest", "vertexNormals", "parallelToAxis"}, true,
+                "to the nearest place of the surface, or where the line along the point's normal or along "
+                "`axis` meets it");
+  b.structural("axis", Double3{0, 1, 0}, {.doc = "direction of parallelToAxis, world axes at rest"});
+  b.structural("reverse", false, {.doc = "lines go against the normal or axis"});
+  b.structural("bidirectional", false, {.doc = "lines go both ways; the nearer hit counts"});
+  b.structural("closestIfNoIntersection", false,
+               {.doc = "a point whose line meets nothing goes to the nearest place; otherwise it stays"});
+  b.enumeration("side", {"surface", "outside", "inside"}, true,
+                "surface: all points go onto it; outside: only those inside, so that all end up outside; "
+                "inside: the other way round");
+  FinishDeformer(b, &ComputeShrinkWrap, BindShrinkWrap, DemandShrinkWrap).cost(2000, 900);
+}
+
+}  // namespace kpsa

@@ -1,0 +1,268 @@
+#include "base/triangle_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <utility>
+#include <vector>
+
+namespace kpsa {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Soup {
+  PointBuffer points;
+  std::vector<Index> triangles;
+  TriangleTree tree;
+  AlignedFloats boxes;
+
+  Soup(std::vector<float> xyz, std::vector<Index> corners)
+      : points(PointBuffer::FromInterleaved(xyz)), triangles(std::move(corners)), tree(view(), triangles) {
+    Refit();
+  }
+  ConstPointsView view() const { return points.view(); }
+  void Refit() {
+    boxes = AlignedFloats(tree.BoxFloats());
+    tree.Fit(view(), boxes.span());
+  }
+  SurfacePoint Closest(Double3 p, double max_distance = kInfinity) const {
+    return tree.Closest(view(), boxes.span(), p, max_distance);
+  }
+};
+
+class Places {
+ public:
+  explicit Places(unsigned seed) : engine_(seed) {}
+  double Signed() { return 2 * (static_cast<double>(engine_()) / 4294967296.0) - 1; }
+  Double3 Vector() { return {Signed(), Signed(), Signed()}; }
+
+ private:
+  std::mt19937 engine_;
+};
+
+// Triangles of all sizes; some without area, some that share corners, some twice.
+Soup RandomSoup(std::size_t count, unsigned seed) {
+  Places random(seed);
+  std::vector<float> xyz;
+  std::vector<Index> triangles;
+  for (std::size_t t = 0; t < count; ++t) {
+    const Double3 center = random.Vector();
+    const double size = t % 9 == 0 ? 1 : 0.1;
+    for (int k = 0; k < 3; ++k) {
+      const Double3 p = t % 13 == 0 ? center : center + random.Vector() * size;
+      for (int a = 0; a < 3; ++a) xyz.push_back(static_cast<float>(p[a]));
+      const auto i = static_cast<Index>(3 * t) + static_cast<Index>(k);
+      triangles.push_back(t % 5 == 4 ? i - 3 : i);  // every fifth triangle is there a second time
+    }
+  }
+  return {std::move(xyz), std::move(triangles)};
+}
+
+SurfacePoint ByHand(const Soup& soup, Double3 p) {
+  SurfacePoint best;
+  for (Index t = 0; t < soup.triangles.size() / 3; ++t) {
+    SurfacePoint one = ClosestOnTriangle(soup.view(), &soup.triangles[3 * std::size_t{t}], p);
+    one.triangle = t;
+    if (one.squared < best.squared) best = one;
+  }
+  return best;
+}
+
+TEST(ClosestOnTriangle, KnowsFaceEdgeAndCorner) {
+  const PointBuffer points = PointBuffer::FromInterleaved(std::vector<float>{0, 0, 0, 4, 0, 0, 0, 4, 0});
+  const Index corners[3] = {0, 1, 2};
+  const SurfacePoint face = ClosestOnTriangle(points.view(), corners, {1, 2, 3});
+  EXPECT_EQ(face.point, (Double3{1, 2, 0}));
+  EXPECT_DOUBLE_EQ(face.squared, 9);
+  EXPECT_DOUBLE_EQ(face.weights[0], 0.25);
+  EXPECT_DOUBLE_EQ(face.weights[1], 0.25);
+  EXPECT_DOUBLE_EQ(face.weights[2], 0.5);
+  const SurfacePoint edge = ClosestOnTriangle(points.view(), corners, {3, -2, 0});
+  EXPECT_EQ(edge.point, (Double3{3, 0, 0}));
+  EXPECT_DOUBLE_EQ(edge.weights[1], 0.75);
+  EXPECT_EQ(edge.weights[2], 0);
+  const SurfacePoint corner = ClosestOnTriangle(points.view(), corners, {-3, 9, 1});
+  EXPECT_EQ(corner.point, (Double3{0, 4, 0}));
+  EXPECT_EQ(corner.weights[2], 1);
+}
+
+TEST(ClosestOnTriangle, NoPlaceOfTheTriangleIsNearer) {
+  Places random(3);
+  for (int round = 0; round < 50; ++round) {
+    const Soup soup = RandomSoup(2, static_cast<unsigned>(100 + round));
+    const Double3 p = random.Vector();
+    const Index* corners = &soup.triangles[3];
+    const SurfacePoint found = ClosestOnTriangle(soup.view(), corners, p);
+    Double3 mean;
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Index i = corners[k];
+      mean = mean + Double3{soup.view().x[i], soup.view().y[i], soup.view().z[i]} * found.weights[k];
+      sum += found.weights[k];
+      EXPECT_GE(found.weights[k], 0);
+    }
+    EXPECT_NEAR(sum, 1, 1e-12);
+    EXPECT_LT(Length(mean - found.point), 1e-12);
+    EXPECT_NEAR(found.squared, Dot(p - found.point, p - found.point), 1e-14);
+    for (int i = 0; i <= 20; ++i) {
+      for (int j = 0; i + j <= 20; ++j) {
+        const double w[3] = {i / 20.0, j / 20.0, (20 - i - j) / 20.0};
+        Double3 q;
+        for (int k = 0; k < 3; ++k) {
+          const Index c = corners[k];
+          q = q + Double3{soup.view().x[c], soup.view().y[c], soup.view().z[c]} * w[k];
+        }
+        EXPECT_GE(Dot(p - q, p - q), found.squared - 1e-12);
+      }
+    }
+  }
+}
+
+TEST(TriangleTree, FindsWhatAllTrianglesGive) {
+  for (const std::size_t count : {1ul, 4ul, 5ul, 333ul}) {
+    const Soup soup = RandomSoup(count, 7);
+    Places random(8);
+    for (int i = 0; i < 500; ++i) {
+      const Double3 p = random.Vector() * (i % 10 == 0 ? 30 : 1.2);
+      const SurfacePoint expected = ByHand(soup, p), found = soup.Closest(p);
+      ASSERT_EQ(found.triangle, expected.triangle) << i;
+      EXPECT_EQ(found.squared, expected.squared);
+      EXPECT_EQ(found.point, expected.point);
+      // A limit hides what is beyond it, and nothing else
+      const double distance = std::sqrt(expected.squared);
+      EXPECT_EQ(soup.Closest(p, distance * 1.001 + 1e-9).triangle, expected.triangle);
+      if (distance > 1e-6) {
+        EXPECT_EQ(soup.Closest(p, distance * 0.999).triangle, kNoIndex);
+      }
+    }
+  }
+}
+
+TEST(TriangleTree, TiesGoToTheLowerTriangle) {
+  // A fan around the origin: every place below it is nearest to the corner that all share
+  std::vector<float> xyz = {0, 0, 0};
+  std::vector<Index> triangles;
+  constexpr Index kBlades = 40;
+  for (Index i = 0; i < kBlades; ++i) {
+    const double angle = 6.28318 * i / kBlades;
+    for (double c : {std::cos(angle), std::sin(angle), 0.7}) xyz.push_back(static_cast<float>(c));
+    triangles.insert(triangles.end(), {1 + i, 0, 1 + (i + 1) % kBlades});
+  }
+  const Soup soup(xyz, triangles);
+  EXPECT_EQ(soup.Closest({0, 0, -1}).triangle, 0u);
+  EXPECT_EQ(soup.Closest({0.01, -0.02, -3}).triangle, 0u);
+  // On the edge between the blades 20 and 21, from outside of the cone
+  const SurfacePoint edge =
+      soup.Closest({soup.view().x[22] * 0.5 * 1.7, soup.view().y[22] * 0.5 * 1.7, 0.35 - 0.5});
+  EXPECT_EQ(edge.triangle, 20u);
+}
+
+TEST(TriangleTree, RefittedBoxesFindMovedTriangles) {
+  Soup soup = RandomSoup(200, 9);
+  Places random(10);
+  const PointsView view = soup.points.view();
+  for (std::size_t i = 0; i < view.count; ++i) {
+    view.x[i] = static_cast<float>(3 * random.Signed());
+    view.y[i] += 5;
+  }
+  soup.tree.Fit(soup.view(), soup.boxes.span());
+  for (int i = 0; i < 200; ++i) {
+    const Double3 p = random.Vector() * 4 + Double3{0, 5, 0};
+    EXPECT_EQ(soup.Closest(p).triangle, ByHand(soup, p).triangle);
+  }
+}
+
+TEST(TriangleTree, SeveralComeInOrder) {
+  const Soup soup = RandomSoup(150, 11);
+  Places random(12);
+  std::vector<SurfacePoint> found;
+  for (int i = 0; i < 100; ++i) {
+    const Double3 p = random.Vector();
+    std::vector<std::pair<double, Index>> all;
+    for (Index t = 0; t < 150; ++t)
+      all.emplace_back(ClosestOnTriangle(soup.view(), &soup.triangles[3 * std::size_t{t}], p).squared, t);
+    std::sort(all.begin(), all.end());
+    soup.tree.ClosestSeveral(soup.view(), soup.boxes.span(), p, 7, kInfinity, &found);
+    ASSERT_EQ(found.size(), 7u);
+    for (std::size_t k = 0; k < 7; ++k) EXPECT_EQ(found[k].triangle, all[k].second);
+    soup.tree.ClosestSeveral(soup.view(), soup.boxes.span(), p, 200, std::sqrt(all[4].first) + 1e-9, &found);
+    EXPECT_EQ(found.size(),
+              static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [&](const auto& a) {
+                return a.first <= std::pow(std::sqrt(all[4].first) + 1e-9, 2);
+              })));
+  }
+}
+
+TEST(TriangleTree, LinesHitWhatAllTrianglesSay) {
+  const Soup soup = RandomSoup(300, 13);
+  Places random(14);
+  int hits = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Double3 o = random.Vector() * 2, d = random.Vector();
+    // By hand: the plane of each triangle, and on which side of its edges the line passes
+    LineHit expected;
+    for (Index t = 0; t < 300; ++t) {
+      Double3 c[3];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Index p = soup.triangles[3 * std::size_t{t} + k];
+        c[k] = {soup.view().x[p], soup.view().y[p], soup.view().z[p]};
+      }
+      const Double3 n = Cross(c[1] - c[0], c[2] - c[0]);
+      if (Dot(n, d) == 0) continue;
+      const double at = Dot(n, c[0] - o) / Dot(n, d);
+      const Double3 p = o + d * at;
+      bool inside = at >= 0 && at < expected.t;
+      for (int k = 0; k < 3; ++k) inside = inside && Dot(n, Cross(c[(k + 1) % 3] - c[k], p - c[k])) >= 0;
+      if (inside) expected.triangle = t, expected.t = at;
+    }
+    const LineHit found = soup.tree.FirstHit(soup.view(), soup.boxes.span(), o, d);
+    if (expected.triangle == kNoIndex) {
+      EXPECT_EQ(found.triangle, kNoIndex);
+      continue;
+    }
+    ++hits;
+    EXPECT_EQ(found.triangle, expected.triangle);
+    EXPECT_NEAR(found.t, expected.t, 1e-9 * (1 + expected.t));
+  }
+  EXPECT_GT(hits, 100);
+}
+
+TEST(TriangleTree, LinesThroughEdgesHit) {
+  // Two triangles of a square; lines through their diagonal and along the axes
+  const Soup soup({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}, {0, 1, 2, 0, 2, 3});
+  for (int i = 1; i < 100; ++i) {
+    const double at = i / 100.0;
+    const LineHit hit = soup.tree.FirstHit(soup.view(), soup.boxes.span(), {at, at, 2}, {0, 0, -1});
+    ASSERT_NE(hit.triangle, kNoIndex) << i;
+    EXPECT_DOUBLE_EQ(hit.t, 2);
+  }
+  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {2, 0.5, 2}, {0, 0, -1}).triangle, kNoIndex);
+  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {0.5, 0.5, 2}, {0, 0, 1}).triangle, kNoIndex);
+  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {0.5, 0.5, 2}, {0, 0, 0}).triangle, kNoIndex);
+}
+
+TEST(TriangleTree, WhatIsNotFiniteTakesNoPart) {
+  Soup soup = RandomSoup(50, 15);
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t i = 0; i < 3 * 25; ++i) soup.points.view().y[i] = kNan;
+  soup.Refit();
+  const SurfacePoint found = soup.Closest({0.1, 0.2, 0.3});
+  ASSERT_NE(found.triangle, kNoIndex);
+  EXPECT_GE(found.triangle, 25u);
+  EXPECT_TRUE(std::isfinite(found.squared));
+  EXPECT_EQ(soup.Closest({kNan, 0, 0}).triangle, kNoIndex);
+  EXPECT_EQ(soup.Closest({kInfinity, 0, 0}).triangle, kNoIndex);
+  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {kNan, 0, 0}, {0, 0, 1}).triangle, kNoIndex);
+  // A tree over such points is one, too
+  const Soup again({kNan, 0, 0, 1, kNan, 0, 0, 0, 0, 1, 1, 1, 2, 1, 1, 1, 2, 1}, {0, 1, 2, 3, 4, 5});
+  EXPECT_EQ(again.Closest({0, 0, 0}).triangle, 1u);
+  const Soup empty({0, 0, 0}, {});
+  EXPECT_EQ(empty.Closest({0, 0, 0}).triangle, kNoIndex);
+}
+
+}  // namespace
+}  // namespace kpsa

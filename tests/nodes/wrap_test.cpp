@@ -1,0 +1,198 @@
+// wrap and proximityWrap as nodes.
+#include <cmath>
+
+#include "base/triangle_tree.h"
+#include "tests/nodes/driver_rig.h"
+
+namespace kpsa {
+namespace {
+
+std::shared_ptr<const Mesh> Cage() {
+  return GridMesh(17, 15, [](double x, double y) { return 0.3 * std::sin(2 * x) * std::cos(y); });
+}
+std::shared_ptr<const Mesh> Cloth(double above = 0.1) {
+  return GridMesh(23, 21, [=](double x, double y) { return 0.3 * std::sin(2 * x) + 0.05 * y * y + above; });
+}
+std::shared_ptr<const Mesh> Flat(double height, Index n = 9) {
+  return GridMesh(n, n, [=](double, double) { return height; });
+}
+
+const std::vector<std::pair<std::string, std::vector<std::pair<std::string, Value>>>> kTurning = {
+    {"wrap", {}},
+    {"wrap", {{"influences", 1}}},
+    {"wrap", {{"maxDistance", 0.5}}},
+    {"proximityWrap", {}},
+    {"proximityWrap", {{"smoothInfluences", 3}}},
+    {"proximityWrap", {{"wrapMode", "surface"}}}};
+
+TEST(Wrap, RestsAtRestAndFollowsARigidDriver) {
+  for (const auto& [type, values] : kTurning) {
+    DriverRig rig(type, Cage(), Cloth(), values);
+    EXPECT_LT(MaxDistance(rig.At(Matrix4()), rig.Rest()), 2e-7) << type;
+    const Matrix4 motion = ComposeTrs({0.3, -1, 2}, Random(4).Rotation(), {1, 1, 1});
+    std::vector<Double3> expected = rig.Rest();
+    for (Double3& p : expected) p = TransformPoint(motion, p);
+    EXPECT_LT(MaxDistance(rig.At(motion), expected), 2e-6) << type;
+    // And back
+    EXPECT_LT(MaxDistance(rig.At(Matrix4()), rig.Rest()), 2e-7) << type;
+  }
+}
+
+TEST(Wrap, TheOffsetKeepsItsLengthOrStretchesOrGoes) {
+  // A flat driver that is stretched along x: points above it, and points beside it in its plane
+  const Matrix4 stretch = Scaling({3, 1, 1});
+  const auto above = MeshOf({0.25f, 0.25f, 0.5f, -0.5f, 0, 0.5f, 0, 1, 0.5f}, {0, 1, 2});
+  const auto beside = MeshOf({1.5f, 0, 0, 1.5f, 0.5f, 0, 2, 0, 0}, {0, 1, 2});
+  const std::vector<Double3> above_there = {{0.75, 0.25, 0.5}, {-1.5, 0, 0.5}, {0, 1, 0.5}};
+  for (const char* mode : {"offset", "surface"}) {
+    DriverRig rig("proximityWrap", Flat(0), above, {{"wrapMode", mode}});
+    EXPECT_LT(MaxDistance(rig.At(stretch), above_there), 1e-6) << mode;
+  }
+  DriverRig offset("proximityWrap", Flat(0), beside);
+  EXPECT_LT(MaxDistance(offset.At(stretch), {{3.5, 0, 0}, {3.5, 0.5, 0}, {4, 0, 0}}), 1e-6);
+  DriverRig surface("proximityWrap", Flat(0), beside, {{"wrapMode", "surface"}});
+  EXPECT_LT(MaxDistance(surface.At(stretch), {{4.5, 0, 0}, {4.5, 0.5, 0}, {6, 0, 0}}), 1e-6);
+  DriverRig snap("proximityWrap", Flat(0), beside, {{"wrapMode", "snap"}});
+  EXPECT_LT(MaxDistance(snap.At(stretch), {{3, 0, 0}, {3, 0.5, 0}, {3, 0, 0}}), 1e-6);
+}
+
+TEST(Wrap, TheOffsetTurnsWithTheNormal) {
+  // A driver of two planes that folds along x = 0: points above each half turn with it
+  DriverRig rig("proximityWrap", GridMesh(3, 3, [](double, double) { return 0; }),
+                MeshOf({-1, 0, 0.5f, 1, 0, 0.5f, 1, 1, 0.5f}, {0, 1, 2}));
+  // The fold is a blend shape of the driver: at rest it is flat
+  rig.g.add("blendShape", "fold");
+  MorphTargets::Target target{"up", {0, 2, 3, 5, 6, 8}, {}};
+  for (int i = 0; i < 6; ++i) target.deltas.insert(target.deltas.end(), {0, 0, 1});
+  rig.g.hold("fold.targets[0]",
+             std::make_shared<const MorphTargets>(std::vector<MorphTargets::Target>{target}, Index{9}));
+  rig.g.connect("cage.points", "fold.inPoints[0]");
+  const Status cut = rig.g.graph.Disconnect(rig.g.plug("w.driverPoints"));
+  ASSERT_TRUE(cut.ok());
+  rig.g.connect("fold.outPoints[0]", "w.driverPoints");
+  rig.g.request.varying.clear();
+  rig.g.vary("fold.weight[0]");
+  rig.g.set("fold.weight[0]", 0.0);
+  EXPECT_LT(MaxDistance(rig.Points(), rig.Rest()), 2e-7);
+  rig.g.set("fold.weight[0]", 1.0);
+  // The slopes rise outwards at 45 degrees: their normals lean inwards
+  const double lean = 0.5 / std::sqrt(2.0);
+  const std::vector<Double3> expected = {
+      {-1 + lean, 0, 1 + lean}, {1 - lean, 0, 1 + lean}, {1 - lean, 1, 1 + lean}};
+  EXPECT_LT(MaxDistance(rig.Points(), expected), 1e-6);
+}
+
+TEST(Wrap, SnappedPointsLieOnTheDriver) {
+  DriverRig rig("proximityWrap", Cage(), Cloth(), {{"wrapMode", "snap"}});
+  const Matrix4 motion = ComposeTrs({0, 0, 1}, Random(6).Rotation(), {1, 0.5, 2});
+  const std::vector<Double3> snapped = rig.At(motion);
+  const ConstPointsView rest = rig.driver->data().rest.view();
+  PointBuffer moved(rest.count);
+  for (std::size_t i = 0; i < rest.count; ++i) {
+    const Double3 p = TransformPoint(motion, {rest.x[i], rest.y[i], rest.z[i]});
+    moved.view().x[i] = static_cast<float>(p.x);
+    moved.view().y[i] = static_cast<float>(p.y);
+    moved.view().z[i] = static_cast<float>(p.z);
+  }
+  const TriangleTree tree(moved.view(), rig.driver->data().triangles);
+  AlignedFloats boxes(tree.BoxFloats());
+  tree.Fit(moved.view(), boxes.span());
+  for (const Double3& p : snapped) EXPECT_LT(tree.Closest(moved.view(), boxes.span(), p).squared, 1e-12);
+}
+
+TEST(Wrap, EnvelopeWeightsAndDistanceLimit) {
+  const Matrix4 up = Translation({0, 0, 1});
+  for (const char* type : {"wrap", "proximityWrap"}) {
+    DriverRig off(type, Cage(), Cloth(), {{"envelope", 0.0}});
+    EXPECT_EQ(MaxDistance(off.At(up), off.Rest()), 0) << type;
+    DriverRig half(type, Cage(), Cloth(), {{"envelope", 0.5}});
+    std::vector<Double3> expected = half.Rest();
+    for (Double3& p : expected) p.z += 0.5;
+    EXPECT_LT(MaxDistance(half.At(up), expected), 1e-6) << type;
+
+    DriverRig weighted(type, Cage(), Cloth());
+    std::vector<float> weights(weighted.follower->point_count(), 0.0f);
+    weights[7] = 1;
+    weighted.g.hold("w.weights[0]", std::make_shared<const WeightMap>(weights));
+    const std::vector<Double3> points = weighted.At(up), rest = weighted.Rest();
+    for (std::size_t i = 0; i < points.size(); ++i)
+      EXPECT_NEAR(points[i].z - rest[i].z, i == 7 ? 1 : 0, i == 7 ? 1e-6 : 0) << type << i;
+    // What does not move asks for nothing: the rings of one point's influences are left
+    EXPECT_LT(weighted.PointsOf("move"), 60u) << type;
+
+    // One point lies beyond the distance
+    DriverRig limited(type, Flat(0, 41), MeshOf({0, 0, 0.1f, 0.1f, 0, 0.1f, 0, 0, 0.5f}, {0, 1, 2}),
+                      {{"maxDistance", 0.3}});
+    const std::vector<Double3> near = limited.At(up);
+    EXPECT_NEAR(near[0].z, 1.1, 1e-6) << type;
+    EXPECT_NEAR(near[1].z, 1.1, 1e-6) << type;
+    EXPECT_EQ(near[2].z, 0.5) << type;
+  }
+}
+
+TEST(Wrap, SmoothInfluencesSpreadASpike) {
+  // One driver point jumps up: with spread influences the point above it rises less, and neighbours more
+  const auto deltas = [](int smooth) {
+    DriverRig rig("proximityWrap", Flat(0, 9), Flat(0.05, 9),
+                  {{"wrapMode", "snap"}, {"smoothInfluences", smooth}});
+    rig.g.add("blendShape", "fold");
+    rig.g.hold("fold.targets[0]", std::make_shared<const MorphTargets>(
+                                      std::vector<MorphTargets::Target>{{"up", {40}, {0, 0, 1}}}, Index{81}));
+    rig.g.connect("cage.points", "fold.inPoints[0]");
+    EXPECT_TRUE(rig.g.graph.Disconnect(rig.g.plug("w.driverPoints")).ok());
+    rig.g.connect("fold.outPoints[0]", "w.driverPoints");
+    rig.g.request.varying.clear();
+    rig.g.vary("fold.weight[0]");
+    rig.g.set("fold.weight[0]", 1.0);
+    std::vector<double> heights;
+    for (const Double3& p : rig.Points()) heights.push_back(p.z);
+    return heights;
+  };
+  const std::vector<double> sharp = deltas(0), spread = deltas(1);
+  EXPECT_NEAR(sharp[40], 1, 1e-6);
+  EXPECT_NEAR(sharp[41], 0, 1e-6);
+  EXPECT_NEAR(spread[40], 0.5, 1e-6);       // half of the weight stays
+  EXPECT_NEAR(spread[41], 1.0 / 12, 1e-6);  // a sixth of the half comes from the middle
+}
+
+TEST(Wrap, SubsetsHaveTheBitsOfTheWholeAndNeedFewDriverPoints) {
+  for (const auto& [type, values] : kTurning) {
+    DriverRig rig(type, GridMesh(41, 41, [](double x, double y) { return 0.2 * x * y; }), Cloth(), values);
+    const Index needed = rig.ExpectSubsetsKeepTheBits(3);
+    EXPECT_GT(needed, 3u) << type;
+    EXPECT_LT(needed, 3u * 120u) << type;
+    EXPECT_LT(needed, 41u * 41u / 4) << type;
+  }
+}
+
+TEST(Wrap, FoldedDriversGiveNumbers) {
+  // Flattened to a line, to a point, mirrored
+  for (const auto& [type, values] : kTurning) {
+    DriverRig rig(type, Cage(), Cloth(), values);
+    for (const Double3& scale : {Double3{1, 0, 0}, Double3{0, 0, 0}, Double3{-1, 1, 1}, Double3{1, 1, 0}}) {
+      for (const Double3& p : rig.At(Scaling(scale))) EXPECT_LT(Length(p), 10) << type;
+    }
+  }
+}
+
+TEST(Wrap, ErrorsSayWhatIsMissing) {
+  const auto error_of = [](DriverRig& rig) {
+    const Status status = rig.g.try_pull("w.outPoints[0]");
+    return status.ok() ? std::string("no error") : status.ToString();
+  };
+  for (const char* type : {"wrap", "proximityWrap", "shrinkWrap"}) {
+    DriverRig alone(type, Cage(), Cloth());
+    ASSERT_TRUE(alone.g.graph.Disconnect(alone.g.plug("w.driverPoints")).ok());
+    EXPECT_NE(error_of(alone).find("it has no driver"), std::string::npos);
+    DriverRig other(type, Cage(), Cloth());
+    other.g.hold("w.driverMesh", Cloth());
+    EXPECT_NE(error_of(other).find("driver's mesh has 483 points, driverPoints 255"), std::string::npos);
+    DriverRig bare(type, MeshOf({0, 0, 0, 1, 0, 0}, {}), Cloth());
+    EXPECT_NE(error_of(bare).find("has no faces"), std::string::npos);
+    DriverRig flat(type, Cage(), Cloth(), {{"driverMatrix", Scaling({1, 0, 1})}});
+    EXPECT_NE(error_of(flat).find("driverMatrix is singular"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace kpsa
