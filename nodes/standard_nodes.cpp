@@ -10,9 +10,9 @@ void AddTimeNode(NodeRegistry& registry) {
 
 void AddStandardNodes(NodeRegistry& registry) {
   for (auto* add :
-       {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode, AddSkinClusterNode,
-        AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode, AddCurveNodes,
-        AddTripwireNode, AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
+       {AddTimeNode, AddTransformNodes, AddClipNodes, AddClipLayerNodes, AddMeshNode, AddBlendShapeNode,
+        AddSkinClusterNode, AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode,
+        AddCurveNodes, AddTripwireNode, AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
     add(registry);
   }
 }
