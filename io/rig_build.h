@@ -50,16 +50,26 @@ class RigBuild {
   };
   using Places = std::vector<Double3>;
 
+  // rig_scopes.cpp: names within templates
+  std::string InScope(const std::string& text, int source) const;
+  void InScope(YamlNode* value, int source) const;
+  void ResolveScopes();
+
+  // rig_clips.cpp: clips of the rig's own
+  void AddClips();
+  void AddLayer(const RigClip& clip, const RigClipLayer& from, LayeredClip* to, double* end);
+  std::vector<bool> MaskedNodes(const RigClipLayer& layer);
+
   // rig_nodes.cpp: nodes, their values, overrides
   void ApplySpecialOverrides();
   void AddNodes();
   void ReadAttributes(Made* made);
-  bool IsSpecial(const NodeDef& def, const std::string& key) const;
   void ReadAttribute(const Made& made, const RigAttribute& attribute, bool overrides);
   void ReadPlug(const PlugRef& plug, const YamlNode& value, int source, bool overrides);
   void ReadOverrides();
   void ReadOverride(const RigOverride& override_);
   void FinishOverrides();
+  void CheckVariants();
 
   // rig_places.cpp: parents, handles, curves
   void AddCurves();
