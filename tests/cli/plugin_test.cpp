@@ -59,6 +59,8 @@ TEST_F(Plugins, TheCommandLineLoadsThemToo) {
   ExpectBadFile("bare.yaml", Rig(""), {"bare.yaml:3", "unknown node type \"wobble\""});
   EXPECT_EQ(Get({"bare.yaml", "--plugin", "lib/wobble.so"}, "sway.output"),
             (std::vector<double>{-30, 0, 30, 0}));
+  ExpectGood({"inspect", "bare.yaml", "--plugin", "lib/wobble.so"});
+  ExpectGood({"inspect", "rig.yaml"});
   // Both name it: it is loaded once
   EXPECT_EQ(Get({"rig.yaml", "--plugin", "lib/wobble.so", "--plugin", "lib/../lib/wobble.so"}, "sway.output"),
             (std::vector<double>{-30, 0, 30, 0}));
