@@ -1,13 +1,15 @@
-// kpsa explain: why a node was evaluated, and why it could not be masked or skipped.
+// kpsa explain: why a node was evaluated, and why it could not be masked or skipped; what moves a vertex.
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/acceleration.h"
+#include "cli/explain_vertex.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
+#include "graph/evaluator.h"
 #include "graph/explain.h"
 #include "graph/plan_report.h"
 
@@ -18,8 +20,10 @@ struct ExplainFlags : Flags {
   AccelerationFlags acceleration;
   std::string what;
   std::vector<std::string> wanted;
-  std::optional<std::string> vertices;
+  std::optional<std::string> vertices, frame;
 };
+
+constexpr int kMostFrames = 1'000'000;  // of --frame
 
 std::string DriverText(const Rig& rig, const PlugRef& plug) {
   const Graph& graph = *rig.graph;
@@ -33,6 +37,14 @@ std::string DriverText(const Rig& rig, const PlugRef& plug) {
   const AttributeDef& attribute = graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
   return attribute.output ? "an output"
                           : fmt::format("at its default, {}", attribute.default_value.ToString());
+}
+
+// Why a step that is in the plan did not run; "" where it did.
+std::string NotEvaluated(const Plan& plan, const Profile& profile, Index step) {
+  if (profile.counts()[step] > 0) return "";
+  const Plan::StepInfo& info = plan.infos()[step];
+  if (info.segment != 0) return fmt::format("it runs {}", SegmentName(plan, info.segment));
+  return "nothing that it reads has changed since the frame before";
 }
 
 struct Target {
@@ -51,12 +63,67 @@ Result<Target> FindTarget(const Rig& rig, const std::string& what) {
   return AsUsage(status);
 }
 
-CommandResult Explain(const ExplainFlags& flags) {
+// The frame of --frame and those that come before it: one, so that what changed since then is told, or all
+// where a node needs its past. The profile is of the last one.
+Status EvaluateTo(const Rig& rig, const std::shared_ptr<const Plan>& plan, int frame, Profile* profile) {
+  Evaluator evaluator(plan);
+  const Index time = plan->FindVarying(rig.scene.time);
+  for (int f = plan->stateful_node().empty() ? frame - 1 : std::min(frame - 1, 0); f <= frame; ++f) {
+    if (Interrupted()) return InterruptedStatus();
+    if (f == frame) evaluator.Record(profile, f);
+    if (time != kNoIndex) evaluator.Set(time, f / rig.fps);
+    const Status status = evaluator.Evaluate();
+    if (status.ok()) continue;
+    const std::string& message = status.errors().front().message;
+    return Status::Evaluation("at frame {}: {}", f, message).At(PlaceOfMessage(rig, message));
+  }
+  return Status();
+}
+
+CommandResult ExplainVertex(const ExplainFlags& flags, const Rig& rig, const VertexName& vertex) {
+  if (flags.acceleration.wanted() || !flags.wanted.empty() || flags.vertices.has_value())
+    return Status::Usage(
+        "{}: a vertex is told of with its full stack: expected no --accelerate, --kpsa, --want or "
+        "--vertices",
+        flags.what);
+  const Result<std::vector<double>> times = SampleTimes(flags, rig);
+  if (!times.ok()) return times.status();
+  if (times->size() != 1 && (flags.frames.has_value() || flags.times.has_value()))
+    return Status::Usage("{}: expected one frame, found {}", flags.what, Thousands(times->size()));
+  Flags rest_flags = flags;
+  rest_flags.rest = true;
+  rest_flags.clip.reset();
+  rest_flags.pose.reset();
+  rest_flags.sets.clear();
+  const Result<std::unique_ptr<OpenRig>> rest = LoadRigOf(rest_flags);
+  if (!rest.ok()) return rest.status();
+  const Result<VertexStory> story = TellOfVertex(rig, (*rest)->rig, vertex, times->front());
+  if (!story.ok()) return story.status();
+  Print(flags.json ? VertexJson(*story) : VertexText(*story));
+  return 0;
+}
+
+CommandResult Explain(ExplainFlags flags) {
+  std::optional<int> frame;
+  if (flags.frame.has_value()) {
+    if (flags.frames.has_value() || flags.times.has_value())
+      return Status::Usage("--frame and {}: expected one of them",
+                           flags.frames.has_value() ? "--frames" : "--times");
+    const Result<int> number = ParseCount("--frame", *flags.frame, -kMostFrames, kMostFrames);
+    if (!number.ok()) return number.status();
+    frame = *number;
+    flags.frames = *flags.frame;
+  }
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
   KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
+  if (!rig.graph->FindNode(flags.what).ok() && !rig.graph->FindPlug(flags.what).ok()) {
+    const Result<std::optional<VertexName>> vertex = FindVertex(rig, flags.what);
+    if (!vertex.ok()) return vertex.status();
+    if (vertex->has_value()) return ExplainVertex(flags, rig, **vertex);
+  }
   Compiler compiler;
   if (flags.acceleration.wanted())
     KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
@@ -71,11 +138,15 @@ CommandResult Explain(const ExplainFlags& flags) {
   if (!times.ok()) return times.status();
   const InterruptScope interruptible;
   Profile profile(plan);
-  RigFrameOptions options;
-  options.threads = 1;
-  options.profile = &profile;
-  KPSA_RETURN_IF_ERROR(
-      EvaluateTimes(rig, *compiled, *times, options, [](std::size_t, const Evaluator&) { return Status(); }));
+  if (frame.has_value()) {
+    KPSA_RETURN_IF_ERROR(EvaluateTo(rig, *compiled, *frame, &profile));
+  } else {
+    RigFrameOptions options;
+    options.threads = 1;
+    options.profile = &profile;
+    KPSA_RETURN_IF_ERROR(EvaluateTimes(rig, *compiled, *times, options,
+                                       [](std::size_t, const Evaluator&) { return Status(); }));
+  }
 
   const std::string name = rig.graph->name(target->node);
   std::vector<Index> steps;
@@ -95,7 +166,8 @@ CommandResult Explain(const ExplainFlags& flags) {
                       {"count", profile.counts()[s]},
                       {"points", plan.infos()[s].points},
                       {"points_total", plan.infos()[s].points_total},
-                      {"dirtied_by", CauseChain(plan, profile, s)},
+                      {"dirtied_by", profile.counts()[s] > 0 ? CauseChain(plan, profile, s) : ""},
+                      {"not_evaluated", NotEvaluated(plan, profile, s)},
                       {"needed_by", NeedChain(plan, s)},
                       {"mask", MaskText(plan, s)}});
     }
@@ -115,7 +187,11 @@ CommandResult Explain(const ExplainFlags& flags) {
     Print(fmt::format("  {}: {}, evaluated in {} of {}, {}\n", StepName(plan, s), PointsText(plan.infos()[s]),
                       Thousands(profile.counts()[s]), Plural(times->size(), "frame"),
                       SegmentName(plan, plan.infos()[s].segment)));
-    if (profile.counts()[s] > 0) Print(fmt::format("    dirtied by  {}\n", CauseChain(plan, profile, s)));
+    if (const std::string why = NotEvaluated(plan, profile, s); !why.empty()) {
+      Print(fmt::format("    skipped     {}\n", why));
+    } else {
+      Print(fmt::format("    dirtied by  {}\n", CauseChain(plan, profile, s)));
+    }
     Print(fmt::format("    needed by   {}\n    points      {}\n", NeedChain(plan, s), MaskText(plan, s)));
   }
   return 0;
@@ -125,17 +201,23 @@ CommandResult Explain(const ExplainFlags& flags) {
 
 void AddExplainCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<ExplainFlags>();
-  CLI::App* command = AddCommand(
-      program, "explain", "Why a node is evaluated, what dirtied it, why it is not masked or skipped",
-      "Evaluates the clip, or the frames that are chosen, and tells of the last evaluation.\n"
-      "Examples:\n"
-      "  kpsa explain head.yaml mush\n"
-      "  kpsa explain head.yaml jaw.rotateX --clip face_talk\n"
-      "  kpsa explain head.yaml mush --accelerate",
-      chosen, [flags] { return Explain(*flags); });
+  CLI::App* command =
+      AddCommand(program, "explain", "Why a node is evaluated or not, and what moves a vertex",
+                 "Of a node: what dirtied it, who needs it, why it is not masked or skipped. Evaluates the "
+                 "clip, or the frames "
+                 "that are chosen, and tells of the last evaluation; --frame tells what changed since the "
+                 "frame before.\n"
+                 "Of a vertex: the joints, morph targets and deformers that move it, and how far.\n"
+                 "Examples:\n"
+                 "  kpsa explain head.yaml mush\n"
+                 "  kpsa explain head.yaml jaw.rotateX --clip face_talk\n"
+                 "  kpsa explain head.yaml mush --accelerate --frame 12\n"
+                 "  kpsa explain head.yaml head_mesh[812] --frame 12",
+                 chosen, [flags] { return Explain(*flags); });
   AddRigFlags(command, flags.get());
-  AddRequired(command, "NODE", &flags->what, "a node, or a plug (node.attr)");
+  AddRequired(command, "NODE", &flags->what, "a node, a plug (node.attr) or a vertex (mesh[812])");
   AddTimeFlags(command, flags.get());
+  AddOption(command, "--frame", "F", &flags->frame, "one frame, after the one before it");
   AddRepeated(command, "--want", "PLUG", &flags->wanted,
               "a plug or a mesh's points (head_mesh@mush) instead of all meshes; may be repeated");
   AddOption(command, "--vertices", "LIST", &flags->vertices,

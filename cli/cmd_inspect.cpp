@@ -63,7 +63,7 @@ CommandResult Inspect(const Flags& flags) {
     if (!(*parsed > 0)) return Status::Usage("--fps {}: expected a number above 0", *flags.fps);
     fps = *parsed;
   }
-  const Result<FileFacts> facts = InspectFile(flags.file, fps);
+  const Result<FileFacts> facts = InspectFile(flags.file, fps, flags.plugins);
   if (!facts.ok()) return facts.status();
   if (flags.json) {
     PrintJson(Json(flags.file, *facts));
@@ -105,6 +105,7 @@ void AddInspectCommand(CLI::App* program, Command* chosen) {
                                  chosen, [flags] { return Inspect(*flags); });
   AddRequired(command, "FILE", &flags->file, ".glb .gltf .yaml .npz .pc2 .mdd .kpsa, or .json (weight maps)");
   AddOption(command, "--fps", "N", &flags->fps, "frames a second of .pc2 files; 24 if not given");
+  AddPluginFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
 }
 

@@ -7,6 +7,7 @@
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/options.h"
+#include "cli/rig_schema.h"
 #include "cli/table.h"
 #include "io/quantity.h"
 
@@ -15,7 +16,7 @@ namespace {
 
 struct NodesFlags : Flags {
   std::optional<std::string> type;
-  bool markdown = false;
+  bool markdown = false, schema = false;
 };
 
 const char* UnitName(Unit unit) {
@@ -96,6 +97,16 @@ nlohmann::ordered_json Json(const NodeDef& def) {
 CommandResult Nodes(const NodesFlags& flags) {
   NodeRegistry registry;
   AddAllNodes(registry);
+  PluginLoader plugins(&registry);
+  KPSA_RETURN_IF_ERROR(LoadPlugins(flags, &plugins));
+  if (flags.markdown + flags.schema + flags.json > 1)
+    return Status::Usage("expected one of --markdown, --schema and --json");
+  if (flags.schema) {
+    if (flags.type.has_value())
+      return Status::Usage("--schema is of all node types, expected no TYPE, found \"{}\"", *flags.type);
+    Print(RigSchema(registry));
+    return 0;
+  }
   std::vector<const NodeDef*> defs;
   for (const std::string& name : registry.Names()) defs.push_back(registry.Find(name));
   if (flags.type.has_value()) {
@@ -145,10 +156,13 @@ void AddNodesCommand(CLI::App* program, Command* chosen) {
                                  "Examples:\n"
                                  "  kpsa nodes\n"
                                  "  kpsa nodes deltaMush\n"
-                                 "  kpsa nodes --json",
+                                 "  kpsa nodes --plugin libmynodes.so --json\n"
+                                 "  kpsa nodes --schema > rig.schema.json",
                                  chosen, [flags] { return Nodes(*flags); });
   AddOption(command, "TYPE", "", &flags->type, "one node type, with its attributes");
   AddSwitch(command, "--markdown", &flags->markdown, "print the whole reference as Markdown");
+  AddSwitch(command, "--schema", &flags->schema, "print a JSON Schema of rig files, for editors");
+  AddPluginFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
 }
 

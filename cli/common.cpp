@@ -38,6 +38,12 @@ void AddRigFlags(CLI::App* command, Flags* flags) {
   AddSwitch(command, "--rest", &flags->rest, "no clip: the file's transforms and default weights");
   AddOption(command, "--fps", "N", &flags->fps, "frames a second; the rig's, else 24");
   AddOption(command, "--variant", "NAME", &flags->variant, "a variant of the rig");
+  AddPluginFlag(command, flags);
+}
+
+void AddPluginFlag(CLI::App* command, Flags* flags) {
+  AddRepeated(command, "--plugin", "FILE", &flags->plugins,
+              "a shared library that adds node types; may be repeated");
 }
 
 void AddTimeFlags(CLI::App* command, Flags* flags) {
@@ -74,6 +80,11 @@ void AddAllNodes(NodeRegistry& registry) {
   AddKpsaNode(registry);
 }
 
+Status LoadPlugins(const Flags& flags, PluginLoader* loader) {
+  for (const std::string& file : flags.plugins) KPSA_RETURN_IF_ERROR(loader->Load(file).At({"--plugin"}));
+  return Status();
+}
+
 Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   RigOptions options;
   options.variant = flags.variant;
@@ -90,6 +101,9 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   options.rest = flags.rest;
   auto open = std::make_unique<OpenRig>();
   AddAllNodes(open->registry);
+  PluginLoader plugins(&open->registry);
+  KPSA_RETURN_IF_ERROR(LoadPlugins(flags, &plugins));
+  options.plugins = &plugins;
   Result<Rig> rig = LoadRig(open->registry, flags.file, options);
   if (!rig.ok()) return rig.status();
   open->rig = std::move(*rig);

@@ -14,6 +14,7 @@
 #include "base/status.h"
 #include "base/text.h"
 #include "graph/node_registry.h"
+#include "graph/plugin_loader.h"
 #include "io/rig_builder.h"
 
 namespace CLI {
@@ -26,6 +27,7 @@ namespace kpsa {
 struct Flags {
   std::string file;               // the rig or character
   std::vector<std::string> sets;  // --set plug=value
+  std::vector<std::string> plugins;
   std::optional<std::string> pose, clip, fps, variant;
   bool rest = false;
   std::optional<std::string> frames, times;
@@ -34,8 +36,10 @@ struct Flags {
   bool force = false, quiet = false, json = false;
 };
 
-void AddRigFlags(CLI::App* command, Flags* flags);   // FILE --set --pose --clip --rest --fps --variant
-void AddTimeFlags(CLI::App* command, Flags* flags);  // --frames --times
+void AddRigFlags(CLI::App* command, Flags* flags);    // FILE --set --pose --clip --rest --fps
+                                                      // --variant --plugin
+void AddPluginFlag(CLI::App* command, Flags* flags);  // --plugin
+void AddTimeFlags(CLI::App* command, Flags* flags);   // --frames --times
 void AddOutputFlags(CLI::App* command, Flags* flags, const std::string& doc);  // -o --force
 void AddThreadsFlag(CLI::App* command, Flags* flags);
 void AddQuietFlag(CLI::App* command, Flags* flags);
@@ -46,6 +50,8 @@ Result<int> ThreadCount(const Flags& flags);
 
 // Every node type of the program: the standard ones and KPSA's.
 void AddAllNodes(NodeRegistry& registry);
+// The libraries of --plugin.
+Status LoadPlugins(const Flags& flags, PluginLoader* loader);
 
 // The registry and the rig that refers to it.
 struct OpenRig {

@@ -98,9 +98,10 @@ Result<FileFacts> InspectCharacter(const std::string& path) {
   return facts;
 }
 
-Result<FileFacts> InspectRig(const std::string& path) {
+Result<FileFacts> InspectRig(const std::string& path, const std::vector<std::string>& plugins) {
   Flags flags;
   flags.file = path;
+  flags.plugins = plugins;
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   const Rig& rig = (*open)->rig;
@@ -261,10 +262,10 @@ Result<FileFacts> InspectWeights(const std::string& path) {
   return facts;
 }
 
-Result<FileFacts> InspectFile(const std::string& path, double fps) {
+Result<FileFacts> InspectFile(const std::string& path, double fps, const std::vector<std::string>& plugins) {
   const std::string suffix = Suffix(path);
   if (suffix == ".glb" || suffix == ".gltf") return InspectCharacter(path);
-  if (suffix == ".yaml" || suffix == ".yml") return InspectRig(path);
+  if (suffix == ".yaml" || suffix == ".yml") return InspectRig(path, plugins);
   if (suffix == ".npz") return InspectNpz(path);
   if (suffix == ".pc2" || suffix == ".mdd") return InspectPointCache(path, fps);
   if (suffix == ".kpsa") return InspectSubspace(path);

@@ -25,12 +25,12 @@ struct FileFacts {
 };
 
 // Of any file that kpsa reads or writes, by suffix: .glb .gltf .yaml .yml .npz .pc2 .mdd .kpsa .json (weight
-// maps).
-Result<FileFacts> InspectFile(const std::string& path, double fps);
+// maps). `plugins` are libraries of nodes for rigs.
+Result<FileFacts> InspectFile(const std::string& path, double fps, const std::vector<std::string>& plugins);
 
 // One kind each; see InspectFile.
 Result<FileFacts> InspectCharacter(const std::string& path);
-Result<FileFacts> InspectRig(const std::string& path);
+Result<FileFacts> InspectRig(const std::string& path, const std::vector<std::string>& plugins);
 Result<FileFacts> InspectNpz(const std::string& path);
 Result<FileFacts> InspectPointCache(const std::string& path, double fps);
 Result<FileFacts> InspectSubspace(const std::string& path);

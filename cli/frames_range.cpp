@@ -137,17 +137,18 @@ Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig) {
     for (std::int64_t frame : *frames) times.push_back(static_cast<double>(frame) / rig.fps);
     return times;
   }
-  double duration = 0;
+  double begin = 0, duration = 0;
   for (const CharacterClip& clip : rig.scene.clips) {
-    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip) duration = clip.duration;
+    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip)
+      begin = clip.begin, duration = clip.duration;
   }
   // A clip that was made at this rate ends on a frame, but for rounding
-  const double last = std::floor(duration * rig.fps + 1e-3);
-  if (!(last < static_cast<double>(kMaxSamples))) {
+  const double first = std::ceil(begin * rig.fps - 1e-3), last = std::floor(duration * rig.fps + 1e-3);
+  if (!(last - first < static_cast<double>(kMaxSamples))) {
     return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames: choose some with --frames",
                          rig.scene.clip.value_or(""), duration, Thousands(kMaxSamples));
   }
-  for (double frame = 0; frame <= last; ++frame) times.push_back(frame / rig.fps);
+  for (double frame = first; frame <= last; ++frame) times.push_back(frame / rig.fps);
   return times;
 }
 

@@ -93,8 +93,9 @@ Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<s
     if (found == nullptr)
       return Status::Invalid("the character has no clip \"{}\"{}", name, DidYouMean(name, known));
     TrainingClip clip{name, {}};
-    const auto count = static_cast<std::size_t>(std::floor(found->duration * rig.fps + 1e-6)) + 1;
-    for (std::size_t i = 0; i < count; ++i) clip.times.push_back(static_cast<double>(i) / rig.fps);
+    const double first = std::ceil(found->begin * rig.fps - 1e-6);
+    const auto count = static_cast<std::size_t>(std::floor(found->duration * rig.fps + 1e-6) - first) + 1;
+    for (std::size_t i = 0; i < count; ++i) clip.times.push_back((first + static_cast<double>(i)) / rig.fps);
     frames.push_back(std::move(clip));
   }
   return frames;

@@ -1,82 +1,13 @@
 // The nodes of a clip: a clipTransform for every animated transform, a clipWeights for every animated mesh
 // node.
 #include <algorithm>
-#include <map>
 
 #include "io/character_graph.h"
+#include "io/clip_channels.h"
 #include "io/graph_editor.h"
 
 namespace kpsa {
 namespace {
-
-constexpr std::size_t kMaxNotes = 200;
-
-AnimationSampler ToSampler(const gltf::Channel& channel) {
-  AnimationSampler sampler;
-  switch (channel.interpolation) {
-    case gltf::Interpolation::kStep:
-      sampler.interpolation = AnimationSampler::Interpolation::kStep;
-      break;
-    case gltf::Interpolation::kLinear:
-      sampler.interpolation = AnimationSampler::Interpolation::kLinear;
-      break;
-    case gltf::Interpolation::kCubicSpline:
-      sampler.interpolation = AnimationSampler::Interpolation::kCubicSpline;
-      break;
-  }
-  sampler.components = channel.components;
-  sampler.times = channel.times;
-  sampler.values = channel.values;
-  return sampler;
-}
-
-// The channels of one node.
-struct NodeKeys {
-  AnimationKeys::Data data;
-  bool moves = false, morphs = false;
-};
-
-void AddNote(std::string note, std::vector<std::string>* notes) {
-  if (std::find(notes->begin(), notes->end(), note) == notes->end() && notes->size() < kMaxNotes)
-    notes->push_back(std::move(note));
-}
-
-std::map<Index, NodeKeys> KeysByNode(const gltf::Character& character, const gltf::Clip& clip,
-                                     std::vector<std::string>* notes) {
-  std::map<Index, NodeKeys> keys;
-  for (const gltf::Channel& channel : clip.channels) {
-    NodeKeys& of_node = keys[channel.node];
-    AnimationSampler* sampler = nullptr;
-    switch (channel.path) {
-      case gltf::Path::kTranslation:
-        sampler = &of_node.data.translation;
-        break;
-      case gltf::Path::kRotation:
-        sampler = &of_node.data.rotation;
-        break;
-      case gltf::Path::kScale:
-        sampler = &of_node.data.scale;
-        break;
-      case gltf::Path::kWeights:
-        sampler = &of_node.data.weights;
-        break;
-    }
-    if (!sampler->times.empty()) {
-      AddNote(fmt::format("clip \"{}\" animates one property of nodes[{}] twice; the first is used", clip.id,
-                          channel.node),
-              notes);
-      continue;
-    }
-    *sampler = ToSampler(channel);
-    (channel.path == gltf::Path::kWeights ? of_node.morphs : of_node.moves) = true;
-  }
-  for (auto& [index, of_node] : keys) {
-    of_node.data.rest_translation = character.nodes[index].translation;
-    of_node.data.rest_rotation = character.nodes[index].rotation;
-    of_node.data.rest_scale = character.nodes[index].scale;
-  }
-  return keys;
-}
 
 class ClipWriter {
  public:
@@ -126,9 +57,13 @@ class ClipWriter {
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph) {
   Index index = kNoIndex;
+  const LayeredClip* layered = nullptr;
   if (clip.has_value()) {
+    for (const LayeredClip& candidate : scene->layered) {
+      if (candidate.id == *clip) layered = &candidate;
+    }
     index = character.FindClip(*clip);
-    if (index == kNoIndex) {
+    if (index == kNoIndex && layered == nullptr) {
       std::vector<std::string> ids;
       for (const CharacterClip& known : scene->clips) ids.push_back(known.id);
       if (ids.empty()) return Status::Invalid("the character has no clips, so none named \"{}\"", *clip);
@@ -143,6 +78,7 @@ Status SetClip(const gltf::Character& character, std::optional<std::string_view>
   for (NodeId node : scene->clip_nodes) KPSA_RETURN_IF_ERROR(graph->RemoveNode(node));
   scene->clip_nodes.clear();
   scene->clip.reset();
+  if (layered != nullptr) return PlayLayers(character, *layered, scene, graph);
   if (index == kNoIndex) return Status();
 
   ClipWriter writer(scene, graph);

@@ -68,14 +68,30 @@ struct CharacterMesh {
 
 struct CharacterClip {
   std::string id;
-  double duration = 0;  // seconds
+  double duration = 0;  // seconds, from time 0 to its end
+  double begin = 0;     // the first time that is played where nobody says
+};
+
+// A clip of the character's clips, over each other (nodes/clip_layers.cpp says how).
+struct LayeredClip {
+  struct Layer {
+    Index clip = kNoIndex;  // of the character
+    double weight = 1;      // 0..1
+    bool additive = false;
+    double start = 0, speed = 1;  // seconds; seconds of the clip a second
+    bool loop = false;
+    std::vector<bool> moves;  // by glTF node: whether the layer may move it; empty: all
+  };
+  std::string id;
+  std::vector<Layer> layers;
 };
 
 struct CharacterGraph {
   std::vector<CharacterMesh> meshes;  // in the order of their glTF nodes
   std::vector<NodeId> transforms;     // by glTF node
-  std::vector<CharacterClip> clips;   // all of the file
-  std::optional<std::string> clip;    // the one that plays
+  std::vector<CharacterClip> clips;   // all of the file, then the layered ones
+  std::vector<LayeredClip> layered;
+  std::optional<std::string> clip;  // the one that plays
   std::vector<NodeId> clip_nodes;
   PlugRef time;
   std::vector<std::string> notes;  // what was ignored, one line each
@@ -97,6 +113,9 @@ inline constexpr std::size_t kMaxMorphTargets = 8192;
 // Replaces the clip that plays; none: the rest pose. Plugs that somebody else drives are left alone.
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph);
+// The nodes of a layered clip; *scene is as SetClip leaves it without a clip.
+Status PlayLayers(const gltf::Character& character, const LayeredClip& clip, CharacterGraph* scene,
+                  Graph* graph);
 // Whether any clip of the character drives the plug.
 bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug);
 

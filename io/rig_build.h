@@ -51,17 +51,27 @@ class RigBuild {
   };
   using Places = std::vector<Double3>;
 
+  // rig_scopes.cpp: names within templates
+  std::string InScope(const std::string& text, int source) const;
+  void InScope(YamlNode* value, int source) const;
+  void ResolveScopes();
+
+  // rig_clips.cpp: clips of the rig's own
+  void AddClips();
+  void AddLayer(const RigClip& clip, const RigClipLayer& from, LayeredClip* to, double* end);
+  std::vector<bool> MaskedNodes(const RigClipLayer& layer);
+
   // rig_nodes.cpp: nodes, their values, overrides
   void ApplySpecialOverrides();
   static RigAttribute SpecialOf(const std::string& key, const RigOverride& override_);
   void AddNodes();
   void ReadAttributes(Made* made);
-  bool IsSpecial(const NodeDef& def, const std::string& key) const;
   void ReadAttribute(const Made& made, const RigAttribute& attribute, bool overrides);
   void ReadPlug(const PlugRef& plug, const YamlNode& value, int source, bool overrides);
   void ReadOverrides();
   void ReadOverride(const RigOverride& override_);
   void FinishOverrides();
+  void CheckVariants();
 
   // rig_shapes.cpp: targets, combinations and in-betweens of blend shapes, blend weights of skins
   bool TakeOwnSpecial(const RigOverride& override_);

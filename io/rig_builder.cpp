@@ -7,6 +7,7 @@
 #include <map>
 #include <tuple>
 
+#include "graph/plugin_loader.h"
 #include "io/rig_build.h"
 
 namespace kpsa {
@@ -33,6 +34,25 @@ Status InOrder(const Status& status) {
   Status ordered;
   for (Error& error : errors) ordered.Add(std::move(error));
   return ordered;
+}
+
+// The variant's overrides take the place of the rig's own of the same plug.
+Status ApplyVariant(const std::string& name, RigFile* file) {
+  std::vector<std::string> names;
+  for (const RigVariant& variant : file->variants) {
+    names.push_back(variant.name);
+    if (variant.name != name) continue;
+    for (const RigOverride& override_ : variant.overrides) {
+      std::erase_if(file->overrides,
+                    [&](const RigOverride& other) { return other.plug.text == override_.plug.text; });
+      file->overrides.push_back(override_);
+    }
+    return Status();
+  }
+  const std::string& path = file->sources.front().path;
+  if (names.empty()) return Status::Usage("{} has no variants, so none named \"{}\"", path, name);
+  return Status::Usage("{} has no variant \"{}\"{}; it has {}", path, name, DidYouMean(name, names),
+                       fmt::join(names, ", "));
 }
 
 double RestDiagonal(const CharacterGraph& scene, RestPose* rest) {
@@ -63,6 +83,8 @@ RigBuild::RigBuild(RigFile* file, Rig* rig, RestPose* rest, YamlErrors* errors)
 }
 
 void RigBuild::Run() {
+  AddClips();
+  ResolveScopes();
   ApplySpecialOverrides();
   AddNodes();
   for (Made& made : made_) {
@@ -86,6 +108,7 @@ void RigBuild::Run() {
   PlaceStagesAtHandles();
   ConnectPivots();
   FinishOverrides();
+  CheckVariants();
   AddControls();
   AddAccelerations();
 }
@@ -107,8 +130,6 @@ RigBuild::Made* RigBuild::FindMade(NodeId id) {
 }
 
 Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const RigOptions& options) {
-  if (options.variant.has_value())
-    return Status::Usage("{} has no variants, so none named \"{}\"", path, *options.variant);
   if (options.fps.has_value() && !(*options.fps > 0 && std::isfinite(*options.fps))) {
     return Status::Usage("frames a second: expected a number above 0, found {}", *options.fps);
   }
@@ -119,17 +140,29 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
     file.sources.push_back({path, "", FileUnits(), {}});
     file.character = RigString{path, character_at, 0};
     if (options.fps.has_value()) file.sources[0].units.fps = *options.fps;
+    if (options.variant.has_value()) return ApplyVariant(*options.variant, &file);
   } else {
     errors.Append(ReadRigFile(path, options.fps, &file));
     if (!file.character.has_value() || !file.complete) return InOrder(errors.Take());
     character_at = file.character->where;
+    if (options.variant.has_value()) KPSA_RETURN_IF_ERROR(ApplyVariant(*options.variant, &file));
+  }
+
+  for (const RigString& plugin : file.plugins) {
+    errors.Append((options.plugins == nullptr
+                       ? Status::Invalid("plugin \"{}\": plugins are not loaded here", plugin.text)
+                       : options.plugins->Load(plugin.text))
+                      .At(plugin.where));
   }
 
   Rig rig;
   rig.path = path;
   rig.units = file.sources[0].units;
   rig.fps = rig.units.fps;
-  for (const RigSource& source : file.sources) rig.files.push_back(source.path);
+  for (const RigSource& source : file.sources) {
+    if (source.scope.empty()) rig.files.push_back(source.path);
+  }
+  for (const RigString& plugin : file.plugins) rig.files.push_back(plugin.text);
   Result<gltf::Character> character = gltf::LoadGltf(file.character->text);
   if (!character.ok()) {
     Status status = character.status();
@@ -142,8 +175,11 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   rig.character = std::make_shared<const gltf::Character>(std::move(*character));
   rig.graph = std::make_unique<Graph>(registry);
   CharacterOptions character_options;
-  character_options.clip = options.clip;
-  character_options.rest = options.rest;
+  const bool own_clip = options.clip.has_value() &&
+                        std::any_of(file.clips.begin(), file.clips.end(),
+                                    [&](const RigClip& clip) { return clip.name == *options.clip; });
+  if (!own_clip) character_options.clip = options.clip;
+  character_options.rest = options.rest || own_clip;
   character_options.weld = file.weld;
   Result<CharacterGraph> scene = BuildCharacterGraph(*rig.character, character_options, rig.graph.get());
   if (!scene.ok()) return scene.status();
@@ -153,6 +189,7 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   rig.rest_diagonal = RestDiagonal(rig.scene, &rest);
   RigBuild(&file, &rig, &rest, &errors).Run();
   if (!errors.ok()) return InOrder(errors.Take());
+  if (own_clip) KPSA_RETURN_IF_ERROR(SetClip(&rig, *options.clip));
   rig.notes.insert(rig.notes.begin(), rig.scene.notes.begin(), rig.scene.notes.end());
   return rig;
 }

@@ -16,11 +16,14 @@
 
 namespace kpsa {
 
+class PluginLoader;
+
 struct RigOptions {
-  std::optional<std::string> clip;     // of the character; unset: its first one, if it has any
+  std::optional<std::string> clip;     // of the character or the rig; unset: its first one, if it has any
   bool rest = false;                   // no clip
   std::optional<double> fps;           // instead of the rig's
-  std::optional<std::string> variant;  // (version 1 has none)
+  std::optional<std::string> variant;  // of the rig's `variants`
+  PluginLoader* plugins = nullptr;     // of the registry; null: rigs with plugins are refused
 };
 
 // A plug that an animator and the trainer may move. It is a number; runtime units.

@@ -2,9 +2,11 @@
 
 #include <filesystem>
 #include <map>
+#include <span>
 #include <unordered_map>
 
 #include "io/rig_file_sections.h"
+#include "io/rig_templates.h"
 
 namespace kpsa {
 namespace {
@@ -16,8 +18,14 @@ constexpr double kDefaultFps = 24;
 class Reader {
  public:
   Reader(RigFile* rig, YamlErrors* errors, std::optional<double> fps)
-      : rig_(rig), errors_(errors), fps_(fps) {}
+      : rig_(rig), errors_(errors), fps_(fps), templates_(rig, errors, Definer()) {}
 
+  void ReadAll(const std::string& path) {
+    Read(path, {path, 0, 0});
+    if (rig_->complete) templates_.Expand();
+  }
+
+ private:
   void Read(const std::string& path, const SourceLocation& included_at) {
     std::error_code ignored;
     const std::string identity = std::filesystem::weakly_canonical(path, ignored).string();
@@ -60,7 +68,6 @@ class Reader {
     open_.pop_back();
   }
 
- private:
   struct Opened {
     std::string identity, path;
     SourceLocation included_at;
@@ -112,48 +119,53 @@ class Reader {
     if (const YamlNode* node = map.Find("weld"); node != nullptr && Define("weld", "weld", node->where())) {
       ReadBool(*node, "weld", &rig_->weld, errors_);
     }
-    if (const YamlNode* node = map.Find("include"); node != nullptr && !node->is_null())
-      ReadIncludes(*node, here.folder);
+    if (const YamlNode* node = map.Find("plugins"); node != nullptr && !node->is_null()) {
+      for (RigString& file : ReadFiles(*node, "plugins", source)) rig_->plugins.push_back(std::move(file));
+    }
+    if (const YamlNode* node = map.Find("include"); node != nullptr && !node->is_null()) {
+      for (const RigString& file : ReadFiles(*node, "include", source)) Read(file.text, file.where);
+    }
 
     // A section whose lines are all comments is empty
     const auto section = [&](const char* key) {
       const YamlNode* node = map.Find(key);
       return node == nullptr || node->is_null() ? nullptr : node;
     };
-    SectionReader sections{rig_, errors_, source,
-                           [this](const std::string& section, const std::string& key,
-                                  const SourceLocation& where) { return Define(section, key, where); }};
+    SectionReader sections{rig_, errors_, source, Definer()};
     if (const YamlNode* node = section("nodes")) sections.ReadNodes(*node);
     if (const YamlNode* node = section("connections")) sections.ReadConnections(*node);
     if (const YamlNode* node = section("deform")) sections.ReadDeform(*node);
     if (const YamlNode* node = section("controls")) sections.ReadControls(*node);
     if (const YamlNode* node = section("accelerate")) sections.ReadAccelerate(*node);
     if (const YamlNode* node = section("overrides")) sections.ReadOverrides(*node);
-    for (const char* later : {"plugins", "variants", "clips", "references", "templates", "use"}) {
-      const YamlNode* node = map.Find(later);
-      if (node == nullptr) continue;
+    if (const YamlNode* node = section("variants")) sections.ReadVariants(*node);
+    if (const YamlNode* node = section("templates")) templates_.ReadTemplates(*node, source);
+    if (const YamlNode* node = section("use")) templates_.ReadUses(*node, source);
+    if (const YamlNode* node = section("clips")) sections.ReadClips(*node);
+    if (map.Find("references") != nullptr) {
       for (const YamlNode& key : root.keys) {
-        if (key.scalar == later) errors_->Add(key, "`{}` needs a newer kpsa", later);
+        if (key.scalar == "references") errors_->Add(key, "`references` needs a newer kpsa");
       }
     }
     map.RejectUnread();
   }
 
-  void ReadIncludes(const YamlNode& node, const std::string& folder) {
-    const std::vector<YamlNode>* items = &node.items;
-    std::vector<YamlNode> single;
-    if (node.is_scalar()) {
-      single.push_back(node);
-      items = &single;
-    } else if (!node.is_sequence()) {
-      errors_->Add(node, "include: expected a list of files, found {}", node.kind_name());
-      return;
+  // A file or a list of them, each resolved.
+  std::vector<RigString> ReadFiles(const YamlNode& node, const char* key, int source) {
+    std::vector<RigString> files;
+    if (!node.is_scalar() && !node.is_sequence()) {
+      errors_->Add(node, "{}: expected a list of files, found {}", key, node.kind_name());
+      return files;
     }
-    const std::string base = folder;  // the sources may move while they grow
-    for (const YamlNode& item : *items) {
+    const std::span<const YamlNode> items =
+        node.is_scalar() ? std::span(&node, 1) : std::span<const YamlNode>(node.items);
+    for (const YamlNode& item : items) {
       std::string file;
-      if (ReadString(item, "include", &file, errors_)) Read(ResolvePath(base, file), item.where());
+      if (!ReadString(item, key, &file, errors_)) continue;
+      files.push_back(
+          {ResolvePath(rig_->sources[static_cast<std::size_t>(source)].folder, file), item.where(), source});
     }
+    return files;
   }
 
   // Notes where a key was defined; false and an error that names both places if it was defined before.
@@ -168,9 +180,16 @@ class Reader {
     return false;
   }
 
+  TemplateReader::Define Definer() {
+    return [this](const std::string& section, const std::string& key, const SourceLocation& where) {
+      return Define(section, key, where);
+    };
+  }
+
   RigFile* rig_;
   YamlErrors* errors_;
   std::optional<double> fps_;
+  TemplateReader templates_;
   std::vector<Opened> open_;
   std::map<std::string, SourceLocation> read_;
   std::unordered_map<std::string, SourceLocation> defined_;
@@ -209,7 +228,7 @@ void ReadVersion(YamlMap* map, YamlErrors* errors) {
 Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig) {
   *rig = RigFile();
   YamlErrors errors;
-  Reader(rig, &errors, fps).Read(path, {path, 0, 0});
+  Reader(rig, &errors, fps).ReadAll(path);
   for (RigSource& source : rig->sources) source.units.fps = fps.value_or(rig->fps.value_or(kDefaultFps));
   if (errors.ok() && !rig->character.has_value()) {
     errors.Append(

@@ -1,11 +1,12 @@
-// A rig file (RIG-FORMAT.md, version 1) as plain data, its includes merged in. Names are not looked up and
-// values of attributes are not typed yet: that takes a registry and a character (io/rig_builder.h). Keys of
-// later versions (plugins, variants, clips, references, templates, use) are refused by name.
+// A rig file (RIG-FORMAT.md, version 1) as plain data, its includes merged in and its templates expanded.
+// Names are not looked up and values of attributes are not typed yet: that takes a registry and a character
+// (io/rig_builder.h). Keys of later versions (clips, references) are refused by name.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/quantity.h"
@@ -19,6 +20,8 @@ struct RigSource {
   std::string folder;  // relative paths in the file start here; "" is the current folder
   FileUnits units;     // of bare numbers in this file
   SourceLocation included_at;
+  std::string scope = {};  // of what a `use:` makes of a template: "arm_L:" begins the names of its nodes
+  int outer = -1;          // ... and the source whose names it sees besides its own
 };
 
 // A string or a value with its place. `source` is an index into RigFile::sources.
@@ -85,9 +88,34 @@ struct RigOverride {
   YamlNode value;
 };
 
+struct RigClipLayer {
+  RigString clip;
+  double weight = 1;  // 0..1
+  bool additive = false;
+  std::vector<RigString> mask;    // patterns with * and ? for names of nodes; none: all nodes
+  std::optional<YamlNode> start;  // a bare number is a frame
+  double speed = 1;
+  bool loop = false;
+};
+// A clip of the rig's own: clips of the character over each other.
+struct RigClip {
+  std::string name;
+  SourceLocation where;
+  int source = 0;
+  std::vector<RigClipLayer> layers;
+  std::optional<std::pair<std::int64_t, std::int64_t>> frames;  // first and last
+};
+
+// Overrides that are chosen by name; all files' parts of it together.
+struct RigVariant {
+  std::string name;
+  std::vector<RigOverride> overrides;
+};
+
 struct RigFile {
   std::vector<RigSource> sources;      // [0] is the file that was opened
   std::optional<RigString> character;  // path, resolved
+  std::vector<RigString> plugins;      // paths, resolved
   std::optional<double> fps;
   bool weld = true;
   bool complete = true;  // false: some file could not be read, so that names may be missing
@@ -97,6 +125,8 @@ struct RigFile {
   std::vector<RigControl> controls;
   std::vector<RigAccelerate> accelerate;
   std::vector<RigOverride> overrides;
+  std::vector<RigVariant> variants;
+  std::vector<RigClip> clips;
 };
 
 // Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig

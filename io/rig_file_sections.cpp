@@ -41,14 +41,15 @@ void SectionReader::ReadNodes(const YamlNode& node) {
       errors->Add(key, "a node needs a name of at most 1024 bytes");
       continue;
     }
-    if (!define("node", key.scalar, key.where())) continue;
-    const std::string what = fmt::format("node \"{}\"", key.scalar);
+    const std::string name = scope() + key.scalar;
+    if (!define("node", name, key.where())) continue;
+    const std::string what = fmt::format("node \"{}\"", name);
     if (!body.is_map()) {
       errors->Add(body, "{}: expected a map with its type, found {}", what, body.kind_name());
       continue;
     }
     RigNode rig_node;
-    rig_node.name = key.scalar;
+    rig_node.name = name;
     rig_node.where = key.where();
     rig_node.source = source;
     const YamlNode* type = body.Find("type");
@@ -131,7 +132,7 @@ void SectionReader::ReadDeform(const YamlNode& node) {
     if (points != nullptr) {
       deform.points = RigString{{}, points->where(), source};
       if (ReadString(*points, "points", &deform.points->text, errors))
-        define("the stack of", deform.points->text, points->where());
+        define("the stack of", scope() + deform.points->text, points->where());
     }
     std::map<std::string, SourceLocation> seen;
     for (const RigString& deformer : deform.stack) {
@@ -149,7 +150,7 @@ void SectionReader::ReadControls(const YamlNode& node) {
   if (!CheckMap(node, "controls")) return;
   for (std::size_t i = 0; i < node.keys.size(); ++i) {
     const YamlNode& key = node.keys[i];
-    if (!define("control", key.scalar, key.where())) continue;
+    if (!define("control", scope() + key.scalar, key.where())) continue;
     YamlMap map(node.items[i], fmt::format("control \"{}\"", key.scalar), errors);
     const YamlNode* min = map.Required("min");
     const YamlNode* max = map.Required("max");
@@ -253,6 +254,28 @@ void SectionReader::ReadOverrides(const YamlNode& node) {
     const YamlNode& key = node.keys[i];
     if (define("override", key.scalar, key.where())) {
       rig->overrides.push_back({{key.scalar, key.where(), source}, node.items[i]});
+    }
+  }
+}
+
+void SectionReader::ReadVariants(const YamlNode& node) {
+  if (!CheckMap(node, "variants")) return;
+  for (std::size_t i = 0; i < node.keys.size(); ++i) {
+    const std::string& name = node.keys[i].scalar;
+    const YamlNode& body = node.items[i];
+    const std::string what = fmt::format("variant \"{}\"", name);
+    auto variant = std::find_if(rig->variants.begin(), rig->variants.end(),
+                                [&](const RigVariant& v) { return v.name == name; });
+    if (variant == rig->variants.end()) variant = rig->variants.insert(variant, {name, {}});
+    if (body.is_null()) continue;
+    if (!body.is_map()) {
+      errors->Add(body, "{}: expected a map of plugs and values, found {}", what, body.kind_name());
+      continue;
+    }
+    for (std::size_t k = 0; k < body.keys.size(); ++k) {
+      const YamlNode& key = body.keys[k];
+      if (define(what + ", override", key.scalar, key.where()))
+        variant->overrides.push_back({{key.scalar, key.where(), source}, body.items[k]});
     }
   }
 }

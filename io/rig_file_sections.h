@@ -21,11 +21,15 @@ struct SectionReader {
   void ReadControls(const YamlNode& node);
   void ReadAccelerate(const YamlNode& node);
   void ReadOverrides(const YamlNode& node);
+  void ReadVariants(const YamlNode& node);
+  void ReadClips(const YamlNode& node);  // io/rig_file_clips.cpp
 
  private:
   bool CheckMap(const YamlNode& node, const char* section) const;
   bool ReadNames(const YamlNode& node, const std::string& what, std::vector<RigString>* names) const;
+  void ReadLayer(const YamlNode& node, RigClip* clip) const;
   void ReadAcceleratePoints(const YamlNode& node, RigAccelerate* accelerate) const;
+  const std::string& scope() const { return rig->sources[static_cast<std::size_t>(source)].scope; }
   const FileUnits& units() const { return rig->sources[static_cast<std::size_t>(source)].units; }
 };
 

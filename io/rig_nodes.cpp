@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "io/rig_build.h"
+#include "io/rig_words.h"
 
 namespace kpsa {
 namespace {
@@ -9,40 +10,11 @@ namespace {
 // Words of stacks: no node may be called so.
 constexpr const char* kStackWords[] = {"gltf", "morph", "skin", "transform"};
 
-bool HasAttribute(const NodeDef& def, const char* name) { return def.FindAttribute(name) >= 0; }
-
-bool IsDeformer(const NodeDef& def) {
-  const int points = def.FindAttribute("inPoints");
-  return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry &&
-         HasAttribute(def, "outPoints");
-}
-
 const AttributeDef& AttributeOf(const Graph& graph, const PlugRef& plug) {
   return graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
 }
 
 }  // namespace
-
-// Keys that a definition does not declare, but that mean something for its kind of node.
-bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
-  if (key == "parent") return HasAttribute(def, "parentMatrix");
-  if (key == "at") return HasAttribute(def, "offsetParentMatrix");
-  if (key == "constrained")
-    return HasAttribute(def, "inMatrix") && HasAttribute(def, "outMatrix") && def.name != "splineIk";
-  if (key == "targets") return HasAttribute(def, "targetMatrix") && HasAttribute(def, "outMatrix");
-  if (key == "mid") return def.name == "ikHandle";
-  if (key == "start" || key == "end")
-    return def.name == "ikHandle" || def.name == "splineIk" || def.name == "twistDistribution";
-  if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
-  if (def.name == "poseInterpolator" && key == "poses") return true;
-  if (key == "driver") return HasAttribute(def, "driverPoints") || def.name == "poseInterpolator";
-  if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
-  if (key == "curve" || key == "curves")
-    return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
-  if (def.name == "blendShape") return key == "targets" || key == "combinations" || key == "inbetweens";
-  if (def.name == "skinCluster") return key == "blendWeights";
-  return false;
-}
 
 RigAttribute RigBuild::SpecialOf(const std::string& key, const RigOverride& override_) {
   YamlNode key_node;
@@ -54,8 +26,8 @@ RigAttribute RigBuild::SpecialOf(const std::string& key, const RigOverride& over
   return {key, key_node, override_.value, override_.plug.source};
 }
 
-// An override of such a key replaces it in the node before anything is read: `wire1.weights`,
-// `lips.vertices`.
+// An override of a word that is no attribute replaces it in the node before anything is read:
+// `wire1.weights`, `lips.vertices`.
 void RigBuild::ApplySpecialOverrides() {
   std::vector<RigOverride> others;
   for (RigOverride& override_ : file_->overrides) {
@@ -68,7 +40,7 @@ void RigBuild::ApplySpecialOverrides() {
     }
     const NodeDef* def = longest == nullptr ? nullptr : graph().registry().Find(longest->type);
     const std::string key = longest == nullptr ? "" : text.substr(longest->name.size() + 1);
-    if (def == nullptr || !IsSpecial(*def, key)) {
+    if (def == nullptr || !IsRigWord(*def, key)) {
       if (longest == nullptr && TakeOwnSpecial(override_)) continue;
       others.push_back(std::move(override_));
       continue;
@@ -112,7 +84,7 @@ void RigBuild::ReadAttributes(Made* made) {
       const int number = def.FindAttribute(attribute.name);
       if ((number >= 0 && def.attributes[static_cast<std::size_t>(number)].structural) != structural)
         continue;
-      if (IsSpecial(def, attribute.name)) {
+      if (IsRigWord(def, attribute.name)) {
         made->special[attribute.name] = &attribute;
       } else {
         ReadAttribute(*made, attribute, false);
@@ -151,12 +123,7 @@ void RigBuild::ReadAttribute(const Made& made, const RigAttribute& attribute, bo
     for (const AttributeDef& a : def.attributes) {
       if (!a.output) names.push_back(a.name);
     }
-    for (const char* word :
-         {"parent",       "at",         "members",      "weights",     "falloff", "driver", "poses",
-          "vertices",     "mesh",       "closed",       "places",      "curve",   "curves", "targets",
-          "combinations", "inbetweens", "blendWeights", "constrained", "start",   "mid",    "end"}) {
-      if (IsSpecial(def, word)) names.push_back(word);
-    }
+    for (const RigWord& word : RigWordsOf(def)) names.push_back(word.name);
     errors_->Add(attribute.key, "node \"{}\" ({}) has no attribute \"{}\"{}", made.from->name, def.name,
                  attribute.name, DidYouMean(attribute.name, names));
     return;
@@ -275,6 +242,22 @@ void RigBuild::FinishOverrides() {
     if (!by_value || stacked_.count(KeyOf(plug)) != 0) continue;
     if (graph().FindConnection(plug) != nullptr) Fail({}, graph().Disconnect(plug));
     if (IsClipPlug(rig_->scene, graph(), plug)) rig_->pinned.push_back(plug);
+  }
+}
+
+// What no chosen variant sets exists all the same.
+void RigBuild::CheckVariants() {
+  for (const RigVariant& variant : file_->variants) {
+    for (const RigOverride& override_ : variant.overrides) {
+      const std::string& text = override_.plug.text;
+      if (errors_->full()) return;
+      const Result<PlugRef> plug = graph().FindPlug(text);
+      if (plug.ok() || graph().FindPlug(text + "[0]").ok()) continue;
+      const std::size_t dot = text.rfind('.');
+      const Made* made = dot == std::string::npos ? nullptr : FindMade(text.substr(0, dot));
+      if (made == nullptr || !IsRigWord(graph().def(made->id), text.substr(dot + 1)))
+        Fail(override_.plug.where, plug.status());
+    }
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "io/rig_build.h"
+#include "io/rig_words.h"
 
 namespace kpsa {
 namespace {
@@ -22,7 +23,7 @@ bool RigBuild::TakeOwnSpecial(const RigOverride& override_) {
     const CharacterMesh& mesh = rig_->scene.meshes[m];
     for (const NodeId id : {mesh.blend_shape, mesh.skin_cluster}) {
       if (key != "combinations" && key != "inbetweens" && key != "blendWeights") continue;
-      if (id.version == 0 || !IsSpecial(graph().def(id), key)) continue;
+      if (id.version == 0 || !IsRigWord(graph().def(id), key)) continue;
       if (name != graph().name(id) && name != graph().name(mesh.transform)) continue;
       auto made =
           std::find_if(own_made_.begin(), own_made_.end(), [&](const Made& other) { return other.id == id; });

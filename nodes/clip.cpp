@@ -4,34 +4,13 @@
 
 #include "base/prefetch.h"
 #include "graph/geometry.h"
+#include "nodes/clip_keys.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/sampler.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
 namespace {
-
-// A sampler's keys as the kernels want them.
-struct Keys {
-  std::vector<float> times, values;
-  SamplerKeys view;  // of these; moving a Keys keeps it valid
-  bool empty() const { return times.empty(); }
-};
-
-Result<Keys> MakeKeys(const AnimationSampler& sampler, const char* what) {
-  Keys keys;
-  keys.times.assign(sampler.times.begin(), sampler.times.end());
-  keys.values.assign(sampler.values.begin(), sampler.values.end());
-  if (keys.empty()) return keys;
-  using From = AnimationSampler::Interpolation;
-  keys.view = {keys.times, keys.values, static_cast<std::size_t>(sampler.components),
-               sampler.interpolation == From::kStep          ? Interpolation::kStep
-               : sampler.interpolation == From::kCubicSpline ? Interpolation::kCubicSpline
-                                                             : Interpolation::kLinear};
-  const Status status = keys.view.Validate();
-  if (!status.ok()) return Status::Invalid("{}: {}", what, status.ToString());
-  return keys;
-}
 
 // Whether a vector channel gives the same value, its first key's, at any time.
 bool IsConstant(const SamplerKeys& keys) {

@@ -12,6 +12,7 @@ void AddStandardNodes(NodeRegistry& registry) {
   for (auto* add : {AddTimeNode,
                     AddTransformNodes,
                     AddClipNodes,
+                    AddClipLayerNodes,
                     AddMeshNode,
                     AddBlendShapeNode,
                     AddSkinClusterNode,

@@ -8,6 +8,7 @@ namespace kpsa {
 void AddTimeNode(NodeRegistry& registry);               // time
 void AddTransformNodes(NodeRegistry& registry);         // transform, joint
 void AddClipNodes(NodeRegistry& registry);              // clipTransform, clipWeights, animCurve(UU, UA, UL)
+void AddClipLayerNodes(NodeRegistry& registry);         // clipLayer, layeredTransform, layeredWeights
 void AddMeshNode(NodeRegistry& registry);               // mesh
 void AddBlendShapeNode(NodeRegistry& registry);         // blendShape, combinationShape
 void AddSkinClusterNode(NodeRegistry& registry);        // skinCluster

@@ -7,6 +7,7 @@
 
 #include "graph/frames.h"
 #include "tests/cli/hello_folder.h"
+#include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
 namespace kpsa {

@@ -1,0 +1,30 @@
+// Loads libraries of nodes (graph/plugin.h) into a registry. One loader a registry, before it is shared
+// between threads; libraries stay loaded until the program ends.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/status.h"
+#include "graph/node_registry.h"
+
+namespace kpsa {
+
+class PluginLoader {
+ public:
+  explicit PluginLoader(NodeRegistry* registry) : registry_(registry) {}
+
+  // Adds the node types of the library at `path`; relative paths start at the current folder. A library that
+  // was loaded before is passed over. Errors, after which the registry is as it was: no such file, one that
+  // the system cannot load (its words are in the message), one that does not export kpsa_plugin_abi and
+  // kpsa_register, another ABI version, a node type without a name or a name that exists, an exception.
+  Status Load(const std::string& path);
+
+ private:
+  NodeRegistry* registry_;
+  std::vector<std::string> loaded_;            // canonical paths
+  std::map<std::string, std::string> origin_;  // node type -> the library that brought it
+};
+
+}  // namespace kpsa

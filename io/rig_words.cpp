@@ -1,0 +1,79 @@
+#include "io/rig_words.h"
+
+#include <algorithm>
+
+namespace kpsa {
+namespace {
+
+bool Has(const NodeDef& def, const char* name) { return def.FindAttribute(name) >= 0; }
+
+bool IsCurve(const NodeDef& def) { return def.name == "curve"; }
+
+bool FollowsCurve(const NodeDef& def) {
+  return Has(def, "curve") && Has(def, "displacements") && !IsCurve(def);
+}
+
+bool IsBlendShape(const NodeDef& def) { return def.name == "blendShape"; }
+
+bool IsChain(const NodeDef& def) {
+  return def.name == "ikHandle" || def.name == "splineIk" || def.name == "twistDistribution";
+}
+
+struct Rule {
+  RigWord word;
+  bool (*applies)(const NodeDef&);
+};
+const Rule kRules[] = {
+    {{"parent", "the transform that carries it"}, [](const NodeDef& d) { return Has(d, "parentMatrix"); }},
+    {{"at", "where it rests: a curve's vertex, a transform, a vertex of the mesh or [x, y, z]"},
+     [](const NodeDef& d) { return Has(d, "offsetParentMatrix"); }},
+    {{"members", "the points that it moves"}, IsDeformer},
+    {{"weights", "a weight map, file.json#map, or a list of them"}, IsDeformer},
+    {{"falloff", "1 at a place, 0 at the radius and beyond"}, IsDeformer},
+    {{"vertices", "control vertices at rest, of the mesh"}, IsCurve},
+    {{"mesh", "of the vertices, where the character has several"}, IsCurve},
+    {{"places", "control vertices at rest, [x, y, z] in the world"}, IsCurve},
+    {{"closed", "whether the last vertex is followed by the first"}, IsCurve},
+    {{"curve", "the curve that it follows"}, FollowsCurve},
+    {{"curves", "several curves that it follows"}, FollowsCurve},
+    {{"driver", "the mesh that it follows, mesh or mesh@stage; of a poseInterpolator a transform"},
+     [](const NodeDef& d) { return Has(d, "driverPoints") || d.name == "poseInterpolator"; }},
+    {{"poses", "poses of the driver by name, angles from rest"},
+     [](const NodeDef& d) { return d.name == "poseInterpolator"; }},
+    {{"targets", "transforms of a constraint, or morph targets of a blend shape"},
+     [](const NodeDef& d) {
+       return (Has(d, "targetMatrix") && Has(d, "outMatrix")) || d.name == "blendShape";
+     }},
+    {{"combinations", "weights of targets by those of others"}, IsBlendShape},
+    {{"inbetweens", "other targets that a target goes through"}, IsBlendShape},
+    {{"blendWeights", "a weight map of dual quaternions"},
+     [](const NodeDef& d) { return d.name == "skinCluster"; }},
+    {{"constrained", "the transform whose local matrix it owns"},
+     [](const NodeDef& d) { return Has(d, "inMatrix") && Has(d, "outMatrix") && d.name != "splineIk"; }},
+    {{"start", "the first joint of the chain"}, IsChain},
+    {{"mid", "the joint that bends"}, [](const NodeDef& d) { return d.name == "ikHandle"; }},
+    {{"end", "the last joint of the chain"}, IsChain},
+};
+
+}  // namespace
+
+std::vector<RigWord> RigWordsOf(const NodeDef& def) {
+  std::vector<RigWord> words;
+  for (const Rule& rule : kRules) {
+    if (rule.applies(def)) words.push_back(rule.word);
+  }
+  return words;
+}
+
+bool IsRigWord(const NodeDef& def, std::string_view key) {
+  return std::any_of(std::begin(kRules), std::end(kRules),
+                     [&](const Rule& rule) { return key == rule.word.name && rule.applies(def); });
+}
+
+bool IsDeformer(const NodeDef& def) {
+  const int points = def.FindAttribute("inPoints");
+  return points >= 0 && def.attributes[static_cast<std::size_t>(points)].per_geometry &&
+         Has(def, "outPoints");
+}
+
+}  // namespace kpsa

@@ -1,0 +1,40 @@
+// Libraries that must be refused, one a KPSA_BROKEN_...
+#include <stdexcept>
+
+#include "graph/plugin.h"
+
+[[maybe_unused]] static void AddOne(kpsa::NodeRegistry& registry, const char* name) {
+  registry.add(name, "Half a value.")
+      .in("input", 0.0)
+      .out("output", kpsa::Type::kDouble)
+      .compute([](double x) { return x / 2; });
+}
+
+#if defined(KPSA_BROKEN_silent)
+extern "C" int nothing_that_kpsa_knows() { return 0; }
+#elif defined(KPSA_BROKEN_mute)
+extern "C" int kpsa_plugin_abi() { return kpsa::kPluginAbi; }
+#elif defined(KPSA_BROKEN_old)
+extern "C" int kpsa_plugin_abi() { return kpsa::kPluginAbi - 1; }
+extern "C" void kpsa_register(kpsa::NodeRegistry&) {}
+#elif defined(KPSA_BROKEN_unresolved)
+extern "C" int a_function_that_nobody_has();
+extern "C" int kpsa_plugin_abi() { return a_function_that_nobody_has(); }
+extern "C" void kpsa_register(kpsa::NodeRegistry&) {}
+#else
+KPSA_PLUGIN(registry) {
+  AddOne(registry, "fine");
+#if defined(KPSA_BROKEN_twice)
+  AddOne(registry, "half");
+  AddOne(registry, "half");
+#elif defined(KPSA_BROKEN_taken)
+  AddOne(registry, "transform");
+#elif defined(KPSA_BROKEN_rival)
+  AddOne(registry, "wobble");
+#elif defined(KPSA_BROKEN_nameless)
+  AddOne(registry, "");
+#elif defined(KPSA_BROKEN_throwing)
+  throw std::runtime_error("no licence found");
+#endif
+}
+#endif
