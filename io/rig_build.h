@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <set>
@@ -120,6 +121,11 @@ class RigBuild {
   const WeightFile* FindWeightFile(const YamlNode& reference, const std::string& path);
   Index VertexCount(const Geometry& of) const;
   Index PointOf(const Geometry& of, Index vertex) const;
+
+  // rig_lights.cpp: what illuminations see
+  void ConnectLights();
+  std::optional<NodeId> FindWithOutputs(const YamlNode& name, std::initializer_list<const char*> outputs,
+                                        const char* what);
 
   // rig_request.cpp: controls and acceleration
   void AddControls();

@@ -74,6 +74,7 @@ void RigBuild::Run() {
   if (errors_->ok()) PlaceHandles();
   ConnectCurves();
   BuildStacks();
+  ConnectLights();
   MakeConnections();
   PlaceStagesAtHandles();
   ConnectPivots();

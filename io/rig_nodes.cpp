@@ -29,6 +29,8 @@ bool RigBuild::IsSpecial(const NodeDef& def, const std::string& key) const {
   if (key == "at") return HasAttribute(def, "offsetParentMatrix");
   if (key == "members" || key == "weights" || key == "falloff") return IsDeformer(def);
   if (def.name == "curve") return key == "vertices" || key == "mesh" || key == "closed" || key == "places";
+  if (def.name == "indirectIllumination" && (key == "meshes" || key == "camera" || key == "lights"))
+    return true;
   if (key == "curve") return HasAttribute(def, "curve") && HasAttribute(def, "displacements");
   return false;
 }

@@ -9,10 +9,10 @@ void AddTimeNode(NodeRegistry& registry) {
 }
 
 void AddStandardNodes(NodeRegistry& registry) {
-  for (auto* add :
-       {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode, AddSkinClusterNode,
-        AddTransformGeometryNode, AddLatticeNode, AddClusterNodes, AddDeltaMushNode, AddCurveNodes,
-        AddTripwireNode, AddMathNodes, AddMatrixNodes, AddSelectionNodes}) {
+  for (auto* add : {AddTimeNode, AddTransformNodes, AddClipNodes, AddMeshNode, AddBlendShapeNode,
+                    AddSkinClusterNode, AddTransformGeometryNode, AddLatticeNode, AddClusterNodes,
+                    AddDeltaMushNode, AddCurveNodes, AddTripwireNode, AddMathNodes, AddMatrixNodes,
+                    AddSelectionNodes, AddLightNodes, AddIlluminationNodes}) {
     add(registry);
   }
 }

@@ -19,7 +19,9 @@ void AddCurveNodes(NodeRegistry& registry);             // curve, wire
 void AddTripwireNode(NodeRegistry& registry);           // tripwire
 void AddMathNodes(NodeRegistry& registry);    // remapValue, multiplyDivide, plusMinusAverage, unitConversion
 void AddMatrixNodes(NodeRegistry& registry);  // multMatrix, composeMatrix, decomposeMatrix
-void AddSelectionNodes(NodeRegistry& registry);  // condition, choice
+void AddSelectionNodes(NodeRegistry& registry);     // condition, choice
+void AddLightNodes(NodeRegistry& registry);         // camera, pointLight, areaLight, sunLight
+void AddIlluminationNodes(NodeRegistry& registry);  // indirectIllumination
 
 // All of them.
 void AddStandardNodes(NodeRegistry& registry);
