@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <tiny_gltf.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cstring>
 #include <filesystem>
 #include <limits>
@@ -57,6 +59,13 @@ bool HasScheme(std::string_view uri) {
   return colon != std::string_view::npos && colon > 0 && uri[colon] == ':';
 }
 
+// Schemes are written in either case (RFC 3986, 3.1).
+bool HasPrefixIgnoringCase(std::string_view text, std::string_view prefix) {
+  return text.size() >= prefix.size() &&
+         std::equal(prefix.begin(), prefix.end(), text.begin(),
+                    [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+}
+
 std::string Shortened(const std::string& text) {
   return text.size() <= 80 ? text : text.substr(0, 77) + "...";
 }
@@ -65,7 +74,7 @@ Result<std::vector<std::uint8_t>> LoadBuffer(const BufferSource& source, bool is
                                              const Container& container, const std::string& folder) {
   std::vector<std::uint8_t> bytes;
   if (source.has_uri) {
-    if (source.uri.starts_with("data:")) {
+    if (HasPrefixIgnoringCase(source.uri, "data:")) {
       Result<std::vector<std::uint8_t>> decoded = DecodeDataUri(source.uri);
       if (!decoded.ok()) return decoded.status();
       bytes = std::move(*decoded);

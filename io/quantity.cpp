@@ -114,7 +114,12 @@ Result<double> ParseQuantity(std::string_view text, Unit unit, const FileUnits& 
         whole);
   }
   double number = 0;
-  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
+  auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), number);
+  if (error == std::errc::result_out_of_range &&
+      std::string_view(rest.data(), static_cast<std::size_t>(end - rest.data())).find("e-") !=
+          std::string_view::npos) {
+    number = 0, error = std::errc();  // too small to tell from 0
+  }
   if (error == std::errc::result_out_of_range || !std::isfinite(number)) {
     return Status::Invalid("\"{}\" is outside of the range of numbers", whole);
   }

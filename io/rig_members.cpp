@@ -248,6 +248,8 @@ bool RigBuild::FindMap(const YamlNode& reference, int source, const Made& made, 
   // Without #map the file has one map only. Maps may have a # in their names, too
   const std::size_t suffix = text.find(".json#");
   const std::size_t hash = suffix == std::string::npos ? text.rfind('#') : suffix + 5;
+  if (hash == 0)
+    return errors_->Add(reference, "weights \"{}\": expected the file before the #, FILE.json#MAP", text);
   const std::string path = ResolvePath(folder(source), text.substr(0, hash));
   *file = FindWeightFile(reference, path);
   if (*file == nullptr) return false;

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Builds the program and its tests under sanitizers and runs all tests there: the address and undefined-behaviour
 # sanitizers, or with `sh tests/sanitize.sh tsan` the thread sanitizer. Tests that measure what sanitizers change
-# (label "native" in CMakeLists.txt) are left out. Clang, since it compiles sanitized code four times faster than GCC,
+# (KPSA_NATIVE in CMakeLists.txt) are left out. Clang, since it compiles sanitized code four times faster than GCC,
 # and since a second compiler sees what the first does not.
 set -e
 cd "$(dirname "$0")/.."
@@ -15,4 +15,4 @@ fi
 cmake -S . -B $folder -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g0" \
   -D$sanitizer=ON -DKPSA_COMPILE_ONCE=ON > /dev/null
 cmake --build $folder
-ctest --test-dir $folder --output-on-failure -LE native -j "$(nproc)"
+ctest --test-dir $folder --output-on-failure -j "$(nproc)"

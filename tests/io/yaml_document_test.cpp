@@ -168,6 +168,7 @@ TEST(Quantity, SaysWhatIsWrong) {
   EXPECT_TRUE(Has(failure(".nan", Unit::kNone), "not finite"));
   EXPECT_TRUE(Has(failure("-.inf", Unit::kNone), "not finite"));
   EXPECT_TRUE(Has(failure("1e999", Unit::kNone), "outside of the range"));
+  EXPECT_EQ(*ParseQuantity("-1e-400", Unit::kNone, units), 0);
   EXPECT_TRUE(Has(failure("010", Unit::kNone), "leading zeros"));
   EXPECT_TRUE(Has(failure("0x10", Unit::kNone), "leading zeros"));
   EXPECT_TRUE(Has(failure("nan", Unit::kNone), "no number"));
