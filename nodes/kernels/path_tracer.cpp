@@ -53,6 +53,28 @@ Ray MakeRay(Double3 origin, Double3 direction, double far) {
   return ray;
 }
 
+// Unit normals of triangles' corners: of all triangles about the point that are turned away from this one by
+// no more than a crease, by their areas.
+std::vector<Double3> CornerNormals(std::size_t points, std::span<const Index> triangles,
+                                   const std::vector<Double3>& faces) {
+  constexpr double kCrease = 0.6427876096865394;  // cosine of 50 degrees
+  std::vector<Index> offsets(points + 1, 0), around(triangles.size());
+  for (Index p : triangles) ++offsets[p + 1];
+  for (std::size_t p = 0; p < points; ++p) offsets[p + 1] += offsets[p];
+  std::vector<Index> next(offsets.begin(), offsets.end() - 1);
+  for (std::size_t c = 0; c < triangles.size(); ++c) around[next[triangles[c]]++] = static_cast<Index>(c / 3);
+  std::vector<Double3> units, normals;
+  for (const Double3& face : faces) units.push_back(Unit(face));
+  for (std::size_t c = 0; c < triangles.size(); ++c) {
+    Double3 sum;
+    for (Index i = offsets[triangles[c]]; i < offsets[triangles[c] + 1]; ++i) {
+      if (Dot(units[around[i]], units[c / 3]) >= kCrease) sum = sum + faces[around[i]];
+    }
+    normals.push_back(Unit(sum));
+  }
+  return normals;
+}
+
 }  // namespace
 
 double SampleNumber(std::uint32_t seed, std::uint32_t sample, std::uint32_t dimension) {
@@ -72,12 +94,14 @@ Result<PathTracer> PathTracer::Build(ConstPointsView points, std::span<const Ind
     return Status::Invalid("{} albedo numbers for {} triangles", albedo.size(), triangles.size() / 3);
   PathTracer tracer(std::move(*scene));
   tracer.lights_ = std::move(lights);
+  std::vector<Double3> faces;  // normals of the length of twice the area
   for (std::size_t t = 0; t < triangles.size(); t += 3) {
     const Double3 a = PointOf(points, triangles[t]);
-    tracer.normals_.push_back(
-        Unit(Cross(PointOf(points, triangles[t + 1]) - a, PointOf(points, triangles[t + 2]) - a)));
+    faces.push_back(Cross(PointOf(points, triangles[t + 1]) - a, PointOf(points, triangles[t + 2]) - a));
     tracer.albedo_.push_back({albedo[t], albedo[t + 1], albedo[t + 2]});
   }
+  tracer.corner_normals_ = CornerNormals(points.count, triangles, faces);
+  for (const Double3& face : faces) tracer.normals_.push_back(Unit(face));
   return tracer;
 }
 
@@ -88,18 +112,25 @@ ShadingPlace PathTracer::Look(Double3 origin, Double3 direction) const {
   RayHit hit;
   scene_.ClosestHits({&ray, 1}, {&hit, 1});
   if (hit.triangle == kNoIndex) return place;
-  const Double3 normal = normals_[hit.triangle];
+  const Double3 flat = normals_[hit.triangle];
+  const Double3* const corners = &corner_normals_[3 * std::size_t{hit.triangle}];
+  const Double3 smooth =
+      Unit(corners[0] * (1.0 - hit.u - hit.v) + corners[1] * double{hit.u} + corners[2] * double{hit.v});
+  const double side = Dot(flat, unit) > 0 ? -1 : 1;
   place.hit = true;
   place.position = origin + unit * hit.t;
-  place.normal = Dot(normal, unit) > 0 ? normal * -1.0 : normal;
+  place.face = flat * side;
+  place.normal = Dot(smooth, unit) * side < 0 ? smooth * side : place.face;
   place.albedo = albedo_[hit.triangle];
   place.scale = std::max({Length(place.position), static_cast<double>(hit.t), 1e-3});
   return place;
 }
 
 bool PathTracer::Sees(const ShadingPlace& place, Double3 direction, double distance) const {
+  if (!(Dot(direction, place.face) > 0))
+    return false;  // behind the surface, though not behind its shading normal
   const double nudge = kNudge * place.scale;
-  const Ray ray = MakeRay(place.position + place.normal * nudge, direction, distance - 2 * nudge);
+  const Ray ray = MakeRay(place.position + place.face * nudge, direction, distance - 2 * nudge);
   if (!(ray.far > 0)) return true;
   std::uint8_t occluded = 0;
   scene_.Occluded({&ray, 1}, {&occluded, 1});
@@ -159,7 +190,8 @@ Double3 PathTracer::Indirect(const ShadingPlace& place, std::uint32_t seed, int 
       const auto sample = static_cast<std::uint32_t>(s), dimension = static_cast<std::uint32_t>(4 * bounce);
       const Double3 direction = CosineDirection(from.normal, SampleNumber(seed, sample, dimension),
                                                 SampleNumber(seed, sample, dimension + 1));
-      const ShadingPlace next = Look(from.position + from.normal * (kNudge * from.scale), direction);
+      if (!(Dot(direction, from.face) > 0)) break;
+      const ShadingPlace next = Look(from.position + from.face * (kNudge * from.scale), direction);
       if (!next.hit) break;
       through = Times(through, next.albedo);
       for (std::size_t l = 0; l < lights_.size(); ++l) {

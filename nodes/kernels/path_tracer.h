@@ -32,7 +32,8 @@ struct DiffuseLight {
 struct ShadingPlace {
   bool hit = false;
   Double3 position;  // world, metres
-  Double3 normal;    // unit, towards the viewer
+  Double3 normal;    // unit, towards the viewer: smooth over edges of less than 50 degrees
+  Double3 face;      // unit, towards the viewer: of the triangle itself
   Double3 albedo;
   double scale = 0;  // metres: distances below are rounding of the position
 };
@@ -58,8 +59,9 @@ class PathTracer {
   bool Sees(const ShadingPlace& place, Double3 direction, double distance) const;
 
   RayScene scene_;
-  std::vector<Double3> normals_;  // [triangles] unit; zero where a triangle has no area
-  std::vector<Double3> albedo_;   // [triangles]
+  std::vector<Double3> normals_;         // [triangles] unit; zero where a triangle has no area
+  std::vector<Double3> corner_normals_;  // [3 * triangles]
+  std::vector<Double3> albedo_;          // [triangles]
   std::vector<DiffuseLight> lights_;
 };
 

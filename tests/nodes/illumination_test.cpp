@@ -13,7 +13,7 @@
 namespace kpsa {
 namespace {
 
-const NodeRegistry& Registry() {
+const NodeRegistry& IlluminationRegistry() {
   static const NodeRegistry* registry = [] {
     auto* r = new NodeRegistry;
     AddStandardNodes(*r);
@@ -36,7 +36,7 @@ std::shared_ptr<const Mesh> Corner() {
 }
 
 struct Room : TestGraph {
-  Room() : TestGraph(Registry()) {
+  Room() : TestGraph(IlluminationRegistry()) {
     const auto mesh = Corner();
     add("mesh", "m", {{"mesh", Value(mesh)}});
     add("camera", "cam", {{"matrix", Value(Translation({0, 1, 4}))}, {"verticalFieldOfView", Value(0.8)}});
@@ -54,7 +54,7 @@ struct Room : TestGraph {
 };
 
 TEST(Camera, TakesTheScreenToDirections) {
-  TestGraph g(Registry());
+  TestGraph g(IlluminationRegistry());
   g.add("camera", "cam",
         {{"matrix", Value(Translation({1, 2, 3}))},
          {"verticalFieldOfView", Value(kPi / 2)},
@@ -69,7 +69,7 @@ TEST(Camera, TakesTheScreenToDirections) {
 }
 
 TEST(Lights, HandOnTheirSizeAndStrength) {
-  TestGraph g(Registry());
+  TestGraph g(IlluminationRegistry());
   g.add("areaLight", "a",
         {{"width", Value(2.0)},
          {"height", Value(3.0)},
@@ -85,7 +85,7 @@ TEST(IndirectIllumination, TheWallColoursTheFloor) {
   const std::vector<float> light = room.pull_points("gi.irradiance");
   ASSERT_EQ(light.size(), 3u * 24 * 16);
   // A pixel at the floor before the wall, and one of the background
-  const std::size_t floor = 3 * (9 * 24 + 12), nothing = 0;
+  const std::size_t floor = 3 * (12 * 24 + 12), nothing = 0;
   EXPECT_GT(light[floor], 2 * light[floor + 1]);
   EXPECT_GT(light[floor + 1], 0);
   EXPECT_EQ(light[nothing], 0);
