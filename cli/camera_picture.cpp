@@ -95,6 +95,17 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
   return view;
 }
 
+CameraView Accelerated(const CameraView& view, const Rig& rig, const std::vector<AppliedSubspace>& applied) {
+  CameraView fast = view;
+  for (const AppliedSubspace& one : applied) {
+    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
+      if (view.irradiance.has_value() && one.entry.points[p].points == *view.irradiance)
+        fast.irradiance = one.Output(*rig.graph, p);
+    }
+  }
+  return fast;
+}
+
 Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compiler, const CameraView& view,
                                                 const std::vector<double>& times,
                                                 const RigFrameOptions& options) {
@@ -178,6 +189,20 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
         return Status();
       }));
   return images;
+}
+
+Image LightError(const CameraImage& a, const CameraImage& b, double error_max) {
+  Image image(static_cast<int>(a.width), static_cast<int>(a.height), {24, 26, 30});
+  for (std::size_t p = 0; p < a.hit.size(); ++p) {
+    double squares = 0;
+    for (std::size_t k = 3 * p; k < 3 * p + 3; ++k) {
+      const double d = double{a.indirect[k]} - b.indirect[k];
+      squares += d * d;
+    }
+    const Rgb color = TurboColor(std::sqrt(squares) / error_max);
+    std::copy(color.begin(), color.end(), image.rgb.begin() + static_cast<std::ptrdiff_t>(3 * p));
+  }
+  return image;
 }
 
 Image Develop(const CameraImage& picture, double exposure, CameraLayer layer) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/acceleration.h"
 #include "cli/image.h"
 #include "cli/rig_frames.h"
 #include "nodes/kernels/path_tracer.h"
@@ -28,6 +29,8 @@ struct CameraView {
 // The view of a camera node. Errors: no such camera (the nearest one is named), several illuminations that
 // use it.
 Result<CameraView> FindCamera(const Rig& rig, const std::string& name);
+// The same view with what subspaces say of its light after bounces.
+CameraView Accelerated(const CameraView& view, const Rig& rig, const std::vector<AppliedSubspace>& applied);
 
 // One picture: linear light, 3 numbers a pixel, row by row from the top left.
 struct CameraImage {
@@ -42,5 +45,9 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
 enum class CameraLayer { kAll, kDirect, kIndirect };
 // Radiance albedo / pi times irradiance, times `exposure`, as sRGB; light beyond 1 is compressed smoothly.
 Image Develop(const CameraImage& picture, double exposure, CameraLayer layer = CameraLayer::kAll);
+
+// How far two pictures' light after bounces is apart at each pixel, as a heat map from 0 to `error_max`
+// (irradiance).
+Image LightError(const CameraImage& a, const CameraImage& b, double error_max);
 
 }  // namespace kpsa

@@ -91,7 +91,7 @@ Status CheckCameraFlags(const RenderFlags& flags) {
 }
 
 // Pictures through a camera of the rig, six in a row.
-Result<std::vector<Image>> CameraRows(const Rig& rig, Compiler* compiler, const RenderFlags& flags,
+Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const RenderFlags& flags,
                                       const std::vector<double>& times, const RigFrameOptions& options) {
   const Result<CameraView> view = FindCamera(rig, *flags.camera);
   if (!view.ok()) return view.status();
@@ -110,10 +110,28 @@ Result<std::vector<Image>> CameraRows(const Rig& rig, Compiler* compiler, const 
             : *flags.layer == "indirect" ? CameraLayer::kIndirect
                                          : layer;
   }
-  const Result<std::vector<CameraImage>> pictures = EvaluateCamera(rig, compiler, *view, times, options);
-  if (!pictures.ok()) return pictures.status();
+  const Result<std::vector<CameraImage>> full = EvaluateCamera(rig, compiler, *view, times, options);
+  if (!full.ok()) return full.status();
   std::vector<Image> rows, row;
-  for (const CameraImage& picture : *pictures) {
+  if (flags.acceleration.wanted()) {
+    const Result<std::vector<AppliedSubspace>> applied =
+        ApplyAcceleration(&rig, compiler, flags.acceleration);
+    if (!applied.ok()) return applied.status();
+    const Result<std::vector<CameraImage>> fast =
+        EvaluateCamera(rig, compiler, Accelerated(*view, rig, *applied), times, options);
+    if (!fast.ok()) return fast.status();
+    for (std::size_t f = 0; f < times.size(); ++f) {
+      const double error_max = 4 * applied->front().tolerance;
+      Image error = LightError((*full)[f], (*fast)[f], error_max);
+      std::vector<Image> three = {Develop((*full)[f], exposure, layer), Develop((*fast)[f], exposure, layer),
+                                  std::move(error)};
+      DrawTitle(three[0], "full"), DrawTitle(three[1], "accelerated");
+      DrawTitle(three[2], fmt::format("error, 0 .. {:.3g}", error_max));
+      rows.push_back(SideBySide(three));
+    }
+    return rows;
+  }
+  for (const CameraImage& picture : *full) {
     row.push_back(Develop(picture, exposure, layer));
     if (row.size() == 6) rows.push_back(SideBySide(row)), row.clear();
   }
