@@ -17,6 +17,10 @@ namespace {
 std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
   std::vector<std::string> names;
   for (const AcceleratedPoints& points : entry.points) {
+    if (points.colors) {
+      names.push_back(rig.graph->PlugName(points.points));
+      continue;
+    }
     const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
     names.push_back(mesh.name + "@" + mesh.stages[points.stage].name);
   }
@@ -163,6 +167,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
     one.notes = std::move(accelerated->notes);
     const NodeDef& def = rig->graph->def(one.node);
     for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
+      if (one.entry.points[p].colors) continue;
       CharacterMesh& mesh = rig->scene.meshes[one.entry.points[p].mesh];
       if (mesh.points == mesh.stages[one.entry.points[p].stage].points) {
         mesh.points = {one.node, def.FindAttribute("outPoints"), static_cast<int>(p), -1};

@@ -40,6 +40,10 @@ struct AppliedSubspace {
   std::shared_ptr<const KpsaConfig> config;  // of the node
   std::vector<std::string> notes;            // what may surprise
   double tolerance = 0, violation_rate = 0;  // in force
+  // What takes the place of entry.points[p].
+  PlugRef Output(const Graph& graph, std::size_t p) const {
+    return {node, graph.def(node).FindAttribute("outPoints"), static_cast<int>(p), -1};
+  }
 };
 
 // Rewrites the rig's graph; final points that are accelerated are then those of the KPSA node

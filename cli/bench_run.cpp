@@ -92,6 +92,19 @@ double PointsComputed(const Plan& plan, const Profile& profile) {
   return points;
 }
 
+// Where colours are accelerated, they are what is compared: those of the nodes, or what takes their place.
+Request ColorOutputs(const Rig& rig, const std::vector<AppliedSubspace>& applied, bool accelerated) {
+  Request request;
+  for (const AppliedSubspace& one : applied) {
+    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
+      if (one.entry.points[p].colors)
+        request.outputs.push_back({accelerated ? one.Output(*rig.graph, p) : one.entry.points[p].points, {}});
+    }
+  }
+  request.varying.push_back(rig.scene.time);
+  return request;
+}
+
 constexpr std::size_t kTurnFrames = 32;  // of one side, before the other runs them
 
 // What it costs to record the steps of a profile: for small nodes as much as they do.
@@ -121,11 +134,17 @@ class Bench {
     const Result<std::vector<double>> times = SampleTimes(with_clip, rig);
     if (!times.ok()) return times.status();
     Compiler compiler;
-    const auto full_plan = CompileFor(rig, &compiler, AllMeshes(rig));
+    auto full_plan = CompileFor(rig, &compiler, AllMeshes(rig));
     if (!full_plan.ok()) return full_plan.status();
     const Result<std::vector<AppliedSubspace>> applied = ApplyAcceleration(&rig, &compiler, acceleration);
     if (!applied.ok()) return applied.status();
     Request request = AllMeshes(rig);
+    if (Request colors = ColorOutputs(rig, *applied, false); !colors.outputs.empty()) {
+      full_plan = CompileFor(rig, &compiler, colors);
+      if (!full_plan.ok()) return full_plan.status();
+      request = ColorOutputs(rig, *applied, true);
+    }
+    const std::size_t compared = request.outputs.size();
     Verdicts verdicts(*applied, rig, &request);
     const auto fast_plan = CompileFor(rig, &compiler, request);
     if (!fast_plan.ok()) return fast_plan.status();
@@ -138,7 +157,7 @@ class Bench {
 
     // Points
     std::vector<char> hit;
-    PointErrors errors(rig.scene.meshes.size());
+    PointErrors errors(compared);
     for (std::size_t f = 0; f < times->size(); ++f) {
       if (Interrupted()) return InterruptedStatus();
       progress->Set(done_++);
@@ -224,7 +243,13 @@ class Bench {
     result_.clips.push_back(rig.scene.clip.value_or("(rest)"));
     if (result_.clips.size() > 1) return;
     std::map<std::string, std::size_t> stages;
-    for (const CharacterMesh& mesh : rig.scene.meshes) result_.output_points += mesh.mesh().point_count();
+    if (ColorOutputs(rig, applied, false).outputs.empty()) {
+      for (const CharacterMesh& mesh : rig.scene.meshes) result_.output_points += mesh.mesh().point_count();
+    } else {
+      for (const AppliedSubspace& one : applied) {
+        for (const SubspaceOutput& output : one.subspace->outputs) result_.output_points += output.points;
+      }
+    }
     result_.tolerance = applied.front().tolerance;
     result_.violation_limit = applied.front().violation_rate;
     for (const AppliedSubspace& one : applied) {

@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "cli/acceleration.h"
+#include "cli/camera_picture.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
@@ -18,7 +19,7 @@ constexpr std::size_t kMaxPictures = 24;
 
 struct RenderFlags : Flags {
   AccelerationFlags acceleration;
-  std::optional<std::string> size, azimuth, elevation, turntable, error_scale;
+  std::optional<std::string> size, azimuth, elevation, turntable, error_scale, camera, exposure, layer;
 };
 
 struct View {
@@ -64,9 +65,84 @@ Result<View> ReadView(const RenderFlags& flags) {
   return view;
 }
 
+CommandResult WritePicture(const RenderFlags& flags, const Image& picture) {
+  KPSA_RETURN_IF_ERROR(WritePng(*flags.output, flags.force, picture.width, picture.height, picture.rgb));
+  if (!flags.quiet) Say(fmt::format("{}: {} x {}", *flags.output, picture.width, picture.height));
+  return 0;
+}
+
+// What only one of the two ways of taking pictures knows.
+Status CheckCameraFlags(const RenderFlags& flags) {
+  if (!flags.camera.has_value()) {
+    if (flags.exposure.has_value() || flags.layer.has_value())
+      return Status::Usage("{} is of no use without --camera",
+                           flags.exposure.has_value() ? "--exposure" : "--layer");
+    return Status();
+  }
+  const char* const given = flags.size.has_value()          ? "--size"
+                            : flags.azimuth.has_value()     ? "--azimuth"
+                            : flags.elevation.has_value()   ? "--elevation"
+                            : flags.turntable.has_value()   ? "--turntable"
+                            : flags.error_scale.has_value() ? "--error-scale"
+                                                            : nullptr;
+  if (given != nullptr)
+    return Status::Usage("{} is of no use with --camera, which says how a picture is taken", given);
+  return Status();
+}
+
+// Pictures through a camera of the rig, six in a row.
+Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const RenderFlags& flags,
+                                      const std::vector<double>& times, const RigFrameOptions& options) {
+  const Result<CameraView> view = FindCamera(rig, *flags.camera);
+  if (!view.ok()) return view.status();
+  double exposure = 1;
+  if (flags.exposure.has_value()) {
+    const Result<double> read = ParseNumber("--exposure", *flags.exposure);
+    if (!read.ok()) return read.status();
+    if (!(*read > 0)) return Status::Usage("--exposure {}: expected a factor above 0", *flags.exposure);
+    exposure = *read;
+  }
+  CameraLayer layer = CameraLayer::kAll;
+  if (flags.layer.has_value()) {
+    if (*flags.layer != "all" && *flags.layer != "direct" && *flags.layer != "indirect")
+      return Status::Usage("--layer {}: expected all, direct or indirect", *flags.layer);
+    layer = *flags.layer == "direct"     ? CameraLayer::kDirect
+            : *flags.layer == "indirect" ? CameraLayer::kIndirect
+                                         : layer;
+  }
+  const Result<std::vector<CameraImage>> full = EvaluateCamera(rig, compiler, *view, times, options);
+  if (!full.ok()) return full.status();
+  std::vector<Image> rows, row;
+  if (flags.acceleration.wanted()) {
+    const Result<std::vector<AppliedSubspace>> applied =
+        ApplyAcceleration(&rig, compiler, flags.acceleration);
+    if (!applied.ok()) return applied.status();
+    const Result<std::vector<CameraImage>> fast =
+        EvaluateCamera(rig, compiler, Accelerated(*view, rig, *applied), times, options);
+    if (!fast.ok()) return fast.status();
+    for (std::size_t f = 0; f < times.size(); ++f) {
+      const double error_max = 4 * applied->front().tolerance;
+      Image error = LightError((*full)[f], (*fast)[f], error_max);
+      std::vector<Image> three = {Develop((*full)[f], exposure, layer), Develop((*fast)[f], exposure, layer),
+                                  std::move(error)};
+      DrawTitle(three[0], "full"), DrawTitle(three[1], "accelerated");
+      DrawTitle(three[2], fmt::format("error, 0 .. {:.3g}", error_max));
+      rows.push_back(SideBySide(three));
+    }
+    return rows;
+  }
+  for (const CameraImage& picture : *full) {
+    row.push_back(Develop(picture, exposure, layer));
+    if (row.size() == 6) rows.push_back(SideBySide(row)), row.clear();
+  }
+  if (!row.empty()) rows.push_back(SideBySide(row));
+  return rows;
+}
+
 CommandResult Render(const RenderFlags& flags) {
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
   KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
+  KPSA_RETURN_IF_ERROR(CheckCameraFlags(flags));
   const Result<View> view = ReadView(flags);
   if (!view.ok()) return view.status();
   const Result<int> threads = ThreadCount(flags);
@@ -91,6 +167,11 @@ CommandResult Render(const RenderFlags& flags) {
   frame_options.threads = *threads;
   frame_options.quiet = flags.quiet;
   Compiler compiler;
+  if (flags.camera.has_value()) {
+    const Result<std::vector<Image>> taken = CameraRows(rig, &compiler, flags, *times, frame_options);
+    if (!taken.ok()) return taken.status();
+    return WritePicture(flags, StackRows(*taken));
+  }
   Result<std::vector<Pose>> full = EvaluatePoses(rig, &compiler, *times, frame_options);
   if (!full.ok()) return full.status();
   std::vector<Image> rows;
@@ -140,10 +221,7 @@ CommandResult Render(const RenderFlags& flags) {
     }
     if (!row.empty()) rows.push_back(SideBySide(row));
   }
-  const Image picture = StackRows(rows);
-  KPSA_RETURN_IF_ERROR(WritePng(*flags.output, flags.force, picture.width, picture.height, picture.rgb));
-  if (!flags.quiet) Say(fmt::format("{}: {} x {}", *flags.output, picture.width, picture.height));
-  return 0;
+  return WritePicture(flags, StackRows(rows));
 }
 
 }  // namespace
@@ -157,7 +235,8 @@ void AddRenderCommand(CLI::App* program, Command* chosen) {
                  "Examples:\n"
                  "  kpsa render head.glb --clip face_talk --frames 0:120:24 -o talk.png\n"
                  "  kpsa render head.yaml --accelerate -o error.png\n"
-                 "  kpsa render head.yaml --rest --turntable 8 -o around.png",
+                 "  kpsa render head.yaml --rest --turntable 8 -o around.png\n"
+                 "  kpsa render room.yaml --camera front -o room.png",
                  chosen, [flags] { return Render(*flags); });
   AddRigFlags(command, flags.get());
   AddTimeFlags(command, flags.get());
@@ -170,6 +249,11 @@ void AddRenderCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--turntable", "N", &flags->turntable, "N pictures from all around");
   AddOption(command, "--error-scale", "LENGTH", &flags->error_scale,
             "error at the top of the heat map; the tolerance if not given");
+  AddOption(command, "--camera", "NAME", &flags->camera,
+            "a camera of the rig: direct light from its lights, and what its indirectIllumination says");
+  AddOption(command, "--exposure", "FACTOR", &flags->exposure, "of a camera's picture; 1 if not given");
+  AddOption(command, "--layer", "all|direct|indirect", &flags->layer,
+            "of a camera's picture; all if not given");
   AddThreadsFlag(command, flags.get());
   AddQuietFlag(command, flags.get());
 }

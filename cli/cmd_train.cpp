@@ -18,7 +18,8 @@ namespace {
 constexpr std::size_t kCheckPoses = 60;
 
 struct TrainFlags : Flags {
-  std::optional<std::string> name, samples, clips, seed, rows, modes, key_points, tolerance, violation_rate;
+  std::optional<std::string> name, samples, clips, seed, rows, modes, key_points, tolerance, violation_rate,
+      calibration;
   bool paper = false;
 };
 
@@ -33,6 +34,7 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
     return Status();
   };
   KPSA_RETURN_IF_ERROR(count("--samples", flags.samples, 0, 1'000'000, &options->samples));
+  KPSA_RETURN_IF_ERROR(count("--calibration", flags.calibration, 20, 100'000, &options->calibration_poses));
   KPSA_RETURN_IF_ERROR(count("--seed", flags.seed, 0, 2'000'000'000, &options->seed));
   KPSA_RETURN_IF_ERROR(count("--rows", flags.rows, 3, 3000, &options->rows));
   KPSA_RETURN_IF_ERROR(count("--modes", flags.modes, 1, 2000, &options->max_modes));
@@ -165,6 +167,8 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--clips", "A,B,...", &flags->clips, "train on these clips instead of the rig's");
   AddOption(command, "--samples", "N", &flags->samples,
             "poses drawn from the controls; the rig's number if not given");
+  AddOption(command, "--calibration", "N", &flags->calibration,
+            "held-out poses that the tolerance is calibrated with; 400 to 1000, by the rate, if not given");
   AddOption(command, "--seed", "N", &flags->seed, "of the sampled poses; 1 if not given");
   AddOption(command, "--rows", "N", &flags->rows,
             "numbers measured a frame (a point has three); 300 if not given");

@@ -37,8 +37,14 @@ std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
 AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) {
   AccelerationTarget target;
   for (const AcceleratedPoints& points : acceleration.points) {
-    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
     AccelerationTarget::MeshPoints out;
+    if (points.colors) {
+      out.name = rig.graph->PlugName(points.points);
+      out.stages.push_back({"colors", points.points, false});
+      target.meshes.push_back(std::move(out));
+      continue;
+    }
+    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
     for (std::size_t s = 0; s <= points.stage; ++s) {
       const Stage& stage = mesh.stages[s];
       out.stages.push_back({stage.name, stage.points, stage.world});

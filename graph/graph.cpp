@@ -347,7 +347,7 @@ Status Graph::Connect(const PlugRef& source, const PlugRef& destination, bool re
   const Type a = PlugType(source), b = PlugType(destination);
   const bool integral = a == Type::kBool || a == Type::kInt || a == Type::kEnum;
   const bool fits =
-      a == b ||
+      a == b || (IsPointType(a) && IsPointType(b) && PointComponents(a) == PointComponents(b)) ||
       (integral && (b == Type::kDouble || b == Type::kBool || b == Type::kInt || b == Type::kEnum)) ||
       (a == Type::kDouble && (b == Type::kBool || b == Type::kInt || b == Type::kEnum));
   if (!fits) {

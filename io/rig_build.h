@@ -3,6 +3,7 @@
 
 #include <deque>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <set>
@@ -193,6 +194,11 @@ class RigBuild {
                        const Geometry& of, Falloff* falloff);
   bool ReadFalloffShape(const std::string& kind, const YamlNode& node, int source, const Geometry& of,
                         std::function<double(Double3)>* weight_at);
+
+  // rig_lights.cpp: what illuminations see
+  void ConnectLights();
+  std::optional<NodeId> FindWithOutputs(const YamlNode& name, std::initializer_list<const char*> outputs,
+                                        const char* what);
 
   // rig_request.cpp: controls and acceleration
   void AddControls();

@@ -99,6 +99,7 @@ void RigBuild::Run() {
   if (errors_->ok()) PlaceHandles();
   ConnectCurves();
   BuildStacks();
+  ConnectLights();
   ConnectDrivers();
   for (Made& made : made_) SetTargets(&made);
   for (Made& made : own_made_) SetBlendWeights(&made);

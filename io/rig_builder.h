@@ -41,6 +41,7 @@ struct AcceleratedPoints {
   std::size_t mesh = 0;   // in Rig::scene.meshes
   std::size_t stage = 0;  // in its stages: up to and including it
   PlugRef points;
+  bool colors = false;  // points are colours of a node, and of no mesh
 };
 struct Acceleration {
   std::string name;

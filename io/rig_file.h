@@ -74,10 +74,11 @@ struct RigAccelerate {
     std::string mesh, stage;  // "head_mesh@mush"
     SourceLocation where;
   };
-  std::vector<Points> points;
+  std::vector<Points> points;     // either these
+  std::vector<RigString> colors;  // or plugs of colours: "bounced.irradiance"
   std::optional<RigString> space;
   std::string subspace;             // path, resolved; "" where none is named
-  std::optional<double> tolerance;  // metres
+  std::optional<double> tolerance;  // metres; of colours in their units
   double violation_rate = 0.01;     // of frames, 0..1
   std::vector<RigString> train_clips, test_clips;
   std::int64_t train_samples = 0;

@@ -195,7 +195,16 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
     accelerate.where = key.where();
     accelerate.source = source;
     YamlMap map(node.items[i], fmt::format("accelerate \"{}\"", key.scalar), errors);
-    if (const YamlNode* points = map.Required("points")) ReadAcceleratePoints(*points, &accelerate);
+    const YamlNode* colors = map.Find("colors");
+    if (const YamlNode* points = colors == nullptr ? map.Required("points") : map.Find("points")) {
+      if (colors != nullptr) errors->Add(*points, "points: either points or colors");
+      ReadAcceleratePoints(*points, &accelerate);
+    }
+    if (colors != nullptr) {
+      ReadNames(*colors, "colors", &accelerate.colors);
+      if (accelerate.colors.empty())
+        errors->Add(*colors, "colors: name at least one plug, as in gi.irradiance");
+    }
     if (const YamlNode* space = map.Find("space")) {
       accelerate.space = RigString{{}, space->where(), source};
       ReadString(*space, "space", &accelerate.space->text, errors);
@@ -208,7 +217,8 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
     double number = 0;
     if (const YamlNode* tolerance = map.Find("tolerance");
         tolerance != nullptr &&
-        ReadNumber(*tolerance, "tolerance", Unit::kLength, units(), &number, errors)) {
+        ReadNumber(*tolerance, "tolerance", colors != nullptr ? Unit::kNone : Unit::kLength, units(), &number,
+                   errors)) {
       if (number > 0) {
         accelerate.tolerance = number;
       } else {

@@ -103,7 +103,7 @@ void RigBuild::AddAccelerations() {
     to.name = from.name;
     to.where = from.where;
     to.subspace = from.subspace;
-    to.tolerance = from.tolerance.value_or(rig_->rest_diagonal / 2000);
+    to.tolerance = from.tolerance.value_or(from.colors.empty() ? rig_->rest_diagonal / 2000 : 0.05);
     to.violation_rate = from.violation_rate;
     to.train_samples = from.train_samples;
     read_clips(from.train_clips, &to.train_clips);
@@ -122,6 +122,18 @@ void RigBuild::AddAccelerations() {
         continue;
       }
       to.points.push_back({*mesh_index, static_cast<std::size_t>(stage - mesh.stages.data()), stage->points});
+    }
+    for (const RigString& name : from.colors) {
+      const Result<PlugRef> plug = graph().FindPlug(name.text);
+      if (!Fail(name.where, plug.status())) continue;
+      const AttributeDef& attribute =
+          graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
+      if (attribute.type != Type::kColors || !attribute.output || plug->component >= 0) {
+        Fail(name.where, Status::Invalid("{} is a {}, no output of colours", name.text,
+                                         TypeName(graph().PlugType(*plug))));
+        continue;
+      }
+      to.points.push_back({0, 0, *plug, true});
     }
     if (to.train_samples > 0 && rig_->controls.empty()) {
       Fail(from.where,

@@ -15,6 +15,8 @@ bool FollowsCurve(const NodeDef& def) {
 
 bool IsBlendShape(const NodeDef& def) { return def.name == "blendShape"; }
 
+bool IsIllumination(const NodeDef& def) { return def.name == "indirectIllumination"; }
+
 bool IsChain(const NodeDef& def) {
   return def.name == "ikHandle" || def.name == "splineIk" || def.name == "twistDistribution";
 }
@@ -50,6 +52,9 @@ const Rule kRules[] = {
      [](const NodeDef& d) { return d.name == "skinCluster"; }},
     {{"constrained", "the transform whose local matrix it owns"},
      [](const NodeDef& d) { return Has(d, "inMatrix") && Has(d, "outMatrix") && d.name != "splineIk"; }},
+    {{"meshes", "the meshes that are lit; all of the character if not given"}, IsIllumination},
+    {{"camera", "the camera that it looks through"}, IsIllumination},
+    {{"lights", "the lights that light up what it sees"}, IsIllumination},
     {{"start", "the first joint of the chain"}, IsChain},
     {{"mid", "the joint that bends"}, [](const NodeDef& d) { return d.name == "ikHandle"; }},
     {{"end", "the last joint of the chain"}, IsChain},

@@ -38,7 +38,9 @@ void AddStandardNodes(NodeRegistry& registry) {
                     AddIkNodes,
                     AddSpaceSwitchNode,
                     AddSplineIkNode,
-                    AddTwistDistributionNode}) {
+                    AddTwistDistributionNode,
+                    AddLightNodes,
+                    AddIlluminationNodes}) {
     add(registry);
   }
 }

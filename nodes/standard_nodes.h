@@ -37,6 +37,8 @@ void AddIkNodes(NodeRegistry& registry);          // ikHandle, poleVectorConstra
 void AddSpaceSwitchNode(NodeRegistry& registry);  // spaceSwitch
 void AddSplineIkNode(NodeRegistry& registry);     // splineIk
 void AddTwistDistributionNode(NodeRegistry& registry);  // twistDistribution
+void AddLightNodes(NodeRegistry& registry);             // camera, pointLight, areaLight, sunLight
+void AddIlluminationNodes(NodeRegistry& registry);      // indirectIllumination
 
 // All of them.
 void AddStandardNodes(NodeRegistry& registry);

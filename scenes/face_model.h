@@ -56,5 +56,6 @@ class Random {
 using SceneFiles = std::map<std::string, std::string>;
 SceneFiles GenerateFace();
 SceneFiles GenerateHello();
+SceneFiles GenerateRoom();
 
 }  // namespace kpsa::scenes

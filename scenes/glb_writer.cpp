@@ -79,6 +79,8 @@ class Writer {
  private:
   std::string binary_;
   std::vector<std::string> views_, accessors_;
+  std::vector<std::string> materials_ = {
+      "{\"name\":\"surface\",\"pbrMetallicRoughness\":{\"metallicFactor\":0,\"roughnessFactor\":0.6}}"};
 };
 
 std::string Writer::Mesh(const GlbMesh& mesh) {
@@ -102,6 +104,16 @@ std::string Writer::Mesh(const GlbMesh& mesh) {
   }
   const int indices = Accessor(View(std::span<const Index>(mesh.triangles), kElements), 5125,
                                mesh.triangles.size(), "SCALAR");
+  std::size_t material = 0;
+  if (mesh.base_color.has_value()) {
+    const Float3& c = *mesh.base_color;
+    const float rgba[4] = {c[0], c[1], c[2], 1};
+    materials_.push_back(
+        fmt::format("{{\"name\":\"{}\",\"pbrMetallicRoughness\":{{\"baseColorFactor\":{},"
+                    "\"metallicFactor\":0}}}}",
+                    mesh.name, Numbers(rgba)));
+    material = materials_.size() - 1;
+  }
   std::vector<std::string> targets, names, zeros;
   for (const SparseTarget& target : mesh.targets) {
     targets.push_back(fmt::format("{{\"POSITION\":{}}}", Target(target, count)));
@@ -116,8 +128,8 @@ std::string Writer::Mesh(const GlbMesh& mesh) {
   return fmt::format(
       "{{\"name\":\"{}\",\"primitives\":[{{\"attributes\":{{\"POSITION\":{},\"NORMAL\":{},\"JOINTS_0\":{},"
       "\"WEIGHTS_0\":{}"
-      "{}}},\"indices\":{},\"material\":0{}}}]{}}}",
-      mesh.name, position, normal, joint, weight, color, indices, morph, more);
+      "{}}},\"indices\":{},\"material\":{}{}}}]{}}}",
+      mesh.name, position, normal, joint, weight, color, indices, material, morph, more);
 }
 
 std::string Writer::Clip(const GlbClip& clip) {
@@ -178,9 +190,9 @@ std::string Writer::Finish(const GlbScene& scene) {
       "{{\"asset\":{{\"version\":\"2.0\",\"generator\":\"kpsa "
       "generate_scenes\"}},\"scene\":0,\"scenes\":[{{\"nodes\":{}}}],"
       "\"nodes\":{},\"meshes\":{},\"skins\":[{{\"joints\":{},\"inverseBindMatrices\":{},\"skeleton\":{}}}],"
-      "\"materials\":[{{\"name\":\"surface\",\"pbrMetallicRoughness\":{{\"metallicFactor\":0,"
-      "\"roughnessFactor\":0.6}}}}],",
-      Joined(roots), Joined(nodes), Joined(meshes), Joined(joints), inverse, joints.front());
+      "\"materials\":{},",
+      Joined(roots), Joined(nodes), Joined(meshes), Joined(joints), inverse, joints.front(),
+      Joined(materials_));
   if (!clips.empty()) json += fmt::format("\"animations\":{},", Joined(clips));
   json += fmt::format("\"accessors\":{},\"bufferViews\":{},\"buffers\":[{{\"byteLength\":{}}}]}}",
                       Joined(accessors_), Joined(views_), binary_.size());

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -35,6 +36,7 @@ struct GlbMesh {
   std::vector<Influences> influences;
   std::vector<Index> triangles;
   std::vector<SparseTarget> targets;
+  std::optional<Float3> base_color;  // of a material of its own, linear; else the plain one
 };
 
 struct GlbNode {

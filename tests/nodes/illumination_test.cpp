@@ -1,0 +1,131 @@
+// camera, lights and indirectIllumination as nodes.
+#include "nodes/illumination.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/scalar_math.h"
+#include "graph/geometry.h"
+#include "nodes/standard_nodes.h"
+#include "tests/support/test_graph.h"
+
+namespace kpsa {
+namespace {
+
+const NodeRegistry& IlluminationRegistry() {
+  static const NodeRegistry* registry = [] {
+    auto* r = new NodeRegistry;
+    AddStandardNodes(*r);
+    return r;
+  }();
+  return *registry;
+}
+
+// A floor and a red wall.
+std::shared_ptr<const Mesh> Corner() {
+  Mesh::Data data;
+  data.name = "corner";
+  const std::vector<float> xyz = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1, 1, 2, -1, -1, 2, -1};
+  data.rest = PointBuffer::FromInterleaved(xyz);
+  data.triangles = {0, 1, 2, 0, 2, 3, 3, 2, 4, 3, 4, 5};
+  data.triangle_vertices = data.triangles;
+  for (Index i = 0; i < 6; ++i) data.vertex_to_point.push_back(i);
+  data.primitives = {{0, 6, 0, 2, "floor", {0.8f, 0.8f, 0.8f}}, {0, 6, 2, 2, "wall", {0.9f, 0.1f, 0.0f}}};
+  return std::make_shared<const Mesh>(std::move(data));
+}
+
+struct Room : TestGraph {
+  Room() : TestGraph(IlluminationRegistry()) {
+    const auto mesh = Corner();
+    add("mesh", "m", {{"mesh", Value(mesh)}});
+    add("camera", "cam", {{"matrix", Value(Translation({0, 1, 4}))}, {"verticalFieldOfView", Value(0.8)}});
+    add("pointLight", "lamp", {{"matrix", Value(Translation({0.5, 1.5, 0.5}))}, {"intensity", Value(3.0)}});
+    add("indirectIllumination", "gi",
+        {{"mesh[0]", Value(mesh)},
+         {"width", Value(24)},
+         {"height", Value(16)},
+         {"lightKinds", Value(std::vector<std::int64_t>{0})}});
+    connect("m.points", "gi.points[0]");
+    connect("cam.worldFromScreen", "gi.camera");
+    connect("lamp.outMatrix", "gi.lightMatrix[0]");
+    connect("lamp.outColor", "gi.lightColor[0]");
+  }
+};
+
+TEST(Camera, TakesTheScreenToDirections) {
+  TestGraph g(IlluminationRegistry());
+  g.add("camera", "cam",
+        {{"matrix", Value(Translation({1, 2, 3}))},
+         {"verticalFieldOfView", Value(kPi / 2)},
+         {"aspectRatio", Value(2.0)}});
+  const Matrix4 m = g.pull<Matrix4>("cam.worldFromScreen");
+  Double3 origin, direction;
+  PixelRay(m, 0, 4, 2, &origin, &direction);  // the middle of the top left pixel of 4 x 2
+  EXPECT_LT(Length(origin - Double3{1, 2, 3}), 1e-12);
+  EXPECT_LT(Length(direction - Double3{-1.5, 0.5, -1}), 1e-12);
+  PixelRay(m, 7, 4, 2, &origin, &direction);
+  EXPECT_LT(Length(direction - Double3{1.5, -0.5, -1}), 1e-12);
+}
+
+TEST(Lights, HandOnTheirSizeAndStrength) {
+  TestGraph g(IlluminationRegistry());
+  g.add("areaLight", "a",
+        {{"width", Value(2.0)},
+         {"height", Value(3.0)},
+         {"color", Value(Double3{1, 0.5, 0})},
+         {"intensity", Value(4.0)}});
+  EXPECT_EQ(g.pull<Matrix4>("a.outMatrix"), Scaling({2, 3, 1}));
+  const Double3 color = g.pull<Double3>("a.outColor");
+  EXPECT_LT(Length(color - Double3{4, 2, 0}), 1e-12);
+}
+
+TEST(IndirectIllumination, TheWallColoursTheFloor) {
+  Room room;
+  const std::vector<float> light = room.pull_points("gi.irradiance");
+  ASSERT_EQ(light.size(), 3u * 24 * 16);
+  // A pixel at the floor before the wall, and one of the background
+  const std::size_t floor = 3 * (12 * 24 + 12), nothing = 0;
+  EXPECT_GT(light[floor], 2 * light[floor + 1]);
+  EXPECT_GT(light[floor + 1], 0);
+  EXPECT_EQ(light[nothing], 0);
+}
+
+TEST(IndirectIllumination, EachPixelIsItsOwn) {
+  Room room;
+  const std::vector<float> all = room.pull_points("gi.irradiance");
+  for (const std::vector<Index>& pixels :
+       {std::vector<Index>{204}, std::vector<Index>{17, 100, 228, 229, 383}}) {
+    Room few;
+    few.want("gi.irradiance", PointSet::Of(pixels, 24 * 16));
+    const std::vector<float> some = few.pull_points("gi.irradiance");
+    ASSERT_EQ(some.size(), 3 * pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(some[3 * i + k], all[3 * pixels[i] + k]) << pixels[i];
+    }
+  }
+  Room threads;
+  threads.options.parallel = true;
+  EXPECT_EQ(threads.pull_points("gi.irradiance"), all);
+}
+
+TEST(IndirectIllumination, FollowsItsLightAndFailsClearly) {
+  Room room;
+  room.vary("lamp.intensity");
+  const std::vector<float> before = room.pull_points("gi.irradiance");
+  room.set("lamp.intensity", 6.0);
+  const std::vector<float> after = room.pull_points("gi.irradiance");
+  double sum = 0, doubled = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) sum += before[i], doubled += after[i];
+  EXPECT_NEAR(doubled, 2 * sum, 1e-4 * sum);
+
+  Room wrong;
+  wrong.hold("gi.lightKinds", Value(std::vector<std::int64_t>{0, 2}));
+  const Status status = wrong.try_pull("gi.irradiance");
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.ToString().find("2 lightKinds, 1 matrices and 1 colours"), std::string::npos)
+      << status.ToString();
+}
+
+}  // namespace
+}  // namespace kpsa
