@@ -51,7 +51,7 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
     const NodeId node = graph.IdAt(n);
     if (!graph.IsAlive(node)) continue;
     const NodeDef& def = graph.def(node);
-    if (def.FindAttribute("worldFromScreen") >= 0) {
+    if (def.name == "camera") {
       cameras.push_back(graph.name(node));
       if (graph.name(node) == name) camera = node;
     }
@@ -67,7 +67,8 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
   view.world_from_screen = {*camera, graph.def(*camera).FindAttribute("worldFromScreen"), -1, -1};
   std::optional<NodeId> illumination;
   for (NodeId node : illuminations) {
-    const Connection* c = graph.FindConnection({node, graph.def(node).FindAttribute("camera"), -1, -1});
+    const Connection* c =
+        graph.FindConnection({node, graph.def(node).FindAttribute("worldFromScreen"), -1, -1});
     if (c == nullptr || !(c->source == view.world_from_screen)) continue;
     if (illumination.has_value()) {
       return Status::Usage("--camera {}: both {} and {} look through it", name, graph.name(*illumination),

@@ -119,10 +119,17 @@ Json WordSchema(std::string_view word) {
   if (word == "at") return Ref("place");
   if (word == "members") return Ref("members");
   if (word == "weights") return OneOrList({{"type", "string"}});
-  if (word == "falloff")
-    return Closed(
-        {{"at", Ref("place")}, {"radius", Ref("number")}, {"curve", {{"enum", {"smooth", "linear"}}}}},
-        {"at", "radius"});
+  if (word == "falloff") return Ref("falloff");
+  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights")
+    return ListOf(Ref("name"));
+  if (word == "constrained") return OneOrList(Ref("name"));
+  if (word == "combinations")
+    return MapOf(Closed(
+        {{"targets", ListOf(Ref("name"))}, {"method", {{"enum", {"multiply", "lowestWeighting", "smooth"}}}}},
+        {"targets"}));
+  if (word == "inbetweens") return MapOf(MapOf(Ref("name")));
+  if (word == "poses") return MapOf(Numbers(3));
+  if (word == "blendWeights") return OneOrList({{"type", "string"}});
   if (word == "vertices") return Ref("vertices");
   if (word == "places") return {{"type", "array"}, {"items", Numbers(3)}};
   if (word == "closed") return Ref("flag");
@@ -176,6 +183,30 @@ Json Definitions(const NodeRegistry& registry) {
                                {"above", Ref("number")},
                                {"weights", {{"type", "string"}}}}),
                        {{"type", "array"}, {"items", Ref("members")}}}}};
+  const Json curve = {{"enum", {"smooth", "linear"}}}, radius = Ref("number");
+  defs["falloff"] = {
+      {"anyOf",
+       {Closed({{"at", Ref("place")}, {"radius", radius}, {"curve", curve}}, {"at", "radius"}),
+        Closed({{"sphere",
+                 Closed({{"at", Ref("place")}, {"radius", radius}, {"curve", curve}}, {"at", "radius"})}},
+               {"sphere"}),
+        Closed({{"capsule",
+                 Closed({{"from", Ref("place")}, {"to", Ref("place")}, {"radius", radius}, {"curve", curve}},
+                        {"from", "to", "radius"})}},
+               {"capsule"}),
+        Closed({{"plane", Closed({{"at", Ref("place")},
+                                  {"normal", Numbers(3)},
+                                  {"from", Ref("number")},
+                                  {"to", Ref("number")},
+                                  {"curve", curve}},
+                                 {"at", "normal"})}},
+               {"plane"}),
+        Closed({{"proximity",
+                 Closed({{"mesh", Ref("name")}, {"radius", radius}, {"curve", curve}}, {"mesh", "radius"})}},
+               {"proximity"}),
+        Closed({{"weights", OneOrList({{"type", "string"}})}}, {"weights"}),
+        Closed({{"combine", {{"enum", {"multiply", "max", "add"}}}}, {"of", ListOf(Ref("falloff"))}}, {"of"}),
+        {{"type", "array"}, {"items", Ref("falloff")}}}}};
   defs["clips"] = OneOrList(Ref("name"));
   defs["node"] = {{"type", "object"},
                   {"properties", {{"type", {{"enum", std::move(types)}}}}},
@@ -213,14 +244,14 @@ std::string RigSchema(const NodeRegistry& registry) {
                 "what an animator, and the trainer, may move");
   properties["accelerate"] = MapOf(Closed(
       {{"points", Described(OneOrList(Ref("name")), "mesh@stage: up to and including the stage")},
+       {"colors", Described(OneOrList(Ref("name")), "instead of points: outputs of colours, node.attribute")},
        {"space", Described(Ref("name"), "the transform in whose space the points are learnt")},
        {"subspace", Described({{"type", "string"}}, "the file that kpsa train writes")},
        {"tolerance", Ref("number")},
        {"violationRate",
         Described({{"type", {"number", "string"}}, {"minimum", 0}, {"maximum", 1}}, "of frames")},
        {"train", Closed({{"clips", Ref("clips")}, {"samples", {{"type", "integer"}, {"minimum", 0}}}})},
-       {"test", Closed({{"clips", Ref("clips")}})}},
-      {"points"}));
+       {"test", Closed({{"clips", Ref("clips")}})}}));
   properties["overrides"] =
       Described(MapOf(true), "plug: value; instead of what was set or connected before");
   properties["variants"] = Described(MapOf(MapOf(true)), "overrides that --variant chooses by name");

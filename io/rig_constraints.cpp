@@ -23,7 +23,7 @@ void RigBuild::ConnectConstraints() {
   for (Made& made : made_) {
     if (errors_->full()) return;
     const std::string& type = graph().def(made.id).name;
-    if (made.special.count("targets") != 0) ConnectTargets(made);
+    if (made.special.count("targets") != 0 && type != "blendShape") ConnectTargets(made);
     if (type == "ikHandle") {
       ConnectIk(made);
     } else if (type == "splineIk") {

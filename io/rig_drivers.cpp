@@ -137,7 +137,7 @@ void RigBuild::ReadPoses(const Made& made) {
       return;
     angles.insert(angles.end(), one.begin(), one.end());
   }
-  edit.Set(made.id, "poses", Value(std::move(angles)));
+  edit.Set(made.id, "poseAngles", Value(std::move(angles)));
   edit.Set(made.id, "poseNames", Value(fmt::format("{}", fmt::join(names, "\n"))));
   const PlugRef weight = edit.Plug(made.id, "outputWeight", 0);
   if (edit.ok()) graph().SetElementNames(made.id, weight.attribute, std::move(names));

@@ -74,7 +74,7 @@ void RigBuild::ConnectLights() {
     }
     if (const RigAttribute* camera = find("camera")) {
       if (const std::optional<NodeId> node = FindWithOutputs(camera->value, {"worldFromScreen"}, "camera"))
-        edit.Connect(edit.Plug(*node, "worldFromScreen"), edit.Plug(made.id, "camera"));
+        edit.Connect(edit.Plug(*node, "worldFromScreen"), edit.Plug(made.id, "worldFromScreen"));
     } else {
       Fail(made.from->where, Status::Invalid("\"{}\" needs a \"camera\"", made.from->name));
     }

@@ -121,7 +121,7 @@ void AddIlluminationNodes(NodeRegistry& registry) {
   b.category("light");
   b.points_in("points", "world positions of a mesh").array();
   b.structural("mesh", Type::kMesh, {.doc = "the triangles and base colours of points[i]"}).array();
-  b.in("camera", Matrix4(), {.doc = "camera.worldFromScreen"});
+  b.in("worldFromScreen", Matrix4(), {.doc = "of a camera"});
   b.in("lightMatrix", Matrix4(), {.doc = "outMatrix of a light"}).array();
   b.in("lightColor", Double3(), {.doc = "outColor of a light"}).array();
   b.structural("lightKinds", Value(std::vector<std::int64_t>()),

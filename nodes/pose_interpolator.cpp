@@ -23,10 +23,10 @@ struct PoseBound {
 
 Result<BoundKernel> BindPoses(const Binding& binding) {
   const Structural& s = binding.structural();
-  const std::vector<double>& angles = s.value("poses").get<std::vector<double>>();
-  if (angles.empty()) return Status::Invalid("poses: there are none");
+  const std::vector<double>& angles = s.value("poseAngles").get<std::vector<double>>();
+  if (angles.empty()) return Status::Invalid("poseAngles: there are no poses");
   if (angles.size() % 3 != 0)
-    return Status::Invalid("poses: expected three angles a pose, found {} numbers", angles.size());
+    return Status::Invalid("poseAngles: expected three angles a pose, found {} numbers", angles.size());
   PoseSettings settings;
   settings.space.part = static_cast<PoseSpace::Part>(s.get_int("poseType"));
   settings.space.twist_axis = {};
@@ -73,7 +73,7 @@ void AddPoseInterpolatorNode(NodeRegistry& registry) {
            "How near a transform is to each of a few poses: 1 at a pose itself, 0 at the others.")
       .in("matrix", Matrix4(), {.doc = "the transform's local matrix; `driver:` connects it"})
       .structural("restMatrix", Matrix4(), {.doc = "the same at rest: poses are turns from it"})
-      .structural("poses", std::vector<double>{},
+      .structural("poseAngles", std::vector<double>{},
                   {.unit = Unit::kAngle, .doc = "three angles a pose; in rigs a map, name: [x, y, z]"})
       .structural("poseNames", "", {.doc = "of the poses, one a line; `poses:` sets it"})
       .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "of the poses' angles")

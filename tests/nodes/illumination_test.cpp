@@ -47,7 +47,7 @@ struct Room : TestGraph {
          {"height", Value(16)},
          {"lightKinds", Value(std::vector<std::int64_t>{0})}});
     connect("m.points", "gi.points[0]");
-    connect("cam.worldFromScreen", "gi.camera");
+    connect("cam.worldFromScreen", "gi.worldFromScreen");
     connect("lamp.outMatrix", "gi.lightMatrix[0]");
     connect("lamp.outColor", "gi.lightColor[0]");
   }

@@ -143,7 +143,7 @@ TEST(PoseInterpolator, TheNodeIsRelativeToRest) {
   TestGraph g{NodesUnderTest()};
   g.add("poseInterpolator", "p",
         {{"restMatrix", rest},
-         {"poses", std::vector<double>{0, 0, 0, 90 * kDegree, 0, 0, 0, 45 * kDegree, 0}}});
+         {"poseAngles", std::vector<double>{0, 0, 0, 90 * kDegree, 0, 0, 0, 45 * kDegree, 0}}});
   g.vary("p.matrix");
   for (int i = 0; i < 4; ++i) g.want("p.outputWeight[" + std::to_string(i) + "]");
   const auto weights = [&](const Matrix4& matrix) {
@@ -160,9 +160,9 @@ TEST(PoseInterpolator, TheNodeIsRelativeToRest) {
   expect(RotationFromEuler({90 * kDegree, 0, 0}, RotateOrder::kXyz), {0, 1, 0, 0});
   expect(Translation({5, 0, 0}) * RotationFromEuler({0, 45 * kDegree, 0}, RotateOrder::kXyz), {0, 0, 1, 0});
   for (const auto& [attribute, value, message] : std::vector<std::tuple<std::string, Value, std::string>>{
-           {"poses", std::vector<double>{}, "poses: there are none"},
-           {"poses", std::vector<double>{1, 2}, "three angles a pose, found 2"},
-           {"poses", std::vector<double>{0, 0, 0, 0, 0, 0},
+           {"poseAngles", std::vector<double>{}, "poseAngles: there are no poses"},
+           {"poseAngles", std::vector<double>{1, 2}, "three angles a pose, found 2"},
+           {"poseAngles", std::vector<double>{0, 0, 0, 0, 0, 0},
             "the poses \"0\" and \"1\" are the same rotation"}}) {
     TestGraph bad{NodesUnderTest()};
     bad.add("poseInterpolator", "p", {{attribute, value}});
