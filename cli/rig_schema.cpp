@@ -199,7 +199,7 @@ Json Definitions(const NodeRegistry& registry) {
                                   {"from", Ref("number")},
                                   {"to", Ref("number")},
                                   {"curve", curve}},
-                                 {"at", "normal"})}},
+                                 {"at", "normal", "from", "to"})}},
                {"plane"}),
         Closed({{"proximity",
                  Closed({{"mesh", Ref("name")}, {"radius", radius}, {"curve", curve}}, {"mesh", "radius"})}},

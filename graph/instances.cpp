@@ -178,6 +178,10 @@ Source InstanceTable::Take(Source source, int component) {
 Source InstanceTable::ConvertTo(Source source, Type type, const PlugRef& plug, bool rest) {
   const auto is_int = [](Type t) { return t == Type::kBool || t == Type::kInt || t == Type::kEnum; };
   if (source.type == type || (is_int(source.type) && is_int(type) && type != Type::kBool)) return source;
+  if (IsPointType(type)) {  // colours as points, and back: the same numbers
+    source.type = type;
+    return source;
+  }
   if (source.kind == Source::Kind::kValue) {
     if (type == Type::kDouble) source.value = Keep(Value(source.value->AsDouble()));
     if (type == Type::kBool) source.value = Keep(Value(source.value->AsDouble() != 0));

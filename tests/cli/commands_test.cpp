@@ -357,5 +357,35 @@ TEST(Render, PicturesOfFrames) {
   EXPECT_EQ(folder.FileCount(), 2u);
 }
 
+// A camera's light after bounces, fully and from a subspace of its pixels.
+TEST(Render, ACameraSeesLightAfterBounces) {
+  const TemporaryFolder folder;
+  std::string rig = TemporaryFolder::Read(KPSA_SCENES_DIR "/gi/gi.yaml");
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    const std::size_t at = rig.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    rig.replace(at, from.size(), to);
+  };
+  replace("room.glb", KPSA_SCENES_DIR "/gi/room.glb");
+  replace("width: 400, height: 400, samples: 16", "width: 20, height: 20, samples: 8");
+  folder.Write("gi.yaml", rig);
+  const std::string path = folder / "gi.yaml";
+  Ok({"render", path, "--camera", "front", "--times", "1", "-o", folder / "all.png"});
+  Ok({"render", path, "--camera", "front", "--times", "1", "--layer", "direct", "-o", folder / "direct.png"});
+  EXPECT_NE(TemporaryFolder::Read(folder / "all.png"), TemporaryFolder::Read(folder / "direct.png"));
+  EXPECT_EQ(RunKpsa({"render", path, "--camera", "fron", "-o", folder / "no.png"}).exit_code, 2);
+  EXPECT_EQ(RunKpsa({"render", path, "--exposure", "2", "-o", folder / "no.png"}).exit_code, 2);
+
+  Ok({"train", path, "--rows", "90", "--modes", "12", "--calibration", "40"});
+  const Json bench = Json::parse(Ok({"bench", path, "--runs", "1", "--tolerance", "1000", "--json"}));
+  EXPECT_EQ(bench["points"], 400);
+  EXPECT_GT(bench["hit_rate"], 0.5);
+  EXPECT_GT(bench["error"]["rms"], 0.0);
+  EXPECT_LT(bench["error"]["rms"], bench["motion"]["rms"]);
+  EXPECT_GT(bench["speedup"], 1.5);
+  Ok({"render", path, "--camera", "front", "--times", "1", "--accelerate", "-o", folder / "three.png"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "three.png").substr(1, 3), "PNG");
+}
+
 }  // namespace
 }  // namespace kpsa

@@ -109,6 +109,14 @@ TEST(IndirectIllumination, EachPixelIsItsOwn) {
   EXPECT_EQ(threads.pull_points("gi.irradiance"), all);
 }
 
+TEST(IndirectIllumination, ItsColoursMayGoWherePointsDo) {
+  Room room;
+  room.add("tripwire", "trip");
+  room.connect("gi.irradiance", "trip.inPoints[0]");
+  room.vary("lamp.intensity");
+  EXPECT_EQ(room.pull_points("trip.outPoints[0]"), room.pull_points("gi.irradiance"));
+}
+
 TEST(IndirectIllumination, FollowsItsLightAndFailsClearly) {
   Room room;
   room.vary("lamp.intensity");
