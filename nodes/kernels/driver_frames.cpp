@@ -9,7 +9,7 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kGrain = 512;
+constexpr std::size_t kFrameGrain = 512;
 
 Double3 Unit(Double3 v) {
   const double length = Length(v);
@@ -106,7 +106,7 @@ DriverFrames::DriverFrames(const Topology& driver, std::span<const Double3> rest
 void DriverFrames::Run(std::span<const Double3> points, std::span<DriverFrame> frames,
                        const Parallel* parallel) const noexcept {
   KPSA_CHECK_EQ(frames.size(), count());
-  ForRanges(parallel, count(), kGrain, [&](std::size_t begin, std::size_t end) {
+  ForRanges(parallel, count(), kFrameGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       if (!exists(f)) continue;
       Double3 normal;

@@ -7,7 +7,7 @@
 
 namespace kpsa {
 namespace {
-constexpr std::size_t kGrain = 1024;
+constexpr std::size_t kJiggleGrain = 1024;
 constexpr double kMostSteps = 1e15;  // of time: beyond, steps are no whole numbers any more
 }  // namespace
 
@@ -48,7 +48,7 @@ JiggleKernel::Outcome JiggleKernel::Run(const Inputs& inputs, ConstPointsView in
   const bool keep = !anew && step > header.step;  // the newer state becomes the older one
   const std::int64_t from = keep ? header.step : header.before;
   const auto steps = static_cast<double>(step - from);
-  ForRanges(parallel, point_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+  ForRanges(parallel, point_count(), kJiggleGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Double3 goal{in.x[i], in.y[i], in.z[i]};
       Particle p;

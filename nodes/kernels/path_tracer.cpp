@@ -13,7 +13,7 @@ constexpr double kNudge = 1e-5;  // of the place's scale: rays start that far ab
 Double3 PointOf(ConstPointsView p, std::size_t i) { return {p.x[i], p.y[i], p.z[i]}; }
 Double3 Times(Double3 a, Double3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 
-Double3 Unit(Double3 v) {
+Double3 UnitOrZero(Double3 v) {
   const double length = Length(v);
   return length > 0 ? v * (1 / length) : Double3();
 }
@@ -64,13 +64,13 @@ std::vector<Double3> CornerNormals(std::size_t points, std::span<const Index> tr
   std::vector<Index> next(offsets.begin(), offsets.end() - 1);
   for (std::size_t c = 0; c < triangles.size(); ++c) around[next[triangles[c]]++] = static_cast<Index>(c / 3);
   std::vector<Double3> units, normals;
-  for (const Double3& face : faces) units.push_back(Unit(face));
+  for (const Double3& face : faces) units.push_back(UnitOrZero(face));
   for (std::size_t c = 0; c < triangles.size(); ++c) {
     Double3 sum;
     for (Index i = offsets[triangles[c]]; i < offsets[triangles[c] + 1]; ++i) {
       if (Dot(units[around[i]], units[c / 3]) >= kCrease) sum = sum + faces[around[i]];
     }
-    normals.push_back(Unit(sum));
+    normals.push_back(UnitOrZero(sum));
   }
   return normals;
 }
@@ -101,21 +101,21 @@ Result<PathTracer> PathTracer::Build(ConstPointsView points, std::span<const Ind
     tracer.albedo_.push_back({albedo[t], albedo[t + 1], albedo[t + 2]});
   }
   tracer.corner_normals_ = CornerNormals(points.count, triangles, faces);
-  for (const Double3& face : faces) tracer.normals_.push_back(Unit(face));
+  for (const Double3& face : faces) tracer.normals_.push_back(UnitOrZero(face));
   return tracer;
 }
 
 ShadingPlace PathTracer::Look(Double3 origin, Double3 direction) const {
   ShadingPlace place;
-  const Double3 unit = Unit(direction);
+  const Double3 unit = UnitOrZero(direction);
   const Ray ray = MakeRay(origin, unit, 1e30);
   RayHit hit;
   scene_.ClosestHits({&ray, 1}, {&hit, 1});
   if (hit.triangle == kNoIndex) return place;
   const Double3 flat = normals_[hit.triangle];
   const Double3* const corners = &corner_normals_[3 * std::size_t{hit.triangle}];
-  const Double3 smooth =
-      Unit(corners[0] * (1.0 - hit.u - hit.v) + corners[1] * double{hit.u} + corners[2] * double{hit.v});
+  const Double3 smooth = UnitOrZero(corners[0] * (1.0 - hit.u - hit.v) + corners[1] * double{hit.u} +
+                                    corners[2] * double{hit.v});
   const double side = Dot(flat, unit) > 0 ? -1 : 1;
   place.hit = true;
   place.position = origin + unit * hit.t;
@@ -139,7 +139,7 @@ bool PathTracer::Sees(const ShadingPlace& place, Double3 direction, double dista
 
 Double3 PathTracer::FromLight(const DiffuseLight& light, const ShadingPlace& place, double u,
                               double v) const {
-  const Double3 shines = Unit(TransformVector(light.world, {0, 0, -1}));
+  const Double3 shines = UnitOrZero(TransformVector(light.world, {0, 0, -1}));
   if (light.kind == DiffuseLight::Kind::kSun) {
     const double cosine = -Dot(shines, place.normal);
     if (!(cosine > 0) || !Sees(place, shines * -1.0, 1e30)) return {};

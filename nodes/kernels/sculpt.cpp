@@ -9,7 +9,7 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kGrain = 2048;
+constexpr std::size_t kSculptGrain = 2048;
 
 // How far along `direction` a point inside the unit sphere leaves it.
 double Exit(Double3 p, Double3 direction) {
@@ -54,7 +54,7 @@ void SculptKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out,
   Matrix4 sphere_from_stage;
   const float envelope = static_cast<float>(inputs.envelope);
   if (envelope == 0 || !Invert(inputs.stage_from_sphere, &sphere_from_stage)) return;
-  ForRanges(parallel, point_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+  ForRanges(parallel, point_count(), kSculptGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const double w = weights_[i] * envelope;
       if (w == 0) continue;

@@ -11,13 +11,13 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kGrain = 256;
+constexpr std::size_t kShrinkWrapGrain = 256;
 
 std::size_t Padded(std::size_t floats) { return PaddedCount(floats); }
 
 Double3 At(ConstPointsView points, std::size_t i) { return {points.x[i], points.y[i], points.z[i]}; }
 
-Double3 Unit(Double3 v) {
+Double3 UnitVector(Double3 v) {
   const double length = Length(v);
   return length > 0 ? v * (1 / length) : Double3();
 }
@@ -79,7 +79,7 @@ std::size_t ShrinkWrapKernel::ScratchFloats() const {
 Double3 ShrinkWrapKernel::FaceNormal(const Target& target, Index triangle) const noexcept {
   const Index* corner = &tree_.triangles()[3 * std::size_t{triangle}];
   const Double3 a = At(target.points, corner[0]);
-  return Unit(Cross(At(target.points, corner[1]) - a, At(target.points, corner[2]) - a));
+  return UnitVector(Cross(At(target.points, corner[1]) - a, At(target.points, corner[2]) - a));
 }
 
 Double3 ShrinkWrapKernel::Pseudonormal(const Target& target, const SurfacePoint& place) const noexcept {
@@ -101,11 +101,11 @@ Double3 ShrinkWrapKernel::Pseudonormal(const Target& target, const SurfacePoint&
     }
     const int k = other[0] == named[0] ? 0 : other[1] == named[0] ? 1 : 2;
     const Double3 own = At(target.points, other[k]);
-    const double cosine = Dot(Unit(At(target.points, other[(k + 1) % 3]) - own),
-                              Unit(At(target.points, other[(k + 2) % 3]) - own));
+    const double cosine = Dot(UnitVector(At(target.points, other[(k + 1) % 3]) - own),
+                              UnitVector(At(target.points, other[(k + 2) % 3]) - own));
     sum = sum + normal * Acos(cosine);
   }
-  return Unit(sum);
+  return UnitVector(sum);
 }
 
 bool ShrinkWrapKernel::Stays(double signed_distance, double offset) const noexcept {
@@ -181,7 +181,7 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
     normals_->Run(in, normals, {next, normals_->ScratchFloats()}, parallel);
   }
 
-  ForRanges(parallel, point_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+  ForRanges(parallel, point_count(), kShrinkWrapGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const float w = weights_[i] * envelope;
       const Double3 p = At(in, entries_[i]);

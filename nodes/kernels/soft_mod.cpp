@@ -4,7 +4,7 @@
 
 namespace kpsa {
 namespace {
-constexpr std::size_t kGrain = 4096;
+constexpr std::size_t kSoftModGrain = 4096;
 }
 
 ClusterKernel::ClusterKernel(std::span<const Index> out_points, std::span<const float> point_weights)
@@ -29,7 +29,7 @@ void ClusterKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
                {out.x + begin, out.y + begin, out.z + begin, size});
   };
   copy(0, begin_);
-  ForRanges(parallel, end_ - begin_, kGrain, [&](std::size_t begin, std::size_t end) {
+  ForRanges(parallel, end_ - begin_, kSoftModGrain, [&](std::size_t begin, std::size_t end) {
     ApplyAffineDelta(delta, weights_.data(), envelope, in, out, begin_ + begin, begin_ + end);
   });
   copy(end_, count_ - end_);

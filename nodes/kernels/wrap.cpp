@@ -9,7 +9,7 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kGrain = 1024;
+constexpr std::size_t kWrapGrain = 1024;
 constexpr double kFolded = 1e-6;  // of the tangents' lengths
 
 // Any direction in the plane across a unit vector.
@@ -130,14 +130,14 @@ void WrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   const std::span<DriverFrame> frames(reinterpret_cast<DriverFrame*>(driver.data() + in_count_),
                                       frames_.count());
   const bool moved = !(stage_from_driver_ == Matrix4());
-  ForRanges(parallel, in_count_, kGrain, [&](std::size_t begin, std::size_t end) {
+  ForRanges(parallel, in_count_, kWrapGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Double3 p{inputs.driver.x[i], inputs.driver.y[i], inputs.driver.z[i]};
       driver[i] = moved ? TransformPoint(stage_from_driver_, p) : p;
     }
   });
   frames_.Run(driver, frames, parallel);
-  ForRanges(parallel, point_count(), kGrain, [&](std::size_t begin, std::size_t end) {
+  ForRanges(parallel, point_count(), kWrapGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const float w = weights_[i] * envelope;
       if (w == 0 || offsets_[i] == offsets_[i + 1]) continue;
