@@ -416,10 +416,13 @@ class Writer {
     text_ += "    violationRate: 3%  # of frames that may exceed it\n";
     text_ += fmt::format("    train: {{{}samples: {}}}  # clips, and poses drawn from the controls\n",
                          train.empty() ? "" : "clips: " + QuotedList(train) + ", ", options_.samples);
-    if (!test.empty())
+    if (test.empty()) {
+      text_ += "    # The file has no clip to test on; kpsa bench takes the rest pose\n";
+    } else {
       text_ +=
           fmt::format("    test: {{clips: {}}}  # never trained on; what kpsa bench runs{}\n",
                       QuotedList(test), train.empty() ? "" : ": the clip that goes least beyond the others");
+    }
   }
   static std::string LengthOf(double metres) {
     if (metres >= 1) return Rounded(metres) + "m";
