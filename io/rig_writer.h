@@ -17,10 +17,11 @@ struct StarterOptions {
 };
 
 // The text of the rig. Controls: every local rotation (degrees, in the rest pose's axes) and translation that
-// a clip moves away from rest, and every morph weight, ranged by the keys of all clips and rounded outwards;
-// joints that carry no point are left out. Without clips: guesses, marked so. Accelerated: the end of every
-// mesh's stack, in the space of the deepest transform that carries 90 % of the skin; trained on all clips but
-// the first, which is kept for the bench. Errors: those of reading the character.
+// a clip moves away from rest, every expression of VRM that moves a morph target, and every other morph
+// weight, ranged by the keys of all clips and rounded outwards; joints that carry no point are left out.
+// Without clips: guesses, marked so. Accelerated: the end of every mesh's stack, in the space of the deepest
+// transform that carries 90 % of the skin; trained on all clips but the first, which is kept for the bench.
+// Errors: those of reading the character.
 Result<std::string> StarterRig(const NodeRegistry& registry, const std::string& character_path,
                                const StarterOptions& options = {});
 
