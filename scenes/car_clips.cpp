@@ -22,9 +22,9 @@ constexpr Turn kTurns[] = {{{kJaw, kJaw}, 0, -2, 13},         {{kJaw, kJaw}, 1, 
                            {{kBody, kBody}, 0, -4, 4},        {{kBody, kBody}, 1, -6, 6},
                            {{kBody, kBody}, 2, -5, 5},        {{kHood, kHood}, 0, -6, 1},
                            {{kHood, kHood}, 2, -2, 2},        {{kRoof, kRoof}, 0, -4, 4},
-                           {{kRoof, kRoof}, 2, -4, 4},        {{kLidUpL, kLidUpL}, 0, -10, 24},
-                           {{kLidUpR, kLidUpR}, 0, -10, 24},  {{kLidLowL, kLidLowL}, 0, -14, 6},
-                           {{kLidLowR, kLidLowR}, 0, -14, 6}, {{kEyeL, kEyeR}, 0, -12, 16},
+                           {{kRoof, kRoof}, 2, -4, 4},        {{kLidUpL, kLidUpL}, 0, -8, 16},
+                           {{kLidUpR, kLidUpR}, 0, -8, 16},  {{kLidLowL, kLidLowL}, 0, -10, 4},
+                           {{kLidLowR, kLidLowR}, 0, -10, 4}, {{kEyeL, kEyeR}, 0, -12, 16},
                            {{kEyeL, kEyeR}, 1, -22, 22}};
 constexpr int kTurnCount = static_cast<int>(std::size(kTurns));
 
@@ -132,8 +132,8 @@ void Wander(Track* track, int control, Random* random, int shortest, int longest
 void Speak(Track* track, Random* random) {
   const int open = track->Find("mouthOpen"), jaw = track->weights();
   const int shapes[] = {track->Find("pucker"),     track->Find("funnel"),    track->Find("lipPress"),
-                        track->Find("lipUpperUp"), track->Find("lipLowerIn"), track->Find("stretch.L"),
-                        track->Find("smile.L"),    track->Find("lipLowerDown.L")};
+                        track->Find("lipUpperUp"), track->Find("stretch.L"), track->Find("smile.L"),
+                        track->Find("lipLowerDown.L")};
   for (int frame = 4; frame + 12 < track->frames(); frame += 4 + random->Below(10)) {
     for (int syllables = 5 + random->Below(7); syllables > 0; --syllables) {
       const int length = 4 + random->Below(3), which = random->Below(static_cast<int>(std::size(shapes)));
@@ -143,7 +143,7 @@ void Speak(Track* track, Random* random) {
         track->Add(frame + k, jaw, wide * arc);
         track->Add(frame + k, open, lips * arc);
         track->Add(frame + k, shapes[which], amount * arc);
-        if (which >= 5) track->Add(frame + k, shapes[which] + 1, 0.85 * amount * arc);
+        if (which >= 4) track->Add(frame + k, shapes[which] + 1, 0.85 * amount * arc);
       }
       frame += length;
     }

@@ -79,7 +79,6 @@ void Maker::Eyes() {
   PairOf("eyeWide", Lids(-14, -8, 0));
   PairOf("squint", Lids(10, 22, 0));
   PairOf("lidAngry", Lids(14, 2, 16));
-  PairOf("lidSad", Lids(14, 2, -16));
 }
 
 void Maker::Brows() {
@@ -87,7 +86,6 @@ void Maker::Brows() {
   Pair("browUp", [=](const Place& q) { return Double3{0, 9, -4} * band(q, {26, 150, 0}, {34, 24, 24}); });
   Pair("browDown", [=](const Place& q) { return Double3{-2, -8, 5} * band(q, {26, 150, 0}, {34, 24, 24}); });
   Pair("browInnerUp", [=](const Place& q) { return Double3{0, 9, -3} * band(q, {10, 150, 2}, {20, 24, 22}); });
-  Pair("browOuterDown", [=](const Place& q) { return Double3{2, -8, 3} * band(q, {42, 147, -2}, {20, 24, 22}); });
 }
 
 void Maker::Mouth() {
@@ -96,7 +94,6 @@ void Maker::Mouth() {
   });
   Pair("frown", [](const Place& q) { return Double3{2, -13, -3} * (Share(q.p, kCorner, {34, 26, 40}) * q.left); });
   Pair("stretch", [](const Place& q) { return Double3{11, -1, -9} * (Share(q.p, kCorner, {36, 22, 40}) * q.left); });
-  Pair("sneer", [](const Place& q) { return Double3{1, 8, 2} * (Share(q.p, {22, 58, 172}, {26, 18, 30}) * q.upper * q.left * (1 - q.inside)); });
   Pair("lipLowerDown", [](const Place& q) {
     return Double3{1, -8, 1} * (Share(q.p, {18, 38, 172}, {30, 20, 30}) * (1 - q.upper) * q.left * (1 - 0.6 * q.inside));
   });
@@ -117,17 +114,13 @@ void Maker::Mouth() {
     return Double3{0.04 * q.p.x, (1 - 2 * q.upper) * 4.2, -4} * w;
   });
   Center("lipUpperUp", [](const Place& q) { return Double3{0, 8, 3} * (Share(q.p, {0, 56, 174}, {50, 20, 30}) * q.upper * (1 - q.inside)); });
-  Center("lipLowerIn", [](const Place& q) { return Double3{0, 4.5, -7} * (Share(q.p, {0, 40, 174}, {46, 18, 30}) * (1 - q.upper)); });
   Center("mouthLeft", [](const Place& q) { return Double3{13, 1, -0.05 * q.p.x} * Share(q.p, kMiddle, {74, 34, 46}); });
   Center("mouthRight", [](const Place& q) { return Double3{-13, 1, 0.05 * q.p.x} * Share(q.p, kMiddle, {74, 34, 46}); });
 }
 
 void Maker::Body() {
   Pair("fenderPuff", [](const Place& q) { return Double3{8, 2, 5} * (Share(q.p, {74, 64, 128}, {40, 30, 58}) * q.left * (1 - q.inside)); });
-  Pair("fenderSuck", [](const Place& q) { return Double3{-7, 0, -4} * (Share(q.p, {74, 62, 136}, {36, 28, 46}) * q.left * (1 - q.inside)); });
-  Pair("shoulderUp", [](const Place& q) { return Double3{1, 8, 0} * (Share(q.p, {76, 84, 95}, {34, 26, 60}) * q.left); });
   Center("hoodBulge", [](const Place& q) { return Double3{0, 8, 2} * (Share(q.p, {0, 92, 105}, {60, 26, 60}) * (1 - q.eye)); });
-  Center("tailUp", [](const Place& q) { return Double3{0, 10, -3} * Share(q.p, {0, 80, -150}, {110, 46, 60}); });
 }
 
 // Shapes half way, which other targets go through, and shapes that two together need.
@@ -187,9 +180,6 @@ std::vector<Expression> MuscleExpressions(const CarCage& cage) {
     }));
     out.push_back(make("corner" + s, [=](Double3 p) {
       return Double3{side * 6, 1, -5} * Share({side * p.x, p.y, p.z}, {44, 54, 160}, {34, 24, 44});
-    }));
-    out.push_back(make("chin" + s, [=](Double3 p) {
-      return Double3{side * 2, -5, 3} * Share({side * p.x, p.y, p.z}, {30, 32, 168}, {34, 18, 40});
     }));
   }
   out.push_back(make("purse", [](Double3 p) { return Double3{-0.22 * p.x, 0, 6} * Share(p, kMiddle, {70, 36, 50}); }));

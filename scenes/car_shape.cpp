@@ -344,8 +344,8 @@ CarShape MakeCarShape() { return CarBuilder().Build(); }
 
 CarCage MuscleCage() {
   CarCage cage;
-  constexpr int kAround = 20;
-  constexpr std::array<double, 2> kRings[] = {{3, 5}, {9, 10}, {17, 16}, {27, 21}, {38, 24}};
+  constexpr int kAround = 12;
+  constexpr std::array<double, 2> kRings[] = {{4, 6}, {13, 13}, {25, 20}, {38, 23}};
   for (const auto& [wide, high] : kRings) {
     const int first = static_cast<int>(cage.points.size());
     for (int k = 0; k < kAround; ++k) {
@@ -357,14 +357,14 @@ CarCage MuscleCage() {
       if (first > 0) cage.quads.push_back({first + k, first + next, first - kAround + next, first - kAround + k});
     }
   }
-  Inset(&cage, 3.5);
+  Inset(&cage, 5.5);
   return cage;
 }
 
 CarCage PanelCage() {
   CarCage cage;
-  constexpr int kLines[] = {-12, -10, -7, -4, 0, 4, 7, 10, 12}, kAcrossCount = 9;
-  constexpr int kStations[] = {1, 3, 5, 7, 9, 11, 14, 17, 20, 22, 24, 27, 30, 32}, kStationCount = 14;
+  constexpr int kLines[] = {-12, -7, 0, 7, 12}, kAcrossCount = 5;
+  constexpr int kStations[] = {1, 5, 10, 17, 20, 24, 28, 32}, kStationCount = 8;
   for (int j : kStations) {
     for (int i : kLines) cage.points.push_back(TopPoint(i, j));
   }
@@ -387,7 +387,7 @@ CarCage PanelCage() {
     const int next = (k + 1) % n;
     cage.quads.push_back({first + k, first + next, edge[static_cast<std::size_t>(next)], edge[static_cast<std::size_t>(k)]});
   }
-  Inset(&cage, 4);
+  Inset(&cage, 7);
   return cage;
 }
 

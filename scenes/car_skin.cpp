@@ -62,7 +62,7 @@ std::vector<JointShares> CarWeights(const CarShape& shape) {
     w[kHood] = rest * (1 - jaw) * HoodField(p) * (1 - roof);
     rest -= w[kJaw] + w[kHood];
     // What is near the wheels belongs to the suspension
-    w[kChassis] = rest * 0.5 * Smooth(42, kWheelAxle, p.y) * (shape.mouth[i] > 0 ? 0 : 1);
+    w[kChassis] = rest * 0.15 * Smooth(42, kWheelAxle, p.y) * (shape.mouth[i] > 0 ? 0 : 1);
     w[kBody] = rest - w[kChassis];
     out.push_back(w);
   }

@@ -139,21 +139,20 @@ GlbMesh PartsMesh() {
   mesh.name = "car_parts";
   for (const double side : {1.0, -1.0}) {
     std::vector<Station> eye;
-    constexpr double kAngles[] = {1.75, 1.2, 0.8, 0.53, 0.48, 0.30, 0.25, 0.0};
+    constexpr double kAngles[] = {1.5, 0.95, 0.53, 0.48, 0.30, 0.25, 0.0};
     for (std::size_t k = 0; k < std::size(kAngles); ++k) {
-      const Double3 color = k < 4 ? kWhite : k < 6 ? kIris : kPupil;
+      const Double3 color = k < 3 ? kWhite : k < 5 ? kIris : kPupil;
       eye.push_back({kEyeBall * Cos(kAngles[k]), kAngles[k] == 0 ? 0 : kEyeBall * Sin(kAngles[k]), color});
     }
     constexpr Double3 kLook = {0, 0.26, 0.9656};
-    AddTurned({side * kEye.x, kEye.y, kEye.z}, kLook, {1, 0, 0}, eye, 20, side > 0 ? kEyeL : kEyeR, &mesh);
+    AddTurned({side * kEye.x, kEye.y, kEye.z}, kLook, {1, 0, 0}, eye, 16, side > 0 ? kEyeL : kEyeR, &mesh);
     AddTurned({side * 62, 70, 146}, {side * 0.34, 0.2, 0.918}, {0.9378 , 0, side * -0.3473},
-              {{4, 11, kChrome}, {8, 10, kChrome}, {8.5, 8.5, kLamp}, {11, 0, kLamp}}, 14, kBody, &mesh);
+              {{4, 11, kChrome}, {8.5, 9, kLamp}, {11, 0, kLamp}}, 12, kBody, &mesh);
     for (const double end : {1.0, -1.0}) {
       const int joint = end > 0 ? (side > 0 ? kWheelFL : kWheelFR) : (side > 0 ? kWheelBL : kWheelBR);
       AddTurned({side * 70, kWheelAxle, end * kWheelAt}, {side, 0, 0}, {0, 1, 0},
-                {{-10, 24, kRubber}, {-8, kWheelAxle - 1, kRubber}, {8, kWheelAxle - 1, kRubber}, {11, 25, kRubber}, {11, 19, kRubber},
-                 {9, 17, kChrome}, {8, 9, kChrome * 0.6}, {12, 0, kChrome}},
-                16, joint, &mesh);
+                {{-10, 27, kRubber}, {8, kWheelAxle - 1, kRubber}, {11, 24, kRubber}, {10, 18, kChrome}, {12, 0, kChrome}},
+                14, joint, &mesh);
     }
   }
   mesh.normals = SmoothNormals(mesh.positions, mesh.triangles);
