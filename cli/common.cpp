@@ -194,6 +194,10 @@ std::string ByteText(std::uint64_t bytes) {
   return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.3g} {}", value, kUnits[unit]);
 }
 
+std::string ErrorText(double error, bool light) {
+  return light ? fmt::format("{:.3g}", error) : LengthText(error);
+}
+
 std::string LengthText(double metres) {
   if (!std::isfinite(metres)) return "not finite";
   return metres < 0.1 ? fmt::format("{:.3g} mm", metres * 1000) : fmt::format("{:.4g} m", metres);

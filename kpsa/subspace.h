@@ -21,6 +21,7 @@
 namespace kpsa {
 
 inline constexpr int kSubspaceVersion = 1;
+inline constexpr const char* kLightUnits = "light";
 
 // Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
 struct CueDescription {
@@ -51,8 +52,9 @@ struct Subspace {
   double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
   std::vector<TileMap> tiles;                                       // [outputs]
   std::vector<TrainedRange> ranges;                                 // every varying plug upstream
+  bool of_light() const { return units == kLightUnits; }
   std::string rig_hash;  // what it was trained on (KPSA.md, section 3)
-  std::string units = "m";
+  std::string units = "m";  // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
   std::string space;                                    // "" world or mesh space, else the joint
   std::string training = "{}";                          // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r

@@ -104,8 +104,8 @@ TEST(PathTracer, OneBounceHasTheFormFactorOfWhatItComesFrom) {
   ASSERT_TRUE(place.hit);
   EXPECT_EQ(tracer.Direct(place, 0, 1).x, 0);
   const double shadow = 0.02 * 0.02 / 2 / 4;  // of the small triangle, on the ceiling
-  EXPECT_NEAR(tracer.Indirect(place, 1, 8192, 1).x, 0.6 * 4 * FormFactorAbove(2, 1.5) * (1 - shadow), 0.01);
-  EXPECT_NEAR(tracer.Indirect(place, 1, 8192, 2).x, tracer.Indirect(place, 1, 8192, 1).x, 0.01);
+  EXPECT_NEAR(tracer.Indirect(place, {1, 8192, 1}).x, 0.6 * 4 * FormFactorAbove(2, 1.5) * (1 - shadow), 0.01);
+  EXPECT_NEAR(tracer.Indirect(place, {1, 8192, 2}).x, tracer.Indirect(place, {1, 8192, 1}).x, 0.01);
 }
 
 // Inside a sphere with a light in its middle every bounce adds the same everywhere: E (a + a^2 + ...).
@@ -129,7 +129,7 @@ TEST(PathTracer, BouncesInASphereAddUpGeometrically) {
   double expected = 0, power = 1;
   for (int bounces = 1; bounces <= 4; ++bounces) {
     expected += power *= 0.7;
-    EXPECT_NEAR(tracer.Indirect(place, 5, 1024, bounces).x, expected, 0.02 * expected) << bounces;
+    EXPECT_NEAR(tracer.Indirect(place, {5, 1024, bounces}).x, expected, 0.02 * expected) << bounces;
   }
 }
 
