@@ -312,8 +312,7 @@ TEST(GltfImport, BuffersBesideTheDocument) {
   }
   // Data URIs of any media type, and without base64; a second buffer in a .glb
   for (const std::string& uri :
-       {"data:;base64," + b.Base64(), "DATA:;base64," + b.Base64(),
-        "data:application/gltf-buffer;base64," + b.Base64(),
+       {"data:;base64," + b.Base64(), "DATA:;base64," + b.Base64(), "data:application/gltf-buffer;base64," + b.Base64(),
         std::string("data:application/octet-stream,%00%00%80%3F%00%00%00%40%00%00%40%40")}) {
     b.root["buffers"] = {{{"uri", uri}, {"byteLength", 12}}};
     EXPECT_EQ(MustLoad(b.Text()).meshes.at(0).positions, (std::vector<float>{1, 2, 3})) << uri;

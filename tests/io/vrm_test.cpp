@@ -32,7 +32,7 @@ class VrmTest : public RigFixture {
   std::string Rigged(const GltfBuilder& b, const std::vector<std::string>& controls) {
     Write(b);
     std::string text = "kpsa: 1\ncharacter: c.vrm\ncontrols:\n";
-    for (const std::string& control : controls) text += "  \"" + control + "\": {min: -1, max: 1}\n";
+    for (const std::string& control : controls) text += "  \"" + control + "\": {min: 0, max: 1}\n";
     return folder.Write("t.yaml", text);
   }
   gltf::Character Load(const GltfBuilder& b) {
