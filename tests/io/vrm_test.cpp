@@ -211,6 +211,17 @@ TEST_F(VrmTest, ConstraintsUnderClipsAndRigs) {
   EXPECT_NEAR(point.World("twin")(1, 3), 1, 1e-12);  // root's place
 }
 
+TEST_F(VrmTest, RigsMayHaveSuchConstraintsThemselves) {
+  RigPlayer player(folder.Write(
+      "t.yaml",
+      "kpsa: 1\ncharacter: c.gltf\ncontrols: {root.rotateZ: {min: -1, max: 1}}\nnodes:\n"
+      "  turn: {type: vrmRotationConstraint, constrained: tip, sourceMatrix: root.matrix, weight: 0.5}\n"));
+  ASSERT_TRUE(player.ok());
+  EXPECT_EQ(Driver(player.rig, "turn.inMatrix"), "tip_clip.matrix");
+  player.Set("root.rotateZ", kPi / 3);
+  EXPECT_NEAR(player.World("tip")(1, 0), 1, 1e-12);  // 60 degrees, and half as many
+}
+
 TEST_F(VrmTest, WhatNamesNothingIsLeftOut) {
   GltfBuilder b = Faces();
   const auto constrain = [&](std::size_t node, const json& constraint) {
