@@ -32,7 +32,6 @@ class Decompressor {
       return Status::Invalid("{}: byteStride is {}, the view's is {}", where, v.stride, view.byteStride);
     std::span<const std::uint8_t> data;
     KPSA_RETURN_IF_ERROR(Range(v.buffer, v.offset, v.length, where, &data));
-    KPSA_RETURN_IF_ERROR(document_.budget.TakeWork(view.byteLength, where));
     KPSA_RETURN_IF_ERROR(TakeRoom(view.byteLength, where));
     Result<std::vector<std::uint8_t>> decoded = DecodeMeshopt(v, data);
     if (!decoded.ok()) return Status::Invalid("{}: {}", where, decoded.status().errors().front().message);
