@@ -17,13 +17,13 @@ struct Turn {
   int axis;
   double low, high;
 };
-constexpr Turn kTurns[] = {{{kJaw, kJaw}, 0, -2, 13},         {{kJaw, kJaw}, 1, -4, 4},
-                           {{kChassis, kChassis}, 0, -4, 4},  {{kChassis, kChassis}, 2, -4, 4},
-                           {{kBody, kBody}, 0, -4, 4},        {{kBody, kBody}, 1, -6, 6},
-                           {{kBody, kBody}, 2, -5, 5},        {{kHood, kHood}, 0, -6, 1},
-                           {{kHood, kHood}, 2, -2, 2},        {{kRoof, kRoof}, 0, -4, 4},
-                           {{kRoof, kRoof}, 2, -4, 4},        {{kLidUpL, kLidUpL}, 0, -8, 16},
-                           {{kLidUpR, kLidUpR}, 0, -8, 16},  {{kLidLowL, kLidLowL}, 0, -10, 4},
+constexpr Turn kTurns[] = {{{kJaw, kJaw}, 0, -2, 12},         {{kJaw, kJaw}, 1, -3, 3},
+                           {{kChassis, kChassis}, 0, -3, 3},  {{kChassis, kChassis}, 2, -3, 3},
+                           {{kBody, kBody}, 0, -3, 3},        {{kBody, kBody}, 1, -3, 3},
+                           {{kBody, kBody}, 2, -3, 3},        {{kHood, kHood}, 0, -3, 0.5},
+                           {{kHood, kHood}, 2, -0.7, 0.7},    {{kRoof, kRoof}, 0, -1.5, 1.5},
+                           {{kRoof, kRoof}, 2, -1.5, 1.5},    {{kLidUpL, kLidUpL}, 0, -8, 16},
+                           {{kLidUpR, kLidUpR}, 0, -8, 16},   {{kLidLowL, kLidLowL}, 0, -10, 4},
                            {{kLidLowR, kLidLowR}, 0, -10, 4}, {{kEyeL, kEyeR}, 0, -12, 16},
                            {{kEyeL, kEyeR}, 1, -22, 22}};
 constexpr int kTurnCount = static_cast<int>(std::size(kTurns));

@@ -41,7 +41,8 @@ struct CarCage {
   std::vector<std::array<int, 4>> quads;
 };
 CarCage MuscleCage();  // rings around the mouth
-CarCage PanelCage();   // under hood, roof, trunk and the sides above the wheels
+CarCage PanelCage();   // under hood, roof and trunk
+CarCage FrameCage();   // a tube from front to back
 
 enum CarJoint : int {
   kGround, kChassis, kBody, kHood, kRoof, kJaw, kLidUpL, kLidUpR, kLidLowL, kLidLowR, kEyeL, kEyeR,

@@ -303,8 +303,7 @@ void CarBuilder::PickCurves() {
   for (int i = -8; i <= 8; i += 2) curves["grille"].push_back(Side(kRows - 1, i));
   for (int i = 1; i <= 9; ++i) curves["brow.L"].push_back(Top(i, kEyeRow1 + 1));
   for (int k = 0; k < 9; ++k) curves["fender.L"].push_back(Side(kRows, kHalf - 2 + 3 * k));
-  for (int k = 0; k < 9; ++k) curves["sill.L"].push_back(Side(2, kHalf + 3 * k + 4));
-  for (const char* name : {"lidUpper", "lidLower", "brow", "fender", "sill"}) {
+  for (const char* name : {"lidUpper", "lidLower", "brow", "fender"}) {
     for (int point : std::vector<int>(curves[std::string(name) + ".L"]))
       curves[std::string(name) + ".R"].push_back(shape_.mirror[Size(point)]);
   }
@@ -345,7 +344,7 @@ CarShape MakeCarShape() { return CarBuilder().Build(); }
 CarCage MuscleCage() {
   CarCage cage;
   constexpr int kAround = 12;
-  constexpr std::array<double, 2> kRings[] = {{4, 6}, {13, 13}, {25, 20}, {38, 23}};
+  constexpr std::array<double, 2> kRings[] = {{6, 8}, {20, 18}, {38, 23}};
   for (const auto& [wide, high] : kRings) {
     const int first = static_cast<int>(cage.points.size());
     for (int k = 0; k < kAround; ++k) {
@@ -363,31 +362,31 @@ CarCage MuscleCage() {
 
 CarCage PanelCage() {
   CarCage cage;
-  constexpr int kLines[] = {-12, -7, 0, 7, 12}, kAcrossCount = 5;
-  constexpr int kStations[] = {1, 5, 10, 17, 20, 24, 28, 32}, kStationCount = 8;
+  constexpr int kLines[] = {-12, -7, 0, 7, 12}, kStations[] = {1, 5, 10, 17, 20, 24, 28, 32};
+  constexpr int kWide = static_cast<int>(std::size(kLines));
   for (int j : kStations) {
     for (int i : kLines) cage.points.push_back(TopPoint(i, j));
   }
-  for (int j = 0; j + 1 < kStationCount; ++j) {
-    for (int i = 0; i + 1 < kAcrossCount; ++i) {
-      const int a = j * kAcrossCount + i;
-      cage.quads.push_back({a, a + 1, a + 1 + kAcrossCount, a + kAcrossCount});
-    }
-  }
-  // A skirt below, as far as the arches leave room
-  std::vector<int> edge;
-  for (int i = 0; i < kAcrossCount; ++i) edge.push_back(i);
-  for (int j = 1; j < kStationCount; ++j) edge.push_back(j * kAcrossCount + kAcrossCount - 1);
-  for (int i = kAcrossCount - 2; i >= 0; --i) edge.push_back((kStationCount - 1) * kAcrossCount + i);
-  for (int j = kStationCount - 2; j > 0; --j) edge.push_back(j * kAcrossCount);
-  const int first = static_cast<int>(cage.points.size()), n = static_cast<int>(edge.size());
-  for (int k = 0; k < n; ++k) {
-    const Double3 p = cage.points[static_cast<std::size_t>(edge[static_cast<std::size_t>(k)])];
-    cage.points.push_back({p.x * 1.05, p.y - 14, p.z * 1.03});
-    const int next = (k + 1) % n;
-    cage.quads.push_back({first + k, first + next, edge[static_cast<std::size_t>(next)], edge[static_cast<std::size_t>(k)]});
+  for (int a = 0; a + kWide < static_cast<int>(cage.points.size()); ++a) {
+    if (a % kWide + 1 < kWide) cage.quads.push_back({a, a + 1, a + 1 + kWide, a + kWide});
   }
   Inset(&cage, 7);
+  return cage;
+}
+
+CarCage FrameCage() {
+  CarCage cage;
+  constexpr int kAround = 8;
+  for (double z : {130.0, 70.0, 10.0, -60.0, -125.0}) {
+    const int first = static_cast<int>(cage.points.size());
+    for (int k = 0; k < kAround; ++k) {
+      double sine, cosine;
+      SinCos(2 * kPi * (k + 0.5) / kAround, &sine, &cosine);
+      cage.points.push_back({48 * cosine, 58 + 20 * sine, z});
+      const int next = (k + 1) % kAround;
+      if (first > 0) cage.quads.push_back({first - kAround + k, first - kAround + next, first + next, first + k});
+    }
+  }
   return cage;
 }
 

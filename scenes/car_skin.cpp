@@ -89,6 +89,7 @@ std::map<std::string, std::vector<double>> CarWeightMaps(const CarShape& shape) 
     maps["muscles"].push_back(Smooth(2, 1.4, shape.mouth[i]) * Smooth(60, 135, p.z) * (1 - eye));
     maps["squash"].push_back(AwayFromEyes(p));
     maps["panels"].push_back(AwayFromEyes(p) * Smooth(1.6, 0.6, shape.mouth[i]) * Smooth(24, 44, p.y));
+    maps["flex"].push_back(AwayFromEyes(p) * Smooth(1.6, 0.6, shape.mouth[i]));
     maps["deck"].push_back(Smooth(60, 80, p.y) * Smooth(30, 60, p.z) * AwayFromEyes(p));
     maps["mush"].push_back(shape.mouth[i] > 1 || eye > 0 ? 0 : 1);
   }

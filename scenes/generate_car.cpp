@@ -209,7 +209,7 @@ SceneFiles GenerateCar() {
     scene.nodes.push_back({joint.name, joint.parent, at * kMetres, -1});
   }
   const int first = static_cast<int>(scene.nodes.size());
-  scene.meshes = {BodyMesh(shape, expressions), PartsMesh(), CageMesh("muscles", muscles, pulls), CageMesh("panels", PanelCage(), {})};
+  scene.meshes = {BodyMesh(shape, expressions), PartsMesh(), CageMesh("muscles", muscles, pulls), CageMesh("panels", PanelCage(), {}), CageMesh("frame", FrameCage(), {})};
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m)});
   const auto names = [](const std::vector<Expression>& list) {
     std::vector<std::string> out;
