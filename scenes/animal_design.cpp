@@ -68,6 +68,7 @@ HeadDesign MakeAnimalDesign() {
               {22.4, 5.7, 5.8, 22.1, -1.0, 22.3, -6.6, 3},  {23.3, 3.9, 4.0, 23.2, -1.0, 23.3, -4.8, 0}};
   d.mouth_row = 16, d.nose_row = 23, d.eye_row = 34;
   d.brow_column0 = 3, d.brow_column1 = 11;
+  d.relaxations = 14;
   d.eye_center = kAnimalEye;
   d.eye_radius = 1.5;
   d.iris_size = 1.3;
@@ -85,6 +86,7 @@ HeadDesign MakeAnimalDesign() {
   d.line_middle = 0.16, d.line_side = -0.12, d.line_end = -0.55;
   d.upper_height = 0.30, d.upper_notch = 0.0, d.lower_height = 0.34;
   d.lip_fullness = 0.5;
+  d.pocket_narrow = 0.35;
   d.nostril_depth = 0.6;
   d.ear = {};
   d.ear.column0 = 15, d.ear.column1 = 20, d.ear.row0 = 42, d.ear.row1 = 48;

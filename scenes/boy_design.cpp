@@ -25,7 +25,7 @@ double BoyDistance(Double3 p) {
   d = SmoothUnion(d, Cone(p, {2.6, -5, -3.6}, {1.4, 11, -4.2}, 1.7, 1.0), 2.4);
   // Eye sockets, brows
   d = SmoothCut(d, Ellipsoid(p, {3.3, 17.0, 8.9}, {2.7, 1.9, 1.9}), 1.6);
-  d = SmoothUnion(d, Cone(p, {1.4, 19.6, 7.7}, {5.2, 19.7, 5.6}, 0.6, 0.5), 1.4);
+  d = SmoothUnion(d, Cone(p, {1.5, 20.1, 7.5}, {5.2, 19.8, 5.5}, 0.5, 0.45), 1.6);
   // Nose
   d = SmoothUnion(d, Cone(p, {0, 16.9, 7.5}, {0, 14.2, 8.8}, 0.5, 0.7), 1.5);
   d = SmoothUnion(d, Ellipsoid(p, {0, 13.75, 9.15}, {0.98, 0.82, 0.85}), 0.8);
@@ -46,7 +46,7 @@ Double3 BoyColor(Double3 q, double ear) {
   const double arch = 19.95 + 0.25 * Bump(q.x - 3.2, 2.8) - 0.3 * Smooth(4.3, 5.8, q.x);
   const double brow =
       Bump(q.y - arch, 0.7) * Smooth(0.9, 1.7, q.x) * Smooth(5.9, 4.4, q.x) * Smooth(2, 4, q.z);
-  const double hair = Smooth(16.6, 19.0, q.y - 0.95 * q.z) * (1 - Smooth(0, 0.6, ear));
+  const double hair = Smooth(16.0, 20.0, q.y - 0.95 * q.z) * (1 - Smooth(0, 0.6, ear));
   const Double3 skin = Mix(kSkin, kFlush, std::max(0.42 * cheek, 0.4 * nose));
   return Mix(skin, kHair, std::max(0.9 * brow, hair));
 }
@@ -73,6 +73,7 @@ HeadDesign MakeBoyDesign() {
   d.mouth_row = 12, d.nose_row = 19, d.eye_row = 25;
   d.eye_column0 = 3, d.eye_column1 = 10, d.mouth_column = 6;
   d.brow_column0 = 2, d.brow_column1 = 10;
+  d.relaxations = 14;
   d.eye_center = kBoyEye;
   d.eye_radius = 1.75;
   d.iris_size = 1.15;

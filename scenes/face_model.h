@@ -64,7 +64,7 @@ class Random {
 using SceneFiles = std::map<std::string, std::string>;
 SceneFiles GenerateCar();
 // A head: NAME.glb, NAME_curves.yaml, w/NAME.json.
-SceneFiles GenerateHead(const HeadDesign& design);
+SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape);
 SceneFiles GenerateHello();
 SceneFiles GenerateRoom();
 

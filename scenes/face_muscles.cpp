@@ -8,7 +8,7 @@
 namespace kpsa::scenes {
 namespace {
 
-constexpr int kMuscleRows = 16, kMuscleHalf = 9, kMuscleColumns = 2 * kMuscleHalf + 1;
+constexpr int kMuscleRows = 12, kMuscleHalf = 6, kMuscleColumns = 2 * kMuscleHalf + 1;
 constexpr double kMuscleReach = 1.85;  // radians to each side
 constexpr double kMuscleDepth = 0.75;  // under the skin
 

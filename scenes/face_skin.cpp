@@ -120,6 +120,8 @@ std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& desi
   for (std::size_t i = 0; i < count; ++i) {
     const Double3 p = in(kThroatRegion, i), eye = in(kEyeRegion, i), mouth = in(kMouthRegion, i);
     maps["flesh"].push_back(Smooth(0.5, 5.0, p.y) * (1 - shape.ear[i]));
+    const Double3 brow = in(kBrowRegion, i);
+    maps["muscles"].push_back(maps["flesh"][i] * Smooth(-7, -1, p.z) * Smooth(27.5, 24.0, brow.y));
     const double front = Smooth(2.0, 4.5, eye.z) * (1 - shape.ear[i]);
     maps["orbit.L"].push_back(Ball(eye, {3.2, 18.6, 7.2}, {3.4, 3.0, 4.5}) * Smooth(-0.2, 0.8, eye.x) *
                               front);
@@ -129,10 +131,13 @@ std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& desi
   }
   for (std::size_t ring = 1; ring < shape.eye_rings.size(); ++ring) {
     const double left = 1 - Smooth(0, shape.lid_ring - 1, static_cast<double>(ring));
-    eye_ring(ring, [&](std::size_t i) { maps["flesh"][i] *= left; });
+    eye_ring(ring, [&](std::size_t i) { maps["flesh"][i] *= left, maps["muscles"][i] *= left; });
   }
   for (std::size_t ring = contact; ring < shape.mouth_rings.size(); ++ring) {
-    for (int i : shape.mouth_rings[ring]) maps["flesh"][static_cast<std::size_t>(i)] *= 0.6;
+    for (int i : shape.mouth_rings[ring]) {
+      maps["flesh"][static_cast<std::size_t>(i)] *= 0.6;
+      maps["muscles"][static_cast<std::size_t>(i)] *= 0.6;
+    }
   }
   return maps;
 }

@@ -143,8 +143,7 @@ std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, 
 
 }  // namespace
 
-SceneFiles GenerateHead(const HeadDesign& design) {
-  const HeadShape shape = MakeHeadShape(design);
+SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
   const std::vector<Expression> expressions = FaceExpressions(design, shape);
   const auto joint_weights = FaceWeights(design, shape);
   GlbScene scene;

@@ -37,7 +37,9 @@ int main(int argc, char** argv) {
   bool heads = true;
   for (const auto* design :
        {&kpsa::scenes::FaceDesign(), &kpsa::scenes::BoyDesign(), &kpsa::scenes::AnimalDesign()})
-    heads = WriteAll(folder / design->name, kpsa::scenes::GenerateHead(*design)) && heads;
+    heads = WriteAll(folder / design->name,
+                     kpsa::scenes::GenerateHead(*design, kpsa::scenes::MakeHeadShape(*design))) &&
+            heads;
   const bool written = heads && WriteAll(folder / "hello", kpsa::scenes::GenerateHello()) &&
                        WriteAll(folder / "gi", kpsa::scenes::GenerateRoom()) &&
                        WriteAll(folder / "car", kpsa::scenes::GenerateCar());

@@ -87,7 +87,8 @@ struct HeadDesign {
   int half_columns = 27;
   int even_columns = 13;  // of these, from the middle: even in x, by `column_step` of the half width
   double column_step = 0.058;
-  int crown_wide = 6;  // columns from the middle that meet the crown's front side
+  int relaxations = 24;  // of the grid, and ten more
+  int crown_wide = 6;    // columns from the middle that meet the crown's front side
   int mouth_row = 16, nose_row = 23, eye_row = 31;  // first rows of the blocks that get rings
   int eye_column0 = 3, eye_column1 = 12, mouth_column = 8;
   int brow_column0 = 2, brow_column1 = 13;  // of the curve; seven rows above the eyes' block
@@ -104,7 +105,7 @@ struct HeadDesign {
   double mouth_half_width = 1, mouth_curve = 0.12;                // z falls by that times x squared
   double line_middle = -0.05, line_side = 0.05, line_end = 0.07;  // of the line between the lips
   double upper_height = 0.72, upper_notch = 0.14, lower_height = 0.92;
-  double lip_fullness = 1, mouth_depth = 1;
+  double lip_fullness = 1, mouth_depth = 1, pocket_narrow = 0.10;
   double nostril_depth = 1;
 
   EarDesign ear;

@@ -178,7 +178,7 @@ void HeadBuilder::FinishMouth() {
     set(b + 2, mix(0.66) + n_contact * (0.27 * full * pout));
     const Double3 meet = contact + n_contact * (0.15 * full) + Double3{0, side * 0.008, 0};
     set(b + 3, meet);
-    const double shrink = 1 - 0.10 * std::fabs(s);
+    const double shrink = 1 - design_.pocket_narrow * std::fabs(s);
     set(b + 4, Double3{meet.x * shrink, meet.y + side * 0.012, meet.z} + deep * (0.30 + 0.15 * full));
     set(b + 5,
         Double3{meet.x * shrink * 0.95, meet.y + side * 0.22 * full, meet.z} + deep * (0.95 + 0.15 * full));

@@ -245,7 +245,7 @@ HeadShape HeadBuilder::Build() {
       QuadPair(Grid(r, c), Grid(r, c + 1), Grid(r + 1, c + 1), Grid(r + 1, c));
     }
   }
-  Relax(24);
+  Relax(design_.relaxations);
   FinishMouth();
   FinishNostrils();
   Relax(10);

@@ -10,16 +10,14 @@
 
 #include "io/gltf_import.h"
 #include "scenes/face_model.h"
+#include "tests/scenes/heads.h"
 
 namespace kpsa::scenes {
 namespace {
 
-const HeadShape& Shape() {
-  static const HeadShape shape = MakeHeadShape(FaceDesign());
-  return shape;
-}
+const HeadShape& Shape() { return ShapeOf(FaceDesign()); }
 const SceneFiles& Face() {
-  static const SceneFiles files = GenerateHead(FaceDesign());
+  static const SceneFiles files = GenerateHead(FaceDesign(), Shape());
   return files;
 }
 
@@ -31,8 +29,8 @@ std::string FileBytes(const std::string& path) {
 
 TEST(Scenes, TheCommittedFilesAreWhatTheGeneratorWrites) {
   for (const auto& [folder, files] : {std::pair<std::string, SceneFiles>{"face/", Face()},
-                                      {"boy/", GenerateHead(BoyDesign())},
-                                      {"animal/", GenerateHead(AnimalDesign())},
+                                      {"boy/", GenerateHead(BoyDesign(), ShapeOf(BoyDesign()))},
+                                      {"animal/", GenerateHead(AnimalDesign(), ShapeOf(AnimalDesign()))},
                                       {"hello/", GenerateHello()},
                                       {"gi/", GenerateRoom()},
                                       {"car/", GenerateCar()}}) {
