@@ -54,7 +54,8 @@ void AddInitCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<InitFlags>();
   CLI::App* command = AddCommand(
       program, "init", "Write a starter rig for a character",
-      "Controls are ranged by the character's clips; its own deformers are followed by a deltaMush.\n"
+      "Controls are ranged by the character's clips and grouped by part of the body; its own deformers are "
+      "followed by a deltaMush. IK, a cage about the jaw and dual quaternions are suggested in comments.\n"
       "Examples:\n"
       "  kpsa init head.glb\n"
       "  kpsa init characters/head.glb -o rigs/head.yaml",

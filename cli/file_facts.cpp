@@ -6,10 +6,12 @@
 #include <limits>
 #include <map>
 
+#include "cli/acceleration.h"
 #include "cli/common.h"
 #include "cli/output.h"
 #include "io/npz.h"
 #include "io/point_cache.h"
+#include "io/quantity.h"
 #include "io/weights_json.h"
 #include "kpsa/subspace.h"
 #include "kpsa/training_record.h"
@@ -156,11 +158,10 @@ Result<FileFacts> InspectRig(const std::string& path, const std::vector<std::str
   FactTable accelerate{
       "accelerate", {"name", "points", "subspace", ">tolerance", "train clips", "test clips"}, {}};
   for (const Acceleration& a : rig.accelerate) {
-    std::vector<std::string> points;
-    for (const AcceleratedPoints& p : a.points)
-      points.push_back(rig.scene.meshes[p.mesh].name + "@" + rig.scene.meshes[p.mesh].stages[p.stage].name);
-    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(points, ", ")), a.subspace,
-                               LengthText(a.tolerance), fmt::format("{}", fmt::join(a.train_clips, ", ")),
+    const bool colors = !a.points.empty() && a.points[0].colors;
+    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(PointNames(rig, a), ", ")), a.subspace,
+                               colors ? NumberText(a.tolerance) : LengthText(a.tolerance),
+                               fmt::format("{}", fmt::join(a.train_clips, ", ")),
                                fmt::format("{}", fmt::join(a.test_clips, ", "))});
   }
   FactTable files{"files", {"file"}, {}};

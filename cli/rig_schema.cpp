@@ -129,6 +129,7 @@ Json WordSchema(std::string_view word) {
         {"targets"}));
   if (word == "inbetweens") return MapOf(MapOf(Ref("name")));
   if (word == "poses") return MapOf(Numbers(3));
+  if (word == "influences") return {{"type", "string"}};
   if (word == "blendWeights") return OneOrList({{"type", "string"}});
   if (word == "vertices") return Ref("vertices");
   if (word == "places") return {{"type", "array"}, {"items", Numbers(3)}};

@@ -385,6 +385,16 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_GT(bench["speedup"], 1.5);
   Ok({"render", path, "--camera", "front", "--times", "1", "--accelerate", "-o", folder / "three.png"});
   EXPECT_EQ(TemporaryFolder::Read(folder / "three.png").substr(1, 3), "PNG");
+
+  // The entry names the colours, not a mesh; a rig without it takes it from the subspace
+  EXPECT_NE(Ok({"inspect", path}).find("bounced.irradiance"), std::string::npos);
+  const std::size_t entry = rig.find("\naccelerate:");
+  ASSERT_NE(entry, std::string::npos);
+  folder.Write("bare.yaml", rig.substr(0, entry + 1));
+  const Json bare = OkJson({"eval", folder / "bare.yaml", "--kpsa", folder / "gi.kpsa", "--times", "1", "-o",
+                            folder / "bare.npz", "--json"});
+  EXPECT_EQ(bare["accelerated"]["hits"].get<int>() + bare["accelerated"]["misses"].get<int>(), 1)
+      << bare.dump();
 }
 
 }  // namespace
