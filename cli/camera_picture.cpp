@@ -178,7 +178,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
                             evaluator.Get<Double3>(camera + 2 + 2 * l)});
         }
         const Result<PathTracer> tracer =
-            PathTracer::Build(std::as_const(points).view(), triangles, albedo, std::move(lights));
+            PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights);
         if (!tracer.ok()) return tracer.status();
         const Matrix4 world_from_screen = evaluator.Get<Matrix4>(camera);
         CameraImage& image = images[frame];

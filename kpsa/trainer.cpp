@@ -344,7 +344,7 @@ class Trainer {
 
   Result<Subspace> Assemble(const PoseMatrix& poses) {
     const Estimator estimator = options_.mode == EstimatorMode::kPaper ? LeastSquaresEstimator(pca_, cues_)
-                                                                       : MapEstimator(pca_, cues_);
+                                                                       : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
     Eigen::MatrixXd training(cues_.rows(), static_cast<Eigen::Index>(poses.poses()));
     for (std::size_t t = 0; t < poses.poses(); ++t) {
@@ -422,7 +422,7 @@ class Trainer {
       std::size_t column = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         double output_sum = 0;
-        subspace->tiles[m].Reconstruct(scratch.y.span(), buffers[m].view());
+        subspace->tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
         const ConstPointsView p = std::as_const(buffers[m]).view();
         for (std::size_t i = 0; i < p.count; ++i, column += 3) {
           const Double3 d{p.x[i] - static_cast<double>(row[column]),

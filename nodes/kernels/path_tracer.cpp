@@ -45,10 +45,6 @@ std::uint32_t Mixed(std::uint32_t x) {  // a bijection with good avalanche (C. W
   return x ^ x >> 15;
 }
 
-bool HasSize(const DiffuseLight& light) {
-  return light.kind == DiffuseLight::Kind::kArea || light.kind == DiffuseLight::Kind::kBall;
-}
-
 // The pair of dimensions that says where on a light, after those of a path's directions.
 std::uint32_t LightPair(int bounce, std::size_t light) {
   return 64 + static_cast<std::uint32_t>(bounce) + 64 * static_cast<std::uint32_t>(light);
@@ -109,14 +105,15 @@ double SampleNumber(std::uint32_t seed, std::uint32_t sample, std::uint32_t dime
 }
 
 Result<PathTracer> PathTracer::Build(ConstPointsView points, std::span<const Index> triangles,
-                                     std::span<const float> albedo, std::vector<DiffuseLight> lights,
+                                     std::span<const float> albedo, std::span<const DiffuseLight> lights,
                                      std::span<const std::uint8_t> unseen) {
   Result<RayScene> scene = RayScene::Build(points, triangles);
   if (!scene.ok()) return scene.status();
   if (albedo.size() != triangles.size())
     return Status::Invalid("{} albedo numbers for {} triangles", albedo.size(), triangles.size() / 3);
   PathTracer tracer(std::move(*scene));
-  tracer.lights_ = std::move(lights);
+  tracer.lights_.resize(lights.size());
+  tracer.SetLights(lights);
   tracer.corners_.assign(triangles.begin(), triangles.end());
   if (std::find(unseen.begin(), unseen.end(), 1) != unseen.end()) {
     std::vector<Index> seen;
@@ -150,7 +147,7 @@ Status PathTracer::Update(ConstPointsView points, std::span<const DiffuseLight> 
   KPSA_CHECK_EQ(lights.size(), lights_.size());
   KPSA_RETURN_IF_ERROR(scene_.Update(points));
   if (seen_.has_value()) KPSA_RETURN_IF_ERROR(seen_->Update(points));
-  std::copy(lights.begin(), lights.end(), lights_.begin());
+  SetLights(lights);
   ComputeNormals(points);
   return Status();
 }
@@ -221,19 +218,33 @@ bool PathTracer::Sees(const ShadingPlace& place, Double3 direction, double dista
   return occluded == 0;
 }
 
-Double3 PathTracer::FromLight(const DiffuseLight& light, const ShadingPlace& place, double u,
-                              double v) const {
-  const Double3 shines = UnitOrZero(TransformVector(light.world, {0, 0, -1}));
+void PathTracer::SetLights(std::span<const DiffuseLight> lights) {
+  for (std::size_t l = 0; l < lights.size(); ++l) {
+    const Matrix4& world = lights[l].world;
+    Lamp& lamp = lights_[l];
+    lamp.kind = lights[l].kind;
+    lamp.color = lights[l].color;
+    lamp.at = TransformPoint(world, {});
+    lamp.x = TransformVector(world, {1, 0, 0}), lamp.y = TransformVector(world, {0, 1, 0});
+    lamp.shines = UnitOrZero(TransformVector(world, {0, 0, -1}));
+    lamp.radius = Length(lamp.x);
+    lamp.area = Length(Cross(lamp.x, lamp.y));
+  }
+}
+
+Double3 PathTracer::FromLight(const Lamp& light, const ShadingPlace& place, double u, double v) const {
   if (light.kind == DiffuseLight::Kind::kSun) {
-    const double cosine = -Dot(shines, place.normal);
-    if (!(cosine > 0) || !Sees(place, shines * -1.0, 1e30)) return {};
+    const double cosine = -Dot(light.shines, place.normal);
+    if (!(cosine > 0) || !Sees(place, light.shines * -1.0, 1e30)) return {};
     return light.color * cosine;
   }
-  const bool area = light.kind == DiffuseLight::Kind::kArea, ball = light.kind == DiffuseLight::Kind::kBall;
-  Double3 at = TransformPoint(light.world, area ? Double3{u - 0.5, v - 0.5, 0} : Double3());
-  const Double3 axis = ball ? UnitOrZero(place.position - at) : Double3();
-  if (ball) {
-    const double radius = std::sqrt(u) * Length(TransformVector(light.world, {1, 0, 0}));
+  Double3 at = light.at, axis;
+  if (light.kind == DiffuseLight::Kind::kArea) {
+    at = at + light.x * (u - 0.5) + light.y * (v - 0.5);
+    axis = light.shines;
+  } else if (light.kind == DiffuseLight::Kind::kBall) {
+    axis = UnitOrZero(place.position - at);
+    const double radius = std::sqrt(u) * light.radius;
     double sine, cosine;
     SinCos(2 * kPi * v, &sine, &cosine);
     Double3 s, t;
@@ -245,12 +256,9 @@ Double3 PathTracer::FromLight(const DiffuseLight& light, const ShadingPlace& pla
   if (!(distance > 0)) return {};
   const Double3 direction = way * (1 / distance);
   double strength = Dot(direction, place.normal) / (distance * distance);
-  if (ball) strength *= -Dot(direction, axis);
-  if (area) {
-    const Double3 x = TransformVector(light.world, {1, 0, 0}), y = TransformVector(light.world, {0, 1, 0});
-    strength *= -Dot(direction, shines) * Length(Cross(x, y));
-    if (!(Dot(direction, shines) < 0)) return {};
-  }
+  if (!(strength > 0)) return {};
+  if (light.has_size()) strength *= -Dot(direction, axis);
+  if (light.kind == DiffuseLight::Kind::kArea) strength *= light.area;
   if (!(strength > 0) || !Sees(place, direction, distance)) return {};
   return light.color * strength;
 }
@@ -259,7 +267,7 @@ Double3 PathTracer::Direct(const ShadingPlace& place, std::uint32_t seed, int sa
   Double3 sum;
   if (!place.hit) return sum;
   for (std::size_t l = 0; l < lights_.size(); ++l) {
-    const int count = HasSize(lights_[l]) ? std::max(samples, 1) : 1;
+    const int count = lights_[l].has_size() ? std::max(samples, 1) : 1;
     Double3 light;
     for (int s = 0; s < count; ++s) {
       const NumberPair at = SamplePair(seed, static_cast<std::uint32_t>(s), LightPair(0, l));
@@ -288,7 +296,7 @@ Double3 PathTracer::Indirect(const ShadingPlace& place, const PathOptions& optio
       through = Times(through, next.albedo);
       for (std::size_t l = 0; l < lights_.size(); ++l) {
         NumberPair at;
-        if (HasSize(lights_[l])) at = SamplePair(options.seed, sample, LightPair(bounce, l));
+        if (lights_[l].has_size()) at = SamplePair(options.seed, sample, LightPair(bounce, l));
         const Double3 light = Times(through, FromLight(lights_[l], next, at.u, at.v));
         const double most = std::max({light.x, light.y, light.z});
         sum = sum + (most > largest ? light * (largest / most) : light);

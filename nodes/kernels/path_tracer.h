@@ -57,7 +57,7 @@ class PathTracer {
   // search structure, which allocates. unseen: 1 for triangles that See looks through; empty: none.
   // Errors: those of RayScene::Build; albedo of another length.
   static Result<PathTracer> Build(ConstPointsView points, std::span<const Index> triangles,
-                                  std::span<const float> albedo, std::vector<DiffuseLight> lights,
+                                  std::span<const float> albedo, std::span<const DiffuseLight> lights,
                                   std::span<const std::uint8_t> unseen = {});
   // Moves points and lights, as many as there were; see RayScene::Update.
   Status Update(ConstPointsView points, std::span<const DiffuseLight> lights);
@@ -81,7 +81,15 @@ class PathTracer {
   ShadingPlace First(const RayScene& scene, std::span<const Index> numbers, Double3 origin,
                      Double3 direction) const;
   void ComputeNormals(ConstPointsView points);
-  Double3 FromLight(const DiffuseLight& light, const ShadingPlace& place, double u, double v) const;
+  // What of a light is the same for all places.
+  struct Lamp {
+    DiffuseLight::Kind kind = DiffuseLight::Kind::kPoint;
+    Double3 at, x, y, shines, color;  // x, y: of its frame, with their lengths; shines: unit
+    double radius = 0, area = 0;
+    bool has_size() const { return kind == DiffuseLight::Kind::kArea || kind == DiffuseLight::Kind::kBall; }
+  };
+  void SetLights(std::span<const DiffuseLight> lights);
+  Double3 FromLight(const Lamp& light, const ShadingPlace& place, double u, double v) const;
   bool Sees(const ShadingPlace& place, Double3 direction, double distance) const;
 
   RayScene scene_;
@@ -94,7 +102,7 @@ class PathTracer {
   std::vector<Double3> normals_;         // [triangles] unit; zero where a triangle has no area
   std::vector<Double3> corner_normals_;  // [3 * triangles]
   std::vector<Double3> albedo_;          // [triangles]
-  std::vector<DiffuseLight> lights_;
+  std::vector<Lamp> lights_;
 };
 
 // A number in [0, 1) of a sample's dimension. Dimensions 2k and 2k + 1 are a Sobol sequence with Owen's
