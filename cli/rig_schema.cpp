@@ -228,7 +228,7 @@ std::string RigSchema(const NodeRegistry& registry) {
                 "of bare numbers in this file; m and deg if not given");
   properties["fps"] =
       Described({{"type", "number"}, {"exclusiveMinimum", 0}}, "frames a second; 24 if not given");
-  properties["character"] = Described({{"type", "string"}}, "a .glb or .gltf, relative to this file");
+  properties["character"] = Described({{"type", "string"}}, "a .glb, .gltf or .vrm, relative to this file");
   properties["include"] = Described(files, "other rig files, without `character`");
   properties["plugins"] = Described(files, "shared libraries that add node types");
   properties["weld"] = Described(Ref("flag"), "off: keep vertices apart that a UV seam splits");
@@ -251,7 +251,9 @@ std::string RigSchema(const NodeRegistry& registry) {
        {"tolerance", Ref("number")},
        {"violationRate",
         Described({{"type", {"number", "string"}}, {"minimum", 0}, {"maximum", 1}}, "of frames")},
-       {"train", Closed({{"clips", Ref("clips")}, {"samples", {{"type", "integer"}, {"minimum", 0}}}})},
+       {"train", Closed({{"clips", Ref("clips")}, {"samples", {{"type", "integer"}, {"minimum", 0}}},
+          {"keyPoints", {{"type", "integer"}, {"minimum", 1}}},
+          {"heldOut", {{"type", "integer"}, {"minimum", 20}}}})},
        {"test", Closed({{"clips", Ref("clips")}})}}));
   properties["overrides"] =
       Described(MapOf(true), "plug: value; instead of what was set or connected before");

@@ -19,7 +19,7 @@ bool IsCharacterFile(const std::string& path) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   const std::string extension = std::filesystem::path(lower).extension().string();
-  return extension == ".glb" || extension == ".gltf";
+  return extension == ".glb" || extension == ".gltf" || extension == ".vrm";
 }
 
 // By file, in the order in which they first come up, then by line.

@@ -48,10 +48,13 @@ struct Acceleration {
   std::vector<AcceleratedPoints> points;
   std::optional<NodeId> space;  // a transform; unset: the world
   std::string subspace;         // path, "" where the rig names none
-  double tolerance = 0;         // metres; where the rig names none, 1/2000 of the rest pose's diagonal
+  double tolerance = 0;         // metres; where the rig names none, 1/2000 of the rest pose's diagonal;
+                                // of colours in their units, 0.05 where the rig names none
   double violation_rate = 0.01;
   std::vector<std::string> train_clips, test_clips;
   std::int64_t train_samples = 0;
+  std::int64_t key_points = 0;  // that are measured, at least; 0: the trainer's number
+  std::int64_t held_out = 0;    // poses that the tolerance is calibrated with; 0: the trainer's number
   SourceLocation where;
 };
 

@@ -138,8 +138,10 @@ void RigBuild::AddCombination(const Made& made, const YamlNode& key, const YamlN
   }
   for (std::size_t i = 0; i < drivers.size(); ++i)
     edit.Connect(drivers[i], edit.Plug(node, "inputWeight", static_cast<int>(i)));
-  // A clip that plays the combination gives way: it is none of the clip's business
-  const bool clip = IsClipPlug(rig_->scene, graph(), driven);
+  // A clip that plays the combination gives way, and so do VRM's expressions: it is none of their business
+  const Connection* driver = graph().FindConnection(driven);
+  const bool clip = IsClipPlug(rig_->scene, graph(), driven) ||
+                    (driver != nullptr && graph().def(driver->source.node).name == "vrmMorphWeights");
   const PlugRef weight = edit.Plug(node, "outputWeight");
   if (edit.ok()) edit.Check(graph().Connect(weight, driven, clip));
   Fail(key.where(), edit.Take());

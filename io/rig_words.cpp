@@ -55,6 +55,8 @@ const Rule kRules[] = {
     {{"constrained", "the transform whose local matrix it owns"},
      [](const NodeDef& d) { return Has(d, "inMatrix") && Has(d, "outMatrix") && d.name != "splineIk"; }},
     {{"meshes", "the meshes that are lit; all of the character if not given"}, IsIllumination},
+    {{"carried", "lit meshes that move through the picture: light is given at their points, not at their pixels"},
+     IsIllumination},
     {{"camera", "the camera that it looks through"}, IsIllumination},
     {{"lights", "the lights that light up what it sees"}, IsIllumination},
     {{"start", "the first joint of the chain"}, IsChain},

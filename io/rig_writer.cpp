@@ -317,6 +317,7 @@ class Writer {
       }
       if (moves && !(carries_[i] > 0)) idle.push_back(name);
     }
+    WriteExpressions();
     int place = 100;
     for (const CharacterMesh& mesh : rig_.scene.meshes) WriteWeights(mesh, &place);
     std::erase_if(groups_, [](const auto& group) { return group.second.text.empty(); });
@@ -335,6 +336,27 @@ class Writer {
                            InComment(fmt::format("{}", fmt::join(idle, ", "))));
   }
 
+  void WriteExpressions() {
+    if (rig_.scene.expressions.version == 0) return;
+    const int weight = rig_.graph->def(rig_.scene.expressions).FindAttribute("weight");
+    group_ = &groups_[99];
+    group_->title = "Expressions";
+    for (std::size_t e = 0; e < character_.expressions.size(); ++e) {
+      if (character_.expressions[e].binds.empty()) continue;
+      AddElement(rig_.graph->name(rig_.scene.expressions), "weight", character_.expressions[e].name,
+                 {rig_.scene.expressions, weight, static_cast<int>(e), -1}, {0, 1});
+    }
+  }
+
+  // Whether expressions move the target, which is then no control of its own.
+  bool IsExpressed(const CharacterMesh& mesh, std::size_t target) const {
+    if (mesh.morph_weights.version == 0) return false;
+    const int targets = rig_.graph->def(mesh.morph_weights).FindAttribute("targets");
+    const auto& list =
+        rig_.graph->FindValue({mesh.morph_weights, targets, -1, -1})->get<std::vector<std::int64_t>>();
+    return std::find(list.begin(), list.end(), static_cast<std::int64_t>(target)) != list.end();
+  }
+
   // By its name, or where that names something else, by its number.
   void AddElement(const std::string& node, const std::string& array, const std::string& name,
                   const PlugRef& plug, MotionRange range) {
@@ -348,13 +370,14 @@ class Writer {
     const int first = *place;
     *place += 3;  // sides
     if (mesh.geometry.targets == nullptr) return;
-    const int weight = rig_.graph->def(mesh.blend_shape).FindAttribute("weight");
+    const int weight = rig_.graph->def(mesh.weights_node()).FindAttribute("weight");
     const auto& targets = mesh.geometry.targets->targets();
     std::vector<MotionRange> ranges = motions_[mesh.gltf_node].weights;
-    if (ranges.empty()) ranges.assign(targets.size(), {0, 1});  // no clip moves any
+    const bool still = ranges.empty();  // no clip moves any
+    if (still) ranges.assign(targets.size(), {0, 1});
     for (std::size_t k = 0; k < targets.size() && k < ranges.size(); ++k) {
-      if (ranges[k].size() < 0.01) continue;
-      const PlugRef plug{mesh.blend_shape, weight, static_cast<int>(k), -1};
+      if (ranges[k].size() < 0.01 || (still && IsExpressed(mesh, k))) continue;
+      const PlugRef plug{mesh.weights_node(), weight, static_cast<int>(k), -1};
       const BodySide side = SideOfName(targets[k].name);
       group_ = &groups_[first + static_cast<int>(side)];
       group_->title = Title("Shapes of " + mesh.name, side);

@@ -368,11 +368,17 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   };
   replace("room.glb", KPSA_SCENES_DIR "/gi/room.glb");
   replace("width: 400, height: 400, samples: 16", "width: 20, height: 20, samples: 8");
+  replace("samples: 150, keyPoints: 200, heldOut: 60", "samples: 40, keyPoints: 30");
+  folder.Write("carried.yaml", rig);
+  Ok({"render", folder / "carried.yaml", "--camera", "front", "--times", "1", "-o", folder / "carried.png"});
+  replace("carried: [figure], ", "");
+  replace(", \"bounced.pointIrradiance[figure]\"", "");
   folder.Write("gi.yaml", rig);
   const std::string path = folder / "gi.yaml";
   Ok({"render", path, "--camera", "front", "--times", "1", "-o", folder / "all.png"});
   Ok({"render", path, "--camera", "front", "--times", "1", "--layer", "direct", "-o", folder / "direct.png"});
   EXPECT_NE(TemporaryFolder::Read(folder / "all.png"), TemporaryFolder::Read(folder / "direct.png"));
+  EXPECT_NE(TemporaryFolder::Read(folder / "all.png"), TemporaryFolder::Read(folder / "carried.png"));
   EXPECT_EQ(RunKpsa({"render", path, "--camera", "fron", "-o", folder / "no.png"}).exit_code, 2);
   EXPECT_EQ(RunKpsa({"render", path, "--exposure", "2", "-o", folder / "no.png"}).exit_code, 2);
 
@@ -383,7 +389,28 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_GT(bench["error"]["rms"], 0.0);
   EXPECT_LT(bench["error"]["rms"], bench["motion"]["rms"]);
   EXPECT_GT(bench["speedup"], 1.5);
+  EXPECT_EQ(bench["units"], "light");
   Ok({"render", path, "--camera", "front", "--times", "1", "--accelerate", "-o", folder / "three.png"});
+
+  // On the test clip, with a tolerance that keeps most of the motion: hits, and what they are wrong by
+  const Json held_out = Json::parse(Ok({"bench", path, "--runs", "1", "--tolerance", "0.12", "--json"}));
+  EXPECT_GT(held_out["hit_rate"], 0.5);
+  EXPECT_LE(held_out["violation_rate"], 0.1);
+  for (const Json& frame : held_out["per_frame"]) {
+    EXPECT_LT(frame["rms"], 0.2);
+  }
+  const std::string text = Ok({"bench", path, "--runs", "1", "--frames", "0:20:10", "--per-frame"});
+  EXPECT_NE(text.find("an RMS of 0.08"), std::string::npos) << text;
+  EXPECT_EQ(text.find(" m;"), std::string::npos) << text;  // no metres
+  // A lamp where it never was: all frames are rendered fully, and the lamp is named
+  const std::vector<std::string> far = {"bench", path, "--runs", "1", "--frames", "0:20:10", "--set",
+                                        "lampArm.rotateZ=80"};
+  EXPECT_NE(Ok(far).find("lampArm.matrix is outside its trained range"), std::string::npos);
+  std::vector<std::string> as_json = far;
+  as_json.push_back("--json");
+  const Json full = Json::parse(Ok(as_json));
+  EXPECT_EQ(full["hit_rate"], 0.0);
+  EXPECT_EQ(full["error"]["max"], 0.0);
   EXPECT_EQ(TemporaryFolder::Read(folder / "three.png").substr(1, 3), "PNG");
 
   // Commands that look into a rig see the subspace that stands in for the light
