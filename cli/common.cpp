@@ -29,7 +29,7 @@ void OnInterrupt(int) {
 }  // namespace
 
 void AddRigFlags(CLI::App* command, Flags* flags) {
-  AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf)");
+  AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf, .vrm)");
   AddRepeated(command, "--set", "PLUG=VALUE", &flags->sets,
               "plug=value in the rig's units, as in jaw.rotateX=-20; may be repeated");
   AddOption(command, "--pose", "FILE", &flags->pose, "a pose file: plugs and their values");

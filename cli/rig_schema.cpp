@@ -129,6 +129,7 @@ Json WordSchema(std::string_view word) {
         {"targets"}));
   if (word == "inbetweens") return MapOf(MapOf(Ref("name")));
   if (word == "poses") return MapOf(Numbers(3));
+  if (word == "influences") return {{"type", "string"}};
   if (word == "blendWeights") return OneOrList({{"type", "string"}});
   if (word == "vertices") return Ref("vertices");
   if (word == "places") return {{"type", "array"}, {"items", Numbers(3)}};
@@ -227,7 +228,7 @@ std::string RigSchema(const NodeRegistry& registry) {
                 "of bare numbers in this file; m and deg if not given");
   properties["fps"] =
       Described({{"type", "number"}, {"exclusiveMinimum", 0}}, "frames a second; 24 if not given");
-  properties["character"] = Described({{"type", "string"}}, "a .glb or .gltf, relative to this file");
+  properties["character"] = Described({{"type", "string"}}, "a .glb, .gltf or .vrm, relative to this file");
   properties["include"] = Described(files, "other rig files, without `character`");
   properties["plugins"] = Described(files, "shared libraries that add node types");
   properties["weld"] = Described(Ref("flag"), "off: keep vertices apart that a UV seam splits");

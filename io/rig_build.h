@@ -83,6 +83,7 @@ class RigBuild {
   bool FindTarget(const Made& made, const YamlNode& at, const std::string& name, PlugRef* weight);
   void SetTargets(Made* made);
   void SetBlendWeights(Made* made);
+  void SetInfluences(Made* made);
 
   // rig_places.cpp: parents, handles, curves
   void AddCurves();
@@ -169,6 +170,8 @@ class RigBuild {
 
   // rig_members.cpp: members, weights
   void SetWeights(Made* made);
+  void NoteWeights(const Made& made, const RigAttribute& key, const std::string& geometry,
+                   const std::string& path = "", const std::string& map = "");
   const Geometry* GeometryOf(const Made& made, const WeightFile& file) const;
   bool AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of,
                   std::vector<float>* weights);
@@ -180,6 +183,8 @@ class RigBuild {
                       std::vector<std::vector<float>>* weights);
   bool FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
                const NamedWeights** map, const Geometry** of);
+  bool FindGeometry(const YamlNode& reference, const Made& made, const WeightFile& file,
+                    const std::string& path, const Geometry** of);
   std::vector<float> ByPoint(const WeightFile& file, const NamedWeights& map, const Geometry& of) const;
   const WeightFile* FindWeightFile(const YamlNode& reference, const std::string& path);
   Index VertexCount(const Geometry& of) const;

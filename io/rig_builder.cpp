@@ -19,7 +19,7 @@ bool IsCharacterFile(const std::string& path) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   const std::string extension = std::filesystem::path(lower).extension().string();
-  return extension == ".glb" || extension == ".gltf";
+  return extension == ".glb" || extension == ".gltf" || extension == ".vrm";
 }
 
 // By file, in the order in which they first come up, then by line.
@@ -86,6 +86,8 @@ void RigBuild::Run() {
   AddClips();
   ResolveScopes();
   ApplySpecialOverrides();
+  for (Made& made : own_made_) SetInfluences(&made);
+  rig_->rest_diagonal = RestDiagonal(rig_->scene, rest_);
   AddNodes();
   for (Made& made : made_) {
     if (!errors_->full()) ReadAttributes(&made);
@@ -187,7 +189,6 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   rig.scene = std::move(*scene);
 
   RestPose rest(*rig.character, rig.scene);
-  rig.rest_diagonal = RestDiagonal(rig.scene, &rest);
   RigBuild(&file, &rig, &rest, &errors).Run();
   if (!errors.ok()) return InOrder(errors.Take());
   if (own_clip) KPSA_RETURN_IF_ERROR(SetClip(&rig, *options.clip));

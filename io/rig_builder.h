@@ -58,6 +58,20 @@ struct Acceleration {
   SourceLocation where;
 };
 
+// A key of the rig that says something of a deformer's weights.
+struct WeightSource {
+  NodeId deformer;
+  std::string key;  // weights, members, falloff, blendWeights, influences
+  SourceLocation where;
+  std::string geometry;   // the mesh's name in outputs; "": all that it deforms
+  std::string path, map;  // of a weight file; "": the key names none
+  bool operator==(const WeightSource& other) const {
+    return deformer == other.deformer && key == other.key && where.file == other.where.file &&
+           where.line == other.where.line && where.column == other.where.column &&
+           geometry == other.geometry && path == other.path && map == other.map;
+  }
+};
+
 struct Rig {
   std::string path;
   std::shared_ptr<const gltf::Character> character;
@@ -70,6 +84,7 @@ struct Rig {
   std::vector<std::string> files;                     // all that were read
   std::vector<std::string> notes;                     // what may surprise, one line each
   std::map<std::string, SourceLocation> node_places;  // where the rig's own nodes are written, by name
+  std::vector<WeightSource> weights;                  // in the order of the deformers
   std::vector<PlugRef> pinned;                        // plugs that clips leave alone: overridden or set
   double rest_diagonal = 0;                           // metres, of the bounding box of all meshes at rest
 };

@@ -50,6 +50,8 @@ const Rule kRules[] = {
     {{"inbetweens", "other targets that a target goes through"}, IsBlendShape},
     {{"blendWeights", "a weight map of dual quaternions"},
      [](const NodeDef& d) { return d.name == "skinCluster"; }},
+    {{"influences", "a weight file with a map for each joint, instead of the character's own weights"},
+     [](const NodeDef& d) { return d.name == "skinCluster"; }},
     {{"constrained", "the transform whose local matrix it owns"},
      [](const NodeDef& d) { return Has(d, "inMatrix") && Has(d, "outMatrix") && d.name != "splineIk"; }},
     {{"meshes", "the meshes that are lit; all of the character if not given"}, IsIllumination},

@@ -35,6 +35,8 @@ void AddStandardNodes(NodeRegistry& registry) {
                     AddMatrixNodes,
                     AddSelectionNodes,
                     AddConstraintNodes,
+                    AddVrmConstraintNodes,
+                    AddVrmExpressionNodes,
                     AddIkNodes,
                     AddSpaceSwitchNode,
                     AddSplineIkNode,

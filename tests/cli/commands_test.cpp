@@ -411,6 +411,16 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_EQ(full["hit_rate"], 0.0);
   EXPECT_EQ(full["error"]["max"], 0.0);
   EXPECT_EQ(TemporaryFolder::Read(folder / "three.png").substr(1, 3), "PNG");
+
+  // The entry names the colours, not a mesh; a rig without it takes it from the subspace
+  EXPECT_NE(Ok({"inspect", path}).find("bounced.irradiance"), std::string::npos);
+  const std::size_t entry = rig.find("\naccelerate:");
+  ASSERT_NE(entry, std::string::npos);
+  folder.Write("bare.yaml", rig.substr(0, entry + 1));
+  const Json bare = OkJson({"eval", folder / "bare.yaml", "--kpsa", folder / "gi.kpsa", "--times", "1", "-o",
+                            folder / "bare.npz", "--json"});
+  EXPECT_EQ(bare["accelerated"]["hits"].get<int>() + bare["accelerated"]["misses"].get<int>(), 1)
+      << bare.dump();
 }
 
 }  // namespace
