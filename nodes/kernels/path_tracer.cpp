@@ -27,13 +27,13 @@ void Frame(Double3 n, Double3* s, Double3* t) {
   *t = {b, sign + n.y * n.y * a, -n.y};
 }
 
-// Cosine-weighted about n (Malley's method).
-Double3 CosineDirection(Double3 n, double u, double v) {
+// Cosine-weighted about n (Malley's method); v counts from `along`, where that is not zero.
+Double3 CosineDirection(Double3 n, Double3 along, double u, double v) {
   const double radius = std::sqrt(u), height = std::sqrt(std::max(0.0, 1 - u));
   double sine, cosine;
   SinCos(2 * kPi * v, &sine, &cosine);
-  Double3 s, t;
-  Frame(n, &s, &t);
+  Double3 s = UnitOrZero(along - n * Dot(n, along)), t = Cross(n, s);
+  if (!(Length(s) > 0)) Frame(n, &s, &t);
   return s * (radius * cosine) + t * (radius * sine) + n * height;
 }
 
@@ -203,7 +203,11 @@ ShadingPlace PathTracer::OnPoint(Index point) const {
   place.position = positions_[point];
   place.hit = Length(place.normal) > 0;
   place.scale = std::max(Length(place.position), 1e-3);
-  if (place.hit) place.triangle = around_[offsets_[point]], place.albedo = albedo_[place.triangle];
+  if (!place.hit) return place;
+  place.triangle = around_[offsets_[point]];
+  place.albedo = albedo_[place.triangle];
+  const Index* corner = &corners_[3 * std::size_t{place.triangle}];
+  place.along = positions_[corner[0] == point ? corner[1] : corner[0]] - place.position;
   return place;
 }
 
@@ -289,7 +293,7 @@ Double3 PathTracer::Indirect(const ShadingPlace& place, const PathOptions& optio
     ShadingPlace from = place;
     for (int bounce = 0; bounce < options.bounces; ++bounce) {
       const NumberPair way = SamplePair(options.seed, sample, static_cast<std::uint32_t>(bounce));
-      const Double3 direction = CosineDirection(from.normal, way.u, way.v);
+      const Double3 direction = CosineDirection(from.normal, from.along, way.u, way.v);
       if (!(Dot(direction, from.face) > 0)) break;
       const ShadingPlace next = Look(from.position + from.face * (kNudge * from.scale), direction);
       if (!next.hit) break;

@@ -38,6 +38,7 @@ struct ShadingPlace {
   Double3 position;  // world, metres
   Double3 normal;    // unit, towards the viewer: smooth over edges of less than 50 degrees
   Double3 face;      // unit, towards the viewer: of the triangle itself
+  Double3 along;     // across which samples turn with the surface (OnPoint), or zero
   Double3 albedo;
   double scale = 0;  // metres: distances below are rounding of the position
   Index triangle = kNoIndex;
