@@ -1,5 +1,6 @@
 // generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face, FOLDER/hello,
-// FOLDER/gi and FOLDER/car. The bytes are the same on every machine; a test compares them with the files of the source tree.
+// FOLDER/gi and FOLDER/car. The bytes are the same on every machine; a test compares them with the files of
+// the source tree.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
