@@ -287,6 +287,14 @@ std::string RigSchema(const NodeRegistry& registry) {
                    {{"type", "array"}, {"items", {{"type", "integer"}}}, {"minItems", 2}, {"maxItems", 2}}}},
                  {"layers"})),
       "clips of the character over each other, for --clip");
+  properties["references"] =
+      Described(MapOf(Closed({{"file", {{"type", "string"}}},
+                              {"translate", Numbers(3)},
+                              {"clip", Described(Ref("name"), "that it plays; its first one if not given")},
+                              {"start", Described({{"type", {"number", "string"}}},
+                                                  "when the clip begins: a frame, or with a suffix (s f)")}},
+                             {"file"})),
+                "other rigs; what they bring is called NAME:node");
   const Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                        {"title", "kpsa rig file, version 1"},
                        {"type", "object"},

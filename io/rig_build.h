@@ -64,7 +64,8 @@ class RigBuild {
 
   // rig_nodes.cpp: nodes, their values, overrides
   void ApplySpecialOverrides();
-  static RigAttribute SpecialOf(const std::string& key, const RigOverride& override_);
+  void InOwnNames(YamlNode* value, int source) const;
+  RigAttribute SpecialOf(const std::string& key, const RigOverride& override_) const;
   void AddNodes();
   void ReadAttributes(Made* made);
   void ReadAttribute(const Made& made, const RigAttribute& attribute, bool overrides);
@@ -95,6 +96,7 @@ class RigBuild {
   bool RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world);
   bool ReadPlace(const YamlNode& node, int source, int depth, Double3* place);
   bool VertexPlaces(const YamlNode& vertices, const YamlNode* mesh, Places* places);
+  bool HangUnderReference(const Made& made, const YamlNode& at);
   Matrix4 LocalAtRest(NodeId transform) const;
 
   // rig_connect.cpp: connections, names
@@ -147,6 +149,7 @@ class RigBuild {
   void BuildMeshStack(const RigDeform& deform, std::size_t mesh, bool any_morphs);
   void BuildPointsStack(const RigDeform& deform);
   bool ResolveStack(const RigDeform& deform, std::size_t mesh, bool any_morphs, std::vector<Stage>* stages);
+  bool IsOwn(NodeId node, const RigString& name);
   Made* FindDeformer(const RigString& name);
   bool AddGeometry(Made* made, Geometry geometry, bool world, const SourceLocation& where);
   PointBufferPtr PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points);
