@@ -107,6 +107,7 @@ void RigBuild::Run() {
   AddConstraints();
   ConnectTime();
   PlaceStagesAtHandles();
+  PlaceFalloffs();
   ConnectPivots();
   FinishOverrides();
   CheckVariants();
