@@ -73,7 +73,14 @@ Settings NeededBy(const std::string& type) {
             {"target", Translation({0.8, 0.2, 0})}};
   if (type.ends_with("Constraint") || type == "spaceSwitch")
     return {{"targetMatrix[0]", Translation({1, 0, 0})}};
-  if (type == "indirectIllumination") return {{"width", 2}, {"height", 2}, {"samples", 1}, {"bounces", 1}};
+  if (type == "indirectIllumination")
+    return {{"width", 2},
+            {"height", 2},
+            {"samples", 1},
+            {"bounces", 1},
+            {"lightKinds", std::vector<std::int64_t>{0}},
+            {"lightMatrix[0]", Translation({0, 0, 2})},
+            {"lightColor[0]", Double3{1, 1, 1}}};
   return {};
 }
 
