@@ -120,7 +120,7 @@ Json WordSchema(std::string_view word) {
   if (word == "members") return Ref("members");
   if (word == "weights") return OneOrList({{"type", "string"}});
   if (word == "falloff") return Ref("falloff");
-  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights")
+  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "falloffs")
     return ListOf(Ref("name"));
   if (word == "constrained") return OneOrList(Ref("name"));
   if (word == "combinations")
@@ -207,7 +207,8 @@ Json Definitions(const NodeRegistry& registry) {
                {"proximity"}),
         Closed({{"weights", OneOrList({{"type", "string"}})}}, {"weights"}),
         Closed({{"combine", {{"enum", {"multiply", "max", "add"}}}}, {"of", ListOf(Ref("falloff"))}}, {"of"}),
-        {{"type", "array"}, {"items", Ref("falloff")}}}}};
+        {{"type", "array"}, {"items", Ref("falloff")}},
+        Ref("name")}}};
   defs["clips"] = OneOrList(Ref("name"));
   defs["node"] = {{"type", "object"},
                   {"properties", {{"type", {{"enum", std::move(types)}}}}},

@@ -63,6 +63,7 @@ void RigBuild::Run() {
   AddConstraints();
   ConnectTime();
   PlaceStagesAtHandles();
+  PlaceFalloffs();
   ConnectPivots();
   FinishOverrides();
   CheckVariants();
