@@ -25,7 +25,7 @@ TEST(Car, BothRigsValidateWithoutWarnings) {
   }
 }
 
-TEST(Car, TheTestClipEvaluatesAndMoves) {
+TEST(Car, TheTestClipEvaluates) {
   const TemporaryFolder folder;
   for (const std::string& rig : {kCar, kCarMush}) {
     const ProcessResult run = RunKpsa(

@@ -150,8 +150,8 @@ TEST(Car, ABlinkClosesTheEyeAroundTheEyeball) {
   }
 }
 
-// Nearer to the middle than the shell in every direction that matters: below the deck, behind the bumper.
-TEST(Car, TheCagesLieUnderTheShell) {
+// No cage lies in the shell, or far away from it.
+TEST(Car, TheCagesKeepOffTheShell) {
   for (const CarCage& cage : {MuscleCage(), PanelCage(), FrameCage()}) {
     std::set<int> used;
     for (const auto& q : cage.quads) used.insert(q.begin(), q.end());
