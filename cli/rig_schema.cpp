@@ -251,9 +251,10 @@ std::string RigSchema(const NodeRegistry& registry) {
        {"tolerance", Ref("number")},
        {"violationRate",
         Described({{"type", {"number", "string"}}, {"minimum", 0}, {"maximum", 1}}, "of frames")},
-       {"train", Closed({{"clips", Ref("clips")}, {"samples", {{"type", "integer"}, {"minimum", 0}}},
-          {"keyPoints", {{"type", "integer"}, {"minimum", 1}}},
-          {"heldOut", {{"type", "integer"}, {"minimum", 20}}}})},
+       {"train", Closed({{"clips", Ref("clips")},
+                         {"samples", {{"type", "integer"}, {"minimum", 0}}},
+                         {"keyPoints", {{"type", "integer"}, {"minimum", 1}}},
+                         {"heldOut", {{"type", "integer"}, {"minimum", 20}}}})},
        {"test", Closed({{"clips", Ref("clips")}})}}));
   properties["overrides"] =
       Described(MapOf(true), "plug: value; instead of what was set or connected before");

@@ -37,7 +37,8 @@ struct NoisyPoses {
 
 std::vector<CueRef> SpreadCues(std::size_t count) {
   std::vector<CueRef> cues;
-  for (const Index point : GoldenSpread(NoisyPoses::kPoints, count)) cues.push_back({CueKind::kOutput, point});
+  for (const Index point : GoldenSpread(NoisyPoses::kPoints, count))
+    cues.push_back({CueKind::kOutput, point});
   return cues;
 }
 
