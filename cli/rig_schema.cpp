@@ -120,7 +120,7 @@ Json WordSchema(std::string_view word) {
   if (word == "members") return Ref("members");
   if (word == "weights") return OneOrList({{"type", "string"}});
   if (word == "falloff") return Ref("falloff");
-  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights")
+  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "carried")
     return ListOf(Ref("name"));
   if (word == "constrained") return OneOrList(Ref("name"));
   if (word == "combinations")
