@@ -62,14 +62,8 @@ Result<std::shared_ptr<const Subspace>> LoadSubspace(const Rig& rig, const std::
 
 std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
   std::vector<std::string> names;
-  for (const AcceleratedPoints& points : entry.points) {
-    if (points.colors) {
-      names.push_back(rig.graph->PlugName(points.points));
-      continue;
-    }
-    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
-    names.push_back(mesh.name + "@" + mesh.stages[points.stage].name);
-  }
+  for (const AccelerationTarget::MeshPoints& points : MakeTarget(rig, entry).meshes)
+    names.push_back(points.name);
   return names;
 }
 

@@ -88,6 +88,7 @@ int Main(int argc, char** argv) {
   AddInitCommand(&program, &chosen);
   AddValidateCommand(&program, &chosen);
   AddInspectCommand(&program, &chosen);
+  AddFmtCommand(&program, &chosen);
   AddEvalCommand(&program, &chosen);
   AddGetCommand(&program, &chosen);
   AddRenderCommand(&program, &chosen);

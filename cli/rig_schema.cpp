@@ -120,7 +120,8 @@ Json WordSchema(std::string_view word) {
   if (word == "members") return Ref("members");
   if (word == "weights") return OneOrList({{"type", "string"}});
   if (word == "falloff") return Ref("falloff");
-  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "carried")
+  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "carried" ||
+      word == "falloffs")
     return ListOf(Ref("name"));
   if (word == "constrained") return OneOrList(Ref("name"));
   if (word == "combinations")
@@ -207,7 +208,8 @@ Json Definitions(const NodeRegistry& registry) {
                {"proximity"}),
         Closed({{"weights", OneOrList({{"type", "string"}})}}, {"weights"}),
         Closed({{"combine", {{"enum", {"multiply", "max", "add"}}}}, {"of", ListOf(Ref("falloff"))}}, {"of"}),
-        {{"type", "array"}, {"items", Ref("falloff")}}}}};
+        {{"type", "array"}, {"items", Ref("falloff")}},
+        Ref("name")}}};
   defs["clips"] = OneOrList(Ref("name"));
   defs["node"] = {{"type", "object"},
                   {"properties", {{"type", {{"enum", std::move(types)}}}}},
@@ -288,6 +290,14 @@ std::string RigSchema(const NodeRegistry& registry) {
                    {{"type", "array"}, {"items", {{"type", "integer"}}}, {"minItems", 2}, {"maxItems", 2}}}},
                  {"layers"})),
       "clips of the character over each other, for --clip");
+  properties["references"] =
+      Described(MapOf(Closed({{"file", {{"type", "string"}}},
+                              {"translate", Numbers(3)},
+                              {"clip", Described(Ref("name"), "that it plays; its first one if not given")},
+                              {"start", Described({{"type", {"number", "string"}}},
+                                                  "when the clip begins: a frame, or with a suffix (s f)")}},
+                             {"file"})),
+                "other rigs; what they bring is called NAME:node");
   const Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                        {"title", "kpsa rig file, version 1"},
                        {"type", "object"},

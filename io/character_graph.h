@@ -117,7 +117,11 @@ inline constexpr std::size_t kMaxMorphTargets = 8192;
 // Replaces the clip that plays; none: the rest pose. Plugs that somebody else drives are left alone.
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph);
-// The nodes of a layered clip; *scene is as SetClip leaves it without a clip.
+// Lets a clip, plain or layered, play besides what plays already; it begins at `start` seconds. Nodes that
+// another clip moves are left to that.
+Status AddClip(const gltf::Character& character, std::string_view clip, double start, CharacterGraph* scene,
+               Graph* graph);
+// The nodes of a layered clip.
 Status PlayLayers(const gltf::Character& character, const LayeredClip& clip, CharacterGraph* scene,
                   Graph* graph);
 // Where the clip of a transform goes.

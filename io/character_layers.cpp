@@ -108,7 +108,6 @@ Status PlayLayers(const gltf::Character& character, const LayeredClip& clip, Cha
         writer.AddWeights(mesh, layers.morphs);
     }
   }
-  scene->clip = clip.id;
   return writer.Take();
 }
 

@@ -6,7 +6,7 @@
 namespace kpsa {
 namespace {
 
-constexpr double kLeastDegrees = 0.1;  // smaller motion is noise
+constexpr double kLeastTurn = 0.1;  // smaller motion is noise
 constexpr double kLeastMetres = 1e-6;
 constexpr double kSlack = 0.05;  // of a range: so much beyond another is still within
 
@@ -57,7 +57,7 @@ std::size_t CountBeyond(const std::vector<ClipMotion>& motions, std::size_t clip
     }
     others.weights.resize(std::max(others.weights.size(), motion.weights.size()));
     for (int i = 0; i < 3; ++i) {
-      count += motion.rotate[i].size() >= kLeastDegrees && GoesBeyond(motion.rotate[i], others.rotate[i]);
+      count += motion.rotate[i].size() >= kLeastTurn && GoesBeyond(motion.rotate[i], others.rotate[i]);
       count +=
           motion.translate[i].size() >= kLeastMetres && GoesBeyond(motion.translate[i], others.translate[i]);
     }

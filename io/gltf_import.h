@@ -70,6 +70,7 @@ struct Mesh {
   std::string name;
   std::vector<float> positions;  // 3V, x y z interleaved, mesh-local
   std::vector<float> colors;     // COLOR_0, 3V linear 0 .. 1, for pictures; empty where no primitive has it
+  std::vector<float> uvs;  // TEXCOORD_0, 2V; not a number where a primitive lacks it, empty where all do
   std::vector<Primitive> primitives;
   // Row v: the influences of vertex v from all JOINTS_n/WEIGHTS_n in slot order, without zeros; a joint
   // listed twice is summed. Weights are divided by their sum, as the specification wants them to be

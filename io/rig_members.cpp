@@ -37,6 +37,7 @@ void RigBuild::SetWeights(Made* made) {
   const RigAttribute* members = find("members");
   const RigAttribute* maps = find("weights");
   const RigAttribute* falloff = find("falloff");
+  if (falloff != nullptr && falloff->value.is_scalar()) falloff = nullptr;  // a node: ConnectFalloffs
   if (members == nullptr && maps == nullptr && falloff == nullptr) return;
   for (const RigAttribute* key : {members, falloff}) {
     if (key != nullptr) NoteWeights(*made, *key, "");

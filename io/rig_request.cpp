@@ -7,6 +7,10 @@ namespace kpsa {
 
 void RigBuild::AddControls() {
   std::map<std::tuple<Index, int, int, int>, std::string> seen;
+  for (const Control& control : rig_->controls)
+    seen.emplace(std::make_tuple(control.plug.node.index, control.plug.attribute, control.plug.element,
+                                 control.plug.component),
+                 control.name);
   for (const RigControl& from : file_->controls) {
     if (errors_->full()) return;
     const Result<PlugRef> plug = graph().FindPlug(from.plug.text);
@@ -98,6 +102,11 @@ void RigBuild::AddAccelerations() {
     }
   };
   std::map<std::size_t, SourceLocation> by_mesh;
+  for (const Acceleration& entry : rig_->accelerate) {
+    for (const AcceleratedPoints& points : entry.points) {
+      if (!points.colors) by_mesh.emplace(points.mesh, entry.where);
+    }
+  }
   for (const RigAccelerate& from : file_->accelerate) {
     Acceleration to;
     to.name = from.name;

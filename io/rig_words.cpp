@@ -21,6 +21,11 @@ bool IsChain(const NodeDef& def) {
   return def.name == "ikHandle" || def.name == "splineIk" || def.name == "twistDistribution";
 }
 
+// Deformers, and weight maps of their own.
+bool HasWeights(const NodeDef& def) {
+  return IsDeformer(def) || (Has(def, "weights") && Has(def, "outputWeights"));
+}
+
 struct Rule {
   RigWord word;
   bool (*applies)(const NodeDef&);
@@ -29,9 +34,11 @@ const Rule kRules[] = {
     {{"parent", "the transform that carries it"}, [](const NodeDef& d) { return Has(d, "parentMatrix"); }},
     {{"at", "where it rests: a curve's vertex, a transform, a vertex of the mesh or [x, y, z]"},
      [](const NodeDef& d) { return Has(d, "offsetParentMatrix"); }},
-    {{"members", "the points that it moves"}, IsDeformer},
-    {{"weights", "a weight map, file.json#map, or a list of them"}, IsDeformer},
-    {{"falloff", "1 at a place, 0 at the radius and beyond"}, IsDeformer},
+    {{"members", "the points that it moves"}, HasWeights},
+    {{"weights", "a weight map, file.json#map, or a list of them"}, HasWeights},
+    {{"falloff", "1 at a place, 0 at the radius and beyond, or a falloff node"}, HasWeights},
+    {{"falloffs", "the two falloff nodes that it combines"},
+     [](const NodeDef& d) { return Has(d, "input1") && Has(d, "outputWeights"); }},
     {{"vertices", "control vertices at rest, of the mesh"}, IsCurve},
     {{"mesh", "of the vertices, where the character has several"}, IsCurve},
     {{"places", "control vertices at rest, [x, y, z] in the world"}, IsCurve},

@@ -25,6 +25,8 @@ void AddStandardNodes(NodeRegistry& registry) {
                     AddTensionNode,
                     AddWrapNodes,
                     AddShrinkWrapNode,
+                    AddFalloffNodes,
+                    AddPinNodes,
                     AddSculptNode,
                     AddJiggleNode,
                     AddPoseInterpolatorNode,

@@ -21,6 +21,9 @@ void AddNonLinearNodes(NodeRegistry& registry);         // bend, twist, squash, 
 void AddTensionNode(NodeRegistry& registry);            // tension
 void AddWrapNodes(NodeRegistry& registry);              // wrap, proximityWrap
 void AddShrinkWrapNode(NodeRegistry& registry);         // shrinkWrap
+// sphereFalloff, capsuleFalloff, planeFalloff, proximityFalloff, weightMap, combineFalloff
+void AddFalloffNodes(NodeRegistry& registry);
+void AddPinNodes(NodeRegistry& registry);               // uvPin, follicle
 void AddSculptNode(NodeRegistry& registry);             // sculpt
 void AddPoseInterpolatorNode(NodeRegistry& registry);   // poseInterpolator
 void AddJiggleNode(NodeRegistry& registry);             // jiggle

@@ -412,6 +412,16 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_EQ(full["error"]["max"], 0.0);
   EXPECT_EQ(TemporaryFolder::Read(folder / "three.png").substr(1, 3), "PNG");
 
+  // Commands that look into a rig see the subspace that stands in for the light
+  for (const char* wanted : {"", "bounced.irradiance"}) {
+    std::vector<std::string> words = {"compile", path, "--accelerate", "--json"};
+    if (*wanted != 0) words.insert(words.end(), {"--want", wanted});
+    std::string types;
+    const Json compiled = OkJson(words);
+    for (const Json& node : compiled["nodes"]) types += node["type"].get<std::string>() + " ";
+    EXPECT_NE(types.find("kpsa"), std::string::npos) << wanted << ": " << types;
+  }
+
   // The entry names the colours, not a mesh; a rig without it takes it from the subspace
   EXPECT_NE(Ok({"inspect", path}).find("bounced.irradiance"), std::string::npos);
   const std::size_t entry = rig.find("\naccelerate:");
