@@ -126,10 +126,11 @@ std::string BenchText(const BenchResult& r, const BenchContext& context) {
                       r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
   text += fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}{}\n",
                       100 * static_cast<double>(r.hits) / frames,
-                      100 * static_cast<double>(r.violations) / frames, r.light ? "an RMS of " : "", error(r.tolerance));
+                      100 * static_cast<double>(r.violations) / frames, r.light ? "an RMS of " : "",
+                      error(r.tolerance));
   text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
-                      error(r.error_rms), error(r.error_p99), error(r.error_max),
-                      r.worst_frame, r.worst_clip, error(r.motion_rms), error(r.diagonal));
+                      error(r.error_rms), error(r.error_p99), error(r.error_max), r.worst_frame, r.worst_clip,
+                      error(r.motion_rms), error(r.diagonal));
   text += fmt::format(
       "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
       Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),

@@ -96,7 +96,8 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
       if (rig.scene.meshes[m].points == c.source) view.meshes.push_back(m);
     }
   }
-  const auto& carried = StructuralValue(graph, *illumination, "carriedMeshes").get<std::vector<std::int64_t>>();
+  const auto& carried =
+      StructuralValue(graph, *illumination, "carriedMeshes").get<std::vector<std::int64_t>>();
   for (std::size_t i = 0; i < carried.size(); ++i) {
     view.carried.push_back({{*illumination, def.FindAttribute("pointIrradiance"), static_cast<int>(i), -1},
                             static_cast<std::size_t>(carried[i])});
@@ -139,7 +140,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
 
   std::vector<Index> triangles;
   std::vector<float> albedo;
-  std::vector<Index> carrier;                                          // of each triangle: in view.carried, or none
+  std::vector<Index> carrier;  // of each triangle: in view.carried, or none
   std::vector<Index> first_point(view.meshes.size());
   Index count = 0;
   for (std::size_t i = 0; i < view.meshes.size(); ++i) {

@@ -120,7 +120,8 @@ Json WordSchema(std::string_view word) {
   if (word == "members") return Ref("members");
   if (word == "weights") return OneOrList({{"type", "string"}});
   if (word == "falloff") return Ref("falloff");
-  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "falloffs")
+  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "carried" ||
+      word == "falloffs")
     return ListOf(Ref("name"));
   if (word == "constrained") return OneOrList(Ref("name"));
   if (word == "combinations")
@@ -252,9 +253,10 @@ std::string RigSchema(const NodeRegistry& registry) {
        {"tolerance", Ref("number")},
        {"violationRate",
         Described({{"type", {"number", "string"}}, {"minimum", 0}, {"maximum", 1}}, "of frames")},
-       {"train", Closed({{"clips", Ref("clips")}, {"samples", {{"type", "integer"}, {"minimum", 0}}},
-          {"keyPoints", {{"type", "integer"}, {"minimum", 1}}},
-          {"heldOut", {{"type", "integer"}, {"minimum", 20}}}})},
+       {"train", Closed({{"clips", Ref("clips")},
+                         {"samples", {{"type", "integer"}, {"minimum", 0}}},
+                         {"keyPoints", {{"type", "integer"}, {"minimum", 1}}},
+                         {"heldOut", {{"type", "integer"}, {"minimum", 20}}}})},
        {"test", Closed({{"clips", Ref("clips")}})}}));
   properties["overrides"] =
       Described(MapOf(true), "plug: value; instead of what was set or connected before");

@@ -67,12 +67,12 @@ std::string TrainText(const TrainResult& r) {
   text += fmt::format("trained on {} of {} and {}\n", Plural(r.record.clip_poses, "frame"),
                       r.record.clips.empty() ? "no clip" : fmt::format("{}", fmt::join(r.record.clips, ", ")),
                       Plural(r.record.sampled_poses, "sampled pose"));
-  text += fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n",
-                      Plural(r.record.calibration_poses, "pose"), error(r.record.held_out_rms),
-                      error(r.record.held_out_max), error(r.record.motion_rms));
+  text +=
+      fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
+                  error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
   text += fmt::format("calibrated for {}{} in {:.3g} % of poses: {:.1f} % of held-out poses hit\n",
-                      light ? "an RMS of " : "", error(r.subspace->tolerance), 100 * (1 - r.calibration.alpha),
-                      100 * r.calibration.hit_rate);
+                      light ? "an RMS of " : "", error(r.subspace->tolerance),
+                      100 * (1 - r.calibration.alpha), 100 * r.calibration.hit_rate);
   if (r.check.poses > 0) {
     text += fmt::format(
         "tried on {} of the controls: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "

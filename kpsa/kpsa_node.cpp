@@ -287,7 +287,8 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
   }
   const std::size_t padded = subspace.soft_cache.padded_rows();
   // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles) and g
-  const std::size_t scratch = std::max({whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())), 3 * padded});
+  const std::size_t scratch = std::max(
+      {whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())), 3 * padded});
   const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 +
                             (padded + (subspace.latent.empty() ? 0 : subspace.tile_inputs())) * sizeof(float);
   return BoundKernel{std::make_shared<const KpsaKernel>(std::move(kernel)), scratch, state};

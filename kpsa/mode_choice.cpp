@@ -37,10 +37,11 @@ Eigen::Index ChooseModeCount(const Pca& pca, std::span<const CueRef> cues, const
     const Eigen::MatrixXd cp = c * variances.head(m).asDiagonal();
     Eigen::MatrixXd covariance = Multiply(cp, c.transpose());
     for (Eigen::Index row = 0; row < set.rows(); ++row) {
-      const Eigen::Index rest = pca.mode_count() - m;  // of the modes; what all leave over is in the set's noise
-      const double left = (set.loadings.row(row).tail(rest).array().square() *
-                           variances.tail(rest).array().transpose())
-                              .sum();
+      const Eigen::Index rest =
+          pca.mode_count() - m;  // of the modes; what all leave over is in the set's noise
+      const double left =
+          (set.loadings.row(row).tail(rest).array().square() * variances.tail(rest).array().transpose())
+              .sum();
       covariance(row, row) += HonestResidual(left + set.noise[row], pca.poses, m);
     }
     const Eigen::MatrixXd p = cp.transpose() * covariance.llt().solve(y);  // [m x poses]

@@ -122,8 +122,8 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   for (const SubspaceOutput& output : s.outputs) {
     const auto rows = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
     KPSA_CHECK_LE(first + rows, maps.rows());
-    s.tiles.push_back(BuildTiles(maps.middleRows(first, rows), pca.mean.segment(first, rows),
-                                 s.components, inputs, options));
+    s.tiles.push_back(BuildTiles(maps.middleRows(first, rows), pca.mean.segment(first, rows), s.components,
+                                 inputs, options));
     first += rows;
   }
   KPSA_CHECK_EQ(first, maps.rows());

@@ -51,15 +51,15 @@ struct Subspace {
       calibration;  // held-out poses; the threshold follows from a tolerance (Calibrate)
   double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
   std::vector<TileMap> tiles;                                       // [outputs]
-  // Empty, and tiles read y; or, where all points depend on all cues (light), Q [M x r], column by column, and
-  // tiles read z = Q y.
+  // Empty, and tiles read y; or, where all points depend on all cues (light), Q [M x r], column by column,
+  // and tiles read z = Q y.
   std::vector<float> latent;
-  std::vector<TrainedRange> ranges;                                 // every varying plug upstream
+  std::vector<TrainedRange> ranges;  // every varying plug upstream
   bool of_light() const { return units == kLightUnits; }
-  std::string rig_hash;  // what it was trained on (KPSA.md, section 3)
-  std::string units = "m";  // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
-  std::string space;                                    // "" world or mesh space, else the joint
-  std::string training = "{}";                          // JSON: summary of the training, shown by `inspect`
+  std::string rig_hash;         // what it was trained on (KPSA.md, section 3)
+  std::string units = "m";      // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
+  std::string space;            // "" world or mesh space, else the joint
+  std::string training = "{}";  // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
 };
@@ -67,8 +67,9 @@ struct Subspace {
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
 Status ValidateSubspace(const Subspace& subspace);
 
-// Tiles and SoftCache of a trained estimator (without its gain: by latent coordinates); rows of the PCA's outputs are split over `outputs`.
-// training: y of the training poses [r x T]. The caller fills cues, calibration, ranges and names.
+// Tiles and SoftCache of a trained estimator (without its gain: by latent coordinates); rows of the PCA's
+// outputs are split over `outputs`. training: y of the training poses [r x T]. The caller fills cues,
+// calibration, ranges and names.
 Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                       const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
                       const TileOptions& options);

@@ -49,8 +49,7 @@ class TileFactorer {
     if (samples.size() > 0) moved_ = Multiply(gain, samples);
     // Directions of the motion, rare ones included: what is dropped costs a hundredth of the budget, and in
     // any one sample a tenth of the largest error
-    Eigen::MatrixXd gram =
-        Multiply(GemmOperand::Dense(motion_), GemmOperand::Dense(gain).Transposed());
+    Eigen::MatrixXd gram = Multiply(GemmOperand::Dense(motion_), GemmOperand::Dense(gain).Transposed());
     total_ = gram.trace();
     if (moved_.size() > 0 && std::isfinite(max_budget_))
       gram += budget_ / (max_budget_ * max_budget_) * (moved_ * moved_.transpose());

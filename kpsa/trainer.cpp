@@ -282,7 +282,8 @@ class Trainer {
       cues.push_back({CueKind::kOutput, point});
     for (Index s = 0; s < layout_.scalars; ++s) cues.push_back({CueKind::kScalar, s});
     pca_ = TruncatedPca(pca_, ChooseModeCount(pca_, cues, noise_, *judges));
-    for (double& residual : pca_.row_residual) residual = HonestResidual(residual, pca_.poses, pca_.mode_count());
+    for (double& residual : pca_.row_residual)
+      residual = HonestResidual(residual, pca_.poses, pca_.mode_count());
   }
 
   Status FindModes(PoseMatrix* poses) {
@@ -343,8 +344,9 @@ class Trainer {
   }
 
   Result<Subspace> Assemble(const PoseMatrix& poses) {
-    const Estimator estimator = options_.mode == EstimatorMode::kPaper ? LeastSquaresEstimator(pca_, cues_)
-                                                                       : MapEstimator(pca_, cues_, !of_light());
+    const Estimator estimator = options_.mode == EstimatorMode::kPaper
+                                    ? LeastSquaresEstimator(pca_, cues_)
+                                    : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
     Eigen::MatrixXd training(cues_.rows(), static_cast<Eigen::Index>(poses.poses()));
     for (std::size_t t = 0; t < poses.poses(); ++t) {

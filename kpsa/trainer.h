@@ -21,9 +21,9 @@ struct TrainingClip {
 
 struct TrainOptions {
   EstimatorMode mode = EstimatorMode::kMap;
-  int max_modes = 250;     // map; paper mode takes key_points / 2
-  std::size_t rows = 300;  // of measurements: a point takes 3, an entry of a signal 1
-  std::size_t min_points = 16;  // that are measured
+  int max_modes = 250;                // map; paper mode takes key_points / 2
+  std::size_t rows = 300;             // of measurements: a point takes 3, an entry of a signal 1
+  std::size_t min_points = 16;        // that are measured
   std::size_t key_points = 80;        // paper mode
   std::size_t samples = 0;            // of the controls, besides the clips
   std::size_t calibration_poses = 0;  // 0: four times as many as the violation rate wants, 400 to 1,000

@@ -25,8 +25,8 @@ struct Workplace {
   std::vector<DiffuseLight> lights;
 };
 
-// Tracers that no evaluation uses now. Any is as good as any other: all are built of the rest points, and what
-// rays meet depends on that layout and on where the points are, not on where they have been.
+// Tracers that no evaluation uses now. Any is as good as any other: all are built of the rest points, and
+// what rays meet depends on that layout and on where the points are, not on where they have been.
 class Workplaces {
  public:
   std::unique_ptr<Workplace> Take() {
@@ -226,12 +226,14 @@ void AddIlluminationNodes(NodeRegistry& registry) {
                        "pointIrradiance"});
   b.structural("width", 400, {.min = 1, .max = kLargestSide, .doc = "pixels"});
   b.structural("height", 400, {.min = 1, .max = kLargestSide, .doc = "pixels"});
-  b.structural("samples", 16, {.min = 1, .max = 65536, .doc = "paths a shading point; powers of two are even"});
+  b.structural("samples", 16,
+               {.min = 1, .max = 65536, .doc = "paths a shading point; powers of two are even"});
   b.structural("bounces", 2, {.min = 1, .max = 64, .doc = "surfaces a path may meet"});
-  b.structural("largestContribution", 0.0,
-               {.min = 0,
-                .doc = "of one light to one path at one bounce; what is more is scaled down, which makes the mean "
-                       "darker. 0: no limit"});
+  b.structural(
+      "largestContribution", 0.0,
+      {.min = 0,
+       .doc = "of one light to one path at one bounce; what is more is scaled down, which makes the mean "
+              "darker. 0: no limit"});
   b.structural("seed", 0, {.min = 0, .doc = "of the samples"});
   b.out("irradiance", Type::kColors,
         "at each pixel, row by row from the top left; 0 where there is no surface");

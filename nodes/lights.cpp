@@ -1,5 +1,5 @@
-// camera, pointLight, sphereLight, areaLight, sunLight: what a picture is taken with. Each hands on its frame and its
-// strength.
+// camera, pointLight, sphereLight, areaLight, sunLight: what a picture is taken with. Each hands on its frame
+// and its strength.
 #include "base/scalar_math.h"
 #include "nodes/illumination.h"
 #include "nodes/standard_nodes.h"

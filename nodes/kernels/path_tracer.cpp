@@ -85,8 +85,8 @@ struct NumberPair {
 NumberPair SamplePair(std::uint32_t seed, std::uint32_t sample, std::uint32_t pair) {
   const std::uint32_t own = Mixed(seed ^ Mixed(pair + 0x9e3779b9u));
   const std::uint32_t index = Reversed(Scrambled(Reversed(sample), own));
-  // Both numbers are computed in reversed order of bits. The first dimension is the index itself; bit k of the
-  // second is the sum of the index's bits j with an odd binomial (j over k), that is k's bits among j's
+  // Both numbers are computed in reversed order of bits. The first dimension is the index itself; bit k of
+  // the second is the sum of the index's bits j with an odd binomial (j over k), that is k's bits among j's
   std::uint32_t second = index;
   second ^= second >> 1 & 0x55555555u;
   second ^= second >> 2 & 0x33333333u;

@@ -1,10 +1,11 @@
 // Diffuse light in a scene of triangles: what arrives directly from lights, and what arrives after bounces,
 // by path tracing (Kajiya 1986) with next-event estimation.
 //
-// Samples are functions of (seed, sample, dimension): the same arguments give the same light, whatever else is
-// computed, in which order and on how many threads. With one seed in all frames the noise of the estimate does
-// not flicker: what does not move keeps its error. Surfaces are Lambertian and two-sided. Irradiance is that
-// of the side that faces the viewer, in the units of the lights; albedos are reflectances 0 .. 1 a channel.
+// Samples are functions of (seed, sample, dimension): the same arguments give the same light, whatever else
+// is computed, in which order and on how many threads. With one seed in all frames the noise of the estimate
+// does not flicker: what does not move keeps its error. Surfaces are Lambertian and two-sided. Irradiance is
+// that of the side that faces the viewer, in the units of the lights; albedos are reflectances 0 .. 1 a
+// channel.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +25,8 @@ struct DiffuseLight {
     kPoint,  // at the origin of `world`; color is radiant intensity: irradiance at 1 m, facing it
     kArea,   // the square [-0.5, 0.5]^2 of world's x and y, shining along -z; color is radiance
     kSun,    // along world's -z from everywhere; color is irradiance of a surface facing it
-    kBall,   // at the origin of `world`, of the radius of its x: a disk that faces what it lights; color as of
-             // a point, so that nothing near it gets more than 2 / radius^2 of it
+    kBall,  // at the origin of `world`, of the radius of its x: a disk that faces what it lights; color as of
+            // a point, so that nothing near it gets more than 2 / radius^2 of it
   };
   Kind kind = Kind::kPoint;
   Matrix4 world;
@@ -69,8 +70,8 @@ class PathTracer {
   ShadingPlace See(Double3 origin, Double3 direction) const {
     return seen_.has_value() ? First(*seen_, seen_triangles_, origin, direction) : Look(origin, direction);
   }
-  // A point of the triangles, on the side where they are counter-clockwise; no hit where its triangles have no
-  // area.
+  // A point of the triangles, on the side where they are counter-clockwise; no hit where its triangles have
+  // no area.
   ShadingPlace OnPoint(Index point) const;
   // Irradiance that arrives from lights; `samples` a light that has a size.
   Double3 Direct(const ShadingPlace& place, std::uint32_t seed, int samples) const;
@@ -94,9 +95,9 @@ class PathTracer {
   bool Sees(const ShadingPlace& place, Double3 direction, double distance) const;
 
   RayScene scene_;
-  std::optional<RayScene> seen_;       // without the unseen triangles
-  std::vector<Index> seen_triangles_;  // their numbers
-  std::vector<Index> corners_;         // [3 * triangles]
+  std::optional<RayScene> seen_;         // without the unseen triangles
+  std::vector<Index> seen_triangles_;    // their numbers
+  std::vector<Index> corners_;           // [3 * triangles]
   std::vector<Index> offsets_, around_;  // of each point: corners that are there
   std::vector<Double3> positions_;       // [points]
   std::vector<Double3> faces_;           // [triangles] normals of the length of twice the area
@@ -107,8 +108,8 @@ class PathTracer {
 };
 
 // A number in [0, 1) of a sample's dimension. Dimensions 2k and 2k + 1 are a Sobol sequence with Owen's
-// scrambling, in an order of its own (Burley 2020, JCGT 9.4): each pair is even over the first 2^n samples, for
-// every n.
+// scrambling, in an order of its own (Burley 2020, JCGT 9.4): each pair is even over the first 2^n samples,
+// for every n.
 double SampleNumber(std::uint32_t seed, std::uint32_t sample, std::uint32_t dimension);
 
 }  // namespace kpsa

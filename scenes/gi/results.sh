@@ -1,6 +1,6 @@
 #!/bin/sh
 # Light after bounces, learnt and measured: trains scenes/gi/gi.yaml, prints the table of its test clip frame by frame, and writes
-# pictures (full, accelerated, error) of four of its frames. From the project's root, after the build: sh scenes/gi/results.sh
+# pictures (full, accelerated, error) of three of its frames. From the project's root, after the build: sh scenes/gi/results.sh
 # [kpsa] [folder]
 set -e
 kpsa=${1:-build/kpsa}

@@ -402,8 +402,8 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_NE(text.find("an RMS of 0.08"), std::string::npos) << text;
   EXPECT_EQ(text.find(" m;"), std::string::npos) << text;  // no metres
   // A lamp where it never was: all frames are rendered fully, and the lamp is named
-  const std::vector<std::string> far = {"bench", path, "--runs", "1", "--frames", "0:20:10", "--set",
-                                        "lampArm.rotateZ=80"};
+  const std::vector<std::string> far = {"bench",    path,      "--runs", "1",
+                                        "--frames", "0:20:10", "--set",  "lampArm.rotateZ=80"};
   EXPECT_NE(Ok(far).find("lamp.outMatrix is outside its trained range"), std::string::npos);
   std::vector<std::string> as_json = far;
   as_json.push_back("--json");

@@ -37,7 +37,8 @@ struct NoisyPoses {
 
 std::vector<CueRef> SpreadCues(std::size_t count) {
   std::vector<CueRef> cues;
-  for (const Index point : GoldenSpread(NoisyPoses::kPoints, count)) cues.push_back({CueKind::kOutput, point});
+  for (const Index point : GoldenSpread(NoisyPoses::kPoints, count))
+    cues.push_back({CueKind::kOutput, point});
   return cues;
 }
 
@@ -85,7 +86,7 @@ TEST(ModeChoice, SpreadsOverRowsAndColumns) {
   ASSERT_EQ(points.size(), 200u);
   std::vector<int> rows(8), columns(8);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (i > 0) EXPECT_LT(points[i - 1], points[i]);
+    EXPECT_TRUE(i == 0 || points[i - 1] < points[i]) << i;
     ++rows[points[i] / 400 / 50], ++columns[points[i] % 400 / 50];
   }
   for (int count : rows) EXPECT_NEAR(count, 25, 3);

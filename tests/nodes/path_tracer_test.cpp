@@ -241,10 +241,12 @@ TEST(PathTracer, MovesWithoutAMemory) {
 
 TEST(PathTracer, SeesThroughWhatIsUnseenAndStandsOnPoints) {
   Triangles t = Floor();
-  t.AddQuad({-1, 1, 1}, {2, 0, 0}, {0, 0, -2}, 0.5f);  // a table above the floor, counter-clockwise from above
+  t.AddQuad({-1, 1, 1}, {2, 0, 0}, {0, 0, -2},
+            0.5f);  // a table above the floor, counter-clockwise from above
   const std::vector<std::uint8_t> unseen = {0, 0, 1, 1};
-  Result<PathTracer> tracer = PathTracer::Build(PointBuffer::FromInterleaved(t.xyz).view(), t.corners, t.albedo,
-                                                std::vector<DiffuseLight>{PointLight({0, 3, 0}, 9)}, unseen);
+  Result<PathTracer> tracer =
+      PathTracer::Build(PointBuffer::FromInterleaved(t.xyz).view(), t.corners, t.albedo,
+                        std::vector<DiffuseLight>{PointLight({0, 3, 0}, 9)}, unseen);
   ASSERT_TRUE(tracer.ok());
   const ShadingPlace table = tracer->Look({0.1, 2, 0.2}, {0, -1, 0}),
                      floor = tracer->See({0.1, 2, 0.2}, {0, -1, 0});
