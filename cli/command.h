@@ -32,5 +32,6 @@ void AddExplainCommand(CLI::App* program, Command* chosen);
 void AddCompareCommand(CLI::App* program, Command* chosen);
 void AddGraphCommand(CLI::App* program, Command* chosen);
 void AddNodesCommand(CLI::App* program, Command* chosen);
+void AddWeightsCommand(CLI::App* program, Command* chosen);
 
 }  // namespace kpsa

@@ -46,6 +46,7 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) 
       out.name = target.within.Inner(rig.graph->PlugName(points.points));
       out.stages.push_back({"colors", points.points, false});
       target.meshes.push_back(std::move(out));
+      target.colors = true;
       continue;
     }
     const CharacterMesh& mesh = rig.scene.meshes[points.mesh];

@@ -26,9 +26,7 @@ class ClipWriter {
 
   void AddTransform(Index gltf_node, const std::shared_ptr<const AnimationKeys>& keys) {
     const NodeId transform = scene_->transforms[gltf_node];
-    const auto input = scene_->clip_inputs.find(transform.index);
-    const PlugRef offset =
-        input != scene_->clip_inputs.end() ? input->second : edit_.Plug(transform, "offsetParentMatrix");
+    const PlugRef offset = ClipInput(*scene_, *graph_, transform);
     if (!edit_.ok() || IsDriven(offset)) return;
     const NodeId node = AddNode("clipTransform", graph_->name(transform) + "_clip", keys);
     if (edit_.ok()) edit_.Connect(edit_.Plug(node, "matrix"), offset);
@@ -37,7 +35,7 @@ class ClipWriter {
   void AddWeights(const CharacterMesh& mesh, const std::shared_ptr<const AnimationKeys>& keys) {
     const NodeId node = AddNode("clipWeights", mesh.name + "_clipWeights", keys);
     for (int k = 0; k < keys->data().weights.components && edit_.ok(); ++k) {
-      const PlugRef weight = edit_.Plug(mesh.blend_shape, "weight", k);
+      const PlugRef weight = edit_.Plug(mesh.weights_node(), "weight", k);
       if (edit_.ok() && !IsDriven(weight)) edit_.Connect(edit_.Plug(node, "output", k), weight);
     }
     Start(node);
@@ -122,6 +120,12 @@ Status AddClip(const gltf::Character& character, std::string_view clip, double s
     }
   }
   return writer.edit().Take();
+}
+
+PlugRef ClipInput(const CharacterGraph& scene, const Graph& graph, NodeId transform) {
+  const auto input = scene.clip_inputs.find(transform.index);
+  if (input != scene.clip_inputs.end()) return input->second;
+  return {transform, graph.def(transform).FindAttribute("offsetParentMatrix"), -1, -1};
 }
 
 bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug) {

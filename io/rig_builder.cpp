@@ -1,8 +1,30 @@
 #include "io/rig_builder.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "io/rig_build.h"
 
 namespace kpsa {
+namespace {
+
+double RestDiagonal(const CharacterGraph& scene, RestPose* rest) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Double3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    for (const Double3& p : rest->WorldPoints(m)) {
+      for (int i = 0; i < 3; ++i) {
+        low[i] = std::min(low[i], p[i]);
+        high[i] = std::max(high[i], p[i]);
+      }
+    }
+  }
+  const double diagonal = Length(high - low);
+  return std::isfinite(diagonal) ? diagonal : 0;
+}
+
+}  // namespace
 
 RigBuild::RigBuild(RigFile* file, Rig* rig, RestPose* rest, YamlErrors* errors)
     : file_(file), rig_(rig), rest_(rest), errors_(errors), stack_of_mesh_(rig->scene.meshes.size()) {
@@ -18,6 +40,8 @@ void RigBuild::Run() {
   AddClips();
   ResolveScopes();
   ApplySpecialOverrides();
+  for (Made& made : own_made_) SetInfluences(&made);
+  rig_->rest_diagonal = RestDiagonal(rig_->scene, rest_);
   AddNodes();
   for (Made& made : made_) {
     if (!errors_->full()) ReadAttributes(&made);
@@ -39,6 +63,7 @@ void RigBuild::Run() {
   AddConstraints();
   ConnectTime();
   PlaceStagesAtHandles();
+  PlaceFalloffs();
   ConnectPivots();
   FinishOverrides();
   CheckVariants();

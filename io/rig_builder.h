@@ -48,10 +48,13 @@ struct Acceleration {
   std::vector<AcceleratedPoints> points;
   std::optional<NodeId> space;  // a transform; unset: the world
   std::string subspace;         // path, "" where the rig names none
-  double tolerance = 0;         // metres; where the rig names none, 1/2000 of the rest pose's diagonal
+  double tolerance = 0;         // metres; where the rig names none, 1/2000 of the rest pose's diagonal;
+                                // of colours in their units, 0.05 where the rig names none
   double violation_rate = 0.01;
   std::vector<std::string> train_clips, test_clips;
   std::int64_t train_samples = 0;
+  std::int64_t key_points = 0;  // that are measured, at least; 0: the trainer's number
+  std::int64_t held_out = 0;    // poses that the tolerance is calibrated with; 0: the trainer's number
   SourceLocation where;
   int reference = -1;  // in Rig::references: whose entry it is; -1: of the rig's own files
 };
@@ -70,6 +73,20 @@ struct PlayedClip {
   double start = 0;  // seconds
 };
 
+// A key of the rig that says something of a deformer's weights.
+struct WeightSource {
+  NodeId deformer;
+  std::string key;  // weights, members, falloff, blendWeights, influences
+  SourceLocation where;
+  std::string geometry;   // the mesh's name in outputs; "": all that it deforms
+  std::string path, map;  // of a weight file; "": the key names none
+  bool operator==(const WeightSource& other) const {
+    return deformer == other.deformer && key == other.key && where.file == other.where.file &&
+           where.line == other.where.line && where.column == other.where.column &&
+           geometry == other.geometry && path == other.path && map == other.map;
+  }
+};
+
 struct Rig {
   std::string path;
   std::shared_ptr<const gltf::Character> character;
@@ -82,6 +99,7 @@ struct Rig {
   std::vector<std::string> files;                     // all that were read
   std::vector<std::string> notes;                     // what may surprise, one line each
   std::map<std::string, SourceLocation> node_places;  // where the rig's own nodes are written, by name
+  std::vector<WeightSource> weights;                  // in the order of the deformers
   std::vector<PlugRef> pinned;                        // plugs that clips leave alone: overridden or set
   double rest_diagonal = 0;                           // metres, of the bounding box of all meshes at rest
   // Several characters: `character` and `scene` are those of all of them, the rig's own first

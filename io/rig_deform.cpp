@@ -33,6 +33,7 @@ void RigBuild::BuildStacks() {
   for (const RigDeform& deform : file_->deform) {
     if (deform.points.has_value()) BuildPointsStack(deform);
   }
+  ConnectFalloffs();
   for (Made& made : made_) {
     SetWeights(&made);
     const bool deforms = graph().def(made.id).FindAttribute("outPoints") >= 0 &&

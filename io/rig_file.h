@@ -84,6 +84,7 @@ struct RigAccelerate {
   double violation_rate = 0.01;     // of frames, 0..1
   std::vector<RigString> train_clips, test_clips;
   std::int64_t train_samples = 0;
+  std::int64_t key_points = 0, held_out = 0;  // 0: the trainer's
 };
 
 struct RigOverride {

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <set>
 #include <tuple>
@@ -22,7 +21,7 @@ bool IsCharacterFile(const std::string& path) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   }
   const std::string extension = std::filesystem::path(lower).extension().string();
-  return extension == ".glb" || extension == ".gltf";
+  return extension == ".glb" || extension == ".gltf" || extension == ".vrm";
 }
 
 // By file, in the order in which they first come up, then by line.
@@ -69,21 +68,6 @@ bool NamesReference(const std::string& variant, const RigFile& file) {
   return std::any_of(file.references.begin(), file.references.end(), [&](const RigReference& reference) {
     return variant.starts_with(reference.name + ":");
   });
-}
-
-double RestDiagonal(const CharacterGraph& scene, RestPose* rest) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Double3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    for (const Double3& p : rest->WorldPoints(m)) {
-      for (int i = 0; i < 3; ++i) {
-        low[i] = std::min(low[i], p[i]);
-        high[i] = std::max(high[i], p[i]);
-      }
-    }
-  }
-  const double diagonal = Length(high - low);
-  return std::isfinite(diagonal) ? diagonal : 0;
 }
 
 // Overrides that a file gives to one that it references, in the latter's names; `sources[i]` has the units
@@ -218,7 +202,6 @@ Result<LoadedRig> Loader::Load(const std::string& path, const std::optional<std:
     if (!errors.ok()) return InOrder(errors.Take());  // without them, names are missing
   }
   RestPose rest(*rig.character, rig.scene);
-  rig.rest_diagonal = RestDiagonal(rig.scene, &rest);
   RigBuild(&file, &rig, &rest, &errors).Run();
   if (!errors.ok()) return InOrder(errors.Take());
   if (given != nullptr) {

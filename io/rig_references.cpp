@@ -149,7 +149,8 @@ void Mover::AddScene() {
     Name(&mesh.name);
     mesh.gltf_node += nodes_;
     for (NodeId* node :
-         {&mesh.transform, &mesh.rest, &mesh.blend_shape, &mesh.skin_cluster, &mesh.transform_geometry})
+         {&mesh.transform, &mesh.rest, &mesh.morph_weights, &mesh.blend_shape, &mesh.skin_cluster,
+          &mesh.transform_geometry})
       *node = Moved(*node);
     for (NodeId& node : mesh.influence_nodes) node = Moved(node);
     for (Stage& stage : mesh.stages) {
@@ -222,6 +223,11 @@ void Mover::AddRig() {
   }
   to.node_places[place_.name] = place_.where;
   for (auto& [name, where] : from.node_places) to.node_places[prefix_ + name] = where;
+  for (WeightSource& source : from.weights) {
+    source.deformer = Moved(source.deformer);
+    if (!source.geometry.empty()) Name(&source.geometry);
+    to.weights.push_back(std::move(source));
+  }
   for (const PlugRef& plug : from.pinned) to.pinned.push_back(Moved(plug));
   for (PlayedClip& clip : from.played) {
     Name(&clip.id);

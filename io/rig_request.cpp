@@ -115,6 +115,8 @@ void RigBuild::AddAccelerations() {
     to.tolerance = from.tolerance.value_or(from.colors.empty() ? rig_->rest_diagonal / 2000 : 0.05);
     to.violation_rate = from.violation_rate;
     to.train_samples = from.train_samples;
+    to.key_points = from.key_points;
+    to.held_out = from.held_out;
     read_clips(from.train_clips, &to.train_clips);
     read_clips(from.test_clips, &to.test_clips);
     if (from.space.has_value()) to.space = FindTransform(from.space->text, from.space->where);
