@@ -49,10 +49,11 @@ Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std
   return entry;
 }
 
-Result<std::shared_ptr<const Subspace>> LoadSubspace(const Rig& rig, const std::string& path) {
+// `rig`: the path of the one that is trained for it.
+Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
-    return Status::Invalid("no such file; kpsa train {} writes it", rig.path).At({path});
+    return Status::Invalid("no such file; kpsa train {} writes it", rig).At({path});
   Result<Subspace> subspace = ReadSubspace(path);
   if (!subspace.ok()) return subspace.status();
   return std::make_shared<const Subspace>(std::move(*subspace));
@@ -115,7 +116,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
                                                        const AccelerationFlags& flags) {
   std::vector<AppliedSubspace> applied;
   if (flags.kpsa.has_value()) {
-    const auto subspace = LoadSubspace(*rig, *flags.kpsa);
+    const auto subspace = LoadSubspace(rig->path, *flags.kpsa);
     if (!subspace.ok()) return subspace.status();
     AppliedSubspace one;
     one.subspace = *subspace;
@@ -139,7 +140,9 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
       if (entry.subspace.empty())
         return Status::Invalid("accelerate: \"{}\" names no subspace file; --kpsa names one", entry.name)
             .At(entry.where);
-      const auto subspace = LoadSubspace(*rig, entry.subspace);
+      const auto subspace = LoadSubspace(
+          entry.reference < 0 ? rig->path : rig->references[static_cast<std::size_t>(entry.reference)].file,
+          entry.subspace);
       if (!subspace.ok()) return subspace.status();
       AppliedSubspace one;
       one.path = entry.subspace;

@@ -74,6 +74,9 @@ TEST_F(TwoHellos, AllCommandsTakeThem) {
     const ProcessResult run = RunKpsa(command);
     EXPECT_EQ(run.exit_code, 0) << command[0] << ": " << run.err;
   }
+  const ProcessResult untrained = RunKpsa({"bench", two()});
+  EXPECT_NE(untrained.err.find("kpsa train " + folder.rig() + " writes it"), std::string::npos)
+      << untrained.err;
   const ProcessResult train = RunKpsa({"train", two(), "--name", "a:column"});
   EXPECT_EQ(train.exit_code, 2);
   EXPECT_NE(train.err.find("accelerate: \"a:column\" is an entry of "), std::string::npos) << train.err;
