@@ -19,7 +19,7 @@ const NodeRig kRigs[] = {
     {"scenes/hello/hello.yaml", "wave", false},    {"scenes/face/face.yaml", "talk", false},
     {"scenes/gi/gi.yaml", "dance", false},         {"tests/rigs/nodes/constraints.yaml", "", true},
     {"tests/rigs/nodes/deformers.yaml", "", true}, {"tests/rigs/nodes/drivers.yaml", "shot", true},
-    {"tests/rigs/nodes/utilities.yaml", "", true},
+    {"tests/rigs/nodes/plate.yaml", "", true},     {"tests/rigs/nodes/utilities.yaml", "", true},
 };
 
 Result<Rig> Open(const NodeRig& of) {
