@@ -37,6 +37,8 @@ void AddStandardNodes(NodeRegistry& registry) {
                     AddMatrixNodes,
                     AddSelectionNodes,
                     AddConstraintNodes,
+                    AddVrmConstraintNodes,
+                    AddVrmExpressionNodes,
                     AddIkNodes,
                     AddSpaceSwitchNode,
                     AddSplineIkNode,
