@@ -334,10 +334,10 @@ TEST_F(RigFalloffs, NodesErrAtTheirLine) {
     return Errors("nodes:\n  c: {type: cluster, falloff: " + falloff + "}\n  s: {type: sphereFalloff}\n" +
                   more + "deform:\n  - {meshes: [cloth], stack: [c]}\n");
   };
-  EXPECT_TRUE(Has(errors("sx"), "t.yaml:4:30: unknown falloff \"sx\" (did you mean \"s\"?)")) << errors("sx");
-  EXPECT_TRUE(Has(errors("c"), "t.yaml:4:30: \"c\" is a cluster, no falloff")) << errors("c");
+  EXPECT_TRUE(Has(errors("sx"), "t.yaml:4:31: unknown falloff \"sx\" (did you mean \"s\"?)")) << errors("sx");
+  EXPECT_TRUE(Has(errors("c"), "t.yaml:4:31: \"c\" is a cluster, no falloff")) << errors("c");
   EXPECT_TRUE(Has(errors("b", "  b: {type: combineFalloff}\n"),
-                  "t.yaml:4:30: \"b\" (combineFalloff): expected two falloff nodes, falloffs: [a, b]"));
+                  "t.yaml:4:31: \"b\" (combineFalloff): expected two falloff nodes, falloffs: [a, b]"));
   EXPECT_TRUE(Has(errors("b", "  b: {type: combineFalloff, falloffs: [s]}\n"), "t.yaml:6:39: \"b\""));
   EXPECT_TRUE(Has(errors("b", "  b: {type: combineFalloff, falloffs: [s, [s]]}\n"),
                   "t.yaml:6:43: expected the name of a falloff node"));

@@ -19,7 +19,7 @@ std::shared_ptr<const Mesh> SmallSheet() {
 std::shared_ptr<const Curve> ACurve() {
   return std::make_shared<const Curve>(std::vector<Double3>{{-1, 0, 0}, {0, 0.2, 0}, {1, 0, 0}}, false);
 }
-std::shared_ptr<const AnimationKeys> Keys() {
+std::shared_ptr<const AnimationKeys> ExampleKeys() {
   AnimationKeys::Data data;
   data.translation.times = data.weights.times = {0, 1};
   data.translation.values = {0, 0, 0, 1, 2, 3};
@@ -34,9 +34,9 @@ Settings NeededBy(const std::string& type) {
   if (type == "mesh") return {{"mesh", SmallSheet()}};
   if (type == "curve") return {{"curve", ACurve()}};
   if (type == "wire") return {{"curve", ACurve()}, {"displacements", PointsOf({0, 0, 1, 0, 0, 1, 0, 0, 1})}};
-  if (type == "clipTransform" || type == "clipWeights") return {{"keys", Keys()}};
+  if (type == "clipTransform" || type == "clipWeights") return {{"keys", ExampleKeys()}};
   if (type == "layeredTransform" || type == "layeredWeights")
-    return {{"keys[0]", Keys()}, {"time[0]", 0.5}, {"additive", std::vector<std::int64_t>{0}}};
+    return {{"keys[0]", ExampleKeys()}, {"time[0]", 0.5}, {"additive", std::vector<std::int64_t>{0}}};
   if (type.starts_with("animCurve"))
     return {{"keyTimes", std::vector<double>{0, 1}}, {"keyValues", std::vector<double>{0, 1}}};
   if (type == "poseInterpolator") return {{"poseAngles", std::vector<double>{0, 0, 0, 1, 0, 0}}};

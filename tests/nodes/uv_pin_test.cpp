@@ -93,7 +93,10 @@ TEST(UvPin, FindsTheTriangleThatHoldsTheCoordinate) {
   RandomFrames random(3);
   const std::vector<Index>& triangles = rig.mesh->data().triangles;
   const std::vector<Double3> points = ToDouble(rig.mesh->data().rest.view());
-  for (int pin = 0; pin < 40; ++pin) rig.Put(pin, random.Number(0, 1), random.Number(0, 1));
+  for (int pin = 0; pin < 40; ++pin) {
+    const double u = random.Number(0, 1), v = random.Number(0, 1);
+    rig.Put(pin, u, v);
+  }
   for (int pin = 0; pin < 40; ++pin) rig.g.want("pin.outputMatrix[" + std::to_string(pin) + "]");
   RandomFrames again(3);
   for (int pin = 0; pin < 40; ++pin) {
@@ -161,7 +164,7 @@ TEST(UvPin, TheFirstOfOverlappingTrianglesCountsAndTheNearestOutside) {
   EXPECT_LT(Apart(PlaceIn(rig.Pin()), {0.25, 0.375, 5}), 1e-12);
   uvs(same, {0, 1, 1, 0, 1, 1});
   rig.Put(0, 2, 0.25);  // outside of both: the edge of the second is nearest
-  EXPECT_LT(Apart(PlaceIn(rig.Pin()), {0.25, 0.75, 5}), 1e-12);
+  EXPECT_LT(Apart(PlaceIn(rig.Pin()), {0.75, 0.25, 5}), 1e-12);
   rig.Put(0, -3, -4);
   EXPECT_LT(Apart(PlaceIn(rig.Pin()), {0, 0, 0}), 1e-12);
 }
