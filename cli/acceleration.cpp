@@ -14,19 +14,6 @@
 namespace kpsa {
 namespace {
 
-std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
-  std::vector<std::string> names;
-  for (const AcceleratedPoints& points : entry.points) {
-    if (points.colors) {
-      names.push_back(rig.graph->PlugName(points.points));
-      continue;
-    }
-    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
-    names.push_back(mesh.name + "@" + mesh.stages[points.stage].name);
-  }
-  return names;
-}
-
 std::vector<std::string> PointNames(const Subspace& subspace) {
   std::vector<std::string> names;
   for (const SubspaceOutput& output : subspace.outputs) names.push_back(output.name);
@@ -38,6 +25,11 @@ Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std
   Acceleration entry;
   entry.name = std::filesystem::path(path).stem().string();
   for (const SubspaceOutput& output : subspace.outputs) {
+    if (const Result<PlugRef> plug = rig.graph->FindPlug(output.name);
+        plug.ok() && rig.graph->PlugType(*plug) == Type::kColors) {
+      entry.points.push_back({0, 0, *plug, true});
+      continue;
+    }
     const Result<MeshStage> found = FindMeshStage(rig, output.name);
     if (!found.ok())
       return Status::Invalid("the subspace is for {}; {}", output.name,
@@ -67,6 +59,13 @@ Result<std::shared_ptr<const Subspace>> LoadSubspace(const Rig& rig, const std::
 }
 
 }  // namespace
+
+std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
+  std::vector<std::string> names;
+  for (const AccelerationTarget::MeshPoints& points : MakeTarget(rig, entry).meshes)
+    names.push_back(points.name);
+  return names;
+}
 
 void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags, bool optional) {
   if (optional) AddSwitch(command, "--accelerate", &flags->accelerate, "with the rig's own subspaces");

@@ -28,6 +28,16 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
                   r.bound_points_ms > 0
                       ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
                       : "");
+  nlohmann::ordered_json per_frame = nlohmann::ordered_json::array();
+  for (const BenchResult::Frame& f : r.per_frame) {
+    per_frame.push_back({{"clip", f.clip},
+                         {"frame", f.number},
+                         {"hit", f.hit},
+                         {"rms", Finite(f.rms)},
+                         {"max", Finite(f.max)},
+                         {"full_ms", f.full_ms},
+                         {"accelerated_ms", f.accelerated_ms}});
+  }
   const nlohmann::ordered_json document = {
       {"schema", "kpsa.bench/1"},
       {"rig", context.rig},
@@ -42,6 +52,7 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
       {"frames", r.frames},
       {"threads", context.options.threads},
       {"runs", context.options.runs},
+      {"units", r.light ? "light" : "m"},
       {"tolerance", r.tolerance},
       {"full",
        {{"ms_per_frame", r.full_ms},
@@ -72,11 +83,24 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
+      {"per_frame", per_frame},
       {"notes", r.notes}};
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
+std::string FramesText(const BenchResult& r) {
+  Table table({"clip", ">frame", "", ">RMS", ">max", ">full ms", ">accelerated ms", ">speedup"});
+  for (const BenchResult::Frame& f : r.per_frame) {
+    table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
+               ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
+               fmt::format("{:.3f}", f.accelerated_ms),
+               fmt::format("{:.1f}x", f.accelerated_ms > 0 ? f.full_ms / f.accelerated_ms : 0)});
+  }
+  return table.Text();
+}
+
 std::string BenchText(const BenchResult& r, const BenchContext& context) {
+  const auto error = [&](double value) { return ErrorText(value, r.light); };
   std::string text;
   const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
   text += fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
@@ -100,12 +124,12 @@ std::string BenchText(const BenchResult& r, const BenchContext& context) {
   text += fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
                       r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
                       r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
-  text += fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}\n",
+  text += fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}{}\n",
                       100 * static_cast<double>(r.hits) / frames,
-                      100 * static_cast<double>(r.violations) / frames, LengthText(r.tolerance));
+                      100 * static_cast<double>(r.violations) / frames, r.light ? "an RMS of " : "", error(r.tolerance));
   text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
-                      LengthText(r.error_rms), LengthText(r.error_p99), LengthText(r.error_max),
-                      r.worst_frame, r.worst_clip, LengthText(r.motion_rms), LengthText(r.diagonal));
+                      error(r.error_rms), error(r.error_p99), error(r.error_max),
+                      r.worst_frame, r.worst_clip, error(r.motion_rms), error(r.diagonal));
   text += fmt::format(
       "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
       Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),

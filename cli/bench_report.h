@@ -16,6 +16,7 @@ struct BenchContext {
 // One object; times in milliseconds, lengths in metres; -1 where an error is not finite.
 std::string BenchJson(const BenchResult& result, const BenchContext& context);
 // For people, with the next command.
+std::string FramesText(const BenchResult& result);  // a table of all frames
 std::string BenchText(const BenchResult& result, const BenchContext& context);
 
 }  // namespace kpsa

@@ -169,7 +169,9 @@ class Bench {
       hit.push_back(verdicts.last_hit());
       const double worst = errors.AddFrame(*full.evaluator, *fast.evaluator);
       // A blended or full miss keeps the tolerance, too, or it counts
-      if (worst > result_.tolerance) ++result_.violations;
+      if ((result_.light ? errors.frame_rms() : worst) > result_.tolerance) ++result_.violations;
+      result_.per_frame.push_back(
+          {rig.scene.clip.value_or(""), f, verdicts.last_hit(), errors.frame_rms(), worst, 0, 0});
       if (worst > result_.error_max)
         result_.error_max = worst, result_.worst_frame = f, result_.worst_clip = rig.scene.clip.value_or("");
     }
@@ -201,6 +203,8 @@ class Bench {
     for (std::size_t f = 0; f < times->size(); ++f) {
       const double a = Median(full.frame_ns[f]), b = Median(fast.frame_ns[f]);
       clip_full += a, clip_fast += b;
+      BenchResult::Frame& frame = result_.per_frame[result_.per_frame.size() - times->size() + f];
+      frame.full_ms = a / 1e6, frame.accelerated_ms = b / 1e6;
       if (hit[f]) sums_.full_hit_ns += a, sums_.accelerated_hit_ns += b;
     }
     sums_.full_ns += clip_full;
@@ -251,6 +255,7 @@ class Bench {
       }
     }
     result_.tolerance = applied.front().tolerance;
+    result_.light = applied.front().subspace->of_light();
     result_.violation_limit = applied.front().violation_rate;
     for (const AppliedSubspace& one : applied) {
       for (const std::string& note : one.notes) result_.notes.push_back(note);

@@ -31,6 +31,14 @@ struct BenchResult {
   std::vector<std::string> notes;
   std::size_t frames = 0, points = 0, output_points = 0, cues = 0, modes = 0;  // points: accelerated
   double tolerance = 0, violation_limit = 0;                                   // of the first subspace
+  bool light = false;  // errors are numbers, and a frame's is its RMS
+  struct Frame {
+    std::string clip;
+    std::size_t number = 0;
+    bool hit = false;
+    double rms = 0, max = 0, full_ms = 0, accelerated_ms = 0;
+  };
+  std::vector<Frame> per_frame;
 
   double full_ms = 0;  // a frame
   std::vector<BenchNode> full_nodes;

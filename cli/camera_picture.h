@@ -17,6 +17,11 @@ namespace kpsa {
 struct CameraView {
   PlugRef world_from_screen;
   std::optional<PlugRef> irradiance;  // of the illumination that looks through the camera
+  struct Carried {
+    PlugRef irradiance;    // at the points of a mesh
+    std::size_t mesh = 0;  // in `meshes`
+  };
+  std::vector<Carried> carried;  // by the illumination
   struct Light {
     DiffuseLight::Kind kind;
     PlugRef matrix, color;
@@ -30,7 +35,8 @@ struct CameraView {
 // use it.
 Result<CameraView> FindCamera(const Rig& rig, const std::string& name);
 // The same view with what subspaces say of its light after bounces.
-CameraView Accelerated(const CameraView& view, const Rig& rig, const std::vector<AppliedSubspace>& applied);
+CameraView AcceleratedView(const CameraView& view, const Rig& rig,
+                           const std::vector<AppliedSubspace>& applied);
 
 // One picture: linear light, 3 numbers a pixel, row by row from the top left.
 struct CameraImage {

@@ -13,6 +13,7 @@ namespace {
 struct BenchFlags : Flags {
   AccelerationFlags acceleration;
   std::optional<std::string> runs;
+  bool per_frame = false;
 };
 
 // The rig's test clips; without them, what the flags choose ("").
@@ -55,6 +56,7 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   result->notes.insert(result->notes.begin(), notes.begin(), notes.end());
   const BenchContext context{flags.file, flags.acceleration.kpsa, options};
   Print(flags.json ? BenchJson(*result, context) : BenchText(*result, context));
+  if (flags.per_frame && !flags.json) Print("\n" + FramesText(*result));
   if (!flags.quiet) {
     for (const std::string& note : result->notes) Say("note: " + note);
   }
@@ -80,6 +82,7 @@ void AddBenchCommand(CLI::App* program, Command* chosen) {
   AddAccelerationFlags(command, &flags->acceleration, false);
   AddOption(command, "--runs", "N", &flags->runs, "timed evaluations of every frame; 5 if not given");
   AddOption(command, "--threads", "N", &flags->threads, "threads of both sides; 1 if not given");
+  AddSwitch(command, "--per-frame", &flags->per_frame, "a line a frame: hit, error, times, speedup");
   AddQuietFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
 }

@@ -118,7 +118,7 @@ Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const Render
         ApplyAcceleration(&rig, compiler, flags.acceleration);
     if (!applied.ok()) return applied.status();
     const Result<std::vector<CameraImage>> fast =
-        EvaluateCamera(rig, compiler, Accelerated(*view, rig, *applied), times, options);
+        EvaluateCamera(rig, compiler, AcceleratedView(*view, rig, *applied), times, options);
     if (!fast.ok()) return fast.status();
     for (std::size_t f = 0; f < times.size(); ++f) {
       const double error_max = 4 * applied->front().tolerance;

@@ -63,6 +63,7 @@ class Random {
 
 // All files of a scene: path below its folder -> bytes.
 using SceneFiles = std::map<std::string, std::string>;
+SceneFiles GenerateCar();
 // A head: NAME.glb, NAME_curves.yaml, w/NAME.json.
 SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape);
 SceneFiles GenerateHello();

@@ -1,6 +1,6 @@
 // generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face, FOLDER/boy,
-// FOLDER/animal, FOLDER/hello and FOLDER/gi. The bytes are the same on every machine; a test compares them
-// with the files of the source tree.
+// FOLDER/animal, FOLDER/car, FOLDER/hello and FOLDER/gi. The bytes are the same on every machine; a test
+// compares them with the files of the source tree.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
                      kpsa::scenes::GenerateHead(*design, kpsa::scenes::MakeHeadShape(*design))) &&
             heads;
   const bool written = heads && WriteAll(folder / "hello", kpsa::scenes::GenerateHello()) &&
-                       WriteAll(folder / "gi", kpsa::scenes::GenerateRoom());
+                       WriteAll(folder / "gi", kpsa::scenes::GenerateRoom()) &&
+                       WriteAll(folder / "car", kpsa::scenes::GenerateCar());
   return written ? 0 : 4;
 }

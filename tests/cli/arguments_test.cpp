@@ -182,7 +182,7 @@ TEST(Arguments, HelpAndFirstMinutes) {
   const ProcessResult help = RunKpsa({"--help"});
   EXPECT_EQ(help.exit_code, 0);
   for (const char* name : {"init", "validate", "inspect", "eval", "get", "render", "train", "bench",
-                           "compile", "profile", "explain", "compare", "graph", "nodes"}) {
+                           "compile", "profile", "explain", "compare", "graph", "nodes", "weights"}) {
     EXPECT_NE(help.out.find(std::string("  ") + name), std::string::npos) << name;
     const ProcessResult one = RunKpsa({name, "--help"});
     EXPECT_EQ(one.exit_code, 0) << name;

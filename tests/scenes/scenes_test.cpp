@@ -32,7 +32,8 @@ TEST(Scenes, TheCommittedFilesAreWhatTheGeneratorWrites) {
                                       {"boy/", GenerateHead(BoyDesign(), ShapeOf(BoyDesign()))},
                                       {"animal/", GenerateHead(AnimalDesign(), ShapeOf(AnimalDesign()))},
                                       {"hello/", GenerateHello()},
-                                      {"gi/", GenerateRoom()}}) {
+                                      {"gi/", GenerateRoom()},
+                                      {"car/", GenerateCar()}}) {
     for (const auto& [name, bytes] : files) {
       EXPECT_TRUE(FileBytes(std::string(KPSA_SCENES_DIR) + "/" + folder + name) == bytes)
           << folder << name << " differs: run generate_scenes " << KPSA_SCENES_DIR;
