@@ -11,7 +11,6 @@ namespace kpsa {
 namespace {
 
 using nlohmann::json;
-using Bytes = std::vector<std::uint8_t>;
 
 // The sheet as Draco's mesh, and the document that holds it compressed.
 class DracoCharacter {
@@ -56,7 +55,7 @@ class DracoCharacter {
   }
 
   GridCharacter grid;
-  Bytes data;
+  std::vector<std::uint8_t> data;
   int position = 0, color = 0, joints = 0, weights = 0;
 
  private:
@@ -253,7 +252,7 @@ TEST(GltfDraco, DamagedBytes) {
   std::size_t refused = 0;
   for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
     DracoCharacter character(8, method, method == draco::MESH_EDGEBREAKER_ENCODING ? 11 : 0);
-    const Bytes good = character.data;
+    const std::vector<std::uint8_t> good = character.data;
     for (int round = 0; round < 150; ++round) {
       character.data = good;
       for (std::uint32_t flips = 1 + random() % 3; flips > 0; --flips)

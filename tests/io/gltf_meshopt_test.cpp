@@ -9,17 +9,17 @@ namespace kpsa {
 namespace {
 
 using nlohmann::json;
-using Bytes = std::vector<std::uint8_t>;
 
-Bytes EncodeAttributes(const void* data, std::size_t count, std::size_t stride) {
-  Bytes encoded(meshopt_encodeVertexBufferBound(count, stride));
+std::vector<std::uint8_t> EncodeAttributes(const void* data, std::size_t count, std::size_t stride) {
+  std::vector<std::uint8_t> encoded(meshopt_encodeVertexBufferBound(count, stride));
   encoded.resize(meshopt_encodeVertexBuffer(encoded.data(), encoded.size(), data, count, stride));
   EXPECT_FALSE(encoded.empty());
   return encoded;
 }
-Bytes EncodeIndices(const std::vector<unsigned>& indices, std::size_t vertices, bool triangles) {
-  Bytes encoded(triangles ? meshopt_encodeIndexBufferBound(indices.size(), vertices)
-                          : meshopt_encodeIndexSequenceBound(indices.size(), vertices));
+std::vector<std::uint8_t> EncodeIndices(const std::vector<unsigned>& indices, std::size_t vertices,
+                                        bool triangles) {
+  std::vector<std::uint8_t> encoded(triangles ? meshopt_encodeIndexBufferBound(indices.size(), vertices)
+                                              : meshopt_encodeIndexSequenceBound(indices.size(), vertices));
   encoded.resize(
       triangles
           ? meshopt_encodeIndexBuffer(encoded.data(), encoded.size(), indices.data(), indices.size())
@@ -39,7 +39,7 @@ class Compressed {
 
   // Replaces the view of an accessor by these compressed bytes.
   void Put(int accessor, const char* mode, const char* filter, std::size_t count, std::size_t stride,
-           const Bytes& encoded) {
+           const std::vector<std::uint8_t>& encoded) {
     json& view = View(accessor);
     while (out.buffer.size() % 4 != 0) out.buffer.push_back(0);
     view["buffer"] = 1;
@@ -58,14 +58,14 @@ class Compressed {
   }
   // As it is, without loss.
   void PutAttributes(int accessor, std::size_t stride) {
-    const Bytes data = Plain(accessor);
+    const std::vector<std::uint8_t> data = Plain(accessor);
     Put(accessor, "ATTRIBUTES", nullptr, data.size() / stride, stride,
         EncodeAttributes(data.data(), data.size() / stride, stride));
   }
-  Bytes Plain(int accessor) {
+  std::vector<std::uint8_t> Plain(int accessor) {
     const json& view = View(accessor);
     const auto begin = plain_.begin() + view["byteOffset"].get<std::ptrdiff_t>();
-    return Bytes(begin, begin + view["byteLength"].get<std::ptrdiff_t>());
+    return std::vector<std::uint8_t>(begin, begin + view["byteLength"].get<std::ptrdiff_t>());
   }
   json& View(int accessor) {
     return out.root["bufferViews"][out.root["accessors"][static_cast<std::size_t>(accessor)]["bufferView"]
@@ -87,7 +87,7 @@ class Compressed {
   GltfBuilder out;
 
  private:
-  Bytes plain_;
+  std::vector<std::uint8_t> plain_;
   std::size_t fallback_size_ = 0;
 };
 
@@ -231,7 +231,7 @@ TEST(GltfMeshopt, Filters) {
   }
   for (const int bits : {8, 16}) {
     const std::size_t stride = bits == 8 ? 4 : 8;
-    Bytes packed(n * stride);
+    std::vector<std::uint8_t> packed(n * stride);
     meshopt_encodeFilterOct(packed.data(), n, stride, bits, normals.data());
     json& position = compressed.out.root["accessors"][static_cast<std::size_t>(grid.position)];
     position["componentType"] = bits == 8 ? 5120 : 5122;
@@ -313,7 +313,7 @@ TEST(GltfMeshopt, WhatTheExtensionForbids) {
 TEST(GltfMeshopt, DamagedBytes) {
   const GridCharacter grid(8);
   Compressed compressed = CompressAll(grid, true);
-  const Bytes good = compressed.out.buffer;
+  const std::vector<std::uint8_t> good = compressed.out.buffer;
   std::mt19937 random(5);
   std::size_t refused = 0;
   for (int round = 0; round < 200; ++round) {
