@@ -5,15 +5,42 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/table.h"
+#include "kpsa/kpsa_node.h"
 
 namespace kpsa {
 namespace {
 
+using OrderedJson = nlohmann::ordered_json;
+
 double Finite(double value) { return std::isfinite(value) ? value : -1; }
 
-}  // namespace
+double Rms(const std::vector<double>& values) {
+  double sum = 0;
+  for (double value : values) sum += value * value;
+  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
 
-std::string BenchJson(const BenchResult& r, const BenchContext& context) {
+// The error of every frame, and what it consists of; null where no modes are kept.
+OrderedJson FrameErrorsJson(const FrameErrors& e) {
+  if (e.empty()) return {};
+  OrderedJson hits = OrderedJson::array();
+  for (char hit : e.hit) hits.push_back(hit != 0);
+  return {{"rms",
+           {{"projection", Rms(e.projection)},
+            {"cueing", Rms(e.cueing)},
+            {"storage", Rms(e.storage)},
+            {"total", Rms(e.total)},
+            {"soft_cache", Rms(e.soft_cache)}}},
+          {"times", e.times},
+          {"projection", e.projection},
+          {"cueing", e.cueing},
+          {"storage", e.storage},
+          {"total", e.total},
+          {"soft_cache", e.soft_cache},
+          {"hit", hits}};
+}
+
+OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
   nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
   for (const BenchNode& n : r.full_nodes) {
     nodes.push_back({{"name", n.name},
@@ -28,17 +55,21 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
                   r.bound_points_ms > 0
                       ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
                       : "");
-  const nlohmann::ordered_json document = {
+  return {
       {"schema", "kpsa.bench/1"},
       {"rig", context.rig},
+      {"subspace", r.subspace},
+      {"mode", r.mode},
       {"clip", fmt::format("{}", fmt::join(r.clips, ", "))},
       {"clips", r.clips},
       {"trained_on", r.trained_on},
       {"points", r.points},
       {"output_points", r.output_points},
       {"cues", r.cues},
+      {"cue_points", r.cue_points},
       {"cue_stages", r.cue_stages},
       {"modes", r.modes},
+      {"storage", {{"bytes_per_point", r.bytes_per_point}, {"mean_rank", r.mean_rank}}},
       {"frames", r.frames},
       {"threads", context.options.threads},
       {"runs", context.options.runs},
@@ -69,15 +100,16 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
         {"bbox_diagonal", r.diagonal},
         {"worst_clip", r.worst_clip},
         {"worst_frame", r.worst_frame}}},
+      {"frame_errors", FrameErrorsJson(r.frame_errors)},
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
       {"notes", r.notes}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-std::string BenchText(const BenchResult& r, const BenchContext& context) {
+std::string SideText(const BenchResult& r, const BenchContext& context) {
   std::string text;
+  if (context.kpsa.size() > 1) text += r.subspace + "\n";
   const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
   text += fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
                       Plural(r.cues, "cue"), fmt::join(r.cue_stages, ", "), r.modes);
@@ -100,12 +132,20 @@ std::string BenchText(const BenchResult& r, const BenchContext& context) {
   text += fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
                       r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
                       r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
-  text += fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}\n",
-                      100 * static_cast<double>(r.hits) / frames,
-                      100 * static_cast<double>(r.violations) / frames, LengthText(r.tolerance));
+  text += fmt::format(
+      "hits       {:.1f} % of frames; {:.1f} % of frames beyond {}\n",
+      100 * static_cast<double>(r.hits) / frames, 100 * static_cast<double>(r.violations) / frames,
+      r.tolerance >= kAnyError ? "any tolerance" : "the tolerance of " + LengthText(r.tolerance));
   text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
                       LengthText(r.error_rms), LengthText(r.error_p99), LengthText(r.error_max),
                       r.worst_frame, r.worst_clip, LengthText(r.motion_rms), LengthText(r.diagonal));
+  if (const FrameErrors& e = r.frame_errors; !e.empty()) {
+    text += fmt::format(
+        "split      RMS of all frames reconstructed: projection {}, cueing {}, storage {}, together {}; with "
+        "SoftCache {}\n",
+        LengthText(Rms(e.projection)), LengthText(Rms(e.cueing)), LengthText(Rms(e.storage)),
+        LengthText(Rms(e.total)), LengthText(Rms(e.soft_cache)));
+  }
   text += fmt::format(
       "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
       Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),
@@ -121,9 +161,23 @@ std::string BenchText(const BenchResult& r, const BenchContext& context) {
                           ", "),
                 r.never_evaluated.size() > 6 ? ", ..." : ""));
   if (!r.worst_miss.empty()) text += r.worst_miss + "\n";
-  const std::string with = context.kpsa.has_value() ? "--kpsa " + *context.kpsa : "--accelerate";
-  text += fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
   return text;
+}
+
+}  // namespace
+
+std::string BenchJson(const std::vector<BenchResult>& results, const BenchContext& context) {
+  OrderedJson document = SideJson(results.front(), context), beside = OrderedJson::array();
+  for (std::size_t i = 1; i < results.size(); ++i) beside.push_back(SideJson(results[i], context));
+  document["beside"] = std::move(beside);
+  return document.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+}
+
+std::string BenchText(const std::vector<BenchResult>& results, const BenchContext& context) {
+  std::string text;
+  for (const BenchResult& result : results) text += (text.empty() ? "" : "\n\n") + SideText(result, context);
+  const std::string with = context.kpsa.empty() ? "--accelerate" : "--kpsa " + context.kpsa.front();
+  return text + fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
 }
 
 }  // namespace kpsa

@@ -96,7 +96,8 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
   return view;
 }
 
-CameraView Accelerated(const CameraView& view, const Rig& rig, const std::vector<AppliedSubspace>& applied) {
+CameraView AcceleratedView(const CameraView& view, const Rig& rig,
+                           const std::vector<AppliedSubspace>& applied) {
   CameraView fast = view;
   for (const AppliedSubspace& one : applied) {
     for (std::size_t p = 0; p < one.entry.points.size(); ++p) {

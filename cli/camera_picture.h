@@ -30,7 +30,8 @@ struct CameraView {
 // use it.
 Result<CameraView> FindCamera(const Rig& rig, const std::string& name);
 // The same view with what subspaces say of its light after bounces.
-CameraView Accelerated(const CameraView& view, const Rig& rig, const std::vector<AppliedSubspace>& applied);
+CameraView AcceleratedView(const CameraView& view, const Rig& rig,
+                           const std::vector<AppliedSubspace>& applied);
 
 // One picture: linear light, 3 numbers a pixel, row by row from the top left.
 struct CameraImage {

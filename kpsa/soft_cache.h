@@ -1,12 +1,13 @@
 // SoftCache: how far a measurement is from what the subspace was trained on, and what to do about it.
 // Glossary: y the r normalised measurements, G their covariance, F the factor: W with W^T W = G^-1, lower
-// triangular (map), or the projector on the residual I - C C^+ (paper); g = F^T F y.
+// triangular (map), or Q^T, the M orthonormal rows that span what the modes do to the cues (paper: far fewer
+// numbers than the projector I - Q Q^T); g = F^T F y (map), or the residual y - F^T F y = y - C p (paper).
 //
 // map:   score 1 = |F y|^2 (residual and Mahalanobis distance in one); score 2 = the largest leave-one-out
 // error of a
 //        cue, |([G^-1]_ii)^-1 g_i| with the block of the cue; each over its 99 % training quantile; the
 //        larger counts.
-// paper: |F y| = |y - C p| over its 99 % training quantile.
+// paper: |y - C p| over its 99 % training quantile.
 // F is read once, four rows at a time: w = F y gives the four values that the same rows then add to g.
 //
 // Below tau_lo = c tau: a hit. Between tau_lo and tau: a stateless smoothstep blends the full evaluation in.
@@ -55,6 +56,7 @@ double FullWeight(double score, const SoftCacheThreshold& threshold);
 // The immutable data. Plain arrays: it is stored in the subspace file.
 struct SoftCacheModel {
   EstimatorMode mode = EstimatorMode::kMap;
+  std::size_t modes = 0;       // M; paper mode: rows of F
   std::vector<Index> offsets;  // [K + 1] rows of each cue
   AlignedArray<float>
       factor;  // F: for every 4 rows their groups of 16 columns (map: up to the diagonal), 4 x 16 each
@@ -67,7 +69,13 @@ struct SoftCacheModel {
   std::size_t cues() const { return offsets.empty() ? 0 : offsets.size() - 1; }
 };
 
-// From an estimator; the quantiles from training measurements, one a column [r x T].
+// Q^T [M x r] of a paper estimator, rotated (varimax) so that each of the coordinates Q^T y moves few points.
+Eigen::MatrixXd PaperRows(const Estimator& estimator, int components);
+
+// From an estimator; the quantiles from training measurements, one a column [r x T]. Paper mode: with these
+// rows, or with those of PaperRows.
+SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
+                                  const Eigen::MatrixXd& training, const Eigen::MatrixXd& paper_rows);
 SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
                                   const Eigen::MatrixXd& training);
 
@@ -77,10 +85,12 @@ struct RawScores {
 };
 // Run time. y and g of at least padded_rows() floats, y with zeros beyond its rows; allocates nothing; the
 // same bits on every SIMD target.
-RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g);
+// Paper mode: `coordinates` [M, padded to 16], if not empty, becomes Q^T y.
+RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g,
+                           std::span<float> coordinates = {});
 // The score and what follows from it. NaN or infinity in y is a miss.
 Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g);
+              std::span<float> g, std::span<float> coordinates = {});
 
 // The trained range of a plug that may vary, margin included.
 struct TrainedRange {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "kpsa/gemm.h"
 
 namespace kpsa {
 namespace {
@@ -41,10 +42,13 @@ Status ValidateSubspace(const Subspace& s) {
     return Status::Invalid("the {} cues have {} rows, but {} means and {} scales", s.cues.size(), counted,
                            rows, s.cue_scale.size());
   }
-  if (s.soft_cache.mode != s.mode || s.soft_cache.factor.size() != s.soft_cache.factor_size()) {
+  if (s.soft_cache.mode != s.mode || s.soft_cache.modes != s.modes ||
+      s.soft_cache.factor.size() != s.soft_cache.factor_size()) {
     return Status::Invalid("the factor of the cues has {} entries, expected {}", s.soft_cache.factor.size(),
                            s.soft_cache.factor_size());
   }
+  if (s.mode == EstimatorMode::kPaper && s.modes > rows)
+    return Status::Invalid("{} measured values cannot determine {} modes", rows, s.modes);
   std::size_t blocks = 0;
   for (std::size_t k = 0; k < s.cues.size() && s.mode == EstimatorMode::kMap; ++k) {
     const std::size_t height = s.soft_cache.offsets[k + 1] - s.soft_cache.offsets[k];
@@ -66,11 +70,21 @@ Status ValidateSubspace(const Subspace& s) {
   if (s.tiles.size() != s.outputs.size())
     return Status::Invalid("{} outputs, but {} sets of tiles", s.outputs.size(), s.tiles.size());
   for (std::size_t i = 0; i < s.outputs.size(); ++i) {
-    if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != rows ||
+    if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != s.map_inputs() ||
         s.tiles[i].data().components != s.components) {
       return Status::Invalid("output \"{}\" has {} points of {} components, its tiles {} of {}",
                              s.outputs[i].name, s.outputs[i].points, s.components, s.tiles[i].points(),
                              s.tiles[i].data().components);
+    }
+  }
+  if (s.kept_modes.size() > 0) {
+    std::size_t points = 0;
+    for (const SubspaceOutput& output : s.outputs) points += output.points;
+    if (static_cast<std::size_t>(s.kept_modes.rows()) != points * static_cast<std::size_t>(s.components) ||
+        static_cast<std::size_t>(s.kept_modes.cols()) != s.modes || !s.kept_modes.allFinite()) {
+      return Status::Invalid("the kept modes are {} x {}, or not finite; expected {} x {}",
+                             s.kept_modes.rows(), s.kept_modes.cols(),
+                             points * static_cast<std::size_t>(s.components), s.modes);
     }
   }
   for (const TrainedRange& range : s.ranges) {
@@ -99,28 +113,37 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   s.outputs = std::move(outputs);
   s.cue_mean.assign(cues.mean.data(), cues.mean.data() + cues.mean.size());
   s.cue_scale.assign(cues.scale.data(), cues.scale.data() + cues.scale.size());
-  s.soft_cache = MakeSoftCacheModel(estimator, cues, training);
+  // Paper mode reconstructs from its M coordinates, of which a tile needs few
+  const bool paper = s.mode == EstimatorMode::kPaper;
+  Eigen::MatrixXd rows;
+  if (paper) rows = PaperRows(estimator, s.components);
+  s.soft_cache = MakeSoftCacheModel(estimator, cues, training, rows);
 
   // Some of the training poses, evenly spread, watch the largest errors
   TileInputs inputs{estimator.covariance, {}};
+  if (paper) inputs.covariance = rows * estimator.covariance * rows.transpose();
   const Eigen::Index count = std::min<Eigen::Index>(training.cols(), kTileSamples);
   inputs.samples.resize(training.rows(), count);
   for (Eigen::Index i = 0; i < count; ++i)
     inputs.samples.col(i) = training.col((2 * i + 1) * training.cols() / (2 * count));
+  if (paper) inputs.samples = (rows * inputs.samples).eval();
+  const Eigen::MatrixXd gain = paper ? Multiply(estimator.gain, rows.transpose()) : estimator.gain;
   Eigen::Index first = 0;
   for (const SubspaceOutput& output : s.outputs) {
-    const auto rows = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
-    KPSA_CHECK_LE(first + rows, estimator.gain.rows());
-    s.tiles.push_back(BuildTiles(estimator.gain.middleRows(first, rows), pca.mean.segment(first, rows),
+    const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
+    KPSA_CHECK_LE(first + height, gain.rows());
+    s.tiles.push_back(BuildTiles(gain.middleRows(first, height), pca.mean.segment(first, height),
                                  s.components, inputs, options));
-    first += rows;
+    first += height;
   }
-  KPSA_CHECK_EQ(first, estimator.gain.rows());
+  KPSA_CHECK_EQ(first, gain.rows());
   return s;
 }
 
 SubspaceScratch::SubspaceScratch(const Subspace& subspace)
-    : y(subspace.soft_cache.padded_rows()), g(subspace.soft_cache.padded_rows()) {}
+    : y(subspace.soft_cache.padded_rows()),
+      g(subspace.soft_cache.padded_rows()),
+      w(subspace.mode == EstimatorMode::kPaper ? (subspace.modes + 15) / 16 * 16 : 0) {}
 
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y) {
   for (std::size_t j = 0; j < raw.size(); ++j)
@@ -130,6 +153,8 @@ void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch) {
   KPSA_CHECK_EQ(raw.size(), subspace.rows());
   Normalize(subspace, raw, scratch->y.span());
+  if (scratch->w.size() > 0)
+    ComputeRawScores(subspace.soft_cache, scratch->y.span(), scratch->g.span(), scratch->w.span());
 }
 
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch) {

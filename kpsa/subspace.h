@@ -3,7 +3,7 @@
 //   SubspaceScratch scratch(subspace);                     // once a thread
 //   Measure(subspace, raw, &scratch);                      // raw cue values -> y
 //   Verdict v = Judge(subspace, threshold, &scratch);      // SoftCache
-//   subspace.tiles[output].Reconstruct(scratch.y, points)  // y -> points (kpsa/tiles.h)
+//   subspace.tiles[output].Reconstruct(scratch.map_inputs(), points)  // kpsa/tiles.h
 //
 // None of these allocates. The file is safetensors (base/safetensors.h) with kind "kpsa-subspace".
 #pragma once
@@ -50,12 +50,17 @@ struct Subspace {
       calibration;  // held-out poses; the threshold follows from a tolerance (Calibrate)
   double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
   std::vector<TileMap> tiles;                                       // [outputs]
-  std::vector<TrainedRange> ranges;                                 // every varying plug upstream
-  std::string rig_hash;  // what it was trained on (KPSA.md, section 3)
+  // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
+  // split errors with it (kpsa/error_split.h); no frame needs it.
+  Eigen::MatrixXf kept_modes;
+  std::vector<TrainedRange> ranges;  // every varying plug upstream
+  std::string rig_hash;              // what it was trained on (KPSA.md, section 3)
   std::string units = "m";
   std::string space;                                    // "" world or mesh space, else the joint
   std::string training = "{}";                          // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r
+  // What the tiles take: y, or in paper mode the M coordinates Q^T y (kpsa/soft_cache.h).
+  std::size_t map_inputs() const { return mode == EstimatorMode::kPaper ? modes : rows(); }
 };
 
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
@@ -77,11 +82,13 @@ struct SubspaceScratch {
   explicit SubspaceScratch(const Subspace& subspace);
   AlignedFloats y;  // [r, padded to 16]
   AlignedFloats g;  // the same size
+  AlignedFloats w;  // paper mode: the coordinates Q^T y [M, padded to 16]; else empty
+  std::span<const float> map_inputs() const { return w.size() > 0 ? w.span() : y.span(); }
 };
 
 // y[j] = (raw[j] - mean) * scale, in float32.
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y);
-// raw [r] in scene units -> scratch->y.
+// raw [r] in scene units -> scratch->y, and what follows from it for the tiles.
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch);
 // The verdict on scratch->y. Ranges are checked by the caller (FirstOutside), before this.
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);

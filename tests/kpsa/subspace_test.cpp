@@ -96,7 +96,7 @@ TEST_P(SubspaceTest, ReconstructsWhatTheEstimatorSays) {
     std::size_t first = 0;
     for (std::size_t output = 0; output < 2; ++output) {
       PointBuffer points(subspace_.outputs[output].points);
-      subspace_.tiles[output].Reconstruct(scratch.y.span(), points.view());
+      subspace_.tiles[output].Reconstruct(scratch.map_inputs(), points.view());
       const std::vector<float> xyz = points.Interleaved();
       double sum = 0;
       for (std::size_t i = 0; i < xyz.size(); ++i)
@@ -131,8 +131,8 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   PointBuffer x(150), y(150);
   Measure(subspace_, RawCues(4), &a);
   Measure(*read, RawCues(4), &b);
-  subspace_.tiles[0].Reconstruct(a.y.span(), x.view());
-  read->tiles[0].Reconstruct(b.y.span(), y.view());
+  subspace_.tiles[0].Reconstruct(a.map_inputs(), x.view());
+  read->tiles[0].Reconstruct(b.map_inputs(), y.view());
   EXPECT_EQ(x.Interleaved(), y.Interleaved());
   const SoftCacheThreshold threshold{.tau = 1};
   EXPECT_EQ(Judge(subspace_, threshold, &a).score, Judge(*read, threshold, &b).score);
@@ -147,6 +147,27 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   EXPECT_EQ(bytes(path_), first);
 }
 
+TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
+  subspace_.kept_modes = pca_.output_modes().cast<float>();
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
+  const Result<Subspace> read = ReadSubspace(path_);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->kept_modes, subspace_.kept_modes);
+  // What differs from what was written is refused
+  std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  const std::string wanted(reinterpret_cast<const char*>(subspace_.kept_modes.data() + 40), 32);
+  const std::size_t at = bytes.find(wanted);
+  ASSERT_NE(at, std::string::npos);
+  bytes[at] = static_cast<char>(bytes[at] ^ 1);
+  file.seekp(0);
+  file << bytes;
+  file.close();
+  EXPECT_NE(ReadSubspace(path_).status().ToString().find("damaged"), std::string::npos);
+  subspace_.kept_modes.conservativeResize(Eigen::NoChange, 6);
+  EXPECT_NE(WriteSubspace(subspace_, path_).ToString().find("kept modes"), std::string::npos);
+}
+
 TEST_P(SubspaceTest, EveryTargetGivesTheSameFrames) {
   std::vector<float> first;
   double score = 0;
@@ -155,7 +176,7 @@ TEST_P(SubspaceTest, EveryTargetGivesTheSameFrames) {
     SubspaceScratch scratch(subspace_);
     PointBuffer points(150);
     Measure(subspace_, RawCues(0), &scratch);
-    subspace_.tiles[0].Reconstruct(scratch.y.span(), points.view());
+    subspace_.tiles[0].Reconstruct(scratch.map_inputs(), points.view());
     const double now = Judge(subspace_, {.tau = 1}, &scratch).score;
     if (first.empty()) first = points.Interleaved(), score = now;
     EXPECT_EQ(points.Interleaved(), first) << target;
