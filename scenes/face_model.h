@@ -54,6 +54,7 @@ class Random {
 
 // All files of a scene: path below its folder -> bytes.
 using SceneFiles = std::map<std::string, std::string>;
+SceneFiles GenerateCar();
 SceneFiles GenerateFace();
 SceneFiles GenerateHello();
 SceneFiles GenerateRoom();

@@ -1,5 +1,5 @@
-// generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face, FOLDER/hello and
-// FOLDER/gi. The bytes are the same on every machine; a test compares them with the files of the source tree.
+// generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face, FOLDER/hello,
+// FOLDER/gi and FOLDER/car. The bytes are the same on every machine; a test compares them with the files of the source tree.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   const std::filesystem::path folder = argv[1];
   const bool written = WriteAll(folder / "face", kpsa::scenes::GenerateFace()) &&
                        WriteAll(folder / "hello", kpsa::scenes::GenerateHello()) &&
-                       WriteAll(folder / "gi", kpsa::scenes::GenerateRoom());
+                       WriteAll(folder / "gi", kpsa::scenes::GenerateRoom()) &&
+                       WriteAll(folder / "car", kpsa::scenes::GenerateCar());
   return written ? 0 : 4;
 }

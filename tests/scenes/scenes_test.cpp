@@ -31,7 +31,7 @@ std::string FileBytes(const std::string& path) {
 
 TEST(Scenes, TheCommittedFilesAreWhatTheGeneratorWrites) {
   for (const auto& [folder, files] :
-       {std::pair<std::string, SceneFiles>{"face/", Face()}, {"hello/", GenerateHello()}, {"gi/", GenerateRoom()}}) {
+       {std::pair<std::string, SceneFiles>{"face/", Face()}, {"hello/", GenerateHello()}, {"gi/", GenerateRoom()}, {"car/", GenerateCar()}}) {
     for (const auto& [name, bytes] : files) {
       EXPECT_TRUE(FileBytes(std::string(KPSA_SCENES_DIR) + "/" + folder + name) == bytes)
           << folder << name << " differs: run generate_scenes " << KPSA_SCENES_DIR;
