@@ -1,4 +1,5 @@
-// The clips of the face: what the trainer may see (`extreme`, `talk_train`), and `talk`, which it may not.
+// The clips of a head: what the trainer may see (`extreme`, `talk_train`), `talk`, which it may not, and
+// `emotions`.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -20,18 +21,25 @@ struct Turn {
 constexpr Turn kTurns[] = {{kJaw, 0, 0, 20},    {kJaw, 1, -5, 5},    {kHead, 0, -14, 14}, {kHead, 1, -22, 22},
                            {kHead, 2, -12, 12}, {kNeck, 0, -10, 10}, {kNeck, 1, -15, 15}, {kNeck, 2, -8, 8}};
 constexpr Turn kEyeTurns[] = {{kEyeL, 0, -14, 16}, {kEyeL, 1, -24, 24}};  // both eyes look the same way
+constexpr Turn kEarTurns[] = {
+    {kEarL, 0, -20, 25}, {kEarL, 2, -18, 14}, {kEarR, 0, -20, 25}, {kEarR, 2, -14, 18}};
 
 // The values of all controls at all frames.
 class Track {
  public:
-  Track(std::vector<std::string> expressions, int frames)
+  Track(const HeadDesign& design, std::vector<std::string> expressions, int frames)
       : names_(std::move(expressions)),
+        joints_(static_cast<int>(design.joints.size())),
         frames_(frames),
         weights_(Size(frames) * names_.size()),
         turns_(Size(frames) * kJointCount) {}
 
   int frames() const { return frames_; }
-  int expressions() const { return static_cast<int>(names_.size()); }
+  bool ears() const { return joints_ > kEarL; }
+  // Those that move by themselves, which come first.
+  int expressions() const {
+    return static_cast<int>(std::find_if(names_.begin(), names_.end(), IsCorrective) - names_.begin());
+  }
   int Find(const std::string& name) const {
     const auto it = std::find(names_.begin(), names_.end(), name);
     KPSA_CHECK(it != names_.end());
@@ -50,7 +58,7 @@ class Track {
 
   GlbClip Finish(const std::string& name, int mesh_node) const {
     GlbClip clip = {name, frames_, {}};
-    for (int joint = kNeck; joint < kJointCount; ++joint) {
+    for (int joint = kNeck; joint < joints_; ++joint) {
       GlbChannel channel = {joint, false, {}};
       for (int f = 0; f < frames_; ++f) {
         const Double3 degrees = turns_[Size(f) * kJointCount + Size(joint)];
@@ -69,7 +77,7 @@ class Track {
  private:
   static std::size_t Size(int i) { return static_cast<std::size_t>(i); }
   std::vector<std::string> names_;
-  int frames_;
+  int joints_, frames_;
   std::vector<double> weights_;
   std::vector<Double3> turns_;
 };
@@ -82,15 +90,19 @@ std::vector<Control> AllControls(const Track& track) {
   for (int e = 0; e < track.expressions(); ++e) {
     controls.push_back([e](Track& t, int f, double share) { t.Weight(f, e) += std::fabs(share); });
   }
-  for (const Turn& turn : kTurns) {
+  const auto add = [&](const Turn& turn) {
     controls.push_back([turn](Track& t, int f, double share) {
       t.Degrees(f, turn.joint, turn.axis) += share >= 0 ? share * turn.high : -share * turn.low;
     });
-  }
+  };
+  for (const Turn& turn : kTurns) add(turn);
   for (const Turn& turn : kEyeTurns) {
     controls.push_back([turn](Track& t, int f, double share) {
       t.Look(f, turn.axis, share >= 0 ? share * turn.high : -share * turn.low);
     });
+  }
+  if (track.ears()) {
+    for (const Turn& turn : kEarTurns) add(turn);
   }
   return controls;
 }
@@ -99,13 +111,13 @@ std::vector<Control> AllControls(const Track& track) {
 constexpr int kSweep = 8;
 double SweepShare(int k) { return 1 - std::fabs(k - kSweep / 2.0) / (kSweep / 2.0); }
 
-GlbClip Extreme(const std::vector<std::string>& names, int mesh_node) {
+GlbClip Extreme(const HeadDesign& design, const std::vector<std::string>& names, int mesh_node) {
   constexpr int kPairs = 48;
-  const int weights = static_cast<int>(names.size()),
-            turns = static_cast<int>(std::size(kTurns) + std::size(kEyeTurns));
+  const std::vector<Control> controls = AllControls(Track(design, names, 1));
+  const int weights = Track(design, names, 1).expressions(),
+            turns = static_cast<int>(controls.size()) - weights;
   const int sweeps = weights + 2 * turns + kPairs;
-  Track track(names, sweeps * kSweep + 1);
-  const std::vector<Control> controls = AllControls(track);
+  Track track(design, names, sweeps * kSweep + 1);
   int frame = 0;
   const auto sweep = [&](const std::vector<std::pair<int, double>>& moved) {
     for (int k = 0; k < kSweep; ++k, ++frame) {
@@ -145,12 +157,12 @@ void Wander(Track& track, const Control& control, Random& random, int shortest, 
   }
 }
 
-GlbClip TalkTrain(const std::vector<std::string>& names, int mesh_node) {
-  Track track(names, 36 * 24 + 1);
+GlbClip TalkTrain(const HeadDesign& design, const std::vector<std::string>& names, int mesh_node) {
+  Track track(design, names, 36 * 24 + 1);
   const std::vector<Control> controls = AllControls(track);
   Random random(23);
   for (std::size_t c = 0; c < controls.size(); ++c) {
-    const bool turn = c >= names.size();
+    const bool turn = static_cast<int>(c) >= track.expressions();
     Wander(track, controls[c], random, 5, 14, turn ? 0.25 : 0.55, turn ? 0.8 : 0.9, turn);
   }
   return track.Finish("talk_train", mesh_node);
@@ -187,8 +199,8 @@ void Speak(Track& track, Random& random) {
   }
 }
 
-GlbClip Talk(const std::vector<std::string>& names, int mesh_node) {
-  Track track(names, 10 * 24 + 1);
+GlbClip Talk(const HeadDesign& design, const std::vector<std::string>& names, int mesh_node) {
+  Track track(design, names, 10 * 24 + 1);
   const std::vector<Control> controls = AllControls(track);
   Random random(101);
   Speak(track, random);
@@ -203,13 +215,13 @@ GlbClip Talk(const std::vector<std::string>& names, int mesh_node) {
   // Everything else stirs, now and then
   for (std::size_t c = 0; c < controls.size(); ++c) {
     if (static_cast<int>(c) == left_blink || static_cast<int>(c) == right_blink) continue;
-    const bool turn = c >= names.size();
-    const bool jaw = turn && c - names.size() < 2;
+    const int after = static_cast<int>(c) - track.expressions();
+    const bool turn = after >= 0, jaw = turn && after < 2;
     Wander(track, controls[c], random, turn ? 12 : 7, turn ? 30 : 20, turn ? 0.2 : 0.6,
            jaw    ? 0.12
            : turn ? 0.4
                   : 0.7,
-           turn && !(jaw && c == names.size()));
+           turn && after != 0);
   }
   for (int f = 0; f < track.frames(); ++f) {
     track.Degrees(f, kJaw, 0) = std::clamp(track.Degrees(f, kJaw, 0), -2.0, 20.0);
@@ -217,10 +229,115 @@ GlbClip Talk(const std::vector<std::string>& names, int mesh_node) {
   return track.Finish("talk", mesh_node);
 }
 
+struct Part {
+  const char* name;  // an expression, or one of both sides
+  double weight;
+};
+struct Emotion {
+  std::vector<Part> parts;
+  double jaw, nod, turn, tilt;  // degrees
+};
+const std::vector<Emotion>& AllEmotions() {
+  static const std::vector<Emotion> emotions = {
+      {{{"smile", 0.95},
+        {"cheekRaise", 0.7},
+        {"squint", 0.3},
+        {"mouthOpen", 0.4},
+        {"lipUpperUp", 0.3},
+        {"browOuterUp", 0.25},
+        {"dimple", 0.3}},
+       6,
+       -6,
+       0,
+       3},  // joy
+      {{{"browDown", 1},
+        {"squint", 0.45},
+        {"sneer", 0.55},
+        {"lipPress", 0.6},
+        {"jawForward", 0.4},
+        {"nostrilFlare", 0.8},
+        {"frown", 0.35},
+        {"neckTense", 0.4}},
+       0,
+       7,
+       0,
+       0},  // anger
+      {{{"browInnerUp", 1},
+        {"frown", 0.8},
+        {"chinUp", 0.6},
+        {"squint", 0.2},
+        {"blink", 0.25},
+        {"lipLowerRoll", 0.3}},
+       0,
+       10,
+       -6,
+       5},  // sadness
+      {{{"browInnerUp", 0.9}, {"browOuterUp", 1}, {"eyeWide", 1}, {"mouthOpen", 0.8}, {"funnel", 0.2}},
+       13,
+       -6,
+       0,
+       0},  // surprise
+      {{{"browInnerUp", 1},
+        {"browDown", 0.35},
+        {"eyeWide", 0.9},
+        {"stretch", 0.9},
+        {"neckTense", 0.8},
+        {"lipLowerDown", 0.5}},
+       5,
+       -4,
+       8,
+       0},  // fear
+      {{{"sneer", 1},
+        {"browDown", 0.5},
+        {"lipUpperUp", 0.8},
+        {"squint", 0.5},
+        {"chinUp", 0.4},
+        {"frown", 0.3},
+        {"mouthLeft", 0.3}},
+       0,
+       3,
+       10,
+       -4}};  // disgust
+  return emotions;
+}
+
+// One after the other from neutral and back, a little less on the right, and never quite still.
+GlbClip Emotions(const HeadDesign& design, const std::vector<std::string>& names, int mesh_node) {
+  constexpr int kLength = 48, kRise = 12, kFall = 34, kEnd = 46;
+  const std::vector<Emotion>& emotions = AllEmotions();
+  Track track(design, names, static_cast<int>(emotions.size()) * kLength + 1);
+  const auto has = [&](const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  for (std::size_t e = 0; e < emotions.size(); ++e) {
+    for (int k = 0; k < kLength; ++k) {
+      const int frame = static_cast<int>(e) * kLength + k;
+      const double level = Smooth(0, kRise, k) * Smooth(kEnd, kFall, k);
+      const double now = level * (1 - 0.08 * (0.5 - 0.5 * Cos(2 * kPi * k / 16.0)));
+      for (const Part& part : emotions[e].parts) {
+        const std::string name = part.name;
+        if (has(name)) {
+          track.Weight(frame, track.Find(name)) += part.weight * now;
+        } else {
+          track.Weight(frame, track.Find(name + ".L")) += part.weight * now;
+          track.Weight(frame, track.Find(name + ".R")) += part.weight * 0.92 * now;
+        }
+      }
+      track.Degrees(frame, kJaw, 0) += emotions[e].jaw * now;
+      track.Degrees(frame, kHead, 0) += emotions[e].nod * level;
+      track.Degrees(frame, kHead, 1) += emotions[e].turn * level;
+      track.Degrees(frame, kHead, 2) += emotions[e].tilt * level;
+    }
+  }
+  return track.Finish("emotions", mesh_node);
+}
+
 }  // namespace
 
-std::vector<GlbClip> FaceClips(const std::vector<std::string>& expressions, int mesh_node) {
-  return {Extreme(expressions, mesh_node), TalkTrain(expressions, mesh_node), Talk(expressions, mesh_node)};
+std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::string>& expressions,
+                               int mesh_node) {
+  return {Extreme(design, expressions, mesh_node), TalkTrain(design, expressions, mesh_node),
+          Talk(design, expressions, mesh_node), Emotions(design, expressions, mesh_node)};
 }
 
 }  // namespace kpsa::scenes

@@ -11,31 +11,39 @@
 
 namespace kpsa::scenes {
 
-// Joints of the face in the order of the skin.
-enum Joint : int { kRoot, kNeck, kHead, kJaw, kEyeL, kEyeR, kJointCount };
-struct JointRest {
-  const char* name;
-  int parent;
-  Double3 position;  // world, cm
-};
-const std::vector<JointRest>& FaceJoints();
-
-// Shares of the joints at every point, kJointCount each.
-std::vector<std::array<double, kJointCount>> FaceWeights(const HeadShape& shape);
+// Shares of the joints at every point, kJointCount each; heads with fewer joints have 0 there.
+std::vector<std::array<double, kJointCount>> FaceWeights(const HeadDesign& design, const HeadShape& shape);
 
 // An expression: displacements of all points, cm.
 struct Expression {
   std::string name;
   std::vector<Double3> deltas;
 };
-std::vector<Expression> FaceExpressions(const HeadShape& shape);
+// The expressions that are controls; for a production's head then their in-betweens and correctives.
+std::vector<Expression> FaceExpressions(const HeadDesign& design, const HeadShape& shape);
+bool IsCorrective(const std::string& expression);
 
-// The clips `extreme`, `talk_train` and `talk` for expressions of these names; node indices as FaceJoints,
-// the mesh node is `mesh_node`.
-std::vector<GlbClip> FaceClips(const std::vector<std::string>& expressions, int mesh_node);
+// The clips `extreme`, `talk_train`, `talk` and `emotions` for expressions of these names, of which
+// correctives stay 0; node indices as the design's joints, the mesh node is `mesh_node`.
+std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::string>& expressions,
+                               int mesh_node);
 
 // Maps of weights for the rig's deformers: name -> one value a point.
-std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadShape& shape);
+std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& design, const HeadShape& shape);
+
+// The muscles under a production's face: a coarse sheet with holes for eyes and mouth, and what each does.
+struct MuscleShape {
+  std::vector<Double3> points;
+  std::vector<std::array<int, 4>> quads;
+  std::vector<Expression> pulls;
+};
+MuscleShape MakeMuscles(const HeadDesign& design);
+
+// The rig's curves and handles, as its YAML.
+std::string CurvesYaml(const HeadDesign& design, const HeadShape& shape);
+
+// 1 at the centre of an ellipsoid, 0 from its surface on.
+double Ball(Double3 p, Double3 center, Double3 radius);
 
 // A generator of pseudo-random numbers that is the same everywhere (Knuth's MMIX constants, upper bits).
 class Random {
@@ -55,7 +63,8 @@ class Random {
 // All files of a scene: path below its folder -> bytes.
 using SceneFiles = std::map<std::string, std::string>;
 SceneFiles GenerateCar();
-SceneFiles GenerateFace();
+// A head: NAME.glb, NAME_curves.yaml, w/NAME.json.
+SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape);
 SceneFiles GenerateHello();
 SceneFiles GenerateRoom();
 

@@ -1,4 +1,4 @@
-// Puts the face's files together: face.glb, the rig's curves, the weight maps.
+// Puts a head's files together: the .glb, the rig's curves, the weight maps.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,28 +25,21 @@ std::array<std::uint8_t, 4> Color(Double3 linear) {
   return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
 }
 
-// Skin with a tint on lips, cheeks and nose, darker brows.
-std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadShape& shape) {
-  constexpr Double3 kSkin = {0.62, 0.43, 0.34}, kLip = {0.50, 0.21, 0.19}, kFlush = {0.62, 0.34, 0.27};
-  constexpr Double3 kBrow = {0.11, 0.07, 0.05}, kMouth = {0.25, 0.07, 0.06};
-  const auto mix = [](Double3 a, Double3 b, double t) { return a * (1 - t) + b * t; };
+// The skin's, with tinted lips.
+std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadDesign& design, const HeadShape& shape) {
   std::vector<Double3> colors;
-  for (const Double3& p : shape.points) {
-    const Double3 q = {std::fabs(p.x), p.y, p.z};
-    const double cheek = Bump(Length(q - Double3{4.3, 15.2, 6.6}), 2.8),
-                 nose = Bump(Length(q - Double3{0, 14.8, 11.0}), 1.8);
-    const double arch =
-        20.62 + 0.32 * Bump(q.x - 3.7, 2.4) - 0.25 * Smooth(4.2, 5.6, q.x);  // the brow's line
-    const double brow =
-        Bump(q.y - arch, 0.60) * Smooth(0.7, 1.6, q.x) * Smooth(5.7, 4.0, q.x) * Smooth(2, 4, p.z);
-    colors.push_back(mix(mix(kSkin, kFlush, std::max(0.30 * cheek, 0.35 * nose)), kBrow, 0.9 * brow));
+  for (std::size_t i = 0; i < shape.points.size(); ++i) {
+    const Double3 p = shape.points[i];
+    const Double3 color = design.color({std::fabs(p.x), p.y, p.z}, shape.ear[i]);
+    colors.push_back(design.ear.pointed && shape.ear_inside[i] ? design.inner_ear_color : color);
   }
   const auto border = static_cast<std::size_t>(shape.border_ring);
   for (std::size_t ring = border; ring < shape.mouth_rings.size(); ++ring) {
-    const double lip = ring == border ? 0.55 : 1.0;
+    const double lip = ring == border ? design.lip_tint : 1.0;
     for (int i : shape.mouth_rings[ring]) {
       Double3& c = colors[static_cast<std::size_t>(i)];
-      c = ring > static_cast<std::size_t>(shape.contact_ring) ? kMouth : mix(c, kLip, lip);
+      c = ring > static_cast<std::size_t>(shape.contact_ring) ? design.mouth_color
+                                                              : Mix(c, design.lip_color, lip);
     }
   }
   std::vector<std::array<std::uint8_t, 4>> out;
@@ -54,29 +47,58 @@ std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadShape& shape) {
   return out;
 }
 
-GlbMesh FaceMesh(const HeadShape& shape, const std::vector<Expression>& expressions) {
+Influences InfluencesOf(const HeadDesign& design, const std::array<double, kJointCount>& weights) {
+  return MakeInfluences(std::span(weights.data(), design.joints.size()));
+}
+
+SparseTarget TargetOf(const Expression& expression) {
+  SparseTarget target = {expression.name, {}, {}};
+  for (std::size_t i = 0; i < expression.deltas.size(); ++i) {
+    if (Length(expression.deltas[i]) < kSmallestDelta) continue;
+    target.points.push_back(static_cast<Index>(i));
+    target.deltas.push_back(ToMetres(expression.deltas[i]));
+  }
+  return target;
+}
+
+GlbMesh FaceMesh(const HeadDesign& design, const HeadShape& shape, const std::vector<Expression>& expressions,
+                 const std::vector<std::array<double, kJointCount>>& joint_weights) {
   GlbMesh mesh;
   mesh.name = "face_mesh";
   for (const Double3& p : shape.points) mesh.positions.push_back(ToMetres(p));
   mesh.triangles = Triangulate(shape.quads);
   mesh.normals = SmoothNormals(mesh.positions, mesh.triangles);
-  mesh.colors = SkinColors(shape);
-  for (const auto& weights : FaceWeights(shape)) mesh.influences.push_back(MakeInfluences(weights));
-  for (const Expression& expression : expressions) {
-    SparseTarget target = {expression.name, {}, {}};
-    for (std::size_t i = 0; i < expression.deltas.size(); ++i) {
-      if (Length(expression.deltas[i]) < kSmallestDelta) continue;
-      target.points.push_back(static_cast<Index>(i));
-      target.deltas.push_back(ToMetres(expression.deltas[i]));
-    }
-    mesh.targets.push_back(std::move(target));
-  }
+  mesh.colors = SkinColors(design, shape);
+  for (const auto& weights : joint_weights) mesh.influences.push_back(InfluencesOf(design, weights));
+  for (const Expression& expression : expressions) mesh.targets.push_back(TargetOf(expression));
   return mesh;
 }
 
-GlbMesh EyesMesh() {
-  const EyeShape eye = MakeEyeShape();
-  constexpr Double3 kColors[] = {{0.80, 0.77, 0.74}, {0.10, 0.20, 0.28}, {0.01, 0.01, 0.01}};
+// A muscle moves with the joints of the skin above it.
+GlbMesh MusclesMesh(const HeadDesign& design, const HeadShape& shape,
+                    const std::vector<std::array<double, kJointCount>>& joint_weights) {
+  const MuscleShape muscles = MakeMuscles(design);
+  GlbMesh mesh;
+  mesh.name = "muscles";
+  for (const Double3& p : muscles.points) {
+    mesh.positions.push_back(ToMetres(p));
+    mesh.colors.push_back(Color({0.35, 0.07, 0.06}));
+    std::size_t nearest = 0;
+    for (std::size_t i = 0; i < shape.points.size(); ++i) {
+      if (Length(shape.points[i] - p) < Length(shape.points[nearest] - p)) nearest = i;
+    }
+    mesh.influences.push_back(InfluencesOf(design, joint_weights[nearest]));
+  }
+  mesh.triangles = Triangulate(muscles.quads);
+  mesh.normals = SmoothNormals(mesh.positions, mesh.triangles);
+  for (const Expression& pull : muscles.pulls) mesh.targets.push_back(TargetOf(pull));
+  return mesh;
+}
+
+GlbMesh EyesMesh(const HeadDesign& design) {
+  const EyeShape eye = MakeEyeShape(design);
+  const Double3 center = design.eye_center;
+  const Double3 colors[] = {{0.80, 0.77, 0.74}, design.iris_color, {0.01, 0.01, 0.01}};
   GlbMesh mesh;
   mesh.name = "eyes";
   for (double side : {1.0, -1.0}) {
@@ -84,54 +106,14 @@ GlbMesh EyesMesh() {
     std::array<double, kJointCount> weights = {};
     weights[side > 0 ? kEyeL : kEyeR] = 1;
     for (std::size_t i = 0; i < eye.points.size(); ++i) {
-      mesh.positions.push_back(
-          ToMetres(eye.points[i] + Double3{side * kEyeCenter.x, kEyeCenter.y, kEyeCenter.z}));
-      mesh.colors.push_back(Color(kColors[eye.part[i]]));
-      mesh.influences.push_back(MakeInfluences(weights));
+      mesh.positions.push_back(ToMetres(eye.points[i] + Double3{side * center.x, center.y, center.z}));
+      mesh.colors.push_back(Color(colors[eye.part[i]]));
+      mesh.influences.push_back(InfluencesOf(design, weights));
     }
     for (Index index : Triangulate(eye.quads)) mesh.triangles.push_back(base + index);
   }
   mesh.normals = SmoothNormals(mesh.positions, mesh.triangles);
   return mesh;
-}
-
-// The point nearest to `at`; one on the middle of the face where `at` is.
-int Nearest(const HeadShape& shape, Double3 at) {
-  int best = 0;
-  double least = 1e30;
-  for (std::size_t i = 0; i < shape.points.size(); ++i) {
-    const double distance = Length(shape.points[i] - at);
-    if (distance >= least || (at.x == 0 && shape.points[i].x != 0)) continue;
-    least = distance;
-    best = static_cast<int>(i);
-  }
-  return best;
-}
-
-std::string CurvesYaml(const HeadShape& shape) {
-  std::string out =
-      "# Written by generate_scenes: the vertices that face.yaml's wires run along and its soft handles sit "
-      "at.\n"
-      "kpsa: 1\n"
-      "nodes:\n";
-  const auto curve = [&](const char* name, const std::vector<int>& points, const char* parent) {
-    out += fmt::format("  {}: {{type: curve, mesh: face_mesh, vertices: [{}], parent: {}}}\n", name,
-                       fmt::join(points, ", "), parent);
-  };
-  curve("upperLip", shape.upper_lip_curve, "head");
-  curve("lowerLip", shape.lower_lip_curve, "jaw");
-  curve("browL", shape.brow_curve_left, "head");
-  curve("browR", shape.brow_curve_right, "head");
-  const auto handle = [&](const char* name, int point, const char* parent) {
-    out += fmt::format("  {}: {{type: transform, parent: {}, at: {{vertex: {}, mesh: face_mesh}}}}\n", name,
-                       parent, point);
-  };
-  const int cheek = Nearest(shape, {4.4, 14.6, 6.8});
-  handle("nose", Nearest(shape, {0, 14.8, 11.6}), "head");
-  handle("chin", Nearest(shape, {0, 8.9, 8.8}), "jaw");
-  handle("cheekL", cheek, "head");
-  handle("cheekR", shape.mirror[static_cast<std::size_t>(cheek)], "head");
-  return out;
 }
 
 std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, std::size_t points) {
@@ -161,26 +143,30 @@ std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, 
 
 }  // namespace
 
-SceneFiles GenerateFace() {
-  const HeadShape shape = MakeHeadShape();
-  const std::vector<Expression> expressions = FaceExpressions(shape);
+SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
+  const std::vector<Expression> expressions = FaceExpressions(design, shape);
+  const auto joint_weights = FaceWeights(design, shape);
   GlbScene scene;
-  for (const JointRest& joint : FaceJoints()) {
+  for (const JointRest& joint : design.joints) {
     Double3 at = joint.position;
-    if (joint.parent >= 0) at = at - FaceJoints()[static_cast<std::size_t>(joint.parent)].position;
+    if (joint.parent >= 0) at = at - design.joints[static_cast<std::size_t>(joint.parent)].position;
     scene.joints.push_back(static_cast<int>(scene.nodes.size()));
     scene.nodes.push_back({joint.name, joint.parent, at * kMetres, -1});
   }
   const int mesh_node = static_cast<int>(scene.nodes.size());
   scene.nodes.push_back({"face_mesh", -1, {}, 0});
   scene.nodes.push_back({"eyes", -1, {}, 1});
-  scene.meshes = {FaceMesh(shape, expressions), EyesMesh()};
+  scene.meshes = {FaceMesh(design, shape, expressions, joint_weights), EyesMesh(design)};
+  if (design.production) {
+    scene.nodes.push_back({"muscles", -1, {}, 2});
+    scene.meshes.push_back(MusclesMesh(design, shape, joint_weights));
+  }
   std::vector<std::string> names;
   for (const Expression& expression : expressions) names.push_back(expression.name);
-  scene.clips = FaceClips(names, mesh_node);
-  return {{"face.glb", WriteGlb(scene)},
-          {"face_curves.yaml", CurvesYaml(shape)},
-          {"w/face.json", WeightsJson(FaceWeightMaps(shape), shape.points.size())}};
+  scene.clips = FaceClips(design, names, mesh_node);
+  return {{design.name + ".glb", WriteGlb(scene)},
+          {design.name + "_curves.yaml", CurvesYaml(design, shape)},
+          {"w/" + design.name + ".json", WeightsJson(FaceWeightMaps(design, shape), shape.points.size())}};
 }
 
 }  // namespace kpsa::scenes

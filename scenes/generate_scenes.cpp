@@ -1,5 +1,6 @@
-// generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face, FOLDER/hello,
-// FOLDER/gi and FOLDER/car. The bytes are the same on every machine; a test compares them with the files of the source tree.
+// generate_scenes FOLDER: writes the generated files of the scenes into FOLDER/face, FOLDER/boy,
+// FOLDER/animal, FOLDER/car, FOLDER/hello and FOLDER/gi. The bytes are the same on every machine; a test
+// compares them with the files of the source tree.
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -33,8 +34,13 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::filesystem::path folder = argv[1];
-  const bool written = WriteAll(folder / "face", kpsa::scenes::GenerateFace()) &&
-                       WriteAll(folder / "hello", kpsa::scenes::GenerateHello()) &&
+  bool heads = true;
+  for (const auto* design :
+       {&kpsa::scenes::FaceDesign(), &kpsa::scenes::BoyDesign(), &kpsa::scenes::AnimalDesign()})
+    heads = WriteAll(folder / design->name,
+                     kpsa::scenes::GenerateHead(*design, kpsa::scenes::MakeHeadShape(*design))) &&
+            heads;
+  const bool written = heads && WriteAll(folder / "hello", kpsa::scenes::GenerateHello()) &&
                        WriteAll(folder / "gi", kpsa::scenes::GenerateRoom()) &&
                        WriteAll(folder / "car", kpsa::scenes::GenerateCar());
   return written ? 0 : 4;

@@ -10,17 +10,9 @@
 
 namespace kpsa::scenes {
 
-// The grid: rows from the neck's edge to the crown, columns around. Column 0 is the middle of the face,
-// columns count towards +x; -1 is the mirror image of 1.
-inline constexpr int kHalfColumns = 27;
-inline constexpr int kColumns = 2 * kHalfColumns;
-
-inline constexpr int kMouthRow = 16, kNoseRow = 23, kEyeRow = 31;  // first rows of the blocks that get rings
-inline constexpr int kEyeColumn0 = 3, kEyeColumn1 = 12, kMouthColumn = 8;
-inline constexpr int kEarColumn0 = 17, kEarColumn1 = 20, kEarRow0 = 25, kEarRow1 = 35;
-
 class HeadBuilder {
  public:
+  explicit HeadBuilder(const HeadDesign& design) : design_(design), columns_(2 * design.half_columns) {}
   HeadShape Build();
 
  private:
@@ -30,6 +22,7 @@ class HeadBuilder {
     shape_.mirror.push_back(static_cast<int>(shape_.points.size()) - 1);
     shape_.lip.push_back(0);
     shape_.ear.push_back(0);
+    shape_.ear_inside.push_back(false);
     return static_cast<int>(shape_.points.size()) - 1;
   }
   // A point and its mirror image; returns the first.
@@ -55,7 +48,18 @@ class HeadBuilder {
       Quad(m[Size(a)], m[Size(d)], m[Size(c)], m[Size(b)]);
     }
   }
-  int Grid(int row, int column) const { return grid_[Size(row)][Size((column + kColumns) % kColumns)]; }
+  int Grid(int row, int column) const { return grid_[Size(row)][Size((column + columns_) % columns_)]; }
+  double ColumnAngle(int column) const;
+  Double3 Project(Double3 p) const { return ProjectToHead(design_, p); }
+  Double3 Normal(Double3 p) const { return HeadNormal(design_, p); }
+  Double3 LidPoint(int k, int n, const LidRing& ring) const;
+  double MouthLine(double s) const;
+  double UpperBorder(double s) const;
+  double LowerBorder(double s) const;
+  // The loop's points moved to ring `ring` of the ear: its shell, or its cup.
+  std::vector<Double3> ShellRing(std::size_t ring, std::size_t count, Double3 origin) const;
+  std::vector<Double3> CupRing(const EarRing& ring, const std::vector<int>& loop, Double3 center) const;
+  void MarkHole(int row0, int row1, int column0, int column1);
   std::vector<int> Loop(int row0, int row1, int column0, int column1, int first_row, int first_column) const;
   void MakeGrid();
   void MakeCrown();
@@ -71,6 +75,8 @@ class HeadBuilder {
   void Compact();
   void PickCurves();
 
+  const HeadDesign& design_;
+  const int columns_;
   HeadShape shape_;
   std::vector<bool> pinned_;
   std::vector<std::vector<int>> grid_;

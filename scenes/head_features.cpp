@@ -7,57 +7,59 @@
 
 namespace kpsa::scenes {
 
-namespace {
-
 // Corners and lids of the left eye: k = 0 the inner corner, n / 2 the outer one, first along the upper lid.
-// `open` scales the height, `wide` the width; the point lies on a flattened sphere of radius rho.
-Double3 LidPoint(int k, int n, double wide, double open, double rho) {
+// The point lies on a flattened sphere above the eyeball.
+Double3 HeadBuilder::LidPoint(int k, int n, const LidRing& ring) const {
   const int half = n / 2;
   const bool upper = k <= half;
   const double even = upper ? static_cast<double>(k) / half : static_cast<double>(n - k) / half;
   const double s = 0.45 * even + 0.55 * (0.5 - 0.5 * Cos(kPi * even));
-  const double x = -1.30 + 2.62 * s;
+  const double x = design_.lid_inner + design_.lid_span * s;
   const double skew = upper ? s + 0.16 * s * (1 - s) : s - 0.22 * s * (1 - s);
   const double arch = 4 * skew * (1 - skew), roundness = std::sqrt(arch);
-  const double height =
-      upper ? 0.53 * (0.55 * arch + 0.45 * roundness) : -0.44 * (0.6 * arch + 0.4 * roundness);
-  const double line = -0.14 * (1 - s) + 0.06 * s;
-  const Double3 p = {x * wide, line + height * open, 0};
+  const double height = upper ? design_.lid_upper * (0.55 * arch + 0.45 * roundness)
+                              : -design_.lid_lower * (0.6 * arch + 0.4 * roundness);
+  const double line = design_.tilt_inner * (1 - s) + design_.tilt_outer * s;
+  const Double3 p = {x * ring.wide, line + height * ring.open, 0};
+  const double rho = design_.eye_radius + ring.above;
   const double inside = rho * rho - 0.86 * p.x * p.x - p.y * p.y;
-  return kEyeCenter + Double3{p.x, p.y, std::sqrt(std::max(inside, 0.04))};
+  return design_.eye_center + Double3{p.x, p.y, std::sqrt(std::max(inside, 0.04))};
 }
 
-struct LidRing {
-  double wide, open, rho;
-};
-constexpr LidRing kLidRings[] = {{1.16, 1.62, kEyeRadius + 0.20}, {1.05, 1.22, kEyeRadius + 0.20},
-                                 {1.0, 1.0, kEyeRadius + 0.15},   {0.985, 0.94, kEyeRadius + 0.03},
-                                 {1.01, 1.1, kEyeRadius + 0.035}, {1.02, 1.7, kEyeRadius + 0.04}};
+namespace {
 constexpr int kSkinRingsOfEye = 3;
+}
 
-}  // namespace
+// The cells of a block, and their mirror images, have no quads of the grid.
+void HeadBuilder::MarkHole(int row0, int row1, int column0, int column1) {
+  for (int r = row0; r < row1; ++r) {
+    for (int c = column0; c < column1; ++c) {
+      hole_[Size(r * columns_ + (c + columns_) % columns_)] = true;
+      hole_[Size(r * columns_ + (2 * columns_ - 1 - c) % columns_)] = true;
+    }
+  }
+}
 
 void HeadBuilder::MakeEyes() {
-  const int mid = kEyeRow + 3;
-  std::vector<int> loop = Loop(kEyeRow, kEyeRow + 6, kEyeColumn0, kEyeColumn1, mid, kEyeColumn0);
+  const int eye_row = design_.eye_row;
+  std::vector<int> loop =
+      Loop(eye_row, eye_row + 6, design_.eye_column0, design_.eye_column1, eye_row + 3, design_.eye_column0);
   std::reverse(loop.begin() + 1, loop.end());  // from the inner corner over the upper lid: clockwise
   const int n = static_cast<int>(loop.size());
   std::vector<std::vector<int>> rings = {loop};
-  for (int ring = 1; ring <= kSkinRingsOfEye + static_cast<int>(std::size(kLidRings)); ++ring) {
+  for (int ring = 1; ring <= kSkinRingsOfEye + static_cast<int>(design_.lid_rings.size()); ++ring) {
     std::vector<int> points;
     for (int k = 0; k < n; ++k) {
       const int lid = ring - kSkinRingsOfEye - 1;
       if (lid < 0) {
         const double t = static_cast<double>(ring) / (kSkinRingsOfEye + 1);
-        const LidRing& first = kLidRings[0];
-        const Double3 inner = LidPoint(k, n, first.wide, first.open, first.rho);
-        points.push_back(AddPair(ProjectToHead(At(loop[Size(k)]) * (1 - t) + inner * t)));
+        const Double3 inner = LidPoint(k, n, design_.lid_rings[0]);
+        points.push_back(AddPair(Project(At(loop[Size(k)]) * (1 - t) + inner * t)));
       } else {
-        points.push_back(
-            AddPair(LidPoint(k, n, kLidRings[lid].wide, kLidRings[lid].open, kLidRings[lid].rho)));
-        if (lid == 0) At(points.back()) = ProjectToHead(At(points.back()));
+        points.push_back(AddPair(LidPoint(k, n, design_.lid_rings[Size(lid)])));
+        if (lid == 0) At(points.back()) = Project(At(points.back()));
         if (lid == 1 && k < n / 2)
-          At(points.back()).z -= 0.07 * Sin(2 * kPi * k / n);  // the upper lid's fold
+          At(points.back()).z -= design_.lid_fold * Sin(2 * kPi * k / n);  // the upper lid's fold
         if (lid >= 1) Pin(points.back());
       }
     }
@@ -72,27 +74,25 @@ void HeadBuilder::MakeEyes() {
   }
   shape_.eye_rings = rings;
   shape_.lid_ring = kSkinRingsOfEye + 3;
-  for (int r = kEyeRow; r < kEyeRow + 6; ++r) {
-    for (int c = kEyeColumn0; c < kEyeColumn1; ++c) {
-      hole_[Size(r * kColumns + c)] = hole_[Size(r * kColumns + (kColumns - 1 - c))] = true;
-    }
-  }
+  MarkHole(eye_row, eye_row + 6, design_.eye_column0, design_.eye_column1);
+}
+
+// The lines of the mouth at s = -1 .. 1 (x = s * half width).
+double HeadBuilder::MouthLine(double s) const {
+  return design_.line_middle * Bump(s, 0.3) + design_.line_side * Bump(std::fabs(s) - 0.4, 0.45) -
+         design_.line_end * s * s;
+}
+double HeadBuilder::UpperBorder(double s) const {
+  const double a = std::fabs(s), side = std::max(1 - a, 0.0);
+  return design_.upper_height * std::sqrt(side) * (0.35 + 0.65 * side) / (0.35 + 0.65 * 0.8) * 1.05 -
+         design_.upper_notch * Bump(s, 0.26);
+}
+double HeadBuilder::LowerBorder(double s) const {
+  const double c = std::max(1 - s * s, 0.0);
+  return -design_.lower_height * (0.55 * c + 0.45 * c * c) - 0.02;
 }
 
 namespace {
-
-// The lines of the mouth at s = -1 .. 1 (x = s * half width).
-double MouthLine(double s) {
-  return -0.05 * Bump(s, 0.3) + 0.05 * Bump(std::fabs(s) - 0.4, 0.45) - 0.07 * s * s;
-}
-double UpperBorder(double s) {
-  const double a = std::fabs(s), side = std::max(1 - a, 0.0);
-  return 0.72 * std::sqrt(side) * (0.35 + 0.65 * side) / (0.35 + 0.65 * 0.8) * 1.05 - 0.14 * Bump(s, 0.26);
-}
-double LowerBorder(double s) {
-  const double c = std::max(1 - s * s, 0.0);
-  return -0.92 * (0.55 * c + 0.45 * c * c) - 0.02;
-}
 
 constexpr int kSkinRingsOfMouth = 3;
 constexpr int kMouthRings = 12;  // with the block's border
@@ -100,8 +100,8 @@ constexpr int kMouthRings = 12;  // with the block's border
 }  // namespace
 
 void HeadBuilder::MakeMouth() {
-  std::vector<int> loop =
-      Loop(kMouthRow, kMouthRow + 6, -kMouthColumn, kMouthColumn, kMouthRow + 3, -kMouthColumn);
+  const int mouth_row = design_.mouth_row, column = design_.mouth_column;
+  std::vector<int> loop = Loop(mouth_row, mouth_row + 6, -column, column, mouth_row + 3, -column);
   std::reverse(loop.begin() + 1, loop.end());
   const int n = static_cast<int>(loop.size()), half = n / 2;
   std::vector<std::vector<int>> rings = {loop};
@@ -137,32 +137,30 @@ void HeadBuilder::MakeMouth() {
       Quad(b, a, d, c);
     }
   }
-  for (int r = kMouthRow; r < kMouthRow + 6; ++r) {
-    for (int c = -kMouthColumn; c < kMouthColumn; ++c) {
-      hole_[Size(r * kColumns + (c + kColumns) % kColumns)] = true;
-    }
-  }
+  MarkHole(mouth_row, mouth_row + 6, -column, column);
 }
 
 // Places the rings of the mouth between the block's border, as it is now, and the lines of the lips.
 void HeadBuilder::FinishMouth() {
   const std::vector<std::vector<int>>& rings = shape_.mouth_rings;
+  const Double3 mouth = design_.mouth_center;
   const int n = static_cast<int>(rings[0].size()), half = n / 2;
   for (int k = 0; k < n; ++k) {
     const bool upper = k > 0 && k < half, corner = k == 0 || k == half;
     const double even = (k <= half ? 2.0 * k / half : 2.0 * (n - k) / half) - 1;
     const double s = 0.5 * even + 0.5 * Sin(even * kPi / 2);
     const double side = corner ? 0 : upper ? 1 : -1;
-    const double x = s * kMouthHalfWidth;
-    const double line = kMouthCenter.y + MouthLine(s);
+    const double x = s * design_.mouth_half_width;
+    const double line = mouth.y + MouthLine(s);
     const double open = corner ? 0 : upper ? UpperBorder(s) : LowerBorder(s);
     const double out_x = corner ? 1.05 : 1.02;
-    const Double3 border = ProjectToHead({x * out_x, line + open, kMouthCenter.z - 0.12 * x * x});
-    const Double3 contact = ProjectToHead({x, line, kMouthCenter.z - 0.12 * x * x});
-    const Double3 n_border = HeadNormal(border), n_contact = HeadNormal(contact);
+    const Double3 border = Project({x * out_x, line + open, mouth.z - design_.mouth_curve * x * x});
+    const Double3 contact = Project({x, line, mouth.z - design_.mouth_curve * x * x});
+    const Double3 n_border = Normal(border), n_contact = Normal(contact);
     const double full = std::sqrt(std::max(1 - s * s, 0.0));  // lips thin out towards the corners
-    const double pout = upper ? 0.85 + 0.25 * Bump(s, 0.35) : 1.0 + 0.12 * Bump(std::fabs(s) - 0.3, 0.4);
-    const Double3 deep = {0, 0, -1};
+    const double pout = design_.lip_fullness *
+                        (upper ? 0.85 + 0.25 * Bump(s, 0.35) : 1.0 + 0.12 * Bump(std::fabs(s) - 0.3, 0.4));
+    const Double3 deep = {0, 0, -design_.mouth_depth};
     const auto set = [&](int ring, Double3 p) {
       const int i = rings[Size(ring)][Size(k)];
       At(i) = p;
@@ -171,7 +169,7 @@ void HeadBuilder::FinishMouth() {
     const Double3 block = At(rings[0][Size(k)]);
     for (int ring = 1; ring <= kSkinRingsOfMouth; ++ring) {
       const double t = static_cast<double>(ring) / (kSkinRingsOfMouth + 1);
-      set(ring, ProjectToHead(block * (1 - t) + border * t));
+      set(ring, Project(block * (1 - t) + border * t));
     }
     const int b = shape_.border_ring;
     set(b, border + n_border * (0.05 * full));
@@ -180,7 +178,7 @@ void HeadBuilder::FinishMouth() {
     set(b + 2, mix(0.66) + n_contact * (0.27 * full * pout));
     const Double3 meet = contact + n_contact * (0.15 * full) + Double3{0, side * 0.008, 0};
     set(b + 3, meet);
-    const double shrink = 1 - 0.10 * std::fabs(s);
+    const double shrink = 1 - design_.pocket_narrow * std::fabs(s);
     set(b + 4, Double3{meet.x * shrink, meet.y + side * 0.012, meet.z} + deep * (0.30 + 0.15 * full));
     set(b + 5,
         Double3{meet.x * shrink * 0.95, meet.y + side * 0.22 * full, meet.z} + deep * (0.95 + 0.15 * full));
@@ -193,7 +191,7 @@ void HeadBuilder::FinishMouth() {
 }
 
 void HeadBuilder::MakeNostrils() {
-  const std::vector<int> loop = Loop(kNoseRow, kNoseRow + 2, 1, 3, kNoseRow, 1);
+  const std::vector<int> loop = Loop(design_.nose_row, design_.nose_row + 2, 1, 3, design_.nose_row, 1);
   nostril_rings_ = {loop};
   const int n = static_cast<int>(loop.size());
   for (int ring = 0; ring < 3; ++ring) {
@@ -216,86 +214,96 @@ void HeadBuilder::MakeNostrils() {
   }
   QuadPair(p[Size(n / 2 - 1)], p[Size(n / 2)], p[Size(n / 2 + 1)], p[Size(n / 2 + 1)]);
   FinishNostrils();
-  for (int r = kNoseRow; r < kNoseRow + 2; ++r) {
-    for (int c = 1; c < 3; ++c) {
-      hole_[Size(r * kColumns + c)] = hole_[Size(r * kColumns + (kColumns - 1 - c))] = true;
-    }
-  }
+  MarkHole(design_.nose_row, design_.nose_row + 2, 1, 3);
 }
 
 void HeadBuilder::FinishNostrils() {
   Double3 center = {};
   const double n = static_cast<double>(nostril_rings_[0].size());
   for (int i : nostril_rings_[0]) center = center + At(i) * (1 / n);
-  const Double3 up = HeadNormal(center) * -1.0;
+  const Double3 up = Normal(center) * -1.0;
   constexpr double kScale[] = {0.72, 0.6, 0.4}, kDepth[] = {0.0, 0.3, 0.7};
   for (std::size_t ring = 1; ring < nostril_rings_.size(); ++ring) {
     for (std::size_t k = 0; k < nostril_rings_[0].size(); ++k) {
       const Double3 outer = At(nostril_rings_[0][k]);
       Double3 p = center + (outer - center) * kScale[ring - 1];
-      if (ring == 1) p = ProjectToHead(p);
-      At(nostril_rings_[ring][k]) = p + (up + Double3{0, 0, -0.3}) * kDepth[ring - 1];
+      if (ring == 1) p = Project(p);
+      At(nostril_rings_[ring][k]) =
+          p + (up + Double3{0, 0, -0.3}) * (design_.nostril_depth * kDepth[ring - 1]);
       Pin(nostril_rings_[ring][k]);
     }
   }
 }
 
-namespace {
+// A closed Catmull-Rom curve through the outline, evenly in its parameter; rings shrink towards the bowl,
+// which lies in front and a little below the middle.
+std::vector<Double3> HeadBuilder::ShellRing(std::size_t ring, std::size_t count, Double3 origin) const {
+  const EarDesign& ear = design_.ear;
+  const EarRing& e = ear.rings[ring];
+  const int n = static_cast<int>(count), m = static_cast<int>(ear.outline.size());
+  std::vector<Double3> points;
+  for (int k = 0; k < n; ++k) {
+    const double at = static_cast<double>(k) * m / n;
+    const int i1 = static_cast<int>(at);
+    const double t = at - i1, t2 = t * t, t3 = t2 * t;
+    const double w[4] = {(-t3 + 2 * t2 - t) / 2, (3 * t3 - 5 * t2 + 2) / 2, (-3 * t3 + 4 * t2 + t) / 2,
+                         (t3 - t2) / 2};
+    double p = 0, q = 0;
+    for (int j = 0; j < 4; ++j) {
+      const auto& control = ear.outline[Size((i1 + j - 1 + m) % m)];
+      p += w[j] * control[0];
+      q += w[j] * control[1];
+    }
+    const double bowl_p = 0.75, bowl_q = -0.15;
+    const double rp = bowl_p + (p - bowl_p) * e.scale, rq = bowl_q + (q - bowl_q) * e.scale;
+    const double rear = Smooth(-0.6, 2.0, p), lobe = Smooth(-1.2, -2.6, q);
+    double height = e.front_height + (e.back_height - e.front_height) * rear;
+    if (e.scale < 0.85 && ring >= ear.rings.size() / 2)
+      height += lobe * (0.42 + 0.55 * rear - height) * 0.8;  // the lobe is plain
+    points.push_back(origin + ear.back * rp + ear.lean * rq + ear.out * height);
+  }
+  return points;
+}
 
-// Outline of the left ear in its plane: p backwards, q upwards, cm; counter-clockwise from outside.
-constexpr double kEarOutline[][2] = {{-0.15, -2.55}, {0.55, -3.0}, {1.25, -2.5}, {1.75, -1.35},
-                                     {2.3, -0.1},    {2.65, 1.2},  {2.45, 2.4},  {1.6, 3.15},
-                                     {0.6, 3.1},     {-0.2, 2.2},  {-0.4, 0.9},  {-0.45, -0.9}};
-struct EarRing {
-  double scale, front_height, back_height;
-};
-constexpr EarRing kEarRings[] = {
-    {0.60, -0.05, 0.05}, {0.72, 0.12, 0.55}, {0.97, 0.22, 1.0},  {1.0, 0.36, 1.22}, {0.90, 0.42, 1.30},
-    {0.80, 0.26, 1.02},  {0.66, 0.22, 0.92}, {0.52, 0.24, 0.98}, {0.38, 0.0, 0.62}, {0.22, -0.18, 0.18}};
-
-}  // namespace
+// A cone over the loop, cut open from low in front to its tip behind.
+std::vector<Double3> HeadBuilder::CupRing(const EarRing& ring, const std::vector<int>& loop,
+                                          Double3 center) const {
+  const EarDesign& ear = design_.ear;
+  const double length = Length(ear.lean);
+  const Double3 up = ear.lean * (1 / length), open = ear.back;
+  std::vector<Double3> points;
+  for (int i : loop) {
+    Double3 across = shape_.points[Size(i)] - center;
+    across = across - up * Dot(across, up);
+    const double behind = 0.5 - 0.5 * Dot(across, open) / Length(across);  // 0 where it opens, 1 at the tip
+    const double rim = 0.08 + 0.92 * behind * behind * (1.4 - 0.4 * behind);
+    const double height = std::min(rim * ring.front_height + ring.back_height, 1.0);
+    const double width = ring.scale * (1 - height * height * 0.6 - height * 0.34);
+    points.push_back(center + across * width + up * (length * height));
+  }
+  return points;
+}
 
 void HeadBuilder::MakeEars() {
-  const std::vector<int> loop = Loop(kEarRow0, kEarRow1, kEarColumn0, kEarColumn1, kEarRow0, kEarColumn0);
+  const EarDesign& ear = design_.ear;
+  const std::vector<int> loop = Loop(ear.row0, ear.row1, ear.column0, ear.column1, ear.row0, ear.column0);
   const int n = static_cast<int>(loop.size());
   Double3 center = {};
   for (int i : loop) center = center + At(i) * (1.0 / n);
-  center = ProjectToHead(center);
-  const Double3 origin = center + Double3{-0.15, 0.1, 0.5};
-  const Double3 back = {0.27, 0.05, -0.962}, lean = {0.09, 0.975, -0.20}, out = {0.96, -0.05, 0.27};
+  center = Project(center);
+  const Double3 origin = center + ear.shift;
   std::vector<int> outer = loop;
   std::vector<int> points;
-  const int ring_count = static_cast<int>(std::size(kEarRings));
-  for (int ring = 0; ring < ring_count; ++ring) {
+  for (std::size_t ring = 0; ring < ear.rings.size(); ++ring) {
     points.clear();
-    const EarRing& e = kEarRings[ring];
-    for (int k = 0; k < n; ++k) {
-      // A closed Catmull-Rom curve through the outline, evenly in its parameter
-      const int m = static_cast<int>(std::size(kEarOutline));
-      const double at = static_cast<double>(k) * m / n;
-      const int i1 = static_cast<int>(at);
-      const double t = at - i1, t2 = t * t, t3 = t2 * t;
-      const double w[4] = {(-t3 + 2 * t2 - t) / 2, (3 * t3 - 5 * t2 + 2) / 2, (-3 * t3 + 4 * t2 + t) / 2,
-                           (t3 - t2) / 2};
-      double p = 0, q = 0;
-      for (int j = 0; j < 4; ++j) {
-        const auto& control = kEarOutline[(i1 + j - 1 + m) % m];
-        p += w[j] * control[0];
-        q += w[j] * control[1];
-      }
-      // Rings shrink towards the bowl, which lies in front and a little below the middle
-      const double bowl_p = 0.75, bowl_q = -0.15;
-      const double rp = bowl_p + (p - bowl_p) * e.scale, rq = bowl_q + (q - bowl_q) * e.scale;
-      const double rear = Smooth(-0.6, 2.0, p), lobe = Smooth(-1.2, -2.6, q);
-      double height = e.front_height + (e.back_height - e.front_height) * rear;
-      if (ring >= 5) height += lobe * (0.42 + 0.55 * rear - height) * 0.8;  // the lobe is plain
-      const Double3 pos = origin + back * rp + lean * rq + out * height;
+    const std::vector<Double3> places =
+        ear.pointed ? CupRing(ear.rings[ring], loop, origin) : ShellRing(ring, loop.size(), origin);
+    for (const Double3& pos : places) {
       points.push_back(AddPair(pos));
       const std::size_t id = Size(points.back());
-      shape_.ear[id] = shape_.ear[id + 1] = std::min(1.0, ring / 3.0);
-      if (ring == 0) {
-        At(points.back()) = ProjectToHead(pos);
-      }
+      shape_.ear[id] = shape_.ear[id + 1] = std::min(1.0, static_cast<double>(ring) / 3.0);
+      shape_.ear_inside[id] = shape_.ear_inside[id + 1] = ring > ear.rings.size() / 2;
+      if (ring == 0) At(points.back()) = Project(pos);
       Pin(points.back());
     }
     for (int k = 0; k < n; ++k) {
@@ -316,11 +324,7 @@ void HeadBuilder::MakeEars() {
       QuadPair(a, b, c, d);
     }
   }
-  for (int r = kEarRow0; r < kEarRow1; ++r) {
-    for (int c = kEarColumn0; c < kEarColumn1; ++c) {
-      hole_[Size(r * kColumns + c)] = hole_[Size(r * kColumns + (kColumns - 1 - c))] = true;
-    }
-  }
+  MarkHole(ear.row0, ear.row1, ear.column0, ear.column1);
 }
 
 }  // namespace kpsa::scenes

@@ -8,39 +8,51 @@
 #include "scenes/head_builder.h"
 
 namespace kpsa::scenes {
-namespace {
 
-// --- The grid: rows from the neck's edge to the crown, columns around. Column 0 is the middle of the face.
-// A row where its outline passes the front, the side (x is the half width) and the back; `rows` to the next
-// one.
-struct GuideRow {
-  double front_y, front_z, side_x, side_y, side_z, back_y, back_z;
-  int rows;
-};
-constexpr GuideRow kGuides[] = {{0.0, 3.9, 5.9, 0.0, -2.4, 0.0, -7.8, 4},
-                                {4.0, 3.5, 5.3, 4.0, -2.0, 5.0, -6.8, 3},
-                                {7.0, 4.4, 5.3, 7.6, -1.4, 8.6, -7.0, 4},
-                                {7.35, 7.6, 5.7, 9.4, -0.6, 10.6, -7.6, 2},
-                                {8.6, 8.7, 6.0, 10.6, -0.3, 12.0, -8.2, 3},
-                                {10.0, 8.6, 6.2, 11.9, -0.2, 13.3, -8.9, 6},  // mouth
-                                {13.1, 9.3, 6.7, 14.3, -0.4, 15.9, -9.8, 1},
-                                {13.7, 9.6, 6.8, 14.9, -0.5, 16.5, -10.0, 3},  // under the nose
-                                {14.35, 11.2, 6.9, 15.8, -0.6, 17.4, -10.2, 5},
-                                {17.0, 10.0, 7.1, 17.4, -0.8, 19.2, -10.4, 6},  // eyes
-                                {20.2, 8.9, 7.2, 20.2, -1.0, 21.9, -10.3, 2},
-                                {21.3, 9.0, 7.3, 21.3, -1.1, 23.0, -10.0, 3},
-                                {23.6, 8.8, 7.3, 23.6, -1.2, 24.8, -9.4, 3},
-                                {26.6, 7.2, 6.5, 26.6, -1.3, 27.2, -7.8, 3},
-                                {28.9, 3.4, 3.9, 29.2, -1.3, 29.1, -5.2, 0}};
-// Angle of column c = 0 .. kHalfColumns: even in x over the face, coarser behind.
-double ColumnAngle(int c) {
-  if (c <= 13) return Asin(0.058 * c);
-  const double front = Asin(0.058 * 13);
-  const double t = static_cast<double>(c - 13) / (kHalfColumns - 13);
+// Angle of column c = 0 .. half_columns: even in x over the face, coarser behind.
+double HeadBuilder::ColumnAngle(int c) const {
+  if (c <= design_.even_columns) return Asin(design_.column_step * c);
+  const double front = Asin(design_.column_step * design_.even_columns);
+  const double t =
+      static_cast<double>(c - design_.even_columns) / (design_.half_columns - design_.even_columns);
   return front + (kPi - front) * (0.72 * t + 0.28 * t * t);
 }
 
+namespace {
+
+std::vector<GuideRow> AllRows(const HeadDesign& design) {
+  std::vector<GuideRow> rows;
+  for (std::size_t g = 0; g + 1 < design.guides.size(); ++g) {
+    const GuideRow &a = design.guides[g], &b = design.guides[g + 1];
+    for (int k = 0; k < a.rows; ++k) {
+      const double t = static_cast<double>(k) / a.rows, s = 1 - t;
+      rows.push_back({a.front_y * s + b.front_y * t, a.front_z * s + b.front_z * t,
+                      a.side_x * s + b.side_x * t, a.side_y * s + b.side_y * t, a.side_z * s + b.side_z * t,
+                      a.back_y * s + b.back_y * t, a.back_z * s + b.back_z * t, 0});
+    }
+  }
+  rows.push_back(design.guides.back());
+  return rows;
+}
+
+Double3 PlaceInRow(const GuideRow& row, double angle) {
+  const double sine = Sin(angle), cosine = Cos(angle);
+  const bool front = cosine >= 0;
+  const double end_y = front ? row.front_y : row.back_y, end_z = front ? row.front_z : row.back_z;
+  const double blend = sine * sine;
+  // The face is flat from side to side near its middle: keep the front row's height there
+  return {row.side_x * sine, end_y + (row.side_y - end_y) * blend,
+          row.side_z + (end_z - row.side_z) * std::fabs(cosine)};
+}
+
 }  // namespace
+
+Double3 GuidePlace(const HeadDesign& design, double row, double angle) {
+  const std::vector<GuideRow> rows = AllRows(design);
+  const auto below = std::min(static_cast<std::size_t>(row), rows.size() - 2);
+  const double t = row - static_cast<double>(below);
+  return PlaceInRow(rows[below], angle) * (1 - t) + PlaceInRow(rows[below + 1], angle) * t;
+}
 
 // The border of the block rows x columns, counter-clockwise from outside, starting at a given point of it.
 std::vector<int> HeadBuilder::Loop(int row0, int row1, int column0, int column1, int first_row,
@@ -58,83 +70,66 @@ std::vector<int> HeadBuilder::Loop(int row0, int row1, int column0, int column1,
 }
 
 void HeadBuilder::MakeGrid() {
-  for (const GuideRow& guide : kGuides) rows_ += guide.rows;
-  ++rows_;
-  std::vector<GuideRow> rows;
-  for (std::size_t g = 0; g + 1 < std::size(kGuides); ++g) {
-    const GuideRow &a = kGuides[g], &b = kGuides[g + 1];
-    for (int k = 0; k < a.rows; ++k) {
-      const double t = static_cast<double>(k) / a.rows, s = 1 - t;
-      rows.push_back({a.front_y * s + b.front_y * t, a.front_z * s + b.front_z * t,
-                      a.side_x * s + b.side_x * t, a.side_y * s + b.side_y * t, a.side_z * s + b.side_z * t,
-                      a.back_y * s + b.back_y * t, a.back_z * s + b.back_z * t, 0});
-    }
-  }
-  rows.push_back(kGuides[std::size(kGuides) - 1]);
-  grid_.assign(Size(rows_), std::vector<int>(kColumns));
+  const std::vector<GuideRow> rows = AllRows(design_);
+  rows_ = static_cast<int>(rows.size());
+  grid_.assign(Size(rows_), std::vector<int>(Size(columns_)));
   for (int r = 0; r < rows_; ++r) {
-    for (int c = 0; c < kColumns; ++c) grid_[Size(r)][Size(c)] = Add({});
+    for (int c = 0; c < columns_; ++c) grid_[Size(r)][Size(c)] = Add({});
   }
   for (int r = 0; r < rows_; ++r) {
     const GuideRow& row = rows[Size(r)];
-    for (int c = 0; c <= kHalfColumns; ++c) {
-      const double angle = ColumnAngle(c), sine = Sin(angle), cosine = Cos(angle);
-      const bool front = cosine >= 0;
-      const double end_y = front ? row.front_y : row.back_y, end_z = front ? row.front_z : row.back_z;
-      const double blend = sine * sine;
-      // The face is flat from side to side near its middle: keep the front row's height there
-      Double3 p = {row.side_x * sine, end_y + (row.side_y - end_y) * blend,
-                   row.side_z + (end_z - row.side_z) * std::fabs(cosine)};
+    for (int c = 0; c <= design_.half_columns; ++c) {
       const int a = Grid(r, c), b = Grid(r, -c);
-      At(a) = ProjectToHead(p);
+      At(a) = Project(PlaceInRow(row, ColumnAngle(c)));
       if (r == 0) At(a) = {At(a).x, 0, At(a).z};
-      if (c == 0 || c == kHalfColumns) At(a).x = 0;
+      if (c == 0 || c == design_.half_columns) At(a).x = 0;
       Pair(a, b);
       if (a != b) At(b) = {-At(a).x, At(a).y, At(a).z};
       if (r == 0) Pin(a);
     }
   }
-  hole_.assign(Size(rows_ * kColumns), false);
+  hole_.assign(Size(rows_ * columns_), false);
 }
 
 // The crown: the top row is the border of a square grid of quads.
 void HeadBuilder::MakeCrown() {
   // Columns -w .. w in front are one side, the same behind, and the rest the sides
-  constexpr int kWide = 6, kDeep = kHalfColumns - 2 * kWide;  // quads across (2 w), quads deep
+  const int wide = design_.crown_wide,
+            deep = design_.half_columns - 2 * wide;  // quads across (2 w), quads deep
   const int top = rows_ - 1;
   // square[i][j]: i from the front to the back, j from -x to +x
-  std::vector<std::vector<int>> square(Size(kDeep + 1), std::vector<int>(Size(2 * kWide + 1)));
-  for (int i = 0; i <= kDeep; ++i) {
-    for (int j = -kWide; j <= kWide; ++j) {
-      int& point = square[Size(i)][Size(j + kWide)];
+  std::vector<std::vector<int>> square(Size(deep + 1), std::vector<int>(Size(2 * wide + 1)));
+  for (int i = 0; i <= deep; ++i) {
+    for (int j = -wide; j <= wide; ++j) {
+      int& point = square[Size(i)][Size(j + wide)];
       if (i == 0) {
         point = Grid(top, j);
-      } else if (i == kDeep) {
-        point = Grid(top, kHalfColumns - j);
-      } else if (j == kWide) {
-        point = Grid(top, kWide + i);
-      } else if (j == -kWide) {
-        point = Grid(top, -kWide - i);
+      } else if (i == deep) {
+        point = Grid(top, design_.half_columns - j);
+      } else if (j == wide) {
+        point = Grid(top, wide + i);
+      } else if (j == -wide) {
+        point = Grid(top, -wide - i);
       } else {
         point = Add({});
       }
     }
   }
-  for (int i = 1; i < kDeep; ++i) {
-    for (int j = -kWide + 1; j < kWide; ++j) {
-      const int point = square[Size(i)][Size(j + kWide)];
-      const double u = static_cast<double>(i) / kDeep, v = (j + kWide) / (2.0 * kWide);
-      const Double3 front = At(square[0][Size(j + kWide)]), back = At(square[Size(kDeep)][Size(j + kWide)]);
-      const Double3 right = At(square[Size(i)][0]), left = At(square[Size(i)][2 * kWide]);
+  for (int i = 1; i < deep; ++i) {
+    for (int j = -wide + 1; j < wide; ++j) {
+      const int point = square[Size(i)][Size(j + wide)];
+      const double u = static_cast<double>(i) / deep, v = (j + wide) / (2.0 * wide);
+      const Double3 front = At(square[0][Size(j + wide)]), back = At(square[Size(deep)][Size(j + wide)]);
+      const Double3 right = At(square[Size(i)][0]), left = At(square[Size(i)][Size(2 * wide)]);
       // Half of each of the two linear blends, lifted, then projected
       Double3 p = (front * (1 - u) + back * u) * 0.5 + (right * (1 - v) + left * v) * 0.5;
       p.y += 1.0;
-      At(point) = ProjectToHead(p);
-      shape_.mirror[Size(point)] = square[Size(i)][Size(-j + kWide)];
+      At(point) = Project(p);
+      shape_.mirror[Size(point)] = square[Size(i)][Size(-j + wide)];
     }
   }
-  for (int i = 0; i < kDeep; ++i) {
-    for (int j = 0; j < 2 * kWide; ++j) {
+  for (int i = 0; i < deep; ++i) {
+    for (int j = 0; j < 2 * wide; ++j) {
       const auto at = [&](int a, int b) { return square[Size(a)][Size(b)]; };
       Quad(at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
     }
@@ -161,10 +156,10 @@ void HeadBuilder::Relax(int iterations) {
       if (pinned_[i] || neighbours[i].empty()) continue;
       Double3 mean = {};
       for (int j : neighbours[i]) mean = mean + At(j) * (1.0 / static_cast<double>(neighbours[i].size()));
-      const Double3 normal = HeadNormal(shape_.points[i]);
+      const Double3 normal = Normal(shape_.points[i]);
       Double3 step = mean - shape_.points[i];
       step = step - normal * Dot(step, normal);
-      next[i] = ProjectToHead(shape_.points[i] + step * 0.5);
+      next[i] = Project(shape_.points[i] + step * 0.5);
     }
     shape_.points = next;
     Symmetrize();
@@ -200,6 +195,7 @@ void HeadBuilder::Compact() {
     out.mirror.push_back(index[Size(shape_.mirror[i])]);
     out.lip.push_back(shape_.lip[i]);
     out.ear.push_back(shape_.ear[i]);
+    out.ear_inside.push_back(shape_.ear_inside[i]);
   }
   for (auto q : shape_.quads) {
     for (int& i : q) i = index[Size(i)];
@@ -229,8 +225,8 @@ void HeadBuilder::PickCurves() {
     shape_.upper_lip_curve.push_back(lips[Size(k)]);
     shape_.lower_lip_curve.push_back(lips[Size((n - k) % n)]);
   }
-  const int brow_row = kEyeRow + 7;
-  for (int c = 2; c <= 13; ++c) {
+  const int brow_row = design_.eye_row + 7;
+  for (int c = design_.brow_column0; c <= design_.brow_column1; ++c) {
     shape_.brow_curve_left.push_back(Grid(brow_row, c));
     shape_.brow_curve_right.push_back(Grid(brow_row, -c));
   }
@@ -244,12 +240,12 @@ HeadShape HeadBuilder::Build() {
   MakeNostrils();
   MakeEars();
   for (int r = 0; r + 1 < rows_; ++r) {
-    for (int c = 0; c < kHalfColumns; ++c) {
-      if (hole_[Size(r * kColumns + c)]) continue;
+    for (int c = 0; c < design_.half_columns; ++c) {
+      if (hole_[Size(r * columns_ + c)]) continue;
       QuadPair(Grid(r, c), Grid(r, c + 1), Grid(r + 1, c + 1), Grid(r + 1, c));
     }
   }
-  Relax(24);
+  Relax(design_.relaxations);
   FinishMouth();
   FinishNostrils();
   Relax(10);
@@ -260,6 +256,6 @@ HeadShape HeadBuilder::Build() {
   return std::move(shape_);
 }
 
-HeadShape MakeHeadShape() { return HeadBuilder().Build(); }
+HeadShape MakeHeadShape(const HeadDesign& design) { return HeadBuilder(design).Build(); }
 
 }  // namespace kpsa::scenes

@@ -27,7 +27,7 @@ struct Mesh {
 
 const Mesh& Head() {
   static const Mesh head = [] {
-    const scenes::HeadShape shape = scenes::MakeHeadShape();
+    const scenes::HeadShape shape = scenes::MakeHeadShape(scenes::FaceDesign());
     Mesh mesh;
     for (const Double3& p : shape.points) {
       for (int axis = 0; axis < 3; ++axis) mesh.points.push_back(static_cast<float>(p[axis] * 0.01));

@@ -10,16 +10,14 @@
 
 #include "io/gltf_import.h"
 #include "scenes/face_model.h"
+#include "tests/scenes/heads.h"
 
 namespace kpsa::scenes {
 namespace {
 
-const HeadShape& Shape() {
-  static const HeadShape shape = MakeHeadShape();
-  return shape;
-}
+const HeadShape& Shape() { return ShapeOf(FaceDesign()); }
 const SceneFiles& Face() {
-  static const SceneFiles files = GenerateFace();
+  static const SceneFiles files = GenerateHead(FaceDesign(), Shape());
   return files;
 }
 
@@ -30,8 +28,12 @@ std::string FileBytes(const std::string& path) {
 }
 
 TEST(Scenes, TheCommittedFilesAreWhatTheGeneratorWrites) {
-  for (const auto& [folder, files] :
-       {std::pair<std::string, SceneFiles>{"face/", Face()}, {"hello/", GenerateHello()}, {"gi/", GenerateRoom()}, {"car/", GenerateCar()}}) {
+  for (const auto& [folder, files] : {std::pair<std::string, SceneFiles>{"face/", Face()},
+                                      {"boy/", GenerateHead(BoyDesign(), ShapeOf(BoyDesign()))},
+                                      {"animal/", GenerateHead(AnimalDesign(), ShapeOf(AnimalDesign()))},
+                                      {"hello/", GenerateHello()},
+                                      {"gi/", GenerateRoom()},
+                                       {"car/", GenerateCar()}}) {
     for (const auto& [name, bytes] : files) {
       EXPECT_TRUE(FileBytes(std::string(KPSA_SCENES_DIR) + "/" + folder + name) == bytes)
           << folder << name << " differs: run generate_scenes " << KPSA_SCENES_DIR;
@@ -63,7 +65,7 @@ TEST(Scenes, TheFaceLoadsAsItWasMade) {
   ASSERT_EQ(face.meshes.size(), 2u);
   const gltf::Mesh &skin = face.meshes[0], &eyes = face.meshes[1];
   ASSERT_EQ(skin.vertex_count(), Shape().points.size());
-  const std::vector<Expression> expressions = FaceExpressions(Shape());
+  const std::vector<Expression> expressions = FaceExpressions(FaceDesign(), Shape());
   ASSERT_EQ(skin.targets.size(), expressions.size());
   for (std::size_t t = 0; t < expressions.size(); ++t) {
     EXPECT_EQ(skin.targets[t].name, expressions[t].name);
@@ -77,7 +79,8 @@ TEST(Scenes, TheFaceLoadsAsItWasMade) {
   EXPECT_EQ(skin.colors.size(), skin.positions.size());
   EXPECT_EQ(eyes.colors.size(), eyes.positions.size());
   EXPECT_TRUE(skin.skinned() && eyes.skinned());
-  for (const char* clip : {"extreme", "talk_train", "talk"}) EXPECT_NE(face.FindClip(clip), kNoIndex);
+  for (const char* clip : {"extreme", "talk_train", "talk", "emotions"})
+    EXPECT_NE(face.FindClip(clip), kNoIndex);
   for (const char* joint : {"root", "neck", "head", "jaw", "eye.L", "eye.R", "face_mesh", "eyes"}) {
     EXPECT_TRUE(std::any_of(face.nodes.begin(), face.nodes.end(), [&](const gltf::Node& n) {
       return n.name == joint;
@@ -155,9 +158,9 @@ TEST(Head, NoTwoPointsCoincideAndNoTriangleIsFlat) {
 
 TEST(Head, WeightsAddUpToExactlyOneInFourJoints) {
   std::set<int> used;
-  for (const auto& shares : FaceWeights(Shape())) {
+  for (const auto& shares : FaceWeights(FaceDesign(), Shape())) {
     for (double w : shares) EXPECT_GE(w, 0);
-    const Influences influences = MakeInfluences(shares);
+    const Influences influences = MakeInfluences(std::span(shares.data(), FaceDesign().joints.size()));
     float sum = 0;
     for (std::size_t k = 0; k < 4; ++k) {
       sum += influences.weights[k];
@@ -165,11 +168,11 @@ TEST(Head, WeightsAddUpToExactlyOneInFourJoints) {
     }
     EXPECT_EQ(sum, 1.0f);
   }
-  EXPECT_EQ(used.size(), static_cast<std::size_t>(kJointCount));
+  EXPECT_EQ(used.size(), FaceDesign().joints.size());
 }
 
 TEST(Head, TheJawMovesTheLowerLipAndNotTheUpper) {
-  const auto weights = FaceWeights(Shape());
+  const auto weights = FaceWeights(FaceDesign(), Shape());
   const std::vector<int>& contact = Shape().mouth_rings[static_cast<std::size_t>(Shape().contact_ring)];
   const std::size_t quarter = contact.size() / 4;
   EXPECT_LT(weights[static_cast<std::size_t>(contact[quarter])][kJaw], 0.01);
@@ -177,7 +180,7 @@ TEST(Head, TheJawMovesTheLowerLipAndNotTheUpper) {
 }
 
 TEST(Expressions, AreManyNamedLocalAndMirrored) {
-  const std::vector<Expression> expressions = FaceExpressions(Shape());
+  const std::vector<Expression> expressions = FaceExpressions(FaceDesign(), Shape());
   EXPECT_GE(expressions.size(), 40u);
   std::map<std::string, const Expression*> by_name;
   for (const Expression& e : expressions) {
@@ -206,7 +209,7 @@ TEST(Expressions, AreManyNamedLocalAndMirrored) {
 }
 
 TEST(Expressions, ABlinkClosesTheEyeWithoutCuttingTheEyeball) {
-  const std::vector<Expression> expressions = FaceExpressions(Shape());
+  const std::vector<Expression> expressions = FaceExpressions(FaceDesign(), Shape());
   const auto blink = std::find_if(expressions.begin(), expressions.end(),
                                   [](const Expression& e) { return e.name == "blink.L"; });
   const std::vector<int>& edge = Shape().eye_rings[static_cast<std::size_t>(Shape().lid_ring)];
@@ -219,19 +222,20 @@ TEST(Expressions, ABlinkClosesTheEyeWithoutCuttingTheEyeball) {
   for (std::size_t k = 0; k < n; ++k) {
     for (double share : {0.25, 0.5, 0.75, 1.0}) {
       const Double3 p = Shape().points[at(k)] + blink->deltas[at(k)] * share;
-      EXPECT_GT(Length(p - kEyeCenter), kEyeRadius - 0.02) << k << " at " << share;
+      EXPECT_GT(Length(p - FaceDesign().eye_center), FaceDesign().eye_radius - 0.02) << k << " at " << share;
     }
   }
 }
 
 TEST(Clips, HaveUnitRotationsAndWeightsInRange) {
   std::vector<std::string> names;
-  for (const Expression& e : FaceExpressions(Shape())) names.push_back(e.name);
-  const std::vector<GlbClip> clips = FaceClips(names, 6);
-  ASSERT_EQ(clips.size(), 3u);
+  for (const Expression& e : FaceExpressions(FaceDesign(), Shape())) names.push_back(e.name);
+  const std::vector<GlbClip> clips = FaceClips(FaceDesign(), names, 6);
+  ASSERT_EQ(clips.size(), 4u);
   EXPECT_EQ(clips[0].name, "extreme");
   EXPECT_EQ(clips[1].name, "talk_train");
   EXPECT_EQ(clips[2].name, "talk");
+  EXPECT_EQ(clips[3].name, "emotions");
   for (const GlbClip& clip : clips) {
     for (const GlbChannel& channel : clip.channels) {
       const std::size_t width = channel.weights ? names.size() : 4;
@@ -266,10 +270,10 @@ TEST(Clips, HaveUnitRotationsAndWeightsInRange) {
 // The test clip is rich: its principal modes are counted in expression space with the skin left out, which is
 // a lower bound of what the whole stack does.
 TEST(Clips, TheTestClipNeedsManyModes) {
-  const std::vector<Expression> expressions = FaceExpressions(Shape());
+  const std::vector<Expression> expressions = FaceExpressions(FaceDesign(), Shape());
   std::vector<std::string> names;
   for (const Expression& e : expressions) names.push_back(e.name);
-  const GlbClip talk = FaceClips(names, 6).back();
+  const GlbClip talk = FaceClips(FaceDesign(), names, 6)[2];
   const GlbChannel& weights = talk.channels.back();
   const std::size_t n = names.size(), frames = static_cast<std::size_t>(talk.frames);
   // Covariance of the weights and Gram matrix of the shapes; the eigenvalues of their product are the

@@ -1,0 +1,87 @@
+// The rigs with a production's stack: they are valid without a word, each deformer does something, and some
+// points are the same bits as all of them.
+#include <algorithm>
+#include <random>
+
+#include "tests/cli/process.h"
+#include "tests/cli/rig_run.h"
+
+namespace kpsa {
+namespace {
+
+class Production : public ::testing::TestWithParam<const char*> {
+ protected:
+  std::string path() const { return std::string(KPSA_SCENES_DIR "/") + GetParam(); }
+};
+
+TEST_P(Production, IsValidWithoutAWord) {
+  const ProcessResult result = RunKpsa({"validate", path()});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.err, "");
+  EXPECT_NE(result.out.find("fine"), std::string::npos) << result.out;
+}
+
+// Every stage moves points, and those of a subset by the same bits.
+TEST_P(Production, SomePointsHaveTheBitsOfAll) {
+  RigOptions rest;
+  rest.rest = true;
+  Result<Rig> rig = LoadRig(AcceleratedRegistry(), path(), rest);
+  ASSERT_TRUE(rig.ok()) << rig.status().ToString();
+  EXPECT_TRUE(rig->notes.empty());
+  const std::vector<double> pose = SmoothPoses(*rig, 2, 0.8)[1];
+  const auto& mesh = rig->scene.meshes[0];
+  const auto total = static_cast<Index>(mesh.mesh().point_count());
+  std::vector<Index> some(total);
+  for (Index i = 0; i < total; ++i) some[i] = i;
+  std::shuffle(some.begin(), some.end(), std::mt19937(7));
+  some.resize(33);
+  std::sort(some.begin(), some.end());
+  Compiler compiler;
+  const auto start = [&](const std::vector<PointSet>& sets, bool posed) {
+    Request request;
+    request.varying = VaryingPlugs(*rig);
+    for (const Stage& stage : mesh.stages) {
+      for (const PointSet& set : sets) request.outputs.push_back({stage.points, set});
+    }
+    Result<std::shared_ptr<const Plan>> plan = compiler.Compile(*rig->graph, request);
+    EXPECT_TRUE(plan.ok()) << plan.status().ToString();
+    auto evaluator = std::make_unique<Evaluator>(*plan);
+    for (std::size_t c = 0; posed && c < rig->controls.size(); ++c) {
+      const PlugRef& plug = rig->controls[c].plug;
+      const Index varying = (*plan)->FindVarying(plug);
+      if (varying == kNoIndex) continue;
+      evaluator->Set(varying, pose[c],
+                     (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
+    }
+    EXPECT_TRUE(evaluator->Evaluate().ok());
+    return evaluator;
+  };
+  const auto whole = start({PointSet()}, true), part = start({PointSet::Of(some, total)}, true);
+  const auto still = start({PointSet()}, false);
+  for (std::size_t s = 0; s < mesh.stages.size(); ++s) {
+    SCOPED_TRACE(mesh.stages[s].name);
+    const ConstPointsView all = whole->Points(s), few = part->Points(s), resting = still->Points(s);
+    ASSERT_EQ(few.count, some.size());
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      EXPECT_EQ(all.x[some[i]], few.x[i]);
+      EXPECT_EQ(all.y[some[i]], few.y[i]);
+      EXPECT_EQ(all.z[some[i]], few.z[i]);
+    }
+    if (s == 0) continue;
+    const ConstPointsView before = whole->Points(s - 1), resting_before = still->Points(s - 1);
+    double moved = 0, moved_at_rest = 0;
+    for (std::size_t i = 0; i < all.count; ++i) {
+      moved = std::max(moved, double{std::abs(all.y[i] - before.y[i]) + std::abs(all.z[i] - before.z[i])});
+      moved_at_rest = std::max(moved_at_rest, double{std::abs(resting.y[i] - resting_before.y[i])});
+    }
+    EXPECT_GT(moved, 1e-5);
+    EXPECT_LT(moved_at_rest, 1e-5);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Rigs, Production,
+                         ::testing::Values("boy/boy.yaml", "boy/boy_mush.yaml", "animal/animal.yaml",
+                                           "animal/animal_mush.yaml"));
+
+}  // namespace
+}  // namespace kpsa
