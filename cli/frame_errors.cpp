@@ -28,7 +28,7 @@ SplitBlock MakeBlock(const AppliedSubspace& one) {
   block.poses.resize(block.modes.rows(), kFramesAtATime);
   block.estimates.resize(block.modes.rows(), kFramesAtATime);
   block.mean.resize(block.modes.rows());
-  const std::vector<float> zero(s.map_inputs(), 0.0f);  // cues at their means
+  const std::vector<float> zero(s.rows(), 0.0f);  // cues at their means
   Eigen::Index row = 0;
   for (const TileMap& tiles : s.tiles) {
     PointBuffer mean(tiles.points());

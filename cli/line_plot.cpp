@@ -1,9 +1,9 @@
 #include "cli/line_plot.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-
-#include "base/text.h"
 
 namespace kpsa {
 namespace {

@@ -51,7 +51,7 @@ struct KpsaKernel {
   std::vector<Output> outputs;
 };
 
-// Kept from decide to compute, per evaluator; what the tiles take (Subspace::map_inputs) follows it.
+// Kept from decide to compute, per evaluator; the normalised measurement y follows it, padded to 16.
 struct KpsaState {
   Verdict verdict;
 };
@@ -141,10 +141,7 @@ std::uint64_t Decide(ComputeContext& c) {
   const Stopwatch watch(projection_ns);
   Normalize(subspace, raw, y);
   for (std::size_t j = r; j < padded; ++j) y[j] = 0;
-  const bool paper = subspace.mode == EstimatorMode::kPaper;
-  const std::span<float> coordinates(c.scratch + 3 * padded, paper ? padded : 0);
-  state.verdict = Judge(subspace.soft_cache, kernel.threshold, y, g, coordinates);
-  if (paper) std::copy_n(coordinates.begin(), subspace.modes, y.begin());  // what the tiles take
+  state.verdict = Judge(subspace.soft_cache, kernel.threshold, y, g);
   return state.verdict.hit ? 0 : all;
 }
 
@@ -160,7 +157,7 @@ void WriteVerdict(const ComputeContext& c) {
 void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
   const Subspace& subspace = *kernel.config->data().subspace;
   const KpsaKernel::Output& wanted = kernel.outputs[m];
-  const std::span<const float> y(Measured(c), subspace.map_inputs());
+  const std::span<const float> y(Measured(c), subspace.rows());
   const Matrix4& matrix = c.get<Matrix4>(kSpaceMatrix);
   const bool in_space = kernel.config->data().outputs_in_space[m] != 0;
   const Matrix4* space = !in_space || matrix == Matrix4() ? nullptr : &matrix;
@@ -214,7 +211,7 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
     }
     // Frames that share a pass over the subspace
     const Stopwatch watch(reconstruction_ns);
-    const std::size_t r = subspace.map_inputs();
+    const std::size_t r = subspace.rows();
     for (std::size_t first = 0; first < count; first += kBlockFrames) {
       const std::size_t frames = std::min(kBlockFrames, count - first);
       float* y = contexts[first].scratch;
@@ -281,9 +278,8 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
     kernel.outputs.push_back(std::move(output));
   }
   const std::size_t padded = subspace.soft_cache.padded_rows();
-  // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles), g and
-  // coordinates
-  const std::size_t scratch = std::max({whole, PaddedCount(kBlockFrames * subspace.rows()), 4 * padded});
+  // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles) and g
+  const std::size_t scratch = std::max({whole, PaddedCount(kBlockFrames * subspace.rows()), 3 * padded});
   const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 + padded * sizeof(float);
   return BoundKernel{std::make_shared<const KpsaKernel>(std::move(kernel)), scratch, state};
 }

@@ -33,13 +33,13 @@ HWY_INLINE float SumInHalves(D d, V v) {
 }
 #endif
 
-// Up to 16 rows of F against y, four by four, sixteen columns at a time: w [16], and g += F_rows^T w. Returns
+// Up to 16 rows of F against y, four by four, sixteen columns at a time: w, and g += F_rows^T w. Returns
 // |w|^2.
 float Rows(const float* HWY_RESTRICT rows, std::size_t fours, std::size_t groups, const float* HWY_RESTRICT y,
-           float* HWY_RESTRICT w, float* HWY_RESTRICT g) {
+           float* HWY_RESTRICT g) {
   const hn::CappedTag<float, 16> d;
   constexpr std::size_t kLanes = HWY_MIN(HWY_LANES(float), 16), kVectors = 16 / kLanes;
-  float squared = 0;
+  float w[16], squared = 0;
   for (std::size_t four = 0; four < fours; ++four) {
     const float* HWY_RESTRICT at = rows + 64 * groups * four;
     hn::Vec<decltype(d)> sum[4][kVectors];
@@ -82,19 +82,16 @@ float Rows(const float* HWY_RESTRICT rows, std::size_t fours, std::size_t groups
   return squared;
 }
 
-// g = F^T F y; returns |F y|^2. F [rows x columns]. Where `coordinates` is not null, F y goes there [rows,
-// padded to 16].
+// g = F^T F y; returns |F y|^2. F [rows x columns].
 double Project(const float* factor, std::size_t rows, std::size_t columns, bool lower, const float* y,
-               float* coordinates, float* g) {
+               float* g) {
   const std::size_t all = (columns + 15) / 16;
   for (std::size_t j = 0; j < 16 * all; ++j) g[j] = 0;
   double sum = 0;
-  float own[16];
   for (std::size_t row = 0; row < rows; row += 16) {
     const std::size_t groups = lower ? row / 16 + 1 : all,
                       fours = ((rows - row < 16 ? rows - row : 16) + 3) / 4;
-    float* const w = coordinates == nullptr ? own : coordinates + row;
-    sum += static_cast<double>(Rows(factor, fours, groups, y, w, g));
+    sum += static_cast<double>(Rows(factor, fours, groups, y, g));
     factor += 64 * groups * fours;
   }
   return sum;
@@ -111,9 +108,6 @@ HWY_AFTER_NAMESPACE();
 #include <cmath>
 
 #include "base/check.h"
-#include "kpsa/eigen_solvers.h"
-#include "kpsa/gemm.h"
-#include "kpsa/varimax.h"
 
 namespace kpsa {
 
@@ -122,7 +116,6 @@ HWY_EXPORT(Project);
 namespace {
 
 constexpr double kQuantile = 0.99;
-constexpr int kRowSweeps = 12;  // of varimax: what is left to gain then saves no tile an input
 
 double Quantile(std::vector<double> values, double share) {
   const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
@@ -150,6 +143,14 @@ Index FirstNotFinite(const SoftCacheModel& model, std::span<const float> y) {
     }
   }
   return kNoIndex;
+}
+
+// Rows that span those of p = (coordinates) y, M <= r.
+Eigen::MatrixXd OrthonormalRows(const Eigen::MatrixXd& coordinates) {
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(coordinates.transpose());
+  const Eigen::MatrixXd q =
+      qr.householderQ() * Eigen::MatrixXd::Identity(coordinates.cols(), coordinates.rows());
+  return q.transpose();
 }
 
 // F in the layout of SoftCacheModel::factor.
@@ -189,35 +190,16 @@ double FullWeight(double score, const SoftCacheThreshold& threshold) {
   return t * t * (3 - 2 * t);
 }
 
-Eigen::MatrixXd PaperRows(const Estimator& estimator, int components) {
-  const Eigen::MatrixXd& p = estimator.coordinates;
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(p.transpose());
-  const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(p.cols(), p.rows());
-  // Varimax wants orthonormal columns: the nearest ones
-  Eigen::MatrixXd outputs = Multiply(estimator.gain, q);
-  const SymmetricEigen eigen = AllEigen(outputs.transpose() * outputs);
-  const Eigen::VectorXd inverse = eigen.values.cwiseMax(1e-12 * eigen.values[0]).cwiseSqrt().cwiseInverse();
-  outputs = Multiply(outputs, eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose());
-  const VarimaxResult varimax = Varimax({.max_sweeps = kRowSweeps}, components, &outputs);
-  return (q * varimax.rotation).transpose();
-}
-
 SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
                                   const Eigen::MatrixXd& training) {
-  return MakeSoftCacheModel(
-      estimator, cues, training,
-      estimator.mode == EstimatorMode::kPaper ? PaperRows(estimator, 3) : Eigen::MatrixXd());
-}
-
-SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
-                                  const Eigen::MatrixXd& training, const Eigen::MatrixXd& paper_rows) {
   KPSA_CHECK_EQ(training.rows(), cues.rows());
   SoftCacheModel model;
   model.mode = estimator.mode;
   model.offsets = cues.offsets;
   const bool map = model.mode == EstimatorMode::kMap;
   model.modes = static_cast<std::size_t>(estimator.coordinates.rows());
-  model.factor = PackFactor(map ? estimator.whitening : paper_rows, map, model.factor_size());
+  model.factor = PackFactor(map ? estimator.whitening : OrthonormalRows(estimator.coordinates), map,
+                            model.factor_size());
   for (std::size_t k = 0; k < cues.cues.size() && model.mode == EstimatorMode::kMap; ++k) {
     const auto begin = static_cast<Eigen::Index>(cues.offsets[k]);
     const Eigen::Index height = static_cast<Eigen::Index>(cues.offsets[k + 1]) - begin;
@@ -249,14 +231,11 @@ SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues
   return model;
 }
 
-RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g,
-                           std::span<float> coordinates) {
-  KPSA_DCHECK(coordinates.empty() || coordinates.size() >= (model.modes + 15) / 16 * 16);
+RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g) {
   KPSA_DCHECK(y.size() >= model.padded_rows() && g.size() >= model.padded_rows());
   const bool map = model.mode == EstimatorMode::kMap;
-  double squared = HWY_DYNAMIC_DISPATCH(Project)(
-      model.factor.data(), map ? model.rows() : model.modes, model.rows(), map, y.data(),
-      map || coordinates.empty() ? nullptr : coordinates.data(), g.data());
+  double squared = HWY_DYNAMIC_DISPATCH(Project)(model.factor.data(), map ? model.rows() : model.modes,
+                                                 model.rows(), map, y.data(), g.data());
   if (!map) {
     squared = 0;
     for (std::size_t j = 0; j < model.rows(); ++j) {
@@ -284,9 +263,9 @@ RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y
 }
 
 Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g, std::span<float> coordinates) {
+              std::span<float> g) {
   Verdict verdict;
-  const RawScores raw = ComputeRawScores(model, y, g, coordinates);
+  const RawScores raw = ComputeRawScores(model, y, g);
   // A NaN or an infinity anywhere in y spoils score 1
   if (!std::isfinite(raw.score1)) verdict.offender = FirstNotFinite(model, y);
   verdict.score = std::max(raw.score1 / model.quantile1, raw.score2 / model.quantile2);

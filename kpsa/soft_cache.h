@@ -69,13 +69,7 @@ struct SoftCacheModel {
   std::size_t cues() const { return offsets.empty() ? 0 : offsets.size() - 1; }
 };
 
-// Q^T [M x r] of a paper estimator, rotated (varimax) so that each of the coordinates Q^T y moves few points.
-Eigen::MatrixXd PaperRows(const Estimator& estimator, int components);
-
-// From an estimator; the quantiles from training measurements, one a column [r x T]. Paper mode: with these
-// rows, or with those of PaperRows.
-SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
-                                  const Eigen::MatrixXd& training, const Eigen::MatrixXd& paper_rows);
+// From an estimator; the quantiles from training measurements, one a column [r x T].
 SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
                                   const Eigen::MatrixXd& training);
 
@@ -85,12 +79,10 @@ struct RawScores {
 };
 // Run time. y and g of at least padded_rows() floats, y with zeros beyond its rows; allocates nothing; the
 // same bits on every SIMD target.
-// Paper mode: `coordinates` [M, padded to 16], if not empty, becomes Q^T y.
-RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g,
-                           std::span<float> coordinates = {});
+RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g);
 // The score and what follows from it. NaN or infinity in y is a miss.
 Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g, std::span<float> coordinates = {});
+              std::span<float> g);
 
 // The trained range of a plug that may vary, margin included.
 struct TrainedRange {

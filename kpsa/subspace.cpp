@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "kpsa/gemm.h"
 
 namespace kpsa {
 namespace {
@@ -70,7 +69,7 @@ Status ValidateSubspace(const Subspace& s) {
   if (s.tiles.size() != s.outputs.size())
     return Status::Invalid("{} outputs, but {} sets of tiles", s.outputs.size(), s.tiles.size());
   for (std::size_t i = 0; i < s.outputs.size(); ++i) {
-    if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != s.map_inputs() ||
+    if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != rows ||
         s.tiles[i].data().components != s.components) {
       return Status::Invalid("output \"{}\" has {} points of {} components, its tiles {} of {}",
                              s.outputs[i].name, s.outputs[i].points, s.components, s.tiles[i].points(),
@@ -113,37 +112,28 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   s.outputs = std::move(outputs);
   s.cue_mean.assign(cues.mean.data(), cues.mean.data() + cues.mean.size());
   s.cue_scale.assign(cues.scale.data(), cues.scale.data() + cues.scale.size());
-  // Paper mode reconstructs from its M coordinates, of which a tile needs few
-  const bool paper = s.mode == EstimatorMode::kPaper;
-  Eigen::MatrixXd rows;
-  if (paper) rows = PaperRows(estimator, s.components);
-  s.soft_cache = MakeSoftCacheModel(estimator, cues, training, rows);
+  s.soft_cache = MakeSoftCacheModel(estimator, cues, training);
 
   // Some of the training poses, evenly spread, watch the largest errors
   TileInputs inputs{estimator.covariance, {}};
-  if (paper) inputs.covariance = rows * estimator.covariance * rows.transpose();
   const Eigen::Index count = std::min<Eigen::Index>(training.cols(), kTileSamples);
   inputs.samples.resize(training.rows(), count);
   for (Eigen::Index i = 0; i < count; ++i)
     inputs.samples.col(i) = training.col((2 * i + 1) * training.cols() / (2 * count));
-  if (paper) inputs.samples = (rows * inputs.samples).eval();
-  const Eigen::MatrixXd gain = paper ? Multiply(estimator.gain, rows.transpose()) : estimator.gain;
   Eigen::Index first = 0;
   for (const SubspaceOutput& output : s.outputs) {
     const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
-    KPSA_CHECK_LE(first + height, gain.rows());
-    s.tiles.push_back(BuildTiles(gain.middleRows(first, height), pca.mean.segment(first, height),
+    KPSA_CHECK_LE(first + height, estimator.gain.rows());
+    s.tiles.push_back(BuildTiles(estimator.gain.middleRows(first, height), pca.mean.segment(first, height),
                                  s.components, inputs, options));
     first += height;
   }
-  KPSA_CHECK_EQ(first, gain.rows());
+  KPSA_CHECK_EQ(first, estimator.gain.rows());
   return s;
 }
 
 SubspaceScratch::SubspaceScratch(const Subspace& subspace)
-    : y(subspace.soft_cache.padded_rows()),
-      g(subspace.soft_cache.padded_rows()),
-      w(subspace.mode == EstimatorMode::kPaper ? (subspace.modes + 15) / 16 * 16 : 0) {}
+    : y(subspace.soft_cache.padded_rows()), g(subspace.soft_cache.padded_rows()) {}
 
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y) {
   for (std::size_t j = 0; j < raw.size(); ++j)
@@ -153,8 +143,6 @@ void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch) {
   KPSA_CHECK_EQ(raw.size(), subspace.rows());
   Normalize(subspace, raw, scratch->y.span());
-  if (scratch->w.size() > 0)
-    ComputeRawScores(subspace.soft_cache, scratch->y.span(), scratch->g.span(), scratch->w.span());
 }
 
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch) {

@@ -3,7 +3,7 @@
 //   SubspaceScratch scratch(subspace);                     // once a thread
 //   Measure(subspace, raw, &scratch);                      // raw cue values -> y
 //   Verdict v = Judge(subspace, threshold, &scratch);      // SoftCache
-//   subspace.tiles[output].Reconstruct(scratch.map_inputs(), points)  // kpsa/tiles.h
+//   subspace.tiles[output].Reconstruct(scratch.y, points)  // y -> points (kpsa/tiles.h)
 //
 // None of these allocates. The file is safetensors (base/safetensors.h) with kind "kpsa-subspace".
 #pragma once
@@ -59,8 +59,6 @@ struct Subspace {
   std::string space;                                    // "" world or mesh space, else the joint
   std::string training = "{}";                          // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r
-  // What the tiles take: y, or in paper mode the M coordinates Q^T y (kpsa/soft_cache.h).
-  std::size_t map_inputs() const { return mode == EstimatorMode::kPaper ? modes : rows(); }
 };
 
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
@@ -82,13 +80,11 @@ struct SubspaceScratch {
   explicit SubspaceScratch(const Subspace& subspace);
   AlignedFloats y;  // [r, padded to 16]
   AlignedFloats g;  // the same size
-  AlignedFloats w;  // paper mode: the coordinates Q^T y [M, padded to 16]; else empty
-  std::span<const float> map_inputs() const { return w.size() > 0 ? w.span() : y.span(); }
 };
 
 // y[j] = (raw[j] - mean) * scale, in float32.
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y);
-// raw [r] in scene units -> scratch->y, and what follows from it for the tiles.
+// raw [r] in scene units -> scratch->y.
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch);
 // The verdict on scratch->y. Ranges are checked by the caller (FirstOutside), before this.
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);

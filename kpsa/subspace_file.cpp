@@ -224,7 +224,7 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
     TileData data;
     data.points = s->outputs[i].points;
     data.components = s->components;
-    data.inputs = s->map_inputs();
+    data.inputs = s->rows();
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "ranks", {kAny}), &data.ranks));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "wide", {kAny}), &data.wide));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "direct", {kAny}), &data.direct));

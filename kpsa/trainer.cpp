@@ -386,7 +386,7 @@ class Trainer {
       double largest = 0;
       std::size_t column = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
-        subspace->tiles[m].Reconstruct(scratch.map_inputs(), buffers[m].view());
+        subspace->tiles[m].Reconstruct(scratch.y.span(), buffers[m].view());
         const ConstPointsView p = std::as_const(buffers[m]).view();
         for (std::size_t i = 0; i < p.count; ++i, column += 3) {
           const Double3 d{p.x[i] - static_cast<double>(row[column]),

@@ -96,7 +96,7 @@ TEST_P(SubspaceTest, ReconstructsWhatTheEstimatorSays) {
     std::size_t first = 0;
     for (std::size_t output = 0; output < 2; ++output) {
       PointBuffer points(subspace_.outputs[output].points);
-      subspace_.tiles[output].Reconstruct(scratch.map_inputs(), points.view());
+      subspace_.tiles[output].Reconstruct(scratch.y.span(), points.view());
       const std::vector<float> xyz = points.Interleaved();
       double sum = 0;
       for (std::size_t i = 0; i < xyz.size(); ++i)
@@ -131,8 +131,8 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   PointBuffer x(150), y(150);
   Measure(subspace_, RawCues(4), &a);
   Measure(*read, RawCues(4), &b);
-  subspace_.tiles[0].Reconstruct(a.map_inputs(), x.view());
-  read->tiles[0].Reconstruct(b.map_inputs(), y.view());
+  subspace_.tiles[0].Reconstruct(a.y.span(), x.view());
+  read->tiles[0].Reconstruct(b.y.span(), y.view());
   EXPECT_EQ(x.Interleaved(), y.Interleaved());
   const SoftCacheThreshold threshold{.tau = 1};
   EXPECT_EQ(Judge(subspace_, threshold, &a).score, Judge(*read, threshold, &b).score);
@@ -176,7 +176,7 @@ TEST_P(SubspaceTest, EveryTargetGivesTheSameFrames) {
     SubspaceScratch scratch(subspace_);
     PointBuffer points(150);
     Measure(subspace_, RawCues(0), &scratch);
-    subspace_.tiles[0].Reconstruct(scratch.map_inputs(), points.view());
+    subspace_.tiles[0].Reconstruct(scratch.y.span(), points.view());
     const double now = Judge(subspace_, {.tau = 1}, &scratch).score;
     if (first.empty()) first = points.Interleaved(), score = now;
     EXPECT_EQ(points.Interleaved(), first) << target;
