@@ -20,12 +20,16 @@ inline double DistanceFalloff(double distance, double radius, FalloffFade fade) 
   return Fade(fade, 1 - distance / radius);
 }
 
-// Around the segment from a to b.
-inline double CapsuleFalloff(Double3 p, Double3 a, Double3 b, double radius, FalloffFade fade) {
+inline double SegmentDistance(Double3 p, Double3 a, Double3 b) {
   const Double3 along = b - a;
   const double square = Dot(along, along);
   const double t = square > 0 ? std::clamp(Dot(p - a, along) / square, 0.0, 1.0) : 0;
-  return DistanceFalloff(Length(p - (a + along * t)), radius, fade);
+  return Length(p - (a + along * t));
+}
+
+// Around the segment from a to b.
+inline double CapsuleFalloff(Double3 p, Double3 a, Double3 b, double radius, FalloffFade fade) {
+  return DistanceFalloff(SegmentDistance(p, a, b), radius, fade);
 }
 
 // By the height above a plane: 1 at `from` (and beyond it), 0 at `to`; from and to differ. normal: unit

@@ -19,6 +19,7 @@
 #include "nodes/kernels/soft_mod.h"
 #include "nodes/kernels/weights.h"
 #include "nodes/kernels/wire.h"
+#include "nodes/kernels/wrap.h"
 #include "tests/nodes/kernel_support.h"
 
 namespace kpsa {
@@ -364,6 +365,81 @@ int Main(int argc, char** argv) {
             const Float3 tangent = Unit(edge_to - normal * Dot(edge_to, normal)),
                          binormal = Cross(normal, tangent);
             result[i] = a[i] + tangent * detail[i].x + binormal * detail[i].y + normal * detail[i].z;
+          }
+        });
+  }
+  for (const bool nearest : {false, true}) {
+    // A sheet of as many points, a little above its driver
+    const std::vector<Double3> driver_rest = ToDouble(in);
+    PointBuffer above(n);
+    CopyPoints(in, above.view());
+    for (std::size_t i = 0; i < n; ++i) above.view().x[i] *= 0.99f, above.view().z[i] += 0.01f;
+    const ConstPointsView follower = std::as_const(above).view();
+    const TriangleTree tree(
+        in, nearest ? PointTriangles(mesh.topology)
+                    : std::vector<Index>(mesh.topology.triangles().begin(), mesh.topology.triangles().end()));
+    AlignedFloats boxes(tree.BoxFloats());
+    tree.Fit(in, boxes.span());
+    const WrapSurface surface{in, &tree, boxes.span()};
+    const WrapInfluences influences = nearest
+                                          ? NearestInfluences(surface, follower, all, 1, 8)
+                                          : SurfaceInfluences(surface, mesh.topology, follower, all, 1, 0);
+    const WrapKernel kernel(WrapMode::kOffset, mesh.topology, driver_rest, Matrix4(), influences, follower,
+                            all, all);
+    PointBuffer driver(n);
+    const Matrix4 motion = ComposeTrs({0.1, 0.2, 0.3}, {0.1, 0.2, 0, 1}, {1, 1.1, 1});
+    for (std::size_t i = 0; i < n; ++i) {
+      const Double3 p = TransformPoint(motion, driver_rest[i]);
+      driver.view().x[i] = static_cast<float>(p.x), driver.view().y[i] = static_cast<float>(p.y);
+      driver.view().z[i] = static_cast<float>(p.z);
+    }
+    const ConstPointsView now = std::as_const(driver).view();
+    // The twin has the simplest frames: normals of the triangles around, tangents to the first neighbour
+    struct Frame {
+      Float3 t, b, n;
+    };
+    const auto neighbors = mesh.topology.neighbors();
+    const auto frames_of = [&](const std::vector<Float3>& at, std::vector<Frame>* frames) {
+      for (std::size_t i = 0; i < n; ++i) {
+        Float3 normal{0, 0, 0};
+        for (Index t : mesh.topology.point_triangles().row(i)) {
+          const Index* v = &mesh.topology.triangles()[3 * t];
+          normal = normal + Cross(at[v[1]] - at[v[0]], at[v[2]] - at[v[0]]);
+        }
+        normal = Unit(normal);
+        const Float3 edge_to = at[neighbors.row(i)[0]] - at[i];
+        const Float3 tangent = Unit(edge_to - normal * Dot(edge_to, normal));
+        (*frames)[i] = {tangent, Cross(normal, tangent), normal};
+      }
+    };
+    std::vector<Frame> rest_frames(n), frames(n);
+    frames_of(points, &rest_frames);
+    std::vector<Float3> offsets, driver_points(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (Index e = influences.offsets[i]; e < influences.offsets[i + 1]; ++e) {
+        const Index p = influences.points[e];
+        const Float3 o = Float3{follower.x[i], follower.y[i], follower.z[i]} - points[p];
+        const Frame& f = rest_frames[p];
+        offsets.push_back({Dot(o, f.t), Dot(o, f.b), Dot(o, f.n)});
+      }
+    }
+    Report(
+        nearest ? "wrap, 8 influences" : "proximityWrap", n,
+        [&] {
+          kernel.Run({1, now}, follower, out.view(), scratch.span());
+        },
+        [&] {
+          for (std::size_t i = 0; i < n; ++i) driver_points[i] = {now.x[i], now.y[i], now.z[i]};
+          frames_of(driver_points, &frames);
+          for (std::size_t i = 0; i < n; ++i) {
+            Float3 sum{0, 0, 0};
+            for (Index e = influences.offsets[i]; e < influences.offsets[i + 1]; ++e) {
+              const Frame& f = frames[influences.points[e]];
+              const Float3 o = offsets[e];
+              sum = sum + (driver_points[influences.points[e]] + f.t * o.x + f.b * o.y + f.n * o.z) *
+                              static_cast<float>(influences.weights[e]);
+            }
+            result[i] = sum;
           }
         });
   }

@@ -14,19 +14,6 @@
 namespace kpsa {
 namespace {
 
-std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
-  std::vector<std::string> names;
-  for (const AcceleratedPoints& points : entry.points) {
-    if (points.colors) {
-      names.push_back(rig.graph->PlugName(points.points));
-      continue;
-    }
-    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
-    names.push_back(mesh.name + "@" + mesh.stages[points.stage].name);
-  }
-  return names;
-}
-
 std::vector<std::string> PointNames(const Subspace& subspace) {
   std::vector<std::string> names;
   for (const SubspaceOutput& output : subspace.outputs) names.push_back(output.name);
@@ -38,6 +25,11 @@ Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std
   Acceleration entry;
   entry.name = std::filesystem::path(path).stem().string();
   for (const SubspaceOutput& output : subspace.outputs) {
+    if (const Result<PlugRef> plug = rig.graph->FindPlug(output.name);
+        plug.ok() && rig.graph->PlugType(*plug) == Type::kColors) {
+      entry.points.push_back({0, 0, *plug, true});
+      continue;
+    }
     const Result<MeshStage> found = FindMeshStage(rig, output.name);
     if (!found.ok())
       return Status::Invalid("the subspace is for {}; {}", output.name,
@@ -57,16 +49,24 @@ Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std
   return entry;
 }
 
-Result<std::shared_ptr<const Subspace>> LoadSubspace(const Rig& rig, const std::string& path) {
+// `rig`: the path of the one that is trained for it.
+Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
-    return Status::Invalid("no such file; kpsa train {} writes it", rig.path).At({path});
+    return Status::Invalid("no such file; kpsa train {} writes it", rig).At({path});
   Result<Subspace> subspace = ReadSubspace(path);
   if (!subspace.ok()) return subspace.status();
   return std::make_shared<const Subspace>(std::move(*subspace));
 }
 
 }  // namespace
+
+std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
+  std::vector<std::string> names;
+  for (const AccelerationTarget::MeshPoints& points : MakeTarget(rig, entry).meshes)
+    names.push_back(points.name);
+  return names;
+}
 
 void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags) {
   AddSwitch(command, "--accelerate", &flags->accelerate, "with the rig's own subspaces");
@@ -120,7 +120,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
                                                        const AccelerationFlags& flags) {
   std::vector<AppliedSubspace> applied;
   if (flags.kpsa.has_value()) {
-    const auto subspace = LoadSubspace(*rig, *flags.kpsa);
+    const auto subspace = LoadSubspace(rig->path, *flags.kpsa);
     if (!subspace.ok()) return subspace.status();
     AppliedSubspace one;
     one.subspace = *subspace;
@@ -144,7 +144,9 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
       if (entry.subspace.empty())
         return Status::Invalid("accelerate: \"{}\" names no subspace file; --kpsa names one", entry.name)
             .At(entry.where);
-      const auto subspace = LoadSubspace(*rig, entry.subspace);
+      const auto subspace = LoadSubspace(
+          entry.reference < 0 ? rig->path : rig->references[static_cast<std::size_t>(entry.reference)].file,
+          entry.subspace);
       if (!subspace.ok()) return subspace.status();
       AppliedSubspace one;
       one.path = entry.subspace;

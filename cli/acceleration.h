@@ -32,6 +32,9 @@ Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted);
 Result<double> ParseTolerance(const std::string& text);
 Result<double> ParseRate(const std::string& text);
 
+// What an entry accelerates: "head_mesh@mush", or the plug of colours.
+std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry);
+
 // One accelerate entry of the rig with its subspace in place.
 struct AppliedSubspace {
   std::string name;  // of the entry

@@ -55,6 +55,16 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
                   r.bound_points_ms > 0
                       ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
                       : "");
+  OrderedJson per_frame = OrderedJson::array();
+  for (const BenchResult::Frame& f : r.per_frame) {
+    per_frame.push_back({{"clip", f.clip},
+                         {"frame", f.number},
+                         {"hit", f.hit},
+                         {"rms", Finite(f.rms)},
+                         {"max", Finite(f.max)},
+                         {"full_ms", f.full_ms},
+                         {"accelerated_ms", f.accelerated_ms}});
+  }
   return {
       {"schema", "kpsa.bench/1"},
       {"rig", context.rig},
@@ -73,6 +83,7 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
       {"frames", r.frames},
       {"threads", context.options.threads},
       {"runs", context.options.runs},
+      {"units", r.light ? "light" : "m"},
       {"tolerance", r.tolerance},
       {"full",
        {{"ms_per_frame", r.full_ms},
@@ -104,10 +115,12 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
+      {"per_frame", per_frame},
       {"notes", r.notes}};
 }
 
 std::string SideText(const BenchResult& r, const BenchContext& context) {
+  const auto error = [&](double value) { return ErrorText(value, r.light); };
   std::string text;
   if (context.kpsa.size() > 1) text += r.subspace + "\n";
   const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
@@ -135,16 +148,18 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
   text += fmt::format(
       "hits       {:.1f} % of frames; {:.1f} % of frames beyond {}\n",
       100 * static_cast<double>(r.hits) / frames, 100 * static_cast<double>(r.violations) / frames,
-      r.tolerance >= kAnyError ? "any tolerance" : "the tolerance of " + LengthText(r.tolerance));
+      r.tolerance >= kAnyError
+          ? "any tolerance"
+          : fmt::format("the tolerance of {}{}", r.light ? "an RMS of " : "", error(r.tolerance)));
   text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
-                      LengthText(r.error_rms), LengthText(r.error_p99), LengthText(r.error_max),
-                      r.worst_frame, r.worst_clip, LengthText(r.motion_rms), LengthText(r.diagonal));
+                      error(r.error_rms), error(r.error_p99), error(r.error_max), r.worst_frame, r.worst_clip,
+                      error(r.motion_rms), error(r.diagonal));
   if (const FrameErrors& e = r.frame_errors; !e.empty()) {
     text += fmt::format(
         "split      RMS of all frames reconstructed: projection {}, cueing {}, storage {}, together {}; with "
         "SoftCache {}\n",
-        LengthText(Rms(e.projection)), LengthText(Rms(e.cueing)), LengthText(Rms(e.storage)),
-        LengthText(Rms(e.total)), LengthText(Rms(e.soft_cache)));
+        error(Rms(e.projection)), error(Rms(e.cueing)), error(Rms(e.storage)), error(Rms(e.total)),
+        error(Rms(e.soft_cache)));
   }
   text += fmt::format(
       "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
@@ -171,6 +186,22 @@ std::string BenchJson(const std::vector<BenchResult>& results, const BenchContex
   for (std::size_t i = 1; i < results.size(); ++i) beside.push_back(SideJson(results[i], context));
   document["beside"] = std::move(beside);
   return document.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+}
+
+std::string FramesText(const std::vector<BenchResult>& results) {
+  std::string text;
+  for (const BenchResult& r : results) {
+    Table table({"clip", ">frame", "", ">RMS", ">max", ">full ms", ">accelerated ms", ">speedup"});
+    for (const BenchResult::Frame& f : r.per_frame) {
+      table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
+                 ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
+                 fmt::format("{:.3f}", f.accelerated_ms),
+                 fmt::format("{:.1f}x", f.accelerated_ms > 0 ? f.full_ms / f.accelerated_ms : 0)});
+    }
+    if (results.size() > 1) text += r.subspace + "\n";
+    text += table.Text();
+  }
+  return text;
 }
 
 std::string BenchText(const std::vector<BenchResult>& results, const BenchContext& context) {

@@ -18,5 +18,7 @@ struct BenchContext {
 std::string BenchJson(const std::vector<BenchResult>& results, const BenchContext& context);
 // For people, with the next command.
 std::string BenchText(const std::vector<BenchResult>& results, const BenchContext& context);
+// A table of all frames, for every side.
+std::string FramesText(const std::vector<BenchResult>& results);
 
 }  // namespace kpsa

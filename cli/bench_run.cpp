@@ -191,6 +191,7 @@ void Contender::Describe() {
   result.subspace = applied.front().path;
   result.mode = applied.front().subspace->mode == EstimatorMode::kMap ? "map" : "paper";
   result.tolerance = applied.front().tolerance;
+  result.light = applied.front().subspace->of_light();
   result.violation_limit = applied.front().violation_rate;
   double bytes = 0, tiles = 0;
   for (const AppliedSubspace& one : applied) {
@@ -225,9 +226,10 @@ void Contender::Compare(std::size_t frame, const Evaluator& full, const std::str
   weights.emplace_back();
   for (std::size_t n = 0; n < applied.size(); ++n)
     weights.back().push_back(EmittedFullWeight(applied[n], verdicts->last_scores()[n]));
-  const double worst = clip_errors.AddFrame(full, *side->evaluator);
+  const double worst = clip_errors.AddFrame(full, *side->evaluator), rms = clip_errors.frame_rms();
   // A blended or full miss keeps the tolerance, too, or it counts
-  if (worst > result.tolerance) ++result.violations;
+  if ((result.light ? rms : worst) > result.tolerance) ++result.violations;
+  result.per_frame.push_back({clip, frame, verdicts->last_hit(), rms, worst, 0, 0});
   if (worst > result.error_max)
     result.error_max = worst, result.worst_frame = frame, result.worst_clip = clip;
 }
@@ -236,6 +238,8 @@ void Contender::AddTimes(const std::vector<double>& full_ns) {
   for (std::size_t f = 0; f < full_ns.size(); ++f) {
     const double a = full_ns[f], b = Median(side->frame_ns[f]);
     sums.full_ns += a, sums.accelerated_ns += b;
+    BenchResult::Frame& frame = result.per_frame[result.per_frame.size() - full_ns.size() + f];
+    frame.full_ms = a / 1e6, frame.accelerated_ms = b / 1e6;
     if (hit[f]) sums.full_hit_ns += a, sums.accelerated_hit_ns += b;
   }
 }

@@ -36,6 +36,14 @@ struct BenchResult {
   std::size_t cue_points = 0;                 // of the cues; the others are scalars
   double bytes_per_point = 0, mean_rank = 0;  // that the reconstruction reads
   double tolerance = 0, violation_limit = 0;  // of the first subspace
+  bool light = false;                         // errors are numbers, and a frame's is its RMS
+  struct Frame {
+    std::string clip;
+    std::size_t number = 0;
+    bool hit = false;
+    double rms = 0, max = 0, full_ms = 0, accelerated_ms = 0;
+  };
+  std::vector<Frame> per_frame;
 
   double full_ms = 0;  // a frame
   std::vector<BenchNode> full_nodes;

@@ -9,7 +9,7 @@
 namespace kpsa {
 namespace {
 
-constexpr int kAreaSamples = 16;  // shadow rays a pixel and area light
+constexpr int kAreaSamples = 16;  // shadow rays a pixel and light that has a size
 
 bool IsLight(const NodeDef& def) {
   return def.FindAttribute("outColor") >= 0 && def.FindAttribute("outMatrix") >= 0;
@@ -17,9 +17,10 @@ bool IsLight(const NodeDef& def) {
 
 CameraView::Light LightOf(const Graph& graph, NodeId node) {
   const NodeDef& def = graph.def(node);
-  const DiffuseLight::Kind kind = def.name == "areaLight"  ? DiffuseLight::Kind::kArea
-                                  : def.name == "sunLight" ? DiffuseLight::Kind::kSun
-                                                           : DiffuseLight::Kind::kPoint;
+  const DiffuseLight::Kind kind = def.name == "areaLight"     ? DiffuseLight::Kind::kArea
+                                  : def.name == "sunLight"    ? DiffuseLight::Kind::kSun
+                                  : def.name == "sphereLight" ? DiffuseLight::Kind::kBall
+                                                              : DiffuseLight::Kind::kPoint;
   return {
       kind, {node, def.FindAttribute("outMatrix"), -1, -1}, {node, def.FindAttribute("outColor"), -1, -1}};
 }
@@ -31,13 +32,15 @@ double SrgbCurve(double linear) {
 // Everything up to 0.8 as it is, beyond it a curve that reaches 1 at infinity.
 double Compressed(double x) { return x <= 0.8 ? x : 1 - 0.2 * 0.2 / (x - 0.6); }
 
-Index SizeOf(const Graph& graph, NodeId node, const char* name) {
+const Value& StructuralValue(const Graph& graph, NodeId node, const char* name) {
   const PlugRef plug{node, graph.def(node).FindAttribute(name), -1, -1};
   const Value* set = graph.FindValue(plug);
-  const Value& value =
-      set != nullptr ? *set
-                     : graph.def(node).attributes[static_cast<std::size_t>(plug.attribute)].default_value;
-  return static_cast<Index>(value.AsInt());
+  return set != nullptr ? *set
+                        : graph.def(node).attributes[static_cast<std::size_t>(plug.attribute)].default_value;
+}
+
+Index SizeOf(const Graph& graph, NodeId node, const char* name) {
+  return static_cast<Index>(StructuralValue(graph, node, name).AsInt());
 }
 
 }  // namespace
@@ -93,6 +96,12 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
       if (rig.scene.meshes[m].points == c.source) view.meshes.push_back(m);
     }
   }
+  const auto& carried =
+      StructuralValue(graph, *illumination, "carriedMeshes").get<std::vector<std::int64_t>>();
+  for (std::size_t i = 0; i < carried.size(); ++i) {
+    view.carried.push_back({{*illumination, def.FindAttribute("pointIrradiance"), static_cast<int>(i), -1},
+                            static_cast<std::size_t>(carried[i])});
+  }
   return view;
 }
 
@@ -103,6 +112,9 @@ CameraView AcceleratedView(const CameraView& view, const Rig& rig,
     for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
       if (view.irradiance.has_value() && one.entry.points[p].points == *view.irradiance)
         fast.irradiance = one.Output(*rig.graph, p);
+      for (CameraView::Carried& carried : fast.carried) {
+        if (one.entry.points[p].points == carried.irradiance) carried.irradiance = one.Output(*rig.graph, p);
+      }
     }
   }
   return fast;
@@ -122,17 +134,27 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
   }
   const auto irradiance = static_cast<Index>(request.outputs.size());
   if (view.irradiance.has_value()) request.outputs.push_back({*view.irradiance, {}});
+  for (const CameraView::Carried& carried : view.carried) request.outputs.push_back({carried.irradiance, {}});
   const auto plan = CompileFor(rig, compiler, request);
   if (!plan.ok()) return plan.status();
 
   std::vector<Index> triangles;
   std::vector<float> albedo;
+  std::vector<Index> carrier;  // of each triangle: in view.carried, or none
+  std::vector<Index> first_point(view.meshes.size());
   Index count = 0;
-  for (std::size_t m : view.meshes) {
+  for (std::size_t i = 0; i < view.meshes.size(); ++i) {
+    const std::size_t m = view.meshes[i];
+    first_point[i] = count;
+    Index owner = kNoIndex;
+    for (std::size_t k = 0; k < view.carried.size(); ++k) {
+      if (view.carried[k].mesh == i) owner = static_cast<Index>(k);
+    }
     const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
     for (const Mesh::Primitive& primitive : mesh.primitives) {
       for (Index t = 3 * primitive.first_triangle;
            t < 3 * (primitive.first_triangle + primitive.triangle_count); ++t) {
+        if (t % 3 == 0) carrier.push_back(owner);
         triangles.push_back(count + mesh.triangles[t]);
         albedo.push_back(std::clamp(primitive.base_color[t % 3], 0.0f, 1.0f));
       }
@@ -158,7 +180,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
                             evaluator.Get<Double3>(camera + 2 + 2 * l)});
         }
         const Result<PathTracer> tracer =
-            PathTracer::Build(std::as_const(points).view(), triangles, albedo, std::move(lights));
+            PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights);
         if (!tracer.ok()) return tracer.status();
         const Matrix4 world_from_screen = evaluator.Get<Matrix4>(camera);
         CameraImage& image = images[frame];
@@ -167,6 +189,20 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
         for (std::vector<float>* layer : {&image.albedo, &image.direct, &image.indirect})
           layer->assign(3 * pixels, 0);
         image.hit.assign(pixels, 0);
+        // Light after bounces, at a pixel: its own, or what the points around say of a carried mesh
+        const auto indirect = [&](std::size_t p, const ShadingPlace& place) -> Double3 {
+          const auto at = [](const ConstPointsView& light, std::size_t i) {
+            return Double3{light.x[i], light.y[i], light.z[i]};
+          };
+          if (!place.hit || !view.irradiance.has_value()) return {};
+          const Index owner = carrier[place.triangle];
+          if (owner == kNoIndex) return at(evaluator.Points(irradiance), p);
+          const ConstPointsView light = evaluator.Points(irradiance + 1 + owner);
+          const Index* corner = &triangles[3 * std::size_t{place.triangle}];
+          const Index first = first_point[view.carried[owner].mesh];
+          return at(light, corner[0] - first) * (1 - place.u - place.v) +
+                 at(light, corner[1] - first) * place.u + at(light, corner[2] - first) * place.v;
+        };
         const auto shade = [&](std::size_t begin, std::size_t end) {
           for (std::size_t p = begin; p < end; ++p) {
             Double3 origin, direction;
@@ -175,19 +211,15 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
             const Double3 light =
                 tracer->Direct(place, static_cast<std::uint32_t>(p) * 0x9e3779b1u, kAreaSamples);
             image.hit[p] = place.hit;
+            const Double3 bounced = indirect(p, place);
             for (int k = 0; k < 3; ++k) {
               image.albedo[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(place.albedo[k]);
               image.direct[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(light[k]);
+              image.indirect[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(bounced[k]);
             }
           }
         };
         ParallelFor(pixels, 256, shade);
-        if (!view.irradiance.has_value()) return Status();
-        const ConstPointsView light = evaluator.Points(irradiance);
-        for (std::size_t p = 0; p < pixels; ++p) {
-          image.indirect[3 * p] = light.x[p], image.indirect[3 * p + 1] = light.y[p];
-          image.indirect[3 * p + 2] = light.z[p];
-        }
         return Status();
       }));
   return images;

@@ -17,6 +17,11 @@ namespace kpsa {
 struct CameraView {
   PlugRef world_from_screen;
   std::optional<PlugRef> irradiance;  // of the illumination that looks through the camera
+  struct Carried {
+    PlugRef irradiance;    // at the points of a mesh
+    std::size_t mesh = 0;  // in `meshes`
+  };
+  std::vector<Carried> carried;  // by the illumination
   struct Light {
     DiffuseLight::Kind kind;
     PlugRef matrix, color;

@@ -14,6 +14,7 @@ struct BenchFlags : Flags {
   AccelerationFlags acceleration;             // what all sides share
   std::vector<std::string> kpsa, tolerances;  // of each; one tolerance is for all
   std::optional<std::string> runs;
+  bool per_frame = false;
 };
 
 // The rig's test clips; without them, what the flags choose ("").
@@ -76,6 +77,7 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   results->front().notes.insert(results->front().notes.begin(), notes.begin(), notes.end());
   const BenchContext context{flags.file, flags.kpsa, options};
   Print(flags.json ? BenchJson(*results, context) : BenchText(*results, context));
+  if (flags.per_frame && !flags.json) Print("\n" + FramesText(*results));
   for (const BenchResult& result : *results) {
     for (const std::string& note : result.notes) {
       if (!flags.quiet) Say("note: " + note);
@@ -110,6 +112,7 @@ void AddBenchCommand(CLI::App* program, Command* chosen) {
   AddSharedAccelerationFlags(command, &flags->acceleration);
   AddOption(command, "--runs", "N", &flags->runs, "timed evaluations of every frame; 5 if not given");
   AddOption(command, "--threads", "N", &flags->threads, "threads of both sides; 1 if not given");
+  AddSwitch(command, "--per-frame", &flags->per_frame, "a line a frame: hit, error, times, speedup");
   AddQuietFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
 }

@@ -55,9 +55,8 @@ CommandResult Compile(const CompileFlags& flags) {
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
   Compiler compiler;
-  if (flags.acceleration.wanted())
-    KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
-  Result<Request> request = BuildRequest(rig, flags.wanted, flags.vertices);
+  Result<Request> request =
+      AcceleratedRequest(&rig, &compiler, flags.acceleration, flags.wanted, flags.vertices);
   if (!request.ok()) return request.status();
   request->varying = VaryingPlugs(rig);
   const auto compiled = CompileFor(rig, &compiler, *request);

@@ -125,12 +125,11 @@ CommandResult Explain(ExplainFlags flags) {
     if (vertex->has_value()) return ExplainVertex(flags, rig, **vertex);
   }
   Compiler compiler;
-  if (flags.acceleration.wanted())
-    KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
+  const Result<Request> request =
+      AcceleratedRequest(&rig, &compiler, flags.acceleration, flags.wanted, flags.vertices);
+  if (!request.ok()) return request.status();
   const Result<Target> target = FindTarget(rig, flags.what);
   if (!target.ok()) return target.status();
-  const Result<Request> request = BuildRequest(rig, flags.wanted, flags.vertices);
-  if (!request.ok()) return request.status();
   const auto compiled = CompileFor(rig, &compiler, *request);
   if (!compiled.ok()) return compiled.status();
   const Plan& plan = **compiled;

@@ -28,9 +28,8 @@ CommandResult DrawGraph(const GraphFlags& flags) {
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
   Compiler compiler;
-  if (flags.acceleration.wanted())
-    KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
-  const Result<Request> request = BuildRequest(rig, flags.wanted, flags.vertices);
+  const Result<Request> request =
+      AcceleratedRequest(&rig, &compiler, flags.acceleration, flags.wanted, flags.vertices);
   if (!request.ok()) return request.status();
   const auto plan = CompileFor(rig, &compiler, *request);
   if (!plan.ok()) return plan.status();

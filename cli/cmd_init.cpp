@@ -26,8 +26,8 @@ CommandResult Init(const InitFlags& flags) {
   options.iterations = *iterations;
   options.samples = *samples;
   const std::string suffix = Suffix(flags.file);
-  if (suffix != ".glb" && suffix != ".gltf")
-    return Status::Usage("expected a character, .glb or .gltf").At({flags.file});
+  if (suffix != ".glb" && suffix != ".gltf" && suffix != ".vrm")
+    return Status::Usage("expected a character, .glb, .gltf or .vrm").At({flags.file});
   const std::string stem = fs::path(flags.file).stem().string();
   const std::string place = flags.output.value_or(stem + ".yaml");
   KPSA_RETURN_IF_ERROR(CheckOutput(place, flags.force, {".yaml", ".yml"}));
@@ -54,12 +54,13 @@ void AddInitCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<InitFlags>();
   CLI::App* command = AddCommand(
       program, "init", "Write a starter rig for a character",
-      "Controls are ranged by the character's clips; its own deformers are followed by a deltaMush.\n"
+      "Controls are ranged by the character's clips and grouped by part of the body; its own deformers are "
+      "followed by a deltaMush. IK, a cage about the jaw and dual quaternions are suggested in comments.\n"
       "Examples:\n"
       "  kpsa init head.glb\n"
       "  kpsa init characters/head.glb -o rigs/head.yaml",
       chosen, [flags] { return Init(*flags); });
-  AddRequired(command, "CHARACTER", &flags->file, "a character, .glb or .gltf");
+  AddRequired(command, "CHARACTER", &flags->file, "a character, .glb, .gltf or .vrm");
   AddOutputFlags(command, flags.get(),
                  "the rig; the character's name with .yaml, in this folder, if not given");
   AddOption(command, "--iterations", "N", &flags->iterations, "of the deltaMush; 10 if not given");

@@ -103,7 +103,8 @@ void AddInspectCommand(CLI::App* program, Command* chosen) {
                                  "  kpsa inspect head.glb\n"
                                  "  kpsa inspect head.kpsa --json",
                                  chosen, [flags] { return Inspect(*flags); });
-  AddRequired(command, "FILE", &flags->file, ".glb .gltf .yaml .npz .pc2 .mdd .kpsa, or .json (weight maps)");
+  AddRequired(command, "FILE", &flags->file,
+              ".glb .gltf .vrm .yaml .npz .pc2 .mdd .kpsa, or .json (weight maps)");
   AddOption(command, "--fps", "N", &flags->fps, "frames a second of .pc2 files; 24 if not given");
   AddPluginFlag(command, flags.get());
   AddJsonFlag(command, flags.get());

@@ -11,6 +11,8 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/profile_run.h"
+#include "cli/request.h"
+#include "cli/rig_frames.h"
 #include "cli/table.h"
 #include "graph/plan_report.h"
 
@@ -113,9 +115,9 @@ CommandResult RunProfile(const ProfileFlags& flags) {
   const Result<std::vector<double>> times = SampleTimes(flags, rig);
   if (!times.ok()) return times.status();
   Compiler compiler;
-  if (flags.acceleration.wanted())
-    KPSA_RETURN_IF_ERROR(ApplyAcceleration(&rig, &compiler, flags.acceleration).status());
-  const auto plan = CompileFor(rig, &compiler, AllMeshes(rig));
+  const Result<Request> request = AcceleratedRequest(&rig, &compiler, flags.acceleration, {}, {});
+  if (!request.ok()) return request.status();
+  const auto plan = CompileFor(rig, &compiler, *request);
   if (!plan.ok()) return plan.status();
 
   const InterruptScope interruptible;

@@ -15,7 +15,7 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kCheckPoses = 60;
+constexpr std::size_t kCheckPoses = 60, kLightCheckPoses = 4;  // light takes seconds a pose
 
 struct TrainFlags : Flags {
   std::optional<std::string> name, samples, clips, seed, rows, modes, key_points, tolerance, violation_rate,
@@ -98,11 +98,22 @@ CommandResult RunTrain(const TrainFlags& flags) {
   Rig& rig = (*open)->rig;
   const Result<Acceleration> entry = ChooseEntry(rig, flags);
   if (!entry.ok()) return entry.status();
+  if (entry->reference >= 0) {
+    const Reference& from = rig.references[static_cast<std::size_t>(entry->reference)];
+    return Status::Usage(
+        "accelerate: \"{}\" is an entry of {}: train that rig; its subspace serves here, too", entry->name,
+        from.file);
+  }
   const std::string path = flags.output.value_or(entry->subspace);
   if (path.empty())
     return Status::Usage("accelerate: \"{}\" names no subspace file: expected -o FILE.kpsa", entry->name);
   KPSA_RETURN_IF_ERROR(CheckOutput(path, flags.force, {".kpsa"}));
   if (!flags.samples.has_value()) options.samples = static_cast<std::size_t>(entry->train_samples);
+  if (!flags.calibration.has_value()) options.calibration_poses = static_cast<std::size_t>(entry->held_out);
+  if (entry->key_points > 0) {
+    options.min_points = static_cast<std::size_t>(entry->key_points);
+    if (!flags.key_points.has_value()) options.key_points = options.min_points;
+  }
   if (!flags.tolerance.has_value()) options.tolerance = entry->tolerance;
   if (!flags.violation_rate.has_value()) options.violation_rate = entry->violation_rate;
   if (flags.clips.has_value()) {
@@ -134,7 +145,8 @@ CommandResult RunTrain(const TrainFlags& flags) {
   const Calibration calibration =
       Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
   const Result<SubspaceCheck> check =
-      CheckSubspace(&rig, *entry, subspace, kCheckPoses, options.seed ^ 0x9e3779b97f4a7c15ull);
+      CheckSubspace(&rig, *entry, subspace, subspace->of_light() ? kLightCheckPoses : kCheckPoses,
+                    options.seed ^ 0x9e3779b97f4a7c15ull);
   if (!check.ok()) return check.status();
   const InterruptScope writing;
   KPSA_RETURN_IF_ERROR(WriteSubspace(*subspace, path));

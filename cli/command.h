@@ -20,6 +20,7 @@ using Command = std::function<CommandResult()>;
 void AddInitCommand(CLI::App* program, Command* chosen);
 void AddValidateCommand(CLI::App* program, Command* chosen);
 void AddInspectCommand(CLI::App* program, Command* chosen);
+void AddFmtCommand(CLI::App* program, Command* chosen);
 void AddEvalCommand(CLI::App* program, Command* chosen);
 void AddGetCommand(CLI::App* program, Command* chosen);
 void AddRenderCommand(CLI::App* program, Command* chosen);
@@ -32,5 +33,6 @@ void AddExplainCommand(CLI::App* program, Command* chosen);
 void AddCompareCommand(CLI::App* program, Command* chosen);
 void AddGraphCommand(CLI::App* program, Command* chosen);
 void AddNodesCommand(CLI::App* program, Command* chosen);
+void AddWeightsCommand(CLI::App* program, Command* chosen);
 
 }  // namespace kpsa

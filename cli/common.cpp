@@ -29,7 +29,7 @@ void OnInterrupt(int) {
 }  // namespace
 
 void AddRigFlags(CLI::App* command, Flags* flags) {
-  AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf)");
+  AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf, .vrm)");
   AddRepeated(command, "--set", "PLUG=VALUE", &flags->sets,
               "plug=value in the rig's units, as in jaw.rotateX=-20; may be repeated");
   AddOption(command, "--pose", "FILE", &flags->pose, "a pose file: plugs and their values");
@@ -192,6 +192,10 @@ std::string ByteText(std::uint64_t bytes) {
   int unit = 0;
   for (; value >= 999.5 && unit < 4; ++unit) value /= 1000;
   return unit == 0 ? fmt::format("{} B", bytes) : fmt::format("{:.3g} {}", value, kUnits[unit]);
+}
+
+std::string ErrorText(double error, bool light) {
+  return light ? fmt::format("{:.3g}", error) : LengthText(error);
 }
 
 std::string LengthText(double metres) {

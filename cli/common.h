@@ -81,6 +81,7 @@ void PrintJson(const Json& json) {
 
 std::string ByteText(std::uint64_t bytes);                         // 3.1 MB
 std::string LengthText(double metres);                             // 0.213 mm
+std::string ErrorText(double error, bool light);                   // of points a length, of light a number
 std::string Plural(std::uint64_t count, const std::string& noun);  // "1 mesh", "12 vertices"
 
 // From here to the end of the scope an interrupt (Ctrl-C) only sets the flag that Interrupted() reads, so

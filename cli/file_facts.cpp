@@ -6,10 +6,12 @@
 #include <limits>
 #include <map>
 
+#include "cli/acceleration.h"
 #include "cli/common.h"
 #include "cli/output.h"
 #include "io/npz.h"
 #include "io/point_cache.h"
+#include "io/quantity.h"
 #include "io/weights_json.h"
 #include "kpsa/subspace.h"
 #include "kpsa/training_record.h"
@@ -47,6 +49,27 @@ const char* NpzTypeName(NpzType type) {
   static const char* const kNames[] = {"float32", "float64", "int8",   "int16",  "int32", "int64",
                                        "uint8",   "uint16",  "uint32", "uint64", "bool"};
   return kNames[static_cast<std::size_t>(type)];
+}
+
+// Only where there are any: few files have them.
+void AddVrmFacts(const gltf::Character& character, const std::vector<std::string>& names, FileFacts* facts) {
+  if (!character.expressions.empty()) {
+    static const char* const kKinds[] = {"", "blink", "lookAt", "mouth"};
+    FactTable expressions{"expressions", {"expression", "kind", ">morph targets"}, {}};
+    for (const gltf::Expression& e : character.expressions)
+      expressions.rows.push_back(
+          {e.name, std::string(kKinds[static_cast<int>(e.kind)]), Count(e.binds.size())});
+    facts->tables.push_back(std::move(expressions));
+  }
+  if (!character.constraints.empty()) {
+    static const char* const kTypes[] = {"roll", "aim", "rotation"};
+    FactTable constraints{"constraints", {"node", "constraint", "source", ">weight"}, {}};
+    for (const gltf::NodeConstraint& c : character.constraints) {
+      constraints.rows.push_back(
+          {names[c.node], std::string(kTypes[static_cast<int>(c.type)]), names[c.source], c.weight});
+    }
+    facts->tables.push_back(std::move(constraints));
+  }
 }
 
 }  // namespace
@@ -94,6 +117,7 @@ Result<FileFacts> InspectCharacter(const std::string& path) {
   }
   facts.facts.emplace_back("memory bytes", memory);
   facts.tables = {std::move(meshes), std::move(clips)};
+  AddVrmFacts(*character, names, &facts);
   facts.notes = character->warnings;
   return facts;
 }
@@ -134,11 +158,10 @@ Result<FileFacts> InspectRig(const std::string& path, const std::vector<std::str
   FactTable accelerate{
       "accelerate", {"name", "points", "subspace", ">tolerance", "train clips", "test clips"}, {}};
   for (const Acceleration& a : rig.accelerate) {
-    std::vector<std::string> points;
-    for (const AcceleratedPoints& p : a.points)
-      points.push_back(rig.scene.meshes[p.mesh].name + "@" + rig.scene.meshes[p.mesh].stages[p.stage].name);
-    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(points, ", ")), a.subspace,
-                               LengthText(a.tolerance), fmt::format("{}", fmt::join(a.train_clips, ", ")),
+    const bool colors = !a.points.empty() && a.points[0].colors;
+    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(PointNames(rig, a), ", ")), a.subspace,
+                               colors ? NumberText(a.tolerance) : LengthText(a.tolerance),
+                               fmt::format("{}", fmt::join(a.train_clips, ", ")),
                                fmt::format("{}", fmt::join(a.test_clips, ", "))});
   }
   FactTable files{"files", {"file"}, {}};
@@ -264,15 +287,16 @@ Result<FileFacts> InspectWeights(const std::string& path) {
 
 Result<FileFacts> InspectFile(const std::string& path, double fps, const std::vector<std::string>& plugins) {
   const std::string suffix = Suffix(path);
-  if (suffix == ".glb" || suffix == ".gltf") return InspectCharacter(path);
+  if (suffix == ".glb" || suffix == ".gltf" || suffix == ".vrm") return InspectCharacter(path);
   if (suffix == ".yaml" || suffix == ".yml") return InspectRig(path, plugins);
   if (suffix == ".npz") return InspectNpz(path);
   if (suffix == ".pc2" || suffix == ".mdd") return InspectPointCache(path, fps);
   if (suffix == ".kpsa") return InspectSubspace(path);
   if (suffix == ".json") return InspectWeights(path);
-  return Status::
-      Usage("expected a file that ends in .glb, .gltf, .yaml, .npz, .pc2, .mdd, .kpsa or .json (weight maps)")
-          .At({path});
+  return Status::Usage(
+             "expected a file that ends in .glb, .gltf, .vrm, .yaml, .npz, .pc2, .mdd, .kpsa or .json "
+             "(weight maps)")
+      .At({path});
 }
 
 }  // namespace kpsa

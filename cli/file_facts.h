@@ -24,8 +24,8 @@ struct FileFacts {
   std::vector<std::string> notes;
 };
 
-// Of any file that kpsa reads or writes, by suffix: .glb .gltf .yaml .yml .npz .pc2 .mdd .kpsa .json (weight
-// maps). `plugins` are libraries of nodes for rigs.
+// Of any file that kpsa reads or writes, by suffix: .glb .gltf .vrm .yaml .yml .npz .pc2 .mdd .kpsa .json
+// (weight maps). `plugins` are libraries of nodes for rigs.
 Result<FileFacts> InspectFile(const std::string& path, double fps, const std::vector<std::string>& plugins);
 
 // One kind each; see InspectFile.

@@ -138,6 +138,7 @@ Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig) {
     return times;
   }
   double begin = 0, duration = 0;
+  if (rig.playing.has_value()) begin = rig.playing->begin, duration = rig.playing->duration;
   for (const CharacterClip& clip : rig.scene.clips) {
     if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip)
       begin = clip.begin, duration = clip.duration;

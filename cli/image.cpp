@@ -70,7 +70,6 @@ int TextWidth(std::string_view text, int scale) {
   return stb_easy_font_width(line.data()) * scale;
 }
 
-int TextHeight(int scale) { return 9 * scale; }
 
 Rgb TurboColor(double t) {
   if (std::isnan(t)) return {128, 128, 128};

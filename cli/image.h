@@ -29,7 +29,6 @@ struct Image {
 // x, y: the upper left corner. Clipped to the picture.
 void DrawText(Image& image, int x, int y, int scale, Rgb color, std::string_view text);
 int TextWidth(std::string_view text, int scale);  // pixels
-int TextHeight(int scale);
 
 // A rainbow of rising brightness order (polynomial fit of Google's Turbo, Apache 2.0, A. Mikhailov 2019),
 // from dark blue at 0 over green to dark red at 1; t is clamped, a NaN is grey. Linear-light output is up to

@@ -20,12 +20,22 @@ constexpr char kFirstMinutes[] =
     "  kpsa bench head.yaml                full against accelerated: times, errors, hits\n\n"
     "  kpsa --help lists all commands, kpsa COMMAND --help explains one.\n";
 
-const std::vector<std::string>& CommandNames(CLI::App& program) {
-  static std::vector<std::string> names;
-  names.clear();
-  for (const CLI::App* command : program.get_subcommands([](CLI::App*) { return true; }))
+std::vector<std::string> CommandNames(const CLI::App& program) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; }))
     names.push_back(command->get_name());
   return names;
+}
+
+// The innermost command that was named, and what was typed for it: "kpsa weights import".
+std::pair<const CLI::App*, std::string> Innermost(const CLI::App& program) {
+  const CLI::App* command = &program;
+  std::string name = "kpsa";
+  for (auto parsed = command->get_subcommands(); !parsed.empty(); parsed = command->get_subcommands()) {
+    command = parsed.front();
+    name += " " + command->get_name();
+  }
+  return {command, name};
 }
 
 std::vector<std::string> OptionNames(const CLI::App& command) {
@@ -39,23 +49,27 @@ std::vector<std::string> OptionNames(const CLI::App& command) {
 
 // What CLI11 refuses, in our words.
 int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
-  const auto parsed = program.get_subcommands();
-  const CLI::App& command = parsed.empty() ? program : *parsed.front();
-  const std::string name = parsed.empty() ? "kpsa" : "kpsa " + command.get_name();
+  const auto& [command, name] = Innermost(program);
   std::string message = error.what();
   std::replace(message.begin(), message.end(), '\n', ' ');
-  if (parsed.empty() && !arguments.empty()) {
+  if (command == &program && !arguments.empty()) {
     const std::string& word = arguments.front();
     message = word.starts_with('-')
                   ? fmt::format("unknown option \"{}\"{}", word, DidYouMean(word, OptionNames(program)))
                   : fmt::format("unknown command \"{}\"{}; kpsa --help lists all", word,
                                 DidYouMean(word, CommandNames(program)));
+  } else if (const std::vector<std::string> actions = CommandNames(*command);
+             command != &program && !actions.empty()) {
+    const std::string word = arguments.size() > 1 ? arguments[1] : "";
+    message = word.empty() || word.starts_with('-')
+                  ? fmt::format("expected one of {}", fmt::join(actions, ", "))
+                  : fmt::format("unknown command \"{}\"{}", word, DidYouMean(word, actions));
   } else if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
     const std::vector<std::string> extras = program.remaining(true);
     const std::string word = extras.empty() ? "" : extras.front();
     const std::string bare = word.substr(0, word.find('='));
     message = word.starts_with('-')
-                  ? fmt::format("unknown option \"{}\"{}", bare, DidYouMean(bare, OptionNames(command)))
+                  ? fmt::format("unknown option \"{}\"{}", bare, DidYouMean(bare, OptionNames(*command)))
                   : fmt::format("unexpected argument \"{}\"", word);
   } else if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {
     message = "expected " + message.substr(0, message.find(" is required"));
@@ -74,6 +88,7 @@ int Main(int argc, char** argv) {
   AddInitCommand(&program, &chosen);
   AddValidateCommand(&program, &chosen);
   AddInspectCommand(&program, &chosen);
+  AddFmtCommand(&program, &chosen);
   AddEvalCommand(&program, &chosen);
   AddGetCommand(&program, &chosen);
   AddRenderCommand(&program, &chosen);
@@ -86,6 +101,7 @@ int Main(int argc, char** argv) {
   AddCompareCommand(&program, &chosen);
   AddGraphCommand(&program, &chosen);
   AddNodesCommand(&program, &chosen);
+  AddWeightsCommand(&program, &chosen);
   program.footer(kFirstMinutes + std::string("\nExit codes: 0 fine, 1 a check failed or things differ, 2 "
                                              "usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
 
@@ -105,7 +121,7 @@ int Main(int argc, char** argv) {
     Print(kFirstMinutes);
     return FlushOutput().ok() ? 0 : 3;
   }
-  const std::string name = "kpsa " + program.get_subcommands().front()->get_name();
+  const std::string name = Innermost(program).second;
   if (const std::string problem = ApplySimdChoice(); !problem.empty()) {
     PrintErrors(name, Status::Usage("{}", problem));
     return 2;

@@ -12,6 +12,14 @@ CLI::App* AddCommand(CLI::App* program, const std::string& name, const std::stri
   return command;
 }
 
+CLI::App* AddCommandGroup(CLI::App* program, const std::string& name, const std::string& doc,
+                          const std::string& examples) {
+  CLI::App* group = program->add_subcommand(name, doc);
+  group->footer(examples);
+  group->require_subcommand(1);
+  return group;
+}
+
 void AddOption(CLI::App* command, const std::string& name, const std::string& value,
                std::optional<std::string>* to, const std::string& doc) {
   CLI::Option* option = command->add_option_function<std::string>(

@@ -15,6 +15,10 @@ namespace kpsa {
 CLI::App* AddCommand(CLI::App* program, const std::string& name, const std::string& doc,
                      const std::string& examples, Command* chosen, Command run);
 
+// A subcommand that is only there for those that are added to it.
+CLI::App* AddCommandGroup(CLI::App* program, const std::string& name, const std::string& doc,
+                          const std::string& examples);
+
 // Positional arguments where the name has no dash. `value` names what is expected ("FILE", "A:B[:S]").
 void AddOption(CLI::App* command, const std::string& name, const std::string& value,
                std::optional<std::string>* to, const std::string& doc);

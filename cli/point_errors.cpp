@@ -22,7 +22,9 @@ double PointErrors::AddFrame(const Evaluator& exact, const Evaluator& other) {
   bins_.resize(kBins, 0);
   double worst = 0;
   std::size_t at = 0;
+  frame_rms_ = 0;
   for (Index o = 0; o < outputs_; ++o) {
+    const double before = squares_;
     const ConstPointsView a = exact.Points(o), b = other.Points(o);
     if (frames_ == 0)
       first_.resize(at + 3 * a.count), sum_.resize(first_.size()), square_sum_.resize(at / 3 + a.count);
@@ -43,6 +45,8 @@ double PointErrors::AddFrame(const Evaluator& exact, const Evaluator& other) {
       squares_ += distance * distance;
       ++bins_[Bin(distance)];
     }
+    if (a.count > 0)
+      frame_rms_ = std::max(frame_rms_, std::sqrt((squares_ - before) / static_cast<double>(a.count)));
   }
   count_ += at / 3;
   ++frames_;

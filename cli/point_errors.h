@@ -17,6 +17,7 @@ class PointErrors {
 
   // The largest distance of this frame, metres; infinity where something is not finite.
   double AddFrame(const Evaluator& exact, const Evaluator& other);
+  double frame_rms() const { return frame_rms_; }  // of the last frame: the largest of an output's RMS
   void Merge(const PointErrors& later);
 
   double rms() const;
@@ -28,7 +29,7 @@ class PointErrors {
 
  private:
   std::size_t outputs_ = 0;
-  double squares_ = 0;
+  double squares_ = 0, frame_rms_ = 0;
   std::uint64_t count_ = 0;
   std::vector<std::uint64_t> bins_;  // of distances, by their logarithm
   double low_[3] = {1e300, 1e300, 1e300}, high_[3] = {-1e300, -1e300, -1e300};

@@ -85,4 +85,28 @@ Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wan
   return request;
 }
 
+Result<Request> AcceleratedRequest(Rig* rig, Compiler* compiler, const AccelerationFlags& flags,
+                                   const std::vector<std::string>& wanted,
+                                   const std::optional<std::string>& vertices) {
+  std::vector<AppliedSubspace> applied;
+  if (flags.wanted()) {
+    Result<std::vector<AppliedSubspace>> result = ApplyAcceleration(rig, compiler, flags);
+    if (!result.ok()) return result.status();
+    applied = std::move(*result);
+  }
+  Result<Request> request = BuildRequest(*rig, wanted, vertices);
+  if (!request.ok()) return request;
+  for (const AppliedSubspace& one : applied) {
+    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
+      if (!one.entry.points[p].colors) continue;
+      const PlugRef fast = one.Output(*rig->graph, p);
+      for (RequestedOutput& output : request->outputs) {
+        if (output.plug == one.entry.points[p].points) output.plug = fast;
+      }
+      if (wanted.empty() && !vertices.has_value()) request->outputs.push_back({fast, {}});
+    }
+  }
+  return request;
+}
+
 }  // namespace kpsa

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/acceleration.h"
 #include "graph/plan.h"
 #include "io/rig_builder.h"
 
@@ -29,5 +30,11 @@ Result<WantedPlug> FindWanted(const Rig& rig, std::string_view text);
 // file: ranges and indices ("0:99,120") into each wanted mesh. Time varies.
 Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wanted,
                              const std::optional<std::string>& vertices);
+
+// The same with the subspaces in place that the flags ask for, if they do. Colours that a subspace gives are
+// asked of it, and are wanted besides the meshes where nothing is named.
+Result<Request> AcceleratedRequest(Rig* rig, Compiler* compiler, const AccelerationFlags& flags,
+                                   const std::vector<std::string>& wanted,
+                                   const std::optional<std::string>& vertices);
 
 }  // namespace kpsa

@@ -120,7 +120,8 @@ Json WordSchema(std::string_view word) {
   if (word == "members") return Ref("members");
   if (word == "weights") return OneOrList({{"type", "string"}});
   if (word == "falloff") return Ref("falloff");
-  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights")
+  if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "carried" ||
+      word == "falloffs")
     return ListOf(Ref("name"));
   if (word == "constrained") return OneOrList(Ref("name"));
   if (word == "combinations")
@@ -129,6 +130,7 @@ Json WordSchema(std::string_view word) {
         {"targets"}));
   if (word == "inbetweens") return MapOf(MapOf(Ref("name")));
   if (word == "poses") return MapOf(Numbers(3));
+  if (word == "influences") return {{"type", "string"}};
   if (word == "blendWeights") return OneOrList({{"type", "string"}});
   if (word == "vertices") return Ref("vertices");
   if (word == "places") return {{"type", "array"}, {"items", Numbers(3)}};
@@ -206,7 +208,8 @@ Json Definitions(const NodeRegistry& registry) {
                {"proximity"}),
         Closed({{"weights", OneOrList({{"type", "string"}})}}, {"weights"}),
         Closed({{"combine", {{"enum", {"multiply", "max", "add"}}}}, {"of", ListOf(Ref("falloff"))}}, {"of"}),
-        {{"type", "array"}, {"items", Ref("falloff")}}}}};
+        {{"type", "array"}, {"items", Ref("falloff")}},
+        Ref("name")}}};
   defs["clips"] = OneOrList(Ref("name"));
   defs["node"] = {{"type", "object"},
                   {"properties", {{"type", {{"enum", std::move(types)}}}}},
@@ -227,7 +230,7 @@ std::string RigSchema(const NodeRegistry& registry) {
                 "of bare numbers in this file; m and deg if not given");
   properties["fps"] =
       Described({{"type", "number"}, {"exclusiveMinimum", 0}}, "frames a second; 24 if not given");
-  properties["character"] = Described({{"type", "string"}}, "a .glb or .gltf, relative to this file");
+  properties["character"] = Described({{"type", "string"}}, "a .glb, .gltf or .vrm, relative to this file");
   properties["include"] = Described(files, "other rig files, without `character`");
   properties["plugins"] = Described(files, "shared libraries that add node types");
   properties["weld"] = Described(Ref("flag"), "off: keep vertices apart that a UV seam splits");
@@ -250,7 +253,10 @@ std::string RigSchema(const NodeRegistry& registry) {
        {"tolerance", Ref("number")},
        {"violationRate",
         Described({{"type", {"number", "string"}}, {"minimum", 0}, {"maximum", 1}}, "of frames")},
-       {"train", Closed({{"clips", Ref("clips")}, {"samples", {{"type", "integer"}, {"minimum", 0}}}})},
+       {"train", Closed({{"clips", Ref("clips")},
+                         {"samples", {{"type", "integer"}, {"minimum", 0}}},
+                         {"keyPoints", {{"type", "integer"}, {"minimum", 1}}},
+                         {"heldOut", {{"type", "integer"}, {"minimum", 20}}}})},
        {"test", Closed({{"clips", Ref("clips")}})}}));
   properties["overrides"] =
       Described(MapOf(true), "plug: value; instead of what was set or connected before");
@@ -284,6 +290,14 @@ std::string RigSchema(const NodeRegistry& registry) {
                    {{"type", "array"}, {"items", {{"type", "integer"}}}, {"minItems", 2}, {"maxItems", 2}}}},
                  {"layers"})),
       "clips of the character over each other, for --clip");
+  properties["references"] =
+      Described(MapOf(Closed({{"file", {{"type", "string"}}},
+                              {"translate", Numbers(3)},
+                              {"clip", Described(Ref("name"), "that it plays; its first one if not given")},
+                              {"start", Described({{"type", {"number", "string"}}},
+                                                  "when the clip begins: a frame, or with a suffix (s f)")}},
+                             {"file"})),
+                "other rigs; what they bring is called NAME:node");
   const Json schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                        {"title", "kpsa rig file, version 1"},
                        {"type", "object"},

@@ -36,12 +36,17 @@ std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
 
 AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) {
   AccelerationTarget target;
+  if (acceleration.reference >= 0) {
+    const Reference& reference = rig.references[static_cast<std::size_t>(acceleration.reference)];
+    target.within = {reference.name_space, reference.root};
+  }
   for (const AcceleratedPoints& points : acceleration.points) {
     AccelerationTarget::MeshPoints out;
     if (points.colors) {
-      out.name = rig.graph->PlugName(points.points);
+      out.name = target.within.Inner(rig.graph->PlugName(points.points));
       out.stages.push_back({"colors", points.points, false});
       target.meshes.push_back(std::move(out));
+      target.colors = true;
       continue;
     }
     const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
@@ -49,13 +54,16 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) 
       const Stage& stage = mesh.stages[s];
       out.stages.push_back({stage.name, stage.points, stage.world});
     }
-    out.name = mesh.name + "@" + mesh.stages[points.stage].name;
+    out.name = target.within.Inner(mesh.name + "@" + mesh.stages[points.stage].name);
     target.meshes.push_back(std::move(out));
   }
   if (acceleration.space) {
     const NodeDef& def = rig.graph->def(*acceleration.space);
     target.space.push_back({*acceleration.space, def.FindAttribute("worldMatrix"), -1, -1});
-    target.space_name = rig.graph->name(*acceleration.space);
+    target.space_name = target.within.Inner(rig.graph->name(*acceleration.space));
+  } else if (acceleration.reference >= 0) {
+    const NodeId root = target.within.root;
+    target.space.push_back({root, rig.graph->def(root).FindAttribute("worldMatrix"), -1, -1});
   }
   target.varying = VaryingPlugs(rig);
   for (const Control& control : rig.controls) target.controls.push_back(control.plug);

@@ -121,8 +121,16 @@ Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
   for (const Control& control : rig->controls)
     ranges.push_back({control.plug, control.min, control.max, control.value, control.by_clip});
   std::vector<std::vector<Index>> regions;
-  for (const AcceleratedPoints& points : entry.points)
-    regions.push_back(RegionsOf(*rig, rig->scene.meshes[points.mesh], &check.worst_regions));
+  for (std::size_t p = 0; p < entry.points.size(); ++p) {
+    const AcceleratedPoints& points = entry.points[p];
+    if (points.colors) {
+      const Index total = (*full_plan)->outputs()[p].points.total();
+      regions.emplace_back(total, static_cast<Index>(check.worst_regions.size()));
+      check.worst_regions.push_back({rig->graph->PlugName(points.points), 0, 0});
+    } else {
+      regions.push_back(RegionsOf(*rig, rig->scene.meshes[points.mesh], &check.worst_regions));
+    }
+  }
   std::vector<std::size_t> region_counts(check.worst_regions.size(), 0);
   Evaluator full(*full_plan), fast(*fast_plan);
   std::vector<double> full_ns, fast_ns;

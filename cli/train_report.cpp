@@ -23,6 +23,7 @@ std::string TrainJson(const TrainResult& r) {
   const nlohmann::ordered_json document =
       nlohmann::ordered_json{{"schema", "kpsa.train/1"},
                              {"subspace", r.path},
+                             {"units", r.subspace->units},
                              {"points", r.points()},
                              {"cues", r.subspace->cues.size()},
                              {"rows", r.subspace->rows()},
@@ -57,6 +58,8 @@ std::string TrainJson(const TrainResult& r) {
 }
 
 std::string TrainText(const TrainResult& r) {
+  const bool light = r.subspace->of_light();
+  const auto error = [&](double value) { return ErrorText(value, light); };
   std::string text;
   text += fmt::format("{}: {}, {} ({} numbers), {} modes, {:.1f} s\n", r.path, Plural(r.points(), "point"),
                       Plural(r.subspace->cues.size(), "cue"), r.subspace->rows(), r.subspace->modes,
@@ -64,12 +67,12 @@ std::string TrainText(const TrainResult& r) {
   text += fmt::format("trained on {} of {} and {}\n", Plural(r.record.clip_poses, "frame"),
                       r.record.clips.empty() ? "no clip" : fmt::format("{}", fmt::join(r.record.clips, ", ")),
                       Plural(r.record.sampled_poses, "sampled pose"));
-  text += fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n",
-                      Plural(r.record.calibration_poses, "pose"), LengthText(r.record.held_out_rms),
-                      LengthText(r.record.held_out_max), LengthText(r.record.motion_rms));
-  text += fmt::format("calibrated for {} in {:.3g} % of poses: {:.1f} % of held-out poses hit\n",
-                      LengthText(r.subspace->tolerance), 100 * (1 - r.calibration.alpha),
-                      100 * r.calibration.hit_rate);
+  text +=
+      fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
+                  error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
+  text += fmt::format("calibrated for {}{} in {:.3g} % of poses: {:.1f} % of held-out poses hit\n",
+                      light ? "an RMS of " : "", error(r.subspace->tolerance),
+                      100 * (1 - r.calibration.alpha), 100 * r.calibration.hit_rate);
   if (r.check.poses > 0) {
     text += fmt::format(
         "tried on {} of the controls: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "
@@ -86,10 +89,10 @@ std::string TrainText(const TrainResult& r) {
     }
     Table poses({"worst of these poses (controls)", "where", ">max", ">RMS"});
     for (const auto& pose : r.check.worst_poses)
-      poses.Row({pose.controls, pose.region, LengthText(pose.max), LengthText(pose.rms)});
+      poses.Row({pose.controls, pose.region, error(pose.max), error(pose.rms)});
     Table regions({"worst regions", ">RMS", ">max"});
     for (const auto& region : r.check.worst_regions)
-      regions.Row({region.name, LengthText(region.rms), LengthText(region.max)});
+      regions.Row({region.name, error(region.rms), error(region.max)});
     text += "\n" + poses.Text() + "\n" + regions.Text();
   }
   text += fmt::format("\nnext: kpsa bench {}{}\n", r.rig, r.own_path ? "" : " --kpsa " + r.path);

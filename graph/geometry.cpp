@@ -78,6 +78,12 @@ Curve::Curve(std::vector<Double3> cvs, bool closed) : cvs_(std::move(cvs)), clos
   digest_ = hasher.Finish();
 }
 
+TriangleUvs::TriangleUvs(std::vector<float> values) : values_(std::move(values)) {
+  Hasher hasher;
+  AddVector(hasher, values_);
+  digest_ = hasher.Finish();
+}
+
 WeightMap::WeightMap(std::vector<float> weights) : weights_(std::move(weights)) {
   Hasher hasher;
   AddVector(hasher, weights_);

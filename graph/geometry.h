@@ -127,6 +127,20 @@ class Curve final : public Asset {
   Digest digest_;
 };
 
+// Texture coordinates by triangle: of triangle t of a mesh u v u v u v from 6 t on, as the file has them; not
+// a number where it has none.
+class TriangleUvs final : public Asset {
+ public:
+  explicit TriangleUvs(std::vector<float> values);
+  const char* kind() const override { return "triangleUvs"; }
+  Digest digest() const override { return digest_; }
+  const std::vector<float>& values() const { return values_; }
+
+ private:
+  std::vector<float> values_;
+  Digest digest_;
+};
+
 // One float a point: a weight map, or membership (0 or 1).
 class WeightMap final : public Asset {
  public:

@@ -46,6 +46,10 @@ class Graph {
 
   Result<NodeId> AddNode(std::string_view type, std::string_view name);
   Status RemoveNode(NodeId node);  // with its connections and values
+  // Takes over all nodes of another graph of the same registry. Names and aliases begin with `prefix` then,
+  // and ids have what is returned added to their index. A name that is taken is an error, and nothing is
+  // changed.
+  Result<Index> Absorb(Graph other, std::string_view prefix);
   // Unit of numbers: the runtime's (metres, radians, seconds). The type and the range are checked, and that
   // numbers are finite. The latest wins: setting a whole plug forgets what was set on its children (or its
   // single points).

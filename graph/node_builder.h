@@ -141,6 +141,8 @@ class NodeBuilder {
     return *this;
   }
   NodeBuilder& in_place(std::string_view input);
+  // Of an input in the group that was closed last.
+  int input_position(std::string_view input);
   NodeBuilder& cost(float ns, float ns_per_point) {
     group().cost_ns = ns;
     group().cost_ns_per_point = ns_per_point;
@@ -194,7 +196,6 @@ class NodeBuilder {
   AttributeDef& attribute() { return def_->attributes.back(); }
   ComputeGroup& group() { return def_->groups.back(); }
   NodeBuilder& add(AttributeDef attribute);
-  int input_position(std::string_view input);
   NodeBuilder& group_compute(ComputeFn compute);
   NodeBuilder& group_for(std::vector<std::string> outputs, std::vector<std::string> inputs,
                          ComputeFn compute);

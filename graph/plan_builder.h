@@ -38,7 +38,6 @@ class PlanBuilder {
                           std::uint32_t reuse);
   std::uint32_t ConstantSlot(const Value& value, Type type, const PointSet& points);
   std::uint32_t AddText(const std::string& text);
-  void WriteTable(std::vector<std::uint32_t>& table) const;
 
   InstanceTable& table_;
   const PlanDraft& draft_;

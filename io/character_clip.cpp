@@ -11,13 +11,22 @@ namespace {
 
 class ClipWriter {
  public:
-  ClipWriter(CharacterGraph* scene, Graph* graph) : scene_(scene), graph_(graph), edit_(graph) {}
+  ClipWriter(CharacterGraph* scene, Graph* graph)
+      : scene_(scene), graph_(graph), edit_(graph), time_(scene->time) {}
+
+  // Before anything else, where the clip does not begin at time 0.
+  void StartAt(std::string_view clip, double start) {
+    const NodeId node = edit_.AddFresh("clipLayer", fmt::format("{}_start", clip));
+    if (!edit_.ok()) return;
+    scene_->clip_nodes.push_back(node);
+    edit_.Set(node, "start", start);
+    edit_.Connect(scene_->time, edit_.Plug(node, "time"));
+    time_ = edit_.Plug(node, "localTime");
+  }
 
   void AddTransform(Index gltf_node, const std::shared_ptr<const AnimationKeys>& keys) {
     const NodeId transform = scene_->transforms[gltf_node];
-    const auto input = scene_->clip_inputs.find(transform.index);
-    const PlugRef offset =
-        input != scene_->clip_inputs.end() ? input->second : edit_.Plug(transform, "offsetParentMatrix");
+    const PlugRef offset = ClipInput(*scene_, *graph_, transform);
     if (!edit_.ok() || IsDriven(offset)) return;
     const NodeId node = AddNode("clipTransform", graph_->name(transform) + "_clip", keys);
     if (edit_.ok()) edit_.Connect(edit_.Plug(node, "matrix"), offset);
@@ -26,7 +35,7 @@ class ClipWriter {
   void AddWeights(const CharacterMesh& mesh, const std::shared_ptr<const AnimationKeys>& keys) {
     const NodeId node = AddNode("clipWeights", mesh.name + "_clipWeights", keys);
     for (int k = 0; k < keys->data().weights.components && edit_.ok(); ++k) {
-      const PlugRef weight = edit_.Plug(mesh.blend_shape, "weight", k);
+      const PlugRef weight = edit_.Plug(mesh.weights_node(), "weight", k);
       if (edit_.ok() && !IsDriven(weight)) edit_.Connect(edit_.Plug(node, "output", k), weight);
     }
     Start(node);
@@ -44,45 +53,65 @@ class ClipWriter {
   }
   // Time last: a node without inputs is connected without a search for cycles.
   void Start(NodeId node) {
-    if (edit_.ok()) edit_.Connect(scene_->time, edit_.Plug(node, "time"));
+    if (edit_.ok()) edit_.Connect(time_, edit_.Plug(node, "time"));
   }
 
   CharacterGraph* scene_;
   Graph* graph_;
   GraphEditor edit_;
+  PlugRef time_;
 };
+
+// By its id: one of the character, else (kNoIndex) a layered one.
+struct FoundClip {
+  Index index = kNoIndex;
+  const LayeredClip* layered = nullptr;
+};
+Result<FoundClip> FindClip(const gltf::Character& character, const CharacterGraph& scene,
+                           std::string_view clip) {
+  FoundClip found;
+  for (const LayeredClip& candidate : scene.layered) {
+    if (candidate.id == clip) found.layered = &candidate;
+  }
+  found.index = character.FindClip(clip);
+  if (found.index != kNoIndex || found.layered != nullptr) return found;
+  std::vector<std::string> ids;
+  for (const CharacterClip& known : scene.clips) ids.push_back(known.id);
+  if (ids.empty()) return Status::Invalid("the character has no clips, so none named \"{}\"", clip);
+  constexpr std::size_t kShown = 20;
+  const std::vector<std::string> shown(
+      ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), kShown)));
+  return Status::Invalid("the character has no clip \"{}\"{}; its clips are {}{}", clip,
+                         DidYouMean(clip, ids), fmt::join(shown, ", "), ids.size() > kShown ? ", ..." : "");
+}
 
 }  // namespace
 
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph) {
-  Index index = kNoIndex;
-  const LayeredClip* layered = nullptr;
-  if (clip.has_value()) {
-    for (const LayeredClip& candidate : scene->layered) {
-      if (candidate.id == *clip) layered = &candidate;
-    }
-    index = character.FindClip(*clip);
-    if (index == kNoIndex && layered == nullptr) {
-      std::vector<std::string> ids;
-      for (const CharacterClip& known : scene->clips) ids.push_back(known.id);
-      if (ids.empty()) return Status::Invalid("the character has no clips, so none named \"{}\"", *clip);
-      constexpr std::size_t kShown = 20;
-      const std::vector<std::string> shown(
-          ids.begin(), ids.begin() + static_cast<std::ptrdiff_t>(std::min(ids.size(), kShown)));
-      return Status::Invalid("the character has no clip \"{}\"{}; its clips are {}{}", *clip,
-                             DidYouMean(*clip, ids), fmt::join(shown, ", "),
-                             ids.size() > kShown ? ", ..." : "");
-    }
-  }
+  if (clip.has_value()) KPSA_RETURN_IF_ERROR(FindClip(character, *scene, *clip).status());
   for (NodeId node : scene->clip_nodes) KPSA_RETURN_IF_ERROR(graph->RemoveNode(node));
   scene->clip_nodes.clear();
   scene->clip.reset();
-  if (layered != nullptr) return PlayLayers(character, *layered, scene, graph);
-  if (index == kNoIndex) return Status();
+  if (!clip.has_value()) return Status();
+  const std::string id(*clip);
+  KPSA_RETURN_IF_ERROR(AddClip(character, id, 0, scene, graph));
+  scene->clip = id;
+  return Status();
+}
 
+Status AddClip(const gltf::Character& character, std::string_view clip, double start, CharacterGraph* scene,
+               Graph* graph) {
+  const Result<FoundClip> found = FindClip(character, *scene, clip);
+  if (!found.ok()) return found.status();
+  if (found->layered != nullptr) {
+    LayeredClip moved = *found->layered;
+    for (LayeredClip::Layer& layer : moved.layers) layer.start += start;
+    return PlayLayers(character, moved, scene, graph);
+  }
   ClipWriter writer(scene, graph);
-  for (auto& [gltf_node, node_keys] : KeysByNode(character, character.clips[index], &scene->notes)) {
+  if (start != 0) writer.StartAt(clip, start);
+  for (auto& [gltf_node, node_keys] : KeysByNode(character, character.clips[found->index], &scene->notes)) {
     const auto keys = std::make_shared<const AnimationKeys>(std::move(node_keys.data));
     if (node_keys.moves) writer.AddTransform(gltf_node, keys);
     if (!node_keys.morphs) continue;
@@ -90,8 +119,13 @@ Status SetClip(const gltf::Character& character, std::optional<std::string_view>
       if (mesh.gltf_node == gltf_node && mesh.geometry.targets != nullptr) writer.AddWeights(mesh, keys);
     }
   }
-  scene->clip = std::string(*clip);
   return writer.edit().Take();
+}
+
+PlugRef ClipInput(const CharacterGraph& scene, const Graph& graph, NodeId transform) {
+  const auto input = scene.clip_inputs.find(transform.index);
+  if (input != scene.clip_inputs.end()) return input->second;
+  return {transform, graph.def(transform).FindAttribute("offsetParentMatrix"), -1, -1};
 }
 
 bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug) {

@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "io/character_vrm.h"
 #include "io/graph_editor.h"
 
 namespace kpsa {
@@ -16,7 +17,11 @@ constexpr std::size_t kMaxAllPathBytes = 8u << 20;
 class Builder {
  public:
   Builder(const gltf::Character& character, const CharacterOptions& options, Graph* graph)
-      : character_(character), options_(options), graph_(graph), edit_(graph) {}
+      : character_(character),
+        options_(options),
+        graph_(graph),
+        edit_(graph),
+        vrm_(character, &scene_, graph) {}
 
   Result<CharacterGraph> Build() {
     KPSA_RETURN_IF_ERROR(CheckSizes());
@@ -25,10 +30,12 @@ class Builder {
     const NodeId time = edit_.Add("time", "time");
     scene_.time = edit_.Plug(time, "time");
     AddTransforms();
+    if (edit_.ok()) edit_.Check(vrm_.AddExpressions());
     const std::vector<std::string> names = character_.UniqueNames();
     for (Index node : character_.MeshNodes()) {
       if (edit_.ok()) AddMesh(node, names[node]);
     }
+    if (edit_.ok()) edit_.Check(vrm_.AddConstraints());
     if (!edit_.ok()) return edit_.Take();
 
     FindClipPlugs();
@@ -67,15 +74,15 @@ class Builder {
   }
 
   void FindClipPlugs() {
-    std::unordered_map<Index, Index> blend_shapes;  // by glTF node
+    std::unordered_map<Index, Index> weights;  // by glTF node: whose weights its channels are
     for (const CharacterMesh& mesh : scene_.meshes) {
-      if (mesh.blend_shape.version != 0) blend_shapes[mesh.gltf_node] = mesh.blend_shape.index;
+      if (mesh.blend_shape.version != 0) weights[mesh.gltf_node] = mesh.weights_node().index;
     }
     for (const gltf::Clip& clip : character_.clips) {
       for (const gltf::Channel& channel : clip.channels) {
         if (channel.path != gltf::Path::kWeights) {
           scene_.clip_transforms.insert(scene_.transforms[channel.node].index);
-        } else if (const auto it = blend_shapes.find(channel.node); it != blend_shapes.end()) {
+        } else if (const auto it = weights.find(channel.node); it != weights.end()) {
           scene_.clip_weights.insert(it->second);
         }
       }
@@ -196,11 +203,13 @@ class Builder {
     for (const MorphTargets::Target& target : mesh->geometry.targets->targets()) names.push_back(target.name);
     const PlugRef weight = edit_.Plug(mesh->blend_shape, "weight", 0);
     if (!edit_.ok()) return;
+    edit_.Check(vrm_.AddMorphWeights(names, mesh));
     graph_->SetElementNames(mesh->blend_shape, weight.attribute, std::move(names));
     for (std::size_t k = 0; k < mesh->weights.size(); ++k) {
       if (mesh->weights[k] != 0)
-        edit_.Set(mesh->blend_shape, "weight", static_cast<int>(k), mesh->weights[k]);
+        edit_.Set(mesh->weights_node(), "weight", static_cast<int>(k), mesh->weights[k]);
     }
+    if (mesh->morph_weights.version != 0) graph_->AddDelegate(mesh->transform, mesh->morph_weights);
     graph_->AddDelegate(mesh->transform, mesh->blend_shape);
   }
 
@@ -235,6 +244,7 @@ class Builder {
   Graph* graph_;
   GraphEditor edit_;
   CharacterGraph scene_;
+  VrmGraph vrm_;
   std::map<Index, WeldedMesh> welded_;
 };
 

@@ -7,7 +7,7 @@
 // 512 bytes).
 // `<mesh>_mesh`, `<mesh>_blendShape` and `<mesh>_skinCluster` carry the mesh's name in outputs
 // (Character::UniqueName);
-// `<mesh>.weight[...]` finds the blendShape's.
+// `<mesh>.weight[...]` finds the blendShape's. What VRM's extensions add: io/character_vrm.h.
 #pragma once
 
 #include <memory>
@@ -56,11 +56,14 @@ struct CharacterMesh {
   std::vector<double> weights;                                 // default morph weights
   NodeId transform;                                            // of the mesh node
   NodeId rest, blend_shape, skin_cluster, transform_geometry;  // invalid where absent
-  std::vector<Stage> stages;                                   // in order; the last one's points are `points`
+  NodeId morph_weights;       // likewise: before the blendShape, where expressions move the mesh
+  std::vector<Stage> stages;  // in order; the last one's points are `points`
   PlugRef points;
   bool world = false;  // whether `points` are in world space
   std::vector<OutputPrimitive> primitives;
   const Mesh& mesh() const { return *geometry.mesh; }
+  // Whose `weight` clips and rigs set.
+  NodeId weights_node() const { return morph_weights.version != 0 ? morph_weights : blend_shape; }
   // By name; `gltf` is the last of the file's own stages, `skin` also an unskinned mesh's transform. Null if
   // none.
   const Stage* FindStage(std::string_view stage) const;
@@ -93,6 +96,7 @@ struct CharacterGraph {
   std::vector<LayeredClip> layered;
   std::optional<std::string> clip;  // the one that plays
   std::vector<NodeId> clip_nodes;
+  NodeId expressions;  // of VRM; invalid where absent
   PlugRef time;
   std::vector<std::string> notes;  // what was ignored, one line each
   std::unordered_set<Index> clip_transforms,
@@ -113,9 +117,15 @@ inline constexpr std::size_t kMaxMorphTargets = 8192;
 // Replaces the clip that plays; none: the rest pose. Plugs that somebody else drives are left alone.
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph);
-// The nodes of a layered clip; *scene is as SetClip leaves it without a clip.
+// Lets a clip, plain or layered, play besides what plays already; it begins at `start` seconds. Nodes that
+// another clip moves are left to that.
+Status AddClip(const gltf::Character& character, std::string_view clip, double start, CharacterGraph* scene,
+               Graph* graph);
+// The nodes of a layered clip.
 Status PlayLayers(const gltf::Character& character, const LayeredClip& clip, CharacterGraph* scene,
                   Graph* graph);
+// Where the clip of a transform goes.
+PlugRef ClipInput(const CharacterGraph& scene, const Graph& graph, NodeId transform);
 // Whether any clip of the character drives the plug.
 bool IsClipPlug(const CharacterGraph& scene, const Graph& graph, const PlugRef& plug);
 

@@ -37,7 +37,7 @@ class LayerWriter {
   }
   void AddTransform(Index gltf_node, const std::vector<NodeLayers::Part>& parts) {
     const NodeId transform = scene_->transforms[gltf_node];
-    const PlugRef offset = edit_.Plug(transform, "offsetParentMatrix");
+    const PlugRef offset = ClipInput(*scene_, *graph_, transform);
     if (!edit_.ok() || graph_->FindConnection(offset) != nullptr) return;
     const NodeId node = AddBlend("layeredTransform", graph_->name(transform) + "_clip", parts);
     if (edit_.ok()) edit_.Connect(edit_.Plug(node, "matrix"), offset);
@@ -49,7 +49,7 @@ class LayerWriter {
     for (const NodeLayers::Part& part : parts)
       targets = std::max(targets, part.keys->data().weights.components);
     for (int k = 0; k < targets && edit_.ok(); ++k) {
-      const PlugRef weight = edit_.Plug(mesh.blend_shape, "weight", k);
+      const PlugRef weight = edit_.Plug(mesh.weights_node(), "weight", k);
       if (edit_.ok() && graph_->FindConnection(weight) == nullptr)
         edit_.Connect(edit_.Plug(node, "output", k), weight);
     }
@@ -108,7 +108,6 @@ Status PlayLayers(const gltf::Character& character, const LayeredClip& clip, Cha
         writer.AddWeights(mesh, layers.morphs);
     }
   }
-  scene->clip = clip.id;
   return writer.Take();
 }
 

@@ -73,6 +73,7 @@ std::string Shortened(const std::string& text) {
 Result<std::vector<std::uint8_t>> LoadBuffer(const BufferSource& source, bool is_first,
                                              const Container& container, const std::string& folder) {
   std::vector<std::uint8_t> bytes;
+  if (source.is_fallback) return bytes;
   if (source.has_uri) {
     if (HasPrefixIgnoringCase(source.uri, "data:")) {
       Result<std::vector<std::uint8_t>> decoded = DecodeDataUri(source.uri);
@@ -290,9 +291,9 @@ Result<Document> LoadDocument(std::span<const std::uint8_t> bytes, const std::st
   Document document;
   auto model = std::make_shared<tinygltf::Model>();
   KPSA_RETURN_IF_ERROR(ParseModel(reduced->text, model.get()));
-  document.model = std::move(model);
   document.target_names = std::move(reduced->target_names);
   document.no_view = reduced->no_view;
+  document.vrm = std::move(reduced->vrm);
   document.warnings = std::move(reduced->warnings);
   std::uint64_t total = bytes.size();
   for (std::size_t i = 0; i < reduced->buffers.size(); ++i) {
@@ -306,6 +307,8 @@ Result<Document> LoadDocument(std::span<const std::uint8_t> bytes, const std::st
   }
   document.budget.memory = (std::uint64_t{256} << 20) + 32 * total;
   document.budget.work = (std::uint64_t{4} << 30) + 64 * total;
+  KPSA_RETURN_IF_ERROR(Decompress(reduced->meshopt, reduced->draco, model.get(), &document));
+  document.model = std::move(model);
   return document;
 }
 
@@ -317,7 +320,7 @@ Result<Character> LoadGltfFromMemory(std::span<const std::uint8_t> bytes, const 
     if (!document.ok()) return located(document.status());
     Character character;
     character.path = name;
-    for (const auto read : {&ReadMeshes, &ReadScene, &ReadSkins, &ReadClips}) {
+    for (const auto read : {&ReadMeshes, &ReadScene, &ReadSkins, &ReadClips, &ReadVrm}) {
       if (Status status = read(*document, &character); !status.ok()) return located(std::move(status));
     }
     return character;

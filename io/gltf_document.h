@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "io/gltf_compressed.h"
 #include "io/gltf_import.h"
 
 namespace tinygltf {
@@ -31,6 +32,7 @@ struct Document {
   std::vector<std::vector<std::uint8_t>> buffers;      // empty where the file gives no data
   std::vector<std::vector<std::string>> target_names;  // [mesh][target] from mesh.extras.targetNames
   int no_view = 0;                                     // accessors without a buffer view name this one
+  std::string vrm;                                     // what ReadVrm reads, as JSON; may be empty
   std::vector<std::string> warnings;
   mutable Budget budget;
 };
@@ -51,6 +53,7 @@ struct BufferSource {
   bool has_uri = false;
   std::string uri;
   std::uint64_t byte_length = 0;
+  bool is_fallback = false;  // of EXT_meshopt_compression: nobody reads it
 };
 // The structure of the text, checked and reduced to what is read: `text` for tinygltf, the rest beside it.
 struct ReducedJson {
@@ -58,6 +61,9 @@ struct ReducedJson {
   std::vector<BufferSource> buffers;
   std::vector<std::vector<std::string>> target_names;
   int no_view = 0;
+  std::vector<MeshoptView> meshopt;
+  std::vector<DracoPrimitive> draco;
+  std::string vrm;
   std::vector<std::string> warnings;
 };
 Result<ReducedJson> ReduceJson(std::span<const std::uint8_t> text);
@@ -100,5 +106,6 @@ Status ReadScene(const Document& document, Character* character);
 Status ReadMeshes(const Document& document, Character* character);
 Status ReadSkins(const Document& document, Character* character);
 Status ReadClips(const Document& document, Character* character);
+Status ReadVrm(const Document& document, Character* character);
 
 }  // namespace kpsa::gltf

@@ -4,10 +4,10 @@
 //
 // Units and spaces are glTF's, which are ours: metres, seconds, Y up, right-handed, column-major matrices.
 //
-// Extensions: KHR_mesh_quantization is read. Extensions that cannot move a point (KHR_texture_*,
-// KHR_materials_*, KHR_lights_punctual, EXT_texture_*, ...) are ignored even where the file requires them.
-// Any other required one (KHR_draco_mesh_compression, EXT_meshopt_compression, ...) is an error that names
-// it. Images are never read.
+// Extensions: KHR_mesh_quantization, EXT_meshopt_compression, KHR_draco_mesh_compression (vertices in the
+// order in which Draco decodes them) and what io/gltf_vrm.h lists are read. Extensions that cannot move a
+// point (KHR_texture_*, KHR_materials_*, KHR_lights_punctual, EXT_texture_*, ...) are ignored even where the
+// file requires them. Any other required one is an error that names it. Images are never read.
 //
 // The file is hostile: JSON depth and size, container lengths, every index, count, stride and offset, every
 // float and every allocation are checked first, and a buffer may not lie outside the document's folder.
@@ -22,6 +22,7 @@
 #include "base/points.h"
 #include "base/status.h"
 #include "base/types.h"
+#include "io/gltf_vrm.h"
 
 namespace kpsa::gltf {
 
@@ -69,6 +70,7 @@ struct Mesh {
   std::string name;
   std::vector<float> positions;  // 3V, x y z interleaved, mesh-local
   std::vector<float> colors;     // COLOR_0, 3V linear 0 .. 1, for pictures; empty where no primitive has it
+  std::vector<float> uvs;  // TEXCOORD_0, 2V; not a number where a primitive lacks it, empty where all do
   std::vector<Primitive> primitives;
   // Row v: the influences of vertex v from all JOINTS_n/WEIGHTS_n in slot order, without zeros; a joint
   // listed twice is summed. Weights are divided by their sum, as the specification wants them to be
@@ -124,8 +126,10 @@ struct Character {
   std::vector<Skin> skins;
   std::vector<Material> materials;
   std::vector<Clip> clips;
-  std::vector<Index> scene_roots;     // of the default scene, else the first, else every root
-  std::vector<std::string> warnings;  // what was ignored and might be missed, one line each
+  std::vector<Expression> expressions;      // of VRM
+  std::vector<NodeConstraint> constraints;  // VRMC_node_constraint, one a node at most
+  std::vector<Index> scene_roots;           // of the default scene, else the first, else every root
+  std::vector<std::string> warnings;        // what was ignored and might be missed, one line each
 
   // The name of a node in outputs: its name, `node<index>` if it has none, `<name>#<index>` where it is
   // shared. A mesh node shares with mesh nodes only; any other node with all nodes.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <limits>
 #include <map>
 
 #include "io/gltf_document.h"
@@ -196,6 +197,25 @@ Status ReadColors(const Document& document, const tinygltf::Primitive& in, const
   return {};
 }
 
+// Appends the texture coordinates of this primitive where it has them; nothing while no primitive had any.
+Status ReadUvs(const Document& document, const tinygltf::Primitive& in, const std::string& where,
+               const Primitive& primitive, Mesh* mesh) {
+  const int accessor = FindAttribute(in.attributes, "TEXCOORD_0");
+  if (accessor < 0 && mesh->uvs.empty()) return {};
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(8 * (mesh->vertex_count() - mesh->uvs.size() / 2), where));
+  if (accessor >= 0 && primitive.vertex_count > 0) {
+    const std::string place = where + ".TEXCOORD_0";
+    KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
+    std::vector<float> uvs;
+    KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, 2, kPositionTypes, place, &uvs));
+    mesh->uvs.resize(2 * static_cast<std::size_t>(primitive.first_vertex), kNone);
+    mesh->uvs.insert(mesh->uvs.end(), uvs.begin(), uvs.end());
+  }
+  mesh->uvs.resize(2 * mesh->vertex_count(), kNone);
+  return {};
+}
+
 Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, const std::string& where,
                      Mesh* mesh) {
   Primitive primitive;
@@ -214,6 +234,7 @@ Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, co
   KPSA_RETURN_IF_ERROR(ReadInfluences(document, in, where, &primitive, mesh));
   KPSA_RETURN_IF_ERROR(ReadTargets(document, in, where, primitive, mesh));
   KPSA_RETURN_IF_ERROR(ReadColors(document, in, where, primitive, mesh));
+  KPSA_RETURN_IF_ERROR(ReadUvs(document, in, where, primitive, mesh));
   mesh->primitives.push_back(std::move(primitive));
   return {};
 }

@@ -237,12 +237,19 @@ Status CheckVersion(const json& asset) {
   return {};
 }
 
+constexpr const char *kMeshopt = "EXT_meshopt_compression", *kDraco = "KHR_draco_mesh_compression";
+
+bool IsRead(std::string_view extension) {
+  return extension == "KHR_mesh_quantization" || extension == kMeshopt || extension == kDraco ||
+         extension == "VRM" || extension == "VRMC_vrm" || extension == "VRMC_node_constraint";
+}
+
 bool CannotMovePoints(std::string_view extension) {
   for (const std::string_view prefix : {"KHR_texture_", "KHR_materials_", "KHR_lights_", "KHR_xmp",
-                                        "EXT_texture_", "EXT_lights_", "MSFT_texture_"}) {
+                                        "EXT_texture_", "EXT_lights_", "MSFT_texture_", "VRMC_materials_"}) {
     if (extension.starts_with(prefix)) return true;
   }
-  return extension == "KHR_mesh_quantization";  // that one is read
+  return false;
 }
 
 Status CheckExtensions(const json& root) {
@@ -252,36 +259,99 @@ Status CheckExtensions(const json& root) {
   for (const json& name : *required) {
     if (!name.is_string()) return Status::Invalid("extensionsRequired must be an array of texts");
     const std::string& text = name.get_ref<const std::string&>();
-    if (CannotMovePoints(text)) continue;
-    const bool compressed = text == "KHR_draco_mesh_compression" || text.ends_with("_meshopt_compression");
+    if (IsRead(text) || CannotMovePoints(text)) continue;
+    const bool compressed = text.ends_with("_compression");
     return Status::Invalid("requires the extension {}, which is not supported{}", text,
                            compressed ? "; export the file without compression" : "");
   }
   return {};
 }
 
-// Geometry that only an extension holds would read as zeros.
-Status CheckCompressedPrimitives(const json& root, const json& reduced) {
+// What an extension has put on an object, or null.
+const json* FindExtension(const json& object, const char* name) {
+  const auto extensions = object.find("extensions");
+  if (extensions == object.end()) return nullptr;
+  const auto found = extensions->find(name);
+  return found == extensions->end() ? nullptr : &*found;
+}
+
+Status CopyMeshopt(const json& root, std::vector<MeshoptView>* views) {
+  static const Fields fields = {{"buffer", Kind::kIndex, true, "buffers"},
+                                {"byteOffset", Kind::kSize},
+                                {"byteLength", Kind::kSize, true},
+                                {"byteStride", Kind::kSize, true},
+                                {"count", Kind::kSize, true},
+                                {"mode", Kind::kString, true},
+                                {"filter", Kind::kString}};
+  const auto found = root.find("bufferViews");
+  if (found == root.end()) return {};
+  const Reducer reducer(root);
+  for (std::size_t i = 0; i < found->size(); ++i) {
+    const json* extension = FindExtension((*found)[i], kMeshopt);
+    if (extension == nullptr) continue;
+    const std::string where = fmt::format("bufferViews[{}].extensions.{}", i, kMeshopt);
+    json copy;
+    KPSA_RETURN_IF_ERROR(reducer.Copy(*extension, fields, where, &copy));
+    MeshoptView& view = views->emplace_back();
+    view.view = i;
+    view.buffer = copy["buffer"].get<std::size_t>();
+    view.offset = copy.value("byteOffset", std::uint64_t{0});
+    view.length = copy["byteLength"].get<std::uint64_t>();
+    view.stride = copy["byteStride"].get<std::uint64_t>();
+    view.count = copy["count"].get<std::uint64_t>();
+    view.mode = copy["mode"].get<std::string>();
+    view.filter = copy.value("filter", std::string("NONE"));
+    if (view.stride > 256)
+      return Status::Invalid("{}.byteStride is {}, expected 256 at most", where, view.stride);
+  }
+  return {};
+}
+
+Status CopyDraco(const json& root, std::vector<DracoPrimitive>* all) {
+  static const Fields ids = {};
+  static const Fields fields = {{"bufferView", Kind::kIndex, true, "bufferViews"},
+                                {"attributes", Kind::kObject, true, nullptr, 0, &ids}};
   const auto meshes = root.find("meshes");
   if (meshes == root.end()) return {};
+  const Reducer reducer(root);
   for (std::size_t m = 0; m < meshes->size(); ++m) {
     const json& primitives = (*meshes)[m]["primitives"];
     for (std::size_t p = 0; p < primitives.size(); ++p) {
-      const auto extensions = primitives[p].find("extensions");
-      if (extensions == primitives[p].end() || !extensions->contains("KHR_draco_mesh_compression")) continue;
-      const json& attributes = reduced["meshes"][m]["primitives"][p]["attributes"];
-      const auto position = attributes.find("POSITION");
-      if (position == attributes.end()) continue;
-      const json& accessor = reduced["accessors"][position->get<std::size_t>()];
-      if (!accessor.contains("bufferView") && !accessor.contains("sparse")) {
-        return Status::Invalid(
-            "meshes[{}].primitives[{}] is compressed with KHR_draco_mesh_compression, which is not "
-            "supported; export the file without compression",
-            m, p);
+      const json* extension = FindExtension(primitives[p], kDraco);
+      if (extension == nullptr) continue;
+      const std::string where = fmt::format("meshes[{}].primitives[{}].extensions.{}", m, p, kDraco);
+      json copy;
+      KPSA_RETURN_IF_ERROR(reducer.Copy(*extension, fields, where, &copy));
+      DracoPrimitive& primitive = all->emplace_back();
+      primitive.mesh = m, primitive.primitive = p;
+      primitive.view = copy["bufferView"].get<std::size_t>();
+      for (const auto& [name, id] : (*extension)["attributes"].items()) {
+        if (!id.is_number_unsigned() || id.get<std::uint64_t>() > kLargestInt)
+          return Status::Invalid("{}.attributes.{} must be a whole number from 0 to {}", where, name,
+                                 kLargestInt);
+        primitive.attributes[name] = id.get<std::uint32_t>();
       }
     }
   }
   return {};
+}
+
+// The parts of VRM's extensions that are read, for ReadVrm: {"VRM", "VRMC_vrm", "constraints": [[node, it]]}.
+std::string VrmText(const json& root) {
+  json parts = json::object();
+  const auto keep = [&](const char* name, const char* key) {
+    const json* extension = FindExtension(root, name);
+    if (extension == nullptr || !extension->contains(key)) return;
+    parts[name] = (*extension)[key];
+  };
+  keep("VRM", "blendShapeMaster");
+  keep("VRMC_vrm", "expressions");
+  const auto nodes = root.find("nodes");
+  for (std::size_t i = 0; nodes != root.end() && i < nodes->size(); ++i) {
+    if (const json* it = FindExtension((*nodes)[i], "VRMC_node_constraint"))
+      parts["constraints"].push_back({i, *it});
+  }
+  return parts.empty() ? std::string() : parts.dump();
 }
 
 // mesh.extras.targetNames, where it is an array of texts; anything else in extras is somebody else's.
@@ -308,6 +378,9 @@ Status CopyBuffers(const json& root, std::vector<BufferSource>* buffers) {
     buffer.has_uri = copy.contains("uri");
     if (buffer.has_uri) buffer.uri = std::move(copy["uri"].get_ref<std::string&>());
     buffer.byte_length = copy["byteLength"].get<std::uint64_t>();
+    const json* extension = FindExtension((*found)[i], kMeshopt);
+    buffer.is_fallback =
+        extension != nullptr && extension->contains("fallback") && (*extension)["fallback"] == true;
   }
   return {};
 }
@@ -322,8 +395,10 @@ Result<ReducedJson> ReduceJson(std::span<const std::uint8_t> text) {
     KPSA_RETURN_IF_ERROR(Reducer(root).Copy(root, TopLevel(), "", &reduced));
     KPSA_RETURN_IF_ERROR(CheckVersion(reduced["asset"]));
     KPSA_RETURN_IF_ERROR(CheckExtensions(root));
-    KPSA_RETURN_IF_ERROR(CheckCompressedPrimitives(root, reduced));
     KPSA_RETURN_IF_ERROR(CopyBuffers(root, &result.buffers));
+    KPSA_RETURN_IF_ERROR(CopyMeshopt(root, &result.meshopt));
+    KPSA_RETURN_IF_ERROR(CopyDraco(root, &result.draco));
+    result.vrm = VrmText(root);
     if (reduced.contains("meshes")) {
       for (const json& mesh : root["meshes"]) result.target_names.push_back(TargetNames(mesh));
     }

@@ -64,7 +64,8 @@ class RigBuild {
 
   // rig_nodes.cpp: nodes, their values, overrides
   void ApplySpecialOverrides();
-  static RigAttribute SpecialOf(const std::string& key, const RigOverride& override_);
+  void InOwnNames(YamlNode* value, int source) const;
+  RigAttribute SpecialOf(const std::string& key, const RigOverride& override_) const;
   void AddNodes();
   void ReadAttributes(Made* made);
   void ReadAttribute(const Made& made, const RigAttribute& attribute, bool overrides);
@@ -83,6 +84,7 @@ class RigBuild {
   bool FindTarget(const Made& made, const YamlNode& at, const std::string& name, PlugRef* weight);
   void SetTargets(Made* made);
   void SetBlendWeights(Made* made);
+  void SetInfluences(Made* made);
 
   // rig_places.cpp: parents, handles, curves
   void AddCurves();
@@ -94,6 +96,7 @@ class RigBuild {
   bool RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world);
   bool ReadPlace(const YamlNode& node, int source, int depth, Double3* place);
   bool VertexPlaces(const YamlNode& vertices, const YamlNode* mesh, Places* places);
+  bool HangUnderReference(const Made& made, const YamlNode& at);
   Matrix4 LocalAtRest(NodeId transform) const;
 
   // rig_connect.cpp: connections, names
@@ -146,6 +149,7 @@ class RigBuild {
   void BuildMeshStack(const RigDeform& deform, std::size_t mesh, bool any_morphs);
   void BuildPointsStack(const RigDeform& deform);
   bool ResolveStack(const RigDeform& deform, std::size_t mesh, bool any_morphs, std::vector<Stage>* stages);
+  bool IsOwn(NodeId node, const RigString& name);
   Made* FindDeformer(const RigString& name);
   bool AddGeometry(Made* made, Geometry geometry, bool world, const SourceLocation& where);
   PointBufferPtr PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points);
@@ -154,6 +158,7 @@ class RigBuild {
   // rig_drivers.cpp: meshes that drive others
   void ConnectDrivers();
   void ConnectDriver(const Made& made, const RigAttribute& driver);
+  std::shared_ptr<const TriangleUvs> UvsOf(std::size_t mesh);
   void ReadPoses(const Made& made);
   void ConnectTime();
   void SplitStage(const std::string& text, std::string* mesh, std::string* stage) const;
@@ -169,6 +174,8 @@ class RigBuild {
 
   // rig_members.cpp: members, weights
   void SetWeights(Made* made);
+  void NoteWeights(const Made& made, const RigAttribute& key, const std::string& geometry,
+                   const std::string& path = "", const std::string& map = "");
   const Geometry* GeometryOf(const Made& made, const WeightFile& file) const;
   bool AddMembers(const YamlNode& node, int source, const Made& made, const Geometry& of,
                   std::vector<float>* weights);
@@ -180,6 +187,8 @@ class RigBuild {
                       std::vector<std::vector<float>>* weights);
   bool FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
                const NamedWeights** map, const Geometry** of);
+  bool FindGeometry(const YamlNode& reference, const Made& made, const WeightFile& file,
+                    const std::string& path, const Geometry** of);
   std::vector<float> ByPoint(const WeightFile& file, const NamedWeights& map, const Geometry& of) const;
   const WeightFile* FindWeightFile(const YamlNode& reference, const std::string& path);
   Index VertexCount(const Geometry& of) const;
@@ -194,6 +203,16 @@ class RigBuild {
                        const Geometry& of, Falloff* falloff);
   bool ReadFalloffShape(const std::string& kind, const YamlNode& node, int source, const Geometry& of,
                         std::function<double(Double3)>* weight_at);
+
+  // rig_falloff_nodes.cpp: falloffs that vary
+  struct FalloffUse {  // a geometry that a falloff node measures, as a deformer has it
+    NodeId falloff, deformer;
+    int element, geometry;
+  };
+  void ConnectFalloffs();
+  std::optional<PlugRef> FalloffOf(const YamlNode& name, const Made& deformer, std::size_t geometry,
+                                   int depth);
+  void PlaceFalloffs();
 
   // rig_lights.cpp: what illuminations see
   void ConnectLights();
@@ -243,6 +262,9 @@ class RigBuild {
   std::map<PlugKey, std::pair<std::string, SourceLocation>> constrained_;
   std::vector<ChainJoint> chain_joints_;
   std::unordered_map<Index, Places> curves_;  // by graph node: rest cvs in the world
+  std::vector<FalloffUse> falloff_uses_;
+  std::map<Index, int> falloff_elements_;  // by falloff node: how many geometries it measures
+  std::map<std::size_t, std::shared_ptr<const TriangleUvs>> uvs_;  // by mesh, of those that were asked for
   std::vector<std::optional<SourceLocation>> stack_of_mesh_;
   std::map<std::string, std::optional<WeightFile>> weight_files_;  // by path; none: it could not be read
 };

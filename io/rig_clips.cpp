@@ -62,18 +62,9 @@ void RigBuild::AddLayer(const RigClip& clip, const RigClipLayer& from, LayeredCl
                                           from.clip.text, DidYouMean(from.clip.text, names)));
     return;
   }
-  if (from.start.has_value()) {
-    const Result<double> frame = ParseQuantity(from.start->scalar, Unit::kNone, FileUnits());
-    if (from.start->is_scalar() && frame.ok() && from.start->scalar.find('%') == std::string::npos) {
-      layer.start = *frame / rig_->fps;
-    } else if (!ReadNumber(*from.start, "start", Unit::kTime, units(clip.source), &layer.start, errors_)) {
-      return;
-    }
-    if (!(std::abs(layer.start) <= kMaxSeconds)) {
-      errors_->Add(*from.start, "start: expected at most {} s, found {} s", kMaxSeconds, layer.start);
-      return;
-    }
-  }
+  if (from.start.has_value() &&
+      !ReadStart(*from.start, rig_->fps, units(clip.source), &layer.start, errors_))
+    return;
   layer.weight = from.weight;
   layer.additive = from.additive;
   layer.speed = from.speed;

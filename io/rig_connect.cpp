@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "io/rig_build.h"
+#include "io/rig_references.h"
 
 namespace kpsa {
 
@@ -61,12 +62,21 @@ void RigBuild::MakeConnections() {
     }
     if (!pending.overrides) ConnectUnlessOverridden(*from, pending.to, pending.where, pending.source, false);
   }
+  std::map<PlugKey, SourceLocation> across;  // into references, where what was connected gives way
   for (const RigConnection& connection : file_->connections) {
     if (errors_->full()) return;
     const Result<PlugRef> from = graph().FindPlug(connection.from);
     const Result<PlugRef> to = graph().FindPlug(connection.to);
     const bool good = Fail(connection.where, from.status());
     if (!Fail(connection.where, to.status()) || !good) continue;
+    if (ReferenceOf(*rig_, to->node) != nullptr) {
+      const auto [it, added] = across.emplace(KeyOf(*to), connection.where);
+      if (!added) {
+        Fail(connection.where, Status::Invalid("{} is connected twice: here and at {}", graph().PlugName(*to),
+                                               it->second.ToString()));
+        continue;
+      }
+    }
     ConnectUnlessOverridden(*from, *to, connection.where, connection.source, connection.override_clip);
   }
   for (const Pending& pending : pending_) {
@@ -138,6 +148,20 @@ void RigBuild::ConnectPlugs(const PlugRef& from, const PlugRef& to, const Source
       return;
     }
     replace = true;
+  }
+  // What the referenced file connects gives way, the parts of the plug and what it is a part of as well
+  if (const Reference* reference = ReferenceOf(*rig_, to.node); reference != nullptr) {
+    const auto overlap = [](int a, int b) { return a == b || a < 0 || b < 0; };
+    std::vector<PlugRef> driven;
+    for (const Connection& driver : graph().Inputs(to.node, to.attribute)) {
+      const PlugRef& plug = driver.destination;
+      const NodeId by = driver.source.node;
+      const bool theirs =
+          ReferenceOf(*rig_, by) == reference || by == reference->root || by == rig_->scene.time.node;
+      if (theirs && overlap(plug.element, to.element) && overlap(plug.component, to.component))
+        driven.push_back(plug);
+    }
+    for (const PlugRef& plug : driven) Fail(where, graph().Disconnect(plug));
   }
   const double factor = units(source).FactorOf(PlugUnit(to)) / units(source).FactorOf(PlugUnit(from));
   const Type from_type = graph().PlugType(from), to_type = graph().PlugType(to);

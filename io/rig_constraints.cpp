@@ -239,6 +239,7 @@ bool RigBuild::TakeOver(const PlugRef& plug, const Made& by, const PlugRef& in, 
 // The parent of what is constrained; of chains, of their first joint.
 bool RigBuild::ConnectParentOf(NodeId transform, const Made& by, const SourceLocation& where) {
   GraphEditor edit(&graph());
+  if (!edit.Has(by.id, "parentMatrix")) return true;  // it acts on local matrices only
   const PlugRef above = edit.Plug(transform, "parentMatrix"), parent = edit.Plug(by.id, "parentMatrix");
   if (!edit.ok() || !IsUnwritten(parent)) return Fail(where, edit.Take());
   if (const Connection* connection = graph().FindConnection(above))
@@ -253,7 +254,8 @@ bool RigBuild::Constrain(NodeId transform, const Made& by, const char* in_name, 
   const PlugRef offset = edit.Plug(transform, "offsetParentMatrix"), in = edit.Plug(by.id, in_name, element),
                 out = edit.Plug(by.id, out_name, element);
   if (!Fail(where, edit.Take()) || !TakeOver(offset, by, in, out, where)) return false;
-  rig_->scene.clip_inputs[transform.index] = in;
+  rig_->scene.clip_inputs.try_emplace(transform.index,
+                                      in);  // below a constraint of the file, if there is one
   return true;
 }
 

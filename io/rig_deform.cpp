@@ -4,6 +4,7 @@
 
 #include "base/matrix.h"
 #include "io/rig_build.h"
+#include "io/rig_references.h"
 
 namespace kpsa {
 
@@ -15,6 +16,7 @@ void RigBuild::BuildStacks() {
     for (const RigString& name : deform.meshes) {
       const std::optional<std::size_t> mesh = FindMesh(name.text, name.where);
       if (!mesh.has_value()) continue;
+      if (!IsOwn(rig_->scene.meshes[*mesh].transform, name)) continue;
       if (const std::optional<SourceLocation>& first = stack_of_mesh_[*mesh]; first.has_value()) {
         Fail(name.where,
              Status::Invalid("mesh \"{}\" has a stack already, at {}", name.text, first->ToString()));
@@ -31,6 +33,7 @@ void RigBuild::BuildStacks() {
   for (const RigDeform& deform : file_->deform) {
     if (deform.points.has_value()) BuildPointsStack(deform);
   }
+  ConnectFalloffs();
   for (Made& made : made_) {
     SetWeights(&made);
     const bool deforms = graph().def(made.id).FindAttribute("outPoints") >= 0 &&
@@ -40,6 +43,14 @@ void RigBuild::BuildStacks() {
                                         made.from->where.ToString(), made.from->name));
     }
   }
+}
+
+// Stacks are those of the file that a mesh or an attribute comes from.
+bool RigBuild::IsOwn(NodeId node, const RigString& name) {
+  const Reference* reference = ReferenceOf(*rig_, node);
+  return reference == nullptr ||
+         Fail(name.where, Status::Invalid("\"{}\" belongs to a reference: its stack is what {} says",
+                                          name.text, reference->file));
 }
 
 RigBuild::Made* RigBuild::FindDeformer(const RigString& name) {
@@ -175,7 +186,7 @@ void RigBuild::BuildMeshStack(const RigDeform& deform, std::size_t mesh_index, b
 void RigBuild::BuildPointsStack(const RigDeform& deform) {
   const RigString& name = *deform.points;
   const Result<PlugRef> plug = graph().FindPlug(name.text);
-  if (!Fail(name.where, plug.status())) return;
+  if (!Fail(name.where, plug.status()) || !IsOwn(plug->node, name)) return;
   const AttributeDef& attribute =
       graph().def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
   if (graph().PlugType(*plug) != Type::kPoints || attribute.output) {

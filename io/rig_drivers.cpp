@@ -100,9 +100,30 @@ void RigBuild::ConnectDriver(const Made& made, const RigAttribute& driver) {
   }
   GraphEditor edit(&graph());
   edit.Set(made.id, "driverMesh", mesh.geometry.mesh);
+  if (edit.Has(made.id, "driverUvs")) {
+    std::shared_ptr<const TriangleUvs> uvs = UvsOf(*index);
+    if (uvs != nullptr) edit.Set(made.id, "driverUvs", std::move(uvs));
+  }
   if (!world) edit.Set(made.id, "driverMatrix", rest_->WorldFromMesh(*index, {}));
   edit.Connect(points, edit.Plug(made.id, "driverPoints"));
   Fail(where, edit.Take());
+}
+
+// Of the mesh's triangles; null where the file has none.
+std::shared_ptr<const TriangleUvs> RigBuild::UvsOf(std::size_t index) {
+  const CharacterMesh& mesh = rig_->scene.meshes[index];
+  const std::vector<float>& by_vertex =
+      rig_->character->meshes[rig_->character->nodes[mesh.gltf_node].mesh].uvs;
+  if (by_vertex.empty()) return nullptr;
+  std::shared_ptr<const TriangleUvs>& uvs = uvs_[index];
+  if (uvs == nullptr) {
+    std::vector<float> values;
+    for (const Index vertex : mesh.mesh().data().triangle_vertices)
+      values.insert(values.end(), &by_vertex[2 * std::size_t{vertex}],
+                    &by_vertex[2 * std::size_t{vertex}] + 2);
+    uvs = std::make_shared<const TriangleUvs>(std::move(values));
+  }
+  return uvs;
 }
 
 // A poseInterpolator's `driver: TRANSFORM` and `poses: {name: [x, y, z], ...}`.

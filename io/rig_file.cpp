@@ -142,11 +142,7 @@ class Reader {
     if (const YamlNode* node = section("templates")) templates_.ReadTemplates(*node, source);
     if (const YamlNode* node = section("use")) templates_.ReadUses(*node, source);
     if (const YamlNode* node = section("clips")) sections.ReadClips(*node);
-    if (map.Find("references") != nullptr) {
-      for (const YamlNode& key : root.keys) {
-        if (key.scalar == "references") errors_->Add(key, "`references` needs a newer kpsa");
-      }
-    }
+    if (const YamlNode* node = section("references")) sections.ReadReferences(*node);
     map.RejectUnread();
   }
 
@@ -225,12 +221,12 @@ void ReadVersion(YamlMap* map, YamlErrors* errors) {
   }
 }
 
-Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig) {
+Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig, bool part) {
   *rig = RigFile();
   YamlErrors errors;
   Reader(rig, &errors, fps).ReadAll(path);
   for (RigSource& source : rig->sources) source.units.fps = fps.value_or(rig->fps.value_or(kDefaultFps));
-  if (errors.ok() && !rig->character.has_value()) {
+  if (errors.ok() && !part && !rig->character.has_value() && rig->references.empty()) {
     errors.Append(
         Status::Invalid("the rig names no character: add \"character: FILE.glb\"").At({path, 1, 1}));
   }

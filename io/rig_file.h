@@ -1,6 +1,6 @@
 // A rig file (RIG-FORMAT.md, version 1) as plain data, its includes merged in and its templates expanded.
 // Names are not looked up and values of attributes are not typed yet: that takes a registry and a character
-// (io/rig_builder.h). Keys of later versions (clips, references) are refused by name.
+// (io/rig_builder.h), which also reads the files of `references`.
 #pragma once
 
 #include <cstdint>
@@ -22,6 +22,8 @@ struct RigSource {
   SourceLocation included_at;
   std::string scope = {};  // of what a `use:` makes of a template: "arm_L:" begins the names of its nodes
   int outer = -1;          // ... and the source whose names it sees besides its own
+  // Of overrides that the file which references this one gives it: "hero:" begins what that calls ours
+  std::string referenced_as = {};
 };
 
 // A string or a value with its place. `source` is an index into RigFile::sources.
@@ -82,6 +84,7 @@ struct RigAccelerate {
   double violation_rate = 0.01;     // of frames, 0..1
   std::vector<RigString> train_clips, test_clips;
   std::int64_t train_samples = 0;
+  std::int64_t key_points = 0, held_out = 0;  // 0: the trainer's
 };
 
 struct RigOverride {
@@ -107,6 +110,16 @@ struct RigClip {
   std::optional<std::pair<std::int64_t, std::int64_t>> frames;  // first and last
 };
 
+// Another rig, under a namespace.
+struct RigReference {
+  std::string name;  // "hero" of the namespace "hero:"
+  SourceLocation where;
+  int source = 0;
+  RigString file;                            // path, resolved
+  std::optional<YamlNode> translate, start;  // a bare start is a frame
+  std::optional<RigString> clip;             // as the referenced file calls it
+};
+
 // Overrides that are chosen by name; all files' parts of it together.
 struct RigVariant {
   std::string name;
@@ -128,11 +141,14 @@ struct RigFile {
   std::vector<RigOverride> overrides;
   std::vector<RigVariant> variants;
   std::vector<RigClip> clips;
+  std::vector<RigReference> references;
+  std::vector<RigOverride> returned;  // connections of overrides that are not ours to make (rig_references.h)
 };
 
 // Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig
-// then holds what could be read, for finding more of them. `fps` overrides the rig's for the suffix f.
-Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig);
+// then holds what could be read, for finding more of them. `fps` overrides the rig's for the suffix f. A part
+// that others include has no character.
+Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig, bool part = false);
 
 // The units: section into `units`.
 void ReadUnits(const YamlNode& node, FileUnits* units, YamlErrors* errors);

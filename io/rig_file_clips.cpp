@@ -1,4 +1,4 @@
-// `clips:` of a rig file: clips of the character over each other.
+// `clips:` of a rig file: clips of the character over each other. `references:`: other rigs.
 #include "io/rig_file_sections.h"
 
 namespace kpsa {
@@ -6,6 +6,7 @@ namespace {
 
 constexpr std::size_t kMaxLayers = 64;
 constexpr std::int64_t kMaxFrame = 1'000'000;
+constexpr std::size_t kMaxNamespace = 256;
 
 }  // namespace
 
@@ -70,6 +71,38 @@ void SectionReader::ReadLayer(const YamlNode& node, RigClip* clip) const {
   if (const YamlNode* loop = map.Find("loop")) ReadBool(*loop, "loop", &layer.loop, errors);
   map.RejectUnread();
   if (!layer.clip.text.empty()) clip->layers.push_back(std::move(layer));
+}
+
+void SectionReader::ReadReferences(const YamlNode& node) {
+  if (!CheckMap(node, "references")) return;
+  for (std::size_t i = 0; i < node.keys.size(); ++i) {
+    const YamlNode& key = node.keys[i];
+    if (key.scalar.empty() || key.scalar.size() > kMaxNamespace ||
+        key.scalar.find(':') != std::string::npos) {
+      errors->Add(key, "a reference needs a name of at most {} bytes, without a colon", kMaxNamespace);
+      continue;
+    }
+    if (!define("reference", key.scalar, key.where())) continue;
+    RigReference reference;
+    reference.name = key.scalar;
+    reference.where = key.where();
+    reference.source = source;
+    YamlMap map(node.items[i], fmt::format("reference \"{}\"", key.scalar), errors);
+    const YamlNode* file = map.Required("file");
+    if (const YamlNode* translate = map.Find("translate")) reference.translate = *translate;
+    if (const YamlNode* start = map.Find("start")) reference.start = *start;
+    if (const YamlNode* clip = map.Find("clip")) {
+      reference.clip = RigString{{}, clip->where(), source};
+      ReadString(*clip, "clip", &reference.clip->text, errors);
+    }
+    map.RejectUnread();
+    if (file == nullptr || !ReadString(*file, "file", &reference.file.text, errors)) continue;
+    reference.file.text =
+        ResolvePath(rig->sources[static_cast<std::size_t>(source)].folder, reference.file.text);
+    reference.file.where = file->where();
+    reference.file.source = source;
+    rig->references.push_back(std::move(reference));
+  }
 }
 
 }  // namespace kpsa

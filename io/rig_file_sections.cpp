@@ -6,7 +6,7 @@
 namespace kpsa {
 namespace {
 
-constexpr std::int64_t kMaxSamples = 1'000'000;
+constexpr std::int64_t kMaxSamples = 1'000'000, kMaxKeyPoints = 100'000;
 
 }  // namespace
 
@@ -222,7 +222,8 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
       if (number > 0) {
         accelerate.tolerance = number;
       } else {
-        errors->Add(*tolerance, "tolerance: expected a length above 0, found {}", tolerance->scalar);
+        errors->Add(*tolerance, "tolerance: expected a {} above 0, found {}",
+                    colors != nullptr ? "number" : "length", tolerance->scalar);
       }
     }
     if (const YamlNode* rate = map.Find("violationRate");
@@ -238,6 +239,10 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
         ReadNames(*clips, "clips", &accelerate.train_clips);
       if (const YamlNode* samples = train_map.Find("samples"))
         ReadInteger(*samples, "samples", 0, kMaxSamples, &accelerate.train_samples, errors);
+      if (const YamlNode* points = train_map.Find("keyPoints"))
+        ReadInteger(*points, "keyPoints", 1, kMaxKeyPoints, &accelerate.key_points, errors);
+      if (const YamlNode* poses = train_map.Find("heldOut"))
+        ReadInteger(*poses, "heldOut", 20, kMaxSamples, &accelerate.held_out, errors);
       train_map.RejectUnread();
     }
     if (const YamlNode* test = map.Find("test")) {

@@ -22,7 +22,8 @@ struct SectionReader {
   void ReadAccelerate(const YamlNode& node);
   void ReadOverrides(const YamlNode& node);
   void ReadVariants(const YamlNode& node);
-  void ReadClips(const YamlNode& node);  // io/rig_file_clips.cpp
+  void ReadClips(const YamlNode& node);       // io/rig_file_clips.cpp
+  void ReadReferences(const YamlNode& node);  // the same
 
  private:
   bool CheckMap(const YamlNode& node, const char* section) const;

@@ -1,4 +1,4 @@
-// What an illumination sees: `meshes`, `camera` and `lights` of a rig's node, by their names.
+// What an illumination sees: `meshes`, `carried`, `camera` and `lights` of a rig's node, by their names.
 #include <algorithm>
 
 #include "io/rig_build.h"
@@ -72,6 +72,25 @@ void RigBuild::ConnectLights() {
       edit.Connect(mesh.points, edit.Plug(made.id, "points", static_cast<int>(i)));
       edit.Set(made.id, "mesh", static_cast<int>(i), mesh.geometry.mesh);
     }
+    std::vector<std::int64_t> carried;
+    std::vector<std::string> carried_names;
+    if (const RigAttribute* listed = find("carried")) {
+      std::vector<const YamlNode*> names;
+      if (!ReadNames(listed->value, "carried", &names, errors_)) continue;
+      for (const YamlNode* name : names) {
+        const std::optional<std::size_t> mesh = FindMesh(name->scalar, name->where());
+        if (!mesh.has_value()) continue;
+        const auto found = std::find(meshes.begin(), meshes.end(), *mesh);
+        if (found == meshes.end()) {
+          errors_->Add(*name, "carried: \"{}\" is none of the meshes that are lit", name->scalar);
+          continue;
+        }
+        carried.push_back(found - meshes.begin());
+        carried_names.push_back(name->scalar);
+      }
+    }
+    edit.Set(made.id, "carriedMeshes", carried);
+    graph().SetElementNames(made.id, graph().def(made.id).FindAttribute("pointIrradiance"), carried_names);
     if (const RigAttribute* camera = find("camera")) {
       if (const std::optional<NodeId> node = FindWithOutputs(camera->value, {"worldFromScreen"}, "camera"))
         edit.Connect(edit.Plug(*node, "worldFromScreen"), edit.Plug(made.id, "worldFromScreen"));
@@ -88,7 +107,7 @@ void RigBuild::ConnectLights() {
       if (!node.has_value()) continue;
       const std::string& type = graph().def(*node).name;
       const auto i = static_cast<int>(kinds.size());
-      kinds.push_back(type == "areaLight" ? 1 : type == "sunLight" ? 2 : 0);
+      kinds.push_back(type == "areaLight" ? 1 : type == "sunLight" ? 2 : type == "sphereLight" ? 3 : 0);
       edit.Connect(edit.Plug(*node, "outMatrix"), edit.Plug(made.id, "lightMatrix", i));
       edit.Connect(edit.Plug(*node, "outColor"), edit.Plug(made.id, "lightColor", i));
     }

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <limits>
 
+#include "io/mesh_weights.h"
 #include "io/rig_build.h"
 
 namespace kpsa {
@@ -13,12 +14,6 @@ bool ParseVertex(std::string_view text, std::uint64_t* vertex) {
   while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *vertex);
   return error == std::errc() && end == text.data() + text.size() && !text.empty();
-}
-
-std::vector<float> Dense(const WeightFile& file, const NamedWeights& map) {
-  std::vector<float> dense(file.points, map.default_value);
-  for (std::size_t i = 0; i < map.indices.size(); ++i) dense[map.indices[i]] = map.values[i];
-  return dense;
 }
 
 }  // namespace
@@ -42,7 +37,11 @@ void RigBuild::SetWeights(Made* made) {
   const RigAttribute* members = find("members");
   const RigAttribute* maps = find("weights");
   const RigAttribute* falloff = find("falloff");
+  if (falloff != nullptr && falloff->value.is_scalar()) falloff = nullptr;  // a node: ConnectFalloffs
   if (members == nullptr && maps == nullptr && falloff == nullptr) return;
+  for (const RigAttribute* key : {members, falloff}) {
+    if (key != nullptr) NoteWeights(*made, *key, "");
+  }
 
   std::vector<std::vector<float>> weights;
   for (const Geometry& of : made->geometries)
@@ -67,6 +66,14 @@ void RigBuild::SetWeights(Made* made) {
              std::make_shared<const WeightMap>(std::move(weights[g])));
   }
   Fail(made->from->where, edit.Take());
+}
+
+// For those that look for the map of a deformer; a deformer with several geometries comes here several times.
+void RigBuild::NoteWeights(const Made& made, const RigAttribute& key, const std::string& geometry,
+                           const std::string& path, const std::string& map) {
+  WeightSource note{made.id, key.name, key.key.where(), geometry, path, map};
+  if (std::find(rig_->weights.begin(), rig_->weights.end(), note) == rig_->weights.end())
+    rig_->weights.push_back(std::move(note));
 }
 
 // "0:99,120" (both ends included), a number, or a list of numbers.
@@ -161,7 +168,7 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
     const Geometry* owner = nullptr;
     if (!FindMap(*file_map, source, made, &file, &values, &owner)) return false;
     if (owner->name != of.name) return true;
-    const std::vector<float> dense = Dense(*file, *values);
+    const std::vector<float> dense = DenseWeights(*file, *values);
     for (Index v = 0; v < dense.size(); ++v) {
       if (dense[v] > 0) (*weights)[PointOf(of, v)] = 1;
     }
@@ -243,33 +250,30 @@ bool RigBuild::FindMap(const YamlNode& reference, int source, const Made& made, 
                        const NamedWeights** map, const Geometry** of) {
   std::string text;
   if (!ReadString(reference, "weights", &text, errors_)) return false;
-  // Without #map the file has one map only. Maps may have a # in their names, too
-  const std::size_t suffix = text.find(".json#");
-  const std::size_t hash = suffix == std::string::npos ? text.rfind('#') : suffix + 5;
-  if (hash == 0)
+  const WeightReference parts = SplitWeightReference(text);
+  if (parts.path.empty())
     return errors_->Add(reference, "weights \"{}\": expected the file before the #, FILE.json#MAP", text);
-  const std::string path = ResolvePath(folder(source), text.substr(0, hash));
+  const std::string path = ResolvePath(folder(source), parts.path);
   *file = FindWeightFile(reference, path);
   if (*file == nullptr) return false;
-  std::vector<std::string> maps;
-  for (const NamedWeights& each : (*file)->maps) maps.push_back(each.name);
-  if (hash == std::string::npos && maps.size() != 1) {
-    return errors_->Add(reference, "weights \"{}\": expected \"{}#MAP\"; the file has the maps {}", text,
-                        text, fmt::join(maps, ", "));
-  }
-  const std::string name = hash == std::string::npos ? maps[0] : text.substr(hash + 1);
-  *map = (*file)->Find(name);
-  if (*map == nullptr)
-    return errors_->Add(reference, "{} has no map \"{}\"{}", path, name, DidYouMean(name, maps));
-  *of = GeometryOf(made, **file);
+  const Result<const NamedWeights*> found = FindWeights(**file, path, parts.map);
+  if (!Fail(reference.where(), found.status())) return false;
+  *map = *found;
+  return FindGeometry(reference, made, **file, path, of);
+}
+
+// The geometry of the deformer that a weight file is for.
+bool RigBuild::FindGeometry(const YamlNode& reference, const Made& made, const WeightFile& file,
+                            const std::string& path, const Geometry** of) {
+  *of = GeometryOf(made, file);
   if (*of == nullptr) {
     std::vector<std::string> names;
     for (const Geometry& geometry : made.geometries) names.push_back(geometry.name);
-    return errors_->Add(reference, "{} is for mesh \"{}\"; \"{}\" deforms {}", path, (*file)->mesh,
+    return errors_->Add(reference, "{} is for mesh \"{}\"; \"{}\" deforms {}", path, file.mesh,
                         made.from->name, fmt::join(names, ", "));
   }
-  if ((*file)->points != VertexCount(**of)) {
-    return errors_->Add(reference, "{} is for {} vertices; {} has {}", path, (*file)->points, (*of)->name,
+  if (file.points != VertexCount(**of)) {
+    return errors_->Add(reference, "{} is for {} vertices; {} has {}", path, file.points, (*of)->name,
                         VertexCount(**of));
   }
   return true;
@@ -279,9 +283,7 @@ const RigBuild::Geometry* RigBuild::GeometryOf(const Made& made, const WeightFil
   for (const Geometry& geometry : made.geometries) {
     if (geometry.name == file.mesh) return &geometry;
     if (!geometry.mesh.has_value()) continue;
-    const CharacterMesh& mesh = rig_->scene.meshes[*geometry.mesh];
-    if (file.mesh == graph().name(mesh.transform) || file.mesh == rig_->character->nodes[mesh.gltf_node].name)
-      return &geometry;
+    if (NamesMesh(file, *rig_->character, graph(), rig_->scene.meshes[*geometry.mesh])) return &geometry;
   }
   return nullptr;
 }
@@ -289,7 +291,7 @@ const RigBuild::Geometry* RigBuild::GeometryOf(const Made& made, const WeightFil
 // A welded point takes its vertices' largest.
 std::vector<float> RigBuild::ByPoint(const WeightFile& file, const NamedWeights& map,
                                      const Geometry& of) const {
-  const std::vector<float> dense = Dense(file, map);
+  const std::vector<float> dense = DenseWeights(file, map);
   std::vector<float> by_point(of.count, -std::numeric_limits<float>::infinity());
   for (Index v = 0; v < dense.size(); ++v) {
     float& weight = by_point[PointOf(of, v)];
@@ -316,6 +318,7 @@ bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made,
       good = false;
       continue;
     }
+    NoteWeights(made, attribute, of->name, file->path, map->name);
     const std::vector<float> by_point = ByPoint(*file, *map, *of);
     std::vector<float>& product = (*weights)[static_cast<std::size_t>(of - made.geometries.data())];
     for (std::size_t p = 0; p < product.size(); ++p) product[p] *= by_point[p];

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "io/rig_build.h"
+#include "io/rig_references.h"
 #include "io/rig_words.h"
 
 namespace kpsa {
@@ -16,14 +17,24 @@ const AttributeDef& AttributeOf(const Graph& graph, const PlugRef& plug) {
 
 }  // namespace
 
-RigAttribute RigBuild::SpecialOf(const std::string& key, const RigOverride& override_) {
+// What the file that references this one calls ours, as we call it.
+void RigBuild::InOwnNames(YamlNode* value, int source) const {
+  const std::string& prefix = file_->sources[static_cast<std::size_t>(source)].referenced_as;
+  if (prefix.empty()) return;
+  if (value->is_scalar() && value->scalar.starts_with(prefix)) value->scalar.erase(0, prefix.size());
+  for (YamlNode& item : value->items) InOwnNames(&item, source);
+}
+
+RigAttribute RigBuild::SpecialOf(const std::string& key, const RigOverride& override_) const {
   YamlNode key_node;
   key_node.kind = YamlNode::Kind::kScalar;
   key_node.scalar = key;
   key_node.file = override_.value.file;
   key_node.line = override_.plug.where.line;
   key_node.column = override_.plug.where.column;
-  return {key, key_node, override_.value, override_.plug.source};
+  RigAttribute special{key, key_node, override_.value, override_.plug.source};
+  InOwnNames(&special.value, special.source);
+  return special;
 }
 
 // An override of a word that is no attribute replaces it in the node before anything is read:
@@ -166,7 +177,12 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
     return;
   }
   if (connected) {
-    pending_.push_back({value.scalar, plug, value.where(), source, overrides});
+    const std::string& prefix = file_->sources[static_cast<std::size_t>(source)].referenced_as;
+    if (!value.scalar.starts_with(prefix)) {  // a node of the file that references this one, or of another
+      file_->returned.push_back({{what, value.where(), source}, value});
+      return;
+    }
+    pending_.push_back({value.scalar.substr(prefix.size()), plug, value.where(), source, overrides});
     if (overrides) overridden_.emplace_back(plug, false);
     return;
   }
@@ -184,7 +200,9 @@ void RigBuild::ReadPlug(const PlugRef& plug, const YamlNode& value, int source, 
   }
   Value read;
   if (!ReadValue(value, what, attribute, type, units(source), &read, errors_)) return;
-  errors_->Add(value, graph().Set(plug, std::move(read)));
+  // Characters stand where their files have them at rest
+  errors_->Add(value, IsReferenceRoot(*rig_, plug.node) ? graph().Pose(plug, std::move(read))
+                                                        : graph().Set(plug, std::move(read)));
   if (overrides) overridden_.emplace_back(plug, true);
 }
 
@@ -254,8 +272,10 @@ void RigBuild::CheckVariants() {
       const Result<PlugRef> plug = graph().FindPlug(text);
       if (plug.ok() || graph().FindPlug(text + "[0]").ok()) continue;
       const std::size_t dot = text.rfind('.');
-      const Made* made = dot == std::string::npos ? nullptr : FindMade(text.substr(0, dot));
-      if (made == nullptr || !IsRigWord(graph().def(made->id), text.substr(dot + 1)))
+      const Result<NodeId> node = graph().FindNode(text.substr(0, dot));
+      const bool written = dot != std::string::npos && node.ok() &&
+                           (FindMade(*node) != nullptr || ReferenceOf(*rig_, *node) != nullptr);
+      if (!written || !IsRigWord(graph().def(*node), text.substr(dot + 1)))
         Fail(override_.plug.where, plug.status());
     }
   }

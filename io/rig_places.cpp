@@ -4,6 +4,7 @@
 
 #include "base/matrix.h"
 #include "io/rig_build.h"
+#include "io/rig_references.h"
 
 namespace kpsa {
 namespace {
@@ -194,6 +195,7 @@ bool RigBuild::Place(Made* made, int depth) {
   Double3 place;
   Matrix4 parent, inverse;
   bool good = ReadPlace(at, it->second->source, depth + 1, &place);
+  if (good) good = HangUnderReference(*made, at);
   if (const Connection* connection = graph().FindConnection(edit.Plug(made->id, "parentMatrix"));
       good && connection != nullptr) {
     good = RestWorld(connection->source.node, at, depth + 1, &parent);
@@ -207,7 +209,26 @@ bool RigBuild::Place(Made* made, int depth) {
   return Fail(at.where(), edit.Take());
 }
 
+// A handle at a place of a referenced character, of which nothing says what carries it, goes along with that
+// character.
+bool RigBuild::HangUnderReference(const Made& made, const YamlNode& at) {
+  GraphEditor edit(&graph());
+  const PlugRef parent = edit.Plug(made.id, "parentMatrix");
+  if (graph().FindConnection(parent) != nullptr || graph().FindValue(parent) != nullptr) return true;
+  std::optional<NodeId> of;
+  if (at.is_scalar()) {
+    if (const Result<NodeId> node = graph().FindNode(at.scalar); node.ok()) of = *node;
+  } else if (const YamlNode* mesh = at.is_map() ? at.Find("mesh") : nullptr) {
+    if (const auto found = FindMesh(mesh->scalar, mesh->where())) of = rig_->scene.meshes[*found].transform;
+  }
+  const Reference* reference = of.has_value() ? ReferenceOf(*rig_, *of) : nullptr;
+  if (reference == nullptr) return true;
+  edit.Connect(edit.Plug(reference->root, "worldMatrix"), parent);
+  return Fail(at.where(), edit.Take());
+}
+
 Matrix4 RigBuild::LocalAtRest(NodeId node) const {
+  if (IsReferenceRoot(*rig_, node)) return Matrix4();
   const int offset = graph().def(node).FindAttribute("offsetParentMatrix");
   const int order = graph().def(node).FindAttribute("rotateOrder");
   Matrix4 local;

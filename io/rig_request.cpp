@@ -7,6 +7,10 @@ namespace kpsa {
 
 void RigBuild::AddControls() {
   std::map<std::tuple<Index, int, int, int>, std::string> seen;
+  for (const Control& control : rig_->controls)
+    seen.emplace(std::make_tuple(control.plug.node.index, control.plug.attribute, control.plug.element,
+                                 control.plug.component),
+                 control.name);
   for (const RigControl& from : file_->controls) {
     if (errors_->full()) return;
     const Result<PlugRef> plug = graph().FindPlug(from.plug.text);
@@ -98,6 +102,11 @@ void RigBuild::AddAccelerations() {
     }
   };
   std::map<std::size_t, SourceLocation> by_mesh;
+  for (const Acceleration& entry : rig_->accelerate) {
+    for (const AcceleratedPoints& points : entry.points) {
+      if (!points.colors) by_mesh.emplace(points.mesh, entry.where);
+    }
+  }
   for (const RigAccelerate& from : file_->accelerate) {
     Acceleration to;
     to.name = from.name;
@@ -106,6 +115,8 @@ void RigBuild::AddAccelerations() {
     to.tolerance = from.tolerance.value_or(from.colors.empty() ? rig_->rest_diagonal / 2000 : 0.05);
     to.violation_rate = from.violation_rate;
     to.train_samples = from.train_samples;
+    to.key_points = from.key_points;
+    to.held_out = from.held_out;
     read_clips(from.train_clips, &to.train_clips);
     read_clips(from.test_clips, &to.test_clips);
     if (from.space.has_value()) to.space = FindTransform(from.space->text, from.space->where);

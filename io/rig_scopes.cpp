@@ -43,7 +43,8 @@ void RigBuild::ResolveScopes() {
     if (!scoped(node.source) || def == nullptr) continue;
     for (RigAttribute& attribute : node.attributes) {
       if (IsRigWord(*def, attribute.name)) {
-        if (attribute.name == "parent" || attribute.name == "at" || attribute.name == "curve")
+        if (attribute.name == "parent" || attribute.name == "at" || attribute.name == "curve" ||
+            attribute.name == "falloffs" || (attribute.name == "falloff" && attribute.value.is_scalar()))
           InScope(&attribute.value, attribute.source);
         if (attribute.name != "falloff" || !attribute.value.is_map()) continue;
         for (std::size_t i = 0; i < attribute.value.keys.size(); ++i) {

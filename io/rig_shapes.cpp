@@ -1,7 +1,8 @@
 // Blend shapes of a rig: nodes that take targets of meshes by name, combinations and in-betweens, on the
-// rig's own nodes and on the file's; and the blend weights of the file's skins.
+// rig's own nodes and on the file's; and the weights of the file's skins.
 #include <algorithm>
 
+#include "io/mesh_weights.h"
 #include "io/rig_build.h"
 #include "io/rig_words.h"
 
@@ -22,7 +23,8 @@ bool RigBuild::TakeOwnSpecial(const RigOverride& override_) {
   for (std::size_t m = 0; m < rig_->scene.meshes.size(); ++m) {
     const CharacterMesh& mesh = rig_->scene.meshes[m];
     for (const NodeId id : {mesh.blend_shape, mesh.skin_cluster}) {
-      if (key != "combinations" && key != "inbetweens" && key != "blendWeights") continue;
+      if (key != "combinations" && key != "inbetweens" && key != "blendWeights" && key != "influences")
+        continue;
       if (id.version == 0 || !IsRigWord(graph().def(id), key)) continue;
       if (name != graph().name(id) && name != graph().name(mesh.transform)) continue;
       auto made =
@@ -136,8 +138,10 @@ void RigBuild::AddCombination(const Made& made, const YamlNode& key, const YamlN
   }
   for (std::size_t i = 0; i < drivers.size(); ++i)
     edit.Connect(drivers[i], edit.Plug(node, "inputWeight", static_cast<int>(i)));
-  // A clip that plays the combination gives way: it is none of the clip's business
-  const bool clip = IsClipPlug(rig_->scene, graph(), driven);
+  // A clip that plays the combination gives way, and so do VRM's expressions: it is none of their business
+  const Connection* driver = graph().FindConnection(driven);
+  const bool clip = IsClipPlug(rig_->scene, graph(), driven) ||
+                    (driver != nullptr && graph().def(driver->source.node).name == "vrmMorphWeights");
   const PlugRef weight = edit.Plug(node, "outputWeight");
   if (edit.ok()) edit.Check(graph().Connect(weight, driven, clip));
   Fail(key.where(), edit.Take());
@@ -258,6 +262,26 @@ void RigBuild::SetBlendWeights(Made* made) {
   GraphEditor edit(&graph());
   edit.Set(made->id, "blendWeights", 0, std::make_shared<const WeightMap>(std::move(weights[0])));
   Fail(it->second->value.where(), edit.Take());
+}
+
+// `head_mesh_skinCluster.influences: "w/skin.json"`: before anything looks at who moves what.
+void RigBuild::SetInfluences(Made* made) {
+  const auto it = made->special.find("influences");
+  if (it == made->special.end() || errors_->full()) return;
+  const YamlNode& value = it->second->value;
+  std::string text;
+  if (!ReadString(value, "influences", &text, errors_)) return;
+  const WeightFile* file = FindWeightFile(value, ResolvePath(folder(it->second->source), text));
+  const Geometry* of = nullptr;
+  if (file == nullptr || !FindGeometry(value, *made, *file, file->path, &of)) return;
+  CharacterMesh& mesh = rig_->scene.meshes[*of->mesh];
+  Result<std::shared_ptr<const Influences>> influences = InfluencesFrom(*file, mesh, graph());
+  if (!errors_->Add(value, influences.status())) return;
+  NoteWeights(*made, *it->second, of->name, file->path);
+  mesh.influences = std::move(*influences);
+  GraphEditor edit(&graph());
+  edit.Set(made->id, "influences", 0, mesh.influences);
+  Fail(value.where(), edit.Take());
 }
 
 }  // namespace kpsa

@@ -184,4 +184,17 @@ bool ReadValue(const YamlNode& node, std::string_view what, const AttributeDef& 
   return errors->Add(node, "{} is set by the rig itself and cannot be written", what);
 }
 
+bool ReadStart(const YamlNode& node, double fps, const FileUnits& units, double* seconds,
+               YamlErrors* errors) {
+  constexpr double kMaxSeconds = 1e6;
+  const Result<double> frame = ParseQuantity(node.scalar, Unit::kNone, FileUnits());
+  if (node.is_scalar() && frame.ok() && node.scalar.find('%') == std::string::npos) {
+    *seconds = *frame / fps;
+  } else if (!ReadNumber(node, "start", Unit::kTime, units, seconds, errors)) {
+    return false;
+  }
+  return std::abs(*seconds) <= kMaxSeconds ||
+         errors->Add(node, "start: expected at most {} s, found {} s", kMaxSeconds, *seconds);
+}
+
 }  // namespace kpsa

@@ -20,4 +20,7 @@ bool ReadValue(const YamlNode& node, std::string_view what, const AttributeDef& 
 bool ReadNumbers(const YamlNode& node, std::string_view what, Unit unit, const FileUnits& units,
                  std::size_t count, std::vector<double>* values, YamlErrors* errors);
 
+// When a clip begins, in seconds: a bare number is a frame.
+bool ReadStart(const YamlNode& node, double fps, const FileUnits& units, double* seconds, YamlErrors* errors);
+
 }  // namespace kpsa

@@ -21,6 +21,11 @@ bool IsChain(const NodeDef& def) {
   return def.name == "ikHandle" || def.name == "splineIk" || def.name == "twistDistribution";
 }
 
+// Deformers, and weight maps of their own.
+bool HasWeights(const NodeDef& def) {
+  return IsDeformer(def) || (Has(def, "weights") && Has(def, "outputWeights"));
+}
+
 struct Rule {
   RigWord word;
   bool (*applies)(const NodeDef&);
@@ -29,9 +34,11 @@ const Rule kRules[] = {
     {{"parent", "the transform that carries it"}, [](const NodeDef& d) { return Has(d, "parentMatrix"); }},
     {{"at", "where it rests: a curve's vertex, a transform, a vertex of the mesh or [x, y, z]"},
      [](const NodeDef& d) { return Has(d, "offsetParentMatrix"); }},
-    {{"members", "the points that it moves"}, IsDeformer},
-    {{"weights", "a weight map, file.json#map, or a list of them"}, IsDeformer},
-    {{"falloff", "1 at a place, 0 at the radius and beyond"}, IsDeformer},
+    {{"members", "the points that it moves"}, HasWeights},
+    {{"weights", "a weight map, file.json#map, or a list of them"}, HasWeights},
+    {{"falloff", "1 at a place, 0 at the radius and beyond, or a falloff node"}, HasWeights},
+    {{"falloffs", "the two falloff nodes that it combines"},
+     [](const NodeDef& d) { return Has(d, "input1") && Has(d, "outputWeights"); }},
     {{"vertices", "control vertices at rest, of the mesh"}, IsCurve},
     {{"mesh", "of the vertices, where the character has several"}, IsCurve},
     {{"places", "control vertices at rest, [x, y, z] in the world"}, IsCurve},
@@ -50,9 +57,14 @@ const Rule kRules[] = {
     {{"inbetweens", "other targets that a target goes through"}, IsBlendShape},
     {{"blendWeights", "a weight map of dual quaternions"},
      [](const NodeDef& d) { return d.name == "skinCluster"; }},
+    {{"influences", "a weight file with a map for each joint, instead of the character's own weights"},
+     [](const NodeDef& d) { return d.name == "skinCluster"; }},
     {{"constrained", "the transform whose local matrix it owns"},
      [](const NodeDef& d) { return Has(d, "inMatrix") && Has(d, "outMatrix") && d.name != "splineIk"; }},
     {{"meshes", "the meshes that are lit; all of the character if not given"}, IsIllumination},
+    {{"carried",
+      "lit meshes that move through the picture: light is given at their points, not at their pixels"},
+     IsIllumination},
     {{"camera", "the camera that it looks through"}, IsIllumination},
     {{"lights", "the lights that light up what it sees"}, IsIllumination},
     {{"start", "the first joint of the chain"}, IsChain},

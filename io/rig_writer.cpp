@@ -6,7 +6,9 @@
 #include <map>
 
 #include "base/matrix.h"
-#include "base/scalar_math.h"
+#include "base/text.h"
+#include "io/clip_motion.h"
+#include "io/joint_roles.h"
 #include "io/rig_builder.h"
 
 namespace kpsa {
@@ -17,24 +19,10 @@ constexpr double kLeastDegrees = 0.1;       // smaller motion is noise,
 constexpr double kLeastBesides = 0.01;      // unless the joint turns about another axis
 constexpr double kLeastTranslation = 1e-4;  // of the rest diagonal
 constexpr double kSpaceShare = 0.9;         // of the skin that the space's subtree carries
+constexpr double kLargeMetres = 20;         // more is seldom meant
+constexpr double kReach = 0.25;             // of a limb's length, that its target may go
 
-struct Range {
-  double min = 0, max = 0;  // rest is always inside
-  void Add(double value) {
-    min = std::min(min, value);
-    max = std::max(max, value);
-  }
-  double size() const { return std::max(-min, max); }
-};
-
-// What the clips do to one glTF node, relative to its rest.
-struct Motion {
-  Range rotate[3];     // degrees
-  Range translate[3];  // metres, in the rest pose's axes
-  std::vector<Range> weights;
-};
-
-Range RoundedOut(Range range, double step) {
+MotionRange RoundedOut(MotionRange range, double step) {
   // A step more or less is decided with some slack: 0.30000000000000004 stays 0.3
   return {std::floor(range.min / step + 1e-6) * step, std::ceil(range.max / step - 1e-6) * step};
 }
@@ -82,15 +70,20 @@ class Writer {
       : rig_(rig),
         character_(*rig.character),
         options_(options),
+        roles_(JointRoles(character_)),
         motions_(character_.nodes.size()),
-        carries_(character_.nodes.size(), 0.0) {}
+        carries_(character_.nodes.size(), 0.0),
+        mush_(FreeName("mush")) {}
 
   std::string Write() {
     MeasureCarried();
     for (const gltf::Clip& clip : character_.clips) {
-      for (const gltf::Channel& channel : clip.channels) Measure(channel);
+      clips_.push_back(MeasureClip(character_, clip));
+      for (const auto& [node, motion] : clips_.back()) motions_[node].Add(motion);
     }
+    limbs_ = FindLimbs(character_, roles_);
     WriteHead();
+    WriteSkins();
     WriteControls();
     WriteAcceleration();
     return std::move(text_);
@@ -119,37 +112,18 @@ class Writer {
     for (double& share : carries_) share = total > 0 ? share / total : 0;
   }
 
-  void Measure(const gltf::Channel& channel) {
-    const gltf::Node& node = character_.nodes[channel.node];
-    Motion& motion = motions_[channel.node];
-    const auto width = static_cast<std::size_t>(channel.components);
-    const bool cubic = channel.interpolation == gltf::Interpolation::kCubicSpline;
-    const Matrix4 rest_inverse = InverseOrIdentity(node.LocalMatrix());
-    for (std::size_t k = 0; k < channel.times.size(); ++k) {
-      const double* value = &channel.values[(cubic ? 3 * k + 1 : k) * width];
-      switch (channel.path) {
-        case gltf::Path::kRotation: {
-          const Quaternion now{value[0], value[1], value[2], value[3]};
-          const Matrix4 relative =
-              RotationFromQuaternion(Conjugate(Normalized(node.rotation)) * Normalized(now));
-          const Double3 angles = EulerFromRotation(relative, RotateOrder::kXyz);
-          for (int i = 0; i < 3; ++i) motion.rotate[i].Add(angles[i] * 180 / kPi);
-          break;
-        }
-        case gltf::Path::kTranslation: {
-          const Double3 offset = TransformPoint(rest_inverse, {value[0], value[1], value[2]});
-          for (int i = 0; i < 3; ++i) motion.translate[i].Add(offset[i]);
-          break;
-        }
-        case gltf::Path::kScale:
-          break;
-        case gltf::Path::kWeights:
-          motion.weights.resize(std::max(motion.weights.size(), width));
-          for (std::size_t i = 0; i < width; ++i) motion.weights[i].Add(value[i]);
-          break;
-      }
-    }
+  // A name that nothing else has.
+  std::string FreeName(const std::string& wish) const {
+    const auto taken = [&](const std::string& name) {
+      return rig_.graph->FindNode(name).ok() ||
+             std::any_of(character_.nodes.begin(), character_.nodes.end(),
+                         [&](const gltf::Node& node) { return node.name == name; });
+    };
+    std::string name = wish;
+    for (int i = 2; taken(name); ++i) name = fmt::format("{}{}", wish, i);
+    return name;
   }
+  const std::string& NameOf(Index node) const { return rig_.graph->name(rig_.scene.transforms[node]); }
 
   void WriteHead() {
     std::vector<std::string> meshes;
@@ -161,13 +135,24 @@ class Writer {
     const std::string file = options_.character.empty()
                                  ? std::filesystem::path(character_.path).filename().string()
                                  : options_.character;
+    const auto several = [](std::size_t count, const char* one, const char* many) {
+      return fmt::format("{} {}", Thousands(count), count == 1 ? one : many);
+    };
     text_ += fmt::format(
-        "# A starter rig for {}: {} meshes, {} points, {} clips, {:.3g} m from corner to corner.\n"
-        "# Lengths are in cm and angles in degrees here; write 2mm or 0.1rad for anything else.\n"
+        "# A starter rig for {}: {}, {}, {}, {:.3g} m from corner to corner.\n"
+        "# It works as it is: kpsa validate, eval, render, train, bench. Comments say what to do next; take "
+        "out "
+        "the # where no space\n"
+        "# follows it to try what is suggested there.\n"
+        "# Lengths are in cm and angles in degrees; write 2mm or 0.1rad for anything else.\n",
+        InComment(file), several(meshes.size(), "mesh", "meshes"), several(points, "point", "points"),
+        several(character_.clips.size(), "clip", "clips"), rig_.rest_diagonal);
+    if (rig_.rest_diagonal > kLargeMetres)
+      text_ += "# So large a character may have been meant in cm: then read cm where metres are written.\n";
+    text_ += fmt::format(
         "kpsa: 1\n"
         "units: {{length: cm, angle: deg}}\n"
         "character: {}\n",
-        InComment(file), meshes.size(), points, character_.clips.size(), rig_.rest_diagonal,
         Quoted(file, false));
     if (meshes.empty()) {
       text_ += "# The scene shows no mesh: there is nothing to deform or to accelerate.\n";
@@ -175,35 +160,130 @@ class Writer {
     }
     text_ += fmt::format(
         "\nnodes:\n"
-        "  # Smooths what the skin does to the surface. Other deformers: lattice, cluster, softMod, wire "
-        "(`kpsa nodes`).\n"
-        "  mush: {{type: deltaMush, iterations: {}}}\n"
+        "  # Smooths what the skin does to the surface. Other deformers: lattice, cluster, softMod, wire, "
+        "wrap, "
+        "... (kpsa nodes).\n"
+        "  {}: {{type: deltaMush, iterations: {}}}\n",
+        Quoted(mush_, false), options_.iterations);
+    WriteCage();
+    WriteLimbs();
+    text_ += fmt::format(
         "\ndeform:\n"
-        "  # gltf is the file's own morph targets and skin; deformers act in this order.\n"
+        "  # gltf is the file's own morph targets and skin; deformers act in this order.{}\n"
         "  - meshes: {}\n"
-        "    stack: [gltf, mush]\n",
-        options_.iterations, QuotedList(meshes));
+        "    stack: [gltf, {}]\n",
+        cage_.empty() ? "" : fmt::format(" {} would go before {}.", cage_, mush_), QuotedList(meshes),
+        Quoted(mush_, true));
   }
 
-  void AddControl(const std::string& node, const std::string& attribute, const PlugRef& plug, Range range) {
+  // A lattice about the jaw, where there is one that moves points.
+  void WriteCage() {
+    const Index jaw = FindJoint(character_, "jaw");
+    if (jaw == kNoIndex || character_.nodes[jaw].parent == kNoIndex || !IsInfluence(jaw)) return;
+    cage_ = FreeName("jawCage");
+    text_ += fmt::format(
+        "  # A cage about what the jaw moves; connect its points, as in chin.outValue -> "
+        "{0}.points[1,0,2].y\n"
+        "  #{0}: {{type: lattice, parent: {1}, divisions: [3, 3, 3], members: {{joint: {2}, above: "
+        "0.05}}}}\n",
+        cage_, Quoted(NameOf(character_.nodes[jaw].parent), true), Quoted(NameOf(jaw), true));
+  }
+  bool IsInfluence(Index node) const {
+    return std::any_of(rig_.scene.meshes.begin(), rig_.scene.meshes.end(), [&](const CharacterMesh& mesh) {
+      return std::find(mesh.influence_nodes.begin(), mesh.influence_nodes.end(),
+                       rig_.scene.transforms[node]) != mesh.influence_nodes.end();
+    });
+  }
+
+  std::string GoalOf(const Limb& limb) const {
+    return FreeName(fmt::format("{}{}Goal", limb.part == BodyPart::kArm ? "hand" : "foot",
+                                limb.side == BodySide::kLeft ? "L" : "R"));
+  }
+  void WriteLimbs() {
+    if (limbs_.empty()) return;
+    text_ +=
+        "  # IK: the end of a limb follows its goal (blend: 0 is the clip alone); a poleVectorConstraint "
+        "turns "
+        "the elbow or knee.\n";
+    for (const Limb& limb : limbs_) {
+      const std::string goal = GoalOf(limb), end = Quoted(NameOf(limb.end), true);
+      text_ += fmt::format(
+          "  #{0}: {{type: transform, at: {1}}}\n"
+          "  #{2}: {{type: ikHandle, start: {3}, mid: {4}, end: {1}, target: {0}.worldMatrix}}\n",
+          goal, end, FreeName(goal + "Ik"), Quoted(NameOf(limb.start), true), Quoted(NameOf(limb.mid), true));
+    }
+  }
+  // How far the goal may go, in each direction.
+  void WriteGoals(const Limb& limb) {
+    const auto place = [&](Index node) {
+      Matrix4 world;
+      for (Index i = node; i != kNoIndex; i = character_.nodes[i].parent)
+        world = character_.nodes[i].LocalMatrix() * world;
+      return TransformPoint(world, {});
+    };
+    const double length =
+        Length(place(limb.mid) - place(limb.start)) + Length(place(limb.end) - place(limb.mid));
+    const double reach = std::max(std::floor(kReach * length * 100), 0.1);
+    for (const char axis : {'X', 'Y', 'Z'})
+      text_ += fmt::format("  #{0}.translate{1}: {{min: {2}, max: {3}}}\n", GoalOf(limb), axis,
+                           Rounded(-reach), Rounded(reach));
+  }
+
+  void WriteSkins() {
+    std::vector<std::string> skins;
+    for (const CharacterMesh& mesh : rig_.scene.meshes) {
+      if (mesh.influences != nullptr) skins.push_back(rig_.graph->name(mesh.skin_cluster));
+    }
+    if (skins.empty()) return;
+    text_ += fmt::format(
+        "\n# Keeps the thickness of twisted limbs{}. Skin weights as files to edit: kpsa weights export\n"
+        "#overrides:\n  #{}: dualQuaternion\n",
+        skins.size() == 1 ? "" : ", here of one skin of several",
+        Quoted(skins[0] + ".skinningMethod", false));
+  }
+
+  void AddControl(const std::string& node, const std::string& attribute, const PlugRef& plug,
+                  MotionRange range) {
     const std::string name = node + "." + attribute;
     const Result<PlugRef> found = rig_.graph->FindPlug(name);
     if (!found.ok() || !(*found == plug)) {  // names with dots can hide each other
-      text_ += fmt::format("  # {} cannot be told from another plug by its name\n", InComment(name));
+      group_->text += fmt::format("  # {} cannot be told from another plug by its name\n", InComment(name));
       return;
     }
-    if (control_count_++ == 0) text_ += heading_;
-    text_ += fmt::format("  {}: {{min: {}, max: {}}}\n", Quoted(name, false), Rounded(range.min),
-                         Rounded(range.max));
+    ++group_->controls;
+    group_->text += fmt::format("  {}: {{min: {}, max: {}}}\n", Quoted(name, false), Rounded(range.min),
+                                Rounded(range.max));
+  }
+
+  // Controls under one heading.
+  struct Group {
+    std::string title, text;
+    int controls = 0;
+  };
+  static std::string Title(std::string title, BodySide side) {
+    if (title[0] >= 'a' && title[0] <= 'z') title[0] = static_cast<char>(title[0] - 'a' + 'A');
+    return side == BodySide::kMiddle ? title : fmt::format("{}, {}", title, SideName(side));
+  }
+  Group* GroupOf(const JointRole& role) {
+    const int part = static_cast<int>(role.part), side = static_cast<int>(role.side);
+    const bool arm = role.part == BodyPart::kArm || role.part == BodyPart::kFingers;
+    // An arm and its fingers, then the other arm
+    const int place = role.part == BodyPart::kOther ? 90
+                      : arm                         ? 10 * static_cast<int>(BodyPart::kArm) + 2 * side
+                                                    : 10 * part;
+    Group& group = groups_[place + (arm ? part - static_cast<int>(BodyPart::kArm) : side)];
+    group.title = Title(PartName(role.part), role.side);
+    return &group;
   }
 
   void WriteControls() {
     const bool guess = character_.clips.empty();
-    heading_ = guess ? "\n# What may move, for animators and for training. The file has no clips: these "
-                       "ranges are guesses.\ncontrols:\n"
-                     : "\n# What may move, for animators and for training: what the clips move, as far as "
-                       "they move it (rounded outwards).\n"
-                       "# Each is on top of the rest pose or of the clip that plays.\ncontrols:\n";
+    std::string heading =
+        guess ? "\n# What may move, for animators and for training. The file has no clips: these ranges are "
+                "guesses, to be corrected.\ncontrols:\n"
+              : "\n# What may move, for animators and for training: what the clips move, as far as they do "
+                "(rounded outwards).\n"
+                "# Each is on top of the rest pose or of the clip that plays.\ncontrols:\n";
     const double step =
         std::pow(10.0, std::floor(std::log10(std::max(rig_.rest_diagonal, 1e-6) * 100 / 500)));  // cm
     std::vector<std::string> idle;
@@ -213,49 +293,96 @@ class Writer {
       const std::string& name = rig_.graph->name(node);
       const NodeDef& def = rig_.graph->def(node);
       if (guess && carries_[i] > 0 && IsJoint(i)) {
-        for (Range& range : motion.rotate) range = {-kGuessDegrees, kGuessDegrees};
+        for (MotionRange& range : motion.rotate) range = {-kGuessDegrees, kGuessDegrees};
       }
+      group_ = GroupOf(roles_[i]);
       bool moves = false;
       double turn = 0;
-      for (const Range& range : motion.rotate) turn = std::max(turn, range.size());
+      for (const MotionRange& range : motion.rotate) turn = std::max(turn, range.size());
       const double least = turn >= kLeastDegrees ? kLeastBesides : kLeastDegrees;
+      const auto add = [&](const char* attribute, int axis, MotionRange range) {
+        moves = true;
+        if (carries_[i] > 0)
+          AddControl(name, fmt::format("{}{}", attribute, "XYZ"[axis]),
+                     {node, def.FindAttribute(attribute), -1, axis}, range);
+      };
       for (int axis = 0; axis < 3; ++axis) {
-        const std::string letter(1, "XYZ"[axis]);
-        const bool rotates = motion.rotate[axis].size() >= least;
-        const bool shifts = motion.translate[axis].size() > kLeastTranslation * rig_.rest_diagonal;
-        moves = moves || rotates || shifts;
-        if (!(carries_[i] > 0)) continue;
-        if (rotates)
-          AddControl(name, "rotate" + letter, {node, def.FindAttribute("rotate"), -1, axis},
-                     RoundedOut(motion.rotate[axis], motion.rotate[axis].size() < 1 ? 0.1 : 1));
-        if (shifts) {
-          const Range in_cm{motion.translate[axis].min * 100, motion.translate[axis].max * 100};
-          AddControl(name, "translate" + letter, {node, def.FindAttribute("translate"), -1, axis},
-                     RoundedOut(in_cm, step));
-        }
+        const MotionRange& range = motion.rotate[axis];
+        if (range.size() >= least) add("rotate", axis, RoundedOut(range, range.size() < 1 ? 0.1 : 1));
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        const MotionRange& range = motion.translate[axis];
+        if (range.size() > kLeastTranslation * rig_.rest_diagonal)
+          add("translate", axis, RoundedOut({range.min * 100, range.max * 100}, step));
       }
       if (moves && !(carries_[i] > 0)) idle.push_back(name);
     }
-    for (const CharacterMesh& mesh : rig_.scene.meshes) WriteWeights(mesh);
+    WriteExpressions();
+    int place = 100;
+    for (const CharacterMesh& mesh : rig_.scene.meshes) WriteWeights(mesh, &place);
+    std::erase_if(groups_, [](const auto& group) { return group.second.text.empty(); });
+    for (const auto& [key, group] : groups_) control_count_ += group.controls;
+    if (control_count_ > 0) text_ += heading;
+    for (const auto& [key, group] : groups_) {
+      if (groups_.size() > 1) text_ += fmt::format("  # {}\n", InComment(group.title));
+      text_ += group.text;
+    }
+    if (control_count_ > 0 && !limbs_.empty()) text_ += "  # Goals of the IK above\n";
+    for (const Limb& limb : limbs_) {
+      if (control_count_ > 0) WriteGoals(limb);
+    }
     if (!idle.empty())
       text_ += fmt::format("  # Moved by clips, but carrying no point: {}\n",
                            InComment(fmt::format("{}", fmt::join(idle, ", "))));
   }
 
-  void WriteWeights(const CharacterMesh& mesh) {
+  void WriteExpressions() {
+    if (rig_.scene.expressions.version == 0) return;
+    const int weight = rig_.graph->def(rig_.scene.expressions).FindAttribute("weight");
+    group_ = &groups_[99];
+    group_->title = "Expressions";
+    for (std::size_t e = 0; e < character_.expressions.size(); ++e) {
+      if (character_.expressions[e].binds.empty()) continue;
+      AddElement(rig_.graph->name(rig_.scene.expressions), "weight", character_.expressions[e].name,
+                 {rig_.scene.expressions, weight, static_cast<int>(e), -1}, {0, 1});
+    }
+  }
+
+  // Whether expressions move the target, which is then no control of its own.
+  bool IsExpressed(const CharacterMesh& mesh, std::size_t target) const {
+    if (mesh.morph_weights.version == 0) return false;
+    const int targets = rig_.graph->def(mesh.morph_weights).FindAttribute("targets");
+    const auto& list =
+        rig_.graph->FindValue({mesh.morph_weights, targets, -1, -1})->get<std::vector<std::int64_t>>();
+    return std::find(list.begin(), list.end(), static_cast<std::int64_t>(target)) != list.end();
+  }
+
+  // By its name, or where that names something else, by its number.
+  void AddElement(const std::string& node, const std::string& array, const std::string& name,
+                  const PlugRef& plug, MotionRange range) {
+    std::string attribute = array + "[" + name + "]";
+    const Result<PlugRef> by_name = rig_.graph->FindPlug(node + "." + attribute);
+    if (!by_name.ok() || !(*by_name == plug)) attribute = fmt::format("{}[{}]", array, plug.element);
+    AddControl(node, attribute, plug, range);
+  }
+
+  void WriteWeights(const CharacterMesh& mesh, int* place) {
+    const int first = *place;
+    *place += 3;  // sides
     if (mesh.geometry.targets == nullptr) return;
-    const int weight = rig_.graph->def(mesh.blend_shape).FindAttribute("weight");
+    const int weight = rig_.graph->def(mesh.weights_node()).FindAttribute("weight");
     const auto& targets = mesh.geometry.targets->targets();
-    std::vector<Range> ranges = motions_[mesh.gltf_node].weights;
-    if (ranges.empty()) ranges.assign(targets.size(), {0, 1});  // no clip moves any
+    std::vector<MotionRange> ranges = motions_[mesh.gltf_node].weights;
+    const bool still = ranges.empty();  // no clip moves any
+    if (still) ranges.assign(targets.size(), {0, 1});
     for (std::size_t k = 0; k < targets.size() && k < ranges.size(); ++k) {
-      if (ranges[k].size() < 0.01) continue;
-      const PlugRef plug{mesh.blend_shape, weight, static_cast<int>(k), -1};
+      if (ranges[k].size() < 0.01 || (still && IsExpressed(mesh, k))) continue;
+      const PlugRef plug{mesh.weights_node(), weight, static_cast<int>(k), -1};
+      const BodySide side = SideOfName(targets[k].name);
+      group_ = &groups_[first + static_cast<int>(side)];
+      group_->title = Title("Shapes of " + mesh.name, side);
       const std::string& node = rig_.graph->name(mesh.transform);
-      std::string attribute = "weight[" + targets[k].name + "]";
-      const Result<PlugRef> by_name = rig_.graph->FindPlug(node + "." + attribute);
-      if (!by_name.ok() || !(*by_name == plug)) attribute = fmt::format("weight[{}]", k);
-      AddControl(node, attribute, plug, RoundedOut(ranges[k], 0.1));
+      AddElement(node, "weight", targets[k].name, plug, RoundedOut(ranges[k], 0.1));
     }
   }
 
@@ -280,44 +407,62 @@ class Writer {
   void WriteAcceleration() {
     if (rig_.scene.meshes.empty() || control_count_ == 0) return;
     std::vector<std::string> points, train, test;
-    for (const CharacterMesh& mesh : rig_.scene.meshes) points.push_back(mesh.name + "@mush");
+    for (const CharacterMesh& mesh : rig_.scene.meshes) points.push_back(mesh.name + "@" + mush_);
+    if (!clips_.empty()) test.push_back(character_.clips[TamestClip(character_, clips_)].id);
     for (const CharacterClip& clip : rig_.scene.clips) {
-      std::vector<std::string>& to = test.empty() ? test : train;
       if (std::find(test.begin(), test.end(), clip.id) == test.end() &&
-          std::find(train.begin(), train.end(), clip.id) == train.end()) {
-        to.push_back(clip.id);
-      }
+          std::find(train.begin(), train.end(), clip.id) == train.end())
+        train.push_back(clip.id);
     }
     const std::string stem = std::filesystem::path(character_.path).stem().string();
     // 0.3 % of the size or a bit less, as one round number: what lets most frames of a face be hits
     const double raw = rig_.rest_diagonal * 1000 * 0.003;
     const double power = std::pow(10.0, std::floor(std::log10(std::max(raw, 1e-9))));
     const double tolerance = power * (raw >= 5 * power ? 5 : raw >= 2 * power ? 2 : 1);
-    text_ += fmt::format("\naccelerate:\n  {}:\n", Quoted(stem.empty() ? "character" : stem, false));
+    text_ += fmt::format(
+        "\n# What kpsa train learns and kpsa bench measures. More clips and wider controls make it hold for "
+        "more "
+        "poses.\n"
+        "accelerate:\n  {}:\n",
+        Quoted(stem.empty() ? "character" : stem, false));
     text_ += fmt::format("    points: {}  # up to and including that stage; later stages run exactly\n",
                          QuotedList(points));
     if (const std::optional<std::string> space = Space()) {
-      text_ += fmt::format("    space: {}  # the transform in whose space the points are learned\n",
-                           Quoted(*space, false));
+      text_ +=
+          fmt::format("    space: {}  # what carries nearly all points; motion in its space is learned\n",
+                      Quoted(*space, false));
     }
-    text_ += fmt::format("    subspace: {}  # `kpsa train` writes it\n",
+    text_ += fmt::format("    subspace: {}  # kpsa train writes it\n",
                          Quoted(options_.subspace.empty() ? stem + ".kpsa" : options_.subspace, false));
-    text_ += fmt::format("    tolerance: {}mm  # the largest error of a point that is accepted\n",
-                         Rounded(tolerance));
+    text_ += fmt::format("    tolerance: {}  # the largest error of a point that is accepted\n",
+                         LengthOf(tolerance / 1000));
     text_ += "    violationRate: 3%  # of frames that may exceed it\n";
     text_ += fmt::format("    train: {{{}samples: {}}}  # clips, and poses drawn from the controls\n",
                          train.empty() ? "" : "clips: " + QuotedList(train) + ", ", options_.samples);
-    if (!test.empty())
-      text_ += fmt::format("    test: {{clips: {}}}  # never trained on; what `kpsa bench` runs\n",
-                           QuotedList(test));
+    if (test.empty()) {
+      text_ += "    # The file has no clip to test on; kpsa bench takes the rest pose\n";
+    } else {
+      text_ +=
+          fmt::format("    test: {{clips: {}}}  # never trained on; what kpsa bench runs{}\n",
+                      QuotedList(test), train.empty() ? "" : ": the clip that goes least beyond the others");
+    }
   }
-
+  static std::string LengthOf(double metres) {
+    if (metres >= 1) return Rounded(metres) + "m";
+    return metres >= 0.01 ? Rounded(metres * 100) + "cm" : Rounded(metres * 1000) + "mm";
+  }
   const Rig& rig_;
   const gltf::Character& character_;
   const StarterOptions& options_;
-  std::vector<Motion> motions_;  // by glTF node
+  std::vector<JointRole> roles_;  // by glTF node
+  std::vector<Limb> limbs_;
+  std::vector<ClipMotion> clips_;
+  std::vector<Motion> motions_;  // of all clips, by glTF node
   std::vector<double> carries_;  // by glTF node
-  std::string text_, heading_;
+  std::string mush_, cage_;      // names; "": there is no cage
+  std::string text_;
+  std::map<int, Group> groups_;  // by their place in the file
+  Group* group_ = nullptr;       // that controls are added to
   int control_count_ = 0;
 };
 

@@ -17,10 +17,12 @@ struct StarterOptions {
 };
 
 // The text of the rig. Controls: every local rotation (degrees, in the rest pose's axes) and translation that
-// a clip moves away from rest, and every morph weight, ranged by the keys of all clips and rounded outwards;
-// joints that carry no point are left out. Without clips: guesses, marked so. Accelerated: the end of every
+// a clip moves away from rest, every expression of VRM that moves a morph target, and every other morph
+// weight, ranged by the keys of all clips and rounded outwards; joints that carry no point are left out. They
+// are grouped by part of the body and side. Without clips: guesses, marked so. Accelerated: the end of every
 // mesh's stack, in the space of the deepest transform that carries 90 % of the skin; trained on all clips but
-// the first, which is kept for the bench. Errors: those of reading the character.
+// the one whose motion the others contain best, which is kept for the bench. In comments, as lines that work:
+// IK of arms and legs, a cage about the jaw, dual quaternions. Errors: those of reading the character.
 Result<std::string> StarterRig(const NodeRegistry& registry, const std::string& character_path,
                                const StarterOptions& options = {});
 

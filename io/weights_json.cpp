@@ -1,14 +1,15 @@
 #include "io/weights_json.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include "io/file.h"
+#include "io/quantity.h"
 
 namespace kpsa {
 namespace {
@@ -128,6 +129,14 @@ class Reader {
   Status status_;
 };
 
+// The fewest digits that the reader, which goes through double, reads back as the same float.
+std::string FloatText(float value) {
+  std::string text = fmt::format("{}", value);
+  double read = 0;
+  std::from_chars(text.data(), text.data() + text.size(), read);
+  return static_cast<float>(read) == value ? text : NumberText(static_cast<double>(value));
+}
+
 std::vector<std::string> MapNames(const WeightFile& file) {
   std::vector<std::string> names;
   for (const NamedWeights& map : file.maps) names.push_back(map.name);
@@ -164,6 +173,7 @@ Result<WeightFile> ReadWeightFile(const std::string& path) {
     const json root = json::parse(bytes->begin(), bytes->end(), watch);
     if (is_repeated) return Status::Invalid("the key \"{}\" is defined twice", repeated).At({path});
     WeightFile file;
+    file.path = path;
     KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root));
     return file;
   } catch (const json::parse_error& error) {
@@ -174,47 +184,50 @@ Result<WeightFile> ReadWeightFile(const std::string& path) {
   }
 }
 
-Result<std::vector<float>> DenseWeights(const WeightFile& file, const std::string& path,
-                                        std::string_view name, std::string_view mesh, std::size_t points) {
-  if (file.mesh != mesh) {
-    return Status::Invalid("holds weights of the mesh \"{}\", expected \"{}\"", file.mesh, mesh).At({path});
-  }
-  if (file.points != points) {
-    return Status::Invalid("holds weights for {} points, \"{}\" has {}; the mesh changed since", file.points,
-                           mesh, points)
-        .At({path});
-  }
-  const NamedWeights* map = file.Find(name);
-  if (map == nullptr) {
-    return Status::Invalid("has no map \"{}\"{}", name, DidYouMean(name, MapNames(file))).At({path});
-  }
-  std::vector<float> weights(points, map->default_value);
-  for (std::size_t i = 0; i < map->indices.size(); ++i) weights[map->indices[i]] = map->values[i];
-  return weights;
+std::vector<float> DenseWeights(const WeightFile& file, const NamedWeights& map) {
+  std::vector<float> dense(file.points, map.default_value);
+  for (std::size_t i = 0; i < map.indices.size(); ++i) dense[map.indices[i]] = map.values[i];
+  return dense;
 }
 
-Result<std::vector<float>> LoadWeights(const std::string& folder, const std::string& reference,
-                                       std::string_view mesh, std::size_t points) {
-  const std::size_t suffix = reference.find(".json#");
-  const std::size_t hash = suffix == std::string::npos ? reference.rfind('#') : suffix + 5;
-  const std::string path = (std::filesystem::path(folder) / reference.substr(0, hash)).string();
-  const Result<WeightFile> file = ReadWeightFile(path);
-  if (!file.ok()) return file.status();
-  if (hash != std::string::npos) return DenseWeights(*file, path, reference.substr(hash + 1), mesh, points);
-  if (file->maps.size() != 1) {
-    return Status::Invalid("has {} maps; say which one: \"{}#<map>\"", file->maps.size(), reference)
-        .At({path});
+WeightReference SplitWeightReference(const std::string& text) {
+  const std::size_t suffix = text.find(".json#");
+  const std::size_t hash = suffix == std::string::npos ? text.rfind('#') : suffix + 5;
+  if (hash == std::string::npos) return {text, std::nullopt};
+  return {text.substr(0, hash), text.substr(hash + 1)};
+}
+
+Result<const NamedWeights*> FindWeights(const WeightFile& file, const std::string& path,
+                                        const std::optional<std::string>& map) {
+  const std::vector<std::string> names = MapNames(file);
+  if (!map.has_value()) {
+    if (names.size() == 1) return &file.maps[0];
+    return Status::Invalid("\"{0}\": expected \"{0}#MAP\"; the file has the maps {1}", path,
+                           fmt::join(names, ", "));
   }
-  return DenseWeights(*file, path, file->maps[0].name, mesh, points);
+  if (const NamedWeights* found = file.Find(*map); found != nullptr) return found;
+  return Status::Invalid("{} has no map \"{}\"{}", path, *map, DidYouMean(*map, names));
+}
+
+std::string WeightFileText(const WeightFile& file) {
+  const auto text_of = [](const json& value) {
+    return value.dump(-1, ' ', false, json::error_handler_t::replace);
+  };
+  std::string text =
+      fmt::format("{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": {}, \"points\": {},\n \"maps\": {{",
+                  text_of(file.mesh), file.points);
+  for (const NamedWeights& map : file.maps) {
+    std::vector<std::string> values;
+    for (float value : map.values) values.push_back(FloatText(value));
+    text += fmt::format("{}\n  {}: {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}",
+                        &map == file.maps.data() ? "" : ",", text_of(map.name), FloatText(map.default_value),
+                        fmt::join(map.indices, ","), fmt::join(values, ","));
+  }
+  return text + "}}\n";
 }
 
 Status WriteWeightFile(const std::string& path, const WeightFile& file, bool force) {
-  json root = {{"kpsa", "weights"}, {"version", 1}, {"mesh", file.mesh}, {"points", file.points}};
-  json& maps = root["maps"] = json::object();
-  for (const NamedWeights& map : file.maps) {
-    maps[map.name] = {{"default", map.default_value}, {"indices", map.indices}, {"values", map.values}};
-  }
-  const std::string text = root.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+  const std::string text = WeightFileText(file);
   return WriteFileAtomically(path, force, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 

@@ -3,6 +3,7 @@
 //    "maps": {"upper": {"default": 0, "indices": [4, 7], "values": [0.5, 1]}}}
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,6 +25,7 @@ struct WeightFile {
   std::string mesh;  // the name of the mesh node
   std::size_t points = 0;
   std::vector<NamedWeights> maps;  // in the file's order of names
+  std::string path = {};           // where it was read
   const NamedWeights* Find(std::string_view name) const;
 };
 
@@ -32,16 +34,21 @@ struct WeightFile {
 // number that is not finite.
 Result<WeightFile> ReadWeightFile(const std::string& path);
 
-// One weight a point of map `name`; an error where the file is of another mesh or number of points, or has no
-// such map. `path` is for messages.
-Result<std::vector<float>> DenseWeights(const WeightFile& file, const std::string& path,
-                                        std::string_view name, std::string_view mesh, std::size_t points);
+// One weight a point.
+std::vector<float> DenseWeights(const WeightFile& file, const NamedWeights& map);
 
-// Reads "file.json#map" with `reference` relative to `folder`; without "#map" the file must have one map
-// only.
-Result<std::vector<float>> LoadWeights(const std::string& folder, const std::string& reference,
-                                       std::string_view mesh, std::size_t points);
+// "file.json#map" in its parts; without "#map" there is no map. Maps may have a # in their names, too.
+struct WeightReference {
+  std::string path;  // as written
+  std::optional<std::string> map;
+};
+WeightReference SplitWeightReference(const std::string& text);
+// The map that is named, or the only one; an error where there is none, or several. `path` is for messages.
+Result<const NamedWeights*> FindWeights(const WeightFile& file, const std::string& path,
+                                        const std::optional<std::string>& map);
 
+// One map a line, and the fewest digits that read back as the same floats.
+std::string WeightFileText(const WeightFile& file);
 Status WriteWeightFile(const std::string& path, const WeightFile& file, bool force);
 
 }  // namespace kpsa

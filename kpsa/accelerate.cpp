@@ -25,10 +25,11 @@ Index Place(std::vector<Signal>* list, const Signal& signal) {
   return static_cast<Index>(list->size() - 1);
 }
 
-Result<Signal> FindSignal(const Graph& graph, const std::string& name) {
-  Result<PlugRef> plug = graph.FindPlug(name);
+Result<Signal> FindSignal(const Graph& graph, const std::string& name, const RigWithin& within) {
+  Result<PlugRef> plug = graph.FindPlug(within.prefix + name);
+  if (!plug.ok() && !within.prefix.empty()) plug = graph.FindPlug(name);  // time
   if (!plug.ok()) return plug.status();
-  Signal signal{name, *plug, graph.PlugType(*plug) == Type::kMatrix};
+  Signal signal{graph.PlugName(*plug), *plug, graph.PlugType(*plug) == Type::kMatrix};
   return signal;
 }
 
@@ -56,6 +57,7 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
                                std::shared_ptr<const Subspace> subspace, const std::string& node_name,
                                const AccelerateOptions& options) {
   Accelerated result;
+  const RigWithin& within = target.within;
   KpsaConfig::Data data;
   data.subspace = subspace;
 
@@ -73,8 +75,8 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
   const Signature trained = TrainedSignature(*subspace);
   if (SignatureDigest(trained) != subspace->rig_hash)
     return Status::Invalid("the subspace is corrupt: its rig hash is not that of the rig that it describes");
-  const std::string difference =
-      SignatureDifference(trained, RigSignature(*graph, target.outputs(), target.space, target.controls));
+  const std::string difference = SignatureDifference(
+      trained, RigSignature(*graph, target.outputs(), target.space, target.controls, within));
   if (!difference.empty()) {
     if (!options.stale_is_miss) {
       return Status::Invalid(
@@ -110,7 +112,7 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
     bool have_rest = false;
     for (std::size_t e = 0; e < signal.entries(); ++e) {
       TrainedRange range;
-      if (const auto it = ranges.find(EntryName(signal, e)); it != ranges.end()) {
+      if (const auto it = ranges.find(within.Inner(EntryName(signal, e))); it != ranges.end()) {
         range = it->second;
       } else {
         if (!have_rest) KPSA_RETURN_IF_ERROR(RestEntries(*graph, compiler, signal, rest));
@@ -162,7 +164,7 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
       }
     } else {
       const std::size_t slash = cue.plug.rfind('/');
-      Result<Signal> signal = FindSignal(*graph, cue.plug.substr(0, slash));
+      Result<Signal> signal = FindSignal(*graph, cue.plug.substr(0, slash), within);
       if (!signal.ok()) return signal.status();
       Index entry = 0;
       const char* const end = cue.plug.data() + cue.plug.size();

@@ -10,6 +10,7 @@
 #include "graph/compiler.h"
 #include "kpsa/kpsa_node.h"
 #include "kpsa/signals.h"
+#include "kpsa/signature.h"
 
 namespace kpsa {
 
@@ -22,12 +23,14 @@ struct AccelerationTarget {
     bool world = true;  // world space; else mesh space
   };
   struct MeshPoints {
-    std::string name;           // "head_mesh@mush"
+    std::string name;           // "head_mesh@mush", as the subspace calls it
     std::vector<Stage> stages;  // up to and including the accelerated one, which is the last
   };
   std::vector<MeshPoints> meshes;
+  bool colors = false;         // they are light at shading points, and no points of meshes
   std::vector<PlugRef> space;  // none, or the worldMatrix of the frame
-  std::string space_name;
+  std::string space_name;      // "" for the world, or what is the world to a rig within another one
+  RigWithin within;
   std::vector<PlugRef> varying;   // time, controls: all that may vary
   std::vector<PlugRef> controls;  // of these, the ones whose held value is no part of the rig's identity
   std::vector<PlugRef> outputs() const;

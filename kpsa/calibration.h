@@ -18,7 +18,7 @@ namespace kpsa {
 // One calibration pose: its score, and the largest point error of the pure reconstruction (before blending).
 struct CalibrationPair {
   double score = 0;
-  double error = 0;  // scene units
+  double error = 0;  // scene units; of light the RMS over an output's points, the largest of all outputs
 };
 
 struct Calibration {

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "kpsa/estimator.h"
+#include "kpsa/mode_choice.h"
 #include "kpsa/varimax.h"
 
 namespace kpsa {
@@ -21,7 +22,7 @@ constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
 // Values that move more than they are trusted.
-std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise) {
+std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise, std::size_t max_outputs) {
   const bool stages = pca.layout.stage_points > 0;
   std::vector<CueRef> candidates = AllCandidates(pca, kMinMotion, !stages, stages, true);
   std::erase_if(candidates, [&](const CueRef& cue) {
@@ -29,7 +30,14 @@ std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise) {
     return cue.kind == CueKind::kScalar && !noise.scalars.empty() &&
            pca.row_variance[column] <= noise.scalars[cue.index];
   });
-  return candidates;
+  const auto outputs = static_cast<std::size_t>(std::count_if(
+      candidates.begin(), candidates.end(), [](const CueRef& c) { return c.kind == CueKind::kOutput; }));
+  if (max_outputs == 0 || outputs <= max_outputs) return candidates;
+  const std::vector<Index> kept = GoldenSpread(outputs, max_outputs);  // outputs come first
+  std::vector<CueRef> thinned;
+  for (const Index i : kept) thinned.push_back(candidates[i]);
+  thinned.insert(thinned.end(), candidates.begin() + static_cast<std::ptrdiff_t>(outputs), candidates.end());
+  return thinned;
 }
 
 class Chooser {
@@ -41,7 +49,7 @@ class Chooser {
   std::vector<CueRef> Run() {
     SelectInRounds();
     if (!chosen_.empty()) AddPoints();
-    if (!chosen_.empty() && pca_.layout.stage_points > 0) AddWorstPoints();
+    if (!chosen_.empty() && pca_.layout.stage_points > 0 && !options_.by_rms) AddWorstPoints();
     return std::move(chosen_);
   }
 
@@ -54,19 +62,20 @@ class Chooser {
 
   // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them.
   void SelectInRounds() {
-    const std::vector<CueRef> candidates = Candidates(pca_, noise_);
+    const std::vector<CueRef> candidates = Candidates(pca_, noise_, options_.max_outputs);
     std::vector<double> weights;
-    for (std::size_t round = 1; round <= kSelectionRounds; ++round) {
+    const std::size_t rounds = options_.by_rms ? 1 : kSelectionRounds;
+    for (std::size_t round = 1; round <= rounds; ++round) {
       CueSelectionOptions selection;
       selection.fixed = chosen_;
       selection.count = options_.rows;
-      selection.max_cost = static_cast<double>(options_.rows * round) / static_cast<double>(kSelectionRounds);
+      selection.max_cost = static_cast<double>(options_.rows * round) / static_cast<double>(rounds);
       selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) {
         return cue.kind == CueKind::kScalar ? 1.0 : 3.0;
       };
       selection.point_weights = weights;
       chosen_ = SelectCues(pca_, candidates, positions_, noise_, selection).cues;
-      if (round == kSelectionRounds || chosen_.empty()) break;
+      if (round == rounds || chosen_.empty()) break;
       weights = Survey(chosen_).largest;
       double mean = 0;
       for (const double error : weights) mean += error / static_cast<double>(weights.size());
@@ -75,7 +84,7 @@ class Chooser {
   }
 
   void AddPoints() {
-    std::vector<CueRef> points = Candidates(pca_, noise_);
+    std::vector<CueRef> points = Candidates(pca_, noise_, options_.max_outputs);
     std::erase_if(points, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
     std::size_t have = 0;
     for (const CueRef& cue : chosen_) have += cue.kind != CueKind::kScalar;

@@ -12,6 +12,9 @@ struct CueChoiceOptions {
   std::size_t rows = 300;       // of measurements: a point takes 3, a scalar 1
   std::size_t min_points = 16;  // points see what no scalar does: some of them are kept to judge by
   double tolerance = 1e-4;      // scene units
+  // Where errors count by their RMS alone (light, with its noise): one round, no worst points.
+  bool by_rms = false;
+  std::size_t max_outputs = 0;  // output points that may become cues, spread; 0: all
 };
 
 // A-optimal cues (kpsa/cue_selection.h): points of the candidate stages (of the outputs, where there are

@@ -20,9 +20,14 @@ Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
   return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
 }
 
+Eigen::VectorXd Reach(const Eigen::MatrixXd& gain) {
+  if (gain.rows() == 0) return Eigen::VectorXd::Zero(gain.cols());
+  return gain.cwiseAbs().colwise().maxCoeff().transpose();
+}
+
 // covariance P [M x M] of the mode coordinates, cues C [r x M] -> G, its factors and B.
 Estimator MapWithCovariance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const Eigen::MatrixXd& p,
-                            const Eigen::VectorXd& noise) {
+                            const Eigen::VectorXd& noise, bool keep_gain = true) {
   Estimator estimator;
   const Eigen::MatrixXd cp = Multiply(c, p);  // [r x M]
   estimator.covariance = Multiply(cp, c.transpose());
@@ -35,14 +40,26 @@ Estimator MapWithCovariance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, 
   estimator.judge = TransposedProduct(estimator.whitening, estimator.whitening);
   estimator.judge = (0.5 * (estimator.judge + estimator.judge.transpose())).eval();
   estimator.coordinates = cholesky.solve(cp).transpose();
-  estimator.gain = Multiply(a, estimator.coordinates);
+  if (keep_gain) {
+    estimator.gain = Multiply(a, estimator.coordinates);
+    estimator.reach = Reach(estimator.gain);
+    return estimator;
+  }
+  constexpr Eigen::Index kColumns = 64;  // of B at a time
+  estimator.reach.resize(r);
+  for (Eigen::Index first = 0; first < r; first += kColumns) {
+    const Eigen::Index count = std::min(kColumns, r - first);
+    const Eigen::MatrixXd q = estimator.coordinates.middleCols(first, count);
+    estimator.reach.segment(first, count) = Reach(Multiply(a, q));
+  }
   return estimator;
 }
 
 }  // namespace
 
-Estimator MapEstimator(const Pca& pca, const CueSet& cues) {
-  return MapWithCovariance(pca.output_modes(), cues.loadings, pca.mode_variance().asDiagonal(), cues.noise);
+Estimator MapEstimator(const Pca& pca, const CueSet& cues, bool keep_gain) {
+  return MapWithCovariance(pca.output_modes(), cues.loadings, pca.mode_variance().asDiagonal(), cues.noise,
+                           keep_gain);
 }
 
 Estimator RotatedMapEstimator(const Pca& pca, const CueSet& cues, const Eigen::MatrixXd& rotation) {
@@ -76,6 +93,7 @@ Estimator LeastSquaresEstimator(const Pca& pca, const CueSet& cues) {
   estimator.mode = EstimatorMode::kPaper;
   estimator.coordinates = qr.matrixQR().topRows(m).triangularView<Eigen::Upper>().solve(q.transpose());
   estimator.gain = Multiply(pca.output_modes(), estimator.coordinates);
+  estimator.reach = Reach(estimator.gain);
   estimator.judge = Eigen::MatrixXd::Identity(r, r) - q * q.transpose();
   estimator.judge = (0.5 * (estimator.judge + estimator.judge.transpose())).eval();
   return estimator;

@@ -19,7 +19,8 @@ enum class EstimatorMode : std::uint8_t { kMap, kPaper };
 
 struct Estimator {
   EstimatorMode mode = EstimatorMode::kMap;
-  Eigen::MatrixXd gain;         // B [cN x r]: f - mu = B y
+  Eigen::MatrixXd gain;         // B [cN x r]: f - mu = B y; empty where it was not asked for (B = A Q)
+  Eigen::VectorXd reach;        // [r] the largest entry of each column of B
   Eigen::MatrixXd coordinates;  // Q [M x r]: mode coordinates p = Q y
   Eigen::MatrixXd covariance;   // G [r x r] of y under the model (both modes)
   Eigen::MatrixXd whitening;  // [r x r] lower triangular, inverse Cholesky factor of G: w = whitening * y has
@@ -29,7 +30,8 @@ struct Estimator {
   std::string warning;    // not empty: paper mode fell back to map, and why
 };
 
-Estimator MapEstimator(const Pca& pca, const CueSet& cues);
+// keep_gain: false saves the memory of B, which is large for pictures.
+Estimator MapEstimator(const Pca& pca, const CueSet& cues, bool keep_gain = true);
 
 // Paper mode. A condition number above 1e4, or fewer rows than modes, gives MapEstimator with a warning.
 inline constexpr double kMaxCondition = 1e4;

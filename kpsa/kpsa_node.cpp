@@ -51,12 +51,18 @@ struct KpsaKernel {
   std::vector<Output> outputs;
 };
 
-// Kept from decide to compute, per evaluator; the normalised measurement y follows it, padded to 16.
+// Kept from decide to compute, per evaluator; the normalised measurement y follows it, padded to 16, and z
+// where tiles read that.
 struct KpsaState {
   Verdict verdict;
 };
 float* Measured(const ComputeContext& c) {
   return reinterpret_cast<float*>(c.state + (sizeof(KpsaState) + 63) / 64 * 64);
+}
+
+std::span<const float> TileInputsOf(const ComputeContext& c, const Subspace& subspace) {
+  const std::size_t y = subspace.latent.empty() ? 0 : subspace.soft_cache.padded_rows();
+  return {Measured(c) + y, subspace.tile_inputs()};
 }
 
 Index FirstOutsideGuard(const ComputeContext& c, const KpsaConfig::Data& data) {
@@ -142,6 +148,8 @@ std::uint64_t Decide(ComputeContext& c) {
   Normalize(subspace, raw, y);
   for (std::size_t j = r; j < padded; ++j) y[j] = 0;
   state.verdict = Judge(subspace.soft_cache, kernel.threshold, y, g);
+  if (!subspace.latent.empty() && state.verdict.full_weight < 1)
+    ToLatent(subspace, y, {Measured(c) + padded, subspace.tile_inputs()});
   return state.verdict.hit ? 0 : all;
 }
 
@@ -157,7 +165,7 @@ void WriteVerdict(const ComputeContext& c) {
 void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
   const Subspace& subspace = *kernel.config->data().subspace;
   const KpsaKernel::Output& wanted = kernel.outputs[m];
-  const std::span<const float> y(Measured(c), subspace.rows());
+  const std::span<const float> y = TileInputsOf(c, subspace);
   const Matrix4& matrix = c.get<Matrix4>(kSpaceMatrix);
   const bool in_space = kernel.config->data().outputs_in_space[m] != 0;
   const Matrix4* space = !in_space || matrix == Matrix4() ? nullptr : &matrix;
@@ -211,7 +219,7 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
     }
     // Frames that share a pass over the subspace
     const Stopwatch watch(reconstruction_ns);
-    const std::size_t r = subspace.rows();
+    const std::size_t r = subspace.tile_inputs();
     for (std::size_t first = 0; first < count; first += kBlockFrames) {
       const std::size_t frames = std::min(kBlockFrames, count - first);
       float* y = contexts[first].scratch;
@@ -219,7 +227,7 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
       Matrix4 spaces[kBlockFrames];
       bool moved = false;
       for (std::size_t f = 0; f < frames; ++f) {
-        std::memcpy(y + f * r, Measured(contexts[first + f]), r * sizeof(float));
+        std::memcpy(y + f * r, TileInputsOf(contexts[first + f], subspace).data(), r * sizeof(float));
         outs[f] = contexts[first + f].out_points(kOutPoints, static_cast<std::uint32_t>(m));
         spaces[f] = contexts[first + f].get<Matrix4>(kSpaceMatrix);
         moved = moved || (kernel.config->data().outputs_in_space[m] != 0 && !(spaces[f] == Matrix4()));
@@ -279,8 +287,10 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
   }
   const std::size_t padded = subspace.soft_cache.padded_rows();
   // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles) and g
-  const std::size_t scratch = std::max({whole, PaddedCount(kBlockFrames * subspace.rows()), 3 * padded});
-  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 + padded * sizeof(float);
+  const std::size_t scratch = std::max(
+      {whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())), 3 * padded});
+  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 +
+                            (padded + (subspace.latent.empty() ? 0 : subspace.tile_inputs())) * sizeof(float);
   return BoundKernel{std::make_shared<const KpsaKernel>(std::move(kernel)), scratch, state};
 }
 
@@ -293,6 +303,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   hasher.Add(std::string_view(s.training));
   hasher.Add(std::span<const double>(s.cue_mean));
   hasher.Add(std::span<const float>(s.soft_cache.factor.span()));
+  hasher.Add(std::span<const float>(s.latent));
   for (const TileMap& tiles : s.tiles) {
     hasher.Add(std::span<const std::uint8_t>(tiles.data().u.span()));
     hasher.Add(std::span<const std::uint16_t>(tiles.data().v.span()));

@@ -152,7 +152,7 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
     } else if (!groups.empty() && p % 20 < 13) {
       sampler.MixGroups(groups, &pose);
     } else {
-      if (clips > 0 && p % 2 == 0) {
+      if (clips > 0 && (p % 2 == 0 || controls.empty())) {
         pose.clip = static_cast<int>(sampler.random().Below(clips));
         pose.phase = sampler.random().Unit();
       }

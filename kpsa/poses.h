@@ -44,6 +44,7 @@ std::vector<SampledPose> Sweeps(const std::vector<ControlRange>& controls);
 //   0.2  a group of controls that act together, and a few controls on top;
 //   0.35 mixtures of several controls at random values, every second one laid over a random frame of a random
 //   clip.
+// Without controls: random times of the clips.
 std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses,
                                      const ControlGroups& groups, std::size_t clips, std::size_t count,
                                      std::uint64_t seed);

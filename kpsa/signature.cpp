@@ -14,7 +14,8 @@ std::string Short(const Digest& digest) { return digest.ToHex().substr(0, 12); }
 }  // namespace
 
 Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs,
-                       const std::vector<PlugRef>& space, const std::vector<PlugRef>& controls) {
+                       const std::vector<PlugRef>& space, const std::vector<PlugRef>& controls,
+                       const RigWithin& within) {
   // All nodes upstream of the outputs, clips left out
   std::vector<NodeId> stack;
   std::set<Index> seen, carriers;
@@ -22,6 +23,7 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs,
     if (seen.insert(output.node.index).second) stack.push_back(output.node);
   }
   for (const PlugRef& frame : space) {
+    if (frame.node == within.root) continue;
     if (seen.insert(frame.node.index).second) stack.push_back(frame.node);
     carriers.merge(ParentChain(graph, frame.node));
   }
@@ -37,11 +39,12 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs,
     const NodeId node = stack.back();
     stack.pop_back();
     const NodeDef& def = graph.def(node);
-    const std::string& name = graph.name(node);
+    const std::string name = within.Inner(graph.name(node));
     std::vector<std::string> connections;
     for (const Connection& c : graph.Inputs(node)) {
-      if (graph.def(c.source.node).animation) continue;
-      connections.push_back(graph.PlugName(c.source) + ">" + graph.PlugName(c.destination));
+      if (graph.def(c.source.node).animation || c.source.node == within.root) continue;
+      connections.push_back(within.Inner(graph.PlugName(c.source)) + ">" +
+                            within.Inner(graph.PlugName(c.destination)));
       if (seen.insert(c.source.node.index).second) stack.push_back(c.source.node);
     }
     std::sort(connections.begin(), connections.end());

@@ -13,11 +13,22 @@ namespace kpsa {
 using Signature =
     std::map<std::string, std::string>;  // "mush.iterations" -> digest; "mush" -> type and connections
 
+// A rig within another one: its nodes' names begin with `prefix`, and hang under `root`. It has the identity
+// of the rig alone, and in a subspace things are called as there.
+struct RigWithin {
+  std::string prefix;
+  NodeId root;
+  std::string Inner(const std::string& name) const {
+    return name.starts_with(prefix) ? name.substr(prefix.size()) : name;
+  }
+};
+
 // Everything upstream of `outputs` and `space`. Poses (Graph::Pose) of the plugs in `controls` and of the
 // transforms from `space` up to the root are left out, and clips with what they drive; what is set for the
 // rest state is not.
 Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs,
-                       const std::vector<PlugRef>& space, const std::vector<PlugRef>& controls);
+                       const std::vector<PlugRef>& space, const std::vector<PlugRef>& controls,
+                       const RigWithin& within = {});
 // "" if they agree, else what differs, at most three entries by name.
 std::string SignatureDifference(const Signature& trained, const Signature& now);
 std::string SignatureDigest(const Signature& signature);

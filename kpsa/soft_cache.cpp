@@ -206,7 +206,7 @@ SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues
     Eigen::MatrixXd block = estimator.judge.block(begin, begin, height, height);
     block = block.llt().solve(Eigen::MatrixXd::Identity(height, height)).eval();
     // The error of a scalar counts by the displacement it stands for, so that all cues speak of lengths
-    if (cues.cues[k].kind == CueKind::kScalar) block *= estimator.gain.col(begin).cwiseAbs().maxCoeff();
+    if (cues.cues[k].kind == CueKind::kScalar) block *= estimator.reach[begin];
     for (Eigen::Index i = 0; i < block.size(); ++i)
       model.leave_one_out.push_back(static_cast<float>(block.data()[i]));
   }

@@ -57,6 +57,8 @@ Status ValidateSubspace(const Subspace& s) {
     return Status::Invalid("the leave-one-out blocks have {} entries, expected {}",
                            s.soft_cache.leave_one_out.size(), blocks);
   }
+  if (!s.latent.empty() && (rows == 0 || s.latent.size() % rows != 0 || !AllFinite<float>(s.latent)))
+    return Status::Invalid("the {} latent factors of {} rows make no sense", s.latent.size(), rows);
   if (!AllFinite<double>(s.cue_mean) || !AllFinite<double>(s.cue_scale) ||
       !AllFinite<float>(s.soft_cache.factor.span()) || !AllFinite<float>(s.soft_cache.leave_one_out)) {
     return Status::Invalid("the data of the cues hold a NaN or an infinity");
@@ -69,7 +71,7 @@ Status ValidateSubspace(const Subspace& s) {
   if (s.tiles.size() != s.outputs.size())
     return Status::Invalid("{} outputs, but {} sets of tiles", s.outputs.size(), s.tiles.size());
   for (std::size_t i = 0; i < s.outputs.size(); ++i) {
-    if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != rows ||
+    if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != s.tile_inputs() ||
         s.tiles[i].data().components != s.components) {
       return Status::Invalid("output \"{}\" has {} points of {} components, its tiles {} of {}",
                              s.outputs[i].name, s.outputs[i].points, s.components, s.tiles[i].points(),
@@ -120,20 +122,40 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   inputs.samples.resize(training.rows(), count);
   for (Eigen::Index i = 0; i < count; ++i)
     inputs.samples.col(i) = training.col((2 * i + 1) * training.cols() / (2 * count));
+  const bool latent = estimator.gain.size() == 0;
+  using Map = Eigen::Ref<const Eigen::MatrixXd>;
+  const Map maps = latent ? Map(pca.output_modes()) : Map(estimator.gain);
+  if (latent) {
+    const Eigen::MatrixXd& q = estimator.coordinates;
+    for (Eigen::Index i = 0; i < q.size(); ++i) s.latent.push_back(static_cast<float>(q.data()[i]));
+    inputs.covariance = q * estimator.covariance * q.transpose();
+    inputs.samples = (q * inputs.samples).eval();
+  }
   Eigen::Index first = 0;
   for (const SubspaceOutput& output : s.outputs) {
     const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
-    KPSA_CHECK_LE(first + height, estimator.gain.rows());
-    s.tiles.push_back(BuildTiles(estimator.gain.middleRows(first, height), pca.mean.segment(first, height),
+    KPSA_CHECK_LE(first + height, maps.rows());
+    s.tiles.push_back(BuildTiles(maps.middleRows(first, height), pca.mean.segment(first, height),
                                  s.components, inputs, options));
     first += height;
   }
-  KPSA_CHECK_EQ(first, estimator.gain.rows());
+  KPSA_CHECK_EQ(first, maps.rows());
   return s;
 }
 
 SubspaceScratch::SubspaceScratch(const Subspace& subspace)
-    : y(subspace.soft_cache.padded_rows()), g(subspace.soft_cache.padded_rows()) {}
+    : y(subspace.soft_cache.padded_rows()),
+      g(subspace.soft_cache.padded_rows()),
+      z(subspace.latent.empty() ? 0 : subspace.tile_inputs()) {}
+
+void ToLatent(const Subspace& subspace, std::span<const float> y, std::span<float> z) {
+  const std::size_t modes = subspace.tile_inputs();
+  const float* q = subspace.latent.data();
+  for (std::size_t i = 0; i < modes; ++i) z[i] = 0;
+  for (std::size_t j = 0; j < subspace.rows(); ++j, q += modes) {
+    for (std::size_t i = 0; i < modes; ++i) z[i] = z[i] + q[i] * y[j];
+  }
+}
 
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y) {
   for (std::size_t j = 0; j < raw.size(); ++j)
@@ -143,6 +165,7 @@ void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch) {
   KPSA_CHECK_EQ(raw.size(), subspace.rows());
   Normalize(subspace, raw, scratch->y.span());
+  if (scratch->z.size() > 0) ToLatent(subspace, scratch->y.span(), scratch->z.span());
 }
 
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch) {

@@ -3,7 +3,7 @@
 //   SubspaceScratch scratch(subspace);                     // once a thread
 //   Measure(subspace, raw, &scratch);                      // raw cue values -> y
 //   Verdict v = Judge(subspace, threshold, &scratch);      // SoftCache
-//   subspace.tiles[output].Reconstruct(scratch.y, points)  // y -> points (kpsa/tiles.h)
+//   subspace.tiles[output].Reconstruct(scratch.inputs(), points)  // -> points (kpsa/tiles.h)
 //
 // None of these allocates. The file is safetensors (base/safetensors.h) with kind "kpsa-subspace".
 #pragma once
@@ -21,6 +21,7 @@
 namespace kpsa {
 
 inline constexpr int kSubspaceVersion = 1;
+inline constexpr const char* kLightUnits = "light";
 
 // Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
 struct CueDescription {
@@ -53,19 +54,25 @@ struct Subspace {
   // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
   // split errors with it (kpsa/error_split.h); no frame needs it.
   Eigen::MatrixXf kept_modes;
+  // Empty, and tiles read y; or, where all points depend on all cues (light), Q [M x r], column by column,
+  // and tiles read z = Q y.
+  std::vector<float> latent;
   std::vector<TrainedRange> ranges;  // every varying plug upstream
-  std::string rig_hash;              // what it was trained on (KPSA.md, section 3)
-  std::string units = "m";
-  std::string space;                                    // "" world or mesh space, else the joint
-  std::string training = "{}";                          // JSON: summary of the training, shown by `inspect`
+  bool of_light() const { return units == kLightUnits; }
+  std::string rig_hash;         // what it was trained on (KPSA.md, section 3)
+  std::string units = "m";      // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
+  std::string space;            // "" world or mesh space, else the joint
+  std::string training = "{}";  // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r
+  std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
 };
 
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
 Status ValidateSubspace(const Subspace& subspace);
 
-// Tiles and SoftCache of a trained estimator; rows of the PCA's outputs are split over `outputs`.
-// training: y of the training poses [r x T]. The caller fills cues, calibration, ranges and names.
+// Tiles and SoftCache of a trained estimator (without its gain: by latent coordinates); rows of the PCA's
+// outputs are split over `outputs`. training: y of the training poses [r x T]. The caller fills cues,
+// calibration, ranges and names.
 Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                       const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
                       const TileOptions& options);
@@ -80,11 +87,15 @@ struct SubspaceScratch {
   explicit SubspaceScratch(const Subspace& subspace);
   AlignedFloats y;  // [r, padded to 16]
   AlignedFloats g;  // the same size
+  AlignedFloats z;  // [M] what tiles read instead of y, or empty
+  std::span<const float> inputs() const { return z.size() > 0 ? z.span() : y.span(); }
 };
 
 // y[j] = (raw[j] - mean) * scale, in float32.
 void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<float> y);
-// raw [r] in scene units -> scratch->y.
+// z = Q y; the same bits on every SIMD target.
+void ToLatent(const Subspace& subspace, std::span<const float> y, std::span<float> z);
+// raw [r] in scene units -> scratch->y and inputs().
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch);
 // The verdict on scratch->y. Ranges are checked by the caller (FirstOutside), before this.
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);

@@ -143,6 +143,7 @@ std::string ContentDigest(const Subspace& s) {
   hasher.Add(std::span<const Index>(s.soft_cache.offsets));
   hasher.Add(std::span<const float>(s.soft_cache.factor.span()));
   hasher.Add(std::span<const float>(s.soft_cache.leave_one_out));
+  if (!s.latent.empty()) hasher.Add(std::span<const float>(s.latent));
   for (const CalibrationPair& pair : s.calibration) {
     hasher.Add(pair.score);
     hasher.Add(pair.error);
@@ -224,7 +225,7 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
     TileData data;
     data.points = s->outputs[i].points;
     data.components = s->components;
-    data.inputs = s->rows();
+    data.inputs = s->tile_inputs();
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "ranks", {kAny}), &data.ranks));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "wide", {kAny}), &data.wide));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "direct", {kAny}), &data.direct));
@@ -266,6 +267,7 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
   Add<std::uint32_t>(&writer, "cueOffsets", s.soft_cache.offsets);
   Add<float>(&writer, "factor", s.soft_cache.factor.span());
   Add<float>(&writer, "leaveOneOut", s.soft_cache.leave_one_out);
+  if (!s.latent.empty()) Add<float>(&writer, "latent", s.latent);
   std::vector<double> calibration;
   for (const CalibrationPair& pair : s.calibration)
     calibration.insert(calibration.end(), {pair.score, pair.error});
@@ -326,6 +328,11 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   KPSA_RETURN_IF_ERROR(
       Assign(file.Values<float>("factor", {s.soft_cache.factor_size()}), &s.soft_cache.factor));
   KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
+  if (s.of_light() && rows > 0 && s.mode == EstimatorMode::kMap) {
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("latent", {kAny}), &s.latent));
+    if (s.latent.empty() || s.latent.size() % rows != 0)
+      return Status::Invalid("{}: {} latent factors of {} rows", path, s.latent.size(), rows);
+  }
   const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 2});
   if (!calibration.ok()) return calibration.status();
   for (std::size_t i = 0; i + 1 < calibration->size(); i += 2)

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "kpsa/eigen_solvers.h"
+#include "kpsa/gemm.h"
 
 namespace kpsa {
 namespace {
@@ -44,11 +45,11 @@ class TileFactorer {
         max_budget_(options.max_budget),
         points_(static_cast<double>(gain.rows() / components)),
         budget_(options.rms_budget * options.rms_budget * points_),
-        motion_(gain * covariance) {
-    if (samples.size() > 0) moved_ = gain * samples;
+        motion_(Multiply(gain, covariance)) {
+    if (samples.size() > 0) moved_ = Multiply(gain, samples);
     // Directions of the motion, rare ones included: what is dropped costs a hundredth of the budget, and in
     // any one sample a tenth of the largest error
-    Eigen::MatrixXd gram = motion_ * gain.transpose();
+    Eigen::MatrixXd gram = Multiply(GemmOperand::Dense(motion_), GemmOperand::Dense(gain).Transposed());
     total_ = gram.trace();
     if (moved_.size() > 0 && std::isfinite(max_budget_))
       gram += budget_ / (max_budget_ * max_budget_) * (moved_ * moved_.transpose());

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "kpsa/cue_choice.h"
+#include "kpsa/mode_choice.h"
 #include "kpsa/pca.h"
 #include "kpsa/pose_recorder.h"
 
@@ -22,6 +23,8 @@ constexpr double kStillTurn =
 constexpr double kStillShare = 0.1;
 constexpr double kNoiseTurn = 1e-4;        // what a cue is not trusted below: a turn of a joint,
 constexpr double kNoiseShare = 5e-3;       // and a shift of a joint or a point, of the tolerance
+constexpr double kLightShift = 1e-4;       // metres; where the tolerance is no length: both, of a joint
+constexpr int kMaxLightModes = 120;        // that are looked at; noise is beyond
 constexpr std::size_t kGroupPoints = 400;  // where the trainer looks which controls act together
 constexpr double kGroupShare = 0.2;        // of a control's largest displacement: it acts on a point
 constexpr std::size_t kGroupSize = 8;      // controls that move a point most
@@ -51,7 +54,10 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &held_out));
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
     KPSA_RETURN_IF_ERROR(FindRanges(poses));
+    PoseMatrix judges(layout_);
+    if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
+    if (judges.poses() > 0) KeepModes(&judges);
     KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
     KPSA_RETURN_IF_ERROR(ChooseCues(poses));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
@@ -245,12 +251,39 @@ class Trainer {
         }
         // Clips turn joints a little about axes that no control has: what moves no point noticeably is no new
         // pose
-        const double still = !signal.matrix ? 0 : e < 9 ? kStillTurn : kStillShare * options_.tolerance;
+        const double still = !signal.matrix ? 0
+                             : e < 9        ? kStillTurn
+                             : of_light()   ? kLightShift
+                                            : kStillShare * options_.tolerance;
         ranges_.push_back(
             MakeTrainedRange(EntryName(signal, e), lo - still, hi + still, options_.range_margin));
       }
     }
     return Status();
+  }
+
+  bool of_light() const { return rig_.target.colors; }
+
+  // Takes every fifth pose away.
+  void Split(PoseMatrix* poses, PoseMatrix* judges) const {
+    PoseMatrix kept(layout_);
+    for (std::size_t t = 0; t < poses->poses(); ++t) {
+      const std::span<const float> row = std::as_const(*poses).row(t);
+      std::copy(row.begin(), row.end(), (t % 5 == 4 ? *judges : kept).AddPose().begin());
+    }
+    *poses = std::move(kept);
+  }
+
+  // As many modes as new poses confirm, and noise as new poses have it.
+  void KeepModes(PoseMatrix* judges) {
+    judges->Subtract(pca_.mean);
+    std::vector<CueRef> cues;
+    for (const Index point : GoldenSpread(layout_.points, std::max<std::size_t>(options_.min_points, 100)))
+      cues.push_back({CueKind::kOutput, point});
+    for (Index s = 0; s < layout_.scalars; ++s) cues.push_back({CueKind::kScalar, s});
+    pca_ = TruncatedPca(pca_, ChooseModeCount(pca_, cues, noise_, *judges));
+    for (double& residual : pca_.row_residual)
+      residual = HonestResidual(residual, pca_.poses, pca_.mode_count());
   }
 
   Status FindModes(PoseMatrix* poses) {
@@ -272,6 +305,7 @@ class Trainer {
     pca_options.max_modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2)
                                                                    : options_.max_modes;
     pca_options.seed = options_.seed;
+    if (of_light()) pca_options.max_modes = std::min(pca_options.max_modes, kMaxLightModes);
     Result<Pca> pca = ComputePca(*poses, mean, pca_options);
     if (!pca.ok()) return pca.status();
     pca_ = std::move(*pca);
@@ -287,7 +321,7 @@ class Trainer {
     noise.point = std::max(noise.point, shift * shift);
     for (const Signal& signal : recorder_->signals()) {
       for (std::size_t e = 0; e < signal.entries(); ++e) {
-        const double still = !signal.matrix ? 0 : e < 9 ? kNoiseTurn : shift;
+        const double still = !signal.matrix ? 0 : e < 9 ? kNoiseTurn : of_light() ? kLightShift : shift;
         noise.scalars.push_back(still * still);
       }
     }
@@ -299,6 +333,8 @@ class Trainer {
     choice.rows = options_.rows;
     choice.min_points = options_.min_points;
     choice.tolerance = options_.tolerance;
+    choice.by_rms = of_light();
+    if (of_light()) choice.max_outputs = options_.max_candidates;
     const std::vector<CueRef> chosen = options_.mode == EstimatorMode::kPaper
                                            ? ChoosePaperCues(pca_, positions_, diagonal_)
                                            : kpsa::ChooseCues(pca_, positions_, noise_, poses, choice);
@@ -308,8 +344,9 @@ class Trainer {
   }
 
   Result<Subspace> Assemble(const PoseMatrix& poses) {
-    const Estimator estimator = options_.mode == EstimatorMode::kPaper ? LeastSquaresEstimator(pca_, cues_)
-                                                                       : MapEstimator(pca_, cues_);
+    const Estimator estimator = options_.mode == EstimatorMode::kPaper
+                                    ? LeastSquaresEstimator(pca_, cues_)
+                                    : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
     Eigen::MatrixXd training(cues_.rows(), static_cast<Eigen::Index>(poses.poses()));
     for (std::size_t t = 0; t < poses.poses(); ++t) {
@@ -325,6 +362,7 @@ class Trainer {
     subspace.mode = estimator.mode;
     subspace.ranges = ranges_;
     subspace.space = rig_.target.space_name;
+    if (of_light()) subspace.units = kLightUnits;
     subspace.tolerance = options_.tolerance;
     subspace.violation_rate = options_.violation_rate;
     subspace.cues.clear();
@@ -383,21 +421,25 @@ class Trainer {
       }
       Measure(*subspace, raw, &scratch);
       const Verdict verdict = kpsa::Judge(*subspace, always, &scratch);
-      double largest = 0;
+      double largest = 0, largest_mean = 0;  // squared
       std::size_t column = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
-        subspace->tiles[m].Reconstruct(scratch.y.span(), buffers[m].view());
+        double output_sum = 0;
+        subspace->tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
         const ConstPointsView p = std::as_const(buffers[m]).view();
         for (std::size_t i = 0; i < p.count; ++i, column += 3) {
           const Double3 d{p.x[i] - static_cast<double>(row[column]),
                           p.y[i] - static_cast<double>(row[column + 1]),
                           p.z[i] - static_cast<double>(row[column + 2])};
           const double squared = Dot(d, d);
-          sum += squared;
+          output_sum += squared;
           largest = std::max(largest, squared);
         }
+        sum += output_sum;
+        largest_mean =
+            std::max(largest_mean, output_sum / static_cast<double>(std::max<std::size_t>(1, p.count)));
       }
-      subspace->calibration.push_back({verdict.score, std::sqrt(largest)});
+      subspace->calibration.push_back({verdict.score, std::sqrt(of_light() ? largest_mean : largest)});
       record_.held_out_max = std::max(record_.held_out_max, std::sqrt(largest));
     }
     if (held_out.poses() > 0)

@@ -21,14 +21,14 @@ struct TrainingClip {
 
 struct TrainOptions {
   EstimatorMode mode = EstimatorMode::kMap;
-  int max_modes = 250;     // map; paper mode takes key_points / 2
-  std::size_t rows = 300;  // of measurements: a point takes 3, an entry of a signal 1
-  std::size_t min_points = 16;
+  int max_modes = 250;                // map; paper mode takes key_points / 2
+  std::size_t rows = 300;             // of measurements: a point takes 3, an entry of a signal 1
+  std::size_t min_points = 16;        // that are measured
   std::size_t key_points = 80;        // paper mode
   std::size_t samples = 0;            // of the controls, besides the clips
   std::size_t calibration_poses = 0;  // 0: four times as many as the violation rate wants, 400 to 1,000
   std::uint64_t seed = 1;
-  double tolerance = 1e-4, violation_rate = 0.01;  // metres; share of frames
+  double tolerance = 1e-4, violation_rate = 0.01;  // metres, or light; share of frames
   bool keep_modes = false;                         // in the subspace, for reports (Subspace::kept_modes)
   double range_margin = 0.1;                       // of the trained extent
   std::size_t max_candidates = 4000;               // points that may become cues, spread over the meshes
@@ -46,6 +46,9 @@ struct TrainingRig {
 
 // Errors: no poses, nothing moves, a pose that fails to evaluate (its clip and time or its controls),
 // cancelled (kInterrupted). The graph comes back without a clip.
+// Light (AccelerationTarget::colors) has noise: a fifth of the training poses chooses the number of modes
+// (kpsa/mode_choice.h), and errors are the RMS over a frame's shading points, since no subspace knows the
+// noise of one of them.
 Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                        const TrainOptions& options);
 

@@ -16,6 +16,7 @@ struct TrainingRecord {
   std::uint64_t seed = 1;
   double motion_rms = 0, diagonal = 0;        // metres
   double held_out_rms = 0, held_out_max = 0;  // of the pure reconstruction on the calibration poses, metres
+                                              // (of light: its units, as all of these)
   double tile_rms = 0;                        // what tiles and half precision add
   std::string mode;                           // "map" or "paper"
   std::string warning;

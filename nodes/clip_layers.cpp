@@ -177,6 +177,18 @@ void ComputeLayeredWeights(ComputeContext& c) {
   }
 }
 
+// Declares what all that blend layers have: time, weight, keys and kind of each.
+NodeBuilder AddLayered(NodeRegistry& registry, std::string name, std::string doc) {
+  NodeBuilder b = registry.add(std::move(name), std::move(doc));
+  b.category("time").animation();
+  b.in("time", 0.0, {.unit = Unit::kTime, .doc = "in the layer's clip"}).array();
+  b.in("weight", 1.0, {.min = 0, .max = 1, .doc = "of the layer"}).array();
+  b.structural("keys", Type::kAsset).array();
+  b.structural("additive", std::vector<std::int64_t>{},
+               {.doc = "1 for a layer that adds to those below, 0 for one that replaces them"});
+  return b;
+}
+
 }  // namespace
 
 void AddClipLayerNodes(NodeRegistry& registry) {
@@ -196,34 +208,14 @@ void AddClipLayerNodes(NodeRegistry& registry) {
                      return LayerTime(time, start, speed, loop, duration);
                    })
       .cost(15, 0);
-  const char* const kAdditive = "1 for a layer that adds to those below, 0 for one that replaces them";
-  registry
-      .add("layeredTransform",
-           "A transform's part of several clips over each other: its local matrix over time.")
-      .category("time")
-      .animation()
-      .in("time", 0.0, {.unit = Unit::kTime, .doc = "in the layer's clip"})
-      .array()
-      .in("weight", 1.0, {.min = 0, .max = 1, .doc = "of the layer"})
-      .array()
-      .structural("keys", Type::kAsset)
-      .array()
-      .structural("additive", std::vector<std::int64_t>{}, {.doc = kAdditive})
+  AddLayered(registry, "layeredTransform",
+             "A transform's part of several clips over each other: its local matrix over time.")
       .out("matrix", Type::kMatrix)
       .compute(&ComputeLayeredTransform)
       .bind(BindLayeredTransform)
       .cost(250, 0);
-  registry
-      .add("layeredWeights", "A mesh's part of several clips over each other: its morph weights over time.")
-      .category("time")
-      .animation()
-      .in("time", 0.0, {.unit = Unit::kTime, .doc = "in the layer's clip"})
-      .array()
-      .in("weight", 1.0, {.min = 0, .max = 1, .doc = "of the layer"})
-      .array()
-      .structural("keys", Type::kAsset)
-      .array()
-      .structural("additive", std::vector<std::int64_t>{}, {.doc = kAdditive})
+  AddLayered(registry, "layeredWeights",
+             "A mesh's part of several clips over each other: its morph weights over time.")
       .structural("rest", std::vector<double>{}, {.doc = "weights where no layer plays"})
       .out("output", Type::kDouble)
       .array()

@@ -64,6 +64,16 @@ void ComputeConstraint(ComputeContext& c) {
   c.out_value<Matrix4>(0) = BlendMatrices(in, local, blend);
 }
 
+// The sum of of(target, i), each by its share of the weights.
+template <typename Of>
+Double3 WeightedMean(const ComputeContext& c, double total, Of of) {
+  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
+  Double3 sum;
+  for (std::uint32_t i = 0; i < targets.size(); ++i)
+    sum = sum + of(targets[i], i) * (TargetWeight(c, i) / total);
+  return sum;
+}
+
 // point: the offset is in the axes of the constrained's parent.
 using PointKernel = ConstraintKernel<Double3>;
 
@@ -78,12 +88,9 @@ Result<BoundKernel> BindPoint(const Binding& binding) {
 
 void ConstrainPoint(const PointKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
                     double total, Matrix4* local) {
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
-  Double3 sum;
-  for (std::uint32_t i = 0; i < targets.size(); ++i) {
-    sum = sum +
-          (TransformPoint(parent_inverse, PlaceOf(targets[i])) + k.offsets[i]) * (TargetWeight(c, i) / total);
-  }
+  const Double3 sum = WeightedMean(c, total, [&](const Matrix4& target, std::uint32_t i) {
+    return TransformPoint(parent_inverse, PlaceOf(target)) + k.offsets[i];
+  });
   (*local)(0, 3) = sum.x, (*local)(1, 3) = sum.y, (*local)(2, 3) = sum.z;
 }
 
@@ -162,14 +169,11 @@ Result<BoundKernel> BindScale(const Binding& binding) {
 
 void ConstrainScale(const ScaleKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
                     double total, Matrix4* local) {
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
-  Double3 sum;
-  for (std::uint32_t i = 0; i < targets.size(); ++i) {
-    const Double3 s = TakeApart(parent_inverse * targets[i]).scale, &offset = k.offsets[i];
-    sum = sum + Double3{s.x * offset.x, s.y * offset.y, s.z * offset.z} * (TargetWeight(c, i) / total);
-  }
   MatrixParts parts = TakeApart(*local);
-  parts.scale = sum;
+  parts.scale = WeightedMean(c, total, [&](const Matrix4& target, std::uint32_t i) {
+    const Double3 s = TakeApart(parent_inverse * target).scale, &offset = k.offsets[i];
+    return Double3{s.x * offset.x, s.y * offset.y, s.z * offset.z};
+  });
   *local = PutTogether(parts);
 }
 

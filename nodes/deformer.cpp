@@ -1,8 +1,10 @@
 #include "nodes/deformer.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "graph/geometry.h"
+#include "nodes/kernels/weights.h"
 
 namespace kpsa {
 
@@ -24,11 +26,85 @@ NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string do
   return builder;
 }
 
+namespace {
+
+// A deformer's own kernel, and what it needs where a falloff is connected.
+struct WithFalloff {
+  std::shared_ptr<const void> kernel;
+  ComputeFn compute = nullptr;
+  std::size_t scratch_floats = 0;  // the kernel's own; behind them, the points as they came in
+  int falloff = -1;                // the input; -1: none
+  std::vector<Index> positions;    // of the output points among those that come in; empty: the same
+};
+
+void ComputeWithFalloff(ComputeContext& c) {
+  const auto& bound = c.kernel_as<WithFalloff>();
+  ComputeContext own = c;
+  own.kernel = bound.kernel.get();
+  if (bound.falloff < 0) {
+    bound.compute(own);
+    return;
+  }
+  const ConstPointsView& in = c.points(kInPoints);
+  const PointsView& out = c.out_points(0);
+  const std::size_t row = PaddedCount(out.count);
+  float* copy = c.scratch + bound.scratch_floats;
+  const PointsView before{copy, copy + row, copy + 2 * row, out.count};  // compute may work in place
+  if (bound.positions.empty()) {
+    CopyPoints(in, before);
+  } else {
+    GatherPoints(in, bound.positions, before);
+  }
+  bound.compute(own);
+  const float* weights = c.points(bound.falloff).x;
+  c.host->For(out.count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const float w = weights[i];
+      if (w == 1) continue;
+      out.x[i] = w == 0 ? before.x[i] : before.x[i] + w * (out.x[i] - before.x[i]);
+      out.y[i] = w == 0 ? before.y[i] : before.y[i] + w * (out.y[i] - before.y[i]);
+      out.z[i] = w == 0 ? before.z[i] : before.z[i] + w * (out.z[i] - before.z[i]);
+    }
+  });
+}
+
+}  // namespace
+
 NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind, DemandFn demand) {
+  builder
+      .points_in("falloffWeights",
+                 "a factor for what it does to each point, which may vary; `falloff: NAME` connects it",
+                 Type::kWeights)
+      .per_geometry();
   builder.out("outPoints", Type::kPoints, "the deformed points").per_geometry();
-  builder.compute(compute).in_place("inPoints");
-  if (bind) builder.bind(std::move(bind));
-  if (demand) builder.demand(std::move(demand));
+  builder.compute(&ComputeWithFalloff).in_place("inPoints");
+  const int falloff = builder.input_position("falloffWeights");
+  builder.bind([=](const Binding& binding) -> Result<BoundKernel> {
+    BoundKernel own;
+    if (bind) {
+      Result<BoundKernel> made = bind(binding);
+      if (!made.ok()) return made.status();
+      own = std::move(*made);
+    }
+    WithFalloff bound{own.object, compute, (own.scratch_floats + 15) / 16 * 16, -1, {}};
+    if (binding.input("falloffWeights").total() == 0) {
+      return MakeBound(std::move(bound), own.scratch_floats, own.state_bytes);
+    }
+    bound.falloff = falloff;
+    const PointSet &in = binding.input("inPoints"), &out = binding.output("outPoints");
+    if (!(in == out)) bound.positions = in.PositionsOf(out);
+    const std::size_t scratch = bound.scratch_floats + 3 * PaddedCount(out.size());
+    return MakeBound(std::move(bound), scratch, own.state_bytes);
+  });
+  builder.demand([=](Demand& asked) {
+    const PointSet& out = asked.output("outPoints");
+    if (demand) {
+      demand(asked);
+    } else {
+      asked.Require("inPoints", 0, out);
+    }
+    if (asked.input_total("falloffWeights") > 0) asked.Require("falloffWeights", 0, out);
+  });
   return builder;
 }
 

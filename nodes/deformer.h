@@ -25,7 +25,9 @@ enum DeformerInput { kInPoints = 0, kEnvelope = 1, kParentMatrix = 2, kFirstOwnI
 // Declares inPoints, envelope, parentMatrix, weights, mesh, space, geometryMatrix. Declare the deformer's own
 // inputs next, then close it with FinishDeformer.
 NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string doc);
-// Declares outPoints and the group; the output may take over the input's buffer. demand may be null (local).
+// Declares falloffWeights, outPoints and the group; the output may take over the input's buffer. demand may
+// be null (local). Where falloffWeights w are connected, the points are in + w (out - in) of what compute
+// gives: its own kernel knows nothing of them, and nothing is spent where they are not.
 NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind, DemandFn demand = nullptr);
 
 // The weight map at these points (empty: 1 everywhere); for bind, at the output points.

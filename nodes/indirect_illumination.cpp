@@ -1,7 +1,8 @@
-// indirectIllumination: the irradiance that arrives after bounces, at what a camera sees. A picture's pixels
-// are its points: demand is local in them and global in the geometry.
+// indirectIllumination: the irradiance that arrives after bounces, at what a camera sees and at the points of
+// meshes that move through its picture. Demand is local in these shading points and global in the geometry.
 #include <algorithm>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "graph/geometry.h"
@@ -14,25 +15,104 @@ namespace kpsa {
 namespace {
 
 enum Input { kPoints, kCamera, kLightMatrix, kLightColor };
+enum Output { kIrradiance, kPointIrradiance };
 constexpr Index kLargestSide = 4096;
 
-struct IlluminationKernel {
-  std::vector<Index> pixels, triangles;  // triangles over all meshes' points, one after the other
-  std::vector<float> albedo;             // three a triangle
-  std::vector<DiffuseLight::Kind> lights;
-  Index width = 0, height = 0, points = 0;
-  std::uint32_t seed = 0;
-  int samples = 0, bounces = 0;
+// A tracer with room for the inputs of one evaluation.
+struct Workplace {
+  PathTracer tracer;
+  PointBuffer points;
+  std::vector<DiffuseLight> lights;
 };
 
-Result<Index> PixelCount(const Structural& s, std::string_view, int) {
-  const int width = s.get_int("width"), height = s.get_int("height");
-  return static_cast<Index>(width) * static_cast<Index>(height);
+// Tracers that no evaluation uses now. Any is as good as any other: all are built of the rest points, and
+// what rays meet depends on that layout and on where the points are, not on where they have been.
+class Workplaces {
+ public:
+  std::unique_ptr<Workplace> Take() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (free_.empty()) return nullptr;
+    std::unique_ptr<Workplace> last = std::move(free_.back());
+    free_.pop_back();
+    return last;
+  }
+  void Give(std::unique_ptr<Workplace> place) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    free_.push_back(std::move(place));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Workplace>> free_;
+};
+
+struct IlluminationKernel {
+  std::vector<Index> pixels;
+  std::vector<std::vector<Index>> carried;  // by element of pointIrradiance: points, of all meshes' points
+  std::vector<Index> triangles;             // over all meshes' points, one after the other
+  std::vector<float> albedo;                // three a triangle
+  std::vector<std::uint8_t> unseen;         // triangles of carried meshes
+  PointBuffer rest;
+  std::vector<DiffuseLight::Kind> lights;
+  Index width = 0, height = 0;
+  PathOptions paths;
+  std::shared_ptr<Workplaces> workplaces = std::make_shared<Workplaces>();
+};
+
+const std::vector<std::int64_t>& CarriedMeshes(const Structural& s) {
+  return s.value("carriedMeshes").get<std::vector<std::int64_t>>();
+}
+
+Result<Index> ShadingPointCount(const Structural& s, std::string_view output, int element) {
+  if (output == "irradiance") {
+    const int width = s.get_int("width"), height = s.get_int("height");
+    return static_cast<Index>(width) * static_cast<Index>(height);
+  }
+  const std::vector<std::int64_t>& carried = CarriedMeshes(s);
+  if (element < 0 || static_cast<std::size_t>(element) >= carried.size()) return 0;
+  const auto* mesh = s.asset<Mesh>("mesh", static_cast<int>(carried[static_cast<std::size_t>(element)]));
+  return mesh == nullptr ? 0 : mesh->point_count();
 }
 
 void DemandGeometry(Demand& demand) {
   for (int m = 0; m < demand.structural().array_size("points"); ++m)
     demand.Require("points", m, PointSet::All(demand.input_total("points", m)));
+}
+
+Status BindMeshes(const Binding& binding, IlluminationKernel* kernel, std::vector<Index>* first_points) {
+  const Structural& s = binding.structural();
+  const std::vector<std::int64_t>& carried = CarriedMeshes(s);
+  const int meshes = s.array_size("points");
+  if (meshes == 0) return Status::Invalid("points: no mesh to light; connect points[0]");
+  Index points = 0;
+  std::vector<float> rest;
+  for (int m = 0; m < meshes; ++m) {
+    const auto* mesh = s.asset<Mesh>("mesh", m);
+    if (mesh == nullptr) return Status::Invalid("mesh[{}] is not set: points[{}] need their triangles", m, m);
+    const Index total = binding.input("points", m).total();
+    if (mesh->point_count() != total)
+      return Status::Invalid("mesh[{}] has {} points, points[{}] are {}", m, mesh->point_count(), m, total);
+    const bool unseen = std::find(carried.begin(), carried.end(), m) != carried.end();
+    for (const Mesh::Primitive& primitive : mesh->data().primitives) {
+      for (Index t = primitive.first_triangle; t < primitive.first_triangle + primitive.triangle_count; ++t) {
+        for (Index k = 0; k < 3; ++k) {
+          kernel->triangles.push_back(points + mesh->data().triangles[3 * t + k]);
+          kernel->albedo.push_back(std::clamp(primitive.base_color[k], 0.0f, 1.0f));
+        }
+        kernel->unseen.push_back(unseen);
+      }
+    }
+    // Where the search structure gets its layout; the mesh's own rest where nothing upstream tells another
+    const Value* at_rest = s.rest("points", m);
+    const ConstPointsView from = at_rest != nullptr && at_rest->points()->count() == total
+                                     ? std::as_const(*at_rest->points()).view()
+                                     : std::as_const(mesh->data().rest).view();
+    for (std::size_t i = 0; i < from.count; ++i) rest.insert(rest.end(), {from.x[i], from.y[i], from.z[i]});
+    first_points->push_back(points);
+    points += total;
+  }
+  kernel->rest = PointBuffer::FromInterleaved(rest);
+  return Status();
 }
 
 Result<BoundKernel> BindIllumination(const Binding& binding) {
@@ -41,31 +121,22 @@ Result<BoundKernel> BindIllumination(const Binding& binding) {
   kernel.pixels = binding.output("irradiance").ToVector();
   kernel.width = static_cast<Index>(s.get_int("width"));
   kernel.height = static_cast<Index>(s.get_int("height"));
-  kernel.samples = s.get_int("samples");
-  kernel.bounces = s.get_int("bounces");
-  kernel.seed = static_cast<std::uint32_t>(s.get_int("seed"));
-  const int meshes = s.array_size("points");
-  if (meshes == 0) return Status::Invalid("points: no mesh to light; connect points[0]");
-  for (int m = 0; m < meshes; ++m) {
-    const auto* mesh = s.asset<Mesh>("mesh", m);
-    if (mesh == nullptr) return Status::Invalid("mesh[{}] is not set: points[{}] need their triangles", m, m);
-    const Index total = binding.input("points", m).total();
-    if (mesh->point_count() != total)
-      return Status::Invalid("mesh[{}] has {} points, points[{}] are {}", m, mesh->point_count(), m, total);
-    for (const Mesh::Primitive& primitive : mesh->data().primitives) {
-      for (Index t = primitive.first_triangle; t < primitive.first_triangle + primitive.triangle_count; ++t) {
-        for (Index k = 0; k < 3; ++k) {
-          kernel.triangles.push_back(kernel.points + mesh->data().triangles[3 * t + k]);
-          kernel.albedo.push_back(std::clamp(primitive.base_color[k], 0.0f, 1.0f));
-        }
-      }
-    }
-    kernel.points += total;
+  kernel.paths = {static_cast<std::uint32_t>(s.get_int("seed")), s.get_int("samples"), s.get_int("bounces"),
+                  s.get_double("largestContribution")};
+  std::vector<Index> first_points;
+  KPSA_RETURN_IF_ERROR(BindMeshes(binding, &kernel, &first_points));
+  int element = 0;
+  for (std::int64_t mesh : CarriedMeshes(s)) {
+    if (mesh < 0 || static_cast<std::size_t>(mesh) >= first_points.size())
+      return Status::Invalid("carriedMeshes: {} is none of the {} meshes", mesh, first_points.size());
+    std::vector<Index>& points =
+        kernel.carried.emplace_back(binding.output("pointIrradiance", element++).ToVector());
+    for (Index& point : points) point += first_points[static_cast<std::size_t>(mesh)];
   }
   const auto& kinds = s.value("lightKinds").get<std::vector<std::int64_t>>();
   for (std::int64_t kind : kinds) {
-    if (kind < 0 || kind > 2)
-      return Status::Invalid("lightKinds: {} is none of 0 (point), 1 (area), 2 (sun)", kind);
+    if (kind < 0 || kind > 3)
+      return Status::Invalid("lightKinds: {} is none of 0 (point), 1 (area), 2 (sun), 3 (sphere)", kind);
     kernel.lights.push_back(static_cast<DiffuseLight::Kind>(kind));
   }
   if (static_cast<int>(kinds.size()) != s.array_size("lightMatrix") ||
@@ -76,40 +147,64 @@ Result<BoundKernel> BindIllumination(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
-void ComputeIllumination(ComputeContext& c) {
-  const auto& kernel = c.kernel_as<IlluminationKernel>();
+// A workplace with the inputs of this evaluation.
+Result<std::unique_ptr<Workplace>> SetUp(const ComputeContext& c, const IlluminationKernel& kernel) {
+  std::unique_ptr<Workplace> place = kernel.workplaces->Take();
+  if (place == nullptr) {
+    std::vector<DiffuseLight> lights(kernel.lights.size());
+    Result<PathTracer> tracer = PathTracer::Build(std::as_const(kernel.rest).view(), kernel.triangles,
+                                                  kernel.albedo, lights, kernel.unseen);
+    if (!tracer.ok()) return tracer.status();
+    place = std::make_unique<Workplace>(
+        Workplace{std::move(*tracer), PointBuffer(kernel.rest.count()), std::move(lights)});
+  }
   const ArrayView<ConstPointsView> meshes = c.array<ConstPointsView>(kPoints);
-  PointBuffer all(kernel.points);
   std::size_t at = 0;
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
     const ConstPointsView& from = meshes[m];
-    std::copy_n(from.x, from.count, all.view().x + at);
-    std::copy_n(from.y, from.count, all.view().y + at);
-    std::copy_n(from.z, from.count, all.view().z + at);
+    std::copy_n(from.x, from.count, place->points.view().x + at);
+    std::copy_n(from.y, from.count, place->points.view().y + at);
+    std::copy_n(from.z, from.count, place->points.view().z + at);
     at += from.count;
   }
-  std::vector<DiffuseLight> lights(kernel.lights.size());
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kLightMatrix);
   const ArrayView<Double3> colors = c.array<Double3>(kLightColor);
-  for (std::uint32_t l = 0; l < lights.size(); ++l) lights[l] = {kernel.lights[l], matrices[l], colors[l]};
-  const Result<PathTracer> tracer =
-      PathTracer::Build(std::as_const(all).view(), kernel.triangles, kernel.albedo, std::move(lights));
-  if (!tracer.ok()) return c.host->Fail(tracer.status().errors().front().message);
-  const Matrix4& camera = c.get<Matrix4>(kCamera);
-  const PointsView& out = c.out_points(0);
+  for (std::uint32_t l = 0; l < kernel.lights.size(); ++l)
+    place->lights[l] = {kernel.lights[l], matrices[l], colors[l]};
+  KPSA_RETURN_IF_ERROR(place->tracer.Update(std::as_const(place->points).view(), place->lights));
+  return place;
+}
+
+void ComputeIllumination(ComputeContext& c) {
+  const auto& kernel = c.kernel_as<IlluminationKernel>();
+  Result<std::unique_ptr<Workplace>> place = SetUp(c, kernel);
+  if (!place.ok()) return c.host->Fail(place.status().errors().front().message);
+  const PathTracer& tracer = (*place)->tracer;
   const Parallel parallel = HostParallel(c);
+  const auto gather = [&](const ShadingPlace& at, Index own, const PointsView& out, std::size_t i) {
+    PathOptions paths = kernel.paths;
+    paths.seed ^= own * 0x9e3779b1u;
+    const Double3 light = tracer.Indirect(at, paths);
+    out.x[i] = static_cast<float>(light.x);
+    out.y[i] = static_cast<float>(light.y);
+    out.z[i] = static_cast<float>(light.z);
+  };
+  const Matrix4& camera = c.get<Matrix4>(kCamera);
   ForRanges(&parallel, kernel.pixels.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Double3 origin, direction;
       PixelRay(camera, kernel.pixels[i], kernel.width, kernel.height, &origin, &direction);
-      const ShadingPlace place = tracer->Look(origin, direction);
-      const Double3 light = tracer->Indirect(place, kernel.seed ^ kernel.pixels[i] * 0x9e3779b1u,
-                                             kernel.samples, kernel.bounces);
-      out.x[i] = static_cast<float>(light.x);
-      out.y[i] = static_cast<float>(light.y);
-      out.z[i] = static_cast<float>(light.z);
+      gather(tracer.See(origin, direction), kernel.pixels[i], c.out_points(kIrradiance), i);
     }
   });
+  for (std::uint32_t e = 0; e < kernel.carried.size(); ++e) {
+    const std::vector<Index>& points = kernel.carried[e];
+    ForRanges(&parallel, points.size(), 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        gather(tracer.OnPoint(points[i]), ~points[i], c.out_points(kPointIrradiance, e), i);
+    });
+  }
+  kernel.workplaces->Give(std::move(*place));
 }
 
 }  // namespace
@@ -125,18 +220,28 @@ void AddIlluminationNodes(NodeRegistry& registry) {
   b.in("lightMatrix", Matrix4(), {.doc = "outMatrix of a light"}).array();
   b.in("lightColor", Double3(), {.doc = "outColor of a light"}).array();
   b.structural("lightKinds", Value(std::vector<std::int64_t>()),
-               {.doc = "what each light is: 0 point, 1 area, 2 sun"});
+               {.doc = "what each light is: 0 point, 1 area, 2 sun, 3 sphere"});
+  b.structural("carriedMeshes", Value(std::vector<std::int64_t>()),
+               {.doc = "numbers of meshes that the pixels look through; light at their points is in "
+                       "pointIrradiance"});
   b.structural("width", 400, {.min = 1, .max = kLargestSide, .doc = "pixels"});
   b.structural("height", 400, {.min = 1, .max = kLargestSide, .doc = "pixels"});
-  b.structural("samples", 16, {.min = 1, .max = 65536, .doc = "paths a pixel"});
+  b.structural("samples", 16,
+               {.min = 1, .max = 65536, .doc = "paths a shading point; powers of two are even"});
   b.structural("bounces", 2, {.min = 1, .max = 64, .doc = "surfaces a path may meet"});
+  b.structural(
+      "largestContribution", 0.0,
+      {.min = 0,
+       .doc = "of one light to one path at one bounce; what is more is scaled down, which makes the mean "
+              "darker. 0: no limit"});
   b.structural("seed", 0, {.min = 0, .doc = "of the samples"});
   b.out("irradiance", Type::kColors,
         "at each pixel, row by row from the top left; 0 where there is no surface");
+  b.out("pointIrradiance", Type::kColors, "at each point of a carried mesh").array();
   b.compute(&ComputeIllumination)
       .demand(DemandGeometry)
       .bind(BindIllumination)
-      .point_count(PixelCount)
+      .point_count(ShadingPointCount)
       .cost(1e6f, 2e4f);
 }
 

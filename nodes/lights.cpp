@@ -1,5 +1,5 @@
-// camera, pointLight, areaLight, sunLight: what a picture is taken with. Each hands on its frame and its
-// strength.
+// camera, pointLight, sphereLight, areaLight, sunLight: what a picture is taken with. Each hands on its frame
+// and its strength.
 #include "base/scalar_math.h"
 #include "nodes/illumination.h"
 #include "nodes/standard_nodes.h"
@@ -34,6 +34,15 @@ void AddLightNodes(NodeRegistry& registry) {
                                "radiant intensity: irradiance at 1 m");
   FinishLight(point);
   PassMatrix(point);
+
+  NodeBuilder sphere = AddLight(registry, "sphereLight", "Light from a ball, with soft shadows.",
+                                "radiant intensity: irradiance at 1 m, from afar");
+  sphere.in("radius", 0.1, {.min = 0, .unit = Unit::kLength, .doc = "of the ball"});
+  FinishLight(sphere);
+  sphere.out("outMatrix", Type::kMatrix, "the light's frame, scaled to its size");
+  sphere.compute_for({"outMatrix"}, {"matrix", "radius"}, [](const Matrix4& matrix, double radius) {
+    return matrix * Scaling({radius, radius, radius});
+  });
 
   NodeBuilder area = AddLight(registry, "areaLight", "Light from a rectangle, along its -Z.", "radiance");
   area.in("width", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "along the frame's X"});

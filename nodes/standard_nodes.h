@@ -21,6 +21,9 @@ void AddNonLinearNodes(NodeRegistry& registry);         // bend, twist, squash, 
 void AddTensionNode(NodeRegistry& registry);            // tension
 void AddWrapNodes(NodeRegistry& registry);              // wrap, proximityWrap
 void AddShrinkWrapNode(NodeRegistry& registry);         // shrinkWrap
+// sphereFalloff, capsuleFalloff, planeFalloff, proximityFalloff, weightMap, combineFalloff
+void AddFalloffNodes(NodeRegistry& registry);
+void AddPinNodes(NodeRegistry& registry);               // uvPin, follicle
 void AddSculptNode(NodeRegistry& registry);             // sculpt
 void AddPoseInterpolatorNode(NodeRegistry& registry);   // poseInterpolator
 void AddJiggleNode(NodeRegistry& registry);             // jiggle
@@ -33,9 +36,12 @@ void AddUtilityNodes(NodeRegistry& registry);
 void AddMatrixNodes(NodeRegistry& registry);
 void AddSelectionNodes(NodeRegistry& registry);   // condition, choice
 void AddConstraintNodes(NodeRegistry& registry);  // pointConstraint, orient..., parent..., scale..., aim...
-void AddIkNodes(NodeRegistry& registry);          // ikHandle, poleVectorConstraint
-void AddSpaceSwitchNode(NodeRegistry& registry);  // spaceSwitch
-void AddSplineIkNode(NodeRegistry& registry);     // splineIk
+// vrmRollConstraint, vrmAimConstraint, vrmRotationConstraint
+void AddVrmConstraintNodes(NodeRegistry& registry);
+void AddVrmExpressionNodes(NodeRegistry& registry);     // vrmExpressions, vrmMorphWeights
+void AddIkNodes(NodeRegistry& registry);                // ikHandle, poleVectorConstraint
+void AddSpaceSwitchNode(NodeRegistry& registry);        // spaceSwitch
+void AddSplineIkNode(NodeRegistry& registry);           // splineIk
 void AddTwistDistributionNode(NodeRegistry& registry);  // twistDistribution
 void AddLightNodes(NodeRegistry& registry);             // camera, pointLight, areaLight, sunLight
 void AddIlluminationNodes(NodeRegistry& registry);      // indirectIllumination

@@ -91,6 +91,7 @@ void ComputeWrap(ComputeContext& c) {
 void AddWrapNodes(NodeRegistry& registry) {
   NodeBuilder wrap = AddDeformer(registry, "wrap",
                                  "Points follow the nearest points of a driver mesh, each with its frame.");
+  wrap.version(2);  // floats
   AddDriver(wrap);
   wrap.structural("maxDistance", 0.0,
                   {.min = 0,
@@ -100,10 +101,11 @@ void AddWrapNodes(NodeRegistry& registry) {
   wrap.structural("influences", 8,
                   {.min = 1, .max = 64, .doc = "how many driver points, the nearest ones, move a point"});
   wrap.enumeration("falloffMode", {"volume"}, true, "how distances are measured: straight through space");
-  FinishDeformer(wrap, &ComputeWrap, BindWrap<true>, DemandWrapNode<true>).cost(1000, 90);
+  FinishDeformer(wrap, &ComputeWrap, BindWrap<true>, DemandWrapNode<true>).cost(1000, 45);
 
   NodeBuilder proximity =
       AddDeformer(registry, "proximityWrap", "Points follow the nearest place of a driver's surface.");
+  proximity.version(2);  // floats
   AddDriver(proximity);
   proximity.enumeration(
       "wrapMode", {"offset", "surface", "snap"}, true,
@@ -116,7 +118,7 @@ void AddWrapNodes(NodeRegistry& registry) {
   proximity.structural(
       "smoothInfluences", 0,
       {.min = 0, .max = 20, .doc = "rings over which the influence of the nearest triangle is spread"});
-  FinishDeformer(proximity, &ComputeWrap, BindWrap<false>, DemandWrapNode<false>).cost(1000, 60);
+  FinishDeformer(proximity, &ComputeWrap, BindWrap<false>, DemandWrapNode<false>).cost(1000, 30);
 }
 
 }  // namespace kpsa

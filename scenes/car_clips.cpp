@@ -17,22 +17,23 @@ struct Turn {
   int axis;
   double low, high;
 };
-constexpr Turn kTurns[] = {{{kJaw, kJaw}, 0, -2, 12},         {{kJaw, kJaw}, 1, -3, 3},
-                           {{kChassis, kChassis}, 0, -3, 3},  {{kChassis, kChassis}, 2, -3, 3},
-                           {{kBody, kBody}, 0, -3, 3},        {{kBody, kBody}, 1, -3, 3},
-                           {{kBody, kBody}, 2, -3, 3},        {{kHood, kHood}, 0, -3, 0.5},
-                           {{kHood, kHood}, 2, -0.7, 0.7},    {{kRoof, kRoof}, 0, -1.5, 1.5},
-                           {{kRoof, kRoof}, 2, -1.5, 1.5},    {{kLidUpL, kLidUpL}, 0, -8, 16},
-                           {{kLidUpR, kLidUpR}, 0, -8, 16},   {{kLidLowL, kLidLowL}, 0, -10, 4},
-                           {{kLidLowR, kLidLowR}, 0, -10, 4}, {{kEyeL, kEyeR}, 0, -12, 16},
-                           {{kEyeL, kEyeR}, 1, -22, 22}};
+constexpr Turn kTurns[] = {
+    {{kJaw, kJaw}, 0, -2, 12},        {{kJaw, kJaw}, 1, -3, 3},          {{kChassis, kChassis}, 0, -3, 3},
+    {{kChassis, kChassis}, 2, -3, 3}, {{kBody, kBody}, 0, -3, 3},        {{kBody, kBody}, 1, -3, 3},
+    {{kBody, kBody}, 2, -3, 3},       {{kHood, kHood}, 0, -3, 0.5},      {{kHood, kHood}, 2, -0.7, 0.7},
+    {{kRoof, kRoof}, 0, -1.5, 1.5},   {{kRoof, kRoof}, 2, -1.5, 1.5},    {{kLidUpL, kLidUpL}, 0, -8, 16},
+    {{kLidUpR, kLidUpR}, 0, -8, 16},  {{kLidLowL, kLidLowL}, 0, -10, 4}, {{kLidLowR, kLidLowR}, 0, -10, 4},
+    {{kEyeL, kEyeR}, 0, -12, 16},     {{kEyeL, kEyeR}, 1, -22, 22}};
 constexpr int kTurnCount = static_cast<int>(std::size(kTurns));
 
 // The values of all controls at all frames: weights of the body, of the muscles, turns.
 class Track {
  public:
   Track(std::vector<std::string> names, std::size_t bodys, int frames)
-      : names_(std::move(names)), bodys_(bodys), frames_(frames), weights_(Size(frames) * names_.size()),
+      : names_(std::move(names)),
+        bodys_(bodys),
+        frames_(frames),
+        weights_(Size(frames) * names_.size()),
         turns_(Size(frames) * Size(kTurnCount)) {}
 
   int frames() const { return frames_; }
@@ -50,7 +51,8 @@ class Track {
       weights_[Size(frame) * names_.size() + Size(control)] += std::fabs(share);
     } else {
       const int turn = control - weights();
-      turns_[Size(frame * kTurnCount + turn)] += share >= 0 ? share * kTurns[turn].high : -share * kTurns[turn].low;
+      turns_[Size(frame * kTurnCount + turn)] +=
+          share >= 0 ? share * kTurns[turn].high : -share * kTurns[turn].low;
     }
   }
 
@@ -66,7 +68,8 @@ class Track {
           if (turn.joints[0] != joint && turn.joints[1] != joint) continue;
           degrees[turn.axis] += std::clamp(turns_[Size(f * kTurnCount + t)], turn.low, turn.high);
         }
-        const Quaternion q = QuaternionFromRotation(RotationFromEuler(degrees * (kPi / 180), RotateOrder::kXyz));
+        const Quaternion q =
+            QuaternionFromRotation(RotationFromEuler(degrees * (kPi / 180), RotateOrder::kXyz));
         for (double v : {q.x, q.y, q.z, q.w}) channel.values.push_back(static_cast<float>(v));
       }
       clip.channels.push_back(std::move(channel));
@@ -116,14 +119,17 @@ void Sweep(Track* track) {
 }
 
 // Smooth motion between random keys, `calm` of which rest at 0.
-void Wander(Track* track, int control, Random* random, int shortest, int longest, double calm, double largest) {
+void Wander(Track* track, int control, Random* random, int shortest, int longest, double calm,
+            double largest) {
   double from = 0;
   for (int frame = 0; frame < track->frames();) {
     const int length = shortest + random->Below(longest - shortest + 1);
     const bool rests = random->Uniform() < calm;
-    const double u = random->Uniform(), sign = control >= track->weights() && random->Uniform() < 0.5 ? -1 : 1;
+    const double u = random->Uniform(),
+                 sign = control >= track->weights() && random->Uniform() < 0.5 ? -1 : 1;
     const double to = rests ? 0 : sign * largest * (0.15 + 0.85 * u);
-    for (int k = 0; k < length; ++k, ++frame) track->Add(frame, control, from + (to - from) * Smooth(0, length, k));
+    for (int k = 0; k < length; ++k, ++frame)
+      track->Add(frame, control, from + (to - from) * Smooth(0, length, k));
     from = to;
   }
 }
@@ -131,13 +137,14 @@ void Wander(Track* track, int control, Random* random, int shortest, int longest
 // Syllables in phrases: the jaw opens and closes with a shape of the lips each; and blinks.
 void Speak(Track* track, Random* random) {
   const int open = track->Find("mouthOpen"), jaw = track->weights();
-  const int shapes[] = {track->Find("pucker"),     track->Find("funnel"),    track->Find("lipPress"),
-                        track->Find("lipUpperUp"), track->Find("stretch.L"), track->Find("smile.L"),
+  const int shapes[] = {track->Find("pucker"),        track->Find("funnel"),    track->Find("lipPress"),
+                        track->Find("lipUpperUp"),    track->Find("stretch.L"), track->Find("smile.L"),
                         track->Find("lipLowerDown.L")};
   for (int frame = 4; frame + 12 < track->frames(); frame += 4 + random->Below(10)) {
     for (int syllables = 5 + random->Below(7); syllables > 0; --syllables) {
       const int length = 4 + random->Below(3), which = random->Below(static_cast<int>(std::size(shapes)));
-      const double wide = random->Uniform(0.1, 0.65), lips = random->Uniform(0, 0.3), amount = random->Uniform(0.2, 0.8);
+      const double wide = random->Uniform(0.1, 0.65), lips = random->Uniform(0, 0.3),
+                   amount = random->Uniform(0.2, 0.8);
       for (int k = -2; k < length + 2; ++k) {
         const double arc = Bump(k - length / 2.0, length / 2.0 + 2);
         track->Add(frame + k, jaw, wide * arc);

@@ -28,10 +28,13 @@ class Maker {
       double upper = Smooth(kMouthHeight - 8, kMouthHeight + 14, p.y);
       const double inner = Smooth(0.3, 1, std::min(shape.mouth[i], 1.0));
       upper += (0.5 + 0.5 * shape.lip[i] - upper) * inner;
-      places_.push_back({p, upper, Smooth(-14, 14, p.x), Smooth(1.1, 2, shape.mouth[i]), shape.socket[i] > 0 ? 1.0 : 0.0});
+      places_.push_back(
+          {p, upper, Smooth(-14, 14, p.x), Smooth(1.1, 2, shape.mouth[i]), shape.socket[i] > 0 ? 1.0 : 0.0});
     }
   }
-  void Center(const std::string& name, const Formula& formula) { expressions_.push_back({name, Deltas(formula)}); }
+  void Center(const std::string& name, const Formula& formula) {
+    expressions_.push_back({name, Deltas(formula)});
+  }
   void Pair(const std::string& name, const Formula& formula) { PairOf(name, Deltas(formula)); }
   void PairOf(const std::string& name, std::vector<Double3> left) {
     std::vector<Double3> right;
@@ -58,8 +61,8 @@ class Maker {
   std::vector<Expression> expressions_;
 };
 
-// The left lids turned about the eyeball by degrees: the upper one down, the lower one up; `tilt` turns the upper
-// lid's inner end farther.
+// The left lids turned about the eyeball by degrees: the upper one down, the lower one up; `tilt` turns the
+// upper lid's inner end farther.
 std::vector<Double3> Maker::Lids(double upper, double lower, double tilt) const {
   std::vector<Double3> out(places_.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -82,20 +85,31 @@ void Maker::Eyes() {
 }
 
 void Maker::Brows() {
-  const auto band = [](const Place& q, Double3 at, Double3 radius) { return Share(q.p, at, radius) * (1 - q.eye) * q.left; };
+  const auto band = [](const Place& q, Double3 at, Double3 radius) {
+    return Share(q.p, at, radius) * (1 - q.eye) * q.left;
+  };
   Pair("browUp", [=](const Place& q) { return Double3{0, 9, -4} * band(q, {26, 150, 0}, {34, 24, 24}); });
   Pair("browDown", [=](const Place& q) { return Double3{-2, -8, 5} * band(q, {26, 150, 0}, {34, 24, 24}); });
-  Pair("browInnerUp", [=](const Place& q) { return Double3{0, 9, -3} * band(q, {10, 150, 2}, {20, 24, 22}); });
+  Pair("browInnerUp", [=](const Place& q) {
+    return Double3{0, 9, -3} * band(q, {10, 150, 2}, {20, 24, 22});
+  });
 }
 
 void Maker::Mouth() {
   Pair("smile", [](const Place& q) {
-    return (Double3{7, 11, -9} * Share(q.p, kCorner, {34, 24, 40}) + Double3{3, 4, 3} * Share(q.p, {58, 66, 150}, {30, 20, 34})) * q.left;
+    return (Double3{7, 11, -9} * Share(q.p, kCorner, {34, 24, 40}) +
+            Double3{3, 4, 3} * Share(q.p, {58, 66, 150}, {30, 20, 34})) *
+           q.left;
   });
-  Pair("frown", [](const Place& q) { return Double3{2, -13, -3} * (Share(q.p, kCorner, {34, 26, 40}) * q.left); });
-  Pair("stretch", [](const Place& q) { return Double3{11, -1, -9} * (Share(q.p, kCorner, {36, 22, 40}) * q.left); });
+  Pair("frown", [](const Place& q) {
+    return Double3{2, -13, -3} * (Share(q.p, kCorner, {34, 26, 40}) * q.left);
+  });
+  Pair("stretch", [](const Place& q) {
+    return Double3{11, -1, -9} * (Share(q.p, kCorner, {36, 22, 40}) * q.left);
+  });
   Pair("lipLowerDown", [](const Place& q) {
-    return Double3{1, -8, 1} * (Share(q.p, {18, 38, 172}, {30, 20, 30}) * (1 - q.upper) * q.left * (1 - 0.6 * q.inside));
+    return Double3{1, -8, 1} *
+           (Share(q.p, {18, 38, 172}, {30, 20, 30}) * (1 - q.upper) * q.left * (1 - 0.6 * q.inside));
   });
   Center("mouthOpen", [](const Place& q) {
     const double w = Share(q.p, kMiddle, {62, 36, 60});
@@ -103,7 +117,8 @@ void Maker::Mouth() {
   });
   Center("pucker", [](const Place& q) {
     const double w = Share(q.p, kMiddle, {62, 34, 46});
-    return Double3{-0.48 * q.p.x, (2 * q.upper - 1) * 3, 13 - 0.004 * q.p.x * q.p.x} * (w * (1 - 0.5 * q.inside));
+    return Double3{-0.48 * q.p.x, (2 * q.upper - 1) * 3, 13 - 0.004 * q.p.x * q.p.x} *
+           (w * (1 - 0.5 * q.inside));
   });
   Center("funnel", [](const Place& q) {
     const double w = Share(q.p, kMiddle, {62, 36, 46});
@@ -113,20 +128,32 @@ void Maker::Mouth() {
     const double w = Share(q.p, kMiddle, {56, 22, 34}) * (1 - q.inside);
     return Double3{0.04 * q.p.x, (1 - 2 * q.upper) * 4.2, -4} * w;
   });
-  Center("lipUpperUp", [](const Place& q) { return Double3{0, 8, 3} * (Share(q.p, {0, 56, 174}, {50, 20, 30}) * q.upper * (1 - q.inside)); });
-  Center("mouthLeft", [](const Place& q) { return Double3{13, 1, -0.05 * q.p.x} * Share(q.p, kMiddle, {74, 34, 46}); });
-  Center("mouthRight", [](const Place& q) { return Double3{-13, 1, 0.05 * q.p.x} * Share(q.p, kMiddle, {74, 34, 46}); });
+  Center("lipUpperUp", [](const Place& q) {
+    return Double3{0, 8, 3} * (Share(q.p, {0, 56, 174}, {50, 20, 30}) * q.upper * (1 - q.inside));
+  });
+  Center("mouthLeft", [](const Place& q) {
+    return Double3{13, 1, -0.05 * q.p.x} * Share(q.p, kMiddle, {74, 34, 46});
+  });
+  Center("mouthRight", [](const Place& q) {
+    return Double3{-13, 1, 0.05 * q.p.x} * Share(q.p, kMiddle, {74, 34, 46});
+  });
 }
 
 void Maker::Body() {
-  Pair("fenderPuff", [](const Place& q) { return Double3{8, 2, 5} * (Share(q.p, {74, 64, 128}, {40, 30, 58}) * q.left * (1 - q.inside)); });
-  Center("hoodBulge", [](const Place& q) { return Double3{0, 8, 2} * (Share(q.p, {0, 92, 105}, {60, 26, 60}) * (1 - q.eye)); });
+  Pair("fenderPuff", [](const Place& q) {
+    return Double3{8, 2, 5} * (Share(q.p, {74, 64, 128}, {40, 30, 58}) * q.left * (1 - q.inside));
+  });
+  Center("hoodBulge", [](const Place& q) {
+    return Double3{0, 8, 2} * (Share(q.p, {0, 92, 105}, {60, 26, 60}) * (1 - q.eye));
+  });
 }
 
 // Shapes half way, which other targets go through, and shapes that two together need.
 void Maker::Corrections() {
   const auto find = [&](const std::string& name) {
-    return std::find_if(expressions_.begin(), expressions_.end(), [&](const Expression& e) { return e.name == name; })->deltas;
+    return std::find_if(expressions_.begin(), expressions_.end(),
+                        [&](const Expression& e) { return e.name == name; })
+        ->deltas;
   };
   PairOf("blinkHalf", Lids(32.5, 2, 0));  // around the eyeball, not straight through it
   std::vector<Double3> half = find("smile.L");
@@ -182,8 +209,12 @@ std::vector<Expression> MuscleExpressions(const CarCage& cage) {
       return Double3{side * 6, 1, -5} * Share({side * p.x, p.y, p.z}, {44, 54, 160}, {34, 24, 44});
     }));
   }
-  out.push_back(make("purse", [](Double3 p) { return Double3{-0.22 * p.x, 0, 6} * Share(p, kMiddle, {70, 36, 50}); }));
-  out.push_back(make("nose", [](Double3 p) { return Double3{0, 5, 4} * Share(p, {0, 66, 166}, {56, 22, 40}); }));
+  out.push_back(make("purse", [](Double3 p) {
+    return Double3{-0.22 * p.x, 0, 6} * Share(p, kMiddle, {70, 36, 50});
+  }));
+  out.push_back(make("nose", [](Double3 p) {
+    return Double3{0, 5, 4} * Share(p, {0, 66, 166}, {56, 22, 40});
+  }));
   return out;
 }
 

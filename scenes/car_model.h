@@ -1,6 +1,6 @@
 // The generated car that speaks: a shell with a mouth in the front bumper and eyes in the windscreen. All in
-// centimetres, Y up, facing +Z, symmetric about x = 0 exactly; the car's left (.L) is +x. Only IEEE arithmetic
-// and base/scalar_math.h: the same bits everywhere.
+// centimetres, Y up, facing +Z, symmetric about x = 0 exactly; the car's left (.L) is +x. Only IEEE
+// arithmetic and base/scalar_math.h: the same bits everywhere.
 #pragma once
 
 #include <array>
@@ -17,13 +17,13 @@ inline constexpr double kEyeBall = 24;         // its radius
 inline constexpr double kMouthHeight = 47, kMouthWidth = 38;
 inline constexpr double kWheelAxle = 29, kWheelAt = 95, kArch = 35;  // height, +-z, radius of the arch
 
-// Where a point of a coarse mesh lies, or a control of it.
+// The shell.
 struct CarShape {
   std::vector<Double3> points;
   std::vector<std::array<int, 4>> quads;  // counter-clockwise from outside; a triangle repeats its last point
   std::vector<int> mirror;                // the point at (-x, y, z)
-  // Rings from outside to inside, counter-clockwise from outside, from the corner at the greatest x. The first
-  // is of the grid around; eye rings are of the left eye.
+  // Rings from outside to inside, counter-clockwise from outside, from the corner at the greatest x. The
+  // first is of the grid around; eye rings are of the left eye.
   std::vector<std::vector<int>> mouth_rings, eye_rings;
   int lip_ring = 0, lid_ring = 0;  // of mouth_rings: the crest of the lips; of eye_rings: the lids' edge
   std::vector<double> lip;         // a point: sine of its place around the mouth; 0 away from it
@@ -45,12 +45,30 @@ CarCage PanelCage();   // under hood, roof and trunk
 CarCage FrameCage();   // a tube from front to back
 
 enum CarJoint : int {
-  kGround, kChassis, kBody, kHood, kRoof, kJaw, kLidUpL, kLidUpR, kLidLowL, kLidLowR, kEyeL, kEyeR,
-  kWheelFL, kWheelFR, kWheelBL, kWheelBR, kCarJointCount
+  kGround,
+  kChassis,
+  kBody,
+  kHood,
+  kRoof,
+  kJaw,
+  kLidUpL,
+  kLidUpR,
+  kLidLowL,
+  kLidLowR,
+  kEyeL,
+  kEyeR,
+  kWheelFL,
+  kWheelFR,
+  kWheelBL,
+  kWheelBR,
+  kCarJointCount
 };
 const std::vector<JointRest>& CarJoints();
 using JointShares = std::array<double, kCarJointCount>;
 std::vector<JointShares> CarWeights(const CarShape& shape);
+// Of the lower bumper, which the jaw carries: below the mouth's line, fading towards the sides and the
+// wheels.
+double JawField(Double3 p);
 std::map<std::string, std::vector<double>> CarWeightMaps(const CarShape& shape);
 
 // Those that controls move come first; then `half` shapes that others go through and those of combinations.

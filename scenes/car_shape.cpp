@@ -1,5 +1,5 @@
-// The car's shell: rings of quads around the sides under a grid of quads over hood, cabin and trunk, with rings of
-// their own around the mouth and the eyes.
+// The car's shell: rings of quads around the sides under a grid of quads over hood, cabin and trunk, with
+// rings of their own around the mouth and the eyes.
 #include <algorithm>
 #include <cmath>
 
@@ -12,8 +12,9 @@ namespace {
 constexpr double kWidth = 88, kLength = 170, kBottom = 20, kBeltScale = 0.965, kSillScale = 0.95;
 // Lines of the grid: from the middle to the side, and from front to back
 constexpr double kAcross[] = {0, 7, 14, 21, 28, 35, 42, 49, 56, 61, 66, 71, 79, 88};
-constexpr double kAlong[] = {170, 159, 146, 131, 115, 98,  81,  65,  53,  44,  37,   32.5, 28,   23.5, 19,   14.5, 10,
-                             6,   1,   -5,  -14, -27, -42, -55, -66, -78, -90, -102, -114, -126, -138, -150, -161, -170};
+constexpr double kAlong[] = {170, 159,  146, 131,  115,  98,   81,   65,   53,   44,  37,  32.5,
+                             28,  23.5, 19,  14.5, 10,   6,    1,    -5,   -14,  -27, -42, -55,
+                             -66, -78,  -90, -102, -114, -126, -138, -150, -161, -170};
 constexpr int kHalf = 13, kBack = 33, kColumns = 2 * (2 * kHalf + kBack), kRows = 10;
 constexpr int kMouthColumn = 7, kMouthRow0 = 4, kMouthRow1 = 8;
 constexpr int kEyeColumn0 = 1, kEyeColumn1 = 7, kEyeRow0 = 10, kEyeRow1 = 16;
@@ -33,11 +34,14 @@ double BeltHeight(double z) { return 76 + 8 * Smooth(165, 50, z) - 2 * Smooth(-6
 double TopHeight(double x, double z) {
   const double w = x / (kWidth * kBeltScale), l = z / (kLength * kBeltScale);
   const double q = std::min(1.0, Power4(w) + Power4(l));
-  const double deck = BeltHeight(z) + 11 * std::sqrt(1 - q) + 3 * Bump(x, 45) * Smooth(160, 110, z) * Smooth(30, 60, z);
-  const double front = (40 - z - 8 * (x / 70) * (x / 70)) / 36, back = (z + 128) / 58, side = (73 - std::fabs(x)) / 24;
+  const double deck =
+      BeltHeight(z) + 11 * std::sqrt(1 - q) + 3 * Bump(x, 45) * Smooth(160, 110, z) * Smooth(30, 60, z);
+  const double front = (40 - z - 8 * (x / 70) * (x / 70)) / 36, back = (z + 128) / 58,
+               side = (73 - std::fabs(x)) / 24;
   const double t = SmoothMin(SmoothMin(SmoothMin(front, back, 0.3), side, 0.35), 1, 0.3);
   const double cabin = -SmoothMin(-t, 0, 0.12);
-  const double arch = 12.5 - 7.0 * Power4((std::fabs(x) - 25) / 27);  // the brow's line, in z from the roof's edge
+  const double arch =
+      12.5 - 7.0 * Power4((std::fabs(x) - 25) / 27);  // the brow's line, in z from the roof's edge
   const double brow = Bump(z - arch + 9, 8.5) * Smooth(4, 10, std::fabs(x)) * Smooth(51, 43, std::fabs(x));
   return deck + 58 * cabin + 4.5 * brow;
 }
@@ -49,7 +53,8 @@ double RowScale(double v) {
 // The front between bottom and belt: the bumper at x and height y.
 double FrontDepth(double x, double y) {
   const double v = std::clamp((y - kBottom) / (BeltHeight(kLength) - kBottom), 0.0, 1.0), k = RowScale(v);
-  return kLength * k * Root4(1 - Power4(x / (kWidth * k))) + 7 * Bump(y - 44, 26) * Smooth(85, 40, std::fabs(x));
+  return kLength * k * Root4(1 - Power4(x / (kWidth * k))) +
+         7 * Bump(y - 44, 26) * Smooth(85, 40, std::fabs(x));
 }
 
 Double3 TopPoint(int i, int j) {
@@ -87,20 +92,22 @@ Double3 SidePoint(int column, double v) {
     p = {kWidth * k * Root4(1 - Power4(zn)), 0, kLength * k * zn};
   }
   p.y = bottom + (BeltHeight(p.z) - bottom) * v;
-  if (column <= kHalf) p.z = std::max(p.z, p.z + FrontDepth(p.x, p.y) - kLength * k * Root4(1 - Power4(p.x / (kWidth * k))));
+  if (column <= kHalf)
+    p.z = std::max(p.z, p.z + FrontDepth(p.x, p.y) - kLength * k * Root4(1 - Power4(p.x / (kWidth * k))));
   if (column >= kHalf + kBack) p.z -= 5 * Bump(p.y - 40, 20) * Smooth(85, 40, p.x);
   const double dy = p.y - kWheelAxle, dz = std::fabs(p.z) - kWheelAt;
   p.x += 5.0 * Bump(std::sqrt(dy * dy + dz * dz) - kArch, 14) * Smooth(60, 75, p.x);  // flared fenders
   return p;
 }
 
-// A place on the bumper: around the mouth's line by an angle, `wide` and `high` beyond the opening, `out` of the
-// surface.
+// A place on the bumper: around the mouth's line by an angle, `wide` and `high` beyond the opening, `out` of
+// the surface.
 Double3 AroundMouth(double angle, double wide, double high, double out) {
   double sine, cosine;
   SinCos(angle, &sine, &cosine);
   const double x = (kMouthWidth + wide) * cosine;
-  const double line = kMouthHeight + 9.0 * (x / kMouthWidth) * (x / kMouthWidth) * Smooth(70, 30, std::fabs(x));
+  const double line =
+      kMouthHeight + 9.0 * (x / kMouthWidth) * (x / kMouthWidth) * Smooth(70, 30, std::fabs(x));
   const double y = line + (4.5 + high) * sine;
   return {x, y, FrontDepth(x, y) + out};
 }
@@ -215,8 +222,9 @@ void CarBuilder::MakeMouth() {
   struct Ring {
     double wide, high, out, share;
   };
-  constexpr Ring kRings[] = {{8, 8.5, 0.5, 0.75}, {5.5, 6.5, 2.5, 0.9}, {3.0, 4.0, 5.0, 1},   {0.6, 1.2, 4.0, 1.1}, {0, 0, 0.5, 1.25},
-                             {0, 1, -6, 1.5},     {0, 4, -14, 1.75},   {-2, 6, -26, 1.9}, {-12, 2, -34, 2}};
+  constexpr Ring kRings[] = {{8, 8.5, 0.5, 0.75},  {5.5, 6.5, 2.5, 0.9}, {3.0, 4.0, 5.0, 1},
+                             {0.6, 1.2, 4.0, 1.1}, {0, 0, 0.5, 1.25},    {0, 1, -6, 1.5},
+                             {0, 4, -14, 1.75},    {-2, 6, -26, 1.9},    {-12, 2, -34, 2}};
   shape_.lip_ring = 3;
   for (const Ring& ring : kRings) {
     std::vector<int> points(kAround);
@@ -231,7 +239,8 @@ void CarBuilder::MakeMouth() {
     for (int k = 0; k < kAround; ++k) {
       shape_.mouth[Size(points[Size(k)])] = ring.share;
       const int quarter = std::min(k % (kAround / 2), kAround / 2 - k % (kAround / 2));
-      shape_.lip[Size(points[Size(k)])] = (k < kAround / 2 ? 1 : -1) * Smooth(-0.5, 4, quarter) * (quarter > 0 ? 1 : 0);
+      shape_.lip[Size(points[Size(k)])] =
+          (k < kAround / 2 ? 1 : -1) * Smooth(-0.5, 4, quarter) * (quarter > 0 ? 1 : 0);
     }
     Bridge(shape_.mouth_rings.back(), points);
     shape_.mouth_rings.push_back(std::move(points));
@@ -280,7 +289,9 @@ void CarBuilder::MakeEyes() {
     const std::vector<int>& outer = shape_.eye_rings.back();
     for (int k = 0; k < kAround; ++k) {
       const int next = (k + 1) % kAround;
-      const auto m = [&](const std::vector<int>& list, int at) { return shape_.mirror[Size(list[Size(at)])]; };
+      const auto m = [&](const std::vector<int>& list, int at) {
+        return shape_.mirror[Size(list[Size(at)])];
+      };
       shape_.quads.push_back({m(outer, next), m(outer, k), m(points, k), m(points, next)});
     }
     shape_.eye_rings.push_back(std::move(points));
@@ -321,7 +332,9 @@ CarShape CarBuilder::Build() {
 void Inset(CarCage* cage, double depth) {
   std::vector<Double3> normals(cage->points.size());
   for (const auto& q : cage->quads) {
-    const auto at = [&](int k) { return cage->points[static_cast<std::size_t>(q[static_cast<std::size_t>(k)])]; };
+    const auto at = [&](int k) {
+      return cage->points[static_cast<std::size_t>(q[static_cast<std::size_t>(k)])];
+    };
     const Double3 n = Cross(at(2) - at(0), at(3) - at(1));
     for (int i : q) normals[static_cast<std::size_t>(i)] = normals[static_cast<std::size_t>(i)] + n;
   }
@@ -344,7 +357,7 @@ CarShape MakeCarShape() { return CarBuilder().Build(); }
 CarCage MuscleCage() {
   CarCage cage;
   constexpr int kAround = 12;
-  constexpr std::array<double, 2> kRings[] = {{6, 8}, {20, 18}, {38, 23}};
+  constexpr std::array<double, 2> kRings[] = {{3, 4.5}, {15, 14}, {38, 23}};
   for (const auto& [wide, high] : kRings) {
     const int first = static_cast<int>(cage.points.size());
     for (int k = 0; k < kAround; ++k) {
@@ -353,10 +366,11 @@ CarCage MuscleCage() {
       p.z = FrontDepth(p.x, p.y);
       cage.points.push_back(p);
       const int next = (k + 1) % kAround;
-      if (first > 0) cage.quads.push_back({first + k, first + next, first - kAround + next, first - kAround + k});
+      if (first > 0)
+        cage.quads.push_back({first + k, first + next, first - kAround + next, first - kAround + k});
     }
   }
-  Inset(&cage, 5.5);
+  Inset(&cage, 9);
   return cage;
 }
 
@@ -384,7 +398,8 @@ CarCage FrameCage() {
       SinCos(2 * kPi * (k + 0.5) / kAround, &sine, &cosine);
       cage.points.push_back({48 * cosine, 58 + 20 * sine, z});
       const int next = (k + 1) % kAround;
-      if (first > 0) cage.quads.push_back({first - kAround + k, first - kAround + next, first + next, first + k});
+      if (first > 0)
+        cage.quads.push_back({first - kAround + k, first - kAround + next, first + next, first + k});
     }
   }
   return cage;

@@ -8,10 +8,6 @@
 namespace kpsa::scenes::car {
 namespace {
 
-// Of the lower bumper, which the jaw carries: below the mouth's line, fading towards the sides and the wheels.
-double JawField(Double3 p) {
-  return Smooth(kMouthHeight + 6, kMouthHeight - 12, p.y) * Smooth(100, 145, p.z) * Smooth(84, 50, std::fabs(p.x));
-}
 double HoodField(Double3 p) {
   return Smooth(60, 44, std::fabs(p.x)) * Smooth(40, 52, p.z) * Smooth(162, 148, p.z) * Smooth(76, 84, p.y);
 }
@@ -21,24 +17,28 @@ double RoofField(Double3 p) { return Smooth(96, 140, p.y); }
 
 }  // namespace
 
+double JawField(Double3 p) {
+  return Smooth(kMouthHeight + 6, kMouthHeight - 12, p.y) * Smooth(100, 145, p.z) *
+         Smooth(84, 50, std::fabs(p.x));
+}
+
 const std::vector<JointRest>& CarJoints() {
-  static const std::vector<JointRest> joints = {
-      {"ground", -1, {0, 0, 0}},
-      {"chassis", kGround, {0, kWheelAxle, 0}},
-      {"body", kChassis, {0, 45, 0}},
-      {"hood", kBody, {0, 92, 46}},
-      {"roof", kBody, {0, 95, -30}},
-      {"jaw", kBody, {0, 52, 105}},
-      {"lidUp.L", kRoof, kEye},
-      {"lidUp.R", kRoof, Mirrored(kEye)},
-      {"lidLow.L", kRoof, kEye},
-      {"lidLow.R", kRoof, Mirrored(kEye)},
-      {"eye.L", kRoof, kEye},
-      {"eye.R", kRoof, Mirrored(kEye)},
-      {"wheel.FL", kGround, {74, kWheelAxle, kWheelAt}},
-      {"wheel.FR", kGround, {-74, kWheelAxle, kWheelAt}},
-      {"wheel.BL", kGround, {74, kWheelAxle, -kWheelAt}},
-      {"wheel.BR", kGround, {-74, kWheelAxle, -kWheelAt}}};
+  static const std::vector<JointRest> joints = {{"ground", -1, {0, 0, 0}},
+                                                {"chassis", kGround, {0, kWheelAxle, 0}},
+                                                {"body", kChassis, {0, 45, 0}},
+                                                {"hood", kBody, {0, 92, 46}},
+                                                {"roof", kBody, {0, 95, -30}},
+                                                {"jaw", kBody, {0, 52, 105}},
+                                                {"lidUp.L", kRoof, kEye},
+                                                {"lidUp.R", kRoof, Mirrored(kEye)},
+                                                {"lidLow.L", kRoof, kEye},
+                                                {"lidLow.R", kRoof, Mirrored(kEye)},
+                                                {"eye.L", kRoof, kEye},
+                                                {"eye.R", kRoof, Mirrored(kEye)},
+                                                {"wheel.FL", kGround, {74, kWheelAxle, kWheelAt}},
+                                                {"wheel.FR", kGround, {-74, kWheelAxle, kWheelAt}},
+                                                {"wheel.BL", kGround, {74, kWheelAxle, -kWheelAt}},
+                                                {"wheel.BR", kGround, {-74, kWheelAxle, -kWheelAt}}};
   return joints;
 }
 

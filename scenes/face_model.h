@@ -31,13 +31,14 @@ std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::
 // Maps of weights for the rig's deformers: name -> one value a point.
 std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& design, const HeadShape& shape);
 
-// The muscles under a production's face: a coarse sheet with holes for eyes and mouth, and what each does.
+// The muscles under a production's face, or the fascia above them: a coarse sheet with holes for eyes and mouth,
+// and what each muscle does to it.
 struct MuscleShape {
   std::vector<Double3> points;
   std::vector<std::array<int, 4>> quads;
   std::vector<Expression> pulls;
 };
-MuscleShape MakeMuscles(const HeadDesign& design);
+MuscleShape MakeMuscles(const HeadDesign& design, bool deep);
 
 // The rig's curves and handles, as its YAML.
 std::string CurvesYaml(const HeadDesign& design, const HeadShape& shape);

@@ -1,4 +1,5 @@
-// The muscles of a production's face: a sheet under the skin that a proximityWrap follows.
+// The muscles of a production's face, and the fascia above them: sheets under the skin that proximityWraps
+// follow.
 #include <algorithm>
 #include <cmath>
 
@@ -9,29 +10,30 @@ namespace kpsa::scenes {
 namespace {
 
 constexpr int kMuscleRows = 12, kMuscleHalf = 6, kMuscleColumns = 2 * kMuscleHalf + 1;
-constexpr double kMuscleReach = 1.85;  // radians to each side
-constexpr double kMuscleDepth = 0.75;  // under the skin
+constexpr double kMuscleReach = 1.85;                      // radians to each side
+constexpr double kFasciaDepth = 0.75, kMuscleDepth = 1.3;  // under the skin
+constexpr double kUnderSkin = 0.3;                         // at least, between the points, too
 
 // What a muscle does, at places of the reference; those of a side are the left one's.
 struct Pull {
   const char* name;
-  bool sides;
+  bool deep, sides;
   RegionName region;
   Double3 center, radius, delta;
 };
 constexpr Pull kPulls[] = {
-    {"frontalis", true, kBrowRegion, {2.8, 22.2, 7.8}, {3.4, 3.0, 4.0}, {0.05, 0.55, 0.10}},
-    {"corrugator", true, kBrowRegion, {1.6, 20.6, 8.4}, {2.6, 2.2, 3.0}, {-0.30, -0.35, 0.25}},
-    {"orbicularis", true, kEyeRegion, {4.2, 17.4, 6.6}, {3.0, 2.4, 3.4}, {-0.20, 0.20, 0.30}},
-    {"levator", true, kNoseRegion, {2.2, 14.8, 8.6}, {2.2, 2.6, 3.0}, {0.10, 0.45, 0.20}},
-    {"zygomatic", true, kCheekRegion, {4.2, 14.2, 6.4}, {3.2, 3.4, 3.8}, {0.25, 0.40, 0.40}},
-    {"risorius", true, kMouthRegion, {3.8, 11.6, 6.8}, {3.0, 2.6, 3.8}, {0.45, 0.0, -0.20}},
-    {"depressor", true, kMouthRegion, {2.4, 9.8, 7.6}, {2.4, 2.4, 3.2}, {0.15, -0.45, 0.15}},
-    {"buccinator", true, kCheekRegion, {4.2, 12.4, 5.6}, {3.2, 3.2, 4.0}, {0.45, 0.0, 0.30}},
-    {"masseter", true, kJawRegion, {5.2, 11.8, 2.0}, {3.2, 4.0, 4.0}, {0.35, -0.10, 0.05}},
-    {"platysma", true, kThroatRegion, {3.0, 7.0, 3.6}, {3.2, 3.6, 4.2}, {0.20, -0.35, 0.20}},
-    {"mouthRing", false, kMouthRegion, {0, 11.5, 8.8}, {4.2, 3.4, 4.2}, {0, 0, 0.50}},
-    {"mentalis", false, kChinRegion, {0, 9.2, 8.2}, {2.8, 2.4, 3.4}, {0, 0.40, 0.20}}};
+    {"frontalis", false, true, kBrowRegion, {2.8, 22.2, 7.8}, {3.4, 3.0, 4.0}, {0.05, 0.55, 0.10}},
+    {"corrugator", false, true, kBrowRegion, {1.6, 20.6, 8.4}, {2.6, 2.2, 3.0}, {-0.30, -0.35, 0.25}},
+    {"orbicularis", false, true, kEyeRegion, {4.2, 17.4, 6.6}, {3.0, 2.4, 3.4}, {-0.20, 0.20, 0.30}},
+    {"levator", false, true, kNoseRegion, {2.2, 14.8, 8.6}, {2.2, 2.6, 3.0}, {0.10, 0.45, 0.20}},
+    {"zygomatic", true, true, kCheekRegion, {4.2, 14.2, 6.4}, {3.2, 3.4, 3.8}, {0.25, 0.40, 0.40}},
+    {"risorius", false, true, kMouthRegion, {3.8, 11.6, 6.8}, {3.0, 2.6, 3.8}, {0.45, 0.0, -0.20}},
+    {"depressor", true, true, kMouthRegion, {2.4, 9.8, 7.6}, {2.4, 2.4, 3.2}, {0.15, -0.45, 0.15}},
+    {"buccinator", true, true, kCheekRegion, {4.2, 12.4, 5.6}, {3.2, 3.2, 4.0}, {0.45, 0.0, 0.30}},
+    {"masseter", true, true, kJawRegion, {5.2, 11.8, 2.0}, {3.2, 4.0, 4.0}, {0.35, -0.10, 0.05}},
+    {"platysma", true, true, kThroatRegion, {3.0, 7.0, 3.6}, {3.2, 3.6, 4.2}, {0.20, -0.35, 0.20}},
+    {"mouthRing", false, false, kMouthRegion, {0, 11.5, 8.8}, {4.2, 3.4, 4.2}, {0, 0, 0.50}},
+    {"mentalis", true, false, kChinRegion, {0, 9.2, 8.2}, {2.8, 2.4, 3.4}, {0, 0.40, 0.20}}};
 
 bool InHole(const HeadDesign& d, Double3 p) {
   const double x = std::fabs(p.x);
@@ -43,7 +45,7 @@ bool InHole(const HeadDesign& d, Double3 p) {
 
 }  // namespace
 
-MuscleShape MakeMuscles(const HeadDesign& design) {
+MuscleShape MakeMuscles(const HeadDesign& design, bool deep) {
   std::vector<Double3> grid(kMuscleRows * kMuscleColumns);
   const auto at = [](int row, int column) {  // column 0 is the middle
     return static_cast<std::size_t>(row * kMuscleColumns + column + kMuscleHalf);
@@ -52,7 +54,7 @@ MuscleShape MakeMuscles(const HeadDesign& design) {
     const double row = design.muscle_row0 + (design.muscle_row1 - design.muscle_row0) * r / (kMuscleRows - 1);
     for (int c = 0; c <= kMuscleHalf; ++c) {
       const Double3 skin = ProjectToHead(design, GuidePlace(design, row, kMuscleReach * c / kMuscleHalf));
-      Double3 p = skin - HeadNormal(design, skin) * kMuscleDepth;
+      Double3 p = skin - HeadNormal(design, skin) * (deep ? kMuscleDepth : kFasciaDepth);
       if (c == 0) p.x = 0;
       grid[at(r, c)] = p;
       grid[at(r, -c)] = {-p.x, p.y, p.z};
@@ -72,11 +74,18 @@ MuscleShape MakeMuscles(const HeadDesign& design) {
       const std::size_t corners[] = {at(r, c), at(r, c + 1), at(r + 1, c + 1), at(r + 1, c)};
       Double3 middle;
       for (std::size_t i : corners) middle = middle + grid[i] * 0.25;
-      if (InHole(design, middle)) continue;
+      // Nor where the sheet would come out of a hollow of the skin
+      bool out = InHole(design, middle) || design.distance(middle) > -kUnderSkin;
+      for (int k = 0; k < 4; ++k) {
+        const Double3 edge = (grid[corners[k]] + grid[corners[(k + 1) % 4]]) * 0.5;
+        out = out || design.distance(edge) > -kUnderSkin || design.distance(grid[corners[k]]) > -kUnderSkin;
+      }
+      if (out) continue;
       shape.quads.push_back({use(corners[0]), use(corners[1]), use(corners[2]), use(corners[3])});
     }
   }
   for (const Pull& pull : kPulls) {
+    if (pull.deep != deep) continue;
     const Region& region = design.regions[pull.region];
     for (int side : {1, -1}) {
       if (!pull.sides && side < 0) continue;

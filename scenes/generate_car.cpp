@@ -14,16 +14,21 @@ constexpr double kMetres = 0.01;
 constexpr double kSmallestDelta = 0.02, kSmallestWeight = 1e-3;  // cm; of a weight map
 
 Float3 ToMetres(Double3 p) {
-  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres), static_cast<float>(p.z * kMetres)};
+  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
+          static_cast<float>(p.z * kMetres)};
 }
 std::array<std::uint8_t, 4> Color(Double3 linear) {
-  const auto byte = [](double v) { return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5)); };
+  const auto byte = [](double v) {
+    return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5));
+  };
   return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
 }
 
-constexpr Double3 kPaint = {0.02, 0.30, 0.42}, kCream = {0.75, 0.62, 0.38}, kGlass = {0.03, 0.05, 0.07}, kChrome = {0.55, 0.57, 0.60},
-                  kThroat = {0.22, 0.03, 0.03}, kBrowColor = {0.012, 0.02, 0.03}, kRubber = {0.02, 0.02, 0.022}, kWhite = {0.82, 0.82, 0.80},
-                  kIris = {0.16, 0.30, 0.05}, kPupil = {0.004, 0.004, 0.004}, kLamp = {0.85, 0.80, 0.55};
+constexpr Double3 kPaint = {0.02, 0.30, 0.42}, kCream = {0.75, 0.62, 0.38}, kGlass = {0.03, 0.05, 0.07},
+                  kChrome = {0.55, 0.57, 0.60}, kThroat = {0.22, 0.03, 0.03},
+                  kBrowColor = {0.012, 0.02, 0.03}, kRubber = {0.02, 0.02, 0.022},
+                  kWhite = {0.82, 0.82, 0.80}, kIris = {0.16, 0.30, 0.05}, kPupil = {0.004, 0.004, 0.004},
+                  kLamp = {0.85, 0.80, 0.55};
 
 // Paint with a cream flank, glass in the cabin, chrome lips, dark brows.
 std::vector<Double3> BodyColors(const CarShape& shape) {
@@ -32,12 +37,13 @@ std::vector<Double3> BodyColors(const CarShape& shape) {
   for (std::size_t i = 0; i < shape.points.size(); ++i) {
     const Double3 p = shape.points[i];
     const double x = std::fabs(p.x);
-    Double3 c = mix(kPaint, kCream, Smooth(46, 40, p.y) * (shape.mouth[i] > 0 ? 0 : 1));
+    Double3 c = mix(kPaint, kCream, Smooth(48, 37, p.y) * (shape.mouth[i] > 0 ? 0 : 1));
     const double cabin = Smooth(98, 103, p.y) * Smooth(146, 141, p.y);
     const double side = Smooth(52, 57, x) * Smooth(8, 0, p.z) * Smooth(-82, -74, p.z);
     const double rear = Smooth(-68, -76, p.z) * Smooth(46, 40, x);
     c = mix(c, kGlass, cabin * std::max(side, rear));
-    const double brow = Smooth(4, 9, x) * Smooth(50, 44, x) * Smooth(143, 147, p.y) * Smooth(-9, -3, p.z) * Smooth(13, 9, p.z);
+    const double brow = Smooth(4, 9, x) * Smooth(50, 44, x) * Smooth(143, 147, p.y) * Smooth(-9, -3, p.z) *
+                        Smooth(13, 9, p.z);
     c = mix(c, kBrowColor, brow);
     if (shape.socket[i] > 0) c = mix(kPaint, kPaint * 0.45, shape.socket[i]);
     if (shape.mouth[i] > 0) c = mix(c, kChrome, Smooth(0.7, 0.95, shape.mouth[i]));
@@ -47,9 +53,8 @@ std::vector<Double3> BodyColors(const CarShape& shape) {
   return colors;
 }
 
-template <std::size_t kJoints>
 Influences Only(int joint) {
-  std::array<double, kJoints> weights = {};
+  JointShares weights = {};
   weights[static_cast<std::size_t>(joint)] = 1;
   return MakeInfluences(weights);
 }
@@ -78,14 +83,16 @@ GlbMesh BodyMesh(const CarShape& shape, const std::vector<Expression>& expressio
   return mesh;
 }
 
-// Cages lie under the shell.
+// Cages lie under the shell, and as dark as the inside of the mouth.
 GlbMesh CageMesh(const char* name, const CarCage& cage, const std::vector<Expression>& expressions) {
   GlbMesh mesh;
   mesh.name = name;
   for (const Double3& p : cage.points) {
     mesh.positions.push_back(ToMetres(p));
-    mesh.colors.push_back(Color(kGlass));
-    mesh.influences.push_back(Only<kCarJointCount>(kBody));
+    mesh.colors.push_back(Color(kThroat * 0.4));
+    JointShares weights = {};
+    weights[kJaw] = JawField(p), weights[kBody] = 1 - weights[kJaw];
+    mesh.influences.push_back(MakeInfluences(weights));
   }
   mesh.triangles = Triangulate(cage.quads);
   mesh.normals = SmoothNormals(mesh.positions, mesh.triangles);
@@ -93,21 +100,21 @@ GlbMesh CageMesh(const char* name, const CarCage& cage, const std::vector<Expres
   return mesh;
 }
 
-// A surface of revolution about an axis: stations along it with a radius and a colour each, closed by a point at
-// a radius of 0.
+// A surface of revolution about an axis: stations along it with a radius and a colour each, closed by a point
+// at a radius of 0.
 struct Station {
   double along, radius;
   Double3 color;
 };
-void AddTurned(Double3 at, Double3 axis, Double3 across, const std::vector<Station>& stations, int around, int joint,
-               GlbMesh* mesh) {
+void AddTurned(Double3 at, Double3 axis, Double3 across, const std::vector<Station>& stations, int around,
+               int joint, GlbMesh* mesh) {
   const Double3 other = Cross(axis, across);
   std::vector<std::array<int, 4>> quads;
   const auto base = static_cast<int>(mesh->positions.size());
   const auto add = [&](Double3 p, Double3 color) {
     mesh->positions.push_back(ToMetres(p));
     mesh->colors.push_back(Color(color));
-    mesh->influences.push_back(Only<kCarJointCount>(joint));
+    mesh->influences.push_back(Only(joint));
     return static_cast<int>(mesh->positions.size()) - 1;
   };
   std::vector<int> below;
@@ -116,14 +123,18 @@ void AddTurned(Double3 at, Double3 axis, Double3 across, const std::vector<Stati
     for (int k = 0; k < (station.radius == 0 ? 1 : around); ++k) {
       double sine, cosine;
       SinCos(2 * kPi * k / around, &sine, &cosine);
-      ring.push_back(add(at + axis * station.along + (across * cosine + other * sine) * station.radius, station.color));
+      ring.push_back(
+          add(at + axis * station.along + (across * cosine + other * sine) * station.radius, station.color));
     }
     for (std::size_t k = 0; !below.empty() && k < static_cast<std::size_t>(around); ++k) {
       const std::size_t n = static_cast<std::size_t>(around), next = (k + 1) % n;
       const auto of = [](const std::vector<int>& r, std::size_t i) { return r.size() == 1 ? r[0] : r[i]; };
-      if (below.size() == 1) quads.push_back({below[0], of(ring, next), of(ring, k), of(ring, k)});
-      else if (ring.size() == 1) quads.push_back({of(below, k), of(below, next), ring[0], ring[0]});
-      else quads.push_back({below[k], below[next], ring[next], ring[k]});
+      if (below.size() == 1)
+        quads.push_back({below[0], of(ring, next), of(ring, k), of(ring, k)});
+      else if (ring.size() == 1)
+        quads.push_back({of(below, k), of(below, next), ring[0], ring[0]});
+      else
+        quads.push_back({below[k], below[next], ring[next], ring[k]});
     }
     below = std::move(ring);
   }
@@ -146,12 +157,16 @@ GlbMesh PartsMesh() {
     }
     constexpr Double3 kLook = {0, 0.26, 0.9656};
     AddTurned({side * kEye.x, kEye.y, kEye.z}, kLook, {1, 0, 0}, eye, 16, side > 0 ? kEyeL : kEyeR, &mesh);
-    AddTurned({side * 62, 70, 146}, {side * 0.34, 0.2, 0.918}, {0.9378 , 0, side * -0.3473},
+    AddTurned({side * 61, 68, 150}, {side * 0.34, 0.2, 0.918}, {0.9378, 0, side * -0.3473},
               {{4, 11, kChrome}, {8.5, 9, kLamp}, {11, 0, kLamp}}, 12, kBody, &mesh);
     for (const double end : {1.0, -1.0}) {
       const int joint = end > 0 ? (side > 0 ? kWheelFL : kWheelFR) : (side > 0 ? kWheelBL : kWheelBR);
       AddTurned({side * 70, kWheelAxle, end * kWheelAt}, {side, 0, 0}, {0, 1, 0},
-                {{-10, 27, kRubber}, {8, kWheelAxle - 1, kRubber}, {11, 24, kRubber}, {10, 18, kChrome}, {12, 0, kChrome}},
+                {{-10, 27, kRubber},
+                 {8, kWheelAxle - 1, kRubber},
+                 {11, 22, kRubber},
+                 {9, 16, kChrome},
+                 {12, 0, kChrome}},
                 14, joint, &mesh);
     }
   }
@@ -165,18 +180,25 @@ std::string CurvesYaml(const CarShape& shape) {
       "kpsa: 1\n"
       "nodes:\n";
   for (const auto& [name, points] : shape.curves) {
-    const char* parent = name == "lipLower" ? "jaw" : name.starts_with("lid") || name.starts_with("brow") ? "roof" : "body";
-    out += fmt::format("  {}: {{type: curve, mesh: car_body, vertices: [{}], parent: {}}}\n", name, fmt::join(points, ", "), parent);
+    const char* parent = name == "lipLower"                                    ? "jaw"
+                         : name.starts_with("lid") || name.starts_with("brow") ? "roof"
+                                                                               : "body";
+    out += fmt::format("  {}: {{type: curve, mesh: car_body, vertices: [{}], parent: {}}}\n", name,
+                       fmt::join(points, ", "), parent);
   }
   return out;
 }
 
 std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, std::size_t points) {
-  std::string out = fmt::format("{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"car_body\", \"points\": {}, \"maps\": {{", points);
+  std::string out = fmt::format(
+      "{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"car_body\", \"points\": {}, \"maps\": {{",
+      points);
   bool first = true;
   for (const auto& [name, values] : maps) {
-    const auto ones = std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
-    const auto zeros = std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
+    const auto ones =
+        std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
+    const auto zeros =
+        std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
     const double usual = ones > zeros ? 1 : 0;  // the commoner of the two
     std::vector<std::string> indices, numbers;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -184,8 +206,8 @@ std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, 
       indices.push_back(fmt::format("{}", i));
       numbers.push_back(fmt::format("{:.4g}", values[i]));
     }
-    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}", first ? "" : ",", name, usual,
-                       fmt::join(indices, ","), fmt::join(numbers, ","));
+    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}",
+                       first ? "" : ",", name, usual, fmt::join(indices, ","), fmt::join(numbers, ","));
     first = false;
   }
   return out + "\n}}\n";
@@ -209,8 +231,10 @@ SceneFiles GenerateCar() {
     scene.nodes.push_back({joint.name, joint.parent, at * kMetres, -1});
   }
   const int first = static_cast<int>(scene.nodes.size());
-  scene.meshes = {BodyMesh(shape, expressions), PartsMesh(), CageMesh("muscles", muscles, pulls), CageMesh("panels", PanelCage(), {}), CageMesh("frame", FrameCage(), {})};
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m)});
+  scene.meshes = {BodyMesh(shape, expressions), PartsMesh(), CageMesh("muscles", muscles, pulls),
+                  CageMesh("panels", PanelCage(), {}), CageMesh("frame", FrameCage(), {})};
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m)
+    scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m)});
   const auto names = [](const std::vector<Expression>& list) {
     std::vector<std::string> out;
     for (const Expression& each : list) out.push_back(each.name);

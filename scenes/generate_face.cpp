@@ -75,11 +75,11 @@ GlbMesh FaceMesh(const HeadDesign& design, const HeadShape& shape, const std::ve
 }
 
 // A muscle moves with the joints of the skin above it.
-GlbMesh MusclesMesh(const HeadDesign& design, const HeadShape& shape,
+GlbMesh MusclesMesh(const HeadDesign& design, bool deep, const HeadShape& shape,
                     const std::vector<std::array<double, kJointCount>>& joint_weights) {
-  const MuscleShape muscles = MakeMuscles(design);
+  const MuscleShape muscles = MakeMuscles(design, deep);
   GlbMesh mesh;
-  mesh.name = "muscles";
+  mesh.name = deep ? "muscles" : "fascia";
   for (const Double3& p : muscles.points) {
     mesh.positions.push_back(ToMetres(p));
     mesh.colors.push_back(Color({0.35, 0.07, 0.06}));
@@ -158,8 +158,10 @@ SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
   scene.nodes.push_back({"eyes", -1, {}, 1});
   scene.meshes = {FaceMesh(design, shape, expressions, joint_weights), EyesMesh(design)};
   if (design.production) {
-    scene.nodes.push_back({"muscles", -1, {}, 2});
-    scene.meshes.push_back(MusclesMesh(design, shape, joint_weights));
+    for (const bool deep : {true, false}) {
+      scene.nodes.push_back({deep ? "muscles" : "fascia", -1, {}, static_cast<int>(scene.meshes.size())});
+      scene.meshes.push_back(MusclesMesh(design, deep, shape, joint_weights));
+    }
   }
   std::vector<std::string> names;
   for (const Expression& expression : expressions) names.push_back(expression.name);

@@ -68,7 +68,6 @@ class HeadBuilder {
   void MakeNostrils();
   void MakeEars();
   void Relax(int iterations);
-  void FinishEyes();
   void FinishMouth();
   void FinishNostrils();
   void Symmetrize();

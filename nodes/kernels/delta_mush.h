@@ -50,7 +50,6 @@ class DeltaMushKernel {
                   std::span<const float> point_weights = {}, Double3 rest_pivot = {});
 
   std::size_t point_count() const { return count_; }
-  std::size_t input_count() const { return in_count_; }
   std::size_t ScratchFloats() const { return 2 * BufferFloats(); }
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;

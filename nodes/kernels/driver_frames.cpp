@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "nodes/kernels/weights.h"
+#include "nodes/kernels/wrap_run.h"
 
 namespace kpsa {
 namespace {
@@ -82,56 +83,38 @@ DriverFrames::DriverFrames(const Topology& driver, std::span<const Double3> rest
     KPSA_CHECK(it != in_points.end() && *it == point);
     return static_cast<Index>(it - in_points.begin());
   };
+  const auto add = [](std::vector<float>* floats, Double3 v) {
+    for (int i = 0; i < 3; ++i) floats->push_back(static_cast<float>(v[i]));
+    floats->push_back(0);
+  };
   RestFrame frame;
   for (const Index point : frame_points) {
     if (MakeRestFrame(driver, rest, point, &frame)) {
       own_.push_back(entry(point));
       const auto neighbors = driver.neighbors().row(point);
-      for (std::size_t k = 0; k < neighbors.size(); ++k)
-        edges_.push_back({entry(neighbors[k]), frame.duals[k]});
+      for (std::size_t k = 0; k < neighbors.size(); ++k) {
+        edge_points_.push_back(entry(neighbors[k]));
+        add(&duals_, frame.duals[k]);
+      }
       for (const Index t : driver.point_triangles().row(point)) {
         for (std::size_t k = 0; k < 3; ++k)
           triangles_.push_back(entry(driver.triangles()[3 * std::size_t{t} + k]));
       }
-      normal_duals_.push_back(frame.normal_dual);
+      add(&normal_duals_, frame.normal_dual);
     } else {
       own_.push_back(0);
-      normal_duals_.push_back({});
+      add(&normal_duals_, {});
     }
-    edge_offsets_.push_back(static_cast<Index>(edges_.size()));
+    edge_offsets_.push_back(static_cast<Index>(edge_points_.size()));
     triangle_offsets_.push_back(static_cast<Index>(triangles_.size()));
   }
 }
 
-void DriverFrames::Run(std::span<const Double3> points, std::span<DriverFrame> frames,
-                       const Parallel* parallel) const noexcept {
-  KPSA_CHECK_EQ(frames.size(), count());
-  ForRanges(parallel, count(), kFrameGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f) {
-      if (!exists(f)) continue;
-      Double3 normal;
-      for (Index t = triangle_offsets_[f]; t < triangle_offsets_[f + 1]; t += 3) {
-        const Double3 a = points[triangles_[t]];
-        normal = normal + Cross(points[triangles_[t + 1]] - a, points[triangles_[t + 2]] - a);
-      }
-      normal = Unit(normal);
-      double sums[9];
-      for (int c = 0; c < 3; ++c) {
-        for (int a = 0; a < 3; ++a) sums[3 * c + a] = normal[a] * normal_duals_[f][c];
-      }
-      const Double3 own = points[own_[f]];
-      for (Index e = edge_offsets_[f]; e < edge_offsets_[f + 1]; ++e) {
-        const Double3 edge = points[edges_[e].point] - own, dual = edges_[e].dual;
-        const double from[3] = {edge.x, edge.y, edge.z}, to[3] = {dual.x, dual.y, dual.z};
-        for (int c = 0; c < 3; ++c) {
-          for (int a = 0; a < 3; ++a) sums[3 * c + a] += from[a] * to[c];
-        }
-      }
-      double* values = frames[f].values;
-      for (int k = 0; k < 9; ++k) values[k] = sums[k];
-      values[9] = normal.x, values[10] = normal.y, values[11] = normal.z;
-    }
-  });
+void DriverFrames::Run(const float* points, float* frames, const Parallel* parallel) const noexcept {
+  const FramesRun run{own_.data(),   edge_offsets_.data(), triangle_offsets_.data(), edge_points_.data(),
+                      duals_.data(), triangles_.data(),    normal_duals_.data()};
+  ForRanges(parallel, count(), kFrameGrain,
+            [&](std::size_t begin, std::size_t end) { RunDriverFrames(run, points, begin, end, frames); });
 }
 
 }  // namespace kpsa

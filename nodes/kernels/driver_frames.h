@@ -4,8 +4,8 @@
 // over the edges around the point and its normal (area-weighted, of the triangles around it):
 //   F_i = (sum_j e'_j e_j^T + s n' n^T) M^-1,  M = sum_j e_j e_j^T + s n n^T,  e_j = d_j - d_i, s the mean
 //   e^2.
-// A rigid motion of the driver gives its rotation exactly, up to rounding. Where the edges of a point do not
-// span a plane at rest it has no frame, and asks for nothing.
+// A rigid motion of the driver gives its rotation exactly, up to rounding (floats). Where the edges of a
+// point do not span a plane at rest it has no frame, and asks for nothing.
 #pragma once
 
 #include <span>
@@ -21,19 +21,9 @@ namespace kpsa {
 std::vector<Index> DriverFramesDemand(const Topology& driver, std::span<const Double3> rest,
                                       std::span<const Index> frame_points);
 
-// F column by column (column k is where the rest direction k has gone), then the normal: unit length, or 0.
-// F is no rotation: it stretches, too. Plain numbers in a row, so that blends of frames are loops over them.
-struct DriverFrame {
-  static constexpr int kSize = 12;
-  double values[kSize];
-  Double3 Apply(Double3 v) const {
-    return {values[0] * v.x + values[3] * v.y + values[6] * v.z,
-            values[1] * v.x + values[4] * v.y + values[7] * v.z,
-            values[2] * v.x + values[5] * v.y + values[8] * v.z};
-  }
-  Double3 normal() const { return {values[9], values[10], values[11]}; }
-};
-
+// Bound to a set of driver points; frames come as kFrameFloats floats each: F column by column (column k is
+// where the rest direction k has gone), then the normal, unit length, or 0; four floats a column. F is no
+// rotation: it stretches, too.
 class DriverFrames {
  public:
   DriverFrames() = default;
@@ -44,20 +34,16 @@ class DriverFrames {
   std::size_t count() const { return edge_offsets_.size() - 1; }
   // Of one frame: whether it exists.
   bool exists(std::size_t frame) const { return edge_offsets_[frame + 1] > edge_offsets_[frame]; }
-  // points: the in_points now. frames: count() of them; those that do not exist are left alone.
-  void Run(std::span<const Double3> points, std::span<DriverFrame> frames,
-           const Parallel* parallel = nullptr) const noexcept;
+  // points: the in_points now, x y z 0 each, 16-byte aligned. frames: those that do not exist are left alone.
+  void Run(const float* points, float* frames, const Parallel* parallel = nullptr) const noexcept;
 
  private:
-  struct Edge {
-    Index point;   // entry of points
-    Double3 dual;  // M^-1 e
-  };
   std::vector<Index> own_;  // entry of points, a frame
   std::vector<Index> edge_offsets_ = {0}, triangle_offsets_ = {0};
-  std::vector<Edge> edges_;
-  std::vector<Index> triangles_;  // 3 entries of points a triangle around the point
-  std::vector<Double3> normal_duals_;
+  std::vector<Index> edge_points_;  // entry of points
+  std::vector<float> duals_;        // M^-1 e, 4 an edge
+  std::vector<Index> triangles_;    // 3 entries of points a triangle around the point
+  std::vector<float> normal_duals_;
 };
 
 }  // namespace kpsa

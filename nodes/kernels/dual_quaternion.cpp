@@ -18,13 +18,9 @@
 namespace kpsa {
 // What one Run hands to the vector code. Of each joint: rotation xyzw, dual part xyzw, the columns x y z 0
 // of its stretch, and 1 if it stretches.
-struct DualRun {
+struct DualRun : SkinFrame {
   const float* joints;
-  float origin[3];  // translations are relative to it
-  float base[12];   // rows of world_from_mesh relative to origin
-  float base_offset[3];
   float envelope;
-  bool base_is_identity;
   const float* masks;  // null if all 1
   const float* blend;  // null if all 1
   const float* linear[3];
@@ -259,25 +255,13 @@ void DualQuaternionKernel::Run(const Inputs& inputs, ConstPointsView in, PointsV
   KPSA_CHECK(blend_.size() == 0 || inputs.linear.count == count_);
   if (count_ == 0) return;
 
-  // About the image of the mesh's origin, as SkinKernel: small numbers wherever the character stands
   DualRun run{};
-  double origin[3];
-  for (int r = 0; r < 3; ++r) {
-    const double t = inputs.palette[0](r, 3);
-    run.origin[r] = std::isfinite(t) ? static_cast<float>(t) : 0.0f;
-    origin[r] = run.origin[r];
-  }
+  static_cast<SkinFrame&>(run) = SkinFrameOf(inputs.palette[0], inputs.world_from_mesh);
+  const double origin[3] = {run.origin[0], run.origin[1], run.origin[2]};
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     WriteJoint(inputs.palette[joints_[j]], inputs.centers[joints_[j]], origin,
                scratch.data() + kJointFloats * j);
   }
-  const Matrix4& base = inputs.world_from_mesh;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) run.base[4 * r + c] = static_cast<float>(base(r, c));
-    run.base[4 * r + 3] = static_cast<float>(base(r, 3) - origin[r]);
-    run.base_offset[r] = static_cast<float>(base(r, 3));
-  }
-  run.base_is_identity = base == Matrix4();
   run.joints = scratch.data();
   run.envelope = static_cast<float>(inputs.envelope);
   run.masks = masks_.data();

@@ -34,6 +34,9 @@ RTCRay ToEmbree(const Ray& ray) {
 
 struct RayScene::Impl {
   RTCScene scene = nullptr;
+  RTCGeometry geometry = nullptr;  // the scene's; null without triangles
+  float* xyz = nullptr;            // the geometry's
+  std::size_t points = 0;
   ~Impl() {
     if (scene != nullptr) rtcReleaseScene(scene);
   }
@@ -43,6 +46,26 @@ RayScene::RayScene(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RayScene::RayScene(RayScene&&) noexcept = default;
 RayScene& RayScene::operator=(RayScene&&) noexcept = default;
 RayScene::~RayScene() = default;
+
+namespace {
+
+Status CheckFinite(ConstPointsView points) {
+  for (std::size_t i = 0; i < points.count; ++i) {
+    if (!std::isfinite(points.x[i]) || !std::isfinite(points.y[i]) || !std::isfinite(points.z[i]))
+      return Status::Invalid("point {} is not finite", i);
+  }
+  return Status();
+}
+
+void Interleave(ConstPointsView points, float* xyz) {
+  for (std::size_t i = 0; i < points.count; ++i) {
+    xyz[3 * i] = points.x[i];
+    xyz[3 * i + 1] = points.y[i];
+    xyz[3 * i + 2] = points.z[i];
+  }
+}
+
+}  // namespace
 
 Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> triangles) {
   if (triangles.size() % 3 != 0) {
@@ -54,18 +77,17 @@ Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> 
                              points.count);
     }
   }
-  for (std::size_t i = 0; i < points.count; ++i) {
-    if (!std::isfinite(points.x[i]) || !std::isfinite(points.y[i]) || !std::isfinite(points.z[i])) {
-      return Status::Invalid("point {} is not finite", i);
-    }
-  }
+  KPSA_RETURN_IF_ERROR(CheckFinite(points));
   RTCDevice device = SharedDevice();
   if (device == nullptr) return Status::Evaluation("the ray tracer (Embree) cannot start on this machine");
 
   auto impl = std::make_unique<Impl>();
   impl->scene = rtcNewScene(device);
-  rtcSetSceneFlags(impl->scene, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_MEDIUM);  // no spatial splits: one layout an input
+  impl->points = points.count;
+  rtcSetSceneFlags(impl->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC);
+  // Low for the scene: its geometry then has a structure of its own, which can be refitted; that one is built
+  // by surface area without spatial splits, one layout an input
+  rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_LOW);
   if (!triangles.empty()) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* xyz = static_cast<float*>(rtcSetNewGeometryBuffer(
@@ -77,12 +99,11 @@ Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> 
       rtcReleaseGeometry(geometry);
       return Status::Evaluation("no memory for {} triangles in the ray tracer", triangles.size() / 3);
     }
-    for (std::size_t i = 0; i < points.count; ++i) {
-      xyz[3 * i] = points.x[i];
-      xyz[3 * i + 1] = points.y[i];
-      xyz[3 * i + 2] = points.z[i];
-    }
+    Interleave(points, xyz);
     for (std::size_t i = 0; i < triangles.size(); ++i) corner[i] = triangles[i];
+    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
+    impl->geometry = geometry;
+    impl->xyz = xyz;
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(impl->scene, geometry);
     rtcReleaseGeometry(geometry);
@@ -93,6 +114,20 @@ Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> 
                               triangles.size() / 3, static_cast<int>(error));
   }
   return RayScene(std::move(impl));
+}
+
+Status RayScene::Update(ConstPointsView points) {
+  KPSA_CHECK_EQ(points.count, impl_->points);
+  KPSA_RETURN_IF_ERROR(CheckFinite(points));
+  if (impl_->geometry == nullptr) return Status();
+  Interleave(points, impl_->xyz);
+  rtcUpdateGeometryBuffer(impl_->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+  rtcCommitGeometry(impl_->geometry);
+  rtcCommitScene(impl_->scene);
+  if (const RTCError error = rtcGetDeviceError(SharedDevice()); error != RTC_ERROR_NONE)
+    return Status::Evaluation("the ray tracer failed to move its points (Embree error {})",
+                              static_cast<int>(error));
+  return Status();
 }
 
 void RayScene::ClosestHits(std::span<const Ray> rays, std::span<RayHit> hits) const {

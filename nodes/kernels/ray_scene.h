@@ -32,14 +32,20 @@ struct RayHit {
   float v = 0;
 };
 
-// An immutable search structure over a copy of the triangles. Movable; queries may run on any threads at
-// once.
+// A search structure over a copy of the triangles. Movable; queries may run on any threads at once.
 class RayScene {
  public:
   // points: positions of any unit. triangles: three indices into points each.
   // Errors: the number of indices is no multiple of 3; an index is out of range; a point is not finite.
   // A scene without triangles is valid: every ray misses.
   static Result<RayScene> Build(ConstPointsView points, std::span<const Index> triangles);
+
+  // Moves the points, as many as there were. The structure keeps the layout that it was built with, and its
+  // boxes are fitted to where the points are now: what rays meet does not depend on where the points have
+  // been. (Rays through shared edges meet the triangle that the layout has first, so scenes that are to agree
+  // bit for bit are built of the same points.) Allocates nothing of its own. Not while queries run.
+  // Errors: a point is not finite.
+  Status Update(ConstPointsView points);
 
   // hits[i] = the nearest hit of rays[i]. The spans have equal lengths.
   void ClosestHits(std::span<const Ray> rays, std::span<RayHit> hits) const;

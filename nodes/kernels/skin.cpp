@@ -16,13 +16,9 @@
 #define KPSA_NODES_KERNELS_SKIN_RUN_
 namespace kpsa {
 // What one Run hands to the vector code.
-struct SkinRun {
+struct SkinRun : SkinFrame {
   const float* palette;  // columns x y z 0 of each joint, translations relative to `origin`
-  float origin[3];
-  float base[12];        // rows of world_from_mesh relative to origin
-  float base_offset[3];  // its translation alone
   float envelope;
-  bool base_is_identity;
   const float* sums;   // minus 1
   const float* masks;  // null if all 1
 };
@@ -293,6 +289,19 @@ SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_po
   block_groups_.push_back(static_cast<Index>(groups_.size()));
 }
 
+SkinFrame SkinFrameOf(const Matrix4& first_joint, const Matrix4& world_from_mesh) {
+  SkinFrame frame{};
+  for (int r = 0; r < 3; ++r) {
+    const double t = first_joint(r, 3);
+    frame.origin[r] = std::isfinite(t) ? static_cast<float>(t) : 0.0f;
+    for (int c = 0; c < 3; ++c) frame.base[4 * r + c] = static_cast<float>(world_from_mesh(r, c));
+    frame.base[4 * r + 3] = static_cast<float>(world_from_mesh(r, 3) - double{frame.origin[r]});
+    frame.base_offset[r] = static_cast<float>(world_from_mesh(r, 3));
+  }
+  frame.base_is_identity = world_from_mesh == Matrix4();
+  return frame;
+}
+
 void SkinKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
                      const Parallel* parallel) const noexcept {
   KPSA_CHECK_EQ(inputs.palette.size(), joint_count_);
@@ -301,32 +310,18 @@ void SkinKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
   if (count_ == 0) return;
 
-  // The palette about the place of the first joint: blending happens in small numbers wherever the character
-  // stands
   SkinRun run{};
-  double origin[3];
-  for (int r = 0; r < 3; ++r) {
-    const double t = inputs.palette[0](r, 3);
-    run.origin[r] = std::isfinite(t) ? static_cast<float>(t) : 0.0f;
-    origin[r] = run.origin[r];
-  }
+  static_cast<SkinFrame&>(run) = SkinFrameOf(inputs.palette[0], inputs.world_from_mesh);
   float* palette = scratch.data();
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const double* m = inputs.palette[joints_[j]].m.data();
     float* to = palette + 16 * j;
     for (int c = 0; c < 4; ++c) {
       for (int r = 0; r < 3; ++r)
-        to[4 * c + r] = static_cast<float>(c == 3 ? m[12 + r] - origin[r] : m[4 * c + r]);
+        to[4 * c + r] = static_cast<float>(c == 3 ? m[12 + r] - double{run.origin[r]} : m[4 * c + r]);
       to[4 * c + 3] = 0;
     }
   }
-  const Matrix4& base = inputs.world_from_mesh;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) run.base[4 * r + c] = static_cast<float>(base(r, c));
-    run.base[4 * r + 3] = static_cast<float>(base(r, 3) - origin[r]);
-    run.base_offset[r] = static_cast<float>(base(r, 3));
-  }
-  run.base_is_identity = base == Matrix4();
   run.palette = palette;
   run.envelope = static_cast<float>(inputs.envelope);
   run.sums = sums_.data();

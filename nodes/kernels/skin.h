@@ -24,6 +24,16 @@ struct SkinWeights {
   Status Validate() const;
 };
 
+// What both kinds of skin compute about, so that blending happens in small numbers wherever the character
+// stands: the place of the first joint, and the mesh without its skin.
+struct SkinFrame {
+  float origin[3];       // translations are relative to it
+  float base[12];        // rows of world_from_mesh relative to origin
+  float base_offset[3];  // its translation alone
+  bool base_is_identity;
+};
+SkinFrame SkinFrameOf(const Matrix4& first_joint, const Matrix4& world_from_mesh);
+
 // A local kernel. Weights are used as they are, not normalised; a sum within 1e-5 of 1 counts as 1, which
 // keeps the shape of a character that stands 1,000 m away up to the spacing of float there. A point without
 // influences is carried by world_from_mesh alone.

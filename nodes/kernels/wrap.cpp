@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "nodes/kernels/weights.h"
+#include "nodes/kernels/wrap_run.h"
 
 namespace kpsa {
 namespace {
@@ -33,13 +34,16 @@ WrapKernel::WrapKernel(WrapMode mode, const Topology& driver, std::span<const Do
     : mode_(mode),
       stage_from_driver_(stage_from_driver),
       in_count_(in_points.size()),
-      offsets_(influences.offsets),
-      shares_(influences.weights) {
+      count_(out_points.size()),
+      offsets_(influences.offsets) {
   KPSA_CHECK_EQ(offsets_.size(), out_points.size() + 1);
   KPSA_CHECK(IsSortedSet(out_points, rest.count));
   KPSA_CHECK(point_weights.empty() || point_weights.size() == out_points.size());
-  weights_.assign(out_points.size(), 1.0f);
-  if (!point_weights.empty()) weights_.assign(point_weights.begin(), point_weights.end());
+  weights_ = PaddedWeights(point_weights, count_);
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (offsets_[i] == offsets_[i + 1]) weights_.data()[i] = 0;
+  }
+  for (const double share : influences.weights) shares_.push_back(static_cast<float>(share));
   const auto place_in = [](const std::vector<Index>& sorted, Index point) {
     const auto it = std::lower_bound(sorted.begin(), sorted.end(), point);
     KPSA_CHECK(it != sorted.end() && *it == point);
@@ -57,64 +61,40 @@ WrapKernel::WrapKernel(WrapMode mode, const Topology& driver, std::span<const Do
   }
 
   // The rest side, by what computes the present one
-  std::vector<Double3> points;
-  for (const Index p : in_points) points.push_back(driver_rest[p]);
-  std::vector<DriverFrame> frames(frames_.count());
-  frames_.Run(points, frames);
-  for (std::size_t i = 0; i < out_points.size(); ++i) {
-    Rest one;
-    Double3 normal;
-    for (Index e = offsets_[i]; e < offsets_[i + 1]; ++e) {
-      if (frame_of_[e] != kNoIndex) normal = normal + frames[frame_of_[e]].normal() * shares_[e];
-    }
-    if (Length(normal) > kFolded) {
-      normal = normal * (1 / Length(normal));
-      one.tangent = Across(normal);
-      one.binormal = Cross(normal, one.tangent);
-    }
-    one.place = PlaceOf(i, one.tangent, one.binormal, points, frames);
-    rest_.push_back(one);
+  AlignedFloats points(4 * in_count_ + 16), frames(kFrameFloats * frames_.count() + 16);
+  for (std::size_t i = 0; i < in_count_; ++i) {
+    for (int k = 0; k < 3; ++k)
+      points.data()[4 * i + static_cast<std::size_t>(k)] = static_cast<float>(driver_rest[in_points[i]][k]);
   }
+  frames_.Run(points.data(), frames.data());
+  directions_.assign(8 * count_, 0.0f);
+  for (std::size_t i = 0; i < count_; ++i) {
+    Double3 normal;
+    double framed = 0;
+    for (Index e = offsets_[i]; e < offsets_[i + 1]; ++e) {
+      if (frame_of_[e] == kNoIndex) continue;
+      const float* n = frames.data() + kFrameFloats * frame_of_[e] + 12;
+      normal = normal + Double3{n[0], n[1], n[2]} * influences.weights[e];
+      framed += influences.weights[e];
+    }
+    if (!(Length(normal) > kFolded)) continue;
+    normal = normal * (1 / Length(normal));
+    const Double3 tangent = Across(normal), binormal = Cross(normal, tangent);
+    for (int k = 0; k < 3; ++k) {
+      directions_[8 * i + static_cast<std::size_t>(k)] = static_cast<float>(tangent[k] / framed);
+      directions_[8 * i + 4 + static_cast<std::size_t>(k)] = static_cast<float>(binormal[k] / framed);
+    }
+  }
+  const std::size_t row = PaddedCount(count_);
+  rest_ = AlignedFloats(13 * row);
+  if (mode_ == WrapMode::kSnap) return;
+  FindWrapPlaces({offsets_.data(), entries_.data(), frame_of_.data(), shares_.data(), directions_.data(),
+                  nullptr, nullptr, row, 1, false, mode_ == WrapMode::kSurface},
+                 points.data(), frames.data(), 0, count_, rest_.data());
 }
 
 std::size_t WrapKernel::ScratchFloats() const {
-  return (in_count_ * sizeof(Double3) + frames_.count() * sizeof(DriverFrame)) / sizeof(float);
-}
-
-WrapKernel::Place WrapKernel::PlaceOf(std::size_t point, Double3 tangent, Double3 binormal,
-                                      std::span<const Double3> driver,
-                                      std::span<const DriverFrame> frames) const noexcept {
-  Place place;
-  DriverFrame blend{};
-  double framed = 0;
-  for (Index e = offsets_[point]; e < offsets_[point + 1]; ++e) {
-    const double share = shares_[e];
-    place.anchor = place.anchor + driver[entries_[e]] * share;
-    if (frame_of_[e] == kNoIndex) continue;
-    const double* values = frames[frame_of_[e]].values;
-    for (int k = 0; k < DriverFrame::kSize; ++k) blend.values[k] += values[k] * share;
-    framed += share;
-  }
-  place.normal = blend.normal();
-  const double length = Length(place.normal);
-  if (framed == 0 || tangent == Double3() || length <= kFolded) return place;
-  place.tangent = blend.Apply(tangent) * (1 / framed);
-  place.binormal = blend.Apply(binormal) * (1 / framed);
-  const Double3 n = place.normal * (1 / length);
-  place.normal = n;
-  place.turns = true;
-  if (mode_ == WrapMode::kSurface) return place;
-  // The rotation in the plane across n that is nearest to (tangent, binormal)
-  const Double3 t = place.tangent, b = place.binormal;
-  const Double3 turned = (t - n * Dot(n, t)) + Cross(b, n);
-  const double size = Length(turned);
-  if (size <= kFolded * (Length(t) + Length(b))) {
-    place.turns = false;
-    return place;
-  }
-  place.tangent = turned * (1 / size);
-  place.binormal = Cross(n, place.tangent);
-  return place;
+  return (4 * in_count_ + 15) / 16 * 16 + kFrameFloats * frames_.count();
 }
 
 void WrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
@@ -123,43 +103,33 @@ void WrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   KPSA_CHECK_EQ(out.count, point_count());
   KPSA_CHECK_EQ(inputs.driver.count, in_count_);
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
-  CopyPoints(in, out);
   const float envelope = static_cast<float>(inputs.envelope);
-  if (envelope == 0) return;
-  const std::span<Double3> driver(reinterpret_cast<Double3*>(scratch.data()), in_count_);
-  const std::span<DriverFrame> frames(reinterpret_cast<DriverFrame*>(driver.data() + in_count_),
-                                      frames_.count());
+  if (envelope == 0) return CopyPoints(in, out);
+  float *driver = scratch.data(), *frames = driver + (4 * in_count_ + 15) / 16 * 16;
   const bool moved = !(stage_from_driver_ == Matrix4());
   ForRanges(parallel, in_count_, kWrapGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      const Double3 p{inputs.driver.x[i], inputs.driver.y[i], inputs.driver.z[i]};
-      driver[i] = moved ? TransformPoint(stage_from_driver_, p) : p;
+      float* to = driver + 4 * i;
+      to[0] = inputs.driver.x[i], to[1] = inputs.driver.y[i], to[2] = inputs.driver.z[i], to[3] = 0;
+      if (!moved) continue;
+      const Double3 p = TransformPoint(stage_from_driver_, {to[0], to[1], to[2]});
+      to[0] = static_cast<float>(p.x), to[1] = static_cast<float>(p.y), to[2] = static_cast<float>(p.z);
     }
   });
   frames_.Run(driver, frames, parallel);
-  ForRanges(parallel, point_count(), kWrapGrain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const float w = weights_[i] * envelope;
-      if (w == 0 || offsets_[i] == offsets_[i + 1]) continue;
-      const Rest& rest = rest_[i];
-      const Place now = PlaceOf(i, rest.tangent, rest.binormal, driver, frames);
-      const Double3 p{in.x[i], in.y[i], in.z[i]};
-      Double3 goal = now.anchor;
-      if (mode_ != WrapMode::kSnap) {
-        const Double3 offset = p - rest.place.anchor;
-        if (now.turns && rest.place.turns) {
-          goal = goal + now.tangent * Dot(rest.place.tangent, offset) +
-                 now.binormal * Dot(rest.place.binormal, offset) +
-                 now.normal * Dot(rest.place.normal, offset);
-        } else {
-          goal = goal + offset;
-        }
-      }
-      out.x[i] = static_cast<float>(p.x + (goal.x - p.x) * w);
-      out.y[i] = static_cast<float>(p.y + (goal.y - p.y) * w);
-      out.z[i] = static_cast<float>(p.z + (goal.z - p.z) * w);
-    }
-  });
+  const WrapRun run{offsets_.data(),
+                    entries_.data(),
+                    frame_of_.data(),
+                    shares_.data(),
+                    directions_.data(),
+                    rest_.data(),
+                    weights_.data(),
+                    PaddedCount(count_),
+                    envelope,
+                    mode_ == WrapMode::kSnap,
+                    mode_ == WrapMode::kSurface};
+  ForRanges(parallel, count_, kWrapGrain,
+            [&](std::size_t begin, std::size_t end) { RunWrap(run, driver, frames, in, out, begin, end); });
 }
 
 }  // namespace kpsa

@@ -8,7 +8,8 @@
 //                              deformation (2-D polar decomposition)
 //   surface: a' + t' (t.(p - a)) + b' (b.(p - a)) + n' (n.(p - a))   stretched as the surface is
 //   snap:    a'
-// Where the surface is folded up so that there is no tangent, the offset does not turn. Double arithmetic.
+// Where the surface is folded up so that there is no tangent, the offset does not turn. Bound in double, run
+// in floats; what rests stays where it is, to the bit.
 #pragma once
 
 #include <limits>
@@ -71,31 +72,18 @@ class WrapKernel {
              std::span<const Index> out_points, std::span<const Index> in_points,
              std::span<const float> point_weights = {});
 
-  std::size_t point_count() const { return weights_.size(); }
+  std::size_t point_count() const { return count_; }
   std::size_t ScratchFloats() const;
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
 
  private:
-  struct Place {                                // of a bound point, at rest or now
-    Double3 anchor, tangent, binormal, normal;  // tangent and binormal as stretched (kSurface) or orthonormal
-    bool turns = false;                         // false: only the anchor means something
-  };
-  // tangent, binormal: the directions at rest.
-  Place PlaceOf(std::size_t point, Double3 tangent, Double3 binormal, std::span<const Double3> driver,
-                std::span<const DriverFrame> frames) const noexcept;
-
   WrapMode mode_;
   Matrix4 stage_from_driver_;
-  std::size_t in_count_ = 0;
+  std::size_t in_count_ = 0, count_ = 0;
   std::vector<Index> offsets_, entries_, frame_of_;  // influences: entry of `driver`, frame (kNoIndex: none)
-  std::vector<double> shares_;
-  std::vector<float> weights_;
-  struct Rest {
-    Place place;
-    Double3 tangent, binormal;
-  };
-  std::vector<Rest> rest_;
+  std::vector<float> shares_, directions_;           // directions: tangent and binormal at rest
+  AlignedFloats weights_, rest_;                     // of the points; their places at rest (wrap_run.h)
   DriverFrames frames_;
 };
 

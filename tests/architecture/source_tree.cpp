@@ -38,13 +38,15 @@ struct Door {
   std::vector<const char*> files;
   bool any_source = false;  // and every .cpp
 };
-const std::array<Door, 9> kDoors = {{
+const std::array<Door, 11> kDoors = {{
     {"tbb/", {"base/parallel.cpp"}},
     {"oneapi/", {"base/parallel.cpp"}},
     {"yaml-cpp/", {"io/yaml_document.cpp"}},
     {"tiny_gltf",
-     {"io/gltf_accessor.cpp", "io/gltf_clip.cpp", "io/gltf_document.cpp", "io/gltf_mesh.cpp",
-      "io/gltf_scene.cpp"}},
+     {"io/gltf_accessor.cpp", "io/gltf_clip.cpp", "io/gltf_compressed.cpp", "io/gltf_document.cpp",
+      "io/gltf_mesh.cpp", "io/gltf_scene.cpp"}},
+    {"draco/", {"io/gltf_draco.cpp", "tests/io/gltf_draco_test.cpp"}},
+    {"meshoptimizer.h", {"io/gltf_meshopt.cpp", "tests/io/gltf_meshopt_test.cpp"}},
     {"nlohmann/", {}, true},
     {"embree", {"nodes/kernels/ray_scene.cpp"}},
     {"CLI/", {"cli/main.cpp", "cli/options.cpp"}},

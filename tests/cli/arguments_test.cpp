@@ -189,8 +189,8 @@ TEST(Arguments, HelpAndFirstMinutes) {
     EXPECT_NE(bare.out.find(word), std::string::npos);
   const ProcessResult help = RunKpsa({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* name : {"init", "validate", "inspect", "eval", "get", "render", "train", "bench",
-                           "report", "compile", "profile", "explain", "compare", "graph", "nodes"}) {
+  for (const char* name : {"init", "validate", "inspect", "eval", "get", "render", "train", "bench", "report",
+                           "compile", "profile", "explain", "compare", "graph", "nodes", "weights", "fmt"}) {
     EXPECT_NE(help.out.find(std::string("  ") + name), std::string::npos) << name;
     const ProcessResult one = RunKpsa({name, "--help"});
     EXPECT_EQ(one.exit_code, 0) << name;

@@ -148,11 +148,7 @@ TEST_F(BadSubspaces, OfAnotherRig) {
 
 // Any byte may flip: what still fits is played, all else is refused in one message.
 TEST_F(BadSubspaces, RandomDamage) {
-#ifdef KPSA_WITH_ASAN
-  constexpr int kRounds = 60;  // half a second each
-#else
   constexpr int kRounds = 200;
-#endif
   std::mt19937 random(11);
   std::size_t refused = 0;
   for (int round = 0; round < kRounds; ++round) {

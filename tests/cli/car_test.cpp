@@ -25,11 +25,11 @@ TEST(Car, BothRigsValidateWithoutWarnings) {
   }
 }
 
-TEST(Car, TheTestClipEvaluatesAndMoves) {
+TEST(Car, TheTestClipEvaluates) {
   const TemporaryFolder folder;
   for (const std::string& rig : {kCar, kCarMush}) {
-    const ProcessResult run =
-        RunKpsa({"eval", rig, "--clip", "talk", "--frames", "0:40:20", "-o", folder / "a.npz", "--force", "--json"});
+    const ProcessResult run = RunKpsa(
+        {"eval", rig, "--clip", "talk", "--frames", "0:40:20", "-o", folder / "a.npz", "--force", "--json"});
     EXPECT_EQ(run.exit_code, 0) << run.err;
   }
 }

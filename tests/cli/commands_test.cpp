@@ -367,12 +367,17 @@ TEST(Render, ACameraSeesLightAfterBounces) {
     rig.replace(at, from.size(), to);
   };
   replace("room.glb", KPSA_SCENES_DIR "/gi/room.glb");
-  replace("width: 400, height: 400, samples: 16", "width: 20, height: 20, samples: 8");
+  replace("width: 400, height: 400", "width: 20, height: 20");
+  replace("samples: 40, keyPoints: 200, heldOut: 25", "samples: 20, keyPoints: 30");
+  folder.Write("carried.yaml", rig);
+  Ok({"render", folder / "carried.yaml", "--camera", "front", "--times", "1", "-o", folder / "carried.png"});
+  replace("carried: [figure], ", "");
   folder.Write("gi.yaml", rig);
   const std::string path = folder / "gi.yaml";
   Ok({"render", path, "--camera", "front", "--times", "1", "-o", folder / "all.png"});
   Ok({"render", path, "--camera", "front", "--times", "1", "--layer", "direct", "-o", folder / "direct.png"});
   EXPECT_NE(TemporaryFolder::Read(folder / "all.png"), TemporaryFolder::Read(folder / "direct.png"));
+  EXPECT_NE(TemporaryFolder::Read(folder / "all.png"), TemporaryFolder::Read(folder / "carried.png"));
   EXPECT_EQ(RunKpsa({"render", path, "--camera", "fron", "-o", folder / "no.png"}).exit_code, 2);
   EXPECT_EQ(RunKpsa({"render", path, "--exposure", "2", "-o", folder / "no.png"}).exit_code, 2);
 
@@ -383,8 +388,49 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_GT(bench["error"]["rms"], 0.0);
   EXPECT_LT(bench["error"]["rms"], bench["motion"]["rms"]);
   EXPECT_GT(bench["speedup"], 1.5);
+  EXPECT_EQ(bench["units"], "light");
   Ok({"render", path, "--camera", "front", "--times", "1", "--accelerate", "-o", folder / "three.png"});
+
+  // On the test clip, with a tolerance that keeps most of the motion: hits, and what they are wrong by
+  const Json held_out = Json::parse(Ok({"bench", path, "--runs", "1", "--tolerance", "0.12", "--json"}));
+  EXPECT_GT(held_out["hit_rate"], 0.5);
+  EXPECT_LE(held_out["violation_rate"], 0.1);
+  for (const Json& frame : held_out["per_frame"]) {
+    EXPECT_LT(frame["rms"], 0.2);
+  }
+  const std::string text = Ok({"bench", path, "--runs", "1", "--frames", "0:20:10", "--per-frame"});
+  EXPECT_NE(text.find("an RMS of 0.08"), std::string::npos) << text;
+  EXPECT_EQ(text.find(" m;"), std::string::npos) << text;  // no metres
+  // A lamp where it never was: all frames are rendered fully, and the lamp is named
+  const std::vector<std::string> far = {"bench",    path,      "--runs", "1",
+                                        "--frames", "0:20:10", "--set",  "lampArm.rotateZ=80"};
+  EXPECT_NE(Ok(far).find("lamp.outMatrix is outside its trained range"), std::string::npos);
+  std::vector<std::string> as_json = far;
+  as_json.push_back("--json");
+  const Json full = Json::parse(Ok(as_json));
+  EXPECT_EQ(full["hit_rate"], 0.0);
+  EXPECT_EQ(full["error"]["max"], 0.0);
   EXPECT_EQ(TemporaryFolder::Read(folder / "three.png").substr(1, 3), "PNG");
+
+  // Commands that look into a rig see the subspace that stands in for the light
+  for (const char* wanted : {"", "bounced.irradiance"}) {
+    std::vector<std::string> words = {"compile", path, "--accelerate", "--json"};
+    if (*wanted != 0) words.insert(words.end(), {"--want", wanted});
+    std::string types;
+    const Json compiled = OkJson(words);
+    for (const Json& node : compiled["nodes"]) types += node["type"].get<std::string>() + " ";
+    EXPECT_NE(types.find("kpsa"), std::string::npos) << wanted << ": " << types;
+  }
+
+  // The entry names the colours, not a mesh; a rig without it takes it from the subspace
+  EXPECT_NE(Ok({"inspect", path}).find("bounced.irradiance"), std::string::npos);
+  const std::size_t entry = rig.find("\naccelerate:");
+  ASSERT_NE(entry, std::string::npos);
+  folder.Write("bare.yaml", rig.substr(0, entry + 1));
+  const Json bare = OkJson({"eval", folder / "bare.yaml", "--kpsa", folder / "gi.kpsa", "--times", "1", "-o",
+                            folder / "bare.npz", "--json"});
+  EXPECT_EQ(bare["accelerated"]["hits"].get<int>() + bare["accelerated"]["misses"].get<int>(), 1)
+      << bare.dump();
 }
 
 }  // namespace

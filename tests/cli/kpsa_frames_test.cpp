@@ -160,8 +160,7 @@ TEST_F(KpsaFrames, NothingPopsInTheBlendZone) {
   for (std::size_t s = 0; s <= kSteps; ++s) {
     const double t = static_cast<double>(s) / kSteps;
     std::vector<double>& pose = path.emplace_back();
-    for (const Control& control : full.rig.controls)
-      pose.push_back(0.9 * t * control.min);  // before the elbow folds over
+    for (const Control& control : full.rig.controls) pose.push_back(t * control.min);
     pure.Pose(pose);
     const RunFrame frame = pure.Evaluate();
     ASSERT_TRUE(frame.hit) << t << " " << frame.text;

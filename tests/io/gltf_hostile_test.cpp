@@ -113,16 +113,25 @@ TEST(GltfHostile, DamagedStructure) {
       {"follows joint 1, but skins[0] of nodes[0] has 1",
        [](GltfBuilder& b) { b.root["skins"][0]["joints"] = {1}; }},
       {"VENDOR_magic", [](GltfBuilder& b) { b.root["extensionsRequired"] = {"VENDOR_magic"}; }},
-      {"KHR_draco_mesh_compression",
-       [](GltfBuilder& b) { b.root["extensionsRequired"] = {"KHR_draco_mesh_compression"}; }},
       {"export the file without compression",
-       [](GltfBuilder& b) { b.root["extensionsRequired"] = {"EXT_meshopt_compression"}; }},
+       [](GltfBuilder& b) { b.root["extensionsRequired"] = {"VENDOR_meshopt_compression"}; }},
       {"extensionsRequired", [](GltfBuilder& b) { b.root["extensionsRequired"] = {3}; }},
-      {"compressed with KHR_draco",
+      {"KHR_draco_mesh_compression.attributes is missing",
        [](GltfBuilder& b) {
          b.root["accessors"][kPosition].erase("bufferView");
          b.root["meshes"][0]["primitives"][0]["extensions"] = {
              {"KHR_draco_mesh_compression", {{"bufferView", 0}}}};
+       }},
+      {"KHR_draco_mesh_compression does not begin as Draco data do",
+       [](GltfBuilder& b) {
+         b.root["meshes"][0]["primitives"][0]["extensions"] = {
+             {"KHR_draco_mesh_compression", {{"bufferView", 0}, {"attributes", {{"POSITION", 0}}}}}};
+       }},
+      {"EXT_meshopt_compression.count is missing",
+       [](GltfBuilder& b) {
+         b.root["bufferViews"][0]["extensions"] = {
+             {"EXT_meshopt_compression", {{"buffer", 0}, {"byteLength", 36}, {"byteStride", 12}}}};
+         b.root["buffers"] = {{{"byteLength", 4}}};
        }},
       {"buffers[0] has no data",
        [](GltfBuilder& b) {

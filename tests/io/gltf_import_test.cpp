@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/gltf_builder.h"
 #include "tests/support/gltf_reference.h"
 #include "tests/support/temporary_folder.h"
@@ -222,6 +224,36 @@ TEST(GltfImport, QuantizedPositions) {
   }
 }
 
+TEST(GltfImport, TextureCoordinates) {
+  GltfBuilder b;
+  const int position = b.Accessor<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3");
+  const json plain = {{"attributes", {{"POSITION", position}}}};
+  const auto with = [&](int uvs) {
+    return json{{"attributes", {{"POSITION", position}, {"TEXCOORD_0", uvs}}}};
+  };
+  const int floats = b.Accessor<float>({0, 0, 1, 0, 0.5f, 2}, "VEC2");
+  const int bytes = b.Accessor<std::uint16_t>({0, 0, 65535, 0, 0, 65535}, "VEC2", true);
+  const int few = b.Accessor<float>({0, 0, 1, 0}, "VEC2");
+  b.Push("meshes", {{"primitives", {plain, with(floats), plain, with(bytes)}}});
+  b.Push("meshes", {{"primitives", {plain}}});
+  b.Push("nodes", {{"mesh", 0}});
+  const Character c = MustLoad(b.Text());
+  const std::vector<float>& uvs = c.meshes.at(0).uvs;
+  ASSERT_EQ(uvs.size(), 24u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_TRUE(std::isnan(uvs[i]) && std::isnan(uvs[12 + i])) << i;  // primitives without any
+  }
+  EXPECT_EQ(std::vector<float>(uvs.begin() + 6, uvs.begin() + 12), (std::vector<float>{0, 0, 1, 0, 0.5f, 2}));
+  EXPECT_EQ(std::vector<float>(uvs.begin() + 18, uvs.end()), (std::vector<float>{0, 0, 1, 0, 0, 1}));
+  EXPECT_TRUE(c.meshes.at(1).uvs.empty());
+  b.root["meshes"][1]["primitives"][0] = with(few);
+  const Result<Character> refused = Load(b.Text());
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.status().ToString().find("TEXCOORD_0 (accessors[3]) has 2 elements, POSITION has 3"),
+            std::string::npos)
+      << refused.status().ToString();
+}
+
 TEST(GltfImport, InfluencesOfAnySetAndType) {
   GltfBuilder b;
   const int position = b.Accessor(std::vector<float>(6, 0.f), "VEC3");
@@ -312,7 +344,8 @@ TEST(GltfImport, BuffersBesideTheDocument) {
   }
   // Data URIs of any media type, and without base64; a second buffer in a .glb
   for (const std::string& uri :
-       {"data:;base64," + b.Base64(), "DATA:;base64," + b.Base64(), "data:application/gltf-buffer;base64," + b.Base64(),
+       {"data:;base64," + b.Base64(), "DATA:;base64," + b.Base64(),
+        "data:application/gltf-buffer;base64," + b.Base64(),
         std::string("data:application/octet-stream,%00%00%80%3F%00%00%00%40%00%00%40%40")}) {
     b.root["buffers"] = {{{"uri", uri}, {"byteLength", 12}}};
     EXPECT_EQ(MustLoad(b.Text()).meshes.at(0).positions, (std::vector<float>{1, 2, 3})) << uri;

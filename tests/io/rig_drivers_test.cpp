@@ -15,6 +15,7 @@ class RigDrivers : public RigFixture {
   RigPlayer Play(const std::string& text) {
     return RigPlayer(folder.Write("t.yaml", "kpsa: 1\ncharacter: c.gltf\n" + text));
   }
+  static Double3 PlaceOf(const Matrix4& m) { return {m(0, 3), m(1, 3), m(2, 3)}; }
   static constexpr const char* kControls =
       "controls:\n"
       "  root.translateX: {min: -1, max: 1}\n"
@@ -97,6 +98,27 @@ TEST_F(RigDrivers, AShrunkClothLiesOnTheCage) {
     }
     EXPECT_EQ(on, 15);
   }
+}
+
+TEST_F(RigDrivers, APinCarriesATransform) {
+  RigPlayer player = Play(std::string("nodes:\n"
+                                      "  p: {type: uvPin, driver: cage, coordinateU: [0.625, 0.5], "
+                                      "coordinateV: [0.75, 0.25], normalAxis: z}\n"
+                                      "  f: {type: follicle, driver: \"shirt@skin\", parameterU: 1}\n"
+                                      "  a: {type: transform, offsetParentMatrix: \"p.outputMatrix[0]\"}\n"
+                                      "  b: {type: transform, translate: f.outTranslate}\n") +
+                          kControls);
+  ASSERT_TRUE(player.ok());
+  EXPECT_LT(
+      MaxDistance({PlaceOf(player.World("a")), PlaceOf(player.World("b"))}, {{0.25, 0.5, 0}, {0.8, 0, 0.1}}),
+      1e-6);
+  player.Set("root.translateX", 0.5);
+  player.Set("root.rotateZ", 1.5707963267948966);
+  const Matrix4 a = player.World("a");
+  EXPECT_LT(MaxDistance({PlaceOf(a), PlaceOf(player.World("b"))}, {{0, 0.25, 0}, {0.5, 0.8, 0.1}}), 1e-6);
+  EXPECT_NEAR(a(1, 0), 1, 1e-6);  // growing u has turned from x to y
+  EXPECT_NEAR(a(2, 2), 1, 1e-6);
+  EXPECT_TRUE(Has(Errors("nodes:\n  p: {type: uvPin, driver: cag}\n"), "t.yaml:4:28: unknown mesh \"cag\""));
 }
 
 TEST_F(RigDrivers, ErrorsAtTheirLine) {
@@ -266,6 +288,61 @@ TEST_F(RigFalloffs, CombineByMultiplyMaxAndAdd) {
          [&](Double3 p) { return std::min(1.0, left(p) + right(p) + map(p)); });
   Expect("[" + m + ", {combine: max, of: [" + l + ", " + r + "]}]",
          [&](Double3 p) { return map(p) * std::max(left(p), right(p)); });
+}
+
+TEST_F(RigFalloffs, NodesThatVary) {
+  folder.Write("w.json",
+               R"({"kpsa": "weights", "version": 1, "mesh": "cloth", "points": 25,
+                   "maps": {"m": {"default": 1, "indices": [12], "values": [0.5]}}})");
+  RigPlayer player = Play(
+      "nodes:\n"
+      "  h: {type: transform, at: [0, 1, 0.1]}\n"
+      "  up: {type: transform}\n"
+      "  s: {type: sphereFalloff, matrix: h.worldMatrix, radius: 0.9, curve: linear}\n"
+      "  m: {type: weightMap, weights: \"w.json#m\"}\n"
+      "  both: {type: combineFalloff, falloffs: [s, m], operation: multiply}\n"
+      "  c: {type: cluster, matrix: up.worldMatrix, falloff: both}\n"
+      "  d: {type: cluster, matrix: up.worldMatrix, falloff: s}\n"
+      "deform:\n  - {meshes: [cloth], stack: [c]}\n  - {meshes: [shirt], stack: [d, skin]}\n"
+      "controls: {h.translateX: {min: -1, max: 1}, up.translateZ: {min: 0, max: 1}, "
+      "s.radius: {min: 0, max: 2}}\n");
+  ASSERT_TRUE(player.ok());
+  player.Set("up.translateZ", 1);
+  for (const double x : {0.0, 0.5}) {
+    for (const double radius : {0.9, 0.4}) {
+      player.Set("h.translateX", x);
+      player.Set("s.radius", radius);
+      const std::vector<Double3> cloth = player.Points(kCloth);
+      for (Index v = 0; v < 25; ++v) {
+        const double weight = Clamp(1 - Length(PlaceOf(std::size_t{v}) - Double3{x, 1, 0.1}) / radius);
+        EXPECT_NEAR(cloth[player.PointOf(v, kCloth)].z, 0.1 + weight * (v == 12 ? 0.5 : 1), 1e-6) << v;
+      }
+      // Before its skin the shirt is where it rests, 1 m lower
+      const std::vector<Double3> shirt = player.Points(kShirt);
+      for (Index v = 0; v < 25; ++v) {
+        const Double3 at = PlaceOf(std::size_t{v}) - Double3{0, 1, 0};
+        EXPECT_NEAR(shirt[player.PointOf(v, kShirt)].z,
+                    0.1 + Clamp(1 - Length(at - Double3{x, 1, 0.1}) / radius), 1e-6)
+            << v;
+      }
+    }
+  }
+}
+
+TEST_F(RigFalloffs, NodesErrAtTheirLine) {
+  const auto errors = [&](const std::string& falloff, const std::string& more = "") {
+    return Errors("nodes:\n  c: {type: cluster, falloff: " + falloff + "}\n  s: {type: sphereFalloff}\n" +
+                  more + "deform:\n  - {meshes: [cloth], stack: [c]}\n");
+  };
+  EXPECT_TRUE(Has(errors("sx"), "t.yaml:4:31: unknown falloff \"sx\" (did you mean \"s\"?)")) << errors("sx");
+  EXPECT_TRUE(Has(errors("c"), "t.yaml:4:31: \"c\" is a cluster, no falloff")) << errors("c");
+  EXPECT_TRUE(Has(errors("b", "  b: {type: combineFalloff}\n"),
+                  "t.yaml:4:31: \"b\" (combineFalloff): expected two falloff nodes, falloffs: [a, b]"));
+  EXPECT_TRUE(Has(errors("b", "  b: {type: combineFalloff, falloffs: [s]}\n"), "t.yaml:6:39: \"b\""));
+  EXPECT_TRUE(Has(errors("b", "  b: {type: combineFalloff, falloffs: [s, [s]]}\n"),
+                  "t.yaml:6:43: expected the name of a falloff node"));
+  EXPECT_TRUE(Has(errors("b", "  b: {type: combineFalloff, falloffs: [s, b]}\n"), "is made of itself"));
+  EXPECT_TRUE(Has(errors("s", "  w: {type: weightMap, falloff: s}\n"), "expected a falloff at rest"));
 }
 
 TEST_F(RigFalloffs, ErrorsAtTheirLine) {

@@ -88,9 +88,9 @@ TEST_F(RigFileTest, RefusesOtherVersionsAndOtherFiles) {
   EXPECT_TRUE(Has(Short(ReadRigFile(folder / "nobody.yaml", std::nullopt, &rig).ToString()), "nobody.yaml"));
 }
 
-TEST_F(RigFileTest, NamesWhatNeedsANewerVersion) {
-  const std::string text = Errors("references: {}\n");
-  EXPECT_TRUE(Has(text, "t.yaml:3:1: `references` needs a newer kpsa")) << text;
+TEST_F(RigFileTest, NamesTheNearestSection) {
+  const std::string text = Errors("reference: {}\n");
+  EXPECT_TRUE(Has(text, "t.yaml:3:1: rig: unknown key \"reference\" (did you mean \"references\"?)")) << text;
 }
 
 TEST_F(RigFileTest, CollectsErrorsWithPlaceAndSuggestion) {

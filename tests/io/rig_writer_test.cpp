@@ -104,6 +104,72 @@ TEST_F(RigWriterTest, ACharacterWithoutMeshesStillLoads) {
   EXPECT_FALSE(StarterRig(StandardRegistry(), folder / "nobody.glb").ok());
 }
 
+// The body of a character with an arm and a jaw, in which some names are taken already.
+std::string Figure() {
+  GltfBuilder builder = GltfBuilder::Character();
+  auto& nodes = builder.root["nodes"];
+  const auto add = [&](const char* name, std::size_t parent, std::vector<double> translation) {
+    const int node = builder.Push("nodes", {{"name", name}, {"translation", translation}});
+    nodes[parent]["children"].push_back(node);
+    builder.root["skins"][0]["joints"].push_back(node);
+    return static_cast<std::size_t>(node);
+  };
+  const std::size_t upper = add("upperarm.L", 1, {0.2, 0.5, 0}),
+                    lower = add("lowerarm.L", upper, {0.3, 0, 0.05});
+  add("hand.L", lower, {0.3, 0, -0.05});
+  nodes[2]["name"] = "jaw";
+  builder.Push("nodes", {{"name", "mush"}});
+  builder.Push("nodes", {{"name", "handLGoal"}});
+  builder.root["skins"][0].erase("inverseBindMatrices");
+  return builder.Text();
+}
+
+// What is suggested in comments works, too.
+TEST_F(RigWriterTest, SuggestionsLoadWhenTheirSignsAreTakenOut) {
+  folder.Write("c.gltf", Figure());
+  std::string text = Starter(folder / "c.gltf");
+  EXPECT_TRUE(Has(text, "\n  mush2: {type: deltaMush")) << text;
+  EXPECT_TRUE(Has(text, "#handLGoal2: {type: transform, at: hand.L}")) << text;
+  EXPECT_TRUE(Has(text, "start: upperarm.L, mid: lowerarm.L, end: hand.L")) << text;
+  EXPECT_TRUE(Has(text, "#handLGoal2.translateX: {min: -15, max: 15}")) << text;
+  EXPECT_TRUE(Has(text, "joint: jaw, above: 0.05")) << text;
+  const Rig plain = Reload(folder / "c.gltf");
+  const auto at = text.find("stack: [gltf, mush2]");
+  ASSERT_NE(at, std::string::npos) << text;
+  text.replace(at, 20, "stack: [gltf, jawCage, mush2]");
+  for (std::size_t sign = text.find('#'); sign != std::string::npos; sign = text.find('#', sign)) {
+    if (text[sign + 1] != ' ') {
+      text.erase(sign, 1);
+    } else {
+      ++sign;
+    }
+  }
+  const Result<Rig> rig = LoadRig(StandardRegistry(), folder.Write("all.yaml", text));
+  ASSERT_TRUE(rig.ok()) << rig.status().ToString() << text;
+  EXPECT_EQ(rig->controls.size(), plain.controls.size() + 3);
+  EXPECT_EQ(rig->scene.meshes[0].stages.size(), plain.scene.meshes[0].stages.size() + 1);
+  EXPECT_TRUE(rig->graph->FindNode("handLGoal2Ik").ok());
+  EXPECT_TRUE(rig->notes.empty());
+}
+
+TEST_F(RigWriterTest, ControlsAreGrouped) {
+  GltfBuilder builder = GltfBuilder::Character();
+  builder.root["nodes"][1]["name"] = "spine";
+  builder.root["nodes"][2]["name"] = "hand.R";
+  builder.root["meshes"][0]["extras"]["targetNames"][0] = "blink.L";
+  builder.root.erase("animations");
+  folder.Write("c.gltf", builder.Text());
+  const std::string text = Starter(folder / "c.gltf");
+  std::size_t last = 0;
+  for (const char* part : {"  # Body\n  spine.rotateX", "  # Arm, right\n  hand.R.rotateX",
+                           "  # Shapes of body, left\n  body.weight[blink.L]"}) {
+    const std::size_t at = text.find(part);
+    ASSERT_NE(at, std::string::npos) << part << "\n" << text;
+    EXPECT_GT(at, last) << part;
+    last = at;
+  }
+}
+
 TEST_F(RigWriterTest, EveryAssetGetsARigThatLoads) {
   if (SharedFile("assets/head.glb").empty()) GTEST_SKIP() << "no assets beside the checkout";
   for (const char* name :

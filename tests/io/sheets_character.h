@@ -1,7 +1,7 @@
 // A character of sheets for deformers that follow meshes: `cage`, 9 x 9 points over [-1, 1]^2 at z = 0,
 // skinned to root and tip (above x = 0); `shirt`, 5 x 5 points over [-0.8, 0.8]^2 at z = 0.1, with the same
 // skin; `cloth`, like the shirt but without a skin, its node 1 m up along y; `thread`, whose only face has no
-// area.
+// area. All but the thread have texture coordinates, u along x and v along y.
 #pragma once
 
 #include <string>
@@ -14,7 +14,7 @@ namespace kpsa {
 inline GltfBuilder SheetsCharacter() {
   GltfBuilder b;
   const auto sheet = [&](int n, float size, float height, bool skinned) {
-    std::vector<float> xyz, weights;
+    std::vector<float> xyz, weights, uvs;
     std::vector<std::uint8_t> joints;
     std::vector<std::uint16_t> corners;
     for (int v = 0; v < n; ++v) {
@@ -22,6 +22,8 @@ inline GltfBuilder SheetsCharacter() {
         const float x = size * (2.0f * static_cast<float>(u) / static_cast<float>(n - 1) - 1);
         xyz.insert(xyz.end(),
                    {x, size * (2.0f * static_cast<float>(v) / static_cast<float>(n - 1) - 1), height});
+        uvs.insert(uvs.end(), {static_cast<float>(u) / static_cast<float>(n - 1),
+                               static_cast<float>(v) / static_cast<float>(n - 1)});
         joints.insert(joints.end(), {static_cast<std::uint8_t>(x > 0 ? 1 : 0), 0, 0, 0});
         weights.insert(weights.end(), {1, 0, 0, 0});
         if (u + 1 == n || v + 1 == n) continue;
@@ -30,7 +32,8 @@ inline GltfBuilder SheetsCharacter() {
         corners.insert(corners.end(), {a, next(a), next(c), a, next(c), c});
       }
     }
-    nlohmann::json attributes = {{"POSITION", b.Accessor(xyz, "VEC3")}};
+    nlohmann::json attributes = {{"POSITION", b.Accessor(xyz, "VEC3")},
+                                 {"TEXCOORD_0", b.Accessor(uvs, "VEC2")}};
     if (skinned) {
       attributes["JOINTS_0"] = b.Accessor(joints, "VEC4");
       attributes["WEIGHTS_0"] = b.Accessor(weights, "VEC4");

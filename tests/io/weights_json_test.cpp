@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cmath>
+
 #include "tests/support/temporary_folder.h"
 
 namespace kpsa {
@@ -12,21 +15,58 @@ const char kGood[] = R"({"kpsa": "weights", "version": 1, "mesh": "head_mesh", "
 
 TEST(Weights, ReadsMaps) {
   const TemporaryFolder folder;
-  folder.Write("w/lips.json", kGood);
-  const auto upper = LoadWeights(folder.path(), "w/lips.json#upper", "head_mesh", 5);
-  ASSERT_TRUE(upper.ok()) << upper.status().ToString();
-  EXPECT_EQ(*upper, (std::vector<float>{0.5, 0.25, 0.25, 0.25, 1}));
-  EXPECT_EQ(*LoadWeights(folder.path(), "w/lips.json#rest", "head_mesh", 5), std::vector<float>(5, 0.f));
-  const auto error = [&](const std::string& reference, const std::string& mesh, std::size_t points) {
-    return LoadWeights(folder.path(), reference, mesh, points).status().ToString();
+  const std::string path = folder.Write("w/lips.json", kGood);
+  const Result<WeightFile> file = ReadWeightFile(path);
+  ASSERT_TRUE(file.ok()) << file.status().ToString();
+  EXPECT_EQ(file->path, path);
+  const auto weights = [&](const std::string& reference) {
+    const Result<const NamedWeights*> map = FindWeights(*file, path, SplitWeightReference(reference).map);
+    EXPECT_TRUE(map.ok()) << map.status().ToString();
+    return map.ok() ? DenseWeights(*file, **map) : std::vector<float>();
   };
-  EXPECT_NE(error("w/lips.json#uper", "head_mesh", 5).find("did you mean \"upper\""), std::string::npos);
-  EXPECT_NE(error("w/lips.json", "head_mesh", 5).find("has 2 maps"), std::string::npos);
-  EXPECT_NE(error("w/lips.json#upper", "body", 5).find("of the mesh \"head_mesh\", expected \"body\""),
+  EXPECT_EQ(weights("w/lips.json#upper"), (std::vector<float>{0.5, 0.25, 0.25, 0.25, 1}));
+  EXPECT_EQ(weights("w/lips.json#rest"), std::vector<float>(5, 0.f));
+  const auto error = [&](const std::optional<std::string>& map) {
+    return FindWeights(*file, path, map).status().ToString();
+  };
+  EXPECT_NE(error("uper").find("did you mean \"upper\""), std::string::npos);
+  EXPECT_NE(error(std::nullopt).find("the file has the maps upper, rest"), std::string::npos);
+  EXPECT_NE(ReadWeightFile(folder / "w/none.json").status().ToString().find("No such file"),
             std::string::npos);
-  EXPECT_NE(error("w/lips.json#upper", "head_mesh", 6).find("for 5 points, \"head_mesh\" has 6"),
-            std::string::npos);
-  EXPECT_NE(error("w/none.json#upper", "head_mesh", 5).find("No such file"), std::string::npos);
+}
+
+TEST(Weights, ReferencesMayHaveHashes) {
+  const auto parts = [](const std::string& text) {
+    const WeightReference reference = SplitWeightReference(text);
+    return reference.path + " | " + reference.map.value_or("none");
+  };
+  EXPECT_EQ(parts("w.json"), "w.json | none");
+  EXPECT_EQ(parts("w.json#a"), "w.json | a");
+  EXPECT_EQ(parts("take#2/w.json#a#b"), "take#2/w.json | a#b");
+  EXPECT_EQ(parts("#a"), " | a");
+}
+
+// Any finite float, in few digits, with names that JSON escapes.
+TEST(Weights, TextReadsBackTheSameBits) {
+  const TemporaryFolder folder;
+  WeightFile file{"say \"hi\"\n", 3000, {{"a\\b", 0.1f, {}, {}}}};
+  std::uint32_t bits = 1;
+  for (Index i = 0; i < 3000; ++i) {
+    bits = bits * 1664525u + 1013904223u;
+    const auto value = std::bit_cast<float>(bits);
+    file.maps[0].indices.push_back(i);
+    file.maps[0].values.push_back(std::isfinite(value) ? value : 1.0f / static_cast<float>(i + 1));
+  }
+  const std::string text = WeightFileText(file);
+  EXPECT_NE(text.find("\"default\": 0.1,"), std::string::npos) << text.substr(0, 200);
+  const Result<WeightFile> read = ReadWeightFile(folder.Write("w.json", text));
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->mesh, file.mesh);
+  ASSERT_EQ(read->maps.size(), 1u);
+  EXPECT_EQ(read->maps[0].name, file.maps[0].name);
+  EXPECT_EQ(read->maps[0].indices, file.maps[0].indices);
+  EXPECT_EQ(read->maps[0].values, file.maps[0].values);
+  EXPECT_EQ(WeightFileText(*read), text);
 }
 
 TEST(Weights, RoundTrip) {

@@ -107,6 +107,37 @@ TEST_P(SubspaceTest, ReconstructsWhatTheEstimatorSays) {
   }
 }
 
+// Light: tiles read the few coordinates that all cues give together.
+TEST_P(SubspaceTest, LatentCoordinatesSayTheSame) {
+  if (GetParam() != EstimatorMode::kMap) return;
+  const Estimator slim = MapEstimator(pca_, cues_, false);
+  EXPECT_EQ(slim.gain.size(), 0);
+  EXPECT_LT((slim.reach - estimator_.gain.cwiseAbs().colwise().maxCoeff().transpose()).norm(), 1e-12);
+  Subspace latent = MakeSubspace(pca_, cues_, slim, test::AllMeasured(training_, cues_, MeasuredCues),
+                                 subspace_.outputs, {.rms_budget = 1e-6});
+  EXPECT_EQ(latent.tile_inputs(), 7u);
+  EXPECT_EQ(latent.soft_cache.leave_one_out, subspace_.soft_cache.leave_one_out);
+  latent.cues = subspace_.cues;
+  latent.units = kLightUnits;
+  ASSERT_TRUE(WriteSubspace(latent, path_).ok()) << WriteSubspace(latent, path_).ToString();
+  const Result<Subspace> read = ReadSubspace(path_);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->latent, latent.latent);
+  EXPECT_TRUE(read->of_light());
+  SubspaceScratch a(subspace_), b(*read);
+  for (std::size_t t = 0; t < test_.poses(); ++t) {
+    Measure(subspace_, RawCues(t), &a);
+    Measure(*read, RawCues(t), &b);
+    PointBuffer x(90), y(90);
+    subspace_.tiles[1].Reconstruct(a.inputs(), x.view());
+    read->tiles[1].Reconstruct(b.inputs(), y.view());
+    const std::vector<float> p = x.Interleaved(), q = y.Interleaved();
+    for (std::size_t i = 0; i < p.size(); ++i) EXPECT_NEAR(p[i], q[i], 5e-5);
+  }
+  latent.latent.pop_back();
+  EXPECT_FALSE(WriteSubspace(latent, path_).ok());
+}
+
 TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
   const Result<Subspace> read = ReadSubspace(path_);

@@ -109,6 +109,52 @@ TEST(IndirectIllumination, EachPixelIsItsOwn) {
   EXPECT_EQ(threads.pull_points("gi.irradiance"), all);
 }
 
+// A second mesh that the pixels look through: it has light at its points, and throws light on what they see.
+struct Carrying : Room {
+  Carrying() {
+    Mesh::Data data;
+    data.name = "board";
+    data.rest = PointBuffer::FromInterleaved(
+        std::vector<float>{-0.4f, 0.3f, 0, 0.4f, 0.3f, 0, 0.4f, 1.1f, 0, -0.4f, 1.1f, 0});
+    data.triangles = {0, 1, 2, 0, 2, 3};
+    data.triangle_vertices = data.triangles;
+    data.vertex_to_point = {0, 1, 2, 3};
+    data.primitives = {{0, 4, 0, 2, "board", {0.1f, 0.9f, 0.1f}}};
+    const auto board = std::make_shared<const Mesh>(std::move(data));
+    add("mesh", "b", {{"mesh", Value(board)}});
+    hold("gi.mesh[1]", Value(board));
+    connect("b.points", "gi.points[1]");
+  }
+};
+
+TEST(IndirectIllumination, PixelsLookThroughWhatIsCarried) {
+  Room empty;
+  Carrying seen, carried;
+  carried.hold("gi.carriedMeshes", Value(std::vector<std::int64_t>{1}));
+  const std::vector<float> a = empty.pull_points("gi.irradiance"), b = seen.pull_points("gi.irradiance"),
+                           c = carried.pull_points("gi.irradiance");
+  const std::size_t board = 3 * (8 * 24 + 12), beside = 3 * (8 * 24 + 4);
+  // The board faces the camera and the dark; behind it is the wall, which now gets less light
+  EXPECT_NE(b[board], c[board]);
+  EXPECT_NE(a[board], c[board]);
+  EXPECT_EQ(b[beside], c[beside]);
+  const std::vector<float> points = carried.pull_points("gi.pointIrradiance[0]");
+  ASSERT_EQ(points.size(), 12u);
+  for (std::size_t i = 0; i < 6; i += 3) EXPECT_GT(points[i], 0) << i;  // the lower ones, near the floor
+  // Each point is its own
+  Carrying few;
+  few.hold("gi.carriedMeshes", Value(std::vector<std::int64_t>{1}));
+  few.want("gi.pointIrradiance[0]", PointSet::Of({2}, 4));
+  const std::vector<float> some = few.pull_points("gi.pointIrradiance[0]");
+  ASSERT_EQ(some.size(), 3u);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_EQ(some[k], points[6 + k]);
+
+  Carrying wrong;
+  wrong.hold("gi.carriedMeshes", Value(std::vector<std::int64_t>{2}));
+  const Status status = wrong.try_pull("gi.irradiance");
+  EXPECT_NE(status.ToString().find("2 is none of the 2 meshes"), std::string::npos) << status.ToString();
+}
+
 TEST(IndirectIllumination, ItsColoursMayGoWherePointsDo) {
   Room room;
   room.add("tripwire", "trip");

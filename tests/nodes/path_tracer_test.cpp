@@ -25,9 +25,9 @@ struct Triangles {
     Add(corner, corner + u, corner + u + v, reflectance);
     Add(corner, corner + u + v, corner + v, reflectance);
   }
-  PathTracer Tracer(std::vector<DiffuseLight> lights) const {
+  PathTracer Tracer(const std::vector<DiffuseLight>& lights) const {
     Result<PathTracer> tracer =
-        PathTracer::Build(PointBuffer::FromInterleaved(xyz).view(), corners, albedo, std::move(lights));
+        PathTracer::Build(PointBuffer::FromInterleaved(xyz).view(), corners, albedo, lights);
     EXPECT_TRUE(tracer.ok()) << tracer.status().ToString();
     return std::move(*tracer);
   }
@@ -104,8 +104,8 @@ TEST(PathTracer, OneBounceHasTheFormFactorOfWhatItComesFrom) {
   ASSERT_TRUE(place.hit);
   EXPECT_EQ(tracer.Direct(place, 0, 1).x, 0);
   const double shadow = 0.02 * 0.02 / 2 / 4;  // of the small triangle, on the ceiling
-  EXPECT_NEAR(tracer.Indirect(place, 1, 8192, 1).x, 0.6 * 4 * FormFactorAbove(2, 1.5) * (1 - shadow), 0.01);
-  EXPECT_NEAR(tracer.Indirect(place, 1, 8192, 2).x, tracer.Indirect(place, 1, 8192, 1).x, 0.01);
+  EXPECT_NEAR(tracer.Indirect(place, {1, 8192, 1}).x, 0.6 * 4 * FormFactorAbove(2, 1.5) * (1 - shadow), 0.01);
+  EXPECT_NEAR(tracer.Indirect(place, {1, 8192, 2}).x, tracer.Indirect(place, {1, 8192, 1}).x, 0.01);
 }
 
 // Inside a sphere with a light in its middle every bounce adds the same everywhere: E (a + a^2 + ...).
@@ -129,7 +129,7 @@ TEST(PathTracer, BouncesInASphereAddUpGeometrically) {
   double expected = 0, power = 1;
   for (int bounces = 1; bounces <= 4; ++bounces) {
     expected += power *= 0.7;
-    EXPECT_NEAR(tracer.Indirect(place, 5, 1024, bounces).x, expected, 0.02 * expected) << bounces;
+    EXPECT_NEAR(tracer.Indirect(place, {5, 1024, bounces}).x, expected, 0.02 * expected) << bounces;
   }
 }
 
@@ -142,9 +142,122 @@ TEST(PathTracer, SamplesAreEven) {
       ASSERT_LT(x, 1);
       ++bins[static_cast<std::size_t>(x * 16)];
     }
-    for (int count : bins) EXPECT_NEAR(count, 16, dimension < 2 ? 3 : 16) << dimension;
+    for (int count : bins) EXPECT_EQ(count, 16) << dimension;
+  }
+  // Pairs of dimensions: one sample in each box of any shape that 64 samples fill once
+  for (std::uint32_t pair : {0u, 5u, 70u}) {
+    for (int wide : {1, 4, 8, 32}) {
+      std::vector<int> boxes(64);
+      for (std::uint32_t s = 0; s < 64; ++s) {
+        const auto x = static_cast<int>(SampleNumber(7, s, 2 * pair) * wide),
+                   y = static_cast<int>(SampleNumber(7, s, 2 * pair + 1) * 64 / wide);
+        ++boxes[static_cast<std::size_t>(y * wide + x)];
+      }
+      EXPECT_EQ(boxes, std::vector<int>(64, 1)) << pair << ", " << wide;
+    }
   }
   EXPECT_NE(SampleNumber(1, 0, 0), SampleNumber(2, 0, 0));
+}
+
+// A disk of radius r that faces the place, straight above: E = I / (d^2 + r^2).
+TEST(PathTracer, ABallLightsLikeADiskAndNeverMoreThanItIsBright) {
+  const auto above = [](double height, double radius) {
+    const DiffuseLight ball{DiffuseLight::Kind::kBall,
+                            Translation({0, height, 0}) * Scaling({radius, radius, radius}),
+                            {2, 2, 2}};
+    const PathTracer tracer = Floor().Tracer({ball});
+    return tracer.Direct(tracer.Look({0, 5, 0}, {0, -1, 0}), 1, 1024).x;
+  };
+  EXPECT_NEAR(above(1.5, 0.5), 2 / (2.25 + 0.25), 1e-3);
+  EXPECT_NEAR(above(2, 0), 0.5, 1e-6);
+  EXPECT_LT(above(1e-3, 0.5), 2 * 2 / 0.25);
+}
+
+TEST(PathTracer, NoiseFallsAsTheSamplesRise) {
+  Triangles t = Floor();
+  t.AddQuad({-1, 0, -1}, {2, 0, 0}, {0, 2, 0}, 0.8f);
+  t.AddQuad({-1, 0, -1}, {0, 0, 3}, {0, 2, 0}, 0.2f);
+  const PathTracer tracer = t.Tracer({PointLight({0.3, 1.2, 0.6}, 3)});
+  const ShadingPlace place = tracer.Look({0, 2, 0.2}, {0, -1, 0});
+  const auto noise = [&](int samples) {  // deviation over seeds
+    double sum = 0, squares = 0;
+    for (std::uint32_t seed = 0; seed < 40; ++seed) {
+      const double light = tracer.Indirect(place, {seed * 7919, samples, 2}).x;
+      sum += light, squares += light * light;
+    }
+    return std::sqrt(squares / 40 - sum * sum / 1600);
+  };
+  EXPECT_LT(noise(64), 0.5 * noise(8));  // independent samples: 0.35
+  const double mean = tracer.Indirect(place, {1, 4096, 2}).x;
+  EXPECT_GT(mean, tracer.Indirect(place, {1, 4096, 2, 0.02}).x);
+  EXPECT_LT(tracer.Indirect(place, {1, 4096, 1, 0.02}).x, 0.02 + 1e-12);
+}
+
+TEST(PathTracer, MovesWithoutAMemory) {
+  Triangles t = Floor();
+  t.AddQuad({-1, 0, -1}, {2, 0, 0}, {0, 2, 0}, 0.8f);
+  t.AddQuad({-0.5, 0.4, 0}, {1, 0, 0}, {0, 0.3, 0}, 0.5f);
+  const auto pose = [&](double turn) {
+    PointBuffer points = PointBuffer::FromInterleaved(t.xyz);
+    for (std::size_t i = 12; i < points.count(); ++i) {
+      points.view().x[i] += static_cast<float>(0.3 * turn);
+      points.view().y[i] += static_cast<float>(0.1 * turn * turn);
+    }
+    return points;
+  };
+  const auto light = [](double turn) { return PointLight({0.2 + turn, 1.5, 1}, 2); };
+  const auto see = [](const PathTracer& tracer) {
+    std::vector<double> seen;
+    for (int i = 0; i < 200; ++i) {
+      const ShadingPlace place = tracer.Look({0, 1, 3}, {0.005 * (i % 20) - 0.05, -0.01 * (i / 20.0), -1});
+      for (double x : {place.position.x, tracer.Indirect(place, {5, 4, 2}).y, tracer.Direct(place, 1, 1).z})
+        seen.push_back(x);
+    }
+    return seen;
+  };
+  PathTracer forward = t.Tracer({light(0)}), backward = t.Tracer({light(0)});
+  std::vector<std::vector<double>> ahead, back(3);
+  for (double turn : {0.3, 2.0, -1.0}) {
+    const std::vector<DiffuseLight> lights{light(turn)};
+    ASSERT_TRUE(forward.Update(pose(turn).view(), lights).ok());
+    ahead.push_back(see(forward));
+    // It is what it would be if it had been built so
+    Result<PathTracer> fresh = PathTracer::Build(pose(turn).view(), t.corners, t.albedo, lights);
+    const std::vector<double> built = see(*fresh);
+    for (std::size_t i = 0; i < built.size(); ++i) EXPECT_NEAR(ahead.back()[i], built[i], 1e-5);
+  }
+  for (int i = 2; i >= 0; --i) {
+    const double turn = i == 0 ? 0.3 : i == 1 ? 2.0 : -1.0;
+    const std::vector<DiffuseLight> lights{light(turn)};
+    ASSERT_TRUE(backward.Update(pose(turn).view(), lights).ok());
+    back[static_cast<std::size_t>(i)] = see(backward);
+  }
+  EXPECT_EQ(ahead, back);
+  EXPECT_NE(ahead[0], ahead[1]);
+  PointBuffer broken = pose(0);
+  broken.view().z[3] = NAN;
+  EXPECT_FALSE(forward.Update(broken.view(), std::vector<DiffuseLight>{light(0)}).ok());
+}
+
+TEST(PathTracer, SeesThroughWhatIsUnseenAndStandsOnPoints) {
+  Triangles t = Floor();
+  t.AddQuad({-1, 1, 1}, {2, 0, 0}, {0, 0, -2},
+            0.5f);  // a table above the floor, counter-clockwise from above
+  const std::vector<std::uint8_t> unseen = {0, 0, 1, 1};
+  Result<PathTracer> tracer =
+      PathTracer::Build(PointBuffer::FromInterleaved(t.xyz).view(), t.corners, t.albedo,
+                        std::vector<DiffuseLight>{PointLight({0, 3, 0}, 9)}, unseen);
+  ASSERT_TRUE(tracer.ok());
+  const ShadingPlace table = tracer->Look({0.1, 2, 0.2}, {0, -1, 0}),
+                     floor = tracer->See({0.1, 2, 0.2}, {0, -1, 0});
+  EXPECT_NEAR(table.position.y, 1, 1e-6);
+  EXPECT_NEAR(floor.position.y, 0, 1e-6);
+  EXPECT_LT(floor.triangle, 2u);
+  EXPECT_EQ(tracer->Direct(floor, 0, 1).x, 0);  // in its shadow all the same
+  const ShadingPlace corner = tracer->OnPoint(6);
+  EXPECT_LT(Length(corner.position - Double3{-1, 1, 1}), 1e-6);
+  EXPECT_NEAR(corner.normal.y, 1, 1e-9);
+  EXPECT_NEAR(tracer->Direct(corner, 0, 1).x, 9.0 / 6 * 2 / std::sqrt(6.0), 1e-5);
 }
 
 TEST(PathTracer, RefusesWhatIsNoScene) {

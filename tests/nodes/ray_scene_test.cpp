@@ -131,6 +131,49 @@ TEST(RayScene, GivesTheSameBitsForOneRayAndMany) {
   }
 }
 
+TEST(RayScene, FollowsItsPointsWhateverTheyDidBefore) {
+  const Soup rest = RandomSoup(400, 6);
+  const std::vector<Ray> rays = RandomRays(600, 7);
+  const auto moved = [&](unsigned seed) {  // every triangle by itself, far
+    Soup soup = rest;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> shift(-0.8f, 0.8f);
+    for (std::size_t t = 0; t < soup.xyz.size(); t += 9) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float by = shift(random);
+        for (std::size_t corner = 0; corner < 9; corner += 3) soup.xyz[t + corner + axis] += by;
+      }
+    }
+    return soup;
+  };
+  const auto make = [&] { return RayScene::Build(rest.points().view(), rest.triangles); };
+  auto forward = make(), backward = make();
+  const auto hits = [&](RayScene& scene, unsigned seed) {
+    EXPECT_TRUE(scene.Update(moved(seed).points().view()).ok());
+    std::vector<RayHit> found(rays.size());
+    scene.ClosestHits(rays, found);
+    return found;
+  };
+  const auto a1 = hits(*forward, 1), a2 = hits(*forward, 2), b2 = hits(*backward, 2), b1 = hits(*backward, 1);
+  int different = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    for (const auto& [a, b] : {std::pair(a1[i], b1[i]), {a2[i], b2[i]}}) {
+      EXPECT_EQ(a.triangle, b.triangle);
+      EXPECT_EQ(a.t, b.t);
+      EXPECT_EQ(a.u, b.u);
+      EXPECT_EQ(a.v, b.v);
+    }
+    Index triangle;
+    NearestByHand(moved(2), rays[i], &triangle);
+    EXPECT_EQ(a2[i].triangle, triangle) << "ray " << i;
+    different += a1[i].triangle != a2[i].triangle;
+  }
+  EXPECT_GT(different, 100);
+  PointBuffer broken = rest.points();
+  broken.view().x[5] = std::numeric_limits<float>::infinity();
+  EXPECT_NE(forward->Update(broken.view()).ToString().find("point 5 is not finite"), std::string::npos);
+}
+
 TEST(RayScene, RaysThroughSharedEdgesNeverSlipThrough) {
   Soup sheet;  // a grid in the plane z = 0
   constexpr int kSide = 17;

@@ -1,5 +1,8 @@
 // wrap and proximityWrap as nodes.
+#include "nodes/kernels/wrap.h"
+
 #include <cmath>
+#include <numeric>
 
 #include "base/triangle_tree.h"
 #include "tests/nodes/driver_rig.h"
@@ -173,6 +176,127 @@ TEST(Wrap, FoldedDriversGiveNumbers) {
       for (const Double3& p : rig.At(Scaling(scale))) EXPECT_LT(Length(p), 10) << type;
     }
   }
+}
+
+// proximityWrap as it is defined, in double and without sharing anything.
+std::vector<Double3> NaiveWrap(const TestMesh& driver, const std::vector<Double3>& rest,
+                               const std::vector<Double3>& now, ConstPointsView points, bool stretched) {
+  const std::span<const Index> triangles = driver.topology.triangles();
+  struct Frame {
+    Matrix4 f;
+    Double3 normal;
+  };
+  const auto normal_at = [&](Index p, const std::vector<Double3>& at) {
+    Double3 sum;
+    for (const Index t : driver.topology.point_triangles().row(p)) {
+      const Index* c = &triangles[3 * std::size_t{t}];
+      sum = sum + Cross(at[c[1]] - at[c[0]], at[c[2]] - at[c[0]]);
+    }
+    return sum * (1 / Length(sum));
+  };
+  const auto frame_at = [&](Index p) {
+    Matrix4 to = Scaling({0, 0, 0}), from = to;
+    const auto add = [](Matrix4* m, Double3 a, Double3 b, double weight) {
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) (*m)(r, c) += weight * a[r] * b[c];
+      }
+    };
+    double square = 0;
+    const auto ring = driver.topology.neighbors().row(p);
+    for (const Index j : ring) {
+      const Double3 e = rest[j] - rest[p];
+      add(&from, e, e, 1);
+      add(&to, now[j] - now[p], e, 1);
+      square += Dot(e, e);
+    }
+    const Double3 n = normal_at(p, rest), moved = normal_at(p, now);
+    add(&from, n, n, square / static_cast<double>(ring.size()));
+    add(&to, moved, n, square / static_cast<double>(ring.size()));
+    return Frame{to * InverseOrIdentity(from), moved};
+  };
+  std::vector<Double3> result;
+  for (std::size_t i = 0; i < points.count; ++i) {
+    const Double3 p{points.x[i], points.y[i], points.z[i]};
+    SurfacePoint best;
+    for (std::size_t t = 0; t < triangles.size(); t += 3) {
+      SurfacePoint one = ClosestOnTriangle(driver.rest.view(), &triangles[t], p);
+      one.triangle = static_cast<Index>(t / 3);
+      if (one.squared < best.squared) best = one;
+    }
+    Double3 anchor, anchor_now, normal, normal_now;
+    Matrix4 f = Scaling({0, 0, 0});
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index c = triangles[3 * std::size_t{best.triangle} + k];
+      const Frame frame = frame_at(c);
+      anchor = anchor + rest[c] * best.weights[k];
+      anchor_now = anchor_now + now[c] * best.weights[k];
+      normal = normal + normal_at(c, rest) * best.weights[k];
+      normal_now = normal_now + frame.normal * best.weights[k];
+      for (std::size_t m = 0; m < 16; ++m) f.m[m] += frame.f.m[m] * best.weights[k];
+    }
+    normal = normal * (1 / Length(normal));
+    normal_now = normal_now * (1 / Length(normal_now));
+    const Double3 any = std::fabs(normal.x) < 0.5 ? Double3{1, 0, 0} : Double3{0, 1, 0};
+    const Double3 t = Cross(normal, any) * (1 / Length(Cross(normal, any))), b = Cross(normal, t);
+    Double3 t_now = TransformVector(f, t), b_now = TransformVector(f, b);
+    if (!stretched) {  // the nearest rotation, by its angle in the plane
+      const Double3 u = t_now - normal_now * Dot(normal_now, t_now), x = u * (1 / Length(u)),
+                    y = Cross(normal_now, x);
+      const double angle = std::atan2(Dot(t_now, y) - Dot(b_now, x), Dot(t_now, x) + Dot(b_now, y));
+      t_now = x * std::cos(angle) + y * std::sin(angle);
+      b_now = Cross(normal_now, t_now);
+    }
+    const Double3 o = p - anchor;
+    result.push_back(anchor_now + t_now * Dot(t, o) + b_now * Dot(b, o) + normal_now * Dot(normal, o));
+  }
+  return result;
+}
+
+TEST(Wrap, IsWhatItsDefinitionSays) {
+  const TestMesh driver = MakeSheet(15, 13);
+  const std::vector<Double3> rest = ToDouble(driver.rest.view());
+  const TestMesh above = MakeSheet(9, 8, 2);
+  PointBuffer points(above.count()), bent(driver.count());
+  for (std::size_t i = 0; i < above.count(); ++i) {
+    points.view().x[i] = above.rest.view().x[i] * 0.8f;
+    points.view().y[i] = above.rest.view().y[i] * 0.8f + 0.01f;
+    points.view().z[i] = above.rest.view().z[i] + 0.03f;
+  }
+  std::vector<Double3> now;
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    const Double3 p = rest[i];
+    const Double3 q{0.6 * std::sin(1.6 * p.x), 0.4 * p.x * p.x + 1.2 * p.y,
+                    p.z + 0.6 * std::cos(1.6 * p.x) + 0.2 * p.y * p.y};
+    bent.view().x[i] = static_cast<float>(q.x);
+    bent.view().y[i] = static_cast<float>(q.y);
+    bent.view().z[i] = static_cast<float>(q.z);
+    now.push_back({bent.view().x[i], bent.view().y[i], bent.view().z[i]});
+  }
+  const TriangleTree tree(driver.rest.view(), driver.topology.triangles());
+  AlignedFloats boxes(tree.BoxFloats());
+  tree.Fit(driver.rest.view(), boxes.span());
+  std::vector<Index> all(above.count()), drivers(driver.count());
+  std::iota(all.begin(), all.end(), 0u);
+  std::iota(drivers.begin(), drivers.end(), 0u);
+  const ConstPointsView in = std::as_const(points).view();
+  const WrapInfluences influences =
+      SurfaceInfluences({driver.rest.view(), &tree, boxes.span()}, driver.topology, in, all, 10, 0);
+  double far = 0;
+  for (const bool stretched : {false, true}) {
+    const WrapKernel kernel(stretched ? WrapMode::kSurface : WrapMode::kOffset, driver.topology, rest,
+                            Matrix4(), influences, in, all, drivers);
+    AlignedFloats scratch(kernel.ScratchFloats());
+    PointBuffer out(all.size());
+    kernel.Run({1, std::as_const(bent).view()}, in, out.view(), scratch.span());
+    const std::vector<Double3> got = ToDouble(std::as_const(out).view()),
+                               expected = NaiveWrap(driver, rest, now, in, stretched);
+    EXPECT_LT(MaxDistance(got, expected), 2e-6) << stretched;
+    far = std::max(far, MaxDistance(got, ToDouble(in)));
+    // At rest everything stays, to the bit
+    kernel.Run({1, driver.rest.view()}, in, out.view(), scratch.span());
+    EXPECT_EQ(MaxDistance(ToDouble(std::as_const(out).view()), ToDouble(in)), 0) << stretched;
+  }
+  EXPECT_GT(far, 0.1);
 }
 
 TEST(Wrap, ErrorsSayWhatIsMissing) {

@@ -33,7 +33,7 @@ TEST(Scenes, TheCommittedFilesAreWhatTheGeneratorWrites) {
                                       {"animal/", GenerateHead(AnimalDesign(), ShapeOf(AnimalDesign()))},
                                       {"hello/", GenerateHello()},
                                       {"gi/", GenerateRoom()},
-                                       {"car/", GenerateCar()}}) {
+                                      {"car/", GenerateCar()}}) {
     for (const auto& [name, bytes] : files) {
       EXPECT_TRUE(FileBytes(std::string(KPSA_SCENES_DIR) + "/" + folder + name) == bytes)
           << folder << name << " differs: run generate_scenes " << KPSA_SCENES_DIR;

@@ -37,7 +37,7 @@ class GltfBuilder {
     return Push("bufferViews", view);
   }
 
-  // `type` is SCALAR, VEC3, VEC4 or MAT4. The index of the accessor.
+  // `type` is SCALAR, VEC2, VEC3, VEC4 or MAT4. The index of the accessor.
   template <typename T>
   int Accessor(const std::vector<T>& values, const std::string& type, bool normalized = false) {
     nlohmann::json accessor = {{"bufferView", View(values)},
@@ -49,7 +49,7 @@ class GltfBuilder {
   }
 
   static std::size_t Width(const std::string& type) {
-    return type == "SCALAR" ? 1 : type == "VEC3" ? 3 : type == "VEC4" ? 4 : 16;
+    return type == "SCALAR" ? 1 : type == "VEC2" ? 2 : type == "VEC3" ? 3 : type == "VEC4" ? 4 : 16;
   }
 
   int Push(const char* array, const nlohmann::json& value) {

@@ -1,0 +1,124 @@
+// kpsa fmt: rig files in their canonical form.
+#include <memory>
+
+#include "cli/command.h"
+#include "cli/common.h"
+#include "cli/options.h"
+#include "cli/output.h"
+#include "io/file.h"
+#include "io/rig_format.h"
+
+namespace kpsa {
+namespace {
+
+struct FmtFlags {
+  std::vector<std::string> files, plugins;
+  std::optional<std::string> output;
+  bool check = false, in_place = false, drop_comments = false, force = false, quiet = false;
+};
+
+// All that kpsa validate says of a rig; of a part that others include, what can be said of it alone.
+Status CheckRig(const std::string& file, const YamlNode& root, const FmtFlags& flags) {
+  if (root.Find("character") == nullptr && root.Find("references") == nullptr) {
+    RigFile part;
+    return ReadRigFile(file, std::nullopt, &part, true);
+  }
+  Flags rig;
+  rig.file = file;
+  rig.plugins = flags.plugins;
+  return LoadRigOf(rig).status();
+}
+
+// The file's text and its canonical form.
+struct Formatted {
+  std::string before, after;
+};
+Result<Formatted> Format(const std::string& file, const FmtFlags& flags) {
+  const std::string suffix = Suffix(file);
+  if (suffix != ".yaml" && suffix != ".yml")
+    return Status::Usage("expected a rig file that ends in .yaml").At({file});
+  Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(file, kMaxYamlBytes);
+  if (!bytes.ok()) return bytes.status();
+  Formatted text;
+  text.before.assign(bytes->begin(), bytes->end());
+  const Result<YamlNode> root = ParseYaml(text.before, file);
+  if (!root.ok()) return root.status();
+  KPSA_RETURN_IF_ERROR(CheckRig(file, *root, flags));
+  NodeRegistry registry;
+  AddAllNodes(registry);
+  PluginLoader plugins(&registry);
+  Flags with_plugins;
+  with_plugins.plugins = flags.plugins;
+  KPSA_RETURN_IF_ERROR(LoadPlugins(with_plugins, &plugins));
+  Result<std::string> after = FormatRig(*root, registry);
+  if (!after.ok()) return after.status();
+  text.after = std::move(*after);
+  return text;
+}
+
+CommandResult Fmt(const FmtFlags& flags) {
+  if (flags.check && (flags.in_place || flags.output.has_value()))
+    return Status::Usage("--check writes nothing: expected it without --in-place and -o");
+  if (flags.in_place && flags.output.has_value())
+    return Status::Usage("--in-place and -o {}: expected one of them", *flags.output);
+  if (flags.files.size() > 1 && !flags.check && !flags.in_place)
+    return Status::Usage("several files: expected --check or --in-place");
+  if (flags.output.has_value()) {
+    KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, {".yaml", ".yml"}));
+    KPSA_RETURN_IF_ERROR(CheckNotInput(*flags.output, flags.files));
+  }
+  bool differs = false;
+  Status errors;
+  for (const std::string& file : flags.files) {
+    const Result<Formatted> text = Format(file, flags);
+    if (!text.ok()) {
+      errors.Append(text.status());
+      continue;
+    }
+    const bool same = text->before == text->after;
+    const bool loses = !flags.check && !flags.drop_comments && !same && HasComments(text->before);
+    if (flags.check) {
+      if (!same) Print(file + "\n");
+      differs = differs || !same;
+    } else if (flags.in_place) {
+      if (loses) {
+        errors.Append(
+            Status::Usage("has comments, which would be lost; --drop-comments lets them go").At({file}));
+      } else if (!same) {
+        errors.Append(WriteText(file, true, text->after));
+      }
+    } else {
+      if (loses && !flags.quiet) Say(fmt::format("kpsa fmt: {}: its comments are left out", file));
+      errors.Append(WriteText(flags.output.value_or("-"), flags.force, text->after));
+    }
+  }
+  if (!errors.ok()) return errors;
+  return differs ? 1 : 0;
+}
+
+}  // namespace
+
+void AddFmtCommand(CLI::App* program, Command* chosen) {
+  auto flags = std::make_shared<FmtFlags>();
+  CLI::App* command = AddCommand(
+      program, "fmt", "A rig file in canonical form",
+      "Sections in one order, an entry a line where it fits, quotes where they are needed. Comments are "
+      "lost. Invalid rigs are refused.\n"
+      "Examples:\n"
+      "  kpsa fmt head.yaml -o tidy.yaml\n"
+      "  kpsa fmt head.yaml lips.yaml --check\n"
+      "  kpsa fmt head.yaml --in-place --drop-comments",
+      chosen, [flags] { return Fmt(*flags); });
+  AddRepeated(command, "FILE", "FILE", &flags->files, "rig files (.yaml)");
+  AddOption(command, "-o,--output", "FILE", &flags->output, "a .yaml file instead of stdout");
+  AddSwitch(command, "--force", &flags->force, "replace an existing output");
+  AddSwitch(command, "--check", &flags->check,
+            "write nothing: print the files that are not so; exit 1 if any");
+  AddSwitch(command, "--in-place", &flags->in_place, "replace the files themselves");
+  AddSwitch(command, "--drop-comments", &flags->drop_comments, "even where comments are lost");
+  AddRepeated(command, "--plugin", "FILE", &flags->plugins,
+              "a shared library that adds node types; may be repeated");
+  AddSwitch(command, "-q,--quiet", &flags->quiet, "no messages but errors");
+}
+
+}  // namespace kpsa

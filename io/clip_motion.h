@@ -1,0 +1,38 @@
+// How far clips move the nodes of a character away from rest.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "io/gltf_import.h"
+
+namespace kpsa {
+
+struct MotionRange {
+  double min = 0, max = 0;  // rest, 0, is always inside
+  void Add(double value) {
+    min = std::min(min, value);
+    max = std::max(max, value);
+  }
+  double size() const { return std::max(-min, max); }
+};
+
+// What clips do to one glTF node, relative to its rest.
+struct Motion {
+  MotionRange rotate[3];     // degrees, as Euler angles in the rest pose's axes, X first
+  MotionRange translate[3];  // metres, in the rest pose's axes
+  std::vector<MotionRange> weights;
+  void Add(const Motion& other);
+};
+
+using ClipMotion = std::map<Index, Motion>;  // by the glTF nodes that the clip animates
+// At its keys.
+ClipMotion MeasureClip(const gltf::Character& character, const gltf::Clip& clip);
+
+// The clip whose motion goes least beyond that of all others together: one to test on what extremes have
+// taught. The first one of equals, or of more than kMostClipsCompared. `motions` is by clip; there is one.
+std::size_t TamestClip(const gltf::Character& character, const std::vector<ClipMotion>& motions);
+inline constexpr std::size_t kMostClipsCompared = 64;
+
+}  // namespace kpsa

@@ -1,0 +1,281 @@
+// Falloffs that may vary: weights of points by where they are now, for the `falloffWeights` of deformers
+// (Maya: primitiveFalloff, proximityFalloff, blendFalloff). Each serves several geometries: element i of
+// inPoints, geometryMatrix and outputWeights.
+#include <algorithm>
+#include <cmath>
+
+#include "base/falloff_shapes.h"
+#include "base/matrix.h"
+#include "base/triangle_tree.h"
+#include "graph/geometry.h"
+#include "nodes/deformer.h"
+#include "nodes/mesh_topology.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+enum FalloffInput : int { kFalloffPoints = 0, kFalloffParent = 1, kOwn = 2 };
+constexpr std::size_t kFalloffGrain = 2048;
+
+// Where the points are: world from their space, which is the world after the skin. Before it, parentMatrix
+// carries them from where they rest.
+struct FalloffPlace {
+  FalloffFade fade = FalloffFade::kSmooth;
+  bool moved = false;
+  Matrix4 world_from_points_at_rest, parent_rest_inverse;
+
+  static Result<FalloffPlace> Bind(const Structural& s) {
+    FalloffPlace place;
+    place.fade = static_cast<FalloffFade>(s.get_int("curve"));
+    place.moved = s.is_set("geometryMatrix", s.geometry());
+    if (!place.moved) return place;
+    place.world_from_points_at_rest = s.value("geometryMatrix").get<Matrix4>();
+    const Result<Matrix4> parent = RestMatrix(s, "parentMatrix");
+    if (!parent.ok()) return parent.status();
+    if (!Invert(*parent, &place.parent_rest_inverse))
+      return Status::Invalid("parentMatrix is singular at rest");
+    return place;
+  }
+  Matrix4 WorldFromPoints(const Matrix4& parent) const {
+    return moved ? parent * parent_rest_inverse * world_from_points_at_rest : Matrix4();
+  }
+};
+
+Result<BoundKernel> BindShape(const Binding& binding) {
+  Result<FalloffPlace> place = FalloffPlace::Bind(binding.structural());
+  if (!place.ok()) return place.status();
+  return MakeBound(std::move(*place), 0);
+}
+
+// weights[i] = weight(m * points[i])
+template <typename F>
+void ForPoints(const ComputeContext& c, const Matrix4& m, F weight) {
+  const ConstPointsView& in = c.points(kFalloffPoints);
+  float* out = c.out_points(0).x;
+  c.host->For(in.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      out[i] = static_cast<float>(weight(TransformPoint(m, {in.x[i], in.y[i], in.z[i]})));
+  });
+}
+
+// A radius of nothing holds its middle only.
+double ByDistance(double distance, double radius, FalloffFade fade) {
+  if (radius > 0) return DistanceFalloff(distance, radius, fade);
+  return distance > 0 ? 0 : 1;
+}
+
+void ComputeSphere(ComputeContext& c) {
+  const auto& place = c.kernel_as<FalloffPlace>();
+  const double radius = c.get<double>(kOwn + 1);
+  Matrix4 from_world;
+  const bool there = Invert(c.get<Matrix4>(kOwn), &from_world);
+  ForPoints(c, from_world * place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
+            [&](Double3 p) { return there ? ByDistance(Length(p), radius, place.fade) : 0; });
+}
+
+void ComputeCapsule(ComputeContext& c) {
+  const auto& place = c.kernel_as<FalloffPlace>();
+  const Double3 a = TransformPoint(c.get<Matrix4>(kOwn), {}),
+                b = TransformPoint(c.get<Matrix4>(kOwn + 1), {});
+  const double radius = c.get<double>(kOwn + 2);
+  ForPoints(c, place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
+            [&](Double3 p) { return ByDistance(SegmentDistance(p, a, b), radius, place.fade); });
+}
+
+void ComputePlane(ComputeContext& c) {
+  const auto& place = c.kernel_as<FalloffPlace>();
+  const double start = c.get<double>(kOwn + 1), end = c.get<double>(kOwn + 2);
+  Matrix4 from_world;
+  const bool there = Invert(c.get<Matrix4>(kOwn), &from_world);
+  ForPoints(c, from_world * place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)), [&](Double3 p) {
+    if (!there) return 0.0;
+    if (start == end) return p.y <= start ? 1.0 : 0.0;  // a step
+    return PlaneFalloff(p, {}, {0, 1, 0}, start, end, place.fade);
+  });
+}
+
+// The driver's surface, in the world.
+struct Proximity {
+  FalloffPlace place;
+  Matrix4 world_from_driver;
+  TriangleTree tree;
+  std::size_t row = 0;  // floats of a component of the driver's points
+};
+
+Result<BoundKernel> BindProximity(const Binding& binding) {
+  const Structural& s = binding.structural();
+  Result<FalloffPlace> place = FalloffPlace::Bind(s);
+  if (!place.ok()) return place.status();
+  const auto* mesh = s.asset<Mesh>("driverMesh");
+  const Value* rest = s.rest("driverPoints");
+  if (mesh == nullptr || !s.is_set("driverPoints"))
+    return Status::Invalid("it has no driver: name a mesh, `driver: MESH` or `driver: \"MESH@STAGE\"`");
+  if (rest == nullptr || rest->points() == nullptr) return Status::Invalid("its driver has no rest shape");
+  const ConstPointsView points = rest->points()->view();
+  Status error;
+  const Topology* topology = TopologyOf(mesh, &error);
+  if (topology == nullptr) return error;
+  if (points.count != topology->point_count())
+    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", topology->point_count(),
+                           points.count);
+  if (topology->triangle_count() == 0)
+    return Status::Invalid("its driver \"{}\" has no faces", mesh->data().name);
+  Proximity bound{*place, s.value("driverMatrix").get<Matrix4>(), TriangleTree(points, topology->triangles()),
+                  PaddedCount(points.count)};
+  const std::size_t scratch = 3 * bound.row + bound.tree.BoxFloats();
+  return MakeBound(std::move(bound), scratch);
+}
+
+void ComputeProximity(ComputeContext& c) {
+  const auto& bound = c.kernel_as<Proximity>();
+  const ConstPointsView& driver = c.points(kOwn);
+  const double radius = c.get<double>(kOwn + 1);
+  const PointsView surface{c.scratch, c.scratch + bound.row, c.scratch + 2 * bound.row, driver.count};
+  for (std::size_t i = 0; i < driver.count; ++i) {
+    const Double3 p = TransformPoint(bound.world_from_driver, {driver.x[i], driver.y[i], driver.z[i]});
+    surface.x[i] = static_cast<float>(p.x);
+    surface.y[i] = static_cast<float>(p.y);
+    surface.z[i] = static_cast<float>(p.z);
+  }
+  const std::span<float> boxes(c.scratch + 3 * bound.row, bound.tree.BoxFloats());
+  bound.tree.Fit(surface, boxes);
+  ForPoints(c, bound.place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)), [&](Double3 p) {
+    const SurfacePoint near = bound.tree.Closest(surface, boxes, p, std::max(radius, 0.0));
+    return near.triangle == kNoIndex ? 0 : ByDistance(std::sqrt(near.squared), radius, bound.place.fade);
+  });
+}
+
+// All of the driver, for any point.
+void DemandProximity(Demand& demand) {
+  demand.Require("inPoints", 0, demand.output("outputWeights"));
+  demand.Require("driverPoints", -1, PointSet::All(demand.input_total("driverPoints", -1)));
+}
+
+struct Painted {
+  std::vector<float> weights;  // at the output points
+};
+
+Result<BoundKernel> BindWeightMap(const Binding& binding) {
+  const auto* map = binding.structural().asset<WeightMap>("weights");
+  if (map == nullptr) return Status::Invalid("weights are not set");
+  const PointSet& out = binding.output("outputWeights");
+  Painted painted;
+  for (Index i = 0; i < out.size(); ++i) painted.weights.push_back(map->weights()[out[i]]);
+  return MakeBound(std::move(painted), 0);
+}
+
+void ComputeWeightMap(ComputeContext& c) {
+  const double scale = c.get<double>(0);
+  const std::vector<float>& weights = c.kernel_as<Painted>().weights;
+  float* out = c.out_points(0).x;
+  for (std::size_t i = 0; i < weights.size(); ++i)
+    out[i] = static_cast<float>(std::clamp(weights[i] * scale, 0.0, 1.0));
+}
+
+enum class FalloffOperation : int { kMultiply, kMax, kMin, kAdd, kSubtract, kAverage };
+
+double Combined(FalloffOperation how, double a, double b) {
+  switch (how) {
+    case FalloffOperation::kMultiply:
+      return a * b;
+    case FalloffOperation::kMax:
+      return std::max(a, b);
+    case FalloffOperation::kMin:
+      return std::min(a, b);
+    case FalloffOperation::kAdd:
+      return std::min(a + b, 1.0);
+    case FalloffOperation::kSubtract:
+      return std::max(a - b, 0.0);
+    case FalloffOperation::kAverage:
+      break;
+  }
+  return (a + b) / 2;
+}
+
+void ComputeCombine(ComputeContext& c) {
+  const ConstPointsView &a = c.points(0), &b = c.points(1);
+  const auto how = static_cast<FalloffOperation>(c.get<std::int64_t>(2));
+  float* out = c.out_points(0).x;
+  c.host->For(a.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) out[i] = static_cast<float>(Combined(how, a.x[i], b.x[i]));
+  });
+}
+
+NodeBuilder AddFalloff(NodeRegistry& registry, const char* name, const char* doc) {
+  NodeBuilder b = registry.add(name, doc);
+  b.category("falloff");
+  b.points_in("inPoints", "the points, as they come to the deformer").per_geometry();
+  b.in("parentMatrix", Matrix4(), {.doc = "before the skin: what carries the points; `parent:` connects it"});
+  b.structural("geometryMatrix", Matrix4(),
+               {.doc = "world from the points' space at rest, where they are before the skin"})
+      .per_geometry();
+  b.enumeration("curve", {"smooth", "linear"}, true, "how the weight gets from 1 to 0");
+  return b;
+}
+
+NodeBuilder& FinishFalloff(NodeBuilder& b, ComputeFn compute, BindFn bind) {
+  b.out("outputWeights", Type::kWeights, "0 to 1").per_geometry();
+  return b.compute(compute).bind(std::move(bind)).cost(200, 12);
+}
+
+}  // namespace
+
+void AddFalloffNodes(NodeRegistry& registry) {
+  NodeBuilder sphere =
+      AddFalloff(registry, "sphereFalloff", "1 in the middle of a sphere, 0 at its radius and beyond.");
+  sphere.in("matrix", Matrix4(), {.doc = "the sphere's handle, whose scale makes it an ellipsoid"});
+  sphere.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the handle's units"});
+  FinishFalloff(sphere, &ComputeSphere, BindShape);
+
+  NodeBuilder capsule =
+      AddFalloff(registry, "capsuleFalloff", "1 on a line between two places, 0 at the radius and beyond.");
+  capsule.in("startMatrix", Matrix4(), {.doc = "world, where the line starts"});
+  capsule.in("endMatrix", Matrix4(), {.doc = "world, where it ends"});
+  capsule.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the world"});
+  FinishFalloff(capsule, &ComputeCapsule, BindShape);
+
+  NodeBuilder plane = AddFalloff(
+      registry, "planeFalloff",
+      "1 at the height `start` along the handle's y axis and on the side away from `end`, 0 from there on.");
+  plane.in("matrix", Matrix4(), {.doc = "the plane's handle"});
+  plane.in("start", 0.0, {.unit = Unit::kLength, .doc = "in the handle's units; the same as `end`: a step"});
+  plane.in("end", 1.0, {.unit = Unit::kLength, .doc = "in the handle's units"});
+  FinishFalloff(plane, &ComputePlane, BindShape);
+
+  NodeBuilder proximity = AddFalloff(registry, "proximityFalloff",
+                                     "1 on the surface of a mesh, which may move; 0 at the radius from it.");
+  proximity.points_in("driverPoints", "the mesh's points, at any stage; `driver:` connects them");
+  proximity.structural("driverMesh", Type::kMesh, {.doc = "the topology of the mesh"});
+  proximity.structural("driverMatrix", Matrix4(),
+                       {.doc = "world from the mesh's space at rest, where its stage is in mesh space"});
+  proximity.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the world"});
+  FinishFalloff(proximity, &ComputeProximity, BindProximity).demand(DemandProximity).cost(2000, 400);
+
+  registry.add("weightMap", "A painted map as a falloff, with a factor that may vary.")
+      .category("falloff")
+      .structural("weights", Type::kAsset, {.doc = "the map; `weights:`, `members:` and `falloff:` set it"})
+      .per_geometry()
+      .in("multiplier", 1.0, {.doc = "of every weight, before they are cut to 0 to 1"})
+      .out("outputWeights", Type::kWeights, "0 to 1")
+      .per_geometry()
+      .compute(&ComputeWeightMap)
+      .bind(BindWeightMap)
+      .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
+        const auto* map = s.asset<WeightMap>("weights");
+        if (map == nullptr) return Status::Invalid("weights are not set");
+        return static_cast<Index>(map->weights().size());
+      })
+      .cost(100, 1);
+
+  NodeBuilder combine = registry.add("combineFalloff", "One falloff of two.");
+  combine.category("falloff");
+  combine.points_in("input1", "weights; `falloffs:` connects both", Type::kWeights).per_geometry();
+  combine.points_in("input2", "weights", Type::kWeights).per_geometry();
+  combine.enumeration("operation", {"multiply", "max", "min", "add", "subtract", "average"}, false,
+                      "add: their sum, up to 1; subtract: the first less the second, down to 0");
+  combine.out("outputWeights", Type::kWeights, "0 to 1").per_geometry();
+  combine.compute(&ComputeCombine).cost(100, 2);
+}
+
+}  // namespace kpsa

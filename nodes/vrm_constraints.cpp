@@ -1,0 +1,128 @@
+// The node constraints of VRM (VRMC_node_constraint 1.0): roll, aim, rotation. They turn a transform away
+// from its rest rotation, whatever a clip says of its rotation; its place and its size stay those of
+// inMatrix.
+#include "nodes/deformer.h"
+#include "nodes/kernels/constraint_math.h"
+#include "nodes/kernels/matrix_parts.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+namespace {
+
+enum VrmInput { kVrmSource, kVrmIn, kVrmWeight, kVrmParent };
+
+struct VrmKernel {
+  Quaternion rest, source_rest;
+  Matrix4 rest_matrix, source_rest_matrix;
+  Double3 axis;
+};
+
+Quaternion TurnOf(const Matrix4& m) { return TakeApart(m).rotation; }
+
+Result<BoundKernel> BindVrm(const Binding& binding, const char* axis, bool signed_axis) {
+  const Structural& s = binding.structural();
+  VrmKernel k;
+  k.rest_matrix = s.value("restMatrix").get<Matrix4>();
+  k.rest = TurnOf(k.rest_matrix);
+  if (!signed_axis) {
+    k.source_rest_matrix = s.value("sourceRestMatrix").get<Matrix4>();
+    k.source_rest = TurnOf(k.source_rest_matrix);
+  }
+  if (axis != nullptr) {
+    const int choice = static_cast<int>(s.get_int(axis));
+    k.axis[signed_axis ? choice / 2 : choice] = signed_axis && choice % 2 == 1 ? -1 : 1;
+  }
+  return MakeBound(k, 0);
+}
+Result<BoundKernel> BindVrmRoll(const Binding& binding) { return BindVrm(binding, "rollAxis", false); }
+Result<BoundKernel> BindVrmAim(const Binding& binding) { return BindVrm(binding, "aimAxis", true); }
+Result<BoundKernel> BindVrmRotation(const Binding& binding) { return BindVrm(binding, nullptr, false); }
+
+// The turn that is the roll of `turn` about the axis: what is left after the smallest turn that takes the
+// axis to where `turn` takes it.
+Quaternion RollOf(Quaternion turn, Double3 axis) {
+  return Conjugate(ShortestArc(axis, Rotate(turn, axis), Perpendicular(axis, {0, 1, 0}))) * turn;
+}
+
+Quaternion RollTarget(const VrmKernel& k, const ComputeContext& c) {
+  // The source's turn in its parent's axes, seen in the constrained's own
+  const Quaternion in_parent = TurnOf(c.get<Matrix4>(kVrmSource)) * Conjugate(k.source_rest);
+  return k.rest * RollOf(Normalized(Conjugate(k.rest) * in_parent * k.rest), k.axis);
+}
+
+Quaternion RotationTarget(const VrmKernel& k, const ComputeContext& c) {
+  return k.rest * (Conjugate(k.source_rest) * TurnOf(c.get<Matrix4>(kVrmSource)));
+}
+
+Quaternion AimTarget(const VrmKernel& k, const ComputeContext& c) {
+  const Matrix4 &parent = c.get<Matrix4>(kVrmParent), &in = c.get<Matrix4>(kVrmIn);
+  const Double3 place = TransformPoint(parent, {in(0, 3), in(1, 3), in(2, 3)});
+  const Matrix4& source = c.get<Matrix4>(kVrmSource);
+  const Quaternion turned = TurnOf(parent), world = Normalized(turned * k.rest);
+  const Double3 from = Rotate(world, k.axis);
+  Double3 to;
+  if (!Direction(Double3{source(0, 3), source(1, 3), source(2, 3)} - place, 0, &to)) return k.rest;
+  const Quaternion arc = ShortestArc(from, to, Rotate(world, Perpendicular(k.axis, {0, 1, 0})));
+  return Conjugate(turned) * arc * world;
+}
+
+template <Quaternion (*Target)(const VrmKernel&, const ComputeContext&), bool kFromRest>
+void ComputeVrm(ComputeContext& c) {
+  const auto& k = c.kernel_as<VrmKernel>();
+  const Matrix4& in = c.get<Matrix4>(kVrmIn);
+  if (kFromRest && in == k.rest_matrix && c.get<Matrix4>(kVrmSource) == k.source_rest_matrix) {
+    c.out_value<Matrix4>(0) = in;  // bit for bit
+    return;
+  }
+  const double weight = c.get<double>(kVrmWeight);
+  MatrixParts parts = TakeApart(in);
+  parts.rotation = weight > 0 ? Normalized(Target(k, c)) : k.rest;
+  if (weight > 0 && weight < 1) parts.rotation = Slerp(k.rest, parts.rotation, weight);
+  c.out_value<Matrix4>(0) = PutTogether(parts);
+}
+
+NodeBuilder AddVrm(NodeRegistry& registry, const char* name, const char* doc, const char* source_doc) {
+  NodeBuilder b = registry.add(name, doc);
+  b.category("constraint")
+      .in("sourceMatrix", Matrix4(), {.doc = source_doc})
+      .in("inMatrix", Matrix4(), {.doc = "the local matrix below: its rotation gives way to the rest pose's"})
+      .in("weight", 1.0, {.min = 0, .max = 1, .doc = "0: the rest rotation, 1: the constraint's"})
+      .structural("restMatrix", Matrix4(), {.doc = "the constrained transform's local matrix at rest"});
+  return b;
+}
+const char* const kVrmRestDoc = "the source's local matrix at rest";
+const char* const kVrmOutDoc = "local, for the constrained transform's offsetParentMatrix";
+
+}  // namespace
+
+void AddVrmConstraintNodes(NodeRegistry& registry) {
+  NodeBuilder roll = AddVrm(registry, "vrmRollConstraint",
+                            "Rolls a transform about one of its axes as its source has turned since rest.",
+                            "the source's matrix");
+  roll.structural("sourceRestMatrix", Matrix4(), {.doc = kVrmRestDoc})
+      .enumeration("rollAxis", {"x", "y", "z"}, true, "own axis")
+      .out("outMatrix", Type::kMatrix, kVrmOutDoc)
+      .compute(&ComputeVrm<RollTarget, true>)
+      .bind(BindVrmRoll)
+      .cost(400, 0);
+  NodeBuilder aim = AddVrm(registry, "vrmAimConstraint",
+                           "Points an axis of a transform at its source, by the smallest turn from rest.",
+                           "the source's worldMatrix");
+  aim.in("parentMatrix", Matrix4(), {.doc = "worldMatrix of the constrained transform's parent"})
+      .enumeration("aimAxis", {"positiveX", "negativeX", "positiveY", "negativeY", "positiveZ", "negativeZ"},
+                   true, "own axis that points at the source")
+      .out("outMatrix", Type::kMatrix, kVrmOutDoc)
+      .compute(&ComputeVrm<AimTarget, false>)
+      .bind(BindVrmAim)
+      .cost(500, 0);
+  NodeBuilder rotation =
+      AddVrm(registry, "vrmRotationConstraint",
+             "Turns a transform from rest as its source has turned from its own.", "the source's matrix");
+  rotation.structural("sourceRestMatrix", Matrix4(), {.doc = kVrmRestDoc})
+      .out("outMatrix", Type::kMatrix, kVrmOutDoc)
+      .compute(&ComputeVrm<RotationTarget, true>)
+      .bind(BindVrmRotation)
+      .cost(300, 0);
+}
+
+}  // namespace kpsa

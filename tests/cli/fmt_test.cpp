@@ -1,0 +1,67 @@
+// kpsa fmt.
+#include "tests/cli/hello_folder.h"
+#include "tests/cli/process.h"
+
+namespace kpsa {
+namespace {
+
+class Fmt : public ::testing::Test {
+ protected:
+  ProcessResult Run(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), "fmt");
+    return RunKpsa(arguments);
+  }
+  HelloFolder folder;
+};
+
+TEST_F(Fmt, WritesWhereItIsTold) {
+  const std::string text = folder.Yaml();
+  const ProcessResult out = Run({folder.rig()});
+  EXPECT_EQ(out.exit_code, 0) << out.err;
+  EXPECT_TRUE(out.out.starts_with("kpsa: 1\nunits: {length: cm}\ncharacter: hello.glb\nnodes:\n  cage: {"))
+      << out.out;
+  EXPECT_NE(out.err.find("its comments are left out"), std::string::npos) << out.err;
+  EXPECT_EQ(TemporaryFolder::Read(folder.rig()), text);
+  EXPECT_EQ(Run({folder.rig(), "-q"}).err, "");
+  EXPECT_EQ(Run({folder.rig(), "-o", folder / "new.yaml", "-q"}).exit_code, 0);
+  EXPECT_EQ(TemporaryFolder::Read(folder / "new.yaml"), out.out);
+  EXPECT_EQ(Run({folder.rig(), "-o", folder / "new.yaml"}).exit_code, 2) << "it exists";
+
+  const ProcessResult differs = Run({folder / "new.yaml", folder.rig(), "--check"});
+  EXPECT_EQ(differs.exit_code, 1) << differs.err;
+  EXPECT_EQ(differs.out, folder.rig() + "\n");
+  const ProcessResult comments = Run({folder.rig(), "--in-place"});
+  EXPECT_EQ(comments.exit_code, 2);
+  EXPECT_NE(comments.err.find("--drop-comments"), std::string::npos) << comments.err;
+  EXPECT_EQ(TemporaryFolder::Read(folder.rig()), text);
+  EXPECT_EQ(Run({folder.rig(), folder / "new.yaml", "--in-place", "--drop-comments"}).exit_code, 0);
+  EXPECT_EQ(TemporaryFolder::Read(folder.rig()), out.out);
+  EXPECT_EQ(Run({folder.rig(), folder / "new.yaml", "--check"}).exit_code, 0);
+
+  // The same bytes
+  const auto eval = [&](const std::string& rig, const std::string& to) {
+    EXPECT_EQ(RunKpsa({"eval", rig, "--frames", "0:12:6", "-o", folder / to, "-q"}).exit_code, 0);
+    return TemporaryFolder::Read(folder / to);
+  };
+  EXPECT_EQ(eval(kHello, "a.npz"), eval(folder.rig(), "b.npz"));
+}
+
+TEST_F(Fmt, RefusesWhatIsNoRig) {
+  const std::string bad = folder.Edit("type: deltaMush", "type: deltaMash");
+  const ProcessResult run = Run({bad, "--in-place", "--drop-comments"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("hello.yaml:8:16: unknown node type \"deltaMash\""), std::string::npos) << run.err;
+  EXPECT_NE(TemporaryFolder::Read(bad).find("deltaMash"), std::string::npos);
+  // A part that others include is checked for what it is
+  const std::string part = folder.Write("part.yaml", "kpsa: 1\noverrides: {mush.iterations: 3}\n");
+  EXPECT_EQ(Run({part, "--check"}).exit_code, 1);
+  EXPECT_EQ(Run({folder.Write("part.yaml", "kpsa: 1\noverides: {}\n")}).exit_code, 3);
+  EXPECT_EQ(Run({folder / "hello.glb"}).exit_code, 2);
+  EXPECT_EQ(Run({folder / "nobody.yaml"}).exit_code, 3);
+  EXPECT_EQ(Run({part, part}).exit_code, 2);
+  EXPECT_EQ(Run({part, "--check", "--in-place"}).exit_code, 2);
+  EXPECT_EQ(Run({part, "-o", "a.yaml", "--in-place"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace kpsa
