@@ -68,14 +68,18 @@ std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
   return names;
 }
 
-void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags, bool optional) {
-  if (optional) AddSwitch(command, "--accelerate", &flags->accelerate, "with the rig's own subspaces");
+void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags) {
+  AddSwitch(command, "--accelerate", &flags->accelerate, "with the rig's own subspaces");
   AddOption(command, "--kpsa", "FILE.kpsa", &flags->kpsa, "with this subspace");
+  AddOption(command, "--tolerance", "LENGTH", &flags->tolerance,
+            "the largest error of a point, as in 0.2mm; the subspace's own if not given");
+  AddSharedAccelerationFlags(command, flags);
+}
+
+void AddSharedAccelerationFlags(CLI::App* command, AccelerationFlags* flags) {
   AddOption(command, "--stale", "refuse|miss", &flags->stale,
             "a subspace that was trained on another version of the rig: refuse it (if not given), or miss: "
             "evaluate everything fully");
-  AddOption(command, "--tolerance", "LENGTH", &flags->tolerance,
-            "the largest error of a point, as in 0.2mm; the subspace's own if not given");
   AddOption(command, "--violation-rate", "SHARE", &flags->violation_rate,
             "share of frames that may exceed it, as in 1%; the subspace's own if not given");
 }
@@ -154,10 +158,17 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
   for (AppliedSubspace& one : applied) {
     one.name = one.entry.name;
     AccelerateOptions options;
+    if (flags.every_frame) {
+      auto open = std::make_shared<Subspace>(*one.subspace);
+      for (TrainedRange& range : open->ranges)
+        range.lo = -std::numeric_limits<double>::infinity(), range.hi = -range.lo;
+      one.subspace = std::move(open);
+    }
     options.stale_is_miss = flags.stale.has_value() && *flags.stale == "miss";
     if (flags.tolerance.has_value()) options.tolerance = *ParseTolerance(*flags.tolerance);
     if (flags.violation_rate.has_value()) options.violation_rate = *ParseRate(*flags.violation_rate);
     one.tolerance = options.tolerance < 0 ? one.subspace->tolerance : options.tolerance;
+    if (flags.every_frame) options.tolerance = kAnyError;
     one.violation_rate = options.violation_rate < 0 ? one.subspace->violation_rate : options.violation_rate;
     std::string node_name = one.name + "_kpsa";
     while (rig->graph->FindNode(node_name).ok()) node_name += "_";
@@ -193,10 +204,12 @@ void Verdicts::Add(std::size_t frame, const Evaluator& evaluator) {
   ++frames_;
   last_hit_ = true;
   last_score_ = 0;
+  last_scores_.clear();
   for (Index n = 0; n < applied_->size(); ++n) {
     const Index output = first_output_ + 4 * n;
     const double score = evaluator.Get<double>(output + 1);
     last_score_ = std::max(last_score_, score);
+    last_scores_.push_back(score);
     if (score > worst_score_) worst_score_ = score, worst_frame_ = frame;
     if (evaluator.Get<std::int64_t>(output) != 0) continue;
     last_hit_ = false;

@@ -18,11 +18,13 @@ struct Subspace;
 struct AccelerationFlags {
   bool accelerate = false;
   std::optional<std::string> kpsa, stale, tolerance, violation_rate;
+  bool every_frame = false;  // reconstruct every frame, whatever SoftCache and trained ranges say (no flag)
   bool wanted() const { return accelerate || kpsa.has_value(); }
 };
-// --accelerate --kpsa --stale --tolerance --violation-rate; without the first one where a command accelerates
-// anyway.
-void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags, bool optional = true);
+// --accelerate --kpsa --tolerance and the shared ones.
+void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags);
+// --stale --violation-rate
+void AddSharedAccelerationFlags(CLI::App* command, AccelerationFlags* flags);
 // All refusals that need no rig. Where nothing is accelerated, the other flags are refused.
 Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted);
 
@@ -69,6 +71,7 @@ class Verdicts {
   }
   bool last_hit() const { return last_hit_; }
   double last_score() const { return last_score_; }
+  const std::vector<double>& last_scores() const { return last_scores_; }  // one a node
   double worst_score() const { return worst_score_; }
   std::string Text() const;  // one line: hits, misses, worst score
   std::string WorstMiss()
@@ -83,6 +86,7 @@ class Verdicts {
   Index first_output_;
   std::size_t frames_ = 0, hits_ = 0, worst_frame_ = 0;
   double worst_score_ = 0, last_score_ = 0;
+  std::vector<double> last_scores_;
   bool last_hit_ = false;
   std::vector<Reason> reasons_;
 };

@@ -5,15 +5,42 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/table.h"
+#include "kpsa/kpsa_node.h"
 
 namespace kpsa {
 namespace {
 
+using OrderedJson = nlohmann::ordered_json;
+
 double Finite(double value) { return std::isfinite(value) ? value : -1; }
 
-}  // namespace
+double Rms(const std::vector<double>& values) {
+  double sum = 0;
+  for (double value : values) sum += value * value;
+  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
 
-std::string BenchJson(const BenchResult& r, const BenchContext& context) {
+// The error of every frame, and what it consists of; null where no modes are kept.
+OrderedJson FrameErrorsJson(const FrameErrors& e) {
+  if (e.empty()) return {};
+  OrderedJson hits = OrderedJson::array();
+  for (char hit : e.hit) hits.push_back(hit != 0);
+  return {{"rms",
+           {{"projection", Rms(e.projection)},
+            {"cueing", Rms(e.cueing)},
+            {"storage", Rms(e.storage)},
+            {"total", Rms(e.total)},
+            {"soft_cache", Rms(e.soft_cache)}}},
+          {"times", e.times},
+          {"projection", e.projection},
+          {"cueing", e.cueing},
+          {"storage", e.storage},
+          {"total", e.total},
+          {"soft_cache", e.soft_cache},
+          {"hit", hits}};
+}
+
+OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
   nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
   for (const BenchNode& n : r.full_nodes) {
     nodes.push_back({{"name", n.name},
@@ -28,7 +55,7 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
                   r.bound_points_ms > 0
                       ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
                       : "");
-  nlohmann::ordered_json per_frame = nlohmann::ordered_json::array();
+  OrderedJson per_frame = OrderedJson::array();
   for (const BenchResult::Frame& f : r.per_frame) {
     per_frame.push_back({{"clip", f.clip},
                          {"frame", f.number},
@@ -38,17 +65,21 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
                          {"full_ms", f.full_ms},
                          {"accelerated_ms", f.accelerated_ms}});
   }
-  const nlohmann::ordered_json document = {
+  return {
       {"schema", "kpsa.bench/1"},
       {"rig", context.rig},
+      {"subspace", r.subspace},
+      {"mode", r.mode},
       {"clip", fmt::format("{}", fmt::join(r.clips, ", "))},
       {"clips", r.clips},
       {"trained_on", r.trained_on},
       {"points", r.points},
       {"output_points", r.output_points},
       {"cues", r.cues},
+      {"cue_points", r.cue_points},
       {"cue_stages", r.cue_stages},
       {"modes", r.modes},
+      {"storage", {{"bytes_per_point", r.bytes_per_point}, {"mean_rank", r.mean_rank}}},
       {"frames", r.frames},
       {"threads", context.options.threads},
       {"runs", context.options.runs},
@@ -80,28 +111,18 @@ std::string BenchJson(const BenchResult& r, const BenchContext& context) {
         {"bbox_diagonal", r.diagonal},
         {"worst_clip", r.worst_clip},
         {"worst_frame", r.worst_frame}}},
+      {"frame_errors", FrameErrorsJson(r.frame_errors)},
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
       {"per_frame", per_frame},
       {"notes", r.notes}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-std::string FramesText(const BenchResult& r) {
-  Table table({"clip", ">frame", "", ">RMS", ">max", ">full ms", ">accelerated ms", ">speedup"});
-  for (const BenchResult::Frame& f : r.per_frame) {
-    table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
-               ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
-               fmt::format("{:.3f}", f.accelerated_ms),
-               fmt::format("{:.1f}x", f.accelerated_ms > 0 ? f.full_ms / f.accelerated_ms : 0)});
-  }
-  return table.Text();
-}
-
-std::string BenchText(const BenchResult& r, const BenchContext& context) {
+std::string SideText(const BenchResult& r, const BenchContext& context) {
   const auto error = [&](double value) { return ErrorText(value, r.light); };
   std::string text;
+  if (context.kpsa.size() > 1) text += r.subspace + "\n";
   const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
   text += fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
                       Plural(r.cues, "cue"), fmt::join(r.cue_stages, ", "), r.modes);
@@ -124,13 +145,22 @@ std::string BenchText(const BenchResult& r, const BenchContext& context) {
   text += fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
                       r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
                       r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
-  text += fmt::format("hits       {:.1f} % of frames; {:.1f} % of frames beyond the tolerance of {}{}\n",
-                      100 * static_cast<double>(r.hits) / frames,
-                      100 * static_cast<double>(r.violations) / frames, r.light ? "an RMS of " : "",
-                      error(r.tolerance));
+  text += fmt::format(
+      "hits       {:.1f} % of frames; {:.1f} % of frames beyond {}\n",
+      100 * static_cast<double>(r.hits) / frames, 100 * static_cast<double>(r.violations) / frames,
+      r.tolerance >= kAnyError
+          ? "any tolerance"
+          : fmt::format("the tolerance of {}{}", r.light ? "an RMS of " : "", error(r.tolerance)));
   text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
                       error(r.error_rms), error(r.error_p99), error(r.error_max), r.worst_frame, r.worst_clip,
                       error(r.motion_rms), error(r.diagonal));
+  if (const FrameErrors& e = r.frame_errors; !e.empty()) {
+    text += fmt::format(
+        "split      RMS of all frames reconstructed: projection {}, cueing {}, storage {}, together {}; with "
+        "SoftCache {}\n",
+        error(Rms(e.projection)), error(Rms(e.cueing)), error(Rms(e.storage)), error(Rms(e.total)),
+        error(Rms(e.soft_cache)));
+  }
   text += fmt::format(
       "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
       Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),
@@ -146,9 +176,39 @@ std::string BenchText(const BenchResult& r, const BenchContext& context) {
                           ", "),
                 r.never_evaluated.size() > 6 ? ", ..." : ""));
   if (!r.worst_miss.empty()) text += r.worst_miss + "\n";
-  const std::string with = context.kpsa.has_value() ? "--kpsa " + *context.kpsa : "--accelerate";
-  text += fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
   return text;
+}
+
+}  // namespace
+
+std::string BenchJson(const std::vector<BenchResult>& results, const BenchContext& context) {
+  OrderedJson document = SideJson(results.front(), context), beside = OrderedJson::array();
+  for (std::size_t i = 1; i < results.size(); ++i) beside.push_back(SideJson(results[i], context));
+  document["beside"] = std::move(beside);
+  return document.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+}
+
+std::string FramesText(const std::vector<BenchResult>& results) {
+  std::string text;
+  for (const BenchResult& r : results) {
+    Table table({"clip", ">frame", "", ">RMS", ">max", ">full ms", ">accelerated ms", ">speedup"});
+    for (const BenchResult::Frame& f : r.per_frame) {
+      table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
+                 ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
+                 fmt::format("{:.3f}", f.accelerated_ms),
+                 fmt::format("{:.1f}x", f.accelerated_ms > 0 ? f.full_ms / f.accelerated_ms : 0)});
+    }
+    if (results.size() > 1) text += r.subspace + "\n";
+    text += table.Text();
+  }
+  return text;
+}
+
+std::string BenchText(const std::vector<BenchResult>& results, const BenchContext& context) {
+  std::string text;
+  for (const BenchResult& result : results) text += (text.empty() ? "" : "\n\n") + SideText(result, context);
+  const std::string with = context.kpsa.empty() ? "--accelerate" : "--kpsa " + context.kpsa.front();
+  return text + fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
 }
 
 }  // namespace kpsa

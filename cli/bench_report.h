@@ -8,15 +8,17 @@
 namespace kpsa {
 
 struct BenchContext {
-  std::string rig;                  // as the user named it
-  std::optional<std::string> kpsa;  // --kpsa
+  std::string rig;                // as the user named it
+  std::vector<std::string> kpsa;  // --kpsa
   BenchOptions options;
 };
 
-// One object; times in milliseconds, lengths in metres; -1 where an error is not finite.
-std::string BenchJson(const BenchResult& result, const BenchContext& context);
+// One object, that of the first side; those of the others stand in its list "beside". Times in milliseconds,
+// lengths in metres; -1 where an error is not finite.
+std::string BenchJson(const std::vector<BenchResult>& results, const BenchContext& context);
 // For people, with the next command.
-std::string FramesText(const BenchResult& result);  // a table of all frames
-std::string BenchText(const BenchResult& result, const BenchContext& context);
+std::string BenchText(const std::vector<BenchResult>& results, const BenchContext& context);
+// A table of all frames, for every side.
+std::string FramesText(const std::vector<BenchResult>& results);
 
 }  // namespace kpsa

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <map>
+#include <memory>
+#include <numeric>
 #include <set>
 
 #include "base/parallel.h"
@@ -44,7 +47,7 @@ std::vector<char> PointStepsAbove(const Plan& plan, const std::vector<NodeId>& n
   return seen;
 }
 
-// One of the two evaluations.
+// One of the evaluations.
 struct Side {
   std::shared_ptr<const Plan> plan;
   std::unique_ptr<Evaluator> evaluator;
@@ -120,250 +123,355 @@ double RecordingNs(const Plan& plan, const Profile& recorded) {
   return each * events;
 }
 
+// One accelerated side: what is summed over the clips, and what belongs to the present one.
+struct Contender {
+  AccelerationFlags flags;
+  BenchResult result;
+  PointErrors errors;
+  Sums sums;
+
+  std::unique_ptr<OpenRig> open;
+  std::vector<AppliedSubspace> applied;
+  Request request;
+  std::size_t compared = 0;  // outputs
+  std::unique_ptr<Verdicts> verdicts;
+  std::unique_ptr<Side> side;
+  PointErrors clip_errors;
+  std::vector<char> hit;
+  FullWeights weights;
+
+  // The rig of the flags with the subspaces in place. `outputs` becomes what the full side has to compute.
+  Status Load(const Flags& clip_flags, const BenchOptions& options, std::size_t frames, Request* outputs) {
+    Result<std::unique_ptr<OpenRig>> loaded = LoadRigOf(clip_flags);
+    if (!loaded.ok()) return loaded.status();
+    side.reset(), verdicts.reset(), applied.clear();  // of the clip before, which refer to its rig
+    open = std::move(*loaded);
+    Rig& rig = open->rig;
+    Compiler compiler;
+    *outputs = AllMeshes(rig);
+    Result<std::vector<AppliedSubspace>> made = ApplyAcceleration(&rig, &compiler, flags);
+    if (!made.ok()) return made.status();
+    applied = std::move(*made);
+    request = AllMeshes(rig);
+    if (Request colors = ColorOutputs(rig, applied, false); !colors.outputs.empty()) {
+      *outputs = std::move(colors);
+      request = ColorOutputs(rig, applied, true);
+    }
+    compared = request.outputs.size();
+    verdicts = std::make_unique<Verdicts>(applied, rig, &request);
+    const auto plan = CompileFor(rig, &compiler, request);
+    if (!plan.ok()) return plan.status();
+    side = std::make_unique<Side>(rig, *plan, options.threads > 1, frames);
+    clip_errors = PointErrors(compared);
+    hit.clear();
+    weights.clear();
+    Describe();
+    return Status();
+  }
+  void Describe();
+  void Compare(std::size_t frame, const Evaluator& full, const std::string& clip);
+  void AddTimes(const std::vector<double>& full_ns);
+  void AddFullProfile(const Plan& plan, const Profile& profile, double wall, double full_ns);
+  void AddProfile(const Profile& profile, const KpsaTimes& kpsa, double wall, double fast_ns);
+  void Finish();
+};
+
+void Contender::Describe() {
+  const Rig& rig = open->rig;
+  result.clips.push_back(rig.scene.clip.value_or("(rest)"));
+  if (result.clips.size() > 1) return;
+  std::map<std::string, std::size_t> stages;
+  if (ColorOutputs(rig, applied, false).outputs.empty()) {
+    for (const CharacterMesh& mesh : rig.scene.meshes) result.output_points += mesh.mesh().point_count();
+  } else {
+    for (const AppliedSubspace& one : applied) {
+      for (const SubspaceOutput& output : one.subspace->outputs) result.output_points += output.points;
+    }
+  }
+  result.subspace = applied.front().path;
+  result.mode = applied.front().subspace->mode == EstimatorMode::kMap ? "map" : "paper";
+  result.tolerance = applied.front().tolerance;
+  result.light = applied.front().subspace->of_light();
+  result.violation_limit = applied.front().violation_rate;
+  double bytes = 0, tiles = 0;
+  for (const AppliedSubspace& one : applied) {
+    for (const std::string& note : one.notes) result.notes.push_back(note);
+    for (const SubspaceOutput& output : one.subspace->outputs) result.points += output.points;
+    for (const TileMap& map : one.subspace->tiles) {
+      bytes += static_cast<double>(map.bytes()), tiles += static_cast<double>(map.tiles());
+      result.mean_rank += map.mean_rank() * static_cast<double>(map.tiles());
+    }
+    result.cues += one.subspace->cues.size();
+    result.modes += one.subspace->modes;
+    for (const CueDescription& cue : one.subspace->cues) {
+      const bool scalar = cue.kind == CueDescription::Kind::kScalar;
+      const std::string& name = scalar ? cue.plug : one.subspace->outputs[cue.mesh].name;
+      ++stages[scalar ? "scalars" : "points of " + name.substr(0, name.rfind('@')) + "@" + cue.stage];
+      result.cue_points += !scalar;
+    }
+    const TrainingRecord record = ParseTraining(one.subspace->training);
+    for (const std::string& clip : record.clips) result.trained_on.push_back(clip);
+    if (record.sampled_poses > 0)
+      result.trained_on.push_back(fmt::format("{} samples of the controls", record.sampled_poses));
+  }
+  result.bytes_per_point = bytes / static_cast<double>(std::max<std::size_t>(1, result.points));
+  result.mean_rank /= std::max(1.0, tiles);
+  for (const auto& [stage, count] : stages) result.cue_stages.push_back(fmt::format("{} {}", count, stage));
+}
+
+// After both have evaluated a frame.
+void Contender::Compare(std::size_t frame, const Evaluator& full, const std::string& clip) {
+  verdicts->Add(frame, *side->evaluator);
+  hit.push_back(verdicts->last_hit());
+  weights.emplace_back();
+  for (std::size_t n = 0; n < applied.size(); ++n)
+    weights.back().push_back(EmittedFullWeight(applied[n], verdicts->last_scores()[n]));
+  const double worst = clip_errors.AddFrame(full, *side->evaluator), rms = clip_errors.frame_rms();
+  // A blended or full miss keeps the tolerance, too, or it counts
+  if ((result.light ? rms : worst) > result.tolerance) ++result.violations;
+  result.per_frame.push_back({clip, frame, verdicts->last_hit(), rms, worst, 0, 0});
+  if (worst > result.error_max)
+    result.error_max = worst, result.worst_frame = frame, result.worst_clip = clip;
+}
+
+void Contender::AddTimes(const std::vector<double>& full_ns) {
+  for (std::size_t f = 0; f < full_ns.size(); ++f) {
+    const double a = full_ns[f], b = Median(side->frame_ns[f]);
+    sums.full_ns += a, sums.accelerated_ns += b;
+    BenchResult::Frame& frame = result.per_frame[result.per_frame.size() - full_ns.size() + f];
+    frame.full_ms = a / 1e6, frame.accelerated_ms = b / 1e6;
+    if (hit[f]) sums.full_hit_ns += a, sums.accelerated_hit_ns += b;
+  }
+}
+
+// A profiled evaluation is slower: its parts are scaled to the timed one. Rigs of one file have the same
+// nodes, so this side's name steps of the full plan, too.
+void Contender::AddFullProfile(const Plan& plan, const Profile& profile, double wall, double full_ns) {
+  const double scale = full_ns / std::max(1.0, wall);
+  std::vector<NodeId> stage_nodes;
+  for (const AppliedSubspace& one : applied) {
+    for (const AcceleratedPoints& points : one.entry.points) stage_nodes.push_back(points.points.node);
+  }
+  const std::vector<char> skippable = PointStepsAbove(plan, stage_nodes);
+  double skipped = 0, kept_points = 0;
+  for (Index s = 0; s < plan.steps().size(); ++s) {
+    const double ns = static_cast<double>(profile.self_ns()[s]) * scale;
+    BenchNode& node = sums.nodes[plan.step_name(s)];
+    node.name = plan.step_name(s), node.type = plan.step_type(s);
+    node.ms_per_frame += ns;
+    node.points = std::max(node.points, plan.infos()[s].points);
+    if (skippable[s]) skipped += ns;
+    if (!skippable[s] && plan.infos()[s].points_total > 0) kept_points += ns;
+  }
+  sums.bound_points += kept_points;
+  sums.bound_graph += std::max(0.0, full_ns - skipped - kept_points);
+  sums.points_full += PointsComputed(plan, profile);
+}
+
+void Contender::AddProfile(const Profile& profile, const KpsaTimes& kpsa, double wall, double fast_ns) {
+  const Plan& plan = *side->plan;
+  const double scale = fast_ns / std::max(1.0, wall);
+  std::vector<NodeId> kpsa_nodes;
+  for (const AppliedSubspace& one : applied) kpsa_nodes.push_back(one.node);
+  const std::vector<char> cue_steps = PointStepsAbove(plan, kpsa_nodes);
+  double cues = static_cast<double>(kpsa.cues) * scale, downstream = 0, misses = 0;
+  for (Index s = 0; s < plan.steps().size(); ++s) {
+    const Plan::StepInfo& info = plan.infos()[s];
+    const double ns = static_cast<double>(profile.self_ns()[s]) * scale;
+    if (profile.counts()[s] > 0) sums.computed.insert(plan.step_name(s));
+    if (std::find(kpsa_nodes.begin(), kpsa_nodes.end(), info.node) != kpsa_nodes.end()) continue;
+    if (info.segment != 0) {
+      misses += ns;
+    } else if (info.points_total > 0) {
+      (cue_steps[s] ? cues : downstream) += ns;
+    }
+  }
+  sums.cues += cues, sums.downstream += downstream, sums.misses += misses;
+  sums.projection += static_cast<double>(kpsa.projection) * scale;
+  sums.reconstruction += static_cast<double>(kpsa.reconstruction) * scale;
+  sums.graph += std::max(0.0, fast_ns - cues - downstream - misses -
+                                  static_cast<double>(kpsa.projection + kpsa.reconstruction) * scale);
+  sums.points_accelerated += PointsComputed(plan, profile);
+}
+
+void Contender::Finish() {
+  const auto frames = static_cast<double>(std::max<std::size_t>(1, result.frames));
+  const auto hits = static_cast<double>(std::max<std::size_t>(1, result.hits));
+  const auto ms = [&](double ns) { return ns / frames / 1e6; };
+  result.full_ms = ms(sums.full_ns);
+  result.accelerated_ms = ms(sums.accelerated_ns);
+  result.full_ms_on_hits = sums.full_hit_ns / hits / 1e6;
+  result.accelerated_ms_on_hits = sums.accelerated_hit_ns / hits / 1e6;
+  result.graph_ms = ms(sums.graph), result.cues_ms = ms(sums.cues),
+  result.projection_ms = ms(sums.projection);
+  result.reconstruction_ms = ms(sums.reconstruction), result.downstream_ms = ms(sums.downstream),
+  result.misses_ms = ms(sums.misses);
+  result.bound_graph_ms = ms(sums.bound_graph), result.bound_points_ms = ms(sums.bound_points);
+  result.bound_ms = result.bound_graph_ms + result.bound_points_ms;
+  result.points_full = sums.points_full / frames;
+  result.points_accelerated = sums.points_accelerated / frames;
+  for (auto& [name, node] : sums.nodes) {
+    node.ms_per_frame = ms(node.ms_per_frame);
+    result.full_nodes.push_back(node);
+    if (!sums.computed.contains(name)) result.never_evaluated.push_back(name);
+  }
+  result.nodes_total = sums.nodes.size();
+  std::stable_sort(result.full_nodes.begin(), result.full_nodes.end(),
+                   [](const BenchNode& a, const BenchNode& b) { return a.ms_per_frame > b.ms_per_frame; });
+  result.error_rms = errors.rms();
+  result.error_p99 = errors.Percentile(0.99);
+  result.motion_rms = errors.motion_rms();
+  result.diagonal = errors.diagonal();
+}
+
 class Bench {
  public:
-  Bench(const BenchOptions& options, BenchResult* result) : options_(options), result_(*result) {}
+  Bench(const std::vector<AccelerationFlags>& sides, const BenchOptions& options) : options_(options) {
+    contenders_.resize(sides.size());
+    for (std::size_t i = 0; i < sides.size(); ++i) contenders_[i].flags = sides[i];
+  }
 
-  Status RunClip(const Flags& flags, const AccelerationFlags& acceleration, const std::string& clip,
-                 Progress* progress) {
+  Status RunClip(const Flags& flags, const std::string& clip, Progress* progress) {
     Flags with_clip = flags;
     if (!clip.empty()) with_clip.clip = clip;
     const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(with_clip);
     if (!open.ok()) return open.status();
-    Rig& rig = (*open)->rig;
-    const Result<std::vector<double>> times = SampleTimes(with_clip, rig);
-    if (!times.ok()) return times.status();
-    Compiler compiler;
-    auto full_plan = CompileFor(rig, &compiler, AllMeshes(rig));
-    if (!full_plan.ok()) return full_plan.status();
-    const Result<std::vector<AppliedSubspace>> applied = ApplyAcceleration(&rig, &compiler, acceleration);
-    if (!applied.ok()) return applied.status();
-    Request request = AllMeshes(rig);
-    if (Request colors = ColorOutputs(rig, *applied, false); !colors.outputs.empty()) {
-      full_plan = CompileFor(rig, &compiler, colors);
-      if (!full_plan.ok()) return full_plan.status();
-      request = ColorOutputs(rig, *applied, true);
+    const Rig& rig = (*open)->rig;
+    const Result<std::vector<double>> sampled = SampleTimes(with_clip, rig);
+    if (!sampled.ok()) return sampled.status();
+    const std::vector<double>& times = *sampled;
+    Request outputs;
+    for (std::size_t i = 0; i < contenders_.size(); ++i) {
+      Request wanted;
+      KPSA_RETURN_IF_ERROR(contenders_[i].Load(with_clip, options_, times.size(), &wanted));
+      if (i == 0) outputs = wanted;
+      if (outputs.outputs.size() != wanted.outputs.size() ||
+          outputs.outputs.front().plug != wanted.outputs.front().plug)
+        return Status::Usage("{} and {} accelerate different things, which no common run compares",
+                             contenders_[0].result.subspace, contenders_[i].result.subspace);
     }
-    const std::size_t compared = request.outputs.size();
-    Verdicts verdicts(*applied, rig, &request);
-    const auto fast_plan = CompileFor(rig, &compiler, request);
-    if (!fast_plan.ok()) return fast_plan.status();
-    Describe(rig, *applied);
-    Side full(rig, *full_plan, options_.threads > 1, times->size()),
-        fast(rig, *fast_plan, options_.threads > 1, times->size());
+    Compiler compiler;
+    const auto full_plan = CompileFor(rig, &compiler, outputs);
+    if (!full_plan.ok()) return full_plan.status();
+    Side full(rig, *full_plan, options_.threads > 1, times.size());
+    std::vector<Side*> sides{&full};
+    for (Contender& contender : contenders_) sides.push_back(contender.side.get());
     const auto located = [&](const Status& status, double t) {
       return Status::Evaluation("at {} s: {}", t, status.errors().front().message).At({rig.path});
     };
 
     // Points
-    std::vector<char> hit;
-    PointErrors errors(compared);
-    for (std::size_t f = 0; f < times->size(); ++f) {
+    for (std::size_t f = 0; f < times.size(); ++f) {
       if (Interrupted()) return InterruptedStatus();
       progress->Set(done_++);
-      for (Side* side : {&full, &fast}) {
-        if (const Status status = side->Evaluate((*times)[f]); !status.ok())
-          return located(status, (*times)[f]);
+      for (Side* side : sides) {
+        if (const Status status = side->Evaluate(times[f]); !status.ok()) return located(status, times[f]);
       }
-      verdicts.Add(f, *fast.evaluator);
-      hit.push_back(verdicts.last_hit());
-      const double worst = errors.AddFrame(*full.evaluator, *fast.evaluator);
-      // A blended or full miss keeps the tolerance, too, or it counts
-      if ((result_.light ? errors.frame_rms() : worst) > result_.tolerance) ++result_.violations;
-      result_.per_frame.push_back(
-          {rig.scene.clip.value_or(""), f, verdicts.last_hit(), errors.frame_rms(), worst, 0, 0});
-      if (worst > result_.error_max)
-        result_.error_max = worst, result_.worst_frame = f, result_.worst_clip = rig.scene.clip.value_or("");
+      for (Contender& contender : contenders_)
+        contender.Compare(f, *full.evaluator, rig.scene.clip.value_or(""));
     }
-    errors_.Merge(errors);
-    result_.hits += verdicts.hits();
-    result_.frames += times->size();
-    result_.verdict_text = verdicts.Text();
-    if (!verdicts.WorstMiss().empty()) result_.worst_miss = verdicts.WorstMiss();
+    for (Contender& contender : contenders_) {
+      contender.errors.Merge(contender.clip_errors);
+      contender.result.hits += contender.verdicts->hits();
+      contender.result.frames += times.size();
+      contender.result.verdict_text = contender.verdicts->Text();
+      if (const std::string worst = contender.verdicts->WorstMiss(); !worst.empty())
+        contender.result.worst_miss = worst;
+    }
 
-    // Times. The sides take turns by blocks of frames: each keeps its caches as in playback, and both see the
+    // Times. The sides take turns by blocks of frames: each keeps its caches as in playback, and all see the
     // same machine
     for (int run = 0; run < options_.runs; ++run) {
-      full.StartAgain();
-      fast.StartAgain();
-      for (std::size_t first = 0, block = 0; first < times->size(); first += kTurnFrames, ++block) {
-        const std::size_t end = std::min(first + kTurnFrames, times->size());
-        Side* const side = (static_cast<std::size_t>(run) + block) % 2 == 0 ? &full : &fast;
-        for (Side* turn : {side, side == &full ? &fast : &full}) {
+      for (Side* side : sides) side->StartAgain();
+      for (std::size_t first = 0, block = 0; first < times.size(); first += kTurnFrames, ++block) {
+        const std::size_t end = std::min(first + kTurnFrames, times.size());
+        for (std::size_t turn = 0; turn < sides.size(); ++turn) {
+          Side* const side = sides[(static_cast<std::size_t>(run) + block + turn) % sides.size()];
           for (std::size_t f = first; f < end; ++f) {
             if (Interrupted()) return InterruptedStatus();
-            if (const Status status = turn->Timed(f, (*times)[f]); !status.ok())
-              return located(status, (*times)[f]);
+            if (const Status status = side->Timed(f, times[f]); !status.ok())
+              return located(status, times[f]);
           }
         }
         for (std::size_t f = first; f < end; ++f) progress->Set(done_++);
       }
     }
-    double clip_full = 0, clip_fast = 0;
-    for (std::size_t f = 0; f < times->size(); ++f) {
-      const double a = Median(full.frame_ns[f]), b = Median(fast.frame_ns[f]);
-      clip_full += a, clip_fast += b;
-      BenchResult::Frame& frame = result_.per_frame[result_.per_frame.size() - times->size() + f];
-      frame.full_ms = a / 1e6, frame.accelerated_ms = b / 1e6;
-      if (hit[f]) sums_.full_hit_ns += a, sums_.accelerated_hit_ns += b;
+    std::vector<double> full_ns;
+    for (const auto& runs : full.frame_ns) full_ns.push_back(Median(runs));
+    for (Contender& contender : contenders_) contender.AddTimes(full_ns);
+    KPSA_RETURN_IF_ERROR(ProfileClip(&full, times, full_ns));
+    for (Contender& contender : contenders_) {
+      Result<FrameErrors> errors = SplitFrames(with_clip, contender.flags, times, contender.weights);
+      if (!errors.ok()) return errors.status();
+      contender.result.frame_errors.Append(*errors);
     }
-    sums_.full_ns += clip_full;
-    sums_.accelerated_ns += clip_fast;
-    return ProfileClip(*applied, &full, &fast, *times, clip_full, clip_fast);
+    return Status();
   }
 
-  void Finish() {
-    const auto frames = static_cast<double>(std::max<std::size_t>(1, result_.frames));
-    const auto hits = static_cast<double>(std::max<std::size_t>(1, result_.hits));
-    const auto ms = [&](double ns) { return ns / frames / 1e6; };
-    result_.full_ms = ms(sums_.full_ns);
-    result_.accelerated_ms = ms(sums_.accelerated_ns);
-    result_.full_ms_on_hits = sums_.full_hit_ns / hits / 1e6;
-    result_.accelerated_ms_on_hits = sums_.accelerated_hit_ns / hits / 1e6;
-    result_.graph_ms = ms(sums_.graph), result_.cues_ms = ms(sums_.cues),
-    result_.projection_ms = ms(sums_.projection);
-    result_.reconstruction_ms = ms(sums_.reconstruction), result_.downstream_ms = ms(sums_.downstream),
-    result_.misses_ms = ms(sums_.misses);
-    result_.bound_graph_ms = ms(sums_.bound_graph), result_.bound_points_ms = ms(sums_.bound_points);
-    result_.bound_ms = result_.bound_graph_ms + result_.bound_points_ms;
-    result_.points_full = sums_.points_full / frames;
-    result_.points_accelerated = sums_.points_accelerated / frames;
-    for (auto& [name, node] : sums_.nodes) {
-      node.ms_per_frame = ms(node.ms_per_frame);
-      result_.full_nodes.push_back(node);
-      if (!sums_.computed.contains(name)) result_.never_evaluated.push_back(name);
+  std::vector<BenchResult> Finish() {
+    std::vector<BenchResult> results;
+    for (Contender& contender : contenders_) {
+      contender.Finish();
+      results.push_back(std::move(contender.result));
     }
-    result_.nodes_total = sums_.nodes.size();
-    std::stable_sort(result_.full_nodes.begin(), result_.full_nodes.end(),
-                     [](const BenchNode& a, const BenchNode& b) { return a.ms_per_frame > b.ms_per_frame; });
-    result_.error_rms = errors_.rms();
-    result_.error_p99 = errors_.Percentile(0.99);
-    result_.motion_rms = errors_.motion_rms();
-    result_.diagonal = errors_.diagonal();
+    return results;
   }
 
  private:
-  void Describe(const Rig& rig, const std::vector<AppliedSubspace>& applied) {
-    result_.clips.push_back(rig.scene.clip.value_or("(rest)"));
-    if (result_.clips.size() > 1) return;
-    std::map<std::string, std::size_t> stages;
-    if (ColorOutputs(rig, applied, false).outputs.empty()) {
-      for (const CharacterMesh& mesh : rig.scene.meshes) result_.output_points += mesh.mesh().point_count();
-    } else {
-      for (const AppliedSubspace& one : applied) {
-        for (const SubspaceOutput& output : one.subspace->outputs) result_.output_points += output.points;
-      }
+  // What the time consists of.
+  Status ProfileClip(Side* full, const std::vector<double>& times, const std::vector<double>& full_ns) {
+    std::vector<Side*> sides{full};
+    for (Contender& contender : contenders_) sides.push_back(contender.side.get());
+    std::vector<Profile> profiles;
+    for (Side* side : sides) {
+      profiles.emplace_back(*side->plan);
+      side->StartAgain();
     }
-    result_.tolerance = applied.front().tolerance;
-    result_.light = applied.front().subspace->of_light();
-    result_.violation_limit = applied.front().violation_rate;
-    for (const AppliedSubspace& one : applied) {
-      for (const std::string& note : one.notes) result_.notes.push_back(note);
-      for (const SubspaceOutput& output : one.subspace->outputs) result_.points += output.points;
-      result_.cues += one.subspace->cues.size();
-      result_.modes += one.subspace->modes;
-      for (const CueDescription& cue : one.subspace->cues) {
-        const bool scalar = cue.kind == CueDescription::Kind::kScalar;
-        const std::string& name = scalar ? cue.plug : one.subspace->outputs[cue.mesh].name;
-        ++stages[scalar ? "scalars" : "points of " + name.substr(0, name.rfind('@')) + "@" + cue.stage];
-      }
-      const TrainingRecord record = ParseTraining(one.subspace->training);
-      for (const std::string& clip : record.clips) result_.trained_on.push_back(clip);
-      if (record.sampled_poses > 0)
-        result_.trained_on.push_back(fmt::format("{} samples of the controls", record.sampled_poses));
-    }
-    for (const auto& [stage, count] : stages)
-      result_.cue_stages.push_back(fmt::format("{} {}", count, stage));
-  }
-
-  // What the time consists of. A profiled evaluation is slower: what recording costs is taken out, and the
-  // parts are scaled to the timed one.
-  Status ProfileClip(const std::vector<AppliedSubspace>& applied, Side* full, Side* fast,
-                     const std::vector<double>& times, double full_ns, double fast_ns) {
-    Profile full_profile(*full->plan), fast_profile(*fast->plan);
-    double full_wall = 0, fast_wall = 0;
-    full->StartAgain();
-    fast->StartAgain();
+    std::vector<double> wall(sides.size(), 0.0);
+    std::vector<KpsaTimes> kpsa(sides.size());
     MeasureKpsaTimes(true);
     TakeKpsaTimes();
     Status status;
     for (std::size_t f = 0; f < times.size() && status.ok(); ++f) {
-      for (Side* side : {full, fast}) {
-        side->evaluator->Record(side == full ? &full_profile : &fast_profile, static_cast<int>(f));
+      for (std::size_t i = 0; i < sides.size() && status.ok(); ++i) {
+        sides[i]->evaluator->Record(&profiles[i], static_cast<int>(f));
         const std::uint64_t begin = ProfileClock();
-        if (status.ok()) status = side->Evaluate(times[f]);
-        (side == full ? full_wall : fast_wall) += static_cast<double>(ProfileClock() - begin);
-        side->evaluator->Record(nullptr);
+        status = sides[i]->Evaluate(times[f]);
+        wall[i] += static_cast<double>(ProfileClock() - begin);
+        sides[i]->evaluator->Record(nullptr);
+        const KpsaTimes taken = TakeKpsaTimes();
+        kpsa[i].cues += taken.cues, kpsa[i].projection += taken.projection;
+        kpsa[i].reconstruction += taken.reconstruction;
       }
     }
-    const KpsaTimes kpsa = TakeKpsaTimes();
     MeasureKpsaTimes(false);
     KPSA_RETURN_IF_ERROR(std::move(status));
-
-    full_wall -= RecordingNs(*full->plan, full_profile);
-    fast_wall -= RecordingNs(*fast->plan, fast_profile);
-    const double full_scale = full_ns / std::max(1.0, full_wall),
-                 fast_scale = fast_ns / std::max(1.0, fast_wall);
-    std::vector<NodeId> stage_nodes, kpsa_nodes;
-    for (const AppliedSubspace& one : applied) {
-      kpsa_nodes.push_back(one.node);
-      for (const AcceleratedPoints& points : one.entry.points) stage_nodes.push_back(points.points.node);
+    for (std::size_t i = 0; i < sides.size(); ++i) wall[i] -= RecordingNs(*sides[i]->plan, profiles[i]);
+    const double clip_full = std::accumulate(full_ns.begin(), full_ns.end(), 0.0);
+    for (std::size_t i = 0; i < contenders_.size(); ++i) {
+      double clip_fast = 0;
+      for (const auto& runs : contenders_[i].side->frame_ns) clip_fast += Median(runs);
+      contenders_[i].AddFullProfile(*full->plan, profiles[0], wall[0], clip_full);
+      contenders_[i].AddProfile(profiles[i + 1], kpsa[i + 1], wall[i + 1], clip_fast);
     }
-    const std::vector<char> skippable = PointStepsAbove(*full->plan, stage_nodes);
-    double skipped = 0, kept_points = 0;
-    for (Index s = 0; s < full->plan->steps().size(); ++s) {
-      const double ns = static_cast<double>(full_profile.self_ns()[s]) * full_scale;
-      BenchNode& node = sums_.nodes[full->plan->step_name(s)];
-      node.name = full->plan->step_name(s), node.type = full->plan->step_type(s);
-      node.ms_per_frame += ns;
-      node.points = std::max(node.points, full->plan->infos()[s].points);
-      if (skippable[s]) skipped += ns;
-      if (!skippable[s] && full->plan->infos()[s].points_total > 0) kept_points += ns;
-    }
-    sums_.bound_points += kept_points;
-    sums_.bound_graph += std::max(0.0, full_ns - skipped - kept_points);
-    const std::vector<char> cue_steps = PointStepsAbove(*fast->plan, kpsa_nodes);
-    double cues = static_cast<double>(kpsa.cues) * fast_scale, downstream = 0, misses = 0;
-    for (Index s = 0; s < fast->plan->steps().size(); ++s) {
-      const Plan::StepInfo& info = fast->plan->infos()[s];
-      const double ns = static_cast<double>(fast_profile.self_ns()[s]) * fast_scale;
-      if (fast_profile.counts()[s] > 0) sums_.computed.insert(fast->plan->step_name(s));
-      if (std::find(kpsa_nodes.begin(), kpsa_nodes.end(), info.node) != kpsa_nodes.end()) continue;
-      if (info.segment != 0) {
-        misses += ns;
-      } else if (info.points_total > 0) {
-        (cue_steps[s] ? cues : downstream) += ns;
-      }
-    }
-    sums_.cues += cues, sums_.downstream += downstream, sums_.misses += misses;
-    sums_.projection += static_cast<double>(kpsa.projection) * fast_scale;
-    sums_.reconstruction += static_cast<double>(kpsa.reconstruction) * fast_scale;
-    sums_.graph += std::max(0.0, fast_ns - cues - downstream - misses -
-                                     static_cast<double>(kpsa.projection + kpsa.reconstruction) * fast_scale);
-    sums_.points_full += PointsComputed(*full->plan, full_profile);
-    sums_.points_accelerated += PointsComputed(*fast->plan, fast_profile);
     return Status();
   }
 
   const BenchOptions& options_;
-  BenchResult& result_;
-  PointErrors errors_;
-  Sums sums_;
+  std::deque<Contender> contenders_;  // stay where they are: their verdicts refer to them
   std::size_t done_ = 0;
 };
 
 }  // namespace
 
-Result<BenchResult> RunBench(const Flags& flags, const AccelerationFlags& acceleration,
-                             const std::vector<std::string>& clips, const BenchOptions& options) {
-  BenchResult result;
+Result<std::vector<BenchResult>> RunBench(const Flags& flags, const std::vector<AccelerationFlags>& sides,
+                                          const std::vector<std::string>& clips,
+                                          const BenchOptions& options) {
   const ThreadLimit limit(options.threads);
-  Bench bench(options, &result);
+  Bench bench(sides, options);
   Progress progress("bench, frames", 0, options.quiet);
-  for (const std::string& clip : clips)
-    KPSA_RETURN_IF_ERROR(bench.RunClip(flags, acceleration, clip, &progress));
-  bench.Finish();
-  return result;
+  for (const std::string& clip : clips) KPSA_RETURN_IF_ERROR(bench.RunClip(flags, clip, &progress));
+  return bench.Finish();
 }
 
 }  // namespace kpsa

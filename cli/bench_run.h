@@ -1,21 +1,22 @@
-// Full against accelerated evaluation of the same frames, in one process.
+// Full against accelerated evaluation of the same frames, in one process; with one subspace or with several.
 //
-// For every clip: one pass compares the points (and warms both sides up), some runs are timed, one pass is
-// profiled. Timed frames of the two sides alternate, so that whatever else the machine does hits both. A
-// frame's time is the median over the runs; a clip's is the mean over its frames.
+// For every clip: one pass compares the points (and warms all sides up), some runs are timed, one pass is
+// profiled. The sides take turns by blocks of frames, so that whatever else the machine does hits all of
+// them. A frame's time is the median over the runs; a clip's is the mean over its frames.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "cli/acceleration.h"
+#include "cli/frame_errors.h"
 #include "graph/plan_report.h"
 
 namespace kpsa {
 
 struct BenchOptions {
   int runs = 5;
-  int threads = 1;  // more: both sides evaluate steps and wide kernels in parallel
+  int threads = 1;  // more: all sides evaluate steps and wide kernels in parallel
   bool quiet = false;
 };
 
@@ -25,13 +26,17 @@ struct BenchNode {
   Index points = 0;
 };
 
+// One accelerated side, and the full one of the same run.
 struct BenchResult {
   std::vector<std::string> clips, trained_on,
       cue_stages;  // cue_stages: "face_mesh@skin: 40 points", "80 scalars"
   std::vector<std::string> notes;
+  std::string subspace, mode;  // path and "map" or "paper", of the first subspace
   std::size_t frames = 0, points = 0, output_points = 0, cues = 0, modes = 0;  // points: accelerated
-  double tolerance = 0, violation_limit = 0;                                   // of the first subspace
-  bool light = false;  // errors are numbers, and a frame's is its RMS
+  std::size_t cue_points = 0;                 // of the cues; the others are scalars
+  double bytes_per_point = 0, mean_rank = 0;  // that the reconstruction reads
+  double tolerance = 0, violation_limit = 0;  // of the first subspace
+  bool light = false;                         // errors are numbers, and a frame's is its RMS
   struct Frame {
     std::string clip;
     std::size_t number = 0;
@@ -64,11 +69,12 @@ struct BenchResult {
   std::size_t nodes_total = 0;                     // that the full evaluation computes
   std::vector<std::string> never_evaluated;        // of these, in the accelerated one
   double points_full = 0, points_accelerated = 0;  // computed a frame, over all nodes but KPSA's
+  FrameErrors frame_errors;                        // none where the subspaces keep no modes
 };
 
 // Every frame of the clips ("": the one that the flags choose), or the times of the flags. The rig is loaded
-// anew for each.
-Result<BenchResult> RunBench(const Flags& flags, const AccelerationFlags& acceleration,
-                             const std::vector<std::string>& clips, const BenchOptions& options);
+// anew for each clip and side. One result a side.
+Result<std::vector<BenchResult>> RunBench(const Flags& flags, const std::vector<AccelerationFlags>& sides,
+                                          const std::vector<std::string>& clips, const BenchOptions& options);
 
 }  // namespace kpsa

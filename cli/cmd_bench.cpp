@@ -11,7 +11,8 @@ namespace kpsa {
 namespace {
 
 struct BenchFlags : Flags {
-  AccelerationFlags acceleration;
+  AccelerationFlags acceleration;             // what all sides share
+  std::vector<std::string> kpsa, tolerances;  // of each; one tolerance is for all
   std::optional<std::string> runs;
   bool per_frame = false;
 };
@@ -36,9 +37,29 @@ Result<std::vector<std::string>> TestClips(const BenchFlags& flags, std::vector<
   return clips;
 }
 
+// One side a subspace, or one with the rig's own.
+Result<std::vector<AccelerationFlags>> SidesOf(const BenchFlags& flags) {
+  const std::size_t count = std::max<std::size_t>(1, flags.kpsa.size()), given = flags.tolerances.size();
+  if (given > 1 && given != count)
+    return Status::Usage("{} --tolerance for {} --kpsa: expected one, or one for each", given, count);
+  std::vector<AccelerationFlags> sides(count, flags.acceleration);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!flags.kpsa.empty()) sides[i].kpsa = flags.kpsa[i];
+    const std::string tolerance = given == 0 ? "own" : flags.tolerances[given == 1 ? 0 : i];
+    if (tolerance == "any") {
+      sides[i].tolerance = "1e30m";
+    } else if (tolerance != "own") {
+      sides[i].tolerance = tolerance;
+    }
+    KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(sides[i], true));
+  }
+  return sides;
+}
+
 CommandResult RunBenchCommand(const BenchFlags& flags) {
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
-  KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, true));
+  const Result<std::vector<AccelerationFlags>> sides = SidesOf(flags);
+  if (!sides.ok()) return sides.status();
   const Result<int> threads = ThreadCount(flags),
                     runs = ParseCount("--runs", flags.runs.value_or("5"), 1, 1000);
   if (!threads.ok()) return threads.status();
@@ -51,14 +72,16 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   const Result<std::vector<std::string>> clips = TestClips(flags, &notes);
   if (!clips.ok()) return clips.status();
   const InterruptScope interruptible;
-  Result<BenchResult> result = RunBench(flags, flags.acceleration, *clips, options);
-  if (!result.ok()) return result.status();
-  result->notes.insert(result->notes.begin(), notes.begin(), notes.end());
-  const BenchContext context{flags.file, flags.acceleration.kpsa, options};
-  Print(flags.json ? BenchJson(*result, context) : BenchText(*result, context));
-  if (flags.per_frame && !flags.json) Print("\n" + FramesText(*result));
-  if (!flags.quiet) {
-    for (const std::string& note : result->notes) Say("note: " + note);
+  Result<std::vector<BenchResult>> results = RunBench(flags, *sides, *clips, options);
+  if (!results.ok()) return results.status();
+  results->front().notes.insert(results->front().notes.begin(), notes.begin(), notes.end());
+  const BenchContext context{flags.file, flags.kpsa, options};
+  Print(flags.json ? BenchJson(*results, context) : BenchText(*results, context));
+  if (flags.per_frame && !flags.json) Print("\n" + FramesText(*results));
+  for (const BenchResult& result : *results) {
+    for (const std::string& note : result.notes) {
+      if (!flags.quiet) Say("note: " + note);
+    }
   }
   return 0;
 }
@@ -71,15 +94,22 @@ void AddBenchCommand(CLI::App* program, Command* chosen) {
       AddCommand(program, "bench", "Full against accelerated on the same frames: times, errors, hits",
                  "Runs the rig's test clips with its own subspaces, unless --clip and --kpsa say otherwise. "
                  "Errors are end to end:\n"
-                 "final points against the full evaluation, all frames, misses included.\n"
+                 "final points against the full evaluation, all frames, misses included. Several --kpsa take "
+                 "turns in one run.\n"
                  "Examples:\n"
                  "  kpsa bench head.yaml\n"
                  "  kpsa bench head.yaml --kpsa other.kpsa --clip face_talk --json\n"
-                 "  kpsa bench head.yaml --tolerance 0.5mm --threads 2",
+                 "  kpsa bench head.yaml --tolerance 0.5mm --threads 2\n"
+                 "  kpsa bench head.yaml --kpsa paper.kpsa --tolerance any --kpsa head.kpsa --tolerance own",
                  chosen, [flags] { return RunBenchCommand(*flags); });
   AddRigFlags(command, flags.get());
   AddTimeFlags(command, flags.get());
-  AddAccelerationFlags(command, &flags->acceleration, false);
+  AddRepeated(command, "--kpsa", "FILE.kpsa", &flags->kpsa, "with this subspace; may be given several times");
+  AddRepeated(
+      command, "--tolerance", "LENGTH", &flags->tolerances,
+      "the largest error of a point, as in 0.2mm; own: the subspace's, any: accept every frame; one, or "
+      "one for each --kpsa");
+  AddSharedAccelerationFlags(command, &flags->acceleration);
   AddOption(command, "--runs", "N", &flags->runs, "timed evaluations of every frame; 5 if not given");
   AddOption(command, "--threads", "N", &flags->threads, "threads of both sides; 1 if not given");
   AddSwitch(command, "--per-frame", &flags->per_frame, "a line a frame: hit, error, times, speedup");

@@ -199,7 +199,8 @@ CommandResult Render(const RenderFlags& flags) {
       RenderInput exact = MakeInput(rig, (*full)[f]), emitted = MakeInput(rig, (*fast)[f]);
       exact.scalar_max = emitted.scalar_max =
           view->error_scale.value_or(std::max(applied->front().tolerance, 1e-7));
-      KPSA_RETURN_IF_ERROR(add(RenderComparison(exact, emitted, camera, view->options)));
+      const RenderDots dots = KeyPoints(*applied, (*full)[f]);
+      KPSA_RETURN_IF_ERROR(add(RenderComparison(exact, emitted, camera, view->options, &dots)));
     }
     if (!flags.quiet && !chosen)
       Say(fmt::format("the frame with the largest error, at {:.4g} s: {}", (*times)[worst],
@@ -229,7 +230,7 @@ CommandResult Render(const RenderFlags& flags) {
 void AddRenderCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<RenderFlags>();
   CLI::App* command =
-      AddCommand(program, "render", "Pictures: full, or full, accelerated and error side by side",
+      AddCommand(program, "render", "Pictures: full, or full, key points, accelerated and error side by side",
                  "The middle of the clip, or with a subspace the frame with the largest error, unless "
                  "--frames or --times choose.\n"
                  "Examples:\n"

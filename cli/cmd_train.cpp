@@ -20,7 +20,7 @@ constexpr std::size_t kCheckPoses = 60, kLightCheckPoses = 4;  // light takes se
 struct TrainFlags : Flags {
   std::optional<std::string> name, samples, clips, seed, rows, modes, key_points, tolerance, violation_rate,
       calibration;
-  bool paper = false;
+  bool paper = false, keep_modes = false;
 };
 
 // All numbers of the flags, over those of the rig's entry.
@@ -43,6 +43,7 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
     return Status::Usage(
         "--key-points is for --paper; otherwise --rows says how many measurements there are");
   if (flags.paper) options->mode = EstimatorMode::kPaper;
+  options->keep_modes = flags.keep_modes;
   if (flags.tolerance.has_value()) {
     const Result<double> value = ParseTolerance(*flags.tolerance);
     if (!value.ok()) return value.status();
@@ -191,6 +192,8 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddSwitch(command, "--paper", &flags->paper,
             "the method of the paper: key points of varimax modes, least squares");
   AddOption(command, "--key-points", "N", &flags->key_points, "key points of --paper; 80 if not given");
+  AddSwitch(command, "--keep-modes", &flags->keep_modes,
+            "store the modes as well, so that bench can split the error of each frame");
   AddThreadsFlag(command, flags.get());
   AddQuietFlag(command, flags.get());
   AddJsonFlag(command, flags.get());

@@ -26,6 +26,7 @@ void AddGetCommand(CLI::App* program, Command* chosen);
 void AddRenderCommand(CLI::App* program, Command* chosen);
 void AddTrainCommand(CLI::App* program, Command* chosen);
 void AddBenchCommand(CLI::App* program, Command* chosen);
+void AddReportCommand(CLI::App* program, Command* chosen);
 void AddCompileCommand(CLI::App* program, Command* chosen);
 void AddProfileCommand(CLI::App* program, Command* chosen);
 void AddExplainCommand(CLI::App* program, Command* chosen);

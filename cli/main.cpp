@@ -94,6 +94,7 @@ int Main(int argc, char** argv) {
   AddRenderCommand(&program, &chosen);
   AddTrainCommand(&program, &chosen);
   AddBenchCommand(&program, &chosen);
+  AddReportCommand(&program, &chosen);
   AddCompileCommand(&program, &chosen);
   AddProfileCommand(&program, &chosen);
   AddExplainCommand(&program, &chosen);

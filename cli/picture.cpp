@@ -17,6 +17,7 @@ constexpr int kSkyRays = 64;           // ambient occlusion rays a point
 constexpr int kLightRays = 12;         // shadow rays a point towards the key light's disc
 constexpr double kLightRadius = 0.22;  // of the key light's disc at distance 1
 constexpr int kLargestSide = 8192;
+constexpr double kDotRadius = 0.006;  // of a dot, in diagonals of the shape
 
 Double3 Unit(Double3 v) {
   const double length = Length(v);
@@ -340,8 +341,54 @@ std::vector<float> PointDistances(std::span<const float> a, std::span<const floa
   return out;
 }
 
+RenderPart MakeDots(const RenderDots& dots, double radius) {
+  struct Balls {
+    std::vector<float> points;
+    std::vector<Index> triangles;
+  };
+  // An octahedron, every edge halved and blown up: corners 0 .. 5, then the middles of the edges
+  constexpr int kCorners[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
+  std::vector<Double3> ball;
+  for (const auto& c : kCorners)
+    ball.push_back({static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])});
+  std::vector<Index> sides;
+  const auto middle = [&](Index a, Index b) {
+    const Double3 m = Unit(ball[a] + ball[b]);
+    for (Index i = 6; i < ball.size(); ++i) {
+      if (Length(ball[i] - m) < 1e-9) return i;
+    }
+    ball.push_back(m);
+    return static_cast<Index>(ball.size() - 1);
+  };
+  for (Index x : {0u, 1u}) {
+    for (Index y : {2u, 3u}) {
+      for (Index z : {4u, 5u}) {
+        const bool outwards = (x + y + z) % 2 == 0;
+        const Index a = x, b = outwards ? y : z, c = outwards ? z : y;
+        const Index ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+        for (Index corner : {a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca}) sides.push_back(corner);
+      }
+    }
+  }
+  auto balls = std::make_shared<Balls>();
+  for (std::size_t d = 0; d + 2 < dots.points.size(); d += 3) {
+    const auto first = static_cast<Index>(balls->points.size() / 3);
+    for (const Double3& p : ball) {
+      for (int k = 0; k < 3; ++k)
+        balls->points.push_back(dots.points[d + static_cast<std::size_t>(k)] +
+                                static_cast<float>(radius * p[k]));
+    }
+    for (Index corner : sides) balls->triangles.push_back(first + corner);
+  }
+  RenderPart part;
+  part.points = balls->points, part.triangles = balls->triangles;
+  part.color = {0.85, 0.03, 0.02};
+  part.owner = balls;
+  return part;
+}
+
 Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accelerated, const Camera& camera,
-                               const RenderOptions& options) {
+                               const RenderOptions& options, const RenderDots* dots) {
   if (full.parts.size() != accelerated.parts.size()) {
     return Status::Usage("{} parts cannot be compared with {}", full.parts.size(), accelerated.parts.size());
   }
@@ -357,16 +404,23 @@ Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accel
     for (float d : distances[i]) largest = std::max(largest, d);
     heat.parts[i].scalars = distances[i];
   }
+  RenderInput dotted;
+  std::vector<std::pair<const RenderInput*, std::string>> panels = {
+      {&full, "full"}, {&accelerated, "accelerated"}, {&heat, "error " + Millimetres(largest) + " max"}};
+  if (dots != nullptr) {
+    dotted = full;
+    Double3 center;
+    dotted.parts.push_back(MakeDots(*dots, kDotRadius * Diagonal(full, &center)));
+    panels.insert(panels.begin() + 1, {&dotted, dots->title});
+  }
   std::vector<Image> images;
-  for (const RenderInput* input : {&full, &accelerated, static_cast<const RenderInput*>(&heat)}) {
+  for (const auto& [input, title] : panels) {
     Result<Image> image = RenderMesh(*input, camera, options);
     if (!image.ok()) return image.status();
     images.push_back(std::move(*image));
+    DrawTitle(images.back(), title);
   }
-  DrawTitle(images[0], "full");
-  DrawTitle(images[1], "accelerated");
-  DrawTitle(images[2], "error " + Millimetres(largest) + " max");
-  DrawLegend(images[2], full.scalar_max);
+  DrawLegend(images.back(), full.scalar_max);
   return SideBySide(images);
 }
 

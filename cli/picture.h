@@ -8,6 +8,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/status.h"
@@ -61,9 +62,18 @@ Result<std::vector<Image>> RenderTurntable(const RenderInput& input, int count, 
 // distances[i] = |a_i - b_i| of two sets of points (3 floats each): the scalars of a heat map.
 std::vector<float> PointDistances(std::span<const float> a, std::span<const float> b);
 
+// Small balls at points of the shape: where something is measured.
+struct RenderDots {
+  std::string title;
+  std::vector<float> points;  // 3 each, metres, world space
+};
+// Their surface. `radius` in metres.
+RenderPart MakeDots(const RenderDots& dots, double radius);
+
 // Three pictures side by side from one camera: "full", "accelerated" and the heat map of their distance,
-// titled with its maximum. `full` and `accelerated` hold the same parts with different points.
+// titled with its maximum; with dots a fourth, of the full shape with them, after the first. `full` and
+// `accelerated` hold the same parts with different points.
 Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accelerated, const Camera& camera,
-                               const RenderOptions& options = {});
+                               const RenderOptions& options = {}, const RenderDots* dots = nullptr);
 
 }  // namespace kpsa

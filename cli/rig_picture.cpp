@@ -4,6 +4,8 @@
 #include <array>
 #include <memory>
 
+#include "kpsa/subspace.h"
+
 namespace kpsa {
 namespace {
 
@@ -91,6 +93,26 @@ Camera FramePoses(const Rig& rig, const std::vector<Pose>& poses, const RenderOp
     all.parts.insert(all.parts.end(), one.parts.begin(), one.parts.end());
   }
   return FrameCamera(all, options, azimuth, elevation);
+}
+
+RenderDots KeyPoints(const std::vector<AppliedSubspace>& applied, const Pose& pose) {
+  RenderDots dots;
+  std::size_t scalars = 0;
+  bool paper = true;
+  for (const AppliedSubspace& one : applied) {
+    paper = paper && one.subspace->mode == EstimatorMode::kPaper;
+    for (const CueDescription& cue : one.subspace->cues) {
+      if (cue.kind == CueDescription::Kind::kScalar || one.entry.points[cue.mesh].colors) {
+        ++scalars;
+        continue;
+      }
+      const std::vector<float>& points = pose[one.entry.points[cue.mesh].mesh];
+      for (std::size_t k = 0; k < 3; ++k) dots.points.push_back(points[3 * std::size_t{cue.point} + k]);
+    }
+  }
+  dots.title = Plural(dots.points.size() / 3, paper ? "key point" : "point");
+  if (scalars > 0) dots.title += ", " + Plural(scalars, "scalar");
+  return dots;
 }
 
 double WorstDistance(const Pose& a, const Pose& b) {

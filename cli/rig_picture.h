@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "cli/acceleration.h"
 #include "cli/picture.h"
 #include "cli/rig_frames.h"
 
@@ -20,6 +21,8 @@ RenderInput MakeInput(const Rig& rig, const Pose& pose);
 // A camera that sees all of the poses.
 Camera FramePoses(const Rig& rig, const std::vector<Pose>& poses, const RenderOptions& options,
                   double azimuth, double elevation);
+// The points that the subspaces measure, on the pose.
+RenderDots KeyPoints(const std::vector<AppliedSubspace>& applied, const Pose& pose);
 double WorstDistance(const Pose& a, const Pose& b);  // metres
 // Pictures below each other.
 Image StackRows(const std::vector<Image>& rows);

@@ -82,9 +82,10 @@ float Rows(const float* HWY_RESTRICT rows, std::size_t fours, std::size_t groups
   return squared;
 }
 
-// g = F^T F y; returns |F y|^2.
-double Project(const float* factor, std::size_t rows, bool lower, const float* y, float* g) {
-  const std::size_t all = (rows + 15) / 16;
+// g = F^T F y; returns |F y|^2. F [rows x columns].
+double Project(const float* factor, std::size_t rows, std::size_t columns, bool lower, const float* y,
+               float* g) {
+  const std::size_t all = (columns + 15) / 16;
   for (std::size_t j = 0; j < 16 * all; ++j) g[j] = 0;
   double sum = 0;
   for (std::size_t row = 0; row < rows; row += 16) {
@@ -102,6 +103,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -143,17 +145,25 @@ Index FirstNotFinite(const SoftCacheModel& model, std::span<const float> y) {
   return kNoIndex;
 }
 
+// Rows that span those of p = (coordinates) y, M <= r.
+Eigen::MatrixXd OrthonormalRows(const Eigen::MatrixXd& coordinates) {
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(coordinates.transpose());
+  const Eigen::MatrixXd q =
+      qr.householderQ() * Eigen::MatrixXd::Identity(coordinates.cols(), coordinates.rows());
+  return q.transpose();
+}
+
 // F in the layout of SoftCacheModel::factor.
 AlignedArray<float> PackFactor(const Eigen::MatrixXd& matrix, bool lower, std::size_t size) {
   AlignedArray<float> factor(size);
-  const Eigen::Index n = matrix.rows(), all = (n + 15) / 16;
+  const Eigen::Index n = matrix.rows(), columns = matrix.cols(), all = (columns + 15) / 16;
   float* to = factor.data();
   for (Eigen::Index row = 0; row < n; row += 4) {
     const Eigen::Index groups = lower ? row / 16 + 1 : all;
     for (Eigen::Index group = 0; group < groups; ++group) {
       for (Eigen::Index i = row; i < row + 4; ++i) {
         for (Eigen::Index j = 16 * group; j < 16 * group + 16; ++j)
-          *to++ = i < n && j < n ? static_cast<float>(matrix(i, j)) : 0.0f;
+          *to++ = i < n && j < columns ? static_cast<float>(matrix(i, j)) : 0.0f;
       }
     }
   }
@@ -165,7 +175,8 @@ AlignedArray<float> PackFactor(const Eigen::MatrixXd& matrix, bool lower, std::s
 std::size_t SoftCacheModel::factor_size() const {
   const std::size_t all = padded_rows() / 16;
   std::size_t size = 0;
-  for (std::size_t row = 0; row < rows(); row += 4)
+  const std::size_t height = mode == EstimatorMode::kMap ? rows() : modes;
+  for (std::size_t row = 0; row < height; row += 4)
     size += 64 * (mode == EstimatorMode::kMap ? row / 16 + 1 : all);
   return size;
 }
@@ -186,7 +197,9 @@ SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues
   model.mode = estimator.mode;
   model.offsets = cues.offsets;
   const bool map = model.mode == EstimatorMode::kMap;
-  model.factor = PackFactor(map ? estimator.whitening : estimator.judge, map, model.factor_size());
+  model.modes = static_cast<std::size_t>(estimator.coordinates.rows());
+  model.factor = PackFactor(map ? estimator.whitening : OrthonormalRows(estimator.coordinates), map,
+                            model.factor_size());
   for (std::size_t k = 0; k < cues.cues.size() && model.mode == EstimatorMode::kMap; ++k) {
     const auto begin = static_cast<Eigen::Index>(cues.offsets[k]);
     const Eigen::Index height = static_cast<Eigen::Index>(cues.offsets[k + 1]) - begin;
@@ -221,8 +234,15 @@ SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues
 RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g) {
   KPSA_DCHECK(y.size() >= model.padded_rows() && g.size() >= model.padded_rows());
   const bool map = model.mode == EstimatorMode::kMap;
-  const double squared =
-      HWY_DYNAMIC_DISPATCH(Project)(model.factor.data(), model.rows(), map, y.data(), g.data());
+  double squared = HWY_DYNAMIC_DISPATCH(Project)(model.factor.data(), map ? model.rows() : model.modes,
+                                                 model.rows(), map, y.data(), g.data());
+  if (!map) {
+    squared = 0;
+    for (std::size_t j = 0; j < model.rows(); ++j) {
+      g[j] = y[j] - g[j];
+      squared += static_cast<double>(g[j]) * g[j];
+    }
+  }
   RawScores raw;
   float largest = -1;
   const float* block = model.leave_one_out.data();

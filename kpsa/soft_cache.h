@@ -1,12 +1,13 @@
 // SoftCache: how far a measurement is from what the subspace was trained on, and what to do about it.
 // Glossary: y the r normalised measurements, G their covariance, F the factor: W with W^T W = G^-1, lower
-// triangular (map), or the projector on the residual I - C C^+ (paper); g = F^T F y.
+// triangular (map), or Q^T, the M orthonormal rows that span what the modes do to the cues (paper: far fewer
+// numbers than the projector I - Q Q^T); g = F^T F y (map), or the residual y - F^T F y = y - C p (paper).
 //
 // map:   score 1 = |F y|^2 (residual and Mahalanobis distance in one); score 2 = the largest leave-one-out
 // error of a
 //        cue, |([G^-1]_ii)^-1 g_i| with the block of the cue; each over its 99 % training quantile; the
 //        larger counts.
-// paper: |F y| = |y - C p| over its 99 % training quantile.
+// paper: |y - C p| over its 99 % training quantile.
 // F is read once, four rows at a time: w = F y gives the four values that the same rows then add to g.
 //
 // Below tau_lo = c tau: a hit. Between tau_lo and tau: a stateless smoothstep blends the full evaluation in.
@@ -55,6 +56,7 @@ double FullWeight(double score, const SoftCacheThreshold& threshold);
 // The immutable data. Plain arrays: it is stored in the subspace file.
 struct SoftCacheModel {
   EstimatorMode mode = EstimatorMode::kMap;
+  std::size_t modes = 0;       // M; paper mode: rows of F
   std::vector<Index> offsets;  // [K + 1] rows of each cue
   AlignedArray<float>
       factor;  // F: for every 4 rows their groups of 16 columns (map: up to the diagonal), 4 x 16 each

@@ -41,10 +41,13 @@ Status ValidateSubspace(const Subspace& s) {
     return Status::Invalid("the {} cues have {} rows, but {} means and {} scales", s.cues.size(), counted,
                            rows, s.cue_scale.size());
   }
-  if (s.soft_cache.mode != s.mode || s.soft_cache.factor.size() != s.soft_cache.factor_size()) {
+  if (s.soft_cache.mode != s.mode || s.soft_cache.modes != s.modes ||
+      s.soft_cache.factor.size() != s.soft_cache.factor_size()) {
     return Status::Invalid("the factor of the cues has {} entries, expected {}", s.soft_cache.factor.size(),
                            s.soft_cache.factor_size());
   }
+  if (s.mode == EstimatorMode::kPaper && s.modes > rows)
+    return Status::Invalid("{} measured values cannot determine {} modes", rows, s.modes);
   std::size_t blocks = 0;
   for (std::size_t k = 0; k < s.cues.size() && s.mode == EstimatorMode::kMap; ++k) {
     const std::size_t height = s.soft_cache.offsets[k + 1] - s.soft_cache.offsets[k];
@@ -73,6 +76,16 @@ Status ValidateSubspace(const Subspace& s) {
       return Status::Invalid("output \"{}\" has {} points of {} components, its tiles {} of {}",
                              s.outputs[i].name, s.outputs[i].points, s.components, s.tiles[i].points(),
                              s.tiles[i].data().components);
+    }
+  }
+  if (s.kept_modes.size() > 0) {
+    std::size_t points = 0;
+    for (const SubspaceOutput& output : s.outputs) points += output.points;
+    if (static_cast<std::size_t>(s.kept_modes.rows()) != points * static_cast<std::size_t>(s.components) ||
+        static_cast<std::size_t>(s.kept_modes.cols()) != s.modes || !s.kept_modes.allFinite()) {
+      return Status::Invalid("the kept modes are {} x {}, or not finite; expected {} x {}",
+                             s.kept_modes.rows(), s.kept_modes.cols(),
+                             points * static_cast<std::size_t>(s.components), s.modes);
     }
   }
   for (const TrainedRange& range : s.ranges) {
@@ -120,11 +133,11 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   }
   Eigen::Index first = 0;
   for (const SubspaceOutput& output : s.outputs) {
-    const auto rows = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
-    KPSA_CHECK_LE(first + rows, maps.rows());
-    s.tiles.push_back(BuildTiles(maps.middleRows(first, rows), pca.mean.segment(first, rows), s.components,
-                                 inputs, options));
-    first += rows;
+    const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
+    KPSA_CHECK_LE(first + height, maps.rows());
+    s.tiles.push_back(BuildTiles(maps.middleRows(first, height), pca.mean.segment(first, height),
+                                 s.components, inputs, options));
+    first += height;
   }
   KPSA_CHECK_EQ(first, maps.rows());
   return s;

@@ -51,6 +51,9 @@ struct Subspace {
       calibration;  // held-out poses; the threshold follows from a tolerance (Calibrate)
   double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
   std::vector<TileMap> tiles;                                       // [outputs]
+  // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
+  // split errors with it (kpsa/error_split.h); no frame needs it.
+  Eigen::MatrixXf kept_modes;
   // Empty, and tiles read y; or, where all points depend on all cues (light), Q [M x r], column by column,
   // and tiles read z = Q y.
   std::vector<float> latent;

@@ -15,6 +15,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kKind[] = "kpsa-subspace";
+constexpr char kModes[] = "modes";
 constexpr std::size_t kMaxCues = 1u << 16, kMaxOutputs = 1u << 12;
 constexpr std::uint64_t kMaxPoints = 1u << 28;
 
@@ -125,6 +126,10 @@ std::map<std::string, std::string> Header(const Subspace& s) {
           {"training", s.training}};
 }
 
+std::span<const float> KeptModes(const Subspace& s) {
+  return {s.kept_modes.data(), static_cast<std::size_t>(s.kept_modes.size())};
+}
+
 // Of all that the file says: a damaged one is refused, as numbers that are only a little wrong would not be
 // seen.
 std::string ContentDigest(const Subspace& s) {
@@ -153,6 +158,7 @@ std::string ContentDigest(const Subspace& s) {
     hasher.Add(std::span<const std::uint8_t>(data.u.span()));
     hasher.Add(std::span<const float>(data.mean.span()));
   }
+  if (s.kept_modes.size() > 0) hasher.Add(KeptModes(s));
   return hasher.Finish().ToHex();
 }
 
@@ -171,7 +177,7 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
     return Status::Invalid("{}: the mode is \"{}\", expected map or paper", file.name(), mode);
   s->mode = s->soft_cache.mode = mode == "paper" ? EstimatorMode::kPaper : EstimatorMode::kMap;
   s->components = static_cast<int>(reader.Count("components", 3));
-  s->modes = reader.Count("modes", 1u << 20);
+  s->modes = s->soft_cache.modes = reader.Count("modes", 1u << 20);
   s->soft_cache.quantile1 = reader.Number("quantile1");
   s->soft_cache.quantile2 = reader.Number("quantile2");
   s->tolerance = reader.Number("tolerance");
@@ -237,6 +243,18 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
   return {};
 }
 
+// Column by column: a row of the tensor is a mode.
+Status ReadModes(const SafetensorsFile& file, Subspace* s) {
+  std::uint64_t rows = 0;
+  for (const SubspaceOutput& output : s->outputs)
+    rows += output.points * static_cast<std::uint64_t>(s->components);
+  const Result<std::vector<float>> values = file.Values<float>(kModes, {s->modes, rows});
+  if (!values.ok()) return values.status();
+  s->kept_modes = Eigen::Map<const Eigen::MatrixXf>(values->data(), static_cast<Eigen::Index>(rows),
+                                                    static_cast<Eigen::Index>(s->modes));
+  return {};
+}
+
 }  // namespace
 
 Status WriteSubspace(const Subspace& s, const std::string& path) {
@@ -266,6 +284,12 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     Add<std::uint16_t>(&writer, prefix + "v", data.v.span(), true);
     Add<std::uint8_t>(&writer, prefix + "u", data.u.span());
     Add<float>(&writer, prefix + "mean", data.mean.span());
+  }
+  if (s.kept_modes.size() > 0) {
+    writer.Add<float>(
+        kModes,
+        {static_cast<std::uint64_t>(s.kept_modes.cols()), static_cast<std::uint64_t>(s.kept_modes.rows())},
+        KeptModes(s));
   }
   return writer.Write(path);
 }
@@ -314,6 +338,7 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   for (std::size_t i = 0; i + 1 < calibration->size(); i += 2)
     s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
+  if (file.tensors().contains(kModes)) KPSA_RETURN_IF_ERROR(ReadModes(file, &s));
   if (Status status = ValidateSubspace(s); !status.ok())
     return Status::Invalid("{}: {}", path, status.ToString());
   const Result<std::string> digest = file.Metadata("digest");

@@ -358,6 +358,7 @@ class Trainer {
     Subspace subspace =
         MakeSubspace(pca_, cues_, estimator, training, std::move(outputs),
                      TileOptions{kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance});
+    if (options_.keep_modes) subspace.kept_modes = pca_.output_modes().cast<float>();
     subspace.mode = estimator.mode;
     subspace.ranges = ranges_;
     subspace.space = rig_.target.space_name;

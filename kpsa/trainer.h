@@ -29,6 +29,7 @@ struct TrainOptions {
   std::size_t calibration_poses = 0;  // 0: four times as many as the violation rate wants, 400 to 1,000
   std::uint64_t seed = 1;
   double tolerance = 1e-4, violation_rate = 0.01;  // metres, or light; share of frames
+  bool keep_modes = false;                         // in the subspace, for reports (Subspace::kept_modes)
   double range_margin = 0.1;                       // of the trained extent
   std::size_t max_candidates = 4000;               // points that may become cues, spread over the meshes
   std::function<bool(const char* what, double share)> progress;  // false cancels; may be null

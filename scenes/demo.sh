@@ -13,4 +13,4 @@ printf '\n== full against accelerated, on a clip that it was not trained on\n'
 build/kpsa bench scenes/face/face.yaml --kpsa out/face.kpsa
 printf '\n== drawing\n'
 build/kpsa render scenes/face/face.yaml --clip talk --kpsa out/face.kpsa -o out/face.png --force
-printf '\nout/face.png shows the face fully evaluated, accelerated, and the error between the two.\n'
+printf '\nout/face.png shows the face fully evaluated, what is measured of it, accelerated, and the error between the two.\n'

@@ -128,6 +128,14 @@ TEST(Arguments, UsageMistakes) {
       {{"train", kHello, "--key-points", "20", "-o", "x.kpsa"}, 2, "--paper"},
       {{"bench", kHello, "--kpsa", "none.kpsa"}, 3, "kpsa train"},
       {{"bench", kHello, "--runs", "0"}, 2, "--runs"},
+      {{"bench", kHello, "--tolerance", "1mm", "--tolerance", "2mm"}, 2, "one for each"},
+      {{"bench", kHello, "--tolerance", "some"}, 2, "--tolerance"},
+      {{"report"}, 2, "BENCH.json"},
+      {{"report", "none.json"}, 3, "none.json"},
+      {{"report", "head.json"}, 3, "kpsa bench --json"},
+      {{"report", "head.json", "--plot", "a.png"}, 2, ".svg"},
+      {{"report", "head.json", "head.json", "--plot", "a.svg"}, 2, "one bench"},
+      {{"report", "head.json", "--reference", "1x", "--reference", "2x"}, 2, "--reference"},
       {{"render", kHello}, 2, ".png"},
       {{"render", kHello, "-o", "a.png", "--size", "1000000x1"}, 2, "--size"},
       {{"render", kHello, "-o", "a.png", "--size", "big"}, 2, "WIDTHxHEIGHT"},
@@ -181,8 +189,8 @@ TEST(Arguments, HelpAndFirstMinutes) {
     EXPECT_NE(bare.out.find(word), std::string::npos);
   const ProcessResult help = RunKpsa({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  for (const char* name : {"init", "validate", "inspect", "eval", "get", "render", "train", "bench",
-                           "compile", "profile", "explain", "compare", "graph", "nodes", "weights"}) {
+  for (const char* name : {"init", "validate", "inspect", "eval", "get", "render", "train", "bench", "report",
+                           "compile", "profile", "explain", "compare", "graph", "nodes", "weights", "fmt"}) {
     EXPECT_NE(help.out.find(std::string("  ") + name), std::string::npos) << name;
     const ProcessResult one = RunKpsa({name, "--help"});
     EXPECT_EQ(one.exit_code, 0) << name;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "kpsa/eigen_solvers.h"
+#include "kpsa/error_split.h"
 #include "kpsa/varimax.h"
 #include "tests/kpsa/synthetic.h"
 
@@ -48,6 +49,42 @@ struct Fixture {
   PoseMatrix training, test;
   Pca pca;
 };
+
+// The split of errors that bench reports, from points alone.
+TEST(ErrorSplit, IsThatOfTheEstimatorWhereTheMapIsDense) {
+  const Fixture s(200, 20, 150, {.max_modes = 30});
+  const CueSet cues = MakeCueSet(s.pca, s.Optimal(8), s.sheet.diagonal());
+  const Estimator estimator = MapEstimator(s.pca, cues);
+  const std::vector<PoseErrors> expected = EstimateErrors(s.pca, cues, estimator, s.test);
+  const auto frames = static_cast<Eigen::Index>(s.test.poses()), rows = s.pca.output_modes().rows();
+  Eigen::MatrixXd poses(rows, frames), estimates(rows, frames);
+  for (Eigen::Index t = 0; t < frames; ++t) {
+    const std::span<const float> row = s.test.row(static_cast<std::size_t>(t));
+    poses.col(t) = Eigen::Map<const Eigen::VectorXf>(row.data(), rows).cast<double>();
+    estimates.col(t) = estimator.gain * MeasuredCues(s.pca.layout, cues, row);
+  }
+  const std::vector<SplitError> split = SplitErrors(s.pca.output_modes(), poses, estimates);
+  for (std::size_t t = 0; t < split.size(); ++t) {
+    EXPECT_NEAR(split[t].projection, expected[t].projection, 1e-10);
+    EXPECT_NEAR(split[t].cueing, expected[t].cue, 1e-10);
+    EXPECT_NEAR(split[t].total, expected[t].total, 1e-10);
+    EXPECT_LT(split[t].storage, 1e-12);
+    EXPECT_GT(split[t].cueing, 1e-6);
+    EXPECT_NEAR(std::hypot(split[t].projection, split[t].cueing), split[t].total, 1e-9 * split[t].total);
+  }
+  // An estimate that leaves the subspace: the rest of the pose can make up for it, or add to it
+  const Eigen::VectorXd off =
+      poses.col(0) - s.pca.output_modes() * (s.pca.output_modes().transpose() * poses.col(0));
+  for (double sign : {-1.0, 1.0}) {
+    const Eigen::MatrixXd outside = estimates + sign * 0.01 * off * Eigen::RowVectorXd::Ones(frames);
+    const SplitError e = SplitErrors(s.pca.output_modes(), poses, outside)[0];
+    EXPECT_NEAR(e.storage, 0.01 * e.projection, 1e-12);
+    EXPECT_NEAR(e.cueing, expected[0].cue, 1e-10);
+    EXPECT_NEAR(e.total * e.total,
+                e.cueing * e.cueing + (e.projection - sign * e.storage) * (e.projection - sign * e.storage),
+                1e-15);
+  }
+}
 
 TEST(Estimator, TotalErrorIsProjectionAndCueErrorByPythagoras) {
   const Fixture s(200, 20, 150, {.max_modes = 30});

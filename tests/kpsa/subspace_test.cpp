@@ -178,6 +178,27 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   EXPECT_EQ(bytes(path_), first);
 }
 
+TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
+  subspace_.kept_modes = pca_.output_modes().cast<float>();
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
+  const Result<Subspace> read = ReadSubspace(path_);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->kept_modes, subspace_.kept_modes);
+  // What differs from what was written is refused
+  std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  const std::string wanted(reinterpret_cast<const char*>(subspace_.kept_modes.data() + 40), 32);
+  const std::size_t at = bytes.find(wanted);
+  ASSERT_NE(at, std::string::npos);
+  bytes[at] = static_cast<char>(bytes[at] ^ 1);
+  file.seekp(0);
+  file << bytes;
+  file.close();
+  EXPECT_NE(ReadSubspace(path_).status().ToString().find("damaged"), std::string::npos);
+  subspace_.kept_modes.conservativeResize(Eigen::NoChange, 6);
+  EXPECT_NE(WriteSubspace(subspace_, path_).ToString().find("kept modes"), std::string::npos);
+}
+
 TEST_P(SubspaceTest, EveryTargetGivesTheSameFrames) {
   std::vector<float> first;
   double score = 0;

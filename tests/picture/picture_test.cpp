@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 
 #include "base/parallel.h"
 #include "scenes/glb_writer.h"
@@ -157,6 +159,57 @@ TEST(Picture, AComparisonShowsThreePicturesAndTheLargestError) {
             static_cast<std::ptrdiff_t>(distances.size()) - 1);
   accelerated.parts[0].points = std::span(moved).first(moved.size() - 3);
   EXPECT_FALSE(RenderComparison(full, accelerated, {}, options).ok());
+}
+
+TEST(Picture, AComparisonShowsKeyPointsOnRequest) {
+  const Mesh square = Square();
+  RenderInput full;
+  full.parts = {square.Part()};
+  Camera camera;
+  camera.eye = {0, 0, 10};
+  camera.field_of_view = 2 * std::atan(2.0 / 10);
+  const RenderOptions options = Plain(120, 120);
+  RenderDots dots{"2 key points",
+                  {0.5f, 0.5f, 0, -0.5f, -0.5f, -0.5f}};  // the second one is behind the square
+  const auto image = RenderComparison(full, full, camera, options, &dots);
+  ASSERT_TRUE(image.ok());
+  ASSERT_EQ(image->width, 4 * 120 + 3 * 4);
+  const auto reds = [&](int left) {
+    int count = 0;
+    double x = 0, y = 0;
+    for (int row = 20; row < 120; ++row) {
+      for (int column = left; column < left + 120; ++column) {
+        const Rgb c = image->At(column, row);
+        if (c[0] < 100 || c[0] < 2 * c[1]) continue;
+        ++count, x += column - left, y += row;
+      }
+    }
+    return std::array<double, 3>{static_cast<double>(count), x / std::max(1, count), y / std::max(1, count)};
+  };
+  EXPECT_EQ(reds(0)[0], 0);
+  EXPECT_EQ(reds(2 * 124)[0], 0);
+  const std::array<double, 3> seen = reds(124);
+  EXPECT_GT(seen[0], 1);
+  EXPECT_LT(seen[0], 30);
+  EXPECT_NEAR(seen[1], 75, 2);
+  EXPECT_NEAR(seen[2], 45, 2);
+  // Every ball is closed: its edges go both ways once
+  const RenderPart balls = MakeDots(dots, 0.1);
+  std::map<std::pair<Index, Index>, int> edges;
+  for (std::size_t t = 0; t < balls.triangles.size(); t += 3) {
+    for (std::size_t k = 0; k < 3; ++k) ++edges[{balls.triangles[t + k], balls.triangles[t + (k + 1) % 3]}];
+  }
+  for (const auto& [edge, count] : edges) {
+    EXPECT_EQ(count, 1);
+    EXPECT_EQ(edges.count({edge.second, edge.first}), 1u);
+  }
+  for (std::size_t i = 0; i < balls.points.size(); i += 3) {
+    const std::size_t d = i < balls.points.size() / 2 ? 0 : 3;
+    const double x = double{balls.points[i]} - dots.points[d],
+                 y = double{balls.points[i + 1]} - dots.points[d + 1],
+                 z = double{balls.points[i + 2]} - dots.points[d + 2];
+    EXPECT_NEAR(std::sqrt(x * x + y * y + z * z), 0.1, 1e-6);
+  }
 }
 
 TEST(Picture, ATurntableStartsInFrontAndTurns) {

@@ -1,0 +1,32 @@
+// Errors of an accelerated rig frame by frame, split as the paper does (kpsa/error_split.h).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/acceleration.h"
+
+namespace kpsa {
+
+// RMS over the accelerated points, in metres and in the space of the subspace. One entry a frame; all empty
+// where a subspace was trained without --keep-modes.
+struct FrameErrors {
+  std::vector<double> times;                               // seconds
+  std::vector<double> projection, cueing, storage, total;  // every frame reconstructed
+  std::vector<double> soft_cache;                          // of what is emitted: 0 at a full miss
+  std::vector<char> hit;
+  bool empty() const { return times.empty(); }
+  void Append(const FrameErrors& later);
+};
+
+// What SoftCache decided: for each frame the share of the full evaluation in the points of each subspace.
+using FullWeights = std::vector<std::vector<double>>;
+
+// That share, from the KPSA node's score.
+double EmittedFullWeight(const AppliedSubspace& applied, double score);
+
+// Evaluates the times once more, on a rig loaded anew, every frame reconstructed.
+Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acceleration,
+                                const std::vector<double>& times, const FullWeights& weights);
+
+}  // namespace kpsa

@@ -1,0 +1,106 @@
+// The table of results: what bench, report and scenes/results.sh make of several subspaces of one rig.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "cli/line_plot.h"
+#include "tests/cli/process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace kpsa {
+namespace {
+
+using Json = nlohmann::json;
+
+std::size_t Count(const std::string& text, const std::string& what) {
+  std::size_t count = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
+  return count;
+}
+
+TEST(LinePlot, StepsAreRoundAndFew) {
+  EXPECT_DOUBLE_EQ(RoundStep(1, 5), 0.2);
+  EXPECT_DOUBLE_EQ(RoundStep(0.0301, 6), 0.01);
+  EXPECT_DOUBLE_EQ(RoundStep(240, 6), 50);
+  for (double top = 1e-4; top < 1e4; top *= 1.37) {
+    const double step = RoundStep(top, 6);
+    EXPECT_LE(top / step, 6 * (1 + 1e-9)) << top;
+    EXPECT_GT(top / step, 6 / 2.6) << top;
+  }
+}
+
+TEST(LinePlot, LinesBreakWhereThereIsNoNumber) {
+  LinePlot plot{"a < b", "frame", "error", {{"one", "#112233", {0, 1, NAN, 2, 4}}}, "misses", {2}};
+  const std::string svg = PlotsAsSvg({plot}, 2);
+  EXPECT_EQ(Count(svg, "<polyline"), 2u);
+  EXPECT_EQ(Count(svg, "a &lt; b"), 1u);
+  EXPECT_EQ(Count(svg, ">misses<"), 1u);
+  EXPECT_EQ(Count(svg, ">4<"), 2u);  // the last frame and the top of the error
+  EXPECT_EQ(svg, PlotsAsSvg({plot}, 2));
+  EXPECT_NE(PlotsAsSvg({plot, plot, plot}, 2).find("height=\"500\""), std::string::npos);
+  plot.lines[0].y = {std::numeric_limits<double>::infinity(), 0};  // nothing to scale by
+  EXPECT_EQ(Count(PlotsAsSvg({plot}, 1), "nan") + Count(PlotsAsSvg({plot}, 1), "inf"), 0u);
+}
+
+// scenes/results.sh with the smallest rig in the place of the characters.
+TEST(Results, TheScriptWritesTheTablesAndPictures) {
+  const TemporaryFolder folder;
+  const ProcessResult run =
+      RunShell("sh '" KPSA_SOURCE_DIR "/scenes/results.sh' --try '" KPSA_PROGRAM "' '" + folder.path() + "'",
+               300, folder.path());
+  ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
+  const std::string text = TemporaryFolder::Read(folder / "results.md");
+  for (const char* words : {"10 key points", "paper mode, all frames accepted", "| default |", "| 1x |"})
+    EXPECT_NE(text.find(words), std::string::npos) << words << "\n" << text;
+  // Every picture is there
+  std::size_t pictures = 0;
+  for (std::size_t at = text.find("](results/"); at != std::string::npos;
+       at = text.find("](results/", at + 1)) {
+    const std::string name = text.substr(at + 2, text.find(')', at) - at - 2);
+    EXPECT_GT(TemporaryFolder::Read(folder / name).size(), 1000u) << name;
+    ++pictures;
+  }
+  EXPECT_EQ(pictures, 3u);
+  // Four plots: paper mode once, as both its sides have the same subspace, and the default
+  EXPECT_EQ(Count(TemporaryFolder::Read(folder / "results/hello.svg"), "KPSA</text>"), 2u);
+
+  const Json bench = Json::parse(TemporaryFolder::Read(folder / "out/hello.json"));
+  ASSERT_EQ(bench["beside"].size(), 2u);
+  const Json &accepted = bench, &cached = bench["beside"][0], &ours = bench["beside"][1];
+  EXPECT_EQ(accepted["mode"], "paper");
+  EXPECT_EQ(ours["mode"], "map");
+  EXPECT_EQ(accepted["cue_points"], 10);
+  EXPECT_EQ(accepted["modes"], 5);
+  EXPECT_EQ(accepted["hit_rate"], 1.0);
+  EXPECT_LT(ours["error"]["rms"], accepted["error"]["rms"]);
+  EXPECT_EQ(accepted["full"], cached["full"]) << "one full side for all";
+  EXPECT_GT(ours["storage"]["bytes_per_point"], 0);
+  for (const Json* side : {&accepted, &cached, &ours}) {
+    const Json& e = (*side)["frame_errors"];
+    const std::size_t frames = (*side)["frames"];
+    ASSERT_EQ(e["total"].size(), frames);
+    double sum = 0;
+    for (std::size_t f = 0; f < frames; ++f) {
+      const double projection = e["projection"][f], cueing = e["cueing"][f], storage = e["storage"][f],
+                   total = e["total"][f], emitted = e["soft_cache"][f];
+      // The map is stored in tiles: Pythagoras holds up to what these add (kpsa/error_split.h)
+      EXPECT_NEAR(total * total, projection * projection + cueing * cueing,
+                  2 * projection * storage + storage * storage + 1e-6 * total * total);
+      if (e["hit"][f].get<bool>()) {
+        EXPECT_EQ(emitted, total);
+      } else {
+        EXPECT_LT(emitted, total);
+      }
+      sum += emitted * emitted;
+    }
+    // The whole rig is accelerated: this is the error of the final points
+    EXPECT_NEAR(std::sqrt(sum / static_cast<double>(frames)), (*side)["error"]["rms"].get<double>(),
+                1e-3 * (*side)["error"]["rms"].get<double>() + 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace kpsa
