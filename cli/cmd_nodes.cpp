@@ -6,6 +6,7 @@
 
 #include "cli/command.h"
 #include "cli/common.h"
+#include "cli/node_pictures.h"
 #include "cli/options.h"
 #include "cli/rig_schema.h"
 #include "cli/table.h"
@@ -16,6 +17,7 @@ namespace {
 
 struct NodesFlags : Flags {
   std::optional<std::string> type;
+  std::optional<std::string> pictures;
   bool markdown = false, schema = false;
 };
 
@@ -71,6 +73,10 @@ Table Attributes(const NodeDef& def) {
   return table;
 }
 
+std::string PictureLink(const std::string& type) {
+  return HasNodePicture(type) ? fmt::format("![{}: before and after](nodes/{}.png)\n\n", type, type) : "";
+}
+
 nlohmann::ordered_json Json(const NodeDef& def) {
   nlohmann::ordered_json attributes = nlohmann::ordered_json::array();
   for (const AttributeDef& a : def.attributes) {
@@ -99,8 +105,12 @@ CommandResult Nodes(const NodesFlags& flags) {
   AddAllNodes(registry);
   PluginLoader plugins(&registry);
   KPSA_RETURN_IF_ERROR(LoadPlugins(flags, &plugins));
-  if (flags.markdown + flags.schema + flags.json > 1)
-    return Status::Usage("expected one of --markdown, --schema and --json");
+  if (flags.markdown + flags.schema + flags.json + flags.pictures.has_value() > 1)
+    return Status::Usage("expected one of --markdown, --pictures, --schema and --json");
+  if (flags.pictures.has_value()) {
+    KPSA_RETURN_IF_ERROR(WriteNodePictures(registry, *flags.pictures, flags.force));
+    return 0;
+  }
   if (flags.schema) {
     if (flags.type.has_value())
       return Status::Usage("--schema is of all node types, expected no TYPE, found \"{}\"", *flags.type);
@@ -131,7 +141,8 @@ CommandResult Nodes(const NodesFlags& flags) {
     for (const auto& [category, members] : by_category) {
       Print("\n## " + category + "\n");
       for (const NodeDef* def : members)
-        Print(fmt::format("\n### {}\n\n{}\n\n{}", def->name, def->doc, Attributes(*def).Markdown()));
+        Print(fmt::format("\n### {}\n\n{}\n\n{}{}", def->name, def->doc, PictureLink(def->name),
+                          Attributes(*def).Markdown()));
     }
     return 0;
   }
@@ -161,6 +172,9 @@ void AddNodesCommand(CLI::App* program, Command* chosen) {
                                  chosen, [flags] { return Nodes(*flags); });
   AddOption(command, "TYPE", "", &flags->type, "one node type, with its attributes");
   AddSwitch(command, "--markdown", &flags->markdown, "print the whole reference as Markdown");
+  AddOption(command, "--pictures", "FOLDER", &flags->pictures,
+            "write a picture of what each deformer does, FOLDER/TYPE.png");
+  AddSwitch(command, "--force", &flags->force, "replace existing pictures");
   AddSwitch(command, "--schema", &flags->schema, "print a JSON Schema of rig files, for editors");
   AddPluginFlag(command, flags.get());
   AddJsonFlag(command, flags.get());

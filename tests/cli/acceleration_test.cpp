@@ -8,6 +8,7 @@
 
 #include "cli/rig_training.h"
 #include "graph/evaluator.h"
+#include "io/graph_editor.h"
 #include "nodes/standard_nodes.h"
 #include "tests/cli/rig_run.h"
 
@@ -140,6 +141,57 @@ TEST_F(TrainedRig, ToleranceInfiniteNeverRunsTheMush) {
   EXPECT_EQ(Computes(fast, "mush"), 0u);
   EXPECT_GT(Computes(full, "mush"), 0u);
   EXPECT_LT(worst, 0.01 * moved);
+}
+
+// A pin downstream asks the node for the corners of its triangle, and the node reconstructs just these.
+TEST_F(TrainedRig, PinsRideOnTheAcceleratedPoints) {
+  Rig full_rig = Load(), rig = Load();
+  const auto play = [&](Rig* of, bool accelerate) {
+    const CharacterMesh& mesh = of->scene.meshes[0];
+    GraphEditor edit(of->graph.get());
+    const NodeId pin = edit.Add("uvPin", "pin");
+    edit.Set(pin, "driverMesh", mesh.geometry.mesh);
+    edit.Set(pin, "face", 0, Value(300));
+    edit.Connect(mesh.points, edit.Plug(pin, "driverPoints"));
+    const PlugRef matrix = edit.Plug(pin, "outputMatrix", 0);
+    EXPECT_TRUE(edit.ok()) << edit.Take().ToString();
+    Compiler compiler;
+    if (accelerate) {
+      AccelerateOptions options;
+      options.tolerance = kInfinity;
+      EXPECT_TRUE(Accelerate(of->graph.get(), &compiler, MakeTarget(*of, of->accelerate[0]), *subspace_,
+                             "kpsa", options)
+                      .ok());
+    }
+    Request request;
+    request.varying = VaryingPlugs(*of);
+    request.outputs.push_back({matrix, {}});
+    Result<std::shared_ptr<const Plan>> plan = compiler.Compile(*of->graph, request);
+    EXPECT_TRUE(plan.ok()) << plan.status().ToString();
+    Run run{*plan, std::make_unique<Evaluator>(*plan), std::make_unique<Profile>(**plan)};
+    run.evaluator->Record(run.profile.get());
+    return run;
+  };
+  Run full = play(&full_rig, false), fast = play(&rig, true);
+  double moved = 0, rest = 0;
+  for (int frame = 0; frame < 10; ++frame) {
+    Pose(full_rig, frame, full.evaluator.get());
+    Pose(rig, frame, fast.evaluator.get());
+    ASSERT_TRUE(full.evaluator->Evaluate().ok());
+    ASSERT_TRUE(fast.evaluator->Evaluate().ok());
+    const Matrix4 a = full.evaluator->Get<Matrix4>(0), b = fast.evaluator->Get<Matrix4>(0);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(a(i, 3), b(i, 3), 2e-3) << frame;
+    if (frame == 0) rest = a(0, 3);
+    moved = std::max(moved, std::fabs(a(0, 3) - rest));
+  }
+  EXPECT_GT(moved, 5e-3);
+  Index node_points = 0;
+  for (Index s = 0; s < fast.plan->steps().size(); ++s) {
+    if (std::string("kpsa") == fast.plan->step_name(s))
+      node_points = std::max(node_points, fast.plan->infos()[s].points);
+  }
+  EXPECT_GE(node_points, 3u);
+  EXPECT_LT(node_points, rig.scene.meshes[0].mesh().point_count() / 4);
 }
 
 TEST_F(TrainedRig, FramesDoNotDependOnTheirOrder) {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "cli/common.h"
+#include "cli/node_pictures.h"
 #include "cli/rig_schema.h"
 #include "io/yaml_document.h"
 #include "tests/cli/hello_folder.h"
@@ -193,6 +194,31 @@ TEST(NodeReference, IsWhatTheProgramPrints) {
       FirstDifference(docs, Replaced(docs, "Smooths the points and gives", "Smooths the points and takes"))
           .substr(0, 5),
       "line ");
+}
+
+// Each deformer has one, small, and as committed.
+TEST(NodeReference, PicturesShowWhatEveryDeformerDoes) {
+  NodeRegistry registry;
+  AddAllNodes(registry);
+  const std::string docs = TemporaryFolder::Read(KPSA_SOURCE_DIR "/docs/nodes.md");
+  for (const std::string& name : registry.Names()) {
+    EXPECT_EQ(HasNodePicture(name), IsDeformer(*registry.Find(name))) << name;
+    EXPECT_EQ(docs.find("](nodes/" + name + ".png)") != std::string::npos, HasNodePicture(name)) << name;
+  }
+  const Result<std::vector<NodePicture>> pictures = DrawNodePictures(registry);
+  ASSERT_TRUE(pictures.ok()) << pictures.status().ToString();
+  EXPECT_GT(pictures->size(), 15u);
+  std::set<std::string> different;
+  for (const NodePicture& picture : *pictures) {
+    const std::string committed =
+        TemporaryFolder::Read(KPSA_SOURCE_DIR "/docs/nodes/" + picture.type + ".png");
+    EXPECT_TRUE(std::equal(picture.png.begin(), picture.png.end(), committed.begin(), committed.end(),
+                           [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); }))
+        << picture.type << ": draw it anew: kpsa nodes --pictures docs/nodes --force";
+    EXPECT_LT(picture.png.size(), 15000u) << picture.type;
+    different.insert(committed);
+  }
+  EXPECT_EQ(different.size(), pictures->size());
 }
 
 }  // namespace
