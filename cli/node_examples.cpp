@@ -9,7 +9,7 @@
 namespace kpsa {
 namespace {
 
-using ExampleSetting = NodeExample::ExampleSetting;
+using ExampleSetting = NodeExample::Setting;
 
 // Rows of points from a function of two numbers, 0 to 1; closed: the last column is followed by the first.
 template <typename F>

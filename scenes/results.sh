@@ -67,12 +67,12 @@ if [ "$1" = --try ]; then
   cp "$work/main.md" "$work/mush.md"
 else
   characters='boy/boy car/car animal/animal' variants='boy/boy_mush car/car_mush animal/animal_mush'
-  measure boy/boy 170 96
-  measure car/car 70 48
-  measure animal/animal 80 96
-  measure boy/boy_mush 170 96
-  measure car/car_mush 70 48
-  measure animal/animal_mush 80 96
+  measure boy/boy 170 200
+  measure car/car 70 150
+  measure animal/animal 80 200
+  measure boy/boy_mush 170 200
+  measure car/car_mush 70 150
+  measure animal/animal_mush 80 200
   draw boy/boy talk 40 1mm
   draw car/car talk 40 10mm
   draw animal/animal talk 40 1mm

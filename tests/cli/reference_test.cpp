@@ -9,6 +9,7 @@
 #include "cli/common.h"
 #include "cli/node_pictures.h"
 #include "cli/rig_schema.h"
+#include "io/rig_words.h"
 #include "io/yaml_document.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/json_schema.h"
