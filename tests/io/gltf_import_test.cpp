@@ -247,7 +247,7 @@ TEST(GltfImport, TextureCoordinates) {
   EXPECT_EQ(std::vector<float>(uvs.begin() + 18, uvs.end()), (std::vector<float>{0, 0, 1, 0, 0, 1}));
   EXPECT_TRUE(c.meshes.at(1).uvs.empty());
   b.root["meshes"][1]["primitives"][0] = with(few);
-  const Result<Character> refused = Load(b.Text());
+  const Result<Character> refused = Load(b.Text(), "/nonexistent");
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.status().ToString().find("TEXCOORD_0 (accessors[3]) has 2 elements, POSITION has 3"),
             std::string::npos)

@@ -71,6 +71,8 @@ Settings NeededBy(const std::string& type) {
     return {{"inMidMatrix", Translation({0.5, 0.1, 0})},
             {"belowMatrix[0]", Translation({0.5, -0.1, 0})},
             {"target", Translation({0.8, 0.2, 0})}};
+  if (type.starts_with("vrm") && type.ends_with("Constraint"))
+    return {{"sourceMatrix", Translation({1, 0, 0})}};
   if (type.ends_with("Constraint") || type == "spaceSwitch")
     return {{"targetMatrix[0]", Translation({1, 0, 0})}};
   if (type == "indirectIllumination")

@@ -168,17 +168,17 @@ TEST(Picture, AComparisonShowsKeyPointsOnRequest) {
   Camera camera;
   camera.eye = {0, 0, 10};
   camera.field_of_view = 2 * std::atan(2.0 / 10);
-  const RenderOptions options = Plain(120, 120);
+  const RenderOptions options = Plain(480, 480);
   RenderDots dots{"2 key points",
                   {0.5f, 0.5f, 0, -0.5f, -0.5f, -0.5f}};  // the second one is behind the square
   const auto image = RenderComparison(full, full, camera, options, &dots);
   ASSERT_TRUE(image.ok());
-  ASSERT_EQ(image->width, 4 * 120 + 3 * 4);
+  ASSERT_EQ(image->width, 4 * 480 + 3 * 4);
   const auto reds = [&](int left) {
     int count = 0;
     double x = 0, y = 0;
-    for (int row = 20; row < 120; ++row) {
-      for (int column = left; column < left + 120; ++column) {
+    for (int row = 20; row < 480; ++row) {
+      for (int column = left; column < left + 480; ++column) {
         const Rgb c = image->At(column, row);
         if (c[0] < 100 || c[0] < 2 * c[1]) continue;
         ++count, x += column - left, y += row;
@@ -187,12 +187,12 @@ TEST(Picture, AComparisonShowsKeyPointsOnRequest) {
     return std::array<double, 3>{static_cast<double>(count), x / std::max(1, count), y / std::max(1, count)};
   };
   EXPECT_EQ(reds(0)[0], 0);
-  EXPECT_EQ(reds(2 * 124)[0], 0);
-  const std::array<double, 3> seen = reds(124);
+  EXPECT_EQ(reds(2 * 484)[0], 0);
+  const std::array<double, 3> seen = reds(484);
   EXPECT_GT(seen[0], 1);
   EXPECT_LT(seen[0], 30);
-  EXPECT_NEAR(seen[1], 75, 2);
-  EXPECT_NEAR(seen[2], 45, 2);
+  EXPECT_NEAR(seen[1], 300, 2);
+  EXPECT_NEAR(seen[2], 180, 2);
   // Every ball is closed: its edges go both ways once
   const RenderPart balls = MakeDots(dots, 0.1);
   std::map<std::pair<Index, Index>, int> edges;
