@@ -1,7 +1,6 @@
 // Tables and plots from what `kpsa bench --json` printed: one document a rig, each with one side or several.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 

@@ -31,8 +31,8 @@ std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::
 // Maps of weights for the rig's deformers: name -> one value a point.
 std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& design, const HeadShape& shape);
 
-// The muscles under a production's face, or the fascia above them: a coarse sheet with holes for eyes and mouth,
-// and what each muscle does to it.
+// The muscles under a production's face, or the fascia above them: a coarse sheet with holes for eyes and
+// mouth, and what each muscle does to it.
 struct MuscleShape {
   std::vector<Double3> points;
   std::vector<std::array<int, 4>> quads;

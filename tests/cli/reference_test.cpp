@@ -216,7 +216,7 @@ TEST(NodeReference, PicturesShowWhatEveryDeformerDoes) {
     EXPECT_TRUE(std::equal(picture.png.begin(), picture.png.end(), committed.begin(), committed.end(),
                            [](std::uint8_t a, char b) { return a == static_cast<std::uint8_t>(b); }))
         << picture.type << ": draw it anew: kpsa nodes --pictures docs/nodes --force";
-    EXPECT_LT(picture.png.size(), 15000u) << picture.type;
+    EXPECT_LT(picture.png.size(), 20000u) << picture.type;
     different.insert(committed);
   }
   EXPECT_EQ(different.size(), pictures->size());
