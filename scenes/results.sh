@@ -72,7 +72,7 @@ else
   measure animal/animal 80 200
   measure boy/boy_mush 170 200
   measure car/car_mush 70 150
-  measure animal/animal_mush 80 200
+  measure animal/animal_mush 80 240
   draw boy/boy talk 40 1mm
   draw car/car talk 40 10mm
   draw animal/animal talk 40 1mm
