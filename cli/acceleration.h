@@ -32,7 +32,8 @@ Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted);
 Result<double> ParseTolerance(const std::string& text);
 Result<double> ParseRate(const std::string& text);
 
-// What an entry accelerates: "head_mesh@mush", or the plug of colours.
+// What an entry accelerates, as its subspace calls it: "head_mesh@mush" without the namespace of a reference,
+// or the plug of colours.
 std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry);
 
 // One accelerate entry of the rig with its subspace in place.

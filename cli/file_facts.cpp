@@ -159,7 +159,12 @@ Result<FileFacts> InspectRig(const std::string& path, const std::vector<std::str
       "accelerate", {"name", "points", "subspace", ">tolerance", "train clips", "test clips"}, {}};
   for (const Acceleration& a : rig.accelerate) {
     const bool colors = !a.points.empty() && a.points[0].colors;
-    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(PointNames(rig, a), ", ")), a.subspace,
+    std::vector<std::string> points = PointNames(rig, a);
+    if (a.reference >= 0) {
+      for (std::string& name : points)
+        name.insert(0, rig.references[static_cast<std::size_t>(a.reference)].name_space);
+    }
+    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(points, ", ")), a.subspace,
                                colors ? NumberText(a.tolerance) : LengthText(a.tolerance),
                                fmt::format("{}", fmt::join(a.train_clips, ", ")),
                                fmt::format("{}", fmt::join(a.test_clips, ", "))});

@@ -6,12 +6,13 @@
 
 #include "base/scalar_math.h"
 #include "scenes/car_model.h"
+#include "scenes/weight_maps.h"
 
 namespace kpsa::scenes::car {
 namespace {
 
 constexpr double kMetres = 0.01;
-constexpr double kSmallestDelta = 0.02, kSmallestWeight = 1e-3;  // cm; of a weight map
+constexpr double kSmallestDelta = 0.02;  // cm
 
 Float3 ToMetres(Double3 p) {
   return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
@@ -189,30 +190,6 @@ std::string CurvesYaml(const CarShape& shape) {
   return out;
 }
 
-std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, std::size_t points) {
-  std::string out = fmt::format(
-      "{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"car_body\", \"points\": {}, \"maps\": {{",
-      points);
-  bool first = true;
-  for (const auto& [name, values] : maps) {
-    const auto ones =
-        std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
-    const auto zeros =
-        std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
-    const double usual = ones > zeros ? 1 : 0;  // the commoner of the two
-    std::vector<std::string> indices, numbers;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (std::fabs(values[i] - usual) < kSmallestWeight) continue;
-      indices.push_back(fmt::format("{}", i));
-      numbers.push_back(fmt::format("{:.4g}", values[i]));
-    }
-    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}",
-                       first ? "" : ",", name, usual, fmt::join(indices, ","), fmt::join(numbers, ","));
-    first = false;
-  }
-  return out + "\n}}\n";
-}
-
 }  // namespace
 }  // namespace kpsa::scenes::car
 
@@ -243,7 +220,7 @@ SceneFiles GenerateCar() {
   scene.clips = CarClips(names(expressions), first, names(pulls), first + 2);
   return {{"car.glb", WriteGlb(scene)},
           {"car_curves.yaml", CurvesYaml(shape)},
-          {"w/car.json", WeightsJson(CarWeightMaps(shape), shape.points.size())}};
+          {"w/car.json", WeightsJson("car_body", CarWeightMaps(shape), shape.points.size())}};
 }
 
 }  // namespace kpsa::scenes

@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "scenes/face_model.h"
+#include "scenes/weight_maps.h"
 
 namespace kpsa::scenes {
 namespace {
 
-constexpr double kMetres = 0.01;          // of the centimetres that shapes are made in
-constexpr double kSmallestDelta = 2e-4;   // cm; expressions leave out less
-constexpr double kSmallestWeight = 1e-3;  // of a weight map
+constexpr double kMetres = 0.01;         // of the centimetres that shapes are made in
+constexpr double kSmallestDelta = 2e-4;  // cm; expressions leave out less
 
 Float3 ToMetres(Double3 p) {
   return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
@@ -116,31 +116,6 @@ GlbMesh EyesMesh(const HeadDesign& design) {
   return mesh;
 }
 
-std::string WeightsJson(const std::map<std::string, std::vector<double>>& maps, std::size_t points) {
-  std::string out = fmt::format(
-      "{{\"kpsa\": \"weights\", \"version\": 1, \"mesh\": \"face_mesh\", \"points\": {}, \"maps\": {{",
-      points);
-  bool first = true;
-  for (const auto& [name, values] : maps) {
-    // The commonest of 0 and 1 is the default
-    const auto ones =
-        std::count_if(values.begin(), values.end(), [](double v) { return v > 1 - kSmallestWeight; });
-    const auto zeros =
-        std::count_if(values.begin(), values.end(), [](double v) { return v < kSmallestWeight; });
-    const double usual = ones > zeros ? 1 : 0;
-    std::vector<std::string> indices, numbers;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (std::fabs(values[i] - usual) < kSmallestWeight) continue;
-      indices.push_back(fmt::format("{}", i));
-      numbers.push_back(fmt::format("{:.4g}", values[i]));
-    }
-    out += fmt::format("{}\n  \"{}\": {{\"default\": {}, \"indices\": [{}], \"values\": [{}]}}",
-                       first ? "" : ",", name, usual, fmt::join(indices, ","), fmt::join(numbers, ","));
-    first = false;
-  }
-  return out + "\n}}\n";
-}
-
 }  // namespace
 
 SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
@@ -168,7 +143,8 @@ SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
   scene.clips = FaceClips(design, names, mesh_node);
   return {{design.name + ".glb", WriteGlb(scene)},
           {design.name + "_curves.yaml", CurvesYaml(design, shape)},
-          {"w/" + design.name + ".json", WeightsJson(FaceWeightMaps(design, shape), shape.points.size())}};
+          {"w/" + design.name + ".json",
+           WeightsJson("face_mesh", FaceWeightMaps(design, shape), shape.points.size())}};
 }
 
 }  // namespace kpsa::scenes

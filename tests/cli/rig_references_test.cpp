@@ -74,6 +74,8 @@ TEST_F(TwoHellos, AllCommandsTakeThem) {
     const ProcessResult run = RunKpsa(command);
     EXPECT_EQ(run.exit_code, 0) << command[0] << ": " << run.err;
   }
+  const ProcessResult inspected = RunKpsa({"inspect", two()});
+  EXPECT_NE(inspected.out.find("a:column@mush"), std::string::npos) << inspected.out;
   const ProcessResult untrained = RunKpsa({"bench", two()});
   EXPECT_NE(untrained.err.find("kpsa train " + folder.rig() + " writes it"), std::string::npos)
       << untrained.err;
