@@ -15,10 +15,7 @@ void SectionReader::ReadClips(const YamlNode& node) {
   for (std::size_t i = 0; i < node.keys.size(); ++i) {
     const YamlNode& key = node.keys[i];
     if (!define("clip", key.scalar, key.where())) continue;
-    RigClip clip;
-    clip.name = key.scalar;
-    clip.where = key.where();
-    clip.source = source;
+    auto clip = Declared<RigClip>(key);
     YamlMap map(node.items[i], fmt::format("clip \"{}\"", key.scalar), errors);
     const YamlNode* layers = map.Required("layers");
     if (layers != nullptr &&
@@ -83,10 +80,7 @@ void SectionReader::ReadReferences(const YamlNode& node) {
       continue;
     }
     if (!define("reference", key.scalar, key.where())) continue;
-    RigReference reference;
-    reference.name = key.scalar;
-    reference.where = key.where();
-    reference.source = source;
+    auto reference = Declared<RigReference>(key);
     YamlMap map(node.items[i], fmt::format("reference \"{}\"", key.scalar), errors);
     const YamlNode* file = map.Required("file");
     if (const YamlNode* translate = map.Find("translate")) reference.translate = *translate;

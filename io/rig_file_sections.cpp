@@ -190,10 +190,7 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
   for (std::size_t i = 0; i < node.keys.size(); ++i) {
     const YamlNode& key = node.keys[i];
     if (!define("accelerate", key.scalar, key.where())) continue;
-    RigAccelerate accelerate;
-    accelerate.name = key.scalar;
-    accelerate.where = key.where();
-    accelerate.source = source;
+    auto accelerate = Declared<RigAccelerate>(key);
     YamlMap map(node.items[i], fmt::format("accelerate \"{}\"", key.scalar), errors);
     const YamlNode* colors = map.Find("colors");
     if (const YamlNode* points = colors == nullptr ? map.Required("points") : map.Find("points")) {

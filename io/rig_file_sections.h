@@ -27,6 +27,15 @@ struct SectionReader {
 
  private:
   bool CheckMap(const YamlNode& node, const char* section) const;
+  // What a section's key declares, with its name and place.
+  template <typename T>
+  T Declared(const YamlNode& key) const {
+    T declared;
+    declared.name = key.scalar;
+    declared.where = key.where();
+    declared.source = source;
+    return declared;
+  }
   bool ReadNames(const YamlNode& node, const std::string& what, std::vector<RigString>* names) const;
   void ReadLayer(const YamlNode& node, RigClip* clip) const;
   void ReadAcceleratePoints(const YamlNode& node, RigAccelerate* accelerate) const;

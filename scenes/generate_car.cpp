@@ -11,19 +11,7 @@
 namespace kpsa::scenes::car {
 namespace {
 
-constexpr double kMetres = 0.01;
 constexpr double kSmallestDelta = 0.02;  // cm
-
-Float3 ToMetres(Double3 p) {
-  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
-          static_cast<float>(p.z * kMetres)};
-}
-std::array<std::uint8_t, 4> Color(Double3 linear) {
-  const auto byte = [](double v) {
-    return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5));
-  };
-  return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
-}
 
 constexpr Double3 kPaint = {0.02, 0.30, 0.42}, kCream = {0.75, 0.62, 0.38}, kGlass = {0.03, 0.05, 0.07},
                   kChrome = {0.55, 0.57, 0.60}, kThroat = {0.22, 0.03, 0.03},

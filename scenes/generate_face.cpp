@@ -10,20 +10,7 @@
 namespace kpsa::scenes {
 namespace {
 
-constexpr double kMetres = 0.01;         // of the centimetres that shapes are made in
 constexpr double kSmallestDelta = 2e-4;  // cm; expressions leave out less
-
-Float3 ToMetres(Double3 p) {
-  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
-          static_cast<float>(p.z * kMetres)};
-}
-
-std::array<std::uint8_t, 4> Color(Double3 linear) {
-  const auto byte = [](double v) {
-    return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5));
-  };
-  return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
-}
 
 // The skin's, with tinted lips.
 std::vector<std::array<std::uint8_t, 4>> SkinColors(const HeadDesign& design, const HeadShape& shape) {

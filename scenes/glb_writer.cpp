@@ -265,4 +265,17 @@ Influences MakeInfluences(std::span<const double> weight_of_joint) {
   return out;
 }
 
+Float3 ToMetres(Double3 centimetres) {
+  const Double3& p = centimetres;
+  return {static_cast<float>(p.x * kMetres), static_cast<float>(p.y * kMetres),
+          static_cast<float>(p.z * kMetres)};
+}
+
+std::array<std::uint8_t, 4> Color(Double3 linear) {
+  const auto byte = [](double v) {
+    return static_cast<std::uint8_t>(std::floor(255 * std::clamp(v, 0.0, 1.0) + 0.5));
+  };
+  return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
+}
+
 }  // namespace kpsa::scenes

@@ -76,6 +76,12 @@ std::vector<Float3> SmoothNormals(std::span<const Float3> positions, std::span<c
 // Splits quads along their first diagonal; a quad that repeats its last point is one triangle.
 std::vector<Index> Triangulate(std::span<const std::array<int, 4>> quads);
 
+// Shapes are made in centimetres, files are in metres.
+inline constexpr double kMetres = 0.01;
+Float3 ToMetres(Double3 centimetres);
+// A linear colour, opaque.
+std::array<std::uint8_t, 4> Color(Double3 linear);
+
 // Weights rounded to multiples of 1/4096 that add up to 1 exactly; the four largest are kept.
 Influences MakeInfluences(std::span<const double> weight_of_joint);
 

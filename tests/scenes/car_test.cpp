@@ -7,6 +7,7 @@
 
 #include "io/gltf_import.h"
 #include "scenes/car_model.h"
+#include "tests/scenes/mesh_checks.h"
 
 namespace kpsa::scenes::car {
 namespace {
@@ -45,44 +46,14 @@ TEST(Car, IsSymmetricToTheBit) {
     EXPECT_EQ(Mirrored(Shape().points[i]), Shape().points[At(Shape().mirror, i)]);
 }
 
-// Every edge has two quads that run along it in opposite directions, but for the lower edge and the two
-// sockets.
-TEST(Car, IsAManifoldWithThreeBorders) {
-  std::map<std::pair<int, int>, int> directed;
-  for (const auto& q : Shape().quads) {
-    for (std::size_t k = 0; k < 4; ++k) {
-      if (q[k] != q[(k + 1) % 4]) ++directed[{q[k], q[(k + 1) % 4]}];
-    }
-  }
-  std::map<int, int> border;
-  for (const auto& [edge, count] : directed) {
-    EXPECT_EQ(count, 1) << edge.first << "-" << edge.second;
-    if (!directed.contains({edge.second, edge.first})) border[edge.first] = edge.second;
-  }
-  int loops = 0;
-  for (; !border.empty(); ++loops) {
-    for (auto at = border.begin(); at != border.end();) {
-      const int next = at->second;
-      border.erase(at);
-      at = border.find(next);
-    }
-  }
-  EXPECT_EQ(loops, 3);
-}
+// The lower edge and the two sockets.
+TEST(Car, IsAManifoldWithThreeBorders) { EXPECT_EQ(CountBorders(Shape().quads, "car"), 3); }
 
 TEST(Car, NoTwoPointsCoincideAndNoTriangleIsFlat) {
-  std::set<std::array<double, 3>> places;
-  for (const Double3& p : Shape().points) places.insert({p.x, p.y, p.z});
-  EXPECT_EQ(places.size(), Shape().points.size());
+  CheckPointsAndTriangles(Shape().points, Shape().quads, 1e-3, "car");
   std::set<int> used;
   for (const auto& q : Shape().quads) used.insert(q.begin(), q.end());
   EXPECT_EQ(used.size(), Shape().points.size());
-  const std::vector<Index> triangles = Triangulate(Shape().quads);
-  for (std::size_t t = 0; t < triangles.size(); t += 3) {
-    const Double3 a = Shape().points[triangles[t]], b = Shape().points[triangles[t + 1]],
-                  c = Shape().points[triangles[t + 2]];
-    EXPECT_GT(Length(Cross(b - a, c - a)), 1e-3) << "triangle " << t / 3;
-  }
 }
 
 TEST(Car, WeightsAddUpToExactlyOneAndUseTheJointsOfTheShell) {

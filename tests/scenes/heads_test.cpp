@@ -8,6 +8,7 @@
 #include <set>
 
 #include "scenes/face_model.h"
+#include "tests/scenes/mesh_checks.h"
 
 namespace kpsa::scenes {
 namespace {
@@ -50,33 +51,8 @@ TEST(Heads, AreSymmetricToTheBitAndNoTwoPointsCoincide) {
 // Three borders: the neck and the sockets.
 TEST(Heads, AreManifoldsWithThreeBordersAndNoFlatTriangles) {
   for (const Made& head : Heads()) {
-    std::map<std::pair<int, int>, int> directed;
-    for (const auto& q : head.shape.quads) {
-      for (std::size_t k = 0; k < 4; ++k) {
-        if (q[k] != q[(k + 1) % 4]) ++directed[{q[k], q[(k + 1) % 4]}];
-      }
-    }
-    std::map<int, int> border;
-    for (const auto& [edge, count] : directed) {
-      EXPECT_EQ(count, 1) << head.design.name << " " << edge.first << "-" << edge.second;
-      if (!directed.contains({edge.second, edge.first})) border[edge.first] = edge.second;
-    }
-    int loops = 0;
-    for (; !border.empty(); ++loops) {
-      for (auto at = border.begin(); at != border.end();) {
-        const int next = at->second;
-        border.erase(at);
-        at = border.find(next);
-      }
-    }
-    EXPECT_EQ(loops, 3) << head.design.name;
-    const std::vector<Index> triangles = Triangulate(head.shape.quads);
-    for (std::size_t t = 0; t < triangles.size(); t += 3) {
-      const Double3 a = head.shape.points[triangles[t]];
-      const Double3 area =
-          Cross(head.shape.points[triangles[t + 1]] - a, head.shape.points[triangles[t + 2]] - a);
-      EXPECT_GT(Length(area), 1e-6) << head.design.name << " triangle " << t / 3;
-    }
+    EXPECT_EQ(CountBorders(head.shape.quads, head.design.name), 3) << head.design.name;
+    CheckPointsAndTriangles(head.shape.points, head.shape.quads, 1e-6, head.design.name);
   }
 }
 

@@ -11,6 +11,7 @@
 #include "io/gltf_import.h"
 #include "scenes/face_model.h"
 #include "tests/scenes/heads.h"
+#include "tests/scenes/mesh_checks.h"
 
 namespace kpsa::scenes {
 namespace {
@@ -118,42 +119,11 @@ TEST(Head, IsSymmetricToTheBit) {
   }
 }
 
-// Every edge has two quads that run along it in opposite directions, but for three borders: the neck and the
-// sockets.
-TEST(Head, IsAManifoldWithThreeBorders) {
-  std::map<std::pair<int, int>, int> directed;
-  for (const auto& q : Shape().quads) {
-    for (std::size_t k = 0; k < 4; ++k) {
-      if (q[k] != q[(k + 1) % 4]) ++directed[{q[k], q[(k + 1) % 4]}];
-    }
-  }
-  std::map<int, int> border;
-  for (const auto& [edge, count] : directed) {
-    EXPECT_EQ(count, 1) << edge.first << "-" << edge.second;
-    if (!directed.contains({edge.second, edge.first})) border[edge.first] = edge.second;
-  }
-  int loops = 0;
-  while (!border.empty()) {
-    ++loops;
-    for (auto at = border.begin(); at != border.end();) {
-      const int next = at->second;
-      border.erase(at);
-      at = border.find(next);
-    }
-  }
-  EXPECT_EQ(loops, 3);
-}
+// The neck and the sockets.
+TEST(Head, IsAManifoldWithThreeBorders) { EXPECT_EQ(CountBorders(Shape().quads, "face"), 3); }
 
 TEST(Head, NoTwoPointsCoincideAndNoTriangleIsFlat) {
-  std::set<std::array<double, 3>> places;
-  for (const Double3& p : Shape().points) places.insert({p.x, p.y, p.z});
-  EXPECT_EQ(places.size(), Shape().points.size());
-  const std::vector<Index> triangles = Triangulate(Shape().quads);
-  for (std::size_t t = 0; t < triangles.size(); t += 3) {
-    const Double3 a = Shape().points[triangles[t]], b = Shape().points[triangles[t + 1]],
-                  c = Shape().points[triangles[t + 2]];
-    EXPECT_GT(Length(Cross(b - a, c - a)), 1e-5) << "triangle " << t / 3;
-  }
+  CheckPointsAndTriangles(Shape().points, Shape().quads, 1e-5, "face");
 }
 
 TEST(Head, WeightsAddUpToExactlyOneInFourJoints) {
