@@ -14,6 +14,7 @@
 #include "cli/rig_training.h"
 #include "graph/evaluator.h"
 #include "kpsa/estimator.h"
+#include "kpsa/mode_choice.h"
 #include "kpsa/pose_recorder.h"
 #include "kpsa/varimax.h"
 #include "nodes/standard_nodes.h"
@@ -107,15 +108,10 @@ class Ablation {
       Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
       if (!plan.ok()) return plan.status();
       totals_.push_back((*plan)->outputs()[0].points.total());
-      CandidateStage candidate{mesh.stages.size() - 1, {}};
-      if (mesh.stages.size() > 1) {
-        --candidate.stage;
-        const std::size_t count = std::min<std::size_t>(kCandidates, totals_.back());
-        for (std::size_t i = 0; i < count; ++i)
-          candidate.points.push_back(static_cast<Index>((2 * i + 1) * totals_.back() / (2 * count)));
-        stage_name_ = mesh.stages[candidate.stage].name;
-      }
-      candidates.push_back(std::move(candidate));
+      if (mesh.stages.size() < 2) continue;
+      candidates.push_back(
+          {totals_.size() - 1, mesh.stages.size() - 2, EvenSpread(totals_.back(), kCandidates)});
+      stage_name_ = mesh.stages[candidates.back().stage].name;
     }
     std::vector<Signal> signals;
     for (int clip = -1; clip < static_cast<int>(clips->size()); ++clip) {
@@ -248,29 +244,30 @@ class Ablation {
     Request request;
     request.varying = {rig_.scene.time};
     const auto& target = training_rig_.target;
-    for (std::size_t m = 0; m < target.meshes.size(); ++m) {
-      std::vector<Index> outputs, stage;
-      std::size_t output_begin = 0, stage_begin = 0;
-      for (std::size_t before = 0; before < m; ++before) {
-        output_begin += totals_[before];
-        stage_begin += recorder_->candidates()[before].points.size();
-      }
-      const std::vector<Index>& points = recorder_->candidates()[m].points;
+    // The cues of a kind with indices from `begin` on, as numbers from 0
+    const auto among = [&](CueKind kind, std::size_t begin, std::size_t count) {
+      std::vector<Index> found;
       for (const CueRef& cue : cues) {
-        if (cue.kind == CueKind::kOutput && cue.index >= output_begin &&
-            cue.index < output_begin + totals_[m])
-          outputs.push_back(static_cast<Index>(cue.index - output_begin));
-        if (cue.kind == CueKind::kStage && cue.index >= stage_begin &&
-            cue.index < stage_begin + points.size())
-          stage.push_back(points[cue.index - stage_begin]);
+        if (cue.kind == kind && cue.index >= begin && cue.index < begin + count)
+          found.push_back(static_cast<Index>(cue.index - begin));
       }
-      std::sort(outputs.begin(), outputs.end());
-      std::sort(stage.begin(), stage.end());
+      std::sort(found.begin(), found.end());
+      return found;
+    };
+    std::size_t begin = 0;
+    for (std::size_t m = 0; m < target.meshes.size(); begin += totals_[m++]) {
+      const std::vector<Index> outputs = among(CueKind::kOutput, begin, totals_[m]);
       if (!outputs.empty())
         request.outputs.push_back({target.meshes[m].stages.back().points, PointSet::Of(outputs, totals_[m])});
+    }
+    begin = 0;
+    for (const CandidateStage& candidate : recorder_->candidates()) {
+      std::vector<Index> stage = among(CueKind::kStage, begin, candidate.points.size());
+      begin += candidate.points.size();
+      for (Index& point : stage) point = candidate.points[point];
       if (!stage.empty())
-        request.outputs.push_back({target.meshes[m].stages[recorder_->candidates()[m].stage].points,
-                                   PointSet::Of(stage, totals_[m])});
+        request.outputs.push_back({target.meshes[candidate.mesh].stages[candidate.stage].points,
+                                   PointSet::Of(stage, totals_[candidate.mesh])});
     }
     std::size_t column = 0;
     for (const Signal& signal : recorder_->signals()) {

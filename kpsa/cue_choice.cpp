@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "kpsa/estimator.h"
@@ -22,13 +23,18 @@ constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
 // Values that move more than they are trusted.
-std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise, std::size_t max_outputs) {
-  const bool stages = pca.layout.stage_points > 0;
-  std::vector<CueRef> candidates = AllCandidates(pca, kMinMotion, !stages, stages, true);
+std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise, const std::vector<CueRef>& place,
+                               std::size_t max_outputs) {
+  std::vector<char> here(pca.layout.points + pca.layout.stage_points);
+  const auto number = [&](const CueRef& cue) {
+    return cue.index + (cue.kind == CueKind::kStage ? pca.layout.points : 0);
+  };
+  for (const CueRef& cue : place) here[number(cue)] = 1;
+  std::vector<CueRef> candidates = AllCandidates(pca, kMinMotion, true, true, true);
   std::erase_if(candidates, [&](const CueRef& cue) {
+    if (cue.kind != CueKind::kScalar) return here[number(cue)] == 0;
     const auto column = static_cast<Eigen::Index>(CueColumn(pca.layout, cue));
-    return cue.kind == CueKind::kScalar && !noise.scalars.empty() &&
-           pca.row_variance[column] <= noise.scalars[cue.index];
+    return !noise.scalars.empty() && pca.row_variance[column] <= noise.scalars[cue.index];
   });
   const auto outputs = static_cast<std::size_t>(std::count_if(
       candidates.begin(), candidates.end(), [](const CueRef& c) { return c.kind == CueKind::kOutput; }));
@@ -47,9 +53,29 @@ class Chooser {
       : pca_(pca), positions_(positions), noise_(noise), poses_(poses), options_(options) {}
 
   std::vector<CueRef> Run() {
-    SelectInRounds();
-    if (!chosen_.empty()) AddPoints();
-    if (!chosen_.empty() && pca_.layout.stage_points > 0 && !options_.by_rms) AddWorstPoints();
+    std::vector<CuePlace> places = options_.places;
+    if (places.empty()) {
+      const bool stages = pca_.layout.stage_points > 0;
+      places.push_back({AllCandidates(pca_, kMinMotion, !stages, stages, false), 0});
+    }
+    std::vector<CueRef> best;
+    double least = std::numeric_limits<double>::infinity();
+    for (const CuePlace& place : places) {
+      if (place.cost >= least) break;
+      chosen_.clear();
+      SelectInRounds(place.points);
+      if (chosen_.empty()) continue;
+      AddPoints(place.points);
+      if (places.size() == 1) break;
+      const PointSurvey survey = Survey(chosen_);
+      const double beyond = static_cast<double>(survey.poses_beyond) / static_cast<double>(survey.poses);
+      const double cost = place.cost + beyond * options_.miss_cost;
+      if (cost < least) least = cost, best = chosen_;
+    }
+    if (!best.empty()) chosen_ = std::move(best);
+    const bool early = std::any_of(chosen_.begin(), chosen_.end(),
+                                   [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
+    if (early && !options_.by_rms) AddWorstPoints();
     return std::move(chosen_);
   }
 
@@ -61,8 +87,8 @@ class Chooser {
   }
 
   // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them.
-  void SelectInRounds() {
-    const std::vector<CueRef> candidates = Candidates(pca_, noise_, options_.max_outputs);
+  void SelectInRounds(const std::vector<CueRef>& place) {
+    const std::vector<CueRef> candidates = Candidates(pca_, noise_, place, options_.max_outputs);
     std::vector<double> weights;
     const std::size_t rounds = options_.by_rms ? 1 : kSelectionRounds;
     for (std::size_t round = 1; round <= rounds; ++round) {
@@ -83,8 +109,8 @@ class Chooser {
     }
   }
 
-  void AddPoints() {
-    std::vector<CueRef> points = Candidates(pca_, noise_, options_.max_outputs);
+  void AddPoints(const std::vector<CueRef>& place) {
+    std::vector<CueRef> points = Candidates(pca_, noise_, place, options_.max_outputs);
     std::erase_if(points, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
     std::size_t have = 0;
     for (const CueRef& cue : chosen_) have += cue.kind != CueKind::kScalar;

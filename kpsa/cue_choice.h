@@ -8,6 +8,12 @@
 
 namespace kpsa {
 
+// Points that may be measured together, and what the graph spends until they are there (ns).
+struct CuePlace {
+  std::vector<CueRef> points;
+  double cost = 0;
+};
+
 struct CueChoiceOptions {
   std::size_t rows = 300;       // of measurements: a point takes 3, a scalar 1
   std::size_t min_points = 16;  // points see what no scalar does: some of them are kept to judge by
@@ -15,12 +21,17 @@ struct CueChoiceOptions {
   // Where errors count by their RMS alone (light, with its noise): one round, no worst points.
   bool by_rms = false;
   std::size_t max_outputs = 0;  // output points that may become cues, spread; 0: all
+  // Where points may be measured, the cheapest place first (kpsa/cue_places.h); empty: the points of stages,
+  // or where there are none, the outputs.
+  std::vector<CuePlace> places = {};
+  double miss_cost = 0;  // of the full evaluation (ns), for a pose that a place leaves beyond the tolerance
 };
 
-// A-optimal cues (kpsa/cue_selection.h): points of the candidate stages (of the outputs, where there are
-// none) and scalars, in rounds: after each share of the rows, points count by the largest errors that
-// training poses still have there. The least expected squared error alone leaves small regions to chance (a
-// tongue behind teeth).
+// A-optimal cues (kpsa/cue_selection.h): points of one place and scalars, in rounds: after each share of the
+// rows, points count by the largest errors that training poses still have there. The least expected squared
+// error alone leaves small regions to chance (a tongue behind teeth). The place is the one of the least
+// expected cost: of its points, and of the full evaluation for the training poses that it leaves beyond the
+// tolerance.
 //
 // Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
 // deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are

@@ -74,4 +74,13 @@ std::vector<Index> GoldenSpread(std::size_t total, std::size_t count) {
   return points;
 }
 
+std::vector<Index> EvenSpread(std::size_t total, std::size_t count) {
+  std::vector<Index> points;
+  count = std::min(count, total);
+  for (std::size_t i = 0; i < count; ++i)
+    points.push_back(static_cast<Index>((2 * i + 1) * total / (2 * count)));
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  return points;
+}
+
 }  // namespace kpsa

@@ -13,15 +13,14 @@ Result<std::shared_ptr<const Plan>> PoseRecorder::CompileFor(const std::vector<P
   Request request;
   const AccelerationTarget& target = rig_.target;
   for (const auto& mesh : target.meshes) request.outputs.push_back({mesh.stages.back().points, {}});
-  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
-    if (candidates_[m].points.empty()) continue;
-    const auto& mesh = target.meshes[m];
+  for (const CandidateStage& candidate : candidates_) {
+    const PlugRef& points = target.meshes[candidate.mesh].stages[candidate.stage].points;
     Request whole;
-    whole.outputs.push_back({mesh.stages[candidates_[m].stage].points, {}});
+    whole.outputs.push_back({points, {}});
     Result<std::shared_ptr<const Plan>> sizes = compiler_->Compile(*rig_.graph, whole);
     if (!sizes.ok()) return sizes.status();
-    request.outputs.push_back({mesh.stages[candidates_[m].stage].points,
-                               PointSet::Of(candidates_[m].points, (*sizes)->outputs()[0].points.total())});
+    request.outputs.push_back(
+        {points, PointSet::Of(candidate.points, (*sizes)->outputs()[0].points.total())});
   }
   for (const Signal& signal : signals_) request.outputs.push_back({signal.plug, {}});
   for (const PlugRef& plug : target.space) request.outputs.push_back({plug, {}});
@@ -59,10 +58,8 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
     }
   };
   for (const auto& mesh : target.meshes) store_points(evaluator.Points(o++), mesh.stages.back().world);
-  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
-    if (!candidates_[m].points.empty())
-      store_points(evaluator.Points(o++), target.meshes[m].stages[candidates_[m].stage].world);
-  }
+  for (const CandidateStage& candidate : candidates_)
+    store_points(evaluator.Points(o++), target.meshes[candidate.mesh].stages[candidate.stage].world);
   for (const Signal& signal : signals_) {
     if (signal.matrix) {
       double entries[12];

@@ -1,4 +1,4 @@
-// Evaluates poses of a rig into rows of a pose matrix: output points, candidate points of an earlier stage,
+// Evaluates poses of a rig into rows of a pose matrix: output points, candidate points of earlier stages,
 // and entries of signals, all in the space of the target. Internal to training.
 #pragma once
 
@@ -8,10 +8,10 @@
 
 namespace kpsa {
 
-// Where candidates lie: a stage of each mesh (the accelerated one itself: outputs are the candidates).
+// Points of an earlier stage of a mesh that may become cues.
 struct CandidateStage {
-  std::size_t stage = 0;      // in MeshPoints::stages
-  std::vector<Index> points;  // of the mesh; empty if the stage is the accelerated one
+  std::size_t mesh = 0, stage = 0;  // in AccelerationTarget::meshes, in its stages
+  std::vector<Index> points;        // of the mesh
 };
 
 class PoseRecorder {

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "kpsa/cue_choice.h"
+#include "kpsa/cue_places.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/pca.h"
 #include "kpsa/pose_recorder.h"
@@ -14,10 +15,8 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kProbePoints = 20;  // of a stage, to see what a cue there would drag in
-constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
-constexpr double kTileShare = 0.05;       // of the tolerance: RMS error that tiles and bytes may add
-constexpr double kTileMaxShare = 0.6;     // of the tolerance: the largest error that they may add
+constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
+constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
 constexpr double kStillTurn =
     5e-4;  // a turn (radians) and a shift (of the tolerance) of a joint that are none
 constexpr double kStillShare = 0.1;
@@ -28,16 +27,6 @@ constexpr int kMaxLightModes = 120;        // that are looked at; noise is beyon
 constexpr std::size_t kGroupPoints = 400;  // where the trainer looks which controls act together
 constexpr double kGroupShare = 0.2;        // of a control's largest displacement: it acts on a point
 constexpr std::size_t kGroupSize = 8;      // controls that move a point most
-
-// Count of indices, evenly spread.
-std::vector<Index> Spread(std::size_t total, std::size_t count) {
-  std::vector<Index> points;
-  count = std::min(count, total);
-  for (std::size_t i = 0; i < count; ++i)
-    points.push_back(static_cast<Index>((2 * i + 1) * total / (2 * count)));
-  points.erase(std::unique(points.begin(), points.end()), points.end());
-  return points;
-}
 
 class Trainer {
  public:
@@ -82,54 +71,23 @@ class Trainer {
     return Status();
   }
 
-  // The latest stage at which a cue point costs little more than itself, and candidate points there.
-  Result<CandidateStage> ChooseStage(const AccelerationTarget::MeshPoints& mesh, Index total,
-                                     std::size_t budget) {
-    CandidateStage chosen;
-    for (std::size_t stage = mesh.stages.size(); stage-- > 0;) {
-      Request request;
-      const std::vector<Index> probe = Spread(total, kProbePoints);
-      request.outputs.push_back({mesh.stages[stage].points, PointSet::Of(probe, total)});
-      request.varying = {rig_.time};
-      for (const ControlRange& control : rig_.controls) {
-        if (!control.by_clip) request.varying.push_back(control.plug);
-      }
-      Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
-      if (!plan.ok()) return plan.status();
-      Index largest = 0;
-      for (const Plan::StepInfo& info : (*plan)->infos()) {
-        if (info.points_total == total) largest = std::max(largest, info.points);
-      }
-      chosen.stage = stage;
-      if (static_cast<double>(largest) <= kMaxPointsPerCue * static_cast<double>(probe.size())) break;
-    }
-    if (chosen.stage + 1 < mesh.stages.size()) chosen.points = Spread(total, budget);
-    return chosen;
-  }
-
   Status Prepare() {
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     std::vector<Index> totals;
-    std::size_t all = 0;
     for (const auto& mesh : rig_.target.meshes) {
       Request request;
       request.outputs.push_back({mesh.stages.back().points, {}});
       Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
       if (!plan.ok()) return plan.status();
       totals.push_back((*plan)->outputs()[0].points.total());
-      all += totals.back();
     }
     std::vector<CandidateStage> candidates;
-    for (std::size_t m = 0; m < totals.size(); ++m) {
-      if (options_.mode == EstimatorMode::kPaper) {  // key points are output points
-        candidates.push_back({rig_.target.meshes[m].stages.size() - 1, {}});
-        continue;
-      }
-      const std::size_t budget =
-          std::max<std::size_t>(1, options_.max_candidates * totals[m] / std::max<std::size_t>(1, all));
-      Result<CandidateStage> stage = ChooseStage(rig_.target.meshes[m], totals[m], budget);
-      if (!stage.ok()) return stage.status();
-      candidates.push_back(std::move(*stage));
+    if (options_.mode == EstimatorMode::kMap) {  // the paper's key points are output points
+      Result<CuePlaces> places = FindCuePlaces(rig_, &compiler_, totals);
+      if (!places.ok()) return places.status();
+      candidates = std::move(places->stages);
+      places_ = std::move(places->places);
+      full_cost_ = places->full_cost;
     }
 
     // Signals: under the controls, and under each clip
@@ -197,7 +155,7 @@ class Trainer {
   // Which controls move the same points, from the sweeps: rows [first, first + 2 controls) of the poses. What
   // moves a point by a good part of what it moves any point acts there.
   ControlGroups FindGroups(const PoseMatrix& poses, std::size_t first) const {
-    const std::vector<Index> points = Spread(static_cast<Index>(layout_.points), kGroupPoints);
+    const std::vector<Index> points = EvenSpread(static_cast<Index>(layout_.points), kGroupPoints);
     std::vector<float> rest(
         3 * points.size());  // the mean of all sweeps, since most of them leave a point at rest
     const std::size_t n = rig_.controls.size();
@@ -334,6 +292,8 @@ class Trainer {
     choice.min_points = options_.min_points;
     choice.tolerance = options_.tolerance;
     choice.by_rms = of_light();
+    choice.places = places_;
+    choice.miss_cost = full_cost_;
     if (of_light()) choice.max_outputs = options_.max_candidates;
     const std::vector<CueRef> chosen = options_.mode == EstimatorMode::kPaper
                                            ? ChoosePaperCues(pca_, positions_, diagonal_)
@@ -385,19 +345,20 @@ class Trainer {
       d.plug = ranges_[index].plug;
       return d;
     }
-    for (std::size_t m = 0; m < totals_.size(); ++m) {
-      const CandidateStage& candidate = recorder_->candidates()[m];
-      const auto count =
-          cue.kind == CueKind::kOutput ? totals_[m] : static_cast<Index>(candidate.points.size());
-      if (index >= count) {
-        index -= count;
-        continue;
-      }
-      const auto& stages = rig_.target.meshes[m].stages;
-      d.mesh = static_cast<Index>(m);
-      d.stage = cue.kind == CueKind::kOutput ? OutputStage(stages).name : stages[candidate.stage].name;
-      d.point = cue.kind == CueKind::kOutput ? index : candidate.points[index];
+    const auto put = [&](std::size_t m, const AccelerationTarget::Stage& stage, Index point) {
+      d.mesh = static_cast<Index>(m), d.stage = stage.name, d.point = point;
       return d;
+    };
+    if (cue.kind == CueKind::kOutput) {
+      std::size_t m = 0;
+      for (; index >= totals_[m]; ++m) index -= totals_[m];
+      return put(m, OutputStage(rig_.target.meshes[m].stages), index);
+    }
+    for (const CandidateStage& candidate : recorder_->candidates()) {
+      if (index < candidate.points.size())
+        return put(candidate.mesh, rig_.target.meshes[candidate.mesh].stages[candidate.stage],
+                   candidate.points[index]);
+      index -= static_cast<Index>(candidate.points.size());
     }
     KPSA_CHECK(false);
     return d;
@@ -453,6 +414,8 @@ class Trainer {
   std::unique_ptr<PoseRecorder> recorder_;
   PoseLayout layout_;
   std::vector<Index> totals_;
+  std::vector<CuePlace> places_;
+  double full_cost_ = 0;
   std::vector<Double3> positions_;
   std::vector<TrainedRange> ranges_;
   Pca pca_;

@@ -189,7 +189,7 @@ void AddBlendShapeNode(NodeRegistry& registry) {
   b.structural("inbetweenShape", std::vector<std::int64_t>{}, {.doc = "the targets that are these shapes"});
   b.structural("inbetweenWeight", std::vector<double>{},
                {.doc = "the weights at which the targets are these shapes; more than 0, less than 1"});
-  FinishDeformer(b, &ComputeBlendShape, BindBlendShape, DemandBlendShape).cost(100, 3);
+  FinishDeformer(b, &ComputeBlendShape, BindBlendShape, DemandBlendShape).cost(300, 5);
 
   registry.add("combinationShape", "The weight of a shape that acts where others act together.")
       .category("deformer")

@@ -162,7 +162,8 @@ void AddCurveNodes(NodeRegistry& registry) {
       .in("parentMatrix", Matrix4(), {.doc = "turns the offsets; `parent:` connects it"})
       .out("displacements", Type::kPoints, "the offsets in world axes")
       .unit(Unit::kLength)
-      .compute(&ComputeDisplacements);
+      .compute(&ComputeDisplacements)
+      .cost(150, 20);
   NodeBuilder b = AddDeformer(registry, "wire", "Points near a curve, or near several, follow it.");
   b.points_in("displacements", "the curve's displacements");
   b.points_in("deformedWire", "of several curves, in place of displacements; `curves:` connects them")
@@ -179,7 +180,7 @@ void AddCurveNodes(NodeRegistry& registry) {
   b.structural(
       "crossingEffect", 0.0,
       {.min = 0, .max = 1, .doc = "of several curves: 0 near ones take over from far ones, 1 they add up"});
-  FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 6);
+  FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 2);
 }
 
 }  // namespace kpsa

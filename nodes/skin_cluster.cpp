@@ -170,7 +170,7 @@ void AddSkinClusterNode(NodeRegistry& registry) {
   b.structural("blendWeights", Type::kAsset,
                {.doc = "of weightBlended: 0 takes classicLinear, 1 dualQuaternion; 0 where unset"})
       .per_geometry();
-  FinishDeformer(b, &ComputeSkin, BindSkin, DemandSkin).cost(1000, 8);
+  FinishDeformer(b, &ComputeSkin, BindSkin, DemandSkin).cost(500, 5);
 }
 
 void AddTransformGeometryNode(NodeRegistry& registry) {

@@ -101,7 +101,7 @@ void AddWrapNodes(NodeRegistry& registry) {
   wrap.structural("influences", 8,
                   {.min = 1, .max = 64, .doc = "how many driver points, the nearest ones, move a point"});
   wrap.enumeration("falloffMode", {"volume"}, true, "how distances are measured: straight through space");
-  FinishDeformer(wrap, &ComputeWrap, BindWrap<true>, DemandWrapNode<true>).cost(1000, 45);
+  FinishDeformer(wrap, &ComputeWrap, BindWrap<true>, DemandWrapNode<true>).cost(3000, 60);
 
   NodeBuilder proximity =
       AddDeformer(registry, "proximityWrap", "Points follow the nearest place of a driver's surface.");
@@ -118,7 +118,7 @@ void AddWrapNodes(NodeRegistry& registry) {
   proximity.structural(
       "smoothInfluences", 0,
       {.min = 0, .max = 20, .doc = "rings over which the influence of the nearest triangle is spread"});
-  FinishDeformer(proximity, &ComputeWrap, BindWrap<false>, DemandWrapNode<false>).cost(1000, 30);
+  FinishDeformer(proximity, &ComputeWrap, BindWrap<false>, DemandWrapNode<false>).cost(5000, 46);
 }
 
 }  // namespace kpsa

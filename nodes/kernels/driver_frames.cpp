@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
 #include "base/check.h"
 #include "nodes/kernels/weights.h"
@@ -88,6 +89,7 @@ DriverFrames::DriverFrames(const Topology& driver, std::span<const Double3> rest
     floats->push_back(0);
   };
   RestFrame frame;
+  std::unordered_map<Index, Index> numbers;  // of the driver's triangles among these
   for (const Index point : frame_points) {
     if (MakeRestFrame(driver, rest, point, &frame)) {
       own_.push_back(entry(point));
@@ -97,7 +99,9 @@ DriverFrames::DriverFrames(const Topology& driver, std::span<const Double3> rest
         add(&duals_, frame.duals[k]);
       }
       for (const Index t : driver.point_triangles().row(point)) {
-        for (std::size_t k = 0; k < 3; ++k)
+        const auto [at, fresh] = numbers.emplace(t, static_cast<Index>(triangles_.size() / 3));
+        around_.push_back(at->second);
+        for (std::size_t k = 0; fresh && k < 3; ++k)
           triangles_.push_back(entry(driver.triangles()[3 * std::size_t{t} + k]));
       }
       add(&normal_duals_, frame.normal_dual);
@@ -106,15 +110,20 @@ DriverFrames::DriverFrames(const Topology& driver, std::span<const Double3> rest
       add(&normal_duals_, {});
     }
     edge_offsets_.push_back(static_cast<Index>(edge_points_.size()));
-    triangle_offsets_.push_back(static_cast<Index>(triangles_.size()));
+    triangle_offsets_.push_back(static_cast<Index>(around_.size()));
   }
 }
 
 void DriverFrames::Run(const float* points, float* frames, const Parallel* parallel) const noexcept {
   const FramesRun run{own_.data(),   edge_offsets_.data(), triangle_offsets_.data(), edge_points_.data(),
-                      duals_.data(), triangles_.data(),    normal_duals_.data()};
-  ForRanges(parallel, count(), kFrameGrain,
-            [&](std::size_t begin, std::size_t end) { RunDriverFrames(run, points, begin, end, frames); });
+                      duals_.data(), around_.data(),       normal_duals_.data()};
+  float* normals = frames + kFrameFloats * count();
+  ForRanges(parallel, triangles_.size() / 3, kFrameGrain, [&](std::size_t begin, std::size_t end) {
+    RunTriangleNormals(triangles_.data(), points, begin, end, normals);
+  });
+  ForRanges(parallel, count(), kFrameGrain, [&](std::size_t begin, std::size_t end) {
+    RunDriverFrames(run, points, normals, begin, end, frames);
+  });
 }
 
 }  // namespace kpsa

@@ -14,6 +14,7 @@
 #include "base/matrix.h"
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
+#include "nodes/kernels/wrap_run.h"
 
 namespace kpsa {
 
@@ -34,7 +35,10 @@ class DriverFrames {
   std::size_t count() const { return edge_offsets_.size() - 1; }
   // Of one frame: whether it exists.
   bool exists(std::size_t frame) const { return edge_offsets_[frame + 1] > edge_offsets_[frame]; }
-  // points: the in_points now, x y z 0 each, 16-byte aligned. frames: those that do not exist are left alone.
+  // For the frames, and normals on the way.
+  std::size_t Floats() const { return kFrameFloats * count() + 4 * (triangles_.size() / 3); }
+  // points: the in_points now, x y z 0 each. frames [Floats()]: count() frames first; those that do not exist
+  // are left alone. Both 16-byte aligned.
   void Run(const float* points, float* frames, const Parallel* parallel = nullptr) const noexcept;
 
  private:
@@ -42,7 +46,8 @@ class DriverFrames {
   std::vector<Index> edge_offsets_ = {0}, triangle_offsets_ = {0};
   std::vector<Index> edge_points_;  // entry of points
   std::vector<float> duals_;        // M^-1 e, 4 an edge
-  std::vector<Index> triangles_;    // 3 entries of points a triangle around the point
+  std::vector<Index> around_;       // triangles around the point
+  std::vector<Index> triangles_;    // 3 entries of points each
   std::vector<float> normal_duals_;
 };
 

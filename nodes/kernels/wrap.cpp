@@ -61,7 +61,7 @@ WrapKernel::WrapKernel(WrapMode mode, const Topology& driver, std::span<const Do
   }
 
   // The rest side, by what computes the present one
-  AlignedFloats points(4 * in_count_ + 16), frames(kFrameFloats * frames_.count() + 16);
+  AlignedFloats points(4 * in_count_ + 16), frames(frames_.Floats() + 16);
   for (std::size_t i = 0; i < in_count_; ++i) {
     for (int k = 0; k < 3; ++k)
       points.data()[4 * i + static_cast<std::size_t>(k)] = static_cast<float>(driver_rest[in_points[i]][k]);
@@ -93,9 +93,7 @@ WrapKernel::WrapKernel(WrapMode mode, const Topology& driver, std::span<const Do
                  points.data(), frames.data(), 0, count_, rest_.data());
 }
 
-std::size_t WrapKernel::ScratchFloats() const {
-  return (4 * in_count_ + 15) / 16 * 16 + kFrameFloats * frames_.count();
-}
+std::size_t WrapKernel::ScratchFloats() const { return (4 * in_count_ + 15) / 16 * 16 + frames_.Floats(); }
 
 void WrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
                      const Parallel* parallel) const noexcept {

@@ -14,18 +14,25 @@ namespace HWY_NAMESPACE {
 
 constexpr float kFoldedSquare = 1e-10f;  // of the tangents' lengths, squared
 
-void FramesOf(const FramesRun& run, const float* HWY_RESTRICT driver, std::size_t begin, std::size_t end,
-              float* HWY_RESTRICT frames) {
+void NormalsOf(const Index* HWY_RESTRICT triangles, const float* HWY_RESTRICT driver, std::size_t begin,
+               std::size_t end, float* HWY_RESTRICT normals) {
+  for (std::size_t t = begin; t < end; ++t) {
+    const Index* corner = triangles + 3 * t;
+    const F4 a = Load4(driver + 4 * std::size_t{corner[0]});
+    const F4 b = Sub4(Load4(driver + 4 * std::size_t{corner[1]}), a);
+    const F4 c = Sub4(Load4(driver + 4 * std::size_t{corner[2]}), a);
+    Store4(Cross4(b, c), normals + 4 * t);
+  }
+}
+
+void FramesOf(const FramesRun& run, const float* HWY_RESTRICT driver, const float* HWY_RESTRICT normals,
+              std::size_t begin, std::size_t end, float* HWY_RESTRICT frames) {
   for (std::size_t f = begin; f < end; ++f) {
     const Index first = run.edge_offsets[f], last = run.edge_offsets[f + 1];
     if (first == last) continue;
     F4 sum = Zero4();
-    for (Index t = run.triangle_offsets[f]; t < run.triangle_offsets[f + 1]; t += 3) {
-      const F4 a = Load4(driver + 4 * std::size_t{run.triangles[t]});
-      const F4 b = Sub4(Load4(driver + 4 * std::size_t{run.triangles[t + 1]}), a);
-      const F4 c = Sub4(Load4(driver + 4 * std::size_t{run.triangles[t + 2]}), a);
-      sum = Add4(sum, Cross4(b, c));
-    }
+    for (Index t = run.triangle_offsets[f]; t < run.triangle_offsets[f + 1]; ++t)
+      sum = Add4(sum, Load4(normals + 4 * std::size_t{run.around[t]}));
     alignas(16) float n[4];
     Store4(sum, n);
     const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
@@ -207,13 +214,18 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace kpsa {
 
+HWY_EXPORT(NormalsOf);
 HWY_EXPORT(FramesOf);
 HWY_EXPORT(Places);
 HWY_EXPORT(Wrap);
 
-void RunDriverFrames(const FramesRun& run, const float* driver, std::size_t begin, std::size_t end,
-                     float* frames) noexcept {
-  HWY_DYNAMIC_DISPATCH(FramesOf)(run, driver, begin, end, frames);
+void RunTriangleNormals(const Index* triangles, const float* driver, std::size_t begin, std::size_t end,
+                        float* normals) noexcept {
+  HWY_DYNAMIC_DISPATCH(NormalsOf)(triangles, driver, begin, end, normals);
+}
+void RunDriverFrames(const FramesRun& run, const float* driver, const float* normals, std::size_t begin,
+                     std::size_t end, float* frames) noexcept {
+  HWY_DYNAMIC_DISPATCH(FramesOf)(run, driver, normals, begin, end, frames);
 }
 void FindWrapPlaces(const WrapRun& run, const float* driver, const float* frames, std::size_t begin,
                     std::size_t end, float* places) noexcept {

@@ -16,7 +16,7 @@ struct FramesRun {
   const Index *own, *edge_offsets, *triangle_offsets;  // by frame
   const Index* edge_points;
   const float* duals;         // by edge
-  const Index* triangles;     // 3 a triangle
+  const Index* around;        // triangles around the point
   const float* normal_duals;  // by frame
 };
 
@@ -32,9 +32,12 @@ struct WrapRun {
   bool snaps, stretches;  // kSnap, kSurface
 };
 
-// driver: in_points as x y z 0. frames: kFrameFloats each.
-void RunDriverFrames(const FramesRun& run, const float* driver, std::size_t begin, std::size_t end,
-                     float* frames) noexcept;
+// driver: in_points as x y z 0. triangles: 3 points each; normals: 4 floats each, twice the area long.
+void RunTriangleNormals(const Index* triangles, const float* driver, std::size_t begin, std::size_t end,
+                        float* normals) noexcept;
+// frames: kFrameFloats each.
+void RunDriverFrames(const FramesRun& run, const float* driver, const float* normals, std::size_t begin,
+                     std::size_t end, float* frames) noexcept;
 // The 13 rows of these points; `run` without rest and weights.
 void FindWrapPlaces(const WrapRun& run, const float* driver, const float* frames, std::size_t begin,
                     std::size_t end, float* places) noexcept;

@@ -102,6 +102,37 @@ TEST(CueChoice, NoiseKeepsSmallSurprisesSmall) {
   EXPECT_LT(moved(fold.noise), kTolerance);
 }
 
+// Two places: the stage, which does not see the folds, and the outputs, which do.
+std::vector<CueRef> ChooseAmongPlaces(const Fold& fold, double output_cost, double miss_cost) {
+  CueChoiceOptions options{.rows = 20, .min_points = 4, .tolerance = kTolerance, .miss_cost = miss_cost};
+  CuePlace stage{{}, 10}, outputs{{}, output_cost};
+  for (Index i = 0; i < kPoints; ++i) {
+    stage.points.push_back({CueKind::kStage, i});
+    outputs.points.push_back({CueKind::kOutput, i});
+  }
+  options.places = {stage, outputs};
+  std::vector<CueRef> chosen = ChooseCues(fold.pca, fold.positions, fold.noise, fold.poses, options);
+  std::erase_if(chosen, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
+  return chosen;
+}
+bool AllOf(const std::vector<CueRef>& cues, CueKind kind) {
+  return std::all_of(cues.begin(), cues.end(), [&](const CueRef& cue) { return cue.kind == kind; });
+}
+
+TEST(CueChoice, AnEarlierPlaceIsTakenWhereItSeesEnough) {
+  const std::vector<CueRef> chosen = ChooseAmongPlaces(Fold(0), 100, 1000);
+  ASSERT_FALSE(chosen.empty());
+  EXPECT_TRUE(AllOf(chosen, CueKind::kStage));
+}
+
+TEST(CueChoice, ALaterPlaceIsTakenWhereMissesWouldCostMore) {
+  const std::vector<CueRef> chosen = ChooseAmongPlaces(Fold(3), 100, 1000);
+  ASSERT_FALSE(chosen.empty());
+  EXPECT_TRUE(AllOf(chosen, CueKind::kOutput));
+  // Four in ten poses fold: misses that cost little are the better bargain
+  EXPECT_FALSE(AllOf(ChooseAmongPlaces(Fold(3), 100, 20), CueKind::kOutput));
+}
+
 TEST(CueChoice, PaperModeTakesTwoPointsAMode) {
   const Fold fold(0);
   const std::vector<CueRef> cues = ChoosePaperCues(fold.pca, fold.positions, 1.0);

@@ -1,0 +1,24 @@
+// Where points may be measured: at the outputs, or at earlier stages of the deformer stack, which cost less.
+// A point before a deltaMush needs no neighbours; one before a wrap needs no driver. What a place costs is
+// what the compiler keeps for a few points there, by the costs that the nodes declare (NodeBuilder::cost).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "kpsa/cue_choice.h"
+#include "kpsa/pose_recorder.h"
+
+namespace kpsa {
+
+struct CuePlaces {
+  std::vector<CandidateStage> stages;  // whose points are recorded besides the outputs
+  std::vector<CuePlace> places;        // the cheapest first
+  double full_cost = 0;                // of all outputs (ns)
+};
+
+// The dearest place is, for each mesh, the latest stage at which a point costs little more than itself; the
+// others cost less and less. totals: points of each mesh.
+Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals);
+
+}  // namespace kpsa
