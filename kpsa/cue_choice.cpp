@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "kpsa/calibration.h"
 #include "kpsa/estimator.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/varimax.h"
@@ -61,16 +62,14 @@ class Chooser {
     std::vector<CueRef> best;
     double least = std::numeric_limits<double>::infinity();
     for (const CuePlace& place : places) {
-      if (place.cost >= least) break;
       chosen_.clear();
       SelectInRounds(place.points);
       if (chosen_.empty()) continue;
       AddPoints(place.points);
-      if (places.size() == 1) break;
-      const PointSurvey survey = Survey(chosen_);
-      const double beyond = static_cast<double>(survey.poses_beyond) / static_cast<double>(survey.poses);
-      const double cost = place.cost + beyond * options_.miss_cost;
-      if (cost < least) least = cost, best = chosen_;
+      if (places.size() == 1 || options_.judges == nullptr) break;
+      const double cost = place.cost + Misses(chosen_) * options_.miss_cost;
+      if (cost >= least) break;  // earlier ones see even less
+      least = cost, best = chosen_;
     }
     if (!best.empty()) chosen_ = std::move(best);
     const bool early = std::any_of(chosen_.begin(), chosen_.end(),
@@ -84,6 +83,45 @@ class Chooser {
     const CueSet cues = MakeCueSet(pca_, chosen, noise_);
     return SurveyPoints(pca_, cues, MapEstimator(pca_, cues), poses_,
                         std::max<std::size_t>(1, poses_.poses() / kErrorPoses), options_.tolerance);
+  }
+
+  // Share of the poses that SoftCache would not accept, calibrated with the judges: of these, which are new,
+  // and of the training poses, among them the frames of clips, in equal parts.
+  double Misses(const std::vector<CueRef>& chosen) const {
+    const CueSet cues = MakeCueSet(pca_, chosen, noise_);
+    const Estimator estimator = MapEstimator(pca_, cues);
+    const Eigen::MatrixXd trained = Measured(cues, poses_), judges = Measured(cues, *options_.judges);
+    const SoftCacheModel model = MakeSoftCacheModel(estimator, cues, trained);
+    const PointSurvey survey = SurveyPoints(pca_, cues, estimator, *options_.judges, 1);
+    std::vector<CalibrationPair> pairs;
+    for (const double error : survey.by_pose) pairs.push_back({0, error});
+    const std::vector<double> scores = Scores(model, judges);
+    for (std::size_t t = 0; t < pairs.size(); ++t) pairs[t].score = scores[t];
+    const SoftCacheThreshold threshold =
+        Calibrate(pairs, options_.tolerance, options_.violation_rate).threshold;
+    const auto missed = [&](const std::vector<double>& of) {
+      return static_cast<double>(
+                 std::ranges::count_if(of, [&](double score) { return !(score <= threshold.tau_lo()); })) /
+             static_cast<double>(of.size());
+    };
+    return (missed(scores) + missed(Scores(model, trained))) / 2;
+  }
+  static std::vector<double> Scores(const SoftCacheModel& model, const Eigen::MatrixXd& measured) {
+    SoftCacheThreshold always;
+    always.tau = std::numeric_limits<double>::infinity();
+    AlignedArray<float> y(model.padded_rows()), g(model.padded_rows());
+    std::vector<double> scores;
+    for (Eigen::Index t = 0; t < measured.cols(); ++t) {
+      Eigen::Map<Eigen::VectorXf>(y.data(), measured.rows()) = measured.col(t).cast<float>();
+      scores.push_back(Judge(model, always, y.span(), g.span()).score);
+    }
+    return scores;
+  }
+  Eigen::MatrixXd Measured(const CueSet& cues, const PoseMatrix& poses) const {
+    Eigen::MatrixXd measured(cues.rows(), static_cast<Eigen::Index>(poses.poses()));
+    for (std::size_t t = 0; t < poses.poses(); ++t)
+      measured.col(static_cast<Eigen::Index>(t)) = MeasuredCues(pca_.layout, cues, poses.row(t));
+    return measured;
   }
 
   // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them.
@@ -124,11 +162,12 @@ class Chooser {
 
   void AddWorstPoints() {
     PointSurvey survey = Survey(chosen_);
-    const std::size_t before = survey.poses_beyond;
-    if (static_cast<double>(before) < kHopeless * static_cast<double>(survey.poses)) return;
+    const std::size_t before = survey.poses_beyond(options_.tolerance);
+    if (static_cast<double>(before) < kHopeless * static_cast<double>(survey.poses())) return;
     const auto most = static_cast<std::size_t>(kWorstShare * static_cast<double>(pca_.layout.points));
     std::vector<CueRef> more = chosen_;
-    for (std::size_t round = 0; round < kWorstRounds && survey.poses_beyond > 0; ++round) {
+    for (std::size_t round = 0; round < kWorstRounds && survey.poses_beyond(options_.tolerance) > 0;
+         ++round) {
       std::vector<Index> order(pca_.layout.points);
       std::iota(order.begin(), order.end(), Index{0});
       std::stable_sort(order.begin(), order.end(),
@@ -144,7 +183,8 @@ class Chooser {
       if (added == 0) break;
       survey = Survey(more);
     }
-    if (static_cast<double>(survey.poses_beyond) <= kWorthwhile * static_cast<double>(before))
+    if (static_cast<double>(survey.poses_beyond(options_.tolerance)) <=
+        kWorthwhile * static_cast<double>(before))
       chosen_ = std::move(more);
   }
 

@@ -21,17 +21,20 @@ struct CueChoiceOptions {
   // Where errors count by their RMS alone (light, with its noise): one round, no worst points.
   bool by_rms = false;
   std::size_t max_outputs = 0;  // output points that may become cues, spread; 0: all
-  // Where points may be measured, the cheapest place first (kpsa/cue_places.h); empty: the points of stages,
-  // or where there are none, the outputs.
+  // Where points may be measured, the dearest place first, each seeing more than the next
+  // (kpsa/cue_places.h); empty: the points of stages, or where there are none, the outputs.
   std::vector<CuePlace> places = {};
-  double miss_cost = 0;  // of the full evaluation (ns), for a pose that a place leaves beyond the tolerance
+  // With what places are compared: poses that were not trained on, centred with pca.mean, and what a miss
+  // costs (ns). Null: the first place that has cues is taken.
+  const PoseMatrix* judges = nullptr;
+  double miss_cost = 0;
+  double violation_rate = 0.01;
 };
 
 // A-optimal cues (kpsa/cue_selection.h): points of one place and scalars, in rounds: after each share of the
 // rows, points count by the largest errors that training poses still have there. The least expected squared
 // error alone leaves small regions to chance (a tongue behind teeth). The place is the one of the least
-// expected cost: of its points, and of the full evaluation for the training poses that it leaves beyond the
-// tolerance.
+// expected cost: of its points, and of the full evaluation where SoftCache would miss.
 //
 // Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
 // deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are

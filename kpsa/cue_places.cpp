@@ -10,8 +10,7 @@ namespace {
 
 constexpr std::size_t kProbePoints = 20;  // of a stage, to see what cues there would drag in
 constexpr double kMaxPointsPerCue = 1.5;  // points of a step that a local cue may cost
-constexpr std::size_t kPlaces = 6;        // at most
-constexpr double kCheaper = 0.7;          // than the place after it, each
+constexpr double kSaving = 0.01;          // of the full cost, from each place to the next
 // Candidates of a place at earlier stages, over all meshes: neighbours tell much the same, and modes are
 // found for the outputs, not for many more points of stages.
 constexpr std::size_t kStagePoints = 500;
@@ -45,25 +44,21 @@ struct PricedStage {
   double cost = 0;
 };
 
-// kPlaces stages of a mesh, the dearest first; the last ones are the same where there are fewer.
+// Stages of a mesh, the latest local one first, each cheaper than the one before by at least `saving`.
 Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* compiler,
-                                             const AccelerationTarget::MeshPoints& mesh, Index total) {
+                                             const AccelerationTarget::MeshPoints& mesh, Index total,
+                                             double saving) {
   std::vector<PricedStage> priced;
   const std::vector<Index> probe = EvenSpread(total, kProbePoints);
   const auto local = static_cast<Index>(kMaxPointsPerCue * static_cast<double>(probe.size()));
-  double limit = 0;
-  for (std::size_t stage = mesh.stages.size(); stage-- > 0 && priced.size() < kPlaces;) {
+  for (std::size_t stage = mesh.stages.size(); stage-- > 0;) {
     const Result<Kept> kept =
         KeptFor(rig, compiler, {mesh.stages[stage].points, PointSet::Of(probe, total)}, total);
     if (!kept.ok()) return kept.status();
-    if (priced.empty()) {
-      if (kept->points > local && stage > 0) continue;
-      limit = kept->cost;
-    }
-    for (; kept->cost <= limit && priced.size() < kPlaces; limit *= kCheaper)
+    if (priced.empty() ? kept->points <= local || stage == 0 : kept->cost <= priced.back().cost - saving)
       priced.push_back({stage, kept->cost});
+    if (!priced.empty() && priced.back().cost < saving) break;
   }
-  priced.resize(kPlaces, priced.back());
   return priced;
 }
 
@@ -72,27 +67,28 @@ Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* c
 Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals) {
   const auto& meshes = rig.target.meshes;
   CuePlaces result;
-  std::vector<std::vector<PricedStage>> stages;  // by mesh
-  std::size_t all = 0;
+  std::size_t all = 0, count = 0;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
-    Result<std::vector<PricedStage>> priced = PriceStages(rig, compiler, meshes[m], totals[m]);
-    if (!priced.ok()) return priced.status();
-    stages.push_back(std::move(*priced));
     const Result<Kept> full = KeptFor(rig, compiler, {meshes[m].stages.back().points, {}}, totals[m]);
     if (!full.ok()) return full.status();
     result.full_cost += full->cost;
     all += totals[m];
   }
+  std::vector<std::vector<PricedStage>> stages;  // by mesh
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    Result<std::vector<PricedStage>> priced =
+        PriceStages(rig, compiler, meshes[m], totals[m], kSaving * result.full_cost);
+    if (!priced.ok()) return priced.status();
+    count = std::max(count, priced->size());
+    stages.push_back(std::move(*priced));
+  }
   std::map<std::pair<std::size_t, std::size_t>, Index> recorded;  // mesh and stage: its first stage point
   Index next = 0;
-  for (std::size_t p = kPlaces; p-- > 0;) {
-    bool dearer = p + 1 == kPlaces;
-    for (const auto& priced : stages) dearer = dearer || priced[p].stage != priced[p + 1].stage;
-    if (!dearer) continue;
+  for (std::size_t p = 0; p < count; ++p) {
     CuePlace& place = result.places.emplace_back();
     Index output = 0;
     for (std::size_t m = 0; m < meshes.size(); output += totals[m++]) {
-      const PricedStage& stage = stages[m][p];
+      const PricedStage& stage = stages[m][std::min(p, stages[m].size() - 1)];
       place.cost += stage.cost;
       if (stage.stage + 1 == meshes[m].stages.size()) {
         for (Index i = 0; i < totals[m]; ++i) place.points.push_back({CueKind::kOutput, output + i});
@@ -100,8 +96,8 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
       }
       const std::vector<Index> points =
           EvenSpread(totals[m], std::max<std::size_t>(1, kStagePoints * totals[m] / all));
-      const auto [at, fresh] = recorded.emplace(std::pair(m, stage.stage), next);
-      if (fresh) {
+      const auto [at, first] = recorded.emplace(std::pair(m, stage.stage), next);
+      if (first) {
         result.stages.push_back({m, stage.stage, points});
         next += static_cast<Index>(points.size());
       }

@@ -13,7 +13,7 @@ namespace kpsa {
 
 struct CuePlaces {
   std::vector<CandidateStage> stages;  // whose points are recorded besides the outputs
-  std::vector<CuePlace> places;        // the cheapest first
+  std::vector<CuePlace> places;        // the dearest first
   double full_cost = 0;                // of all outputs (ns)
 };
 

@@ -167,11 +167,12 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
       y.col(static_cast<Eigen::Index>(k)) = MeasuredCues(pca.layout, cues, poses.row(chosen[k]));
     }
     const Eigen::MatrixXd reached = Multiply(a, Multiply(estimator.coordinates, y));
-    std::vector<std::atomic<bool>> beyond(chosen.size());
+    std::vector<std::atomic<double>> worst(chosen.size());
     ParallelFor(points, 512, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = 0; k < chosen.size(); ++k) {
         const float* pose = poses.row(chosen[k]).data();
         const double* estimate = reached.col(static_cast<Eigen::Index>(k)).data();
+        double most = 0;
         for (std::size_t i = begin; i < end; ++i) {
           double squared = 0;
           for (std::size_t c = components * i; c < components * (i + 1); ++c) {
@@ -179,17 +180,23 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
                 (static_cast<double>(pose[c]) - estimate[c]) * (static_cast<double>(pose[c]) - estimate[c]);
           }
           survey.largest[i] = std::max(survey.largest[i], squared);
-          if (squared <= limit * limit) continue;
-          ++survey.beyond[i];
-          beyond[k] = true;
+          survey.beyond[i] += squared > limit * limit;
+          most = std::max(most, squared);
+        }
+        double before = worst[k];
+        while (before < most && !worst[k].compare_exchange_weak(before, most)) {
         }
       }
     });
-    survey.poses += chosen.size();
-    for (const auto& is : beyond) survey.poses_beyond += is;
+    for (const auto& squared : worst) survey.by_pose.push_back(std::sqrt(squared));
   }
   for (double& value : survey.largest) value = std::sqrt(value);
   return survey;
+}
+
+std::size_t PointSurvey::poses_beyond(double limit) const {
+  return static_cast<std::size_t>(
+      std::count_if(by_pose.begin(), by_pose.end(), [&](double error) { return error > limit; }));
 }
 
 double RmsError(const std::vector<PoseErrors>& errors, std::size_t points) {

@@ -58,10 +58,11 @@ std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const
                                        const PoseMatrix& poses);
 // Errors by point, over every `stride`-th pose.
 struct PointSurvey {
-  std::vector<double> largest;   // [N] scene units
-  std::vector<Index> beyond;     // [N] poses in which the point is farther off than `limit`
-  std::size_t poses = 0;         // that were looked at
-  std::size_t poses_beyond = 0;  // in which any point is
+  std::vector<double> largest;  // [N] scene units
+  std::vector<Index> beyond;    // [N] poses in which the point is farther off than `limit`
+  std::vector<double> by_pose;  // largest error of each pose that was looked at
+  std::size_t poses() const { return by_pose.size(); }
+  std::size_t poses_beyond(double limit) const;
 };
 PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                          const PoseMatrix& poses, std::size_t stride,

@@ -24,6 +24,7 @@ constexpr double kNoiseTurn = 1e-4;        // what a cue is not trusted below: a
 constexpr double kNoiseShare = 5e-3;       // and a shift of a joint or a point, of the tolerance
 constexpr double kLightShift = 1e-4;       // metres; where the tolerance is no length: both, of a joint
 constexpr int kMaxLightModes = 120;        // that are looked at; noise is beyond
+constexpr std::size_t kJudges = 300;       // new poses that compare places for cues
 constexpr std::size_t kGroupPoints = 400;  // where the trainer looks which controls act together
 constexpr double kGroupShare = 0.2;        // of a control's largest displacement: it acts on a point
 constexpr std::size_t kGroupSize = 8;      // controls that move a point most
@@ -44,11 +45,16 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
     KPSA_RETURN_IF_ERROR(FindRanges(poses));
     PoseMatrix judges(layout_);
-    if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
+    if (of_light() && options_.mode == EstimatorMode::kMap) {
+      Split(&poses, &judges);
+    } else if (places_.size() > 1) {
+      KPSA_RETURN_IF_ERROR(sample_(kJudges, options_.seed ^ 0x2545f4914f6cdd1dull, &judges));
+    }
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
-    if (judges.poses() > 0) KeepModes(&judges);
+    if (judges.poses() > 0) judges.Subtract(pca_.mean);
+    if (of_light() && judges.poses() > 0) KeepModes(judges);
     KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
-    KPSA_RETURN_IF_ERROR(ChooseCues(poses));
+    KPSA_RETURN_IF_ERROR(ChooseCues(poses, judges));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
     Result<Subspace> subspace = Assemble(poses);
     if (!subspace.ok()) return subspace;
@@ -133,11 +139,11 @@ class Trainer {
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, poses));
       groups = FindGroups(*poses, first);
     }
-    const auto sample = [&](std::size_t count, std::uint64_t seed, PoseMatrix* to) {
+    sample_ = [this, clip_poses, groups](std::size_t count, std::uint64_t seed, PoseMatrix* to) {
       return recorder_->AddSamples(
           SamplePoses(rig_.controls, *clip_poses, groups, clips_.size(), count, seed), clips_, to);
     };
-    KPSA_RETURN_IF_ERROR(sample(options_.samples, options_.seed, poses));
+    KPSA_RETURN_IF_ERROR(sample_(options_.samples, options_.seed, poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3)
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
@@ -147,7 +153,7 @@ class Trainer {
     if (calibration == 0)
       calibration =
           static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
-    KPSA_RETURN_IF_ERROR(sample(calibration, options_.seed ^ 0x5deece66dull, held_out));
+    KPSA_RETURN_IF_ERROR(sample_(calibration, options_.seed ^ 0x5deece66dull, held_out));
     record_.calibration_poses = held_out->poses();
     return Status();
   }
@@ -233,13 +239,12 @@ class Trainer {
   }
 
   // As many modes as new poses confirm, and noise as new poses have it.
-  void KeepModes(PoseMatrix* judges) {
-    judges->Subtract(pca_.mean);
+  void KeepModes(const PoseMatrix& judges) {
     std::vector<CueRef> cues;
     for (const Index point : GoldenSpread(layout_.points, std::max<std::size_t>(options_.min_points, 100)))
       cues.push_back({CueKind::kOutput, point});
     for (Index s = 0; s < layout_.scalars; ++s) cues.push_back({CueKind::kScalar, s});
-    pca_ = TruncatedPca(pca_, ChooseModeCount(pca_, cues, noise_, *judges));
+    pca_ = TruncatedPca(pca_, ChooseModeCount(pca_, cues, noise_, judges));
     for (double& residual : pca_.row_residual)
       residual = HonestResidual(residual, pca_.poses, pca_.mode_count());
   }
@@ -286,14 +291,16 @@ class Trainer {
     return noise;
   }
 
-  Status ChooseCues(const PoseMatrix& poses) {
+  Status ChooseCues(const PoseMatrix& poses, const PoseMatrix& judges) {
     CueChoiceOptions choice;
     choice.rows = options_.rows;
     choice.min_points = options_.min_points;
     choice.tolerance = options_.tolerance;
     choice.by_rms = of_light();
     choice.places = places_;
+    choice.judges = judges.poses() > 0 ? &judges : nullptr;
     choice.miss_cost = full_cost_;
+    choice.violation_rate = options_.violation_rate;
     if (of_light()) choice.max_outputs = options_.max_candidates;
     const std::vector<CueRef> chosen = options_.mode == EstimatorMode::kPaper
                                            ? ChoosePaperCues(pca_, positions_, diagonal_)
@@ -416,6 +423,7 @@ class Trainer {
   std::vector<Index> totals_;
   std::vector<CuePlace> places_;
   double full_cost_ = 0;
+  std::function<Status(std::size_t count, std::uint64_t seed, PoseMatrix* to)> sample_;  // of the controls
   std::vector<Double3> positions_;
   std::vector<TrainedRange> ranges_;
   Pca pca_;

@@ -104,7 +104,7 @@ void AddHandle(NodeBuilder& b) {
 void AddClusterNodes(NodeRegistry& registry) {
   NodeBuilder cluster = AddDeformer(registry, "cluster", "Moves weighted points with a handle.");
   AddHandle(cluster);
-  FinishDeformer(cluster, &ComputeCluster, BindCluster).cost(200, 1);
+  FinishDeformer(cluster, &ComputeCluster, BindCluster).cost(200, 0.3f);
 
   NodeBuilder soft =
       AddDeformer(registry, "softMod", "Moves points with a handle, fading with the distance from a centre.");
@@ -113,7 +113,7 @@ void AddClusterNodes(NodeRegistry& registry) {
                   {.unit = Unit::kLength, .doc = "world space at rest; default: the handle"});
   soft.structural("falloffRadius", 0.05, {.min = 0, .unit = Unit::kLength});
   soft.enumeration("falloffCurve", {"smooth", "linear", "spline", "none"}, true);
-  FinishDeformer(soft, &ComputeCluster, BindSoftMod).cost(200, 1);
+  FinishDeformer(soft, &ComputeCluster, BindSoftMod).cost(200, 0.3f);
 }
 
 }  // namespace kpsa

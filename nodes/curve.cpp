@@ -180,7 +180,7 @@ void AddCurveNodes(NodeRegistry& registry) {
   b.structural(
       "crossingEffect", 0.0,
       {.min = 0, .max = 1, .doc = "of several curves: 0 near ones take over from far ones, 1 they add up"});
-  FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 2);
+  FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 0.8f);
 }
 
 }  // namespace kpsa

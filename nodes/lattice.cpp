@@ -168,7 +168,7 @@ void AddLatticeNode(NodeRegistry& registry) {
                {.unit = Unit::kLength,
                 .doc = "corner of the box in the stage's space at rest; default: around the members"});
   b.structural("boxMax", Double3(), {.unit = Unit::kLength});
-  FinishDeformer(b, &ComputeLattice, BindLattice, DemandLattice).cost(500, 6);
+  FinishDeformer(b, &ComputeLattice, BindLattice, DemandLattice).cost(500, 3);
 }
 
 }  // namespace kpsa

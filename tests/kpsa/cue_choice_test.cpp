@@ -17,31 +17,37 @@ constexpr double kTolerance = 1e-3;
 
 // A row of points that two controls bend; the outputs follow the stage but for the first `folded` ones, which
 // jump to the other side where the first control is large.
+PoseMatrix FoldedPoses(std::size_t folded, double jump, unsigned seed) {
+  PoseMatrix poses({.points = kPoints, .components = 3, .stage_points = kPoints, .scalars = 3});
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (std::size_t t = 0; t < kPoses; ++t) {
+    const std::span<float> row = poses.AddPose();
+    const double a = uniform(random), b = uniform(random), c = uniform(random);
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      const double u = static_cast<double>(i) / kPoints;
+      const double p[3] = {u, 0.1 * a * u, 0.1 * b * (1 - u)};
+      for (std::size_t k = 0; k < 3; ++k) {
+        row[3 * i + k] = static_cast<float>(p[k]);
+        row[3 * (kPoints + i) + k] = static_cast<float>(p[k]);
+      }
+      if (i < folded && c > 0.2) row[3 * i + 2] += static_cast<float>(jump);
+    }
+    row[6 * kPoints] = static_cast<float>(a);
+    row[6 * kPoints + 1] = static_cast<float>(b);
+    row[6 * kPoints + 2] = static_cast<float>(1e-7 * c);  // noise that happens to say when points jump
+  }
+  return poses;
+}
+
 struct Fold {
   explicit Fold(std::size_t folded, double jump = 0.01)
-      : poses({.points = kPoints, .components = 3, .stage_points = kPoints, .scalars = 3}) {
-    std::mt19937 random(1);
-    std::uniform_real_distribution<double> uniform(-1, 1);
-    for (std::size_t t = 0; t < kPoses; ++t) {
-      const std::span<float> row = poses.AddPose();
-      const double a = uniform(random), b = uniform(random), c = uniform(random);
-      for (std::size_t i = 0; i < kPoints; ++i) {
-        const double u = static_cast<double>(i) / kPoints;
-        const double p[3] = {u, 0.1 * a * u, 0.1 * b * (1 - u)};
-        for (std::size_t k = 0; k < 3; ++k) {
-          row[3 * i + k] = static_cast<float>(p[k]);
-          row[3 * (kPoints + i) + k] = static_cast<float>(p[k]);
-        }
-        if (i < folded && c > 0.2) row[3 * i + 2] += static_cast<float>(jump);
-      }
-      row[6 * kPoints] = static_cast<float>(a);
-      row[6 * kPoints + 1] = static_cast<float>(b);
-      row[6 * kPoints + 2] = static_cast<float>(1e-7 * c);  // noise that happens to say when points jump
-    }
+      : poses(FoldedPoses(folded, jump, 1)), judges(FoldedPoses(folded, jump, 2)) {
     for (std::size_t i = 0; i < 2 * kPoints; ++i)
       positions.push_back({static_cast<double>(i % kPoints) / kPoints, 0, 0});
     const Eigen::VectorXd mean = poses.Mean();
     poses.Subtract(mean);
+    judges.Subtract(mean);
     pca = *ComputePca(poses, mean, {.max_modes = 20});
     noise.scalars = {0, 0, 1e-8};
   }
@@ -54,7 +60,7 @@ struct Fold {
     return *std::max_element(survey.largest.begin(), survey.largest.end());
   }
 
-  PoseMatrix poses;
+  PoseMatrix poses, judges;
   std::vector<Double3> positions;
   Pca pca;
   CueNoise noise{1.0};
@@ -102,15 +108,20 @@ TEST(CueChoice, NoiseKeepsSmallSurprisesSmall) {
   EXPECT_LT(moved(fold.noise), kTolerance);
 }
 
-// Two places: the stage, which does not see the folds, and the outputs, which do.
+// Two places: the outputs, which see the folds, and the stage, which does not.
 std::vector<CueRef> ChooseAmongPlaces(const Fold& fold, double output_cost, double miss_cost) {
-  CueChoiceOptions options{.rows = 20, .min_points = 4, .tolerance = kTolerance, .miss_cost = miss_cost};
+  CueChoiceOptions options{.rows = 20,
+                           .min_points = 4,
+                           .tolerance = kTolerance,
+                           .judges = &fold.judges,
+                           .miss_cost = miss_cost,
+                           .violation_rate = 0.05};
   CuePlace stage{{}, 10}, outputs{{}, output_cost};
   for (Index i = 0; i < kPoints; ++i) {
     stage.points.push_back({CueKind::kStage, i});
     outputs.points.push_back({CueKind::kOutput, i});
   }
-  options.places = {stage, outputs};
+  options.places = {outputs, stage};
   std::vector<CueRef> chosen = ChooseCues(fold.pca, fold.positions, fold.noise, fold.poses, options);
   std::erase_if(chosen, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
   return chosen;
