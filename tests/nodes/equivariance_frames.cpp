@@ -198,6 +198,8 @@ void AddIllumination(std::vector<NodeSetUp>* all) {
                 "the few samples of a pixel lie about the world's axes"};
   all->push_back(lit);
   lit.given[3].idle = true;
+  lit.given.push_back(
+      Setting("bounces", 1));  // those of points turn with the surface, but not what they meet
   lit.what = "at points", lit.gives = {{"pointIrradiance[0]", Moves::kNot}};
   lit.unless = 0, lit.why = "";
   all->push_back(lit);
