@@ -230,7 +230,7 @@ double TrialError(const NodeSetUp& set_up, Trial trial, const std::vector<Value>
                   const std::string& unmoved) {
   const Matrix4 motion = MotionOf(trial);
   const std::vector<Value> outputs =
-      EvaluateSetUp(set_up, (trial & kAll) != 0 ? motion : Matrix4(), motion, unmoved);
+      EvaluateSetUp(set_up, (trial & kWithRest) != 0 ? motion : Matrix4(), motion, unmoved);
   double worst = outputs.size() == unmoved_outputs.size() && !outputs.empty() ? 0 : 1e30;
   for (std::size_t i = 0; i < std::min(outputs.size(), unmoved_outputs.size()); ++i) {
     const Moves moves = set_up.gives[i % set_up.gives.size()].moves;
@@ -248,7 +248,7 @@ double TrialTolerance(const NodeSetUp& set_up, Trial trial) {
 }
 
 std::string TrialName(Trial trial) {
-  return std::string((trial & kAll) != 0 ? "rest and frame" : "frame alone") +
+  return std::string((trial & kWithRest) != 0 ? "rest and frame" : "frame alone") +
          ((trial & (kAllFar | kNowFar)) != 0 ? ", far" : ", turned");
 }
 

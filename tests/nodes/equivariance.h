@@ -40,7 +40,8 @@ struct GivenOutput {
 // The motions that a set-up goes through: of everything, or of the frame alone, while the rest pose that
 // nodes are bound to stays where it is (a character that walks).
 enum Trial : unsigned { kAllTurned = 1, kAllFar = 2, kNowTurned = 4, kNowFar = 8 };
-inline constexpr unsigned kAll = kAllTurned | kAllFar, kNow = kNowTurned | kNowFar, kEverything = kAll | kNow;
+inline constexpr unsigned kWithRest = kAllTurned | kAllFar, kFrameAlone = kNowTurned | kNowFar,
+                          kEveryTrial = kWithRest | kFrameAlone;
 
 struct NodeSetUp {
   std::string type, what;  // a node type, which of its ways to work

@@ -124,7 +124,7 @@ void AddChains(std::vector<NodeSetUp>* all) {
                      {"blend", Moves::kNot, 1.0, 0.9},
                      Setting("maintainOffset", maintain)},
                     {{"outMatrix[0]", Moves::kNot}, {"outMatrix[1]", Moves::kNot}},
-                    kNow,
+                    kFrameAlone,
                     "the curve stays where it rests, and is offset from there"});
   }
   for (const bool axis : {false, true}) {

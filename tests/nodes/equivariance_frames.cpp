@@ -77,7 +77,7 @@ void AddMatrices(std::vector<NodeSetUp>* all) {
                   "rotation",
                   {frame("inputMatrix"), Setting("useTranslate", false)},
                   {{"outputMatrix", Moves::kFrame}},
-                  kEverything,
+                  kEveryTrial,
                   "the origin takes the place of the translation"});
 }
 

@@ -39,7 +39,7 @@ void AddOwnSurfaces(std::vector<NodeSetUp>* all) {
   }
 }
 
-void AddWraps(std::vector<NodeSetUp>* all) {
+void AddWrapSetUps(std::vector<NodeSetUp>* all) {
   const std::vector<std::pair<std::string, GivenInput>> ways = {
       {"wrap", Setting("influences", 5)},
       {"wrap", Setting("maxDistance", 0.35)},
@@ -52,7 +52,7 @@ void AddWraps(std::vector<NodeSetUp>* all) {
     all->push_back(AfterSkin(type, what, DriverAfterSkin({way})));
     all->back().given[0].bound = true;  // the driver carries the points
     if (way.input == "maxDistance") {
-      all->back().unless = kNow;
+      all->back().unless = kFrameAlone;
       all->back().why = "points without a driver near them stay";
     }
     all->push_back(BeforeSkin(type, what, DriverBeforeSkin({way}), false));
@@ -60,7 +60,7 @@ void AddWraps(std::vector<NodeSetUp>* all) {
   }
 }
 
-void AddShrinkWraps(std::vector<NodeSetUp>* all) {
+void AddShrinkWrapSetUps(std::vector<NodeSetUp>* all) {
   const GivenInput axis{"axis", Moves::kDirection, Double3{0.1, 0.2, 1}, {}};
   for (const char* projection : {"closest", "vertexNormals", "parallelToAxis"}) {
     const bool along = projection == std::string("parallelToAxis");
@@ -112,7 +112,7 @@ void AddFalloffs(std::vector<NodeSetUp>* all) {
                    "a driver before its skin",
                    DriverBeforeSkin({points, Setting("radius", 0.6)}),
                    {{"outputWeights[0]", Moves::kNot}},
-                   kNow,
+                   kFrameAlone,
                    kCarriedByNobody};
   all->push_back(behind);
 }
@@ -138,7 +138,7 @@ void AddPins(std::vector<NodeSetUp>* all) {
                                             {"outNormal", Moves::kDirection},
                                             {"outTangent", Moves::kDirection}};
   all->push_back({"uvPin", "world", DriverAfterSkin(two), pins, 0, ""});
-  all->push_back({"uvPin", "before the skin", DriverBeforeSkin(two), pins, kNow, kCarriedByNobody});
+  all->push_back({"uvPin", "before the skin", DriverBeforeSkin(two), pins, kFrameAlone, kCarriedByNobody});
   NodeSetUp local{"uvPin", "local", DriverAfterSkin(two), pins, 0, ""};
   local.given.push_back(Setting("relativeSpaceMode", "local"));
   all->push_back(local);
@@ -148,7 +148,8 @@ void AddPins(std::vector<NodeSetUp>* all) {
   for (GivenOutput& pin : custom.gives) pin.moves = Moves::kNot;
   all->push_back(custom);
   all->push_back({"follicle", "", DriverAfterSkin(one), follows, 0, ""});
-  all->push_back({"follicle", "before the skin", DriverBeforeSkin(one), follows, kNow, kCarriedByNobody});
+  all->push_back(
+      {"follicle", "before the skin", DriverBeforeSkin(one), follows, kFrameAlone, kCarriedByNobody});
   all->push_back({"follicle", "in a face",
                   DriverAfterSkin({Setting("face", 4), Setting("barycentric", Double3{0.6, 0.1, 0.3})}),
                   follows, 0, ""});
@@ -159,8 +160,8 @@ void AddPins(std::vector<NodeSetUp>* all) {
 std::vector<NodeSetUp> SurfaceSetUps() {
   std::vector<NodeSetUp> all;
   AddOwnSurfaces(&all);
-  AddWraps(&all);
-  AddShrinkWraps(&all);
+  AddWrapSetUps(&all);
+  AddShrinkWrapSetUps(&all);
   AddFalloffs(&all);
   AddPins(&all);
   return all;

@@ -43,7 +43,7 @@ TEST(RigidMotion, MovesWhatNodesGive) {
 // The canary: what the table says of an input is seen in the outputs.
 TEST(RigidMotion, ShowsInputsThatAreLeftBehind) {
   for (const NodeSetUp& set_up : AllSetUps()) {
-    if (set_up.unless == kEverything) continue;
+    if (set_up.unless == kEveryTrial) continue;
     const std::vector<Value> outputs = EvaluateSetUp(set_up, Matrix4(), Matrix4());
     for (const GivenInput& input : set_up.given) {
       if (input.moves == Moves::kNot) continue;
