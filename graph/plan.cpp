@@ -5,8 +5,9 @@ namespace kpsa {
 Index Plan::FindVarying(const PlugRef& plug) const {
   for (Index v = 0; v < varying_.size(); ++v) {
     const PlugRef& p = varying_[v].plug;
-    if (p.node == plug.node && p.attribute == plug.attribute &&
-        (p.element == plug.element || IsPointType(varying_[v].type)))
+    // Of points that are no array, an element is one of them
+    const bool points = p.element < 0 && IsPointType(varying_[v].type);
+    if (p.node == plug.node && p.attribute == plug.attribute && (p.element == plug.element || points))
       return v;
   }
   return kNoIndex;

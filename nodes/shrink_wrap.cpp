@@ -53,6 +53,7 @@ void DemandShrinkWrap(Demand& demand) {
 
 struct ShrinkWrapBound {
   ShrinkWrapKernel kernel;
+  CarriedFrame frame;
   double scale;  // stage lengths of a world length 1
 };
 
@@ -75,7 +76,7 @@ Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
   ShrinkWrapBound bound{
       ShrinkWrapKernel(*settings, *driver->topology, driver->rest->tree, driver->stage_from_driver, *own,
                        out.ToVector(), in.ToVector(), BoundWeights(binding)),
-      1 / frame->WorldScale()};
+      *frame, 1 / frame->WorldScale()};
   const std::size_t scratch = bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
 }
@@ -83,7 +84,8 @@ Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
 void ComputeShrinkWrap(ComputeContext& c) {
   const auto& bound = c.kernel_as<ShrinkWrapBound>();
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kOffset) * bound.scale, c.points(kDriverPoints)},
+  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kOffset) * bound.scale, c.points(kDriverPoints),
+                    bound.frame.Motion(c.get<Matrix4>(kParentMatrix))},
                    c.points(kInPoints), c.out_points(0), ScratchSpan(c, bound.kernel.ScratchFloats()),
                    &parallel);
 }
@@ -92,6 +94,7 @@ void ComputeShrinkWrap(ComputeContext& c) {
 
 void AddShrinkWrapNode(NodeRegistry& registry) {
   NodeBuilder b = AddDeformer(registry, "shrinkWrap", "Points go onto the surface of another mesh.");
+  b.version(2);  // an axis that its parent turns
   AddDriver(b);
   b.in("offset", 0.0,
        {.unit = Unit::kLength,
@@ -99,7 +102,8 @@ void AddShrinkWrapNode(NodeRegistry& registry) {
   b.enumeration("projection", {"closest", "vertexNormals", "parallelToAxis"}, true,
                 "to the nearest place of the surface, or where the line along the point's normal or along "
                 "`axis` meets it");
-  b.structural("axis", Double3{0, 1, 0}, {.doc = "direction of parallelToAxis, world axes at rest"});
+  b.structural("axis", Double3{0, 1, 0},
+               {.doc = "direction of parallelToAxis, world axes at rest; it turns with parentMatrix"});
   b.structural("reverse", false, {.doc = "lines go against the normal or axis"});
   b.structural("bidirectional", false, {.doc = "lines go both ways; the nearer hit counts"});
   b.structural("closestIfNoIntersection", false,

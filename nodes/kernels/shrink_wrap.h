@@ -47,6 +47,7 @@ class ShrinkWrapKernel {
     double envelope = 1;
     double offset = 0;       // points' space
     ConstPointsView target;  // all of its points, in its own space
+    Matrix4 turn = {};       // of the axis since rest
   };
   // target, tree: the target's faces, the tree built at rest. own: the faces of the points that move
   // (kNormals only). in_points: sorted, at least the demand.

@@ -76,6 +76,32 @@ TEST(Evaluator, FoldsWhatDependsOnNothingThatVaries) {
   EXPECT_NE(varying.status().ToString().find("constant.a"), std::string::npos);
 }
 
+TEST(Evaluator, ElementsOfPointArraysVaryByThemselves) {
+  NodeRegistry registry;
+  registry.add("last", "Coordinates of two.")
+      .points_in("sheets")
+      .array()
+      .out("out", Type::kDouble)
+      .compute([](ComputeContext& c) {
+        const ArrayView<ConstPointsView> sheets = c.array<ConstPointsView>(0);
+        c.out_value<double>(0) = 10.0 * sheets[0].x[0] + sheets[1].x[0];
+      })
+      .demand([](Demand& demand) {
+        for (int i : {0, 1}) demand.Require("sheets", i, PointSet::All(1));
+      });
+  TestGraph g(registry);
+  const auto at = [](float x) {
+    return std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(std::vector<float>{x, 0, 0}));
+  };
+  g.add("last", "n", {{"sheets[0]", PointBufferPtr(at(1))}, {"sheets[1]", PointBufferPtr(at(2))}});
+  for (const char* plug : {"n.sheets[0]", "n.sheets[1]"}) g.vary(plug);
+  EXPECT_EQ(g.pull<double>("n.out"), 12);
+  g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("n.sheets[1]")), at(5)->view());
+  EXPECT_EQ(g.pull<double>("n.out"), 15);
+  g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("n.sheets[0]")), at(3)->view());
+  EXPECT_EQ(g.pull<double>("n.out"), 35);
+}
+
 TEST(Evaluator, ChildrenOfVectorsAsSourcesAndDestinations) {
   TestGraph g(ToyRegistry());
   g.add("scale3", "s", {{"input", Double3{1, 2, 3}}, {"factor", 2.0}});
