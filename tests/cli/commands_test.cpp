@@ -367,7 +367,7 @@ TEST(Render, ACameraSeesLightAfterBounces) {
     rig.replace(at, from.size(), to);
   };
   replace("room.glb", KPSA_SCENES_DIR "/gi/room.glb");
-  replace("width: 400, height: 400", "width: 20, height: 20");
+  replace("width: 400, height: 400, samples: 16", "width: 20, height: 20, samples: 8");
   replace("samples: 40, keyPoints: 200, heldOut: 25", "samples: 20, keyPoints: 30");
   folder.Write("carried.yaml", rig);
   Ok({"render", folder / "carried.yaml", "--camera", "front", "--times", "1", "-o", folder / "carried.png"});
