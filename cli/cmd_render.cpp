@@ -19,7 +19,8 @@ constexpr std::size_t kMaxPictures = 24;
 
 struct RenderFlags : Flags {
   AccelerationFlags acceleration;
-  std::optional<std::string> size, azimuth, elevation, turntable, error_scale, camera, exposure, layer;
+  std::optional<std::string> size, azimuth, elevation, turntable, error_scale, camera, exposure, layer,
+      shrink;
 };
 
 struct View {
@@ -74,9 +75,11 @@ CommandResult WritePicture(const RenderFlags& flags, const Image& picture) {
 // What only one of the two ways of taking pictures knows.
 Status CheckCameraFlags(const RenderFlags& flags) {
   if (!flags.camera.has_value()) {
-    if (flags.exposure.has_value() || flags.layer.has_value())
-      return Status::Usage("{} is of no use without --camera",
-                           flags.exposure.has_value() ? "--exposure" : "--layer");
+    const char* const given = flags.exposure.has_value() ? "--exposure"
+                              : flags.layer.has_value()  ? "--layer"
+                              : flags.shrink.has_value() ? "--shrink"
+                                                         : nullptr;
+    if (given != nullptr) return Status::Usage("{} is of no use without --camera", given);
     return Status();
   }
   const char* const given = flags.size.has_value()          ? "--size"
@@ -110,6 +113,13 @@ Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const Render
             : *flags.layer == "indirect" ? CameraLayer::kIndirect
                                          : layer;
   }
+  int shrink = 1;
+  if (flags.shrink.has_value()) {
+    const auto least = static_cast<int>(std::min(view->width, view->height));
+    const Result<int> times = ParseCount("--shrink", *flags.shrink, 1, least);
+    if (!times.ok()) return times.status();
+    shrink = *times;
+  }
   const Result<std::vector<CameraImage>> full = EvaluateCamera(rig, compiler, *view, times, options);
   if (!full.ok()) return full.status();
   std::vector<Image> rows, row;
@@ -125,6 +135,7 @@ Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const Render
       Image error = LightError((*full)[f], (*fast)[f], error_max);
       std::vector<Image> three = {Develop((*full)[f], exposure, layer), Develop((*fast)[f], exposure, layer),
                                   std::move(error)};
+      for (Image& image : three) image = Shrunk(image, shrink);
       DrawTitle(three[0], "full"), DrawTitle(three[1], "accelerated");
       DrawTitle(three[2], fmt::format("error, 0 .. {:.3g}", error_max));
       rows.push_back(SideBySide(three));
@@ -132,7 +143,7 @@ Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const Render
     return rows;
   }
   for (const CameraImage& picture : *full) {
-    row.push_back(Develop(picture, exposure, layer));
+    row.push_back(Shrunk(Develop(picture, exposure, layer), shrink));
     if (row.size() == 6) rows.push_back(SideBySide(row)), row.clear();
   }
   if (!row.empty()) rows.push_back(SideBySide(row));
@@ -255,6 +266,8 @@ void AddRenderCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--exposure", "FACTOR", &flags->exposure, "of a camera's picture; 1 if not given");
   AddOption(command, "--layer", "all|direct|indirect", &flags->layer,
             "of a camera's picture; all if not given");
+  AddOption(command, "--shrink", "N", &flags->shrink,
+            "a camera's picture N times smaller: each pixel is the mean of N x N");
   AddThreadsFlag(command, flags.get());
   AddQuietFlag(command, flags.get());
 }

@@ -70,7 +70,6 @@ int TextWidth(std::string_view text, int scale) {
   return stb_easy_font_width(line.data()) * scale;
 }
 
-
 Rgb TurboColor(double t) {
   if (std::isnan(t)) return {128, 128, 128};
   t = std::clamp(t, 0.0, 1.0);
@@ -131,6 +130,24 @@ Image SideBySide(std::span<const Image> images, int gap) {
       for (int column = 0; column < image.width; ++column) out.Set(x + column, row, image.At(column, row));
     }
     x += image.width + gap;
+  }
+  return out;
+}
+
+Image Shrunk(const Image& image, int times) {
+  Image out(image.width / times, image.height / times, kGround);
+  const int count = times * times;
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      std::array<int, 3> sum = {};
+      for (int i = 0; i < count; ++i) {
+        const Rgb from = image.At(times * x + i % times, times * y + i / times);
+        for (std::size_t k = 0; k < 3; ++k) sum[k] += from[k];
+      }
+      Rgb mean;
+      for (std::size_t k = 0; k < 3; ++k) mean[k] = static_cast<std::uint8_t>((sum[k] + count / 2) / count);
+      out.Set(x, y, mean);
+    }
   }
   return out;
 }

@@ -44,6 +44,10 @@ void DrawTitle(Image& image, std::string_view title);
 // The pictures in one row on a common ground, `gap` pixels apart, tops aligned.
 Image SideBySide(std::span<const Image> images, int gap = 4);
 
+// The picture `times` smaller: each pixel is the mean of times x times; what is left over at the right and
+// the bottom is cut off.
+Image Shrunk(const Image& image, int times);
+
 // "0.213 mm": three significant digits.
 std::string Millimetres(double metres);
 

@@ -367,7 +367,7 @@ TEST(Render, ACameraSeesLightAfterBounces) {
     rig.replace(at, from.size(), to);
   };
   replace("room.glb", KPSA_SCENES_DIR "/gi/room.glb");
-  replace("width: 400, height: 400", "width: 20, height: 20");
+  replace("width: 400, height: 400, samples: 16", "width: 20, height: 20, samples: 8");
   replace("samples: 40, keyPoints: 200, heldOut: 25", "samples: 20, keyPoints: 30");
   folder.Write("carried.yaml", rig);
   Ok({"render", folder / "carried.yaml", "--camera", "front", "--times", "1", "-o", folder / "carried.png"});
@@ -380,6 +380,14 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_NE(TemporaryFolder::Read(folder / "all.png"), TemporaryFolder::Read(folder / "carried.png"));
   EXPECT_EQ(RunKpsa({"render", path, "--camera", "fron", "-o", folder / "no.png"}).exit_code, 2);
   EXPECT_EQ(RunKpsa({"render", path, "--exposure", "2", "-o", folder / "no.png"}).exit_code, 2);
+  EXPECT_EQ(RunKpsa({"render", path, "--shrink", "2", "-o", folder / "no.png"}).exit_code, 2);
+  EXPECT_NE(RunKpsa({"render", path, "--camera", "front", "--shrink", "21", "-o", folder / "no.png"})
+                .err.find("from 1 to 20"),
+            std::string::npos);
+  EXPECT_NE(RunKpsa({"render", path, "--camera", "front", "--frames", "0:1", "--shrink", "3", "-o",
+                     folder / "small.png"})
+                .err.find("16 x 6"),
+            std::string::npos);
 
   Ok({"train", path, "--rows", "90", "--modes", "12", "--calibration", "40"});
   const Json bench = Json::parse(Ok({"bench", path, "--runs", "1", "--tolerance", "1000", "--json"}));

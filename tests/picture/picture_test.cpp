@@ -265,6 +265,19 @@ TEST(Image, SideBySideKeepsThePixels) {
   EXPECT_EQ(SideBySide({}).width, 0);
 }
 
+TEST(Image, ShrunkPixelsAreMeans) {
+  Image image(5, 4, {9, 9, 9});
+  image.Fill(0, 0, 2, 2, {10, 20, 255});
+  image.Set(1, 1, {11, 22, 0});
+  image.Fill(4, 0, 1, 4, {200, 200, 200});  // left over
+  const Image small = Shrunk(image, 2);
+  EXPECT_EQ(small.width, 2);
+  EXPECT_EQ(small.height, 2);
+  EXPECT_EQ(small.At(0, 0), (Rgb{10, 21, 191}));
+  EXPECT_EQ(small.At(1, 1), (Rgb{9, 9, 9}));
+  EXPECT_EQ(Shrunk(image, 1).rgb, image.rgb);
+}
+
 TEST(Image, LengthsKeepThreeDigits) {
   EXPECT_EQ(Millimetres(0), "0.000 mm");
   EXPECT_EQ(Millimetres(0.000213), "0.213 mm");
