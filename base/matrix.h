@@ -8,8 +8,15 @@ namespace kpsa {
 Matrix4 operator*(const Matrix4& a, const Matrix4& b);
 
 // m applied to a point (w = 1) and to a direction (w = 0). The last row is taken as (0, 0, 0, 1).
-Double3 TransformPoint(const Matrix4& m, Double3 p);
-Double3 TransformVector(const Matrix4& m, Double3 v);
+inline Double3 TransformPoint(const Matrix4& m, Double3 p) {
+  return {m(0, 0) * p.x + m(0, 1) * p.y + m(0, 2) * p.z + m(0, 3),
+          m(1, 0) * p.x + m(1, 1) * p.y + m(1, 2) * p.z + m(1, 3),
+          m(2, 0) * p.x + m(2, 1) * p.y + m(2, 2) * p.z + m(2, 3)};
+}
+inline Double3 TransformVector(const Matrix4& m, Double3 v) {
+  return {m(0, 0) * v.x + m(0, 1) * v.y + m(0, 2) * v.z, m(1, 0) * v.x + m(1, 1) * v.y + m(1, 2) * v.z,
+          m(2, 0) * v.x + m(2, 1) * v.y + m(2, 2) * v.z};
+}
 
 // General inverse by cofactors; a singular matrix (|det| == 0 or not finite) gives the zero matrix and
 // `false`.
