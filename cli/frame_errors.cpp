@@ -79,7 +79,7 @@ Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acc
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
   AccelerationFlags always = acceleration;
-  always.every_frame = always.with_modes = true;
+  always.every_frame = true;
   Compiler compiler;
   const Result<std::vector<AppliedSubspace>> applied = ApplyAcceleration(&rig, &compiler, always);
   if (!applied.ok()) return applied.status();
