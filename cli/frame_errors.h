@@ -25,8 +25,7 @@ using FullWeights = std::vector<std::vector<double>>;
 // That share, from the KPSA node's score.
 double EmittedFullWeight(const AppliedSubspace& applied, double score);
 
-// Evaluates the times once more, on a rig loaded anew, every frame reconstructed. acceleration.with_modes has
-// to be set.
+// Evaluates the times once more, on a rig loaded anew, every frame reconstructed.
 Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acceleration,
                                 const std::vector<double>& times, const FullWeights& weights);
 
