@@ -47,12 +47,16 @@ double BoxSquared(const float* box, Double3 p) {
   return box[0] <= box[3] ? sum : kInfinity;
 }
 
-double Scale(const float* root, Double3 p) {
+// Of a box and a place, for the rounding between them: its own, so that one far triangle costs the others
+// nothing.
+double Scale(const float* box, Double3 p) {
   double scale = 0;
   for (int a = 0; a < 3; ++a)
-    scale = std::max({scale, std::fabs(double{root[a]}), std::fabs(double{root[3 + a]}), std::fabs(p[a])});
+    scale = std::max({scale, std::fabs(double{box[a]}), std::fabs(double{box[3 + a]}), std::fabs(p[a])});
   return scale;
 }
+
+bool IsFinite(Double3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 bool Less(const SurfacePoint& a, const SurfacePoint& b) {
   return a.squared < b.squared || (a.squared == b.squared && a.triangle < b.triangle);
@@ -83,7 +87,7 @@ SurfacePoint ClosestOnTriangle(ConstPointsView points, const Index corners[3], D
   const Double3 a = At(points, corners[0]), b = At(points, corners[1]), c = At(points, corners[2]);
   const Double3 normal = Cross(b - a, c - a);
   const double square = Dot(normal, normal);
-  if (square > 0) {
+  if (square > 0 && std::isfinite(square)) {
     const double u = Dot(normal, Cross(c - b, place - b)), v = Dot(normal, Cross(a - c, place - c)),
                  w = Dot(normal, Cross(b - a, place - a));
     if (u > 0 && v > 0 && w > 0) {  // above the inside
@@ -172,9 +176,10 @@ void TriangleTree::Fit(ConstPointsView points, std::span<float> boxes) const {
       for (std::size_t k = 0; k < 3; ++k) {
         const Index i = triangles_[3 * std::size_t{order_[e]} + k];
         const float place[3] = {points.x[i], points.y[i], points.z[i]};
-        for (std::size_t a = 0; a < 3; ++a) {  // comparisons leave NaN out
-          if (place[a] < box[a]) box[a] = place[a];
-          if (place[a] > box[3 + a]) box[3 + a] = place[a];
+        if (!std::isfinite(place[0]) || !std::isfinite(place[1]) || !std::isfinite(place[2])) continue;
+        for (std::size_t a = 0; a < 3; ++a) {
+          box[a] = std::min(box[a], place[a]);
+          box[3 + a] = std::max(box[3 + a], place[a]);
         }
       }
     }
@@ -207,11 +212,12 @@ void TriangleTree::Walk(Near near, Visit visit) const {
 SurfacePoint TriangleTree::Closest(ConstPointsView points, std::span<const float> boxes, Double3 place,
                                    double max_distance) const {
   SurfacePoint best;
-  if (nodes_.empty()) return best;
-  const double scale = Scale(boxes.data(), place), limit = max_distance * max_distance;
+  const double limit = max_distance * max_distance;
+  if (!IsFinite(place) || std::isnan(limit)) return best;
   const auto near = [&](Index n) {
-    const double squared = BoxSquared(boxes.data() + 6 * std::size_t{n}, place);
-    return squared <= Slack(std::min(best.squared, limit), scale) ? squared : kInfinity;
+    const float* box = boxes.data() + 6 * std::size_t{n};
+    const double squared = BoxSquared(box, place);
+    return squared <= Slack(std::min(best.squared, limit), Scale(box, place)) ? squared : kInfinity;
   };
   Walk(near, [&](Index t) {
     SurfacePoint found = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
@@ -225,12 +231,13 @@ void TriangleTree::ClosestSeveral(ConstPointsView points, std::span<const float>
                                   std::size_t count, double max_distance,
                                   std::vector<SurfacePoint>* found) const {
   found->clear();
-  if (nodes_.empty() || count == 0) return;
-  const double scale = Scale(boxes.data(), place), limit = max_distance * max_distance;
+  const double limit = max_distance * max_distance;
+  if (count == 0 || !IsFinite(place) || std::isnan(limit)) return;
   const auto near = [&](Index n) {
-    const double squared = BoxSquared(boxes.data() + 6 * std::size_t{n}, place);
+    const float* box = boxes.data() + 6 * std::size_t{n};
+    const double squared = BoxSquared(box, place);
     const double farthest = found->size() < count ? limit : found->back().squared;
-    return squared <= Slack(farthest, scale) ? squared : kInfinity;
+    return squared <= Slack(farthest, Scale(box, place)) ? squared : kInfinity;
   };
   Walk(near, [&](Index t) {
     SurfacePoint one = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
@@ -244,10 +251,10 @@ void TriangleTree::ClosestSeveral(ConstPointsView points, std::span<const float>
 LineHit TriangleTree::FirstHit(ConstPointsView points, std::span<const float> boxes, Double3 origin,
                                Double3 direction) const {
   LineHit best;
-  if (nodes_.empty()) return best;
-  const double margin = 1e-9 * Scale(boxes.data(), origin);
+  if (!IsFinite(origin) || !IsFinite(direction)) return best;
   const auto near = [&](Index n) {
-    const double t = BoxEntry(boxes.data() + 6 * std::size_t{n}, origin, direction, margin);
+    const float* box = boxes.data() + 6 * std::size_t{n};
+    const double t = BoxEntry(box, origin, direction, 1e-9 * Scale(box, origin));
     return t <= best.t ? t : kInfinity;
   };
   constexpr double kEdge = 1e-9;  // lines through an edge miss none of its triangles

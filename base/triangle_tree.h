@@ -4,7 +4,9 @@
 // refitted to other points in memory that the caller brings: nothing is allocated after the constructor.
 // Arithmetic is plain double over the float points, every query is answered on its own, and equally near
 // triangles are told apart by their number (the lower one wins): answers depend on nothing but the points.
-// Points that are not finite take no part. Nearest place on a triangle: C. Ericson, Real-Time Collision
+// Points that are not finite take no part: of a triangle with such a corner what is near is the edge between
+// the others, and lines miss it; a query that is not finite finds nothing. None of them costs the others
+// anything. Nearest place on a triangle: C. Ericson, Real-Time Collision
 // Detection (2005), 5.1.5; lines: Moeller and Trumbore (1997).
 #pragma once
 

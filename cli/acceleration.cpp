@@ -50,11 +50,12 @@ Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std
 }
 
 // `rig`: the path of the one that is trained for it.
-Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, const std::string& path) {
+Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, const std::string& path,
+                                                     bool with_modes) {
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     return Status::Invalid("no such file; kpsa train {} writes it", rig).At({path});
-  Result<Subspace> subspace = ReadSubspace(path);
+  Result<Subspace> subspace = ReadSubspace(path, with_modes ? ReadModes::kYes : ReadModes::kNo);
   if (!subspace.ok()) return subspace.status();
   return std::make_shared<const Subspace>(std::move(*subspace));
 }
@@ -120,7 +121,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
                                                        const AccelerationFlags& flags) {
   std::vector<AppliedSubspace> applied;
   if (flags.kpsa.has_value()) {
-    const auto subspace = LoadSubspace(rig->path, *flags.kpsa);
+    const auto subspace = LoadSubspace(rig->path, *flags.kpsa, flags.with_modes);
     if (!subspace.ok()) return subspace.status();
     AppliedSubspace one;
     one.subspace = *subspace;
@@ -146,7 +147,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
             .At(entry.where);
       const auto subspace = LoadSubspace(
           entry.reference < 0 ? rig->path : rig->references[static_cast<std::size_t>(entry.reference)].file,
-          entry.subspace);
+          entry.subspace, flags.with_modes);
       if (!subspace.ok()) return subspace.status();
       AppliedSubspace one;
       one.path = entry.subspace;

@@ -19,6 +19,7 @@ struct AccelerationFlags {
   bool accelerate = false;
   std::optional<std::string> kpsa, stale, tolerance, violation_rate;
   bool every_frame = false;  // reconstruct every frame, whatever SoftCache and trained ranges say (no flag)
+  bool with_modes = false;   // Subspace::kept_modes as well, which SplitFrames needs (no flag)
   bool wanted() const { return accelerate || kpsa.has_value(); }
 };
 // --accelerate --kpsa --tolerance and the shared ones.

@@ -328,7 +328,10 @@ class Bench {
  public:
   Bench(const std::vector<AccelerationFlags>& sides, const BenchOptions& options) : options_(options) {
     contenders_.resize(sides.size());
-    for (std::size_t i = 0; i < sides.size(); ++i) contenders_[i].flags = sides[i];
+    for (std::size_t i = 0; i < sides.size(); ++i) {
+      contenders_[i].flags = sides[i];
+      contenders_[i].flags.with_modes = true;  // for SplitFrames
+    }
   }
 
   Status RunClip(const Flags& flags, const std::string& clip, Progress* progress) {

@@ -20,7 +20,7 @@
 
 namespace kpsa {
 
-inline constexpr int kSubspaceVersion = 1;
+inline constexpr int kSubspaceVersion = 2;
 inline constexpr const char* kLightUnits = "light";
 
 // Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
@@ -52,7 +52,7 @@ struct Subspace {
   double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
   std::vector<TileMap> tiles;                                       // [outputs]
   // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
-  // split errors with it (kpsa/error_split.h); no frame needs it.
+  // split errors with it (kpsa/error_split.h); no frame needs it, so it is read only where asked for.
   Eigen::MatrixXf kept_modes;
   // Empty, and tiles read y; or, where all points depend on all cues (light), Q [M x r], column by column,
   // and tiles read z = Q y.
@@ -80,7 +80,8 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
 Status WriteSubspace(const Subspace& subspace, const std::string& path);
 // Errors: as SafetensorsFile::Read; another kind of file; a newer version; any part that is missing or
 // inconsistent.
-Result<Subspace> ReadSubspace(const std::string& path);
+enum class ReadModes : std::uint8_t { kNo, kYes };  // Subspace::kept_modes, which may be most of a file
+Result<Subspace> ReadSubspace(const std::string& path, ReadModes modes = ReadModes::kNo);
 
 // Everything that changes while a subspace is used. One a thread.
 struct SubspaceScratch {

@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr char kKind[] = "kpsa-subspace";
-constexpr char kModes[] = "modes";
+constexpr char kModes[] = "modes", kModesDigest[] = "modesDigest", kLatent[] = "latent";
 constexpr std::size_t kMaxCues = 1u << 16, kMaxOutputs = 1u << 12;
 constexpr std::uint64_t kMaxPoints = 1u << 28;
 
@@ -130,8 +130,14 @@ std::span<const float> KeptModes(const Subspace& s) {
   return {s.kept_modes.data(), static_cast<std::size_t>(s.kept_modes.size())};
 }
 
-// Of all that the file says: a damaged one is refused, as numbers that are only a little wrong would not be
-// seen.
+std::string ModesDigest(const Subspace& s) {
+  Hasher hasher;
+  hasher.Add(KeptModes(s));
+  return hasher.Finish().ToHex();
+}
+
+// Of all that the file says but the kept modes, which have a digest of their own: a damaged one is refused,
+// as numbers that are only a little wrong would not be seen.
 std::string ContentDigest(const Subspace& s) {
   Hasher hasher;
   for (const auto& [key, text] : Header(s)) {
@@ -158,7 +164,6 @@ std::string ContentDigest(const Subspace& s) {
     hasher.Add(std::span<const std::uint8_t>(data.u.span()));
     hasher.Add(std::span<const float>(data.mean.span()));
   }
-  if (s.kept_modes.size() > 0) hasher.Add(KeptModes(s));
   return hasher.Finish().ToHex();
 }
 
@@ -244,7 +249,7 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
 }
 
 // Column by column: a row of the tensor is a mode.
-Status ReadModes(const SafetensorsFile& file, Subspace* s) {
+Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
   std::uint64_t rows = 0;
   for (const SubspaceOutput& output : s->outputs)
     rows += output.points * static_cast<std::uint64_t>(s->components);
@@ -252,6 +257,10 @@ Status ReadModes(const SafetensorsFile& file, Subspace* s) {
   if (!values.ok()) return values.status();
   s->kept_modes = Eigen::Map<const Eigen::MatrixXf>(values->data(), static_cast<Eigen::Index>(rows),
                                                     static_cast<Eigen::Index>(s->modes));
+  const Result<std::string> digest = file.Metadata(kModesDigest);
+  if (!digest.ok()) return digest.status();
+  if (*digest != ModesDigest(*s))
+    return Status::Invalid("{}: the file is damaged: its modes are not those that were written", file.name());
   return {};
 }
 
@@ -267,7 +276,7 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
   Add<std::uint32_t>(&writer, "cueOffsets", s.soft_cache.offsets);
   Add<float>(&writer, "factor", s.soft_cache.factor.span());
   Add<float>(&writer, "leaveOneOut", s.soft_cache.leave_one_out);
-  if (!s.latent.empty()) Add<float>(&writer, "latent", s.latent);
+  if (!s.latent.empty()) Add<float>(&writer, kLatent, s.latent);
   std::vector<double> calibration;
   for (const CalibrationPair& pair : s.calibration)
     calibration.insert(calibration.end(), {pair.score, pair.error});
@@ -290,11 +299,12 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
         kModes,
         {static_cast<std::uint64_t>(s.kept_modes.cols()), static_cast<std::uint64_t>(s.kept_modes.rows())},
         KeptModes(s));
+    writer.SetMetadata(kModesDigest, ModesDigest(s));
   }
   return writer.Write(path);
 }
 
-Result<Subspace> ReadSubspace(const std::string& path) {
+Result<Subspace> ReadSubspace(const std::string& path, ReadModes modes) {
   const Result<SafetensorsFile> read = SafetensorsFile::Read(path);
   if (!read.ok()) return read.status();
   const SafetensorsFile& file = *read;
@@ -307,8 +317,7 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   if (*version != std::to_string(kSubspaceVersion)) {
     return Status::Invalid(
         "{}: the subspace has format version {}, this program reads version {}; train it again or use the "
-        "program "
-        "that wrote it",
+        "program that wrote it",
         path, *version, kSubspaceVersion);
   }
   Subspace s;
@@ -328,9 +337,9 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   KPSA_RETURN_IF_ERROR(
       Assign(file.Values<float>("factor", {s.soft_cache.factor_size()}), &s.soft_cache.factor));
   KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
-  if (s.of_light() && rows > 0 && s.mode == EstimatorMode::kMap) {
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("latent", {kAny}), &s.latent));
-    if (s.latent.empty() || s.latent.size() % rows != 0)
+  if (file.tensors().contains(kLatent)) {
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(kLatent, {kAny}), &s.latent));
+    if (rows == 0 || s.latent.empty() || s.latent.size() % rows != 0)
       return Status::Invalid("{}: {} latent factors of {} rows", path, s.latent.size(), rows);
   }
   const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 2});
@@ -338,7 +347,8 @@ Result<Subspace> ReadSubspace(const std::string& path) {
   for (std::size_t i = 0; i + 1 < calibration->size(); i += 2)
     s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
-  if (file.tensors().contains(kModes)) KPSA_RETURN_IF_ERROR(ReadModes(file, &s));
+  if (modes == ReadModes::kYes && (file.tensors().contains(kModes) || file.metadata().contains(kModesDigest)))
+    KPSA_RETURN_IF_ERROR(ReadKeptModes(file, &s));
   if (Status status = ValidateSubspace(s); !status.ok())
     return Status::Invalid("{}: {}", path, status.ToString());
   const Result<std::string> digest = file.Metadata("digest");

@@ -26,7 +26,8 @@ struct Workplace {
 };
 
 // Tracers that no evaluation uses now. Any is as good as any other: all are built of the rest points, and
-// what rays meet depends on that layout and on where the points are, not on where they have been.
+// what rays meet depends on that layout and on where the points are, not on where they have been. There are
+// as many as evaluations have been under way at once; bind builds the first.
 class Workplaces {
  public:
   std::unique_ptr<Workplace> Take() {
@@ -38,11 +39,16 @@ class Workplaces {
   }
   void Give(std::unique_ptr<Workplace> place) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    free_.push_back(std::move(place));
+    free_.push_back(std::move(place));  // has room: see AddRoom
+  }
+  void AddRoom() {  // for one more
+    const std::lock_guard<std::mutex> lock(mutex_);
+    free_.reserve(++count_);
   }
 
  private:
   std::mutex mutex_;
+  std::size_t count_ = 0;
   std::vector<std::unique_ptr<Workplace>> free_;
 };
 
@@ -115,6 +121,16 @@ Status BindMeshes(const Binding& binding, IlluminationKernel* kernel, std::vecto
   return Status();
 }
 
+Result<std::unique_ptr<Workplace>> MakeWorkplace(const IlluminationKernel& kernel) {
+  std::vector<DiffuseLight> lights(kernel.lights.size());
+  Result<PathTracer> tracer = PathTracer::Build(std::as_const(kernel.rest).view(), kernel.triangles,
+                                                kernel.albedo, lights, kernel.unseen);
+  if (!tracer.ok()) return tracer.status();
+  kernel.workplaces->AddRoom();
+  return std::make_unique<Workplace>(
+      Workplace{std::move(*tracer), PointBuffer(kernel.rest.count()), std::move(lights)});
+}
+
 Result<BoundKernel> BindIllumination(const Binding& binding) {
   const Structural& s = binding.structural();
   IlluminationKernel kernel;
@@ -144,20 +160,14 @@ Result<BoundKernel> BindIllumination(const Binding& binding) {
     return Status::Invalid("{} lightKinds, {} matrices and {} colours of lights: expected as many of each",
                            kinds.size(), s.array_size("lightMatrix"), s.array_size("lightColor"));
   }
+  Result<std::unique_ptr<Workplace>> first = MakeWorkplace(kernel);
+  if (!first.ok()) return first.status();
+  kernel.workplaces->Give(std::move(*first));
   return MakeBound(std::move(kernel), 0);
 }
 
-// A workplace with the inputs of this evaluation.
-Result<std::unique_ptr<Workplace>> SetUp(const ComputeContext& c, const IlluminationKernel& kernel) {
-  std::unique_ptr<Workplace> place = kernel.workplaces->Take();
-  if (place == nullptr) {
-    std::vector<DiffuseLight> lights(kernel.lights.size());
-    Result<PathTracer> tracer = PathTracer::Build(std::as_const(kernel.rest).view(), kernel.triangles,
-                                                  kernel.albedo, lights, kernel.unseen);
-    if (!tracer.ok()) return tracer.status();
-    place = std::make_unique<Workplace>(
-        Workplace{std::move(*tracer), PointBuffer(kernel.rest.count()), std::move(lights)});
-  }
+// Puts the inputs of this evaluation in place.
+Status SetUp(const ComputeContext& c, const IlluminationKernel& kernel, Workplace* place) {
   const ArrayView<ConstPointsView> meshes = c.array<ConstPointsView>(kPoints);
   std::size_t at = 0;
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
@@ -171,15 +181,11 @@ Result<std::unique_ptr<Workplace>> SetUp(const ComputeContext& c, const Illumina
   const ArrayView<Double3> colors = c.array<Double3>(kLightColor);
   for (std::uint32_t l = 0; l < kernel.lights.size(); ++l)
     place->lights[l] = {kernel.lights[l], matrices[l], colors[l]};
-  KPSA_RETURN_IF_ERROR(place->tracer.Update(std::as_const(place->points).view(), place->lights));
-  return place;
+  const Parallel parallel = HostParallel(c);
+  return place->tracer.Update(std::as_const(place->points).view(), place->lights, &parallel);
 }
 
-void ComputeIllumination(ComputeContext& c) {
-  const auto& kernel = c.kernel_as<IlluminationKernel>();
-  Result<std::unique_ptr<Workplace>> place = SetUp(c, kernel);
-  if (!place.ok()) return c.host->Fail(place.status().errors().front().message);
-  const PathTracer& tracer = (*place)->tracer;
+void Illuminate(ComputeContext& c, const IlluminationKernel& kernel, const PathTracer& tracer) {
   const Parallel parallel = HostParallel(c);
   const auto gather = [&](const ShadingPlace& at, Index own, const PointsView& out, std::size_t i) {
     PathOptions paths = kernel.paths;
@@ -204,7 +210,22 @@ void ComputeIllumination(ComputeContext& c) {
         gather(tracer.OnPoint(points[i]), ~points[i], c.out_points(kPointIrradiance, e), i);
     });
   }
-  kernel.workplaces->Give(std::move(*place));
+}
+
+void ComputeIllumination(ComputeContext& c) {
+  const auto& kernel = c.kernel_as<IlluminationKernel>();
+  std::unique_ptr<Workplace> place = kernel.workplaces->Take();
+  if (place == nullptr) {  // another evaluation is under way
+    Result<std::unique_ptr<Workplace>> made = MakeWorkplace(kernel);
+    if (!made.ok()) return c.host->Fail(made.status().errors().front().message);
+    place = std::move(*made);
+  }
+  if (const Status status = SetUp(c, kernel, place.get()); status.ok()) {
+    Illuminate(c, kernel, place->tracer);
+  } else {
+    c.host->Fail(status.errors().front().message);
+  }
+  kernel.workplaces->Give(std::move(place));
 }
 
 }  // namespace

@@ -23,11 +23,11 @@ void AddWrapNodes(NodeRegistry& registry);              // wrap, proximityWrap
 void AddShrinkWrapNode(NodeRegistry& registry);         // shrinkWrap
 // sphereFalloff, capsuleFalloff, planeFalloff, proximityFalloff, weightMap, combineFalloff
 void AddFalloffNodes(NodeRegistry& registry);
-void AddPinNodes(NodeRegistry& registry);               // uvPin, follicle
-void AddSculptNode(NodeRegistry& registry);             // sculpt
-void AddPoseInterpolatorNode(NodeRegistry& registry);   // poseInterpolator
-void AddJiggleNode(NodeRegistry& registry);             // jiggle
-void AddTripwireNode(NodeRegistry& registry);           // tripwire
+void AddPinNodes(NodeRegistry& registry);              // uvPin, follicle
+void AddSculptNode(NodeRegistry& registry);            // sculpt
+void AddPoseInterpolatorNode(NodeRegistry& registry);  // poseInterpolator
+void AddJiggleNode(NodeRegistry& registry);            // jiggle
+void AddTripwireNode(NodeRegistry& registry);          // tripwire
 void AddMathNodes(NodeRegistry& registry);  // remapValue, multiplyDivide, plusMinusAverage, unitConversion
 void AddExpressionNode(NodeRegistry& registry);  // expression
 // clamp, setRange, blendColors, distanceBetween, angleBetween, vectorProduct
@@ -43,8 +43,8 @@ void AddIkNodes(NodeRegistry& registry);                // ikHandle, poleVectorC
 void AddSpaceSwitchNode(NodeRegistry& registry);        // spaceSwitch
 void AddSplineIkNode(NodeRegistry& registry);           // splineIk
 void AddTwistDistributionNode(NodeRegistry& registry);  // twistDistribution
-void AddLightNodes(NodeRegistry& registry);             // camera, pointLight, areaLight, sunLight
-void AddIlluminationNodes(NodeRegistry& registry);      // indirectIllumination
+void AddLightNodes(NodeRegistry& registry);         // camera, pointLight, sphereLight, areaLight, sunLight
+void AddIlluminationNodes(NodeRegistry& registry);  // indirectIllumination
 
 // All of them.
 void AddStandardNodes(NodeRegistry& registry);

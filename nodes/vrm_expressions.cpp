@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <array>
 
+#include "graph/graph.h"
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
 namespace {
-
-constexpr std::int64_t kMostVrmElements = 1 << 20;  // as arrays of the graph
 
 // What may be held back, by its number in `kind`: 1 blink, 2 lookAt, 3 mouth.
 constexpr std::size_t kHeldKinds = 3;
@@ -81,13 +80,12 @@ void ComputeExpressions(ComputeContext& c) {
   }
 }
 
-// By morph target: its binds, in their order.
 struct MorphBind {
-  std::uint32_t expression;
+  std::uint32_t target, expression;
   double share;
 };
 struct MorphWeightsKernel {
-  std::vector<std::vector<MorphBind>> binds;
+  std::vector<MorphBind> binds;  // by target; those of one in their order
 };
 
 Result<BoundKernel> BindMorphWeights(const Binding& binding) {
@@ -99,18 +97,21 @@ Result<BoundKernel> BindMorphWeights(const Binding& binding) {
     return Status::Invalid("targets has {} entries, expressions {}, shares {}; expected as many of each",
                            targets.size(), expressions.size(), shares.size());
   }
+  AttributeDef list;
+  list.array = true;
+  const std::int64_t most = Graph::MaxElements(list);
   MorphWeightsKernel kernel;
   for (std::size_t i = 0; i < targets.size(); ++i) {
     for (const auto& [name, value] :
          {std::pair("targets", targets[i]), std::pair("expressions", expressions[i])}) {
-      if (value < 0 || value >= kMostVrmElements)
-        return Status::Invalid("{}: entry {} is {}, expected an index below {}", name, i, value,
-                               kMostVrmElements);
+      if (value < 0 || value >= most)
+        return Status::Invalid("{}: entry {} is {}, expected an index below {}", name, i, value, most);
     }
-    const auto target = static_cast<std::size_t>(targets[i]);
-    if (target >= kernel.binds.size()) kernel.binds.resize(target + 1);
-    kernel.binds[target].push_back({static_cast<std::uint32_t>(expressions[i]), shares[i]});
+    kernel.binds.push_back(
+        {static_cast<std::uint32_t>(targets[i]), static_cast<std::uint32_t>(expressions[i]), shares[i]});
   }
+  std::stable_sort(kernel.binds.begin(), kernel.binds.end(),
+                   [](const MorphBind& a, const MorphBind& b) { return a.target < b.target; });
   return MakeBound(std::move(kernel), 0);
 }
 
@@ -118,11 +119,12 @@ void ComputeMorphWeights(ComputeContext& c) {
   const auto& k = c.kernel_as<MorphWeightsKernel>();
   const ArrayView<double> weights = c.array<double>(0), expressions = c.array<double>(1);
   const std::uint32_t* table = c.out + c.out[0];
+  auto bind = k.binds.begin();
   for (std::uint32_t i = 0; i < table[0]; ++i) {
     double weight = i < weights.size() ? weights[i] : 0.0;
-    if (i < k.binds.size() && !k.binds[i].empty()) {
-      for (const MorphBind& bind : k.binds[i])
-        weight += bind.expression < expressions.size() ? expressions[bind.expression] * bind.share : 0.0;
+    if (bind != k.binds.end() && bind->target == i) {
+      for (; bind != k.binds.end() && bind->target == i; ++bind)
+        weight += bind->expression < expressions.size() ? expressions[bind->expression] * bind->share : 0.0;
       weight = std::clamp(weight, 0.0, 1.0);
     }
     *reinterpret_cast<double*>(c.values + table[1 + i]) = weight;

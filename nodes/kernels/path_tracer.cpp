@@ -143,32 +143,47 @@ Result<PathTracer> PathTracer::Build(ConstPointsView points, std::span<const Ind
   return tracer;
 }
 
-Status PathTracer::Update(ConstPointsView points, std::span<const DiffuseLight> lights) {
+Status PathTracer::Update(ConstPointsView points, std::span<const DiffuseLight> lights,
+                          const Parallel* parallel) {
   KPSA_CHECK_EQ(lights.size(), lights_.size());
   KPSA_RETURN_IF_ERROR(scene_.Update(points));
   if (seen_.has_value()) KPSA_RETURN_IF_ERROR(seen_->Update(points));
   SetLights(lights);
-  ComputeNormals(points);
+  ComputeNormals(points, parallel);
   return Status();
 }
 
 // Those of corners are of all triangles about the point that are turned away from this one by no more than a
-// crease, by their areas.
-void PathTracer::ComputeNormals(ConstPointsView points) {
+// crease, by their areas; of all of them where there are so many that comparing each with each would take
+// long.
+void PathTracer::ComputeNormals(ConstPointsView points, const Parallel* parallel) {
   constexpr double kCrease = 0.6427876096865394;  // cosine of 50 degrees
+  constexpr std::size_t kMany = 128, kGrain = 1024;
   for (std::size_t i = 0; i < points.count; ++i) positions_[i] = PointOf(points, i);
-  for (std::size_t t = 0; t < faces_.size(); ++t) {
-    const Double3 a = positions_[corners_[3 * t]];
-    faces_[t] = Cross(positions_[corners_[3 * t + 1]] - a, positions_[corners_[3 * t + 2]] - a);
-    normals_[t] = UnitOrZero(faces_[t]);
-  }
-  for (std::size_t c = 0; c < corners_.size(); ++c) {
-    Double3 sum;
-    for (Index i = offsets_[corners_[c]]; i < offsets_[corners_[c] + 1]; ++i) {
-      if (Dot(normals_[around_[i]], normals_[c / 3]) >= kCrease) sum = sum + faces_[around_[i]];
+  ForRanges(parallel, faces_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const Double3 a = positions_[corners_[3 * t]];
+      faces_[t] = Cross(positions_[corners_[3 * t + 1]] - a, positions_[corners_[3 * t + 2]] - a);
+      normals_[t] = UnitOrZero(faces_[t]);
     }
-    corner_normals_[c] = UnitOrZero(sum);
-  }
+  });
+  ForRanges(parallel, points.count, kGrain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      const std::span<const Index> around(around_.data() + offsets_[p], offsets_[p + 1] - offsets_[p]);
+      const bool many = around.size() > kMany;
+      Double3 all;
+      for (std::size_t i = 0; many && i < around.size(); ++i) all = all + faces_[around[i]];
+      for (const Index t : around) {
+        Double3 sum = all;
+        for (std::size_t i = 0; !many && i < around.size(); ++i) {
+          if (Dot(normals_[around[i]], normals_[t]) >= kCrease) sum = sum + faces_[around[i]];
+        }
+        for (std::size_t c = 3 * std::size_t{t}; c < 3 * std::size_t{t} + 3; ++c) {
+          if (corners_[c] == p) corner_normals_[c] = UnitOrZero(sum);
+        }
+      }
+    }
+  });
 }
 
 ShadingPlace PathTracer::First(const RayScene& scene, std::span<const Index> numbers, Double3 origin,

@@ -16,6 +16,7 @@
 #include "base/matrix.h"
 #include "base/points.h"
 #include "base/status.h"
+#include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/ray_scene.h"
 
 namespace kpsa {
@@ -37,9 +38,11 @@ struct DiffuseLight {
 struct ShadingPlace {
   bool hit = false;
   Double3 position;  // world, metres
-  Double3 normal;    // unit, towards the viewer: smooth over edges of less than 50 degrees
-  Double3 face;      // unit, towards the viewer: of the triangle itself
-  Double3 along;     // across which samples turn with the surface (OnPoint), or zero
+  // Unit, towards the viewer: smooth over edges of less than 50 degrees, and about points of very many
+  // triangles.
+  Double3 normal;
+  Double3 face;   // unit, towards the viewer: of the triangle itself
+  Double3 along;  // across which samples turn with the surface (OnPoint), or zero
   Double3 albedo;
   double scale = 0;  // metres: distances below are rounding of the position
   Index triangle = kNoIndex;
@@ -62,7 +65,8 @@ class PathTracer {
                                   std::span<const float> albedo, std::span<const DiffuseLight> lights,
                                   std::span<const std::uint8_t> unseen = {});
   // Moves points and lights, as many as there were; see RayScene::Update.
-  Status Update(ConstPointsView points, std::span<const DiffuseLight> lights);
+  Status Update(ConstPointsView points, std::span<const DiffuseLight> lights,
+                const Parallel* parallel = nullptr);
 
   // The first surface along a ray; direction need not be of unit length.
   ShadingPlace Look(Double3 origin, Double3 direction) const { return First(scene_, {}, origin, direction); }
@@ -82,7 +86,7 @@ class PathTracer {
   PathTracer(RayScene scene) : scene_(std::move(scene)) {}
   ShadingPlace First(const RayScene& scene, std::span<const Index> numbers, Double3 origin,
                      Double3 direction) const;
-  void ComputeNormals(ConstPointsView points);
+  void ComputeNormals(ConstPointsView points, const Parallel* parallel = nullptr);
   // What of a light is the same for all places.
   struct Lamp {
     DiffuseLight::Kind kind = DiffuseLight::Kind::kPoint;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/instruction_count.h"
+
 namespace kpsa {
 namespace {
 
@@ -262,6 +264,86 @@ TEST(TriangleTree, WhatIsNotFiniteTakesNoPart) {
   EXPECT_EQ(again.Closest({0, 0, 0}).triangle, 1u);
   const Soup empty({0, 0, 0}, {});
   EXPECT_EQ(empty.Closest({0, 0, 0}).triangle, kNoIndex);
+}
+
+TEST(TriangleTree, FindsTheSameAmongCornersThatAreNotFinite) {
+  Soup soup = RandomSoup(300, 16);
+  Places random(17);
+  constexpr float kBroken[] = {std::numeric_limits<float>::infinity(),
+                               -std::numeric_limits<float>::infinity(),
+                               std::numeric_limits<float>::quiet_NaN(), 1e30f};
+  const PointsView view = soup.points.view();
+  for (std::size_t i = 0; i < view.count; i += 7) {
+    float* const rows[3] = {view.x, view.y, view.z};
+    rows[i % 3][i] = kBroken[i / 7 % 4];
+  }
+  soup.tree.Fit(soup.view(), soup.boxes.span());
+  for (int i = 0; i < 300; ++i) {
+    const Double3 p = random.Vector() * 1.5;
+    const SurfacePoint expected = ByHand(soup, p), found = soup.Closest(p);
+    ASSERT_EQ(found.triangle, expected.triangle) << i;
+    EXPECT_EQ(found.point, expected.point);
+    EXPECT_TRUE(std::isfinite(Length(found.point)));
+  }
+}
+
+// Of an edge that is left between two corners, whatever the third one is.
+TEST(ClosestOnTriangle, TakesTheEdgeThatIsLeft) {
+  const Index corners[3] = {0, 1, 2};
+  for (const float bad : {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
+    const PointBuffer points = PointBuffer::FromInterleaved(std::vector<float>{0, 0, 0, 4, 1, 2, bad, 3, 1});
+    const SurfacePoint found = ClosestOnTriangle(points.view(), corners, {1, 5, 3});
+    EXPECT_LT(Length(found.point - Double3{4, 1, 2} * (15.0 / 21)), 1e-12) << bad;
+  }
+}
+
+// A query looks at a few of many triangles, whatever one of them or the query is.
+TEST(TriangleTree, LooksAtFewTriangles) {
+  constexpr float kInf = std::numeric_limits<float>::infinity(),
+                  kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr Index kSide = 17;
+  std::vector<float> xyz;
+  std::vector<Index> triangles;
+  for (Index i = 0; i < kSide * kSide; ++i) {
+    const Index column = i % kSide, row = i / kSide;
+    xyz.insert(xyz.end(), {static_cast<float>(column) / 8 - 1, static_cast<float>(row) / 8 - 1,
+                           0.01f * static_cast<float>((7 * column + 5 * row) % 9)});
+    if (column + 1 < kSide && row + 1 < kSide)
+      triangles.insert(triangles.end(), {i, i + 1, i + kSide, i + 1, i + kSide + 1, i + kSide});
+  }
+  Soup soup(xyz, triangles);
+  std::vector<SurfacePoint> found;
+  found.reserve(8);
+  enum Query { kClosest, kSeveral, kHit };
+  const auto count = [&](Query query, Double3 p, Double3 direction, double limit = kInfinity) {
+    return CountInstructions([&] {
+      if (query == kClosest) soup.tree.Closest(soup.view(), soup.boxes.span(), p, limit);
+      if (query == kSeveral) soup.tree.ClosestSeveral(soup.view(), soup.boxes.span(), p, 4, limit, &found);
+      if (query == kHit) soup.tree.FirstHit(soup.view(), soup.boxes.span(), p, direction);
+    });
+  };
+  const Double3 place{0.11, 0.23, 0.1}, way{0.3, 0.4, -1};
+  for (const Query query : {kClosest, kSeveral, kHit}) {
+    const auto usual = count(query, place, way);
+    if (!usual.has_value()) GTEST_SKIP() << "instructions cannot be counted here";
+    for (const float far : {kInf, 1e30f}) {
+      const float before = soup.points.view().x[200];
+      soup.points.view().x[200] = far;
+      soup.tree.Fit(soup.view(), soup.boxes.span());
+      EXPECT_LT(*count(query, place, way), 2 * *usual + 3000) << query << ", " << far;
+      soup.points.view().x[200] = before;
+      soup.tree.Fit(soup.view(), soup.boxes.span());
+    }
+    for (const double bad : {kInfinity, static_cast<double>(kNan)}) {
+      EXPECT_LT(*count(query, {0, bad, 0}, way), 3000u) << query << ", " << bad;
+      if (query == kHit) {
+        EXPECT_LT(*count(query, place, {0, bad, 1}), 3000u) << bad;
+      }
+    }
+    if (query != kHit) {
+      EXPECT_LT(*count(query, place, way, kNan), 3000u) << query;
+    }
+  }
 }
 
 }  // namespace

@@ -389,7 +389,7 @@ TEST(Render, ACameraSeesLightAfterBounces) {
                 .err.find("16 x 6"),
             std::string::npos);
 
-  Ok({"train", path, "--rows", "90", "--modes", "12", "--calibration", "40"});
+  Ok({"train", path, "--rows", "90", "--modes", "12", "--calibration", "40", "--keep-modes"});
   const Json bench = Json::parse(Ok({"bench", path, "--runs", "1", "--tolerance", "1000", "--json"}));
   EXPECT_EQ(bench["points"], 400);
   EXPECT_GT(bench["hit_rate"], 0.5);
@@ -397,6 +397,7 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_LT(bench["error"]["rms"], bench["motion"]["rms"]);
   EXPECT_GT(bench["speedup"], 1.5);
   EXPECT_EQ(bench["units"], "light");
+  EXPECT_GT(bench["frame_errors"]["rms"]["projection"], 0.0);  // from the modes in the file
   Ok({"render", path, "--camera", "front", "--times", "1", "--accelerate", "-o", folder / "three.png"});
 
   // On the test clip, with a tolerance that keeps most of the motion: hits, and what they are wrong by

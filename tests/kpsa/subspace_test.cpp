@@ -138,6 +138,37 @@ TEST_P(SubspaceTest, LatentCoordinatesSayTheSame) {
   EXPECT_FALSE(WriteSubspace(latent, path_).ok());
 }
 
+// Paper mode that falls back keeps the whole map of its measurements, of light as well: there is no Q.
+TEST_P(SubspaceTest, PaperModeThatFellBackComesBack) {
+  if (GetParam() != EstimatorMode::kPaper) return;
+  const std::vector<CueRef> few = {{CueKind::kOutput, 20}, {CueKind::kOutput, 170}};
+  const CueSet cues = MakeCueSet(pca_, few, sheet_.diagonal());
+  const Estimator estimator = LeastSquaresEstimator(pca_, cues);
+  ASSERT_EQ(estimator.mode, EstimatorMode::kMap);
+  ASSERT_NE(estimator.warning, "");
+  Subspace fallen = MakeSubspace(pca_, cues, estimator, test::AllMeasured(training_, cues, MeasuredCues),
+                                 subspace_.outputs, {.rms_budget = 1e-6});
+  fallen.cues = {subspace_.cues[0], subspace_.cues[1]};
+  for (const char* units : {"m", kLightUnits}) {
+    fallen.units = units;
+    ASSERT_TRUE(WriteSubspace(fallen, path_).ok()) << WriteSubspace(fallen, path_).ToString();
+    const Result<Subspace> read = ReadSubspace(path_);
+    ASSERT_TRUE(read.ok()) << units << ": " << read.status().ToString();
+    EXPECT_EQ(read->mode, EstimatorMode::kMap);
+    EXPECT_EQ(read->units, units);
+    EXPECT_TRUE(read->latent.empty());
+    std::vector<double> raw = RawCues(3);
+    raw.erase(raw.begin() + 6, raw.end());
+    SubspaceScratch a(fallen), b(*read);
+    PointBuffer x(90), y(90);
+    Measure(fallen, raw, &a);
+    Measure(*read, raw, &b);
+    fallen.tiles[1].Reconstruct(a.inputs(), x.view());
+    read->tiles[1].Reconstruct(b.inputs(), y.view());
+    EXPECT_EQ(x.Interleaved(), y.Interleaved());
+  }
+}
+
 TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
   const Result<Subspace> read = ReadSubspace(path_);
@@ -181,9 +212,11 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
 TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   subspace_.kept_modes = pca_.output_modes().cast<float>();
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
-  const Result<Subspace> read = ReadSubspace(path_);
+  const Result<Subspace> read = ReadSubspace(path_, ReadModes::kYes), frames = ReadSubspace(path_);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   EXPECT_EQ(read->kept_modes, subspace_.kept_modes);
+  ASSERT_TRUE(frames.ok()) << frames.status().ToString();
+  EXPECT_EQ(frames->kept_modes.size(), 0);  // frames need none
   // What differs from what was written is refused
   std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(file), {}};
@@ -194,7 +227,14 @@ TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   file.seekp(0);
   file << bytes;
   file.close();
-  EXPECT_NE(ReadSubspace(path_).status().ToString().find("damaged"), std::string::npos);
+  EXPECT_NE(ReadSubspace(path_, ReadModes::kYes).status().ToString().find("damaged"), std::string::npos);
+  EXPECT_TRUE(ReadSubspace(path_).ok());  // what is not read is not looked at
+  // Modes of which nothing tells what they were
+  const std::size_t digest = bytes.find("modesDigest");
+  ASSERT_NE(digest, std::string::npos);
+  bytes[digest] = 'n';
+  std::ofstream(path_, std::ios::binary) << bytes;
+  EXPECT_NE(ReadSubspace(path_, ReadModes::kYes).status().ToString().find("modesDigest"), std::string::npos);
   subspace_.kept_modes.conservativeResize(Eigen::NoChange, 6);
   EXPECT_NE(WriteSubspace(subspace_, path_).ToString().find("kept modes"), std::string::npos);
 }
@@ -250,8 +290,8 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   };
   EXPECT_EQ(message(header), "no error");
   EXPECT_NE(edited([](Json* j) {
-              (*j)["__metadata__"]["version"] = "2";
-            }).find("format version 2, this program reads version 1"),
+              (*j)["__metadata__"]["version"] = "1";
+            }).find("format version 1, this program reads version 2; train it again"),
             std::string::npos);
   EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"),
             std::string::npos);

@@ -8,6 +8,7 @@
 #include "base/scalar_math.h"
 #include "graph/geometry.h"
 #include "nodes/standard_nodes.h"
+#include "tests/support/memory_in_use.h"
 #include "tests/support/test_graph.h"
 
 namespace kpsa {
@@ -51,6 +52,10 @@ struct Room : TestGraph {
     connect("lamp.outMatrix", "gi.lightMatrix[0]");
     connect("lamp.outColor", "gi.lightColor[0]");
   }
+  void replace(const std::string& source, const std::string& destination) {
+    const Status status = graph.Connect(plug(source), plug(destination), true);
+    EXPECT_TRUE(status.ok()) << status.ToString();
+  }
 };
 
 TEST(Camera, TakesTheScreenToDirections) {
@@ -78,6 +83,57 @@ TEST(Lights, HandOnTheirSizeAndStrength) {
   EXPECT_EQ(g.pull<Matrix4>("a.outMatrix"), Scaling({2, 3, 1}));
   const Double3 color = g.pull<Double3>("a.outColor");
   EXPECT_LT(Length(color - Double3{4, 2, 0}), 1e-12);
+
+  // A ball's size is in its frame: whatever the frame turns, its axes get the radius
+  const Matrix4 place = Translation({1, 2, 3}) * RotationFromUnit({0, 0, 0.6, 0.8});
+  g.add("sphereLight", "s", {{"matrix", Value(place)}, {"radius", Value(0.25)}, {"intensity", Value(2.0)}});
+  const Matrix4 ball = g.pull<Matrix4>("s.outMatrix");
+  EXPECT_EQ(ball, place * Scaling({0.25, 0.25, 0.25}));
+  EXPECT_NEAR(Length(TransformVector(ball, {1, 0, 0})), 0.25, 1e-15);
+  EXPECT_EQ(g.pull<Double3>("s.outColor"), (Double3{2, 2, 2}));
+}
+
+double Sum(const std::vector<float>& light) {
+  double sum = 0;
+  for (const float x : light) sum += x;
+  return sum;
+}
+
+// A sphereLight in the lamp's place.
+struct BallRoom : Room {
+  explicit BallRoom(double radius) {
+    add("sphereLight", "ball",
+        {{"matrix", Value(Translation({0.5, 1.5, 0.5}))},
+         {"intensity", Value(3.0)},
+         {"radius", Value(radius)}});
+    hold("gi.lightKinds", Value(std::vector<std::int64_t>{3}));
+    replace("ball.outMatrix", "gi.lightMatrix[0]");
+    replace("ball.outColor", "gi.lightColor[0]");
+  }
+};
+
+TEST(IndirectIllumination, ABallIsAPointThatHasASize) {
+  Room point;
+  BallRoom tiny(0), small(0.2), large(1.4);
+  const std::vector<float> a = point.pull_points("gi.irradiance"), b = tiny.pull_points("gi.irradiance");
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-6 * (1 + a[i])) << i;
+  const double whole = Sum(a);
+  EXPECT_NEAR(Sum(small.pull_points("gi.irradiance")), whole, 0.1 * whole);
+  EXPECT_LT(Sum(large.pull_points("gi.irradiance")), 0.8 * whole);  // from near, it lights less than a point
+}
+
+TEST(IndirectIllumination, OneContributionIsBounded) {
+  Room free, loose, tight;
+  loose.hold("gi.largestContribution", 1e3);
+  tight.hold("gi.largestContribution", 0.01);
+  tight.hold("gi.bounces", 1);
+  const std::vector<float> all = free.pull_points("gi.irradiance");
+  EXPECT_EQ(loose.pull_points("gi.irradiance"), all);
+  const std::vector<float> bounded = tight.pull_points("gi.irradiance");
+  for (const float light : bounded) EXPECT_LE(light, 0.01f);
+  EXPECT_GT(Sum(bounded), 0);
+  EXPECT_LT(Sum(bounded), 0.5 * Sum(all));
 }
 
 TEST(IndirectIllumination, TheWallColoursTheFloor) {
@@ -161,6 +217,55 @@ TEST(IndirectIllumination, ItsColoursMayGoWherePointsDo) {
   room.connect("gi.irradiance", "trip.inPoints[0]");
   room.vary("lamp.intensity");
   EXPECT_EQ(room.pull_points("trip.outPoints[0]"), room.pull_points("gi.irradiance"));
+}
+
+// What it takes some megabytes to trace.
+std::shared_ptr<const Mesh> LargeFloor() {
+  constexpr Index kSide = 120;
+  Mesh::Data data;
+  data.name = "floor";
+  std::vector<float> xyz;
+  for (Index i = 0; i < kSide * kSide; ++i) {
+    xyz.insert(xyz.end(),
+               {0.02f * static_cast<float>(i % kSide) - 1, 0, 1 - 0.02f * static_cast<float>(i / kSide)});
+    data.vertex_to_point.push_back(i);
+    if (i % kSide + 1 == kSide || i / kSide + 1 == kSide) continue;
+    const Index far = i + kSide;
+    data.triangles.insert(data.triangles.end(), {i, i + 1, far + 1, i, far + 1, far});
+  }
+  data.rest = PointBuffer::FromInterleaved(xyz);
+  data.triangle_vertices = data.triangles;
+  data.primitives = {
+      {0, kSide * kSide, 0, static_cast<Index>(data.triangles.size() / 3), "floor", {0.8f, 0.8f, 0.8f}}};
+  return std::make_shared<const Mesh>(std::move(data));
+}
+
+// A frame without numbers is refused; the next one is what it would have been without it. What frames need is
+// there before the first one, and stays.
+TEST(IndirectIllumination, ABrokenFrameLeavesNothingBehind) {
+  Room room;
+  const auto mesh = LargeFloor();
+  room.hold("m.mesh", Value(mesh));
+  room.hold("gi.mesh[0]", Value(mesh));
+  room.hold("gi.width", 2);
+  room.hold("gi.height", 2);
+  room.add("transformGeometry", "move");
+  room.connect("m.points", "move.inPoints[0]");
+  room.replace("move.outPoints[0]", "gi.points[0]");
+  room.vary("move.matrix");
+  room.want("gi.irradiance");
+  ASSERT_TRUE(room.compile().ok()) << room.compile().ToString();
+  const std::size_t bound = MemoryInUse();
+  const std::vector<float> before = room.pull_points("gi.irradiance");
+  constexpr std::size_t kLittle = std::size_t{1} << 19;  // bytes
+  EXPECT_LT(MemoryInUse(), bound + kLittle);
+  room.set("move.matrix", Translation({NAN, 0, 0}));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_FALSE(room.try_pull("gi.irradiance").ok());
+    EXPECT_LT(bound, MemoryInUse() + kLittle);
+  }
+  room.set("move.matrix", Matrix4());
+  EXPECT_EQ(room.pull_points("gi.irradiance"), before);
 }
 
 TEST(IndirectIllumination, FollowsItsLightAndFailsClearly) {

@@ -260,6 +260,31 @@ TEST(PathTracer, SeesThroughWhatIsUnseenAndStandsOnPoints) {
   EXPECT_NEAR(tracer->Direct(corner, 0, 1).x, 9.0 / 6 * 2 / std::sqrt(6.0), 1e-5);
 }
 
+// Many triangles about a point that lean out all around; a few of them belong to steep walls.
+TEST(PathTracer, ManyTrianglesAboutAPointShareItsNormal) {
+  const auto hub_normal = [](Index blades, Double3 direction) {
+    std::vector<float> xyz = {0, 0, 0};
+    std::vector<Index> corners;
+    for (Index i = 0; i < blades; ++i) {
+      const double angle = 2 * kPi * i / blades, height = i < blades / 2 ? 0.0 : 3.0;
+      for (const double x : {Cos(angle), height, -Sin(angle)}) xyz.push_back(static_cast<float>(x));
+      corners.insert(corners.end(), {0, 1 + i, 1 + (i + 1) % blades});
+    }
+    const Result<PathTracer> tracer =
+        PathTracer::Build(PointBuffer::FromInterleaved(xyz).view(), corners,
+                          std::vector<float>(corners.size(), 0.5f), std::vector<DiffuseLight>());
+    EXPECT_TRUE(tracer.ok());
+    const ShadingPlace place = tracer->Look(direction * 1e-2 + Double3{0, 1, 0}, {0, -1, 0});
+    EXPECT_TRUE(place.hit);
+    return place.normal;
+  };
+  // A crease keeps the flat half flat; where there are very many it is the mean of all, whichever is seen
+  EXPECT_NEAR(hub_normal(40, {0, 0, -1}).y, 1, 1e-6);
+  const Double3 flat = hub_normal(50000, {0, 0, -1});
+  EXPECT_GT(flat.y, 0.2);
+  EXPECT_LT(flat.y, 0.9);
+}
+
 TEST(PathTracer, RefusesWhatIsNoScene) {
   Triangles t = Floor();
   t.albedo.pop_back();

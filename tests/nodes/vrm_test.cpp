@@ -1,6 +1,7 @@
 // VRM's nodes against the pseudocode of its specification, in arithmetic of this test's own.
 #include "nodes/kernels/matrix_parts.h"
 #include "tests/nodes/node_support.h"
+#include "tests/support/memory_in_use.h"
 
 namespace kpsa {
 namespace {
@@ -219,6 +220,26 @@ TEST(VrmExpressions, AddToMorphWeights) {
   EXPECT_EQ(of(0, 1, 0), std::pair(0.25, 0.75));
   EXPECT_EQ(of(1, 1, 0.5), std::pair(0.75, 1.0));
   EXPECT_EQ(of(0, 0, -1), std::pair(0.25, 0.0));
+}
+
+// Binds are in any order; what they name beyond the mesh's targets costs nothing.
+TEST(VrmExpressions, BindsAreFewHoweverFarTheirTargets) {
+  const std::size_t before = MemoryInUse();
+  TestGraph g(StandardNodes());
+  constexpr std::int64_t kLast = (1 << 20) - 1;
+  g.add("vrmMorphWeights", "m",
+        {{"weight[3]", 0.125},
+         {"expression[1]", 0.5},
+         {"targets", Value(std::vector<std::int64_t>{kLast, 3, 0, 3})},
+         {"expressions", Value(std::vector<std::int64_t>{0, 1, kLast, 0})},
+         {"shares", Value(std::vector<double>{1, 0.25, 1, 1})}});
+  g.vary("m.weight[3]");  // so that it is there at run time
+  g.want("m.output[2]");
+  g.want("m.output[3]");
+  g.set("m.weight[3]", 0.25);
+  EXPECT_EQ(g.pull<double>("m.output[3]"), 0.375);
+  EXPECT_EQ(g.pull<double>("m.output[2]"), 0);
+  EXPECT_LT(MemoryInUse(), before + (std::size_t{1} << 20));
 }
 
 TEST(VrmExpressions, RefuseListsThatMakeNoSense) {
