@@ -321,6 +321,17 @@ TEST(Acceleration, FirstFiveMinutes) {
   EXPECT_TRUE(bench["nodes"]["never_evaluated"].is_array());
   EXPECT_LE(bench["error"]["rms"], bench["error"]["max"]);
 
+  // One frame, or a pose in which nothing moves: all of it is evaluated every time
+  for (const std::vector<std::string>& chosen :
+       {std::vector<std::string>{"--frames", "5"}, {"--rest"}, {"--rest", "--frames", "0:2"}}) {
+    std::vector<std::string> arguments{"bench", rig, "--runs", "1", "--json", "-q"};
+    arguments.insert(arguments.end(), chosen.begin(), chosen.end());
+    const Json still = OkJson(arguments);
+    EXPECT_GT(still["full"]["ms_per_frame"], 0) << still["clip"];
+    EXPECT_GT(still["nodes"]["total"], 0) << still["clip"];
+    EXPECT_EQ(still["points_evaluated_per_frame"]["full"], bench["points_evaluated_per_frame"]["full"]);
+  }
+
   // Tolerance 0: the exact rig, bit for bit
   Ok({"eval", rig, "-o", folder / "full.npz"});
   Ok({"eval", rig, "--accelerate", "--tolerance", "0", "-o", folder / "zero.npz"});
