@@ -28,7 +28,8 @@ void AddSharedAccelerationFlags(CLI::App* command, AccelerationFlags* flags);
 // All refusals that need no rig. Where nothing is accelerated, the other flags are refused.
 Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted);
 
-// "0.2mm" as metres, "1%" or "0.01" as a share.
+// "0.2mm" as metres, "any" as kAnyError (kpsa/kpsa_node.h), "1%" or "0.01" as a share.
+Result<double> ParseLength(const std::string& what, const std::string& text);
 Result<double> ParseTolerance(const std::string& text);
 Result<double> ParseRate(const std::string& text);
 

@@ -39,7 +39,7 @@ measure() {
 draw() {
   name=$(basename "$1") rig=scenes/$1.yaml
   # shellcheck disable=SC2086
-  "$kpsa" render "$rig" --clip "$2" --frames "$3" --kpsa "$work/$name-paper.kpsa" --tolerance 1e30m --error-scale "$4" -q \
+  "$kpsa" render "$rig" --clip "$2" --frames "$3" --kpsa "$work/$name-paper.kpsa" --tolerance any --error-scale "$4" -q \
     --force -o "$docs/results/$name-paper.png" $render_options
   # shellcheck disable=SC2086
   "$kpsa" render "$rig" --clip "$2" --frames "$3" --kpsa "$work/$name.kpsa" --error-scale "$4" -q --force \

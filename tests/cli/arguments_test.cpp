@@ -86,6 +86,8 @@ TEST(Arguments, UsageMistakes) {
       {eval({"--kpsa", "x.kpsa"}), 3, "no such file"},
       {eval({"--accelerate", "--tolerance", "-1mm"}), 2, "--tolerance"},
       {eval({"--accelerate", "--tolerance", "nan"}), 2, "--tolerance"},
+      {eval({"--accelerate", "--tolerance", "all"}), 2, "or any"},
+      {{"train", kHello, "--tolerance", "any", "-o", "out.kpsa"}, 2, "--tolerance"},
       {eval({"--accelerate", "--violation-rate", "2"}), 2, "0 to 1"},
       {eval({"--blender"}), 2, ".pc2"},
       {{"eval", kHello, "-o", "out.abc"}, 2, ".usda"},
