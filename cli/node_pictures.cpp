@@ -238,8 +238,11 @@ Status WriteNodePictures(const NodeRegistry& registry, const std::string& folder
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return Status::Invalid("the folder {} cannot be made: {}", folder, error.message());
+  const auto path = [&](const NodePicture& picture) { return folder + "/" + picture.type + ".png"; };
   for (const NodePicture& picture : *pictures)
-    KPSA_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + picture.type + ".png", force, picture.png));
+    KPSA_RETURN_IF_ERROR(OutputFile::Create(path(picture), force).status());
+  for (const NodePicture& picture : *pictures)
+    KPSA_RETURN_IF_ERROR(WriteFileAtomically(path(picture), force, picture.png));
   return {};
 }
 
