@@ -208,7 +208,7 @@ Verdicts::Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, 
   }
 }
 
-void Verdicts::Add(std::size_t frame, const Evaluator& evaluator) {
+void Verdicts::Add(std::int64_t frame, const Evaluator& evaluator) {
   ++frames_;
   last_hit_ = true;
   last_score_ = 0;

@@ -64,7 +64,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
 class Verdicts {
  public:
   Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, Request* request);
-  void Add(std::size_t frame, const Evaluator& evaluator);
+  void Add(std::int64_t frame, const Evaluator& evaluator);  // its number, for Text and WorstMiss
 
   std::size_t frames() const { return frames_; }
   std::size_t hits() const { return hits_; }  // frames in which all nodes hit
@@ -82,11 +82,13 @@ class Verdicts {
  private:
   struct Reason {
     std::string text;
-    std::size_t count = 0, first_frame = 0;
+    std::size_t count = 0;
+    std::int64_t first_frame = 0;
   };
   const std::vector<AppliedSubspace>* applied_;
   Index first_output_;
-  std::size_t frames_ = 0, hits_ = 0, worst_frame_ = 0;
+  std::size_t frames_ = 0, hits_ = 0;
+  std::int64_t worst_frame_ = 0;
   double worst_score_ = 0, last_score_ = 0;
   std::vector<double> last_scores_;
   bool last_hit_ = false;

@@ -110,7 +110,7 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
         {"p99", Finite(r.error_p99)},
         {"bbox_diagonal", r.diagonal},
         {"worst_clip", r.worst_clip},
-        {"worst_frame", r.worst_frame}}},
+        {"worst_frame", r.worst_clip.empty() ? OrderedJson() : OrderedJson(r.worst_frame)}}},
       {"frame_errors", FrameErrorsJson(r.frame_errors)},
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
@@ -151,9 +151,11 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
       r.tolerance >= kAnyError
           ? "any tolerance"
           : fmt::format("the tolerance of {}{}", r.light ? "an RMS of " : "", error(r.tolerance)));
-  text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
-                      error(r.error_rms), error(r.error_p99), error(r.error_max), r.worst_frame, r.worst_clip,
-                      error(r.motion_rms), error(r.diagonal));
+  text +=
+      fmt::format("error      RMS {}, 99 % {}, max {}{}; motion RMS {}, diagonal {}\n", error(r.error_rms),
+                  error(r.error_p99), error(r.error_max),
+                  r.worst_clip.empty() ? "" : fmt::format(" (frame {} of {})", r.worst_frame, r.worst_clip),
+                  error(r.motion_rms), error(r.diagonal));
   if (const FrameErrors& e = r.frame_errors; !e.empty()) {
     text += fmt::format(
         "split      RMS of all frames reconstructed: projection {}, cueing {}, storage {}, together {}; with "

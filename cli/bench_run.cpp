@@ -178,7 +178,7 @@ struct Contender {
     return Status();
   }
   void Describe();
-  void Compare(std::size_t frame, const Evaluator& full, const std::string& clip);
+  void Compare(std::int64_t frame, const Evaluator& full, const std::string& clip);
   void AddTimes(const std::vector<double>& full_ns);
   void AddFullProfile(const Plan& plan, const Profile& profile, double wall, double full_ns);
   void AddProfile(const Profile& profile, const KpsaTimes& kpsa, double wall, double fast_ns);
@@ -229,7 +229,7 @@ void Contender::Describe() {
 }
 
 // After both have evaluated a frame.
-void Contender::Compare(std::size_t frame, const Evaluator& full, const std::string& clip) {
+void Contender::Compare(std::int64_t frame, const Evaluator& full, const std::string& clip) {
   verdicts->Add(frame, *side->evaluator);
   hit.push_back(verdicts->last_hit());
   weights.emplace_back();
@@ -379,7 +379,7 @@ class Bench {
         if (const Status status = side->Evaluate(times[f]); !status.ok()) return located(status, times[f]);
       }
       for (Contender& contender : contenders_)
-        contender.Compare(f, *full.evaluator, rig.scene.clip.value_or(""));
+        contender.Compare(FrameNumber(times[f], rig.fps), *full.evaluator, rig.scene.clip.value_or("(rest)"));
     }
     for (Contender& contender : contenders_) {
       contender.errors.Merge(contender.clip_errors);

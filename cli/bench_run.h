@@ -39,7 +39,7 @@ struct BenchResult {
   bool light = false;                         // errors are numbers, and a frame's is its RMS
   struct Frame {
     std::string clip;
-    std::size_t number = 0;
+    std::int64_t number = 0;  // of the clip's frames
     bool hit = false;
     double rms = 0, max = 0, full_ms = 0, accelerated_ms = 0;
   };
@@ -62,9 +62,9 @@ struct BenchResult {
   std::size_t hits = 0, violations = 0;  // violations: accepted frames with a point beyond the tolerance
   std::string verdict_text, worst_miss;
   double error_rms = 0, error_max = 0, error_p99 = 0,
-         diagonal = 0;  // metres, all points of all frames, misses included
-  std::string worst_clip;
-  std::size_t worst_frame = 0;
+         diagonal = 0;     // metres, all points of all frames, misses included
+  std::string worst_clip;  // "": nothing differs
+  std::int64_t worst_frame = 0;
   double motion_rms = 0;                           // metres, distance from the mean over a clip's frames
   std::size_t nodes_total = 0;                     // that the full evaluation computes
   std::vector<std::string> never_evaluated;        // of these, in the accelerated one

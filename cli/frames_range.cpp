@@ -116,6 +116,10 @@ Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view 
   return indices;
 }
 
+std::int64_t FrameNumber(double seconds, double fps) {
+  return std::llround(std::clamp(seconds * fps, -1e15, 1e15));
+}
+
 Status CheckTimeFlags(const Flags& flags) {
   if (flags.frames.has_value() && flags.times.has_value())
     return Status::Usage("--frames and --times: expected one of them");

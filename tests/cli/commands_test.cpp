@@ -332,6 +332,18 @@ TEST(Acceleration, FirstFiveMinutes) {
     EXPECT_EQ(still["points_evaluated_per_frame"]["full"], bench["points_evaluated_per_frame"]["full"]);
   }
 
+  // Frames have the clip's numbers, and none is the worst where nothing differs
+  const Json some = OkJson({"bench", rig, "--frames", "10:40:10", "--runs", "1", "--json", "-q"});
+  std::vector<int> numbers;
+  for (const Json& frame : some["per_frame"]) numbers.push_back(frame["frame"]);
+  EXPECT_EQ(numbers, (std::vector<int>{10, 20, 30, 40}));
+  EXPECT_EQ(some["error"]["worst_frame"].get<int>() % 10, 0) << some["error"];
+  EXPECT_GE(some["error"]["worst_frame"], 10);
+  const std::string exact =
+      Ok({"bench", rig, "--frames", "10:40:10", "--tolerance", "0", "--runs", "1", "-q"});
+  EXPECT_EQ(exact.find("(frame"), std::string::npos) << exact;
+  EXPECT_NE(exact.find("first at frame 10"), std::string::npos) << exact;
+
   // Tolerance 0: the exact rig, bit for bit
   Ok({"eval", rig, "-o", folder / "full.npz"});
   Ok({"eval", rig, "--accelerate", "--tolerance", "0", "-o", folder / "zero.npz"});
