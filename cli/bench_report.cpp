@@ -142,9 +142,10 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
   times.Row({"full", fmt::format("{:.3f}", r.full_ms), heaviest});
   times.Row({"accelerated", fmt::format("{:.3f}", r.accelerated_ms), parts});
   text += times.Text();
-  text += fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
-                      r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
-                      r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  text += fmt::format(
+      "\nspeedup    {}{}; ceiling {}, bound by the graph above the points{}\n", RatioText(r.speedup(), 2),
+      r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
+      RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
   text += fmt::format(
       "hits       {:.1f} % of frames; {:.1f} % of frames beyond {}\n",
       100 * static_cast<double>(r.hits) / frames, 100 * static_cast<double>(r.violations) / frames,
@@ -197,8 +198,7 @@ std::string FramesText(const std::vector<BenchResult>& results) {
     for (const BenchResult::Frame& f : r.per_frame) {
       table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
                  ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
-                 fmt::format("{:.3f}", f.accelerated_ms),
-                 fmt::format("{:.1f}x", f.accelerated_ms > 0 ? f.full_ms / f.accelerated_ms : 0)});
+                 fmt::format("{:.3f}", f.accelerated_ms), RatioText(Ratio(f.full_ms, f.accelerated_ms))});
     }
     if (results.size() > 1) text += r.subspace + "\n";
     text += table.Text();

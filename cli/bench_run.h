@@ -5,6 +5,7 @@
 // them. A frame's time is the median over the runs; a clip's is the mean over its frames.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,11 @@ struct BenchNode {
   double ms_per_frame = 0;
   Index points = 0;
 };
+
+// How many times as long; not a number where that is unknown.
+inline double Ratio(double ms, double shorter_ms) {
+  return shorter_ms > 0 ? ms / shorter_ms : std::numeric_limits<double>::quiet_NaN();
+}
 
 // One accelerated side, and the full one of the same run.
 struct BenchResult {
@@ -51,13 +57,11 @@ struct BenchResult {
   double graph_ms = 0, cues_ms = 0, projection_ms = 0, reconstruction_ms = 0, downstream_ms = 0,
          misses_ms = 0;  // its parts
   double full_ms_on_hits = 0, accelerated_ms_on_hits = 0;
-  double speedup() const { return accelerated_ms > 0 ? full_ms / accelerated_ms : 0; }
-  double speedup_on_hits() const {
-    return accelerated_ms_on_hits > 0 ? full_ms_on_hits / accelerated_ms_on_hits : 0;
-  }
+  double speedup() const { return Ratio(full_ms, accelerated_ms); }
+  double speedup_on_hits() const { return Ratio(full_ms_on_hits, accelerated_ms_on_hits); }
   // What no subspace can skip: the full evaluation without the steps with points above the accelerated ones.
   double bound_ms = 0, bound_graph_ms = 0, bound_points_ms = 0;
-  double ceiling() const { return bound_ms > 0 ? full_ms / bound_ms : 0; }
+  double ceiling() const { return Ratio(full_ms, bound_ms); }
 
   std::size_t hits = 0, violations = 0;  // violations: accepted frames with a point beyond the tolerance
   std::string verdict_text, worst_miss;

@@ -117,8 +117,6 @@ double NumberAt(const BenchJsonValue& side, const char* pointer) {
   return value.is_number() ? value.get<double>() : NAN;
 }
 
-std::string Times(double ratio) { return std::isfinite(ratio) ? fmt::format("{:.1f}x", ratio) : "-"; }
-
 // "0.0123 %" of the diagonal: two significant digits and more.
 std::string ShareOf(const BenchJsonValue& side, double length) {
   const double share = length < 0 ? NAN : 100 * length / NumberAt(side, "/error/bbox_diagonal");
@@ -150,8 +148,8 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
         reached.Row({NameOf(side), Thousands(side.at("points").get<std::uint64_t>()), ModeOf(side),
                      MeasuredOf(side), std::to_string(side.at("modes").get<std::uint64_t>()),
                      fmt::format("{:.1f} %", 100 * NumberAt(side, "/hit_rate")),
-                     Times(NumberAt(side, "/speedup_on_hits")), Times(NumberAt(side, "/speedup")),
-                     paper ? document.reference : "", Times(NumberAt(side, "/ceiling/speedup")),
+                     RatioText(NumberAt(side, "/speedup_on_hits")), RatioText(NumberAt(side, "/speedup")),
+                     paper ? document.reference : "", RatioText(NumberAt(side, "/ceiling/speedup")),
                      ShareOf(side, NumberAt(side, "/error/rms")), ShareOf(side, NumberAt(side, "/error/max")),
                      tolerance >= kAnyError ? "any" : LengthText(tolerance)});
         const double accelerated = NumberAt(side, "/accelerated/ms_per_frame");
