@@ -385,7 +385,6 @@ class Bench {
       contender.errors.Merge(contender.clip_errors);
       contender.result.hits += contender.verdicts->hits();
       contender.result.frames += times.size();
-      contender.result.verdict_text = contender.verdicts->Text();
       if (const std::string worst = contender.verdicts->WorstMiss(); !worst.empty())
         contender.result.worst_miss = worst;
     }

@@ -63,8 +63,8 @@ struct BenchResult {
   double bound_ms = 0, bound_graph_ms = 0, bound_points_ms = 0;
   double ceiling() const { return Ratio(full_ms, bound_ms); }
 
-  std::size_t hits = 0, violations = 0;  // violations: accepted frames with a point beyond the tolerance
-  std::string verdict_text, worst_miss;
+  std::size_t hits = 0, violations = 0;  // violations: frames beyond the tolerance, accepted or not
+  std::string worst_miss;
   double error_rms = 0, error_max = 0, error_p99 = 0,
          diagonal = 0;     // metres, all points of all frames, misses included
   std::string worst_clip;  // "": nothing differs
