@@ -59,6 +59,9 @@ TEST(Eval, SameBytesForAnyThreadsAndWaysToSayTimes) {
   Ok({"eval", kHello, "--frames", "0:24:12", "--threads", "1", "-o", folder / "a.npz"});
   Ok({"eval", kHello, "--times", "0,0.5,1", "--threads", "3", "-o", folder / "b.npz"});
   EXPECT_EQ(TemporaryFolder::Read(folder / "a.npz"), TemporaryFolder::Read(folder / "b.npz"));
+  Ok({"eval", kHello, "--frames", "0:48", "-o", folder / "range.npz"});
+  Ok({"eval", kHello, "-o", folder / "clip.npz"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "range.npz"), TemporaryFolder::Read(folder / "clip.npz"));
   Ok({"eval", kHello, "--times", "1,0,0.5", "-o", folder / "c.npz"});
   const Result<Npz> forward = ReadNpz(folder / "a.npz"), shuffled = ReadNpz(folder / "c.npz");
   ASSERT_TRUE(forward.ok() && shuffled.ok());
