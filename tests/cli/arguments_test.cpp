@@ -130,6 +130,7 @@ TEST(Arguments, UsageMistakes) {
       {{"train", kHello, "--key-points", "20", "-o", "x.kpsa"}, 2, "--paper"},
       {{"bench", kHello, "--kpsa", "none.kpsa"}, 3, "kpsa train"},
       {{"bench", kHello, "--runs", "0"}, 2, "--runs"},
+      {{"get", KPSA_SCENES_DIR "/boy/boy.yaml", "face_mesh@fixx"}, 2, " more"},
       {{"nodes", "bend", "--pictures", "pictures"}, 2, "no TYPE"},
       {{"bench", kHello, "--tolerance", "1mm", "--tolerance", "2mm"}, 2, "one for each"},
       {{"bench", kHello, "--tolerance", "some"}, 2, "--tolerance"},
