@@ -55,6 +55,7 @@ PictureFrame FrameAround(const DrawnHalf& before, const DrawnHalf& after) {
   return {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, kSide * kSamples * (1 - 2 * kMargin) / size};
 }
 
+// A renderer of its own: cli/picture.h's rays (Embree) differ between processors, and a test compares bytes.
 class Canvas {
  public:
   Canvas() : depth_(kCells * kCells, -1e30), color_(kCells * kCells, Double3{1, 1, 1}) {}
