@@ -87,7 +87,7 @@ Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::ui
 Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
   namespace fs = std::filesystem;
   OutputFile file;
-  file.path_ = file.target_ = path;
+  file.path_ = path;
   file.force_ = force;
   if (path.empty()) return Status::Usage("the name of the output is empty");
   struct stat info = {};
@@ -98,12 +98,6 @@ Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
     if (!file.device_ && !force) {
       return Status::Usage("exists already; give another name, or --force to replace it").At({path});
     }
-    if (!file.device_) {
-      std::error_code error;
-      file.target_ = fs::canonical(path, error).string();
-      if (error) return Status::Usage("cannot be written: {}", error.message()).At({path});
-      file.mode_ = info.st_mode & 0777;
-    }
   } else if (errno != ENOENT) {
     return Status::Usage("cannot be written: {}", Reason(errno)).At({path});
   }
@@ -111,7 +105,7 @@ Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
     std::error_code error;
     file.temporary_ = CreateTemporary((fs::temp_directory_path(error) / "kpsa").string());
   } else {
-    file.temporary_ = CreateTemporary(file.target_);
+    file.temporary_ = CreateTemporary(path);
   }
   if (file.temporary_.empty()) {
     const fs::path folder = fs::path(path).parent_path();
@@ -126,8 +120,6 @@ OutputFile::OutputFile(OutputFile&& other) noexcept { *this = std::move(other); 
 
 OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   std::swap(path_, other.path_);
-  std::swap(target_, other.target_);
-  std::swap(mode_, other.mode_);
   std::swap(temporary_, other.temporary_);
   std::swap(force_, other.force_);
   std::swap(device_, other.device_);
@@ -144,8 +136,7 @@ Status OutputFile::Commit() {
     return Status::Usage("appeared while it was being written; give another name, or --force to replace it")
         .At({path_});
   }
-  if ((mode_ != 0 && ::chmod(temporary_.c_str(), mode_) != 0) ||
-      ::rename(temporary_.c_str(), target_.c_str()) != 0) {
+  if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
     return Status::Invalid("cannot be written: {}", Reason(errno)).At({path_});
   }
   temporary_.clear();

@@ -17,7 +17,6 @@ Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::ui
 
 // An output that is written under a temporary name beside its place and renamed by Commit, so that nobody
 // ever sees half a file; without Commit the destructor removes what was written. Move-only, for one thread.
-// What replaces a file gets its permissions; a link stays, and what it leads to is replaced.
 // A device or pipe (/dev/null, /dev/stdout) cannot be renamed over: it gets a copy of the finished bytes.
 class OutputFile {
  public:
@@ -37,8 +36,7 @@ class OutputFile {
 
  private:
   OutputFile() = default;
-  std::string path_, target_, temporary_;  // target_: path_, links followed
-  unsigned mode_ = 0;                      // of the file that is replaced; 0: there is none
+  std::string path_, temporary_;
   bool force_ = false, device_ = false;
 };
 

@@ -62,21 +62,6 @@ TEST(File, AppearingFilesAreNotOverwritten) {
   EXPECT_EQ(TemporaryFolder::Read(folder / "a"), "somebody else's");
 }
 
-TEST(File, WhatIsReplacedKeepsItsLinkAndPermissions) {
-  const TemporaryFolder folder, other;
-  const std::string file = other.Write("a", "one"), link = folder / "link";
-  ASSERT_EQ(::chmod(file.c_str(), 0640), 0);
-  ASSERT_EQ(::symlink(file.c_str(), link.c_str()), 0);
-  ASSERT_TRUE(WriteFileAtomically(link, true, Bytes("two")).ok());
-  struct stat info = {};
-  ASSERT_EQ(::lstat(link.c_str(), &info), 0);
-  EXPECT_TRUE(S_ISLNK(info.st_mode));
-  EXPECT_EQ(TemporaryFolder::Read(file), "two");
-  ASSERT_EQ(::stat(file.c_str(), &info), 0);
-  EXPECT_EQ(info.st_mode & 0777u, 0640u);
-  EXPECT_EQ(folder.FileCount() + other.FileCount(), 2u);
-}
-
 TEST(File, ReadsWithinTheLimit) {
   const TemporaryFolder folder;
   const std::string path = folder.Write("a", "12345");
