@@ -6,7 +6,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "cli/bench_report.h"
 #include "cli/line_plot.h"
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
@@ -44,17 +43,6 @@ TEST(LinePlot, LinesBreakWhereThereIsNoNumber) {
   EXPECT_NE(PlotsAsSvg({plot, plot, plot}, 2).find("height=\"500\""), std::string::npos);
   plot.lines[0].y = {std::numeric_limits<double>::infinity(), 0};  // nothing to scale by
   EXPECT_EQ(Count(PlotsAsSvg({plot}, 1), "nan") + Count(PlotsAsSvg({plot}, 1), "inf"), 0u);
-}
-
-TEST(BenchReport, WhatIsNotKnownIsNoNumber) {
-  BenchResult result;
-  result.per_frame.emplace_back();
-  const std::string text = BenchText({result}, {}) + FramesText({result});
-  EXPECT_NE(text.find("speedup    -; ceiling -, bound"), std::string::npos) << text;
-  EXPECT_EQ(text.find("0.0x"), std::string::npos) << text;
-  const Json json = Json::parse(BenchJson({result}, {}));
-  EXPECT_TRUE(json["ceiling"]["speedup"].is_null() && json["speedup"].is_null()) << json;
-  EXPECT_TRUE(json["error"]["worst_frame"].is_null()) << json["error"];
 }
 
 // scenes/results.sh with the smallest rig in the place of the characters.
