@@ -122,7 +122,7 @@ int Main(int argc, char** argv) {
   flags.file = argv[1];
   AccelerationFlags acceleration;
   acceleration.kpsa = argv[2];
-  acceleration.tolerance = "1e31m";
+  acceleration.tolerance = "any";
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return Fail(open.status());
   Rig& rig = (*open)->rig;

@@ -73,7 +73,8 @@ void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags) {
   AddSwitch(command, "--accelerate", &flags->accelerate, "with the rig's own subspaces");
   AddOption(command, "--kpsa", "FILE.kpsa", &flags->kpsa, "with this subspace");
   AddOption(command, "--tolerance", "LENGTH", &flags->tolerance,
-            "the largest error of a point, as in 0.2mm; the subspace's own if not given");
+            "the largest error of a point, as in 0.2mm; any: accept every frame; the subspace's own if not "
+            "given");
   AddSharedAccelerationFlags(command, flags);
 }
 
@@ -85,11 +86,18 @@ void AddSharedAccelerationFlags(CLI::App* command, AccelerationFlags* flags) {
             "share of frames that may exceed it, as in 1%; the subspace's own if not given");
 }
 
-Result<double> ParseTolerance(const std::string& text) {
+Result<double> ParseLength(const std::string& what, const std::string& text) {
   const Result<double> value = ParseQuantity(text, Unit::kLength, FileUnits());
   if (!value.ok() || *value < 0)
-    return Status::Usage(
-        "--tolerance \"{}\": expected a length of 0 or more, as in 0.2mm (a bare number is metres)", text);
+    return Status::Usage("{} \"{}\": expected a length of 0 or more, as in 0.2mm (a bare number is metres)",
+                         what, text);
+  return value;
+}
+
+Result<double> ParseTolerance(const std::string& text) {
+  if (text == "any") return kAnyError;
+  const Result<double> value = ParseLength("--tolerance", text);
+  if (!value.ok()) return Status::Usage("{}, or any", value.status().errors().front().message);
   return value;
 }
 
@@ -201,7 +209,7 @@ Verdicts::Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, 
   }
 }
 
-void Verdicts::Add(std::size_t frame, const Evaluator& evaluator) {
+void Verdicts::Add(std::int64_t frame, const Evaluator& evaluator) {
   ++frames_;
   last_hit_ = true;
   last_score_ = 0;

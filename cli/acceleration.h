@@ -29,7 +29,8 @@ void AddSharedAccelerationFlags(CLI::App* command, AccelerationFlags* flags);
 // All refusals that need no rig. Where nothing is accelerated, the other flags are refused.
 Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted);
 
-// "0.2mm" as metres, "1%" or "0.01" as a share.
+// "0.2mm" as metres, "any" as kAnyError (kpsa/kpsa_node.h), "1%" or "0.01" as a share.
+Result<double> ParseLength(const std::string& what, const std::string& text);
 Result<double> ParseTolerance(const std::string& text);
 Result<double> ParseRate(const std::string& text);
 
@@ -64,7 +65,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
 class Verdicts {
  public:
   Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, Request* request);
-  void Add(std::size_t frame, const Evaluator& evaluator);
+  void Add(std::int64_t frame, const Evaluator& evaluator);  // its number, for Text and WorstMiss
 
   std::size_t frames() const { return frames_; }
   std::size_t hits() const { return hits_; }  // frames in which all nodes hit
@@ -82,11 +83,13 @@ class Verdicts {
  private:
   struct Reason {
     std::string text;
-    std::size_t count = 0, first_frame = 0;
+    std::size_t count = 0;
+    std::int64_t first_frame = 0;
   };
   const std::vector<AppliedSubspace>* applied_;
   Index first_output_;
-  std::size_t frames_ = 0, hits_ = 0, worst_frame_ = 0;
+  std::size_t frames_ = 0, hits_ = 0;
+  std::int64_t worst_frame_ = 0;
   double worst_score_ = 0, last_score_ = 0;
   std::vector<double> last_scores_;
   bool last_hit_ = false;

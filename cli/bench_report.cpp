@@ -110,7 +110,7 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
         {"p99", Finite(r.error_p99)},
         {"bbox_diagonal", r.diagonal},
         {"worst_clip", r.worst_clip},
-        {"worst_frame", r.worst_frame}}},
+        {"worst_frame", r.worst_clip.empty() ? OrderedJson() : OrderedJson(r.worst_frame)}}},
       {"frame_errors", FrameErrorsJson(r.frame_errors)},
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
@@ -142,18 +142,21 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
   times.Row({"full", fmt::format("{:.3f}", r.full_ms), heaviest});
   times.Row({"accelerated", fmt::format("{:.3f}", r.accelerated_ms), parts});
   text += times.Text();
-  text += fmt::format("\nspeedup    {:.2f}x{}; ceiling {:.1f}x, bound by the graph above the points{}\n",
-                      r.speedup(), r.hits == 0 ? "" : fmt::format(", {:.2f}x on hits", r.speedup_on_hits()),
-                      r.ceiling(), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  text += fmt::format(
+      "\nspeedup    {}{}; ceiling {}, bound by the graph above the points{}\n", RatioText(r.speedup(), 2),
+      r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
+      RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
   text += fmt::format(
       "hits       {:.1f} % of frames; {:.1f} % of frames beyond {}\n",
       100 * static_cast<double>(r.hits) / frames, 100 * static_cast<double>(r.violations) / frames,
       r.tolerance >= kAnyError
           ? "any tolerance"
           : fmt::format("the tolerance of {}{}", r.light ? "an RMS of " : "", error(r.tolerance)));
-  text += fmt::format("error      RMS {}, 99 % {}, max {} (frame {} of {}); motion RMS {}, diagonal {}\n",
-                      error(r.error_rms), error(r.error_p99), error(r.error_max), r.worst_frame, r.worst_clip,
-                      error(r.motion_rms), error(r.diagonal));
+  text +=
+      fmt::format("error      RMS {}, 99 % {}, max {}{}; motion RMS {}, diagonal {}\n", error(r.error_rms),
+                  error(r.error_p99), error(r.error_max),
+                  r.worst_clip.empty() ? "" : fmt::format(" (frame {} of {})", r.worst_frame, r.worst_clip),
+                  error(r.motion_rms), error(r.diagonal));
   if (const FrameErrors& e = r.frame_errors; !e.empty()) {
     text += fmt::format(
         "split      RMS of all frames reconstructed: projection {}, cueing {}, storage {}, together {}; with "
@@ -195,8 +198,7 @@ std::string FramesText(const std::vector<BenchResult>& results) {
     for (const BenchResult::Frame& f : r.per_frame) {
       table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
                  ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
-                 fmt::format("{:.3f}", f.accelerated_ms),
-                 fmt::format("{:.1f}x", f.accelerated_ms > 0 ? f.full_ms / f.accelerated_ms : 0)});
+                 fmt::format("{:.3f}", f.accelerated_ms), RatioText(Ratio(f.full_ms, f.accelerated_ms))});
     }
     if (results.size() > 1) text += r.subspace + "\n";
     text += table.Text();

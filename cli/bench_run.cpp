@@ -13,6 +13,7 @@
 #include "cli/point_errors.h"
 #include "cli/progress.h"
 #include "cli/rig_frames.h"
+#include "cli/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/training_record.h"
 
@@ -53,12 +54,14 @@ struct Side {
   std::unique_ptr<Evaluator> evaluator;
   Index time = kNoIndex;
   std::vector<std::vector<double>> frame_ns;  // by frame and run
+  bool anew = false;                          // every evaluation: nothing changes from frame to frame
 
-  Side(const Rig& rig, std::shared_ptr<const Plan> made, bool parallel, std::size_t frames)
+  Side(const Rig& rig, std::shared_ptr<const Plan> made, bool parallel, std::size_t frames, bool still)
       : plan(std::move(made)),
         evaluator(std::make_unique<Evaluator>(plan, EvaluatorOptions{parallel, nullptr})),
         time(plan->FindVarying(rig.scene.time)),
-        frame_ns(frames) {}
+        frame_ns(frames),
+        anew(still || frames == 1) {}
   Status Evaluate(double t) {
     if (time != kNoIndex) evaluator->Set(time, t);
     return evaluator->Evaluate();
@@ -67,7 +70,11 @@ struct Side {
   void StartAgain() {
     if (!plan->stateful_node().empty()) evaluator->Restart();
   }
+  void Forget() {
+    if (anew) evaluator->Invalidate();
+  }
   Status Timed(std::size_t frame, double t) {
+    Forget();
     const std::uint64_t begin = ProfileClock();
     Status status = Evaluate(t);
     frame_ns[frame].push_back(static_cast<double>(ProfileClock() - begin));
@@ -141,7 +148,9 @@ struct Contender {
   FullWeights weights;
 
   // The rig of the flags with the subspaces in place. `outputs` becomes what the full side has to compute.
-  Status Load(const Flags& clip_flags, const BenchOptions& options, std::size_t frames, Request* outputs) {
+  // Where nothing moves, the controls vary.
+  Status Load(const Flags& clip_flags, const BenchOptions& options, std::size_t frames, bool still,
+              Request* outputs) {
     Result<std::unique_ptr<OpenRig>> loaded = LoadRigOf(clip_flags);
     if (!loaded.ok()) return loaded.status();
     side.reset(), verdicts.reset(), applied.clear();  // of the clip before, which refer to its rig
@@ -158,18 +167,18 @@ struct Contender {
       request = ColorOutputs(rig, applied, true);
     }
     compared = request.outputs.size();
+    if (still) outputs->varying = request.varying = VaryingPlugs(rig);
     verdicts = std::make_unique<Verdicts>(applied, rig, &request);
     const auto plan = CompileFor(rig, &compiler, request);
     if (!plan.ok()) return plan.status();
-    side = std::make_unique<Side>(rig, *plan, options.threads > 1, frames);
+    side = std::make_unique<Side>(rig, *plan, options.threads > 1, frames, still);
     clip_errors = PointErrors(compared);
     hit.clear();
     weights.clear();
-    Describe();
     return Status();
   }
   void Describe();
-  void Compare(std::size_t frame, const Evaluator& full, const std::string& clip);
+  void Compare(std::int64_t frame, const Evaluator& full, const std::string& clip);
   void AddTimes(const std::vector<double>& full_ns);
   void AddFullProfile(const Plan& plan, const Profile& profile, double wall, double full_ns);
   void AddProfile(const Profile& profile, const KpsaTimes& kpsa, double wall, double fast_ns);
@@ -220,7 +229,7 @@ void Contender::Describe() {
 }
 
 // After both have evaluated a frame.
-void Contender::Compare(std::size_t frame, const Evaluator& full, const std::string& clip) {
+void Contender::Compare(std::int64_t frame, const Evaluator& full, const std::string& clip) {
   verdicts->Add(frame, *side->evaluator);
   hit.push_back(verdicts->last_hit());
   weights.emplace_back();
@@ -343,22 +352,24 @@ class Bench {
     const Result<std::vector<double>> sampled = SampleTimes(with_clip, rig);
     if (!sampled.ok()) return sampled.status();
     const std::vector<double>& times = *sampled;
-    Request outputs;
-    for (std::size_t i = 0; i < contenders_.size(); ++i) {
-      Request wanted;
-      KPSA_RETURN_IF_ERROR(contenders_[i].Load(with_clip, options_, times.size(), &wanted));
-      if (i == 0) outputs = wanted;
-      if (outputs.outputs.size() != wanted.outputs.size() ||
-          outputs.outputs.front().plug != wanted.outputs.front().plug)
-        return Status::Usage("{} and {} accelerate different things, which no common run compares",
-                             contenders_[0].result.subspace, contenders_[i].result.subspace);
-    }
-    Compiler compiler;
-    const auto full_plan = CompileFor(rig, &compiler, outputs);
+    Result<std::shared_ptr<const Plan>> full_plan = LoadSides(with_clip, rig, times.size(), false);
     if (!full_plan.ok()) return full_plan.status();
-    Side full(rig, *full_plan, options_.threads > 1, times.size());
+    const bool still = (*full_plan)->steps().empty();
+    if (still) full_plan = LoadSides(with_clip, rig, times.size(), true);
+    if (!full_plan.ok()) return full_plan.status();
+    if ((*full_plan)->steps().empty())
+      return Status::Invalid("nothing moves and there are no controls, so there is nothing to time")
+          .At({rig.path});
+    Side full(rig, *full_plan, options_.threads > 1, times.size(), still);
     std::vector<Side*> sides{&full};
-    for (Contender& contender : contenders_) sides.push_back(contender.side.get());
+    for (Contender& contender : contenders_) {
+      contender.Describe();
+      sides.push_back(contender.side.get());
+    }
+    if (still) {
+      contenders_.front().result.notes.push_back(
+          "nothing moves: timed is the evaluation of this pose from its controls, all of it every time");
+    }
     const auto located = [&](const Status& status, double t) {
       return Status::Evaluation("at {} s: {}", t, status.errors().front().message).At({rig.path});
     };
@@ -371,13 +382,12 @@ class Bench {
         if (const Status status = side->Evaluate(times[f]); !status.ok()) return located(status, times[f]);
       }
       for (Contender& contender : contenders_)
-        contender.Compare(f, *full.evaluator, rig.scene.clip.value_or(""));
+        contender.Compare(FrameNumber(times[f], rig.fps), *full.evaluator, rig.scene.clip.value_or("(rest)"));
     }
     for (Contender& contender : contenders_) {
       contender.errors.Merge(contender.clip_errors);
       contender.result.hits += contender.verdicts->hits();
       contender.result.frames += times.size();
-      contender.result.verdict_text = contender.verdicts->Text();
       if (const std::string worst = contender.verdicts->WorstMiss(); !worst.empty())
         contender.result.worst_miss = worst;
     }
@@ -404,6 +414,7 @@ class Bench {
     for (Contender& contender : contenders_) contender.AddTimes(full_ns);
     KPSA_RETURN_IF_ERROR(ProfileClip(&full, times, full_ns));
     for (Contender& contender : contenders_) {
+      if (!KeepModes(contender.applied)) continue;
       Result<FrameErrors> errors = SplitFrames(with_clip, contender.flags, times, contender.weights);
       if (!errors.ok()) return errors.status();
       contender.result.frame_errors.Append(*errors);
@@ -421,6 +432,23 @@ class Bench {
   }
 
  private:
+  // All contenders' rigs and the plan of the full side.
+  Result<std::shared_ptr<const Plan>> LoadSides(const Flags& flags, const Rig& rig, std::size_t frames,
+                                                bool still) {
+    Request outputs;
+    for (std::size_t i = 0; i < contenders_.size(); ++i) {
+      Request wanted;
+      KPSA_RETURN_IF_ERROR(contenders_[i].Load(flags, options_, frames, still, &wanted));
+      if (i == 0) outputs = wanted;
+      if (outputs.outputs.size() != wanted.outputs.size() ||
+          outputs.outputs.front().plug != wanted.outputs.front().plug)
+        return Status::Usage("{} and {} accelerate different things, which no common run compares",
+                             contenders_[0].applied.front().path, contenders_[i].applied.front().path);
+    }
+    Compiler compiler;
+    return CompileFor(rig, &compiler, outputs);
+  }
+
   // What the time consists of.
   Status ProfileClip(Side* full, const std::vector<double>& times, const std::vector<double>& full_ns) {
     std::vector<Side*> sides{full};
@@ -437,6 +465,7 @@ class Bench {
     Status status;
     for (std::size_t f = 0; f < times.size() && status.ok(); ++f) {
       for (std::size_t i = 0; i < sides.size() && status.ok(); ++i) {
+        sides[i]->Forget();
         sides[i]->evaluator->Record(&profiles[i], static_cast<int>(f));
         const std::uint64_t begin = ProfileClock();
         status = sides[i]->Evaluate(times[f]);

@@ -5,6 +5,7 @@
 // them. A frame's time is the median over the runs; a clip's is the mean over its frames.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,11 @@ struct BenchNode {
   Index points = 0;
 };
 
+// How many times as long; not a number where that is unknown.
+inline double Ratio(double ms, double shorter_ms) {
+  return shorter_ms > 0 ? ms / shorter_ms : std::numeric_limits<double>::quiet_NaN();
+}
+
 // One accelerated side, and the full one of the same run.
 struct BenchResult {
   std::vector<std::string> clips, trained_on,
@@ -39,7 +45,7 @@ struct BenchResult {
   bool light = false;                         // errors are numbers, and a frame's is its RMS
   struct Frame {
     std::string clip;
-    std::size_t number = 0;
+    std::int64_t number = 0;  // of the clip's frames
     bool hit = false;
     double rms = 0, max = 0, full_ms = 0, accelerated_ms = 0;
   };
@@ -51,20 +57,18 @@ struct BenchResult {
   double graph_ms = 0, cues_ms = 0, projection_ms = 0, reconstruction_ms = 0, downstream_ms = 0,
          misses_ms = 0;  // its parts
   double full_ms_on_hits = 0, accelerated_ms_on_hits = 0;
-  double speedup() const { return accelerated_ms > 0 ? full_ms / accelerated_ms : 0; }
-  double speedup_on_hits() const {
-    return accelerated_ms_on_hits > 0 ? full_ms_on_hits / accelerated_ms_on_hits : 0;
-  }
+  double speedup() const { return Ratio(full_ms, accelerated_ms); }
+  double speedup_on_hits() const { return Ratio(full_ms_on_hits, accelerated_ms_on_hits); }
   // What no subspace can skip: the full evaluation without the steps with points above the accelerated ones.
   double bound_ms = 0, bound_graph_ms = 0, bound_points_ms = 0;
-  double ceiling() const { return bound_ms > 0 ? full_ms / bound_ms : 0; }
+  double ceiling() const { return Ratio(full_ms, bound_ms); }
 
-  std::size_t hits = 0, violations = 0;  // violations: accepted frames with a point beyond the tolerance
-  std::string verdict_text, worst_miss;
+  std::size_t hits = 0, violations = 0;  // violations: frames beyond the tolerance, accepted or not
+  std::string worst_miss;
   double error_rms = 0, error_max = 0, error_p99 = 0,
-         diagonal = 0;  // metres, all points of all frames, misses included
-  std::string worst_clip;
-  std::size_t worst_frame = 0;
+         diagonal = 0;     // metres, all points of all frames, misses included
+  std::string worst_clip;  // "": nothing differs
+  std::int64_t worst_frame = 0;
   double motion_rms = 0;                           // metres, distance from the mean over a clip's frames
   std::size_t nodes_total = 0;                     // that the full evaluation computes
   std::vector<std::string> never_evaluated;        // of these, in the accelerated one

@@ -26,6 +26,51 @@ bool IsRepeated(const BenchJsonValue& side, const std::vector<BenchJsonValue>& s
   });
 }
 
+// Numbers as kpsa bench writes them: null where there is none, and -1 for an error that is not finite.
+Status CheckSide(const BenchJsonValue& side) {
+  const auto check = [&](const char* pointer, const char* expected, const auto& sound) {
+    const BenchJsonValue& value = side.at(BenchJsonValue::json_pointer(pointer));
+    if (value.is_null() || (value.is_number() && sound(value.get<double>()))) return Status();
+    return Status::Invalid("{} is {}, expected {}", pointer,
+                           value.is_number() ? value.dump() : value.type_name(), expected);
+  };
+  for (const char* count : {"/points", "/cues", "/cue_points", "/modes"}) {
+    KPSA_RETURN_IF_ERROR(check(count, "a whole number from 0 on", [](double value) {
+      return value >= 0 && value < 1e15 && value == std::floor(value);
+    }));
+  }
+  KPSA_RETURN_IF_ERROR(
+      check("/hit_rate", "a share from 0 to 1", [](double value) { return value >= 0 && value <= 1; }));
+  std::vector<const char*> numbers = {"/tolerance",
+                                      "/speedup_on_hits",
+                                      "/speedup",
+                                      "/ceiling/speedup",
+                                      "/error/bbox_diagonal",
+                                      "/full/ms_per_frame",
+                                      "/full/ns_per_point",
+                                      "/accelerated/ms_per_frame",
+                                      "/accelerated/graph",
+                                      "/accelerated/cues",
+                                      "/accelerated/projection",
+                                      "/accelerated/reconstruction",
+                                      "/accelerated/downstream",
+                                      "/accelerated/misses",
+                                      "/storage/bytes_per_point"};
+  if (!side.at("frame_errors").is_null()) {
+    for (const char* part :
+         {"/frame_errors/rms/projection", "/frame_errors/rms/cueing", "/frame_errors/rms/storage",
+          "/frame_errors/rms/total", "/frame_errors/rms/soft_cache"})
+      numbers.push_back(part);
+  }
+  for (const char* number : numbers)
+    KPSA_RETURN_IF_ERROR(check(number, "a number from 0 on", [](double value) { return value >= 0; }));
+  for (const char* error : {"/error/rms", "/error/max"}) {
+    KPSA_RETURN_IF_ERROR(
+        check(error, "a number from 0 on, or -1", [](double value) { return value >= 0 || value == -1; }));
+  }
+  return Status();
+}
+
 // The sides of a document, the first included.
 Result<std::vector<BenchJsonValue>> ReadSides(const std::string& path) {
   const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kMostBytes);
@@ -39,6 +84,13 @@ Result<std::vector<BenchJsonValue>> ReadSides(const std::string& path) {
   document.erase("beside");
   sides.push_back(std::move(document));
   for (BenchJsonValue& side : beside) sides.push_back(std::move(side));
+  try {
+    for (const BenchJsonValue& side : sides) {
+      if (const Status status = CheckSide(side); !status.ok()) return Status(status).At({path});
+    }
+  } catch (const BenchJsonValue::exception& error) {
+    return Status::Invalid("is no bench of this version: {}", error.what()).At({path});
+  }
   return sides;
 }
 
@@ -65,11 +117,9 @@ double NumberAt(const BenchJsonValue& side, const char* pointer) {
   return value.is_number() ? value.get<double>() : NAN;
 }
 
-std::string Times(double ratio) { return std::isfinite(ratio) ? fmt::format("{:.1f}x", ratio) : "-"; }
-
 // "0.0123 %" of the diagonal: two significant digits and more.
 std::string ShareOf(const BenchJsonValue& side, double length) {
-  const double share = 100 * length / NumberAt(side, "/error/bbox_diagonal");
+  const double share = length < 0 ? NAN : 100 * length / NumberAt(side, "/error/bbox_diagonal");
   return std::isfinite(share) ? fmt::format("{:.{}f} %", share,
                                             share >= 0.1    ? 2
                                             : share >= 0.01 ? 3
@@ -98,8 +148,8 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
         reached.Row({NameOf(side), Thousands(side.at("points").get<std::uint64_t>()), ModeOf(side),
                      MeasuredOf(side), std::to_string(side.at("modes").get<std::uint64_t>()),
                      fmt::format("{:.1f} %", 100 * NumberAt(side, "/hit_rate")),
-                     Times(NumberAt(side, "/speedup_on_hits")), Times(NumberAt(side, "/speedup")),
-                     paper ? document.reference : "", Times(NumberAt(side, "/ceiling/speedup")),
+                     RatioText(NumberAt(side, "/speedup_on_hits")), RatioText(NumberAt(side, "/speedup")),
+                     paper ? document.reference : "", RatioText(NumberAt(side, "/ceiling/speedup")),
                      ShareOf(side, NumberAt(side, "/error/rms")), ShareOf(side, NumberAt(side, "/error/max")),
                      tolerance >= kAnyError ? "any" : LengthText(tolerance)});
         const double accelerated = NumberAt(side, "/accelerated/ms_per_frame");

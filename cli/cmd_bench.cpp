@@ -46,11 +46,7 @@ Result<std::vector<AccelerationFlags>> SidesOf(const BenchFlags& flags) {
   for (std::size_t i = 0; i < count; ++i) {
     if (!flags.kpsa.empty()) sides[i].kpsa = flags.kpsa[i];
     const std::string tolerance = given == 0 ? "own" : flags.tolerances[given == 1 ? 0 : i];
-    if (tolerance == "any") {
-      sides[i].tolerance = "1e30m";
-    } else if (tolerance != "own") {
-      sides[i].tolerance = tolerance;
-    }
+    if (tolerance != "own") sides[i].tolerance = tolerance;
     KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(sides[i], true));
   }
   return sides;

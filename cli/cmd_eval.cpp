@@ -67,7 +67,7 @@ CommandResult Eval(const EvalFlags& flags) {
   options.quiet = flags.quiet;
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
-        if (!applied.empty()) verdicts.Add(frame, evaluator);
+        if (!applied.empty()) verdicts.Add(FrameNumber((*times)[frame], rig.fps), evaluator);
         for (Index m = 0; m < meshes.size(); ++m) meshes[m] = evaluator.Points(m);
         return (*output)->Frame(meshes);
       }));

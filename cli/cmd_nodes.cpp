@@ -108,6 +108,8 @@ CommandResult Nodes(const NodesFlags& flags) {
   if (flags.markdown + flags.schema + flags.json + flags.pictures.has_value() > 1)
     return Status::Usage("expected one of --markdown, --pictures, --schema and --json");
   if (flags.pictures.has_value()) {
+    if (flags.type.has_value())
+      return Status::Usage("--pictures is of all node types, expected no TYPE, found \"{}\"", *flags.type);
     KPSA_RETURN_IF_ERROR(WriteNodePictures(registry, *flags.pictures, flags.force));
     return 0;
   }

@@ -11,6 +11,7 @@
 #include "cli/output.h"
 #include "cli/rig_picture.h"
 #include "io/png.h"
+#include "kpsa/kpsa_node.h"
 
 namespace kpsa {
 namespace {
@@ -58,7 +59,7 @@ Result<View> ReadView(const RenderFlags& flags) {
     view.turntable = *count;
   }
   if (flags.error_scale.has_value()) {
-    const Result<double> scale = ParseTolerance(*flags.error_scale);
+    const Result<double> scale = ParseLength("--error-scale", *flags.error_scale);
     if (!scale.ok() || !(*scale > 0))
       return Status::Usage("--error-scale \"{}\": expected a length above 0, as in 1mm", *flags.error_scale);
     view.error_scale = *scale;
@@ -208,8 +209,9 @@ CommandResult Render(const RenderFlags& flags) {
                                      view->azimuth, view->elevation);
     for (std::size_t f : frames) {
       RenderInput exact = MakeInput(rig, (*full)[f]), emitted = MakeInput(rig, (*fast)[f]);
-      exact.scalar_max = emitted.scalar_max =
-          view->error_scale.value_or(std::max(applied->front().tolerance, 1e-7));
+      const AppliedSubspace& first = applied->front();
+      const double tolerance = first.tolerance < kAnyError ? first.tolerance : first.subspace->tolerance;
+      exact.scalar_max = emitted.scalar_max = view->error_scale.value_or(std::max(tolerance, 1e-7));
       const RenderDots dots = KeyPoints(*applied, (*full)[f]);
       KPSA_RETURN_IF_ERROR(add(RenderComparison(exact, emitted, camera, view->options, &dots)));
     }

@@ -45,7 +45,7 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
   if (flags.paper) options->mode = EstimatorMode::kPaper;
   options->keep_modes = flags.keep_modes;
   if (flags.tolerance.has_value()) {
-    const Result<double> value = ParseTolerance(*flags.tolerance);
+    const Result<double> value = ParseLength("--tolerance", *flags.tolerance);
     if (!value.ok()) return value.status();
     options->tolerance = *value;
   }

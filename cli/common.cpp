@@ -203,6 +203,10 @@ std::string LengthText(double metres) {
   return metres < 0.1 ? fmt::format("{:.3g} mm", metres * 1000) : fmt::format("{:.4g} m", metres);
 }
 
+std::string RatioText(double ratio, int digits) {
+  return std::isfinite(ratio) ? fmt::format("{:.{}f}x", ratio, digits) : "-";
+}
+
 std::string Plural(std::uint64_t count, const std::string& noun) {
   if (count == 1) return "1 " + noun;
   if (noun.ends_with("vertex")) return Thousands(count) + " " + noun.substr(0, noun.size() - 2) + "ices";

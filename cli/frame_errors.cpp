@@ -73,6 +73,11 @@ double EmittedFullWeight(const AppliedSubspace& applied, double score) {
                     Calibrate(s.calibration, tolerance, applied.violation_rate, s.blend_start).threshold);
 }
 
+bool KeepModes(const std::vector<AppliedSubspace>& applied) {
+  return std::all_of(applied.begin(), applied.end(),
+                     [](const AppliedSubspace& one) { return one.subspace->kept_modes.size() > 0; });
+}
+
 Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acceleration,
                                 const std::vector<double>& times, const FullWeights& weights) {
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
@@ -88,7 +93,6 @@ Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acc
   Request request;
   request.varying.push_back(rig.scene.time);
   for (const AppliedSubspace& one : *applied) {
-    if (one.subspace->kept_modes.size() == 0) return errors;
     blocks.push_back(MakeBlock(one));
     for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
       request.outputs.push_back({one.entry.points[p].points, {}});

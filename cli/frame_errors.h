@@ -9,7 +9,7 @@
 namespace kpsa {
 
 // RMS over the accelerated points, in metres and in the space of the subspace. One entry a frame; all empty
-// where a subspace was trained without --keep-modes.
+// where nothing was split.
 struct FrameErrors {
   std::vector<double> times;                               // seconds
   std::vector<double> projection, cueing, storage, total;  // every frame reconstructed
@@ -24,6 +24,9 @@ using FullWeights = std::vector<std::vector<double>>;
 
 // That share, from the KPSA node's score.
 double EmittedFullWeight(const AppliedSubspace& applied, double score);
+
+// Whether every subspace was trained with --keep-modes, which SplitFrames needs.
+bool KeepModes(const std::vector<AppliedSubspace>& applied);
 
 // Evaluates the times once more, on a rig loaded anew, every frame reconstructed.
 Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acceleration,

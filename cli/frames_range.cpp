@@ -116,6 +116,10 @@ Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view 
   return indices;
 }
 
+std::int64_t FrameNumber(double seconds, double fps) {
+  return std::llround(std::clamp(seconds * fps, -1e15, 1e15));
+}
+
 Status CheckTimeFlags(const Flags& flags) {
   if (flags.frames.has_value() && flags.times.has_value())
     return Status::Usage("--frames and --times: expected one of them");
@@ -144,7 +148,8 @@ Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig) {
       begin = clip.begin, duration = clip.duration;
   }
   // A clip that was made at this rate ends on a frame, but for rounding
-  const double first = std::ceil(begin * rig.fps - 1e-3), last = std::floor(duration * rig.fps + 1e-3);
+  // (+ 0: from a first frame -0)
+  const double first = std::ceil(begin * rig.fps - 1e-3) + 0.0, last = std::floor(duration * rig.fps + 1e-3);
   if (!(last - first < static_cast<double>(kMaxSamples))) {
     return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames: choose some with --frames",
                          rig.scene.clip.value_or(""), duration, Thousands(kMaxSamples));

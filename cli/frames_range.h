@@ -29,6 +29,8 @@ Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view 
 // The times of --frames or --times in seconds. Without them: every frame of the clip that plays, from 0 to
 // its end; time 0 alone if none plays.
 Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig);
+// The frame of the clip that is nearest to a time, for reports; held within +-1e15.
+std::int64_t FrameNumber(double seconds, double fps);
 // Whether all refusals of --frames and --times pass, before a rig is loaded.
 Status CheckTimeFlags(const Flags& flags);
 

@@ -55,6 +55,7 @@ PictureFrame FrameAround(const DrawnHalf& before, const DrawnHalf& after) {
   return {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, kSide * kSamples * (1 - 2 * kMargin) / size};
 }
 
+// A renderer of its own: cli/picture.h's rays (Embree) differ between processors, and a test compares bytes.
 class Canvas {
  public:
   Canvas() : depth_(kCells * kCells, -1e30), color_(kCells * kCells, Double3{1, 1, 1}) {}
@@ -238,8 +239,11 @@ Status WriteNodePictures(const NodeRegistry& registry, const std::string& folder
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) return Status::Invalid("the folder {} cannot be made: {}", folder, error.message());
+  const auto path = [&](const NodePicture& picture) { return folder + "/" + picture.type + ".png"; };
   for (const NodePicture& picture : *pictures)
-    KPSA_RETURN_IF_ERROR(WriteFileAtomically(folder + "/" + picture.type + ".png", force, picture.png));
+    KPSA_RETURN_IF_ERROR(OutputFile::Create(path(picture), force).status());
+  for (const NodePicture& picture : *pictures)
+    KPSA_RETURN_IF_ERROR(WriteFileAtomically(path(picture), force, picture.png));
   return {};
 }
 

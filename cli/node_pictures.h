@@ -20,7 +20,7 @@ struct NodePicture {
 bool HasNodePicture(const std::string& type);
 // Of all types that have one, by name. Errors: an example that cannot be evaluated, with its type.
 Result<std::vector<NodePicture>> DrawNodePictures(const NodeRegistry& registry);
-// Writes <folder>/<type>.png of all of them; errors of the folder or its files.
+// Writes <folder>/<type>.png of all of them; errors of the folder or its files, before any is written.
 Status WriteNodePictures(const NodeRegistry& registry, const std::string& folder, bool force);
 
 }  // namespace kpsa

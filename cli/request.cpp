@@ -6,6 +6,8 @@
 namespace kpsa {
 namespace {
 
+constexpr std::size_t kMostStages = 8;  // that a message lists
+
 std::vector<std::string> MeshNames(const Rig& rig) {
   std::vector<std::string> names;
   for (const CharacterMesh& mesh : rig.scene.meshes) names.push_back(mesh.name);
@@ -33,8 +35,12 @@ Result<MeshStage> FindMeshStage(const Rig& rig, std::string_view text) {
   if (stage == nullptr) {
     std::vector<std::string> stages;
     for (const Stage& s : mesh->stages) stages.push_back(s.name);
-    return Status::Usage("\"{}\": the mesh has no stage \"{}\"; it has {}", text, stage_name,
-                         fmt::join(stages, ", "));
+    const std::string nearest = DidYouMean(stage_name, stages);
+    const std::size_t count = stages.size();
+    if (count > kMostStages) stages.resize(kMostStages - 2);
+    return Status::Usage("\"{}\": the mesh has no stage \"{}\"{}; it has {}{}", text, stage_name, nearest,
+                         fmt::join(stages, ", "),
+                         count > kMostStages ? fmt::format(" and {} more", count - stages.size()) : "");
   }
   return MeshStage{mesh, stage->points};
 }

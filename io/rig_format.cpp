@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "io/rig_words.h"
 
@@ -264,25 +265,35 @@ Result<std::string> FormatRig(const YamlNode& root, const NodeRegistry& registry
 }
 
 bool HasComments(std::string_view text) {
-  char quote = 0;
-  char before = '\n';  // the last byte that is no blank, or the blank itself
-  bool blank = true;
+  enum class In : std::uint8_t { kNothing, kPlain, kProperty, kSingle, kDouble };  // kind of token
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
+  In in = In::kNothing;
+  int flow = 0;  // open brackets
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (quote != 0) {
-      if (quote == '"' && c == '\\') {
-        ++i;
-      } else if (c == quote) {
-        quote = 0;
-      }
-      blank = false;
+    const char c = text[i], next = i + 1 < text.size() ? text[i + 1] : '\n';
+    if (in == In::kSingle || in == In::kDouble) {
+      if (in == In::kDouble && c == '\\') ++i;
+      if (c == (in == In::kSingle ? '\'' : '"')) in = In::kNothing;
       continue;
     }
-    if (c == '#' && blank) return true;
-    const bool starts = before == '\n' || std::string_view("[{,:-").find(before) != std::string_view::npos;
-    if ((c == '"' || c == '\'') && starts) quote = c;
-    blank = c == ' ' || c == '\t' || c == '\n' || c == '\r';
-    if (c == '\n' || !blank) before = c;
+    if (c == '#' && (i == 0 || blank(text[i - 1]))) return true;
+    const bool bracket = flow > 0 && std::string_view(",[]{}").find(c) != std::string_view::npos;
+    const bool colon =
+        c == ':' &&
+        (blank(next) || (flow > 0 && std::string_view(",[]{}").find(next) != std::string_view::npos));
+    if (in == In::kPlain && c != '\n' && !bracket && !colon) continue;
+    if (in == In::kProperty && !blank(c) && !bracket) continue;
+    in = In::kNothing;
+    if (blank(c) || c == ',' || c == ':' || ((c == '-' || c == '?') && blank(next))) continue;
+    if (c == '[' || c == '{') {
+      ++flow;
+    } else if (c == ']' || c == '}') {
+      flow = std::max(0, flow - 1);
+    } else if (c == '\'' || c == '"') {
+      in = c == '"' ? In::kDouble : In::kSingle;
+    } else {
+      in = c == '&' || c == '!' || c == '*' ? In::kProperty : In::kPlain;
+    }
   }
   return false;
 }

@@ -309,6 +309,16 @@ void Maker::Combinations() {
 
 }  // namespace
 
+SparseTarget TargetOf(const Expression& expression, double smallest) {
+  SparseTarget target = {expression.name, {}, {}};
+  for (std::size_t i = 0; i < expression.deltas.size(); ++i) {
+    if (Length(expression.deltas[i]) < smallest) continue;
+    target.points.push_back(static_cast<Index>(i));
+    target.deltas.push_back(ToMetres(expression.deltas[i]));
+  }
+  return target;
+}
+
 bool IsCorrective(const std::string& expression) {
   return expression.find(kInbetween) != std::string::npos ||
          expression.find(kCombination) != std::string::npos;

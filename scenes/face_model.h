@@ -19,6 +19,8 @@ struct Expression {
   std::string name;
   std::vector<Double3> deltas;
 };
+// As a morph target, without displacements below `smallest`, cm.
+SparseTarget TargetOf(const Expression& expression, double smallest);
 // The expressions that are controls; for a production's head then their in-betweens and correctives.
 std::vector<Expression> FaceExpressions(const HeadDesign& design, const HeadShape& shape);
 bool IsCorrective(const std::string& expression);

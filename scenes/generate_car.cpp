@@ -49,15 +49,8 @@ Influences Only(int joint) {
 }
 
 void AddTargets(const std::vector<Expression>& expressions, GlbMesh* mesh) {
-  for (const Expression& expression : expressions) {
-    SparseTarget target = {expression.name, {}, {}};
-    for (std::size_t i = 0; i < expression.deltas.size(); ++i) {
-      if (Length(expression.deltas[i]) < kSmallestDelta) continue;
-      target.points.push_back(static_cast<Index>(i));
-      target.deltas.push_back(ToMetres(expression.deltas[i]));
-    }
-    mesh->targets.push_back(std::move(target));
-  }
+  for (const Expression& expression : expressions)
+    mesh->targets.push_back(TargetOf(expression, kSmallestDelta));
 }
 
 GlbMesh BodyMesh(const CarShape& shape, const std::vector<Expression>& expressions) {

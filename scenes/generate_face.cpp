@@ -38,16 +38,6 @@ Influences InfluencesOf(const HeadDesign& design, const std::array<double, kJoin
   return MakeInfluences(std::span(weights.data(), design.joints.size()));
 }
 
-SparseTarget TargetOf(const Expression& expression) {
-  SparseTarget target = {expression.name, {}, {}};
-  for (std::size_t i = 0; i < expression.deltas.size(); ++i) {
-    if (Length(expression.deltas[i]) < kSmallestDelta) continue;
-    target.points.push_back(static_cast<Index>(i));
-    target.deltas.push_back(ToMetres(expression.deltas[i]));
-  }
-  return target;
-}
-
 GlbMesh FaceMesh(const HeadDesign& design, const HeadShape& shape, const std::vector<Expression>& expressions,
                  const std::vector<std::array<double, kJointCount>>& joint_weights) {
   GlbMesh mesh;
@@ -57,7 +47,8 @@ GlbMesh FaceMesh(const HeadDesign& design, const HeadShape& shape, const std::ve
   mesh.normals = SmoothNormals(mesh.positions, mesh.triangles);
   mesh.colors = SkinColors(design, shape);
   for (const auto& weights : joint_weights) mesh.influences.push_back(InfluencesOf(design, weights));
-  for (const Expression& expression : expressions) mesh.targets.push_back(TargetOf(expression));
+  for (const Expression& expression : expressions)
+    mesh.targets.push_back(TargetOf(expression, kSmallestDelta));
   return mesh;
 }
 
@@ -78,7 +69,7 @@ GlbMesh MusclesMesh(const HeadDesign& design, bool deep, const HeadShape& shape,
   }
   mesh.triangles = Triangulate(muscles.quads);
   mesh.normals = SmoothNormals(mesh.positions, mesh.triangles);
-  for (const Expression& pull : muscles.pulls) mesh.targets.push_back(TargetOf(pull));
+  for (const Expression& pull : muscles.pulls) mesh.targets.push_back(TargetOf(pull, kSmallestDelta));
   return mesh;
 }
 

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "cli/bench_report.h"
 #include "io/npz.h"
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
@@ -59,6 +60,9 @@ TEST(Eval, SameBytesForAnyThreadsAndWaysToSayTimes) {
   Ok({"eval", kHello, "--frames", "0:24:12", "--threads", "1", "-o", folder / "a.npz"});
   Ok({"eval", kHello, "--times", "0,0.5,1", "--threads", "3", "-o", folder / "b.npz"});
   EXPECT_EQ(TemporaryFolder::Read(folder / "a.npz"), TemporaryFolder::Read(folder / "b.npz"));
+  Ok({"eval", kHello, "--frames", "0:48", "-o", folder / "range.npz"});
+  Ok({"eval", kHello, "-o", folder / "clip.npz"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "range.npz"), TemporaryFolder::Read(folder / "clip.npz"));
   Ok({"eval", kHello, "--times", "1,0,0.5", "-o", folder / "c.npz"});
   const Result<Npz> forward = ReadNpz(folder / "a.npz"), shuffled = ReadNpz(folder / "c.npz");
   ASSERT_TRUE(forward.ok() && shuffled.ok());
@@ -292,6 +296,17 @@ TEST(Inspect, KnowsWhatItWrites) {
   EXPECT_EQ(OkJson({"inspect", KPSA_SCENES_DIR "/face/w/face.json", "--json"})["kind"], "weights");
 }
 
+TEST(BenchReport, WhatIsNotKnownIsNoNumber) {
+  BenchResult result;
+  result.per_frame.emplace_back();
+  const std::string text = BenchText({result}, {}) + FramesText({result});
+  EXPECT_NE(text.find("speedup    -; ceiling -, bound"), std::string::npos) << text;
+  EXPECT_EQ(text.find("0.0x"), std::string::npos) << text;
+  const Json json = Json::parse(BenchJson({result}, {}));
+  EXPECT_TRUE(json["ceiling"]["speedup"].is_null() && json["speedup"].is_null()) << json;
+  EXPECT_TRUE(json["error"]["worst_frame"].is_null()) << json["error"];
+}
+
 // The first five minutes: init, train, bench, and what follows from them.
 TEST(Acceleration, FirstFiveMinutes) {
   const TemporaryFolder folder;
@@ -320,6 +335,29 @@ TEST(Acceleration, FirstFiveMinutes) {
   EXPECT_GT(bench["full"]["ms_per_frame"], 0);
   EXPECT_TRUE(bench["nodes"]["never_evaluated"].is_array());
   EXPECT_LE(bench["error"]["rms"], bench["error"]["max"]);
+
+  // One frame, or a pose in which nothing moves: all of it is evaluated every time
+  for (const std::vector<std::string>& chosen :
+       {std::vector<std::string>{"--frames", "5"}, {"--rest"}, {"--rest", "--frames", "0:2"}}) {
+    std::vector<std::string> arguments{"bench", rig, "--runs", "1", "--json", "-q"};
+    arguments.insert(arguments.end(), chosen.begin(), chosen.end());
+    const Json still = OkJson(arguments);
+    EXPECT_GT(still["full"]["ms_per_frame"], 0) << still["clip"];
+    EXPECT_GT(still["nodes"]["total"], 0) << still["clip"];
+    EXPECT_EQ(still["points_evaluated_per_frame"]["full"], bench["points_evaluated_per_frame"]["full"]);
+  }
+
+  // Frames have the clip's numbers, and none is the worst where nothing differs
+  const Json some = OkJson({"bench", rig, "--frames", "10:40:10", "--runs", "1", "--json", "-q"});
+  std::vector<int> numbers;
+  for (const Json& frame : some["per_frame"]) numbers.push_back(frame["frame"]);
+  EXPECT_EQ(numbers, (std::vector<int>{10, 20, 30, 40}));
+  EXPECT_EQ(some["error"]["worst_frame"].get<int>() % 10, 0) << some["error"];
+  EXPECT_GE(some["error"]["worst_frame"], 10);
+  const std::string exact =
+      Ok({"bench", rig, "--frames", "10:40:10", "--tolerance", "0", "--runs", "1", "-q"});
+  EXPECT_EQ(exact.find("(frame"), std::string::npos) << exact;
+  EXPECT_NE(exact.find("first at frame 10"), std::string::npos) << exact;
 
   // Tolerance 0: the exact rig, bit for bit
   Ok({"eval", rig, "-o", folder / "full.npz"});

@@ -1,5 +1,6 @@
 // Accelerated rigs of other shapes: several meshes and stages, a rig that travels, and motion that no
 // training pose had. Each hit has to keep the tolerance.
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -224,6 +225,7 @@ TEST_F(Travelling, CuesThatAreNoNumbersMiss) {
   EXPECT_FALSE(frame.hit);
   EXPECT_EQ(frame.reason, MissReason::kNotFinite);
   EXPECT_NE(frame.text.find("is not a number"), std::string::npos) << frame.text;
+  EXPECT_EQ(std::count(frame.text.begin(), frame.text.end(), '@'), 1) << frame.text;  // mesh@stage
   run.Set("lower.translateX", 0);
   EXPECT_TRUE(SameBytes(run.Evaluate().points, before.points));
 }

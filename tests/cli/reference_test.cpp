@@ -220,6 +220,12 @@ TEST(NodeReference, PicturesShowWhatEveryDeformerDoes) {
     different.insert(committed);
   }
   EXPECT_EQ(different.size(), pictures->size());
+  // All of them or none: the last one exists
+  const TemporaryFolder folder;
+  folder.Write(pictures->back().type + ".png", "mine");
+  EXPECT_EQ(WriteNodePictures(registry, folder.path(), false).kind(), ErrorKind::kUsage);
+  EXPECT_EQ(folder.FileCount(), 1u);
+  EXPECT_EQ(TemporaryFolder::Read(folder / (pictures->back().type + ".png")), "mine");
 }
 
 }  // namespace

@@ -70,6 +70,28 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
   const Json bench = Json::parse(TemporaryFolder::Read(folder / "out/hello.json"));
   ASSERT_EQ(bench["beside"].size(), 2u);
   const Json &accepted = bench, &cached = bench["beside"][0], &ours = bench["beside"][1];
+  // No tables of what is no number
+  const auto edited = [&](const char* pointer, const Json& value) {
+    Json wrong = bench;
+    wrong[Json::json_pointer(pointer)] = value;
+    return RunKpsa({"report", folder.Write("wrong.json", wrong.dump())});
+  };
+  EXPECT_EQ(edited("/hit_rate", 1).exit_code, 0);
+  EXPECT_EQ(edited("/error/rms", -1).exit_code, 0);
+  for (const auto& [pointer, value] :
+       std::vector<std::pair<const char*, Json>>{{"/points", -5},
+                                                 {"/modes", 2.5},
+                                                 {"/hit_rate", "0.9"},
+                                                 {"/hit_rate", 7},
+                                                 {"/beside/0/cues", -1},
+                                                 {"/speedup", true},
+                                                 {"/frame_errors/rms/total", "x"},
+                                                 {"/error/max", -2}}) {
+    const ProcessResult refused = edited(pointer, value);
+    EXPECT_EQ(refused.exit_code, 3) << pointer;
+    EXPECT_NE(refused.err.find("wrong.json"), std::string::npos) << refused.err;
+    EXPECT_EQ(refused.out, "") << pointer;
+  }
   EXPECT_EQ(accepted["mode"], "paper");
   EXPECT_EQ(ours["mode"], "map");
   EXPECT_EQ(accepted["cue_points"], 10);

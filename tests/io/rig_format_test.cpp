@@ -182,9 +182,13 @@ TEST(RigFormat, HostileStringsStayWhatTheyAre) {
 }
 
 TEST(RigFormat, FindsComments) {
-  for (const char* text : {"# a", "a: b # c", "a: 'it''s' # c", "a:\n#c\n", "a: \"\\\"\" # c"})
+  for (const char* text :
+       {"# a", "a: b # c", "a: 'it''s' # c", "a:\n#c\n", "a: \"\\\"\" # c", "{a.b: x-'} # c", "{a: x:'b} # c",
+        "a: x-' # c", "a: x,' # c", "a: [x, y'] # c", "- ' ' # c", "a: b'\nc: 'd' # e", "{\"a\":'b'} # c"})
     EXPECT_TRUE(HasComments(text)) << text;
-  for (const char* text : {"a: b#c", "a: 'b # c'", "a: \"b \\\" # c\"", "{a: '# b', \"# c\": 1}", ""})
+  for (const char* text :
+       {"a: b#c", "a: 'b # c'", "a: \"b \\\" # c\"", "{a: '# b', \"# c\": 1}", "", "- '# a'", "{\"a\":'# b'}",
+        "a: [x,'# b']", "a: &n '# b'", "? '# a'\n: '# b'", "a: x#"})
     EXPECT_FALSE(HasComments(text)) << text;
 }
 

@@ -7,7 +7,7 @@
 
 namespace kpsa {
 
-// <source dir>/../shared/<path>, also where the source is a worktree one level deeper.
+// <source dir>/../shared/<path>, or one folder above that.
 inline std::string SharedFile(const std::string& path) {
   namespace fs = std::filesystem;
   const fs::path source = fs::path(__FILE__).parent_path().parent_path().parent_path();
