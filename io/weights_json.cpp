@@ -9,6 +9,7 @@
 #include <set>
 
 #include "io/file.h"
+#include "io/json_depth.h"
 #include "io/quantity.h"
 
 namespace kpsa {
@@ -88,6 +89,12 @@ class Reader {
     return static_cast<float>(number);
   }
 
+  // A number or null as it is; what may be long by its kind.
+  static std::string Short(const json& value) {
+    return value.is_number() || value.is_null() ? value.dump()
+                                                : fmt::format("an entry of type {}", value.type_name());
+  }
+
   void ReadMap(const std::string& name, const json& in) {
     const std::string where = fmt::format("map \"{}\": ", name);
     if (!in.is_object()) return Fail("{}must be an object", where);
@@ -110,14 +117,14 @@ class Reader {
     std::set<Index> seen;
     for (std::size_t i = 0; i < indices.size(); ++i) {
       if (!indices[i].is_number_unsigned() || indices[i].get<std::uint64_t>() >= file_->points) {
-        Fail("{}indices[{}] is {}, expected a point from 0 to {}", where, i, indices[i].dump(),
+        Fail("{}indices[{}] is {}, expected a point from 0 to {}", where, i, Short(indices[i]),
              static_cast<long long>(file_->points) - 1);
         continue;
       }
       const auto index = indices[i].get<Index>();
       if (!seen.insert(index).second) Fail("{}point {} occurs twice", where, index);
       const std::optional<float> value = Number(values[i]);
-      if (!value) Fail("{}values[{}] is {}, expected a finite number", where, i, values[i].dump());
+      if (!value) Fail("{}values[{}] is {}, expected a finite number", where, i, Short(values[i]));
       map.indices.push_back(index);
       map.values.push_back(value.value_or(0));
     }
@@ -155,6 +162,7 @@ const NamedWeights* WeightFile::Find(std::string_view name) const {
 Result<WeightFile> ReadWeightFile(const std::string& path) {
   const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kLargestFile);
   if (!bytes.ok()) return bytes.status();
+  if (Status status = CheckJsonDepth(*bytes); !status.ok()) return std::move(status).At({path});
   try {
     // JSON libraries keep the last of equal keys; here the first is remembered, too
     std::vector<std::set<std::string>> keys;

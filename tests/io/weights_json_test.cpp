@@ -108,6 +108,8 @@ TEST(Weights, EveryErrorIsNamed) {
   expect(with("[1, 0.5]", "[1, null]"), "values[1] is null");
   expect(with("[1, 0.5]", "[1, 1e39]"), "values[1] is 1e+39, expected a finite");
   expect(with("[1, 0.5]", "[1, 1e999]"), "is no valid weight file");
+  expect(with("[4, 0]", "[4, [[1]]]"), "indices[1] is an entry of type array, expected a point");
+  expect(with("[1, 0.5]", "[1, \"half\"]"), "values[1] is an entry of type string, expected a finite");
   expect(with("0.25", "\"x\""), "default must be a finite number");
   expect(with("\"version\": 1", "\"version\": 2"), "version must be 1");
   expect(with("\"default\"", "\"defualt\""), "did you mean \"default\"");
@@ -122,6 +124,17 @@ TEST(Weights, EveryErrorIsNamed) {
   // Collected: both errors of one file
   const auto both = ReadWeightFile(folder.Write("w.json", with("[4, 0]", "[9, 9]")));
   EXPECT_EQ(both.status().errors().size(), 2u);
+}
+
+TEST(Weights, NestedTextIsRefusedBeforeAnybodyRecurses) {
+  const TemporaryFolder folder;
+  const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+  const Result<WeightFile> file =
+      ReadWeightFile(folder.Write("w.json", R"({"kpsa": "weights", "version": 1, "mesh": "m", "points": 1,
+        "maps": {"a": {"indices": [)" + deep + R"(], "values": [1]}}})"));
+  ASSERT_FALSE(file.ok());
+  EXPECT_NE(file.status().ToString().find("nested more than"), std::string::npos) << file.status().ToString();
+  EXPECT_EQ(file.status().errors()[0].where.file, folder / "w.json");
 }
 
 }  // namespace
