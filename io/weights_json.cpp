@@ -15,7 +15,7 @@
 namespace kpsa {
 namespace {
 
-using json = nlohmann::ordered_json;
+using json = nlohmann::json;  // finds keys by their order; ordered_json looks at each
 constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 30;
 
 SourceLocation PlaceOfByte(const std::string& path, const std::vector<std::uint8_t>& text, std::size_t byte) {
@@ -32,7 +32,8 @@ class Reader {
  public:
   Reader(const std::string& path, WeightFile* file) : path_(path), file_(file) {}
 
-  Status Read(const json& root) {
+  // `names`: the maps' in the file's order.
+  Status Read(const json& root, const std::vector<std::string>& names) {
     if (!root.is_object() || Text(root, "kpsa") != "weights") {
       Fail("is no weight file; expected {{\"kpsa\": \"weights\", ...}}");
       return std::move(status_);
@@ -54,7 +55,7 @@ class Reader {
     if (maps == root.end() || !maps->is_object()) {
       Fail("maps must be an object of weight maps");
     } else if (status_.ok()) {
-      for (const auto& [name, map] : maps->items()) ReadMap(name, map);
+      for (const std::string& name : names) ReadMap(name, maps->at(name));
     }
     return std::move(status_);
   }
@@ -165,16 +166,19 @@ Result<WeightFile> ReadWeightFile(const std::string& path) {
   if (Status status = CheckJsonDepth(*bytes); !status.ok()) return std::move(status).At({path});
   try {
     // JSON libraries keep the last of equal keys; here the first is remembered, too
+    constexpr int kDepthOfMaps = 2;
+    std::vector<std::string> names;
     std::vector<std::set<std::string>> keys;
     std::string repeated;
     bool is_repeated = false;
-    const auto watch = [&](int, json::parse_event_t event, json& parsed) {
+    const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
       if (event == json::parse_event_t::object_start) keys.emplace_back();
       if (event == json::parse_event_t::object_end && !keys.empty()) keys.pop_back();
       if (event == json::parse_event_t::key && !keys.empty() && !is_repeated) {
         const auto& key = parsed.get_ref<const std::string&>();
         is_repeated = !keys.back().insert(key).second;
         if (is_repeated) repeated = key;
+        if (depth == kDepthOfMaps) names.push_back(key);
       }
       return true;
     };
@@ -182,7 +186,7 @@ Result<WeightFile> ReadWeightFile(const std::string& path) {
     if (is_repeated) return Status::Invalid("the key \"{}\" is defined twice", repeated).At({path});
     WeightFile file;
     file.path = path;
-    KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root));
+    KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root, names));
     return file;
   } catch (const json::parse_error& error) {
     return Status::Invalid("is no valid JSON here (NaN and trailing commas are none)")

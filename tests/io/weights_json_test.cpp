@@ -1,8 +1,10 @@
 #include "io/weights_json.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <chrono>
 #include <cmath>
 
 #include "tests/support/temporary_folder.h"
@@ -135,6 +137,22 @@ TEST(Weights, NestedTextIsRefusedBeforeAnybodyRecurses) {
   ASSERT_FALSE(file.ok());
   EXPECT_NE(file.status().ToString().find("nested more than"), std::string::npos) << file.status().ToString();
   EXPECT_EQ(file.status().errors()[0].where.file, folder / "w.json");
+}
+
+// In the file's order, and in no time that grows by the square of their number.
+TEST(Weights, ManyMaps) {
+  const TemporaryFolder folder;
+  constexpr int kMaps = 50000;
+  std::string text = R"({"maps": {)";
+  for (int i = 0; i < kMaps; ++i) text += fmt::format("{}\"m{}\":{{}}", i == 0 ? "" : ",", kMaps - i);
+  text += R"(}, "kpsa": "weights", "version": 1, "mesh": "m", "points": 1})";
+  const auto begin = std::chrono::steady_clock::now();
+  const Result<WeightFile> file = ReadWeightFile(folder.Write("w.json", text));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
+  ASSERT_TRUE(file.ok()) << file.status().ToString();
+  ASSERT_EQ(file->maps.size(), static_cast<std::size_t>(kMaps));
+  for (int i = 0; i < kMaps; i += 4999)
+    EXPECT_EQ(file->maps[static_cast<std::size_t>(i)].name, fmt::format("m{}", kMaps - i));
 }
 
 }  // namespace
