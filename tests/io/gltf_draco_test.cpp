@@ -246,6 +246,21 @@ TEST(GltfDraco, WhatDoesNotFit) {
   EXPECT_NE(c.warnings[0].find("fewer triangles"), std::string::npos);
 }
 
+// Metadata and whatever else lies in the bytes is read anew for each primitive.
+TEST(GltfDraco, PrimitivesThatShareMuchAreRefused) {
+  DracoCharacter character(3, draco::MESH_SEQUENTIAL_ENCODING);
+  const auto shared = [&](std::size_t bytes, int primitives) {
+    character.data.resize(bytes, 0);
+    GltfBuilder b = character.Document();
+    json& list = b.root["meshes"][0]["primitives"];
+    for (int i = 1; i < primitives; ++i) list.push_back(json(list[0]));
+    return LoadError(b.Glb());
+  };
+  EXPECT_EQ(shared(1 << 16, 100), "accepted");
+  const std::string error = shared(1 << 20, 100);
+  EXPECT_NE(error.find("too many primitives share compressed bytes"), std::string::npos) << error;
+}
+
 // Any outcome but a crash (run under sanitizers and valgrind, too).
 TEST(GltfDraco, DamagedBytes) {
   std::mt19937 random(11);
