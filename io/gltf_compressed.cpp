@@ -116,7 +116,7 @@ class Decompressor {
  private:
   // Others are not decoded: nobody asks for them.
   static bool IsRead(const std::string& name) {
-    return name == "POSITION" || name == "COLOR_0" || name.starts_with("JOINTS_") ||
+    return name == "POSITION" || name == "COLOR_0" || name == "TEXCOORD_0" || name.starts_with("JOINTS_") ||
            name.starts_with("WEIGHTS_");
   }
   const tinygltf::Accessor& AccessorOf(int index) const {
