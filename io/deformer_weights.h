@@ -57,7 +57,8 @@ struct MirroredWeights {
 };
 // The weights of one side on the other. The partner of a point is the one whose rest place, and whose
 // neighbours', come closest to those of its mirror image. A point that is its own partner keeps its weight;
-// in a skin the joints of both sides share it. The side that is taken from stays as it is.
+// in a skin the joints of both sides share it, where its mirror image is within the tolerance. The side that
+// is taken from stays as it is.
 Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, const MirrorOptions& options);
 
 }  // namespace kpsa

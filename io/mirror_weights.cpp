@@ -158,10 +158,12 @@ Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, co
     const double side = options.from == MirrorOptions::From::kLeft    ? partners.Side(p)
                         : options.from == MirrorOptions::From::kRight ? -partners.Side(p)
                                                                       : 0;
-    if (side > 0 && partner != p) continue;
-    const bool flips = options.from == MirrorOptions::From::kBoth;
-    sources[p] = {partner == p && !flips ? Source::kShares : Source::kTakes, partner};
-    unmatched[p] = distance > result.tolerance;
+    const bool flips = options.from == MirrorOptions::From::kBoth, far = distance > result.tolerance;
+    if (side > 0 && (partner != p || far)) continue;
+    // Its own partner, but not in the plane: nobody is on the other side
+    if (partner != p || !far)
+      sources[p] = {partner == p && !flips ? Source::kShares : Source::kTakes, partner};
+    unmatched[p] = far;
     result.farthest = std::max(result.farthest, distance);
   }
   for (Index v = 0; v < mesh.vertex_count; ++v) {
