@@ -167,12 +167,10 @@ CommandResult Import(const WeightsFlags& flags) {
     const Result<const NamedWeights*> found = FindWeights(*file, reference.path, reference.map);
     if (!found.ok()) return Status(found.status()).At({reference.path});
     map = *found;
-    const std::vector<float> weights = DenseWeights(*file, *map);
-    for (std::size_t v = 0; v < weights.size(); ++v) {
-      if (!(weights[v] >= 0 && weights[v] <= 1))
-        return Status::Invalid("map \"{}\": vertex {} weighs {}, outside of 0 to 1", map->name, v, weights[v])
-            .At({reference.path});
-    }
+    if (const Index v = FirstOutOfRange(*file, *map); v != kNoIndex)
+      return Status::Invalid("map \"{}\": vertex {} weighs {}, outside of 0 to 1", map->name, v,
+                             DenseWeights(*file, *map)[v])
+          .At({reference.path});
   }
   const Destination to = FindDestination(flags, rig, *of, reference.path, map == nullptr ? "" : map->name);
   const std::string facts = map == nullptr ? Facts(*file, true) : Facts(*map, *file);

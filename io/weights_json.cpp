@@ -221,6 +221,13 @@ Result<const NamedWeights*> FindWeights(const WeightFile& file, const std::strin
   return Status::Invalid("{} has no map \"{}\"{}", path, *map, DidYouMean(*map, names));
 }
 
+Index FirstOutOfRange(const WeightFile& file, const NamedWeights& map) {
+  const std::vector<float> weights = DenseWeights(file, map);
+  const auto first = std::find_if(weights.begin(), weights.end(),
+                                  [](float weight) { return !(weight >= 0 && weight <= 1); });
+  return first == weights.end() ? kNoIndex : static_cast<Index>(first - weights.begin());
+}
+
 std::string WeightFileText(const WeightFile& file) {
   const auto text_of = [](const json& value) {
     return value.dump(-1, ' ', false, json::error_handler_t::replace);
