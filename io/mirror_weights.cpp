@@ -182,13 +182,13 @@ Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, co
     Result<WeightFile> file =
         SkinWeights(mesh, MirroredInfluences(*mesh.influences, sources, other_joint), *rig.graph);
     if (!file.ok()) return file.status();
-    result.file = std::move(*file);
+    result.file = InOwnNames(rig, of, std::move(*file));
     return result;
   }
   const std::vector<float> before = PointWeights(rig, of);
   std::vector<float> after;
   for (const Source& source : sources) after.push_back(before[source.from]);
-  result.file = VertexWeights(mesh, rig.graph->name(of.stage->node), after);
+  result.file = InOwnNames(rig, of, VertexWeights(mesh, rig.graph->name(of.stage->node), after));
   return result;
 }
 
