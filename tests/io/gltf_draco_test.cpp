@@ -1,6 +1,7 @@
 // KHR_draco_mesh_compression: documents that are compressed here, by Draco's encoder.
 #include <draco/compression/decode.h>
 #include <draco/compression/expert_encode.h>
+#include <draco/metadata/geometry_metadata.h>
 
 #include <functional>
 #include <map>
@@ -15,7 +16,8 @@ using nlohmann::json;
 // The sheet as Draco's mesh, and the document that holds it compressed.
 class DracoCharacter {
  public:
-  explicit DracoCharacter(std::size_t n, int method, int position_bits = 0) : grid(n) {
+  explicit DracoCharacter(std::size_t n, int method, int position_bits = 0, std::size_t metadata_bytes = 0)
+      : grid(n) {
     mesh_.set_num_points(static_cast<std::uint32_t>(grid.vertex_count));
     position = Add(draco::GeometryAttribute::POSITION, draco::DT_FLOAT32, 3, grid.positions.data(), 12);
     color = Add(draco::GeometryAttribute::COLOR, draco::DT_UINT8, 4, grid.colors.data(), 4);
@@ -25,6 +27,11 @@ class DracoCharacter {
     for (std::size_t i = 0; i < grid.indices.size(); i += 3) {
       mesh_.AddFace({draco::PointIndex(grid.indices[i]), draco::PointIndex(grid.indices[i + 1]),
                      draco::PointIndex(grid.indices[i + 2])});
+    }
+    if (metadata_bytes > 0) {
+      auto metadata = std::make_unique<draco::GeometryMetadata>();
+      metadata->AddEntryString("note", std::string(metadata_bytes, 'x'));
+      mesh_.AddMetadata(std::move(metadata));
     }
     draco::ExpertEncoder encoder(mesh_);
     encoder.SetEncodingMethod(method);
@@ -251,9 +258,9 @@ TEST(GltfDraco, WhatDoesNotFit) {
 
 // Metadata and whatever else lies in the bytes is read anew for each primitive.
 TEST(GltfDraco, PrimitivesThatShareMuchAreRefused) {
-  DracoCharacter character(3, draco::MESH_SEQUENTIAL_ENCODING);
-  const auto shared = [&](std::size_t bytes, int primitives) {
-    character.data.resize(bytes, 0);
+  const auto shared = [&](std::size_t metadata_bytes, int primitives) {
+    DracoCharacter character(3, draco::MESH_SEQUENTIAL_ENCODING, 0, metadata_bytes);
+    EXPECT_GT(character.data.size(), metadata_bytes);
     GltfBuilder b = character.Document();
     json& list = b.root["meshes"][0]["primitives"];
     for (int i = 1; i < primitives; ++i) list.push_back(json(list[0]));
