@@ -17,6 +17,7 @@ constexpr std::uint64_t kFreeDecoded = std::uint64_t{64} << 20;
 // Compressed bytes of Draco that are read, for each byte of the file: views may overlap, and what a decoder
 // reads besides points and faces (metadata) counts nowhere else.
 constexpr std::uint64_t kMostRead = 4;
+constexpr std::uint64_t kFreeRead = std::uint64_t{8} << 20;
 
 class Decompressor {
  public:
@@ -162,7 +163,7 @@ class Decompressor {
 
   tinygltf::Model& model_;
   Document& document_;
-  std::uint64_t room_ = kFreeDecoded, unread_ = kFreeDecoded;
+  std::uint64_t room_ = kFreeDecoded, unread_ = kFreeRead;
   int primitives_with_fewer_ = 0;
 };
 

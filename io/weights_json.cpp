@@ -27,6 +27,40 @@ SourceLocation PlaceOfByte(const std::string& path, const std::vector<std::uint8
   return place;
 }
 
+// JSON libraries keep the last of equal keys and forget their order. (A callback of json::parse would tell
+// them, too, but makes it look at all maps again after each.)
+struct WeightKeys final : json::json_sax_t {
+  std::optional<std::string> repeated;  // the first
+  std::vector<std::string> maps;        // those of an object in the outermost one
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(json::number_integer_t) override { return true; }
+  bool number_unsigned(json::number_unsigned_t) override { return true; }
+  bool number_float(json::number_float_t, const std::string&) override { return true; }
+  bool string(std::string&) override { return true; }
+  bool binary(json::binary_t&) override { return true; }
+  bool start_array(std::size_t) override { return true; }
+  bool end_array() override { return true; }
+  bool start_object(std::size_t) override {
+    open_.emplace_back();
+    return true;
+  }
+  bool end_object() override {
+    open_.pop_back();
+    return true;
+  }
+  bool key(std::string& name) override {
+    if (open_.size() == 2) maps.push_back(name);
+    if (!open_.back().insert(name).second && !repeated.has_value()) repeated = name;
+    return true;
+  }
+  bool parse_error(std::size_t, const std::string&, const json::exception&) override { return false; }
+
+ private:
+  std::vector<std::set<std::string>> open_;
+};
+
 // Collects the errors of one file.
 class Reader {
  public:
@@ -165,28 +199,14 @@ Result<WeightFile> ReadWeightFile(const std::string& path) {
   if (!bytes.ok()) return bytes.status();
   if (Status status = CheckJsonDepth(*bytes); !status.ok()) return std::move(status).At({path});
   try {
-    // JSON libraries keep the last of equal keys; here the first is remembered, too
-    constexpr int kDepthOfMaps = 2;
-    std::vector<std::string> names;
-    std::vector<std::set<std::string>> keys;
-    std::string repeated;
-    bool is_repeated = false;
-    const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
-      if (event == json::parse_event_t::object_start) keys.emplace_back();
-      if (event == json::parse_event_t::object_end && !keys.empty()) keys.pop_back();
-      if (event == json::parse_event_t::key && !keys.empty() && !is_repeated) {
-        const auto& key = parsed.get_ref<const std::string&>();
-        is_repeated = !keys.back().insert(key).second;
-        if (is_repeated) repeated = key;
-        if (depth == kDepthOfMaps) names.push_back(key);
-      }
-      return true;
-    };
-    const json root = json::parse(bytes->begin(), bytes->end(), watch);
-    if (is_repeated) return Status::Invalid("the key \"{}\" is defined twice", repeated).At({path});
+    WeightKeys keys;
+    json::sax_parse(bytes->begin(), bytes->end(), &keys);  // what it cannot read, the next line says
+    const json root = json::parse(bytes->begin(), bytes->end());
+    if (keys.repeated.has_value())
+      return Status::Invalid("the key \"{}\" is defined twice", *keys.repeated).At({path});
     WeightFile file;
     file.path = path;
-    KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root, names));
+    KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root, keys.maps));
     return file;
   } catch (const json::parse_error& error) {
     return Status::Invalid("is no valid JSON here (NaN and trailing commas are none)")

@@ -305,7 +305,9 @@ TEST_F(DeformerWeightsTest, NoPointBeyondTheToleranceSharesJoints) {
       }
       const bool is_source = from == (shift > 0 ? MirrorOptions::From::kLeft : MirrorOptions::From::kRight);
       EXPECT_EQ(mirrored.unmatched.size(), is_source ? 0u : 19u);
-      if (is_source) EXPECT_EQ(WeightFileText(mirrored.file), WeightFileText(before));
+      if (is_source) {
+        EXPECT_EQ(WeightFileText(mirrored.file), WeightFileText(before));
+      }
     }
   }
 }

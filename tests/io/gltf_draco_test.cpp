@@ -130,7 +130,9 @@ TEST(GltfDraco, EdgebreakerInDracosOrder) {
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       EXPECT_EQ(got.positions[3 * i + c], plain.positions[3 * before[i] + c]);
-      if (c < 2) EXPECT_EQ(got.uvs.at(2 * i + c), plain.uvs.at(2 * before[i] + c));
+      if (c < 2) {
+        EXPECT_EQ(got.uvs.at(2 * i + c), plain.uvs.at(2 * before[i] + c));
+      }
       EXPECT_EQ(got.colors[3 * i + c], plain.colors[3 * before[i] + c]);
       EXPECT_EQ(got.targets[0].deltas[3 * i + c], plain.targets.at(0).deltas[3 * before[i] + c]);
     }
