@@ -8,6 +8,7 @@
 #include "cli/common.h"
 #include "cli/table.h"
 #include "io/file.h"
+#include "io/json_depth.h"
 #include "kpsa/kpsa_node.h"
 
 namespace kpsa {
@@ -21,8 +22,10 @@ constexpr std::uint64_t kMostBytes = 1u << 28;
 // the same.
 bool IsRepeated(const BenchJsonValue& side, const std::vector<BenchJsonValue>& sides) {
   if (side.at("tolerance").get<double>() < kAnyError) return false;
+  const auto subspace = side.at("subspace").get<std::string>();
   return std::any_of(sides.begin(), sides.end(), [&](const BenchJsonValue& other) {
-    return other.at("subspace") == side.at("subspace") && other.at("tolerance").get<double>() < kAnyError;
+    return other.at("subspace").get<std::string>() == subspace &&
+           other.at("tolerance").get<double>() < kAnyError;
   });
 }
 
@@ -75,6 +78,7 @@ Status CheckSide(const BenchJsonValue& side) {
 Result<std::vector<BenchJsonValue>> ReadSides(const std::string& path) {
   const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kMostBytes);
   if (!bytes.ok()) return bytes.status();
+  if (Status status = CheckJsonDepth(*bytes); !status.ok()) return std::move(status).At({path});
   BenchJsonValue document = BenchJsonValue::parse(bytes->begin(), bytes->end(), nullptr, false);
   if (!document.is_object() || document.value("schema", BenchJsonValue()) != "kpsa.bench/1")
     return Status::Invalid("is not what kpsa bench --json prints").At({path});

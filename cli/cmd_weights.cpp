@@ -92,7 +92,8 @@ Destination FindDestination(const WeightsFlags& flags, const Rig& rig, const Def
     if (source.key != "members") (source.path.empty() ? others : maps).push_back(&source);
   }
   Destination to;
-  const std::string name = rig.graph->name(of.stage->node);
+  const std::string name = rig.graph->name(of.stage->node),
+                    own_name = name.substr(NamespaceOf(rig, of).size());
   if (!flags.output.has_value() && maps.size() == 1 && others.empty()) {
     to.path = maps[0]->path;
     to.map = maps[0]->map;
@@ -103,7 +104,7 @@ Destination FindDestination(const WeightsFlags& flags, const Rig& rig, const Def
     return to;
   }
   to.path = flags.output.value_or("");
-  to.map = of.is_skin() ? "" : to.path.empty() ? map_name : name;
+  to.map = of.is_skin() ? "" : to.path.empty() ? map_name : own_name;
   const auto place = rig.node_places.find(name);
   const SourceLocation at = place == rig.node_places.end() ? SourceLocation{rig.path, 0, 0} : place->second;
   const std::string path = RelativeTo(at.file, to.path.empty() ? map_path : to.path);
@@ -121,7 +122,7 @@ Destination FindDestination(const WeightsFlags& flags, const Rig& rig, const Def
       instead += fmt::format("{}{} (line {})", instead.empty() ? " in place of its " : ", its ", source->key,
                              source->where.line);
   }
-  to.instruction = fmt::format("{}: give \"{}\" this map{}\n  weights: \"{}#{}\"", at.ToString(), name,
+  to.instruction = fmt::format("{}: give \"{}\" this map{}\n  weights: \"{}#{}\"", at.ToString(), own_name,
                                instead, path, to.map);
   return to;
 }
@@ -129,7 +130,7 @@ Destination FindDestination(const WeightsFlags& flags, const Rig& rig, const Def
 // The file as it is to be written: the map among the others that are in it already.
 Result<WeightFile> Merged(const Rig& rig, const DeformedMesh& of, const Destination& to,
                           const WeightFile& file, const NamedWeights& map) {
-  WeightFile merged{of.mesh->name, file.points, {}};
+  WeightFile merged{of.mesh->name.substr(NamespaceOf(rig, of).size()), file.points, {}};
   std::error_code error;
   if (fs::exists(to.path, error)) {
     Result<WeightFile> before = ReadWeightFile(to.path);
@@ -167,12 +168,10 @@ CommandResult Import(const WeightsFlags& flags) {
     const Result<const NamedWeights*> found = FindWeights(*file, reference.path, reference.map);
     if (!found.ok()) return Status(found.status()).At({reference.path});
     map = *found;
-    const std::vector<float> weights = DenseWeights(*file, *map);
-    for (std::size_t v = 0; v < weights.size(); ++v) {
-      if (!(weights[v] >= 0 && weights[v] <= 1))
-        return Status::Invalid("map \"{}\": vertex {} weighs {}, outside of 0 to 1", map->name, v, weights[v])
-            .At({reference.path});
-    }
+    if (const Index v = FirstOutOfRange(*file, *map); v != kNoIndex)
+      return Status::Invalid("map \"{}\": vertex {} weighs {}, outside of 0 to 1", map->name, v,
+                             DenseWeights(*file, *map)[v])
+          .At({reference.path});
   }
   const Destination to = FindDestination(flags, rig, *of, reference.path, map == nullptr ? "" : map->name);
   const std::string facts = map == nullptr ? Facts(*file, true) : Facts(*map, *file);

@@ -33,6 +33,25 @@ Result<DeformedMesh> FindDeformed(const Rig& rig, std::string_view text) {
   return found[0];
 }
 
+std::string NamespaceOf(const Rig& rig, const DeformedMesh& of) {
+  std::string innermost;  // references come before those within them
+  for (const Reference& reference : rig.references) {
+    if (of.stage->node.index >= reference.begin && of.stage->node.index < reference.end)
+      innermost = reference.name_space;
+  }
+  return innermost;
+}
+
+WeightFile InOwnNames(const Rig& rig, const DeformedMesh& of, WeightFile file) {
+  const std::string prefix = NamespaceOf(rig, of);
+  const auto strip = [&](std::string* name) {
+    if (name->starts_with(prefix)) name->erase(0, prefix.size());
+  };
+  strip(&file.mesh);
+  for (NamedWeights& map : file.maps) strip(&map.name);
+  return file;
+}
+
 std::vector<float> PointWeights(const Rig& rig, const DeformedMesh& of) {
   const int attribute = rig.graph->def(of.stage->node).FindAttribute("weights");
   const Value* value = rig.graph->FindValue({of.stage->node, attribute, of.stage->geometry, -1});
@@ -42,18 +61,26 @@ std::vector<float> PointWeights(const Rig& rig, const DeformedMesh& of) {
 
 Result<WeightFile> DeformerWeights(const Rig& rig, const DeformedMesh& of) {
   const CharacterMesh& mesh = *of.mesh;
-  if (of.is_skin()) return SkinWeights(mesh, *mesh.influences, *rig.graph);
-  return VertexWeights(mesh, rig.graph->name(of.stage->node), PointWeights(rig, of));
+  Result<WeightFile> file = of.is_skin()
+                                ? SkinWeights(mesh, *mesh.influences, *rig.graph)
+                                : VertexWeights(mesh, rig.graph->name(of.stage->node), PointWeights(rig, of));
+  if (!file.ok()) return file.status();
+  return InOwnNames(rig, of, std::move(*file));
 }
 
 Status CheckWeights(const Rig& rig, const DeformedMesh& of, const WeightFile& file) {
   const CharacterMesh& mesh = *of.mesh;
-  if (!NamesMesh(file, *rig.character, *rig.graph, mesh))
-    return Status::Invalid("is for mesh \"{}\", expected \"{}\"", file.mesh, mesh.name).At({file.path});
+  const std::string prefix = NamespaceOf(rig, of);
+  WeightFile here = file;
+  here.mesh.insert(0, prefix);
+  for (NamedWeights& map : here.maps) map.name.insert(0, prefix);
+  if (!NamesMesh(here, *rig.character, *rig.graph, mesh))
+    return Status::Invalid("is for mesh \"{}\", expected \"{}\"", file.mesh, mesh.name.substr(prefix.size()))
+        .At({file.path});
   if (file.points != mesh.vertex_count)
     return Status::Invalid("is for {} vertices; {} has {}", file.points, mesh.name, mesh.vertex_count)
         .At({file.path});
-  return of.is_skin() ? InfluencesFrom(file, mesh, *rig.graph).status() : Status();
+  return of.is_skin() ? InfluencesFrom(here, mesh, *rig.graph).status() : Status();
 }
 
 }  // namespace kpsa

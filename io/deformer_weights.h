@@ -23,6 +23,11 @@ struct DeformedMesh {
 // nearest), several meshes, the file's morph targets and transforms, which take no weights.
 Result<DeformedMesh> FindDeformed(const Rig& rig, std::string_view text);
 
+// "hero:" of a deformer that a reference brought along, "" of the rig's own. Its weight files are those of
+// the referenced rig, and name meshes, joints and maps as that does: without it.
+std::string NamespaceOf(const Rig& rig, const DeformedMesh& of);
+WeightFile InOwnNames(const Rig& rig, const DeformedMesh& of, WeightFile file);
+
 // Of a deformer that is no skin: by point of the mesh, members, maps and falloff multiplied.
 std::vector<float> PointWeights(const Rig& rig, const DeformedMesh& of);
 // What the deformer weighs the vertices with: members, maps and falloff multiplied, as one map called by the
@@ -57,7 +62,8 @@ struct MirroredWeights {
 };
 // The weights of one side on the other. The partner of a point is the one whose rest place, and whose
 // neighbours', come closest to those of its mirror image. A point that is its own partner keeps its weight;
-// in a skin the joints of both sides share it. The side that is taken from stays as it is.
+// in a skin the joints of both sides share it, where its mirror image is within the tolerance. The side that
+// is taken from stays as it is.
 Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, const MirrorOptions& options);
 
 }  // namespace kpsa

@@ -24,11 +24,24 @@ using FilePointer = std::unique_ptr<std::FILE, Closer>;
 
 std::atomic<unsigned> temporary_counter{0};
 
+// Where a write to `path` ends up: nobody else follows links for rename.
+std::string WithoutLinks(const std::string& path) {
+  constexpr int kMostLinks = 40;  // as Linux
+  std::filesystem::path target = path;
+  std::error_code error;
+  for (int links = 0; links < kMostLinks && std::filesystem::is_symlink(target, error); ++links) {
+    const std::filesystem::path next = std::filesystem::read_symlink(target, error);
+    if (error) break;
+    target = target.parent_path() / next;  // an absolute one replaces all
+  }
+  return target.string();
+}
+
 // Creates an empty file of a new name; the name, or "" with errno set.
-std::string CreateTemporary(const std::string& prefix) {
+std::string CreateTemporary(const std::string& prefix, unsigned mode = 0666) {
   for (int attempt = 0; attempt < 100; ++attempt) {
     std::string name = fmt::format("{}.tmp{}-{}", prefix, ::getpid(), temporary_counter++);
-    const int descriptor = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+    const int descriptor = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, mode);
     if (descriptor >= 0) {
       ::close(descriptor);
       return name;
@@ -95,6 +108,7 @@ Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
     if (S_ISDIR(info.st_mode))
       return Status::Usage("is a folder, expected the name of a file to write").At({path});
     file.device_ = !S_ISREG(info.st_mode);
+    if (!file.device_) file.mode_ = info.st_mode & 0777;
     if (!file.device_ && !force) {
       return Status::Usage("exists already; give another name, or --force to replace it").At({path});
     }
@@ -105,10 +119,11 @@ Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
     std::error_code error;
     file.temporary_ = CreateTemporary((fs::temp_directory_path(error) / "kpsa").string());
   } else {
-    file.temporary_ = CreateTemporary(path);
+    file.target_ = WithoutLinks(path);
+    file.temporary_ = CreateTemporary(file.target_, file.mode_.value_or(0666) | S_IRUSR | S_IWUSR);
   }
   if (file.temporary_.empty()) {
-    const fs::path folder = fs::path(path).parent_path();
+    const fs::path folder = fs::path(file.target_).parent_path();
     if (errno == ENOENT)
       return Status::Usage("cannot be written: there is no folder {}", folder.string()).At({path});
     return Status::Usage("cannot be written: {}", Reason(errno)).At({path});
@@ -120,7 +135,9 @@ OutputFile::OutputFile(OutputFile&& other) noexcept { *this = std::move(other); 
 
 OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   std::swap(path_, other.path_);
+  std::swap(target_, other.target_);
   std::swap(temporary_, other.temporary_);
+  std::swap(mode_, other.mode_);
   std::swap(force_, other.force_);
   std::swap(device_, other.device_);
   return *this;
@@ -136,7 +153,8 @@ Status OutputFile::Commit() {
     return Status::Usage("appeared while it was being written; give another name, or --force to replace it")
         .At({path_});
   }
-  if (::rename(temporary_.c_str(), path_.c_str()) != 0) {
+  if ((mode_.has_value() && ::chmod(temporary_.c_str(), *mode_) != 0) ||
+      ::rename(temporary_.c_str(), target_.c_str()) != 0) {
     return Status::Invalid("cannot be written: {}", Reason(errno)).At({path_});
   }
   temporary_.clear();

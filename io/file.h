@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::ui
 // An output that is written under a temporary name beside its place and renamed by Commit, so that nobody
 // ever sees half a file; without Commit the destructor removes what was written. Move-only, for one thread.
 // A device or pipe (/dev/null, /dev/stdout) cannot be renamed over: it gets a copy of the finished bytes.
+// A symbolic link stays one: what it points to is replaced. A file that is replaced keeps its permissions.
 class OutputFile {
  public:
   // Fails where the folder is missing or not writable, where `path` is a folder, and where it exists and
@@ -36,7 +38,8 @@ class OutputFile {
 
  private:
   OutputFile() = default;
-  std::string path_, temporary_;
+  std::string path_, target_, temporary_;  // target_: path_ without symbolic links
+  std::optional<unsigned> mode_;           // permissions of the file that is replaced
   bool force_ = false, device_ = false;
 };
 

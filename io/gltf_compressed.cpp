@@ -14,11 +14,18 @@ namespace {
 // of what it decodes.
 constexpr std::uint64_t kMostDecoded = 64;
 constexpr std::uint64_t kFreeDecoded = std::uint64_t{64} << 20;
+// Compressed bytes of Draco that are read, for each byte of the file: views may overlap, and what a decoder
+// reads besides points and faces (metadata) counts nowhere else.
+constexpr std::uint64_t kMostRead = 4;
+constexpr std::uint64_t kFreeRead = std::uint64_t{8} << 20;
 
 class Decompressor {
  public:
   Decompressor(tinygltf::Model* model, Document* document) : model_(*model), document_(*document) {
-    for (const auto& buffer : document->buffers) room_ += kMostDecoded * buffer.size();
+    for (const auto& buffer : document->buffers) {
+      room_ += kMostDecoded * buffer.size();
+      unread_ += kMostRead * buffer.size();
+    }
   }
 
   Status AddView(const MeshoptView& v) {
@@ -74,6 +81,9 @@ class Decompressor {
     KPSA_RETURN_IF_ERROR(
         Range(static_cast<std::size_t>(view.buffer), view.byteOffset, view.byteLength, where, &data));
     if (points >= kNoIndex) return Status::Invalid("{} has {} vertices", where, points);
+    if (data.size() > unread_)
+      return Status::Invalid("{}: too many primitives share compressed bytes", where);
+    unread_ -= data.size();
     if (Status status = DecodeDraco(data, &mesh); !status.ok())
       return Status::Invalid("{} {}", where, status.errors().front().message);
     for (const DracoAttribute& attribute : mesh.attributes) size += attribute.values.size();
@@ -107,7 +117,7 @@ class Decompressor {
  private:
   // Others are not decoded: nobody asks for them.
   static bool IsRead(const std::string& name) {
-    return name == "POSITION" || name == "COLOR_0" || name.starts_with("JOINTS_") ||
+    return name == "POSITION" || name == "COLOR_0" || name == "TEXCOORD_0" || name.starts_with("JOINTS_") ||
            name.starts_with("WEIGHTS_");
   }
   const tinygltf::Accessor& AccessorOf(int index) const {
@@ -153,7 +163,7 @@ class Decompressor {
 
   tinygltf::Model& model_;
   Document& document_;
-  std::uint64_t room_ = kFreeDecoded;
+  std::uint64_t room_ = kFreeDecoded, unread_ = kFreeRead;
   int primitives_with_fewer_ = 0;
 };
 

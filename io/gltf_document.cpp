@@ -10,13 +10,13 @@
 #include <limits>
 
 #include "io/file.h"
+#include "io/json_depth.h"
 
 namespace kpsa::gltf {
 namespace {
 
 constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30;  // as the lengths in a GLB
 constexpr std::uint64_t kLargestJson = std::uint64_t{512} << 20;
-constexpr int kDeepestJson = 500;  // a schema-conforming document needs 10; extras may want more
 
 std::uint32_t ReadUint32(std::span<const std::uint8_t> bytes, std::size_t offset) {
   return bytes[offset] | bytes[offset + 1] << 8 | bytes[offset + 2] << 16 |
@@ -209,27 +209,6 @@ Result<Container> SplitContainer(std::span<const std::uint8_t> bytes) {
   return container;
 }
 
-Status CheckJsonDepth(std::span<const std::uint8_t> text, int max_depth) {
-  int depth = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const std::uint8_t c = text[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '{' || c == '[') {
-      if (++depth > max_depth) {
-        return Status::Invalid("is JSON nested more than {} deep at byte {}", max_depth, i);
-      }
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return {};
-}
-
 Result<std::vector<std::uint8_t>> DecodeDataUri(const std::string& uri) {
   const std::size_t comma = uri.find(',');
   if (comma == std::string::npos) return Status::Invalid("the data URI has no comma");
@@ -284,7 +263,7 @@ Result<Document> LoadDocument(std::span<const std::uint8_t> bytes, const std::st
   if (container->json.size() > kLargestJson) {
     return Status::Invalid("has {} bytes of JSON, at most {} are read", container->json.size(), kLargestJson);
   }
-  KPSA_RETURN_IF_ERROR(CheckJsonDepth(container->json, kDeepestJson));
+  KPSA_RETURN_IF_ERROR(CheckJsonDepth(container->json));
   Result<ReducedJson> reduced = ReduceJson(container->json);
   if (!reduced.ok()) return reduced.status();
 

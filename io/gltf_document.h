@@ -45,9 +45,6 @@ struct Container {
 };
 Result<Container> SplitContainer(std::span<const std::uint8_t> bytes);
 
-// Bracket depth of the text (strings skipped) is at most max_depth: parsers recurse.
-Status CheckJsonDepth(std::span<const std::uint8_t> text, int max_depth);
-
 // A buffer as the document describes it.
 struct BufferSource {
   bool has_uri = false;

@@ -158,10 +158,12 @@ Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, co
     const double side = options.from == MirrorOptions::From::kLeft    ? partners.Side(p)
                         : options.from == MirrorOptions::From::kRight ? -partners.Side(p)
                                                                       : 0;
-    if (side > 0 && partner != p) continue;
-    const bool flips = options.from == MirrorOptions::From::kBoth;
-    sources[p] = {partner == p && !flips ? Source::kShares : Source::kTakes, partner};
-    unmatched[p] = distance > result.tolerance;
+    const bool flips = options.from == MirrorOptions::From::kBoth, far = distance > result.tolerance;
+    if (side > 0 && (partner != p || far)) continue;
+    // Its own partner, but not in the plane: nobody is on the other side
+    if (partner != p || !far)
+      sources[p] = {partner == p && !flips ? Source::kShares : Source::kTakes, partner};
+    unmatched[p] = far;
     result.farthest = std::max(result.farthest, distance);
   }
   for (Index v = 0; v < mesh.vertex_count; ++v) {
@@ -180,13 +182,13 @@ Result<MirroredWeights> MirrorWeights(const Rig& rig, const DeformedMesh& of, co
     Result<WeightFile> file =
         SkinWeights(mesh, MirroredInfluences(*mesh.influences, sources, other_joint), *rig.graph);
     if (!file.ok()) return file.status();
-    result.file = std::move(*file);
+    result.file = InOwnNames(rig, of, std::move(*file));
     return result;
   }
   const std::vector<float> before = PointWeights(rig, of);
   std::vector<float> after;
   for (const Source& source : sources) after.push_back(before[source.from]);
-  result.file = VertexWeights(mesh, rig.graph->name(of.stage->node), after);
+  result.file = InOwnNames(rig, of, VertexWeights(mesh, rig.graph->name(of.stage->node), after));
   return result;
 }
 

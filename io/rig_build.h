@@ -185,8 +185,8 @@ class RigBuild {
                     std::vector<Index>* vertices);
   bool MultiplyByMaps(const RigAttribute& attribute, const Made& made,
                       std::vector<std::vector<float>>* weights);
-  bool FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
-               const NamedWeights** map, const Geometry** of);
+  bool FindMap(const YamlNode& reference, const std::string& key, int source, const Made& made,
+               const WeightFile** file, const NamedWeights** map, const Geometry** of);
   bool FindGeometry(const YamlNode& reference, const Made& made, const WeightFile& file,
                     const std::string& path, const Geometry** of);
   std::vector<float> ByPoint(const WeightFile& file, const NamedWeights& map, const Geometry& of) const;

@@ -86,7 +86,7 @@ bool RigBuild::ReadFalloff(const YamlNode& node, int source, const Made& made, c
     const WeightFile* file = nullptr;
     const NamedWeights* values = nullptr;
     const Geometry* owner = nullptr;
-    if (!FindMap(*shape, source, made, &file, &values, &owner)) return false;
+    if (!FindMap(*shape, "weights", source, made, &file, &values, &owner)) return false;
     if (owner->name != of.name) return true;
     const std::vector<float> by_point = ByPoint(*file, *values, of);
     falloff->emplace(by_point.begin(), by_point.end());

@@ -14,6 +14,7 @@ namespace kpsa {
 namespace {
 
 constexpr std::size_t kMaxReferences = 256;
+constexpr std::size_t kMaxLevels = 16;  // each renames all that is below it
 
 bool IsCharacterFile(const std::string& path) {
   std::string lower = path;
@@ -233,7 +234,7 @@ Status Loader::AddReferences(const std::optional<std::string>& variant, RigFile*
   return all;
 }
 
-// No cycle, and not too many.
+// No cycle, not too deep, and not too many.
 Status Loader::CheckReference(const RigReference& reference) {
   const std::string identity = IdentityOf(reference.file.text);
   const auto first =
@@ -243,6 +244,10 @@ Status Loader::CheckReference(const RigReference& reference) {
     for (auto open = first + 1; open != open_.end(); ++open)
       chain += fmt::format(" -> {} (at {})", open->path, (open - 1)->where.ToString());
     return Status::Invalid("references form a cycle: {} -> {} (here)", chain, first->path)
+        .At(reference.file.where);
+  }
+  if (open_.size() > kMaxLevels) {
+    return Status::Invalid("references are nested more than {} levels deep", kMaxLevels)
         .At(reference.file.where);
   }
   if (++references_ <= kMaxReferences) return Status();

@@ -166,7 +166,7 @@ bool RigBuild::AddMembers(const YamlNode& node, int source, const Made& made, co
     const WeightFile* file = nullptr;
     const NamedWeights* values = nullptr;
     const Geometry* owner = nullptr;
-    if (!FindMap(*file_map, source, made, &file, &values, &owner)) return false;
+    if (!FindMap(*file_map, "weights", source, made, &file, &values, &owner)) return false;
     if (owner->name != of.name) return true;
     const std::vector<float> dense = DenseWeights(*file, *values);
     for (Index v = 0; v < dense.size(); ++v) {
@@ -246,10 +246,10 @@ const WeightFile* RigBuild::FindWeightFile(const YamlNode& reference, const std:
 }
 
 // "w/lips.json#upper": the file, its map, and the geometry of the deformer that it is for.
-bool RigBuild::FindMap(const YamlNode& reference, int source, const Made& made, const WeightFile** file,
-                       const NamedWeights** map, const Geometry** of) {
+bool RigBuild::FindMap(const YamlNode& reference, const std::string& key, int source, const Made& made,
+                       const WeightFile** file, const NamedWeights** map, const Geometry** of) {
   std::string text;
-  if (!ReadString(reference, "weights", &text, errors_)) return false;
+  if (!ReadString(reference, key, &text, errors_)) return false;
   const WeightReference parts = SplitWeightReference(text);
   if (parts.path.empty())
     return errors_->Add(reference, "weights \"{}\": expected the file before the #, FILE.json#MAP", text);
@@ -259,7 +259,11 @@ bool RigBuild::FindMap(const YamlNode& reference, int source, const Made& made, 
   const Result<const NamedWeights*> found = FindWeights(**file, path, parts.map);
   if (!Fail(reference.where(), found.status())) return false;
   *map = *found;
-  return FindGeometry(reference, made, **file, path, of);
+  if (!FindGeometry(reference, made, **file, path, of)) return false;
+  const Index v = FirstOutOfRange(**file, **map);
+  return v == kNoIndex ||
+         errors_->Add(reference, "{}: {} is outside of 0 to 1: vertex {} of map \"{}\" in {}", key,
+                      DenseWeights(**file, **map)[v], v, (*map)->name, path);
 }
 
 // The geometry of the deformer that a weight file is for.
@@ -314,7 +318,7 @@ bool RigBuild::MultiplyByMaps(const RigAttribute& attribute, const Made& made,
     const WeightFile* file = nullptr;
     const NamedWeights* map = nullptr;
     const Geometry* of = nullptr;
-    if (!FindMap(*reference, attribute.source, made, &file, &map, &of)) {
+    if (!FindMap(*reference, attribute.name, attribute.source, made, &file, &map, &of)) {
       good = false;
       continue;
     }

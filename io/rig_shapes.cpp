@@ -253,12 +253,6 @@ void RigBuild::SetBlendWeights(Made* made) {
   if (it == made->special.end() || errors_->full()) return;
   std::vector<std::vector<float>> weights{std::vector<float>(made->geometries.front().count, 1.0f)};
   if (!MultiplyByMaps(*it->second, *made, &weights)) return;
-  for (float weight : weights[0]) {
-    if (!(weight >= 0 && weight <= 1)) {
-      errors_->Add(it->second->value, "blendWeights: {} is outside of 0 to 1", weight);
-      return;
-    }
-  }
   GraphEditor edit(&graph());
   edit.Set(made->id, "blendWeights", 0, std::make_shared<const WeightMap>(std::move(weights[0])));
   Fail(it->second->value.where(), edit.Take());

@@ -9,12 +9,13 @@
 #include <set>
 
 #include "io/file.h"
+#include "io/json_depth.h"
 #include "io/quantity.h"
 
 namespace kpsa {
 namespace {
 
-using json = nlohmann::ordered_json;
+using json = nlohmann::json;  // finds keys by their order; ordered_json looks at each
 constexpr std::uint64_t kLargestFile = std::uint64_t{1} << 30;
 
 SourceLocation PlaceOfByte(const std::string& path, const std::vector<std::uint8_t>& text, std::size_t byte) {
@@ -26,12 +27,47 @@ SourceLocation PlaceOfByte(const std::string& path, const std::vector<std::uint8
   return place;
 }
 
+// JSON libraries keep the last of equal keys and forget their order. (A callback of json::parse would tell
+// them, too, but makes it look at all maps again after each.)
+struct WeightKeys final : json::json_sax_t {
+  std::optional<std::string> repeated;  // the first
+  std::vector<std::string> maps;        // those of an object in the outermost one
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(json::number_integer_t) override { return true; }
+  bool number_unsigned(json::number_unsigned_t) override { return true; }
+  bool number_float(json::number_float_t, const std::string&) override { return true; }
+  bool string(std::string&) override { return true; }
+  bool binary(json::binary_t&) override { return true; }
+  bool start_array(std::size_t) override { return true; }
+  bool end_array() override { return true; }
+  bool start_object(std::size_t) override {
+    open_.emplace_back();
+    return true;
+  }
+  bool end_object() override {
+    open_.pop_back();
+    return true;
+  }
+  bool key(std::string& name) override {
+    if (open_.size() == 2) maps.push_back(name);
+    if (!open_.back().insert(name).second && !repeated.has_value()) repeated = name;
+    return true;
+  }
+  bool parse_error(std::size_t, const std::string&, const json::exception&) override { return false; }
+
+ private:
+  std::vector<std::set<std::string>> open_;
+};
+
 // Collects the errors of one file.
 class Reader {
  public:
   Reader(const std::string& path, WeightFile* file) : path_(path), file_(file) {}
 
-  Status Read(const json& root) {
+  // `names`: the maps' in the file's order.
+  Status Read(const json& root, const std::vector<std::string>& names) {
     if (!root.is_object() || Text(root, "kpsa") != "weights") {
       Fail("is no weight file; expected {{\"kpsa\": \"weights\", ...}}");
       return std::move(status_);
@@ -53,7 +89,7 @@ class Reader {
     if (maps == root.end() || !maps->is_object()) {
       Fail("maps must be an object of weight maps");
     } else if (status_.ok()) {
-      for (const auto& [name, map] : maps->items()) ReadMap(name, map);
+      for (const std::string& name : names) ReadMap(name, maps->at(name));
     }
     return std::move(status_);
   }
@@ -88,6 +124,12 @@ class Reader {
     return static_cast<float>(number);
   }
 
+  // A number or null as it is; what may be long by its kind.
+  static std::string Short(const json& value) {
+    return value.is_number() || value.is_null() ? value.dump()
+                                                : fmt::format("an entry of type {}", value.type_name());
+  }
+
   void ReadMap(const std::string& name, const json& in) {
     const std::string where = fmt::format("map \"{}\": ", name);
     if (!in.is_object()) return Fail("{}must be an object", where);
@@ -110,14 +152,14 @@ class Reader {
     std::set<Index> seen;
     for (std::size_t i = 0; i < indices.size(); ++i) {
       if (!indices[i].is_number_unsigned() || indices[i].get<std::uint64_t>() >= file_->points) {
-        Fail("{}indices[{}] is {}, expected a point from 0 to {}", where, i, indices[i].dump(),
+        Fail("{}indices[{}] is {}, expected a point from 0 to {}", where, i, Short(indices[i]),
              static_cast<long long>(file_->points) - 1);
         continue;
       }
       const auto index = indices[i].get<Index>();
       if (!seen.insert(index).second) Fail("{}point {} occurs twice", where, index);
       const std::optional<float> value = Number(values[i]);
-      if (!value) Fail("{}values[{}] is {}, expected a finite number", where, i, values[i].dump());
+      if (!value) Fail("{}values[{}] is {}, expected a finite number", where, i, Short(values[i]));
       map.indices.push_back(index);
       map.values.push_back(value.value_or(0));
     }
@@ -155,26 +197,16 @@ const NamedWeights* WeightFile::Find(std::string_view name) const {
 Result<WeightFile> ReadWeightFile(const std::string& path) {
   const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kLargestFile);
   if (!bytes.ok()) return bytes.status();
+  if (Status status = CheckJsonDepth(*bytes); !status.ok()) return std::move(status).At({path});
   try {
-    // JSON libraries keep the last of equal keys; here the first is remembered, too
-    std::vector<std::set<std::string>> keys;
-    std::string repeated;
-    bool is_repeated = false;
-    const auto watch = [&](int, json::parse_event_t event, json& parsed) {
-      if (event == json::parse_event_t::object_start) keys.emplace_back();
-      if (event == json::parse_event_t::object_end && !keys.empty()) keys.pop_back();
-      if (event == json::parse_event_t::key && !keys.empty() && !is_repeated) {
-        const auto& key = parsed.get_ref<const std::string&>();
-        is_repeated = !keys.back().insert(key).second;
-        if (is_repeated) repeated = key;
-      }
-      return true;
-    };
-    const json root = json::parse(bytes->begin(), bytes->end(), watch);
-    if (is_repeated) return Status::Invalid("the key \"{}\" is defined twice", repeated).At({path});
+    WeightKeys keys;
+    json::sax_parse(bytes->begin(), bytes->end(), &keys);  // what it cannot read, the next line says
+    const json root = json::parse(bytes->begin(), bytes->end());
+    if (keys.repeated.has_value())
+      return Status::Invalid("the key \"{}\" is defined twice", *keys.repeated).At({path});
     WeightFile file;
     file.path = path;
-    KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root));
+    KPSA_RETURN_IF_ERROR(Reader(path, &file).Read(root, keys.maps));
     return file;
   } catch (const json::parse_error& error) {
     return Status::Invalid("is no valid JSON here (NaN and trailing commas are none)")
@@ -207,6 +239,13 @@ Result<const NamedWeights*> FindWeights(const WeightFile& file, const std::strin
   }
   if (const NamedWeights* found = file.Find(*map); found != nullptr) return found;
   return Status::Invalid("{} has no map \"{}\"{}", path, *map, DidYouMean(*map, names));
+}
+
+Index FirstOutOfRange(const WeightFile& file, const NamedWeights& map) {
+  const std::vector<float> weights = DenseWeights(file, map);
+  const auto first = std::find_if(weights.begin(), weights.end(),
+                                  [](float weight) { return !(weight >= 0 && weight <= 1); });
+  return first == weights.end() ? kNoIndex : static_cast<Index>(first - weights.begin());
 }
 
 std::string WeightFileText(const WeightFile& file) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "cli/bench_tables.h"
 #include "cli/line_plot.h"
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
@@ -43,6 +44,19 @@ TEST(LinePlot, LinesBreakWhereThereIsNoNumber) {
   EXPECT_NE(PlotsAsSvg({plot, plot, plot}, 2).find("height=\"500\""), std::string::npos);
   plot.lines[0].y = {std::numeric_limits<double>::infinity(), 0};  // nothing to scale by
   EXPECT_EQ(Count(PlotsAsSvg({plot}, 1), "nan") + Count(PlotsAsSvg({plot}, 1), "inf"), 0u);
+}
+
+TEST(Results, NestedBenchesAreRefusedBeforeTheyAreCompared) {
+  const TemporaryFolder folder;
+  const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+  const std::string side =
+      R"({"schema": "kpsa.bench/1", "rig": "a.yaml", "tolerance": 1e30, "frame_errors": {}, "subspace": )" +
+      deep;
+  const std::string path = folder.Write("b.json", side + R"(, "beside": [)" + side + "}]}");
+  const Result<std::string> tables = BenchTables({{path, ""}});
+  ASSERT_FALSE(tables.ok());
+  EXPECT_NE(tables.status().ToString().find("nested more than"), std::string::npos);
+  EXPECT_FALSE(BenchPlots(path).ok());
 }
 
 // scenes/results.sh with the smallest rig in the place of the characters.

@@ -116,6 +116,40 @@ TEST_F(WeightsCommand, ASymmetricFaceMirrorsOntoItself) {
   }
 }
 
+// Files of a referenced rig's deformers are that rig's, and what import says goes into it.
+TEST_F(WeightsCommand, DeformersOfReferencesHaveTheNamesOfTheirRig) {
+  folder.Write("two.yaml", "kpsa: 1\nreferences: {a: {file: hello.yaml}, b: {file: hello.yaml}}\n");
+  const std::string before = Frame("two.yaml");
+  std::string here, there;
+  for (const auto& [own, referenced] :
+       {std::pair("mush", "a:mush"), std::pair("column@skin", "a:column@skin")}) {
+    ExpectGood({"weights", "export", "hello.yaml", own, "-q"}, &here);
+    ExpectGood({"weights", "export", "two.yaml", referenced, "-q"}, &there);
+    EXPECT_EQ(here, there);
+    folder.Write(own == std::string("mush") ? "mush.json" : "skin.json", there);
+    ExpectGood({"weights", "mirror", "hello.yaml", own, "--flip", "-q"}, &here);
+    ExpectGood({"weights", "mirror", "two.yaml", referenced, "--flip", "-q"}, &there);
+    EXPECT_EQ(here, there);
+  }
+  std::string mush, skin;
+  folder.Write("w/others.json", "");
+  ExpectGood({"weights", "import", "two.yaml", "a:mush", "mush.json", "-o", "w/m.json", "-q"}, &mush);
+  EXPECT_NE(mush.find("hello.yaml:8:3: give \"mush\" this map\n  weights: \"w/m.json#mush\""),
+            std::string::npos)
+      << mush;
+  ExpectGood({"weights", "import", "two.yaml", "a:column@skin", "skin.json", "-q"}, &skin);
+  const std::size_t line = skin.find("overrides:");
+  ASSERT_NE(line, std::string::npos) << skin;
+  Edit("iterations: 10}", "iterations: 10, weights: \"w/m.json#mush\"}");
+  folder.Write("two.yaml", TemporaryFolder::Read(folder / "two.yaml") + skin.substr(line));
+  EXPECT_TRUE(Frame("two.yaml") == before);
+  ExpectGood({"weights", "import", "two.yaml", "a:mush", "mush.json", "--force", "-q"}, &mush);
+  EXPECT_EQ(mush, "");
+  folder.Write("other.json",
+               Replaced(TemporaryFolder::Read(folder / "mush.json"), "\"column\"", "\"a:column\""));
+  ExpectRefused({"weights", "import", "two.yaml", "a:mush", "other.json"}, 3, {"expected \"column\""});
+}
+
 TEST_F(WeightsCommand, MistakesChangeNothing) {
   folder.Write("w.json",
                R"({"kpsa": "weights", "version": 1, "mesh": "column", "points": 5, "maps": {"m": {}}})");

@@ -12,14 +12,14 @@ namespace {
 
 constexpr int kColumns = 9;  // x from -1 to 1; even vertices below, odd ones above
 
-std::string Strip() {
+std::string Strip(float shift = 0) {
   GltfBuilder b;
   std::vector<float> positions, weights;
   std::vector<std::uint8_t> joints;
   std::vector<std::uint16_t> indices;
   const auto add = [&](int column, int row) {
     const float x = static_cast<float>(column - kColumns / 2) / 4, side = std::fabs(x);
-    positions.insert(positions.end(), {x, static_cast<float>(row), 0});
+    positions.insert(positions.end(), {x + shift, static_cast<float>(row), 0});
     joints.insert(joints.end(), {static_cast<std::uint8_t>(x > 0 ? 1 : 2), 0, 0, 0});
     weights.insert(weights.end(), {side * 0.9f, 1 - side * 0.9f, 0, 0});
   };
@@ -283,6 +283,33 @@ TEST_F(DeformerWeightsTest, TellsWhoHasNoPartner) {
                   .unmatched.empty());
   EXPECT_EQ(Mirrored(rig, "strip@skin", {.names = {{".L", ".X"}}}).unpaired,
             std::vector<std::string>{"leg.L"});
+}
+
+// A strip that is all on one side: the points that are nearest to their own mirror images are their own
+// partners, and none of the other side's joints.
+TEST_F(DeformerWeightsTest, NoPointBeyondTheToleranceSharesJoints) {
+  for (const float shift : {1.25f, -1.25f}) {
+    folder.Write("c.gltf", Strip(shift));
+    const Rig rig = Loaded("");
+    const std::vector<Index> own = shift > 0 ? std::vector<Index>{0, 1, 18} : std::vector<Index>{16, 17};
+    const WeightFile before = Weights(rig, "strip@skin");
+    for (const auto from :
+         {MirrorOptions::From::kLeft, MirrorOptions::From::kRight, MirrorOptions::From::kBoth}) {
+      const MirroredWeights mirrored = Mirrored(rig, "strip@skin", {.from = from});
+      for (const char* joint : {"leg.L", "leg.R"}) {
+        const NamedWeights *old = before.Find(joint), *now = mirrored.file.Find(joint);
+        ASSERT_TRUE(old != nullptr);
+        for (const Index v : own)
+          EXPECT_EQ(now == nullptr ? 0 : DenseWeights(mirrored.file, *now)[v], DenseWeights(before, *old)[v])
+              << v;
+      }
+      const bool is_source = from == (shift > 0 ? MirrorOptions::From::kLeft : MirrorOptions::From::kRight);
+      EXPECT_EQ(mirrored.unmatched.size(), is_source ? 0u : 19u);
+      if (is_source) {
+        EXPECT_EQ(WeightFileText(mirrored.file), WeightFileText(before));
+      }
+    }
+  }
 }
 
 TEST(MirroredName, NeedsAJointThatExists) {

@@ -62,6 +62,45 @@ TEST(File, AppearingFilesAreNotOverwritten) {
   EXPECT_EQ(TemporaryFolder::Read(folder / "a"), "somebody else's");
 }
 
+TEST(File, LinksStayLinks) {
+  const TemporaryFolder folder;
+  folder.Write("sub/a", "one");
+  const auto link = [&](const std::string& to, const char* name) {
+    ASSERT_EQ(::symlink(to.c_str(), (folder / name).c_str()), 0);
+  };
+  link("sub/a", "near");
+  link(folder / "near", "far");
+  link("sub/new", "dangling");
+  link("loop", "loop");
+  link("none/a", "nowhere");
+  EXPECT_FALSE(WriteFileAtomically(folder / "far", false, Bytes("two")).ok());
+  ASSERT_TRUE(WriteFileAtomically(folder / "far", true, Bytes("two")).ok());
+  EXPECT_EQ(TemporaryFolder::Read(folder / "sub/a"), "two");
+  ASSERT_TRUE(WriteFileAtomically(folder / "dangling", false, Bytes("three")).ok());
+  EXPECT_EQ(TemporaryFolder::Read(folder / "sub/new"), "three");
+  EXPECT_FALSE(WriteFileAtomically(folder / "loop", true, Bytes("x")).ok());
+  EXPECT_NE(WriteFileAtomically(folder / "nowhere", true, Bytes("x")).ToString().find("there is no folder"),
+            std::string::npos);
+  for (const char* name : {"near", "far", "dangling", "loop", "nowhere"}) {
+    struct stat info = {};
+    ASSERT_EQ(::lstat((folder / name).c_str(), &info), 0);
+    EXPECT_TRUE(S_ISLNK(info.st_mode)) << name;
+  }
+}
+
+TEST(File, PermissionsStayWhatTheyWere) {
+  const TemporaryFolder folder;
+  for (const mode_t mode : {0600u, 0664u, 0755u, 0400u}) {
+    const std::string path = folder.Write("a", "one");
+    ASSERT_EQ(::chmod(path.c_str(), mode), 0);
+    ASSERT_TRUE(WriteFileAtomically(path, true, Bytes("two")).ok());
+    struct stat info = {};
+    ASSERT_EQ(::stat(path.c_str(), &info), 0);
+    EXPECT_EQ(info.st_mode & 0777, mode);
+    ASSERT_EQ(::unlink(path.c_str()), 0);
+  }
+}
+
 TEST(File, ReadsWithinTheLimit) {
   const TemporaryFolder folder;
   const std::string path = folder.Write("a", "12345");

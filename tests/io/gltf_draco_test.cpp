@@ -1,6 +1,7 @@
 // KHR_draco_mesh_compression: documents that are compressed here, by Draco's encoder.
 #include <draco/compression/decode.h>
 #include <draco/compression/expert_encode.h>
+#include <draco/metadata/geometry_metadata.h>
 
 #include <functional>
 #include <map>
@@ -15,15 +16,22 @@ using nlohmann::json;
 // The sheet as Draco's mesh, and the document that holds it compressed.
 class DracoCharacter {
  public:
-  explicit DracoCharacter(std::size_t n, int method, int position_bits = 0) : grid(n) {
+  explicit DracoCharacter(std::size_t n, int method, int position_bits = 0, std::size_t metadata_bytes = 0)
+      : grid(n) {
     mesh_.set_num_points(static_cast<std::uint32_t>(grid.vertex_count));
     position = Add(draco::GeometryAttribute::POSITION, draco::DT_FLOAT32, 3, grid.positions.data(), 12);
     color = Add(draco::GeometryAttribute::COLOR, draco::DT_UINT8, 4, grid.colors.data(), 4);
+    uvs = Add(draco::GeometryAttribute::TEX_COORD, draco::DT_FLOAT32, 2, grid.uvs.data(), 8);
     joints = Add(draco::GeometryAttribute::GENERIC, draco::DT_UINT8, 4, grid.joints.data(), 4);
     weights = Add(draco::GeometryAttribute::GENERIC, draco::DT_FLOAT32, 4, grid.weights.data(), 16);
     for (std::size_t i = 0; i < grid.indices.size(); i += 3) {
       mesh_.AddFace({draco::PointIndex(grid.indices[i]), draco::PointIndex(grid.indices[i + 1]),
                      draco::PointIndex(grid.indices[i + 2])});
+    }
+    if (metadata_bytes > 0) {
+      auto metadata = std::make_unique<draco::GeometryMetadata>();
+      metadata->AddEntryString("note", std::string(metadata_bytes, 'x'));
+      mesh_.AddMetadata(std::move(metadata));
     }
     draco::ExpertEncoder encoder(mesh_);
     encoder.SetEncodingMethod(method);
@@ -34,11 +42,12 @@ class DracoCharacter {
     data.assign(encoded.data(), encoded.data() + encoded.size());
   }
 
-  // Unique ids: those of POSITION, COLOR_0, JOINTS_0 and WEIGHTS_0.
+  // Unique ids: those of POSITION, COLOR_0, TEXCOORD_0, JOINTS_0 and WEIGHTS_0.
   json Ids() const {
     const auto id = [&](int attribute) { return mesh_.attribute(attribute)->unique_id(); };
     return {{"POSITION", id(position)},
             {"COLOR_0", id(color)},
+            {"TEXCOORD_0", id(uvs)},
             {"JOINTS_0", id(joints)},
             {"WEIGHTS_0", id(weights)}};
   }
@@ -46,7 +55,7 @@ class DracoCharacter {
   GltfBuilder Document() {
     GltfBuilder b = grid.builder;
     const int view = b.View(data);
-    for (const int accessor : {grid.position, grid.color, grid.joint, grid.weight, grid.index})
+    for (const int accessor : {grid.position, grid.color, grid.uv, grid.joint, grid.weight, grid.index})
       b.root["accessors"][static_cast<std::size_t>(accessor)].erase("bufferView");
     b.root["meshes"][0]["primitives"][0]["extensions"] = {
         {"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", Ids()}}}};
@@ -56,7 +65,7 @@ class DracoCharacter {
 
   GridCharacter grid;
   std::vector<std::uint8_t> data;
-  int position = 0, color = 0, joints = 0, weights = 0;
+  int position = 0, color = 0, uvs = 0, joints = 0, weights = 0;
 
  private:
   int Add(draco::GeometryAttribute::Type type, draco::DataType data_type, int components, const void* values,
@@ -121,6 +130,9 @@ TEST(GltfDraco, EdgebreakerInDracosOrder) {
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       EXPECT_EQ(got.positions[3 * i + c], plain.positions[3 * before[i] + c]);
+      if (c < 2) {
+        EXPECT_EQ(got.uvs.at(2 * i + c), plain.uvs.at(2 * before[i] + c));
+      }
       EXPECT_EQ(got.colors[3 * i + c], plain.colors[3 * before[i] + c]);
       EXPECT_EQ(got.targets[0].deltas[3 * i + c], plain.targets.at(0).deltas[3 * before[i] + c]);
     }
@@ -178,7 +190,7 @@ TEST(GltfDraco, WhatDoesNotFit) {
                          .get<std::size_t>()];
   };
   const auto count_all = [&](GltfBuilder& b, std::uint64_t vertices, std::uint64_t indices) {
-    for (const int i : {grid.position, grid.color, grid.joint, grid.weight})
+    for (const int i : {grid.position, grid.color, grid.uv, grid.joint, grid.weight})
       accessor(b, i)["count"] = vertices;
     accessor(b, grid.index)["count"] = indices;
   };
@@ -244,6 +256,21 @@ TEST(GltfDraco, WhatDoesNotFit) {
   EXPECT_EQ(c.meshes.at(0).primitives.at(0).triangles.size(), 150u);
   ASSERT_EQ(c.warnings.size(), 1u);
   EXPECT_NE(c.warnings[0].find("fewer triangles"), std::string::npos);
+}
+
+// Metadata and whatever else lies in the bytes is read anew for each primitive.
+TEST(GltfDraco, PrimitivesThatShareMuchAreRefused) {
+  const auto shared = [&](std::size_t metadata_bytes, int primitives) {
+    DracoCharacter character(3, draco::MESH_SEQUENTIAL_ENCODING, 0, metadata_bytes);
+    EXPECT_GT(character.data.size(), metadata_bytes);
+    GltfBuilder b = character.Document();
+    json& list = b.root["meshes"][0]["primitives"];
+    for (int i = 1; i < primitives; ++i) list.push_back(json(list[0]));
+    return LoadError(b.Glb());
+  };
+  EXPECT_EQ(shared(1 << 16, 100), "accepted");
+  const std::string error = shared(1 << 20, 100);
+  EXPECT_NE(error.find("too many primitives share compressed bytes"), std::string::npos) << error;
 }
 
 // Any outcome but a crash (run under sanitizers and valgrind, too).

@@ -98,6 +98,7 @@ Compressed CompressAll(const GridCharacter& grid, bool triangles) {
                                                                                  {grid.joint, 4},
                                                                                  {grid.weight, 16},
                                                                                  {grid.color, 4},
+                                                                                 {grid.uv, 8},
                                                                                  {grid.delta, 12},
                                                                                  {grid.matrix, 64},
                                                                                  {grid.time, 4},

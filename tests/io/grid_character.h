@@ -1,5 +1,6 @@
-// A character for compressed documents: one sheet of n * n vertices with colours, two joints, a morph target
-// and a clip, all numbers without any pattern. Nodes: 0 mesh, 1 root, 2 tip. And comparisons of what is read.
+// A character for compressed documents: one sheet of n * n vertices with colours and texture coordinates, two
+// joints, a morph target and a clip, all numbers without any pattern. Nodes: 0 mesh, 1 root, 2 tip. And
+// comparisons of what is read.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,13 +16,14 @@
 namespace kpsa {
 
 struct GridCharacter {
-  std::vector<float> positions, weights, deltas, times, turns;
+  std::vector<float> positions, weights, uvs, deltas, times, turns;
   std::vector<std::uint8_t> joints, colors;  // VEC4; colours normalised
   std::vector<std::uint16_t> indices;
   std::size_t vertex_count = 0;
   GltfBuilder builder;
   // Accessors of `builder`
-  int position = 0, joint = 0, weight = 0, color = 0, index = 0, delta = 0, matrix = 0, time = 0, turn = 0;
+  int position = 0, joint = 0, weight = 0, color = 0, uv = 0, index = 0, delta = 0, matrix = 0, time = 0,
+      turn = 0;
 
   explicit GridCharacter(std::size_t n) : vertex_count(n * n) {
     std::mt19937 random(7);
@@ -35,6 +37,7 @@ struct GridCharacter {
       weights.insert(weights.end(), {share, 1 - share, 0, 0});
       joints.insert(joints.end(),
                     {static_cast<std::uint8_t>(i % 2), static_cast<std::uint8_t>(1 - i % 2), 0, 0});
+      uvs.insert(uvs.end(), {positions[3 * i] / 7, positions[3 * i + 1] / 7});
       for (int c = 0; c < 4; ++c) colors.push_back(static_cast<std::uint8_t>(random() % 256));
       if (i % n + 1 == n || i / n + 1 == n) continue;
       const auto corner = [&](std::size_t k) { indices.push_back(static_cast<std::uint16_t>(i + k)); };
@@ -50,6 +53,7 @@ struct GridCharacter {
     joint = b.Accessor(joints, "VEC4");
     weight = b.Accessor(weights, "VEC4");
     color = b.Accessor(colors, "VEC4", true);
+    uv = b.Accessor(uvs, "VEC2");
     index = b.Accessor(indices, "SCALAR");
     delta = b.Accessor(deltas, "VEC3");
     std::vector<float> matrices(32, 0.f);
@@ -57,13 +61,16 @@ struct GridCharacter {
     matrix = b.Accessor(matrices, "MAT4");
     time = b.Accessor(times, "SCALAR");
     turn = b.Accessor(turns, "VEC4");
-    b.Push("meshes",
-           {{"extras", {{"targetNames", {"bulge"}}}},
-            {"primitives",
-             {{{"attributes",
-                {{"POSITION", position}, {"JOINTS_0", joint}, {"WEIGHTS_0", weight}, {"COLOR_0", color}}},
-               {"indices", index},
-               {"targets", {{{"POSITION", delta}}}}}}}});
+    b.Push("meshes", {{"extras", {{"targetNames", {"bulge"}}}},
+                      {"primitives",
+                       {{{"attributes",
+                          {{"POSITION", position},
+                           {"JOINTS_0", joint},
+                           {"WEIGHTS_0", weight},
+                           {"COLOR_0", color},
+                           {"TEXCOORD_0", uv}}},
+                         {"indices", index},
+                         {"targets", {{{"POSITION", delta}}}}}}}});
     b.Push("skins", {{"joints", {1, 2}}, {"inverseBindMatrices", matrix}});
     b.Push("nodes", {{"name", "sheet"}, {"mesh", 0}, {"skin", 0}});
     b.Push("nodes", {{"name", "root"}, {"children", {2}}});
@@ -103,6 +110,7 @@ inline void ExpectSame(const gltf::Character& got, const gltf::Character& expect
     const gltf::Mesh &a = got.meshes[m], &b = expected.meshes[m];
     EXPECT_EQ(a.positions, b.positions);
     EXPECT_EQ(a.colors, b.colors);
+    EXPECT_EQ(a.uvs, b.uvs);
     EXPECT_EQ(a.influence_offsets, b.influence_offsets);
     ASSERT_EQ(a.influences.size(), b.influences.size());
     for (std::size_t i = 0; i < a.influences.size(); ++i) {

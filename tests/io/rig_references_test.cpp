@@ -321,5 +321,22 @@ TEST_F(References, AreBounded) {
   EXPECT_TRUE(Has(text, "more than 256 rigs are referenced")) << text.substr(0, 500);
 }
 
+TEST_F(References, AreSixteenLevelsDeepAtMost) {
+  folder.Write("r17.gltf", "{\"asset\": {\"version\": \"2.0\"}, \"nodes\": [{\"name\": \"leaf\"}]}");
+  for (int level = 0; level < 17; ++level)
+    Write(fmt::format("references: {{a: {{file: r{}.{}}}}}\n", level + 1, level == 16 ? "gltf" : "yaml"),
+          fmt::format("r{}.yaml", level));
+  const Result<Rig> sixteen = LoadRig(StandardRegistry(), folder / "r1.yaml");
+  ASSERT_TRUE(sixteen.ok()) << sixteen.status().ToString();
+  std::string leaf;
+  for (int level = 0; level < 16; ++level) leaf += "a:";
+  EXPECT_TRUE(sixteen->graph->FindNode(leaf + "leaf").ok());
+  const Result<Rig> seventeen = LoadRig(StandardRegistry(), folder / "r0.yaml");
+  ASSERT_FALSE(seventeen.ok());
+  EXPECT_TRUE(Has(Short(seventeen.status().ToString()),
+                  "r16.yaml:2:24: references are nested more than 16 levels deep"))
+      << seventeen.status().ToString();
+}
+
 }  // namespace
 }  // namespace kpsa

@@ -233,6 +233,8 @@ TEST_F(RigStacks, ExplainsBadMembersAndWeights) {
   folder.Write(
       "bad.json",
       R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 3, "maps": {"m": {"default": 0, "indices": [7], "values": [1]}}})");
+  folder.Write("range.json", R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 3, "maps": {
+    "much": {"default": 1, "indices": [1], "values": [1.5]}, "less": {"default": -0.25, "indices": [0], "values": [1]}}})");
   const auto errors = [&](const std::string& keys) {
     return Errors("nodes: {l: {type: cluster, " + keys +
                   "}}\ndeform: [{meshes: [body], stack: [gltf, l]}]\n");
@@ -243,6 +245,11 @@ TEST_F(RigStacks, ExplainsBadMembersAndWeights) {
   EXPECT_TRUE(Has(errors("weights: 'other.json#n'"), "other.json has no map \"n\""));
   EXPECT_TRUE(Has(errors("weights: '#n'"), "weights \"#n\": expected the file before the #"));
   EXPECT_TRUE(Has(errors("weights: 'bad.json#m'"), "bad.json")) << errors("weights: 'bad.json#m'");
+  for (const char* keys : {"weights: 'range.json#much'", "members: {weights: 'range.json#much'}",
+                           "falloff: {weights: 'range.json#much'}"})
+    EXPECT_TRUE(Has(errors(keys), "weights: 1.5 is outside of 0 to 1: vertex 1 of map \"much\""))
+        << errors(keys);
+  EXPECT_TRUE(Has(errors("weights: 'range.json#less'"), "weights: -0.25 is outside of 0 to 1: vertex 1 of"));
   EXPECT_TRUE(Has(errors("weights: 'nobody.json#m'"), "nobody.json")) << errors("weights: 'nobody.json#m'");
   EXPECT_TRUE(Has(errors("members: {vertices: '0:9'}"),
                   "vertices: \"0:9\" is none of body: expected numbers and ranges from 0 to 2"));

@@ -1,8 +1,10 @@
 #include "io/weights_json.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <bit>
+#include <chrono>
 #include <cmath>
 
 #include "tests/support/temporary_folder.h"
@@ -108,6 +110,8 @@ TEST(Weights, EveryErrorIsNamed) {
   expect(with("[1, 0.5]", "[1, null]"), "values[1] is null");
   expect(with("[1, 0.5]", "[1, 1e39]"), "values[1] is 1e+39, expected a finite");
   expect(with("[1, 0.5]", "[1, 1e999]"), "is no valid weight file");
+  expect(with("[4, 0]", "[4, [[1]]]"), "indices[1] is an entry of type array, expected a point");
+  expect(with("[1, 0.5]", "[1, \"half\"]"), "values[1] is an entry of type string, expected a finite");
   expect(with("0.25", "\"x\""), "default must be a finite number");
   expect(with("\"version\": 1", "\"version\": 2"), "version must be 1");
   expect(with("\"default\"", "\"defualt\""), "did you mean \"default\"");
@@ -122,6 +126,33 @@ TEST(Weights, EveryErrorIsNamed) {
   // Collected: both errors of one file
   const auto both = ReadWeightFile(folder.Write("w.json", with("[4, 0]", "[9, 9]")));
   EXPECT_EQ(both.status().errors().size(), 2u);
+}
+
+TEST(Weights, NestedTextIsRefusedBeforeAnybodyRecurses) {
+  const TemporaryFolder folder;
+  const std::string deep = std::string(200000, '[') + std::string(200000, ']');
+  const Result<WeightFile> file =
+      ReadWeightFile(folder.Write("w.json", R"({"kpsa": "weights", "version": 1, "mesh": "m", "points": 1,
+        "maps": {"a": {"indices": [)" + deep + R"(], "values": [1]}}})"));
+  ASSERT_FALSE(file.ok());
+  EXPECT_NE(file.status().ToString().find("nested more than"), std::string::npos) << file.status().ToString();
+  EXPECT_EQ(file.status().errors()[0].where.file, folder / "w.json");
+}
+
+// In the file's order, and in no time that grows by the square of their number.
+TEST(Weights, ManyMaps) {
+  const TemporaryFolder folder;
+  constexpr int kMaps = 50000;
+  std::string text = R"({"maps": {)";
+  for (int i = 0; i < kMaps; ++i) text += fmt::format("{}\"m{}\":{{}}", i == 0 ? "" : ",", kMaps - i);
+  text += R"(}, "kpsa": "weights", "version": 1, "mesh": "m", "points": 1})";
+  const auto begin = std::chrono::steady_clock::now();
+  const Result<WeightFile> file = ReadWeightFile(folder.Write("w.json", text));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(4));
+  ASSERT_TRUE(file.ok()) << file.status().ToString();
+  ASSERT_EQ(file->maps.size(), static_cast<std::size_t>(kMaps));
+  for (int i = 0; i < kMaps; i += 4999)
+    EXPECT_EQ(file->maps[static_cast<std::size_t>(i)].name, fmt::format("m{}", kMaps - i));
 }
 
 }  // namespace
