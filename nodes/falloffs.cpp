@@ -224,21 +224,22 @@ NodeBuilder& FinishFalloff(NodeBuilder& b, ComputeFn compute, BindFn bind) {
 void AddFalloffNodes(NodeRegistry& registry) {
   NodeBuilder sphere =
       AddFalloff(registry, "sphereFalloff", "1 in the middle of a sphere, 0 at its radius and beyond.");
-  sphere.in("matrix", Matrix4(), {.doc = "the sphere's handle, whose scale makes it an ellipsoid"});
+  sphere.in("matrix", Matrix4(), {.doc = "the sphere's handle, whose scale makes it an ellipsoid"})
+      .world_place();
   sphere.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the handle's units"});
   FinishFalloff(sphere, &ComputeSphere, BindShape);
 
   NodeBuilder capsule =
       AddFalloff(registry, "capsuleFalloff", "1 on a line between two places, 0 at the radius and beyond.");
-  capsule.in("startMatrix", Matrix4(), {.doc = "world, where the line starts"});
-  capsule.in("endMatrix", Matrix4(), {.doc = "world, where it ends"});
+  capsule.in("startMatrix", Matrix4(), {.doc = "world, where the line starts"}).world_place();
+  capsule.in("endMatrix", Matrix4(), {.doc = "world, where it ends"}).world_place();
   capsule.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the world"});
   FinishFalloff(capsule, &ComputeCapsule, BindShape);
 
   NodeBuilder plane = AddFalloff(
       registry, "planeFalloff",
       "1 at the height `start` along the handle's y axis and on the side away from `end`, 0 from there on.");
-  plane.in("matrix", Matrix4(), {.doc = "the plane's handle"});
+  plane.in("matrix", Matrix4(), {.doc = "the plane's handle"}).world_place();
   plane.in("start", 0.0, {.unit = Unit::kLength, .doc = "in the handle's units; the same as `end`: a step"});
   plane.in("end", 1.0, {.unit = Unit::kLength, .doc = "in the handle's units"});
   FinishFalloff(plane, &ComputePlane, BindShape);
