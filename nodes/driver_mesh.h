@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/triangle_tree.h"
+#include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/topology.h"
 
