@@ -65,9 +65,13 @@ class ComputeContext {
   T& out_value(int i) const {
     return *reinterpret_cast<T*>(values + out[i]);
   }
+  template <typename T>
+  T& out_value(int i, std::uint32_t element) const {
+    return *reinterpret_cast<T*>(values + (out + out[i])[1 + element]);
+  }
   const PointsView& out_points(int i) const { return out_value<PointsView>(i); }
   const PointsView& out_points(int i, std::uint32_t element) const {
-    return *reinterpret_cast<const PointsView*>(values + (out + out[i])[1 + element]);
+    return out_value<PointsView>(i, element);
   }
   std::uint32_t out_count(int i) const { return (out + out[i])[0]; }
 

@@ -98,6 +98,11 @@ NodeBuilder& NodeBuilder::lazy(bool together) {
   attribute().lazy_together = together;
   return *this;
 }
+NodeBuilder& NodeBuilder::world_place() {
+  KPSA_CHECK(attribute().type == Type::kMatrix && !attribute().array);
+  attribute().world_place = true;
+  return *this;
+}
 NodeBuilder& NodeBuilder::alias(std::string other_name) {
   attribute().aliases.push_back(std::move(other_name));
   return *this;

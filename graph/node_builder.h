@@ -83,6 +83,7 @@ class NodeBuilder {
   NodeBuilder& array();
   NodeBuilder& per_geometry();  // implies array
   NodeBuilder& lazy(bool together = false);
+  NodeBuilder& world_place();
   NodeBuilder& alias(std::string other_name);
   NodeBuilder& unit(Unit u) {
     attribute().unit = u;

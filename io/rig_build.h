@@ -156,6 +156,7 @@ class RigBuild {
   PointBufferPtr RegularGrid(const PlugRef& plug, const RigString& name);
 
   // rig_drivers.cpp: meshes that drive others
+  static const char* SpaceName(bool world) { return world ? "world space" : "mesh space (before the skin)"; }
   void ConnectDrivers();
   void ConnectDriver(const Made& made, const RigAttribute& driver);
   std::shared_ptr<const TriangleUvs> UvsOf(std::size_t mesh);
@@ -213,6 +214,7 @@ class RigBuild {
   std::optional<PlugRef> FalloffOf(const YamlNode& name, const Made& deformer, std::size_t geometry,
                                    int depth);
   void PlaceFalloffs();
+  bool FitsDriver(NodeId falloff, const Made& deformer);
 
   // rig_lights.cpp: what illuminations see
   void ConnectLights();

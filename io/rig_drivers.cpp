@@ -89,13 +89,11 @@ void RigBuild::ConnectDriver(const Made& made, const RigAttribute& driver) {
     return;
   }
   if (!made.geometries.empty() && world != made.world) {
-    const auto space = [](bool in_world) {
-      return in_world ? "world space" : "mesh space (before the skin)";
-    };
-    Fail(where, Status::Invalid(
-                    "\"{}\" deforms {} in {}, and the driver \"{}\" is in {}: name a stage of the "
-                    "driver in the same space",
-                    made.from->name, made.geometries.front().name, space(made.world), text, space(world)));
+    Fail(where,
+         Status::Invalid("\"{}\" deforms {} in {}, and the driver \"{}\" is in {}: name a stage of the "
+                         "driver in the same space",
+                         made.from->name, made.geometries.front().name, SpaceName(made.world), text,
+                         SpaceName(world)));
     return;
   }
   GraphEditor edit(&graph());

@@ -1,6 +1,7 @@
 // Falloffs that vary: `falloff: NAME` of deformers. A falloff node measures the points as they come to the
 // deformer, one element for each geometry of each deformer that names it.
 #include <algorithm>
+#include <set>
 
 #include "io/rig_build.h"
 
@@ -92,15 +93,39 @@ std::optional<PlugRef> RigBuild::FalloffOf(const YamlNode& name, const Made& def
 
 // Where the points of a stage in mesh space are, once that is known.
 void RigBuild::PlaceFalloffs() {
+  std::set<Index> refused;
   for (const FalloffUse& use : falloff_uses_) {
     const Made* deformer = FindMade(use.deformer);
     const Made* falloff = FindMade(use.falloff);
-    if (deformer == nullptr || falloff == nullptr || deformer->world) continue;
+    if (deformer == nullptr || falloff == nullptr) continue;
+    const Geometry& of = deformer->geometries[static_cast<std::size_t>(use.geometry)];
+    const auto driver = falloff->special.find("driver");
+    if (driver != falloff->special.end() && !FitsDriver(use.falloff, *deformer) &&
+        refused.insert(use.falloff.index).second) {
+      const YamlNode& name = driver->second->value;
+      errors_->Add(
+          name,
+          "\"{}\" weighs {} in {}, and the driver \"{}\" is in {}: name a stage of the driver in the "
+          "same space, or the parent that carries what is in mesh space",
+          falloff->from->name, of.name, SpaceName(deformer->world), name.scalar, SpaceName(!deformer->world));
+    }
+    if (deformer->world) continue;
     GraphEditor edit(&graph());
-    edit.Set(use.falloff, "geometryMatrix", use.element,
-             deformer->geometries[static_cast<std::size_t>(use.geometry)].world_from_stage);
+    edit.Set(use.falloff, "geometryMatrix", use.element, of.world_from_stage);
     Fail(falloff->from->where, edit.Take());
   }
+}
+
+// Whether points and driver are measured in one space. In mesh space both are where they rest, unless a
+// parent carries them.
+bool RigBuild::FitsDriver(NodeId falloff, const Made& deformer) {
+  GraphEditor edit(&graph());
+  if (!edit.Has(falloff, "driverMatrix")) return true;
+  const PlugRef parent = edit.Plug(falloff, "parentMatrix");
+  const bool carried = graph().FindConnection(parent) != nullptr || graph().FindValue(parent) != nullptr;
+  const bool world = graph().FindValue(edit.Plug(falloff, "driverMatrix")) == nullptr;
+  return carried || world == deformer.world ||
+         graph().FindConnection(edit.Plug(falloff, "driverPoints")) == nullptr;
 }
 
 }  // namespace kpsa

@@ -10,13 +10,6 @@ namespace {
 
 constexpr std::size_t kMaxLabel = 3;  // clips that are named where several play
 
-// Nodes that stand in the world by their `matrix`, and at its origin where nothing drives that.
-bool IsPlacedByMatrix(const NodeDef& def) {
-  static const char* const kTypes[] = {"bend", "twist", "squash", "flare", "sine", "wave", "sculpt"};
-  return def.category == "light" ||
-         std::find(std::begin(kTypes), std::end(kTypes), def.name) != std::end(kTypes);
-}
-
 // Moves what one rig says of its graph and its character behind what is there already.
 class Mover {
  public:
@@ -68,12 +61,11 @@ class Mover {
     for (Index i = begin_; i < graph_.node_capacity() && edit.ok(); ++i) {
       const NodeId node = graph_.IdAt(i);
       if (node.version == 0) continue;
-      const NodeDef& def = graph_.def(node);
-      for (const char* name : {"parentMatrix", "matrix"}) {
-        const int attribute = def.FindAttribute(name);
-        if (attribute < 0 || def.attributes[static_cast<std::size_t>(attribute)].output) continue;
-        if (std::string_view(name) == "matrix" && !IsPlacedByMatrix(def)) continue;
-        const PlugRef plug{node, attribute, -1, -1};
+      const std::vector<AttributeDef>& attributes = graph_.def(node).attributes;
+      for (std::size_t a = 0; a < attributes.size(); ++a) {
+        if (attributes[a].output || !(attributes[a].world_place || attributes[a].name == "parentMatrix"))
+          continue;
+        const PlugRef plug{node, static_cast<int>(a), -1, -1};
         if (graph_.FindValue(plug) == nullptr && graph_.FindConnection(plug) == nullptr)
           edit.Connect(world, plug);
       }
@@ -148,9 +140,8 @@ void Mover::AddScene() {
   for (CharacterMesh& mesh : from.meshes) {
     Name(&mesh.name);
     mesh.gltf_node += nodes_;
-    for (NodeId* node :
-         {&mesh.transform, &mesh.rest, &mesh.morph_weights, &mesh.blend_shape, &mesh.skin_cluster,
-          &mesh.transform_geometry})
+    for (NodeId* node : {&mesh.transform, &mesh.rest, &mesh.morph_weights, &mesh.blend_shape,
+                         &mesh.skin_cluster, &mesh.transform_geometry})
       *node = Moved(*node);
     for (NodeId& node : mesh.influence_nodes) node = Moved(node);
     for (Stage& stage : mesh.stages) {

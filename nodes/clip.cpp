@@ -245,11 +245,8 @@ void ComputeClipWeights(ComputeContext& c) {
   const auto& [keys, times] = c.kernel_as<ClipWeightsKernel>();
   const std::span<double> values(reinterpret_cast<double*>(c.scratch), keys.view.components);
   if (!keys.empty()) SampleScalars(keys.view, times.Find(c.get<double>(0)), values);
-  const std::uint32_t* table = c.out + c.out[0];
-  for (std::uint32_t i = 0; i < table[0]; ++i) {
-    *reinterpret_cast<double*>(c.values + table[1 + i]) =
-        !keys.empty() && i < values.size() ? values[i] : 0.0;
-  }
+  for (std::uint32_t i = 0; i < c.out_count(0); ++i)
+    c.out_value<double>(0, i) = !keys.empty() && i < values.size() ? values[i] : 0.0;
 }
 
 struct CurveKernel {

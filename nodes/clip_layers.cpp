@@ -160,19 +160,17 @@ Result<BoundKernel> BindLayeredWeights(const Binding& binding) {
 void ComputeLayeredWeights(ComputeContext& c) {
   const auto& k = c.kernel_as<LayeredWeightsKernel>();
   const ArrayView<double> times = c.array<double>(0), weights = c.array<double>(1);
-  const std::uint32_t* table = c.out + c.out[0];
+  const std::uint32_t count = c.out_count(0);
   const auto rest_of = [&](std::size_t n) { return n < k.rest.size() ? k.rest[n] : 0.0; };
-  const auto out = [&](std::uint32_t n) -> double& {
-    return *reinterpret_cast<double*>(c.values + table[1 + n]);
-  };
-  for (std::uint32_t n = 0; n < table[0]; ++n) out(n) = rest_of(n);
+  const auto out = [&](std::uint32_t n) -> double& { return c.out_value<double>(0, n); };
+  for (std::uint32_t n = 0; n < count; ++n) out(n) = rest_of(n);
   for (std::uint32_t i = 0; i < k.layers.size() && i < times.size(); ++i) {
     const WeightsLayer& layer = k.layers[i];
     const Mix mix{i < weights.size() ? weights[i] : 1, layer.additive};
     if (layer.keys.empty() || mix.weight == 0) continue;
     const std::span<double> values(reinterpret_cast<double*>(c.scratch), layer.keys.view.components);
     SampleScalars(layer.keys.view, layer.times.Find(times[i]), values);
-    for (std::uint32_t n = 0; n < table[0] && n < values.size(); ++n)
+    for (std::uint32_t n = 0; n < count && n < values.size(); ++n)
       out(n) = mix(out(n), values[n], rest_of(n));
   }
 }

@@ -59,33 +59,46 @@ void AddDriver(NodeBuilder& b) {
                {.doc = "world from the driver's space at rest, where its stage is in mesh space"});
 }
 
-Result<Driver> BindDriver(const Structural& s, DriverTree tree) {
+Result<const Mesh*> DriverMesh(const Structural& s, std::size_t points) {
   const auto* mesh = s.asset<Mesh>("driverMesh");
-  const Value* value = s.rest("driverPoints");
   if (mesh == nullptr || !s.is_set("driverPoints"))
     return Status::Invalid("it has no driver: name a mesh, `driver: MESH` or `driver: \"MESH@STAGE\"`");
-  if (value == nullptr || value->points() == nullptr) return Status::Invalid("its driver has no rest shape");
+  if (points != mesh->point_count())
+    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", mesh->point_count(), points);
+  if (mesh->data().triangles.empty())
+    return Status::Invalid("its driver \"{}\" has no faces", mesh->data().name);
+  return mesh;
+}
+
+Result<Driver> BindDriver(const Structural& s, DriverTree tree) {
+  Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  const Matrix4 world_from_driver = s.value("driverMatrix").get<Matrix4>();
+  Matrix4 inverse;
+  if (!Invert(world_from_driver, &inverse)) return Status::Invalid("driverMatrix is singular");
+  return BindDriver(s, tree,
+                    frame->fixed() ? frame->stage_from_world() * world_from_driver : world_from_driver);
+}
+
+Result<Driver> BindDriver(const Structural& s, DriverTree tree, const Matrix4& stage_from_driver) {
+  const Value* value = s.rest("driverPoints");
+  const bool known = value != nullptr && value->points() != nullptr;
+  const auto* of = s.asset<Mesh>("driverMesh");
+  const Result<const Mesh*> mesh = DriverMesh(s, known           ? value->points()->count()
+                                                 : of != nullptr ? of->point_count()
+                                                                 : 0);
+  if (!mesh.ok()) return mesh.status();
+  if (!known) return Status::Invalid("its driver has no rest shape");
   Status error;
   Driver driver;
-  driver.topology = TopologyOf(mesh, &error);
+  driver.stage_from_driver = stage_from_driver;
+  driver.topology = TopologyOf(*mesh, &error);
   if (driver.topology == nullptr) return error;
   const ConstPointsView points = value->points()->view();
-  if (points.count != driver.topology->point_count()) {
-    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", driver.topology->point_count(),
-                           points.count);
-  }
-  if (driver.topology->triangle_count() == 0)
-    return Status::Invalid("its driver \"{}\" has no faces", mesh->data().name);
   for (std::size_t i = 0; i < points.count; ++i) {
     if (!std::isfinite(points.x[i]) || !std::isfinite(points.y[i]) || !std::isfinite(points.z[i]))
       return Status::Invalid("point {} of its driver is not finite at rest", i);
   }
-  Result<CarriedFrame> frame = CarriedFrame::Bind(s);
-  if (!frame.ok()) return frame.status();
-  driver.stage_from_driver = s.value("driverMatrix").get<Matrix4>();
-  Matrix4 inverse;
-  if (!Invert(driver.stage_from_driver, &inverse)) return Status::Invalid("driverMatrix is singular");
-  if (frame->fixed()) driver.stage_from_driver = frame->stage_from_world() * driver.stage_from_driver;
 
   Hasher hasher;
   hasher.Add(tree);
@@ -93,7 +106,7 @@ Result<Driver> BindDriver(const Structural& s, DriverTree tree) {
   for (const float* row : {points.x, points.y, points.z})
     hasher.Add(std::span<const float>(row, points.count));
   const Digest key = hasher.Finish();
-  Latest::Shared& latest = *mesh->Derived<Latest>([] { return Latest(); }).shared;
+  Latest::Shared& latest = *(*mesh)->Derived<Latest>([] { return Latest(); }).shared;
   const std::lock_guard<std::mutex> lock(latest.mutex);
   for (const Latest::Entry& entry : latest.entries) {
     if (entry.key == key) driver.rest = entry.rest;

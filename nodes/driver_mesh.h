@@ -1,21 +1,26 @@
-// What deformers share that follow another mesh: its points at any stage, its faces, and where it lies at
-// rest. Thread-safe.
+// What nodes share that follow another mesh: its points at any stage, its faces, and where it lies at rest.
+// Thread-safe.
 #pragma once
 
 #include <memory>
 #include <vector>
 
 #include "base/triangle_tree.h"
+#include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/topology.h"
 
 namespace kpsa {
 
-// The place of driverPoints among the inputs of the group.
+// The place of driverPoints among the inputs of a deformer's group.
 inline constexpr int kDriverPoints = kFirstOwnInput;
 
 // Declares driverPoints, driverMesh and driverMatrix; the first inputs of a deformer's own.
 void AddDriver(NodeBuilder& builder);
+
+// The mesh of a driver whose points are so many. Errors: driverMesh or driverPoints is missing, another
+// number of points than the mesh has, no faces.
+Result<const Mesh*> DriverMesh(const Structural& structural, std::size_t points);
 
 // The driver at rest in the space of the stage, with a tree over its triangles or over its single points.
 struct DriverRest {
@@ -32,9 +37,10 @@ struct Driver {
 };
 
 enum class DriverTree { kTriangles, kPoints };
-// Errors: driverPoints not connected, another number of points than the mesh, no faces, driverMatrix
-// singular, points that are not finite. The last rest of a mesh is kept beside it, since demand and bind both
-// ask.
+// Of a deformer, in the space of its stage. Errors: those of DriverMesh, driverMatrix singular, points that
+// are not finite. The last rests of a mesh are kept beside it: demand and bind both ask, of every geometry.
 Result<Driver> BindDriver(const Structural& structural, DriverTree tree);
+// The same in any other space.
+Result<Driver> BindDriver(const Structural& structural, DriverTree tree, const Matrix4& stage_from_driver);
 
 }  // namespace kpsa

@@ -6,10 +6,8 @@
 
 #include "base/falloff_shapes.h"
 #include "base/matrix.h"
-#include "base/triangle_tree.h"
 #include "graph/geometry.h"
-#include "nodes/deformer.h"
-#include "nodes/mesh_topology.h"
+#include "nodes/driver_mesh.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
@@ -25,20 +23,24 @@ struct FalloffPlace {
   bool moved = false;
   Matrix4 world_from_points_at_rest, parent_rest_inverse;
 
-  static Result<FalloffPlace> Bind(const Structural& s) {
+  // carries: parentMatrix moves something else, too.
+  static Result<FalloffPlace> Bind(const Structural& s, bool carries = false) {
     FalloffPlace place;
     place.fade = static_cast<FalloffFade>(s.get_int("curve"));
     place.moved = s.is_set("geometryMatrix", s.geometry());
-    if (!place.moved) return place;
-    place.world_from_points_at_rest = s.value("geometryMatrix").get<Matrix4>();
+    if (!place.moved && !carries) return place;
+    if (place.moved) place.world_from_points_at_rest = s.value("geometryMatrix").get<Matrix4>();
     const Result<Matrix4> parent = RestMatrix(s, "parentMatrix");
     if (!parent.ok()) return parent.status();
     if (!Invert(*parent, &place.parent_rest_inverse))
       return Status::Invalid("parentMatrix is singular at rest");
     return place;
   }
+  Matrix4 Carried(const Matrix4& world_at_rest, const Matrix4& parent) const {
+    return parent * parent_rest_inverse * world_at_rest;
+  }
   Matrix4 WorldFromPoints(const Matrix4& parent) const {
-    return moved ? parent * parent_rest_inverse * world_from_points_at_rest : Matrix4();
+    return moved ? Carried(world_from_points_at_rest, parent) : Matrix4();
   }
 };
 
@@ -59,28 +61,29 @@ void ForPoints(const ComputeContext& c, const Matrix4& m, F weight) {
   });
 }
 
-// A radius of nothing holds its middle only.
-double ByDistance(double distance, double radius, FalloffFade fade) {
-  if (radius > 0) return DistanceFalloff(distance, radius, fade);
-  return distance > 0 ? 0 : 1;
+// A step at the radius where `start` is no less; a radius of nothing holds its middle only.
+double ByDistance(double distance, double start, double radius, FalloffFade fade) {
+  start = std::max(0.0, start);
+  if (radius > start) return DistanceFalloff(distance - start, radius - start, fade);
+  return distance > std::max(0.0, radius) ? 0 : 1;
 }
 
 void ComputeSphere(ComputeContext& c) {
   const auto& place = c.kernel_as<FalloffPlace>();
-  const double radius = c.get<double>(kOwn + 1);
+  const double radius = c.get<double>(kOwn + 1), start = c.get<double>(kOwn + 2);
   Matrix4 from_world;
   const bool there = Invert(c.get<Matrix4>(kOwn), &from_world);
   ForPoints(c, from_world * place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
-            [&](Double3 p) { return there ? ByDistance(Length(p), radius, place.fade) : 0; });
+            [&](Double3 p) { return there ? ByDistance(Length(p), start, radius, place.fade) : 0; });
 }
 
 void ComputeCapsule(ComputeContext& c) {
   const auto& place = c.kernel_as<FalloffPlace>();
   const Double3 a = TransformPoint(c.get<Matrix4>(kOwn), {}),
                 b = TransformPoint(c.get<Matrix4>(kOwn + 1), {});
-  const double radius = c.get<double>(kOwn + 2);
+  const double radius = c.get<double>(kOwn + 2), start = c.get<double>(kOwn + 3);
   ForPoints(c, place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
-            [&](Double3 p) { return ByDistance(SegmentDistance(p, a, b), radius, place.fade); });
+            [&](Double3 p) { return ByDistance(SegmentDistance(p, a, b), start, radius, place.fade); });
 }
 
 void ComputePlane(ComputeContext& c) {
@@ -95,54 +98,56 @@ void ComputePlane(ComputeContext& c) {
   });
 }
 
-// The driver's surface, in the world.
+// The driver's surface: in the world, or in mesh space, from where parentMatrix carries it as it does the
+// points.
 struct Proximity {
   FalloffPlace place;
-  Matrix4 world_from_driver;
-  TriangleTree tree;
-  std::size_t row = 0;  // floats of a component of the driver's points
+  bool carried = false;
+  Driver driver;
+  std::size_t row = 0;  // floats of a component of the carried driver
 };
 
 Result<BoundKernel> BindProximity(const Binding& binding) {
   const Structural& s = binding.structural();
-  Result<FalloffPlace> place = FalloffPlace::Bind(s);
+  Proximity bound;
+  bound.carried = s.is_set("driverMatrix");
+  const Result<FalloffPlace> place = FalloffPlace::Bind(s, bound.carried);
   if (!place.ok()) return place.status();
-  const auto* mesh = s.asset<Mesh>("driverMesh");
-  const Value* rest = s.rest("driverPoints");
-  if (mesh == nullptr || !s.is_set("driverPoints"))
-    return Status::Invalid("it has no driver: name a mesh, `driver: MESH` or `driver: \"MESH@STAGE\"`");
-  if (rest == nullptr || rest->points() == nullptr) return Status::Invalid("its driver has no rest shape");
-  const ConstPointsView points = rest->points()->view();
-  Status error;
-  const Topology* topology = TopologyOf(mesh, &error);
-  if (topology == nullptr) return error;
-  if (points.count != topology->point_count())
-    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", topology->point_count(),
-                           points.count);
-  if (topology->triangle_count() == 0)
-    return Status::Invalid("its driver \"{}\" has no faces", mesh->data().name);
-  Proximity bound{*place, s.value("driverMatrix").get<Matrix4>(), TriangleTree(points, topology->triangles()),
-                  PaddedCount(points.count)};
-  const std::size_t scratch = 3 * bound.row + bound.tree.BoxFloats();
+  bound.place = *place;
+  Result<Driver> driver = BindDriver(s, DriverTree::kTriangles, s.value("driverMatrix").get<Matrix4>());
+  if (!driver.ok()) return driver.status();
+  bound.driver = std::move(*driver);
+  if (bound.carried) bound.row = PaddedCount(bound.driver.topology->point_count());
+  const std::size_t scratch = 3 * bound.row + bound.driver.rest->tree.BoxFloats();
   return MakeBound(std::move(bound), scratch);
 }
 
 void ComputeProximity(ComputeContext& c) {
   const auto& bound = c.kernel_as<Proximity>();
-  const ConstPointsView& driver = c.points(kOwn);
-  const double radius = c.get<double>(kOwn + 1);
-  const PointsView surface{c.scratch, c.scratch + bound.row, c.scratch + 2 * bound.row, driver.count};
-  for (std::size_t i = 0; i < driver.count; ++i) {
-    const Double3 p = TransformPoint(bound.world_from_driver, {driver.x[i], driver.y[i], driver.z[i]});
-    surface.x[i] = static_cast<float>(p.x);
-    surface.y[i] = static_cast<float>(p.y);
-    surface.z[i] = static_cast<float>(p.z);
+  const Matrix4& parent = c.get<Matrix4>(kFalloffParent);
+  const double radius = c.get<double>(kOwn + 1), start = c.get<double>(kOwn + 2);
+  ConstPointsView surface = c.points(kOwn);
+  if (bound.carried) {
+    const ConstPointsView driver = surface;
+    const Matrix4 world_from_driver = bound.place.Carried(bound.driver.stage_from_driver, parent);
+    const PointsView carried{c.scratch, c.scratch + bound.row, c.scratch + 2 * bound.row, driver.count};
+    c.host->For(driver.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const Double3 p = TransformPoint(world_from_driver, {driver.x[i], driver.y[i], driver.z[i]});
+        carried.x[i] = static_cast<float>(p.x);
+        carried.y[i] = static_cast<float>(p.y);
+        carried.z[i] = static_cast<float>(p.z);
+      }
+    });
+    surface = carried;
   }
-  const std::span<float> boxes(c.scratch + 3 * bound.row, bound.tree.BoxFloats());
-  bound.tree.Fit(surface, boxes);
-  ForPoints(c, bound.place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)), [&](Double3 p) {
-    const SurfacePoint near = bound.tree.Closest(surface, boxes, p, std::max(radius, 0.0));
-    return near.triangle == kNoIndex ? 0 : ByDistance(std::sqrt(near.squared), radius, bound.place.fade);
+  const TriangleTree& tree = bound.driver.rest->tree;
+  const std::span<float> boxes(c.scratch + 3 * bound.row, tree.BoxFloats());
+  tree.Fit(surface, boxes);
+  ForPoints(c, bound.place.WorldFromPoints(parent), [&](Double3 p) {
+    const SurfacePoint near = tree.Closest(surface, boxes, p, std::max(radius, 0.0));
+    return near.triangle == kNoIndex ? 0
+                                     : ByDistance(std::sqrt(near.squared), start, radius, bound.place.fade);
   });
 }
 
@@ -206,12 +211,19 @@ NodeBuilder AddFalloff(NodeRegistry& registry, const char* name, const char* doc
   NodeBuilder b = registry.add(name, doc);
   b.category("falloff");
   b.points_in("inPoints", "the points, as they come to the deformer").per_geometry();
-  b.in("parentMatrix", Matrix4(), {.doc = "before the skin: what carries the points; `parent:` connects it"});
+  b.in("parentMatrix", Matrix4(),
+       {.doc = "what carries points (and a driver) from before a skin; `parent:` connects it"});
   b.structural("geometryMatrix", Matrix4(),
                {.doc = "world from the points' space at rest, where they are before the skin"})
       .per_geometry();
   b.enumeration("curve", {"smooth", "linear"}, true, "how the weight gets from 1 to 0");
   return b;
+}
+
+void AddRadius(NodeBuilder& b, const char* where) {
+  b.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = std::string("where it is 0; ") + where});
+  b.in("start", 0.0,
+       {.min = 0, .unit = Unit::kLength, .doc = "up to where it is 1; as large as the radius: a step"});
 }
 
 NodeBuilder& FinishFalloff(NodeBuilder& b, ComputeFn compute, BindFn bind) {
@@ -224,32 +236,31 @@ NodeBuilder& FinishFalloff(NodeBuilder& b, ComputeFn compute, BindFn bind) {
 void AddFalloffNodes(NodeRegistry& registry) {
   NodeBuilder sphere =
       AddFalloff(registry, "sphereFalloff", "1 in the middle of a sphere, 0 at its radius and beyond.");
-  sphere.in("matrix", Matrix4(), {.doc = "the sphere's handle, whose scale makes it an ellipsoid"});
-  sphere.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the handle's units"});
+  sphere.in("matrix", Matrix4(), {.doc = "the sphere's handle, whose scale makes it an ellipsoid"})
+      .world_place();
+  AddRadius(sphere, "in the handle's units");
   FinishFalloff(sphere, &ComputeSphere, BindShape);
 
   NodeBuilder capsule =
       AddFalloff(registry, "capsuleFalloff", "1 on a line between two places, 0 at the radius and beyond.");
-  capsule.in("startMatrix", Matrix4(), {.doc = "world, where the line starts"});
-  capsule.in("endMatrix", Matrix4(), {.doc = "world, where it ends"});
-  capsule.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the world"});
+  capsule.in("startMatrix", Matrix4(), {.doc = "world, where the line starts"}).world_place();
+  capsule.in("endMatrix", Matrix4(), {.doc = "world, where it ends"}).world_place();
+  AddRadius(capsule, "in the world");
   FinishFalloff(capsule, &ComputeCapsule, BindShape);
 
   NodeBuilder plane = AddFalloff(
       registry, "planeFalloff",
       "1 at the height `start` along the handle's y axis and on the side away from `end`, 0 from there on.");
-  plane.in("matrix", Matrix4(), {.doc = "the plane's handle"});
+  plane.in("matrix", Matrix4(), {.doc = "the plane's handle"}).world_place();
   plane.in("start", 0.0, {.unit = Unit::kLength, .doc = "in the handle's units; the same as `end`: a step"});
   plane.in("end", 1.0, {.unit = Unit::kLength, .doc = "in the handle's units"});
   FinishFalloff(plane, &ComputePlane, BindShape);
 
   NodeBuilder proximity = AddFalloff(registry, "proximityFalloff",
                                      "1 on the surface of a mesh, which may move; 0 at the radius from it.");
-  proximity.points_in("driverPoints", "the mesh's points, at any stage; `driver:` connects them");
-  proximity.structural("driverMesh", Type::kMesh, {.doc = "the topology of the mesh"});
-  proximity.structural("driverMatrix", Matrix4(),
-                       {.doc = "world from the mesh's space at rest, where its stage is in mesh space"});
-  proximity.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "in the world"});
+  AddDriver(proximity);
+  AddRadius(proximity, "in the world");
+  proximity.version(2);  // carries its driver
   FinishFalloff(proximity, &ComputeProximity, BindProximity).demand(DemandProximity).cost(2000, 400);
 
   registry.add("weightMap", "A painted map as a falloff, with a factor that may vary.")

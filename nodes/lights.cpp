@@ -10,7 +10,7 @@ namespace {
 NodeBuilder AddLight(NodeRegistry& registry, const char* name, const char* doc, const char* intensity) {
   NodeBuilder b = registry.add(name, doc);
   b.category("light");
-  b.in("matrix", Matrix4(), {.doc = "the light's world matrix"});
+  b.in("matrix", Matrix4(), {.doc = "the light's world matrix"}).world_place();
   b.in("color", Double3{1, 1, 1}, {.min = 0, .doc = "linear red, green, blue"});
   b.in("intensity", 1.0, {.min = 0, .doc = intensity});
   return b;
@@ -62,6 +62,7 @@ void AddLightNodes(NodeRegistry& registry) {
   registry.add("camera", "A perspective camera that looks along its -Z, up along its Y.")
       .category("light")
       .in("matrix", Matrix4(), {.doc = "the camera's world matrix"})
+      .world_place()
       .in("verticalFieldOfView", 0.7,
           {.min = 1e-3, .max = 3.1, .unit = Unit::kAngle, .doc = "from the lower edge to the upper"})
       .in("aspectRatio", 1.0, {.min = 1e-3, .max = 1e3, .doc = "width of the picture by its height"})

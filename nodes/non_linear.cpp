@@ -48,7 +48,8 @@ void ComputeNonLinear(ComputeContext& c) {
 NodeBuilder Begin(NodeRegistry& registry, const char* name, const char* doc) {
   NodeBuilder b = AddDeformer(registry, name, doc);
   b.in("matrix", Matrix4(),
-       {.doc = "the handle's world matrix: the deformation is about its Y axis, in its units"});
+       {.doc = "the handle's world matrix: the deformation is about its Y axis, in its units"})
+      .world_place();
   return b;
 }
 

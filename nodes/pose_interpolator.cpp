@@ -60,9 +60,8 @@ void ComputePoses(ComputeContext& c) {
   const auto& bound = c.kernel_as<PoseBound>();
   const std::span<double> weights(reinterpret_cast<double*>(c.scratch), bound.weights.pose_count());
   bound.weights.Run(PoseRotation(c.get<Matrix4>(0), bound.rest), weights);
-  const std::uint32_t* table = c.out + c.out[0];
-  for (std::uint32_t i = 0; i < table[0]; ++i)
-    *reinterpret_cast<double*>(c.values + table[1 + i]) = i < weights.size() ? weights[i] : 0.0;
+  for (std::uint32_t i = 0; i < c.out_count(0); ++i)
+    c.out_value<double>(0, i) = i < weights.size() ? weights[i] : 0.0;
 }
 
 }  // namespace

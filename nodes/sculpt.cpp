@@ -61,7 +61,8 @@ void ComputeSculpt(ComputeContext& c) {
 
 void AddSculptNode(NodeRegistry& registry) {
   NodeBuilder b = AddDeformer(registry, "sculpt", "A sphere pushes points out of itself.");
-  b.in("matrix", Matrix4(), {.doc = "the handle's world matrix: the sphere's centre, axes and scale"});
+  b.in("matrix", Matrix4(), {.doc = "the handle's world matrix: the sphere's centre, axes and scale"})
+      .world_place();
   b.in("radius", 0.05, {.min = 0, .unit = Unit::kLength, .doc = "of the sphere, before the handle's scale"});
   b.in("maximumDisplacement", 1.0, {.min = 0, .unit = Unit::kLength, .doc = "no point moves farther"});
   b.in("dropoffDistance", 0.0,

@@ -128,9 +128,8 @@ void ComputeSpline(ComputeContext& c) {
                       c.get<double>(kSplineEndTwist)},
                      {solved, joints});
   }
-  const std::uint32_t* table = c.out + c.out[0];
-  for (std::uint32_t i = 0; i < table[0]; ++i) {
-    auto& out = *reinterpret_cast<Matrix4*>(c.values + table[1 + i]);
+  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
+    auto& out = c.out_value<Matrix4>(0, i);
     if (i >= joints) {
       out = Matrix4();
     } else if (!solve) {

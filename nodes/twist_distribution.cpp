@@ -64,9 +64,8 @@ void ComputeTwist(ComputeContext& c) {
   const auto share = [&](std::uint32_t i) {
     return i < weights.size() ? weights[i] : (i + 1.0) / (joints.size() + 1.0);
   };
-  const std::uint32_t* table = c.out + c.out[0];
-  for (std::uint32_t i = 0; i < table[0]; ++i) {
-    auto& out = *reinterpret_cast<Matrix4*>(c.values + table[1 + i]);
+  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
+    auto& out = c.out_value<Matrix4>(0, i);
     out = i < joints.size() ? joints[i] : Matrix4();
     if (i >= joints.size()) continue;
     const int above = k.above[i];

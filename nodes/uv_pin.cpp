@@ -3,7 +3,7 @@
 
 #include "base/matrix.h"
 #include "graph/geometry.h"
-#include "nodes/deformer.h"
+#include "nodes/driver_mesh.h"
 #include "nodes/kernels/surface_pin.h"
 #include "nodes/standard_nodes.h"
 
@@ -64,14 +64,10 @@ Result<TrianglePlace> PlaceByUv(const Structural& s, const PinPlace& at, std::si
 
 // Everything but the entries.
 Result<PinBound> MakePin(const Structural& s, const PinPlace& at, Index points) {
-  const auto* mesh = s.asset<Mesh>("driverMesh");
-  if (mesh == nullptr || !s.is_set("driverPoints"))
-    return Status::Invalid("it has no driver: name a mesh, `driver: MESH` or `driver: \"MESH@STAGE\"`");
-  if (points != mesh->point_count())
-    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", mesh->point_count(), points);
-  const std::vector<Index>& triangles = mesh->data().triangles;
+  const Result<const Mesh*> mesh = DriverMesh(s, points);
+  if (!mesh.ok()) return mesh.status();
+  const std::vector<Index>& triangles = (*mesh)->data().triangles;
   const std::size_t count = triangles.size() / 3;
-  if (count == 0) return Status::Invalid("its driver \"{}\" has no faces", mesh->data().name);
   const Result<TrianglePlace> place =
       s.value("face", at.element).AsInt() >= 0 ? PlaceByFace(s, at, count) : PlaceByUv(s, at, count);
   if (!place.ok()) return place.status();
@@ -159,12 +155,9 @@ void ComputeFollicle(ComputeContext& c) {
 
 void AddSurface(NodeBuilder& b) {
   b.category("constraint");
-  b.points_in("driverPoints", "the points of the mesh, at any stage of its stack; `driver:` connects them");
-  b.structural("driverMesh", Type::kMesh, {.doc = "the topology of the mesh"});
+  AddDriver(b);
   b.structural("driverUvs", Type::kAsset,
                {.doc = "its texture coordinates, as the file has them (of glTF: v grows downwards)"});
-  b.structural("driverMatrix", Matrix4(),
-               {.doc = "world from the mesh's space at rest, where its stage is in mesh space"});
 }
 
 }  // namespace

@@ -329,6 +329,70 @@ TEST_F(RigFalloffs, NodesThatVary) {
   }
 }
 
+TEST_F(RigFalloffs, ADriverBeforeTheSkinIsCarriedAsThePointsAre) {
+  const auto play = [&](const std::string& parent) {
+    return Play(
+        "nodes:\n"
+        "  up: {type: transform}\n"
+        "  lift: {type: cluster, matrix: up.worldMatrix, envelope: 0}\n"
+        "  near: {type: proximityFalloff, driver: \"cage@lift\", radius: 0.4, curve: linear" +
+        parent +
+        "}\n"
+        "  c: {type: cluster, matrix: up.worldMatrix, falloff: near}\n"
+        "deform:\n"
+        "  - {meshes: [cage], stack: [lift, skin]}\n"
+        "  - {meshes: [shirt], stack: [c, skin]}\n" +
+        kControls + "  up.translateZ: {min: 0, max: 1}\n");
+  };
+  for (const char* parent : {"", ", parent: root"}) {
+    RigPlayer player = play(parent);
+    ASSERT_TRUE(player.ok());
+    const std::vector<Double3> rest = player.Points(kShirt);
+    player.Set("up.translateZ", 1);
+    for (const double x : {0.0, 1.0}) {  // everything goes along
+      player.Set("root.translateX", x);
+      std::vector<Double3> expected = rest;
+      for (Double3& p : expected) p = p + Double3{x, 0, 0.75};  // 0.1 above the cage
+      EXPECT_LT(MaxDistance(player.Points(kShirt), expected), 1e-6) << parent << x;
+    }
+  }
+}
+
+TEST_F(RigFalloffs, ADriverIsInTheSpaceOfWhatItWeighs) {
+  const auto errors = [&](const std::string& driver, const std::string& stack, const std::string& more = "") {
+    return Errors(
+        "nodes:\n"
+        "  up: {type: transform}\n"
+        "  lift: {type: cluster, matrix: up.worldMatrix}\n"
+        "  near: {type: proximityFalloff, driver: \"" +
+        driver + "\"" + more +
+        "}\n"
+        "  map: {type: sphereFalloff}\n"
+        "  both: {type: combineFalloff, falloffs: [map, near]}\n"
+        "  c: {type: cluster, matrix: up.worldMatrix, falloff: both}\n"
+        "deform:\n"
+        "  - {meshes: [cage], stack: [lift, skin]}\n"
+        "  - {meshes: [shirt], stack: " +
+        stack + "}\n");
+  };
+  EXPECT_EQ(
+      errors("cage", "[c, skin]"),
+      "t.yaml:6:42: \"near\" weighs shirt in mesh space (before the skin), and the driver \"cage\" is in "
+      "world space: name a stage of the driver in the same space, or the parent that carries what is in "
+      "mesh space");
+  EXPECT_EQ(
+      errors("cage@lift", "[skin, c]"),
+      "t.yaml:6:42: \"near\" weighs shirt in world space, and the driver \"cage@lift\" is in mesh space "
+      "(before the skin): name a stage of the driver in the same space, or the parent that carries what "
+      "is in mesh space");
+  EXPECT_EQ(errors("cage@lift", "[c, skin]"), "no error");
+  EXPECT_EQ(errors("cage", "[skin, c]"), "no error");
+  for (const char* stack : {"[c, skin]", "[skin, c]"}) {
+    for (const char* driver : {"cage", "cage@lift"})
+      EXPECT_EQ(errors(driver, stack, ", parent: root"), "no error") << stack << driver;
+  }
+}
+
 TEST_F(RigFalloffs, NodesErrAtTheirLine) {
   const auto errors = [&](const std::string& falloff, const std::string& more = "") {
     return Errors("nodes:\n  c: {type: cluster, falloff: " + falloff + "}\n  s: {type: sphereFalloff}\n" +

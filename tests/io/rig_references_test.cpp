@@ -100,6 +100,33 @@ TEST_F(References, AreIndependentAndTranslateMovesAllOfACharacter) {
   EXPECT_LT(MaxDistance(turned.Points(), expected), 1e-5);
 }
 
+TEST_F(References, WhatStandsInTheWorldWithoutAHandleGoesAlong) {
+  const Double3 there{1, 10, 0.5};
+  const auto compare = [&](const std::string& nodes, const std::string& deformer) {
+    SCOPED_TRACE(nodes);
+    Write("character: c.gltf\nnodes:\n  h: {type: transform}\n  " + nodes +
+              "\ndeform: [{meshes: [body], stack: [skin, " + deformer +
+              "]}]\ncontrols: {h.translateX: {min: 0, max: 1}}\n",
+          "placed.yaml");
+    RigPlayer alone(folder / "placed.yaml");
+    RigPlayer moved(Write("references: {a: {file: placed.yaml, translate: [1, 10, 0.5]}}\n"));
+    ASSERT_TRUE(alone.ok() && moved.ok());
+    alone.Set("h.translateX", 0.3), moved.Set("a:h.translateX", 0.3);
+    EXPECT_GT(MaxDistance(alone.Points(), alone.Points("skin")), 1e-3);
+    EXPECT_LT(MaxDistance(moved.Points(), Shifted(alone.Points(), there)), 2e-6);
+  };
+  for (const char* falloff :
+       {"planeFalloff, start: 0, end: 2", "planeFalloff, start: 20, end: -20", "sphereFalloff, radius: 3",
+        "capsuleFalloff, radius: 3", "proximityFalloff, driver: \"body@skin\", radius: 1"})
+    compare(fmt::format("near: {{type: {}}}\n  pull: {{type: cluster, matrix: h.worldMatrix, falloff: near}}",
+                        falloff),
+            "pull");
+  for (const char* deformer : {"bend, curvature: 0.5", "twist, endAngle: 0.5", "squash, factor: 0.5",
+                               "flare, endFlareX: 2", "sine, amplitude: 0.2, wavelength: 3",
+                               "wave, amplitude: 0.2, wavelength: 3, maxRadius: 5", "sculpt, radius: 9"})
+    compare(fmt::format("d: {{type: {}}}", deformer), "d");
+}
+
 TEST_F(References, StandBesideACharacterAndAGltfFileIsARig) {
   const Rig rig = Loaded("references: {a: {file: arm.yaml}, bare: {file: c.gltf, translate: [0, 3, 0]}}\n");
   ASSERT_EQ(rig.scene.meshes.size(), 3u);
