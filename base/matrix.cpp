@@ -149,9 +149,8 @@ void DecomposeTrs(const Matrix4& m, Double3* translation, Quaternion* rotation, 
   for (int i = 0; i < 3; ++i) {
     Double3 v = c[i];
     for (int j = 0; j < i; ++j) v = v - axis[j] * Dot(axis[j], c[i]);
-    const double length = Length(v);
-    s[i] = length;
-    axis[i] = length > 0 ? v * (1 / length) : Double3();
+    s[i] = Length(v);
+    axis[i] = UnitOrZero(v);
   }
   for (int i = 0; i < 3; ++i) {  // a collapsed axis is rebuilt from the other two
     if (s[i] == 0) axis[i] = Cross(axis[(i + 1) % 3], axis[(i + 2) % 3]);

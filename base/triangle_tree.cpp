@@ -227,6 +227,25 @@ SurfacePoint TriangleTree::Closest(ConstPointsView points, std::span<const float
   return best;
 }
 
+SurfacePoint TriangleTree::Lowest(ConstPointsView points, std::span<const float> boxes, Double3 place,
+                                  double max_distance) const {
+  SurfacePoint best;
+  const double limit = max_distance * max_distance;
+  if (!IsFinite(place) || std::isnan(limit)) return best;
+  const auto near = [&](Index n) {
+    const float* box = boxes.data() + 6 * std::size_t{n};
+    const double squared = BoxSquared(box, place);
+    return squared <= Slack(limit, Scale(box, place)) ? squared : kInfinity;
+  };
+  Walk(near, [&](Index t) {
+    if (t >= best.triangle) return;
+    SurfacePoint found = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
+    found.triangle = t;
+    if (found.squared <= limit) best = found;
+  });
+  return best;
+}
+
 void TriangleTree::ClosestSeveral(ConstPointsView points, std::span<const float> boxes, Double3 place,
                                   std::size_t count, double max_distance,
                                   std::vector<SurfacePoint>* found) const {

@@ -54,6 +54,9 @@ class TriangleTree {
   // The nearest place within the distance.
   SurfacePoint Closest(ConstPointsView points, std::span<const float> boxes, Double3 place,
                        double max_distance = std::numeric_limits<double>::infinity()) const;
+  // The place on the triangle of the lowest number that has one within the distance.
+  SurfacePoint Lowest(ConstPointsView points, std::span<const float> boxes, Double3 place,
+                      double max_distance) const;
   // The nearest `count` triangles within the distance, each with its nearest place: near ones first.
   void ClosestSeveral(ConstPointsView points, std::span<const float> boxes, Double3 place, std::size_t count,
                       double max_distance, std::vector<SurfacePoint>* found) const;

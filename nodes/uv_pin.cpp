@@ -56,7 +56,7 @@ Result<TrianglePlace> PlaceByUv(const Structural& s, const PinPlace& at, std::si
   if (uvs->values().size() != 6 * count)
     return Status::Invalid("driverUvs are of {} triangles, its driver has {}", uvs->values().size() / 6,
                            count);
-  const TrianglePlace place = FindUv(uvs->values(), u, v);
+  const TrianglePlace place = uvs->Derived<UvMap>([uvs] { return UvMap(uvs->values()); }).Find(u, v);
   if (place.triangle == kNoIndex)
     return Status::Invalid("none of its driver's faces has texture coordinates");
   return place;

@@ -15,11 +15,6 @@ constexpr double kNudge = 1e-5;  // of the place's scale: rays start that far ab
 Double3 PointOf(ConstPointsView p, std::size_t i) { return {p.x[i], p.y[i], p.z[i]}; }
 Double3 Times(Double3 a, Double3 b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 
-Double3 UnitOrZero(Double3 v) {
-  const double length = Length(v);
-  return length > 0 ? v * (1 / length) : Double3();
-}
-
 // Two directions that make a right-handed frame with the unit vector n (Duff et al. 2017, JCGT 6.1).
 void Frame(Double3 n, Double3* s, Double3* t) {
   const double sign = n.z >= 0 ? 1 : -1, a = -1 / (sign + n.z), b = n.x * n.y * a;

@@ -17,11 +17,6 @@ std::size_t Padded(std::size_t floats) { return PaddedCount(floats); }
 
 Double3 At(ConstPointsView points, std::size_t i) { return {points.x[i], points.y[i], points.z[i]}; }
 
-Double3 UnitVector(Double3 v) {
-  const double length = Length(v);
-  return length > 0 ? v * (1 / length) : Double3();
-}
-
 std::vector<Index> Moving(std::span<const Index> points, std::span<const float> weights) {
   std::vector<Index> moving;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -79,7 +74,7 @@ std::size_t ShrinkWrapKernel::ScratchFloats() const {
 Double3 ShrinkWrapKernel::FaceNormal(const Target& target, Index triangle) const noexcept {
   const Index* corner = &tree_.triangles()[3 * std::size_t{triangle}];
   const Double3 a = At(target.points, corner[0]);
-  return UnitVector(Cross(At(target.points, corner[1]) - a, At(target.points, corner[2]) - a));
+  return UnitOrZero(Cross(At(target.points, corner[1]) - a, At(target.points, corner[2]) - a));
 }
 
 Double3 ShrinkWrapKernel::Pseudonormal(const Target& target, const SurfacePoint& place) const noexcept {
@@ -101,11 +96,11 @@ Double3 ShrinkWrapKernel::Pseudonormal(const Target& target, const SurfacePoint&
     }
     const int k = other[0] == named[0] ? 0 : other[1] == named[0] ? 1 : 2;
     const Double3 own = At(target.points, other[k]);
-    const double cosine = Dot(UnitVector(At(target.points, other[(k + 1) % 3]) - own),
-                              UnitVector(At(target.points, other[(k + 2) % 3]) - own));
+    const double cosine = Dot(UnitOrZero(At(target.points, other[(k + 1) % 3]) - own),
+                              UnitOrZero(At(target.points, other[(k + 2) % 3]) - own));
     sum = sum + normal * Acos(cosine);
   }
-  return UnitVector(sum);
+  return UnitOrZero(sum);
 }
 
 bool ShrinkWrapKernel::Stays(double signed_distance, double offset) const noexcept {
@@ -175,7 +170,7 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
   target.boxes = boxes;
   next += Padded(boxes.size());
   const Double3 axis =
-      inputs.turn == Matrix4() ? settings_.axis : UnitVector(TransformVector(inputs.turn, settings_.axis));
+      inputs.turn == Matrix4() ? settings_.axis : UnitOrZero(TransformVector(inputs.turn, settings_.axis));
   PointsView normals;
   if (normals_.has_value()) {
     normals = ViewIn(next, normals_->point_count());

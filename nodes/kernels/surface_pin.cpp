@@ -3,42 +3,41 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "base/triangle_tree.h"
+#include <vector>
 
 namespace kpsa {
 namespace {
 
 constexpr double kInUvTriangle = 1e-9;  // of a coordinate: nearer ones are in the triangle
 
-// At least as near as the coordinates' box allows.
-double BoxDistance(const float* uv, double u, double v) {
-  const auto [u_low, u_high] = std::minmax({uv[0], uv[2], uv[4]});
-  const auto [v_low, v_high] = std::minmax({uv[1], uv[3], uv[5]});
-  const double du = std::max({u_low - u, u - u_high, 0.0}), dv = std::max({v_low - v, v - v_high, 0.0});
-  return std::sqrt(du * du + dv * dv);
-}
-
 }  // namespace
 
-TrianglePlace FindUv(std::span<const float> uvs, double u, double v) {
-  TrianglePlace best;
-  double nearest = std::numeric_limits<double>::infinity();
-  constexpr Index kCorners[3] = {0, 1, 2};
-  for (std::size_t t = 0; 6 * t + 5 < uvs.size(); ++t) {
-    const float* uv = &uvs[6 * t];
-    if (!std::all_of(uv, uv + 6, [](float x) { return std::isfinite(x); })) continue;
-    if (BoxDistance(uv, u, v) > nearest) continue;
-    const float us[3] = {uv[0], uv[2], uv[4]}, vs[3] = {uv[1], uv[3], uv[5]}, zeros[3] = {0, 0, 0};
-    const SurfacePoint place = ClosestOnTriangle({us, vs, zeros, 3}, kCorners, {u, v, 0});
-    const double distance = std::sqrt(place.squared);
-    if (!(distance < nearest)) continue;
-    nearest = distance;
-    best.triangle = static_cast<Index>(t);
-    std::copy_n(place.weights, 3, best.weights);
-    if (nearest <= kInUvTriangle) break;
+UvMap::UvMap(std::span<const float> uvs) : corners_(uvs.size() / 6 * 3) {
+  const PointsView corners = corners_.view();
+  std::vector<Index> triangles(corners.count);
+  for (std::size_t t = 0; 3 * t < corners.count; ++t) {
+    const std::span<const float> uv = uvs.subspan(6 * t, 6);
+    const bool finite = std::all_of(uv.begin(), uv.end(), [](float x) { return std::isfinite(x); });
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t i = 3 * t + k;
+      triangles[i] = static_cast<Index>(i);
+      corners.x[i] = finite ? uv[2 * k] : std::numeric_limits<float>::quiet_NaN();
+      corners.y[i] = uv[2 * k + 1];
+      corners.z[i] = 0;
+    }
   }
-  return best;
+  tree_ = TriangleTree(corners, triangles);
+  boxes_ = AlignedFloats(tree_.BoxFloats());
+  tree_.Fit(corners, boxes_.span());
+}
+
+TrianglePlace UvMap::Find(double u, double v) const {
+  SurfacePoint found = tree_.Lowest(corners_.view(), boxes_.span(), {u, v, 0}, kInUvTriangle);
+  if (found.triangle == kNoIndex) found = tree_.Closest(corners_.view(), boxes_.span(), {u, v, 0});
+  TrianglePlace place;
+  place.triangle = found.triangle;
+  std::copy_n(found.weights, 3, place.weights);
+  return place;
 }
 
 UvDirection DirectionOfU(std::span<const float> uv) {

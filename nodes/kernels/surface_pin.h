@@ -4,6 +4,8 @@
 
 #include <span>
 
+#include "base/points.h"
+#include "base/triangle_tree.h"
 #include "base/types.h"
 
 namespace kpsa {
@@ -14,10 +16,21 @@ struct TrianglePlace {
   double weights[3] = {0, 0, 0};
 };
 
-// Where (u, v) is. uvs: u v of the corners, 6 numbers a triangle; triangles with a coordinate that is not
-// finite take no part. Of several triangles that hold the coordinate the lowest counts; where none does, the
-// place whose coordinate is nearest. A triangle whose coordinates have no area is the segment that they are.
-TrianglePlace FindUv(std::span<const float> uvs, double u, double v);
+// Where coordinates are on a surface.
+class UvMap {
+ public:
+  // uvs: u v of the corners, 6 numbers a triangle; triangles with a coordinate that is not finite take no
+  // part.
+  explicit UvMap(std::span<const float> uvs);
+  // Of several triangles that hold (u, v) the lowest counts; where none does, the place whose coordinate is
+  // nearest. A triangle whose coordinates have no area is the segment that they are.
+  TrianglePlace Find(double u, double v) const;
+
+ private:
+  PointBuffer corners_;  // (u, v, 0), three a triangle
+  TriangleTree tree_;
+  AlignedFloats boxes_;
+};
 
 // The direction of growing u along a triangle: along[0] (p1 - p0) + along[1] (p2 - p0). (1, 0) where the
 // coordinates, six numbers (or none), do not tell.

@@ -35,6 +35,13 @@ TEST(ScalarMath, AgreesWithTheCLibraryToAFewUlp) {
   EXPECT_NEAR(Sin(1e8), std::sin(1e8), 1e-8);
 }
 
+TEST(Vectors, UnitOrZeroHasNoOtherLength) {
+  EXPECT_EQ(UnitOrZero({0, -4, 0}), (Double3{0, -1, 0}));
+  EXPECT_NEAR(Length(UnitOrZero({1e-3, 2, -5e4})), 1, 1e-15);
+  EXPECT_EQ(UnitOrZero({}), Double3());
+  EXPECT_EQ(UnitOrZero({1, NAN, 0}), Double3());
+}
+
 TEST(Matrix, EulerAnglesComeBackForEveryOrder) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> angle(-1.5, 1.5);

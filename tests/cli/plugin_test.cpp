@@ -1,4 +1,6 @@
 // Libraries of nodes: by `plugins:` of a rig, by --plugin, and those that are refused.
+#include "graph/plugin.h"
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -84,7 +86,7 @@ TEST_F(Plugins, BadLibrariesAreRefused) {
       {"cut.so", {"cut.so\" cannot be loaded"}},
       {Broken("silent"), {"exports no kpsa_plugin_abi", "KPSA_PLUGIN"}},
       {Broken("mute"), {"exports no kpsa_register", "KPSA_PLUGIN"}},
-      {Broken("old"), {"is of ABI version 0, expected 2"}},
+      {Broken("old"), {fmt::format("is of ABI version {}, expected {}", kPluginAbi - 1, kPluginAbi)}},
       {Broken("unresolved"), {"cannot be loaded", "a_function_that_nobody_has"}},
       {Broken("twice"), {"registers the node type \"half\" twice"}},
       {Broken("taken"), {"registers the node type \"transform\", which kpsa itself has already"}},

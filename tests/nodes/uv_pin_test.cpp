@@ -2,8 +2,10 @@
 #include <cmath>
 #include <limits>
 
+#include "nodes/kernels/surface_pin.h"
 #include "tests/nodes/driver_rig.h"
 #include "tests/nodes/node_support.h"
+#include "tests/support/instruction_count.h"
 
 namespace kpsa {
 namespace {
@@ -167,6 +169,52 @@ TEST(UvPin, TheFirstOfOverlappingTrianglesCountsAndTheNearestOutside) {
   EXPECT_LT(Apart(PlaceIn(rig.Pin()), {0.75, 0.25, 5}), 1e-12);
   rig.Put(0, -3, -4);
   EXPECT_LT(Apart(PlaceIn(rig.Pin()), {0, 0, 0}), 1e-12);
+}
+
+// Triangles that overlap, share edges, have no area or no coordinates; against a look at each of them.
+TEST(UvMap, FindsWhatALookAtAllTrianglesFinds) {
+  RandomFrames random(21);
+  std::vector<float> uvs;
+  for (int t = 0; t < 400; ++t) {
+    const double u = random.Number(0, 1), v = random.Number(0, 1), size = t % 17 == 0 ? 0.8 : 0.1;
+    for (int k = 0; k < 3; ++k) {
+      uvs.push_back(static_cast<float>(u + (t % 11 == 0 ? 0 : random.Number(-size, size))));
+      uvs.push_back(t % 23 == 0 && k == 1 ? kNone : static_cast<float>(v + random.Number(-size, size)));
+    }
+    if (t % 5 == 4) std::copy_n(uvs.end() - 12, 6, uvs.end() - 6);  // there a second time
+  }
+  const UvMap map(uvs);
+  for (int i = 0; i < 300; ++i) {
+    const double span = i % 3 == 0 ? 3 : 0.5, u = 0.5 + random.Number(-span, span),
+                 v = i % 50 == 0 ? static_cast<double>(uvs[7]) : 0.5 + random.Number(-span, span);
+    SurfacePoint expected;
+    for (std::size_t t = 0; 6 * t < uvs.size() && !(expected.squared <= 1e-18); ++t) {
+      const float* uv = &uvs[6 * t];
+      if (std::any_of(uv, uv + 6, [](float x) { return std::isnan(x); })) continue;
+      const PointBuffer corners =
+          PointBuffer::FromInterleaved(std::vector<float>{uv[0], uv[1], 0, uv[2], uv[3], 0, uv[4], uv[5], 0});
+      constexpr Index kCorners[3] = {0, 1, 2};
+      SurfacePoint one = ClosestOnTriangle(corners.view(), kCorners, {u, v, 0});
+      one.triangle = static_cast<Index>(t);
+      if (one.squared < expected.squared) expected = one;
+    }
+    const TrianglePlace found = map.Find(u, v);
+    ASSERT_EQ(found.triangle, expected.triangle) << i;
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(found.weights[k], expected.weights[k]);
+  }
+  EXPECT_EQ(UvMap(std::vector<float>(12, kNone)).Find(0, 0).triangle, kNoIndex);
+  EXPECT_EQ(UvMap({}).Find(0, 0).triangle, kNoIndex);
+}
+
+TEST(UvMap, LooksAtFewOfManyTriangles) {
+  const auto mesh = GridMesh(60, 60, [](double, double) { return 0; });
+  const auto uvs = FlatUvs(*mesh);
+  const UvMap map(uvs->values());
+  for (const Double3& at : {Double3{0.3, 0.4, 0}, Double3{0.999, 0.97, 0}, Double3{1.5, 0.5, 0}}) {
+    const auto count = CountInstructions([&] { map.Find(at.x, at.y); });
+    if (!count.has_value()) GTEST_SKIP() << "instructions cannot be counted here";
+    EXPECT_LT(*count, 30000u) << at.x;  // of 6962 triangles, some hundred instructions each
+  }
 }
 
 TEST(UvPin, PlacesByFace) {
