@@ -243,8 +243,8 @@ TEST(RigFormat, KeepsTheRepositorysRigs) {
       ++loaded;
     }
   }
-  EXPECT_GE(files, 22u);
-  EXPECT_EQ(loaded, 7u);
+  EXPECT_GE(files, 23u);
+  EXPECT_EQ(loaded, 8u);
 }
 
 }  // namespace
