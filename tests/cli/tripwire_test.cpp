@@ -263,7 +263,11 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   EXPECT_EQ(hits, 81u);
   EXPECT_EQ(pure.Computes("mush"), 0u);
   EXPECT_EQ(pure.Computes("trip"), 0u);
-  EXPECT_GT(pure.Computes("cheekModR"), 0u);
+  // Up to where points are measured, the stack runs (which stage costs least may depend on rounding)
+  for (const CueDescription& cue : trained->cues) {
+    if (cue.kind == CueDescription::Kind::kScalar) continue;
+    EXPECT_GT(pure.Computes(cue.stage == "skin" ? "face_mesh_skinCluster" : cue.stage), 0u) << cue.stage;
+  }
 
   // And the program's report of the same
   ASSERT_TRUE(WriteSubspace(*trained, folder / "face.kpsa").ok());
@@ -272,7 +276,8 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   ASSERT_EQ(bench.exit_code, 0) << bench.err;
   std::vector<std::string> never = nlohmann::json::parse(bench.out)["nodes"]["never_evaluated"];
   std::sort(never.begin(), never.end());
-  EXPECT_EQ(never, (std::vector<std::string>{"mush", "trip"}));
+  for (const char* node : {"mush", "trip"}) EXPECT_EQ(std::ranges::count(never, node), 1) << node;
+  EXPECT_EQ(std::ranges::count(never, "face_mesh_skinCluster"), 0);
 }
 
 }  // namespace

@@ -69,7 +69,8 @@ void AddShrinkWrapSetUps(std::vector<NodeSetUp>* all) {
         {Setting("bidirectional", true)},
         {Setting("reverse", true), Setting("closestIfNoIntersection", true)},
         {Setting("side", "outside"), Setting("offset", 0.1), Setting("bidirectional", true)},
-        {Setting("side", "inside"), Setting("offset", 0.1), Setting("closestIfNoIntersection", true)}};
+        {Setting("side", "inside"), Setting("offset", 0.1), Setting("bidirectional", true),
+         Setting("closestIfNoIntersection", true)}};
     for (std::size_t i = 0; i < settings.size(); ++i) {
       std::vector<GivenInput> own = settings[i];
       own.push_back(way);
