@@ -56,6 +56,13 @@ double Scale(const float* box, Double3 p) {
   return scale;
 }
 
+// The squared distance to the box of node `n`, or infinity beyond `limit`, squared as well.
+double BoxWithin(std::span<const float> boxes, Index n, Double3 place, double limit) {
+  const float* box = boxes.data() + 6 * std::size_t{n};
+  const double squared = BoxSquared(box, place);
+  return squared <= Slack(limit, Scale(box, place)) ? squared : kInfinity;
+}
+
 bool IsFinite(Double3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 bool Less(const SurfacePoint& a, const SurfacePoint& b) {
@@ -214,11 +221,7 @@ SurfacePoint TriangleTree::Closest(ConstPointsView points, std::span<const float
   SurfacePoint best;
   const double limit = max_distance * max_distance;
   if (!IsFinite(place) || std::isnan(limit)) return best;
-  const auto near = [&](Index n) {
-    const float* box = boxes.data() + 6 * std::size_t{n};
-    const double squared = BoxSquared(box, place);
-    return squared <= Slack(std::min(best.squared, limit), Scale(box, place)) ? squared : kInfinity;
-  };
+  const auto near = [&](Index n) { return BoxWithin(boxes, n, place, std::min(best.squared, limit)); };
   Walk(near, [&](Index t) {
     SurfacePoint found = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
     found.triangle = t;
@@ -232,11 +235,7 @@ SurfacePoint TriangleTree::Lowest(ConstPointsView points, std::span<const float>
   SurfacePoint best;
   const double limit = max_distance * max_distance;
   if (!IsFinite(place) || std::isnan(limit)) return best;
-  const auto near = [&](Index n) {
-    const float* box = boxes.data() + 6 * std::size_t{n};
-    const double squared = BoxSquared(box, place);
-    return squared <= Slack(limit, Scale(box, place)) ? squared : kInfinity;
-  };
+  const auto near = [&](Index n) { return BoxWithin(boxes, n, place, limit); };
   Walk(near, [&](Index t) {
     if (t >= best.triangle) return;
     SurfacePoint found = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
@@ -253,10 +252,7 @@ void TriangleTree::ClosestSeveral(ConstPointsView points, std::span<const float>
   const double limit = max_distance * max_distance;
   if (count == 0 || !IsFinite(place) || std::isnan(limit)) return;
   const auto near = [&](Index n) {
-    const float* box = boxes.data() + 6 * std::size_t{n};
-    const double squared = BoxSquared(box, place);
-    const double farthest = found->size() < count ? limit : found->back().squared;
-    return squared <= Slack(farthest, Scale(box, place)) ? squared : kInfinity;
+    return BoxWithin(boxes, n, place, found->size() < count ? limit : found->back().squared);
   };
   Walk(near, [&](Index t) {
     SurfacePoint one = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);

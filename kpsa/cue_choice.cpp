@@ -93,10 +93,9 @@ class Chooser {
     const Eigen::MatrixXd trained = Measured(cues, poses_), judges = Measured(cues, *options_.judges);
     const SoftCacheModel model = MakeSoftCacheModel(estimator, cues, trained);
     const PointSurvey survey = SurveyPoints(pca_, cues, estimator, *options_.judges, 1);
-    std::vector<CalibrationPair> pairs;
-    for (const double error : survey.by_pose) pairs.push_back({0, error});
     const std::vector<double> scores = Scores(model, judges);
-    for (std::size_t t = 0; t < pairs.size(); ++t) pairs[t].score = scores[t];
+    std::vector<CalibrationPair> pairs;
+    for (std::size_t t = 0; t < scores.size(); ++t) pairs.push_back({scores[t], survey.by_pose[t]});
     const SoftCacheThreshold threshold =
         Calibrate(pairs, options_.tolerance, options_.violation_rate).threshold;
     const auto missed = [&](const std::vector<double>& of) {

@@ -40,16 +40,11 @@ class Trainer {
     record_.mode = options_.mode == EstimatorMode::kMap ? "map" : "paper";
     for (const TrainingClip& clip : clips_) record_.clips.push_back(clip.name);
     KPSA_RETURN_IF_ERROR(Prepare());
-    PoseMatrix poses(layout_), held_out(layout_);
-    KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &held_out));
+    PoseMatrix poses(layout_), held_out(layout_), judges(layout_);
+    KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &held_out, &judges));
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
     KPSA_RETURN_IF_ERROR(FindRanges(poses));
-    PoseMatrix judges(layout_);
-    if (of_light() && options_.mode == EstimatorMode::kMap) {
-      Split(&poses, &judges);
-    } else if (places_.size() > 1) {
-      KPSA_RETURN_IF_ERROR(sample_(kJudges, options_.seed ^ 0x2545f4914f6cdd1dull, &judges));
-    }
+    if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
     if (judges.poses() > 0) judges.Subtract(pca_.mean);
     if (of_light() && judges.poses() > 0) KeepModes(judges);
@@ -124,7 +119,8 @@ class Trainer {
     return Status();
   }
 
-  Status RecordPoses(PoseMatrix* poses, PoseMatrix* held_out) {
+  // To train on, to calibrate with, and, where cues have places to choose from, to judge these by.
+  Status RecordPoses(PoseMatrix* poses, PoseMatrix* held_out, PoseMatrix* judges) {
     for (std::size_t c = 0; c < clips_.size(); ++c) {
       KPSA_RETURN_IF_ERROR(Say("poses", 0.2 * static_cast<double>(c) / static_cast<double>(clips_.size())));
       KPSA_RETURN_IF_ERROR(recorder_->AddClip(clips_[c], poses));
@@ -139,11 +135,11 @@ class Trainer {
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, poses));
       groups = FindGroups(*poses, first);
     }
-    sample_ = [this, clip_poses, groups](std::size_t count, std::uint64_t seed, PoseMatrix* to) {
+    const auto sample = [&](std::size_t count, std::uint64_t seed, PoseMatrix* to) {
       return recorder_->AddSamples(
           SamplePoses(rig_.controls, *clip_poses, groups, clips_.size(), count, seed), clips_, to);
     };
-    KPSA_RETURN_IF_ERROR(sample_(options_.samples, options_.seed, poses));
+    KPSA_RETURN_IF_ERROR(sample(options_.samples, options_.seed, poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3)
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
@@ -153,7 +149,9 @@ class Trainer {
     if (calibration == 0)
       calibration =
           static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
-    KPSA_RETURN_IF_ERROR(sample_(calibration, options_.seed ^ 0x5deece66dull, held_out));
+    KPSA_RETURN_IF_ERROR(sample(calibration, options_.seed ^ 0x5deece66dull, held_out));
+    if (places_.size() > 1)
+      KPSA_RETURN_IF_ERROR(sample(kJudges, options_.seed ^ 0x2545f4914f6cdd1dull, judges));
     record_.calibration_poses = held_out->poses();
     return Status();
   }
@@ -423,7 +421,6 @@ class Trainer {
   std::vector<Index> totals_;
   std::vector<CuePlace> places_;
   double full_cost_ = 0;
-  std::function<Status(std::size_t count, std::uint64_t seed, PoseMatrix* to)> sample_;  // of the controls
   std::vector<Double3> positions_;
   std::vector<TrainedRange> ranges_;
   Pca pca_;
