@@ -51,7 +51,7 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
   }
   const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
   const std::string bound =
-      fmt::format("the graph above the points ({:.4f} ms){}", r.bound_graph_ms,
+      fmt::format("the graph that the subspace reads ({:.4f} ms){}", r.bound_graph_ms,
                   r.bound_points_ms > 0
                       ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
                       : "");
@@ -143,7 +143,7 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
   times.Row({"accelerated", fmt::format("{:.3f}", r.accelerated_ms), parts});
   text += times.Text();
   text += fmt::format(
-      "\nspeedup    {}{}; ceiling {}, bound by the graph above the points{}\n", RatioText(r.speedup(), 2),
+      "\nspeedup    {}{}; ceiling {}, bound by the graph that the subspace reads{}\n", RatioText(r.speedup(), 2),
       r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
       RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
   text += fmt::format(

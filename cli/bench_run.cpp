@@ -262,18 +262,27 @@ void Contender::AddFullProfile(const Plan& plan, const Profile& profile, double 
     for (const AcceleratedPoints& points : one.entry.points) stage_nodes.push_back(points.points.node);
   }
   const std::vector<char> skippable = PointStepsAbove(plan, stage_nodes);
-  double skipped = 0, kept_points = 0;
+  std::set<std::string_view> kept;  // steps of this side that run in every frame
+  for (Index s = 0; s < side->plan->steps().size(); ++s) {
+    if (side->plan->infos()[s].segment == 0) kept.insert(side->plan->step_name(s));
+  }
+  double graph = 0, points = 0, steps_ns = 0, kept_steps = 0;
   for (Index s = 0; s < plan.steps().size(); ++s) {
     const double ns = static_cast<double>(profile.self_ns()[s]) * scale;
     BenchNode& node = sums.nodes[plan.step_name(s)];
     node.name = plan.step_name(s), node.type = plan.step_type(s);
     node.ms_per_frame += ns;
     node.points = std::max(node.points, plan.infos()[s].points);
-    if (skippable[s]) skipped += ns;
-    if (!skippable[s] && plan.infos()[s].points_total > 0) kept_points += ns;
+    steps_ns += ns;
+    if (skippable[s] || !kept.contains(plan.step_name(s))) continue;
+    (plan.infos()[s].points_total > 0 ? points : graph) += ns;
+    ++kept_steps;
   }
-  sums.bound_points += kept_points;
-  sums.bound_graph += std::max(0.0, full_ns - skipped - kept_points);
+  // What passes between steps is theirs in equal parts
+  const double between = std::max(0.0, full_ns - steps_ns);
+  sums.bound_points += points;
+  sums.bound_graph +=
+      graph + between * kept_steps / static_cast<double>(std::max<std::size_t>(1, plan.steps().size()));
   sums.points_full += PointsComputed(plan, profile);
 }
 

@@ -26,17 +26,15 @@ constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that m
 // Values that move more than they are trusted.
 std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise, const std::vector<CueRef>& place,
                                std::size_t max_outputs) {
-  std::vector<char> here(pca.layout.points + pca.layout.stage_points);
-  const auto number = [&](const CueRef& cue) {
-    return cue.index + (cue.kind == CueKind::kStage ? pca.layout.points : 0);
-  };
-  for (const CueRef& cue : place) here[number(cue)] = 1;
-  std::vector<CueRef> candidates = AllCandidates(pca, kMinMotion, true, true, true);
+  std::vector<CueRef> candidates = place;
+  for (Index i = 0; i < pca.layout.scalars; ++i) candidates.push_back({CueKind::kScalar, i});
+  candidates = MovingCandidates(pca, kMinMotion, candidates);
   std::erase_if(candidates, [&](const CueRef& cue) {
-    if (cue.kind != CueKind::kScalar) return here[number(cue)] == 0;
     const auto column = static_cast<Eigen::Index>(CueColumn(pca.layout, cue));
-    return !noise.scalars.empty() && pca.row_variance[column] <= noise.scalars[cue.index];
+    return cue.kind == CueKind::kScalar && !noise.scalars.empty() &&
+           pca.row_variance[column] <= noise.scalars[cue.index];
   });
+  std::ranges::stable_sort(candidates, {}, &CueRef::kind);
   const auto outputs = static_cast<std::size_t>(std::count_if(
       candidates.begin(), candidates.end(), [](const CueRef& c) { return c.kind == CueKind::kOutput; }));
   if (max_outputs == 0 || outputs <= max_outputs) return candidates;
@@ -57,28 +55,33 @@ class Chooser {
     std::vector<CuePlace> places = options_.places;
     if (places.empty()) {
       const bool stages = pca_.layout.stage_points > 0;
-      places.push_back({AllCandidates(pca_, kMinMotion, !stages, stages, false), 0});
+      places.push_back(AllCandidates(pca_, kMinMotion, !stages, stages, false));
     }
-    std::vector<CueRef> best;
-    double least = std::numeric_limits<double>::infinity();
+    const bool compares = places.size() > 1 && options_.judges != nullptr;
     for (const CuePlace& place : places) {
       chosen_.clear();
-      SelectInRounds(place.points);
+      SelectInRounds(place);
       if (chosen_.empty()) continue;
-      AddPoints(place.points);
-      if (places.size() == 1 || options_.judges == nullptr) break;
-      const double cost = place.cost + Misses(chosen_) * options_.miss_cost;
-      if (cost >= least) break;  // earlier ones see even less
-      least = cost, best = chosen_;
+      AddPoints(place);
+      bool better = compares && KeepIfCheaper();
+      const bool early = std::any_of(chosen_.begin(), chosen_.end(),
+                                     [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
+      if (early && !options_.by_rms && AddWorstPoints()) better |= compares && KeepIfCheaper();
+      if (!compares) return std::move(chosen_);
+      if (!better) break;  // earlier ones see even less
     }
-    if (!best.empty()) chosen_ = std::move(best);
-    const bool early = std::any_of(chosen_.begin(), chosen_.end(),
-                                   [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
-    if (early && !options_.by_rms) AddWorstPoints();
-    return std::move(chosen_);
+    return std::move(best_);
   }
 
  private:
+  // Whether what is chosen is expected to cost less than the best so far, which it then is.
+  bool KeepIfCheaper() {
+    const double cost = options_.points_cost(chosen_) + Misses(chosen_) * options_.miss_cost;
+    if (cost >= least_) return false;
+    least_ = cost, best_ = chosen_;
+    return true;
+  }
+
   PointSurvey Survey(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca_, chosen, noise_);
     return SurveyPoints(pca_, cues, MapEstimator(pca_, cues), poses_,
@@ -90,7 +93,8 @@ class Chooser {
   double Misses(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca_, chosen, noise_);
     const Estimator estimator = MapEstimator(pca_, cues);
-    const Eigen::MatrixXd trained = Measured(cues, poses_), judges = Measured(cues, *options_.judges);
+    const Eigen::MatrixXd trained = MeasuredPoses(pca_.layout, cues, poses_),
+                          judges = MeasuredPoses(pca_.layout, cues, *options_.judges);
     const SoftCacheModel model = MakeSoftCacheModel(estimator, cues, trained);
     const PointSurvey survey = SurveyPoints(pca_, cues, estimator, *options_.judges, 1);
     const std::vector<double> scores = Scores(model, judges);
@@ -115,12 +119,6 @@ class Chooser {
       scores.push_back(Judge(model, always, y.span(), g.span()).score);
     }
     return scores;
-  }
-  Eigen::MatrixXd Measured(const CueSet& cues, const PoseMatrix& poses) const {
-    Eigen::MatrixXd measured(cues.rows(), static_cast<Eigen::Index>(poses.poses()));
-    for (std::size_t t = 0; t < poses.poses(); ++t)
-      measured.col(static_cast<Eigen::Index>(t)) = MeasuredCues(pca_.layout, cues, poses.row(t));
-    return measured;
   }
 
   // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them.
@@ -159,10 +157,11 @@ class Chooser {
     chosen_ = SelectCues(pca_, points, positions_, noise_, more).cues;
   }
 
-  void AddWorstPoints() {
+  // Whether it added any.
+  bool AddWorstPoints() {
     PointSurvey survey = Survey(chosen_);
     const std::size_t before = survey.poses_beyond(options_.tolerance);
-    if (static_cast<double>(before) < kHopeless * static_cast<double>(survey.poses())) return;
+    if (static_cast<double>(before) < kHopeless * static_cast<double>(survey.poses())) return false;
     const auto most = static_cast<std::size_t>(kWorstShare * static_cast<double>(pca_.layout.points));
     std::vector<CueRef> more = chosen_;
     for (std::size_t round = 0; round < kWorstRounds && survey.poses_beyond(options_.tolerance) > 0;
@@ -182,9 +181,11 @@ class Chooser {
       if (added == 0) break;
       survey = Survey(more);
     }
-    if (static_cast<double>(survey.poses_beyond(options_.tolerance)) <=
-        kWorthwhile * static_cast<double>(before))
-      chosen_ = std::move(more);
+    if (more.size() == chosen_.size() || static_cast<double>(survey.poses_beyond(options_.tolerance)) >
+                                             kWorthwhile * static_cast<double>(before))
+      return false;
+    chosen_ = std::move(more);
+    return true;
   }
 
   const Pca& pca_;
@@ -192,7 +193,8 @@ class Chooser {
   const CueNoise& noise_;
   const PoseMatrix& poses_;
   const CueChoiceOptions& options_;
-  std::vector<CueRef> chosen_;
+  std::vector<CueRef> chosen_, best_;
+  double least_ = std::numeric_limits<double>::infinity();  // expected cost of the best (ns)
 };
 
 }  // namespace

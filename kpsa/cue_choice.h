@@ -1,6 +1,8 @@
 // The cues of a subspace: which values are measured, by the training poses.
 #pragma once
 
+#include <functional>
+#include <span>
 #include <vector>
 
 #include "kpsa/cue_selection.h"
@@ -8,11 +10,7 @@
 
 namespace kpsa {
 
-// Points that may be measured together, and what the graph spends until they are there (ns).
-struct CuePlace {
-  std::vector<CueRef> points;
-  double cost = 0;
-};
+using CuePlace = std::vector<CueRef>;  // points that may be measured together
 
 struct CueChoiceOptions {
   std::size_t rows = 300;       // of measurements: a point takes 3, a scalar 1
@@ -24,9 +22,11 @@ struct CueChoiceOptions {
   // Where points may be measured, the dearest place first, each seeing more than the next
   // (kpsa/cue_places.h); empty: the points of stages, or where there are none, the outputs.
   std::vector<CuePlace> places = {};
-  // With what places are compared: poses that were not trained on, centred with pca.mean, and what a miss
-  // costs (ns). Null: the first place that has cues is taken.
+  // With what places are compared: poses that were not trained on, centred with pca.mean; what the graph
+  // spends until the points among some cues are there, and what it spends on a miss (ns). Null: the first
+  // place that has cues is taken.
   const PoseMatrix* judges = nullptr;
+  std::function<double(std::span<const CueRef>)> points_cost = {};
   double miss_cost = 0;
   double violation_rate = 0.01;
 };
@@ -38,7 +38,7 @@ struct CueChoiceOptions {
 //
 // Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
 // deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are
-// measured themselves, besides `rows`; not if that does not help.
+// measured themselves, besides `rows`; not if that does not help, or costs more than it saves.
 std::vector<CueRef> ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
                                const PoseMatrix& poses, const CueChoiceOptions& options);
 

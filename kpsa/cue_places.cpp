@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 
 #include "kpsa/mode_choice.h"
 
@@ -14,19 +15,19 @@ constexpr double kSaving = 0.01;          // of the full cost, from each place t
 // Candidates of a place at earlier stages, over all meshes: neighbours tell much the same, and modes are
 // found for the outputs, not for many more points of stages.
 constexpr std::size_t kStagePoints = 500;
+constexpr std::size_t kMinStagePoints = 50;  // of a mesh, however many there are beside it
 
 // What the compiler keeps for some points.
 struct Kept {
   double cost = 0;   // ns of the steps with points
   Index points = 0;  // most of a step over `total` points
 };
-Result<Kept> KeptFor(const TrainingRig& rig, Compiler* compiler, RequestedOutput output, Index total) {
+Result<Kept> KeptFor(const TrainingRig& rig, Compiler* compiler, std::vector<RequestedOutput> outputs,
+                     Index total) {
   Request request;
-  request.outputs.push_back(std::move(output));
+  request.outputs = std::move(outputs);
   request.varying = {rig.time};
-  for (const ControlRange& control : rig.controls) {
-    if (!control.by_clip) request.varying.push_back(control.plug);
-  }
+  for (const ControlRange& control : rig.controls) request.varying.push_back(control.plug);
   const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
   if (!plan.ok()) return plan.status();
   Kept kept;
@@ -53,7 +54,7 @@ Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* c
   const auto local = static_cast<Index>(kMaxPointsPerCue * static_cast<double>(probe.size()));
   for (std::size_t stage = mesh.stages.size(); stage-- > 0;) {
     const Result<Kept> kept =
-        KeptFor(rig, compiler, {mesh.stages[stage].points, PointSet::Of(probe, total)}, total);
+        KeptFor(rig, compiler, {{mesh.stages[stage].points, PointSet::Of(probe, total)}}, total);
     if (!kept.ok()) return kept.status();
     if (priced.empty() ? kept->points <= local || stage == 0 : kept->cost <= priced.back().cost - saving)
       priced.push_back({stage, kept->cost});
@@ -62,19 +63,24 @@ Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* c
   return priced;
 }
 
+// The candidates of a mesh at an earlier stage.
+std::vector<Index> StagePoints(Index total, std::size_t of_all) {
+  return EvenSpread(total, std::max(kMinStagePoints, kStagePoints * total / of_all));
+}
+
 }  // namespace
 
 Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals) {
   const auto& meshes = rig.target.meshes;
   CuePlaces result;
-  std::size_t all = 0, count = 0;
-  for (std::size_t m = 0; m < meshes.size(); ++m) {
-    const Result<Kept> full = KeptFor(rig, compiler, {meshes[m].stages.back().points, {}}, totals[m]);
-    if (!full.ok()) return full.status();
-    result.full_cost += full->cost;
-    all += totals[m];
-  }
+  std::vector<RequestedOutput> outputs;
+  for (const auto& mesh : meshes) outputs.push_back({mesh.stages.back().points, {}});
+  const Result<Kept> full = KeptFor(rig, compiler, std::move(outputs), 0);
+  if (!full.ok()) return full.status();
+  result.full_cost = full->cost;
+  const std::size_t all = std::accumulate(totals.begin(), totals.end(), std::size_t{0});
   std::vector<std::vector<PricedStage>> stages;  // by mesh
+  std::size_t count = 0;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     Result<std::vector<PricedStage>> priced =
         PriceStages(rig, compiler, meshes[m], totals[m], kSaving * result.full_cost);
@@ -88,24 +94,53 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
     CuePlace& place = result.places.emplace_back();
     Index output = 0;
     for (std::size_t m = 0; m < meshes.size(); output += totals[m++]) {
-      const PricedStage& stage = stages[m][std::min(p, stages[m].size() - 1)];
-      place.cost += stage.cost;
-      if (stage.stage + 1 == meshes[m].stages.size()) {
-        for (Index i = 0; i < totals[m]; ++i) place.points.push_back({CueKind::kOutput, output + i});
+      const std::size_t stage = stages[m][std::min(p, stages[m].size() - 1)].stage;
+      if (stage + 1 == meshes[m].stages.size()) {
+        for (Index i = 0; i < totals[m]; ++i) place.push_back({CueKind::kOutput, output + i});
         continue;
       }
-      const std::vector<Index> points =
-          EvenSpread(totals[m], std::max<std::size_t>(1, kStagePoints * totals[m] / all));
-      const auto [at, first] = recorded.emplace(std::pair(m, stage.stage), next);
+      const std::vector<Index> points = StagePoints(totals[m], all);
+      const auto [at, first] = recorded.emplace(std::pair(m, stage), next);
       if (first) {
-        result.stages.push_back({m, stage.stage, points});
+        result.stages.push_back({m, stage, points});
         next += static_cast<Index>(points.size());
       }
       for (std::size_t i = 0; i < points.size(); ++i)
-        place.points.push_back({CueKind::kStage, at->second + static_cast<Index>(i)});
+        place.push_back({CueKind::kStage, at->second + static_cast<Index>(i)});
     }
   }
   return result;
+}
+
+Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
+                            std::span<const CandidateStage> stages, std::span<const CueRef> cues) {
+  const auto& meshes = rig.target.meshes;
+  std::vector<RequestedOutput> outputs;
+  // The cues of a kind whose indices are [begin, begin + count), as points of the mesh
+  const auto request = [&](CueKind kind, Index begin, Index count, std::size_t mesh, std::size_t stage,
+                           const std::vector<Index>* points) {
+    std::vector<Index> wanted;
+    for (const CueRef& cue : cues) {
+      if (cue.kind != kind || cue.index < begin || cue.index >= begin + count) continue;
+      wanted.push_back(points == nullptr ? cue.index - begin : (*points)[cue.index - begin]);
+    }
+    if (wanted.empty()) return;
+    std::sort(wanted.begin(), wanted.end());
+    outputs.push_back({meshes[mesh].stages[stage].points, PointSet::Of(wanted, totals[mesh])});
+  };
+  Index begin = 0;
+  for (std::size_t m = 0; m < meshes.size(); begin += totals[m++])
+    request(CueKind::kOutput, begin, totals[m], m, meshes[m].stages.size() - 1, nullptr);
+  begin = 0;
+  for (const CandidateStage& stage : stages) {
+    const auto count = static_cast<Index>(stage.points.size());
+    request(CueKind::kStage, begin, count, stage.mesh, stage.stage, &stage.points);
+    begin += count;
+  }
+  if (outputs.empty()) return 0.0;
+  const Result<Kept> kept = KeptFor(rig, compiler, std::move(outputs), 0);
+  if (!kept.ok()) return kept.status();
+  return kept->cost;
 }
 
 }  // namespace kpsa

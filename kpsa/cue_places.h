@@ -1,6 +1,7 @@
 // Where points may be measured: at the outputs, or at earlier stages of the deformer stack, which cost less.
-// A point before a deltaMush needs no neighbours; one before a wrap needs no driver. What a place costs is
-// what the compiler keeps for a few points there, by the costs that the nodes declare (NodeBuilder::cost).
+// A point before a deltaMush needs no neighbours; one before a wrap needs no driver. What points cost is what
+// the compiler keeps for them, by the costs that the nodes declare (NodeBuilder::cost), with all controls
+// varying; no clip may play, since it would drive some of them.
 #pragma once
 
 #include <span>
@@ -20,5 +21,9 @@ struct CuePlaces {
 // The dearest place is, for each mesh, the latest stage at which a point costs little more than itself; the
 // others cost less and less. totals: points of each mesh.
 Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals);
+
+// What the points among the cues cost together (ns); stages: as FindCuePlaces gave them.
+Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
+                            std::span<const CandidateStage> stages, std::span<const CueRef> cues);
 
 }  // namespace kpsa

@@ -221,31 +221,34 @@ CueSet MakeCueSet(const Pca& pca, std::span<const CueRef> cues, const CueNoise& 
   return set;
 }
 
-std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool outputs, bool stages,
-                                  bool scalars) {
+std::vector<CueRef> MovingCandidates(const Pca& pca, double min_motion, std::span<const CueRef> cues) {
   const auto motion = [&](CueRef cue) {
     return pca.row_variance
         .segment(static_cast<Eigen::Index>(CueColumn(pca.layout, cue)),
                  static_cast<Eigen::Index>(CueHeight(pca.layout, cue)))
         .sum();
   };
-  std::vector<CueRef> candidates;
-  for (const CueKind kind : {CueKind::kOutput, CueKind::kStage}) {
-    const std::size_t count = kind == CueKind::kOutput ? pca.layout.points : pca.layout.stage_points;
-    if (!(kind == CueKind::kOutput ? outputs : stages)) continue;
-    double largest = 0;
-    for (std::size_t i = 0; i < count; ++i)
-      largest = std::max(largest, motion({kind, static_cast<Index>(i)}));
-    for (std::size_t i = 0; i < count; ++i) {
-      const CueRef cue{kind, static_cast<Index>(i)};
-      if (largest > 0 && motion(cue) >= min_motion * min_motion * largest) candidates.push_back(cue);
-    }
+  double largest[3] = {};  // by kind
+  const auto of_kind = [&](CueRef cue) -> double& { return largest[static_cast<std::size_t>(cue.kind)]; };
+  for (const CueRef& cue : cues) of_kind(cue) = std::max(of_kind(cue), motion(cue));
+  std::vector<CueRef> moving;
+  for (const CueRef& cue : cues) {
+    const double least = cue.kind == CueKind::kScalar ? 0 : min_motion * min_motion * of_kind(cue);
+    if (motion(cue) > 0 && motion(cue) >= least) moving.push_back(cue);
   }
-  for (std::size_t i = 0; i < pca.layout.scalars && scalars; ++i) {
-    const CueRef cue{CueKind::kScalar, static_cast<Index>(i)};
-    if (motion(cue) > 0) candidates.push_back(cue);
-  }
-  return candidates;
+  return moving;
+}
+
+std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool outputs, bool stages,
+                                  bool scalars) {
+  std::vector<CueRef> all;
+  const auto add = [&](bool wanted, CueKind kind, std::size_t count) {
+    for (std::size_t i = 0; wanted && i < count; ++i) all.push_back({kind, static_cast<Index>(i)});
+  };
+  add(outputs, CueKind::kOutput, pca.layout.points);
+  add(stages, CueKind::kStage, pca.layout.stage_points);
+  add(scalars, CueKind::kScalar, pca.layout.scalars);
+  return MovingCandidates(pca, min_motion, all);
 }
 
 CueSelection SelectCues(const Pca& pca, std::span<const CueRef> wanted, std::span<const Double3> positions,

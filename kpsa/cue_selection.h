@@ -78,8 +78,10 @@ struct CueSelection {
   int swaps = 0;
 };
 
-// All points and scalars of the layout that may be cues, without scalars that never moved and points whose
-// RMS motion is below `min_motion` (1e-4, say) of the largest of their kind.
+// Those of the cues that move: without scalars that never moved, and points whose RMS motion is below
+// `min_motion` (1e-4, say) of the largest of their kind among them.
+std::vector<CueRef> MovingCandidates(const Pca& pca, double min_motion, std::span<const CueRef> cues);
+// All that move of the points and scalars of the layout.
 std::vector<CueRef> AllCandidates(const Pca& pca, double min_motion, bool outputs, bool stages, bool scalars);
 
 // positions: the rest positions of outputs, then stage points, [N + P] (for distances). Candidates: none

@@ -112,6 +112,13 @@ Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues,
   return y;
 }
 
+Eigen::MatrixXd MeasuredPoses(const PoseLayout& layout, const CueSet& cues, const PoseMatrix& centered) {
+  Eigen::MatrixXd y(cues.rows(), static_cast<Eigen::Index>(centered.poses()));
+  for (std::size_t t = 0; t < centered.poses(); ++t)
+    y.col(static_cast<Eigen::Index>(t)) = MeasuredCues(layout, cues, centered.row(t));
+  return y;
+}
+
 std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                                        const PoseMatrix& poses) {
   KPSA_CHECK(poses.centered() && poses.layout() == pca.layout);
@@ -179,6 +186,7 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
             squared +=
                 (static_cast<double>(pose[c]) - estimate[c]) * (static_cast<double>(pose[c]) - estimate[c]);
           }
+          if (std::isnan(squared)) squared = std::numeric_limits<double>::infinity();
           survey.largest[i] = std::max(survey.largest[i], squared);
           survey.beyond[i] += squared > limit * limit;
           most = std::max(most, squared);

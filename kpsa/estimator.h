@@ -45,6 +45,8 @@ Estimator RotatedMapEstimator(const Pca& pca, const CueSet& cues, const Eigen::M
 // Measured values of pose t: y from a row of a centred pose matrix. [r]
 Eigen::VectorXd MeasuredCues(const PoseLayout& layout, const CueSet& cues,
                              std::span<const float> centered_row);
+// Of all poses, one a column. [r x T]
+Eigen::MatrixXd MeasuredPoses(const PoseLayout& layout, const CueSet& cues, const PoseMatrix& centered);
 
 // Errors of one pose in the norm of the outputs: total^2 = projection^2 + cue^2 where A is orthonormal.
 struct PoseErrors {
@@ -56,7 +58,7 @@ struct PoseErrors {
 // For all poses (centred with pca.mean). RMS of a pose = error / sqrt(N).
 std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                                        const PoseMatrix& poses);
-// Errors by point, over every `stride`-th pose.
+// Errors by point, over every `stride`-th pose. A point that is no number is infinitely far off.
 struct PointSurvey {
   std::vector<double> largest;  // [N] scene units
   std::vector<Index> beyond;    // [N] poses in which the point is farther off than `limit`

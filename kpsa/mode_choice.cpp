@@ -20,13 +20,10 @@ Eigen::Index ChooseModeCount(const Pca& pca, std::span<const CueRef> cues, const
                              const PoseMatrix& held_out) {
   KPSA_CHECK(held_out.centered() && held_out.layout() == pca.layout && pca.output_orthonormal);
   const CueSet set = MakeCueSet(pca, cues, noise);
-  const auto poses = static_cast<Eigen::Index>(held_out.poses());
   const Eigen::MatrixXd best =
       Multiply(GemmOperand::Dense(pca.output_modes()).Transposed(),
                GemmOperand::Poses(held_out, 0, held_out.poses(), 0, pca.layout.outputs()).Transposed());
-  Eigen::MatrixXd y(set.rows(), poses);
-  for (Eigen::Index t = 0; t < poses; ++t)
-    y.col(t) = MeasuredCues(pca.layout, set, held_out.row(static_cast<std::size_t>(t)));
+  const Eigen::MatrixXd y = MeasuredPoses(pca.layout, set, held_out);
   const Eigen::VectorXd variances = pca.mode_variance();
   std::vector<Eigen::Index> counts;
   std::vector<double> errors;  // less the poses' own energy, which no mode changes
@@ -79,7 +76,6 @@ std::vector<Index> EvenSpread(std::size_t total, std::size_t count) {
   count = std::min(count, total);
   for (std::size_t i = 0; i < count; ++i)
     points.push_back(static_cast<Index>((2 * i + 1) * total / (2 * count)));
-  points.erase(std::unique(points.begin(), points.end()), points.end());
   return points;
 }
 

@@ -24,7 +24,7 @@ double HonestResidual(double residual, std::size_t poses, Eigen::Index modes);
 // `count` of `total` points, spread so that no row or column of a picture is preferred: steps of the golden
 // ratio. Ascending, none twice.
 std::vector<Index> GoldenSpread(std::size_t total, std::size_t count);
-// The same in even steps.
+// As many in even steps, each in the middle of its share. Ascending, none twice.
 std::vector<Index> EvenSpread(std::size_t total, std::size_t count);
 
 }  // namespace kpsa

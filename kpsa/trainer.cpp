@@ -47,7 +47,7 @@ class Trainer {
     if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
     if (judges.poses() > 0) judges.Subtract(pca_.mean);
-    if (of_light() && judges.poses() > 0) KeepModes(judges);
+    if (of_light() && judges.poses() > 0) TruncateModes(judges);
     KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
     KPSA_RETURN_IF_ERROR(ChooseCues(poses, judges));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
@@ -237,7 +237,7 @@ class Trainer {
   }
 
   // As many modes as new poses confirm, and noise as new poses have it.
-  void KeepModes(const PoseMatrix& judges) {
+  void TruncateModes(const PoseMatrix& judges) {
     std::vector<CueRef> cues;
     for (const Index point : GoldenSpread(layout_.points, std::max<std::size_t>(options_.min_points, 100)))
       cues.push_back({CueKind::kOutput, point});
@@ -297,12 +297,20 @@ class Trainer {
     choice.by_rms = of_light();
     choice.places = places_;
     choice.judges = judges.poses() > 0 ? &judges : nullptr;
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+    Status priced;
+    choice.points_cost = [&](std::span<const CueRef> cues) {
+      const Result<double> cost = CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues);
+      if (!cost.ok()) priced = cost.status();
+      return cost.ok() ? *cost : 0;
+    };
     choice.miss_cost = full_cost_;
     choice.violation_rate = options_.violation_rate;
-    if (of_light()) choice.max_outputs = options_.max_candidates;
+    if (of_light()) choice.max_outputs = options_.max_light_candidates;
     const std::vector<CueRef> chosen = options_.mode == EstimatorMode::kPaper
                                            ? ChoosePaperCues(pca_, positions_, diagonal_)
                                            : kpsa::ChooseCues(pca_, positions_, noise_, poses, choice);
+    KPSA_RETURN_IF_ERROR(std::move(priced));
     if (chosen.empty()) return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
     cues_ = MakeCueSet(pca_, chosen, noise_);
     return Status();
@@ -313,10 +321,7 @@ class Trainer {
                                     ? LeastSquaresEstimator(pca_, cues_)
                                     : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
-    Eigen::MatrixXd training(cues_.rows(), static_cast<Eigen::Index>(poses.poses()));
-    for (std::size_t t = 0; t < poses.poses(); ++t) {
-      training.col(static_cast<Eigen::Index>(t)) = MeasuredCues(layout_, cues_, poses.row(t));
-    }
+    const Eigen::MatrixXd training = MeasuredPoses(layout_, cues_, poses);
     std::vector<SubspaceOutput> outputs;
     for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m)
       outputs.push_back({rig_.target.meshes[m].name, totals_[m]});

@@ -31,7 +31,7 @@ struct TrainOptions {
   double tolerance = 1e-4, violation_rate = 0.01;  // metres, or light; share of frames
   bool keep_modes = false;                         // in the subspace, for reports (Subspace::kept_modes)
   double range_margin = 0.1;                       // of the trained extent
-  std::size_t max_candidates = 4000;               // shading points that may become cues
+  std::size_t max_light_candidates = 4000;         // shading points that may become cues
   std::function<bool(const char* what, double share)> progress;  // false cancels; may be null
 };
 

@@ -107,7 +107,8 @@ took turns with the full evaluation in one run.
   layers of proximityWrap are most of it.
 - Speedup of hits: full against accelerated time of the accepted frames. For *all frames accepted* these are all
   frames, as in the slides; with a tolerance those that SoftCache accepts. Of all frames: misses included.
-- Ceiling: what a reconstruction that takes no time at all would reach; the graph above the points has to run in any case.
+- Ceiling: full against what is left where cues, projection and reconstruction take no time at all: the graph that the
+  subspace reads, and later stages.
 - RMS, max: final points against the full evaluation, all points of all frames of the test clip, misses included (they are exact),
   in % of the diagonal of the box around them. The test clips are not trained on.
 - Times are medians of one core (${processor:-unknown}); they vary with the machine, the other columns do not.

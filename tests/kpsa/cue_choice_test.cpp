@@ -108,28 +108,35 @@ TEST(CueChoice, NoiseKeepsSmallSurprisesSmall) {
   EXPECT_LT(moved(fold.noise), kTolerance);
 }
 
+// All points among the cues are of the kind.
+bool AllOf(std::span<const CueRef> cues, CueKind kind) {
+  return std::all_of(cues.begin(), cues.end(),
+                     [&](const CueRef& cue) { return cue.kind == kind || cue.kind == CueKind::kScalar; });
+}
+
 // Two places: the outputs, which see the folds, and the stage, which does not.
 std::vector<CueRef> ChooseAmongPlaces(const Fold& fold, double output_cost, double miss_cost) {
   CueChoiceOptions options{.rows = 20,
                            .min_points = 4,
                            .tolerance = kTolerance,
                            .judges = &fold.judges,
+                           .points_cost =
+                               [&](std::span<const CueRef> cues) {
+                                 return (AllOf(cues, CueKind::kOutput) ? 0 : 10) +
+                                        (AllOf(cues, CueKind::kStage) ? 0 : output_cost);
+                               },
                            .miss_cost = miss_cost,
                            .violation_rate = 0.05};
-  CuePlace stage{{}, 10}, outputs{{}, output_cost};
+  CuePlace stage, outputs;
   for (Index i = 0; i < kPoints; ++i) {
-    stage.points.push_back({CueKind::kStage, i});
-    outputs.points.push_back({CueKind::kOutput, i});
+    stage.push_back({CueKind::kStage, i});
+    outputs.push_back({CueKind::kOutput, i});
   }
   options.places = {outputs, stage};
   std::vector<CueRef> chosen = ChooseCues(fold.pca, fold.positions, fold.noise, fold.poses, options);
   std::erase_if(chosen, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
   return chosen;
 }
-bool AllOf(const std::vector<CueRef>& cues, CueKind kind) {
-  return std::all_of(cues.begin(), cues.end(), [&](const CueRef& cue) { return cue.kind == kind; });
-}
-
 TEST(CueChoice, AnEarlierPlaceIsTakenWhereItSeesEnough) {
   const std::vector<CueRef> chosen = ChooseAmongPlaces(Fold(0), 100, 1000);
   ASSERT_FALSE(chosen.empty());

@@ -32,7 +32,7 @@ class SoftCacheTest : public testing::Test {
         {CueKind::kScalar, 3},  {CueKind::kOutput, 190}, {CueKind::kOutput, 100}};
     cues_ = MakeCueSet(pca_, cues, sheet_.diagonal());
     estimator_ = MapEstimator(pca_, cues_);
-    model_ = MakeSoftCacheModel(estimator_, cues_, test::AllMeasured(training_, cues_, MeasuredCues));
+    model_ = MakeSoftCacheModel(estimator_, cues_, MeasuredPoses(training_.layout(), cues_, training_));
   }
   static std::vector<float> Padded(const SoftCacheModel& model, const Eigen::VectorXd& y) {
     std::vector<float> padded(model.padded_rows());
@@ -104,7 +104,7 @@ TEST_F(SoftCacheTest, PaperModeScoresTheResidual) {
   const Estimator estimator = LeastSquaresEstimator(pca, cues);
   ASSERT_EQ(estimator.mode, EstimatorMode::kPaper) << estimator.warning;
   const SoftCacheModel model =
-      MakeSoftCacheModel(estimator, cues, test::AllMeasured(training_, cues, MeasuredCues));
+      MakeSoftCacheModel(estimator, cues, MeasuredPoses(training_.layout(), cues, training_));
   for (std::size_t t = 0; t < 10; ++t) {
     const Eigen::VectorXd y = MeasuredCues(pca.layout, cues, test_.row(t));
     const Eigen::VectorXd p = cues.loadings.householderQr().solve(y);

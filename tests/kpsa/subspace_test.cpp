@@ -36,7 +36,7 @@ class SubspaceTest : public testing::TestWithParam<EstimatorMode> {
     estimator_ =
         GetParam() == EstimatorMode::kMap ? MapEstimator(pca_, cues_) : LeastSquaresEstimator(pca_, cues_);
     EXPECT_EQ(estimator_.mode, GetParam()) << estimator_.warning;
-    subspace_ = MakeSubspace(pca_, cues_, estimator_, test::AllMeasured(training_, cues_, MeasuredCues),
+    subspace_ = MakeSubspace(pca_, cues_, estimator_, MeasuredPoses(training_.layout(), cues_, training_),
                              {{"head@mush", 150}, {"teeth", 90}}, {.rms_budget = 1e-6});
     for (const CueRef cue : cues) {
       if (cue.kind == CueKind::kScalar) {
@@ -113,7 +113,7 @@ TEST_P(SubspaceTest, LatentCoordinatesSayTheSame) {
   const Estimator slim = MapEstimator(pca_, cues_, false);
   EXPECT_EQ(slim.gain.size(), 0);
   EXPECT_LT((slim.reach - estimator_.gain.cwiseAbs().colwise().maxCoeff().transpose()).norm(), 1e-12);
-  Subspace latent = MakeSubspace(pca_, cues_, slim, test::AllMeasured(training_, cues_, MeasuredCues),
+  Subspace latent = MakeSubspace(pca_, cues_, slim, MeasuredPoses(training_.layout(), cues_, training_),
                                  subspace_.outputs, {.rms_budget = 1e-6});
   EXPECT_EQ(latent.tile_inputs(), 7u);
   EXPECT_EQ(latent.soft_cache.leave_one_out, subspace_.soft_cache.leave_one_out);
@@ -146,7 +146,7 @@ TEST_P(SubspaceTest, PaperModeThatFellBackComesBack) {
   const Estimator estimator = LeastSquaresEstimator(pca_, cues);
   ASSERT_EQ(estimator.mode, EstimatorMode::kMap);
   ASSERT_NE(estimator.warning, "");
-  Subspace fallen = MakeSubspace(pca_, cues, estimator, test::AllMeasured(training_, cues, MeasuredCues),
+  Subspace fallen = MakeSubspace(pca_, cues, estimator, MeasuredPoses(training_.layout(), cues, training_),
                                  subspace_.outputs, {.rms_budget = 1e-6});
   fallen.cues = {subspace_.cues[0], subspace_.cues[1]};
   for (const char* units : {"m", kLightUnits}) {

@@ -114,13 +114,4 @@ inline PoseMatrix NoisePoses(std::size_t count, const PoseLayout& layout, unsign
   return poses;
 }
 
-// Measurements of all poses, one a column [r x T].
-template <typename Cues, typename Function>
-Eigen::MatrixXd AllMeasured(const PoseMatrix& poses, const Cues& cues, Function measure) {
-  Eigen::MatrixXd y(cues.rows(), static_cast<Eigen::Index>(poses.poses()));
-  for (std::size_t t = 0; t < poses.poses(); ++t)
-    y.col(static_cast<Eigen::Index>(t)) = measure(poses.layout(), cues, poses.row(t));
-  return y;
-}
-
 }  // namespace kpsa::test
