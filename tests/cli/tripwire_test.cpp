@@ -236,7 +236,7 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   options.calibration_poses = 60;
   options.max_modes = 60;
   options.rows = 60;
-  options.tolerance = 1.3e-3;
+  options.tolerance = 0.05;  // nothing misses, so the least costly place for cues wins, the bare skin
   options.range_margin = 0.5;
   Result<Subspace> subspace = Train(MakeTrainingRig(&*rig, rig->accelerate[0]), *clips, options);
   ASSERT_TRUE(subspace.ok()) << subspace.status().ToString();
@@ -263,11 +263,8 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   EXPECT_EQ(hits, 81u);
   EXPECT_EQ(pure.Computes("mush"), 0u);
   EXPECT_EQ(pure.Computes("trip"), 0u);
-  // Up to where points are measured, the stack runs (which stage costs least may depend on rounding)
-  for (const CueDescription& cue : trained->cues) {
-    if (cue.kind == CueDescription::Kind::kScalar) continue;
-    EXPECT_GT(pure.Computes(cue.stage == "skin" ? "face_mesh_skinCluster" : cue.stage), 0u) << cue.stage;
-  }
+  EXPECT_EQ(pure.Computes("cheekModR"), 0u);
+  EXPECT_GT(pure.Computes("face_mesh_skinCluster"), 0u);
 
   // And the program's report of the same
   ASSERT_TRUE(WriteSubspace(*trained, folder / "face.kpsa").ok());
@@ -276,8 +273,10 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   ASSERT_EQ(bench.exit_code, 0) << bench.err;
   std::vector<std::string> never = nlohmann::json::parse(bench.out)["nodes"]["never_evaluated"];
   std::sort(never.begin(), never.end());
-  for (const char* node : {"mush", "trip"}) EXPECT_EQ(std::ranges::count(never, node), 1) << node;
-  EXPECT_EQ(std::ranges::count(never, "face_mesh_skinCluster"), 0);
+  EXPECT_EQ(never, (std::vector<std::string>{"browL", "browR", "browWireL", "browWireR", "cheekL",
+                                             "cheekModL", "cheekModR", "cheekR", "chin", "chinMod",
+                                             "lowerLip", "lowerLipWire", "mush", "nose", "noseMod",
+                                             "skullCage", "trip", "upperLip", "upperLipWire"}));
 }
 
 }  // namespace
