@@ -61,6 +61,7 @@ Double3 LinearFromRgb(Rgb c) { return {LinearFromSrgb(c[0]), LinearFromSrgb(c[1]
 struct Surface {
   PointBuffer points;
   std::vector<Index> triangles;
+  std::vector<Index> casting;       // of these, the ones that cast shadows
   std::vector<Double3> normals;     // unit, area-weighted
   std::vector<Double3> colors;      // linear
   std::vector<float> sky;           // 0 .. 1, share of the sky seen
@@ -97,13 +98,16 @@ Result<Surface> Gather(const RenderInput& input) {
       out.colors.push_back(color);
       out.matte.push_back(part.scalars.empty() ? 0 : 1);
     }
+    const auto first = static_cast<std::ptrdiff_t>(out.triangles.size());
     for (Index index : part.triangles) {
       if (index >= n) return Status::Invalid("a triangle names point {}, there are {} points", index, n);
       out.triangles.push_back(static_cast<Index>(base) + index);
     }
     base += n;
+    out.triangles.resize(out.triangles.size() / 3 * 3);
+    if (part.casts_shadows)
+      out.casting.insert(out.casting.end(), out.triangles.begin() + first, out.triangles.end());
   }
-  out.triangles.resize(out.triangles.size() / 3 * 3);
   out.normals.resize(count);
   for (std::size_t t = 0; t < out.triangles.size(); t += 3) {
     const Index a = out.triangles[t], b = out.triangles[t + 1], c = out.triangles[t + 2];
@@ -277,7 +281,9 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
   const Lights lights = {Unit(right * -0.62 + up * 0.70 + back * 0.80),
                          Unit(right * 0.9 + up * 0.05 + back * 0.5),
                          Unit(right * 0.7 + up * 0.5 + back * -0.6)};
-  LightPoints(*scene, lights.key, diagonal, &*surface);
+  Result<RayScene> shadows = RayScene::Build(std::as_const(surface->points).view(), surface->casting);
+  if (!shadows.ok()) return shadows.status();
+  LightPoints(*shadows, lights.key, diagonal, &*surface);
 
   Image image(options.width, options.height, options.background_bottom);
   const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2);
@@ -383,6 +389,8 @@ RenderPart MakeDots(const RenderDots& dots, double radius) {
   RenderPart part;
   part.points = balls->points, part.triangles = balls->triangles;
   part.color = {0.85, 0.03, 0.02};
+  part.casts_shadows =
+      false;  // light is known at points alone: a ball on a large triangle would darken all of it
   part.owner = balls;
   return part;
 }

@@ -24,7 +24,8 @@ struct RenderPart {
   std::span<const float> colors;       // 3 a point, linear light 0 .. 1; or empty: `color` everywhere
   std::span<const float> scalars;      // 1 a point, metres; or empty: the part is drawn as clay
   Double3 color = {0.62, 0.43, 0.35};  // linear light
-  std::shared_ptr<const void> owner;   // keeps alive what the spans refer to, where nobody else does
+  bool casts_shadows = true;
+  std::shared_ptr<const void> owner;  // keeps alive what the spans refer to, where nobody else does
 };
 
 struct RenderInput {

@@ -212,6 +212,36 @@ TEST(Picture, AComparisonShowsKeyPointsOnRequest) {
   }
 }
 
+TEST(Picture, KeyPointsCastNoShadows) {
+  const Mesh square = Square();
+  RenderInput full;
+  full.parts = {square.Part()};
+  Camera camera;
+  camera.eye = {0, 0, 10};
+  camera.field_of_view = 2 * std::atan(2.0 / 10);
+  const RenderDots dots{"1 key point", {-1, 1, 0}};  // at a corner, whose light two triangles share
+  const auto image = RenderComparison(full, full, camera, Plain(120, 120), &dots);
+  ASSERT_TRUE(image.ok());
+  int differ = 0, near = 0;
+  for (int y = 24; y < 120; ++y) {  // below the titles
+    for (int x = 0; x < 120; ++x) {
+      if (image->At(x, y) == image->At(x + 124, y)) continue;
+      ++(std::hypot(x - 30, y - 30) < 4 ? near : differ);
+    }
+  }
+  EXPECT_EQ(differ, 0);
+  EXPECT_GT(near, 0);
+  // The canary: a ball that casts its shadow is seen all over the triangles
+  RenderInput lit = full, dark = full;
+  lit.parts.push_back(MakeDots(dots, 0.02));
+  dark.parts.push_back(MakeDots(dots, 0.02));
+  dark.parts.back().casts_shadows = true;
+  const auto light = RenderMesh(lit, camera, Plain(120, 120)),
+             shade = RenderMesh(dark, camera, Plain(120, 120));
+  ASSERT_TRUE(light.ok() && shade.ok());
+  EXPECT_LT(shade->At(40, 40)[1], light->At(40, 40)[1]);
+}
+
 TEST(Picture, ATurntableStartsInFrontAndTurns) {
   RenderInput input;
   input.parts = {Head().Part()};
