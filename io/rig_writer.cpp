@@ -85,8 +85,8 @@ class Writer {
     WriteHead();
     WriteSkins();
     WriteControls();
-    WriteAcceleration();
-    return std::move(text_);
+    const bool accelerates = WriteAcceleration();
+    return Title(accelerates) + text_;
   }
 
  private:
@@ -125,35 +125,39 @@ class Writer {
   }
   const std::string& NameOf(Index node) const { return rig_.graph->name(rig_.scene.transforms[node]); }
 
-  void WriteHead() {
-    std::vector<std::string> meshes;
+  std::string Title(bool accelerates) const {
     Index points = 0;
-    for (const CharacterMesh& mesh : rig_.scene.meshes) {
-      meshes.push_back(mesh.name);
-      points += mesh.mesh().point_count();
-    }
-    const std::string file = options_.character.empty()
-                                 ? std::filesystem::path(character_.path).filename().string()
-                                 : options_.character;
+    for (const CharacterMesh& mesh : rig_.scene.meshes) points += mesh.mesh().point_count();
     const auto several = [](std::size_t count, const char* one, const char* many) {
       return fmt::format("{} {}", Thousands(count), count == 1 ? one : many);
     };
-    text_ += fmt::format(
+    std::string text = fmt::format(
         "# A starter rig for {}: {}, {}, {}, {:.3g} m from corner to corner.\n"
-        "# It works as it is: kpsa validate, eval, render, train, bench. Comments say what to do next; take "
-        "out "
-        "the # where no space\n"
+        "# It works as it is: kpsa validate, eval, render{}. Comments say what to do next; take out the # "
+        "where no "
+        "space\n"
         "# follows it to try what is suggested there.\n"
         "# Lengths are in cm and angles in degrees; write 2mm or 0.1rad for anything else.\n",
-        InComment(file), several(meshes.size(), "mesh", "meshes"), several(points, "point", "points"),
-        several(character_.clips.size(), "clip", "clips"), rig_.rest_diagonal);
+        InComment(File()), several(rig_.scene.meshes.size(), "mesh", "meshes"),
+        several(points, "point", "points"), several(character_.clips.size(), "clip", "clips"),
+        rig_.rest_diagonal, accelerates ? ", train, bench" : "");
     if (rig_.rest_diagonal > kLargeMetres)
-      text_ += "# So large a character may have been meant in cm: then read cm where metres are written.\n";
+      text += "# So large a character may have been meant in cm: then read cm where metres are written.\n";
+    return text;
+  }
+  std::string File() const {
+    return options_.character.empty() ? std::filesystem::path(character_.path).filename().string()
+                                      : options_.character;
+  }
+
+  void WriteHead() {
+    std::vector<std::string> meshes;
+    for (const CharacterMesh& mesh : rig_.scene.meshes) meshes.push_back(mesh.name);
     text_ += fmt::format(
         "kpsa: 1\n"
         "units: {{length: cm, angle: deg}}\n"
         "character: {}\n",
-        Quoted(file, false));
+        Quoted(File(), false));
     if (meshes.empty()) {
       text_ += "# The scene shows no mesh: there is nothing to deform or to accelerate.\n";
       return;
@@ -404,8 +408,9 @@ class Writer {
     return rig_.graph->name(rig_.scene.transforms[*best]);
   }
 
-  void WriteAcceleration() {
-    if (rig_.scene.meshes.empty() || control_count_ == 0) return;
+  // Whether there is anything to accelerate.
+  bool WriteAcceleration() {
+    if (rig_.scene.meshes.empty() || control_count_ == 0) return false;
     std::vector<std::string> points, train, test;
     for (const CharacterMesh& mesh : rig_.scene.meshes) points.push_back(mesh.name + "@" + mush_);
     if (!clips_.empty()) test.push_back(character_.clips[TamestClip(character_, clips_)].id);
@@ -446,6 +451,7 @@ class Writer {
           fmt::format("    test: {{clips: {}}}  # never trained on; what kpsa bench runs{}\n",
                       QuotedList(test), train.empty() ? "" : ": the clip that goes least beyond the others");
     }
+    return true;
   }
   static std::string LengthOf(double metres) {
     if (metres >= 1) return Rounded(metres) + "m";

@@ -101,6 +101,8 @@ TEST_F(RigWriterTest, ACharacterWithoutMeshesStillLoads) {
   folder.Write("c.gltf", builder.Text());
   const Rig rig = Reload(folder / "c.gltf");
   EXPECT_TRUE(rig.scene.meshes.empty());
+  const std::string text = *StarterRig(StandardRegistry(), folder / "c.gltf");
+  EXPECT_NE(text.find("kpsa validate, eval, render."), std::string::npos) << text;
   EXPECT_FALSE(StarterRig(StandardRegistry(), folder / "nobody.glb").ok());
 }
 
