@@ -21,6 +21,8 @@ enum class Unit : std::uint8_t { kNone, kLength, kAngle, kTime };
 
 class Structural;
 
+inline constexpr int kMaxArrayElements = 1 << 20;  // of an array attribute
+
 struct AttributeDef {
   std::string name;
   Type type = Type::kDouble;
