@@ -136,12 +136,13 @@ TriangleTree::TriangleTree(ConstPointsView points, std::span<const Index> triang
     const auto self = static_cast<Index>(nodes_.size());
     if (range.parent != kNoIndex) nodes_[range.parent].right = self;
     nodes_.push_back({});
+    const auto begin = order_.begin() + range.first, end = begin + range.count;
+    nodes_[self].least = *std::min_element(begin, end);
     if (range.count <= kLeaf) {
       nodes_[self].first = range.first;
       nodes_[self].count = range.count;
       continue;
     }
-    const auto begin = order_.begin() + range.first, end = begin + range.count;
     std::array<float, 3> lo = centers[*begin], hi = lo;
     for (auto it = begin; it != end; ++it) {
       for (std::size_t a = 0; a < 3; ++a) {
@@ -193,8 +194,8 @@ void TriangleTree::Fit(ConstPointsView points, std::span<float> boxes) const {
   }
 }
 
-// Depth first, the nearer child first: near(node) is its distance, or infinity to leave it out (asked again
-// when its turn comes); visit(triangle).
+// Depth first, the nearer child first: near(node) is its distance (or what else children go by), or infinity
+// to leave it out (asked again when its turn comes); visit(triangle).
 template <typename Near, typename Visit>
 void TriangleTree::Walk(Near near, Visit visit) const {
   if (nodes_.empty()) return;
@@ -235,12 +236,15 @@ SurfacePoint TriangleTree::Lowest(ConstPointsView points, std::span<const float>
   SurfacePoint best;
   const double limit = max_distance * max_distance;
   if (!IsFinite(place) || std::isnan(limit)) return best;
-  const auto near = [&](Index n) { return BoxWithin(boxes, n, place, limit); };
-  Walk(near, [&](Index t) {
+  const auto lowest = [&](Index n) {
+    const double least = nodes_[n].least;
+    return least < best.triangle && BoxWithin(boxes, n, place, limit) < kInfinity ? least : kInfinity;
+  };
+  Walk(lowest, [&](Index t) {
     if (t >= best.triangle) return;
     SurfacePoint found = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
     found.triangle = t;
-    if (found.squared <= limit) best = found;
+    if (found.squared <= limit && found.squared < kInfinity) best = found;
   });
   return best;
 }

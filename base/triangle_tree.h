@@ -68,6 +68,7 @@ class TriangleTree {
   struct Node {
     Index first = 0, count = 0;  // of a leaf: its triangles in order_
     Index right = 0;             // of the others: the second child; the first one is the next node
+    Index least = 0;             // of its triangles: the lowest number
   };
   template <typename Near, typename Visit>
   void Walk(Near near, Visit visit) const;

@@ -33,10 +33,10 @@ inline Double3 Cross(Double3 a, Double3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline double Length(Double3 a) { return std::sqrt(Dot(a, a)); }
-// Of unit length; zero where the length is 0 or no number.
+// Of unit length; zero where the square of the length is 0 or not finite.
 inline Double3 UnitOrZero(Double3 v) {
   const double length = Length(v);
-  return length > 0 ? v * (1 / length) : Double3();
+  return length > 0 && std::isfinite(length) ? v * (1 / length) : Double3();
 }
 
 // A rotation; unit length unless a function says otherwise.

@@ -168,9 +168,9 @@ CommandResult Import(const WeightsFlags& flags) {
     const Result<const NamedWeights*> found = FindWeights(*file, reference.path, reference.map);
     if (!found.ok()) return Status(found.status()).At({reference.path});
     map = *found;
-    if (const Index v = FirstOutOfRange(*file, *map); v != kNoIndex)
-      return Status::Invalid("map \"{}\": vertex {} weighs {}, outside of 0 to 1", map->name, v,
-                             DenseWeights(*file, *map)[v])
+    if (const auto outside = FirstOutOfRange(*file, *map); outside.has_value())
+      return Status::Invalid("map \"{}\": vertex {} weighs {}, outside of 0 to 1", map->name, outside->first,
+                             outside->second)
           .At({reference.path});
   }
   const Destination to = FindDestination(flags, rig, *of, reference.path, map == nullptr ? "" : map->name);

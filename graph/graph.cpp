@@ -149,7 +149,9 @@ std::string Graph::PlugName(const PlugRef& plug) const {
   return text;
 }
 
-int Graph::MaxElements(const AttributeDef& attribute) { return attribute.array ? 1 << 20 : 1 << 24; }
+int Graph::MaxElements(const AttributeDef& attribute) {
+  return attribute.array ? kMaxArrayElements : 1 << 24;
+}
 
 Status Graph::CheckPlug(const PlugRef& plug) const {
   if (!IsAlive(plug.node)) return Status::Invalid("a plug of a node that was removed");

@@ -99,7 +99,7 @@ NodeBuilder& NodeBuilder::lazy(bool together) {
   return *this;
 }
 NodeBuilder& NodeBuilder::world_place() {
-  KPSA_CHECK(attribute().type == Type::kMatrix && !attribute().array);
+  KPSA_CHECK(attribute().type == Type::kMatrix && !attribute().array && !attribute().output);
   attribute().world_place = true;
   return *this;
 }

@@ -21,6 +21,8 @@ enum class Unit : std::uint8_t { kNone, kLength, kAngle, kTime };
 
 class Structural;
 
+inline constexpr int kMaxArrayElements = 1 << 20;  // of an array attribute
+
 struct AttributeDef {
   std::string name;
   Type type = Type::kDouble;
@@ -36,7 +38,7 @@ struct AttributeDef {
   bool lazy_together = false;  // all elements of a lazy array share one decision (one bit)
   bool diagnostic = false;     // decides whether the node fails, never what it computes
   bool per_geometry = false;   // array whose element i belongs to the i-th deformed geometry
-  bool world_place = false;    // matrix by which something stands in the world: at its origin by default
+  bool world_place = false;    // matrix that is the world's where nothing drives it
   std::vector<std::string> enum_names;
   std::vector<std::string> aliases;  // other names under which plugs may be written
   std::string grid;  // elements may be written [s,t,u]; names the structural attribute with the divisions

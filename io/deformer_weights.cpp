@@ -34,12 +34,8 @@ Result<DeformedMesh> FindDeformed(const Rig& rig, std::string_view text) {
 }
 
 std::string NamespaceOf(const Rig& rig, const DeformedMesh& of) {
-  std::string innermost;  // references come before those within them
-  for (const Reference& reference : rig.references) {
-    if (of.stage->node.index >= reference.begin && of.stage->node.index < reference.end)
-      innermost = reference.name_space;
-  }
-  return innermost;
+  const Reference* reference = InnermostReference(rig, of.stage->node);
+  return reference == nullptr ? "" : reference->name_space;
 }
 
 WeightFile InOwnNames(const Rig& rig, const DeformedMesh& of, WeightFile file) {

@@ -4,6 +4,7 @@
 #include <tiny_gltf.h>
 
 #include <cstring>
+#include <tuple>
 
 #include "io/gltf_document.h"
 
@@ -14,8 +15,9 @@ namespace {
 // of what it decodes.
 constexpr std::uint64_t kMostDecoded = 64;
 constexpr std::uint64_t kFreeDecoded = std::uint64_t{64} << 20;
-// Compressed bytes of Draco that are read, for each byte of the file: views may overlap, and what a decoder
-// reads besides points and faces (metadata) counts nowhere else.
+// Compressed bytes of Draco that are read, for each byte of the file: views may overlap, primitives may ask
+// the same view for something else, and what a decoder reads besides points and faces (metadata) counts
+// nowhere else.
 constexpr std::uint64_t kMostRead = 4;
 constexpr std::uint64_t kFreeRead = std::uint64_t{8} << 20;
 
@@ -60,7 +62,6 @@ class Decompressor {
     mesh.points = points;
     mesh.most_indices =
         primitive.indices < 0 ? 3 * std::size_t{kNoIndex} : AccessorOf(primitive.indices).count;
-    std::uint64_t size = 0;
     for (const auto& [name, id] : p.attributes) {
       const auto found = primitive.attributes.find(name);
       if (found == primitive.attributes.end() || !IsRead(name)) continue;
@@ -81,28 +82,19 @@ class Decompressor {
     KPSA_RETURN_IF_ERROR(
         Range(static_cast<std::size_t>(view.buffer), view.byteOffset, view.byteLength, where, &data));
     if (points >= kNoIndex) return Status::Invalid("{} has {} vertices", where, points);
-    if (data.size() > unread_)
-      return Status::Invalid("{}: too many primitives share compressed bytes", where);
-    unread_ -= data.size();
-    if (Status status = DecodeDraco(data, &mesh); !status.ok())
-      return Status::Invalid("{} {}", where, status.errors().front().message);
-    for (const DracoAttribute& attribute : mesh.attributes) size += attribute.values.size();
-    size += 4 * mesh.triangles.size();
-    KPSA_RETURN_IF_ERROR(document_.budget.TakeWork(size + mesh.memory, where));
-    KPSA_RETURN_IF_ERROR(TakeRoom(size, where));
-    if (primitive.indices >= 0 && mesh.triangles.size() < AccessorOf(primitive.indices).count)
+    const auto [it, added] = decoded_.try_emplace(RequestOf(p.view, mesh));
+    if (added) KPSA_RETURN_IF_ERROR(Decode(data, std::move(mesh), where, &it->second));
+    const Decoded& decoded = it->second;
+    if (primitive.indices >= 0 && decoded.indices < AccessorOf(primitive.indices).count)
       ++primitives_with_fewer_;
-
-    for (DracoAttribute& attribute : mesh.attributes) {
-      int& accessor = primitive.attributes[attribute.name];
-      accessor = AddAccessor(AccessorOf(accessor), points, std::move(attribute.values));
+    for (const auto& [name, values] : decoded.values) {
+      int& accessor = primitive.attributes[name];
+      accessor = AddAccessor(AccessorOf(accessor), points, values);
     }
     tinygltf::Accessor indices;
     indices.componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
     indices.type = TINYGLTF_TYPE_SCALAR;
-    std::vector<std::uint8_t> bytes(4 * mesh.triangles.size());
-    if (!bytes.empty()) std::memcpy(bytes.data(), mesh.triangles.data(), bytes.size());
-    primitive.indices = AddAccessor(indices, mesh.triangles.size(), std::move(bytes));
+    primitive.indices = AddAccessor(indices, decoded.indices, decoded.triangles);
     primitive.mode = TINYGLTF_MODE_TRIANGLES;
     return {};
   }
@@ -115,6 +107,40 @@ class Decompressor {
   }
 
  private:
+  // What a primitive asks for: a view, points, the most indices, and of each attribute its name, id,
+  // component type and components. Primitives that ask for the same share what it decodes to.
+  using Request = std::tuple<std::size_t, std::size_t, std::size_t,
+                             std::vector<std::tuple<std::string, std::uint32_t, int, int>>>;
+  static Request RequestOf(std::size_t view, const DracoMesh& mesh) {
+    Request request{view, mesh.points, mesh.most_indices, {}};
+    for (const DracoAttribute& a : mesh.attributes)
+      std::get<3>(request).emplace_back(a.name, a.unique_id, a.component_type, a.components);
+    return request;
+  }
+  struct Decoded {
+    std::vector<std::pair<std::string, int>> values;  // views of the attributes, by glTF name
+    int triangles = 0;                                // view
+    std::size_t indices = 0;
+  };
+  Status Decode(std::span<const std::uint8_t> data, DracoMesh mesh, const std::string& where,
+                Decoded* decoded) {
+    if (data.size() > unread_)
+      return Status::Invalid("{}: too many primitives share compressed bytes", where);
+    unread_ -= data.size();
+    if (Status status = DecodeDraco(data, &mesh); !status.ok())
+      return Status::Invalid("{} {}", where, status.errors().front().message);
+    std::uint64_t size = 4 * mesh.triangles.size();
+    for (const DracoAttribute& attribute : mesh.attributes) size += attribute.values.size();
+    KPSA_RETURN_IF_ERROR(document_.budget.TakeWork(size + mesh.memory, where));
+    KPSA_RETURN_IF_ERROR(TakeRoom(size, where));
+    for (DracoAttribute& attribute : mesh.attributes)
+      decoded->values.emplace_back(attribute.name, AddBufferView(std::move(attribute.values)));
+    std::vector<std::uint8_t> bytes(4 * mesh.triangles.size());
+    if (!bytes.empty()) std::memcpy(bytes.data(), mesh.triangles.data(), bytes.size());
+    decoded->triangles = AddBufferView(std::move(bytes));
+    decoded->indices = mesh.triangles.size();
+    return {};
+  }
   // Others are not decoded: nobody asks for them.
   static bool IsRead(const std::string& name) {
     return name == "POSITION" || name == "COLOR_0" || name == "TEXCOORD_0" || name.starts_with("JOINTS_") ||
@@ -147,13 +173,16 @@ class Decompressor {
     document_.buffers.push_back(std::move(bytes));
     return static_cast<int>(document_.buffers.size() - 1);
   }
-  // A copy of an accessor over values of its own; the old one may have other users.
-  int AddAccessor(tinygltf::Accessor accessor, std::size_t count, std::vector<std::uint8_t> values) {
+  int AddBufferView(std::vector<std::uint8_t> values) {
     tinygltf::BufferView view;
     view.byteLength = values.size();
     view.buffer = AddBuffer(std::move(values));
     model_.bufferViews.push_back(std::move(view));
-    accessor.bufferView = static_cast<int>(model_.bufferViews.size() - 1);
+    return static_cast<int>(model_.bufferViews.size() - 1);
+  }
+  // A copy of an accessor over all of a view; the old one may have other users.
+  int AddAccessor(tinygltf::Accessor accessor, std::size_t count, int view) {
+    accessor.bufferView = view;
     accessor.byteOffset = 0;
     accessor.count = count;
     accessor.sparse.isSparse = false;
@@ -164,6 +193,7 @@ class Decompressor {
   tinygltf::Model& model_;
   Document& document_;
   std::uint64_t room_ = kFreeDecoded, unread_ = kFreeRead;
+  std::map<Request, Decoded> decoded_;
   int primitives_with_fewer_ = 0;
 };
 

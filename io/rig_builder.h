@@ -65,6 +65,7 @@ struct Reference {
   std::string file;
   NodeId root;           // the transform `hero`; all that stands in the world there hangs under it
   Index begin, end = 0;  // indices of the nodes that it brings
+  bool Brought(NodeId node) const { return node.index >= begin && node.index < end; }
 };
 
 // A clip, or one of the rig's own, from a time on.
@@ -116,6 +117,9 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
 // Where the node stands that a message of the compiler or an evaluation begins with ("node \"mush\"
 // (deltaMush): ..."); the rig itself where that is a node of the character, or none.
 SourceLocation PlaceOfMessage(const Rig& rig, std::string_view message);
+
+// The reference that brought a node, within others the innermost one; null for the rig's own nodes.
+const Reference* InnermostReference(const Rig& rig, NodeId node);
 
 // Another clip for a loaded rig (none: the rest pose); nodes and plugs of the rig itself stay as they are.
 // Characters that the clip is not of go on with their own.

@@ -250,6 +250,23 @@ bool Same(const YamlNode& a, const YamlNode& b, bool ordered) {
   return true;
 }
 
+// With kNoComment for each #, what stood in comments is part of what a file says; a # within a scalar makes
+// no other difference.
+constexpr char kNoComment = '_';
+
+bool SameUncommented(const YamlNode& said, const YamlNode& says) {
+  const auto same = [](const std::vector<YamlNode>& a, const std::vector<YamlNode>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), SameUncommented);
+  };
+  const auto uncommented = [](std::string text) {
+    std::replace(text.begin(), text.end(), '#', kNoComment);
+    return text;
+  };
+  return said.kind == says.kind && uncommented(said.scalar) == uncommented(says.scalar) &&
+         uncommented(said.tag) == uncommented(says.tag) && same(said.keys, says.keys) &&
+         same(said.items, says.items);
+}
+
 }  // namespace
 
 Result<std::string> FormatRig(const YamlNode& root, const NodeRegistry& registry) {
@@ -265,37 +282,13 @@ Result<std::string> FormatRig(const YamlNode& root, const NodeRegistry& registry
 }
 
 bool HasComments(std::string_view text) {
-  enum class In : std::uint8_t { kNothing, kPlain, kProperty, kSingle, kDouble };  // kind of token
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; };
-  In in = In::kNothing;
-  int flow = 0;  // open brackets
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i], next = i + 1 < text.size() ? text[i + 1] : '\n';
-    if (in == In::kSingle || in == In::kDouble) {
-      if (in == In::kDouble && c == '\\') ++i;
-      if (c == (in == In::kSingle ? '\'' : '"')) in = In::kNothing;
-      continue;
-    }
-    if (c == '#' && (i == 0 || blank(text[i - 1]))) return true;
-    const bool bracket = flow > 0 && std::string_view(",[]{}").find(c) != std::string_view::npos;
-    const bool colon =
-        c == ':' &&
-        (blank(next) || (flow > 0 && std::string_view(",[]{}").find(next) != std::string_view::npos));
-    if (in == In::kPlain && c != '\n' && !bracket && !colon) continue;
-    if (in == In::kProperty && !blank(c) && !bracket) continue;
-    in = In::kNothing;
-    if (blank(c) || c == ',' || c == ':' || ((c == '-' || c == '?') && blank(next))) continue;
-    if (c == '[' || c == '{') {
-      ++flow;
-    } else if (c == ']' || c == '}') {
-      flow = std::max(0, flow - 1);
-    } else if (c == '\'' || c == '"') {
-      in = c == '"' ? In::kDouble : In::kSingle;
-    } else {
-      in = c == '&' || c == '!' || c == '*' ? In::kProperty : In::kPlain;
-    }
-  }
-  return false;
+  if (text.find('#') == std::string_view::npos) return false;
+  if (text.starts_with('%') || text.find("\n%") != std::string_view::npos)
+    return true;  // of a directive, too
+  std::string uncommented(text);
+  std::replace(uncommented.begin(), uncommented.end(), '#', kNoComment);
+  const Result<YamlNode> said = ParseYaml(text, ""), says = ParseYaml(uncommented, "");
+  return !said.ok() || !says.ok() || !SameUncommented(*said, *says);
 }
 
 }  // namespace kpsa

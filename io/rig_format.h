@@ -16,7 +16,7 @@ namespace kpsa {
 // what has no other form: tags.
 Result<std::string> FormatRig(const YamlNode& root, const NodeRegistry& registry);
 
-// Whether the text of a YAML file has comments.
+// Whether the text of a YAML file has comments. Also true where it is no such text but has a #.
 bool HasComments(std::string_view text);
 
 }  // namespace kpsa

@@ -260,10 +260,10 @@ bool RigBuild::FindMap(const YamlNode& reference, const std::string& key, int so
   if (!Fail(reference.where(), found.status())) return false;
   *map = *found;
   if (!FindGeometry(reference, made, **file, path, of)) return false;
-  const Index v = FirstOutOfRange(**file, **map);
-  return v == kNoIndex ||
+  const auto outside = FirstOutOfRange(**file, **map);
+  return !outside.has_value() ||
          errors_->Add(reference, "{}: {} is outside of 0 to 1: vertex {} of map \"{}\" in {}", key,
-                      DenseWeights(**file, **map)[v], v, (*map)->name, path);
+                      outside->second, outside->first, (*map)->name, path);
 }
 
 // The geometry of the deformer that a weight file is for.

@@ -63,8 +63,7 @@ class Mover {
       if (node.version == 0) continue;
       const std::vector<AttributeDef>& attributes = graph_.def(node).attributes;
       for (std::size_t a = 0; a < attributes.size(); ++a) {
-        if (attributes[a].output || !(attributes[a].world_place || attributes[a].name == "parentMatrix"))
-          continue;
+        if (!attributes[a].world_place) continue;
         const PlugRef plug{node, static_cast<int>(a), -1, -1};
         if (graph_.FindValue(plug) == nullptr && graph_.FindConnection(plug) == nullptr)
           edit.Connect(world, plug);
@@ -285,9 +284,17 @@ Status AddReference(const ReferencePlace& place, LoadedRig from, LoadedRig* to) 
 
 const Reference* ReferenceOf(const Rig& rig, NodeId node) {
   for (const Reference& reference : rig.references) {
-    if (node.index >= reference.begin && node.index < reference.end) return &reference;
+    if (reference.Brought(node)) return &reference;
   }
   return nullptr;
+}
+
+const Reference* InnermostReference(const Rig& rig, NodeId node) {
+  const Reference* innermost = nullptr;  // references come before those within them
+  for (const Reference& reference : rig.references) {
+    if (reference.Brought(node)) innermost = &reference;
+  }
+  return innermost;
 }
 
 bool IsReferenceRoot(const Rig& rig, NodeId node) {

@@ -241,11 +241,22 @@ Result<const NamedWeights*> FindWeights(const WeightFile& file, const std::strin
   return Status::Invalid("{} has no map \"{}\"{}", path, *map, DidYouMean(*map, names));
 }
 
-Index FirstOutOfRange(const WeightFile& file, const NamedWeights& map) {
-  const std::vector<float> weights = DenseWeights(file, map);
-  const auto first = std::find_if(weights.begin(), weights.end(),
-                                  [](float weight) { return !(weight >= 0 && weight <= 1); });
-  return first == weights.end() ? kNoIndex : static_cast<Index>(first - weights.begin());
+std::optional<std::pair<Index, float>> FirstOutOfRange(const WeightFile& file, const NamedWeights& map) {
+  const auto outside = [](float weight) { return !(weight >= 0 && weight <= 1); };
+  std::optional<std::pair<Index, float>> first;
+  const auto take = [&](Index point, float weight) {
+    if (!first.has_value() || point < first->first) first.emplace(point, weight);
+  };
+  for (std::size_t i = 0; i < map.indices.size(); ++i) {
+    if (outside(map.values[i])) take(map.indices[i], map.values[i]);
+  }
+  if (!outside(map.default_value)) return first;
+  std::vector<Index> listed = map.indices;
+  std::sort(listed.begin(), listed.end());
+  Index point = 0;  // the first that is not listed
+  while (point < listed.size() && listed[point] == point) ++point;
+  if (point < file.points) take(point, map.default_value);
+  return first;
 }
 
 std::string WeightFileText(const WeightFile& file) {

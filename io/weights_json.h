@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/status.h"
@@ -47,9 +48,9 @@ WeightReference SplitWeightReference(const std::string& text);
 Result<const NamedWeights*> FindWeights(const WeightFile& file, const std::string& path,
                                         const std::optional<std::string>& map);
 
-// The first point that weighs less than 0 or more than 1; kNoIndex where none does. Maps of deformers,
-// falloffs and members have none; those of skins are divided by their sum.
-Index FirstOutOfRange(const WeightFile& file, const NamedWeights& map);
+// The first point that weighs less than 0 or more than 1, and its weight. Maps of deformers, falloffs and
+// members have none; those of skins are divided by their sum.
+std::optional<std::pair<Index, float>> FirstOutOfRange(const WeightFile& file, const NamedWeights& map);
 
 // One map a line, and the fewest digits that read back as the same floats.
 std::string WeightFileText(const WeightFile& file);

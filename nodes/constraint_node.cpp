@@ -13,6 +13,7 @@ NodeBuilder AddConstraint(NodeRegistry& registry, std::string name, std::string 
       .array()
       .in("inMatrix", Matrix4(), {.doc = "the local matrix below: what the clip or the rest pose says"})
       .in("parentMatrix", Matrix4(), {.doc = "worldMatrix of the constrained transform's parent"})
+      .world_place()
       .in("blend", 1.0, {.min = 0, .max = 1, .doc = "0: inMatrix, 1: the constraint"})
       .structural("maintainOffset", false, {.doc = "keeps how the constrained lies to its targets at rest"});
   return b;

@@ -160,6 +160,7 @@ void AddCurveNodes(NodeRegistry& registry) {
       .unit(Unit::kLength)
       .default_from(RestOffsets)
       .in("parentMatrix", Matrix4(), {.doc = "turns the offsets; `parent:` connects it"})
+      .world_place()
       .out("displacements", Type::kPoints, "the offsets in world axes")
       .unit(Unit::kLength)
       .compute(&ComputeDisplacements)

@@ -13,7 +13,8 @@ NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string do
   builder.category("deformer");
   builder.points_in("inPoints", "the points to deform").per_geometry();
   builder.in("envelope", 1.0, {.min = 0, .max = 1, .doc = "0 leaves the points alone, 1 deforms them fully"});
-  builder.in("parentMatrix", Matrix4(), {.doc = "carries the deformer's frame; `parent:` connects it"});
+  builder.in("parentMatrix", Matrix4(), {.doc = "carries the deformer's frame; `parent:` connects it"})
+      .world_place();
   builder.structural("weights", Type::kAsset, {.doc = "weight map times membership; 1 where unset"})
       .per_geometry();
   builder.structural("mesh", Type::kMesh, {.doc = "the topology of the geometry"}).per_geometry();

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -59,12 +60,12 @@ void AddDriver(NodeBuilder& b) {
                {.doc = "world from the driver's space at rest, where its stage is in mesh space"});
 }
 
-Result<const Mesh*> DriverMesh(const Structural& s, std::size_t points) {
+Result<const Mesh*> DriverMesh(const Structural& s, std::optional<std::size_t> points) {
   const auto* mesh = s.asset<Mesh>("driverMesh");
   if (mesh == nullptr || !s.is_set("driverPoints"))
     return Status::Invalid("it has no driver: name a mesh, `driver: MESH` or `driver: \"MESH@STAGE\"`");
-  if (points != mesh->point_count())
-    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", mesh->point_count(), points);
+  if (points.has_value() && *points != mesh->point_count())
+    return Status::Invalid("its driver's mesh has {} points, driverPoints {}", mesh->point_count(), *points);
   if (mesh->data().triangles.empty())
     return Status::Invalid("its driver \"{}\" has no faces", mesh->data().name);
   return mesh;
@@ -82,19 +83,17 @@ Result<Driver> BindDriver(const Structural& s, DriverTree tree) {
 
 Result<Driver> BindDriver(const Structural& s, DriverTree tree, const Matrix4& stage_from_driver) {
   const Value* value = s.rest("driverPoints");
-  const bool known = value != nullptr && value->points() != nullptr;
-  const auto* of = s.asset<Mesh>("driverMesh");
-  const Result<const Mesh*> mesh = DriverMesh(s, known           ? value->points()->count()
-                                                 : of != nullptr ? of->point_count()
-                                                                 : 0);
+  const PointBuffer* rest = value == nullptr ? nullptr : value->points();
+  const Result<const Mesh*> mesh =
+      DriverMesh(s, rest == nullptr ? std::nullopt : std::optional(rest->count()));
   if (!mesh.ok()) return mesh.status();
-  if (!known) return Status::Invalid("its driver has no rest shape");
+  if (rest == nullptr) return Status::Invalid("its driver has no rest shape");
   Status error;
   Driver driver;
   driver.stage_from_driver = stage_from_driver;
   driver.topology = TopologyOf(*mesh, &error);
   if (driver.topology == nullptr) return error;
-  const ConstPointsView points = value->points()->view();
+  const ConstPointsView points = rest->view();
   for (std::size_t i = 0; i < points.count; ++i) {
     if (!std::isfinite(points.x[i]) || !std::isfinite(points.y[i]) || !std::isfinite(points.z[i]))
       return Status::Invalid("point {} of its driver is not finite at rest", i);

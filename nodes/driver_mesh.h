@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/triangle_tree.h"
@@ -18,9 +19,9 @@ inline constexpr int kDriverPoints = kFirstOwnInput;
 // Declares driverPoints, driverMesh and driverMatrix; the first inputs of a deformer's own.
 void AddDriver(NodeBuilder& builder);
 
-// The mesh of a driver whose points are so many. Errors: driverMesh or driverPoints is missing, another
-// number of points than the mesh has, no faces.
-Result<const Mesh*> DriverMesh(const Structural& structural, std::size_t points);
+// The mesh of a driver whose points are so many (unset: nobody knows). Errors: driverMesh or driverPoints is
+// missing, another number of points than the mesh has, no faces.
+Result<const Mesh*> DriverMesh(const Structural& structural, std::optional<std::size_t> points);
 
 // The driver at rest in the space of the stage, with a tree over its triangles or over its single points.
 struct DriverRest {

@@ -1,8 +1,11 @@
 // Falloffs that may vary: weights of points by where they are now, for the `falloffWeights` of deformers
 // (Maya: primitiveFalloff, proximityFalloff, blendFalloff). Each serves several geometries: element i of
 // inPoints, geometryMatrix and outputWeights.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "base/falloff_shapes.h"
 #include "base/matrix.h"
@@ -61,29 +64,29 @@ void ForPoints(const ComputeContext& c, const Matrix4& m, F weight) {
   });
 }
 
-// A step at the radius where `start` is no less; a radius of nothing holds its middle only.
-double ByDistance(double distance, double start, double radius, FalloffFade fade) {
-  start = std::max(0.0, start);
-  if (radius > start) return DistanceFalloff(distance - start, radius - start, fade);
+// A step at the radius where `full` is no less; a radius of nothing holds its middle only.
+double ByDistance(double distance, double full, double radius, FalloffFade fade) {
+  full = std::max(0.0, full);
+  if (radius > full) return DistanceFalloff(distance - full, radius - full, fade);
   return distance > std::max(0.0, radius) ? 0 : 1;
 }
 
 void ComputeSphere(ComputeContext& c) {
   const auto& place = c.kernel_as<FalloffPlace>();
-  const double radius = c.get<double>(kOwn + 1), start = c.get<double>(kOwn + 2);
+  const double radius = c.get<double>(kOwn + 1), full = c.get<double>(kOwn + 2);
   Matrix4 from_world;
   const bool there = Invert(c.get<Matrix4>(kOwn), &from_world);
   ForPoints(c, from_world * place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
-            [&](Double3 p) { return there ? ByDistance(Length(p), start, radius, place.fade) : 0; });
+            [&](Double3 p) { return there ? ByDistance(Length(p), full, radius, place.fade) : 0; });
 }
 
 void ComputeCapsule(ComputeContext& c) {
   const auto& place = c.kernel_as<FalloffPlace>();
   const Double3 a = TransformPoint(c.get<Matrix4>(kOwn), {}),
                 b = TransformPoint(c.get<Matrix4>(kOwn + 1), {});
-  const double radius = c.get<double>(kOwn + 2), start = c.get<double>(kOwn + 3);
+  const double radius = c.get<double>(kOwn + 2), full = c.get<double>(kOwn + 3);
   ForPoints(c, place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
-            [&](Double3 p) { return ByDistance(SegmentDistance(p, a, b), start, radius, place.fade); });
+            [&](Double3 p) { return ByDistance(SegmentDistance(p, a, b), full, radius, place.fade); });
 }
 
 void ComputePlane(ComputeContext& c) {
@@ -125,7 +128,7 @@ Result<BoundKernel> BindProximity(const Binding& binding) {
 void ComputeProximity(ComputeContext& c) {
   const auto& bound = c.kernel_as<Proximity>();
   const Matrix4& parent = c.get<Matrix4>(kFalloffParent);
-  const double radius = c.get<double>(kOwn + 1), start = c.get<double>(kOwn + 2);
+  const double radius = c.get<double>(kOwn + 1), full = c.get<double>(kOwn + 2);
   ConstPointsView surface = c.points(kOwn);
   if (bound.carried) {
     const ConstPointsView driver = surface;
@@ -147,7 +150,7 @@ void ComputeProximity(ComputeContext& c) {
   ForPoints(c, bound.place.WorldFromPoints(parent), [&](Double3 p) {
     const SurfacePoint near = tree.Closest(surface, boxes, p, std::max(radius, 0.0));
     return near.triangle == kNoIndex ? 0
-                                     : ByDistance(std::sqrt(near.squared), start, radius, bound.place.fade);
+                                     : ByDistance(std::sqrt(near.squared), full, radius, bound.place.fade);
   });
 }
 
@@ -207,12 +210,14 @@ void ComputeCombine(ComputeContext& c) {
   });
 }
 
-NodeBuilder AddFalloff(NodeRegistry& registry, const char* name, const char* doc) {
+NodeBuilder AddFalloff(NodeRegistry& registry, const char* name, const char* doc,
+                       std::string_view carried = "points") {
   NodeBuilder b = registry.add(name, doc);
   b.category("falloff");
   b.points_in("inPoints", "the points, as they come to the deformer").per_geometry();
   b.in("parentMatrix", Matrix4(),
-       {.doc = "what carries points (and a driver) from before a skin; `parent:` connects it"});
+       {.doc = fmt::format("what carries {} from before a skin; `parent:` connects it", carried)})
+      .world_place();
   b.structural("geometryMatrix", Matrix4(),
                {.doc = "world from the points' space at rest, where they are before the skin"})
       .per_geometry();
@@ -222,7 +227,7 @@ NodeBuilder AddFalloff(NodeRegistry& registry, const char* name, const char* doc
 
 void AddRadius(NodeBuilder& b, const char* where) {
   b.in("radius", 1.0, {.min = 0, .unit = Unit::kLength, .doc = std::string("where it is 0; ") + where});
-  b.in("start", 0.0,
+  b.in("fullRadius", 0.0,
        {.min = 0, .unit = Unit::kLength, .doc = "up to where it is 1; as large as the radius: a step"});
 }
 
@@ -257,7 +262,8 @@ void AddFalloffNodes(NodeRegistry& registry) {
   FinishFalloff(plane, &ComputePlane, BindShape);
 
   NodeBuilder proximity = AddFalloff(registry, "proximityFalloff",
-                                     "1 on the surface of a mesh, which may move; 0 at the radius from it.");
+                                     "1 on the surface of a mesh, which may move; 0 at the radius from it.",
+                                     "points and a driver");
   AddDriver(proximity);
   AddRadius(proximity, "in the world");
   proximity.version(2);  // carries its driver

@@ -170,6 +170,7 @@ void AddIkNodes(NodeRegistry& registry) {
       .in("inStartMatrix", Matrix4(), {.doc = "the start's local matrix below: of the clip or the rest pose"})
       .in("inMidMatrix", Matrix4(), {.doc = "the middle's local matrix below"})
       .in("parentMatrix", Matrix4(), {.doc = "worldMatrix of the start's parent"})
+      .world_place()
       .in("betweenMatrix", Matrix4(), {.doc = "local matrices of the joints between start and middle"})
       .array()
       .in("belowMatrix", Matrix4(), {.doc = "local matrices of the joints below the middle, the end's last"})

@@ -235,6 +235,7 @@ void AddIlluminationNodes(NodeRegistry& registry) {
       registry.add("indirectIllumination",
                    "Irradiance that surfaces give each other, at the pixels of a camera: path tracing.");
   b.category("light");
+  b.version(2);  // one normal where more than 128 triangles meet
   b.points_in("points", "world positions of a mesh").array();
   b.structural("mesh", Type::kMesh, {.doc = "the triangles and base colours of points[i]"}).array();
   b.in("worldFromScreen", Matrix4(), {.doc = "of a camera"});

@@ -11,18 +11,13 @@ namespace {
 
 constexpr int kOffset = kDriverPoints + 1;
 
-Result<ShrinkWrapSettings> Settings(const Structural& s) {
+ShrinkWrapSettings Settings(const Structural& s) {
   ShrinkWrapSettings settings;
   settings.projection = static_cast<ShrinkWrapSettings::Projection>(s.get_int("projection"));
   settings.side = static_cast<ShrinkWrapSettings::Side>(s.get_int("side"));
   settings.reverse = s.get_bool("reverse");
   settings.bidirectional = s.get_bool("bidirectional");
   settings.closest_if_no_intersection = s.get_bool("closestIfNoIntersection");
-  const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
-  if (!frame.ok()) return frame.status();
-  const Double3 axis = TransformVector(frame->stage_from_world(), s.value("axis").get<Double3>());
-  if (!(Length(axis) > 0)) return Status::Invalid("axis: expected a direction, not of length 0");
-  settings.axis = axis * (1 / Length(axis));
   return settings;
 }
 
@@ -40,43 +35,45 @@ void DemandShrinkWrap(Demand& demand) {
   const Structural& s = demand.structural();
   const PointSet& out = demand.output("outPoints");
   demand.Require("driverPoints", -1, PointSet::All(demand.input_total("driverPoints", -1)));
-  const Result<ShrinkWrapSettings> settings = Settings(s);
+  const ShrinkWrapSettings settings = Settings(s);
   Status error;
-  const bool normals = settings.ok() && settings->projection == ShrinkWrapSettings::Projection::kNormals;
+  const bool normals = settings.projection == ShrinkWrapSettings::Projection::kNormals;
   const Topology* own = normals && !out.is_all() ? OwnTopology(s, out, &error) : nullptr;
   demand.Require(
       "inPoints", 0,
       own == nullptr
           ? out
-          : PointSet::Of(ShrinkWrapDemand(*settings, *own, out.ToVector(), WeightsAt(s, out)), out.total()));
+          : PointSet::Of(ShrinkWrapDemand(settings, *own, out.ToVector(), WeightsAt(s, out)), out.total()));
 }
 
 struct ShrinkWrapBound {
   ShrinkWrapKernel kernel;
   CarriedFrame frame;
   double scale;  // stage lengths of a world length 1
+  Double3 axis;  // at rest, unit length, in the stage
 };
 
 Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
   const Structural& s = binding.structural();
   const PointSet &out = binding.output("outPoints"), &in = binding.input("inPoints");
-  const Result<ShrinkWrapSettings> settings = Settings(s);
-  if (!settings.ok()) return settings.status();
+  const ShrinkWrapSettings settings = Settings(s);
+  const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  const Double3 axis = TransformVector(frame->stage_from_world(), s.value("axis").get<Double3>());
+  if (!(Length(axis) > 0)) return Status::Invalid("axis: expected a direction, not of length 0");
   const Result<Driver> driver = BindDriver(s, DriverTree::kTriangles);
   if (!driver.ok()) return driver.status();
   static const Topology kNone;
   const Topology* own = &kNone;
-  if (settings->projection == ShrinkWrapSettings::Projection::kNormals) {
+  if (settings.projection == ShrinkWrapSettings::Projection::kNormals) {
     Status error;
     own = OwnTopology(s, out, &error);
     if (own == nullptr) return error;
   }
-  const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
-  if (!frame.ok()) return frame.status();
   ShrinkWrapBound bound{
-      ShrinkWrapKernel(*settings, *driver->topology, driver->rest->tree, driver->stage_from_driver, *own,
+      ShrinkWrapKernel(settings, *driver->topology, driver->rest->tree, driver->stage_from_driver, *own,
                        out.ToVector(), in.ToVector(), BoundWeights(binding)),
-      *frame, 1 / frame->WorldScale()};
+      *frame, 1 / frame->WorldScale(), axis * (1 / Length(axis))};
   const std::size_t scratch = bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
 }
@@ -84,10 +81,12 @@ Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
 void ComputeShrinkWrap(ComputeContext& c) {
   const auto& bound = c.kernel_as<ShrinkWrapBound>();
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({c.get<double>(kEnvelope), c.get<double>(kOffset) * bound.scale, c.points(kDriverPoints),
-                    bound.frame.Motion(c.get<Matrix4>(kParentMatrix))},
-                   c.points(kInPoints), c.out_points(0), ScratchSpan(c, bound.kernel.ScratchFloats()),
-                   &parallel);
+  const Matrix4 motion = bound.frame.Motion(c.get<Matrix4>(kParentMatrix));
+  // An axis that nothing turns keeps its bits
+  const Double3 axis = motion == Matrix4() ? bound.axis : UnitOrZero(TransformVector(motion, bound.axis));
+  bound.kernel.Run(
+      {c.get<double>(kEnvelope), c.get<double>(kOffset) * bound.scale, c.points(kDriverPoints), axis},
+      c.points(kInPoints), c.out_points(0), ScratchSpan(c, bound.kernel.ScratchFloats()), &parallel);
 }
 
 }  // namespace

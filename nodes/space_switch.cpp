@@ -73,6 +73,7 @@ void AddSpaceSwitchNode(NodeRegistry& registry) {
           {.min = 0, .doc = "number of the space; between two numbers it goes from one to the next"})
       .in("inMatrix", Matrix4(), {.doc = "the local matrix below: what the clip or the rest pose says"})
       .in("parentMatrix", Matrix4(), {.doc = "worldMatrix of the constrained transform's parent"})
+      .world_place()
       .in("blend", 1.0, {.min = 0, .max = 1, .doc = "0: under the parent, 1: in the space"})
       .structural("maintainOffset", true,
                   {.doc = "the spaces take over from the parent as it lies to them at rest; off: inMatrix is "

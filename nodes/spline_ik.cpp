@@ -157,6 +157,7 @@ void AddSplineIkNode(NodeRegistry& registry) {
       .array()
       .in("tipMatrix", Matrix4(), {.doc = "the end's local matrix"})
       .in("parentMatrix", Matrix4(), {.doc = "worldMatrix of the first joint's parent"})
+      .world_place()
       .in("startTwist", 0.0, {.unit = Unit::kAngle, .doc = "about the first bone"})
       .in("endTwist", 0.0, {.unit = Unit::kAngle, .doc = "about the last bone; those between get a share"})
       .in("blend", 1.0, {.min = 0, .max = 1, .doc = "0: the matrices below, 1: along the curve"})

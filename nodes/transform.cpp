@@ -75,6 +75,7 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "xyz turns about X first")
       .in("offsetParentMatrix", Matrix4(), {.doc = "the rest pose, or what the clip makes of it"})
       .in("parentMatrix", Matrix4(), {.doc = "the parent's worldMatrix"})
+      .world_place()
       .structural("restMatrix", Matrix4(),
                   {.doc = "the local matrix at rest, for poseRotate, swing and twist"})
       .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")

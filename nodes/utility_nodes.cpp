@@ -24,6 +24,7 @@ Double3 SetRange(Double3 value, Double3 low, Double3 high, Double3 old_low, Doub
   return value;
 }
 
+// As UnitOrZero, but also of lengths whose squares are 0 or not finite.
 Double3 UnitLength(Double3 v) {
   Double3 unit;
   return Direction(v, 0, &unit) ? unit : Double3();

@@ -109,6 +109,7 @@ void AddVrmConstraintNodes(NodeRegistry& registry) {
                            "Points an axis of a transform at its source, by the smallest turn from rest.",
                            "the source's worldMatrix");
   aim.in("parentMatrix", Matrix4(), {.doc = "worldMatrix of the constrained transform's parent"})
+      .world_place()
       .enumeration("aimAxis", {"positiveX", "negativeX", "positiveY", "negativeY", "positiveZ", "negativeZ"},
                    true, "own axis that points at the source")
       .out("outMatrix", Type::kMatrix, kVrmOutDoc)

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "graph/graph.h"
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
@@ -69,14 +68,13 @@ void ComputeExpressions(ComputeContext& c) {
       held_back[held] += k.rules[i].overrides[held] == kHoldsAll ? 1 : value;
     }
   }
-  const std::uint32_t* table = c.out + c.out[0];
-  for (std::uint32_t i = 0; i < table[0]; ++i) {
+  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
     double value = k.Value(weights, i);
     if (i < k.rules.size() && k.rules[i].kind != 0) {
       const double back = held_back[k.rules[i].kind - 1];
       value = back > 0 && k.rules[i].binary ? 0 : value * (1 - std::min(back, 1.0));
     }
-    *reinterpret_cast<double*>(c.values + table[1 + i]) = value;
+    c.out_value<double>(0, i) = value;
   }
 }
 
@@ -97,15 +95,13 @@ Result<BoundKernel> BindMorphWeights(const Binding& binding) {
     return Status::Invalid("targets has {} entries, expressions {}, shares {}; expected as many of each",
                            targets.size(), expressions.size(), shares.size());
   }
-  AttributeDef list;
-  list.array = true;
-  const std::int64_t most = Graph::MaxElements(list);
   MorphWeightsKernel kernel;
   for (std::size_t i = 0; i < targets.size(); ++i) {
     for (const auto& [name, value] :
          {std::pair("targets", targets[i]), std::pair("expressions", expressions[i])}) {
-      if (value < 0 || value >= most)
-        return Status::Invalid("{}: entry {} is {}, expected an index below {}", name, i, value, most);
+      if (value < 0 || value >= kMaxArrayElements)
+        return Status::Invalid("{}: entry {} is {}, expected an index below {}", name, i, value,
+                               kMaxArrayElements);
     }
     kernel.binds.push_back(
         {static_cast<std::uint32_t>(targets[i]), static_cast<std::uint32_t>(expressions[i]), shares[i]});
@@ -118,16 +114,15 @@ Result<BoundKernel> BindMorphWeights(const Binding& binding) {
 void ComputeMorphWeights(ComputeContext& c) {
   const auto& k = c.kernel_as<MorphWeightsKernel>();
   const ArrayView<double> weights = c.array<double>(0), expressions = c.array<double>(1);
-  const std::uint32_t* table = c.out + c.out[0];
   auto bind = k.binds.begin();
-  for (std::uint32_t i = 0; i < table[0]; ++i) {
+  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
     double weight = i < weights.size() ? weights[i] : 0.0;
     if (bind != k.binds.end() && bind->target == i) {
       for (; bind != k.binds.end() && bind->target == i; ++bind)
         weight += bind->expression < expressions.size() ? expressions[bind->expression] * bind->share : 0.0;
       weight = std::clamp(weight, 0.0, 1.0);
     }
-    *reinterpret_cast<double*>(c.values + table[1 + i]) = weight;
+    c.out_value<double>(0, i) = weight;
   }
 }
 

@@ -13,9 +13,10 @@ namespace {
 
 constexpr std::size_t kFrameGrain = 512;
 
+// Unlike UnitOrZero's, what is not a number stays that: where the driver has no place, its points have none.
 Double3 Unit(Double3 v) {
   const double length = Length(v);
-  return length == 0 ? v : v * (1 / length);  // not a number stays what it is
+  return length == 0 ? v : v * (1 / length);
 }
 
 Matrix4 Columns(Double3 a, Double3 b, Double3 c) {

@@ -165,17 +165,24 @@ void PathTracer::ComputeNormals(ConstPointsView points, const Parallel* parallel
   ForRanges(parallel, points.count, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       const std::span<const Index> around(around_.data() + offsets_[p], offsets_[p + 1] - offsets_[p]);
-      const bool many = around.size() > kMany;
-      Double3 all;
-      for (std::size_t i = 0; many && i < around.size(); ++i) all = all + faces_[around[i]];
-      for (const Index t : around) {
-        Double3 sum = all;
-        for (std::size_t i = 0; !many && i < around.size(); ++i) {
-          if (Dot(normals_[around[i]], normals_[t]) >= kCrease) sum = sum + faces_[around[i]];
-        }
+      const auto set = [&](Index t, Double3 normal) {
         for (std::size_t c = 3 * std::size_t{t}; c < 3 * std::size_t{t} + 3; ++c) {
-          if (corners_[c] == p) corner_normals_[c] = UnitOrZero(sum);
+          if (corners_[c] == p) corner_normals_[c] = normal;
         }
+      };
+      if (around.size() > kMany) {
+        Double3 sum;
+        for (const Index t : around) sum = sum + faces_[t];
+        const Double3 normal = UnitOrZero(sum);
+        for (const Index t : around) set(t, normal);
+        continue;
+      }
+      for (const Index t : around) {
+        Double3 sum;
+        for (const Index other : around) {
+          if (Dot(normals_[other], normals_[t]) >= kCrease) sum = sum + faces_[other];
+        }
+        set(t, UnitOrZero(sum));
       }
     }
   });

@@ -169,8 +169,6 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
   tree_.Fit(target.points, boxes);
   target.boxes = boxes;
   next += Padded(boxes.size());
-  const Double3 axis =
-      inputs.turn == Matrix4() ? settings_.axis : UnitOrZero(TransformVector(inputs.turn, settings_.axis));
   PointsView normals;
   if (normals_.has_value()) {
     normals = ViewIn(next, normals_->point_count());
@@ -188,7 +186,7 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
       } else if (settings_.projection == ShrinkWrapSettings::Projection::kClosest) {
         goal = Nearest(target, p, inputs.offset);
       } else if (settings_.projection == ShrinkWrapSettings::Projection::kAxis) {
-        goal = AlongLine(target, p, axis, inputs.offset);
+        goal = AlongLine(target, p, inputs.axis, inputs.offset);
       } else {
         const Double3 normal = At(normals, normal_of_[i]);
         goal =

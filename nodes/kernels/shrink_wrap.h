@@ -29,7 +29,6 @@ struct ShrinkWrapSettings {
     kInside,
   };
   Projection projection = Projection::kClosest;
-  Double3 axis{0, 1, 0};                    // of kAxis, unit length, in the points' space
   bool reverse = false;                     // lines go against the normal or axis
   bool bidirectional = false;               // and both ways: the nearer hit counts
   bool closest_if_no_intersection = false;  // where a line meets nothing; otherwise such points stay
@@ -47,7 +46,7 @@ class ShrinkWrapKernel {
     double envelope = 1;
     double offset = 0;       // points' space
     ConstPointsView target;  // all of its points, in its own space
-    Matrix4 turn = {};       // of the axis since rest
+    Double3 axis{0, 1, 0};   // of kAxis, unit length, in the points' space
   };
   // target, tree: the target's faces, the tree built at rest. own: the faces of the points that move
   // (kNormals only). in_points: sorted, at least the demand.

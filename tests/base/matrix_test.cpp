@@ -40,6 +40,9 @@ TEST(Vectors, UnitOrZeroHasNoOtherLength) {
   EXPECT_NEAR(Length(UnitOrZero({1e-3, 2, -5e4})), 1, 1e-15);
   EXPECT_EQ(UnitOrZero({}), Double3());
   EXPECT_EQ(UnitOrZero({1, NAN, 0}), Double3());
+  EXPECT_EQ(UnitOrZero({0, INFINITY, 0}), Double3());
+  EXPECT_EQ(UnitOrZero({1e200, 1, -1e200}), Double3());
+  EXPECT_EQ(UnitOrZero({0, 1e-170, 0}), Double3());
 }
 
 TEST(Matrix, EulerAnglesComeBackForEveryOrder) {

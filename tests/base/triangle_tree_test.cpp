@@ -262,8 +262,30 @@ TEST(TriangleTree, WhatIsNotFiniteTakesNoPart) {
   // A tree over such points is one, too
   const Soup again({kNan, 0, 0, 1, kNan, 0, 0, 0, 0, 1, 1, 1, 2, 1, 1, 1, 2, 1}, {0, 1, 2, 3, 4, 5});
   EXPECT_EQ(again.Closest({0, 0, 0}).triangle, 1u);
+  EXPECT_EQ(again.tree.Lowest(again.view(), again.boxes.span(), {0, 0, 0}, kInfinity).triangle, 1u);
   const Soup empty({0, 0, 0}, {});
   EXPECT_EQ(empty.Closest({0, 0, 0}).triangle, kNoIndex);
+}
+
+TEST(TriangleTree, LowestIsTheFirstWithinTheDistance) {
+  const Soup soup = RandomSoup(333, 18);
+  Places random(19);
+  int several = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Double3 p = random.Vector();
+    const double distance = 0.3 * (1 + random.Signed());
+    Index first = kNoIndex, within = 0;
+    for (Index t = 333; t-- > 0;) {
+      if (ClosestOnTriangle(soup.view(), &soup.triangles[3 * std::size_t{t}], p).squared >
+          distance * distance)
+        continue;
+      first = t;
+      ++within;
+    }
+    several += within > 1 ? 1 : 0;
+    EXPECT_EQ(soup.tree.Lowest(soup.view(), soup.boxes.span(), p, distance).triangle, first) << i;
+  }
+  EXPECT_GT(several, 100);
 }
 
 TEST(TriangleTree, FindsTheSameAmongCornersThatAreNotFinite) {

@@ -258,19 +258,46 @@ TEST(GltfDraco, WhatDoesNotFit) {
   EXPECT_NE(c.warnings[0].find("fewer triangles"), std::string::npos);
 }
 
-// Metadata and whatever else lies in the bytes is read anew for each primitive.
+// Many primitives that name the same bytes; where `differ`, each says another number of indices.
+GltfBuilder SharedBytes(std::size_t metadata_bytes, int primitives, bool differ) {
+  DracoCharacter character(3, draco::MESH_SEQUENTIAL_ENCODING, 0, metadata_bytes);
+  EXPECT_GT(character.data.size(), metadata_bytes);
+  GltfBuilder b = character.Document();
+  for (int i = 1; i < primitives; ++i) {
+    json primitive = b.root["meshes"][0]["primitives"][0];
+    if (differ) {
+      json indices = b.root["accessors"][static_cast<std::size_t>(character.grid.index)];
+      indices["count"] = indices["count"].get<int>() + 3 * i;
+      primitive["indices"] = b.root["accessors"].size();
+      b.root["accessors"].push_back(std::move(indices));
+    }
+    b.root["meshes"][0]["primitives"].push_back(std::move(primitive));
+  }
+  return b;
+}
+
+// Metadata and whatever else lies in the bytes is read anew for each primitive that asks for something else.
 TEST(GltfDraco, PrimitivesThatShareMuchAreRefused) {
-  const auto shared = [&](std::size_t metadata_bytes, int primitives) {
-    DracoCharacter character(3, draco::MESH_SEQUENTIAL_ENCODING, 0, metadata_bytes);
-    EXPECT_GT(character.data.size(), metadata_bytes);
-    GltfBuilder b = character.Document();
-    json& list = b.root["meshes"][0]["primitives"];
-    for (int i = 1; i < primitives; ++i) list.push_back(json(list[0]));
-    return LoadError(b.Glb());
-  };
-  EXPECT_EQ(shared(1 << 16, 100), "accepted");
-  const std::string error = shared(1 << 20, 100);
+  EXPECT_EQ(LoadError(SharedBytes(1 << 16, 100, true).Glb()), "accepted");
+  const std::string error = LoadError(SharedBytes(1 << 20, 100, true).Glb());
   EXPECT_NE(error.find("too many primitives share compressed bytes"), std::string::npos) << error;
+}
+
+// Variants of a material name one view; what it decodes to is shared.
+TEST(GltfDraco, PrimitivesMayBeTheSame) {
+  const gltf::Character one =
+      MustLoadText(DracoCharacter(3, draco::MESH_SEQUENTIAL_ENCODING).Document().Glb());
+  const gltf::Character many = MustLoadText(SharedBytes(1 << 20, 100, false).Glb());
+  ASSERT_EQ(many.meshes.at(0).primitives.size(), 100u);
+  const gltf::Mesh &a = one.meshes.at(0), &b = many.meshes.at(0);
+  ASSERT_EQ(b.positions.size(), 100 * a.positions.size());
+  for (std::size_t i = 0; i < b.positions.size(); ++i)
+    ASSERT_EQ(b.positions[i], a.positions[i % a.positions.size()]) << i;
+  for (std::size_t i = 0; i < 100; ++i) {
+    std::vector<Index> triangles = a.primitives.at(0).triangles;
+    for (Index& corner : triangles) corner += static_cast<Index>(i * a.vertex_count());
+    EXPECT_EQ(b.primitives[i].triangles, triangles) << i;
+  }
 }
 
 // Any outcome but a crash (run under sanitizers and valgrind, too).

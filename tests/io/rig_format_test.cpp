@@ -193,6 +193,21 @@ TEST(RigFormat, FindsComments) {
     EXPECT_FALSE(HasComments(text)) << text;
 }
 
+// In texts over several lines, and where only the reader of YAML knows what is one.
+TEST(RigFormat, FindsCommentsBesideLongTexts) {
+  for (const char* text :
+       {"a: x\n  'tis # gone\n", "a: |\n  'tis\nb: 1 # gone\n", "a: | # b\n  c\n", "a: |\n   b\n # c\n",
+        "- >-\n  \"b\n- c # d", "a: 'b\n  # c' # d", "a: b\n#", "# a\n--- # b\na: b\n"})
+    EXPECT_TRUE(HasComments(text)) << text;
+  for (const char* text :
+       {"%A # b\n---\na: b\n", "[a,#b\n c]", "a: \"\\x23\" # b", "a: &b 'c' # d\ne: *b", "a: b\n... # c\n"})
+    EXPECT_TRUE(HasComments(text)) << text;
+  for (const char* text :
+       {"a: x\n  y#\n  'tis#", "a: |\n  'tis\n  # b\nc: 1", "a: >2\n   # b\n\n  # c\n",
+        "- - |\n    # a\n- '\n  # b'", "a: \"b\n  # c\"", "a: \"\\x23 #\"", "a: &b '# c'\nd: *b", "a: _#"})
+    EXPECT_FALSE(HasComments(text)) << text;
+}
+
 // What a file says, whatever the order of its keys and the spelling of its numbers.
 std::string Meaning(const YamlNode& node) {
   std::vector<std::string> parts;

@@ -51,7 +51,7 @@ TEST_F(References, BringAllOfARigUnderTheirNamespace) {
       LoadedAlone("references: {a: {file: arm.yaml}, b: {file: arm.yaml, translate: [1, 0, 0]}}\n");
   EXPECT_EQ(Driver(rig, "a:arm:hand.parentMatrix"), "a:tip.worldMatrix");
   EXPECT_EQ(Driver(rig, "b:arm:hand.rotate"), "b:loose.rotate");
-  EXPECT_EQ(Driver(rig, fmt::format("b:/{}/node3/tip.parentMatrix", "root")), "b:node3.worldMatrix");
+  EXPECT_EQ(Driver(rig, "b:/root/node3/tip.parentMatrix"), "b:node3.worldMatrix");
   EXPECT_EQ(Driver(rig, "a:root.parentMatrix"), "a.worldMatrix");
   EXPECT_EQ(Driver(rig, "a:loose.parentMatrix"), "a.worldMatrix");
   EXPECT_EQ(Driver(rig, "a:soft.parentMatrix"), "a.worldMatrix");
@@ -75,6 +75,17 @@ TEST_F(References, BringAllOfARigUnderTheirNamespace) {
   EXPECT_EQ(clips, (std::vector<std::string>{"a:wave", "a:late", "b:wave", "b:late"}));
   EXPECT_EQ(rig.files.size(), 3u) << "each file once";
   EXPECT_EQ(Short(PlaceOfMessage(rig, "node \"b:mush\" (deltaMush): x").ToString()), "arm.yaml:9:3");
+}
+
+// What hangs under the root of a reference.
+TEST_F(References, EveryParentIsTheWorldWhereNothingDrivesIt) {
+  for (const std::string& type : StandardRegistry().Names()) {
+    for (const AttributeDef& attribute : StandardRegistry().Find(type)->attributes) {
+      if (!attribute.output && attribute.name == "parentMatrix") {
+        EXPECT_TRUE(attribute.world_place) << type;
+      }
+    }
+  }
 }
 
 TEST_F(References, AreIndependentAndTranslateMovesAllOfACharacter) {

@@ -31,6 +31,7 @@ struct GivenInput {
   Value rest, now;
   bool idle = false;   // it is in world space, and the outputs do not depend on where
   bool bound = false;  // it stays in the rest pose, and moves with that alone
+  bool fits = false;   // where it is left behind, the node is refused
 };
 struct GivenOutput {
   std::string output;

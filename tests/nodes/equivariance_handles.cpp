@@ -141,8 +141,9 @@ void AddLattices(std::vector<NodeSetUp>* all) {
   }
   const GivenInput controls{"points", Moves::kNot, PointsOf(rest), PointsOf(now)};
   const GivenInput divisions = Setting("divisions", std::vector<std::int64_t>{3, 3, 2});
-  const GivenInput low{"boxMin", Moves::kShift, Double3{-0.6, -0.7, -0.4}, {}},
+  GivenInput low{"boxMin", Moves::kShift, Double3{-0.6, -0.7, -0.4}, {}},
       high{"boxMax", Moves::kShift, Double3{0.7, 0.8, 0.5}, {}};
+  low.fits = high.fits = true;  // a box with one corner elsewhere is inside out
   for (const char* interpolation : {"linear", "bspline", "bernstein"}) {
     for (const char* outside : {"inside", "all", "falloff"}) {
       NodeSetUp s = AfterSkin("lattice", std::string(interpolation) + ", " + outside,

@@ -116,6 +116,15 @@ void AddFalloffs(std::vector<NodeSetUp>* all) {
                    kFrameAlone,
                    kCarriedByNobody};
   all->push_back(behind);
+  NodeSetUp carried = behind;
+  carried.what = "before the skin with its driver";
+  carried.given[0].moves = Moves::kNot;
+  carried.given.push_back(place("parentMatrix"));
+  carried.given.back().idle = true;  // it carries both
+  carried.given.push_back({"geometryMatrix[0]", Moves::kFrame, random.Rigid(0.3), {}});
+  carried.unless = 0;
+  carried.why = "";
+  all->push_back(carried);
 }
 
 void AddPins(std::vector<NodeSetUp>* all) {

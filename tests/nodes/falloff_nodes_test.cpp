@@ -68,24 +68,24 @@ TEST(FalloffNodes, ThereMayBeAPlateau) {
   const auto wall = MeshOf({0, -9, -9, 0, 9, -9, 0, 0, 9}, {0, 1, 2});
   for (const char* type : {"sphereFalloff", "capsuleFalloff", "proximityFalloff"}) {
     SCOPED_TRACE(type);
-    FalloffNode f(type, {{"curve", "linear"}}, {"radius", "start"});
+    FalloffNode f(type, {{"curve", "linear"}}, {"radius", "fullRadius"});
     if (type == std::string("proximityFalloff")) {
       f.g.add("mesh", "wall", {{"mesh", wall}});
       f.g.connect("wall.points", "f.driverPoints");
       f.g.hold("f.driverMesh", wall);
     }
     f.Expect([](double x) { return std::max(0.0, 1 - std::fabs(x)); });
-    f.g.set("f.start", 0.5);
+    f.g.set("f.fullRadius", 0.5);
     f.Expect([](double x) { return std::clamp((1 - std::fabs(x)) / 0.5, 0.0, 1.0); });
     f.g.set("f.radius", 2.5);
     f.Expect([](double x) { return std::clamp((2.5 - std::fabs(x)) / 2, 0.0, 1.0); });
-    for (const double start : {0.75, 7.0}) {  // no less than the radius: a step there
+    for (const double full : {0.75, 7.0}) {  // no less than the radius: a step there
       f.g.set("f.radius", 0.75);
-      f.g.set("f.start", start);
+      f.g.set("f.fullRadius", full);
       f.Expect([](double x) { return std::fabs(x) <= 0.75 ? 1.0 : 0.0; });
     }
     f.g.set("f.radius", -1.0);  // what drives it may say so
-    f.g.set("f.start", -2.0);
+    f.g.set("f.fullRadius", -2.0);
     f.Expect([](double x) { return x == 0 ? 1.0 : 0.0; });
   }
 }
@@ -182,7 +182,7 @@ struct WeighedRig {
 TEST(FalloffNodes, ProximityIsTheLeastDistanceToAnyTriangle) {
   WeighedRig rig("proximityFalloff");
   rig.g.hold("f.radius", 0.9);
-  rig.g.hold("f.start", 0.2);
+  rig.g.hold("f.fullRadius", 0.2);
   // Another geometry that it weighs: as if it were alone
   rig.g.connect("sheet.points", "f.inPoints[1]");
   for (const char* output :
