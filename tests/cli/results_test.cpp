@@ -99,6 +99,9 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
                                                  {"/hit_rate", 7},
                                                  {"/beside/0/cues", -1},
                                                  {"/speedup", true},
+                                                 {"/tolerance", nullptr},
+                                                 {"/accelerated/misses", -1},
+                                                 {"/storage/bytes_per_point", "x"},
                                                  {"/frame_errors/rms/total", "x"},
                                                  {"/error/max", -2}}) {
     const ProcessResult refused = edited(pointer, value);
