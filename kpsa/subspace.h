@@ -67,6 +67,9 @@ struct Subspace {
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
 };
 
+// Where a cue is measured, in words: "head_mesh@skin", the mesh of a point at its stage, or a scalar's plug.
+std::string CueName(const Subspace& subspace, const CueDescription& cue);
+
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
 Status ValidateSubspace(const Subspace& subspace);
 

@@ -109,6 +109,10 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
     EXPECT_NE(refused.err.find("wrong.json"), std::string::npos) << refused.err;
     EXPECT_EQ(refused.out, "") << pointer;
   }
+  // Reports name cues by the mesh and the stage where they are measured
+  const Json paper = Json::parse(RunKpsa({"inspect", folder / "out/hello-paper.kpsa", "--json"}).out);
+  for (const Json& cue : paper["cues"]) EXPECT_EQ(cue["where"], "column@mush");
+  EXPECT_EQ(accepted["cue_stages"], Json::array({"10 points of column@mush"}));
   EXPECT_EQ(accepted["mode"], "paper");
   EXPECT_EQ(ours["mode"], "map");
   EXPECT_EQ(accepted["cue_points"], 10);

@@ -209,6 +209,15 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   EXPECT_EQ(bytes(path_), first);
 }
 
+TEST_P(SubspaceTest, CuesAreNamedByMeshAndStage) {
+  const std::vector<std::string> expected = {"head@mush", "teeth@mush", "twist.amount", "head@mush",
+                                             "teeth@mush"};
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_EQ(CueName(subspace_, subspace_.cues[k]), expected[k]) << k;
+  subspace_.cues[0].stage = "skin";  // measured before the stage that is reconstructed
+  EXPECT_EQ(CueName(subspace_, subspace_.cues[0]), "head@skin");
+}
+
 TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   subspace_.kept_modes = pca_.output_modes().cast<float>();
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
