@@ -413,7 +413,7 @@ class Bench {
     for (Contender& contender : contenders_) contender.AddTimes(full_ns);
     KPSA_RETURN_IF_ERROR(ProfileClip(&full, times, full_ns));
     for (Contender& contender : contenders_) {
-      if (!KeepModes(contender.applied)) continue;
+      if (!HaveKeptModes(contender.applied)) continue;
       Result<FrameErrors> errors = SplitFrames(with_clip, contender.flags, times, contender.weights);
       if (!errors.ok()) return errors.status();
       contender.result.frame_errors.Append(*errors);

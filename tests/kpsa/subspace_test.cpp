@@ -221,7 +221,7 @@ TEST_P(SubspaceTest, CuesAreNamedByMeshAndStage) {
 TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   subspace_.kept_modes = pca_.output_modes().cast<float>();
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
-  const Result<Subspace> read = ReadSubspace(path_, ReadModes::kYes), frames = ReadSubspace(path_);
+  const Result<Subspace> read = ReadSubspace(path_, KeptModes::kRead), frames = ReadSubspace(path_);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   EXPECT_EQ(read->kept_modes, subspace_.kept_modes);
   ASSERT_TRUE(frames.ok()) << frames.status().ToString();
@@ -236,14 +236,14 @@ TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   file.seekp(0);
   file << bytes;
   file.close();
-  EXPECT_NE(ReadSubspace(path_, ReadModes::kYes).status().ToString().find("damaged"), std::string::npos);
+  EXPECT_NE(ReadSubspace(path_, KeptModes::kRead).status().ToString().find("damaged"), std::string::npos);
   EXPECT_TRUE(ReadSubspace(path_).ok());  // what is not read is not looked at
   // Modes of which nothing tells what they were
   const std::size_t digest = bytes.find("modesDigest");
   ASSERT_NE(digest, std::string::npos);
   bytes[digest] = 'n';
   std::ofstream(path_, std::ios::binary) << bytes;
-  EXPECT_NE(ReadSubspace(path_, ReadModes::kYes).status().ToString().find("modesDigest"), std::string::npos);
+  EXPECT_NE(ReadSubspace(path_, KeptModes::kRead).status().ToString().find("modesDigest"), std::string::npos);
   subspace_.kept_modes.conservativeResize(Eigen::NoChange, 6);
   EXPECT_NE(WriteSubspace(subspace_, path_).ToString().find("kept modes"), std::string::npos);
 }
