@@ -55,7 +55,7 @@ Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, con
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     return Status::Invalid("no such file; kpsa train {} writes it", rig).At({path});
-  Result<Subspace> subspace = ReadSubspace(path, with_modes ? ReadModes::kYes : ReadModes::kNo);
+  Result<Subspace> subspace = ReadSubspace(path, with_modes ? KeptModes::kRead : KeptModes::kSkip);
   if (!subspace.ok()) return subspace.status();
   return std::make_shared<const Subspace>(std::move(*subspace));
 }

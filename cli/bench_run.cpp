@@ -214,8 +214,7 @@ void Contender::Describe() {
     result.modes += one.subspace->modes;
     for (const CueDescription& cue : one.subspace->cues) {
       const bool scalar = cue.kind == CueDescription::Kind::kScalar;
-      const std::string& name = scalar ? cue.plug : one.subspace->outputs[cue.mesh].name;
-      ++stages[scalar ? "scalars" : "points of " + name.substr(0, name.rfind('@')) + "@" + cue.stage];
+      ++stages[scalar ? "scalars" : "points of " + CueName(*one.subspace, cue)];
       result.cue_points += !scalar;
     }
     const TrainingRecord record = ParseTraining(one.subspace->training);
@@ -423,7 +422,7 @@ class Bench {
     for (Contender& contender : contenders_) contender.AddTimes(full_ns);
     KPSA_RETURN_IF_ERROR(ProfileClip(&full, times, full_ns));
     for (Contender& contender : contenders_) {
-      if (!KeepModes(contender.applied)) continue;
+      if (!HaveKeptModes(contender.applied)) continue;
       Result<FrameErrors> errors = SplitFrames(with_clip, contender.flags, times, contender.weights);
       if (!errors.ok()) return errors.status();
       contender.result.frame_errors.Append(*errors);

@@ -94,6 +94,12 @@ Status CheckCameraFlags(const RenderFlags& flags) {
   return Status();
 }
 
+// What the scale of an error goes by: the tolerance in force, or the trained one where any error may pass;
+// above 0, as errors are divided by it.
+double ShownTolerance(const AppliedSubspace& applied) {
+  return std::max(applied.tolerance < kAnyError ? applied.tolerance : applied.subspace->tolerance, 1e-7);
+}
+
 // Pictures through a camera of the rig, six in a row.
 Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const RenderFlags& flags,
                                       const std::vector<double>& times, const RigFrameOptions& options) {
@@ -132,7 +138,7 @@ Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const Render
         EvaluateCamera(rig, compiler, AcceleratedView(*view, rig, *applied), times, options);
     if (!fast.ok()) return fast.status();
     for (std::size_t f = 0; f < times.size(); ++f) {
-      const double error_max = 4 * applied->front().tolerance;
+      const double error_max = 4 * ShownTolerance(applied->front());
       Image error = LightError((*full)[f], (*fast)[f], error_max);
       std::vector<Image> three = {Develop((*full)[f], exposure, layer), Develop((*fast)[f], exposure, layer),
                                   std::move(error)};
@@ -209,9 +215,7 @@ CommandResult Render(const RenderFlags& flags) {
                                      view->azimuth, view->elevation);
     for (std::size_t f : frames) {
       RenderInput exact = MakeInput(rig, (*full)[f]), emitted = MakeInput(rig, (*fast)[f]);
-      const AppliedSubspace& first = applied->front();
-      const double tolerance = first.tolerance < kAnyError ? first.tolerance : first.subspace->tolerance;
-      exact.scalar_max = emitted.scalar_max = view->error_scale.value_or(std::max(tolerance, 1e-7));
+      exact.scalar_max = emitted.scalar_max = view->error_scale.value_or(ShownTolerance(applied->front()));
       const RenderDots dots = KeyPoints(*applied, (*full)[f]);
       KPSA_RETURN_IF_ERROR(add(RenderComparison(exact, emitted, camera, view->options, &dots)));
     }

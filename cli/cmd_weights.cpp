@@ -92,8 +92,7 @@ Destination FindDestination(const WeightsFlags& flags, const Rig& rig, const Def
     if (source.key != "members") (source.path.empty() ? others : maps).push_back(&source);
   }
   Destination to;
-  const std::string name = rig.graph->name(of.stage->node),
-                    own_name = name.substr(NamespaceOf(rig, of).size());
+  const std::string name = rig.graph->name(of.stage->node), own_name = OwnName(rig, of, name);
   if (!flags.output.has_value() && maps.size() == 1 && others.empty()) {
     to.path = maps[0]->path;
     to.map = maps[0]->map;
@@ -130,7 +129,7 @@ Destination FindDestination(const WeightsFlags& flags, const Rig& rig, const Def
 // The file as it is to be written: the map among the others that are in it already.
 Result<WeightFile> Merged(const Rig& rig, const DeformedMesh& of, const Destination& to,
                           const WeightFile& file, const NamedWeights& map) {
-  WeightFile merged{of.mesh->name.substr(NamespaceOf(rig, of).size()), file.points, {}};
+  WeightFile merged{OwnName(rig, of, of.mesh->name), file.points, {}};
   std::error_code error;
   if (fs::exists(to.path, error)) {
     Result<WeightFile> before = ReadWeightFile(to.path);

@@ -255,16 +255,9 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
   }
   FactTable cues{"cues", {"kind", "where", ">point"}, {}};
   for (const CueDescription& cue : subspace->cues) {
-    if (cue.kind == CueDescription::Kind::kScalar) {
-      cues.rows.push_back({std::string("scalar"), cue.plug, std::string()});
-    } else {
-      cues.rows.push_back(
-          {std::string("point"),
-           fmt::format("{}, stage {}",
-                       cue.mesh < subspace->outputs.size() ? subspace->outputs[cue.mesh].name : "?",
-                       cue.stage),
-           Count(cue.point)});
-    }
+    const bool scalar = cue.kind == CueDescription::Kind::kScalar;
+    cues.rows.push_back({std::string(scalar ? "scalar" : "point"), CueName(*subspace, cue),
+                         scalar ? Cell(std::string()) : Count(cue.point)});
   }
   FactTable ranges{"trained ranges", {"plug", ">min", ">max"}, {}};
   for (const TrainedRange& range : subspace->ranges) ranges.rows.push_back({range.plug, range.lo, range.hi});

@@ -73,7 +73,7 @@ double EmittedFullWeight(const AppliedSubspace& applied, double score) {
                     Calibrate(s.calibration, tolerance, applied.violation_rate, s.blend_start).threshold);
 }
 
-bool KeepModes(const std::vector<AppliedSubspace>& applied) {
+bool HaveKeptModes(const std::vector<AppliedSubspace>& applied) {
   return std::all_of(applied.begin(), applied.end(),
                      [](const AppliedSubspace& one) { return one.subspace->kept_modes.size() > 0; });
 }

@@ -26,7 +26,7 @@ using FullWeights = std::vector<std::vector<double>>;
 double EmittedFullWeight(const AppliedSubspace& applied, double score);
 
 // Whether every subspace was trained with --keep-modes, which SplitFrames needs.
-bool KeepModes(const std::vector<AppliedSubspace>& applied);
+bool HaveKeptModes(const std::vector<AppliedSubspace>& applied);
 
 // Evaluates the times once more, on a rig loaded anew, every frame reconstructed.
 Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acceleration,

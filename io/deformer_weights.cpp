@@ -5,6 +5,15 @@
 #include "io/mesh_weights.h"
 
 namespace kpsa {
+namespace {
+
+// "hero:" of a deformer that a reference brought along, "" of the rig's own.
+std::string NamespaceOf(const Rig& rig, const DeformedMesh& of) {
+  const Reference* reference = InnermostReference(rig, of.stage->node);
+  return reference == nullptr ? "" : reference->name_space;
+}
+
+}  // namespace
 
 Result<DeformedMesh> FindDeformed(const Rig& rig, std::string_view text) {
   std::vector<DeformedMesh> found;
@@ -33,18 +42,14 @@ Result<DeformedMesh> FindDeformed(const Rig& rig, std::string_view text) {
   return found[0];
 }
 
-std::string NamespaceOf(const Rig& rig, const DeformedMesh& of) {
-  const Reference* reference = InnermostReference(rig, of.stage->node);
-  return reference == nullptr ? "" : reference->name_space;
+std::string OwnName(const Rig& rig, const DeformedMesh& of, const std::string& name) {
+  const std::string prefix = NamespaceOf(rig, of);
+  return name.starts_with(prefix) ? name.substr(prefix.size()) : name;
 }
 
 WeightFile InOwnNames(const Rig& rig, const DeformedMesh& of, WeightFile file) {
-  const std::string prefix = NamespaceOf(rig, of);
-  const auto strip = [&](std::string* name) {
-    if (name->starts_with(prefix)) name->erase(0, prefix.size());
-  };
-  strip(&file.mesh);
-  for (NamedWeights& map : file.maps) strip(&map.name);
+  file.mesh = OwnName(rig, of, file.mesh);
+  for (NamedWeights& map : file.maps) map.name = OwnName(rig, of, map.name);
   return file;
 }
 
@@ -71,7 +76,7 @@ Status CheckWeights(const Rig& rig, const DeformedMesh& of, const WeightFile& fi
   here.mesh.insert(0, prefix);
   for (NamedWeights& map : here.maps) map.name.insert(0, prefix);
   if (!NamesMesh(here, *rig.character, *rig.graph, mesh))
-    return Status::Invalid("is for mesh \"{}\", expected \"{}\"", file.mesh, mesh.name.substr(prefix.size()))
+    return Status::Invalid("is for mesh \"{}\", expected \"{}\"", file.mesh, OwnName(rig, of, mesh.name))
         .At({file.path});
   if (file.points != mesh.vertex_count)
     return Status::Invalid("is for {} vertices; {} has {}", file.points, mesh.name, mesh.vertex_count)

@@ -23,9 +23,9 @@ struct DeformedMesh {
 // nearest), several meshes, the file's morph targets and transforms, which take no weights.
 Result<DeformedMesh> FindDeformed(const Rig& rig, std::string_view text);
 
-// "hero:" of a deformer that a reference brought along, "" of the rig's own. Its weight files are those of
-// the referenced rig, and name meshes, joints and maps as that does: without it.
-std::string NamespaceOf(const Rig& rig, const DeformedMesh& of);
+// Weight files of a deformer that a reference brought along are those of the referenced rig, and name meshes,
+// joints and maps as that does: without the "hero:" of the reference. Other names stay as they are.
+std::string OwnName(const Rig& rig, const DeformedMesh& of, const std::string& name);
 WeightFile InOwnNames(const Rig& rig, const DeformedMesh& of, WeightFile file);
 
 // Of a deformer that is no skin: by point of the mesh, members, maps and falloff multiplied.

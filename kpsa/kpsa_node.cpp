@@ -391,12 +391,8 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
       std::string cue = "a cue";
       if (offender < data.subspace->cues.size()) {
         const CueDescription& d = data.subspace->cues[offender];
-        if (d.kind == CueDescription::Kind::kScalar) {
-          cue = d.plug;
-        } else {
-          const std::string& output = data.subspace->outputs[d.mesh].name;  // "head_mesh@mush"
-          cue = fmt::format("{}@{} point {}", output.substr(0, output.rfind('@')), d.stage, d.point);
-        }
+        cue = CueName(*data.subspace, d);
+        if (d.kind == CueDescription::Kind::kPoint) cue += fmt::format(" point {}", d.point);
       }
       return reason == MissReason::kScore ? fmt::format("unlike the trained poses (most at {})", cue)
                                           : fmt::format("{} is not a number", cue);

@@ -17,6 +17,12 @@ bool AllFinite(std::span<const T> values) {
 
 }  // namespace
 
+std::string CueName(const Subspace& subspace, const CueDescription& cue) {
+  if (cue.kind == CueDescription::Kind::kScalar) return cue.plug;
+  const std::string& output = subspace.outputs[cue.mesh].name;  // "head_mesh@mush"
+  return output.substr(0, output.rfind('@')) + "@" + cue.stage;
+}
+
 Status ValidateSubspace(const Subspace& s) {
   const std::size_t rows = s.rows();
   std::size_t counted = 0;

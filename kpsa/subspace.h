@@ -52,7 +52,8 @@ struct Subspace {
   double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
   std::vector<TileMap> tiles;                                       // [outputs]
   // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
-  // split errors with it (kpsa/error_split.h); no frame needs it, so it is read only where asked for.
+  // split errors with it (kpsa/error_split.h); no frame needs it, so of a file it is copied and checked only
+  // where asked for.
   Eigen::MatrixXf kept_modes;
   // Empty, and tiles read y; or, where all points depend on all cues (light), Q [M x r], column by column,
   // and tiles read z = Q y.
@@ -67,6 +68,9 @@ struct Subspace {
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
 };
 
+// Where a cue is measured, in words: "head_mesh@skin", the mesh of a point at its stage, or a scalar's plug.
+std::string CueName(const Subspace& subspace, const CueDescription& cue);
+
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
 Status ValidateSubspace(const Subspace& subspace);
 
@@ -78,10 +82,11 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
                       const TileOptions& options);
 
 Status WriteSubspace(const Subspace& subspace, const std::string& path);
+// Subspace::kept_modes, which may be most of a file: copied and checked, or left out.
+enum class KeptModes : std::uint8_t { kSkip, kRead };
 // Errors: as SafetensorsFile::Read; another kind of file; a newer version; any part that is missing or
 // inconsistent.
-enum class ReadModes : std::uint8_t { kNo, kYes };  // Subspace::kept_modes, which may be most of a file
-Result<Subspace> ReadSubspace(const std::string& path, ReadModes modes = ReadModes::kNo);
+Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes = KeptModes::kSkip);
 
 // Everything that changes while a subspace is used. One a thread.
 struct SubspaceScratch {

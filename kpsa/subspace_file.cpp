@@ -126,13 +126,13 @@ std::map<std::string, std::string> Header(const Subspace& s) {
           {"training", s.training}};
 }
 
-std::span<const float> KeptModes(const Subspace& s) {
+std::span<const float> ModeValues(const Subspace& s) {
   return {s.kept_modes.data(), static_cast<std::size_t>(s.kept_modes.size())};
 }
 
 std::string ModesDigest(const Subspace& s) {
   Hasher hasher;
-  hasher.Add(KeptModes(s));
+  hasher.Add(ModeValues(s));
   return hasher.Finish().ToHex();
 }
 
@@ -298,13 +298,13 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     writer.Add<float>(
         kModes,
         {static_cast<std::uint64_t>(s.kept_modes.cols()), static_cast<std::uint64_t>(s.kept_modes.rows())},
-        KeptModes(s));
+        ModeValues(s));
     writer.SetMetadata(kModesDigest, ModesDigest(s));
   }
   return writer.Write(path);
 }
 
-Result<Subspace> ReadSubspace(const std::string& path, ReadModes modes) {
+Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   const Result<SafetensorsFile> read = SafetensorsFile::Read(path);
   if (!read.ok()) return read.status();
   const SafetensorsFile& file = *read;
@@ -347,7 +347,8 @@ Result<Subspace> ReadSubspace(const std::string& path, ReadModes modes) {
   for (std::size_t i = 0; i + 1 < calibration->size(); i += 2)
     s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
-  if (modes == ReadModes::kYes && (file.tensors().contains(kModes) || file.metadata().contains(kModesDigest)))
+  if (modes == KeptModes::kRead &&
+      (file.tensors().contains(kModes) || file.metadata().contains(kModesDigest)))
     KPSA_RETURN_IF_ERROR(ReadKeptModes(file, &s));
   if (Status status = ValidateSubspace(s); !status.ok())
     return Status::Invalid("{}: {}", path, status.ToString());

@@ -19,9 +19,13 @@ else
 fi
 mkdir -p "$docs/results" "$work"
 
+# "boy: 200 and 510, ...": how many numbers the default and paper mode measure; a key point is three.
+numbers=''
+
 # measure RIG KEY_POINTS ROWS: scenes/RIG.yaml in both modes; paper mode accepting every frame, and with SoftCache.
 measure() {
   name=$(basename "$1") rig=scenes/$1.yaml
+  numbers="$numbers${numbers:+, }$name: $3 and $((3 * $2))"
   printf '\n== %s: training\n' "$name"
   # shellcheck disable=SC2086
   "$kpsa" train "$rig" --paper --key-points "$2" --keep-modes -q --force -o "$work/$name-paper.kpsa" $train_options
@@ -98,9 +102,9 @@ Caching* (SIGGRAPH 2007), whose slides give:
 Below are three characters of this project with as many points. *Paper mode* is the method of the slides with as many key points:
 varimax modes, two key points each, least squares, SoftCache by the residual at the key points. The *default* chooses what to
 measure, points (three numbers each) and scalars, before a deltaMush or at any other place of the graph, and estimates all modes
-from them. \`--rows\` says how many numbers: 200 for the boys, 150 for the cars, 200 for the animal and 240 for animal_mush; paper
-mode's key points are 510, 210 and 240 numbers. Both store their reconstruction alike, in tiles and reduced precision, and both
-took turns with the full evaluation in one run.
+from them. \`--rows\` says how many numbers; those of the default and of paper mode's key points are
+$numbers.
+Both store their reconstruction alike, in tiles and reduced precision, and both took turns with the full evaluation in one run.
 
 - Full: the same program, every optimisation on; nothing of it is slowed down. Its cost stands below in nanoseconds a point. The
   reference's stacks cost what they cost in 2007; these are as heavy as we think a production's is, chosen with their cost in sight:
@@ -111,7 +115,8 @@ took turns with the full evaluation in one run.
   subspace reads, and later stages.
 - RMS, max: final points against the full evaluation, all points of all frames of the test clip, misses included (they are exact),
   in % of the diagonal of the box around them. The test clips are not trained on.
-- Times are medians of one core (${processor:-unknown}); they vary with the machine, the other columns do not.
+- Times are medians of one core (${processor:-unknown}); they vary with the machine, and so do speedups and ceilings; the other
+  columns do not.
 
 ## The three characters
 

@@ -437,6 +437,14 @@ TEST(Render, ACameraSeesLightAfterBounces) {
   EXPECT_EQ(bench["units"], "light");
   EXPECT_GT(bench["frame_errors"]["rms"]["projection"], 0.0);  // from the modes in the file
   Ok({"render", path, "--camera", "front", "--times", "1", "--accelerate", "-o", folder / "three.png"});
+  // The scale of the error goes by the trained tolerance where any error may pass, and is never 0
+  const auto compared = [&](const std::string& tolerance) {
+    Ok({"render", path, "--camera", "front", "--times", "1", "--accelerate", "--tolerance", tolerance, "-o",
+        folder / "compared.png", "--force"});
+    return TemporaryFolder::Read(folder / "compared.png");
+  };
+  EXPECT_TRUE(compared("any") == TemporaryFolder::Read(folder / "three.png"));
+  EXPECT_TRUE(compared("0") == compared("1e-9"));
 
   // On the test clip, with a tolerance that keeps most of the motion: hits, and what they are wrong by
   const Json held_out = Json::parse(Ok({"bench", path, "--runs", "1", "--tolerance", "0.12", "--json"}));

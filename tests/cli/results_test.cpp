@@ -67,8 +67,10 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
                300, folder.path());
   ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
   const std::string text = TemporaryFolder::Read(folder / "results.md");
-  for (const char* words : {"10 key points", "paper mode, all frames accepted", "| default |", "| 1x |"})
+  for (const char* words :
+       {"10 key points", "paper mode, all frames accepted", "| default |", "| 1x |", "\nhello: 24 and 30.\n"})
     EXPECT_NE(text.find(words), std::string::npos) << words << "\n" << text;
+  EXPECT_EQ(text.find("animal_mush"), std::string::npos) << "was not measured";
   // Every picture is there
   std::size_t pictures = 0;
   for (std::size_t at = text.find("](results/"); at != std::string::npos;
@@ -99,6 +101,9 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
                                                  {"/hit_rate", 7},
                                                  {"/beside/0/cues", -1},
                                                  {"/speedup", true},
+                                                 {"/tolerance", nullptr},
+                                                 {"/accelerated/misses", -1},
+                                                 {"/storage/bytes_per_point", "x"},
                                                  {"/frame_errors/rms/total", "x"},
                                                  {"/error/max", -2}}) {
     const ProcessResult refused = edited(pointer, value);
@@ -106,6 +111,10 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
     EXPECT_NE(refused.err.find("wrong.json"), std::string::npos) << refused.err;
     EXPECT_EQ(refused.out, "") << pointer;
   }
+  // Reports name cues by the mesh and the stage where they are measured
+  const Json paper = Json::parse(RunKpsa({"inspect", folder / "out/hello-paper.kpsa", "--json"}).out);
+  for (const Json& cue : paper["cues"]) EXPECT_EQ(cue["where"], "column@mush");
+  EXPECT_EQ(accepted["cue_stages"], Json::array({"10 points of column@mush"}));
   EXPECT_EQ(accepted["mode"], "paper");
   EXPECT_EQ(ours["mode"], "map");
   EXPECT_EQ(accepted["cue_points"], 10);

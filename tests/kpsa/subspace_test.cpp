@@ -209,10 +209,19 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   EXPECT_EQ(bytes(path_), first);
 }
 
+TEST_P(SubspaceTest, CuesAreNamedByMeshAndStage) {
+  const std::vector<std::string> expected = {"head@mush", "teeth@mush", "twist.amount", "head@mush",
+                                             "teeth@mush"};
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_EQ(CueName(subspace_, subspace_.cues[k]), expected[k]) << k;
+  subspace_.cues[0].stage = "skin";  // measured before the stage that is reconstructed
+  EXPECT_EQ(CueName(subspace_, subspace_.cues[0]), "head@skin");
+}
+
 TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   subspace_.kept_modes = pca_.output_modes().cast<float>();
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
-  const Result<Subspace> read = ReadSubspace(path_, ReadModes::kYes), frames = ReadSubspace(path_);
+  const Result<Subspace> read = ReadSubspace(path_, KeptModes::kRead), frames = ReadSubspace(path_);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   EXPECT_EQ(read->kept_modes, subspace_.kept_modes);
   ASSERT_TRUE(frames.ok()) << frames.status().ToString();
@@ -227,14 +236,14 @@ TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   file.seekp(0);
   file << bytes;
   file.close();
-  EXPECT_NE(ReadSubspace(path_, ReadModes::kYes).status().ToString().find("damaged"), std::string::npos);
+  EXPECT_NE(ReadSubspace(path_, KeptModes::kRead).status().ToString().find("damaged"), std::string::npos);
   EXPECT_TRUE(ReadSubspace(path_).ok());  // what is not read is not looked at
   // Modes of which nothing tells what they were
   const std::size_t digest = bytes.find("modesDigest");
   ASSERT_NE(digest, std::string::npos);
   bytes[digest] = 'n';
   std::ofstream(path_, std::ios::binary) << bytes;
-  EXPECT_NE(ReadSubspace(path_, ReadModes::kYes).status().ToString().find("modesDigest"), std::string::npos);
+  EXPECT_NE(ReadSubspace(path_, KeptModes::kRead).status().ToString().find("modesDigest"), std::string::npos);
   subspace_.kept_modes.conservativeResize(Eigen::NoChange, 6);
   EXPECT_NE(WriteSubspace(subspace_, path_).ToString().find("kept modes"), std::string::npos);
 }

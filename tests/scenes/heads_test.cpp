@@ -35,16 +35,13 @@ TEST(Heads, HaveTheReferencesNumbersOfPointsWithinTwoPercent) {
         << head.design.name;
 }
 
-TEST(Heads, AreSymmetricToTheBitAndNoTwoPointsCoincide) {
+TEST(Heads, AreSymmetricToTheBit) {
   for (const Made& head : Heads()) {
-    std::set<std::array<double, 3>> places;
     for (std::size_t i = 0; i < head.shape.points.size(); ++i) {
       const Double3 p = head.shape.points[i],
                     m = head.shape.points[static_cast<std::size_t>(head.shape.mirror[i])];
       EXPECT_EQ(p, (Double3{-m.x, m.y, m.z})) << head.design.name << " " << i;
-      places.insert({p.x, p.y, p.z});
     }
-    EXPECT_EQ(places.size(), head.shape.points.size()) << head.design.name;
   }
 }
 
