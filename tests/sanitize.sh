@@ -8,7 +8,7 @@ cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh clang libclang-rt-14-dev
 if [ "${1:-asan}" = tsan ]; then
   folder=build-tsan sanitizer=KPSA_TSAN
-  export TSAN_OPTIONS=halt_on_error=1
+  export TSAN_OPTIONS="halt_on_error=1 suppressions=$PWD/tests/tsan.supp"
 else
   folder=build-asan sanitizer=KPSA_SANITIZE
 fi
