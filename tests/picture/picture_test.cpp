@@ -41,6 +41,14 @@ const Mesh& Head() {
 // A square of side 2 in the plane z = 0, seen from +z.
 Mesh Square() { return {{-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0}, {0, 1, 2, 0, 2, 3}}; }
 
+// Sees 4 by 4 at the square, which fills the middle half.
+Camera InFrontOfTheSquare() {
+  Camera camera;
+  camera.eye = {0, 0, 10};
+  camera.field_of_view = 2 * std::atan(2.0 / 10);
+  return camera;
+}
+
 RenderOptions Plain(int width, int height) {
   RenderOptions options;
   options.width = width;
@@ -55,9 +63,7 @@ TEST(Picture, ASquareCoversItsPixelsAndNoOthers) {
   const Mesh square = Square();
   RenderInput input;
   input.parts = {square.Part()};
-  Camera camera;
-  camera.eye = {0, 0, 10};
-  camera.field_of_view = 2 * std::atan(2.0 / 10);  // 4 high at the square: it fills the middle half
+  const Camera camera = InFrontOfTheSquare();
   const auto image = RenderMesh(input, camera, Plain(80, 80));
   ASSERT_TRUE(image.ok());
   for (int y = 0; y < 80; ++y) {
@@ -165,9 +171,7 @@ TEST(Picture, AComparisonShowsKeyPointsOnRequest) {
   const Mesh square = Square();
   RenderInput full;
   full.parts = {square.Part()};
-  Camera camera;
-  camera.eye = {0, 0, 10};
-  camera.field_of_view = 2 * std::atan(2.0 / 10);
+  const Camera camera = InFrontOfTheSquare();
   const RenderOptions options = Plain(480, 480);
   RenderDots dots{"2 key points",
                   {0.5f, 0.5f, 0, -0.5f, -0.5f, -0.5f}};  // the second one is behind the square
@@ -216,9 +220,7 @@ TEST(Picture, KeyPointsCastNoShadows) {
   const Mesh square = Square();
   RenderInput full;
   full.parts = {square.Part()};
-  Camera camera;
-  camera.eye = {0, 0, 10};
-  camera.field_of_view = 2 * std::atan(2.0 / 10);
+  const Camera camera = InFrontOfTheSquare();
   const RenderDots dots{"1 key point", {-1, 1, 0}};  // at a corner, whose light two triangles share
   const auto image = RenderComparison(full, full, camera, Plain(120, 120), &dots);
   ASSERT_TRUE(image.ok());
