@@ -194,4 +194,11 @@ NodeBuilder& NodeBuilder::passes(std::string_view input, const std::vector<std::
   return *this;
 }
 
+NodeBuilder& NodeBuilder::touches(std::string_view input, TouchFn f) {
+  KPSA_CHECK_EQ(group().outputs.size(), std::size_t{1});
+  group().touched_input = input_position(input);
+  group().touches = std::move(f);
+  return *this;
+}
+
 }  // namespace kpsa

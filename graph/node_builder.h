@@ -129,6 +129,9 @@ class NodeBuilder {
   // The output equals `input`, bit for bit, while the inputs `held` hold their defaults: then plans do
   // without the step.
   NodeBuilder& passes(std::string_view input, const std::vector<std::string>& held);
+  // Of the points of `input` that come out as the only output: readers of points that are not touched read
+  // that input instead, and where no others are wanted, the node does not run. Null: it may touch any.
+  NodeBuilder& touches(std::string_view input, TouchFn f);
   NodeBuilder& demand(DemandFn f) {
     group().demand = std::move(f);
     return *this;

@@ -98,6 +98,8 @@ struct BoundKernel {
 };
 
 using DemandFn = std::function<void(Demand&)>;
+// Whether a node may change any of these points; those that it does not come out bit for bit as they came in.
+using TouchFn = std::function<bool(const Structural&, const PointSet&)>;
 using BindFn = std::function<Result<BoundKernel>(const Binding&)>;
 // From the kernels of the steps of a batch, which outlive it.
 using BindBatchFn = std::function<std::shared_ptr<const void>(std::span<const void* const> kernels)>;
@@ -119,6 +121,8 @@ struct ComputeGroup {
   int in_place_input = -1;       // position in inputs whose buffer the first output may overwrite
   int passed_input = -1;         // position in inputs of what the only output equals, bit for bit, while
   std::vector<int> held_inputs;  // these (positions) hold their defaults
+  TouchFn touches;               // of the points of the only output; null: it may change any
+  int touched_input = -1;        // position in inputs of the points that it changes
   float cost_ns = 20;            // rough; decides what is worth a thread
   float cost_ns_per_point = 0;
 };

@@ -424,18 +424,22 @@ void PlanBuilder::CacheClosures() {
 }
 
 void PlanBuilder::Explain() {
-  std::vector<char> kept(table_.graph().node_capacity(), 0), folded = kept, passed = kept;
+  std::vector<char> kept(table_.graph().node_capacity(), 0), folded = kept;
+  std::vector<PlanDraft::Passed> passed(kept.size(), PlanDraft::Passed::kNo);
   for (const Plan::StepInfo& info : plan_->infos_) {
     if (info.node.index != kNoIndex) kept[info.node.index] = 1;
   }
   for (std::size_t i = 0; i < table_.instances().size(); ++i) {
     if (!draft_.varying[i]) folded[table_.instances()[i].node.index] = 1;
-    if (draft_.passed[i]) passed[table_.instances()[i].node.index] = 1;
+    if (draft_.passed[i] != PlanDraft::Passed::kNo)
+      passed[table_.instances()[i].node.index] = draft_.passed[i];
   }
   for (const PlugRef& plug : table_.varying()) kept[plug.node.index] = 1;
   for (NodeId node : table_.graph().Nodes()) {
     if (kept[node.index]) continue;
-    const char* reason = passed[node.index]   ? "hands on what drives it, unchanged"
+    const PlanDraft::Passed pass = passed[node.index];
+    const char* reason = pass == PlanDraft::Passed::kEquals        ? "hands on what drives it, unchanged"
+                         : pass == PlanDraft::Passed::kTouchesNone ? "moves none of the points of the request"
                          : folded[node.index] ? "constant: depends on nothing that varies"
                                               : "not needed by the request";
     plan_->excluded_.push_back({table_.graph().name(node), reason});

@@ -24,7 +24,7 @@ class Drafter {
     MarkVarying(order);
     KPSA_RETURN_IF_ERROR(CheckStructural());
     uses_.resize(table_.instances().size());
-    draft_.passed.assign(table_.instances().size(), false);
+    draft_.passed.assign(table_.instances().size(), PlanDraft::Passed::kNo);
     draft_.segments.emplace_back();
 
     // The request's own reads
@@ -131,11 +131,29 @@ class Drafter {
     return passed;
   }
 
+  // The points that come into an instance, where it touches none of these; else null.
+  const Source* UntouchedBy(Index number, const PointSet& points) {
+    const Instance& instance = table_.instances()[number];
+    if (instance.kind != Instance::Kind::kNode || !table_.group(instance).touches ||
+        table_.graph().def(instance.node).stateful)
+      return nullptr;
+    const ComputeGroup& group = table_.group(instance);
+    if (group.touches(StructuralView(table_, instance.node, instance.geometry, &instance, &statics_), points))
+      return nullptr;
+    const auto input = std::ranges::find(instance.inputs, group.touched_input, &Input::position);
+    return input == instance.inputs.end() ? nullptr : &input->source;
+  }
+
   Status Read(Source source, const PointSet& points, Index segment, Reader reader, DraftInput* input) {
     while (source.kind == Source::Kind::kInstance && draft_.varying[source.instance]) {
+      auto why = PlanDraft::Passed::kEquals;
       const Source* passed = PassedBy(source.instance);
+      if (passed == nullptr && IsPointType(source.type)) {
+        why = PlanDraft::Passed::kTouchesNone;
+        passed = UntouchedBy(source.instance, points);
+      }
       if (passed == nullptr || passed->type != source.type) break;
-      draft_.passed[source.instance] = true;
+      draft_.passed[source.instance] = why;
       source = *passed;
     }
     input->component = source.component;

@@ -42,7 +42,9 @@ struct PlanDraft {
   std::vector<DraftSegment> segments;
   std::vector<DraftInput> outputs;  // by request output
   std::vector<bool> varying;        // by instance
-  std::vector<bool> passed;  // by instance: its readers read its input instead (ComputeGroup::passed_input)
+  // By instance: why readers read its input instead
+  enum class Passed : std::uint8_t { kNo, kEquals, kTouchesNone };  // ComputeGroup::passed_input, touches
+  std::vector<Passed> passed;
 };
 
 // Decides segments and point sets backward from the request, and connects steps; inserts gathers where a

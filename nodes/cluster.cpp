@@ -1,5 +1,6 @@
 // cluster and softMod: a handle moves weighted points. Only the handle's own motion acts, relative to its
 // parent: a handle that hangs under the head does not move the face twice when the head turns.
+#include <algorithm>
 #include <cmath>
 
 #include "graph/geometry.h"
@@ -48,8 +49,8 @@ Result<BoundKernel> BindCluster(const Binding& binding) {
   return MakeBound(std::move(*bound), 0);
 }
 
-Result<BoundKernel> BindSoftMod(const Binding& binding) {
-  const Structural& s = binding.structural();
+// Falloff and weight map at some points.
+Result<std::vector<float>> SoftModWeights(const Structural& s, const PointSet& points) {
   Result<ConstPointsView> rest = RestPoints(s);
   if (!rest.ok()) return rest.status();
   Result<Matrix4> handle = RestMatrix(s, "matrix");
@@ -64,11 +65,16 @@ Result<BoundKernel> BindSoftMod(const Binding& binding) {
   profile.curve = kCurves[s.get_int("falloffCurve")];
   // Distances are world ones: a stage in mesh space may be scaled
   const double scale = std::cbrt(std::fabs(Determinant3(frame->world_from_stage())));
-  const std::vector<Index> out = binding.output("outPoints").ToVector();
   const std::vector<float> falloff =
-      RadialFalloff(*rest, out, TransformPoint(frame->stage_from_world(), world),
+      RadialFalloff(*rest, points.ToVector(), TransformPoint(frame->stage_from_world(), world),
                     s.get_double("falloffRadius") / scale, profile);
-  Result<ClusterBound> bound = MakeCluster(binding, MultiplyWeights(falloff, BoundWeights(binding)));
+  return MultiplyWeights(falloff, WeightsAt(s, points));
+}
+
+Result<BoundKernel> BindSoftMod(const Binding& binding) {
+  Result<std::vector<float>> weights = SoftModWeights(binding.structural(), binding.output("outPoints"));
+  if (!weights.ok()) return weights.status();
+  Result<ClusterBound> bound = MakeCluster(binding, std::move(*weights));
   if (!bound.ok()) return bound.status();
   return MakeBound(std::move(*bound), 0);
 }
@@ -113,7 +119,12 @@ void AddClusterNodes(NodeRegistry& registry) {
                   {.unit = Unit::kLength, .doc = "world space at rest; default: the handle"});
   soft.structural("falloffRadius", 0.05, {.min = 0, .unit = Unit::kLength});
   soft.enumeration("falloffCurve", {"smooth", "linear", "spline", "none"}, true);
-  FinishDeformer(soft, &ComputeCluster, BindSoftMod).cost(200, 0.3f);
+  FinishDeformer(soft, &ComputeCluster, BindSoftMod)
+      .cost(200, 0.3f)
+      .touches("inPoints", [](const Structural& structural, const PointSet& points) {
+        const Result<std::vector<float>> weights = SoftModWeights(structural, points);
+        return !weights.ok() || std::ranges::any_of(*weights, [](float w) { return w != 0; });
+      });
 }
 
 }  // namespace kpsa

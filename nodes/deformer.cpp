@@ -79,6 +79,10 @@ NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind
       .per_geometry();
   builder.out("outPoints", Type::kPoints, "the deformed points").per_geometry();
   builder.compute(&ComputeWithFalloff).in_place("inPoints");
+  builder.touches("inPoints", [](const Structural& structural, const PointSet& points) {
+    const std::vector<float> weights = WeightsAt(structural, points);
+    return weights.empty() || std::ranges::any_of(weights, [](float w) { return w != 0; });
+  });
   const int falloff = builder.input_position("falloffWeights");
   builder.bind([=](const Binding& binding) -> Result<BoundKernel> {
     BoundKernel own;

@@ -27,7 +27,8 @@ enum DeformerInput { kInPoints = 0, kEnvelope = 1, kParentMatrix = 2, kFirstOwnI
 NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string doc);
 // Declares falloffWeights, outPoints and the group; the output may take over the input's buffer. demand may
 // be null (local). Where falloffWeights w are connected, the points are in + w (out - in) of what compute
-// gives: its own kernel knows nothing of them, and nothing is spent where they are not.
+// gives: its own kernel knows nothing of them, and nothing is spent where they are not. Every kernel leaves
+// points of weight 0 as they are, bit for bit, so where only such points are wanted, the node does not run.
 NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind, DemandFn demand = nullptr);
 
 // The weight map at these points (empty: 1 everywhere); for bind, at the output points.

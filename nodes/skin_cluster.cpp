@@ -177,7 +177,9 @@ void AddTransformGeometryNode(NodeRegistry& registry) {
   NodeBuilder b =
       AddDeformer(registry, "transformGeometry", "Takes the points of a mesh without a skin to world space.");
   b.in("matrix", Matrix4(), {.doc = "the mesh node's world matrix"});
-  FinishDeformer(b, &ComputeTransformGeometry, nullptr).cost(20, 2);
+  FinishDeformer(b, &ComputeTransformGeometry, nullptr)
+      .cost(20, 2)
+      .touches("inPoints", nullptr);  // to another space goes every point
 }
 
 }  // namespace kpsa

@@ -17,7 +17,8 @@ void AddTripwireNode(NodeRegistry& registry) {
       },
       nullptr)
       .cost(20, 0.3f)
-      .passes_points();
+      .passes_points()
+      .touches("inPoints", nullptr);  // armed, it fails whatever it weighs
 }
 
 }  // namespace kpsa

@@ -1,6 +1,7 @@
 // The rigs with a production's stack: they are valid without a word, each deformer does something, and some
 // points are the same bits as all of them.
 #include <algorithm>
+#include <cstring>
 #include <random>
 
 #include "tests/cli/process.h"
@@ -12,6 +13,24 @@ namespace {
 class Production : public ::testing::TestWithParam<const char*> {
  protected:
   std::string path() const { return std::string(KPSA_SCENES_DIR "/") + GetParam(); }
+  // With the controls at a pose, or at rest.
+  static std::unique_ptr<Evaluator> Evaluated(const Rig& rig, Compiler* compiler,
+                                              std::vector<RequestedOutput> outputs,
+                                              const std::vector<double>* pose) {
+    Result<std::shared_ptr<const Plan>> plan =
+        compiler->Compile(*rig.graph, {std::move(outputs), VaryingPlugs(rig)});
+    EXPECT_TRUE(plan.ok()) << plan.status().ToString();
+    auto evaluator = std::make_unique<Evaluator>(*plan);
+    for (std::size_t c = 0; pose != nullptr && c < rig.controls.size(); ++c) {
+      const PlugRef& plug = rig.controls[c].plug;
+      const Index varying = (*plan)->FindVarying(plug);
+      if (varying == kNoIndex) continue;
+      evaluator->Set(varying, (*pose)[c],
+                     (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
+    }
+    EXPECT_TRUE(evaluator->Evaluate().ok());
+    return evaluator;
+  }
 };
 
 TEST_P(Production, IsValidWithoutAWord) {
@@ -38,23 +57,11 @@ TEST_P(Production, SomePointsHaveTheBitsOfAll) {
   std::sort(some.begin(), some.end());
   Compiler compiler;
   const auto start = [&](const std::vector<PointSet>& sets, bool posed) {
-    Request request;
-    request.varying = VaryingPlugs(*rig);
+    std::vector<RequestedOutput> outputs;
     for (const Stage& stage : mesh.stages) {
-      for (const PointSet& set : sets) request.outputs.push_back({stage.points, set});
+      for (const PointSet& set : sets) outputs.push_back({stage.points, set});
     }
-    Result<std::shared_ptr<const Plan>> plan = compiler.Compile(*rig->graph, request);
-    EXPECT_TRUE(plan.ok()) << plan.status().ToString();
-    auto evaluator = std::make_unique<Evaluator>(*plan);
-    for (std::size_t c = 0; posed && c < rig->controls.size(); ++c) {
-      const PlugRef& plug = rig->controls[c].plug;
-      const Index varying = (*plan)->FindVarying(plug);
-      if (varying == kNoIndex) continue;
-      evaluator->Set(varying, pose[c],
-                     (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
-    }
-    EXPECT_TRUE(evaluator->Evaluate().ok());
-    return evaluator;
+    return Evaluated(*rig, &compiler, std::move(outputs), posed ? &pose : nullptr);
   };
   const auto whole = start({PointSet()}, true), part = start({PointSet::Of(some, total)}, true);
   const auto still = start({PointSet()}, false);
@@ -77,6 +84,30 @@ TEST_P(Production, SomePointsHaveTheBitsOfAll) {
     EXPECT_GT(moved, 1e-5);
     EXPECT_LT(moved_at_rest, 1e-5);
   }
+}
+
+// Deformers that touch none of a request's points are left out of its plan: of one point most are.
+TEST_P(Production, OnePointHasTheBitsOfAll) {
+  RigOptions rest;
+  rest.rest = true;
+  Result<Rig> rig = LoadRig(AcceleratedRegistry(), path(), rest);
+  ASSERT_TRUE(rig.ok()) << rig.status().ToString();
+  const std::vector<double> pose = SmoothPoses(*rig, 2, 0.8)[1];
+  const PlugRef last = rig->scene.meshes[0].stages.back().points;
+  const auto total = static_cast<Index>(rig->scene.meshes[0].mesh().point_count());
+  Compiler compiler;
+  const auto evaluate = [&](const PointSet& set) { return Evaluated(*rig, &compiler, {{last, set}}, &pose); };
+  const auto all = evaluate({});
+  const std::size_t all_steps = all->plan().steps().size();
+  std::size_t least_steps = all_steps;
+  for (Index point = 0; point < total; point += total / 60) {
+    const auto one = evaluate(PointSet::Of({point}, total));
+    least_steps = std::min(least_steps, one->plan().steps().size());
+    const float* const wanted[] = {all->Points(0).x, all->Points(0).y, all->Points(0).z};
+    const float* const got[] = {one->Points(0).x, one->Points(0).y, one->Points(0).z};
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(std::memcmp(wanted[k] + point, got[k], sizeof(float)), 0) << point;
+  }
+  EXPECT_LT(least_steps, all_steps / 2);
 }
 
 INSTANTIATE_TEST_SUITE_P(Rigs, Production,

@@ -1,5 +1,6 @@
 #include "tests/support/toy_nodes.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -145,6 +146,31 @@ void AddToyNodes(NodeRegistry& registry) {
       })
       .in_place("points")
       .cost(20000, 2);
+  registry.add("raise", "Raises the points from one on.")
+      .structural("first", 0)
+      .points_in("points")
+      .in("by", 0.0)
+      .out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        const auto& raised = c.kernel_as<std::vector<float>>();
+        for (std::size_t i = 0; i < c.points(0).count; ++i) {
+          c.out_points(0).x[i] = c.points(0).x[i];
+          c.out_points(0).y[i] = c.points(0).y[i] + raised[i] * static_cast<float>(c.get<double>(1));
+          c.out_points(0).z[i] = c.points(0).z[i];
+        }
+      })
+      .bind([](const Binding& b) -> Result<BoundKernel> {
+        const auto first = static_cast<Index>(b.structural().get_int("first"));
+        auto raised = std::make_shared<std::vector<float>>();
+        for (const Index point : b.output("outPoints").ToVector())
+          raised->push_back(point < first ? 0.0f : 1.0f);
+        return BoundKernel{raised, 0, 0};
+      })
+      .in_place("points")
+      .touches("points", [](const Structural& structural, const PointSet& points) {
+        const auto first = static_cast<Index>(structural.get_int("first"));
+        return std::ranges::any_of(points.ToVector(), [&](Index point) { return point >= first; });
+      });
   registry.add("smooth", "Means over a ring.")
       .structural("rings", 1)
       .points_in("points")
