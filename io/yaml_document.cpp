@@ -251,6 +251,14 @@ Status SyntaxError(const YAML::Exception& error, std::string_view text, const st
 
 }  // namespace
 
+void YamlErrors::Append(Status status) {
+  for (const Error& error : status.errors()) {
+    const bool known = std::ranges::any_of(status_.errors(),
+                                           [&](const Error& e) { return e.ToString() == error.ToString(); });
+    if (!known && !full()) status_.Add(error);
+  }
+}
+
 const char* YamlNode::kind_name() const {
   switch (kind) {
     case Kind::kNull:

@@ -60,9 +60,8 @@ class YamlErrors {
     Append(std::move(status).At(node.where()));
     return false;
   }
-  void Append(Status status) {
-    if (!full()) status_.Append(std::move(status));
-  }
+  // Each error once: what several meshes share is read for each of them.
+  void Append(Status status);
   bool ok() const { return status_.ok(); }
   // Nobody reads more: loops over an author's lines stop then. Later errors are dropped.
   bool full() const { return count() >= kMaxErrors; }

@@ -135,6 +135,19 @@ TEST(YamlMap, CollectsUnknownMissingAndMistypedKeys) {
   EXPECT_TRUE(Has(all, "t.yaml:4:8: count: expected a whole number from 0 to 10, found 1.5")) << all;
 }
 
+TEST(YamlErrors, SayEachErrorOnceAndAHundredAtMost) {
+  const YamlNode root = Parse("a: 1\nb: 2\n");
+  YamlErrors errors;
+  for (int i = 0; i < 2; ++i) {
+    errors.Add(*root.Find("a"), "is wrong");
+    errors.Add(*root.Find("b"), "is wrong");
+  }
+  EXPECT_EQ(errors.count(), 2u);  // two places
+  for (int i = 0; i < 300; ++i) errors.Add(root, "error {}", i);
+  EXPECT_TRUE(errors.full());
+  EXPECT_EQ(errors.count(), 100u);
+}
+
 TEST(Quantity, ReadsBareNumbersInTheFilesUnit) {
   FileUnits units;
   ASSERT_TRUE(units.SetLength("cm").ok());

@@ -214,7 +214,7 @@ TEST(UvMap, LooksAtFewOfManyTriangles) {
   const UvMap map(uvs->values()), stack(stacked);
   for (const auto& [of, at] : std::vector<std::pair<const UvMap*, Double3>>{
            {&map, {0.3, 0.4, 0}}, {&map, {0.999, 0.97, 0}}, {&map, {1.5, 0.5, 0}}, {&stack, {0.3, 0.4, 0}}}) {
-    const auto count = CountInstructions([&] { of->Find(at.x, at.y); });
+    const auto count = CountInstructions([of = of, at = at] { of->Find(at.x, at.y); });
     if (!count.has_value()) GTEST_SKIP() << "instructions cannot be counted here";
     EXPECT_LT(*count, 30000u) << (of == &stack) << at.x;  // of 6962 triangles, some hundred instructions each
   }
