@@ -142,10 +142,11 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
   times.Row({"full", fmt::format("{:.3f}", r.full_ms), heaviest});
   times.Row({"accelerated", fmt::format("{:.3f}", r.accelerated_ms), parts});
   text += times.Text();
-  text += fmt::format(
-      "\nspeedup    {}{}; ceiling {}, bound by the graph that the subspace reads{}\n", RatioText(r.speedup(), 2),
-      r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
-      RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  text += fmt::format("\nspeedup    {}{}; ceiling {}, bound by the graph that the subspace reads{}\n",
+                      RatioText(r.speedup(), 2),
+                      r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
+                      RatioText(r.ceiling()),
+                      r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
   text += fmt::format(
       "hits       {:.1f} % of frames; {:.1f} % of frames beyond {}\n",
       100 * static_cast<double>(r.hits) / frames, 100 * static_cast<double>(r.violations) / frames,

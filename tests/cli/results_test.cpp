@@ -67,8 +67,8 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
                300, folder.path());
   ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
   const std::string text = TemporaryFolder::Read(folder / "results.md");
-  for (const char* words :
-       {"10 key points", "paper mode, all frames accepted", "| default |", "| 1x |", "| with reconstruction |", "\nhello: 24 and 30.\n"})
+  for (const char* words : {"10 key points", "paper mode, all frames accepted", "| default |", "| 1x |",
+                            "| with reconstruction |", "\nhello: 24 and 30.\n"})
     EXPECT_NE(text.find(words), std::string::npos) << words << "\n" << text;
   EXPECT_EQ(text.find("animal_mush"), std::string::npos) << "was not measured";
   // Every picture is there

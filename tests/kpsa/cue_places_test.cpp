@@ -74,7 +74,8 @@ TEST_F(CuePlacesTest, TheDearestIsTheLatestLocalStage) {
     EXPECT_EQ(place.size(), kMeshPoints);  // few enough to be candidates all
     for (const CueRef& cue : place) EXPECT_EQ(cue.kind, CueKind::kStage);
   }
-  EXPECT_DOUBLE_EQ(found.full_cost, 2 * (kMove + kMovePoint * kMeshPoints) + kSmooth + kSmoothPoint * kMeshPoints);
+  EXPECT_DOUBLE_EQ(found.full_cost,
+                   2 * (kMove + kMovePoint * kMeshPoints) + kSmooth + kSmoothPoint * kMeshPoints);
 }
 
 TEST_F(CuePlacesTest, WhatClipsDriveVariesAsWell) {
