@@ -134,8 +134,7 @@ class Writer {
     std::string text = fmt::format(
         "# A starter rig for {}: {}, {}, {}, {:.3g} m from corner to corner.\n"
         "# It works as it is: kpsa validate, eval, render{}. Comments say what to do next; take out the # "
-        "where no "
-        "space\n"
+        "where no space\n"
         "# follows it to try what is suggested there.\n"
         "# Lengths are in cm and angles in degrees; write 2mm or 0.1rad for anything else.\n",
         InComment(File()), several(rig_.scene.meshes.size(), "mesh", "meshes"),

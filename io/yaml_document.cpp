@@ -253,9 +253,10 @@ Status SyntaxError(const YAML::Exception& error, std::string_view text, const st
 
 void YamlErrors::Append(Status status) {
   for (const Error& error : status.errors()) {
-    const bool known = std::ranges::any_of(status_.errors(),
-                                           [&](const Error& e) { return e.ToString() == error.ToString(); });
-    if (!known && !full()) status_.Add(error);
+    if (full()) return;
+    const std::string text = error.ToString();
+    if (std::ranges::none_of(status_.errors(), [&](const Error& e) { return e.ToString() == text; }))
+      status_.Add(error);
   }
 }
 
