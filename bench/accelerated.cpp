@@ -127,11 +127,11 @@ int Main(int argc, char** argv) {
   if (!open.ok()) return Fail(open.status());
   Rig& rig = (*open)->rig;
   Compiler compiler;
-  const Result<std::shared_ptr<const Plan>> full_plan = CompileFor(rig, &compiler, AllMeshes(rig));
+  const Result<std::shared_ptr<const Plan>> full_plan = CompileFor(rig, &compiler, ShownPoints(rig));
   if (!full_plan.ok()) return Fail(full_plan.status());
   const Result<std::vector<AppliedSubspace>> applied = ApplyAcceleration(&rig, &compiler, acceleration);
   if (!applied.ok()) return Fail(applied.status());
-  const Result<std::shared_ptr<const Plan>> plan = CompileFor(rig, &compiler, AllMeshes(rig));
+  const Result<std::shared_ptr<const Plan>> plan = CompileFor(rig, &compiler, ShownPoints(rig));
   if (!plan.ok()) return Fail(plan.status());
   Evaluator evaluator(*plan), full(*full_plan);
   return Report(rig, **plan, evaluator, full, argc > 3 ? std::clamp(std::atoi(argv[3]), 1, 100000) : 20);

@@ -157,11 +157,11 @@ struct Contender {
     open = std::move(*loaded);
     Rig& rig = open->rig;
     Compiler compiler;
-    *outputs = AllMeshes(rig);
+    *outputs = ShownPoints(rig);
     Result<std::vector<AppliedSubspace>> made = ApplyAcceleration(&rig, &compiler, flags);
     if (!made.ok()) return made.status();
     applied = std::move(*made);
-    request = AllMeshes(rig);
+    request = ShownPoints(rig);
     if (Request colors = ColorOutputs(rig, applied, false); !colors.outputs.empty()) {
       *outputs = std::move(colors);
       request = ColorOutputs(rig, applied, true);
@@ -191,7 +191,8 @@ void Contender::Describe() {
   if (result.clips.size() > 1) return;
   std::map<std::string, std::size_t> stages;
   if (ColorOutputs(rig, applied, false).outputs.empty()) {
-    for (const CharacterMesh& mesh : rig.scene.meshes) result.output_points += mesh.mesh().point_count();
+    for (const std::size_t m : ShownMeshes(rig))
+      result.output_points += rig.scene.meshes[m].mesh().point_count();
   } else {
     for (const AppliedSubspace& one : applied) {
       for (const SubspaceOutput& output : one.subspace->outputs) result.output_points += output.points;

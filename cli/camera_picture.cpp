@@ -81,7 +81,7 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
   }
   if (!illumination.has_value()) {
     for (NodeId node : lights) view.lights.push_back(LightOf(graph, node));
-    for (std::size_t m = 0; m < rig.scene.meshes.size(); ++m) view.meshes.push_back(m);
+    view.meshes = ShownMeshes(rig);
     return view;
   }
   const NodeDef& def = graph.def(*illumination);

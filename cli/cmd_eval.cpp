@@ -51,7 +51,8 @@ CommandResult Eval(const EvalFlags& flags) {
     if (!result.ok()) return result.status();
     applied = std::move(*result);
   }
-  Request request = AllMeshes(rig);
+  const std::vector<std::size_t> shown = ShownMeshes(rig);
+  Request request = ShownPoints(rig);
   Verdicts verdicts(applied, rig, &request);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
@@ -60,7 +61,7 @@ CommandResult Eval(const EvalFlags& flags) {
   Result<std::unique_ptr<VertexOutput>> output =
       CreateVertexOutput(*flags.output, rig, *times, {flags.force, flags.blender});
   if (!output.ok()) return output.status();
-  std::vector<ConstPointsView> meshes(rig.scene.meshes.size());
+  std::vector<ConstPointsView> meshes(shown.size());
   RigFrameOptions options;
   options.threads = *threads;
   options.label = "frames";
@@ -76,14 +77,14 @@ CommandResult Eval(const EvalFlags& flags) {
   if (!notes.ok()) return notes.status();
 
   std::size_t vertices = 0;
-  for (const CharacterMesh& mesh : rig.scene.meshes) vertices += mesh.vertex_count;
+  for (const std::size_t m : shown) vertices += rig.scene.meshes[m].vertex_count;
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   if (flags.json) {
     nlohmann::ordered_json document = nlohmann::ordered_json{{"schema", "kpsa.eval/1"},
                                                              {"outputs", (*output)->paths()},
                                                              {"clip", rig.scene.clip.value_or("")},
                                                              {"frames", times->size()},
-                                                             {"meshes", rig.scene.meshes.size()},
+                                                             {"meshes", shown.size()},
                                                              {"vertices", vertices},
                                                              {"seconds", seconds},
                                                              {"notes", *notes}};

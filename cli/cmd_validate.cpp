@@ -19,7 +19,8 @@ Status Check(const Flags& flags, std::vector<std::string>* notes, std::string* s
   *notes = rig.character->warnings;
   notes->insert(notes->end(), rig.notes.begin(), rig.notes.end());
   Compiler compiler;
-  Request request = AllMeshes(rig);
+  Request request;
+  for (const CharacterMesh& mesh : rig.scene.meshes) request.outputs.push_back({mesh.points, {}});
   request.varying = VaryingPlugs(rig);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();

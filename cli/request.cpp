@@ -68,7 +68,10 @@ Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wan
     plugs.push_back(*plug);
   }
   if (wanted.empty()) {
-    for (const CharacterMesh& mesh : rig.scene.meshes) plugs.push_back({mesh.points, &mesh});
+    for (const std::size_t m : ShownMeshes(rig)) {
+      const CharacterMesh& mesh = rig.scene.meshes[m];
+      plugs.push_back({mesh.points, &mesh});
+    }
   }
   Request request;
   request.varying.push_back(rig.scene.time);

@@ -14,9 +14,11 @@
 
 namespace kpsa {
 
-// What the command line asks for: the final points of all meshes, in the order of rig.scene.meshes; time
-// varies.
-Request AllMeshes(const Rig& rig);
+// The meshes that are visible, in rig.scene.meshes; all of them where none is.
+std::vector<std::size_t> ShownMeshes(const Rig& rig);
+// What the command line asks for where nobody says: the final points of the meshes that are shown, in that
+// order; time varies.
+Request ShownPoints(const Rig& rig);
 
 // Compiles the request; errors are located at the rig's file.
 Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compiler, const Request& request);

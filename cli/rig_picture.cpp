@@ -34,14 +34,15 @@ std::shared_ptr<const std::vector<float>> PointColors(const Rig& rig, std::size_
 
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
                                         const RigFrameOptions& options) {
-  const auto plan = CompileFor(rig, compiler, AllMeshes(rig));
+  const auto plan = CompileFor(rig, compiler, ShownPoints(rig));
   if (!plan.ok()) return plan.status();
+  const std::vector<std::size_t> shown = ShownMeshes(rig);
   std::vector<Pose> poses(times.size(), Pose(rig.scene.meshes.size()));
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, times, options, [&](std::size_t frame, const Evaluator& evaluator) {
-        for (Index m = 0; m < rig.scene.meshes.size(); ++m) {
-          const ConstPointsView points = evaluator.Points(m);
-          std::vector<float>& xyz = poses[frame][m];
+        for (Index output = 0; output < shown.size(); ++output) {
+          const ConstPointsView points = evaluator.Points(output);
+          std::vector<float>& xyz = poses[frame][shown[output]];
           xyz.resize(3 * points.count);
           for (std::size_t i = 0; i < points.count; ++i)
             xyz[3 * i] = points.x[i], xyz[3 * i + 1] = points.y[i], xyz[3 * i + 2] = points.z[i];
@@ -54,6 +55,7 @@ Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, cons
 RenderInput MakeInput(const Rig& rig, const Pose& pose) {
   RenderInput input;
   for (std::size_t m = 0; m < pose.size(); ++m) {
+    if (pose[m].empty()) continue;  // hidden
     const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
     const std::span<const Index> triangles(mesh.triangles);
     if (const auto colors = PointColors(rig, m); colors != nullptr) {
@@ -107,6 +109,7 @@ RenderDots KeyPoints(const std::vector<AppliedSubspace>& applied, const Pose& po
         continue;
       }
       const std::vector<float>& points = pose[one.entry.points[cue.mesh].mesh];
+      if (points.empty()) continue;  // of a hidden mesh
       for (std::size_t k = 0; k < 3; ++k) dots.points.push_back(points[3 * std::size_t{cue.point} + k]);
     }
   }

@@ -4,6 +4,7 @@
 
 #include "cli/common.h"
 #include "cli/output.h"
+#include "cli/rig_frames.h"
 #include "io/gltf_export.h"
 #include "io/npz.h"
 #include "io/point_cache.h"
@@ -26,11 +27,12 @@ void Interleave(const Mesh& mesh, ConstPointsView points, Index first, Index cou
 class NpzOutput final : public VertexOutput {
  public:
   NpzOutput(OutputPath path, NpzWriter writer, const Rig& rig)
-      : path_(std::move(path)), writer_(std::move(writer)), rig_(rig) {}
+      : path_(std::move(path)), writer_(std::move(writer)), rig_(rig), shown_(ShownMeshes(rig)) {}
 
   Status Declare(const std::vector<double>& times) {
     KPSA_RETURN_IF_ERROR(writer_.Add("times", {times.size()}, times));
-    for (const CharacterMesh& mesh : rig_.scene.meshes) {
+    for (const std::size_t m : shown_) {
+      const CharacterMesh& mesh = rig_.scene.meshes[m];
       for (const OutputPrimitive& primitive : mesh.primitives) {
         const Result<NpzWriter::ArrayId> id =
             writer_.Declare(primitive.key, NpzType::kFloat32, {times.size(), primitive.vertex_count, 3});
@@ -44,7 +46,7 @@ class NpzOutput final : public VertexOutput {
   Status Frame(std::span<const ConstPointsView> meshes) override {
     std::size_t array = 0;
     for (std::size_t m = 0; m < meshes.size(); ++m) {
-      const CharacterMesh& mesh = rig_.scene.meshes[m];
+      const CharacterMesh& mesh = rig_.scene.meshes[shown_[m]];
       for (const OutputPrimitive& primitive : mesh.primitives) {
         xyz_.resize(std::size_t{3} * primitive.vertex_count);
         Interleave(mesh.mesh(), meshes[m], primitive.first_vertex, primitive.vertex_count, xyz_.data());
@@ -65,6 +67,7 @@ class NpzOutput final : public VertexOutput {
   OutputPath path_;
   NpzWriter writer_;
   const Rig& rig_;
+  std::vector<std::size_t> shown_;
   std::vector<NpzWriter::ArrayId> arrays_;
   std::vector<float> xyz_;
 };
@@ -72,10 +75,11 @@ class NpzOutput final : public VertexOutput {
 class CacheOutput final : public VertexOutput {
  public:
   CacheOutput(std::string path, const Rig& rig, std::vector<double> times, const VertexOutputOptions& options)
-      : path_(std::move(path)), suffix_(Suffix(path_)), rig_(rig), options_(options) {
+      : path_(std::move(path)), suffix_(Suffix(path_)), rig_(rig), shown_(ShownMeshes(rig)), options_(options) {
     cache_.times = std::move(times);
     cache_.fps = rig.fps;
-    for (const CharacterMesh& mesh : rig.scene.meshes) {
+    for (const std::size_t m : shown_) {
+      const CharacterMesh& mesh = rig.scene.meshes[m];
       cache_.meshes.push_back({mesh.name, mesh.vertex_count, {}, mesh.mesh().data().triangle_vertices});
     }
   }
@@ -106,7 +110,7 @@ class CacheOutput final : public VertexOutput {
       std::vector<float>& frames = cache_.meshes[m].frames;
       const std::size_t before = frames.size();
       frames.resize(before + 3 * cache_.meshes[m].vertex_count);
-      Interleave(rig_.scene.meshes[m].mesh(), meshes[m], 0, rig_.scene.meshes[m].vertex_count,
+      Interleave(rig_.scene.meshes[shown_[m]].mesh(), meshes[m], 0, cache_.meshes[m].vertex_count,
                  frames.data() + before);
     }
     return Status();
@@ -133,7 +137,7 @@ class CacheOutput final : public VertexOutput {
         if (options_.blender) {
           options.axes = CacheAxes::kBlender;
           options.order = BlenderVertexOrder(
-              rig_.character->meshes[rig_.character->nodes[rig_.scene.meshes[m].gltf_node].mesh]);
+              rig_.character->meshes[rig_.character->nodes[rig_.scene.meshes[shown_[m]].gltf_node].mesh]);
         }
         const std::string path = CachePathForMesh(path_, cache_, m);
         KPSA_RETURN_IF_ERROR(suffix_ == ".pc2" ? WritePc2(path, cache_, m, options, &notes)
@@ -154,6 +158,7 @@ class CacheOutput final : public VertexOutput {
  private:
   std::string path_, suffix_;
   const Rig& rig_;
+  std::vector<std::size_t> shown_;
   VertexOutputOptions options_;
   PointCache cache_;
 };

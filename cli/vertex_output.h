@@ -1,4 +1,4 @@
-// Animated vertices into a file of any format: .npz frame by frame, the others (.pc2 .mdd .glb .usda) once
+// Animated vertices of the meshes that are shown, into a file of any format: .npz frame by frame, the others (.pc2 .mdd .glb .usda) once
 // all frames are there. World space in metres, vertices in the order of the glTF file.
 #pragma once
 
@@ -21,7 +21,7 @@ struct VertexOutputOptions {
 class VertexOutput {
  public:
   virtual ~VertexOutput() = default;
-  // The next frame: for each mesh of the rig, all its points in their order.
+  // The next frame: for each mesh that is shown, all its points in their order.
   virtual Status Frame(std::span<const ConstPointsView> meshes) = 0;
   // Completes the file; without it nothing appears. Returns what a user should know, one line each.
   virtual Result<std::vector<std::string>> Finish() = 0;

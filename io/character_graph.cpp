@@ -164,6 +164,7 @@ class Builder {
     CharacterMesh mesh;
     mesh.name = name;
     mesh.gltf_node = gltf_node;
+    mesh.visible = from.visible;
     mesh.vertex_count = static_cast<Index>(gltf_mesh.vertex_count());
     mesh.transform = scene_.transforms[gltf_node];
     auto it = welded_.find(from.mesh);  // instances of a mesh share its geometry

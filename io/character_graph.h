@@ -48,6 +48,7 @@ struct OutputPrimitive {
 struct CharacterMesh {
   std::string name;  // in outputs
   Index gltf_node = kNoIndex;
+  bool visible = true;  // a hidden one may drive others, but is no output unless somebody asks for it
   Index vertex_count = 0;
   WeldedMesh geometry;
   std::shared_ptr<const Influences> influences;                // null without a skin

@@ -272,6 +272,7 @@ Result<Document> LoadDocument(std::span<const std::uint8_t> bytes, const std::st
   KPSA_RETURN_IF_ERROR(ParseModel(reduced->text, model.get()));
   document.target_names = std::move(reduced->target_names);
   document.no_view = reduced->no_view;
+  document.hidden = std::move(reduced->hidden);
   document.vrm = std::move(reduced->vrm);
   document.warnings = std::move(reduced->warnings);
   std::uint64_t total = bytes.size();

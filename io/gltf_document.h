@@ -32,6 +32,7 @@ struct Document {
   std::vector<std::vector<std::uint8_t>> buffers;      // empty where the file gives no data
   std::vector<std::vector<std::string>> target_names;  // [mesh][target] from mesh.extras.targetNames
   int no_view = 0;                                     // accessors without a buffer view name this one
+  std::vector<std::size_t> hidden;                     // nodes that are not shown, nor what is below them
   std::string vrm;                                     // what ReadVrm reads, as JSON; may be empty
   std::vector<std::string> warnings;
   mutable Budget budget;
@@ -60,6 +61,7 @@ struct ReducedJson {
   int no_view = 0;
   std::vector<MeshoptView> meshopt;
   std::vector<DracoPrimitive> draco;
+  std::vector<std::size_t> hidden;
   std::string vrm;
   std::vector<std::string> warnings;
 };

@@ -39,6 +39,7 @@ struct Node {
   Index skin = kNoIndex;        // only where there is a mesh
   std::vector<double> weights;  // overrides Mesh::weights where not empty
   bool in_scene = false;        // reached from the roots of the scene that is shown
+  bool visible = true;          // KHR_node_visibility hides neither it nor what it hangs from
   Matrix4 LocalMatrix() const;  // the rest pose: `matrix`, or T * R * S
 };
 

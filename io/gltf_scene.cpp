@@ -69,9 +69,12 @@ void MarkScene(const Document& document, Character* character) {
     for (const int node : model.scenes[scene].nodes) roots.push_back(static_cast<Index>(node));
   }
   for (const Index root : roots) character->nodes[root].in_scene = true;
+  for (const std::size_t hidden : document.hidden) character->nodes[hidden].visible = false;
   for (const Index node : character->order) {
     const Index parent = character->nodes[node].parent;
-    if (parent != kNoIndex && character->nodes[parent].in_scene) character->nodes[node].in_scene = true;
+    if (parent == kNoIndex) continue;
+    if (character->nodes[parent].in_scene) character->nodes[node].in_scene = true;
+    if (!character->nodes[parent].visible) character->nodes[node].visible = false;
   }
 }
 

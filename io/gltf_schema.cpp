@@ -237,10 +237,11 @@ Status CheckVersion(const json& asset) {
   return {};
 }
 
-constexpr const char *kMeshopt = "EXT_meshopt_compression", *kDraco = "KHR_draco_mesh_compression";
+constexpr const char *kMeshopt = "EXT_meshopt_compression", *kDraco = "KHR_draco_mesh_compression",
+                     *kVisibility = "KHR_node_visibility";
 
 bool IsRead(std::string_view extension) {
-  return extension == "KHR_mesh_quantization" || extension == kMeshopt || extension == kDraco ||
+  return extension == "KHR_mesh_quantization" || extension == kMeshopt || extension == kDraco || extension == kVisibility ||
          extension == "VRM" || extension == "VRMC_vrm" || extension == "VRMC_node_constraint";
 }
 
@@ -336,6 +337,21 @@ Status CopyDraco(const json& root, std::vector<DracoPrimitive>* all) {
   return {};
 }
 
+// Nodes that KHR_node_visibility hides, with all below them.
+Status CopyHidden(const json& root, std::vector<std::size_t>* hidden) {
+  const auto nodes = root.find("nodes");
+  for (std::size_t i = 0; nodes != root.end() && i < nodes->size(); ++i) {
+    const json* extension = FindExtension((*nodes)[i], kVisibility);
+    if (extension == nullptr) continue;
+    const auto visible = extension->find("visible");
+    if (visible == extension->end()) continue;
+    if (!visible->is_boolean())
+      return Status::Invalid("nodes[{}].extensions.{}.visible must be true or false", i, kVisibility);
+    if (!visible->get<bool>()) hidden->push_back(i);
+  }
+  return {};
+}
+
 // The parts of VRM's extensions that are read, for ReadVrm: {"VRM", "VRMC_vrm", "constraints": [[node, it]]}.
 std::string VrmText(const json& root) {
   json parts = json::object();
@@ -398,6 +414,7 @@ Result<ReducedJson> ReduceJson(std::span<const std::uint8_t> text) {
     KPSA_RETURN_IF_ERROR(CopyBuffers(root, &result.buffers));
     KPSA_RETURN_IF_ERROR(CopyMeshopt(root, &result.meshopt));
     KPSA_RETURN_IF_ERROR(CopyDraco(root, &result.draco));
+    KPSA_RETURN_IF_ERROR(CopyHidden(root, &result.hidden));
     result.vrm = VrmText(root);
     if (reduced.contains("meshes")) {
       for (const json& mesh : root["meshes"]) result.target_names.push_back(TargetNames(mesh));

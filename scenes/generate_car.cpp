@@ -192,7 +192,7 @@ SceneFiles GenerateCar() {
   scene.meshes = {BodyMesh(shape, expressions), PartsMesh(), CageMesh("muscles", muscles, pulls),
                   CageMesh("panels", PanelCage(), {}), CageMesh("frame", FrameCage(), {})};
   for (std::size_t m = 0; m < scene.meshes.size(); ++m)
-    scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m)});
+    scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m), m >= 2});
   const auto names = [](const std::vector<Expression>& list) {
     std::vector<std::string> out;
     for (const Expression& each : list) out.push_back(each.name);

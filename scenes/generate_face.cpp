@@ -53,11 +53,11 @@ GlbMesh FaceMesh(const HeadDesign& design, const HeadShape& shape, const std::ve
 }
 
 // A muscle moves with the joints of the skin above it.
-GlbMesh MusclesMesh(const HeadDesign& design, bool deep, const HeadShape& shape,
+GlbMesh MusclesMesh(const HeadDesign& design, Sheet sheet, const HeadShape& shape,
                     const std::vector<std::array<double, kJointCount>>& joint_weights) {
-  const MuscleShape muscles = MakeMuscles(design, deep);
+  const MuscleShape muscles = MakeMuscles(design, sheet);
   GlbMesh mesh;
-  mesh.name = deep ? "muscles" : "fascia";
+  mesh.name = NameOf(sheet);
   for (const Double3& p : muscles.points) {
     mesh.positions.push_back(ToMetres(p));
     mesh.colors.push_back(Color({0.35, 0.07, 0.06}));
@@ -111,9 +111,9 @@ SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
   scene.nodes.push_back({"eyes", -1, {}, 1});
   scene.meshes = {FaceMesh(design, shape, expressions, joint_weights), EyesMesh(design)};
   if (design.production) {
-    for (const bool deep : {true, false}) {
-      scene.nodes.push_back({deep ? "muscles" : "fascia", -1, {}, static_cast<int>(scene.meshes.size())});
-      scene.meshes.push_back(MusclesMesh(design, deep, shape, joint_weights));
+    for (const Sheet sheet : kSheets) {
+      scene.nodes.push_back({NameOf(sheet), -1, {}, static_cast<int>(scene.meshes.size()), true});
+      scene.meshes.push_back(MusclesMesh(design, sheet, shape, joint_weights));
     }
   }
   std::vector<std::string> names;

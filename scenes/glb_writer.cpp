@@ -167,6 +167,7 @@ std::string Writer::Finish(const GlbScene& scene) {
   }
   const int inverse = Accessor(View(std::span<const std::array<float, 16>>(inverse_binds)), 5126,
                                inverse_binds.size(), "MAT4");
+  bool hides = false;
   for (std::size_t i = 0; i < scene.nodes.size(); ++i) {
     const GlbNode& node = scene.nodes[i];
     std::vector<std::string> children;
@@ -182,6 +183,8 @@ std::string Writer::Finish(const GlbScene& scene) {
       text += ",\"translation\":" + Numbers(t);
     }
     if (!children.empty()) text += ",\"children\":" + Joined(children);
+    if (node.hidden) text += R"(,"extensions":{"KHR_node_visibility":{"visible":false}})";
+    hides = hides || node.hidden;
     nodes.push_back(text + "}");
     if (node.parent < 0) roots.push_back(fmt::format("{}", i));
   }
@@ -193,6 +196,7 @@ std::string Writer::Finish(const GlbScene& scene) {
       "\"materials\":{},",
       Joined(roots), Joined(nodes), Joined(meshes), Joined(joints), inverse, joints.front(),
       Joined(materials_));
+  if (hides) json += R"("extensionsUsed":["KHR_node_visibility"],)";
   if (!clips.empty()) json += fmt::format("\"animations\":{},", Joined(clips));
   json += fmt::format("\"accessors\":{},\"bufferViews\":{},\"buffers\":[{{\"byteLength\":{}}}]}}",
                       Joined(accessors_), Joined(views_), binary_.size());

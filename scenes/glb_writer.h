@@ -43,7 +43,8 @@ struct GlbNode {
   std::string name;
   int parent = -1;  // an earlier node
   Double3 translation;
-  int mesh = -1;  // skinned by the skin
+  int mesh = -1;        // skinned by the skin
+  bool hidden = false;  // KHR_node_visibility: a cage that others follow
 };
 
 // Values at each frame: rotations are x y z w, weights one a target.

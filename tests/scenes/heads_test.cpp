@@ -147,20 +147,21 @@ TEST(Heads, WeightsUseEveryJointAndClipsRestTheCorrectives) {
   }
 }
 
-TEST(Heads, MusclesAndFasciaLieUnderTheSkinAndPull) {
+TEST(Heads, SheetsLieUnderTheSkinAndPull) {
   for (const Made& head : Heads()) {
-    for (const bool deep : {true, false}) {
-      const MuscleShape muscles = MakeMuscles(head.design, deep);
+    for (const Sheet sheet : kSheets) {
+      SCOPED_TRACE(head.design.name + " " + NameOf(sheet));
+      const MuscleShape muscles = MakeMuscles(head.design, sheet);
       EXPECT_GT(muscles.points.size(), 80u);
       EXPECT_LT(muscles.points.size(), 400u);
-      for (const Double3& p : muscles.points) EXPECT_LT(head.design.distance(p), -0.2) << head.design.name;
+      for (const Double3& p : muscles.points) EXPECT_LT(head.design.distance(p), -0.2);
       int pulling = 0;  // the animal's sheet of muscles does not reach its chin
       for (const Expression& pull : muscles.pulls) {
         double largest = 0;
         for (const Double3& d : pull.deltas) largest = std::max(largest, Length(d));
         pulling += largest > 0.05;
       }
-      EXPECT_GE(pulling, 8) << head.design.name;
+      EXPECT_GE(pulling, 8);
     }
   }
 }
