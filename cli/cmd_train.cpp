@@ -38,10 +38,8 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
   KPSA_RETURN_IF_ERROR(count("--seed", flags.seed, 0, 2'000'000'000, &options->seed));
   KPSA_RETURN_IF_ERROR(count("--rows", flags.rows, 3, 3000, &options->rows));
   KPSA_RETURN_IF_ERROR(count("--modes", flags.modes, 1, 2000, &options->max_modes));
-  KPSA_RETURN_IF_ERROR(count("--key-points", flags.key_points, 2, 2000, &options->key_points));
-  if (flags.key_points.has_value() && !flags.paper)
-    return Status::Usage(
-        "--key-points is for --paper; otherwise --rows says how many measurements there are");
+  KPSA_RETURN_IF_ERROR(count("--key-points", flags.key_points, 2, 2000,
+                             flags.paper ? &options->key_points : &options->min_points));
   if (flags.paper) options->mode = EstimatorMode::kPaper;
   options->keep_modes = flags.keep_modes;
   if (flags.tolerance.has_value()) {
@@ -111,8 +109,8 @@ CommandResult RunTrain(const TrainFlags& flags) {
   if (!flags.samples.has_value()) options.samples = static_cast<std::size_t>(entry->train_samples);
   if (!flags.calibration.has_value()) options.calibration_poses = static_cast<std::size_t>(entry->held_out);
   if (entry->key_points > 0) {
-    options.min_points = static_cast<std::size_t>(entry->key_points);
-    if (!flags.key_points.has_value()) options.key_points = options.min_points;
+    const auto points = static_cast<std::size_t>(entry->key_points);
+    if (!flags.key_points.has_value()) options.key_points = options.min_points = points;
   }
   if (!flags.tolerance.has_value()) options.tolerance = entry->tolerance;
   if (!flags.violation_rate.has_value()) options.violation_rate = entry->violation_rate;
@@ -191,7 +189,7 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
             "share of frames that may exceed it, as in 1%");
   AddSwitch(command, "--paper", &flags->paper,
             "the method of the paper: key points of varimax modes, least squares");
-  AddOption(command, "--key-points", "N", &flags->key_points, "key points of --paper; 80 if not given");
+  AddOption(command, "--key-points", "N", &flags->key_points, "points that are measured: with --paper so many, else at least so many; 80 and 16 if not given");
   AddSwitch(command, "--keep-modes", &flags->keep_modes,
             "store the modes as well, so that bench can split the error of each frame");
   AddThreadsFlag(command, flags.get());

@@ -43,6 +43,7 @@ struct CarCage {
 CarCage MuscleCage();  // rings around the mouth
 CarCage PanelCage();   // under hood, roof and trunk
 CarCage FrameCage();   // a tube from front to back
+CarCage ClayCage();    // a wider one, that animators mould
 
 enum CarJoint : int {
   kGround,

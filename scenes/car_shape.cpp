@@ -388,21 +388,40 @@ CarCage PanelCage() {
   return cage;
 }
 
-CarCage FrameCage() {
+namespace {
+
+// A ring of a tube: its centre's height, half its width and height.
+struct TubeRing {
+  double z, y, wide, high;
+};
+CarCage Tube(std::span<const TubeRing> rings, int around) {
   CarCage cage;
-  constexpr int kAround = 8;
-  for (double z : {130.0, 70.0, 10.0, -60.0, -125.0}) {
+  for (const TubeRing& ring : rings) {
     const int first = static_cast<int>(cage.points.size());
-    for (int k = 0; k < kAround; ++k) {
+    for (int k = 0; k < around; ++k) {
       double sine, cosine;
-      SinCos(2 * kPi * (k + 0.5) / kAround, &sine, &cosine);
-      cage.points.push_back({48 * cosine, 58 + 20 * sine, z});
-      const int next = (k + 1) % kAround;
+      SinCos(2 * kPi * (k + 0.5) / around, &sine, &cosine);
+      cage.points.push_back({ring.wide * cosine, ring.y + ring.high * sine, ring.z});
+      const int next = (k + 1) % around;
       if (first > 0)
-        cage.quads.push_back({first - kAround + k, first - kAround + next, first + next, first + k});
+        cage.quads.push_back({first - around + k, first - around + next, first + next, first + k});
     }
   }
   return cage;
+}
+
+}  // namespace
+
+CarCage FrameCage() {
+  constexpr TubeRing kRings[] = {
+      {130, 58, 48, 20}, {70, 58, 48, 20}, {10, 58, 48, 20}, {-60, 58, 48, 20}, {-125, 58, 48, 20}};
+  return Tube(kRings, 8);
+}
+
+CarCage ClayCage() {
+  constexpr TubeRing kRings[] = {{140, 58, 50, 16}, {100, 62, 56, 20}, {60, 66, 58, 24},   {20, 78, 52, 36},
+                                 {-20, 86, 50, 46}, {-60, 86, 50, 46}, {-100, 74, 54, 28}, {-140, 66, 52, 20}};
+  return Tube(kRings, 12);
 }
 
 }  // namespace kpsa::scenes::car

@@ -190,7 +190,7 @@ SceneFiles GenerateCar() {
   }
   const int first = static_cast<int>(scene.nodes.size());
   scene.meshes = {BodyMesh(shape, expressions), PartsMesh(), CageMesh("muscles", muscles, pulls),
-                  CageMesh("panels", PanelCage(), {}), CageMesh("frame", FrameCage(), {})};
+                  CageMesh("panels", PanelCage(), {}), CageMesh("frame", FrameCage(), {}), CageMesh("clay", ClayCage(), {})};
   for (std::size_t m = 0; m < scene.meshes.size(); ++m)
     scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m), m >= 2});
   const auto names = [](const std::vector<Expression>& list) {

@@ -122,7 +122,7 @@ TEST(Car, ABlinkClosesTheEyeAroundTheEyeball) {
 
 // No cage lies in the shell, or far away from it.
 TEST(Car, TheCagesKeepOffTheShell) {
-  for (const CarCage& cage : {MuscleCage(), PanelCage(), FrameCage()}) {
+  for (const CarCage& cage : {MuscleCage(), PanelCage(), FrameCage(), ClayCage()}) {
     std::set<int> used;
     for (const auto& q : cage.quads) used.insert(q.begin(), q.end());
     EXPECT_EQ(used.size(), cage.points.size());
@@ -153,7 +153,7 @@ TEST(Car, TheFileLoadsWithItsMeshesJointsAndClips) {
   for (const gltf::Mesh& mesh : car->meshes) EXPECT_TRUE(mesh.skinned());
   for (const char* clip : {"extreme", "talk_train", "talk"}) EXPECT_NE(car->FindClip(clip), kNoIndex) << clip;
   for (const char* name :
-       {"body", "jaw", "lidUp.L", "wheel.BR", "car_body", "car_parts", "muscles", "panels", "frame"}) {
+       {"body", "jaw", "lidUp.L", "wheel.BR", "car_body", "car_parts", "muscles", "panels", "frame", "clay"}) {
     EXPECT_TRUE(std::any_of(car->nodes.begin(), car->nodes.end(), [&](const gltf::Node& n) {
       return n.name == name;
     })) << name;
