@@ -115,7 +115,7 @@ Request ColorOutputs(const Rig& rig, const std::vector<AppliedSubspace>& applied
   return request;
 }
 
-constexpr std::size_t kTurnFrames = 32;  // of one side, before the other runs them
+constexpr std::size_t kTurnFrames = 128;  // of one side, before the other runs them: some seconds of playback
 
 // What it costs to record the steps of a profile: for small nodes as much as they do.
 double RecordingNs(const Plan& plan, const Profile& recorded) {

@@ -22,13 +22,13 @@ SheetGrid GridOf(const HeadDesign& d, Sheet sheet) {
   for (const GuideRow& guide : d.guides) head_rows += guide.rows;
   switch (sheet) {
     case Sheet::kMuscles:
-      return {1.3, 1.85, 12, 6, d.muscle_row0, d.muscle_row1};
+      return {1.3, 1.85, 10, 5, d.muscle_row0, d.muscle_row1};
     case Sheet::kFascia:
-      return {0.75, 1.85, 12, 6, d.muscle_row0, d.muscle_row1};
+      return {0.75, 1.85, 10, 5, d.muscle_row0, d.muscle_row1};
     case Sheet::kFat:
-      return {0.45, 1.85, 12, 6, d.muscle_row0, d.muscle_row1};
+      return {0.45, 1.85, 9, 4, d.muscle_row0, d.muscle_row1};
     case Sheet::kClay:
-      return {1.0, 3.0, 9, 8, 0.6 * d.muscle_row0, head_rows - 1.5};
+      return {1.0, 3.0, 8, 6, 0.6 * d.muscle_row0, head_rows - 1.5};
   }
   return {};
 }
