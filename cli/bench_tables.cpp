@@ -17,6 +17,7 @@ namespace {
 using BenchJsonValue = nlohmann::json;
 
 constexpr std::uint64_t kMostBytes = 1u << 28;
+constexpr double kLeastShare = 0.02;  // of the full evaluation, of a node type that is named
 
 // What kpsa bench does not write; caught where a document is read.
 struct Refusal {
@@ -99,6 +100,38 @@ std::string ModeOf(const BenchJsonValue& side) {
   return text;
 }
 
+// The mode and the tolerance that tells sides of the same mode apart.
+std::string SideOf(const BenchJsonValue& side) {
+  const double tolerance = ToleranceOf(side);
+  return ModeOf(side) + (tolerance >= kAnyError ? "" : ", " + LengthText(tolerance));
+}
+
+// What the full evaluation spends its time on, by node type: "61 % proximityWrap (3), 14 % bend (2), ...".
+std::string FullSpentOf(const BenchJsonValue& side) {
+  struct Spent {
+    std::string type;
+    double ms = 0;
+    int nodes = 0;
+  };
+  std::vector<Spent> types;
+  double all = 0;
+  for (const BenchJsonValue& node : side.at("full").at("nodes")) {
+    const auto type = node.at("type").get<std::string>();
+    auto found = std::find_if(types.begin(), types.end(), [&](const Spent& s) { return s.type == type; });
+    if (found == types.end()) found = types.insert(types.end(), {type, 0, 0});
+    const double ms = NumberAt(node, "/ms_per_frame");
+    found->ms += ms, ++found->nodes;
+    all += ms;
+  }
+  std::stable_sort(types.begin(), types.end(), [](const Spent& a, const Spent& b) { return a.ms > b.ms; });
+  std::string text;
+  for (const Spent& spent : types) {
+    if (!(spent.ms >= kLeastShare * all)) break;
+    text += fmt::format("{:.0f} % {} ({}), ", 100 * spent.ms / all, spent.type, spent.nodes);
+  }
+  return text + "others";
+}
+
 std::string MeasuredOf(const BenchJsonValue& side) {
   const std::uint64_t points = CountAt(side, "/cue_points"), cues = CountAt(side, "/cues");
   std::string text = side.at("mode") == "paper" ? Plural(points, "key point") : Plural(points, "point");
@@ -133,12 +166,15 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
                  ">tolerance"});
   Table costs({"character", "mode", ">full, ns a point", ">full, us", ">accelerated, us", ">graph", ">cues",
                ">projection", ">reconstruction", ">later stages", ">misses", ">bytes a point"});
+  Table spent({"character", ">full, us", "of which"});
   Table split(
       {"character", "mode", ">projection", ">cueing", ">storage", ">total", ">with SoftCache", ">misses"});
   for (const BenchDocument& document : documents) {
     const Result<std::vector<BenchJsonValue>> sides = ReadSides(document.path);
     if (!sides.ok()) return sides.status();
     try {
+      spent.Row({NameOf(sides->front()), Microseconds(NumberAt(sides->front(), "/full/ms_per_frame")),
+                 FullSpentOf(sides->front())});
       for (const BenchJsonValue& side : *sides) {
         const bool paper = side.at("mode") == "paper";
         const double tolerance = ToleranceOf(side);
@@ -152,14 +188,14 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
                      tolerance >= kAnyError ? "any" : LengthText(tolerance)});
         const double accelerated = NumberAt(side, "/accelerated/ms_per_frame");
         std::vector<std::string> row = {
-            NameOf(side), ModeOf(side), fmt::format("{:.1f}", NumberAt(side, "/full/ns_per_point")),
+            NameOf(side), SideOf(side), fmt::format("{:.1f}", NumberAt(side, "/full/ns_per_point")),
             Microseconds(NumberAt(side, "/full/ms_per_frame")), Microseconds(accelerated)};
         for (const char* part : {"graph", "cues", "projection", "reconstruction", "downstream", "misses"})
           row.push_back(Microseconds(NumberAt(side, (std::string("/accelerated/") + part).c_str())));
         row.push_back(fmt::format("{:.0f}", NumberAt(side, "/storage/bytes_per_point")));
         costs.Row(std::move(row));
         if (side.at("frame_errors").is_null()) continue;
-        row = {NameOf(side), ModeOf(side)};
+        row = {NameOf(side), SideOf(side)};
         for (const char* part : {"projection", "cueing", "storage", "total", "soft_cache"})
           row.push_back(ShareOf(side, NumberAt(side, (std::string("/frame_errors/rms/") + part).c_str())));
         row.push_back(fmt::format("{:.1f} %", 100 - 100 * ShareAt(side, "/hit_rate")));
@@ -171,7 +207,7 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
       return Status::Invalid("is no bench of this version: {}", error.what()).At({document.path});
     }
   }
-  std::string text = reached.Markdown() + "\n" + costs.Markdown();
+  std::string text = reached.Markdown() + "\n" + costs.Markdown() + "\n" + spent.Markdown();
   if (!split.empty()) text += "\n" + split.Markdown();
   return text;
 }

@@ -201,4 +201,9 @@ NodeBuilder& NodeBuilder::touches(std::string_view input, TouchFn f) {
   return *this;
 }
 
+NodeBuilder& NodeBuilder::strength(std::string_view input) {
+  group().strength_input = input_position(input);
+  return *this;
+}
+
 }  // namespace kpsa

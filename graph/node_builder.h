@@ -132,6 +132,9 @@ class NodeBuilder {
   // Of the points of `input` that come out as the only output: readers of points that are not touched read
   // that input instead, and where no others are wanted, the node does not run. Null: it may touch any.
   NodeBuilder& touches(std::string_view input, TouchFn f);
+  // A number that, while it is 0, lets the points of `touches` out as they came in: where it rests there and
+  // cannot vary, the node does not run.
+  NodeBuilder& strength(std::string_view input);
   NodeBuilder& demand(DemandFn f) {
     group().demand = std::move(f);
     return *this;

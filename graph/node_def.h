@@ -123,6 +123,7 @@ struct ComputeGroup {
   std::vector<int> held_inputs;  // these (positions) hold their defaults
   TouchFn touches;               // of the points of the only output; null: it may change any
   int touched_input = -1;        // position in inputs of the points that it changes
+  int strength_input = -1;       // position in inputs of a number: while that is 0, it touches none of them
   float cost_ns = 20;            // rough; decides what is worth a thread
   float cost_ns_per_point = 0;
 };

@@ -131,6 +131,18 @@ class Drafter {
     return passed;
   }
 
+  // Whether the number is 0 and stays that.
+  bool RestsAtZero(const Instance& instance, int position) {
+    const auto input = std::ranges::find(instance.inputs, position, &Input::position);
+    if (input == instance.inputs.end()) return false;
+    const Source& s = input->source;
+    if (s.kind == Source::Kind::kVarying ||
+        (s.kind == Source::Kind::kInstance && draft_.varying[s.instance]))
+      return false;
+    const Value* value = statics_.Get(s, false);
+    return value != nullptr && value->AsDouble() == 0;
+  }
+
   // The points that come into an instance, where it touches none of these; else null.
   const Source* UntouchedBy(Index number, const PointSet& points) {
     const Instance& instance = table_.instances()[number];
@@ -138,7 +150,8 @@ class Drafter {
         table_.graph().def(instance.node).stateful)
       return nullptr;
     const ComputeGroup& group = table_.group(instance);
-    if (group.touches(StructuralView(table_, instance.node, instance.geometry, &instance, &statics_), points))
+    if (!RestsAtZero(instance, group.strength_input) &&
+        group.touches(StructuralView(table_, instance.node, instance.geometry, &instance, &statics_), points))
       return nullptr;
     const auto input = std::ranges::find(instance.inputs, group.touched_input, &Input::position);
     return input == instance.inputs.end() ? nullptr : &input->source;

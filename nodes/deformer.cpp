@@ -83,6 +83,7 @@ NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind
     const std::vector<float> weights = WeightsAt(structural, points);
     return weights.empty() || std::ranges::any_of(weights, [](float w) { return w != 0; });
   });
+  builder.strength("envelope");
   const int falloff = builder.input_position("falloffWeights");
   builder.bind([=](const Binding& binding) -> Result<BoundKernel> {
     BoundKernel own;

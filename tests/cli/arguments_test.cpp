@@ -127,7 +127,7 @@ TEST(Arguments, UsageMistakes) {
       {{"train", kHello, "--clips", "wave", "-o", "x.kpsa"}, 2, "never trained on"},
       {{"train", kHello, "-o", "x.npz"}, 2, ".kpsa"},
       {{"train", kHello, "--name", "colum", "-o", "x.kpsa"}, 2, "did you mean \"column\""},
-      {{"train", kHello, "--key-points", "20", "-o", "x.kpsa"}, 2, "--paper"},
+      {{"train", kHello, "--key-points", "1", "-o", "x.kpsa"}, 2, "--key-points"},
       {{"bench", kHello, "--kpsa", "none.kpsa"}, 3, "kpsa train"},
       {{"bench", kHello, "--runs", "0"}, 2, "--runs"},
       {{"get", KPSA_SCENES_DIR "/boy/boy.yaml", "face_mesh@fixx"}, 2, " more"},

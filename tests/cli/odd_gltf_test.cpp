@@ -241,5 +241,23 @@ TEST_F(OddGltf, UnusedParts) {
   EXPECT_EQ(Keys(Evaluate(b)), (Keys_{"body/0", "times"}));
 }
 
+// A hidden mesh is evaluated where somebody asks for it by name, or where there is no other.
+TEST_F(OddGltf, HiddenMeshesAreNoOutputs) {
+  GltfBuilder b = Square(4, {0, 1, 2});
+  b.Push("nodes", {{"name", "helper"}, {"mesh", 0}, {"translation", {1, 0, 0}}});
+  b.root["scenes"][0]["nodes"] = {0, 1};
+  EXPECT_EQ(Keys(Evaluate(b)), (Keys_{"helper/0", "square/0", "times"}));
+  const json hidden = {{"KHR_node_visibility", {{"visible", false}}}};
+  b.root["nodes"][1]["extensions"] = hidden;
+  EXPECT_EQ(Keys(Evaluate(b)), (Keys_{"square/0", "times"}));
+  std::string out;
+  ExpectGood({"get", "c.gltf", "helper.worldMatrix", "--frames", "0:0"}, &out);
+  ExpectGood({"render", "c.gltf", "-o", "c.png", "--size", "30x30", "-q"});
+  ExpectGood({"eval", "c.gltf", "-o", "out.usda", "-q"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "out.usda").find("helper"), std::string::npos);
+  b.root["nodes"][0]["extensions"] = hidden;
+  EXPECT_EQ(Keys(Evaluate(b)), (Keys_{"helper/0", "square/0", "times"}));
+}
+
 }  // namespace
 }  // namespace kpsa

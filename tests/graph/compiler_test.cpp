@@ -496,6 +496,27 @@ TEST_F(Untouched, EveryReaderIsLookedAtByItself) {
   EXPECT_FLOAT_EQ(g.evaluator->Points(1).x[0], (9.5f + 0.5f + 1.5f) / 3);
 }
 
+// What would move all points by nothing does not run, as long as that is so for ever.
+TEST_F(Untouched, AStrengthThatRestsAtZeroLeavesTheNodeOut) {
+  g.request.varying.pop_back();  // up.a
+  const Index all = g.want("r.outPoints");
+  ASSERT_TRUE(g.compile().ok());
+  EXPECT_EQ(Reason("r"), "moves none of the points of the request");
+  Set();
+  ASSERT_TRUE(g.evaluator->Evaluate().ok());
+  EXPECT_EQ(g.computes("r"), 0u);
+  EXPECT_EQ(g.evaluator->Points(all).x[7], 7.5f);
+  EXPECT_EQ(g.evaluator->Points(all).y[7], 0);
+
+  ASSERT_TRUE(g.graph.Set(g.plug("up.a"), Value(2.0)).ok());
+  g.plan = nullptr;
+  ASSERT_TRUE(g.compile().ok());
+  Set();
+  ASSERT_TRUE(g.evaluator->Evaluate().ok());
+  EXPECT_EQ(g.computes("r"), 1u);
+  EXPECT_EQ(g.evaluator->Points(all).y[7], 2);
+}
+
 TEST_F(Untouched, TheBitsAreThoseOfAllPoints) {
   const Index all = g.want("r.outPoints");
   ASSERT_TRUE(g.compile().ok());

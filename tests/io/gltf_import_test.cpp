@@ -123,6 +123,31 @@ TEST(GltfImport, ScenesAndNames) {
   EXPECT_EQ(c.MeshNodes(), (std::vector<Index>{0, 3, 4}));
 }
 
+// KHR_node_visibility: hidden nodes hide all that is below them, also what says otherwise.
+TEST(GltfImport, HiddenNodes) {
+  GltfBuilder builder;
+  const json hidden = {{"KHR_node_visibility", {{"visible", false}}}},
+             shown = {{"KHR_node_visibility", {{"visible", true}}}},
+             silent = {{"KHR_node_visibility", json::object()}};
+  builder.Push("nodes", {{"extensions", hidden}, {"children", {1}}});
+  builder.Push("nodes", {{"extensions", shown}, {"children", {2}}});
+  builder.Push("nodes", {{"name", "below"}});
+  builder.Push("nodes", {{"extensions", shown}});
+  builder.Push("nodes", {{"extensions", silent}});
+  builder.root["extensionsRequired"] = {"KHR_node_visibility"};
+  const Character c = MustLoad(builder.Text());
+  ASSERT_EQ(c.nodes.size(), 5u);
+  const bool visible[] = {false, false, false, true, true};
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(c.nodes[i].visible, visible[i]) << i;
+
+  builder.root["nodes"][3]["extensions"]["KHR_node_visibility"]["visible"] = 0;
+  const Result<Character> wrong = Load(builder.Text(), "/nonexistent");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.status().ToString().find("nodes[3].extensions.KHR_node_visibility.visible"),
+            std::string::npos)
+      << wrong.status().ToString();
+}
+
 TEST(GltfImport, PrimitiveModes) {
   const std::map<int, std::vector<Index>> triangles = {{0, {}},
                                                        {1, {}},

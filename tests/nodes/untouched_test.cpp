@@ -50,5 +50,30 @@ TEST(Untouched, PointsOfWeightZeroKeepTheirBits) {
   EXPECT_EQ(exceptions, (std::set<std::string>{"tension", "transformGeometry", "tripwire"}));
 }
 
+// So do all points where the envelope is 0, which the compiler leaves out likewise (NodeBuilder::strength): here
+// the envelope varies, so that the deformer runs.
+TEST(Untouched, AnEnvelopeOfZeroKeepsTheBitsOfAll) {
+  std::set<std::string> types;
+  for (auto* part : {HandleSetUps, SurfaceSetUps}) {
+    for (NodeSetUp& set_up : part()) {
+      const NodeDef& def = *StandardNodes().Find(set_up.type);
+      const GivenInput& in = set_up.given.front();
+      if (in.input != "inPoints[0]" || set_up.gives.front().output != "outPoints[0]" || def.stateful ||
+          !def.groups.front().touches || def.groups.front().strength_input < 0)
+        continue;
+      SCOPED_TRACE(set_up.Name());
+      types.insert(set_up.type);
+      const std::vector<float> came = in.now.points()->Interleaved();
+      set_up.given.push_back({"envelope", Moves::kNot, Value(1.0), Value(0.0)});
+      const std::vector<Value> outputs = EvaluateSetUp(set_up, Matrix4(), Matrix4());
+      ASSERT_EQ(outputs.size(), 2 * set_up.gives.size());
+      const std::vector<float> went = outputs[set_up.gives.size()].points()->Interleaved();
+      ASSERT_EQ(went.size(), came.size());
+      EXPECT_EQ(std::memcmp(came.data(), went.data(), sizeof(float) * came.size()), 0);
+    }
+  }
+  EXPECT_GE(types.size(), 15u);
+}
+
 }  // namespace
 }  // namespace kpsa

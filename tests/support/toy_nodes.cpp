@@ -170,7 +170,8 @@ void AddToyNodes(NodeRegistry& registry) {
       .touches("points", [](const Structural& structural, const PointSet& points) {
         const auto first = static_cast<Index>(structural.get_int("first"));
         return std::ranges::any_of(points.ToVector(), [&](Index point) { return point >= first; });
-      });
+      })
+      .strength("by");
   registry.add("smooth", "Means over a ring.")
       .structural("rings", 1)
       .points_in("points")
