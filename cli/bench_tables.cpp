@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "cli/common.h"
@@ -106,30 +107,27 @@ std::string SideOf(const BenchJsonValue& side) {
   return ModeOf(side) + (tolerance >= kAnyError ? "" : ", " + LengthText(tolerance));
 }
 
-// What the full evaluation spends its time on, by node type: "61 % proximityWrap (3), 14 % bend (2), ...".
+// What the full evaluation spends its time on, by node type: "61 % proximityWrap (3), 14 % bend (2), others".
 std::string FullSpentOf(const BenchJsonValue& side) {
-  struct Spent {
-    std::string type;
-    double ms = 0;
-    int nodes = 0;
-  };
-  std::vector<Spent> types;
+  std::map<std::string, std::pair<double, int>> of_type;  // ms, nodes
   double all = 0;
   for (const BenchJsonValue& node : side.at("full").at("nodes")) {
-    const auto type = node.at("type").get<std::string>();
-    auto found = std::find_if(types.begin(), types.end(), [&](const Spent& s) { return s.type == type; });
-    if (found == types.end()) found = types.insert(types.end(), {type, 0, 0});
-    const double ms = NumberAt(node, "/ms_per_frame");
-    found->ms += ms, ++found->nodes;
-    all += ms;
+    auto& [ms, nodes] = of_type[node.at("type").get<std::string>()];
+    const double own = NumberAt(node, "/ms_per_frame");
+    ms += own, ++nodes;
+    all += own;
   }
-  std::stable_sort(types.begin(), types.end(), [](const Spent& a, const Spent& b) { return a.ms > b.ms; });
+  if (!(all > 0 && std::isfinite(all))) return "-";
+  std::vector<std::pair<double, std::string>> spent;  // sorted by time, then name
+  for (const auto& [type, times] : of_type) {
+    if (times.first >= kLeastShare * all)
+      spent.emplace_back(-times.first,
+                         fmt::format("{:.0f} % {} ({})", 100 * times.first / all, type, times.second));
+  }
+  std::sort(spent.begin(), spent.end());
   std::string text;
-  for (const Spent& spent : types) {
-    if (!(spent.ms >= kLeastShare * all)) break;
-    text += fmt::format("{:.0f} % {} ({}), ", 100 * spent.ms / all, spent.type, spent.nodes);
-  }
-  return text + "others";
+  for (const auto& [ms, words] : spent) text += (text.empty() ? "" : ", ") + words;
+  return text + (spent.size() < of_type.size() ? ", others" : "");
 }
 
 std::string MeasuredOf(const BenchJsonValue& side) {

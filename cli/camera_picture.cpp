@@ -81,7 +81,7 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
   }
   if (!illumination.has_value()) {
     for (NodeId node : lights) view.lights.push_back(LightOf(graph, node));
-    view.meshes = ShownMeshes(rig);
+    view.meshes = ShownMeshes(rig.scene);
     return view;
   }
   const NodeDef& def = graph.def(*illumination);

@@ -121,7 +121,7 @@ void AddCompileCommand(CLI::App* program, Command* chosen) {
                  chosen, [flags] { return Compile(*flags); });
   AddRigFlags(command, flags.get());
   AddRepeated(command, "--want", "PLUG", &flags->wanted,
-              "a plug or a mesh's points (head_mesh@mush) instead of all meshes; may be repeated");
+              "a plug or a mesh's points (head_mesh@mush) instead of all visible meshes; may be repeated");
   AddOption(command, "--vertices", "LIST", &flags->vertices,
             "only some vertices of the wanted meshes, as in 0:99,120");
   AddSwitch(command, "--steps", &flags->steps, "every step by itself instead of nodes");

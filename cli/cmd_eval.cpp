@@ -51,7 +51,7 @@ CommandResult Eval(const EvalFlags& flags) {
     if (!result.ok()) return result.status();
     applied = std::move(*result);
   }
-  const std::vector<std::size_t> shown = ShownMeshes(rig);
+  const std::vector<std::size_t> shown = ShownMeshes(rig.scene);
   Request request = ShownPoints(rig);
   Verdicts verdicts(applied, rig, &request);
   const auto plan = CompileFor(rig, &compiler, request);

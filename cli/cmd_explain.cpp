@@ -218,7 +218,7 @@ void AddExplainCommand(CLI::App* program, Command* chosen) {
   AddTimeFlags(command, flags.get());
   AddOption(command, "--frame", "F", &flags->frame, "one frame, after the one before it");
   AddRepeated(command, "--want", "PLUG", &flags->wanted,
-              "a plug or a mesh's points (head_mesh@mush) instead of all meshes; may be repeated");
+              "a plug or a mesh's points (head_mesh@mush) instead of all visible meshes; may be repeated");
   AddOption(command, "--vertices", "LIST", &flags->vertices,
             "only some vertices of the wanted meshes, as in 0:99,120");
   AddAccelerationFlags(command, &flags->acceleration);

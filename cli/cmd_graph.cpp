@@ -69,7 +69,7 @@ void AddGraphCommand(CLI::App* program, Command* chosen) {
   AddOutputFlags(command, flags.get(), "a .dot file instead of stdout");
   AddAccelerationFlags(command, &flags->acceleration);
   AddRepeated(command, "--want", "PLUG", &flags->wanted,
-              "a plug or a mesh's points (head_mesh@mush) instead of all meshes; may be repeated");
+              "a plug or a mesh's points (head_mesh@mush) instead of all visible meshes; may be repeated");
   AddOption(command, "--vertices", "LIST", &flags->vertices,
             "only some vertices of the wanted meshes, as in 0:99,120");
   AddSwitch(command, "--time", &flags->time, "evaluate the clip and colour by time");

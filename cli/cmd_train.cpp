@@ -189,7 +189,9 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
             "share of frames that may exceed it, as in 1%");
   AddSwitch(command, "--paper", &flags->paper,
             "the method of the paper: key points of varimax modes, least squares");
-  AddOption(command, "--key-points", "N", &flags->key_points, "points that are measured: with --paper so many, else at least so many; 80 and 16 if not given");
+  AddOption(command, "--key-points", "N", &flags->key_points,
+            "points that are measured: with --paper so many, else at least so many, besides --rows if need "
+            "be; the rig's keyPoints, else 80 and 16, if not given");
   AddSwitch(command, "--keep-modes", &flags->keep_modes,
             "store the modes as well, so that bench can split the error of each frame");
   AddThreadsFlag(command, flags.get());

@@ -68,7 +68,7 @@ Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wan
     plugs.push_back(*plug);
   }
   if (wanted.empty()) {
-    for (const std::size_t m : ShownMeshes(rig)) {
+    for (const std::size_t m : ShownMeshes(rig.scene)) {
       const CharacterMesh& mesh = rig.scene.meshes[m];
       plugs.push_back({mesh.points, &mesh});
     }

@@ -26,8 +26,8 @@ struct WantedPlug {
 };
 Result<WantedPlug> FindWanted(const Rig& rig, std::string_view text);
 
-// A request for plugs (all meshes' final points where there are none), restricted to some vertices of the
-// file: ranges and indices ("0:99,120") into each wanted mesh. Time varies.
+// A request for plugs (the final points of the meshes that are shown where there are none), restricted to
+// some vertices of the file: ranges and indices ("0:99,120") into each wanted mesh. Time varies.
 Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wanted,
                              const std::optional<std::string>& vertices);
 

@@ -1,25 +1,14 @@
 #include "cli/rig_frames.h"
 
-#include <algorithm>
-
 #include "cli/common.h"
 #include "cli/progress.h"
 
 namespace kpsa {
 
-std::vector<std::size_t> ShownMeshes(const Rig& rig) {
-  const std::vector<CharacterMesh>& meshes = rig.scene.meshes;
-  const bool any = std::any_of(meshes.begin(), meshes.end(), [](const auto& mesh) { return mesh.visible; });
-  std::vector<std::size_t> shown;
-  for (std::size_t m = 0; m < meshes.size(); ++m) {
-    if (meshes[m].visible || !any) shown.push_back(m);
-  }
-  return shown;
-}
-
 Request ShownPoints(const Rig& rig) {
   Request request;
-  for (const std::size_t m : ShownMeshes(rig)) request.outputs.push_back({rig.scene.meshes[m].points, {}});
+  for (const std::size_t m : ShownMeshes(rig.scene))
+    request.outputs.push_back({rig.scene.meshes[m].points, {}});
   request.varying.push_back(rig.scene.time);
   return request;
 }

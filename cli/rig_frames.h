@@ -14,9 +14,7 @@
 
 namespace kpsa {
 
-// The meshes that are visible, in rig.scene.meshes; all of them where none is.
-std::vector<std::size_t> ShownMeshes(const Rig& rig);
-// What the command line asks for where nobody says: the final points of the meshes that are shown, in that
+// What the command line asks for where nobody says: the final points of ShownMeshes(rig.scene), in that
 // order; time varies.
 Request ShownPoints(const Rig& rig);
 

@@ -36,7 +36,7 @@ Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, cons
                                         const RigFrameOptions& options) {
   const auto plan = CompileFor(rig, compiler, ShownPoints(rig));
   if (!plan.ok()) return plan.status();
-  const std::vector<std::size_t> shown = ShownMeshes(rig);
+  const std::vector<std::size_t> shown = ShownMeshes(rig.scene);
   std::vector<Pose> poses(times.size(), Pose(rig.scene.meshes.size()));
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, times, options, [&](std::size_t frame, const Evaluator& evaluator) {

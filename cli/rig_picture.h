@@ -9,10 +9,10 @@
 
 namespace kpsa {
 
-// The points of all meshes at one time, x y z interleaved.
+// The points of all meshes at one time, x y z interleaved; none of those that are hidden.
 using Pose = std::vector<std::vector<float>>;
 
-// The final points of all meshes at the times.
+// The final points of the meshes that are shown, at the times.
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
                                         const RigFrameOptions& options);
 // One part a mesh, with the file's vertex colours if it has them; or one a primitive where materials have

@@ -27,7 +27,7 @@ void Interleave(const Mesh& mesh, ConstPointsView points, Index first, Index cou
 class NpzOutput final : public VertexOutput {
  public:
   NpzOutput(OutputPath path, NpzWriter writer, const Rig& rig)
-      : path_(std::move(path)), writer_(std::move(writer)), rig_(rig), shown_(ShownMeshes(rig)) {}
+      : path_(std::move(path)), writer_(std::move(writer)), rig_(rig), shown_(ShownMeshes(rig.scene)) {}
 
   Status Declare(const std::vector<double>& times) {
     KPSA_RETURN_IF_ERROR(writer_.Add("times", {times.size()}, times));
@@ -75,7 +75,11 @@ class NpzOutput final : public VertexOutput {
 class CacheOutput final : public VertexOutput {
  public:
   CacheOutput(std::string path, const Rig& rig, std::vector<double> times, const VertexOutputOptions& options)
-      : path_(std::move(path)), suffix_(Suffix(path_)), rig_(rig), shown_(ShownMeshes(rig)), options_(options) {
+      : path_(std::move(path)),
+        suffix_(Suffix(path_)),
+        rig_(rig),
+        shown_(ShownMeshes(rig.scene)),
+        options_(options) {
     cache_.times = std::move(times);
     cache_.fps = rig.fps;
     for (const std::size_t m : shown_) {

@@ -1,5 +1,6 @@
-// Animated vertices of the meshes that are shown, into a file of any format: .npz frame by frame, the others (.pc2 .mdd .glb .usda) once
-// all frames are there. World space in metres, vertices in the order of the glTF file.
+// Animated vertices of the meshes that are shown, into a file of any format: .npz frame by frame, the others
+// (.pc2 .mdd .glb .usda) once all frames are there. World space in metres, vertices in the order of the glTF
+// file.
 #pragma once
 
 #include <memory>

@@ -202,7 +202,11 @@ NodeBuilder& NodeBuilder::touches(std::string_view input, TouchFn f) {
 }
 
 NodeBuilder& NodeBuilder::strength(std::string_view input) {
-  group().strength_input = input_position(input);
+  const int position = input_position(input);
+  const int attribute = group().inputs[static_cast<std::size_t>(position)];
+  const AttributeDef& a = def_->attributes[static_cast<std::size_t>(attribute)];
+  KPSA_CHECK(a.type == Type::kDouble && !a.array && group().touched_input >= 0);
+  group().strength_input = position;
   return *this;
 }
 

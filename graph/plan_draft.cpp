@@ -136,8 +136,7 @@ class Drafter {
     const auto input = std::ranges::find(instance.inputs, position, &Input::position);
     if (input == instance.inputs.end()) return false;
     const Source& s = input->source;
-    if (s.kind == Source::Kind::kVarying ||
-        (s.kind == Source::Kind::kInstance && draft_.varying[s.instance]))
+    if (s.kind == Source::Kind::kVarying || (s.kind == Source::Kind::kInstance && draft_.varying[s.instance]))
       return false;
     const Value* value = statics_.Get(s, false);
     return value != nullptr && value->AsDouble() == 0;
@@ -150,8 +149,9 @@ class Drafter {
         table_.graph().def(instance.node).stateful)
       return nullptr;
     const ComputeGroup& group = table_.group(instance);
-    if (!RestsAtZero(instance, group.strength_input) &&
-        group.touches(StructuralView(table_, instance.node, instance.geometry, &instance, &statics_), points))
+    if (group.touches(StructuralView(table_, instance.node, instance.geometry, &instance, &statics_),
+                      points) &&
+        !RestsAtZero(instance, group.strength_input))
       return nullptr;
     const auto input = std::ranges::find(instance.inputs, group.touched_input, &Input::position);
     return input == instance.inputs.end() ? nullptr : &input->source;

@@ -43,7 +43,11 @@ struct PlanDraft {
   std::vector<DraftInput> outputs;  // by request output
   std::vector<bool> varying;        // by instance
   // By instance: why readers read its input instead
-  enum class Passed : std::uint8_t { kNo, kEquals, kTouchesNone };  // ComputeGroup::passed_input, touches
+  enum class Passed : std::uint8_t {
+    kNo,
+    kEquals,
+    kTouchesNone
+  };  // ComputeGroup::passed_input, touches and strength_input
   std::vector<Passed> passed;
 };
 

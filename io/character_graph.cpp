@@ -303,4 +303,14 @@ Result<CharacterGraph> BuildCharacterGraph(const gltf::Character& character, con
   return Builder(character, options, graph).Build();
 }
 
+std::vector<std::size_t> ShownMeshes(const CharacterGraph& scene) {
+  const std::vector<CharacterMesh>& meshes = scene.meshes;
+  const bool any = std::any_of(meshes.begin(), meshes.end(), [](const auto& mesh) { return mesh.visible; });
+  std::vector<std::size_t> shown;
+  for (std::size_t m = 0; m < meshes.size(); ++m) {
+    if (meshes[m].visible || !any) shown.push_back(m);
+  }
+  return shown;
+}
+
 }  // namespace kpsa

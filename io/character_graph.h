@@ -106,6 +106,9 @@ struct CharacterGraph {
   std::unordered_map<Index, PlugRef> clip_inputs;
 };
 
+// The meshes that are visible, by number; all of them where none is.
+std::vector<std::size_t> ShownMeshes(const CharacterGraph& scene);
+
 // Adds the character to an empty graph whose registry has the standard nodes. Works without recursion at any
 // depth of hierarchy. Errors: an unknown clip; a character beyond kMaxCharacterPoints points, or
 // kMaxSkinJoints or kMaxMorphTargets a mesh.

@@ -241,8 +241,9 @@ constexpr const char *kMeshopt = "EXT_meshopt_compression", *kDraco = "KHR_draco
                      *kVisibility = "KHR_node_visibility";
 
 bool IsRead(std::string_view extension) {
-  return extension == "KHR_mesh_quantization" || extension == kMeshopt || extension == kDraco || extension == kVisibility ||
-         extension == "VRM" || extension == "VRMC_vrm" || extension == "VRMC_node_constraint";
+  return extension == "KHR_mesh_quantization" || extension == kMeshopt || extension == kDraco ||
+         extension == kVisibility || extension == "VRM" || extension == "VRMC_vrm" ||
+         extension == "VRMC_node_constraint";
 }
 
 bool CannotMovePoints(std::string_view extension) {
@@ -343,6 +344,8 @@ Status CopyHidden(const json& root, std::vector<std::size_t>* hidden) {
   for (std::size_t i = 0; nodes != root.end() && i < nodes->size(); ++i) {
     const json* extension = FindExtension((*nodes)[i], kVisibility);
     if (extension == nullptr) continue;
+    if (!extension->is_object())
+      return Status::Invalid("nodes[{}].extensions.{} must be an object", i, kVisibility);
     const auto visible = extension->find("visible");
     if (visible == extension->end()) continue;
     if (!visible->is_boolean())

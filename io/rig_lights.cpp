@@ -59,9 +59,7 @@ void RigBuild::ConnectLights() {
           meshes.push_back(*mesh);
       }
     } else {
-      for (std::size_t m = 0; m < rig_->scene.meshes.size(); ++m) {
-        if (rig_->scene.meshes[m].visible) meshes.push_back(m);
-      }
+      meshes = ShownMeshes(rig_->scene);
     }
     for (std::size_t i = 0; i < meshes.size(); ++i) {
       const CharacterMesh& mesh = rig_->scene.meshes[meshes[i]];

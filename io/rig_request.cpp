@@ -133,6 +133,7 @@ void RigBuild::AddAccelerations() {
         continue;
       }
       to.points.push_back({*mesh_index, static_cast<std::size_t>(stage - mesh.stages.data()), stage->points});
+      rig_->scene.meshes[*mesh_index].visible = true;  // what is accelerated is wanted
     }
     for (const RigString& name : from.colors) {
       const Result<PlugRef> plug = graph().FindPlug(name.text);

@@ -151,7 +151,7 @@ class Writer {
 
   void WriteHead() {
     std::vector<std::string> meshes;
-    for (const CharacterMesh& mesh : rig_.scene.meshes) meshes.push_back(mesh.name);
+    for (const std::size_t m : ShownMeshes(rig_.scene)) meshes.push_back(rig_.scene.meshes[m].name);
     text_ += fmt::format(
         "kpsa: 1\n"
         "units: {{length: cm, angle: deg}}\n"
@@ -411,7 +411,8 @@ class Writer {
   bool WriteAcceleration() {
     if (rig_.scene.meshes.empty() || control_count_ == 0) return false;
     std::vector<std::string> points, train, test;
-    for (const CharacterMesh& mesh : rig_.scene.meshes) points.push_back(mesh.name + "@" + mush_);
+    for (const std::size_t m : ShownMeshes(rig_.scene))
+      points.push_back(rig_.scene.meshes[m].name + "@" + mush_);
     if (!clips_.empty()) test.push_back(character_.clips[TamestClip(character_, clips_)].id);
     for (const CharacterClip& clip : rig_.scene.clips) {
       if (std::find(test.begin(), test.end(), clip.id) == test.end() &&

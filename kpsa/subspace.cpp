@@ -123,7 +123,7 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   s.soft_cache = MakeSoftCacheModel(estimator, cues, training);
 
   // Some of the training poses, evenly spread, watch the largest errors
-  TileInputs inputs{estimator.covariance, {}};
+  TileInputs inputs{estimator.covariance, {}, {}};
   const Eigen::Index count = std::min<Eigen::Index>(training.cols(), kTileSamples);
   inputs.samples.resize(training.rows(), count);
   for (Eigen::Index i = 0; i < count; ++i)
@@ -141,6 +141,7 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   for (const SubspaceOutput& output : s.outputs) {
     const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
     KPSA_CHECK_LE(first + height, maps.rows());
+    inputs.left_out = pca.row_residual.segment(first, height);
     s.tiles.push_back(BuildTiles(maps.middleRows(first, height), pca.mean.segment(first, height),
                                  s.components, inputs, options));
     first += height;

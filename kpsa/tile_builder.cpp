@@ -49,6 +49,7 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
                    const TileInputs& inputs, const TileOptions& options, TileReport* report) {
   KPSA_CHECK(components == 1 || components == 3);
   KPSA_CHECK_EQ(gain.rows(), mean.size());
+  KPSA_CHECK(inputs.left_out.size() == 0 || inputs.left_out.size() == gain.rows());
   TileData data;
   const auto c = static_cast<std::size_t>(components);
   data.points = static_cast<std::size_t>(gain.rows()) / c;
@@ -68,7 +69,17 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
                         height = std::min(kTilePoints * c, data.points * c - first);
       const Eigen::MatrixXd part =
           gain.middleRows(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height));
-      factors[t] = FactorTile(part, covariance, inputs.samples, components, options);
+      TileOptions own = options;
+      if (inputs.left_out.size() > 0 && options.left_out_share > 0) {
+        const double square =
+            inputs.left_out.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height))
+                .sum() /
+            static_cast<double>(height / c);
+        const double most = std::max(options.rms_budget, options.left_out_share * std::sqrt(square));
+        own.max_budget *= most / options.rms_budget;
+        own.rms_budget = most;
+      }
+      factors[t] = FactorTile(part, covariance, inputs.samples, components, own);
     }
   });
 

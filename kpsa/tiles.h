@@ -97,11 +97,15 @@ struct TileOptions {
   double rms_budget = 0;  // expected RMS point error that a tile may add, scene units; > 0
   double max_budget =
       std::numeric_limits<double>::infinity();  // largest point error that it may add in the samples
+  // Of what is left out of a tile anyway (RMS, TileInputs::left_out): where that is more than rms_budget, it
+  // is the tile's, and max_budget grows with it.
+  double left_out_share = 0;
 };
 // What is known of y.
 struct TileInputs {
   Eigen::MatrixXd covariance;  // [r x r]; empty: the identity
   Eigen::MatrixXd samples;     // [r x S] y of some poses, for max_budget; may be empty
+  Eigen::VectorXd left_out;    // [cN] variance of every row that no y tells; empty: 0
 };
 // What the tiles cost in accuracy; scene units. Where precision or the number of attempts do not allow the
 // budgets, these exceed them.

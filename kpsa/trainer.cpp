@@ -17,7 +17,9 @@ namespace {
 
 constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
 constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
-constexpr double kTileRest = 0.25;     // of what the modes leave out (RMS): where that is more, as much
+// Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
+// ones would buy nothing. Of light that is noise, which nobody wants.
+constexpr double kTileRest = 0.25;
 constexpr double kStillTurn =
     5e-4;  // a turn (radians) and a shift (of the tolerance) of a joint that are none
 constexpr double kStillShare = 0.1;
@@ -326,10 +328,10 @@ class Trainer {
     std::vector<SubspaceOutput> outputs;
     for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m)
       outputs.push_back({rig_.target.meshes[m].name, totals_[m]});
-    // Few modes leave out more than a tolerance asks of tiles: bytes beyond that would buy nothing
-    const double tile_rms = std::max(kTileShare * options_.tolerance, kTileRest * LeftOut());
-    Subspace subspace = MakeSubspace(pca_, cues_, estimator, training, std::move(outputs),
-                                     TileOptions{tile_rms, kTileMaxShare / kTileShare * tile_rms});
+    Subspace subspace =
+        MakeSubspace(pca_, cues_, estimator, training, std::move(outputs),
+                     TileOptions{kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance,
+                                 of_light() ? 0 : kTileRest});
     if (options_.keep_modes) subspace.kept_modes = pca_.output_modes().cast<float>();
     subspace.mode = estimator.mode;
     subspace.ranges = ranges_;
@@ -340,12 +342,6 @@ class Trainer {
     subspace.cues.clear();
     for (const CueRef& cue : cues_.cues) subspace.cues.push_back(Describe(cue));
     return subspace;
-  }
-
-  // RMS over training poses and points of what the modes do not reach, scene units.
-  double LeftOut() const {
-    return std::sqrt(std::max(0.0, pca_.discarded_energy()) /
-                     static_cast<double>(std::max<std::size_t>(1, pca_.poses * layout_.points)));
   }
 
   // Where output points are measured: stages that pass points through need not run.

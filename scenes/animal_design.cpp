@@ -113,7 +113,7 @@ HeadDesign MakeAnimalDesign() {
   d.regions[kJawRegion] = Region::At(kReferenceJaw, kAnimalJaw, {1.05, 0.72, 1.25});
   d.regions[kSkullRegion] = Region::At({0, 22, 0}, {0, 19.5, 0}, {1, 0.9, 0.95});
   d.production = true;
-  d.muscle_row0 = 9, d.muscle_row1 = 43;
+  d.sheet_row0 = 9, d.sheet_row1 = 43;
   return d;
 }
 

@@ -110,7 +110,7 @@ HeadDesign MakeBoyDesign() {
   d.regions[kJawRegion] = Region::At(kReferenceJaw, kBoyJaw, {0.95, 0.85, 0.95});
   d.regions[kSkullRegion] = Region::At({0, 22, 0}, {0, 21, 0}, {1.05, 1, 1});
   d.production = true;
-  d.muscle_row0 = 4.5, d.muscle_row1 = 34;
+  d.sheet_row0 = 4.5, d.sheet_row1 = 34;
   return d;
 }
 

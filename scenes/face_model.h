@@ -33,17 +33,17 @@ std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::
 // Maps of weights for the rig's deformers: name -> one value a point.
 std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& design, const HeadShape& shape);
 
-// A layer under a production's skin: a coarse sheet with holes for eyes and mouth, and what each muscle, pad or
-// part does to it.
+// A layer under a production's skin: a coarse sheet with holes for eyes and mouth, and what each muscle, pad
+// or part does to it.
 enum class Sheet { kMuscles, kFascia, kFat, kClay };
 constexpr Sheet kSheets[] = {Sheet::kMuscles, Sheet::kFascia, Sheet::kFat, Sheet::kClay};
 const char* NameOf(Sheet sheet);  // its mesh
-struct MuscleShape {
+struct SheetShape {
   std::vector<Double3> points;
   std::vector<std::array<int, 4>> quads;
   std::vector<Expression> pulls;
 };
-MuscleShape MakeMuscles(const HeadDesign& design, Sheet sheet);
+SheetShape MakeSheet(const HeadDesign& design, Sheet sheet);
 
 // The rig's curves and handles, as its YAML.
 std::string CurvesYaml(const HeadDesign& design, const HeadShape& shape);

@@ -1,5 +1,5 @@
-// What lies under the skin of a production's face: muscles, the fascia above them, pads of fat, and a coarse cage
-// of the whole head that animators mould as if it were clay. Sheets that wraps follow.
+// What lies under the skin of a production's face: muscles, the fascia above them, pads of fat, and a coarse
+// cage of the whole head that animators mould as if it were clay. Sheets that wraps follow.
 #include <algorithm>
 #include <cmath>
 
@@ -22,13 +22,13 @@ SheetGrid GridOf(const HeadDesign& d, Sheet sheet) {
   for (const GuideRow& guide : d.guides) head_rows += guide.rows;
   switch (sheet) {
     case Sheet::kMuscles:
-      return {1.3, 1.85, 10, 5, d.muscle_row0, d.muscle_row1};
+      return {1.3, 1.85, 10, 5, d.sheet_row0, d.sheet_row1};
     case Sheet::kFascia:
-      return {0.75, 1.85, 10, 5, d.muscle_row0, d.muscle_row1};
+      return {0.75, 1.85, 10, 5, d.sheet_row0, d.sheet_row1};
     case Sheet::kFat:
-      return {0.45, 1.85, 9, 4, d.muscle_row0, d.muscle_row1};
+      return {0.45, 1.85, 9, 4, d.sheet_row0, d.sheet_row1};
     case Sheet::kClay:
-      return {1.0, 3.0, 8, 6, 0.6 * d.muscle_row0, head_rows - 1.5};
+      return {1.0, 3.0, 8, 6, 0.6 * d.sheet_row0, head_rows - 1.5};
   }
   return {};
 }
@@ -43,7 +43,13 @@ struct Pull {
 };
 constexpr Pull kPulls[] = {
     {"frontalis", Sheet::kFascia, true, kBrowRegion, {2.8, 22.2, 7.8}, {3.4, 3.0, 4.0}, {0.05, 0.55, 0.10}},
-    {"corrugator", Sheet::kFascia, true, kBrowRegion, {1.6, 20.6, 8.4}, {2.6, 2.2, 3.0}, {-0.30, -0.35, 0.25}},
+    {"corrugator",
+     Sheet::kFascia,
+     true,
+     kBrowRegion,
+     {1.6, 20.6, 8.4},
+     {2.6, 2.2, 3.0},
+     {-0.30, -0.35, 0.25}},
     {"orbicularis", Sheet::kFascia, true, kEyeRegion, {4.2, 17.4, 6.6}, {3.0, 2.4, 3.4}, {-0.20, 0.20, 0.30}},
     {"levator", Sheet::kFascia, true, kNoseRegion, {2.2, 14.8, 8.6}, {2.2, 2.6, 3.0}, {0.10, 0.45, 0.20}},
     {"zygomatic", Sheet::kMuscles, true, kCheekRegion, {4.2, 14.2, 6.4}, {3.2, 3.4, 3.8}, {0.25, 0.40, 0.40}},
@@ -85,7 +91,7 @@ const char* NameOf(Sheet sheet) {
   return kNames[static_cast<std::size_t>(sheet)];
 }
 
-MuscleShape MakeMuscles(const HeadDesign& design, Sheet sheet) {
+SheetShape MakeSheet(const HeadDesign& design, Sheet sheet) {
   const SheetGrid plan = GridOf(design, sheet);
   const int columns = 2 * plan.half + 1;
   std::vector<Double3> grid(static_cast<std::size_t>(plan.rows * columns));
@@ -102,7 +108,7 @@ MuscleShape MakeMuscles(const HeadDesign& design, Sheet sheet) {
       grid[at(r, -c)] = {-p.x, p.y, p.z};
     }
   }
-  MuscleShape shape;
+  SheetShape shape;
   std::vector<int> index(grid.size(), -1);
   const auto use = [&](std::size_t i) {
     if (index[i] < 0) {

@@ -189,16 +189,18 @@ SceneFiles GenerateCar() {
     scene.nodes.push_back({joint.name, joint.parent, at * kMetres, -1});
   }
   const int first = static_cast<int>(scene.nodes.size());
-  scene.meshes = {BodyMesh(shape, expressions), PartsMesh(), CageMesh("muscles", muscles, pulls),
-                  CageMesh("panels", PanelCage(), {}), CageMesh("frame", FrameCage(), {}), CageMesh("clay", ClayCage(), {})};
+  constexpr std::size_t kFirstCage = 2;  // of these
+  scene.meshes = {BodyMesh(shape, expressions),        PartsMesh(),
+                  CageMesh("muscles", muscles, pulls), CageMesh("panels", PanelCage(), {}),
+                  CageMesh("frame", FrameCage(), {}),  CageMesh("clay", ClayCage(), {})};
   for (std::size_t m = 0; m < scene.meshes.size(); ++m)
-    scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m), m >= 2});
+    scene.nodes.push_back({scene.meshes[m].name, -1, {}, static_cast<int>(m), m >= kFirstCage});
   const auto names = [](const std::vector<Expression>& list) {
     std::vector<std::string> out;
     for (const Expression& each : list) out.push_back(each.name);
     return out;
   };
-  scene.clips = CarClips(names(expressions), first, names(pulls), first + 2);
+  scene.clips = CarClips(names(expressions), first, names(pulls), first + static_cast<int>(kFirstCage));
   return {{"car.glb", WriteGlb(scene)},
           {"car_curves.yaml", CurvesYaml(shape)},
           {"w/car.json", WeightsJson("car_body", CarWeightMaps(shape), shape.points.size())}};

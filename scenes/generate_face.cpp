@@ -52,10 +52,10 @@ GlbMesh FaceMesh(const HeadDesign& design, const HeadShape& shape, const std::ve
   return mesh;
 }
 
-// A muscle moves with the joints of the skin above it.
-GlbMesh MusclesMesh(const HeadDesign& design, Sheet sheet, const HeadShape& shape,
-                    const std::vector<std::array<double, kJointCount>>& joint_weights) {
-  const MuscleShape muscles = MakeMuscles(design, sheet);
+// A sheet moves with the joints of the skin above it.
+GlbMesh SheetMesh(const HeadDesign& design, Sheet sheet, const HeadShape& shape,
+                  const std::vector<std::array<double, kJointCount>>& joint_weights) {
+  const SheetShape muscles = MakeSheet(design, sheet);
   GlbMesh mesh;
   mesh.name = NameOf(sheet);
   for (const Double3& p : muscles.points) {
@@ -113,7 +113,7 @@ SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
   if (design.production) {
     for (const Sheet sheet : kSheets) {
       scene.nodes.push_back({NameOf(sheet), -1, {}, static_cast<int>(scene.meshes.size()), true});
-      scene.meshes.push_back(MusclesMesh(design, sheet, shape, joint_weights));
+      scene.meshes.push_back(SheetMesh(design, sheet, shape, joint_weights));
     }
   }
   std::vector<std::string> names;

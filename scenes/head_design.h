@@ -114,7 +114,7 @@ struct HeadDesign {
 
   // A rig as a production's: correctives and in-betweens, more curves, handles and weight maps, muscles.
   bool production = false;
-  double muscle_row0 = 0, muscle_row1 = 0;  // of the grid: from the chin to the brows
+  double sheet_row0 = 0, sheet_row1 = 0;  // of the grid: from the chin to the brows
 };
 
 const HeadDesign& FaceDesign();

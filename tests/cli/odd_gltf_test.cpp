@@ -251,8 +251,13 @@ TEST_F(OddGltf, HiddenMeshesAreNoOutputs) {
   b.root["nodes"][1]["extensions"] = hidden;
   EXPECT_EQ(Keys(Evaluate(b)), (Keys_{"square/0", "times"}));
   std::string out;
-  ExpectGood({"get", "c.gltf", "helper.worldMatrix", "--frames", "0:0"}, &out);
-  ExpectGood({"render", "c.gltf", "-o", "c.png", "--size", "30x30", "-q"});
+  ExpectGood({"compile", "c.gltf", "--want", "helper"}, &out);
+  EXPECT_NE(out.find("helper"), std::string::npos) << out;
+  ExpectGood({"render", "c.gltf", "-o", "c.png", "--size", "60x60", "-q"});
+  GltfBuilder alone = Square(4, {0, 1, 2});
+  folder.Write("alone.gltf", alone.Text());
+  ExpectGood({"render", "alone.gltf", "-o", "alone.png", "--size", "60x60", "-q"});
+  EXPECT_EQ(TemporaryFolder::Read(folder / "c.png"), TemporaryFolder::Read(folder / "alone.png"));
   ExpectGood({"eval", "c.gltf", "-o", "out.usda", "-q"});
   EXPECT_EQ(TemporaryFolder::Read(folder / "out.usda").find("helper"), std::string::npos);
   b.root["nodes"][0]["extensions"] = hidden;

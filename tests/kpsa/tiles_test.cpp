@@ -259,7 +259,7 @@ TEST(Tiles, RareButLargeMotionIsKeptWhereSamplesShowIt) {
   Eigen::MatrixXd gain = SmoothGain(256, 3, 20, 20);
   gain.block(30, 18, 30, 1).setConstant(0.02);
   gain.block(450, 19, 30, 1).setConstant(0.02);
-  TileInputs inputs{Eigen::MatrixXd::Identity(20, 20), Eigen::MatrixXd::Zero(20, 30)};
+  TileInputs inputs{Eigen::MatrixXd::Identity(20, 20), Eigen::MatrixXd::Zero(20, 30), {}};
   inputs.covariance(18, 18) = inputs.covariance(19, 19) = 1e-6;
   for (Eigen::Index i = 0; i < 28; ++i)
     inputs.samples.col(i).head(18) = RandomNormal(18, 1, 30 + static_cast<std::uint64_t>(i));
@@ -343,6 +343,28 @@ TEST(Tiles, InconsistentDataAreRefused) {
   EXPECT_NE(make([](TileData* d) { d->columns[0] = 20; }).find("cue row 20 of 20"), std::string::npos);
   EXPECT_NE(make([](TileData* d) { d->u = AlignedArray<std::uint8_t>(5); }).find("expected"),
             std::string::npos);
+}
+
+// What the modes leave out of a tile makes that tile coarser, and no other.
+TEST(Tiles, ATileStoresNoFinerThanWhatIsLeftOutOfIt) {
+  const Eigen::MatrixXd gain = SmoothGain(2 * kTilePoints, 3, 40, 5);
+  const Eigen::VectorXd mean = Eigen::VectorXd::Zero(gain.rows());
+  TileInputs inputs;
+  inputs.left_out = Eigen::VectorXd::Zero(gain.rows());
+  inputs.left_out.tail(gain.rows() / 2).setConstant(1e-8);  // RMS of a point: 1.7e-4
+  TileOptions options{1e-6, std::numeric_limits<double>::infinity(), 0};
+  TileReport fine, coarse;
+  const TileMap before = BuildTiles(gain, mean, 3, inputs, options, &fine);
+  options.left_out_share = 0.25;
+  const TileMap after = BuildTiles(gain, mean, 3, inputs, options, &coarse);
+  ASSERT_EQ(after.tiles(), 2u);
+  EXPECT_EQ(after.data().ranks[0], before.data().ranks[0]);
+  EXPECT_EQ(after.data().counts[0], before.data().counts[0]);
+  EXPECT_LT(after.data().ranks[1], before.data().ranks[1]);
+  EXPECT_LT(after.bytes(), before.bytes());
+  EXPECT_LE(fine.worst_tile_rms, 1e-6);
+  EXPECT_GT(coarse.worst_tile_rms, 1e-6);
+  EXPECT_LE(coarse.worst_tile_rms, 0.25 * std::sqrt(3e-8));
 }
 
 }  // namespace

@@ -50,8 +50,8 @@ TEST(Untouched, PointsOfWeightZeroKeepTheirBits) {
   EXPECT_EQ(exceptions, (std::set<std::string>{"tension", "transformGeometry", "tripwire"}));
 }
 
-// So do all points where the envelope is 0, which the compiler leaves out likewise (NodeBuilder::strength): here
-// the envelope varies, so that the deformer runs.
+// So do all points where the envelope is 0, which the compiler leaves out likewise (NodeBuilder::strength):
+// here the envelope varies, so that the deformer runs.
 TEST(Untouched, AnEnvelopeOfZeroKeepsTheBitsOfAll) {
   std::set<std::string> types;
   for (auto* part : {HandleSetUps, SurfaceSetUps}) {

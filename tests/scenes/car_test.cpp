@@ -155,8 +155,8 @@ TEST(Car, TheFileLoadsWithItsMeshesJointsAndClips) {
   EXPECT_EQ(car->meshes[2].vertex_count(), MuscleCage().points.size());
   for (const gltf::Mesh& mesh : car->meshes) EXPECT_TRUE(mesh.skinned());
   for (const char* clip : {"extreme", "talk_train", "talk"}) EXPECT_NE(car->FindClip(clip), kNoIndex) << clip;
-  for (const char* name :
-       {"body", "jaw", "lidUp.L", "wheel.BR", "car_body", "car_parts", "muscles", "panels", "frame", "clay"}) {
+  for (const char* name : {"body", "jaw", "lidUp.L", "wheel.BR", "car_body", "car_parts", "muscles", "panels",
+                           "frame", "clay"}) {
     EXPECT_TRUE(std::any_of(car->nodes.begin(), car->nodes.end(), [&](const gltf::Node& n) {
       return n.name == name;
     })) << name;

@@ -151,7 +151,7 @@ TEST(Heads, SheetsLieUnderTheSkinAndPull) {
   for (const Made& head : Heads()) {
     for (const Sheet sheet : kSheets) {
       SCOPED_TRACE(head.design.name + " " + NameOf(sheet));
-      const MuscleShape muscles = MakeMuscles(head.design, sheet);
+      const SheetShape muscles = MakeSheet(head.design, sheet);
       EXPECT_GT(muscles.points.size(), 40u);
       EXPECT_LT(muscles.points.size(), 400u);
       for (const Double3& p : muscles.points) EXPECT_LT(head.design.distance(p), -0.2);

@@ -167,10 +167,11 @@ void AddToyNodes(NodeRegistry& registry) {
         return BoundKernel{raised, 0, 0};
       })
       .in_place("points")
-      .touches("points", [](const Structural& structural, const PointSet& points) {
-        const auto first = static_cast<Index>(structural.get_int("first"));
-        return std::ranges::any_of(points.ToVector(), [&](Index point) { return point >= first; });
-      })
+      .touches("points",
+               [](const Structural& structural, const PointSet& points) {
+                 const auto first = static_cast<Index>(structural.get_int("first"));
+                 return std::ranges::any_of(points.ToVector(), [&](Index point) { return point >= first; });
+               })
       .strength("by");
   registry.add("smooth", "Means over a ring.")
       .structural("rings", 1)
