@@ -413,9 +413,9 @@ CarCage Tube(std::span<const TubeRing> rings, int around) {
 }  // namespace
 
 CarCage FrameCage() {
-  constexpr TubeRing kRings[] = {
-      {130, 58, 48, 20}, {70, 58, 48, 20}, {10, 58, 48, 20}, {-60, 58, 48, 20}, {-125, 58, 48, 20}};
-  return Tube(kRings, 8);
+  std::vector<TubeRing> rings;
+  for (double z : {130.0, 87.0, 44.0, 1.0, -41.0, -83.0, -125.0}) rings.push_back({z, 58, 48, 20});
+  return Tube(rings, 10);
 }
 
 CarCage ClayCage() {

@@ -133,7 +133,7 @@ TEST(Car, TheCagesKeepOffTheShell) {
         if (Length(p - c) < nearest) nearest = Length(p - c), at = p;
       }
       EXPECT_GT(nearest, 1);
-      EXPECT_LT(nearest, 75);
+      EXPECT_LT(nearest, 90);
     }
   }
 }
