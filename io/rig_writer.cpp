@@ -322,7 +322,7 @@ class Writer {
     }
     WriteExpressions();
     int place = 100;
-    for (const CharacterMesh& mesh : rig_.scene.meshes) WriteWeights(mesh, &place);
+    for (const std::size_t m : ShownMeshes(rig_.scene)) WriteWeights(rig_.scene.meshes[m], &place);
     std::erase_if(groups_, [](const auto& group) { return group.second.text.empty(); });
     for (const auto& [key, group] : groups_) control_count_ += group.controls;
     if (control_count_ > 0) text_ += heading;

@@ -6,6 +6,7 @@
 
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
+#include "tests/support/temporary_folder.h"
 
 namespace kpsa {
 namespace {
@@ -108,6 +109,29 @@ TEST_P(Production, OnePointHasTheBitsOfAll) {
     for (int k = 0; k < 3; ++k) EXPECT_EQ(std::memcmp(wanted[k] + point, got[k], sizeof(float)), 0) << point;
   }
   EXPECT_LT(least_steps, all_steps / 2);
+}
+
+// Hidden cages are nobody's output, unless a rig accelerates them.
+TEST(HiddenMeshes, AreShownWhereTheyAreAccelerated) {
+  const TemporaryFolder folder;
+  folder.Write("boy.glb", TemporaryFolder::Read(KPSA_SCENES_DIR "/boy/boy.glb"));
+  const auto shown = [&](const std::string& more) {
+    const std::string rig = "kpsa: 1\ncharacter: boy.glb\n" + more;
+    Result<Rig> loaded = LoadRig(AcceleratedRegistry(), folder.Write("rig.yaml", rig), {});
+    EXPECT_TRUE(loaded.ok()) << loaded.status().ToString();
+    std::vector<std::string> names;
+    for (const std::size_t m : ShownMeshes(loaded->scene)) names.push_back(loaded->scene.meshes[m].name);
+    return names;
+  };
+  EXPECT_EQ(shown(""), (std::vector<std::string>{"face_mesh", "eyes"}));
+  EXPECT_EQ(shown("accelerate: {a: {points: [clay@skin], subspace: a.kpsa}}\n"),
+            (std::vector<std::string>{"face_mesh", "eyes", "clay"}));
+
+  ASSERT_EQ(RunKpsa({"init", folder / "boy.glb", "-o", folder / "init.yaml"}).exit_code, 0);
+  const std::string text = TemporaryFolder::Read(folder / "init.yaml");
+  EXPECT_NE(text.find("- meshes: [face_mesh, eyes]\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("points: [face_mesh@mush, eyes@mush]"), std::string::npos) << text;
+  EXPECT_EQ(text.find("clay"), std::string::npos) << text;
 }
 
 INSTANTIATE_TEST_SUITE_P(Rigs, Production,
