@@ -59,7 +59,8 @@ struct BenchResult {
   double full_ms_on_hits = 0, accelerated_ms_on_hits = 0;
   double speedup() const { return Ratio(full_ms, accelerated_ms); }
   double speedup_on_hits() const { return Ratio(full_ms_on_hits, accelerated_ms_on_hits); }
-  // What is left where cues, projection and reconstruction take no time: of the full evaluation the steps
+  // What is left where cues, projection and reconstruction take no time: the graph and the later stages of
+  // this side, as measured where all frames hit. With misses among them: of the full evaluation the steps
   // that this side's plan has, too, but for those with points above the accelerated ones.
   double bound_ms = 0, bound_graph_ms = 0, bound_points_ms = 0;
   double ceiling() const { return Ratio(full_ms, bound_ms); }

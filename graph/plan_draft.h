@@ -42,13 +42,9 @@ struct PlanDraft {
   std::vector<DraftSegment> segments;
   std::vector<DraftInput> outputs;  // by request output
   std::vector<bool> varying;        // by instance
-  // By instance: why readers read its input instead
-  enum class Passed : std::uint8_t {
-    kNo,
-    kEquals,
-    kTouchesNone
-  };  // ComputeGroup::passed_input, touches and strength_input
-  std::vector<Passed> passed;
+  // Why readers of an instance read its input instead: ComputeGroup::passed_input; touches, strength_input
+  enum class Passed : std::uint8_t { kNo, kEquals, kTouchesNone };
+  std::vector<Passed> passed;  // by instance
 };
 
 // Decides segments and point sets backward from the request, and connects steps; inserts gathers where a

@@ -122,7 +122,10 @@ TEST(Car, ABlinkClosesTheEyeAroundTheEyeball) {
 
 // No cage lies in the shell, or far away from it.
 TEST(Car, TheCagesKeepOffTheShell) {
-  for (const CarCage& cage : {MuscleCage(), PanelCage(), FrameCage(), ClayCage()}) {
+  // The two tubes run through the cabin
+  const std::pair<CarCage, double> cages[] = {
+      {MuscleCage(), 70}, {PanelCage(), 70}, {FrameCage(), 81}, {ClayCage(), 71}};
+  for (const auto& [cage, farthest] : cages) {
     std::set<int> used;
     for (const auto& q : cage.quads) used.insert(q.begin(), q.end());
     EXPECT_EQ(used.size(), cage.points.size());
@@ -133,7 +136,7 @@ TEST(Car, TheCagesKeepOffTheShell) {
         if (Length(p - c) < nearest) nearest = Length(p - c), at = p;
       }
       EXPECT_GT(nearest, 1);
-      EXPECT_LT(nearest, 90);
+      EXPECT_LT(nearest, farthest);
     }
   }
 }

@@ -152,7 +152,7 @@ TEST(Heads, SheetsLieUnderTheSkinAndPull) {
     for (const Sheet sheet : kSheets) {
       SCOPED_TRACE(head.design.name + " " + NameOf(sheet));
       const SheetShape muscles = MakeSheet(head.design, sheet);
-      EXPECT_GT(muscles.points.size(), 40u);
+      EXPECT_GT(muscles.points.size(), 60u);
       EXPECT_LT(muscles.points.size(), 400u);
       for (const Double3& p : muscles.points) EXPECT_LT(head.design.distance(p), -0.2);
       int pulling = 0;  // the animal's sheet of muscles does not reach its chin
