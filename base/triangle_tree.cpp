@@ -1,17 +1,20 @@
 #include "base/triangle_tree.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstring>
 
 #include "base/check.h"
+#include "base/embree.h"
 
 namespace kpsa {
 namespace {
 
-constexpr Index kLeaf = 4;  // triangles
-constexpr int kMaxDepth = 40;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::size_t kFew = 8;  // triangles: they are looked at one by one
+constexpr float kFar = 1e18f;    // Embree takes no larger coordinates
+// What rounding to floats may do, on Embree's side too, of the largest coordinate: 16 steps
+constexpr double kRounding = 2e-6;
 
 Double3 At(ConstPointsView points, Index i) { return {points.x[i], points.y[i], points.z[i]}; }
 
@@ -34,57 +37,48 @@ void ClosestOnSegment(ConstPointsView points, const Index corners[3], int from, 
   best->weights[to] += t;
 }
 
-// What rounding may make of squared distances: boxes are left out only beyond it.
-double Slack(double squared, double scale) { return squared * (1 + 1e-9) + 1e-20 * scale * scale; }
-
-double BoxSquared(const float* box, Double3 p) {
-  double sum = 0;
-  for (int a = 0; a < 3; ++a) {
-    const double below = box[a] - p[a], above = p[a] - box[3 + a];
-    const double out = below > 0 ? below : above > 0 ? above : 0;
-    sum += out * out;
-  }
-  return box[0] <= box[3] ? sum : kInfinity;
-}
-
-// Of a box and a place, for the rounding between them: its own, so that one far triangle costs the others
-// nothing.
-double Scale(const float* box, Double3 p) {
-  double scale = 0;
-  for (int a = 0; a < 3; ++a)
-    scale = std::max({scale, std::fabs(double{box[a]}), std::fabs(double{box[3 + a]}), std::fabs(p[a])});
-  return scale;
-}
-
-// The squared distance to the box of node `n`, or infinity beyond `limit`, squared as well.
-double BoxWithin(std::span<const float> boxes, Index n, Double3 place, double limit) {
-  const float* box = boxes.data() + 6 * std::size_t{n};
-  const double squared = BoxSquared(box, place);
-  return squared <= Slack(limit, Scale(box, place)) ? squared : kInfinity;
-}
-
 bool IsFinite(Double3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+double Largest(Double3 v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
+
+// A place outside of the cube that Embree knows is seen from the cube's surface: no distance grows by that.
+float Clamped(double x) { return static_cast<float>(std::clamp(x, double{-kFar}, double{kFar})); }
 
 bool Less(const SurfacePoint& a, const SurfacePoint& b) {
   return a.squared < b.squared || (a.squared == b.squared && a.triangle < b.triangle);
 }
 
-// Where the line enters the box, or infinity; a little too early rather than too late.
-double BoxEntry(const float* box, Double3 origin, Double3 direction, double margin) {
-  double enter = 0, leave = kInfinity;
-  for (int a = 0; a < 3; ++a) {
-    const double lo = box[a] - margin, hi = box[3 + a] + margin;
-    if (!(lo <= hi)) return kInfinity;
-    if (direction[a] == 0) {
-      if (origin[a] < lo || origin[a] > hi) return kInfinity;
-      continue;
-    }
-    double t0 = (lo - origin[a]) / direction[a], t1 = (hi - origin[a]) / direction[a];
-    if (t0 > t1) std::swap(t0, t1);
-    enter = std::max(enter, t0);
-    leave = std::min(leave, t1);
+// What a line has met so far. Embree hands the context to the triangles: it comes first.
+struct Line {
+  RTCIntersectContext context;
+  ConstPointsView points;
+  const Index* triangles;
+  Double3 origin, direction;
+  double origin_along = 0, lengths = 1;  // t is at origin_along + t * lengths of the ray
+  bool shrinks = false;                  // what lies behind the best hit does not count
+  LineHit best;
+
+  double Along(double t) const { return origin_along + t * lengths; }
+  void Meet(Index t) {
+    constexpr double kEdge = 1e-9;  // lines through an edge miss none of its triangles
+    const Index* corner = &triangles[3 * std::size_t{t}];
+    const Double3 a = At(points, corner[0]), e1 = At(points, corner[1]) - a, e2 = At(points, corner[2]) - a;
+    const Double3 p = Cross(direction, e2), s = origin - a, q = Cross(s, e1);
+    const double det = Dot(e1, p);
+    if (!(std::fabs(det) > 1e-12 * Length(direction) * Length(e1) * Length(e2))) return;
+    double v = Dot(s, p) / det, w = Dot(direction, q) / det, at = Dot(e2, q) / det;
+    if (!(v >= -kEdge && w >= -kEdge && v + w <= 1 + kEdge && at >= 0)) return;
+    if (at > best.t || (at == best.t && t > best.triangle)) return;
+    v = std::clamp(v, 0.0, 1.0);
+    w = std::clamp(w, 0.0, 1 - v);
+    best = {t, {1 - v - w, v, w}, at};
   }
-  return enter <= leave ? enter : kInfinity;
+};
+
+// How far a ray has to be followed, with what rounding makes of it.
+float Reach(double along) {
+  const double reach = along * (1 + kRounding) + 1e-18;
+  return reach < kFar ? static_cast<float>(reach) : std::numeric_limits<float>::infinity();
 }
 
 }  // namespace
@@ -110,187 +104,238 @@ SurfacePoint ClosestOnTriangle(ConstPointsView points, const Index corners[3], D
   return best;
 }
 
-TriangleTree::TriangleTree(ConstPointsView points, std::span<const Index> triangles)
-    : triangles_(triangles.begin(), triangles.end()) {
+struct TriangleTree::Impl {
+  PointBuffer points;
+  std::vector<Index> triangles;
+  RTCGeometry geometry = nullptr;  // the scene's
+  EmbreeScene scene;               // null, of few triangles or without memory: all are looked at
+
+  std::size_t count() const { return triangles.size() / 3; }
+  ConstPointsView view() const { return points.view(); }
+  void CopyIn(ConstPointsView from);
+  void Build();
+  void Refit();
+
+  // All triangles that may be nearer to the place than the limit, which visit(triangle) gives anew. Squared.
+  template <typename Visit>
+  void ForNear(Double3 place, double limit, Visit visit) const;
+  // Its nearest place; none (kNoIndex, infinitely far) beyond the limit. Squared.
+  SurfacePoint On(Index triangle, Double3 place, double limit) const;
+  void Follow(Line* line, Double3 start, Double3 direction, float near, float far) const;
+
+  static void Bounds(const RTCBoundsFunctionArguments* args);
+  static void Intersect(const RTCIntersectFunctionNArguments* args);
+};
+
+// The box of a triangle's finite corners, with a margin of what rounding makes of lines that pass by.
+void TriangleTree::Impl::Bounds(const RTCBoundsFunctionArguments* args) {
+  const Impl& tree = *static_cast<const Impl*>(args->geometryUserPtr);
+  const ConstPointsView points = tree.view();
+  float lo[3] = {kFar, kFar, kFar}, hi[3] = {-kFar, -kFar, -kFar}, size = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Index i = tree.triangles[3 * std::size_t{args->primID} + k];
+    const float place[3] = {points.x[i], points.y[i], points.z[i]};
+    if (!std::isfinite(place[0]) || !std::isfinite(place[1]) || !std::isfinite(place[2])) continue;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const float x = std::clamp(place[a], -kFar, kFar);
+      lo[a] = std::min(lo[a], x);
+      hi[a] = std::max(hi[a], x);
+      size = std::max(size, std::fabs(x));
+    }
+  }
+  const bool none = lo[0] > hi[0];  // far away it is in nobody's way
+  const float margin = none ? 0 : static_cast<float>(kRounding) * size;
+  for (std::size_t a = 0; a < 3; ++a) {
+    lo[a] = none ? kFar : lo[a] - margin;
+    hi[a] = none ? kFar : hi[a] + margin;
+  }
+  *args->bounds_o = {lo[0], lo[1], lo[2], 0, hi[0], hi[1], hi[2], 0};
+}
+
+void TriangleTree::Impl::Intersect(const RTCIntersectFunctionNArguments* args) {
+  if (args->N != 1 || args->valid[0] == 0) return;
+  Line& line = *reinterpret_cast<Line*>(args->context);
+  line.Meet(args->primID);
+  if (!line.shrinks || line.best.triangle == kNoIndex) return;
+  RTCRay& ray = reinterpret_cast<RTCRayHit*>(args->rayhit)->ray;
+  ray.tfar = std::min(ray.tfar, Reach(line.Along(line.best.t)));
+}
+
+void TriangleTree::Impl::CopyIn(ConstPointsView from) {
+  const PointsView to = points.view();
+  std::copy_n(from.x, from.count, to.x);
+  std::copy_n(from.y, from.count, to.y);
+  std::copy_n(from.z, from.count, to.z);
+}
+
+void TriangleTree::Impl::Build() {
+  const RTCDevice device = count() > kFew ? EmbreeDevice() : nullptr;
+  if (device == nullptr) return;
+  geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count()));
+  rtcSetGeometryUserData(geometry, this);
+  rtcSetGeometryBoundsFunction(geometry, &Bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, &Intersect);
+  scene = CommitEmbreeScene(device, geometry);
+  if (rtcGetDeviceError(device) != RTC_ERROR_NONE) scene = nullptr;
+}
+
+void TriangleTree::Impl::Refit() {
+  if (scene == nullptr) return;
+  RefitEmbreeScene(scene, geometry);
+  if (rtcGetDeviceError(EmbreeDevice()) != RTC_ERROR_NONE) scene = nullptr;
+}
+
+template <typename Visit>
+void TriangleTree::Impl::ForNear(Double3 place, double limit, Visit visit) const {
+  if (!IsFinite(place) || std::isnan(limit)) return;
+  if (scene == nullptr) {
+    for (Index t = 0; t < count(); ++t) visit(t);
+    return;
+  }
+  struct Search {
+    Visit visit;
+    double limit, rounding;
+    float Radius() const {
+      const double radius = std::sqrt(limit) * (1 + kRounding) + rounding;
+      return radius < 4 * double{kFar} ? static_cast<float>(radius) : std::numeric_limits<float>::infinity();
+    }
+  };
+  RTCPointQuery query = {Clamped(place.x), Clamped(place.y), Clamped(place.z), 0, 0};
+  Search search{visit, limit,
+                kRounding * std::max({std::fabs(query.x), std::fabs(query.y), std::fabs(query.z)})};
+  search.rounding += 1e-18;
+  query.radius = search.Radius();
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  const auto meet = [](RTCPointQueryFunctionArguments* args) {
+    auto& at = *static_cast<Search*>(args->userPtr);
+    const double now = at.visit(args->primID);
+    if (!(now < at.limit)) return false;
+    at.limit = now;
+    args->query->radius = at.Radius();
+    return true;
+  };
+  rtcPointQuery(scene.get(), &query, &context, meet, &search);
+}
+
+SurfacePoint TriangleTree::Impl::On(Index triangle, Double3 place, double limit) const {
+  SurfacePoint found = ClosestOnTriangle(view(), &triangles[3 * std::size_t{triangle}], place);
+  if (!(found.squared <= limit && found.squared < kInfinity)) return {};
+  found.triangle = triangle;
+  return found;
+}
+
+void TriangleTree::Impl::Follow(Line* line, Double3 start, Double3 direction, float near, float far) const {
+  rtcInitIntersectContext(&line->context);
+  RTCRayHit query = {};
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.ray.org_x = Clamped(start.x), query.ray.org_y = Clamped(start.y), query.ray.org_z = Clamped(start.z);
+  query.ray.dir_x = static_cast<float>(direction.x);
+  query.ray.dir_y = static_cast<float>(direction.y);
+  query.ray.dir_z = static_cast<float>(direction.z);
+  query.ray.tnear = near;
+  query.ray.tfar = far;
+  query.ray.mask = 0xffffffffu;
+  rtcIntersect1(scene.get(), &line->context, &query);
+}
+
+TriangleTree::TriangleTree() = default;
+TriangleTree::TriangleTree(TriangleTree&&) noexcept = default;
+TriangleTree& TriangleTree::operator=(TriangleTree&&) noexcept = default;
+TriangleTree::~TriangleTree() = default;
+
+TriangleTree::TriangleTree(ConstPointsView points, std::span<const Index> triangles) {
   KPSA_CHECK_EQ(triangles.size() % 3, 0u);
-  const auto count = static_cast<Index>(triangles.size() / 3);
-  std::vector<std::array<float, 3>> centers(count);
-  for (Index t = 0; t < count; ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Index i = triangles[3 * t + k];
-      KPSA_CHECK_LT(i, points.count);
-      const float place[3] = {points.x[i], points.y[i], points.z[i]};
-      for (std::size_t a = 0; a < 3; ++a) centers[t][a] += std::isfinite(place[a]) ? place[a] / 3 : 0;
-    }
-    order_.push_back(t);
-  }
-  if (count == 0) return;
-  // Halves along the widest axis until few are left; the first child follows its parent
-  struct Range {
-    Index first, count, parent;
-  };
-  std::vector<Range> open = {{0, count, kNoIndex}};
-  while (!open.empty()) {
-    const Range range = open.back();
-    open.pop_back();
-    const auto self = static_cast<Index>(nodes_.size());
-    if (range.parent != kNoIndex) nodes_[range.parent].right = self;
-    nodes_.push_back({});
-    const auto begin = order_.begin() + range.first, end = begin + range.count;
-    nodes_[self].least = *std::min_element(begin, end);
-    if (range.count <= kLeaf) {
-      nodes_[self].first = range.first;
-      nodes_[self].count = range.count;
-      continue;
-    }
-    std::array<float, 3> lo = centers[*begin], hi = lo;
-    for (auto it = begin; it != end; ++it) {
-      for (std::size_t a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], centers[*it][a]);
-        hi[a] = std::max(hi[a], centers[*it][a]);
-      }
-    }
-    std::size_t axis = 0;
-    for (std::size_t a = 1; a < 3; ++a) {
-      if (hi[a] - lo[a] > hi[axis] - lo[axis]) axis = a;
-    }
-    const Index half = range.count / 2;
-    std::nth_element(begin, begin + half, end, [&](Index a, Index b) {
-      return centers[a][axis] < centers[b][axis] || (centers[a][axis] == centers[b][axis] && a < b);
-    });
-    open.push_back({range.first + half, range.count - half, self});
-    open.push_back({range.first, half, kNoIndex});
-  }
+  for (const Index i : triangles) KPSA_CHECK_LT(i, points.count);
+  if (triangles.empty()) return;
+  impl_ = std::make_unique<Impl>();
+  impl_->points = PointBuffer(points.count);
+  impl_->CopyIn(points);
+  impl_->triangles.assign(triangles.begin(), triangles.end());
+  impl_->Build();
 }
 
-void TriangleTree::Fit(ConstPointsView points, std::span<float> boxes) const {
-  KPSA_CHECK_LE(BoxFloats(), boxes.size());
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  for (std::size_t n = nodes_.size(); n-- > 0;) {  // children before their parents
-    const Node& node = nodes_[n];
-    float* box = boxes.data() + 6 * n;
-    for (std::size_t a = 0; a < 3; ++a) box[a] = kFar, box[3 + a] = -kFar;
-    if (node.count == 0) {
-      for (const std::size_t child : {n + 1, std::size_t{node.right}}) {
-        const float* other = boxes.data() + 6 * child;
-        for (std::size_t a = 0; a < 3; ++a) {
-          box[a] = std::min(box[a], other[a]);
-          box[3 + a] = std::max(box[3 + a], other[3 + a]);
-        }
-      }
-      continue;
-    }
-    for (Index e = node.first; e < node.first + node.count; ++e) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Index i = triangles_[3 * std::size_t{order_[e]} + k];
-        const float place[3] = {points.x[i], points.y[i], points.z[i]};
-        if (!std::isfinite(place[0]) || !std::isfinite(place[1]) || !std::isfinite(place[2])) continue;
-        for (std::size_t a = 0; a < 3; ++a) {
-          box[a] = std::min(box[a], place[a]);
-          box[3 + a] = std::max(box[3 + a], place[a]);
-        }
-      }
-    }
-  }
+std::span<const Index> TriangleTree::triangles() const {
+  return impl_ == nullptr ? std::span<const Index>() : impl_->triangles;
 }
 
-// Depth first, the nearer child first: near(node) is its distance (or what else children go by), or infinity
-// to leave it out (asked again when its turn comes); visit(triangle).
-template <typename Near, typename Visit>
-void TriangleTree::Walk(Near near, Visit visit) const {
-  if (nodes_.empty()) return;
-  std::array<Index, kMaxDepth> open;
-  std::size_t depth = 0;
-  open[depth++] = 0;
-  while (depth > 0) {
-    const Index n = open[--depth];
-    if (near(n) == kInfinity) continue;
-    const Node& node = nodes_[n];
-    if (node.count > 0) {
-      for (Index e = node.first; e < node.first + node.count; ++e) visit(order_[e]);
-      continue;
-    }
-    const bool left_first = near(n + 1) <= near(node.right);
-    KPSA_CHECK_LE(depth + 2, open.size());
-    open[depth++] = left_first ? node.right : n + 1;
-    open[depth++] = left_first ? n + 1 : node.right;
-  }
+ConstPointsView TriangleTree::points() const { return impl_ == nullptr ? ConstPointsView() : impl_->view(); }
+
+void TriangleTree::Move(ConstPointsView points) {
+  if (impl_ == nullptr) return;
+  const ConstPointsView now = impl_->view();
+  KPSA_CHECK_EQ(points.count, now.count);
+  const std::size_t bytes = points.count * sizeof(float);
+  if (std::memcmp(points.x, now.x, bytes) == 0 && std::memcmp(points.y, now.y, bytes) == 0 &&
+      std::memcmp(points.z, now.z, bytes) == 0)
+    return;
+  impl_->CopyIn(points);
+  impl_->Refit();
 }
 
-SurfacePoint TriangleTree::Closest(ConstPointsView points, std::span<const float> boxes, Double3 place,
-                                   double max_distance) const {
+SurfacePoint TriangleTree::Closest(Double3 place, double max_distance) const {
   SurfacePoint best;
+  if (impl_ == nullptr) return best;
   const double limit = max_distance * max_distance;
-  if (!IsFinite(place) || std::isnan(limit)) return best;
-  const auto near = [&](Index n) { return BoxWithin(boxes, n, place, std::min(best.squared, limit)); };
-  Walk(near, [&](Index t) {
-    SurfacePoint found = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
-    found.triangle = t;
-    if (found.squared <= limit && found.squared < kInfinity && Less(found, best)) best = found;
+  impl_->ForNear(place, limit, [&](Index t) {
+    const SurfacePoint found = impl_->On(t, place, limit);
+    if (Less(found, best)) best = found;
+    return best.squared;
   });
   return best;
 }
 
-SurfacePoint TriangleTree::Lowest(ConstPointsView points, std::span<const float> boxes, Double3 place,
-                                  double max_distance) const {
+SurfacePoint TriangleTree::Lowest(Double3 place, double max_distance) const {
   SurfacePoint best;
+  if (impl_ == nullptr) return best;
   const double limit = max_distance * max_distance;
-  if (!IsFinite(place) || std::isnan(limit)) return best;
-  const auto lowest = [&](Index n) {
-    const double least = nodes_[n].least;
-    return least < best.triangle && BoxWithin(boxes, n, place, limit) < kInfinity ? least : kInfinity;
-  };
-  Walk(lowest, [&](Index t) {
-    if (t >= best.triangle) return;
-    SurfacePoint found = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
-    found.triangle = t;
-    if (found.squared <= limit && found.squared < kInfinity) best = found;
+  impl_->ForNear(place, limit, [&](Index t) {
+    if (t < best.triangle) {
+      const SurfacePoint found = impl_->On(t, place, limit);
+      if (found.triangle == t) best = found;
+    }
+    return limit;
   });
   return best;
 }
 
-void TriangleTree::ClosestSeveral(ConstPointsView points, std::span<const float> boxes, Double3 place,
-                                  std::size_t count, double max_distance,
+void TriangleTree::ClosestSeveral(Double3 place, std::size_t count, double max_distance,
                                   std::vector<SurfacePoint>* found) const {
   found->clear();
+  if (impl_ == nullptr || count == 0) return;
   const double limit = max_distance * max_distance;
-  if (count == 0 || !IsFinite(place) || std::isnan(limit)) return;
-  const auto near = [&](Index n) {
-    return BoxWithin(boxes, n, place, found->size() < count ? limit : found->back().squared);
-  };
-  Walk(near, [&](Index t) {
-    SurfacePoint one = ClosestOnTriangle(points, &triangles_[3 * std::size_t{t}], place);
-    one.triangle = t;
-    if (!(one.squared <= limit && one.squared < kInfinity)) return;
-    found->insert(std::upper_bound(found->begin(), found->end(), one, Less), one);
-    if (found->size() > count) found->pop_back();
+  impl_->ForNear(place, limit, [&](Index t) {
+    const SurfacePoint one = impl_->On(t, place, limit);
+    if (one.triangle != kNoIndex && (found->size() < count || Less(one, found->back()))) {
+      if (found->size() == count) found->pop_back();
+      found->insert(std::upper_bound(found->begin(), found->end(), one, Less), one);
+    }
+    return found->size() < count ? limit : found->back().squared;
   });
 }
 
-LineHit TriangleTree::FirstHit(ConstPointsView points, std::span<const float> boxes, Double3 origin,
-                               Double3 direction) const {
-  LineHit best;
-  if (!IsFinite(origin) || !IsFinite(direction)) return best;
-  const auto near = [&](Index n) {
-    const float* box = boxes.data() + 6 * std::size_t{n};
-    const double t = BoxEntry(box, origin, direction, 1e-9 * Scale(box, origin));
-    return t <= best.t ? t : kInfinity;
-  };
-  constexpr double kEdge = 1e-9;  // lines through an edge miss none of its triangles
-  Walk(near, [&](Index t) {
-    const Index* corner = &triangles_[3 * std::size_t{t}];
-    const Double3 a = At(points, corner[0]), e1 = At(points, corner[1]) - a, e2 = At(points, corner[2]) - a;
-    const Double3 p = Cross(direction, e2), s = origin - a, q = Cross(s, e1);
-    const double det = Dot(e1, p);
-    if (!(std::fabs(det) > 1e-12 * Length(direction) * Length(e1) * Length(e2))) return;
-    double v = Dot(s, p) / det, w = Dot(direction, q) / det, at = Dot(e2, q) / det;
-    if (!(v >= -kEdge && w >= -kEdge && v + w <= 1 + kEdge && at >= 0)) return;
-    if (at > best.t || (at == best.t && t > best.triangle)) return;
-    v = std::clamp(v, 0.0, 1.0);
-    w = std::clamp(w, 0.0, 1 - v);
-    best = {t, {1 - v - w, v, w}, at};
-  });
-  return best;
+LineHit TriangleTree::FirstHit(Double3 origin, Double3 direction) const {
+  const double size = Largest(direction);
+  if (impl_ == nullptr || !IsFinite(origin) || !IsFinite(direction) || size == 0) return {};
+  Line line{{}, impl_->view(), impl_->triangles.data(), origin, direction, 0, 1, false, {}};
+  // Rays start where the line is nearest to the coordinates' origin, and go both ways. From there neither
+  // their start nor their direction is rounded by more than the margin of what they meet
+  Double3 unit{direction.x / size, direction.y / size, direction.z / size};
+  line.lengths = size * Length(unit);
+  unit = unit * (1 / Length(unit));
+  line.origin_along = Dot(origin, unit);
+  const Double3 middle = origin - unit * line.origin_along;
+  if (impl_->scene == nullptr || !(Largest(middle) < kFar)) {
+    for (Index t = 0; t < impl_->count(); ++t) line.Meet(t);
+    return line.best;
+  }
+  // Backwards the nearest one comes last
+  if (line.origin_along < 0) impl_->Follow(&line, middle, unit * -1, 0, Reach(-line.origin_along));
+  line.shrinks = true;
+  const double near = std::max(0.0, line.origin_along) * (1 - kRounding), far = line.Along(line.best.t);
+  if (far >= 0 && near < kFar) impl_->Follow(&line, middle, unit, static_cast<float>(near), Reach(far));
+  return line.best;
 }
 
 }  // namespace kpsa

@@ -1,16 +1,17 @@
 // Where a triangle mesh is nearest to a place, and where a line meets it.
 //
-// A tree of boxes over the triangles whose shape is built once (from rest points) and whose boxes are
-// refitted to other points in memory that the caller brings: nothing is allocated after the constructor.
-// Arithmetic is plain double over the float points, every query is answered on its own, and equally near
-// triangles are told apart by their number (the lower one wins): answers depend on nothing but the points.
+// Embree (base/embree.h) says which triangles come into question; its boxes are floats with a margin. What
+// counts is plain double arithmetic over the float points, every query is answered on its own, and equally
+// near triangles are told apart by their number (the lower one wins): answers depend on nothing but the
+// points. The structure is built once, of the points at rest, and its boxes follow points that move.
 // Points that are not finite take no part: of a triangle with such a corner what is near is the edge between
 // the others, and lines miss it; a query that is not finite finds nothing. None of them costs the others
-// anything. Nearest place on a triangle: C. Ericson, Real-Time Collision
-// Detection (2005), 5.1.5; lines: Moeller and Trumbore (1997).
+// anything. Coordinates beyond 1e18 are found slowly. Nearest place on a triangle: C. Ericson, Real-Time
+// Collision Detection (2005), 5.1.5; lines: Moeller and Trumbore (1997).
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -38,43 +39,34 @@ struct LineHit {
   double t = std::numeric_limits<double>::infinity();
 };
 
+// Owns a copy of the points. Movable; queries may run on any threads at once, but not while it moves.
 class TriangleTree {
  public:
-  TriangleTree() = default;  // no triangles
+  TriangleTree();  // no triangles
   // triangles: 3 indices below points.count each (checked).
   TriangleTree(ConstPointsView points, std::span<const Index> triangles);
+  TriangleTree(TriangleTree&&) noexcept;
+  TriangleTree& operator=(TriangleTree&&) noexcept;
+  ~TriangleTree();
 
-  std::size_t triangle_count() const { return triangles_.size() / 3; }
-  std::span<const Index> triangles() const { return triangles_; }
-  std::size_t BoxFloats() const { return 6 * nodes_.size(); }
-  // The boxes of the tree around the triangles as `points` has them; BoxFloats() floats. All queries take the
-  // points and boxes that belong together.
-  void Fit(ConstPointsView points, std::span<float> boxes) const;
+  std::span<const Index> triangles() const;
+  ConstPointsView points() const;  // where they are now
+  // As many points as there were. Costs a comparison where they are the same; allocates nothing of its own.
+  void Move(ConstPointsView points);
 
   // The nearest place within the distance.
-  SurfacePoint Closest(ConstPointsView points, std::span<const float> boxes, Double3 place,
-                       double max_distance = std::numeric_limits<double>::infinity()) const;
-  // The place on the triangle of the lowest number that has one within the distance.
-  SurfacePoint Lowest(ConstPointsView points, std::span<const float> boxes, Double3 place,
-                      double max_distance) const;
+  SurfacePoint Closest(Double3 place, double max_distance = std::numeric_limits<double>::infinity()) const;
+  // The place on the triangle of the lowest number that has one within the distance: for short distances.
+  SurfacePoint Lowest(Double3 place, double max_distance) const;
   // The nearest `count` triangles within the distance, each with its nearest place: near ones first.
-  void ClosestSeveral(ConstPointsView points, std::span<const float> boxes, Double3 place, std::size_t count,
-                      double max_distance, std::vector<SurfacePoint>* found) const;
+  void ClosestSeveral(Double3 place, std::size_t count, double max_distance,
+                      std::vector<SurfacePoint>* found) const;
   // The hit with the least t >= 0. Lines through an edge hit one of its triangles.
-  LineHit FirstHit(ConstPointsView points, std::span<const float> boxes, Double3 origin,
-                   Double3 direction) const;
+  LineHit FirstHit(Double3 origin, Double3 direction) const;
 
  private:
-  struct Node {
-    Index first = 0, count = 0;  // of a leaf: its triangles in order_
-    Index right = 0;             // of the others: the second child; the first one is the next node
-    Index least = 0;             // of its triangles: the lowest number
-  };
-  template <typename Near, typename Visit>
-  void Walk(Near near, Visit visit) const;
-
-  std::vector<Index> triangles_, order_;
-  std::vector<Node> nodes_;
+  struct Impl;
+  std::unique_ptr<Impl> impl_;  // null without triangles
 };
 
 }  // namespace kpsa

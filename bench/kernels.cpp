@@ -378,12 +378,8 @@ int Main(int argc, char** argv) {
     const TriangleTree tree(
         in, nearest ? PointTriangles(mesh.topology)
                     : std::vector<Index>(mesh.topology.triangles().begin(), mesh.topology.triangles().end()));
-    AlignedFloats boxes(tree.BoxFloats());
-    tree.Fit(in, boxes.span());
-    const WrapSurface surface{in, &tree, boxes.span()};
-    const WrapInfluences influences = nearest
-                                          ? NearestInfluences(surface, follower, all, 1, 8)
-                                          : SurfaceInfluences(surface, mesh.topology, follower, all, 1, 0);
+    const WrapInfluences influences = nearest ? NearestInfluences(tree, follower, all, 1, 8)
+                                              : SurfaceInfluences(tree, mesh.topology, follower, all, 1, 0);
     const WrapKernel kernel(WrapMode::kOffset, mesh.topology, driver_rest, Matrix4(), influences, follower,
                             all, all);
     PointBuffer driver(n);

@@ -31,8 +31,6 @@ class Partners {
       std::fill_n(own_.begin() + 3 * static_cast<std::ptrdiff_t>(p), 3, p);
     }
     tree_ = TriangleTree(rest_, own_);  // triangles without area: the points themselves
-    boxes_ = AlignedFloats(tree_.BoxFloats());
-    tree_.Fit(rest_, boxes_.span());
   }
   double Side(Index p) const { return At(p)[axis_]; }
   double Diagonal() const {
@@ -49,10 +47,9 @@ class Partners {
   // kNoIndex where no point is anywhere.
   Index Find(Index p, double tolerance, double* distance) {
     const Double3 place = Mirrored(At(p)), around = Mirrored(around_[p]);
-    const SurfacePoint nearest = tree_.Closest(rest_, boxes_.span(), place);
+    const SurfacePoint nearest = tree_.Closest(place);
     if (nearest.triangle == kNoIndex) return kNoIndex;
-    tree_.ClosestSeveral(rest_, boxes_.span(), place, kCandidates,
-                         std::max(std::sqrt(nearest.squared), tolerance), &found_);
+    tree_.ClosestSeveral(place, kCandidates, std::max(std::sqrt(nearest.squared), tolerance), &found_);
     Index best = nearest.triangle;
     double least = std::numeric_limits<double>::infinity();
     for (const SurfacePoint& candidate : found_) {
@@ -76,7 +73,6 @@ class Partners {
   std::vector<Double3> around_;
   std::vector<Index> own_;
   TriangleTree tree_;
-  AlignedFloats boxes_;
   std::vector<SurfacePoint> found_;
 };
 

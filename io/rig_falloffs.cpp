@@ -15,27 +15,17 @@ constexpr const char* kKinds =
     "{at: PLACE, radius: 5}, {sphere: ...}, {capsule: ...}, {plane: ...}, {proximity: ...}, {weights: ...}, "
     "{combine: multiply, of: [...]} or a list of them";
 
-// A mesh at rest, and how far places are from it.
-struct RestSurface {
-  PointBuffer points;
-  TriangleTree tree;
-  AlignedFloats boxes;
-};
-
-std::shared_ptr<const RestSurface> MakeRestSurface(const std::vector<Double3>& points,
-                                                   const std::vector<Index>& triangles) {
-  auto surface = std::make_shared<RestSurface>();
-  surface->points = PointBuffer(points.size());
-  const PointsView view = surface->points.view();
+// A mesh at rest, for asking how far places are from it.
+std::shared_ptr<const TriangleTree> MakeRestSurface(const std::vector<Double3>& points,
+                                                    const std::vector<Index>& triangles) {
+  PointBuffer floats(points.size());
+  const PointsView to = floats.view();
   for (std::size_t i = 0; i < points.size(); ++i) {
-    view.x[i] = static_cast<float>(points[i].x);
-    view.y[i] = static_cast<float>(points[i].y);
-    view.z[i] = static_cast<float>(points[i].z);
+    to.x[i] = static_cast<float>(points[i].x);
+    to.y[i] = static_cast<float>(points[i].y);
+    to.z[i] = static_cast<float>(points[i].z);
   }
-  surface->tree = TriangleTree(view, triangles);
-  surface->boxes = AlignedFloats(surface->tree.BoxFloats());
-  surface->tree.Fit(view, surface->boxes.span());
-  return surface;
+  return std::make_shared<TriangleTree>(to, triangles);
 }
 
 }  // namespace
@@ -190,7 +180,7 @@ bool RigBuild::ReadFalloffShape(const std::string& kind, const YamlNode& node, i
       const auto surface =
           MakeRestSurface(rest_->WorldPoints(*index), rig_->scene.meshes[*index].mesh().data().triangles);
       *weight_at = [=](Double3 p) {
-        const SurfacePoint near = surface->tree.Closest(surface->points.view(), surface->boxes.span(), p);
+        const SurfacePoint near = surface->Closest(p);
         return near.triangle == kNoIndex ? 0 : DistanceFalloff(std::sqrt(near.squared), radius, fade);
       };
     }

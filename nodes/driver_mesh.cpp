@@ -20,38 +20,60 @@ struct Latest {
     Digest key;
     std::shared_ptr<const DriverRest> rest;
   };
+  static constexpr std::size_t kMost = 4;
   struct Shared {
+    std::shared_ptr<const DriverRest> Find(const Digest& key) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      for (const Entry& entry : entries) {
+        if (entry.key == key) return entry.rest;
+      }
+      return nullptr;
+    }
+    void Add(const Digest& key, std::shared_ptr<const DriverRest> rest) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (entries.size() == kMost) entries.erase(entries.begin());
+      entries.push_back({key, std::move(rest)});
+    }
+
+   private:
     std::mutex mutex;
     std::vector<Entry> entries;
   };
   std::shared_ptr<Shared> shared = std::make_shared<Shared>();
-  static constexpr std::size_t kMost = 4;
 };
+
+PointBuffer Rounded(const std::vector<Double3>& points) {
+  PointBuffer floats(points.size());
+  const PointsView to = floats.view();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    to.x[i] = static_cast<float>(points[i].x);
+    to.y[i] = static_cast<float>(points[i].y);
+    to.z[i] = static_cast<float>(points[i].z);
+  }
+  return floats;
+}
 
 std::shared_ptr<const DriverRest> MakeRest(ConstPointsView points, const Matrix4& stage_from_driver,
                                            const Topology& topology, DriverTree tree) {
   auto rest = std::make_shared<DriverRest>();
-  rest->rounded = PointBuffer(points.count);
-  const PointsView rounded = rest->rounded.view();
   const bool moved = !(stage_from_driver == Matrix4());
   for (std::size_t i = 0; i < points.count; ++i) {
     const Double3 p{points.x[i], points.y[i], points.z[i]};
     const Double3 placed = moved ? TransformPoint(stage_from_driver, p) : p;
     rest->points.push_back(placed);
-    rounded.x[i] = static_cast<float>(placed.x);
-    rounded.y[i] = static_cast<float>(placed.y);
-    rounded.z[i] = static_cast<float>(placed.z);
   }
-  const std::vector<Index> singles =
-      tree == DriverTree::kPoints ? PointTriangles(topology) : std::vector<Index>();
-  rest->tree = TriangleTree(
-      rounded, tree == DriverTree::kPoints ? std::span<const Index>(singles) : topology.triangles());
-  rest->boxes = AlignedFloats(rest->tree.BoxFloats());
-  rest->tree.Fit(rounded, rest->boxes.span());
+  const PointBuffer floats = Rounded(rest->points);
+  if (tree == DriverTree::kTriangles) rest->tree = TriangleTree(floats.view(), topology.triangles());
+  if (tree == DriverTree::kPoints) rest->tree = TriangleTree(floats.view(), PointTriangles(topology));
   return rest;
 }
 
 }  // namespace
+
+MovingSurface Driver::Moving() const {
+  const PointBuffer floats = Rounded(rest->points);
+  return MovingSurface(floats.view(), topology->triangles());
+}
 
 void AddDriver(NodeBuilder& b) {
   b.points_in("driverPoints", "the driver's points, at any stage of its stack; `driver:` connects them");
@@ -106,14 +128,11 @@ Result<Driver> BindDriver(const Structural& s, DriverTree tree, const Matrix4& s
     hasher.Add(std::span<const float>(row, points.count));
   const Digest key = hasher.Finish();
   Latest::Shared& latest = *(*mesh)->Derived<Latest>([] { return Latest(); }).shared;
-  const std::lock_guard<std::mutex> lock(latest.mutex);
-  for (const Latest::Entry& entry : latest.entries) {
-    if (entry.key == key) driver.rest = entry.rest;
-  }
+  driver.rest = latest.Find(key);
   if (driver.rest == nullptr) {
+    // Without the lock: trees take a while, and others may want what is there
     driver.rest = MakeRest(points, driver.stage_from_driver, *driver.topology, tree);
-    if (latest.entries.size() == Latest::kMost) latest.entries.erase(latest.entries.begin());
-    latest.entries.push_back({key, driver.rest});
+    latest.Add(key, driver.rest);
   }
   return driver;
 }

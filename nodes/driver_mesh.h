@@ -9,6 +9,7 @@
 #include "base/triangle_tree.h"
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
+#include "nodes/kernels/moving_surface.h"
 #include "nodes/kernels/topology.h"
 
 namespace kpsa {
@@ -23,21 +24,21 @@ void AddDriver(NodeBuilder& builder);
 // missing, another number of points than the mesh has, no faces.
 Result<const Mesh*> DriverMesh(const Structural& structural, std::optional<std::size_t> points);
 
-// The driver at rest in the space of the stage, with a tree over its triangles or over its single points.
+// The driver at rest in the space of the stage, with a tree over its triangles or over its single points (as
+// floats), or without one.
 struct DriverRest {
   std::vector<Double3> points;
-  PointBuffer rounded;  // the same as floats: what the tree is over
   TriangleTree tree;
-  AlignedFloats boxes;
 };
 
 struct Driver {
   const Topology* topology = nullptr;
   std::shared_ptr<const DriverRest> rest;
   Matrix4 stage_from_driver;
+  MovingSurface Moving() const;  // of the rest points
 };
 
-enum class DriverTree { kTriangles, kPoints };
+enum class DriverTree { kNone, kTriangles, kPoints };
 // Of a deformer, in the space of its stage. Errors: those of DriverMesh, driverMatrix singular, points that
 // are not finite. The last rests of a mesh are kept beside it: demand and bind both ask, of every geometry.
 Result<Driver> BindDriver(const Structural& structural, DriverTree tree);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 #include "base/falloff_shapes.h"
@@ -107,6 +108,7 @@ struct Proximity {
   FalloffPlace place;
   bool carried = false;
   Driver driver;
+  std::optional<MovingSurface> surface;
   std::size_t row = 0;  // floats of a component of the carried driver
 };
 
@@ -117,11 +119,12 @@ Result<BoundKernel> BindProximity(const Binding& binding) {
   const Result<FalloffPlace> place = FalloffPlace::Bind(s, bound.carried);
   if (!place.ok()) return place.status();
   bound.place = *place;
-  Result<Driver> driver = BindDriver(s, DriverTree::kTriangles, s.value("driverMatrix").get<Matrix4>());
+  Result<Driver> driver = BindDriver(s, DriverTree::kNone, s.value("driverMatrix").get<Matrix4>());
   if (!driver.ok()) return driver.status();
   bound.driver = std::move(*driver);
   if (bound.carried) bound.row = PaddedCount(bound.driver.topology->point_count());
-  const std::size_t scratch = 3 * bound.row + bound.driver.rest->tree.BoxFloats();
+  bound.surface.emplace(bound.driver.Moving());
+  const std::size_t scratch = 3 * bound.row;
   return MakeBound(std::move(bound), scratch);
 }
 
@@ -144,11 +147,9 @@ void ComputeProximity(ComputeContext& c) {
     });
     surface = carried;
   }
-  const TriangleTree& tree = bound.driver.rest->tree;
-  const std::span<float> boxes(c.scratch + 3 * bound.row, tree.BoxFloats());
-  tree.Fit(surface, boxes);
+  const MovingSurface::Lease tree = bound.surface->At(surface);
   ForPoints(c, bound.place.WorldFromPoints(parent), [&](Double3 p) {
-    const SurfacePoint near = tree.Closest(surface, boxes, p, std::max(radius, 0.0));
+    const SurfacePoint near = tree->Closest(p, std::max(radius, 0.0));
     return near.triangle == kNoIndex ? 0
                                      : ByDistance(std::sqrt(near.squared), full, radius, bound.place.fade);
   });

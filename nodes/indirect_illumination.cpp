@@ -2,9 +2,9 @@
 // meshes that move through its picture. Demand is local in these shading points and global in the geometry.
 #include <algorithm>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "base/spares.h"
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/illumination.h"
@@ -25,33 +25,6 @@ struct Workplace {
   std::vector<DiffuseLight> lights;
 };
 
-// Tracers that no evaluation uses now. Any is as good as any other: all are built of the rest points, and
-// what rays meet depends on that layout and on where the points are, not on where they have been. There are
-// as many as evaluations have been under way at once; bind builds the first.
-class Workplaces {
- public:
-  std::unique_ptr<Workplace> Take() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (free_.empty()) return nullptr;
-    std::unique_ptr<Workplace> last = std::move(free_.back());
-    free_.pop_back();
-    return last;
-  }
-  void Give(std::unique_ptr<Workplace> place) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    free_.push_back(std::move(place));  // has room: see AddRoom
-  }
-  void AddRoom() {  // for one more
-    const std::lock_guard<std::mutex> lock(mutex_);
-    free_.reserve(++count_);
-  }
-
- private:
-  std::mutex mutex_;
-  std::size_t count_ = 0;
-  std::vector<std::unique_ptr<Workplace>> free_;
-};
-
 struct IlluminationKernel {
   std::vector<Index> pixels;
   std::vector<std::vector<Index>> carried;  // by element of pointIrradiance: points, of all meshes' points
@@ -62,7 +35,9 @@ struct IlluminationKernel {
   std::vector<DiffuseLight::Kind> lights;
   Index width = 0, height = 0;
   PathOptions paths;
-  std::shared_ptr<Workplaces> workplaces = std::make_shared<Workplaces>();
+  // All are built of the rest points, and what rays meet depends on that layout and on where the points are,
+  // not on where they have been. Bind makes the first.
+  std::shared_ptr<Spares<Workplace>> workplaces = std::make_shared<Spares<Workplace>>();
 };
 
 const std::vector<std::int64_t>& CarriedMeshes(const Structural& s) {

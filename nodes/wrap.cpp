@@ -28,7 +28,7 @@ WrapMode ModeOf(const Structural& s) {
 template <bool kAmongPoints>
 WrapInfluences FindInfluences(const Structural& s, const Driver& driver, const PointSet& out,
                               ConstPointsView rest, std::span<const float> weights) {
-  const WrapSurface surface{driver.rest->rounded.view(), &driver.rest->tree, driver.rest->boxes.span()};
+  const TriangleTree& surface = driver.rest->tree;
   // Distances are world ones: a stage in mesh space may be scaled
   const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   const double scale = frame.ok() ? frame->WorldScale() : 1;

@@ -1,20 +1,13 @@
 #include "nodes/kernels/ray_scene.h"
 
-#include <embree3/rtcore.h>
-
 #include <cmath>
 #include <utility>
 
 #include "base/check.h"
+#include "base/embree.h"
 
 namespace kpsa {
 namespace {
-
-// One device for the process: devices are costly to make, and every scene holds a reference of its own.
-RTCDevice SharedDevice() {
-  static RTCDevice device = rtcNewDevice(nullptr);
-  return device;
-}
 
 RTCRay ToEmbree(const Ray& ray) {
   RTCRay out = {};
@@ -33,13 +26,10 @@ RTCRay ToEmbree(const Ray& ray) {
 }  // namespace
 
 struct RayScene::Impl {
-  RTCScene scene = nullptr;
+  EmbreeScene scene;
   RTCGeometry geometry = nullptr;  // the scene's; null without triangles
   float* xyz = nullptr;            // the geometry's
   std::size_t points = 0;
-  ~Impl() {
-    if (scene != nullptr) rtcReleaseScene(scene);
-  }
 };
 
 RayScene::RayScene(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -78,37 +68,25 @@ Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> 
     }
   }
   KPSA_RETURN_IF_ERROR(CheckFinite(points));
-  RTCDevice device = SharedDevice();
-  if (device == nullptr) return Status::Evaluation("the ray tracer (Embree) cannot start on this machine");
-
   auto impl = std::make_unique<Impl>();
-  impl->scene = rtcNewScene(device);
   impl->points = points.count;
-  rtcSetSceneFlags(impl->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC);
-  // Low for the scene: its geometry then has a structure of its own, which can be refitted; that one is built
-  // by surface area without spatial splits, one layout an input
-  rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_LOW);
-  if (!triangles.empty()) {
-    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* xyz = static_cast<float*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points.count));
-    auto* corner = static_cast<std::uint32_t*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                3 * sizeof(std::uint32_t), triangles.size() / 3));
-    if (xyz == nullptr || corner == nullptr) {
-      rtcReleaseGeometry(geometry);
-      return Status::Evaluation("no memory for {} triangles in the ray tracer", triangles.size() / 3);
-    }
-    Interleave(points, xyz);
-    for (std::size_t i = 0; i < triangles.size(); ++i) corner[i] = triangles[i];
-    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
-    impl->geometry = geometry;
-    impl->xyz = xyz;
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(impl->scene, geometry);
+  if (triangles.empty()) return RayScene(std::move(impl));
+  RTCDevice device = EmbreeDevice();
+  if (device == nullptr) return Status::Evaluation("the ray tracer (Embree) cannot start on this machine");
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* xyz = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), points.count));
+  auto* corner = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), triangles.size() / 3));
+  if (xyz == nullptr || corner == nullptr) {
     rtcReleaseGeometry(geometry);
+    return Status::Evaluation("no memory for {} triangles in the ray tracer", triangles.size() / 3);
   }
-  rtcCommitScene(impl->scene);
+  Interleave(points, xyz);
+  for (std::size_t i = 0; i < triangles.size(); ++i) corner[i] = triangles[i];
+  impl->geometry = geometry;
+  impl->xyz = xyz;
+  impl->scene = CommitEmbreeScene(device, geometry);
   if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE) {
     return Status::Evaluation("the ray tracer failed to build over {} triangles (Embree error {})",
                               triangles.size() / 3, static_cast<int>(error));
@@ -122,9 +100,8 @@ Status RayScene::Update(ConstPointsView points) {
   if (impl_->geometry == nullptr) return Status();
   Interleave(points, impl_->xyz);
   rtcUpdateGeometryBuffer(impl_->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
-  rtcCommitGeometry(impl_->geometry);
-  rtcCommitScene(impl_->scene);
-  if (const RTCError error = rtcGetDeviceError(SharedDevice()); error != RTC_ERROR_NONE)
+  RefitEmbreeScene(impl_->scene, impl_->geometry);
+  if (const RTCError error = rtcGetDeviceError(EmbreeDevice()); error != RTC_ERROR_NONE)
     return Status::Evaluation("the ray tracer failed to move its points (Embree error {})",
                               static_cast<int>(error));
   return Status();
@@ -132,13 +109,17 @@ Status RayScene::Update(ConstPointsView points) {
 
 void RayScene::ClosestHits(std::span<const Ray> rays, std::span<RayHit> hits) const {
   KPSA_CHECK_EQ(rays.size(), hits.size());
+  if (impl_->scene == nullptr) {
+    for (RayHit& hit : hits) hit = {};
+    return;
+  }
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     RTCRayHit query = {};
     query.ray = ToEmbree(rays[i]);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(impl_->scene, &context, &query);
+    rtcIntersect1(impl_->scene.get(), &context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
       hits[i] = {};
     } else {
@@ -149,11 +130,15 @@ void RayScene::ClosestHits(std::span<const Ray> rays, std::span<RayHit> hits) co
 
 void RayScene::Occluded(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
   KPSA_CHECK_EQ(rays.size(), occluded.size());
+  if (impl_->scene == nullptr) {
+    for (std::uint8_t& one : occluded) one = 0;
+    return;
+  }
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     RTCRay ray = ToEmbree(rays[i]);
-    rtcOccluded1(impl_->scene, &context, &ray);
+    rtcOccluded1(impl_->scene.get(), &context, &ray);
     occluded[i] = ray.tfar < 0 ? 1 : 0;  // Embree reports a hit as minus infinity
   }
 }

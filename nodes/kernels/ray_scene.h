@@ -1,8 +1,8 @@
-// Rays against triangles: what the pictures, and nodes that look along directions, need of Embree.
+// Rays against triangles: what pictures and light after bounces need.
 //
-// This file is the only door to Embree (3.13); its header appears in ray_scene.cpp alone. Every ray is
-// answered on its own (no packets whose lanes could influence each other), and edges are watertight (robust
-// mode), so that the answers depend neither on the number of threads nor on how rays are grouped into calls.
+// Embree's own triangles (base/embree.h), in floats. Every ray is answered on its own (no packets whose lanes
+// could influence each other), and edges are watertight (robust mode), so that the answers depend neither on
+// the number of threads nor on how rays are grouped into calls.
 #pragma once
 
 #include <cstdint>

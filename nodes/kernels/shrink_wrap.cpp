@@ -44,13 +44,12 @@ std::vector<Index> ShrinkWrapDemand(const ShrinkWrapSettings& settings, const To
 }
 
 ShrinkWrapKernel::ShrinkWrapKernel(const ShrinkWrapSettings& settings, const Topology& target,
-                                   TriangleTree tree, const Matrix4& stage_from_target, const Topology& own,
-                                   std::span<const Index> out_points, std::span<const Index> in_points,
-                                   std::span<const float> point_weights)
+                                   MovingSurface surface, const Matrix4& stage_from_target,
+                                   const Topology& own, std::span<const Index> out_points,
+                                   std::span<const Index> in_points, std::span<const float> point_weights)
     : settings_(settings),
       stage_from_target_(stage_from_target),
-      tree_(std::move(tree)),
-      target_count_(target.point_count()),
+      surface_(std::move(surface)),
       in_count_(in_points.size()),
       around_offsets_(target.point_triangles().offsets.begin(), target.point_triangles().offsets.end()),
       around_(target.point_triangles().values.begin(), target.point_triangles().values.end()),
@@ -66,19 +65,19 @@ ShrinkWrapKernel::ShrinkWrapKernel(const ShrinkWrapSettings& settings, const Top
 }
 
 std::size_t ShrinkWrapKernel::ScratchFloats() const {
-  std::size_t floats = 3 * Padded(target_count_) + Padded(tree_.BoxFloats());
+  std::size_t floats = MovesTarget() ? 3 * Padded(surface_.point_count()) : 0;
   if (normals_.has_value()) floats += 3 * Padded(normals_->point_count()) + normals_->ScratchFloats();
   return floats;
 }
 
-Double3 ShrinkWrapKernel::FaceNormal(const Target& target, Index triangle) const noexcept {
-  const Index* corner = &tree_.triangles()[3 * std::size_t{triangle}];
-  const Double3 a = At(target.points, corner[0]);
-  return UnitOrZero(Cross(At(target.points, corner[1]) - a, At(target.points, corner[2]) - a));
+Double3 ShrinkWrapKernel::FaceNormal(const TriangleTree& target, Index triangle) const noexcept {
+  const Index* corner = &target.triangles()[3 * std::size_t{triangle}];
+  const Double3 a = At(target.points(), corner[0]);
+  return UnitOrZero(Cross(At(target.points(), corner[1]) - a, At(target.points(), corner[2]) - a));
 }
 
-Double3 ShrinkWrapKernel::Pseudonormal(const Target& target, const SurfacePoint& place) const noexcept {
-  const Index* corner = &tree_.triangles()[3 * std::size_t{place.triangle}];
+Double3 ShrinkWrapKernel::Pseudonormal(const TriangleTree& target, const SurfacePoint& place) const noexcept {
+  const Index* corner = &target.triangles()[3 * std::size_t{place.triangle}];
   Index named[3];
   int count = 0;
   for (int k = 0; k < 3; ++k) {
@@ -87,7 +86,7 @@ Double3 ShrinkWrapKernel::Pseudonormal(const Target& target, const SurfacePoint&
   if (count == 3) return FaceNormal(target, place.triangle);
   Double3 sum;
   for (Index e = around_offsets_[named[0]]; e < around_offsets_[named[0] + 1]; ++e) {
-    const Index* other = &tree_.triangles()[3 * std::size_t{around_[e]}];
+    const Index* other = &target.triangles()[3 * std::size_t{around_[e]}];
     const Double3 normal = FaceNormal(target, around_[e]);
     if (count == 2) {
       const bool shares = other[0] == named[1] || other[1] == named[1] || other[2] == named[1];
@@ -95,9 +94,9 @@ Double3 ShrinkWrapKernel::Pseudonormal(const Target& target, const SurfacePoint&
       continue;
     }
     const int k = other[0] == named[0] ? 0 : other[1] == named[0] ? 1 : 2;
-    const Double3 own = At(target.points, other[k]);
-    const double cosine = Dot(UnitOrZero(At(target.points, other[(k + 1) % 3]) - own),
-                              UnitOrZero(At(target.points, other[(k + 2) % 3]) - own));
+    const Double3 own = At(target.points(), other[k]);
+    const double cosine = Dot(UnitOrZero(At(target.points(), other[(k + 1) % 3]) - own),
+                              UnitOrZero(At(target.points(), other[(k + 2) % 3]) - own));
     sum = sum + normal * Acos(cosine);
   }
   return UnitOrZero(sum);
@@ -109,9 +108,9 @@ bool ShrinkWrapKernel::Stays(double signed_distance, double offset) const noexce
   return false;
 }
 
-std::optional<Double3> ShrinkWrapKernel::Nearest(const Target& target, Double3 p,
+std::optional<Double3> ShrinkWrapKernel::Nearest(const TriangleTree& target, Double3 p,
                                                  double offset) const noexcept {
-  const SurfacePoint place = tree_.Closest(target.points, target.boxes, p);
+  const SurfacePoint place = target.Closest(p);
   if (place.triangle == kNoIndex) return std::nullopt;
   if (offset == 0 && settings_.side == ShrinkWrapSettings::Side::kSurface) return place.point;
   const Double3 normal = Pseudonormal(target, place), away = p - place.point;
@@ -124,12 +123,12 @@ std::optional<Double3> ShrinkWrapKernel::Nearest(const Target& target, Double3 p
   return place.point + outward * offset;
 }
 
-std::optional<Double3> ShrinkWrapKernel::AlongLine(const Target& target, Double3 p, Double3 line,
+std::optional<Double3> ShrinkWrapKernel::AlongLine(const TriangleTree& target, Double3 p, Double3 line,
                                                    double offset) const noexcept {
   if (settings_.reverse) line = line * -1.0;
-  LineHit hit = tree_.FirstHit(target.points, target.boxes, p, line);
+  LineHit hit = target.FirstHit(p, line);
   if (settings_.bidirectional) {
-    const LineHit back = tree_.FirstHit(target.points, target.boxes, p, line * -1.0);
+    const LineHit back = target.FirstHit(p, line * -1.0);
     if (back.t < hit.t) {
       hit = back;
       line = line * -1.0;
@@ -147,28 +146,26 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
                            const Parallel* parallel) const noexcept {
   KPSA_CHECK_EQ(in.count, in_count_);
   KPSA_CHECK_EQ(out.count, point_count());
-  KPSA_CHECK_EQ(inputs.target.count, target_count_);
+  KPSA_CHECK_EQ(inputs.target.count, surface_.point_count());
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
   const float envelope = static_cast<float>(inputs.envelope);
   if (envelope == 0) return GatherPoints(in, entries_, out);
 
-  Target target{inputs.target, {}};
+  ConstPointsView placed = inputs.target;
   float* next = scratch.data();
-  if (!(stage_from_target_ == Matrix4())) {
-    const PointsView placed = ViewIn(next, target_count_);
-    for (std::size_t i = 0; i < target_count_; ++i) {
+  if (MovesTarget()) {
+    const PointsView to = ViewIn(next, inputs.target.count);
+    for (std::size_t i = 0; i < to.count; ++i) {
       const Double3 p = TransformPoint(stage_from_target_, At(inputs.target, i));
-      placed.x[i] = static_cast<float>(p.x);
-      placed.y[i] = static_cast<float>(p.y);
-      placed.z[i] = static_cast<float>(p.z);
+      to.x[i] = static_cast<float>(p.x);
+      to.y[i] = static_cast<float>(p.y);
+      to.z[i] = static_cast<float>(p.z);
     }
-    target.points = placed;
+    placed = to;
+    next += 3 * Padded(to.count);
   }
-  next += 3 * Padded(target_count_);
-  const std::span<float> boxes(next, tree_.BoxFloats());
-  tree_.Fit(target.points, boxes);
-  target.boxes = boxes;
-  next += Padded(boxes.size());
+  const MovingSurface::Lease lease = surface_.At(placed);
+  const TriangleTree& target = *lease;
   PointsView normals;
   if (normals_.has_value()) {
     normals = ViewIn(next, normals_->point_count());

@@ -4,8 +4,7 @@
 // axis meets the target. The side of the point follows from the pseudonormal of the triangle, edge or corner
 // that q lies on (Baerentzen and Aanaes, Signed Distance Computation Using the Angle Weighted Pseudonormal,
 // 2005). Signed distances are positive outside, where the target's normals point; `offset` shifts the
-// surface. Every Run fits a tree of boxes, built at bind, to the target as it is, in scratch. Double
-// arithmetic.
+// surface. Double arithmetic.
 #pragma once
 
 #include <optional>
@@ -15,6 +14,7 @@
 #include "base/matrix.h"
 #include "base/points.h"
 #include "base/triangle_tree.h"
+#include "nodes/kernels/moving_surface.h"
 #include "nodes/kernels/normals.h"
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
@@ -48,9 +48,9 @@ class ShrinkWrapKernel {
     ConstPointsView target;  // all of its points, in its own space
     Double3 axis{0, 1, 0};   // of kAxis, unit length, in the points' space
   };
-  // target, tree: the target's faces, the tree built at rest. own: the faces of the points that move
+  // target, surface: the target's faces, and trees over them. own: the faces of the points that move
   // (kNormals only). in_points: sorted, at least the demand.
-  ShrinkWrapKernel(const ShrinkWrapSettings& settings, const Topology& target, TriangleTree tree,
+  ShrinkWrapKernel(const ShrinkWrapSettings& settings, const Topology& target, MovingSurface surface,
                    const Matrix4& stage_from_target, const Topology& own, std::span<const Index> out_points,
                    std::span<const Index> in_points, std::span<const float> point_weights = {});
 
@@ -61,21 +61,18 @@ class ShrinkWrapKernel {
            const Parallel* parallel = nullptr) const noexcept;
 
  private:
-  struct Target {
-    ConstPointsView points;
-    std::span<const float> boxes;
-  };
-  Double3 FaceNormal(const Target& target, Index triangle) const noexcept;
-  Double3 Pseudonormal(const Target& target, const SurfacePoint& place) const noexcept;
-  std::optional<Double3> Nearest(const Target& target, Double3 p, double offset) const noexcept;
-  std::optional<Double3> AlongLine(const Target& target, Double3 p, Double3 line,
+  bool MovesTarget() const { return !(stage_from_target_ == Matrix4()); }
+  Double3 FaceNormal(const TriangleTree& target, Index triangle) const noexcept;
+  Double3 Pseudonormal(const TriangleTree& target, const SurfacePoint& place) const noexcept;
+  std::optional<Double3> Nearest(const TriangleTree& target, Double3 p, double offset) const noexcept;
+  std::optional<Double3> AlongLine(const TriangleTree& target, Double3 p, Double3 line,
                                    double offset) const noexcept;
   bool Stays(double signed_distance, double offset) const noexcept;
 
   ShrinkWrapSettings settings_;
   Matrix4 stage_from_target_;
-  TriangleTree tree_;
-  std::size_t target_count_ = 0, in_count_ = 0;
+  MovingSurface surface_;
+  std::size_t in_count_ = 0;
   std::vector<Index> around_offsets_, around_;  // triangles around each point of the target
   std::vector<float> weights_;
   std::vector<Index> entries_;    // of `in`, an output

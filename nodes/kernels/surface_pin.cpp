@@ -1,8 +1,9 @@
 #include "nodes/kernels/surface_pin.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
+#include <set>
 #include <vector>
 
 namespace kpsa {
@@ -12,30 +13,32 @@ constexpr double kInUvTriangle = 1e-9;  // of a coordinate: nearer ones are in t
 
 }  // namespace
 
-UvMap::UvMap(std::span<const float> uvs) : corners_(uvs.size() / 6 * 3) {
-  const PointsView corners = corners_.view();
-  std::vector<Index> triangles(corners.count);
-  for (std::size_t t = 0; 3 * t < corners.count; ++t) {
-    const std::span<const float> uv = uvs.subspan(6 * t, 6);
+UvMap::UvMap(std::span<const float> uvs) {
+  using Corners = std::array<float, 6>;
+  std::set<Corners> known;
+  std::vector<float> places;
+  std::vector<Index> triangles;
+  for (std::size_t t = 0; 6 * t < uvs.size(); ++t) {
+    Corners uv;
+    std::copy_n(uvs.begin() + 6 * static_cast<std::ptrdiff_t>(t), 6, uv.begin());
     const bool finite = std::all_of(uv.begin(), uv.end(), [](float x) { return std::isfinite(x); });
+    if (!finite || !known.insert(uv).second) continue;
+    numbers_.push_back(static_cast<Index>(t));
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::size_t i = 3 * t + k;
-      triangles[i] = static_cast<Index>(i);
-      corners.x[i] = finite ? uv[2 * k] : std::numeric_limits<float>::quiet_NaN();
-      corners.y[i] = uv[2 * k + 1];
-      corners.z[i] = 0;
+      triangles.push_back(static_cast<Index>(triangles.size()));
+      places.insert(places.end(), {uv[2 * k], uv[2 * k + 1], 0});
     }
   }
-  tree_ = TriangleTree(corners, triangles);
-  boxes_ = AlignedFloats(tree_.BoxFloats());
-  tree_.Fit(corners, boxes_.span());
+  const PointBuffer buffer = PointBuffer::FromInterleaved(places);
+  tree_ = TriangleTree(buffer.view(), triangles);
 }
 
 TrianglePlace UvMap::Find(double u, double v) const {
-  SurfacePoint found = tree_.Lowest(corners_.view(), boxes_.span(), {u, v, 0}, kInUvTriangle);
-  if (found.triangle == kNoIndex) found = tree_.Closest(corners_.view(), boxes_.span(), {u, v, 0});
+  SurfacePoint found = tree_.Lowest({u, v, 0}, kInUvTriangle);
+  if (found.triangle == kNoIndex) found = tree_.Closest({u, v, 0});
   TrianglePlace place;
-  place.triangle = found.triangle;
+  if (found.triangle == kNoIndex) return place;
+  place.triangle = numbers_[found.triangle];
   std::copy_n(found.weights, 3, place.weights);
   return place;
 }

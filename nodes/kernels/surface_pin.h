@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "base/points.h"
 #include "base/triangle_tree.h"
@@ -27,9 +28,8 @@ class UvMap {
   TrianglePlace Find(double u, double v) const;
 
  private:
-  PointBuffer corners_;  // (u, v, 0), three a triangle
-  TriangleTree tree_;
-  AlignedFloats boxes_;
+  std::vector<Index> numbers_;  // of the tree's triangles: of equal ones (stacked shells) the first
+  TriangleTree tree_;           // over (u, v, 0), three a triangle
 };
 
 // The direction of growing u along a triangle: along[0] (p1 - p0) + along[1] (p2 - p0). (1, 0) where the

@@ -33,22 +33,17 @@ struct WrapInfluences {
   CsrView<Index> rows() const { return {offsets, points}; }
 };
 
-// A search structure over the driver at rest: points, a tree of theirs and its boxes.
-struct WrapSurface {
-  ConstPointsView points;
-  const TriangleTree* tree = nullptr;
-  std::span<const float> boxes;
-};
-
+// `driver`: a tree over the driver at rest.
+//
 // The corners of the nearest triangle with their barycentric weights. Then `smooth` times: every driver point
 // gives half of its weight to its neighbours. point_weights: points of weight 0 get no influences.
-WrapInfluences SurfaceInfluences(const WrapSurface& driver, const Topology& topology, ConstPointsView rest,
+WrapInfluences SurfaceInfluences(const TriangleTree& driver, const Topology& topology, ConstPointsView rest,
                                  std::span<const Index> out_points, double max_distance, int smooth,
                                  std::span<const float> point_weights = {});
 // The `count` nearest driver points that belong to faces, weighted (1 - d^2 / r^2)^2, r the distance at which
-// influences end: max_distance, or that of the next driver point where this is nearer. `driver.tree` is over
+// influences end: max_distance, or that of the next driver point where this is nearer. The tree is over
 // single points (PointTriangles).
-WrapInfluences NearestInfluences(const WrapSurface& driver, ConstPointsView rest,
+WrapInfluences NearestInfluences(const TriangleTree& driver, ConstPointsView rest,
                                  std::span<const Index> out_points, double max_distance, std::size_t count,
                                  std::span<const float> point_weights = {});
 // Every point of a face as a triangle of its own (p, p, p), for a tree over points.

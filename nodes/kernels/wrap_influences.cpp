@@ -37,18 +37,17 @@ Double3 At(ConstPointsView points, Index i) { return {points.x[i], points.y[i], 
 
 }  // namespace
 
-WrapInfluences SurfaceInfluences(const WrapSurface& driver, const Topology& topology, ConstPointsView rest,
+WrapInfluences SurfaceInfluences(const TriangleTree& driver, const Topology& topology, ConstPointsView rest,
                                  std::span<const Index> out_points, double max_distance, int smooth,
                                  std::span<const float> point_weights) {
   WrapInfluences influences;
   for (std::size_t i = 0; i < out_points.size(); ++i) {
     Row row;
     if (point_weights.empty() || point_weights[i] != 0) {
-      const SurfacePoint place =
-          driver.tree->Closest(driver.points, driver.boxes, At(rest, out_points[i]), max_distance);
+      const SurfacePoint place = driver.Closest(At(rest, out_points[i]), max_distance);
       for (std::size_t k = 0; k < 3 && place.triangle != kNoIndex; ++k) {
         if (place.weights[k] != 0)
-          row.emplace_back(driver.tree->triangles()[3 * std::size_t{place.triangle} + k], place.weights[k]);
+          row.emplace_back(driver.triangles()[3 * std::size_t{place.triangle} + k], place.weights[k]);
       }
       std::sort(row.begin(), row.end());
       for (int step = 0; step < smooth; ++step) row = Smoothed(topology, row);
@@ -58,7 +57,7 @@ WrapInfluences SurfaceInfluences(const WrapSurface& driver, const Topology& topo
   return influences;
 }
 
-WrapInfluences NearestInfluences(const WrapSurface& driver, ConstPointsView rest,
+WrapInfluences NearestInfluences(const TriangleTree& driver, ConstPointsView rest,
                                  std::span<const Index> out_points, double max_distance, std::size_t count,
                                  std::span<const float> point_weights) {
   WrapInfluences influences;
@@ -66,8 +65,7 @@ WrapInfluences NearestInfluences(const WrapSurface& driver, ConstPointsView rest
   for (std::size_t i = 0; i < out_points.size(); ++i) {
     Row row;
     if (point_weights.empty() || point_weights[i] != 0) {
-      driver.tree->ClosestSeveral(driver.points, driver.boxes, At(rest, out_points[i]), count + 1,
-                                  max_distance, &found);
+      driver.ClosestSeveral(At(rest, out_points[i]), count + 1, max_distance, &found);
       // The next one beyond the count says where the influences end
       double end = max_distance * max_distance;
       if (found.size() > count) {
@@ -79,7 +77,7 @@ WrapInfluences NearestInfluences(const WrapSurface& driver, ConstPointsView rest
       double sum = 0;
       for (const SurfacePoint& near : found) {
         const double fade = end > 0 ? std::max(0.0, 1 - near.squared / end) : 0;
-        row.emplace_back(driver.tree->triangles()[3 * std::size_t{near.triangle}], fade * fade);
+        row.emplace_back(driver.triangles()[3 * std::size_t{near.triangle}], fade * fade);
         sum += fade * fade;
       }
       if (!(sum > 0)) {  // all at the same distance

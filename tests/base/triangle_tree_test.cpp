@@ -20,19 +20,13 @@ struct Soup {
   PointBuffer points;
   std::vector<Index> triangles;
   TriangleTree tree;
-  AlignedFloats boxes;
 
   Soup(std::vector<float> xyz, std::vector<Index> corners)
-      : points(PointBuffer::FromInterleaved(xyz)), triangles(std::move(corners)), tree(view(), triangles) {
-    Refit();
-  }
+      : points(PointBuffer::FromInterleaved(xyz)), triangles(std::move(corners)), tree(view(), triangles) {}
   ConstPointsView view() const { return points.view(); }
-  void Refit() {
-    boxes = AlignedFloats(tree.BoxFloats());
-    tree.Fit(view(), boxes.span());
-  }
+  void Move() { tree.Move(view()); }
   SurfacePoint Closest(Double3 p, double max_distance = kInfinity) const {
-    return tree.Closest(view(), boxes.span(), p, max_distance);
+    return tree.Closest(p, max_distance);
   }
 };
 
@@ -171,7 +165,7 @@ TEST(TriangleTree, RefittedBoxesFindMovedTriangles) {
     view.x[i] = static_cast<float>(3 * random.Signed());
     view.y[i] += 5;
   }
-  soup.tree.Fit(soup.view(), soup.boxes.span());
+  soup.Move();
   for (int i = 0; i < 200; ++i) {
     const Double3 p = random.Vector() * 4 + Double3{0, 5, 0};
     EXPECT_EQ(soup.Closest(p).triangle, ByHand(soup, p).triangle);
@@ -188,10 +182,10 @@ TEST(TriangleTree, SeveralComeInOrder) {
     for (Index t = 0; t < 150; ++t)
       all.emplace_back(ClosestOnTriangle(soup.view(), &soup.triangles[3 * std::size_t{t}], p).squared, t);
     std::sort(all.begin(), all.end());
-    soup.tree.ClosestSeveral(soup.view(), soup.boxes.span(), p, 7, kInfinity, &found);
+    soup.tree.ClosestSeveral(p, 7, kInfinity, &found);
     ASSERT_EQ(found.size(), 7u);
     for (std::size_t k = 0; k < 7; ++k) EXPECT_EQ(found[k].triangle, all[k].second);
-    soup.tree.ClosestSeveral(soup.view(), soup.boxes.span(), p, 200, std::sqrt(all[4].first) + 1e-9, &found);
+    soup.tree.ClosestSeveral(p, 200, std::sqrt(all[4].first) + 1e-9, &found);
     EXPECT_EQ(found.size(),
               static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [&](const auto& a) {
                 return a.first <= std::pow(std::sqrt(all[4].first) + 1e-9, 2);
@@ -221,7 +215,7 @@ TEST(TriangleTree, LinesHitWhatAllTrianglesSay) {
       for (int k = 0; k < 3; ++k) inside = inside && Dot(n, Cross(c[(k + 1) % 3] - c[k], p - c[k])) >= 0;
       if (inside) expected.triangle = t, expected.t = at;
     }
-    const LineHit found = soup.tree.FirstHit(soup.view(), soup.boxes.span(), o, d);
+    const LineHit found = soup.tree.FirstHit(o, d);
     if (expected.triangle == kNoIndex) {
       EXPECT_EQ(found.triangle, kNoIndex);
       continue;
@@ -238,31 +232,31 @@ TEST(TriangleTree, LinesThroughEdgesHit) {
   const Soup soup({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}, {0, 1, 2, 0, 2, 3});
   for (int i = 1; i < 100; ++i) {
     const double at = i / 100.0;
-    const LineHit hit = soup.tree.FirstHit(soup.view(), soup.boxes.span(), {at, at, 2}, {0, 0, -1});
+    const LineHit hit = soup.tree.FirstHit({at, at, 2}, {0, 0, -1});
     ASSERT_NE(hit.triangle, kNoIndex) << i;
     EXPECT_DOUBLE_EQ(hit.t, 2);
   }
-  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {2, 0.5, 2}, {0, 0, -1}).triangle, kNoIndex);
-  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {0.5, 0.5, 2}, {0, 0, 1}).triangle, kNoIndex);
-  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {0.5, 0.5, 2}, {0, 0, 0}).triangle, kNoIndex);
+  EXPECT_EQ(soup.tree.FirstHit({2, 0.5, 2}, {0, 0, -1}).triangle, kNoIndex);
+  EXPECT_EQ(soup.tree.FirstHit({0.5, 0.5, 2}, {0, 0, 1}).triangle, kNoIndex);
+  EXPECT_EQ(soup.tree.FirstHit({0.5, 0.5, 2}, {0, 0, 0}).triangle, kNoIndex);
 }
 
 TEST(TriangleTree, WhatIsNotFiniteTakesNoPart) {
   Soup soup = RandomSoup(50, 15);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   for (std::size_t i = 0; i < 3 * 25; ++i) soup.points.view().y[i] = kNan;
-  soup.Refit();
+  soup.Move();
   const SurfacePoint found = soup.Closest({0.1, 0.2, 0.3});
   ASSERT_NE(found.triangle, kNoIndex);
   EXPECT_GE(found.triangle, 25u);
   EXPECT_TRUE(std::isfinite(found.squared));
   EXPECT_EQ(soup.Closest({kNan, 0, 0}).triangle, kNoIndex);
   EXPECT_EQ(soup.Closest({kInfinity, 0, 0}).triangle, kNoIndex);
-  EXPECT_EQ(soup.tree.FirstHit(soup.view(), soup.boxes.span(), {kNan, 0, 0}, {0, 0, 1}).triangle, kNoIndex);
+  EXPECT_EQ(soup.tree.FirstHit({kNan, 0, 0}, {0, 0, 1}).triangle, kNoIndex);
   // A tree over such points is one, too
   const Soup again({kNan, 0, 0, 1, kNan, 0, 0, 0, 0, 1, 1, 1, 2, 1, 1, 1, 2, 1}, {0, 1, 2, 3, 4, 5});
   EXPECT_EQ(again.Closest({0, 0, 0}).triangle, 1u);
-  EXPECT_EQ(again.tree.Lowest(again.view(), again.boxes.span(), {0, 0, 0}, kInfinity).triangle, 1u);
+  EXPECT_EQ(again.tree.Lowest({0, 0, 0}, kInfinity).triangle, 1u);
   const Soup empty({0, 0, 0}, {});
   EXPECT_EQ(empty.Closest({0, 0, 0}).triangle, kNoIndex);
 }
@@ -283,7 +277,7 @@ TEST(TriangleTree, LowestIsTheFirstWithinTheDistance) {
       ++within;
     }
     several += within > 1 ? 1 : 0;
-    EXPECT_EQ(soup.tree.Lowest(soup.view(), soup.boxes.span(), p, distance).triangle, first) << i;
+    EXPECT_EQ(soup.tree.Lowest(p, distance).triangle, first) << i;
   }
   EXPECT_GT(several, 100);
 }
@@ -299,7 +293,7 @@ TEST(TriangleTree, FindsTheSameAmongCornersThatAreNotFinite) {
     float* const rows[3] = {view.x, view.y, view.z};
     rows[i % 3][i] = kBroken[i / 7 % 4];
   }
-  soup.tree.Fit(soup.view(), soup.boxes.span());
+  soup.Move();
   for (int i = 0; i < 300; ++i) {
     const Double3 p = random.Vector() * 1.5;
     const SurfacePoint expected = ByHand(soup, p), found = soup.Closest(p);
@@ -339,9 +333,9 @@ TEST(TriangleTree, LooksAtFewTriangles) {
   enum Query { kClosest, kSeveral, kHit };
   const auto count = [&](Query query, Double3 p, Double3 direction, double limit = kInfinity) {
     return CountInstructions([&] {
-      if (query == kClosest) soup.tree.Closest(soup.view(), soup.boxes.span(), p, limit);
-      if (query == kSeveral) soup.tree.ClosestSeveral(soup.view(), soup.boxes.span(), p, 4, limit, &found);
-      if (query == kHit) soup.tree.FirstHit(soup.view(), soup.boxes.span(), p, direction);
+      if (query == kClosest) soup.tree.Closest(p, limit);
+      if (query == kSeveral) soup.tree.ClosestSeveral(p, 4, limit, &found);
+      if (query == kHit) soup.tree.FirstHit(p, direction);
     });
   };
   const Double3 place{0.11, 0.23, 0.1}, way{0.3, 0.4, -1};
@@ -351,10 +345,10 @@ TEST(TriangleTree, LooksAtFewTriangles) {
     for (const float far : {kInf, 1e30f}) {
       const float before = soup.points.view().x[200];
       soup.points.view().x[200] = far;
-      soup.tree.Fit(soup.view(), soup.boxes.span());
+      soup.Move();
       EXPECT_LT(*count(query, place, way), 2 * *usual + 3000) << query << ", " << far;
       soup.points.view().x[200] = before;
-      soup.tree.Fit(soup.view(), soup.boxes.span());
+      soup.Move();
     }
     for (const double bad : {kInfinity, static_cast<double>(kNan)}) {
       EXPECT_LT(*count(query, {0, bad, 0}, way), 3000u) << query << ", " << bad;

@@ -202,10 +202,6 @@ class KernelLaw : public testing::Test {
     }
     surface_ = TriangleTree(mesh_.rest.view(), mesh_.topology.triangles());
     singles_ = TriangleTree(mesh_.rest.view(), PointTriangles(mesh_.topology));
-    surface_boxes_ = AlignedFloats(surface_.BoxFloats());
-    singles_boxes_ = AlignedFloats(singles_.BoxFloats());
-    surface_.Fit(mesh_.rest.view(), surface_boxes_.span());
-    singles_.Fit(mesh_.rest.view(), singles_boxes_.span());
     const struct {
       const char* name;
       WrapMode mode;
@@ -219,10 +215,9 @@ class KernelLaw : public testing::Test {
     for (const auto& c : wraps) {
       const auto search = [this, c](std::span<const Index> out_points) {
         return c.nearest
-                   ? NearestInfluences({mesh_.rest.view(), &singles_, singles_boxes_.span()}, wrapped_.view(),
-                                       out_points, 0.2, 6, Masked(out_points))
-                   : SurfaceInfluences({mesh_.rest.view(), &surface_, surface_boxes_.span()}, mesh_.topology,
-                                       wrapped_.view(), out_points, 10, c.smooth, Masked(out_points));
+                   ? NearestInfluences(singles_, wrapped_.view(), out_points, 0.2, 6, Masked(out_points))
+                   : SurfaceInfluences(surface_, mesh_.topology, wrapped_.view(), out_points, 10, c.smooth,
+                                       Masked(out_points));
       };
       // Those of all points are asked for again and again
       const auto of_all = std::make_shared<std::optional<WrapInfluences>>();
@@ -264,8 +259,9 @@ class KernelLaw : public testing::Test {
              return ShrinkWrapDemand(settings, mesh_.topology, out_points, Masked(out_points));
            },
            [this, settings](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
-             const ShrinkWrapKernel kernel(settings, mesh_.topology, surface_, Translation({0, 0, 0.01}),
-                                           mesh_.topology, out_points, in_points, Masked(out_points));
+             const ShrinkWrapKernel kernel(
+                 settings, mesh_.topology, MovingSurface(mesh_.rest.view(), mesh_.topology.triangles()),
+                 Translation({0, 0, 0.01}), mesh_.topology, out_points, in_points, Masked(out_points));
              AlignedFloats scratch(kernel.ScratchFloats());
              kernel.Run({0.9, 0.002, wrapped_.view()}, in, out, scratch.span(), parallel);
            }});
@@ -354,7 +350,6 @@ class KernelLaw : public testing::Test {
   std::vector<Double3> vertices_, vertex_offsets_, driver_rest_;
   PointBuffer wrapped_;
   TriangleTree surface_, singles_;
-  AlignedFloats surface_boxes_, singles_boxes_;
   std::vector<Subject> subjects_;
 };
 

@@ -189,7 +189,7 @@ TEST(ShrinkWrap, TheNearestPlaceIsThatOfAllTriangles) {
   const ConstPointsView rest = std::as_const(ball->data()).rest.view();
   const ConstPointsView in = std::as_const(cloud->data()).rest.view();
   const std::vector<Index> all = AllPoints(in.count);
-  const ShrinkWrapKernel kernel({}, *target, TriangleTree(rest, target->triangles()), Matrix4(), Topology(),
+  const ShrinkWrapKernel kernel({}, *target, MovingSurface(rest, target->triangles()), Matrix4(), Topology(),
                                 all, all);
   // The target is bent far from the shape that the tree was built for
   PointBuffer bent(rest.count), out(in.count);
@@ -219,7 +219,7 @@ TEST(ShrinkWrap, TargetsThatAreNoNumbersLeavePointsAlone) {
   const ConstPointsView rest = std::as_const(ball->data()).rest.view();
   const ConstPointsView in = std::as_const(cloud->data()).rest.view();
   const std::vector<Index> all = AllPoints(in.count);
-  const ShrinkWrapKernel kernel({}, *target, TriangleTree(rest, target->triangles()), Matrix4(), Topology(),
+  const ShrinkWrapKernel kernel({}, *target, MovingSurface(rest, target->triangles()), Matrix4(), Topology(),
                                 all, all);
   PointBuffer none(rest.count), out(in.count);
   std::fill_n(none.view().x, rest.count, std::numeric_limits<float>::quiet_NaN());

@@ -98,9 +98,7 @@ TEST(Wrap, SnappedPointsLieOnTheDriver) {
     moved.view().z[i] = static_cast<float>(p.z);
   }
   const TriangleTree tree(moved.view(), rig.driver->data().triangles);
-  AlignedFloats boxes(tree.BoxFloats());
-  tree.Fit(moved.view(), boxes.span());
-  for (const Double3& p : snapped) EXPECT_LT(tree.Closest(moved.view(), boxes.span(), p).squared, 1e-12);
+  for (const Double3& p : snapped) EXPECT_LT(tree.Closest(p).squared, 1e-12);
 }
 
 TEST(Wrap, EnvelopeWeightsAndDistanceLimit) {
@@ -273,14 +271,11 @@ TEST(Wrap, IsWhatItsDefinitionSays) {
     now.push_back({bent.view().x[i], bent.view().y[i], bent.view().z[i]});
   }
   const TriangleTree tree(driver.rest.view(), driver.topology.triangles());
-  AlignedFloats boxes(tree.BoxFloats());
-  tree.Fit(driver.rest.view(), boxes.span());
   std::vector<Index> all(above.count()), drivers(driver.count());
   std::iota(all.begin(), all.end(), 0u);
   std::iota(drivers.begin(), drivers.end(), 0u);
   const ConstPointsView in = std::as_const(points).view();
-  const WrapInfluences influences =
-      SurfaceInfluences({driver.rest.view(), &tree, boxes.span()}, driver.topology, in, all, 10, 0);
+  const WrapInfluences influences = SurfaceInfluences(tree, driver.topology, in, all, 10, 0);
   double far = 0;
   for (const bool stretched : {false, true}) {
     const WrapKernel kernel(stretched ? WrapMode::kSurface : WrapMode::kOffset, driver.topology, rest,

@@ -1,0 +1,29 @@
+#include "base/embree.h"
+
+namespace kpsa {
+
+RTCDevice EmbreeDevice() {
+  static RTCDevice device = rtcNewDevice(nullptr);
+  return device;
+}
+
+EmbreeScene CommitEmbreeScene(RTCDevice device, RTCGeometry geometry) {
+  EmbreeScene scene(rtcNewScene(device));
+  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC);
+  // Low for the scene: its geometry then has a structure of its own, which can be refitted; that one is built
+  // by surface area without spatial splits, one layout an input
+  rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_LOW);
+  rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene.get(), geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene.get());
+  return scene;
+}
+
+void RefitEmbreeScene(const EmbreeScene& scene, RTCGeometry geometry) {
+  rtcCommitGeometry(geometry);
+  rtcCommitScene(scene.get());
+}
+
+}  // namespace kpsa

@@ -1,0 +1,30 @@
+#include "nodes/kernels/moving_surface.h"
+
+#include <algorithm>
+
+namespace kpsa {
+
+std::unique_ptr<TriangleTree> MovingSurface::Shared::Make() {
+  spares.AddRoom();
+  return std::make_unique<TriangleTree>(rest.view(), triangles);
+}
+
+MovingSurface::MovingSurface(ConstPointsView rest, std::span<const Index> triangles)
+    : shared_(std::make_unique<Shared>()) {
+  shared_->rest = PointBuffer(rest.count);
+  const PointsView to = shared_->rest.view();
+  std::copy_n(rest.x, rest.count, to.x);
+  std::copy_n(rest.y, rest.count, to.y);
+  std::copy_n(rest.z, rest.count, to.z);
+  shared_->triangles.assign(triangles.begin(), triangles.end());
+  shared_->spares.Give(shared_->Make());
+}
+
+MovingSurface::Lease MovingSurface::At(ConstPointsView points) const {
+  std::unique_ptr<TriangleTree> tree = shared_->spares.Take();
+  if (tree == nullptr) tree = shared_->Make();
+  tree->Move(points);
+  return {&shared_->spares, std::move(tree)};
+}
+
+}  // namespace kpsa
