@@ -35,6 +35,8 @@ void RigBuild::ConnectCurves() {
       if (!curve.has_value()) return;
       edit.Set(made.id, rest, element, *graph().FindValue(edit.Plug(*curve, "curve")));
       edit.Connect(edit.Plug(*curve, "displacements"), edit.Plug(made.id, displacements, element));
+      if (edit.Has(made.id, "curveMatrix"))
+        edit.Connect(edit.Plug(*curve, "worldMatrix"), edit.Plug(made.id, "curveMatrix"));
       Fail(value.where(), edit.Take());
     };
     if (one != made.special.end()) follow(one->second->value, "curve", "displacements", -1);

@@ -1,5 +1,5 @@
-// curve: control vertices that are offset in the axes of a parent. wire: points near a curve follow its
-// offsets.
+// curve: control vertices that hang under a parent and are offset in its axes. wire: points near a curve
+// follow its offsets.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -28,6 +28,8 @@ void ComputeDisplacements(ComputeContext& c) {
     out.z[i] = static_cast<float>(d.z);
   }
 }
+
+void ComputeWorldMatrix(ComputeContext& c) { c.out_value<Matrix4>(0) = c.get<Matrix4>(0); }
 
 constexpr int kDisplacements = kFirstOwnInput, kDeformedWire = kFirstOwnInput + 1;
 
@@ -159,12 +161,15 @@ void AddCurveNodes(NodeRegistry& registry) {
       .points_in("cv", "offsets of the vertices from rest, in the parent's axes")
       .unit(Unit::kLength)
       .default_from(RestOffsets)
-      .in("parentMatrix", Matrix4(), {.doc = "turns the offsets; `parent:` connects it"})
+      .in("parentMatrix", Matrix4(), {.doc = "turns the offsets, carries the curve; `parent:` connects it"})
       .world_place()
       .out("displacements", Type::kPoints, "the offsets in world axes")
       .unit(Unit::kLength)
-      .compute(&ComputeDisplacements)
-      .cost(150, 20);
+      .out("worldMatrix", Type::kMatrix, "parentMatrix, which carries the curve")
+      .compute_for({"displacements"}, {"cv", "parentMatrix"}, &ComputeDisplacements)
+      .cost(150, 20)
+      .compute_for({"worldMatrix"}, {"parentMatrix"}, &ComputeWorldMatrix)
+      .cost(10, 0);
   NodeBuilder b = AddDeformer(registry, "wire", "Points near a curve, or near several, follow it.");
   b.points_in("displacements", "the curve's displacements");
   b.points_in("deformedWire", "of several curves, in place of displacements; `curves:` connects them")

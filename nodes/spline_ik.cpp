@@ -19,12 +19,14 @@ enum SplineInput {
   kSplineParent,
   kSplineStartTwist,
   kSplineEndTwist,
-  kSplineBlend
+  kSplineBlend,
+  kSplineCurveMatrix
 };
 
 struct SplineKernel {
   CurveShape shape;
-  std::vector<Double3> vertices;  // at rest
+  std::vector<Double3> vertices;        // at rest, world
+  Matrix4 curve_rest, from_curve_rest;  // the curve's matrix at rest, its inverse
   bool maintain = false;
   PointBufferPtr displacements_rest;
   std::vector<Matrix4> in_rest, offsets;  // offset: what takes the solved local to the one at rest
@@ -32,10 +34,14 @@ struct SplineKernel {
   double start_twist_rest = 0, end_twist_rest = 0;
 };
 
-// The kernel's curve, moved; `moved` of as many vertices.
-void MoveVertices(const SplineKernel& k, const ConstPointsView& by, Double3* moved) {
-  for (std::size_t i = 0; i < k.vertices.size(); ++i)
-    moved[i] = k.vertices[i] + Double3{by.x[i], by.y[i], by.z[i]};
+// The kernel's curve, carried by its matrix and moved; `moved` of as many vertices.
+void MoveVertices(const SplineKernel& k, const Matrix4& curve, const ConstPointsView& by, Double3* moved) {
+  const bool carried = !(curve == k.curve_rest);
+  const Matrix4 motion = carried ? curve * k.from_curve_rest : Matrix4();
+  for (std::size_t i = 0; i < k.vertices.size(); ++i) {
+    const Double3 place = carried ? TransformPoint(motion, k.vertices[i]) : k.vertices[i];
+    moved[i] = place + Double3{by.x[i], by.y[i], by.z[i]};
+  }
 }
 
 bool SamePoints(const ConstPointsView& a, const ConstPointsView& b) {
@@ -68,10 +74,14 @@ Result<BoundKernel> BindSpline(const Binding& binding) {
     k.in_rest.push_back(in->get<Matrix4>());
   }
   k.offsets.resize(k.in_rest.size());
-  Result<Matrix4> tip = RestMatrix(s, "tipMatrix"), parent = RestMatrix(s, "parentMatrix");
-  if (!tip.ok()) return tip.status();
-  if (!parent.ok()) return parent.status();
-  k.tip_rest = *tip, k.parent_rest = *parent;
+  Result<Matrix4> tip = RestMatrix(s, "tipMatrix"), parent = RestMatrix(s, "parentMatrix"),
+                  curve_matrix = RestMatrix(s, "curveMatrix");
+  for (const Result<Matrix4>* one : {&tip, &parent, &curve_matrix}) {
+    if (!one->ok()) return one->status();
+  }
+  k.tip_rest = *tip, k.parent_rest = *parent, k.curve_rest = *curve_matrix;
+  if (!Invert(k.curve_rest, &k.from_curve_rest))
+    return Status::Invalid("curveMatrix is singular at rest, so that it cannot carry the curve");
   const Value* displacements = s.rest("displacements");
   if (displacements == nullptr || displacements->points() == nullptr)
     return Status::Invalid("displacements have no value at rest");
@@ -81,7 +91,7 @@ Result<BoundKernel> BindSpline(const Binding& binding) {
     if (start == nullptr || end == nullptr) return Status::Invalid("twists have no value at rest");
     k.start_twist_rest = start->AsDouble(), k.end_twist_rest = end->AsDouble();
     std::vector<Double3> vertices(k.vertices.size());
-    MoveVertices(k, k.displacements_rest->view(), vertices.data());
+    MoveVertices(k, k.curve_rest, k.displacements_rest->view(), vertices.data());
     std::vector<Matrix4> solved(k.in_rest.size());
     SolveSplineChain(
         {k.parent_rest, k.in_rest, k.tip_rest, k.shape, vertices, k.start_twist_rest, k.end_twist_rest},
@@ -103,12 +113,13 @@ void ComputeSpline(ComputeContext& c) {
   const ConstPointsView& displacements = c.points(kSplineOffsets);
   const ArrayView<Matrix4> in = c.array<Matrix4>(kSplineJoints);
   const Matrix4 &parent = c.get<Matrix4>(kSplineParent), &tip = c.get<Matrix4>(kSplineTip);
+  const Matrix4& curve = c.get<Matrix4>(kSplineCurveMatrix);
   const double blend = c.get<double>(kSplineBlend);
   const std::size_t joints = k.in_rest.size();
   auto* solved = reinterpret_cast<Matrix4*>(c.scratch);
   Matrix4* below = solved + joints;
   auto* vertices = reinterpret_cast<Double3*>(below + joints);
-  bool at_rest = k.maintain && parent == k.parent_rest && tip == k.tip_rest &&
+  bool at_rest = k.maintain && parent == k.parent_rest && tip == k.tip_rest && curve == k.curve_rest &&
                  c.get<double>(kSplineStartTwist) == k.start_twist_rest &&
                  c.get<double>(kSplineEndTwist) == k.end_twist_rest &&
                  SamePoints(displacements, k.displacements_rest->view());
@@ -118,7 +129,7 @@ void ComputeSpline(ComputeContext& c) {
   }
   const bool solve = blend != 0 && !at_rest;
   if (solve) {
-    MoveVertices(k, displacements, vertices);
+    MoveVertices(k, curve, displacements, vertices);
     SolveSplineChain({parent,
                       {below, joints},
                       tip,
@@ -152,6 +163,7 @@ void AddSplineIkNode(NodeRegistry& registry) {
            "Lays a chain of joints along a curve; bones keep their lengths. In rigs: `start` and `end` name "
            "the joints, `curve` the curve.")
       .category("constraint")
+      .version(2)  // the curve hangs under its parent
       .points_in("displacements", "the curve's displacements")
       .in("inMatrix", Matrix4(), {.doc = "local matrices of the joints below, without the end's"})
       .array()
@@ -161,6 +173,8 @@ void AddSplineIkNode(NodeRegistry& registry) {
       .in("startTwist", 0.0, {.unit = Unit::kAngle, .doc = "about the first bone"})
       .in("endTwist", 0.0, {.unit = Unit::kAngle, .doc = "about the last bone; those between get a share"})
       .in("blend", 1.0, {.min = 0, .max = 1, .doc = "0: the matrices below, 1: along the curve"})
+      .in("curveMatrix", Matrix4(), {.doc = "the curve's worldMatrix, which carries its vertices"})
+      .world_place()
       .structural("curve", Type::kCurve, {.doc = "the curve at rest"})
       .structural("maintainOffset", false, {.doc = "keeps how the joints lie to the curve at rest"})
       .out("outMatrix", Type::kMatrix, "local, for the joints' offsetParentMatrix")

@@ -285,6 +285,15 @@ TEST_F(RigConstraints, AChainFollowsItsCurve) {
     EXPECT_NEAR(Between(player.World(kArm[j]), player.World(kArm[j + 1])),
                 Between(plain.World(kArm[j]), plain.World(kArm[j + 1])), 1e-12);
   }
+  EXPECT_EQ(Driver(rig, "spine.curveMatrix"), "rope.worldMatrix");
+  RigPlayer walker = Play(nodes + "}\ncontrols: {root.translateX: {min: -9, max: 9}}\n", false);
+  const Double3 root = At(walker.World("root")), shoulder = At(walker.World("upperarm01.L")),
+                elbow = At(walker.World("lowerarm01.L"));
+  walker.Set("root.translateX", 3);
+  const Double3 walked = At(walker.World("root")) - root;
+  EXPECT_GT(Length(walked), 1);
+  EXPECT_LT(Length(At(walker.World("upperarm01.L")) - shoulder - walked), 1e-6);
+  EXPECT_LT(Length(At(walker.World("lowerarm01.L")) - elbow - walked), 1e-6);
   EXPECT_EQ(Errors("nodes:\n  s: {type: splineIk, start: head, end: wrist.L}\n"),
             "t.yaml:4:30: start \"head\" is no ancestor of end \"wrist.L\"");
   EXPECT_EQ(Errors("nodes:\n  s: {type: splineIk, start: head}\n"),

@@ -112,7 +112,7 @@ void AddChains(std::vector<NodeSetUp>* all) {
         std::vector<Double3>{{0, 0, 0}, {0.5, 1, 0}, {1.5, 1, 0.5}, {2.5, 0, 0.5}}, false);
     all->push_back({"splineIk",
                     OnOff(maintain),
-                    {{"curve", Moves::kPlace, bow, {}},
+                    {{"curve", Moves::kPlace, bow, {}, false, true},
                      {"displacements", Moves::kDirection, PointsOf(std::vector<float>(12, 0.0f)),
                       PointsOf({0, 0.1f, 0, 0.3f, 0, 0.2f, 0, -0.4f, 0.1f, 0.2f, 0.2f, 0})},
                      joint("inMatrix[0]"),
@@ -122,10 +122,11 @@ void AddChains(std::vector<NodeSetUp>* all) {
                      {"startTwist", Moves::kNot, 0.0, 0.3},
                      {"endTwist", Moves::kNot, 0.1, 0.9},
                      {"blend", Moves::kNot, 1.0, 0.9},
+                     WorldMatrix("curveMatrix", &random),
                      Setting("maintainOffset", maintain)},
                     {{"outMatrix[0]", Moves::kNot}, {"outMatrix[1]", Moves::kNot}},
-                    kFrameAlone,
-                    "the curve stays where it rests, and is offset from there"});
+                    0,
+                    ""});
   }
   for (const bool axis : {false, true}) {
     RandomFrames random(45);

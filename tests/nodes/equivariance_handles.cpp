@@ -184,7 +184,7 @@ void AddWires(std::vector<NodeSetUp>* all) {
   all->push_back({"curve",
                   "",
                   {line, WorldMatrix("parentMatrix", &random), {"cv", Moves::kNot, moved.rest, moved.now}},
-                  {{"displacements", Moves::kDirection}},
+                  {{"displacements", Moves::kDirection}, {"worldMatrix", Moves::kFrame}},
                   0,
                   ""});
 }

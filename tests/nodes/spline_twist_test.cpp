@@ -112,16 +112,19 @@ TEST(SplineChain, MovesWithTheWorld) {
 
 class SplineNode {
  public:
-  SplineNode(const Chain& rest, bool maintain) : g(StandardNodes()) {
+  SplineNode(const Chain& rest, bool maintain, const Matrix4& parent = Matrix4()) : g(StandardNodes()) {
     g.add("curve", "c");
     g.hold("c.curve", Value(std::make_shared<const class Curve>(kBow, false)));
     g.add("splineIk", "n",
           {{"maintainOffset", Value(maintain)}, {"tipMatrix", rest.tip}, {"parentMatrix", rest.parent}});
     g.hold("n.curve", Value(std::make_shared<const class Curve>(kBow, false)));
     g.connect("c.displacements", "n.displacements");
+    g.connect("c.worldMatrix", "n.curveMatrix");
+    g.hold("c.parentMatrix", parent);
     for (std::size_t i = 0; i < rest.in.size(); ++i)
       g.hold("n.inMatrix[" + std::to_string(i) + "]", rest.in[i]);
-    for (const char* plug : {"n.parentMatrix", "n.blend", "c.cv", "n.endTwist"}) g.vary(plug);
+    for (const char* plug : {"n.parentMatrix", "n.blend", "c.cv", "c.parentMatrix", "n.endTwist"})
+      g.vary(plug);
     for (std::size_t i = 0; i < rest.in.size(); ++i) g.want("n.outMatrix[" + std::to_string(i) + "]");
   }
   std::vector<Matrix4> Out(std::size_t joints) {
@@ -173,6 +176,34 @@ TEST(SplineIk, MaintainsTheRestBitForBitAndBendsFromThere) {
   const std::vector<Double3> before = rest.Places(), after = lifted.Places();
   for (std::size_t j = 0; j < after.size(); ++j)
     EXPECT_LT(Apart(after[j], before[j] + Double3{0, 0.5, 0}), 1e-9);
+}
+
+// The curve and the chain hang under one root: where that goes, the chain lies in it as before.
+TEST(SplineIk, WalksWithTheParentOfItsCurve) {
+  RandomFrames random(54);
+  const std::vector<float> offsets = {0, 0.5f, 0, 0, 0, 0, 0.25f, 0, 0, 0, 0, -1};
+  for (const bool maintain : {false, true}) {
+    const Chain rest = RandomChain(&random, 4);
+    const Matrix4 root = random.Rigid(2), walk = random.Rigid(5);
+    SplineNode node(rest, maintain, root);
+    node.Move(offsets);
+    const std::vector<Matrix4> before = node.Out(4);
+    node.g.set("c.parentMatrix", walk * root);
+    const std::vector<Matrix4> alone = node.Out(4);
+    node.g.set("n.parentMatrix", walk * rest.parent);
+    const std::vector<Matrix4> after = node.Out(4);
+    double left = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_LT(Apart(after[i], before[i]), 1e-6) << i;
+      left = std::max(left, Apart(alone[i], before[i]));
+    }
+    EXPECT_GT(left, 0.1);
+    // Back at rest, bit for bit
+    node.Move(std::vector<float>(12, 0.0f));
+    node.g.set("c.parentMatrix", root);
+    node.g.set("n.parentMatrix", rest.parent);
+    EXPECT_EQ(node.Out(4), maintain ? rest.in : Solved(rest, kBow).in);
+  }
 }
 
 TEST(SplineIk, SaysWhatIsMissing) {
