@@ -7,7 +7,8 @@ RTCDevice EmbreeDevice() {
   return device;
 }
 
-EmbreeScene CommitEmbreeScene(RTCDevice device, RTCGeometry geometry) {
+EmbreeScene CommitEmbreeScene(RTCDevice device, RTCGeometry geometry, RTCError* error) {
+  rtcGetDeviceError(device);  // what others of this thread left
   EmbreeScene scene(rtcNewScene(device));
   rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC);
   // Low for the scene: its geometry then has a structure of its own, which can be refitted; that one is built
@@ -18,12 +19,16 @@ EmbreeScene CommitEmbreeScene(RTCDevice device, RTCGeometry geometry) {
   rtcAttachGeometry(scene.get(), geometry);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene.get());
+  *error = rtcGetDeviceError(device);
+  if (*error != RTC_ERROR_NONE) scene = nullptr;
   return scene;
 }
 
-void RefitEmbreeScene(const EmbreeScene& scene, RTCGeometry geometry) {
+RTCError RefitEmbreeScene(RTCDevice device, const EmbreeScene& scene, RTCGeometry geometry) {
+  rtcGetDeviceError(device);
   rtcCommitGeometry(geometry);
   rtcCommitScene(scene.get());
+  return rtcGetDeviceError(device);
 }
 
 }  // namespace kpsa

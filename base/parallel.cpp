@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #if defined(KPSA_WITH_TSAN)
 // The library of TBB is not instrumented: the sanitizer does not see how it hands tasks to threads and waits
@@ -44,13 +45,19 @@ void ParallelFor(std::size_t count, std::size_t grain, RangeBody body) {
   const std::size_t chunks = (count + grain - 1) / grain;
   char begins = 0, ends = 0;
   Publish(&begins);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chunks),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      Observe(&begins);
-                      const std::size_t end = range.end() * grain;
-                      body(range.begin() * grain, end < count ? end : count);
-                      Publish(&ends);
-                    });
+  // Its bodies round as the caller does. A thread's tasks do by themselves, but as it rounded when it first
+  // used TBB: where that was within a library that flushes small numbers to zero, they would do so for good
+  tbb::task_group_context rounding(tbb::task_group_context::bound, tbb::task_group_context::default_traits |
+                                                                       tbb::task_group_context::fp_settings);
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, chunks),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        Observe(&begins);
+        const std::size_t end = range.end() * grain;
+        body(range.begin() * grain, end < count ? end : count);
+        Publish(&ends);
+      },
+      rounding);
   Observe(&ends);
 }
 

@@ -15,6 +15,7 @@ constexpr std::size_t kFew = 8;  // triangles: they are looked at one by one
 constexpr float kFar = 1e18f;    // Embree takes no larger coordinates
 // What rounding to floats may do, on Embree's side too, of the largest coordinate: 16 steps
 constexpr double kRounding = 2e-6;
+constexpr float kLeastMargin = 1e-30f;  // Embree may take smaller numbers for 0
 
 Double3 At(ConstPointsView points, Index i) { return {points.x[i], points.y[i], points.z[i]}; }
 
@@ -107,6 +108,7 @@ SurfacePoint ClosestOnTriangle(ConstPointsView points, const Index corners[3], D
 struct TriangleTree::Impl {
   PointBuffer points;
   std::vector<Index> triangles;
+  bool beyond = false;             // a point lies outside of the cube that Embree knows
   RTCGeometry geometry = nullptr;  // the scene's
   EmbreeScene scene;               // null, of few triangles or without memory: all are looked at
 
@@ -143,11 +145,13 @@ void TriangleTree::Impl::Bounds(const RTCBoundsFunctionArguments* args) {
       size = std::max(size, std::fabs(x));
     }
   }
-  const bool none = lo[0] > hi[0];  // far away it is in nobody's way
-  const float margin = none ? 0 : static_cast<float>(kRounding) * size;
+  // Without a finite corner it has an empty box, that is in nobody's way; or, since Embree takes none of
+  // those when it builds, one that is far away
+  const bool none = lo[0] > hi[0];
+  const float margin = std::max(kLeastMargin, static_cast<float>(kRounding) * size);
   for (std::size_t a = 0; a < 3; ++a) {
     lo[a] = none ? kFar : lo[a] - margin;
-    hi[a] = none ? kFar : hi[a] + margin;
+    hi[a] = none ? (tree.scene == nullptr ? kFar : -kFar) : hi[a] + margin;
   }
   *args->bounds_o = {lo[0], lo[1], lo[2], 0, hi[0], hi[1], hi[2], 0};
 }
@@ -166,6 +170,10 @@ void TriangleTree::Impl::CopyIn(ConstPointsView from) {
   std::copy_n(from.x, from.count, to.x);
   std::copy_n(from.y, from.count, to.y);
   std::copy_n(from.z, from.count, to.z);
+  beyond = false;
+  for (const float* row : {to.x, to.y, to.z}) {
+    for (std::size_t i = 0; i < to.count; ++i) beyond |= std::fabs(row[i]) > kFar && std::isfinite(row[i]);
+  }
 }
 
 void TriangleTree::Impl::Build() {
@@ -176,14 +184,13 @@ void TriangleTree::Impl::Build() {
   rtcSetGeometryUserData(geometry, this);
   rtcSetGeometryBoundsFunction(geometry, &Bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry, &Intersect);
-  scene = CommitEmbreeScene(device, geometry);
-  if (rtcGetDeviceError(device) != RTC_ERROR_NONE) scene = nullptr;
+  RTCError error = RTC_ERROR_NONE;
+  scene = CommitEmbreeScene(device, geometry, &error);
 }
 
 void TriangleTree::Impl::Refit() {
-  if (scene == nullptr) return;
-  RefitEmbreeScene(scene, geometry);
-  if (rtcGetDeviceError(EmbreeDevice()) != RTC_ERROR_NONE) scene = nullptr;
+  if (scene == nullptr) return Build();  // there may be memory now
+  if (RefitEmbreeScene(EmbreeDevice(), scene, geometry) != RTC_ERROR_NONE) scene = nullptr;
 }
 
 template <typename Visit>
@@ -326,8 +333,11 @@ LineHit TriangleTree::FirstHit(Double3 origin, Double3 direction) const {
   unit = unit * (1 / Length(unit));
   line.origin_along = Dot(origin, unit);
   const Double3 middle = origin - unit * line.origin_along;
-  if (impl_->scene == nullptr || !(Largest(middle) < kFar)) {
+  const auto all = [&] {
     for (Index t = 0; t < impl_->count(); ++t) line.Meet(t);
+  };
+  if (impl_->scene == nullptr || !(Largest(middle) < kFar)) {
+    all();
     return line.best;
   }
   // Backwards the nearest one comes last
@@ -335,6 +345,7 @@ LineHit TriangleTree::FirstHit(Double3 origin, Double3 direction) const {
   line.shrinks = true;
   const double near = std::max(0.0, line.origin_along) * (1 - kRounding), far = line.Along(line.best.t);
   if (far >= 0 && near < kFar) impl_->Follow(&line, middle, unit, static_cast<float>(near), Reach(far));
+  if (impl_->beyond && !(std::fabs(line.Along(line.best.t)) < kFar)) all();
   return line.best;
 }
 

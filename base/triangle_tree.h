@@ -6,7 +6,8 @@
 // points. The structure is built once, of the points at rest, and its boxes follow points that move.
 // Points that are not finite take no part: of a triangle with such a corner what is near is the edge between
 // the others, and lines miss it; a query that is not finite finds nothing. None of them costs the others
-// anything. Coordinates beyond 1e18 are found slowly. Nearest place on a triangle: C. Ericson, Real-Time
+// anything. Coordinates beyond 1e18 are found slowly; lines from 1e12 times as far as what they meet may miss
+// it. Nearest place on a triangle: C. Ericson, Real-Time
 // Collision Detection (2005), 5.1.5; lines: Moeller and Trumbore (1997).
 #pragma once
 

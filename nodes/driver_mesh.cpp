@@ -29,10 +29,15 @@ struct Latest {
       }
       return nullptr;
     }
-    void Add(const Digest& key, std::shared_ptr<const DriverRest> rest) {
+    // What is there by now, or this one.
+    std::shared_ptr<const DriverRest> Add(const Digest& key, std::shared_ptr<const DriverRest> rest) {
       const std::lock_guard<std::mutex> lock(mutex);
+      for (const Entry& entry : entries) {
+        if (entry.key == key) return entry.rest;
+      }
       if (entries.size() == kMost) entries.erase(entries.begin());
       entries.push_back({key, std::move(rest)});
+      return entries.back().rest;
     }
 
    private:
@@ -64,16 +69,12 @@ std::shared_ptr<const DriverRest> MakeRest(ConstPointsView points, const Matrix4
   }
   const PointBuffer floats = Rounded(rest->points);
   if (tree == DriverTree::kTriangles) rest->tree = TriangleTree(floats.view(), topology.triangles());
+  if (tree == DriverTree::kMoving) rest->moving.emplace(floats.view(), topology.triangles());
   if (tree == DriverTree::kPoints) rest->tree = TriangleTree(floats.view(), PointTriangles(topology));
   return rest;
 }
 
 }  // namespace
-
-MovingSurface Driver::Moving() const {
-  const PointBuffer floats = Rounded(rest->points);
-  return MovingSurface(floats.view(), topology->triangles());
-}
 
 void AddDriver(NodeBuilder& b) {
   b.points_in("driverPoints", "the driver's points, at any stage of its stack; `driver:` connects them");
@@ -131,8 +132,7 @@ Result<Driver> BindDriver(const Structural& s, DriverTree tree, const Matrix4& s
   driver.rest = latest.Find(key);
   if (driver.rest == nullptr) {
     // Without the lock: trees take a while, and others may want what is there
-    driver.rest = MakeRest(points, driver.stage_from_driver, *driver.topology, tree);
-    latest.Add(key, driver.rest);
+    driver.rest = latest.Add(key, MakeRest(points, driver.stage_from_driver, *driver.topology, tree));
   }
   return driver;
 }

@@ -24,21 +24,21 @@ void AddDriver(NodeBuilder& builder);
 // missing, another number of points than the mesh has, no faces.
 Result<const Mesh*> DriverMesh(const Structural& structural, std::optional<std::size_t> points);
 
-// The driver at rest in the space of the stage, with a tree over its triangles or over its single points (as
-// floats), or without one.
+// The driver at rest in the space of the stage, and over its points, as floats, what DriverTree says.
 struct DriverRest {
   std::vector<Double3> points;
   TriangleTree tree;
+  std::optional<MovingSurface> moving;
 };
 
 struct Driver {
   const Topology* topology = nullptr;
   std::shared_ptr<const DriverRest> rest;
   Matrix4 stage_from_driver;
-  MovingSurface Moving() const;  // of the rest points
 };
 
-enum class DriverTree { kNone, kTriangles, kPoints };
+// A tree over its triangles, one over its single points, or trees that follow the driver.
+enum class DriverTree { kTriangles, kPoints, kMoving };
 // Of a deformer, in the space of its stage. Errors: those of DriverMesh, driverMatrix singular, points that
 // are not finite. The last rests of a mesh are kept beside it: demand and bind both ask, of every geometry.
 Result<Driver> BindDriver(const Structural& structural, DriverTree tree);

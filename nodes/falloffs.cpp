@@ -107,7 +107,7 @@ void ComputePlane(ComputeContext& c) {
 struct Proximity {
   FalloffPlace place;
   bool carried = false;
-  Driver driver;
+  Matrix4 world_from_driver;  // at rest
   std::optional<MovingSurface> surface;
   std::size_t row = 0;  // floats of a component of the carried driver
 };
@@ -119,11 +119,11 @@ Result<BoundKernel> BindProximity(const Binding& binding) {
   const Result<FalloffPlace> place = FalloffPlace::Bind(s, bound.carried);
   if (!place.ok()) return place.status();
   bound.place = *place;
-  Result<Driver> driver = BindDriver(s, DriverTree::kNone, s.value("driverMatrix").get<Matrix4>());
+  const Result<Driver> driver = BindDriver(s, DriverTree::kMoving, s.value("driverMatrix").get<Matrix4>());
   if (!driver.ok()) return driver.status();
-  bound.driver = std::move(*driver);
-  if (bound.carried) bound.row = PaddedCount(bound.driver.topology->point_count());
-  bound.surface.emplace(bound.driver.Moving());
+  bound.world_from_driver = driver->stage_from_driver;
+  bound.surface = driver->rest->moving;
+  if (bound.carried) bound.row = PaddedCount(driver->topology->point_count());
   const std::size_t scratch = 3 * bound.row;
   return MakeBound(std::move(bound), scratch);
 }
@@ -135,7 +135,7 @@ void ComputeProximity(ComputeContext& c) {
   ConstPointsView surface = c.points(kOwn);
   if (bound.carried) {
     const ConstPointsView driver = surface;
-    const Matrix4 world_from_driver = bound.place.Carried(bound.driver.stage_from_driver, parent);
+    const Matrix4 world_from_driver = bound.place.Carried(bound.world_from_driver, parent);
     const PointsView carried{c.scratch, c.scratch + bound.row, c.scratch + 2 * bound.row, driver.count};
     c.host->For(driver.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {

@@ -61,7 +61,7 @@ Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
   if (!frame.ok()) return frame.status();
   const Double3 axis = TransformVector(frame->stage_from_world(), s.value("axis").get<Double3>());
   if (!(Length(axis) > 0)) return Status::Invalid("axis: expected a direction, not of length 0");
-  const Result<Driver> driver = BindDriver(s, DriverTree::kNone);
+  const Result<Driver> driver = BindDriver(s, DriverTree::kMoving);
   if (!driver.ok()) return driver.status();
   static const Topology kNone;
   const Topology* own = &kNone;
@@ -71,7 +71,7 @@ Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
     if (own == nullptr) return error;
   }
   ShrinkWrapBound bound{
-      ShrinkWrapKernel(settings, *driver->topology, driver->Moving(), driver->stage_from_driver, *own,
+      ShrinkWrapKernel(settings, *driver->topology, *driver->rest->moving, driver->stage_from_driver, *own,
                        out.ToVector(), in.ToVector(), BoundWeights(binding)),
       *frame, 1 / frame->WorldScale(), axis * (1 / Length(axis))};
   const std::size_t scratch = bound.kernel.ScratchFloats();

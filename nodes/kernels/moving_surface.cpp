@@ -10,7 +10,7 @@ std::unique_ptr<TriangleTree> MovingSurface::Shared::Make() {
 }
 
 MovingSurface::MovingSurface(ConstPointsView rest, std::span<const Index> triangles)
-    : shared_(std::make_unique<Shared>()) {
+    : shared_(std::make_shared<Shared>()) {
   shared_->rest = PointBuffer(rest.count);
   const PointsView to = shared_->rest.view();
   std::copy_n(rest.x, rest.count, to.x);

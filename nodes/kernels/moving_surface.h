@@ -13,13 +13,12 @@
 
 namespace kpsa {
 
-// Trees over the rest points; an evaluation borrows one and moves it. Thread-safe.
+// Trees over the rest points; an evaluation borrows one and moves it. Copies share them. Thread-safe.
 class MovingSurface {
  public:
   // triangles: 3 indices below rest.count each (checked).
   MovingSurface(ConstPointsView rest, std::span<const Index> triangles);
 
-  std::span<const Index> triangles() const { return shared_->triangles; }
   std::size_t point_count() const { return shared_->rest.count(); }
 
   // A tree, until the destructor gives it back; not to outlive the surface.
@@ -50,7 +49,7 @@ class MovingSurface {
     Spares<TriangleTree> spares;
     std::unique_ptr<TriangleTree> Make();
   };
-  std::unique_ptr<Shared> shared_;
+  std::shared_ptr<Shared> shared_;
 };
 
 }  // namespace kpsa

@@ -86,8 +86,9 @@ Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> 
   for (std::size_t i = 0; i < triangles.size(); ++i) corner[i] = triangles[i];
   impl->geometry = geometry;
   impl->xyz = xyz;
-  impl->scene = CommitEmbreeScene(device, geometry);
-  if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE) {
+  RTCError error = RTC_ERROR_NONE;
+  impl->scene = CommitEmbreeScene(device, geometry, &error);
+  if (error != RTC_ERROR_NONE) {
     return Status::Evaluation("the ray tracer failed to build over {} triangles (Embree error {})",
                               triangles.size() / 3, static_cast<int>(error));
   }
@@ -100,8 +101,8 @@ Status RayScene::Update(ConstPointsView points) {
   if (impl_->geometry == nullptr) return Status();
   Interleave(points, impl_->xyz);
   rtcUpdateGeometryBuffer(impl_->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
-  RefitEmbreeScene(impl_->scene, impl_->geometry);
-  if (const RTCError error = rtcGetDeviceError(EmbreeDevice()); error != RTC_ERROR_NONE)
+  if (const RTCError error = RefitEmbreeScene(EmbreeDevice(), impl_->scene, impl_->geometry);
+      error != RTC_ERROR_NONE)
     return Status::Evaluation("the ray tracer failed to move its points (Embree error {})",
                               static_cast<int>(error));
   return Status();

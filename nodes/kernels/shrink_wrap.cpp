@@ -143,7 +143,7 @@ std::optional<Double3> ShrinkWrapKernel::AlongLine(const TriangleTree& target, D
 }
 
 void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
-                           const Parallel* parallel) const noexcept {
+                           const Parallel* parallel) const {
   KPSA_CHECK_EQ(in.count, in_count_);
   KPSA_CHECK_EQ(out.count, point_count());
   KPSA_CHECK_EQ(inputs.target.count, surface_.point_count());

@@ -56,9 +56,9 @@ class ShrinkWrapKernel {
 
   std::size_t point_count() const { return weights_.size(); }
   std::size_t ScratchFloats() const;
-  // In place only where in_points and out_points are the same.
+  // In place only where in_points and out_points are the same. See MovingSurface::At about memory.
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
-           const Parallel* parallel = nullptr) const noexcept;
+           const Parallel* parallel = nullptr) const;
 
  private:
   bool MovesTarget() const { return !(stage_from_target_ == Matrix4()); }

@@ -18,7 +18,7 @@ UvMap::UvMap(std::span<const float> uvs) {
   std::set<Corners> known;
   std::vector<float> places;
   std::vector<Index> triangles;
-  for (std::size_t t = 0; 6 * t < uvs.size(); ++t) {
+  for (std::size_t t = 0; t < uvs.size() / 6; ++t) {
     Corners uv;
     std::copy_n(uvs.begin() + 6 * static_cast<std::ptrdiff_t>(t), 6, uv.begin());
     const bool finite = std::all_of(uv.begin(), uv.end(), [](float x) { return std::isfinite(x); });

@@ -350,6 +350,15 @@ TEST(TriangleTree, LooksAtFewTriangles) {
       soup.points.view().x[200] = before;
       soup.Move();
     }
+    // A few squares here and there are lost, all corners of each
+    const PointBuffer whole = soup.points;
+    for (Index i = 5; i + kSide + 1 < kSide * kSide; i += 41) {
+      for (const Index corner : {i, i + 1, i + kSide, i + kSide + 1}) soup.points.view().y[corner] = kNan;
+    }
+    soup.Move();
+    EXPECT_LT(*count(query, place, way), 2 * *usual + 3000) << query << ", lost squares";
+    soup.points = whole;
+    soup.Move();
     for (const double bad : {kInfinity, static_cast<double>(kNan)}) {
       EXPECT_LT(*count(query, {0, bad, 0}, way), 3000u) << query << ", " << bad;
       if (query == kHit) {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <random>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -63,7 +64,8 @@ bool SameBits(const SurfacePoint& a, const SurfacePoint& b) {
          (a.triangle == kNoIndex || (a.point == b.point && std::equal(a.weights, a.weights + 3, b.weights)));
 }
 bool SameBits(const LineHit& a, const LineHit& b) {
-  return a.triangle == b.triangle && std::memcmp(&a.t, &b.t, sizeof(double)) == 0;
+  return a.triangle == b.triangle && std::memcmp(&a.t, &b.t, sizeof(double)) == 0 &&
+         std::equal(a.weights, a.weights + 3, b.weights);
 }
 
 // What the triangles say one by one.
@@ -125,7 +127,7 @@ void ExpectSameBits(const TriangleTree& tree, double size, double offset, Twin* 
 TEST(TriangleTreeTwin, BitsOfEachTriangleAlone) {
   Twin random(31);
   int hits = 0;
-  for (const double size : {1e-9, 1e-3, 1.0, 1e4, 1e12}) {
+  for (const double size : {1e-43, 1e-38, 1e-34, 1e-9, 1e-3, 1.0, 1e4, 1e12}) {
     for (const double away : {0.0, 1.0, 30.0, 1e4}) {
       const PointBuffer points = random.Soup(9 + random.Below(200), size, away * size);
       const TriangleTree tree(points.view(), Corners(points));
@@ -171,14 +173,53 @@ TEST(TriangleTreeTwin, BitsAfterPointsThatWereNotFiniteAtRest) {
 
 TEST(TriangleTreeTwin, CoordinatesOfAnySizeAreFound) {
   Twin random(34);
+  int hits = 0;
   for (const double size : {1e17, 1e19, 1e25, 1e30}) {
     const PointBuffer points = random.Soup(40, size);
     const TriangleTree tree(points.view(), Corners(points));
     const OneByOne twin(points.view());
     for (int i = 0; i < 30; ++i) {
-      const Double3 place = random.Place(size * (i % 2 == 0 ? 1 : 10)), along = random.Place(size);
+      // From near the coordinates' origin, from where a line never comes near it, and past corners
+      const Double3 place = random.Place(i % 3 == 0 ? 1 : i % 3 == 1 ? size : 10 * size);
+      const std::size_t aim = random.Below(points.count());
+      const Double3 along =
+          i % 2 == 0 ? random.Place(size)
+                     : Double3{points.view().x[aim], points.view().y[aim], points.view().z[aim]} - place;
       ASSERT_TRUE(SameBits(tree.Closest(place), twin.Closest(place))) << size;
-      ASSERT_TRUE(SameBits(tree.FirstHit(place, along), twin.FirstHit(place, along))) << size;
+      const LineHit hit = tree.FirstHit(place, along);
+      ASSERT_TRUE(SameBits(hit, twin.FirstHit(place, along))) << size;
+      hits += hit.triangle != kNoIndex ? 1 : 0;
+    }
+  }
+  EXPECT_GT(hits, 30);
+}
+
+TEST(TriangleTreeTwin, SeveralAndLowestAreThoseOfEachTriangle) {
+  Twin random(39);
+  for (int round = 0; round < 20; ++round) {
+    // On a lattice many places are equally far
+    PointBuffer points = random.Soup(60, 1);
+    for (float* row : {points.view().x, points.view().y, points.view().z}) {
+      for (std::size_t i = 0; i < points.count(); ++i) row[i] = std::round(3 * row[i]) / 2;
+    }
+    const std::vector<Index> corners = Corners(points);
+    const TriangleTree tree(points.view(), corners);
+    for (int i = 0; i < 20; ++i) {
+      const Double3 place{std::round(2 * random.Number()), std::round(2 * random.Number()), 0.5};
+      const double limit = i % 2 == 0 ? kEndless : 1;
+      std::vector<SurfacePoint> all, found;
+      for (Index t = 0; t < 60; ++t) {
+        all.push_back(ClosestOnTriangle(points.view(), &corners[3 * std::size_t{t}], place));
+        all.back().triangle = t;
+        if (!(all.back().squared <= limit * limit)) all.pop_back();
+      }
+      const SurfacePoint lowest = tree.Lowest(place, limit);
+      ASSERT_TRUE(SameBits(lowest, all.empty() ? SurfacePoint() : all.front()));
+      std::stable_sort(all.begin(), all.end(),
+                       [](const SurfacePoint& a, const SurfacePoint& b) { return a.squared < b.squared; });
+      tree.ClosestSeveral(place, 9, limit, &found);
+      ASSERT_EQ(found.size(), std::min<std::size_t>(9, all.size()));
+      for (std::size_t k = 0; k < found.size(); ++k) ASSERT_TRUE(SameBits(found[k], all[k])) << k;
     }
   }
 }
@@ -200,6 +241,8 @@ TEST(TriangleTreeTwin, SeveralThreadsFindTheSame) {
       hits[i] = tree.FirstHit(places[i], places[i] * -1);
     }
   });
+  const OneByOne twin(moved.view());
+  for (std::size_t i = 0; i < 20; ++i) ASSERT_TRUE(SameBits(together[i], twin.Closest(places[i])));
   for (std::size_t i = 0; i < places.size(); ++i) {
     ASSERT_TRUE(SameBits(together[i], fresh.Closest(places[i])));
     ASSERT_TRUE(SameBits(hits[i], fresh.FirstHit(places[i], places[i] * -1)));
@@ -223,6 +266,22 @@ TEST(TriangleTreeTwin, MovedAndAssignedTreesAreTheirOldSelves) {
 }
 
 #if defined(__SSE2__)
+// Nor does a thread keep it that uses a tree before anything else (Embree flushes small numbers to zero).
+TEST(TriangleTreeTwin, ThreadsRoundAsTheyDid) {
+  std::thread([] {
+    Twin random(38);
+    const PointBuffer points = random.Soup(50, 1), moved = random.Soup(50, 2);
+    TriangleTree tree(points.view(), Corners(points));
+    tree.Move(moved.view());
+    std::vector<float> products(64);
+    const float small = 1e-20f * static_cast<float>(1 + random.Below(1));
+    ParallelFor(products.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) products[i] = small * small;
+    });
+    for (const float product : products) EXPECT_GT(product, 0);
+  }).join();
+}
+
 TEST(TriangleTreeTwin, LeavesTheFloatingPointModeAlone) {
   Twin random(37);
   const unsigned before = _mm_getcsr() & ~0x3fu;  // without the sticky flags
