@@ -72,9 +72,11 @@ bool SameBits(const LineHit& a, const LineHit& b) {
 class OneByOne {
  public:
   explicit OneByOne(ConstPointsView points) {
-    for (Index i = 0; i + 2 < points.count; i += 3) {
-      const Index corners[3] = {i, i + 1, i + 2};
-      trees_.emplace_back(points, corners);
+    for (std::size_t i = 0; i + 2 < points.count; i += 3) {
+      std::vector<float> xyz;
+      for (std::size_t k = i; k < i + 3; ++k) xyz.insert(xyz.end(), {points.x[k], points.y[k], points.z[k]});
+      const PointBuffer own = PointBuffer::FromInterleaved(xyz);
+      trees_.emplace_back(own.view(), Corners(own));
     }
   }
   SurfacePoint Closest(Double3 place) const {
