@@ -7,7 +7,8 @@ RTCDevice EmbreeDevice() {
   return device;
 }
 
-EmbreeScene CommitEmbreeScene(RTCDevice device, RTCGeometry geometry, RTCError* error) {
+EmbreeScene CommitEmbreeScene(RTCGeometry geometry, RTCError* error) {
+  RTCDevice device = EmbreeDevice();
   rtcGetDeviceError(device);  // what others of this thread left
   EmbreeScene scene(rtcNewScene(device));
   rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC);
@@ -24,11 +25,11 @@ EmbreeScene CommitEmbreeScene(RTCDevice device, RTCGeometry geometry, RTCError* 
   return scene;
 }
 
-RTCError RefitEmbreeScene(RTCDevice device, const EmbreeScene& scene, RTCGeometry geometry) {
-  rtcGetDeviceError(device);
+RTCError RefitEmbreeScene(const EmbreeScene& scene, RTCGeometry geometry) {
+  rtcGetDeviceError(EmbreeDevice());
   rtcCommitGeometry(geometry);
   rtcCommitScene(scene.get());
-  return rtcGetDeviceError(device);
+  return rtcGetDeviceError(EmbreeDevice());
 }
 
 }  // namespace kpsa

@@ -20,9 +20,9 @@ struct EmbreeRelease {
 };
 using EmbreeScene = std::unique_ptr<std::remove_pointer_t<RTCScene>, EmbreeRelease>;
 
-// A committed scene that owns the geometry; null, with the error, where that fails.
-EmbreeScene CommitEmbreeScene(RTCDevice device, RTCGeometry geometry, RTCError* error);
+// A committed scene that owns the geometry, one of the device above; null, with the error, where that fails.
+EmbreeScene CommitEmbreeScene(RTCGeometry geometry, RTCError* error);
 // After the geometry has moved; its buffers must be marked before. The scene is of no use after an error.
-RTCError RefitEmbreeScene(RTCDevice device, const EmbreeScene& scene, RTCGeometry geometry);
+RTCError RefitEmbreeScene(const EmbreeScene& scene, RTCGeometry geometry);
 
 }  // namespace kpsa

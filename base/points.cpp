@@ -54,6 +54,17 @@ PointBuffer PointBuffer::FromInterleaved(std::span<const float> xyz) {
   return buffer;
 }
 
+PointBuffer PointBuffer::FromPlaces(std::span<const Double3> places) {
+  PointBuffer buffer(places.size());
+  const PointsView view = buffer.view();
+  for (std::size_t i = 0; i < view.count; ++i) {
+    view.x[i] = static_cast<float>(places[i].x);
+    view.y[i] = static_cast<float>(places[i].y);
+    view.z[i] = static_cast<float>(places[i].z);
+  }
+  return buffer;
+}
+
 PointsView PointBuffer::view() {
   float* x = floats_.data();
   const std::size_t padded = PaddedCount(count_);
@@ -76,6 +87,14 @@ std::vector<float> PointBuffer::Interleaved() const {
     }
   }
   return xyz;
+}
+
+void CopyPoints(ConstPointsView in, PointsView out) {
+  const std::size_t bytes = out.count * sizeof(float);
+  if (bytes == 0) return;
+  if (in.x != out.x) std::memcpy(out.x, in.x, bytes);
+  if (out.y != nullptr && in.y != out.y) std::memcpy(out.y, in.y, bytes);
+  if (out.z != nullptr && in.z != out.z) std::memcpy(out.z, in.z, bytes);
 }
 
 }  // namespace kpsa

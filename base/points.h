@@ -62,6 +62,7 @@ class PointBuffer {
   PointBuffer() = default;
   explicit PointBuffer(std::size_t count, int components = 3);
   static PointBuffer FromInterleaved(std::span<const float> xyz);  // x0 y0 z0 x1 ...
+  static PointBuffer FromPlaces(std::span<const Double3> places);  // rounded
   std::size_t count() const { return count_; }
   int components() const { return components_; }
   PointsView view();
@@ -73,6 +74,9 @@ class PointBuffer {
   std::size_t count_ = 0;
   int components_ = 3;
 };
+
+// Copies all components, where they differ in address.
+void CopyPoints(ConstPointsView in, PointsView out);
 
 // Compressed rows: row i is values[offsets[i] .. offsets[i + 1]). offsets has rows() + 1 entries.
 template <typename T>

@@ -1,40 +1,48 @@
 // Workplaces that evaluations borrow and give back: costly ones, of which any is as good as any other.
 //
-// There are as many as evaluations have been under way at once. Whoever finds none makes one, announces it
-// (AddRoom) and gives it back like the others; nothing else allocates. Thread-safe.
+// Whoever finds none makes one, and gives it back like the others: there are as many as evaluations have been
+// under way at once, or a few more, where one was given back behind the back of another that looked.
+// Thread-safe, without locks; allocates nothing.
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <memory>
-#include <mutex>
-#include <utility>
-#include <vector>
 
 namespace kpsa {
 
 template <typename T>
 class Spares {
  public:
-  // The latest one that was given back; null where all are in use.
+  Spares() = default;
+  Spares(const Spares&) = delete;
+  Spares& operator=(const Spares&) = delete;
+  ~Spares() {
+    while (Take() != nullptr) {
+    }
+  }
+  // Null where all are in use.
   std::unique_ptr<T> Take() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (free_.empty()) return nullptr;
-    std::unique_ptr<T> last = std::move(free_.back());
-    free_.pop_back();
-    return last;
+    for (std::atomic<T*>& slot : free_) {
+      if (slot.load(std::memory_order_relaxed) == nullptr) continue;
+      if (T* one = slot.exchange(nullptr, std::memory_order_acquire)) return std::unique_ptr<T>(one);
+    }
+    return nullptr;
   }
+  // More than there is room for are let go.
   void Give(std::unique_ptr<T> one) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    free_.push_back(std::move(one));  // has room
-  }
-  void AddRoom() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    free_.reserve(++count_);
+    for (std::atomic<T*>& slot : free_) {
+      T* none = nullptr;
+      if (slot.compare_exchange_strong(none, one.get(), std::memory_order_release,
+                                       std::memory_order_relaxed)) {
+        one.release();
+        return;
+      }
+    }
   }
 
  private:
-  std::mutex mutex_;
-  std::size_t count_ = 0;
-  std::vector<std::unique_ptr<T>> free_;
+  std::array<std::atomic<T*>, 64> free_ = {};
 };
 
 }  // namespace kpsa

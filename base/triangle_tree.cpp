@@ -167,9 +167,7 @@ void TriangleTree::Impl::Intersect(const RTCIntersectFunctionNArguments* args) {
 
 void TriangleTree::Impl::CopyIn(ConstPointsView from) {
   const PointsView to = points.view();
-  std::copy_n(from.x, from.count, to.x);
-  std::copy_n(from.y, from.count, to.y);
-  std::copy_n(from.z, from.count, to.z);
+  CopyPoints(from, to);
   beyond = false;
   for (const float* row : {to.x, to.y, to.z}) {
     for (std::size_t i = 0; i < to.count; ++i) beyond |= std::fabs(row[i]) > kFar && std::isfinite(row[i]);
@@ -185,12 +183,12 @@ void TriangleTree::Impl::Build() {
   rtcSetGeometryBoundsFunction(geometry, &Bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry, &Intersect);
   RTCError error = RTC_ERROR_NONE;
-  scene = CommitEmbreeScene(device, geometry, &error);
+  scene = CommitEmbreeScene(geometry, &error);
 }
 
 void TriangleTree::Impl::Refit() {
   if (scene == nullptr) return Build();  // there may be memory now
-  if (RefitEmbreeScene(EmbreeDevice(), scene, geometry) != RTC_ERROR_NONE) scene = nullptr;
+  if (RefitEmbreeScene(scene, geometry) != RTC_ERROR_NONE) scene = nullptr;
 }
 
 template <typename Visit>

@@ -15,19 +15,6 @@ constexpr const char* kKinds =
     "{at: PLACE, radius: 5}, {sphere: ...}, {capsule: ...}, {plane: ...}, {proximity: ...}, {weights: ...}, "
     "{combine: multiply, of: [...]} or a list of them";
 
-// A mesh at rest, for asking how far places are from it.
-std::shared_ptr<const TriangleTree> MakeRestSurface(const std::vector<Double3>& points,
-                                                    const std::vector<Index>& triangles) {
-  PointBuffer floats(points.size());
-  const PointsView to = floats.view();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    to.x[i] = static_cast<float>(points[i].x);
-    to.y[i] = static_cast<float>(points[i].y);
-    to.z[i] = static_cast<float>(points[i].z);
-  }
-  return std::make_shared<TriangleTree>(to, triangles);
-}
-
 }  // namespace
 
 bool RigBuild::MultiplyByFalloff(const RigAttribute& attribute, const Made& made, const Geometry& of,
@@ -177,8 +164,9 @@ bool RigBuild::ReadFalloffShape(const std::string& kind, const YamlNode& node, i
       good = errors_->Add(*mesh, "proximity: \"{}\" has no faces", name);
     good = good && index.has_value();
     if (good) {
+      const PointBuffer rest = PointBuffer::FromPlaces(rest_->WorldPoints(*index));
       const auto surface =
-          MakeRestSurface(rest_->WorldPoints(*index), rig_->scene.meshes[*index].mesh().data().triangles);
+          std::make_shared<TriangleTree>(rest.view(), rig_->scene.meshes[*index].mesh().data().triangles);
       *weight_at = [=](Double3 p) {
         const SurfacePoint near = surface->Closest(p);
         return near.triangle == kNoIndex ? 0 : DistanceFalloff(std::sqrt(near.squared), radius, fade);

@@ -47,17 +47,6 @@ struct Latest {
   std::shared_ptr<Shared> shared = std::make_shared<Shared>();
 };
 
-PointBuffer Rounded(const std::vector<Double3>& points) {
-  PointBuffer floats(points.size());
-  const PointsView to = floats.view();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    to.x[i] = static_cast<float>(points[i].x);
-    to.y[i] = static_cast<float>(points[i].y);
-    to.z[i] = static_cast<float>(points[i].z);
-  }
-  return floats;
-}
-
 std::shared_ptr<const DriverRest> MakeRest(ConstPointsView points, const Matrix4& stage_from_driver,
                                            const Topology& topology, DriverTree tree) {
   auto rest = std::make_shared<DriverRest>();
@@ -67,7 +56,7 @@ std::shared_ptr<const DriverRest> MakeRest(ConstPointsView points, const Matrix4
     const Double3 placed = moved ? TransformPoint(stage_from_driver, p) : p;
     rest->points.push_back(placed);
   }
-  const PointBuffer floats = Rounded(rest->points);
+  const PointBuffer floats = PointBuffer::FromPlaces(rest->points);
   if (tree == DriverTree::kTriangles) rest->tree = TriangleTree(floats.view(), topology.triangles());
   if (tree == DriverTree::kMoving) rest->moving.emplace(floats.view(), topology.triangles());
   if (tree == DriverTree::kPoints) rest->tree = TriangleTree(floats.view(), PointTriangles(topology));

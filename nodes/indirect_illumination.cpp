@@ -101,7 +101,6 @@ Result<std::unique_ptr<Workplace>> MakeWorkplace(const IlluminationKernel& kerne
   Result<PathTracer> tracer = PathTracer::Build(std::as_const(kernel.rest).view(), kernel.triangles,
                                                 kernel.albedo, lights, kernel.unseen);
   if (!tracer.ok()) return tracer.status();
-  kernel.workplaces->AddRoom();
   return std::make_unique<Workplace>(
       Workplace{std::move(*tracer), PointBuffer(kernel.rest.count()), std::move(lights)});
 }

@@ -46,14 +46,7 @@ Status CheckDivisions(const std::vector<std::int64_t>& d) {
 Value DefaultControls(const Structural& s) {
   const std::vector<std::int64_t> d = Divisions(s);
   if (!CheckDivisions(d).ok()) return Value(PointBufferPtr(std::make_shared<PointBuffer>(0)));
-  const std::vector<Double3> grid = Grid(d);
-  auto buffer = std::make_shared<PointBuffer>(grid.size());
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    buffer->view().x[i] = static_cast<float>(grid[i].x);
-    buffer->view().y[i] = static_cast<float>(grid[i].y);
-    buffer->view().z[i] = static_cast<float>(grid[i].z);
-  }
-  return Value(PointBufferPtr(buffer));
+  return Value(PointBufferPtr(std::make_shared<PointBuffer>(PointBuffer::FromPlaces(Grid(d)))));
 }
 
 // The box in the stage's space at rest: given, or around the members.

@@ -1,21 +1,15 @@
 #include "nodes/kernels/moving_surface.h"
 
-#include <algorithm>
-
 namespace kpsa {
 
-std::unique_ptr<TriangleTree> MovingSurface::Shared::Make() {
-  spares.AddRoom();
+std::unique_ptr<TriangleTree> MovingSurface::Shared::Make() const {
   return std::make_unique<TriangleTree>(rest.view(), triangles);
 }
 
 MovingSurface::MovingSurface(ConstPointsView rest, std::span<const Index> triangles)
     : shared_(std::make_shared<Shared>()) {
   shared_->rest = PointBuffer(rest.count);
-  const PointsView to = shared_->rest.view();
-  std::copy_n(rest.x, rest.count, to.x);
-  std::copy_n(rest.y, rest.count, to.y);
-  std::copy_n(rest.z, rest.count, to.z);
+  CopyPoints(rest, shared_->rest.view());
   shared_->triangles.assign(triangles.begin(), triangles.end());
   shared_->spares.Give(shared_->Make());
 }

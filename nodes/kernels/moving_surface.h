@@ -47,7 +47,7 @@ class MovingSurface {
     PointBuffer rest;
     std::vector<Index> triangles;
     Spares<TriangleTree> spares;
-    std::unique_ptr<TriangleTree> Make();
+    std::unique_ptr<TriangleTree> Make() const;
   };
   std::shared_ptr<Shared> shared_;
 };

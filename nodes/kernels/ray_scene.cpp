@@ -1,5 +1,6 @@
 #include "nodes/kernels/ray_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -87,7 +88,7 @@ Result<RayScene> RayScene::Build(ConstPointsView points, std::span<const Index> 
   impl->geometry = geometry;
   impl->xyz = xyz;
   RTCError error = RTC_ERROR_NONE;
-  impl->scene = CommitEmbreeScene(device, geometry, &error);
+  impl->scene = CommitEmbreeScene(geometry, &error);
   if (error != RTC_ERROR_NONE) {
     return Status::Evaluation("the ray tracer failed to build over {} triangles (Embree error {})",
                               triangles.size() / 3, static_cast<int>(error));
@@ -101,8 +102,7 @@ Status RayScene::Update(ConstPointsView points) {
   if (impl_->geometry == nullptr) return Status();
   Interleave(points, impl_->xyz);
   rtcUpdateGeometryBuffer(impl_->geometry, RTC_BUFFER_TYPE_VERTEX, 0);
-  if (const RTCError error = RefitEmbreeScene(EmbreeDevice(), impl_->scene, impl_->geometry);
-      error != RTC_ERROR_NONE)
+  if (const RTCError error = RefitEmbreeScene(impl_->scene, impl_->geometry); error != RTC_ERROR_NONE)
     return Status::Evaluation("the ray tracer failed to move its points (Embree error {})",
                               static_cast<int>(error));
   return Status();
@@ -111,7 +111,7 @@ Status RayScene::Update(ConstPointsView points) {
 void RayScene::ClosestHits(std::span<const Ray> rays, std::span<RayHit> hits) const {
   KPSA_CHECK_EQ(rays.size(), hits.size());
   if (impl_->scene == nullptr) {
-    for (RayHit& hit : hits) hit = {};
+    std::fill(hits.begin(), hits.end(), RayHit());
     return;
   }
   RTCIntersectContext context;
@@ -132,7 +132,7 @@ void RayScene::ClosestHits(std::span<const Ray> rays, std::span<RayHit> hits) co
 void RayScene::Occluded(std::span<const Ray> rays, std::span<std::uint8_t> occluded) const {
   KPSA_CHECK_EQ(rays.size(), occluded.size());
   if (impl_->scene == nullptr) {
-    for (std::uint8_t& one : occluded) one = 0;
+    std::fill(occluded.begin(), occluded.end(), std::uint8_t{0});
     return;
   }
   RTCIntersectContext context;

@@ -88,14 +88,6 @@ AlignedFloats PaddedWeights(std::span<const float> weights, std::size_t count) {
   return padded;
 }
 
-void CopyPoints(ConstPointsView in, PointsView out) {
-  const std::size_t bytes = out.count * sizeof(float);
-  if (bytes == 0) return;
-  if (in.x != out.x) std::memcpy(out.x, in.x, bytes);
-  if (out.y != nullptr && in.y != out.y) std::memcpy(out.y, in.y, bytes);
-  if (out.z != nullptr && in.z != out.z) std::memcpy(out.z, in.z, bytes);
-}
-
 void GatherPoints(ConstPointsView in, std::span<const Index> positions, PointsView out) {
   for (std::size_t i = 0; i < positions.size(); ++i) out.x[i] = in.x[positions[i]];
   if (out.y == nullptr) return;

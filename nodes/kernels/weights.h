@@ -36,8 +36,6 @@ std::vector<float> MultiplyWeights(std::span<const float> a, std::span<const flo
 // Aligned, padded with zeros to PaddedCount(count); all ones (and padding zero) if `weights` is empty.
 AlignedFloats PaddedWeights(std::span<const float> weights, std::size_t count);
 
-// Copies all components, where they differ in address.
-void CopyPoints(ConstPointsView in, PointsView out);
 // out[i] = in[positions[i]].
 void GatherPoints(ConstPointsView in, std::span<const Index> positions, PointsView out);
 

@@ -66,6 +66,17 @@ TEST(IncludeArrows, CanaryOfEveryDoor) {
   ASSERT_EQ(found.size(), 4u) << Lines(found);
   EXPECT_EQ(found[0], "graph/a.cpp:1: <tbb/task_arena.h> belongs behind base/parallel.cpp");
   EXPECT_EQ(found[1], "io/other.cpp:1: <yaml-cpp/yaml.h> belongs behind io/yaml_document.cpp");
+
+  TemporaryFolder own;  // a door that is a header of ours
+  own.Write("base/embree.h", "#include <embree3/rtcore.h>\n");
+  own.Write("base/triangle_tree.cpp", "#include \"base/embree.h\"\n");
+  own.Write("nodes/kernels/wire.cpp", "#include \"base/embree.h\"\n");
+  own.Write("base/points.h", "#include \"base/embree.h\"\n");
+  const std::vector<std::string> beside = FindBreaches(ReadSourceTree(own.path()));
+  ASSERT_EQ(beside.size(), 2u) << Lines(beside);
+  EXPECT_TRUE(beside[0].starts_with("base/points.h:1: <base/embree.h> belongs behind base/embree.cpp, "))
+      << beside[0];
+  EXPECT_TRUE(beside[1].starts_with("nodes/kernels/wire.cpp:1: ")) << beside[1];
 }
 
 TEST(IncludeArrows, AGoodTreeHasNoBreach) {

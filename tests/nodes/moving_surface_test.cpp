@@ -31,17 +31,24 @@ TEST(MovingSurface, EvaluationsHaveTreesOfTheirOwn) {
   EXPECT_EQ(surface.point_count(), 40u);
   std::optional<MovingSurface::Lease> first = surface.At(up.view());
   const TriangleTree* const tree = &**first;
+  const TriangleTree* other = nullptr;
   {
     const MovingSurface::Lease second = surface.At(down.view());
-    EXPECT_NE(&*second, tree);
+    other = &*second;
+    EXPECT_NE(other, tree);
     EXPECT_EQ((*first)->Closest({4.2, 0.5, 0}).squared, 9);
     EXPECT_EQ(second->Closest({4.2, 0.5, 0}).squared, 4);
   }
   first.reset();
-  // Given back last, borrowed first, and moved to where it has to be
-  const MovingSurface::Lease third = surface.At(rest.view());
-  EXPECT_EQ(&*third, tree);
+  // The same two again, moved to where they have to be; a third one only while both are in use
+  const MovingSurface::Lease third = surface.At(rest.view()), fourth = surface.At(down.view()),
+                             fifth = surface.At(up.view());
+  EXPECT_EQ(&*third, other);
+  EXPECT_EQ(&*fourth, tree);
+  EXPECT_TRUE(&*fifth != tree && &*fifth != other);
   EXPECT_EQ(third->Closest({4.2, 0.5, 0}).squared, 0);
+  EXPECT_EQ(fourth->Closest({4.2, 0.5, 0}).squared, 4);
+  EXPECT_EQ(fifth->Closest({4.2, 0.5, 0}).squared, 9);
 }
 
 TEST(MovingSurface, ManyAtOnceAreWhereTheyShouldBe) {
