@@ -14,7 +14,7 @@ namespace {
 
 // Inputs and outputs by position.
 enum In { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints };
-enum Out { kOutPoints, kScore, kHit, kMissReason, kOffender };
+enum Out { kOutPoints, kScore, kHit, kFullWeight, kMissReason, kOffender };
 
 std::atomic<bool> measure_times{false};
 std::atomic<std::uint64_t> cue_ns{0}, projection_ns{0}, reconstruction_ns{0};
@@ -157,6 +157,7 @@ void WriteVerdict(const ComputeContext& c) {
   const Verdict& v = c.state_as<KpsaState>().verdict;
   c.out_value<double>(kScore) = v.score;
   c.out_value<std::int64_t>(kHit) = v.hit;
+  c.out_value<double>(kFullWeight) = v.full_weight;
   c.out_value<std::int64_t>(kMissReason) = static_cast<std::int64_t>(v.reason);
   c.out_value<std::int64_t>(kOffender) = v.offender == kNoIndex ? -1 : static_cast<std::int64_t>(v.offender);
 }
@@ -357,7 +358,9 @@ void AddKpsaNode(NodeRegistry& registry) {
       .out("outPoints", Type::kPoints)
       .array()
       .out("score", Type::kDouble)
-      .out("hit", Type::kBool)
+      .out("hit", Type::kBool, "the full evaluation is not needed at all")
+      .out("fullWeight", Type::kDouble,
+           "share of the full evaluation in the points: 0 a hit, between 0 and 1 a blend, 1 a miss")
       .out("missReason", Type::kInt)
       .out("offender", Type::kInt)
       .compute(&Compute)

@@ -10,7 +10,7 @@
 //   fullPoints[m]   the full evaluation of each mesh; lazy, all together
 //   config          KpsaConfig (structural)
 //   tolerance       metres, violationRate (structural): SoftCache's threshold follows from the calibration
-//   poses outPoints[m], score, hit, missReason, offender
+//   poses outPoints[m], score, hit, fullWeight, missReason, offender
 // The engine has no special case for it: everything here could come from a plugin.
 #pragma once
 
