@@ -164,15 +164,10 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
       applied.push_back(std::move(one));
     }
   }
+  Accelerator accelerator(rig->graph.get(), compiler);
   for (AppliedSubspace& one : applied) {
     one.name = one.entry.name;
     AccelerateOptions options;
-    if (flags.every_frame) {
-      auto open = std::make_shared<Subspace>(*one.subspace);
-      for (TrainedRange& range : open->ranges)
-        range.lo = -std::numeric_limits<double>::infinity(), range.hi = -range.lo;
-      one.subspace = std::move(open);
-    }
     options.stale_is_miss = flags.stale.has_value() && *flags.stale == "miss";
     if (flags.tolerance.has_value()) options.tolerance = *ParseTolerance(*flags.tolerance);
     if (flags.violation_rate.has_value()) options.violation_rate = *ParseRate(*flags.violation_rate);
@@ -181,12 +176,16 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
     one.violation_rate = options.violation_rate < 0 ? one.subspace->violation_rate : options.violation_rate;
     std::string node_name = one.name + "_kpsa";
     while (rig->graph->FindNode(node_name).ok()) node_name += "_";
-    Result<Accelerated> accelerated =
-        Accelerate(rig->graph.get(), compiler, MakeTarget(*rig, one.entry), one.subspace, node_name, options);
-    if (!accelerated.ok()) return Status(accelerated.status()).At({one.path});
-    one.node = accelerated->node;
-    one.config = accelerated->config;
-    one.notes = std::move(accelerated->notes);
+    KPSA_RETURN_IF_ERROR(
+        accelerator.Add(MakeTarget(*rig, one.entry), one.subspace, node_name, options).At({one.path}));
+  }
+  Result<std::vector<Accelerated>> accelerated = accelerator.Apply();
+  if (!accelerated.ok()) return Status(accelerated.status()).At({rig->path});
+  for (std::size_t e = 0; e < applied.size(); ++e) {
+    AppliedSubspace& one = applied[e];
+    one.node = (*accelerated)[e].node;
+    one.config = (*accelerated)[e].config;
+    one.notes = std::move((*accelerated)[e].notes);
     const NodeDef& def = rig->graph->def(one.node);
     for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
       if (one.entry.points[p].colors) continue;

@@ -1,5 +1,6 @@
 // kpsa train: a rig to a subspace.
 #include <algorithm>
+#include <chrono>
 #include <memory>
 
 #include "base/parallel.h"
@@ -136,8 +137,10 @@ CommandResult RunTrain(const TrainFlags& flags) {
     progress.Set(static_cast<std::size_t>(100 * share));
     return true;
   };
+  const auto begin = std::chrono::steady_clock::now();
   Result<Subspace> trained = Train(MakeTrainingRig(&rig, *entry), *clips, options);
   if (!trained.ok()) return Status(trained.status()).At({rig.path});
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const auto subspace = std::make_shared<const Subspace>(std::move(*trained));
   const TrainingRecord record = ParseTraining(subspace->training);
   const Calibration calibration =
@@ -149,7 +152,7 @@ CommandResult RunTrain(const TrainFlags& flags) {
   const InterruptScope writing;
   KPSA_RETURN_IF_ERROR(WriteSubspace(*subspace, path));
   const TrainResult result{flags.file,  path,  !flags.output.has_value(), subspace, record,
-                           calibration, *check};
+                           calibration, *check, seconds};
   Print(flags.json ? TrainJson(result) : TrainText(result));
   if (!flags.quiet) {
     for (const std::string& warning : {record.warning, calibration.warning}) {

@@ -90,6 +90,12 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
     training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip,
                                  carriers.count(control.plug.node.index) != 0,
                                  ShownByClip(*rig->graph, control)});
+    // The attribute's own limits; what counts or chooses has no values in between
+    const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)];
+    const Type type = rig->graph->PlugType(control.plug);
+    const bool whole = type == Type::kInt || type == Type::kBool || type == Type::kEnum;
+    training.controls.back().lowest = whole ? control.min : attribute.min;
+    training.controls.back().highest = whole ? control.max : attribute.max;
   }
   training.set_clip = [rig](std::optional<std::string_view> clip) { return SetClip(rig, clip); };
   return training;

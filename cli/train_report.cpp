@@ -32,7 +32,7 @@ std::string TrainJson(const TrainResult& r) {
                               {{"clips", r.record.clips},
                                {"clip_poses", r.record.clip_poses},
                                {"sampled_poses", r.record.sampled_poses}}},
-                             {"seconds", r.record.seconds},
+                             {"seconds", r.seconds},
                              {"held_out",
                               {{"poses", r.record.calibration_poses},
                                {"rms", r.record.held_out_rms},
@@ -63,7 +63,7 @@ std::string TrainText(const TrainResult& r) {
   std::string text;
   text += fmt::format("{}: {}, {} ({} numbers), {} modes, {:.1f} s\n", r.path, Plural(r.points(), "point"),
                       Plural(r.subspace->cues.size(), "cue"), r.subspace->rows(), r.subspace->modes,
-                      r.record.seconds);
+                      r.seconds);
   text += fmt::format("trained on {} of {} and {}\n", Plural(r.record.clip_poses, "frame"),
                       r.record.clips.empty() ? "no clip" : fmt::format("{}", fmt::join(r.record.clips, ", ")),
                       Plural(r.record.sampled_poses, "sampled pose"));

@@ -17,6 +17,7 @@ struct TrainResult {
   TrainingRecord record;
   Calibration calibration;
   SubspaceCheck check;
+  double seconds = 0;  // that the training took
   std::size_t points() const;
 };
 

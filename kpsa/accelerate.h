@@ -48,7 +48,26 @@ struct Accelerated {
   std::vector<std::string> notes;  // what may surprise
 };
 
-// Errors: a subspace of other meshes or stages, or of a rig that differs (named); nothing is changed then.
+// Puts subspaces into a graph, all at once: each is checked against the graph as it was, and what one of them
+// accelerates may drive what another does, in any order. Cues, guards and full evaluations read the stacks,
+// never another KPSA node, as training did; nodes that no accelerated points depend on read the KPSA nodes.
+class Accelerator {
+ public:
+  Accelerator(Graph* graph, Compiler* compiler) : graph_(graph), compiler_(compiler) {}
+  // Errors: a subspace of other meshes or stages, or of a rig that differs (named). The graph is not changed.
+  Status Add(const AccelerationTarget& target, std::shared_ptr<const Subspace> subspace,
+             const std::string& node_name, const AccelerateOptions& options);
+  // Adds the nodes and connects them; in the order of Add.
+  Result<std::vector<Accelerated>> Apply();
+
+ private:
+  struct Entry;
+  Graph* graph_;
+  Compiler* compiler_;
+  std::vector<std::shared_ptr<const Entry>> entries_;
+};
+
+// One subspace alone.
 Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const AccelerationTarget& target,
                                std::shared_ptr<const Subspace> subspace, const std::string& node_name,
                                const AccelerateOptions& options);

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <vector>
+
+#include "kpsa/binomial.h"
 
 namespace kpsa {
 namespace {
 
-constexpr double kShareOfHits = 2;  // in alphas: violations among the hits
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // u in [0, 1] with smoothstep(u) = w.
@@ -23,31 +25,152 @@ double InverseSmoothstep(double w) {
   return hi;
 }
 
-// The largest tau at which the pose does not violate: the blend then takes just enough of the full
-// evaluation.
+// The largest tau at which the pose is no farther than the tolerance: the blend then takes just enough of the
+// full evaluation.
 double LargestHarmless(const CalibrationPair& pair, double tolerance, double blend_start) {
-  if (std::isnan(pair.score) || std::isnan(pair.error)) return 0;
-  if (pair.error <= tolerance) return kInfinity;
+  if (pair.guard >= 1) return kInfinity;
+  if (std::isnan(pair.score) || std::isnan(pair.error) || std::isnan(pair.guard)) return 0;
+  if ((1 - pair.guard) * pair.error <= tolerance) return kInfinity;
   const double u = pair.error == kInfinity ? 1 : InverseSmoothstep(1 - tolerance / pair.error);
   return pair.score / (blend_start + u * (1 - blend_start));
 }
 
+// What is known of the poses of one kind, sorted.
+struct KindPoses {
+  std::size_t poses = 0;
+  double attainable = 0;       // of alpha
+  std::vector<double> limits;  // a pose violates where tau exceeds its limit
+  std::vector<double> scores;  // of poses without a guard, which are hits where tau_lo reaches them
+  std::size_t Violations(double tau) const {
+    return static_cast<std::size_t>(std::lower_bound(limits.begin(), limits.end(), tau) - limits.begin());
+  }
+  std::size_t Hits(double tau_lo) const {
+    return static_cast<std::size_t>(std::upper_bound(scores.begin(), scores.end(), tau_lo) - scores.begin());
+  }
+};
+
+// The smallest rate that n poses without a violation promise.
+double Attainable(double alpha, std::size_t n) {
+  return std::max(alpha, BinomialUpperBound(0, n, kCalibrationConfidence));
+}
+
+// Most violations among n poses that promise a rate; the rate is attainable.
+std::size_t Admitted(double rate, std::size_t n) {
+  std::size_t lo = 0, hi = n;  // lo is admitted
+  while (lo < hi) {
+    const std::size_t middle = lo + (hi - lo + 1) / 2;
+    if (BinomialUpperBound(middle, n, kCalibrationConfidence) <= rate * (1 + 1e-12)) {
+      lo = middle;
+    } else {
+      hi = middle - 1;
+    }
+  }
+  return lo;
+}
+
+bool FewAmongHits(std::size_t violations, std::size_t hits, double alpha) {
+  return static_cast<double>(violations + 1) <= kShareOfHits * alpha * static_cast<double>(hits + 1);
+}
+
+// The largest tau that all demands allow, or 0.
+double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, const Calibration& wanted) {
+  const double c = wanted.threshold.blend_start;
+  std::map<int, KindPoses> kinds;
+  std::vector<double> severe, candidates;
+  double largest_score = 0;
+  for (const CalibrationPair& pair : pairs) {
+    KindPoses& kind = kinds[pair.kind];
+    ++kind.poses;
+    kind.limits.push_back(LargestHarmless(pair, tolerance, c));
+    severe.push_back(LargestHarmless(pair, kSevere * tolerance, c));
+    if (pair.guard == 0 && !std::isnan(pair.score)) kind.scores.push_back(pair.score);
+    if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
+    for (const double limit : {kind.limits.back(), severe.back()}) {
+      if (limit < kInfinity) candidates.push_back(limit);
+    }
+  }
+  const double cap = largest_score / c * (1 + 1e-12);
+  for (double& candidate : candidates) candidate = std::min(candidate, cap);
+  candidates.push_back(cap);
+  std::sort(candidates.rbegin(), candidates.rend());
+  candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
+  std::sort(severe.begin(), severe.end());
+  std::map<int, std::size_t> admitted;
+  for (auto& [number, kind] : kinds) {
+    std::sort(kind.limits.begin(), kind.limits.end());
+    std::sort(kind.scores.begin(), kind.scores.end());
+    kind.attainable = Attainable(wanted.alpha, kind.poses);
+    admitted[number] = Admitted(kind.attainable, kind.poses);
+  }
+  const std::size_t severe_admitted = Admitted(wanted.attainable_severe, pairs.size());
+  for (const double tau : candidates) {
+    if (!(tau > 0)) break;
+    if (static_cast<std::size_t>(std::lower_bound(severe.begin(), severe.end(), tau) - severe.begin()) >
+        severe_admitted)
+      continue;
+    std::size_t violations = 0, hits = 0;
+    bool allowed = true;
+    for (const auto& [number, kind] : kinds) {
+      const std::size_t v = kind.Violations(tau), h = kind.Hits(tau * c);
+      allowed = allowed && v <= admitted[number] && (v == 0 || FewAmongHits(v, h, kind.attainable));
+      violations += v, hits += h;
+    }
+    if (allowed && FewAmongHits(violations, hits, wanted.attainable_alpha)) return tau;
+  }
+  return 0;
+}
+
+// What a threshold means on the poses; the margin forgives the rounding of the limit itself.
+void Count(std::span<const CalibrationPair> pairs, double tolerance, Calibration* c) {
+  std::map<int, Calibration::Kind> kinds;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const CalibrationPair& pair = pairs[i];
+    Calibration::Kind& kind = kinds[pair.kind];
+    kind.kind = pair.kind;
+    const double weight = EmittedWeight(pair, c->threshold), error = EmittedError(pair, c->threshold);
+    ++kind.poses;
+    kind.hits += weight == 0;
+    kind.accepted += weight < 1;
+    kind.violations += weight < 1 && !(error <= tolerance * (1 + 1e-9));
+    c->severe += weight < 1 && !(error <= kSevere * tolerance * (1 + 1e-9));
+    if (weight < 1 && (c->worst == Calibration::kNoPose || error > c->worst_error))
+      c->worst = i, c->worst_error = error;
+  }
+  for (auto& [number, kind] : kinds) {
+    kind.upper_bound = BinomialUpperBound(kind.violations, kind.poses, kCalibrationConfidence);
+    c->upper_bound = std::max(c->upper_bound, kind.upper_bound);
+    c->hits += kind.hits, c->accepted += kind.accepted, c->violations += kind.violations;
+    c->kinds.push_back(kind);
+  }
+  c->hit_rate = static_cast<double>(c->hits) / static_cast<double>(pairs.size());
+  c->accepted_rate = static_cast<double>(c->accepted) / static_cast<double>(pairs.size());
+}
+
 }  // namespace
 
+double EmittedWeight(const CalibrationPair& pair, const SoftCacheThreshold& threshold) {
+  const double score = std::isnan(pair.score) ? 1 : FullWeight(pair.score, threshold);
+  return threshold.tau == kInfinity ? score : std::max(score, std::isnan(pair.guard) ? 1 : pair.guard);
+}
+
 double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& threshold) {
-  const double weight = FullWeight(pair.score, threshold);
+  const double weight = EmittedWeight(pair, threshold);
   return weight == 1 ? 0 : (1 - weight) * pair.error;
 }
 
 Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
                       double blend_start) {
   Calibration result;
-  const double n = static_cast<double>(pairs.size());
   result.poses = pairs.size();
   result.alpha = alpha;
   result.threshold.blend_start = std::clamp(blend_start, 1e-3, 1.0);
-  result.attainable_alpha = std::max(alpha, 1 / (n + 1));
-  result.enough_poses = alpha * (n + 1) >= 1;
+  std::map<int, std::size_t> counts;
+  for (const CalibrationPair& pair : pairs) ++counts[pair.kind];
+  std::size_t fewest = pairs.size();
+  for (const auto& [kind, count] : counts) fewest = std::min(fewest, count);
+  result.attainable_alpha = Attainable(alpha, fewest);
+  result.attainable_severe = Attainable(kSevereShare * alpha, pairs.size());
+  result.enough_poses = result.attainable_alpha <= alpha;
   if (!(tolerance > 0)) return result;  // never a hit: the exact rig
   if (tolerance == kInfinity) {
     result.threshold.tau = kInfinity;
@@ -60,46 +183,16 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   }
   if (!result.enough_poses) {
     result.warning = fmt::format(
-        "{} calibration poses cannot promise a violation rate of {:g}; the threshold keeps {:.3g} "
-        "({})",
-        pairs.size(), alpha, result.attainable_alpha,
-        alpha > 0 ? fmt::format("at least {:.0f} poses are needed", std::ceil(1 / alpha - 1))
+        "{} calibration poses cannot promise a violation rate of {:g}; the threshold keeps {:.3g} ({})",
+        fewest, alpha, result.attainable_alpha,
+        alpha > 0 ? fmt::format("at least {:.0f} poses are needed",
+                                std::ceil(std::log(1 - kCalibrationConfidence) / std::log1p(-alpha)))
                   : "no number of poses can");
   }
-
-  // A pose violates where tau exceeds its limit, so the limit number k + 1 admits k violations
-  std::vector<double> limits;
-  double largest_score = 0;
-  for (const CalibrationPair& pair : pairs) {
-    limits.push_back(LargestHarmless(pair, tolerance, result.threshold.blend_start));
-    if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
-  }
-  std::sort(limits.begin(), limits.end());
-  const double admitted = std::floor(result.attainable_alpha * (n + 1) * (1 + 1e-12) - 1);
-  const double cap = largest_score / result.threshold.blend_start * (1 + 1e-12);
-  const auto limit = [&](std::size_t k) { return k < limits.size() ? std::min(limits[k], cap) : cap; };
-  const auto hits_below = [&](double tau) {
-    const double tau_lo = tau * result.threshold.blend_start;
-    return std::count_if(pairs.begin(), pairs.end(),
-                         [&](const CalibrationPair& pair) { return pair.score <= tau_lo; });
-  };
-  auto k = static_cast<std::size_t>(std::clamp(admitted, 0.0, n));
-  const double share = kShareOfHits * result.attainable_alpha;
-  while (k > 0 && static_cast<double>(k) > share * static_cast<double>(hits_below(limit(k)))) --k;
-  const double tau = limit(k);
+  const double tau = LargestAllowed(pairs, tolerance, result);
   if (tau > 0) result.threshold.tau = tau;
   if (!(tau > 0)) result.warning = "no threshold keeps the violation rate, so nothing is ever a hit";
-
-  // What that means on these poses; the margin forgives the rounding of the limit itself
-  std::size_t hits = 0, accepted = 0;
-  for (const CalibrationPair& pair : pairs) {
-    const double weight = std::isnan(pair.score) ? 1 : FullWeight(pair.score, result.threshold);
-    hits += weight == 0;
-    accepted += weight < 1;
-    result.violations += weight < 1 && !(EmittedError(pair, result.threshold) <= tolerance * (1 + 1e-9));
-  }
-  result.hit_rate = static_cast<double>(hits) / n;
-  result.accepted_rate = static_cast<double>(accepted) / n;
+  Count(pairs, tolerance, &result);
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "base/matrix.h"
 #include "kpsa/signals.h"
+#include "kpsa/space_frame.h"
 
 namespace kpsa {
 namespace {
@@ -15,6 +16,8 @@ namespace {
 // Inputs and outputs by position.
 enum In { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints };
 enum Out { kOutPoints, kScore, kHit, kFullWeight, kMissReason, kOffender };
+
+constexpr int kGrowthSteps = 16;  // of sqrt(2): a space that is 256 times as large as at rest
 
 std::atomic<bool> measure_times{false};
 std::atomic<std::uint64_t> cue_ns{0}, projection_ns{0}, reconstruction_ns{0};
@@ -42,6 +45,9 @@ class Stopwatch {
 struct KpsaKernel {
   std::shared_ptr<const KpsaConfig> config;
   SoftCacheThreshold threshold;
+  // The same where errors are larger, since the space has grown: [j] for a growth of sqrt(2)^j. Errors are
+  // lengths of the space, the tolerance is one of the world.
+  std::vector<double> grown_tau;
   struct Output {
     bool all = true;
     std::vector<Index> points;  // wanted ones, where not all
@@ -55,6 +61,7 @@ struct KpsaKernel {
 // where tiles read that.
 struct KpsaState {
   Verdict verdict;
+  Matrix4 world_from_space;
 };
 float* Measured(const ComputeContext& c) {
   return reinterpret_cast<float*>(c.state + (sizeof(KpsaState) + 63) / 64 * 64);
@@ -65,7 +72,17 @@ std::span<const float> TileInputsOf(const ComputeContext& c, const Subspace& sub
   return {Measured(c) + y, subspace.tile_inputs()};
 }
 
-Index FirstOutsideGuard(const ComputeContext& c, const KpsaConfig::Data& data) {
+// What the guards ask for, and the one that asks most.
+struct GuardVerdict {
+  double weight = 0;
+  Index offender = kNoIndex;
+  void Add(double other, Index guard) {
+    if (other > weight) weight = other, offender = guard;
+  }
+};
+
+GuardVerdict AskGuards(const ComputeContext& c, const KpsaConfig::Data& data) {
+  GuardVerdict verdict;
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
   for (std::uint32_t j = 0; j < matrices.size(); ++j) {
     const double* lo = data.matrix_lo.data() + 12 * j;
@@ -78,20 +95,57 @@ Index FirstOutsideGuard(const ComputeContext& c, const KpsaConfig::Data& data) {
         inside &= (v >= lo[3 * column + row]) & (v <= hi[3 * column + row]);
       }
     }
-    if (!inside) return j;
+    if (inside) continue;
+    const double* ramp = data.matrix_ramp.data() + 12 * j;
+    for (std::size_t e = 0; e < 12; ++e)
+      verdict.Add(GuardWeight(lo[e], hi[e], ramp[e], m.m[4 * (e / 3) + e % 3]), j);
+    if (verdict.weight >= 1) return verdict;
   }
   const ArrayView<double> scalars = c.array<double>(kScalars);
   for (std::uint32_t k = 0; k < scalars.size(); ++k) {
-    if (!(scalars[k] >= data.scalar_lo[k] && scalars[k] <= data.scalar_hi[k])) return matrices.size() + k;
+    if (scalars[k] >= data.scalar_lo[k] && scalars[k] <= data.scalar_hi[k]) continue;
+    verdict.Add(GuardWeight(data.scalar_lo[k], data.scalar_hi[k], data.scalar_ramp[k], scalars[k]),
+                matrices.size() + k);
+    if (verdict.weight >= 1) return verdict;
   }
-  return kNoIndex;
+  return verdict;
+}
+
+constexpr double kStretchSlack = 0.05;  // of the tolerance: displacement that a stretch may cause unnoticed,
+constexpr double kStretchRamp = 1;      // and by which the full evaluation is alone
+constexpr double kStretchRounding = 2e-6;  // matrices of a file are products of floats
+
+// The share of the full evaluation that a stretch asks for.
+double StretchWeight(const KpsaConfig::Data& data, const SpaceFrame& frame) {
+  double stretch = frame.stretch;
+  if (!data.space_scales) stretch = std::max(stretch, std::fabs(frame.scale - 1));
+  const Subspace& s = *data.subspace;
+  const double unit = s.extent > 0 ? s.tolerance / s.extent : 0;
+  return GuardWeight(0, kStretchRounding + kStretchSlack * unit, kStretchRamp * unit, stretch);
+}
+
+// The threshold where the space is `scale` times as large as at rest. Between the steps of the table it falls
+// from one value to the next, never above the one that belongs to the scale (but for the first 1 %).
+SoftCacheThreshold ThresholdAt(const KpsaKernel& kernel, double scale) {
+  constexpr double kFirst = 1.01;
+  SoftCacheThreshold threshold = kernel.threshold;
+  if (scale <= 1 || !(threshold.tau < std::numeric_limits<double>::infinity())) return threshold;
+  const double place = scale <= kFirst ? (scale - 1) / (kFirst - 1) : 1 + 2 * std::log2(scale / kFirst);
+  const auto step = static_cast<std::size_t>(std::min(place, 1e6));
+  if (step + 1 >= kernel.grown_tau.size()) {
+    threshold.tau = -1;
+    return threshold;
+  }
+  const double part = place - static_cast<double>(step);
+  threshold.tau = (1 - part) * kernel.grown_tau[step] + part * kernel.grown_tau[step + 1];
+  return threshold;
 }
 
 // The raw measurement, in the order of the subspace's rows.
-void Gather(const ComputeContext& c, const KpsaConfig::Data& data, std::span<double> raw) {
+void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4& world_from_space,
+            std::span<double> raw) {
   Matrix4 space_from_world;
-  if (!(c.get<Matrix4>(kSpaceMatrix) == Matrix4()))
-    space_from_world = InverseOrIdentity(c.get<Matrix4>(kSpaceMatrix));
+  if (!(world_from_space == Matrix4())) space_from_world = InverseOrIdentity(world_from_space);
   const ArrayView<ConstPointsView> cues = c.array<ConstPointsView>(kCues);
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
   const ArrayView<double> scalars = c.array<double>(kScalars);
@@ -134,23 +188,41 @@ std::uint64_t Decide(ComputeContext& c) {
   };
   // What comes after it binds to the rest points: to the exact ones
   if (c.at_rest || data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
+  SpaceFrame frame;
+  if (data.has_space) frame = SpaceFrameOf(c.get<Matrix4>(kSpaceMatrix), subspace.inverse_rest_stretch);
+  state.world_from_space = frame.world_from_space;
+  const bool any = kernel.threshold.tau == std::numeric_limits<double>::infinity();
   const std::size_t r = subspace.rows();
   const std::span<double> raw(reinterpret_cast<double*>(c.scratch), r);
   const std::size_t padded = subspace.soft_cache.padded_rows();
   const std::span<float> y(Measured(c), padded), g(c.scratch + 2 * padded, padded);
+  GuardVerdict guard;
+  double stretch = 0;
   {
     const Stopwatch watch(cue_ns);
-    if (const Index outside = FirstOutsideGuard(c, data); outside != kNoIndex)
-      return miss(MissReason::kOutOfRange, outside);
-    Gather(c, data, raw);
+    if (!any) {
+      guard = AskGuards(c, data);
+      if (guard.weight >= 1) return miss(MissReason::kOutOfRange, guard.offender);
+      stretch = StretchWeight(data, frame);
+      if (stretch >= 1) return miss(MissReason::kSpace, kNoIndex);
+    }
+    Gather(c, data, frame.world_from_space, raw);
   }
   const Stopwatch watch(projection_ns);
   Normalize(subspace, raw, y);
   for (std::size_t j = r; j < padded; ++j) y[j] = 0;
-  state.verdict = Judge(subspace.soft_cache, kernel.threshold, y, g);
-  if (!subspace.latent.empty() && state.verdict.full_weight < 1)
+  Verdict& verdict = state.verdict;
+  verdict = Judge(subspace.soft_cache, ThresholdAt(kernel, frame.scale), y, g);
+  // The largest weight counts
+  if (guard.weight > verdict.full_weight)
+    verdict.full_weight = guard.weight, verdict.reason = MissReason::kOutOfRange,
+    verdict.offender = guard.offender;
+  if (stretch > verdict.full_weight)
+    verdict.full_weight = stretch, verdict.reason = MissReason::kSpace, verdict.offender = kNoIndex;
+  verdict.hit = verdict.full_weight == 0;
+  if (!subspace.latent.empty() && verdict.full_weight < 1)
     ToLatent(subspace, y, {Measured(c) + padded, subspace.tile_inputs()});
-  return state.verdict.hit ? 0 : all;
+  return verdict.hit ? 0 : all;
 }
 
 void WriteVerdict(const ComputeContext& c) {
@@ -167,7 +239,7 @@ void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, Poi
   const Subspace& subspace = *kernel.config->data().subspace;
   const KpsaKernel::Output& wanted = kernel.outputs[m];
   const std::span<const float> y = TileInputsOf(c, subspace);
-  const Matrix4& matrix = c.get<Matrix4>(kSpaceMatrix);
+  const Matrix4& matrix = c.state_as<KpsaState>().world_from_space;
   const bool in_space = kernel.config->data().outputs_in_space[m] != 0;
   const Matrix4* space = !in_space || matrix == Matrix4() ? nullptr : &matrix;
   const TileMap& tiles = subspace.tiles[m];
@@ -230,7 +302,7 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
       for (std::size_t f = 0; f < frames; ++f) {
         std::memcpy(y + f * r, TileInputsOf(contexts[first + f], subspace).data(), r * sizeof(float));
         outs[f] = contexts[first + f].out_points(kOutPoints, static_cast<std::uint32_t>(m));
-        spaces[f] = contexts[first + f].get<Matrix4>(kSpaceMatrix);
+        spaces[f] = contexts[first + f].state_as<KpsaState>().world_from_space;
         moved = moved || (kernel.config->data().outputs_in_space[m] != 0 && !(spaces[f] == Matrix4()));
       }
       subspace.tiles[m].ReconstructBlock({y, frames * r}, {outs, frames}, {}, {spaces, moved ? frames : 0});
@@ -267,9 +339,16 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
   }
   const double tolerance = s.get_double("tolerance") >= kAnyError ? std::numeric_limits<double>::infinity()
                                                                   : s.get_double("tolerance");
-  const Calibration calibration =
-      Calibrate(subspace.calibration, tolerance, s.get_double("violationRate"), subspace.blend_start);
-  kernel.threshold = calibration.threshold;
+  const double rate = s.get_double("violationRate");
+  kernel.threshold = Calibrate(subspace.calibration, tolerance, rate, subspace.blend_start).threshold;
+  if (data.space_scales && kernel.threshold.tau > 0) {
+    kernel.grown_tau = {kernel.threshold.tau};
+    for (int j = 1; j <= kGrowthSteps && kernel.grown_tau.back() > 0; ++j) {
+      const double smaller = tolerance * std::exp2(-0.5 * j);
+      kernel.grown_tau.push_back(
+          std::max(0.0, Calibrate(subspace.calibration, smaller, rate, subspace.blend_start).threshold.tau));
+    }
+  }
   std::size_t whole = 0;
   for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
     const PointSet& wanted = binding.output("outPoints", static_cast<int>(m));
@@ -321,12 +400,19 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(row.input);
     hasher.Add(row.element);
   }
-  for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.scalar_lo, &data_.scalar_hi})
+  for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.matrix_ramp, &data_.scalar_lo,
+                            &data_.scalar_hi, &data_.scalar_ramp})
     hasher.Add(std::span<const double>(*range));
   for (const CalibrationPair& pair : s.calibration) {
     hasher.Add(pair.score);
     hasher.Add(pair.error);
+    hasher.Add(pair.guard);
+    hasher.Add(pair.kind);
   }
+  hasher.Add(std::span<const double>(s.inverse_rest_stretch.m));
+  hasher.Add(s.extent);
+  hasher.Add(data_.has_space);
+  hasher.Add(data_.space_scales);
   hasher.Add(std::span<const char>(data_.outputs_in_space));
   hasher.Add(data_.always_miss);
   digest_ = hasher.Finish();
@@ -385,10 +471,12 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
     case MissReason::kNone:
       return "hit";
     case MissReason::kNeverHit:
-      return data.always_miss ? "the subspace is stale" : "the tolerance allows no hit";
+      return data.always_miss ? data.always_miss_reason : "the tolerance allows no hit";
     case MissReason::kOutOfRange:
       return fmt::format("{} is outside its trained range",
                          offender < data.guard_names.size() ? data.guard_names[offender] : "a control");
+    case MissReason::kSpace:
+      return fmt::format("{} is stretched, mirrored or scaled as it was not in training", data.stretched);
     case MissReason::kNotFinite:
     case MissReason::kScore: {
       std::string cue = "a cue";

@@ -39,12 +39,17 @@ class KpsaConfig final : public Asset {
   struct Data {
     std::shared_ptr<const Subspace> subspace;
     std::vector<PointCues> cues;
-    std::vector<Row> rows;                     // one a cue, in the order of the subspace's
-    std::vector<char> outputs_in_space;        // [outputs] as of cues: they are given in spaceMatrix's frame
-    std::vector<double> matrix_lo, matrix_hi;  // [12 * matrices] trained ranges; see MatrixEntries
-    std::vector<double> scalar_lo, scalar_hi;  // [scalars]
-    std::vector<std::string> guard_names;      // matrices, then scalars
-    bool always_miss = false;  // the subspace is stale, and the user asked for the full evaluation
+    std::vector<Row> rows;               // one a cue, in the order of the subspace's
+    std::vector<char> outputs_in_space;  // [outputs] as of cues: they are given in spaceMatrix's frame
+    // Trained ranges and how guards come in outside of them (TrainedRange); see MatrixEntries
+    std::vector<double> matrix_lo, matrix_hi, matrix_ramp;  // [12 * matrices]
+    std::vector<double> scalar_lo, scalar_hi, scalar_ramp;  // [scalars]
+    std::vector<std::string> guard_names;                   // matrices, then scalars
+    bool has_space = false;                                 // spaceMatrix is connected
+    bool space_scales = false;                              // a uniform scale of it is taken into account
+    std::string stretched;                                  // what may stretch it: a transform
+    bool always_miss = false;                               // every frame is evaluated fully:
+    std::string always_miss_reason;                         // why
   };
   explicit KpsaConfig(Data data);
   const char* kind() const override { return "kpsaConfig"; }

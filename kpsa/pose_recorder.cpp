@@ -1,12 +1,23 @@
 #include "kpsa/pose_recorder.h"
 
+#include <algorithm>
+#include <cmath>
 #include <mutex>
 
 #include "base/check.h"
 #include "base/matrix.h"
 #include "base/parallel.h"
+#include "kpsa/space_frame.h"
 
 namespace kpsa {
+
+namespace {
+
+double TimeOf(const SampledPose& pose, const TrainingClip& clip) {
+  return clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
+}
+
+}  // namespace
 
 Result<std::shared_ptr<const Plan>> PoseRecorder::CompileFor(const std::vector<PlugRef>& varying) {
   // Outputs: points of the meshes, candidate points, signals, space
@@ -45,7 +56,8 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
   Index o = 0;
   if (!target.space.empty()) {
     const auto last = static_cast<Index>(evaluator.plan().outputs().size() - 1);
-    space_from_world = InverseOrIdentity(evaluator.Get<Matrix4>(last));
+    space_from_world =
+        InverseOrIdentity(SpaceFrameOf(evaluator.Get<Matrix4>(last), inverse_rest_stretch_).world_from_space);
   }
   std::size_t column = 0;
   const auto store_points = [&](ConstPointsView points, bool in_space) {
@@ -60,20 +72,50 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
   for (const auto& mesh : target.meshes) store_points(evaluator.Points(o++), mesh.stages.back().world);
   for (const CandidateStage& candidate : candidates_)
     store_points(evaluator.Points(o++), target.meshes[candidate.mesh].stages[candidate.stage].world);
+  StoreSignals(evaluator, o, row.subspan(column));
+  KPSA_CHECK_EQ(column + layout_.scalars, row.size());
+}
+
+void PoseRecorder::StoreSignals(const Evaluator& evaluator, Index o, std::span<float> entries) const {
+  std::size_t column = 0;
   for (const Signal& signal : signals_) {
     if (signal.matrix) {
-      double entries[12];
-      MatrixEntries(evaluator.Get<Matrix4>(o++), entries);
-      for (double entry : entries) row[column++] = static_cast<float>(entry);
-    } else {
-      const Type type = evaluator.plan().outputs()[o].type;
-      const double value = type == Type::kDouble ? evaluator.Get<double>(o)
-                                                 : static_cast<double>(evaluator.Get<std::int64_t>(o));
-      ++o;
-      row[column++] = static_cast<float>(value);
+      double values[12];
+      MatrixEntries(evaluator.Get<Matrix4>(o++), values);
+      for (double value : values) entries[column++] = static_cast<float>(value);
+      continue;
+    }
+    const Type type = evaluator.plan().outputs()[o].type;
+    const double value = type == Type::kDouble ? evaluator.Get<double>(o)
+                                               : static_cast<double>(evaluator.Get<std::int64_t>(o));
+    ++o;
+    entries[column++] = static_cast<float>(value);
+  }
+}
+
+Status PoseRecorder::CheckFinite(std::span<const float> row) const {
+  const auto bad = std::find_if(row.begin(), row.end(), [](float v) { return !std::isfinite(v); });
+  if (bad == row.end()) return Status();
+  auto column = static_cast<std::size_t>(bad - row.begin());
+  if (column < layout_.outputs()) {
+    std::size_t point = column / 3;
+    for (const auto& mesh : rig_.target.meshes) {
+      Request request;
+      request.outputs.push_back({mesh.stages.back().points, {}});
+      const Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
+      const std::size_t total = plan.ok() ? (*plan)->outputs()[0].points.total() : 0;
+      if (point < total) return Status::Evaluation("point {} of {} is not a number", point, mesh.name);
+      point -= total;
     }
   }
-  KPSA_CHECK_EQ(column, row.size());
+  if (column >= layout_.scalar_begin()) {
+    column -= layout_.scalar_begin();
+    for (const Signal& signal : signals_) {
+      if (column < signal.entries()) return Status::Evaluation("{} is not a number", signal.name);
+      column -= signal.entries();
+    }
+  }
+  return Status::Evaluation("a point of an earlier stage is not a number");
 }
 
 Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
@@ -100,6 +142,10 @@ Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t
     }
   });
   if (failed < count) return Status::Evaluation("{}: {}", name(failed), failure.ToString());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (Status finite = CheckFinite(rows[i]); !finite.ok())
+      return Status::Evaluation("{}: {}", name(i), finite.errors().front().message);
+  }
   return Status();
 }
 
@@ -111,6 +157,52 @@ Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
   return Record(
       *plan, clip.times.size(), poses, [&](std::size_t i, Evaluator& e) { e.Set(time, clip.times[i]); },
       [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
+}
+
+Status PoseRecorder::WidenRanges(const TrainingClip& clip, std::vector<double>* lo, std::vector<double>* hi) {
+  KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
+  Request request;
+  for (const Signal& signal : signals_) request.outputs.push_back({signal.plug, {}});
+  request.varying = {rig_.time};
+  Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
+  if (!plan.ok()) return plan.status();
+  const Index time = (*plan)->FindVarying(rig_.time);
+  Evaluator evaluator(*plan);
+  std::vector<float> entries(layout_.scalars);
+  for (const double t : clip.times) {
+    evaluator.Set(time, t);
+    KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
+    StoreSignals(evaluator, 0, entries);
+    for (std::size_t e = 0; e < entries.size(); ++e) {
+      (*lo)[e] = std::min<double>((*lo)[e], entries[e]);
+      (*hi)[e] = std::max<double>((*hi)[e], entries[e]);
+    }
+  }
+  return rig_.set_clip(std::nullopt);
+}
+
+// "sampled pose (jaw.rotateX -0.38, smile 0.9 of clip talk at 1.2 s)": the controls farthest from rest.
+std::string PoseRecorder::NameOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) const {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t c = 0; c < pose.values.size(); ++c) {
+    const ControlRange& control = rig_.controls[c];
+    const double extent = std::max(control.max - control.min, 1e-300);
+    if (pose.values[c] != control.rest)
+      order.emplace_back(-std::fabs(pose.values[c] - control.rest) / extent, c);
+  }
+  std::sort(order.begin(), order.end());
+  std::string text = "sampled pose";
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, order.size()); ++i) {
+    text +=
+        fmt::format("{}{} {:.4g}", i == 0 ? " (" : ", ",
+                    rig_.graph->PlugName(rig_.controls[order[i].second].plug), pose.values[order[i].second]);
+  }
+  if (!order.empty()) text += order.size() > 3 ? ", ...)" : ")";
+  if (pose.clip >= 0) {
+    const TrainingClip& clip = clips[static_cast<std::size_t>(pose.clip)];
+    text += fmt::format(" over clip \"{}\" at {:.4g} s", clip.name, TimeOf(pose, clip));
+  }
+  return text;
 }
 
 Result<ClipPoses> PoseRecorder::ControlsOfClips(const std::vector<TrainingClip>& clips) {
@@ -183,8 +275,7 @@ Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples,
         *plan, mine.size(), poses,
         [&](std::size_t i, Evaluator& e) {
           if (playing != nullptr && !playing->times.empty()) {
-            e.Set(time,
-                  playing->times.front() + mine[i]->phase * (playing->times.back() - playing->times.front()));
+            e.Set(time, TimeOf(*mine[i], *playing));
           }
           for (std::size_t k = 0; k < used.size(); ++k) {
             const double value = mine[i]->values[used[k]];
@@ -196,7 +287,7 @@ Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples,
             }
           }
         },
-        [&](std::size_t i) { return fmt::format("sampled pose {}", i); }));
+        [&](std::size_t i) { return NameOf(*mine[i], clips); }));
   }
   return Status();
 }

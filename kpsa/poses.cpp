@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 namespace kpsa {
 namespace {
@@ -66,6 +67,29 @@ class Sampler {
     MoveSome(4, 0.6, pose);
   }
 
+  void Mixture(SampledPose* pose) {
+    const std::size_t count = std::min(controls_.size(), 3 + random_.Below(4));
+    for (const std::size_t i : Some(controls_.size(), count))
+      pose->values[i] = controls_[i].min + (controls_[i].max - controls_[i].min) * random_.Unit();
+  }
+
+  void Neighbours(const ControlGroups& groups, SampledPose* pose) {
+    const std::vector<std::size_t>& group = groups[random_.Below(groups.size())];
+    const std::size_t count = std::min(group.size(), 2 + random_.Below(5));
+    for (const std::size_t k : Some(group.size(), count)) Move(group[k], 0.5 + 0.5 * random_.Unit(), pose);
+  }
+
+  // Controls of a clip that plays say nothing; whole numbers have no margin.
+  void Beyond(SampledPose* pose) {
+    const std::size_t count = std::min<std::size_t>(controls_.size(), 1 + random_.Below(3));
+    for (const std::size_t i : Some(controls_.size(), count)) {
+      const ControlRange& c = controls_[i];
+      const double beyond = kBeyondShare * (c.max - c.min) * random_.Unit();
+      const bool up = random_.Unit() < 0.5 || c.min == c.rest;
+      pose->values[i] = std::clamp(up ? c.max + beyond : c.min - beyond, c.lowest, c.highest);
+    }
+  }
+
   // Few controls or many: real poses are both. What is laid over a clip stays smaller, the clip's own motion
   // is there already.
   void MoveMany(SampledPose* pose) {
@@ -82,6 +106,14 @@ class Sampler {
   }
 
  private:
+  // `count` different numbers below n.
+  std::vector<std::size_t> Some(std::size_t n, std::size_t count) {
+    std::vector<std::size_t> all(n);
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    for (std::size_t k = 0; k < count; ++k) std::swap(all[k], all[k + random_.Below(n - k)]);
+    all.resize(count);
+    return all;
+  }
   void Move(std::size_t i, double amount, SampledPose* pose) {
     const ControlRange& c = controls_[i];
     const double end = random_.Unit() < (c.max - c.rest) / std::max(c.max - c.min, 1e-300) ? c.max : c.min;
@@ -159,6 +191,36 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
       if (!controls.empty()) sampler.MoveMany(&pose);
     }
     poses.push_back(std::move(pose));
+  }
+  return poses;
+}
+
+const char* PoseKindName(PoseKind kind) {
+  constexpr const char* kNames[] = {"sampled", "mixtures", "neighbours", "beyond the ranges"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
+                                     const ClipPoses& clip_poses, const ControlGroups& groups,
+                                     std::size_t clips, std::size_t count, std::uint64_t seed) {
+  if (kind == PoseKind::kSampled) return SamplePoses(controls, clip_poses, groups, clips, count, seed);
+  std::vector<SampledPose> poses;
+  if (controls.empty() || (kind == PoseKind::kNeighbours && groups.empty())) return poses;
+  if (kind == PoseKind::kBeyond) poses = SamplePoses(controls, clip_poses, groups, clips, count, seed);
+  Sampler sampler(controls, clip_poses, ~seed);
+  poses.resize(count, sampler.Rest());
+  for (SampledPose& pose : poses) {
+    pose.kind = kind;
+    switch (kind) {
+      case PoseKind::kMixture:
+        sampler.Mixture(&pose);
+        break;
+      case PoseKind::kNeighbours:
+        sampler.Neighbours(groups, &pose);
+        break;
+      default:
+        sampler.Beyond(&pose);
+    }
   }
   return poses;
 }

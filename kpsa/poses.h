@@ -2,12 +2,25 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
 #include "graph/graph.h"
 
 namespace kpsa {
+
+// Ways of drawing poses. Violations are promised of each kind by itself, so that a pose which no clip has is
+// no excuse (kpsa/calibration.h).
+enum class PoseKind : std::uint8_t {
+  kSampled,     // SamplePoses
+  kMixture,     // 3 to 6 controls anywhere in their ranges, the others at rest
+  kNeighbours,  // 2 to 6 controls that move the same points, at 50 to 100 % of their reach
+  kBeyond,      // a sampled pose with 1 to 3 controls up to kBeyondShare of their range beyond an end
+};
+inline constexpr int kPoseKinds = 4;
+inline constexpr double kBeyondShare = 0.1;
+const char* PoseKindName(PoseKind kind);  // "sampled", "mixtures", ...
 
 struct ControlRange {
   PlugRef plug;
@@ -16,6 +29,9 @@ struct ControlRange {
   bool often = false;    // it carries the space of the points: half of the mixtures move it
   std::optional<PlugRef> shown =
       {};  // where the value can be read that gives what a clip does (poseRotate.x for rotateX)
+  // What the attribute itself admits, where that is more than [min, max]; whole numbers admit nothing more.
+  double lowest = -std::numeric_limits<double>::infinity();
+  double highest = std::numeric_limits<double>::infinity();
 };
 
 // Control values of one pose (by control), and where in the training clips it plays: clip < 0 is the rest
@@ -24,6 +40,7 @@ struct SampledPose {
   std::vector<double> values;
   int clip = -1;
   double phase = 0;  // 0..1 of the clip
+  PoseKind kind = PoseKind::kSampled;
 };
 
 // What the controls have to be at the frames of the training clips to give the same pose without a clip: one
@@ -48,5 +65,10 @@ std::vector<SampledPose> Sweeps(const std::vector<ControlRange>& controls);
 std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses,
                                      const ControlGroups& groups, std::size_t clips, std::size_t count,
                                      std::uint64_t seed);
+
+// `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours).
+std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
+                                     const ClipPoses& clip_poses, const ControlGroups& groups,
+                                     std::size_t clips, std::size_t count, std::uint64_t seed);
 
 }  // namespace kpsa

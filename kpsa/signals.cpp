@@ -16,9 +16,10 @@ bool IsTransform(const NodeDef& def) {
 
 }  // namespace
 
-std::set<Index> ParentChain(const Graph& graph, NodeId node) {
-  std::set<Index> chain;
-  while (graph.IsAlive(node) && chain.insert(node.index).second) {
+std::vector<NodeId> ParentsFrom(const Graph& graph, NodeId node) {
+  std::vector<NodeId> chain;
+  while (graph.IsAlive(node) && std::find(chain.begin(), chain.end(), node) == chain.end()) {
+    chain.push_back(node);
     const int parent = graph.def(node).FindAttribute("parentMatrix");
     if (parent < 0) break;
     const Connection* c = graph.FindConnection({node, parent, -1, -1});
@@ -40,7 +41,7 @@ std::string EntryName(const Signal& signal, std::size_t entry) {
 
 Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
                                         const std::vector<PlugRef>& outputs,
-                                        const std::vector<PlugRef>& varying, const PlugRef* space_world,
+                                        const std::vector<PlugRef>& varying, const std::set<Index>& carried,
                                         std::vector<std::string>* unguarded) {
   Request request;
   for (const PlugRef& output : outputs) request.outputs.push_back({output, {}});
@@ -53,8 +54,6 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
         "accelerated; accelerate a stage before it",
         node);
   }
-  const std::set<Index> chain =
-      space_world == nullptr ? std::set<Index>() : ParentChain(graph, space_world->node);
 
   // Nodes that have a varying step, and whether one of them has points
   std::map<Index, bool> nodes;
@@ -88,7 +87,7 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
     const NodeId node = graph.IdAt(index);
     const NodeDef& def = graph.def(node);
     if (IsTransform(def) && !has_points) {
-      if (chain.count(index) != 0) continue;
+      if (carried.count(index) != 0) continue;
       const PlugRef plug{node, def.FindAttribute("matrix"), -1, -1};
       signals.emplace(graph.PlugName(plug), Signal{graph.PlugName(plug), plug, true});
       // A parent that is no transform has no local matrix of its own

@@ -25,16 +25,16 @@ void MatrixEntries(const Matrix4& m, double entries[12]);
 // "jaw.matrix/3": entry 3 of a matrix; a value's name is its signal's.
 std::string EntryName(const Signal& signal, std::size_t entry);
 
-// The nodes from `node` up through parentMatrix, by index.
-std::set<Index> ParentChain(const Graph& graph, NodeId node);
+// The nodes from `node` up through parentMatrix.
+std::vector<NodeId> ParentsFrom(const Graph& graph, NodeId node);
 
-// All signals of the points `outputs` under the varying plugs `varying`, sorted by name. The chain of
-// transforms from the root to `space` (a node whose frame the points are taken in) is left out, if one is
-// given. `unguarded` receives varying inputs that are no signals (arrays of points that are set from
-// outside). Points that depend on a stateful node (NodeDef::stateful) are an error that names it.
+// All signals of the points `outputs` under the varying plugs `varying`, sorted by name. The local matrices
+// of the transforms `carried` are left out: they move the points with their space. `unguarded` receives
+// varying inputs that are no signals (arrays of points that are set from outside). Points that depend on a
+// stateful node (NodeDef::stateful) are an error that names it.
 Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
                                         const std::vector<PlugRef>& outputs,
-                                        const std::vector<PlugRef>& varying, const PlugRef* space_world,
+                                        const std::vector<PlugRef>& varying, const std::set<Index>& carried,
                                         std::vector<std::string>* unguarded);
 
 }  // namespace kpsa

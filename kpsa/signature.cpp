@@ -25,7 +25,7 @@ Signature RigSignature(const Graph& graph, const std::vector<PlugRef>& outputs,
   for (const PlugRef& frame : space) {
     if (frame.node == within.root) continue;
     if (seen.insert(frame.node.index).second) stack.push_back(frame.node);
-    carriers.merge(ParentChain(graph, frame.node));
+    for (const NodeId node : ParentsFrom(graph, frame.node)) carriers.insert(node.index);
   }
   Signature signature;
   std::set<std::tuple<Index, int, int>> moving;  // plugs whose pose says nothing: guards see it

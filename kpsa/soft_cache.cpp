@@ -287,17 +287,9 @@ Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, 
   return verdict;
 }
 
-TrainedRange MakeTrainedRange(std::string plug, double min, double max, double margin) {
-  const double widened = margin * (max - min) + 1e-6 * std::max({1.0, std::fabs(min), std::fabs(max)});
-  return {std::move(plug), min - widened, max + widened};
-}
-
-Index FirstOutside(std::span<const TrainedRange> ranges, std::span<const double> values) {
-  KPSA_DCHECK(ranges.size() == values.size());
-  for (std::size_t i = 0; i < ranges.size(); ++i) {
-    if (!(values[i] >= ranges[i].lo && values[i] <= ranges[i].hi)) return static_cast<Index>(i);
-  }
-  return kNoIndex;
+TrainedRange MakeTrainedRange(std::string plug, double min, double max, double slack, double ramp) {
+  const double widened = slack + 1e-6 * std::max({1.0, std::fabs(min), std::fabs(max)});
+  return {std::move(plug), min - widened, max + widened, ramp};
 }
 
 std::string OutsideMessage(const TrainedRange& range, double value) {

@@ -11,7 +11,8 @@
 // F is read once, four rows at a time: w = F y gives the four values that the same rows then add to g.
 //
 // Below tau_lo = c tau: a hit. Between tau_lo and tau: a stateless smoothstep blends the full evaluation in.
-// Above: the full evaluation alone. Frames therefore do not depend on their order.
+// Above: the full evaluation alone. Frames therefore do not depend on their order. Guards are such ramps,
+// too; the largest weight counts.
 #pragma once
 
 #include <Eigen/Core>
@@ -31,8 +32,9 @@ enum class MissReason : std::uint8_t {
   kNone,        // a hit
   kScore,       // the score is above tau_lo; `offender` is the cue of the largest leave-one-out error
   kNotFinite,   // a measurement is NaN or infinite; `offender` is its cue
-  kOutOfRange,  // a control is outside its trained range; `offender` is its index
+  kOutOfRange,  // a value is outside its trained range; `offender` is its guard
   kNeverHit,    // the tolerance is zero, or no threshold keeps the violation rate
+  kSpace,       // the space is stretched, mirrored or scaled as it was not in training
 };
 
 struct Verdict {
@@ -84,16 +86,24 @@ RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y
 Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
               std::span<float> g);
 
-// The trained range of a plug that may vary, margin included.
+// The trained range of a plug that may vary, and how far outside of it the full evaluation comes in.
 struct TrainedRange {
   std::string plug;
-  double lo = 0, hi = 0;
+  double lo = 0, hi = 0;  // seen in training, or too near to it to matter
+  double ramp = 0;  // from lo - ramp down and hi + ramp up nothing but the full evaluation is left, >= 0
 };
-// [min, max] widened by `margin` of its extent on both sides (and by rounding, 1e-6 of the magnitude, of at
-// least 1: an entry that rested at 0 in training may come out as 1e-11).
-TrainedRange MakeTrainedRange(std::string plug, double min, double max, double margin);
-// Index of the first value outside its range (NaN is outside), or kNoIndex.
-Index FirstOutside(std::span<const TrainedRange> ranges, std::span<const double> values);
+// [min, max] widened on both sides by `slack` (what moves no point noticeably) and by rounding (1e-6 of the
+// magnitude, of at least 1: an entry that rested at 0 in training may come out as 1e-11).
+TrainedRange MakeTrainedRange(std::string plug, double min, double max, double slack, double ramp);
+// Share of the full evaluation that a guard asks for: 0 within [lo, hi], a smoothstep over the ramp, 1
+// beyond; NaN gives 1. Stateless, like the score's.
+inline double GuardWeight(double lo, double hi, double ramp, double value) {
+  const double outside = value < lo ? lo - value : value - hi;
+  if (outside <= 0) return 0;
+  if (!(outside < ramp)) return 1;
+  const double t = outside / ramp;
+  return t * t * (3 - 2 * t);
+}
 // "head.rotateX = 1.2 is outside its trained range [-0.5, 0.5]"
 std::string OutsideMessage(const TrainedRange& range, double value);
 

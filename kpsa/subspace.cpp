@@ -95,13 +95,19 @@ Status ValidateSubspace(const Subspace& s) {
     }
   }
   for (const TrainedRange& range : s.ranges) {
-    if (range.plug.empty() || !(range.lo <= range.hi)) {
-      return Status::Invalid("the trained range of \"{}\" is [{}, {}]", range.plug, range.lo, range.hi);
+    if (range.plug.empty() || !(range.lo <= range.hi) || !(range.ramp >= 0)) {
+      return Status::Invalid("the trained range of \"{}\" is [{}, {}], with a ramp of {}", range.plug,
+                             range.lo, range.hi, range.ramp);
     }
   }
   for (const CalibrationPair& pair : s.calibration) {
-    if (!(pair.score >= 0) || !(pair.error >= 0))
-      return Status::Invalid("a calibration pose has score {} and error {}", pair.score, pair.error);
+    if (!(pair.score >= 0) || !(pair.error >= 0) || !(pair.guard >= 0 && pair.guard <= 1) || pair.kind < 0)
+      return Status::Invalid("a calibration pose of kind {} has score {}, error {} and guard {}", pair.kind,
+                             pair.score, pair.error, pair.guard);
+  }
+  if (!(s.extent >= 0)) return Status::Invalid("the extent of the points is {}", s.extent);
+  for (const double entry : s.inverse_rest_stretch.m) {
+    if (!std::isfinite(entry)) return Status::Invalid("the stretch of the space is not finite");
   }
   if (!(s.blend_start > 0 && s.blend_start <= 1) || !(s.tolerance >= 0) || !(s.violation_rate >= 0)) {
     return Status::Invalid("tolerance {}, violation rate {} or blend start {} make no sense", s.tolerance,

@@ -20,7 +20,7 @@
 
 namespace kpsa {
 
-inline constexpr int kSubspaceVersion = 2;
+inline constexpr int kSubspaceVersion = 3;
 inline constexpr const char* kLightUnits = "light";
 
 // Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
@@ -60,10 +60,14 @@ struct Subspace {
   std::vector<float> latent;
   std::vector<TrainedRange> ranges;  // every varying plug upstream
   bool of_light() const { return units == kLightUnits; }
-  std::string rig_hash;         // what it was trained on (KPSA.md, section 3)
-  std::string units = "m";      // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
-  std::string space;            // "" world or mesh space, else the joint
-  std::string training = "{}";  // JSON: summary of the training, shown by `inspect`
+  std::string rig_hash;          // what it was trained on (KPSA.md, section 3)
+  std::string units = "m";       // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
+  std::string space;             // "" world or mesh space, else the joint
+  Matrix4 inverse_rest_stretch;  // of the space (kpsa/space_frame.h)
+  double extent = 0;             // metres: diagonal of the mean shape, or 0 where a stretch is no length
+  std::vector<std::string> carried;  // transforms up from the space that move the points with it: no guards
+  bool space_scales = false;         // a uniform scale above the space scales the points in it and no more
+  std::string training = "{}";       // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
 };

@@ -7,6 +7,7 @@
 
 #include "base/digest.h"
 #include "base/safetensors.h"
+#include "kpsa/poses.h"
 #include "kpsa/subspace.h"
 
 namespace kpsa {
@@ -105,7 +106,11 @@ std::map<std::string, std::string> Header(const Subspace& s) {
     }
   }
   for (const TrainedRange& range : s.ranges)
-    ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}});
+    ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}, {"ramp", range.ramp}});
+  Json frame = {{"extent", s.extent}, {"scales", s.space_scales}, {"carried", s.carried}};
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) frame["inverseRestStretch"].push_back(s.inverse_rest_stretch(r, c));
+  }
   const Json summary = {{"mode", s.mode == EstimatorMode::kMap ? "map" : "paper"},
                         {"components", s.components},
                         {"modes", s.modes},
@@ -123,6 +128,7 @@ std::map<std::string, std::string> Header(const Subspace& s) {
           {"rigHash", s.rig_hash},
           {"units", s.units},
           {"space", s.space},
+          {"frame", frame.dump()},
           {"training", s.training}};
 }
 
@@ -153,6 +159,8 @@ std::string ContentDigest(const Subspace& s) {
   for (const CalibrationPair& pair : s.calibration) {
     hasher.Add(pair.score);
     hasher.Add(pair.error);
+    hasher.Add(pair.guard);
+    hasher.Add(pair.kind);
   }
   for (const TileMap& tiles : s.tiles) {
     const TileData& data = tiles.data();
@@ -167,13 +175,38 @@ std::string ContentDigest(const Subspace& s) {
   return hasher.Finish().ToHex();
 }
 
+// What the space was at rest, and what moves with it.
+Status ReadFrame(const SafetensorsFile& file, const Json& frame, Subspace* s) {
+  const auto bad = [&](const char* key, const char* expected) {
+    return Status::Invalid("{}: frame: \"{}\" should be {}", file.name(), key, expected);
+  };
+  if (!frame.contains("scales") || !frame["scales"].is_boolean()) return bad("scales", "true or false");
+  s->space_scales = frame["scales"].get<bool>();
+  if (!frame.contains("carried") || !frame["carried"].is_array() || frame["carried"].size() > kMaxCues)
+    return bad("carried", "a list of names");
+  for (const Json& name : frame["carried"]) {
+    if (!name.is_string()) return bad("carried", "a list of names");
+    s->carried.push_back(name.get<std::string>());
+  }
+  const char* const kStretch = "inverseRestStretch";
+  if (!frame.contains(kStretch) || !frame[kStretch].is_array() || frame[kStretch].size() != 9)
+    return bad(kStretch, "nine numbers");
+  for (int i = 0; i < 9; ++i) {
+    const Json& entry = frame[kStretch][static_cast<std::size_t>(i)];
+    if (!entry.is_number()) return bad(kStretch, "nine numbers");
+    s->inverse_rest_stretch(i / 3, i % 3) = entry.get<double>();
+  }
+  return {};
+}
+
 Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
   const Result<Json> summary = JsonMetadata(file, "summary", false, 64),
                      outputs = JsonMetadata(file, "outputs", true, kMaxOutputs),
                      cues = JsonMetadata(file, "cues", true, kMaxCues),
                      ranges = JsonMetadata(file, "ranges", true, kMaxCues),
+                     frame = JsonMetadata(file, "frame", false, 64),
                      training = JsonMetadata(file, "training", false, 1u << 16);
-  for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &training})
+  for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &frame, &training})
     KPSA_RETURN_IF_ERROR(part->status());
   Status status;
   Reader reader(file.name() + ": summary", *summary, &status);
@@ -210,8 +243,10 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
   }
   for (const Json& entry : *ranges) {
     Reader range(file.name() + ": a trained range", entry, &status);
-    s->ranges.push_back({range.Text("plug"), range.Number("lo"), range.Number("hi")});
+    s->ranges.push_back({range.Text("plug"), range.Number("lo"), range.Number("hi"), range.Number("ramp")});
   }
+  s->extent = Reader(file.name() + ": frame", *frame, &status).Number("extent");
+  KPSA_RETURN_IF_ERROR(ReadFrame(file, *frame, s));
   for (const auto& [key, target] : {std::pair{"rigHash", &s->rig_hash},
                                     {"units", &s->units},
                                     {"space", &s->space},
@@ -279,8 +314,9 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
   if (!s.latent.empty()) Add<float>(&writer, kLatent, s.latent);
   std::vector<double> calibration;
   for (const CalibrationPair& pair : s.calibration)
-    calibration.insert(calibration.end(), {pair.score, pair.error});
-  writer.Add<double>("calibration", {s.calibration.size(), 2}, calibration);
+    calibration.insert(calibration.end(),
+                       {pair.score, pair.error, pair.guard, static_cast<double>(pair.kind)});
+  writer.Add<double>("calibration", {s.calibration.size(), 4}, calibration);
   for (std::size_t i = 0; i < s.tiles.size(); ++i) {
     const TileData& data = s.tiles[i].data();
     const std::string prefix = fmt::format("tiles.{}.", i);
@@ -342,10 +378,13 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
     if (rows == 0 || s.latent.empty() || s.latent.size() % rows != 0)
       return Status::Invalid("{}: {} latent factors of {} rows", path, s.latent.size(), rows);
   }
-  const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 2});
+  const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 4});
   if (!calibration.ok()) return calibration.status();
-  for (std::size_t i = 0; i + 1 < calibration->size(); i += 2)
-    s.calibration.push_back({(*calibration)[i], (*calibration)[i + 1]});
+  for (std::size_t i = 0; i + 3 < calibration->size(); i += 4) {
+    const std::span<const double> row(calibration->data() + i, 4);
+    const int kind = row[3] >= 0 && row[3] < kPoseKinds ? static_cast<int>(row[3]) : -1;  // refused below
+    s.calibration.push_back({row[0], row[1], row[2], kind});
+  }
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
   if (modes == KeptModes::kRead &&
       (file.tensors().contains(kModes) || file.metadata().contains(kModesDigest)))

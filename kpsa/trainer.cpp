@@ -1,16 +1,19 @@
 #include "kpsa/trainer.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "base/check.h"
+#include "kpsa/carried.h"
 #include "kpsa/cue_choice.h"
 #include "kpsa/cue_places.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/pca.h"
+#include "kpsa/pose_judge.h"
 #include "kpsa/pose_recorder.h"
+#include "kpsa/signal_reach.h"
+#include "kpsa/space_frame.h"
 
 namespace kpsa {
 namespace {
@@ -20,9 +23,13 @@ constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error th
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
-constexpr double kStillTurn =
-    5e-4;  // a turn (radians) and a shift (of the tolerance) of a joint that are none
-constexpr double kStillShare = 0.1;
+constexpr double kStillTurn = 5e-4;     // of light: a turn (radians) of a joint that is none
+constexpr double kSlackShare = 0.05;    // of the tolerance: what an entry may move points by unnoticed,
+constexpr double kRampShare = 1;        // and by which its guard is fully there, at least
+constexpr double kTrainedBeyond = 0.5;  // of kBeyondShare: the rest of the way the guards come in
+constexpr std::size_t kBetween = 400;   // poses between the frames of all clips, at most
+constexpr std::size_t kChunk = 256;     // calibration poses that are held at once
+constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr double kNoiseTurn = 1e-4;        // what a cue is not trusted below: a turn of a joint,
 constexpr double kNoiseShare = 5e-3;       // and a shift of a joint or a point, of the tolerance
 constexpr double kLightShift = 1e-4;       // metres; where the tolerance is no length: both, of a joint
@@ -38,13 +45,12 @@ class Trainer {
       : rig_(rig), clips_(clips), options_(options) {}
 
   Result<Subspace> Run() {
-    const auto begin = std::chrono::steady_clock::now();
     record_.seed = options_.seed;
     record_.mode = options_.mode == EstimatorMode::kMap ? "map" : "paper";
     for (const TrainingClip& clip : clips_) record_.clips.push_back(clip.name);
     KPSA_RETURN_IF_ERROR(Prepare());
-    PoseMatrix poses(layout_), held_out(layout_), judges(layout_);
-    KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &held_out, &judges));
+    PoseMatrix poses(layout_), judges(layout_);
+    KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
     KPSA_RETURN_IF_ERROR(FindRanges(poses));
     if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
@@ -57,9 +63,8 @@ class Trainer {
     Result<Subspace> subspace = Assemble(poses);
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
-    Judge(held_out, &*subspace);
+    KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
-    record_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     record_.signature =
         RigSignature(*rig_.graph, rig_.target.outputs(), rig_.target.space, rig_.target.controls);
     subspace->rig_hash = SignatureDigest(record_.signature);
@@ -103,7 +108,7 @@ class Trainer {
         if (clip < 0 || !control.by_clip) varying.push_back(control.plug);
       }
       Result<std::vector<Signal>> found =
-          FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, nullptr, nullptr);
+          FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, {}, nullptr);
       if (!found.ok()) return found.status();
       for (Signal& signal : *found) {
         const bool known = std::any_of(signals.begin(), signals.end(),
@@ -114,7 +119,13 @@ class Trainer {
     std::sort(signals.begin(), signals.end(),
               [](const Signal& a, const Signal& b) { return a.name < b.name; });
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
-    recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals));
+    for (const PlugRef& space : rig_.target.space) {
+      const Result<Value> rest = compiler_.Rest(*rig_.graph, space);
+      if (!rest.ok()) return rest.status();
+      inverse_rest_stretch_ = InverseRestStretch(rest->get<Matrix4>());
+    }
+    recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals),
+                                               inverse_rest_stretch_);
     Result<PoseLayout> layout = recorder_->Layout();
     if (!layout.ok()) return layout.status();
     layout_ = *layout;
@@ -122,46 +133,94 @@ class Trainer {
     return Status();
   }
 
-  // To train on, to calibrate with, and, where cues have places to choose from, to judge these by.
-  Status RecordPoses(PoseMatrix* poses, PoseMatrix* held_out, PoseMatrix* judges) {
+  // To train on, and, where cues have places to choose from, to judge these by.
+  Status RecordPoses(PoseMatrix* poses, PoseMatrix* judges) {
+    std::size_t frames = 0;
+    for (const TrainingClip& clip : clips_) frames += clip.times.size();
+    const double between =
+        of_light() ? 0 : std::min(1.0, static_cast<double>(kBetween) / static_cast<double>(frames + 1));
     for (std::size_t c = 0; c < clips_.size(); ++c) {
       KPSA_RETURN_IF_ERROR(Say("poses", 0.2 * static_cast<double>(c) / static_cast<double>(clips_.size())));
-      KPSA_RETURN_IF_ERROR(recorder_->AddClip(clips_[c], poses));
+      KPSA_RETURN_IF_ERROR(recorder_->AddClip(WithTimesBetween(clips_[c], between), poses));
     }
     record_.clip_poses = poses->poses();
-    const Result<ClipPoses> clip_poses = recorder_->ControlsOfClips(clips_);
+    Result<ClipPoses> clip_poses = recorder_->ControlsOfClips(clips_);
     if (!clip_poses.ok()) return clip_poses.status();
+    clip_poses_ = std::move(*clip_poses);
     KPSA_RETURN_IF_ERROR(Say("poses", 0.2));
-    ControlGroups groups;
-    if (options_.samples > 0) {
-      const std::size_t first = poses->poses();
-      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, poses));
-      groups = FindGroups(*poses, first);
+    if (!rig_.controls.empty() && !of_light()) {
+      PoseMatrix sweeps(layout_);
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, &sweeps));
+      groups_ = FindGroups(sweeps);
     }
-    const auto sample = [&](std::size_t count, std::uint64_t seed, PoseMatrix* to) {
-      return recorder_->AddSamples(
-          SamplePoses(rig_.controls, *clip_poses, groups, clips_.size(), count, seed), clips_, to);
+    if (options_.samples > 0) {
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, poses));
+      if (of_light()) groups_ = {};
+    }
+    const auto sample = [&](PoseKind kind, std::size_t count, std::uint64_t seed, PoseMatrix* to) {
+      return recorder_->AddSamples(SampleOf(kind, count, seed), clips_, to);
     };
-    KPSA_RETURN_IF_ERROR(sample(options_.samples, options_.seed, poses));
+    // The sampler's kind, and some of the others
+    std::size_t rest = options_.samples;
+    if (!of_light()) {
+      for (const auto& [kind, share] :
+           {std::pair{PoseKind::kBeyond, 0.08}, std::pair{PoseKind::kMixture, 0.06},
+            std::pair{PoseKind::kNeighbours, 0.06}}) {
+        std::vector<SampledPose> some =
+            SampleOf(kind, static_cast<std::size_t>(share * static_cast<double>(options_.samples)),
+                     options_.seed + static_cast<std::uint64_t>(kind));
+        if (kind == PoseKind::kBeyond) HalfAsFarBeyond(&some);
+        rest -= some.size();
+        KPSA_RETURN_IF_ERROR(recorder_->AddSamples(some, clips_, poses));
+      }
+    }
+    KPSA_RETURN_IF_ERROR(sample(PoseKind::kSampled, rest, options_.seed, poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3)
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
-    std::size_t calibration = options_.calibration_poses;
-    if (calibration == 0)
-      calibration =
-          static_cast<std::size_t>(std::clamp(4.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
-    KPSA_RETURN_IF_ERROR(sample(calibration, options_.seed ^ 0x5deece66dull, held_out));
     if (places_.size() > 1)
-      KPSA_RETURN_IF_ERROR(sample(kJudges, options_.seed ^ 0x2545f4914f6cdd1dull, judges));
-    record_.calibration_poses = held_out->poses();
+      KPSA_RETURN_IF_ERROR(
+          sample(PoseKind::kSampled, kJudges, options_.seed ^ 0x2545f4914f6cdd1dull, judges));
     return Status();
   }
 
-  // Which controls move the same points, from the sweeps: rows [first, first + 2 controls) of the poses. What
-  // moves a point by a good part of what it moves any point acts there.
-  ControlGroups FindGroups(const PoseMatrix& poses, std::size_t first) const {
+  std::vector<SampledPose> SampleOf(PoseKind kind, std::size_t count, std::uint64_t seed) const {
+    return PosesOfKind(kind, rig_.controls, clip_poses_, groups_, clips_.size(), count, seed);
+  }
+
+  // Training ends half way beyond the ranges; on the other half guards come in, and calibration looks.
+  void HalfAsFarBeyond(std::vector<SampledPose>* poses) const {
+    for (SampledPose& pose : *poses) {
+      for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
+        const ControlRange& control = rig_.controls[c];
+        double& value = pose.values[c];
+        const double inside = std::clamp(value, control.min, control.max);
+        value = inside + kTrainedBeyond * (value - inside);
+      }
+    }
+  }
+
+  // A share of the spans between two times gets one more, at all places in between.
+  static TrainingClip WithTimesBetween(const TrainingClip& clip, double share) {
+    TrainingClip dense{clip.name, {}};
+    double due = 0, place = 0.5;
+    for (std::size_t i = 0; i < clip.times.size(); ++i) {
+      dense.times.push_back(clip.times[i]);
+      due += share;
+      if (i + 1 == clip.times.size() || due < 1) continue;
+      due -= 1;
+      dense.times.push_back(clip.times[i] + place * (clip.times[i + 1] - clip.times[i]));
+      place = std::fmod(place + 0.6180339887498949, 1.0);
+    }
+    return dense;
+  }
+
+  // Which controls move the same points, from the sweeps. What moves a point by a good part of what it moves
+  // any point acts there.
+  ControlGroups FindGroups(const PoseMatrix& poses) const {
+    constexpr std::size_t first = 0;
     const std::vector<Index> points = EvenSpread(static_cast<Index>(layout_.points), kGroupPoints);
     std::vector<float> rest(
         3 * points.size());  // the mean of all sweeps, since most of them leave a point at rest
@@ -205,26 +264,55 @@ class Trainer {
     return groups;
   }
 
+  // Of the training poses, and of the clips between frames: quaternion keys turn joints about axes there that
+  // no frame has.
   Status FindRanges(const PoseMatrix& poses) {
-    std::size_t column = layout_.scalar_begin();
-    for (const Signal& signal : recorder_->signals()) {
-      for (std::size_t e = 0; e < signal.entries(); ++e, ++column) {
-        double lo = poses.row(0)[column], hi = lo;
-        for (std::size_t t = 0; t < poses.poses(); ++t) {
-          lo = std::min<double>(lo, poses.row(t)[column]);
-          hi = std::max<double>(hi, poses.row(t)[column]);
-        }
-        // Clips turn joints a little about axes that no control has: what moves no point noticeably is no new
-        // pose
-        const double still = !signal.matrix ? 0
-                             : e < 9        ? kStillTurn
-                             : of_light()   ? kLightShift
-                                            : kStillShare * options_.tolerance;
-        ranges_.push_back(
-            MakeTrainedRange(EntryName(signal, e), lo - still, hi + still, options_.range_margin));
+    const std::span<const float> first = poses.row(0).subspan(layout_.scalar_begin());
+    lo_.assign(first.begin(), first.end());
+    hi_ = lo_;
+    for (std::size_t t = 0; t < poses.poses(); ++t) Widen(poses.row(t).subspan(layout_.scalar_begin()));
+    for (const TrainingClip& clip : clips_) {
+      TrainingClip fine{clip.name, {}};
+      for (std::size_t i = 0; i < clip.times.size(); ++i) {
+        const double next = clip.times[std::min(i + 1, clip.times.size() - 1)];
+        for (const double part : {0.0, 0.25, 0.5, 0.75})
+          fine.times.push_back(clip.times[i] + part * (next - clip.times[i]));
       }
+      if (!of_light()) KPSA_RETURN_IF_ERROR(recorder_->WidenRanges(fine, &lo_, &hi_));
     }
     return Status();
+  }
+  void Widen(std::span<const float> entries) {
+    for (std::size_t e = 0; e < entries.size(); ++e) {
+      lo_[e] = std::min<double>(lo_[e], entries[e]);
+      hi_[e] = std::max<double>(hi_[e], entries[e]);
+    }
+  }
+
+  // Where the guard of every entry begins, and how far it takes to be fully there.
+  Result<std::vector<TrainedRange>> MakeRanges() {
+    std::vector<double> reach(lo_.size(), 0);
+    if (!of_light()) {
+      Result<std::vector<double>> found =
+          FindReach(rig_, &compiler_, recorder_->signals(), inverse_rest_stretch_, diagonal_);
+      if (!found.ok()) return found.status();
+      reach = std::move(*found);
+    }
+    std::vector<TrainedRange> ranges;
+    for (const Signal& signal : recorder_->signals()) {
+      for (std::size_t e = 0; e < signal.entries(); ++e) {
+        const std::size_t i = ranges.size();
+        double slack = options_.tolerance * kSlackShare / reach[i];
+        double ramp =
+            std::max(options_.range_ramp * (hi_[i] - lo_[i]), options_.tolerance * kRampShare / reach[i]);
+        if (of_light()) {
+          slack = !signal.matrix ? 0 : e < 9 ? kStillTurn : kLightShift;
+          ramp = std::max(options_.range_ramp * (hi_[i] - lo_[i]), slack);
+        }
+        ranges.push_back(MakeTrainedRange(EntryName(signal, e), lo_[i], hi_[i], slack, ramp));
+      }
+    }
+    return ranges;
   }
 
   bool of_light() const { return rig_.target.colors; }
@@ -334,8 +422,9 @@ class Trainer {
                                  of_light() ? 0 : kTileRest});
     if (options_.keep_modes) subspace.kept_modes = pca_.output_modes().cast<float>();
     subspace.mode = estimator.mode;
-    subspace.ranges = ranges_;
     subspace.space = rig_.target.space_name;
+    subspace.inverse_rest_stretch = inverse_rest_stretch_;
+    subspace.extent = of_light() ? 0 : diagonal_;
     if (of_light()) subspace.units = kLightUnits;
     subspace.tolerance = options_.tolerance;
     subspace.violation_rate = options_.violation_rate;
@@ -356,8 +445,14 @@ class Trainer {
     Index index = cue.index;
     if (cue.kind == CueKind::kScalar) {
       d.kind = CueDescription::Kind::kScalar;
-      d.plug = ranges_[index].plug;
-      return d;
+      for (const Signal& signal : recorder_->signals()) {
+        if (index < signal.entries()) {
+          d.plug = EntryName(signal, index);
+          return d;
+        }
+        index -= static_cast<Index>(signal.entries());
+      }
+      KPSA_CHECK(false);
     }
     const auto put = [&](std::size_t m, const AccelerationTarget::Stage& stage, Index point) {
       d.mesh = static_cast<Index>(m), d.stage = stage.name, d.point = point;
@@ -378,47 +473,98 @@ class Trainer {
     return d;
   }
 
-  // Scores and errors of the held-out poses, through the same code that runs in the graph.
-  void Judge(const PoseMatrix& held_out, Subspace* subspace) {
-    SubspaceScratch scratch(*subspace);
-    SoftCacheThreshold always;
-    always.tau = std::numeric_limits<double>::infinity();
-    std::vector<double> raw(subspace->rows());
-    std::vector<PointBuffer> buffers;
-    for (const SubspaceOutput& output : subspace->outputs) buffers.emplace_back(output.points);
-    double sum = 0;
-    for (std::size_t t = 0; t < held_out.poses(); ++t) {
-      const std::span<const float> row = held_out.row(t);
-      std::size_t r = 0;
-      for (const CueRef& cue : cues_.cues) {
-        const std::size_t column = CueColumn(layout_, cue);
-        for (std::size_t k = 0; k < CueHeight(layout_, cue); ++k) raw[r++] = row[column + k];
-      }
-      Measure(*subspace, raw, &scratch);
-      const Verdict verdict = kpsa::Judge(*subspace, always, &scratch);
-      double largest = 0, largest_mean = 0;  // squared
-      std::size_t column = 0;
-      for (std::size_t m = 0; m < buffers.size(); ++m) {
-        double output_sum = 0;
-        subspace->tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
-        const ConstPointsView p = std::as_const(buffers[m]).view();
-        for (std::size_t i = 0; i < p.count; ++i, column += 3) {
-          const Double3 d{p.x[i] - static_cast<double>(row[column]),
-                          p.y[i] - static_cast<double>(row[column + 1]),
-                          p.z[i] - static_cast<double>(row[column + 2])};
-          const double squared = Dot(d, d);
-          output_sum += squared;
-          largest = std::max(largest, squared);
+  // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
+  Status Calibrate(Subspace* subspace) {
+    std::vector<SampledPose> sweeps = Sweeps(rig_.controls), trial;
+    for (std::size_t i = 0; i < std::min(kTrialSweeps, sweeps.size()); ++i)
+      trial.push_back(sweeps[i * sweeps.size() / std::min(kTrialSweeps, sweeps.size())]);
+    for (SampledPose& pose :
+         SampleOf(PoseKind::kSampled, kTrialSamples, options_.seed ^ 0x6a09e667f3bcc908ull))
+      trial.push_back(std::move(pose));
+    const Result<Carried> carried =
+        FindCarried(rig_, &compiler_, clips_, trial, inverse_rest_stretch_, diagonal_, options_.tolerance);
+    if (!carried.ok()) return carried.status();
+    subspace->carried = carried->rigid;
+    subspace->space_scales = carried->scales;
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+
+    std::size_t count = options_.calibration_poses;
+    if (count == 0)
+      count =
+          static_cast<std::size_t>(std::clamp(8.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
+    PoseJudge judge(*subspace, layout_, cues_);
+    std::vector<std::vector<float>> entries;
+    std::vector<SampledPose> held_out;
+    for (int k = 0; k < (of_light() ? 1 : kPoseKinds); ++k) {
+      const auto kind = static_cast<PoseKind>(k);
+      const std::vector<SampledPose> poses =
+          SampleOf(kind, count, (options_.seed + static_cast<std::uint64_t>(k)) ^ 0x5deece66dull);
+      for (std::size_t first = 0; first < poses.size(); first += kChunk) {
+        KPSA_RETURN_IF_ERROR(Say("calibration", 0.9 + 0.025 * k));
+        // By clip, as the recorder writes them
+        std::vector<SampledPose> chunk(
+            poses.begin() + static_cast<std::ptrdiff_t>(first),
+            poses.begin() + static_cast<std::ptrdiff_t>(std::min(first + kChunk, poses.size())));
+        std::stable_sort(chunk.begin(), chunk.end(),
+                         [](const SampledPose& a, const SampledPose& b) { return a.clip < b.clip; });
+        PoseMatrix recorded(layout_);
+        KPSA_RETURN_IF_ERROR(recorder_->AddSamples(chunk, clips_, &recorded));
+        for (CalibrationPair& pair : judge.Judge(recorded)) {
+          pair.kind = k;
+          subspace->calibration.push_back(pair);
         }
-        sum += output_sum;
-        largest_mean =
-            std::max(largest_mean, output_sum / static_cast<double>(std::max<std::size_t>(1, p.count)));
+        for (std::size_t t = 0; t < recorded.poses(); ++t) {
+          const std::span<const float> row = std::as_const(recorded).row(t).subspan(layout_.scalar_begin());
+          if (kind != PoseKind::kBeyond) Widen(row);
+          entries.emplace_back(row.begin(), row.end());
+        }
+        held_out.insert(held_out.end(), chunk.begin(), chunk.end());
       }
-      subspace->calibration.push_back({verdict.score, std::sqrt(of_light() ? largest_mean : largest)});
-      record_.held_out_max = std::max(record_.held_out_max, std::sqrt(largest));
     }
-    if (held_out.poses() > 0)
-      record_.held_out_rms = std::sqrt(sum / static_cast<double>(held_out.poses() * layout_.points));
+    record_.calibration_poses = held_out.size();
+    record_.held_out_rms = judge.rms();
+    record_.held_out_max = judge.max();
+
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+    Result<std::vector<TrainedRange>> ranges = MakeRanges();
+    if (!ranges.ok()) return ranges.status();
+    subspace->ranges = std::move(*ranges);
+    const std::vector<char> guarded = GuardedEntries(carried->rigid);
+    for (std::size_t t = 0; t < entries.size(); ++t) {
+      double& guard = subspace->calibration[t].guard;
+      for (std::size_t e = 0; e < entries[t].size(); ++e) {
+        const TrainedRange& range = subspace->ranges[e];
+        if (guarded[e]) guard = std::max(guard, GuardWeight(range.lo, range.hi, range.ramp, entries[t][e]));
+      }
+    }
+    const Calibration calibration = kpsa::Calibrate(subspace->calibration, subspace->tolerance,
+                                                    subspace->violation_rate, subspace->blend_start);
+    if (calibration.worst != Calibration::kNoPose) SayWorst(held_out[calibration.worst], calibration);
+    return Status();
+  }
+
+  // By entry: whether it has a guard where the space carries the points.
+  std::vector<char> GuardedEntries(const std::vector<std::string>& carried) const {
+    std::vector<char> guarded;
+    for (const Signal& signal : recorder_->signals()) {
+      const bool free = signal.matrix && std::find(carried.begin(), carried.end(),
+                                                   rig_.graph->name(signal.plug.node)) != carried.end();
+      guarded.insert(guarded.end(), signal.entries(), !free);
+    }
+    return guarded;
+  }
+
+  void SayWorst(const SampledPose& pose, const Calibration& calibration) {
+    record_.worst.error = calibration.worst_error;
+    record_.worst.kind = PoseKindName(pose.kind);
+    for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
+      if (pose.values[c] != rig_.controls[c].rest && !(pose.clip >= 0 && rig_.controls[c].by_clip))
+        record_.worst.controls.emplace_back(rig_.graph->PlugName(rig_.controls[c].plug), pose.values[c]);
+    }
+    if (pose.clip < 0) return;
+    const TrainingClip& clip = clips_[static_cast<std::size_t>(pose.clip)];
+    record_.worst.clip = clip.name;
+    record_.worst.time = clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
   }
 
   const TrainingRig& rig_;
@@ -431,7 +577,10 @@ class Trainer {
   std::vector<CuePlace> places_;
   double full_cost_ = 0;
   std::vector<Double3> positions_;
-  std::vector<TrainedRange> ranges_;
+  std::vector<double> lo_, hi_;  // of every entry of a signal
+  Matrix4 inverse_rest_stretch_;
+  ClipPoses clip_poses_;
+  ControlGroups groups_;
   Pca pca_;
   CueSet cues_;
   double diagonal_ = 0;

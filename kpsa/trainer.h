@@ -26,11 +26,11 @@ struct TrainOptions {
   std::size_t min_points = 16;        // that are measured
   std::size_t key_points = 80;        // paper mode
   std::size_t samples = 0;            // of the controls, besides the clips
-  std::size_t calibration_poses = 0;  // 0: four times as many as the violation rate wants, 400 to 1,000
+  std::size_t calibration_poses = 0;  // of each kind (PoseKind); 0: 8 / violation_rate, 400 to 1,000
   std::uint64_t seed = 1;
   double tolerance = 1e-4, violation_rate = 0.01;  // metres, or light; share of frames
   bool keep_modes = false;                         // in the subspace, for reports (Subspace::kept_modes)
-  double range_margin = 0.1;                       // of the trained extent
+  double range_ramp = 0.05;                        // of a trained extent: how fast guards come in
   std::size_t max_light_candidates = 4000;         // shading points that may become cues
   std::function<bool(const char* what, double share)> progress;  // false cancels; may be null
 };
@@ -46,6 +46,8 @@ struct TrainingRig {
 
 // Errors: no poses, nothing moves, a pose that fails to evaluate (its clip and time or its controls),
 // cancelled (kInterrupted). The graph comes back without a clip.
+// Clips are trained on at the given times and between them. Besides the sampled poses of PoseKind::kSampled,
+// a fifth of the samples is of the other kinds; each kind has calibration poses of its own.
 // Light (AccelerationTarget::colors) has noise: a fifth of the training poses chooses the number of modes
 // (kpsa/mode_choice.h), and errors are the RMS over a frame's shading points, since no subspace knows the
 // noise of one of them.

@@ -18,7 +18,12 @@ std::string TrainingJson(const TrainingRecord& r) {
                        {"tile_rms", r.tile_rms},
                        {"mode", r.mode},
                        {"warning", r.warning},
-                       {"seconds", r.seconds},
+                       {"worst",
+                        {{"kind", r.worst.kind},
+                         {"clip", r.worst.clip},
+                         {"time", r.worst.time},
+                         {"controls", r.worst.controls},
+                         {"error", r.worst.error}}},
                        {"signature", r.signature}};
   return object.dump();
 }
@@ -56,7 +61,20 @@ TrainingRecord ParseTraining(const std::string& text) {
   r.tile_rms = number(object, "tile_rms");
   r.mode = words("mode");
   r.warning = words("warning");
-  r.seconds = number(object, "seconds");
+  if (object.contains("worst") && object["worst"].is_object()) {
+    const json& worst = object["worst"];
+    const auto text = [&](const char* name) {
+      return worst.contains(name) && worst[name].is_string() ? worst[name].get<std::string>() : std::string();
+    };
+    r.worst.kind = text("kind"), r.worst.clip = text("clip");
+    r.worst.time = number(worst, "time"), r.worst.error = number(worst, "error");
+    if (worst.contains("controls") && worst["controls"].is_array()) {
+      for (const json& control : worst["controls"]) {
+        if (control.is_array() && control.size() == 2 && control[0].is_string() && control[1].is_number())
+          r.worst.controls.emplace_back(control[0].get<std::string>(), control[1].get<double>());
+      }
+    }
+  }
   if (object.contains("signature") && object["signature"].is_object()) {
     for (const auto& [name, digest] : object["signature"].items()) {
       if (digest.is_string()) r.signature[name] = digest.get<std::string>();

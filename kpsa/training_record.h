@@ -1,8 +1,10 @@
 // What a subspace remembers of its training, as the JSON text in Subspace::training: counts, seeds, held-out
-// errors and the rig's signature.
+// errors and the rig's signature. Nothing of it depends on the machine or the time: the same training gives
+// the same bytes.
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kpsa/signature.h"
@@ -20,7 +22,13 @@ struct TrainingRecord {
   double tile_rms = 0;                        // what tiles and half precision add
   std::string mode;                           // "map" or "paper"
   std::string warning;
-  double seconds = 0;
+  // The accepted calibration pose with the largest error of what is emitted, at the trained tolerance.
+  struct Worst {
+    std::string kind, clip;  // PoseKindName; clip "" is the rest pose, no kind: nothing is accepted
+    double time = 0;         // of the clip, seconds
+    std::vector<std::pair<std::string, double>> controls;  // that are not at rest; metres, radians
+    double error = 0;
+  } worst;
   Signature signature;
 };
 

@@ -1,0 +1,68 @@
+#include "kpsa/pose_judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/parallel.h"
+
+namespace kpsa {
+
+PoseJudge::PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues)
+    : subspace_(subspace), layout_(layout), cues_(cues) {}
+
+std::vector<CalibrationPair> PoseJudge::Judge(const PoseMatrix& poses) {
+  struct Errors {
+    double largest = 0, largest_mean = 0, sum = 0;  // squared
+  };
+  std::vector<CalibrationPair> pairs(poses.poses());
+  std::vector<Errors> errors(poses.poses());
+  SoftCacheThreshold always;
+  always.tau = std::numeric_limits<double>::infinity();
+  ParallelFor(poses.poses(), 16, [&](std::size_t begin, std::size_t end) {
+    SubspaceScratch scratch(subspace_);
+    std::vector<double> raw(subspace_.rows());
+    std::vector<PointBuffer> buffers;
+    for (const SubspaceOutput& output : subspace_.outputs) buffers.emplace_back(output.points);
+    for (std::size_t t = begin; t < end; ++t) {
+      const std::span<const float> row = poses.row(t);
+      std::size_t r = 0;
+      for (const CueRef& cue : cues_.cues) {
+        const std::size_t column = CueColumn(layout_, cue);
+        for (std::size_t k = 0; k < CueHeight(layout_, cue); ++k) raw[r++] = row[column + k];
+      }
+      Measure(subspace_, raw, &scratch);
+      pairs[t].score = kpsa::Judge(subspace_, always, &scratch).score;
+      std::size_t column = 0;
+      for (std::size_t m = 0; m < buffers.size(); ++m) {
+        double output_sum = 0;
+        subspace_.tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
+        const ConstPointsView p = std::as_const(buffers[m]).view();
+        for (std::size_t i = 0; i < p.count; ++i, column += 3) {
+          const Double3 d{p.x[i] - static_cast<double>(row[column]),
+                          p.y[i] - static_cast<double>(row[column + 1]),
+                          p.z[i] - static_cast<double>(row[column + 2])};
+          const double squared = Dot(d, d);
+          output_sum += squared;
+          errors[t].largest = std::max(errors[t].largest, squared);
+        }
+        errors[t].sum += output_sum;
+        errors[t].largest_mean = std::max(
+            errors[t].largest_mean, output_sum / static_cast<double>(std::max<std::size_t>(1, p.count)));
+      }
+      pairs[t].error = std::sqrt(subspace_.of_light() ? errors[t].largest_mean : errors[t].largest);
+    }
+  });
+  for (const Errors& e : errors) {
+    sum_ += e.sum;
+    max_ = std::max(max_, std::sqrt(e.largest));
+  }
+  poses_ += poses.poses();
+  return pairs;
+}
+
+double PoseJudge::rms() const {
+  return poses_ == 0 ? 0 : std::sqrt(sum_ / static_cast<double>(poses_ * layout_.points));
+}
+
+}  // namespace kpsa

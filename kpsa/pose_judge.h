@@ -1,0 +1,32 @@
+// Scores and errors of recorded poses under a subspace, through the code that runs in the graph. Internal to
+// training.
+#pragma once
+
+#include <vector>
+
+#include "kpsa/cue_selection.h"
+#include "kpsa/pose_matrix.h"
+#include "kpsa/subspace.h"
+
+namespace kpsa {
+
+class PoseJudge {
+ public:
+  // cues: those of the subspace, in terms of the layout.
+  PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues);
+  // Every pose reconstructed, whatever its score: score and error; guard and kind are the caller's. Poses are
+  // not centred.
+  std::vector<CalibrationPair> Judge(const PoseMatrix& poses);
+  // Over all poses so far, of the pure reconstruction, metres (of light: its units).
+  double rms() const;
+  double max() const { return max_; }
+
+ private:
+  const Subspace& subspace_;
+  const PoseLayout& layout_;
+  const CueSet& cues_;
+  double sum_ = 0, max_ = 0;
+  std::size_t poses_ = 0;
+};
+
+}  // namespace kpsa
