@@ -23,9 +23,11 @@ constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error th
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
-constexpr double kStillTurn = 5e-4;     // of light: a turn (radians) of a joint that is none
-constexpr double kSlackShare = 0.05;    // of the tolerance: what an entry may move points by unnoticed,
-constexpr double kRampShare = 1;        // and by which its guard is fully there, at least
+constexpr double kStillTurn = 5e-4;  // of light: a turn (radians) of a joint that is none
+// Of the tolerance, as displacements of points: what an entry may do unnoticed; an entry that moved less than
+// `kHardlyMoved` in training has its guard fully there after `kStillRamp`, others after `kLeastRamp` at
+// least.
+constexpr double kSlackShare = 0.05, kHardlyMoved = 2, kStillRamp = 1, kLeastRamp = 0.25;
 constexpr double kTrainedBeyond = 0.5;  // of kBeyondShare: the rest of the way the guards come in
 constexpr std::size_t kBetween = 400;   // poses between the frames of all clips, at most
 constexpr std::size_t kChunk = 256;     // calibration poses that are held at once
@@ -302,12 +304,14 @@ class Trainer {
     for (const Signal& signal : recorder_->signals()) {
       for (std::size_t e = 0; e < signal.entries(); ++e) {
         const std::size_t i = ranges.size();
-        double slack = options_.tolerance * kSlackShare / reach[i];
-        double ramp =
-            std::max(options_.range_ramp * (hi_[i] - lo_[i]), options_.tolerance * kRampShare / reach[i]);
+        const double extent = hi_[i] - lo_[i], noticed = options_.tolerance / reach[i];
+        double slack = kSlackShare * noticed;
+        // What hardly moved comes in slowly enough to be no jump; what did, within what calibration looks at
+        double ramp = std::max(options_.range_ramp * extent,
+                               (extent < kHardlyMoved * noticed ? kStillRamp : kLeastRamp) * noticed);
         if (of_light()) {
           slack = !signal.matrix ? 0 : e < 9 ? kStillTurn : kLightShift;
-          ramp = std::max(options_.range_ramp * (hi_[i] - lo_[i]), slack);
+          ramp = std::max(options_.range_ramp * extent, slack);
         }
         ranges.push_back(MakeTrainedRange(EntryName(signal, e), lo_[i], hi_[i], slack, ramp));
       }

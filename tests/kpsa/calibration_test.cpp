@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "kpsa/binomial.h"
 #include "tests/kpsa/synthetic.h"
 
 namespace kpsa {
@@ -33,48 +34,161 @@ std::size_t Violations(std::span<const CalibrationPair> pairs, const SoftCacheTh
   return count;
 }
 
+// Pairs of several kinds, some with a guard that asks for a part of the full evaluation.
+std::vector<CalibrationPair> MixedPairs(std::size_t count, unsigned seed) {
+  std::vector<CalibrationPair> pairs = RandomPairs(count, seed);
+  std::mt19937 random(seed + 100);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    pairs[i].kind = static_cast<int>(i % 3);
+    if (pairs[i].kind == 2) pairs[i].error *= 1.5;
+    if (pairs[i].kind == 1 && unit(random) < 0.4) pairs[i].guard = unit(random) < 0.3 ? 1 : unit(random);
+  }
+  return pairs;
+}
+
+// The demands of the header, counted pose by pose.
+bool IsAllowed(std::span<const CalibrationPair> pairs, const SoftCacheThreshold& threshold, double tolerance,
+               double alpha) {
+  std::size_t violations = 0, hits = 0, severe = 0;
+  const auto attainable = [](double rate, std::size_t n) {
+    return std::max(rate, BinomialUpperBound(0, n, 0.9));
+  };
+  const auto few = [](std::size_t v, std::size_t h, double rate) {
+    return static_cast<double>(v + 1) <= 2 * rate * static_cast<double>(h + 1);
+  };
+  std::size_t fewest = pairs.size();
+  bool good = true;
+  for (int kind = 0; kind < 3; ++kind) {
+    std::vector<CalibrationPair> of_kind;
+    for (const CalibrationPair& pair : pairs) {
+      if (pair.kind == kind) of_kind.push_back(pair);
+    }
+    if (of_kind.empty()) continue;
+    fewest = std::min(fewest, of_kind.size());
+    const double rate = attainable(alpha, of_kind.size());
+    const std::size_t v = Violations(of_kind, threshold, tolerance);
+    const auto h = static_cast<std::size_t>(std::count_if(
+        of_kind.begin(), of_kind.end(), [&](const auto& p) { return EmittedWeight(p, threshold) == 0; }));
+    good = good && BinomialUpperBound(v, of_kind.size(), 0.9) <= rate * (1 + 1e-9) &&
+           (v == 0 || few(v, h, rate));
+    violations += v, hits += h, severe += Violations(of_kind, threshold, 3 * tolerance);
+  }
+  return good && few(violations, hits, attainable(alpha, fewest)) &&
+         BinomialUpperBound(severe, pairs.size(), 0.9) <= attainable(alpha / 10, pairs.size()) * (1 + 1e-9);
+}
+
 TEST(Calibration, IsTheLargestThresholdThatABruteForceSearchFinds) {
-  for (unsigned seed = 1; seed <= 6; ++seed) {
-    const std::vector<CalibrationPair> pairs = RandomPairs(150, seed);
+  int found = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const std::vector<CalibrationPair> pairs = MixedPairs(450, seed);
     for (const double alpha : {0.02, 0.1, 0.3}) {
-      const Calibration c = Calibrate(pairs, 0.0015, alpha, 0.7);
-      double best = -1;
-      for (int i = 1; i <= 10000; ++i) {
-        const double tau = 20.0 * i / 10000;
-        const auto violations =
-            static_cast<double>(Violations(pairs, {.tau = tau, .blend_start = 0.7}, 0.0015));
-        const auto hits = static_cast<double>(std::count_if(
-            pairs.begin(), pairs.end(), [&](const CalibrationPair& p) { return p.score <= 0.7 * tau; }));
-        if ((violations + 1) / 151 <= alpha && violations <= 2 * alpha * hits) best = tau;
+      for (const double tolerance : {0.0008, 0.0025}) {
+        const Calibration c = Calibrate(pairs, tolerance, alpha, 0.7);
+        const double cap = std::max_element(pairs.begin(), pairs.end(),
+                                            [](const auto& a, const auto& b) { return a.score < b.score; })
+                               ->score /
+                           0.7;
+        double best = -1;
+        constexpr int kSteps = 4000;
+        for (int i = 1; i <= kSteps; ++i) {
+          const double tau = cap * i / kSteps;
+          if (IsAllowed(pairs, {.tau = tau, .blend_start = 0.7}, tolerance, alpha)) best = tau;
+        }
+        EXPECT_GE(c.threshold.tau, best) << seed << " " << alpha;
+        if (c.threshold.tau > 0) {
+          ++found;
+          EXPECT_LE(c.threshold.tau, best + 2 * cap / kSteps) << seed << " " << alpha;
+          EXPECT_TRUE(IsAllowed(pairs, c.threshold, tolerance, alpha)) << seed << " " << alpha;
+          EXPECT_EQ(c.violations, Violations(pairs, c.threshold, tolerance));
+        }
       }
-      const double cap = std::max_element(pairs.begin(), pairs.end(),
-                                          [](const auto& a, const auto& b) { return a.score < b.score; })
-                             ->score /
-                         0.7;
-      EXPECT_NEAR(c.threshold.tau, std::min(best, cap), 0.0021) << seed << " " << alpha;
-      EXPECT_EQ(c.violations, Violations(pairs, c.threshold, 0.0015));
-      EXPECT_LE(static_cast<double>(c.violations + 1) / 151, alpha);
+    }
+  }
+  EXPECT_GT(found, 12) << "most of these can be met";
+}
+
+// A promise is about the training at hand: not on the average over trainings, but in nine of ten.
+TEST(Calibration, NineOfTenTrainingsKeepTheirRate) {
+  const std::vector<CalibrationPair> all = RandomPairs(6000, 7);
+  std::mt19937 random(8);
+  for (const double alpha : {0.01, 0.03, 0.05}) {
+    const std::size_t poses = alpha < 0.02 ? 800 : 400, rest = all.size() - poses;
+    int above = 0, above_among_hits = 0, severe_above = 0;
+    double hits = 0, rate = 0;
+    for (int split = 0; split < 300; ++split) {
+      std::vector<CalibrationPair> pairs = all;
+      std::shuffle(pairs.begin(), pairs.end(), random);
+      const std::span<const CalibrationPair> fresh(pairs.data() + poses, rest);
+      const Calibration c = Calibrate({pairs.data(), poses}, 0.002, alpha);
+      const auto violations = static_cast<double>(Violations(fresh, c.threshold, 0.002));
+      const auto fresh_hits = static_cast<double>(std::count_if(
+          fresh.begin(), fresh.end(), [&](const auto& p) { return EmittedWeight(p, c.threshold) == 0; }));
+      above += violations > alpha * static_cast<double>(rest);
+      above_among_hits += violations > 2 * alpha * fresh_hits;
+      severe_above += static_cast<double>(Violations(fresh, c.threshold, 0.006)) >
+                      c.attainable_severe * static_cast<double>(rest);
+      rate += violations / static_cast<double>(rest) / 300;
+      hits += c.hit_rate / 300;
+    }
+    EXPECT_LE(above, 30) << "of 300 at " << alpha;
+    EXPECT_LE(above_among_hits, 30) << "of 300 at " << alpha;
+    EXPECT_LE(severe_above, 30) << "of 300 at " << alpha;
+    EXPECT_GT(rate, alpha * 0.15) << "a threshold that is never used up is too careful";
+    EXPECT_GT(hits, 0.3);
+  }
+}
+
+TEST(Calibration, ALargerToleranceNeverHitsLess) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    const std::vector<CalibrationPair> pairs = MixedPairs(600, seed);
+    for (const double alpha : {0.01, 0.05}) {
+      std::size_t last = 0;
+      double last_tau = -1;
+      for (int i = 0; i <= 60; ++i) {
+        const Calibration c = Calibrate(pairs, 1e-4 * std::exp(0.1 * i), alpha);
+        EXPECT_GE(c.hits, last) << "seed " << seed << ", tolerance " << i;
+        EXPECT_GE(c.threshold.tau, last_tau);
+        last = c.hits, last_tau = c.threshold.tau;
+      }
+      EXPECT_GT(last, 200u);
     }
   }
 }
 
-TEST(Calibration, ViolationsOverAHundredSplitsStayWithinTheRate) {
-  const std::vector<CalibrationPair> all = RandomPairs(2000, 7);
-  std::mt19937 random(8);
-  for (const double alpha : {0.01, 0.05}) {
-    double rate = 0, hits = 0;
-    for (int split = 0; split < 100; ++split) {
-      std::vector<CalibrationPair> pairs = all;
-      std::shuffle(pairs.begin(), pairs.end(), random);
-      const std::span<const CalibrationPair> calibration(pairs.data(), 300), fresh(pairs.data() + 300, 1700);
-      const Calibration c = Calibrate(calibration, 0.002, alpha);
-      rate += static_cast<double>(Violations(fresh, c.threshold, 0.002)) / 1700 / 100;
-      hits += c.hit_rate / 100;
-    }
-    EXPECT_LE(rate, alpha * 1.05) << "expected at most alpha, up to the noise of 100 splits";
-    EXPECT_GT(rate, alpha * 0.3) << "a threshold that is never used up is too careful";
-    EXPECT_GT(hits, 0.3);
-  }
+TEST(Calibration, EveryKindKeepsTheRateByItself) {
+  std::vector<CalibrationPair> pairs(500, CalibrationPair{1, 1e-4, 0, 0});
+  for (int i = 0; i < 500; ++i) pairs.push_back({1.1, i % 8 == 0 ? 0.0015 : 1e-4, 0, 1});
+  // 6 % of all, but 12 % of the second kind
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.08).hit_rate, 0.5);
+  for (CalibrationPair& pair : pairs) pair.kind = 0;
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.08).hit_rate, 1);
+}
+
+TEST(Calibration, WhatAGuardHandsToTheFullEvaluationDoesNoHarm) {
+  std::vector<CalibrationPair> pairs(400, CalibrationPair{1, 1e-4});
+  for (std::size_t i = 0; i < 400; i += 4) pairs[i] = {0.9, 0.0018, 0, 0};
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.05).hit_rate, 0);
+  for (std::size_t i = 0; i < 400; i += 4) pairs[i].guard = 0.5;
+  const Calibration half = Calibrate(pairs, 0.001, 0.05);
+  EXPECT_EQ(half.hit_rate, 0.75);
+  EXPECT_EQ(half.accepted_rate, 1);
+  EXPECT_NEAR(half.worst_error, 0.0009, 1e-12);
+  for (std::size_t i = 0; i < 400; i += 4) pairs[i].guard = 1;
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.05).accepted_rate, 0.75);
+}
+
+TEST(Calibration, FewViolationsMayBeSevere) {
+  std::vector<CalibrationPair> pairs(1000, CalibrationPair{1, 1e-4});
+  for (std::size_t i = 0; i < 20; ++i) pairs[50 * i] = {1, 0.002};
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.05).hit_rate, 1) << "2 % are a little beyond";
+  for (std::size_t i = 0; i < 20; ++i) pairs[50 * i] = {1, 0.0031};
+  EXPECT_EQ(Calibrate(pairs, 0.001, 0.05).hit_rate, 0) << "2 % are beyond three tolerances";
+  for (std::size_t i = 2; i < 20; ++i) pairs[50 * i] = {1, 0.002};
+  const Calibration few = Calibrate(pairs, 0.001, 0.05);
+  EXPECT_EQ(few.hit_rate, 1) << "0.2 % are";
+  EXPECT_EQ(few.severe, 2u);
+  EXPECT_EQ(few.worst, 0u);
 }
 
 TEST(Calibration, LooserDemandsGiveLargerThresholds) {
@@ -98,14 +212,15 @@ TEST(Calibration, TooFewPosesSayWhatTheyCanPromise) {
   const std::vector<CalibrationPair> pairs = RandomPairs(19, 10);
   const Calibration c = Calibrate(pairs, 0.0015, 0.01);
   EXPECT_FALSE(c.enough_poses);
-  EXPECT_DOUBLE_EQ(c.attainable_alpha, 1.0 / 20);
+  EXPECT_NEAR(c.attainable_alpha, 1 - std::pow(0.1, 1.0 / 19), 1e-9);
   EXPECT_EQ(c.violations, 0u);
   EXPECT_GT(c.threshold.tau, 0);
   EXPECT_NE(c.warning.find("19 calibration poses cannot promise a violation rate of 0.01; the threshold "
-                           "keeps 0.05 (at least 99 poses"),
+                           "keeps 0.114 (at least 230 poses"),
             std::string::npos)
       << c.warning;
-  EXPECT_TRUE(Calibrate(RandomPairs(99, 10), 0.0015, 0.01).enough_poses);
+  EXPECT_TRUE(Calibrate(RandomPairs(230, 10), 0.0015, 0.01).enough_poses);
+  EXPECT_FALSE(Calibrate(RandomPairs(229, 10), 0.0015, 0.01).enough_poses);
 }
 
 TEST(Calibration, TheEnds) {
@@ -130,7 +245,7 @@ TEST(Calibration, TheEnds) {
 TEST(Calibration, AFewHitsMayNotAllBeViolations) {
   // Eight poses with small scores and large errors: 2 % of all, and all that would hit
   std::vector<CalibrationPair> pairs(400, CalibrationPair{10, 0.01});
-  for (int i = 0; i < 8; ++i) pairs[static_cast<std::size_t>(50 * i)] = {1, 0.005};
+  for (int i = 0; i < 8; ++i) pairs[static_cast<std::size_t>(50 * i)] = {1, 0.002};
   EXPECT_EQ(Calibrate(pairs, 0.001, 0.03).hit_rate, 0);
   EXPECT_EQ(Calibrate(pairs, 0.001, 0.03).violations, 0u);
   // Where most poses are good ones, the same eight are within the rate
@@ -141,7 +256,7 @@ TEST(Calibration, AFewHitsMayNotAllBeViolations) {
 }
 
 TEST(Calibration, PosesWithoutANumberCountAsViolations) {
-  std::vector<CalibrationPair> pairs(100, CalibrationPair{1, 0.0001});
+  std::vector<CalibrationPair> pairs(200, CalibrationPair{1, 0.0001});
   EXPECT_GT(Calibrate(pairs, 0.001, 0.02).threshold.tau, 0);
   pairs[0].error = pairs[1].error = std::nan("");
   EXPECT_LT(Calibrate(pairs, 0.001, 0.02).threshold.tau, 0);

@@ -18,13 +18,13 @@ TEST(Signals, WhatDependsOnAStatefulNodeIsRefusedByName) {
   Compiler compiler;
   const std::vector<PlugRef> varying = {g.plug("before.a")};
   const Result<std::vector<Signal>> refused =
-      FindSignals(g.graph, &compiler, {g.plug("after.out")}, varying, nullptr, nullptr);
+      FindSignals(g.graph, &compiler, {g.plug("after.out")}, varying, {}, nullptr);
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(
       refused.status().ToString(),
       "\"follow\" remembers its previous frame, and a subspace knows poses only: points after it cannot be "
       "accelerated; accelerate a stage before it");
-  EXPECT_TRUE(FindSignals(g.graph, &compiler, {g.plug("before.out")}, varying, nullptr, nullptr).ok());
+  EXPECT_TRUE(FindSignals(g.graph, &compiler, {g.plug("before.out")}, varying, {}, nullptr).ok());
 }
 
 }  // namespace

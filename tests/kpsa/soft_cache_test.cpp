@@ -174,17 +174,25 @@ TEST(SoftCache, TheBlendIsSmoothAndMonotone) {
   EXPECT_EQ(FullWeight(0.999, {.tau = 1, .blend_start = 1}), 0);
 }
 
-TEST(SoftCache, RangesNameTheControlThatLeavesThem) {
-  const std::vector<TrainedRange> ranges = {MakeTrainedRange("head.rotateX", -0.5, 0.5, 0.05),
-                                            MakeTrainedRange("jaw.open", 0, 1, 0.05),
-                                            MakeTrainedRange("still", 3, 3, 0.05)};
-  EXPECT_NEAR(ranges[0].hi, 0.55, 1e-5);
-  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{0.54, -0.04, 3}), kNoIndex);
-  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{0.54, -0.06, 3}), 1u);
-  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{0.5, 0.5, 3.001}), 2u);
-  EXPECT_EQ(FirstOutside(ranges, std::vector<double>{std::nan(""), 0.5, 3}), 0u);
-  EXPECT_EQ(OutsideMessage(ranges[1], 1.25),
-            "jaw.open = 1.25 is outside its trained range [-0.050001, 1.05]");
+TEST(SoftCache, GuardsComeInSmoothly) {
+  const TrainedRange range = MakeTrainedRange("jaw.open", 0, 1, 0.02, 0.1);
+  EXPECT_NEAR(range.hi, 1.02, 1e-5);
+  const auto weight = [&](double value) { return GuardWeight(range.lo, range.hi, range.ramp, value); };
+  for (const double inside : {-0.02, 0.0, 0.5, 1.02}) EXPECT_EQ(weight(inside), 0) << inside;
+  for (const double outside : {-0.13, 1.13, kInfinity, -kInfinity, std::nan("")})
+    EXPECT_EQ(weight(outside), 1);
+  EXPECT_NEAR(weight(range.hi + 0.05), 0.5, 1e-9);
+  EXPECT_NEAR(weight(range.lo - 0.05), 0.5, 1e-9);
+  double last = 0;
+  for (int i = 0; i <= 1000; ++i) {
+    const double w = weight(1 + 0.15 * i / 1000);
+    EXPECT_GE(w, last);
+    EXPECT_LT(w - last, 1.6 * 0.15 / 1000 / 0.1);  // the slope of a smoothstep is at most 1.5
+    last = w;
+  }
+  EXPECT_EQ(GuardWeight(3, 3, 0, 3), 0);  // no ramp
+  EXPECT_EQ(GuardWeight(3, 3, 0, 3.001), 1);
+  EXPECT_EQ(OutsideMessage(range, 1.25), "jaw.open = 1.25 is outside its trained range [-0.020001, 1.02]");
 }
 
 // The definition in double, value by value.

@@ -53,8 +53,12 @@ class SubspaceTest : public testing::TestWithParam<EstimatorMode> {
                                   .point = cue.index % 150});
       }
     }
-    subspace_.calibration = {{0.5, 1e-4}, {1.5, 3e-3}};
-    subspace_.ranges = {MakeTrainedRange("a.b", -1, 1, 0.05), MakeTrainedRange("c.d", 0, 0, 0.05)};
+    subspace_.calibration = {{0.5, 1e-4, 0, 0}, {1.5, 3e-3, 0.25, 3}};
+    subspace_.inverse_rest_stretch(1, 1) = 0.5;
+    subspace_.extent = 2;
+    subspace_.carried = {"head", "upperarm01.L"};
+    subspace_.space_scales = true;
+    subspace_.ranges = {MakeTrainedRange("a.b", -1, 1, 0, 0.05), MakeTrainedRange("c.d", 0, 0, 0.01, 0)};
     subspace_.rig_hash = "0123456789abcdef";
     subspace_.space = "head";
     subspace_.training = R"({"poses": 200})";
@@ -184,6 +188,13 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   EXPECT_EQ(read->soft_cache.leave_one_out, subspace_.soft_cache.leave_one_out);
   EXPECT_EQ(read->ranges[0].lo, subspace_.ranges[0].lo);
   EXPECT_EQ(read->calibration[1].error, 3e-3);
+  EXPECT_EQ(read->calibration[1].guard, 0.25);
+  EXPECT_EQ(read->calibration[1].kind, 3);
+  EXPECT_EQ(read->inverse_rest_stretch, subspace_.inverse_rest_stretch);
+  EXPECT_EQ(read->extent, 2);
+  EXPECT_EQ(read->carried, subspace_.carried);
+  EXPECT_TRUE(read->space_scales);
+  EXPECT_EQ(read->ranges[0].ramp, 0.05);
   EXPECT_EQ(read->tolerance, 2e-4);
   EXPECT_EQ(read->rig_hash, subspace_.rig_hash);
   EXPECT_EQ(read->space, "head");
