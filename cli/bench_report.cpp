@@ -57,13 +57,13 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
                       : "");
   OrderedJson per_frame = OrderedJson::array();
   for (const BenchResult::Frame& f : r.per_frame) {
-    per_frame.push_back({{"clip", f.clip},
-                         {"frame", f.number},
-                         {"hit", f.hit},
-                         {"rms", Finite(f.rms)},
-                         {"max", Finite(f.max)},
-                         {"full_ms", f.full_ms},
-                         {"accelerated_ms", f.accelerated_ms}});
+    OrderedJson row = {{"clip", f.clip}, {"frame", f.number}};
+    row.update(DecisionJson<OrderedJson>(f.decision));
+    row.update({{"rms", Finite(f.rms)},
+                {"max", Finite(f.max)},
+                {"full_ms", f.full_ms},
+                {"accelerated_ms", f.accelerated_ms}});
+    per_frame.push_back(std::move(row));
   }
   return {
       {"schema", "kpsa.bench/1"},
@@ -102,6 +102,8 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
        r.hits == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(r.speedup_on_hits())},
       {"ceiling", {{"speedup", r.ceiling()}, {"ms_per_frame", r.bound_ms}, {"bound_by", bound}}},
       {"hit_rate", static_cast<double>(r.hits) / frames},
+      {"blend_rate", static_cast<double>(r.blends) / frames},
+      {"most_frequent_reason", r.most_frequent_reason},
       {"violation_rate", static_cast<double>(r.violations) / frames},
       {"violation_limit", r.violation_limit},
       {"error",
@@ -179,7 +181,7 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
                               static_cast<std::ptrdiff_t>(std::min<std::size_t>(6, r.never_evaluated.size())),
                           ", "),
                 r.never_evaluated.size() > 6 ? ", ..." : ""));
-  if (!r.worst_miss.empty()) text += r.worst_miss + "\n";
+  if (!r.most_frequent_reason.empty()) text += r.most_frequent_reason + "\n";
   return text;
 }
 
@@ -195,11 +197,16 @@ std::string BenchJson(const std::vector<BenchResult>& results, const BenchContex
 std::string FramesText(const std::vector<BenchResult>& results) {
   std::string text;
   for (const BenchResult& r : results) {
-    Table table({"clip", ">frame", "", ">RMS", ">max", ">full ms", ">accelerated ms", ">speedup"});
+    Table table({"clip", ">frame", "", ">full", ">score", ">RMS", ">max", ">full ms", ">accelerated ms",
+                 ">speedup", "why"});
     for (const BenchResult::Frame& f : r.per_frame) {
-      table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
+      const FrameDecision& d = f.decision;
+      table.Row({f.clip, fmt::format("{}", f.number), VerdictName(d.verdict()),
+                 fmt::format("{:.0f} %", 100 * d.full_weight),
+                 std::isfinite(d.score) ? fmt::format("{:.3g}", d.score) : "-", ErrorText(f.rms, r.light),
                  ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
-                 fmt::format("{:.3f}", f.accelerated_ms), RatioText(Ratio(f.full_ms, f.accelerated_ms))});
+                 fmt::format("{:.3f}", f.accelerated_ms), RatioText(Ratio(f.full_ms, f.accelerated_ms)),
+                 d.hit() ? "" : d.reason});
     }
     if (results.size() > 1) text += r.subspace + "\n";
     text += table.Text();

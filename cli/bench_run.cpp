@@ -136,6 +136,7 @@ struct Contender {
   BenchResult result;
   PointErrors errors;
   Sums sums;
+  Reasons reasons;
 
   std::unique_ptr<OpenRig> open;
   std::vector<AppliedSubspace> applied;
@@ -168,7 +169,8 @@ struct Contender {
     }
     compared = request.outputs.size();
     if (still) outputs->varying = request.varying = VaryingPlugs(rig);
-    verdicts = std::make_unique<Verdicts>(applied, rig, &request);
+    verdicts = std::make_unique<Verdicts>(applied);
+    verdicts->Ask(rig, &request);
     const auto plan = CompileFor(rig, &compiler, request);
     if (!plan.ok()) return plan.status();
     side = std::make_unique<Side>(rig, *plan, options.threads > 1, frames, still);
@@ -231,14 +233,20 @@ void Contender::Describe() {
 // After both have evaluated a frame.
 void Contender::Compare(std::int64_t frame, const Evaluator& full, const std::string& clip) {
   verdicts->Add(frame, *side->evaluator);
-  hit.push_back(verdicts->last_hit());
+  const FrameDecision& decision = verdicts->records().back().decision;
+  hit.push_back(decision.hit());
+  result.hits += decision.hit();
+  result.blends += decision.verdict() == FrameVerdict::kBlend;
+  if (!decision.hit()) {
+    reasons.Add((applied.size() > 1 ? decision.entry + ": " : "") + decision.reason,
+                fmt::format("frame {} of {}", frame, clip));
+  }
   weights.emplace_back();
-  for (std::size_t n = 0; n < applied.size(); ++n)
-    weights.back().push_back(EmittedFullWeight(applied[n], verdicts->last_scores()[n]));
+  for (const FrameDecision& one : verdicts->last()) weights.back().push_back(one.full_weight);
   const double worst = clip_errors.AddFrame(full, *side->evaluator), rms = clip_errors.frame_rms();
   // A blended or full miss keeps the tolerance, too, or it counts
   if ((result.light ? rms : worst) > result.tolerance) ++result.violations;
-  result.per_frame.push_back({clip, frame, verdicts->last_hit(), rms, worst, 0, 0});
+  result.per_frame.push_back({clip, frame, decision, rms, worst, 0, 0});
   if (worst > result.error_max)
     result.error_max = worst, result.worst_frame = frame, result.worst_clip = clip;
 }
@@ -346,6 +354,7 @@ void Contender::Finish() {
   result.nodes_total = sums.nodes.size();
   std::stable_sort(result.full_nodes.begin(), result.full_nodes.end(),
                    [](const BenchNode& a, const BenchNode& b) { return a.ms_per_frame > b.ms_per_frame; });
+  result.most_frequent_reason = reasons.MostFrequent();
   result.error_rms = errors.rms();
   result.error_p99 = errors.Percentile(0.99);
   result.motion_rms = errors.motion_rms();
@@ -405,10 +414,7 @@ class Bench {
     }
     for (Contender& contender : contenders_) {
       contender.errors.Merge(contender.clip_errors);
-      contender.result.hits += contender.verdicts->hits();
       contender.result.frames += times.size();
-      if (const std::string worst = contender.verdicts->WorstMiss(); !worst.empty())
-        contender.result.worst_miss = worst;
     }
 
     // Times. The sides take turns by blocks of frames: each keeps its caches as in playback, and all see the

@@ -11,6 +11,7 @@
 
 #include "cli/acceleration.h"
 #include "cli/frame_errors.h"
+#include "cli/verdicts.h"
 #include "graph/plan_report.h"
 
 namespace kpsa {
@@ -46,7 +47,7 @@ struct BenchResult {
   struct Frame {
     std::string clip;
     std::int64_t number = 0;  // of the clip's frames
-    bool hit = false;
+    FrameDecision decision;
     double rms = 0, max = 0, full_ms = 0, accelerated_ms = 0;
   };
   std::vector<Frame> per_frame;
@@ -65,8 +66,8 @@ struct BenchResult {
   double bound_ms = 0, bound_graph_ms = 0, bound_points_ms = 0;
   double ceiling() const { return Ratio(full_ms, bound_ms); }
 
-  std::size_t hits = 0, violations = 0;  // violations: frames beyond the tolerance, accepted or not
-  std::string worst_miss;
+  std::size_t hits = 0, blends = 0, violations = 0;  // violations: frames beyond the tolerance
+  std::string most_frequent_reason;                  // of frames that are no hits; "" where all are
   double error_rms = 0, error_max = 0, error_p99 = 0,
          diagonal = 0;     // metres, all points of all frames, misses included
   std::string worst_clip;  // "": nothing differs
