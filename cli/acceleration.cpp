@@ -198,52 +198,22 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
   return applied;
 }
 
-Verdicts::Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, Request* request)
-    : applied_(&applied), first_output_(static_cast<Index>(request->outputs.size())) {
+void ReadColorsFrom(const std::vector<AppliedSubspace>& applied, const Graph& graph, Request* request) {
   for (const AppliedSubspace& one : applied) {
-    const NodeDef& def = rig.graph->def(one.node);
-    for (const char* name : {"hit", "score", "missReason", "offender"}) {
-      request->outputs.push_back({{one.node, def.FindAttribute(name), -1, -1}, {}});
+    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
+      if (!one.entry.points[p].colors) continue;
+      for (RequestedOutput& output : request->outputs) {
+        if (output.plug == one.entry.points[p].points) output.plug = one.Output(graph, p);
+      }
     }
   }
 }
 
-void Verdicts::Add(std::int64_t frame, const Evaluator& evaluator) {
-  ++frames_;
-  last_hit_ = true;
-  last_score_ = 0;
-  last_scores_.clear();
-  for (Index n = 0; n < applied_->size(); ++n) {
-    const Index output = first_output_ + 4 * n;
-    const double score = evaluator.Get<double>(output + 1);
-    last_score_ = std::max(last_score_, score);
-    last_scores_.push_back(score);
-    if (score > worst_score_) worst_score_ = score, worst_frame_ = frame;
-    if (evaluator.Get<std::int64_t>(output) != 0) continue;
-    last_hit_ = false;
-    const std::int64_t offender = evaluator.Get<std::int64_t>(output + 3);
-    const std::string text =
-        MissText(*(*applied_)[n].config, static_cast<MissReason>(evaluator.Get<std::int64_t>(output + 2)),
-                 offender < 0 ? kNoIndex : static_cast<Index>(offender));
-    auto reason =
-        std::find_if(reasons_.begin(), reasons_.end(), [&](const Reason& r) { return r.text == text; });
-    if (reason == reasons_.end()) reason = reasons_.insert(reasons_.end(), Reason{text, 0, frame});
-    ++reason->count;
-  }
-  if (last_hit_) ++hits_;
-}
-
-std::string Verdicts::Text() const {
-  const std::string worst = std::isfinite(worst_score_) ? fmt::format("{:.3g}", worst_score_) : "infinite";
-  return fmt::format("{} hits, {} misses of {}; worst score {} at frame {}", hits_, frames_ - hits_,
-                     Plural(frames_, "frame"), worst, worst_frame_);
-}
-
-std::string Verdicts::WorstMiss() const {
-  const auto most = std::max_element(reasons_.begin(), reasons_.end(),
-                                     [](const Reason& a, const Reason& b) { return a.count < b.count; });
-  if (most == reasons_.end()) return "";
-  return fmt::format("most misses ({}, first at frame {}): {}", most->count, most->first_frame, most->text);
+Calibration CalibrationInForce(const AppliedSubspace& applied) {
+  const Subspace& s = *applied.subspace;
+  const double tolerance =
+      applied.tolerance >= kAnyError ? std::numeric_limits<double>::infinity() : applied.tolerance;
+  return Calibrate(s.calibration, tolerance, applied.violation_rate, s.blend_start);
 }
 
 }  // namespace kpsa

@@ -8,7 +8,7 @@
 
 #include "cli/common.h"
 #include "graph/compiler.h"
-#include "graph/evaluator.h"
+#include "kpsa/calibration.h"
 
 namespace kpsa {
 
@@ -61,39 +61,10 @@ struct AppliedSubspace {
 Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compiler,
                                                        const AccelerationFlags& flags);
 
-// What the KPSA nodes decided, frame after frame. Asks for four more outputs a node.
-class Verdicts {
- public:
-  Verdicts(const std::vector<AppliedSubspace>& applied, const Rig& rig, Request* request);
-  void Add(std::int64_t frame, const Evaluator& evaluator);  // its number, for Text and WorstMiss
+// Colours that an entry accelerates are asked of its node instead.
+void ReadColorsFrom(const std::vector<AppliedSubspace>& applied, const Graph& graph, Request* request);
 
-  std::size_t frames() const { return frames_; }
-  std::size_t hits() const { return hits_; }  // frames in which all nodes hit
-  double hit_rate() const {
-    return frames_ == 0 ? 0 : static_cast<double>(hits_) / static_cast<double>(frames_);
-  }
-  bool last_hit() const { return last_hit_; }
-  double last_score() const { return last_score_; }
-  const std::vector<double>& last_scores() const { return last_scores_; }  // one a node
-  double worst_score() const { return worst_score_; }
-  std::string Text() const;  // one line: hits, misses, worst score
-  std::string WorstMiss()
-      const;  // why the first miss of the most frequent reason happened; "" without misses
-
- private:
-  struct Reason {
-    std::string text;
-    std::size_t count = 0;
-    std::int64_t first_frame = 0;
-  };
-  const std::vector<AppliedSubspace>* applied_;
-  Index first_output_;
-  std::size_t frames_ = 0, hits_ = 0;
-  std::int64_t worst_frame_ = 0;
-  double worst_score_ = 0, last_score_ = 0;
-  std::vector<double> last_scores_;
-  bool last_hit_ = false;
-  std::vector<Reason> reasons_;
-};
+// The thresholds that the node of an entry works with, and what they promise.
+Calibration CalibrationInForce(const AppliedSubspace& applied);
 
 }  // namespace kpsa

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/table.h"
-#include "kpsa/kpsa_node.h"
 
 namespace kpsa {
 namespace {
@@ -40,6 +39,28 @@ OrderedJson FrameErrorsJson(const FrameErrors& e) {
           {"hit", hits}};
 }
 
+OrderedJson RangeJson(const BenchResult::Range& range) { return {range.least, range.most}; }
+
+OrderedJson PromiseJson(const Promise& p) {
+  if (!p.promised()) return {};
+  OrderedJson worst;
+  if (!p.worst_clip.empty()) {
+    worst = {{"clip", p.worst_clip},
+             {"frame", p.worst_frame},
+             {"error", Finite(p.worst_error)},
+             {"tolerances", p.worst_error / p.tolerance}};
+  }
+  const auto share = [](std::size_t part, std::size_t all) {
+    return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
+  };
+  return {{"kept", p.kept()},
+          {"rate", share(p.beyond, p.frames)},
+          {"promised", p.rate},
+          {"rate_of_hits", share(p.hits_beyond, p.hits)},
+          {"promised_of_hits", p.hit_rate()},
+          {"worst_accepted", std::move(worst)}};
+}
+
 OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
   nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
   for (const BenchNode& n : r.full_nodes) {
@@ -57,13 +78,13 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
                       : "");
   OrderedJson per_frame = OrderedJson::array();
   for (const BenchResult::Frame& f : r.per_frame) {
-    per_frame.push_back({{"clip", f.clip},
-                         {"frame", f.number},
-                         {"hit", f.hit},
-                         {"rms", Finite(f.rms)},
-                         {"max", Finite(f.max)},
-                         {"full_ms", f.full_ms},
-                         {"accelerated_ms", f.accelerated_ms}});
+    OrderedJson row = {{"clip", f.clip}, {"frame", f.number}};
+    row.update(DecisionJson<OrderedJson>(f.decision));
+    row.update({{"rms", Finite(f.rms)},
+                {"max", Finite(f.max)},
+                {"full_ms", f.full_ms},
+                {"accelerated_ms", f.accelerated_ms}});
+    per_frame.push_back(std::move(row));
   }
   return {
       {"schema", "kpsa.bench/1"},
@@ -84,13 +105,18 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
       {"threads", context.options.threads},
       {"runs", context.options.runs},
       {"units", r.light ? "light" : "m"},
-      {"tolerance", r.tolerance},
+      {"tolerance", r.promise.tolerance},
+      {"clock", r.cpu_times ? "cpu" : "wall"},
+      {"wall_over_cpu", r.wall_over_cpu},
       {"full",
        {{"ms_per_frame", r.full_ms},
+        {"ms_range", RangeJson(r.full_range)},
         {"ns_per_point", r.output_points == 0 ? 0 : r.full_ms * 1e6 / static_cast<double>(r.output_points)},
         {"nodes", nodes}}},
       {"accelerated",
        {{"ms_per_frame", r.accelerated_ms},
+        {"ms_range", RangeJson(r.accelerated_range)},
+        {"parts_recorded", r.parts_ms},
         {"graph", r.graph_ms},
         {"cues", r.cues_ms},
         {"projection", r.projection_ms},
@@ -98,12 +124,16 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
         {"downstream", r.downstream_ms},
         {"misses", r.misses_ms}}},
       {"speedup", r.speedup()},
+      {"speedup_range", RangeJson(r.speedup_range)},
       {"speedup_on_hits",
        r.hits == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(r.speedup_on_hits())},
       {"ceiling", {{"speedup", r.ceiling()}, {"ms_per_frame", r.bound_ms}, {"bound_by", bound}}},
       {"hit_rate", static_cast<double>(r.hits) / frames},
-      {"violation_rate", static_cast<double>(r.violations) / frames},
-      {"violation_limit", r.violation_limit},
+      {"blend_rate", static_cast<double>(r.blends) / frames},
+      {"most_frequent_reason", r.most_frequent_reason},
+      {"violation_rate", static_cast<double>(r.promise.beyond) / frames},
+      {"violation_limit", r.promise.rate},
+      {"promise", PromiseJson(r.promise)},
       {"error",
        {{"rms", Finite(r.error_rms)},
         {"max", Finite(r.error_max)},
@@ -126,10 +156,11 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
   const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
   text += fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
                       Plural(r.cues, "cue"), fmt::join(r.cue_stages, ", "), r.modes);
-  text += fmt::format("trained on {}; tested on {}: {}, {}, medians of {}\n\n", fmt::join(r.trained_on, ", "),
-                      fmt::join(r.clips, ", "), Plural(r.frames, "frame"),
+  text += fmt::format("trained on {}; tested on {}: {}, {}, medians of {}, {}\n\n",
+                      fmt::join(r.trained_on, ", "), fmt::join(r.clips, ", "), Plural(r.frames, "frame"),
                       Plural(static_cast<std::uint64_t>(context.options.threads), "thread"),
-                      Plural(static_cast<std::uint64_t>(context.options.runs), "run"));
+                      Plural(static_cast<std::uint64_t>(context.options.runs), "run"),
+                      r.cpu_times ? "the thread's CPU time" : "wall time");
   std::string heaviest;
   for (std::size_t i = 0; i < std::min<std::size_t>(4, r.full_nodes.size()); ++i)
     heaviest +=
@@ -138,21 +169,27 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
                                   r.graph_ms, r.cues_ms, r.projection_ms, r.reconstruction_ms);
   if (r.downstream_ms > 0) parts += fmt::format(", later stages {:.3f}", r.downstream_ms);
   if (r.misses_ms > 0) parts += fmt::format(", misses {:.3f}", r.misses_ms);
-  Table times({"", ">ms/frame", "of which"});
-  times.Row({"full", fmt::format("{:.3f}", r.full_ms), heaviest});
-  times.Row({"accelerated", fmt::format("{:.3f}", r.accelerated_ms), parts});
+  Table times({"", ">ms/frame", "over the runs", "of which"});
+  const bool ranges = context.options.runs > 1;
+  const auto range = [&](const BenchResult::Range& of, const char* before, const char* after) {
+    return ranges ? fmt::format("{}{:.3f} to {:.3f}{}", before, of.least, of.most, after) : "";
+  };
+  times.Row({"full", fmt::format("{:.3f}", r.full_ms), range(r.full_range, "", ""), heaviest});
+  times.Row(
+      {"accelerated", fmt::format("{:.3f}", r.accelerated_ms), range(r.accelerated_range, "", ""), parts});
   text += times.Text();
-  text += fmt::format("\nspeedup    {}{}; ceiling {}, bound by the graph that the subspace reads{}\n",
-                      RatioText(r.speedup(), 2),
-                      r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
-                      RatioText(r.ceiling()),
-                      r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
   text += fmt::format(
-      "hits       {:.1f} % of frames; {:.1f} % of frames beyond {}\n",
-      100 * static_cast<double>(r.hits) / frames, 100 * static_cast<double>(r.violations) / frames,
-      r.tolerance >= kAnyError
-          ? "any tolerance"
-          : fmt::format("the tolerance of {}{}", r.light ? "an RMS of " : "", error(r.tolerance)));
+      "\nspeedup    {}{}{}; ceiling {}, bound by the graph that the subspace reads{}\n",
+      RatioText(r.speedup(), 2),
+      ranges && std::isfinite(r.speedup())
+          ? fmt::format(" ({:.2f} to {:.2f} over the runs)", r.speedup_range.least, r.speedup_range.most)
+          : "",
+      r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
+      RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  text += fmt::format("hits       {:.1f} % of frames: {}\n", 100 * static_cast<double>(r.hits) / frames,
+                      CountsText(r.hits, r.blends, r.frames - r.hits - r.blends));
+  if (!r.most_frequent_reason.empty()) text += "           " + r.most_frequent_reason + "\n";
+  text += "promise    " + r.promise.Text("           ");
   text +=
       fmt::format("error      RMS {}, 99 % {}, max {}{}; motion RMS {}, diagonal {}\n", error(r.error_rms),
                   error(r.error_p99), error(r.error_max),
@@ -179,7 +216,6 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
                               static_cast<std::ptrdiff_t>(std::min<std::size_t>(6, r.never_evaluated.size())),
                           ", "),
                 r.never_evaluated.size() > 6 ? ", ..." : ""));
-  if (!r.worst_miss.empty()) text += r.worst_miss + "\n";
   return text;
 }
 
@@ -195,11 +231,16 @@ std::string BenchJson(const std::vector<BenchResult>& results, const BenchContex
 std::string FramesText(const std::vector<BenchResult>& results) {
   std::string text;
   for (const BenchResult& r : results) {
-    Table table({"clip", ">frame", "", ">RMS", ">max", ">full ms", ">accelerated ms", ">speedup"});
+    Table table({"clip", ">frame", "", ">full", ">score", ">RMS", ">max", ">full ms", ">accelerated ms",
+                 ">speedup", "why"});
     for (const BenchResult::Frame& f : r.per_frame) {
-      table.Row({f.clip, fmt::format("{}", f.number), f.hit ? "hit" : "miss", ErrorText(f.rms, r.light),
+      const FrameDecision& d = f.decision;
+      table.Row({f.clip, fmt::format("{}", f.number), VerdictName(d.verdict()),
+                 fmt::format("{:.0f} %", 100 * d.full_weight),
+                 std::isfinite(d.score) ? fmt::format("{:.3g}", d.score) : "-", ErrorText(f.rms, r.light),
                  ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
-                 fmt::format("{:.3f}", f.accelerated_ms), RatioText(Ratio(f.full_ms, f.accelerated_ms))});
+                 fmt::format("{:.3f}", f.accelerated_ms), RatioText(Ratio(f.full_ms, f.accelerated_ms)),
+                 d.hit() ? "" : d.reason});
     }
     if (results.size() > 1) text += r.subspace + "\n";
     text += table.Text();

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "base/parallel.h"
+#include "cli/bench_side.h"
 #include "cli/frames_range.h"
 #include "cli/point_errors.h"
 #include "cli/progress.h"
@@ -20,87 +21,18 @@
 namespace kpsa {
 namespace {
 
-double Median(std::vector<double> values) {
-  const std::size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(middle), values.end());
-  const double high = values[middle];
-  if (values.size() % 2 == 1) return high;
-  return (high + *std::max_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(middle))) / 2;
-}
-
-// Steps with points that the outputs of these nodes need, themselves included.
-std::vector<char> PointStepsAbove(const Plan& plan, const std::vector<NodeId>& nodes) {
-  const auto count = static_cast<Index>(plan.steps().size());
-  std::vector<char> seen(count, 0);
-  std::vector<Index> stack;
-  for (Index s = 0; s < count; ++s) {
-    if (std::find(nodes.begin(), nodes.end(), plan.infos()[s].node) != nodes.end())
-      stack.push_back(s), seen[s] = 1;
-  }
-  while (!stack.empty()) {
-    const Index s = stack.back();
-    stack.pop_back();
-    for (Index p : Producers(plan, s)) {
-      if (!seen[p]) stack.push_back(p), seen[p] = 1;
-    }
-  }
-  for (Index s = 0; s < count; ++s) seen[s] = seen[s] && plan.infos()[s].points_total > 0;
-  return seen;
-}
-
-// One of the evaluations.
-struct Side {
-  std::shared_ptr<const Plan> plan;
-  std::unique_ptr<Evaluator> evaluator;
-  Index time = kNoIndex;
-  std::vector<std::vector<double>> frame_ns;  // by frame and run
-  bool anew = false;                          // every evaluation: nothing changes from frame to frame
-
-  Side(const Rig& rig, std::shared_ptr<const Plan> made, bool parallel, std::size_t frames, bool still)
-      : plan(std::move(made)),
-        evaluator(std::make_unique<Evaluator>(plan, EvaluatorOptions{parallel, nullptr})),
-        time(plan->FindVarying(rig.scene.time)),
-        frame_ns(frames),
-        anew(still || frames == 1) {}
-  Status Evaluate(double t) {
-    if (time != kNoIndex) evaluator->Set(time, t);
-    return evaluator->Evaluate();
-  }
-  // Before another pass over the frames: nodes that remember the previous one do not go back.
-  void StartAgain() {
-    if (!plan->stateful_node().empty()) evaluator->Restart();
-  }
-  void Forget() {
-    if (anew) evaluator->Invalidate();
-  }
-  Status Timed(std::size_t frame, double t) {
-    Forget();
-    const std::uint64_t begin = ProfileClock();
-    Status status = Evaluate(t);
-    frame_ns[frame].push_back(static_cast<double>(ProfileClock() - begin));
-    return status;
-  }
-};
-
 // Sums over clips; divided by frames at the end.
 struct Sums {
   double full_ns = 0, accelerated_ns = 0, full_hit_ns = 0, accelerated_hit_ns = 0;
   double graph = 0, cues = 0, projection = 0, reconstruction = 0, downstream = 0, misses = 0, bound_graph = 0,
          bound_points = 0;
   double points_full = 0, points_accelerated = 0;
+  double parts = 0;                                     // as recorded
+  std::vector<double> full_run_ns, accelerated_run_ns;  // by run
+  double full_wall = 0, full_cpu = 0, wall = 0, cpu = 0;
   std::map<std::string, BenchNode> nodes;
   std::set<std::string> computed;
 };
-
-// Points that a profiled evaluation computed, copies by helper steps and the KPSA nodes left out.
-double PointsComputed(const Plan& plan, const Profile& profile) {
-  double points = 0;
-  for (Index s = 0; s < plan.steps().size(); ++s) {
-    if (*plan.step_label(s) != 0 || std::string_view(plan.step_type(s)) == "kpsa") continue;
-    points += static_cast<double>(plan.infos()[s].points) * static_cast<double>(profile.counts()[s]);
-  }
-  return points;
-}
 
 // Where colours are accelerated, they are what is compared: those of the nodes, or what takes their place.
 Request ColorOutputs(const Rig& rig, const std::vector<AppliedSubspace>& applied, bool accelerated) {
@@ -115,27 +47,13 @@ Request ColorOutputs(const Rig& rig, const std::vector<AppliedSubspace>& applied
   return request;
 }
 
-constexpr std::size_t kTurnFrames = 128;  // of one side, before the other runs them: some seconds of playback
-
-// What it costs to record the steps of a profile: for small nodes as much as they do.
-double RecordingNs(const Plan& plan, const Profile& recorded) {
-  constexpr int kEvents = 4000;
-  if (plan.steps().empty()) return 0;
-  Profile profile(plan);
-  const std::uint64_t begin = ProfileClock();
-  for (int i = 0; i < kEvents; ++i) profile.Add({0, kNoIndex, ProfileClock(), ProfileClock(), 0, 0});
-  const double each = static_cast<double>(ProfileClock() - begin) / kEvents;
-  double events = 0;
-  for (std::uint64_t count : recorded.counts()) events += static_cast<double>(count);
-  return each * events;
-}
-
 // One accelerated side: what is summed over the clips, and what belongs to the present one.
 struct Contender {
   AccelerationFlags flags;
   BenchResult result;
   PointErrors errors;
   Sums sums;
+  Reasons reasons;
 
   std::unique_ptr<OpenRig> open;
   std::vector<AppliedSubspace> applied;
@@ -144,7 +62,6 @@ struct Contender {
   std::unique_ptr<Verdicts> verdicts;
   std::unique_ptr<Side> side;
   PointErrors clip_errors;
-  std::vector<char> hit;
   FullWeights weights;
 
   // The rig of the flags with the subspaces in place. `outputs` becomes what the full side has to compute.
@@ -168,20 +85,21 @@ struct Contender {
     }
     compared = request.outputs.size();
     if (still) outputs->varying = request.varying = VaryingPlugs(rig);
-    verdicts = std::make_unique<Verdicts>(applied, rig, &request);
+    verdicts = std::make_unique<Verdicts>(applied);
+    verdicts->Ask(rig, &request);
     const auto plan = CompileFor(rig, &compiler, request);
     if (!plan.ok()) return plan.status();
     side = std::make_unique<Side>(rig, *plan, options.threads > 1, frames, still);
     clip_errors = PointErrors(compared);
-    hit.clear();
     weights.clear();
     return Status();
   }
   void Describe();
   void Compare(std::int64_t frame, const Evaluator& full, const std::string& clip);
-  void AddTimes(const std::vector<double>& full_ns);
-  void AddFullProfile(const Plan& plan, const Profile& profile, double wall, double full_ns);
-  void AddProfile(const Profile& profile, const KpsaTimes& kpsa, double wall, double fast_ns);
+  void NoteClip(const std::string& clip, bool still);
+  void AddTimes(const FrameTimes& full);
+  void AddFullProfile(const Plan& plan, const RecordedSteps& recorded, double full_ns);
+  void AddProfile(const RecordedSteps& recorded, double fast_ns);
   void Finish();
 };
 
@@ -200,9 +118,8 @@ void Contender::Describe() {
   }
   result.subspace = applied.front().path;
   result.mode = applied.front().subspace->mode == EstimatorMode::kMap ? "map" : "paper";
-  result.tolerance = applied.front().tolerance;
   result.light = applied.front().subspace->of_light();
-  result.violation_limit = applied.front().violation_rate;
+  result.promise.Make(applied);
   double bytes = 0, tiles = 0;
   for (const AppliedSubspace& one : applied) {
     for (const std::string& note : one.notes) result.notes.push_back(note);
@@ -231,32 +148,72 @@ void Contender::Describe() {
 // After both have evaluated a frame.
 void Contender::Compare(std::int64_t frame, const Evaluator& full, const std::string& clip) {
   verdicts->Add(frame, *side->evaluator);
-  hit.push_back(verdicts->last_hit());
+  const FrameDecision& decision = verdicts->records().back().decision;
+  result.hits += decision.hit();
+  result.blends += decision.verdict() == FrameVerdict::kBlend;
+  if (!decision.hit()) {
+    reasons.Add((applied.size() > 1 ? decision.entry + ": " : "") + decision.reason,
+                fmt::format("frame {} of {}", frame, clip));
+  }
   weights.emplace_back();
-  for (std::size_t n = 0; n < applied.size(); ++n)
-    weights.back().push_back(EmittedFullWeight(applied[n], verdicts->last_scores()[n]));
+  for (const FrameDecision& one : verdicts->last()) weights.back().push_back(one.full_weight);
   const double worst = clip_errors.AddFrame(full, *side->evaluator), rms = clip_errors.frame_rms();
-  // A blended or full miss keeps the tolerance, too, or it counts
-  if ((result.light ? rms : worst) > result.tolerance) ++result.violations;
-  result.per_frame.push_back({clip, frame, verdicts->last_hit(), rms, worst, 0, 0});
+  const bool accepted = std::any_of(weights.back().begin(), weights.back().end(),
+                                    [](double full_weight) { return full_weight < 1; });
+  result.promise.Add(clip, frame, decision.hit(), accepted, result.light ? rms : worst);
+  result.per_frame.push_back({clip, frame, decision, rms, worst, 0, 0});
   if (worst > result.error_max)
     result.error_max = worst, result.worst_frame = frame, result.worst_clip = clip;
 }
 
-void Contender::AddTimes(const std::vector<double>& full_ns) {
-  for (std::size_t f = 0; f < full_ns.size(); ++f) {
-    const double a = full_ns[f], b = Median(side->frame_ns[f]);
+// What makes the frames of a clip say little.
+void Contender::NoteClip(const std::string& clip, bool still) {
+  constexpr double kMotion = 1e-6;  // of the diagonal: rounding
+  if (!still && side->times.ns().size() > 1 && clip_errors.motion_rms() <= kMotion * clip_errors.diagonal())
+    result.notes.push_back(fmt::format("nothing moves in {}: its errors are those of one pose", clip));
+  // A clip of several rigs is called "a:wave + b:wave"
+  for (std::size_t begin = 0; begin < clip.size();) {
+    const std::size_t end = std::min(clip.find(" + ", begin), clip.size());
+    const std::string part = clip.substr(begin, end - begin);
+    begin = end + 3;
+    for (const AppliedSubspace& one : applied) {
+      const std::vector<std::string> trained = ParseTraining(one.subspace->training).clips;
+      if (std::find(trained.begin(), trained.end(), MakeTarget(open->rig, one.entry).within.Inner(part)) ==
+          trained.end())
+        continue;
+      result.notes.push_back(fmt::format("{} was trained on: its errors say nothing about new frames", part));
+      break;
+    }
+  }
+}
+
+void Contender::AddTimes(const FrameTimes& full) {
+  const auto add_runs = [](const std::vector<std::vector<double>>& frames, std::vector<double>* runs) {
+    for (const std::vector<double>& frame : frames) {
+      runs->resize(std::max(runs->size(), frame.size()));
+      for (std::size_t run = 0; run < frame.size(); ++run) (*runs)[run] += frame[run];
+    }
+  };
+  add_runs(full.ns(), &sums.full_run_ns);
+  add_runs(side->times.ns(), &sums.accelerated_run_ns);
+  sums.full_wall += full.wall_ns(), sums.full_cpu += full.cpu_ns();
+  sums.wall += side->times.wall_ns(), sums.cpu += side->times.cpu_ns();
+  const std::size_t frames = full.ns().size();
+  for (std::size_t f = 0; f < frames; ++f) {
+    const double a = Median(full.ns()[f]), b = Median(side->times.ns()[f]);
     sums.full_ns += a, sums.accelerated_ns += b;
-    BenchResult::Frame& frame = result.per_frame[result.per_frame.size() - full_ns.size() + f];
+    BenchResult::Frame& frame = result.per_frame[result.per_frame.size() - frames + f];
     frame.full_ms = a / 1e6, frame.accelerated_ms = b / 1e6;
-    if (hit[f]) sums.full_hit_ns += a, sums.accelerated_hit_ns += b;
+    if (frame.decision.hit()) sums.full_hit_ns += a, sums.accelerated_hit_ns += b;
   }
 }
 
 // A profiled evaluation is slower: its parts are scaled to the timed one. Rigs of one file have the same
 // nodes, so this side's name steps of the full plan, too.
-void Contender::AddFullProfile(const Plan& plan, const Profile& profile, double wall, double full_ns) {
-  const double scale = full_ns / std::max(1.0, wall);
+void Contender::AddFullProfile(const Plan& plan, const RecordedSteps& recorded, double full_ns) {
+  const double scale =
+      full_ns / std::max({1.0, recorded.wall_ns,
+                          std::accumulate(recorded.self_ns.begin(), recorded.self_ns.end(), 0.0)});
   std::vector<NodeId> stage_nodes;
   for (const AppliedSubspace& one : applied) {
     for (const AcceleratedPoints& points : one.entry.points) {
@@ -274,7 +231,7 @@ void Contender::AddFullProfile(const Plan& plan, const Profile& profile, double 
   }
   double graph = 0, points = 0, steps_ns = 0, kept_steps = 0;
   for (Index s = 0; s < plan.steps().size(); ++s) {
-    const double ns = static_cast<double>(profile.self_ns()[s]) * scale;
+    const double ns = recorded.self_ns[s] * scale;
     BenchNode& node = sums.nodes[plan.step_name(s)];
     node.name = plan.step_name(s), node.type = plan.step_type(s);
     node.ms_per_frame += ns;
@@ -289,33 +246,61 @@ void Contender::AddFullProfile(const Plan& plan, const Profile& profile, double 
   sums.bound_points += points;
   sums.bound_graph +=
       graph + between * kept_steps / static_cast<double>(std::max<std::size_t>(1, plan.steps().size()));
-  sums.points_full += PointsComputed(plan, profile);
+  sums.points_full += PointsComputed(plan, recorded);
 }
 
-void Contender::AddProfile(const Profile& profile, const KpsaTimes& kpsa, double wall, double fast_ns) {
+void Contender::AddProfile(const RecordedSteps& recorded, double fast_ns) {
   const Plan& plan = *side->plan;
-  const double scale = fast_ns / std::max(1.0, wall);
   std::vector<NodeId> kpsa_nodes;
   for (const AppliedSubspace& one : applied) kpsa_nodes.push_back(one.node);
   const std::vector<char> cue_steps = PointStepsAbove(plan, kpsa_nodes);
-  double cues = static_cast<double>(kpsa.cues) * scale, downstream = 0, misses = 0;
+  double cues = static_cast<double>(recorded.kpsa.cues), downstream = 0, misses = 0;
   for (Index s = 0; s < plan.steps().size(); ++s) {
     const Plan::StepInfo& info = plan.infos()[s];
-    const double ns = static_cast<double>(profile.self_ns()[s]) * scale;
-    if (profile.counts()[s] > 0) sums.computed.insert(plan.step_name(s));
+    if (recorded.counts[s] > 0) sums.computed.insert(plan.step_name(s));
     if (std::find(kpsa_nodes.begin(), kpsa_nodes.end(), info.node) != kpsa_nodes.end()) continue;
     if (info.segment != 0) {
-      misses += ns;
+      misses += recorded.self_ns[s];
     } else if (info.points_total > 0) {
-      (cue_steps[s] ? cues : downstream) += ns;
+      (cue_steps[s] ? cues : downstream) += recorded.self_ns[s];
     }
   }
-  sums.cues += cues, sums.downstream += downstream, sums.misses += misses;
-  sums.projection += static_cast<double>(kpsa.projection) * scale;
-  sums.reconstruction += static_cast<double>(kpsa.reconstruction) * scale;
-  sums.graph += std::max(0.0, fast_ns - cues - downstream - misses -
-                                  static_cast<double>(kpsa.projection + kpsa.reconstruction) * scale);
-  sums.points_accelerated += PointsComputed(plan, profile);
+  const auto projection = static_cast<double>(recorded.kpsa.projection),
+             reconstruction = static_cast<double>(recorded.kpsa.reconstruction);
+  // The graph is what the other parts leave; where these are more than all of it, as recording them costs
+  // time, they share it as they are
+  const double parts = cues + projection + reconstruction + downstream + misses,
+               all = std::max({1.0, recorded.wall_ns, parts}), scale = fast_ns / all;
+  sums.parts += fast_ns * all / std::max(1.0, recorded.wall_ns);
+  sums.cues += cues * scale, sums.downstream += downstream * scale, sums.misses += misses * scale;
+  sums.projection += projection * scale, sums.reconstruction += reconstruction * scale;
+  sums.graph += (all - parts) * scale;
+  sums.points_accelerated += PointsComputed(plan, recorded);
+}
+
+// The least and the most of the runs, and of what is told of all of them.
+BenchResult::Range RangeOf(const std::vector<double>& runs, double factor, double told) {
+  BenchResult::Range range{told, told};
+  for (double run : runs)
+    range.least = std::min(range.least, run * factor), range.most = std::max(range.most, run * factor);
+  return range;
+}
+
+// What is odd about the times.
+void NoteTimes(BenchResult* result) {
+  constexpr double kOdd = 1.1, kExceeds = 1.02;
+  if (result->wall_over_cpu > kOdd) {
+    result->notes.push_back(
+        fmt::format("the clock ran {:.3g} times as long as the program worked (something else runs, too): "
+                    "times are those of its work",
+                    result->wall_over_cpu));
+  }
+  if (result->parts_ms > kExceeds * result->accelerated_ms) {
+    result->notes.push_back(fmt::format(
+        "parts sum to {:.3f} ms of {:.3f} ms: recording costs {:.0f} %; they are shown as shares of the "
+        "total",
+        result->parts_ms, result->accelerated_ms, 100 * (result->parts_ms / result->accelerated_ms - 1)));
+  }
 }
 
 void Contender::Finish() {
@@ -346,6 +331,19 @@ void Contender::Finish() {
   result.nodes_total = sums.nodes.size();
   std::stable_sort(result.full_nodes.begin(), result.full_nodes.end(),
                    [](const BenchNode& a, const BenchNode& b) { return a.ms_per_frame > b.ms_per_frame; });
+  result.parts_ms = ms(sums.parts);
+  std::vector<double> ratios;
+  for (std::size_t run = 0; run < sums.full_run_ns.size(); ++run)
+    ratios.push_back(Ratio(sums.full_run_ns[run], sums.accelerated_run_ns[run]));
+  result.full_range = RangeOf(sums.full_run_ns, 1 / frames / 1e6, result.full_ms);
+  result.accelerated_range = RangeOf(sums.accelerated_run_ns, 1 / frames / 1e6, result.accelerated_ms);
+  result.speedup_range = RangeOf(ratios, 1, result.speedup());
+  if (sums.full_cpu > 0 && sums.cpu > 0) {
+    result.cpu_times = true;
+    result.wall_over_cpu = std::max(sums.full_wall / sums.full_cpu, sums.wall / sums.cpu);
+  }
+  NoteTimes(&result);
+  result.most_frequent_reason = reasons.MostFrequent();
   result.error_rms = errors.rms();
   result.error_p99 = errors.Percentile(0.99);
   result.motion_rms = errors.motion_rms();
@@ -389,26 +387,20 @@ class Bench {
       contenders_.front().result.notes.push_back(
           "nothing moves: timed is the evaluation of this pose from its controls, all of it every time");
     }
-    const auto located = [&](const Status& status, double t) {
-      return Status::Evaluation("at {} s: {}", t, status.errors().front().message).At({rig.path});
-    };
-
     // Points
     for (std::size_t f = 0; f < times.size(); ++f) {
       if (Interrupted()) return InterruptedStatus();
       progress->Set(done_++);
       for (Side* side : sides) {
-        if (const Status status = side->Evaluate(times[f]); !status.ok()) return located(status, times[f]);
+        if (Status status = side->Evaluate(times[f]); !status.ok()) return std::move(status).At({rig.path});
       }
       for (Contender& contender : contenders_)
         contender.Compare(FrameNumber(times[f], rig.fps), *full.evaluator, rig.scene.clip.value_or("(rest)"));
     }
     for (Contender& contender : contenders_) {
+      contender.NoteClip(rig.scene.clip.value_or("(rest)"), still);
       contender.errors.Merge(contender.clip_errors);
-      contender.result.hits += contender.verdicts->hits();
       contender.result.frames += times.size();
-      if (const std::string worst = contender.verdicts->WorstMiss(); !worst.empty())
-        contender.result.worst_miss = worst;
     }
 
     // Times. The sides take turns by blocks of frames: each keeps its caches as in playback, and all see the
@@ -419,19 +411,15 @@ class Bench {
         const std::size_t end = std::min(first + kTurnFrames, times.size());
         for (std::size_t turn = 0; turn < sides.size(); ++turn) {
           Side* const side = sides[(static_cast<std::size_t>(run) + block + turn) % sides.size()];
-          for (std::size_t f = first; f < end; ++f) {
-            if (Interrupted()) return InterruptedStatus();
-            if (const Status status = side->Timed(f, times[f]); !status.ok())
-              return located(status, times[f]);
-          }
+          if (Status status = side->Turn(times, first, end); !status.ok())
+            return std::move(status).At({rig.path});
         }
         for (std::size_t f = first; f < end; ++f) progress->Set(done_++);
       }
     }
-    std::vector<double> full_ns;
-    for (const auto& runs : full.frame_ns) full_ns.push_back(Median(runs));
-    for (Contender& contender : contenders_) contender.AddTimes(full_ns);
-    KPSA_RETURN_IF_ERROR(ProfileClip(&full, times, full_ns));
+    for (Side* side : sides) side->times.Finish();
+    for (Contender& contender : contenders_) contender.AddTimes(full.times);
+    KPSA_RETURN_IF_ERROR(ProfileClip(sides, times));
     for (Contender& contender : contenders_) {
       if (!HaveKeptModes(contender.applied)) continue;
       Result<FrameErrors> errors = SplitFrames(with_clip, contender.flags, times, contender.weights);
@@ -468,42 +456,27 @@ class Bench {
     return CompileFor(rig, &compiler, outputs);
   }
 
-  // What the time consists of.
-  Status ProfileClip(Side* full, const std::vector<double>& times, const std::vector<double>& full_ns) {
-    std::vector<Side*> sides{full};
-    for (Contender& contender : contenders_) sides.push_back(contender.side.get());
-    std::vector<Profile> profiles;
-    for (Side* side : sides) {
-      profiles.emplace_back(*side->plan);
-      side->StartAgain();
-    }
-    std::vector<double> wall(sides.size(), 0.0);
-    std::vector<KpsaTimes> kpsa(sides.size());
+  // What the time consists of. The full side comes first.
+  Status ProfileClip(const std::vector<Side*>& sides, const std::vector<double>& times) {
+    std::vector<RecordedSteps> recorded(sides.size());
+    for (Side* side : sides) side->StartAgain();
     MeasureKpsaTimes(true);
-    TakeKpsaTimes();
     Status status;
-    for (std::size_t f = 0; f < times.size() && status.ok(); ++f) {
-      for (std::size_t i = 0; i < sides.size() && status.ok(); ++i) {
-        sides[i]->Forget();
-        sides[i]->evaluator->Record(&profiles[i], static_cast<int>(f));
-        const std::uint64_t begin = ProfileClock();
-        status = sides[i]->Evaluate(times[f]);
-        wall[i] += static_cast<double>(ProfileClock() - begin);
-        sides[i]->evaluator->Record(nullptr);
-        const KpsaTimes taken = TakeKpsaTimes();
-        kpsa[i].cues += taken.cues, kpsa[i].projection += taken.projection;
-        kpsa[i].reconstruction += taken.reconstruction;
-      }
+    for (std::size_t first = 0; first < times.size() && status.ok(); first += kTurnFrames) {
+      const std::size_t end = std::min(first + kTurnFrames, times.size());
+      for (std::size_t i = 0; i < sides.size() && status.ok(); ++i)
+        status = sides[i]->RecordTurn(times, first, end, &recorded[i]);
     }
     MeasureKpsaTimes(false);
     KPSA_RETURN_IF_ERROR(std::move(status));
-    for (std::size_t i = 0; i < sides.size(); ++i) wall[i] -= RecordingNs(*sides[i]->plan, profiles[i]);
-    const double clip_full = std::accumulate(full_ns.begin(), full_ns.end(), 0.0);
+    const auto sum = [](const FrameTimes& frames) {
+      double ns = 0;
+      for (const std::vector<double>& runs : frames.ns()) ns += Median(runs);
+      return ns;
+    };
     for (std::size_t i = 0; i < contenders_.size(); ++i) {
-      double clip_fast = 0;
-      for (const auto& runs : contenders_[i].side->frame_ns) clip_fast += Median(runs);
-      contenders_[i].AddFullProfile(*full->plan, profiles[0], wall[0], clip_full);
-      contenders_[i].AddProfile(profiles[i + 1], kpsa[i + 1], wall[i + 1], clip_fast);
+      contenders_[i].AddFullProfile(*sides[0]->plan, recorded[0], sum(sides[0]->times));
+      contenders_[i].AddProfile(recorded[i + 1], sum(sides[i + 1]->times));
     }
     return Status();
   }

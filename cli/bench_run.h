@@ -2,7 +2,7 @@
 //
 // For every clip: one pass compares the points (and warms all sides up), some runs are timed, one pass is
 // profiled. The sides take turns by blocks of frames, so that whatever else the machine does hits all of
-// them. A frame's time is the median over the runs; a clip's is the mean over its frames.
+// them. A frame's time is the median over the runs (cli/frame_times.h); a clip's is the mean over its frames.
 #pragma once
 
 #include <limits>
@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "cli/acceleration.h"
+#include "cli/bench_promise.h"
 #include "cli/frame_errors.h"
+#include "cli/verdicts.h"
 #include "graph/plan_report.h"
 
 namespace kpsa {
@@ -41,21 +43,29 @@ struct BenchResult {
   std::size_t frames = 0, points = 0, output_points = 0, cues = 0, modes = 0;  // points: accelerated
   std::size_t cue_points = 0;                 // of the cues; the others are scalars
   double bytes_per_point = 0, mean_rank = 0;  // that the reconstruction reads
-  double tolerance = 0, violation_limit = 0;  // of the first subspace
+  Promise promise;                            // with its tolerance
   bool light = false;                         // errors are numbers, and a frame's is its RMS
   struct Frame {
     std::string clip;
     std::int64_t number = 0;  // of the clip's frames
-    bool hit = false;
+    FrameDecision decision;
     double rms = 0, max = 0, full_ms = 0, accelerated_ms = 0;
   };
   std::vector<Frame> per_frame;
 
-  double full_ms = 0;  // a frame
+  // Over the runs.
+  struct Range {
+    double least = 0, most = 0;
+  };
+  bool cpu_times = false;    // by the work of the thread; else as long as they lasted
+  double wall_over_cpu = 1;  // the larger of both sides'; 1 where it is not known
+  double full_ms = 0;        // a frame
+  Range full_range, accelerated_range, speedup_range;
   std::vector<BenchNode> full_nodes;
   double accelerated_ms = 0;
   double graph_ms = 0, cues_ms = 0, projection_ms = 0, reconstruction_ms = 0, downstream_ms = 0,
          misses_ms = 0;  // its parts
+  double parts_ms = 0;   // as recorded: where they take longer than accelerated_ms, they are shown as shares
   double full_ms_on_hits = 0, accelerated_ms_on_hits = 0;
   double speedup() const { return Ratio(full_ms, accelerated_ms); }
   double speedup_on_hits() const { return Ratio(full_ms_on_hits, accelerated_ms_on_hits); }
@@ -65,8 +75,8 @@ struct BenchResult {
   double bound_ms = 0, bound_graph_ms = 0, bound_points_ms = 0;
   double ceiling() const { return Ratio(full_ms, bound_ms); }
 
-  std::size_t hits = 0, violations = 0;  // violations: frames beyond the tolerance, accepted or not
-  std::string worst_miss;
+  std::size_t hits = 0, blends = 0;
+  std::string most_frequent_reason;  // of frames that are no hits; "" where all are
   double error_rms = 0, error_max = 0, error_p99 = 0,
          diagonal = 0;     // metres, all points of all frames, misses included
   std::string worst_clip;  // "": nothing differs

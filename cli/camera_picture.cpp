@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "cli/frames_range.h"
 #include "nodes/illumination.h"
 
 namespace kpsa {
@@ -122,7 +123,7 @@ CameraView AcceleratedView(const CameraView& view, const Rig& rig,
 
 Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compiler, const CameraView& view,
                                                 const std::vector<double>& times,
-                                                const RigFrameOptions& options) {
+                                                const RigFrameOptions& options, Verdicts* verdicts) {
   Request request;
   request.varying.push_back(rig.scene.time);
   for (std::size_t m : view.meshes) request.outputs.push_back({rig.scene.meshes[m].points, {}});
@@ -135,6 +136,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
   const auto irradiance = static_cast<Index>(request.outputs.size());
   if (view.irradiance.has_value()) request.outputs.push_back({*view.irradiance, {}});
   for (const CameraView::Carried& carried : view.carried) request.outputs.push_back({carried.irradiance, {}});
+  if (verdicts != nullptr) verdicts->Ask(rig, &request);
   const auto plan = CompileFor(rig, compiler, request);
   if (!plan.ok()) return plan.status();
 
@@ -165,6 +167,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
   std::vector<CameraImage> images(times.size());
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, times, options, [&](std::size_t frame, const Evaluator& evaluator) {
+        if (verdicts != nullptr) verdicts->Add(FrameNumber(times[frame], rig.fps), evaluator);
         PointBuffer points(count);
         std::size_t at = 0;
         for (Index m = 0; m < view.meshes.size(); ++m) {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "cli/acceleration.h"
 #include "cli/image.h"
 #include "cli/rig_frames.h"
+#include "cli/verdicts.h"
 #include "nodes/kernels/path_tracer.h"
 
 namespace kpsa {
@@ -44,9 +44,10 @@ struct CameraImage {
   std::vector<float> albedo, direct, indirect;  // reflectance; irradiances
   std::vector<char> hit;                        // whether the pixel shows a surface
 };
+// Also what the rig's KPSA nodes decided, where somebody asks.
 Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compiler, const CameraView& view,
                                                 const std::vector<double>& times,
-                                                const RigFrameOptions& options);
+                                                const RigFrameOptions& options, Verdicts* verdicts = nullptr);
 
 enum class CameraLayer { kAll, kDirect, kIndirect };
 // Radiance albedo / pi times irradiance, times `exposure`, as sRGB; light beyond 1 is compressed smoothly.

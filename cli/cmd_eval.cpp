@@ -11,6 +11,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/rig_frames.h"
+#include "cli/verdicts.h"
 #include "cli/vertex_output.h"
 
 namespace kpsa {
@@ -53,7 +54,8 @@ CommandResult Eval(const EvalFlags& flags) {
   }
   const std::vector<std::size_t> shown = ShownMeshes(rig.scene);
   Request request = ShownPoints(rig);
-  Verdicts verdicts(applied, rig, &request);
+  Verdicts verdicts(applied);
+  verdicts.Ask(rig, &request);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
 
@@ -89,11 +91,19 @@ CommandResult Eval(const EvalFlags& flags) {
                                                              {"seconds", seconds},
                                                              {"notes", *notes}};
     if (!applied.empty()) {
+      nlohmann::ordered_json per_frame = nlohmann::ordered_json::array();
+      for (const FrameRecord& record : verdicts.records()) {
+        nlohmann::ordered_json row = {{"frame", record.frame}};
+        row.update(DecisionJson<nlohmann::ordered_json>(record.decision));
+        per_frame.push_back(std::move(row));
+      }
       document["accelerated"] = {{"hits", verdicts.hits()},
-                                 {"misses", verdicts.frames() - verdicts.hits()},
+                                 {"blends", verdicts.count(FrameVerdict::kBlend)},
+                                 {"misses", verdicts.count(FrameVerdict::kMiss)},
                                  {"hit_rate", verdicts.hit_rate()},
                                  {"worst_score", verdicts.worst_score()},
-                                 {"worst_miss", verdicts.WorstMiss()}};
+                                 {"most_frequent_reason", verdicts.MostFrequentReason()},
+                                 {"per_frame", std::move(per_frame)}};
     }
     PrintJson(document);
   }
@@ -103,6 +113,7 @@ CommandResult Eval(const EvalFlags& flags) {
     }
     for (const std::string& note : *notes) Say("note: " + note);
     if (!applied.empty()) Say(verdicts.Text());
+    if (const std::string reason = verdicts.MostFrequentReason(); !reason.empty()) Say(reason);
     const std::vector<std::string> paths = (*output)->paths();
     Say(fmt::format("{}{}: {} of {}, {:.2f} s", paths.front(),
                     paths.size() > 1 ? fmt::format(" and {} more", paths.size() - 1) : "",

@@ -1,9 +1,11 @@
-// kpsa explain: why a node was evaluated, and why it could not be masked or skipped; what moves a vertex.
+// kpsa explain: why a node was evaluated, and why it could not be masked or skipped; what moves a vertex;
+// what SoftCache decided.
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/acceleration.h"
+#include "cli/explain_decision.h"
 #include "cli/explain_vertex.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
@@ -18,7 +20,8 @@ namespace {
 
 struct ExplainFlags : Flags {
   AccelerationFlags acceleration;
-  std::string what;
+  std::optional<std::string> node;
+  std::string what;  // the same
   std::vector<std::string> wanted;
   std::optional<std::string> vertices, frame;
 };
@@ -63,21 +66,11 @@ Result<Target> FindTarget(const Rig& rig, const std::string& what) {
   return AsUsage(status);
 }
 
-// The frame of --frame and those that come before it: one, so that what changed since then is told, or all
-// where a node needs its past. The profile is of the last one.
-Status EvaluateTo(const Rig& rig, const std::shared_ptr<const Plan>& plan, int frame, Profile* profile) {
-  Evaluator evaluator(plan);
-  const Index time = plan->FindVarying(rig.scene.time);
-  for (int f = plan->stateful_node().empty() ? frame - 1 : std::min(frame - 1, 0); f <= frame; ++f) {
-    if (Interrupted()) return InterruptedStatus();
-    if (f == frame) evaluator.Record(profile, f);
-    if (time != kNoIndex) evaluator.Set(time, f / rig.fps);
-    const Status status = evaluator.Evaluate();
-    if (status.ok()) continue;
-    const std::string& message = status.errors().front().message;
-    return Status::Evaluation("at frame {}: {}", f, message).At(PlaceOfMessage(rig, message));
-  }
-  return Status();
+CommandResult ExplainDecisions(const ExplainFlags& flags, Rig* rig, int frame) {
+  const Result<DecisionStory> story = TellOfDecisions(rig, flags.acceleration, frame);
+  if (!story.ok()) return story.status();
+  Print(flags.json ? DecisionStoryJson(*story) : DecisionText(*story));
+  return 0;
 }
 
 CommandResult ExplainVertex(const ExplainFlags& flags, const Rig& rig, const VertexName& vertex) {
@@ -116,9 +109,17 @@ CommandResult Explain(ExplainFlags flags) {
   }
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
   KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
+  const bool decisions = !flags.node.has_value();
+  if (decisions && !(flags.acceleration.wanted() && frame.has_value()))
+    return Status::Usage(
+        "expected NODE, or --accelerate (or --kpsa) and --frame F for what SoftCache decided");
+  if (decisions && (!flags.wanted.empty() || flags.vertices.has_value()))
+    return Status::Usage("{} is of no use without NODE", flags.wanted.empty() ? "--vertices" : "--want");
+  flags.what = flags.node.value_or("");
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
+  if (decisions) return ExplainDecisions(flags, &rig, *frame);
   if (!rig.graph->FindNode(flags.what).ok() && !rig.graph->FindPlug(flags.what).ok()) {
     const Result<std::optional<VertexName>> vertex = FindVertex(rig, flags.what);
     if (!vertex.ok()) return vertex.status();
@@ -138,7 +139,8 @@ CommandResult Explain(ExplainFlags flags) {
   const InterruptScope interruptible;
   Profile profile(plan);
   if (frame.has_value()) {
-    KPSA_RETURN_IF_ERROR(EvaluateTo(rig, *compiled, *frame, &profile));
+    Evaluator evaluator(*compiled);
+    KPSA_RETURN_IF_ERROR(EvaluateTo(rig, *frame, &evaluator, &profile));
   } else {
     RigFrameOptions options;
     options.threads = 1;
@@ -200,21 +202,25 @@ CommandResult Explain(ExplainFlags flags) {
 
 void AddExplainCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<ExplainFlags>();
-  CLI::App* command =
-      AddCommand(program, "explain", "Why a node is evaluated or not, and what moves a vertex",
-                 "Of a node: what dirtied it, who needs it, why it is not masked or skipped. Evaluates the "
-                 "clip, or the frames "
-                 "that are chosen, and tells of the last evaluation; --frame tells what changed since the "
-                 "frame before.\n"
-                 "Of a vertex: the joints, morph targets and deformers that move it, and how far.\n"
-                 "Examples:\n"
-                 "  kpsa explain head.yaml mush\n"
-                 "  kpsa explain head.yaml jaw.rotateX --clip face_talk\n"
-                 "  kpsa explain head.yaml mush --accelerate --frame 12\n"
-                 "  kpsa explain head.yaml head_mesh[812] --frame 12",
-                 chosen, [flags] { return Explain(*flags); });
+  CLI::App* command = AddCommand(
+      program, "explain", "Why a node is evaluated or not, what moves a vertex, why a frame is a hit or not",
+      "Of a node: what dirtied it, who needs it, why it is not masked or skipped. Evaluates the "
+      "clip, or the frames "
+      "that are chosen, and tells of the last evaluation; --frame tells what changed since the "
+      "frame before.\n"
+      "Of a vertex: the joints, morph targets and deformers that move it, and how far.\n"
+      "Of no node, with a subspace and --frame: what SoftCache decided there, and why.\n"
+      "Examples:\n"
+      "  kpsa explain head.yaml mush\n"
+      "  kpsa explain head.yaml jaw.rotateX --clip face_talk\n"
+      "  kpsa explain head.yaml mush --accelerate --frame 12\n"
+      "  kpsa explain head.yaml --accelerate --frame 12\n"
+      "  kpsa explain head.yaml head_mesh[812] --frame 12",
+      chosen, [flags] { return Explain(*flags); });
   AddRigFlags(command, flags.get());
-  AddRequired(command, "NODE", &flags->what, "a node, a plug (node.attr) or a vertex (mesh[812])");
+  AddOption(
+      command, "NODE", "", &flags->node,
+      "a node, a plug (node.attr) or a vertex (mesh[812]); without it, what SoftCache decided at --frame");
   AddTimeFlags(command, flags.get());
   AddOption(command, "--frame", "F", &flags->frame, "one frame, after the one before it");
   AddRepeated(command, "--want", "PLUG", &flags->wanted,

@@ -27,6 +27,7 @@ std::string CsvField(const std::string& text) {
 constexpr std::size_t kMaxNumbers = 20'000'000;  // printed
 
 struct GetFlags : Flags {
+  AccelerationFlags acceleration;
   std::vector<std::string> plugs;
   std::optional<std::string> format;  // csv if not given
 };
@@ -38,20 +39,28 @@ CommandResult Get(const GetFlags& flags) {
   const bool json = flags.json || flags.format == "json";
   if (flags.format.value_or("csv") != "csv" && flags.format != "json")
     return Status::Usage("--format {}: expected csv or json", *flags.format);
+  KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
   const std::string place = flags.output.value_or("-");
   KPSA_RETURN_IF_ERROR(CheckOutput(place, flags.force, {}));
   const ThreadLimit limit(*threads);
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
-  const Rig& rig = (*open)->rig;
+  Rig& rig = (*open)->rig;
   KPSA_RETURN_IF_ERROR(CheckNotInput(place, rig.files));
   const Result<std::vector<double>> times = SampleTimes(flags, rig);
   if (!times.ok()) return times.status();
+  Compiler compiler;
+  std::vector<AppliedSubspace> applied;
+  if (flags.acceleration.wanted()) {
+    Result<std::vector<AppliedSubspace>> result = ApplyAcceleration(&rig, &compiler, flags.acceleration);
+    if (!result.ok()) return result.status();
+    applied = std::move(*result);
+  }
   Request request;
   request.varying.push_back(rig.scene.time);
   Result<std::vector<Column>> columns = FindColumns(rig, flags.plugs, &request);
   if (!columns.ok()) return columns.status();
-  Compiler compiler;
+  ReadColorsFrom(applied, *rig.graph, &request);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
   std::size_t width = 0;
@@ -84,6 +93,15 @@ CommandResult Get(const GetFlags& flags) {
         if (!json) text += NumberText((*times)[frame]);
         for (std::size_t c = 0; c < columns->size(); ++c) {
           const Column& column = (*columns)[c];
+          if (column.config != nullptr) {
+            const std::string words = column.Words(evaluator);
+            if (json) {
+              values[c].push_back(words);
+            } else {
+              text += "," + CsvField(words);
+            }
+            continue;
+          }
           numbers.clear();
           if (column.output != kNoIndex) column.Read(evaluator, &numbers);
           if (!json) {
@@ -105,7 +123,7 @@ CommandResult Get(const GetFlags& flags) {
     for (std::size_t c = 0; c < columns->size(); ++c) {
       const Column& column = (*columns)[c];
       plugs.push_back({{"plug", column.name},
-                       {"type", TypeName(column.type)},
+                       {"type", column.config != nullptr ? "string" : TypeName(column.type)},
                        {"unit", column.unit},
                        {"values", std::move(values[c])}});
     }
@@ -124,14 +142,18 @@ void AddGetCommand(CLI::App* program, Command* chosen) {
   CLI::App* command = AddCommand(program, "get", "Print values of plugs over time",
                                  "One row a frame. Lengths and angles in the rig's units; matrices in "
                                  "metres, column by column; points by vertex.\n"
+                                 "With a subspace, its node ENTRY_kpsa tells hit, fullWeight, score and "
+                                 "missReason.\n"
                                  "Examples:\n"
                                  "  kpsa get head.yaml jaw.worldMatrix jaw.poseRotateX --frames 0:48\n"
+                                 "  kpsa get head.yaml head_kpsa.missReason --accelerate\n"
                                  "  kpsa get head.glb head_mesh.weight[mouth-open] --json --times 0.5",
                                  chosen, [flags] { return Get(*flags); });
   AddRigFlags(command, flags.get());
   AddRepeated(command, "PLUG", "", &flags->plugs,
               "plugs (jaw.worldMatrix), or points of a mesh (head_mesh@mush)");
   AddTimeFlags(command, flags.get());
+  AddAccelerationFlags(command, &flags->acceleration);
   AddOption(command, "--format", "", &flags->format, "csv (the default) or json");
   AddOutputFlags(command, flags.get(), "a file instead of stdout");
   AddThreadsFlag(command, flags.get());

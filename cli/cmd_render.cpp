@@ -134,8 +134,9 @@ Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const Render
     const Result<std::vector<AppliedSubspace>> applied =
         ApplyAcceleration(&rig, compiler, flags.acceleration);
     if (!applied.ok()) return applied.status();
+    Verdicts verdicts(*applied);
     const Result<std::vector<CameraImage>> fast =
-        EvaluateCamera(rig, compiler, AcceleratedView(*view, rig, *applied), times, options);
+        EvaluateCamera(rig, compiler, AcceleratedView(*view, rig, *applied), times, options, &verdicts);
     if (!fast.ok()) return fast.status();
     for (std::size_t f = 0; f < times.size(); ++f) {
       const double error_max = 4 * ShownTolerance(applied->front());
@@ -143,7 +144,7 @@ Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const Render
       std::vector<Image> three = {Develop((*full)[f], exposure, layer), Develop((*fast)[f], exposure, layer),
                                   std::move(error)};
       for (Image& image : three) image = Shrunk(image, shrink);
-      DrawTitle(three[0], "full"), DrawTitle(three[1], "accelerated");
+      DrawTitle(three[0], "full"), DrawTitle(three[1], PictureTitle(verdicts.records()[f].decision));
       DrawTitle(three[2], fmt::format("error, 0 .. {:.3g}", error_max));
       rows.push_back(SideBySide(three));
     }
@@ -202,7 +203,8 @@ CommandResult Render(const RenderFlags& flags) {
     const Result<std::vector<AppliedSubspace>> applied =
         ApplyAcceleration(&rig, &compiler, flags.acceleration);
     if (!applied.ok()) return applied.status();
-    Result<std::vector<Pose>> fast = EvaluatePoses(rig, &compiler, *times, frame_options);
+    Verdicts verdicts(*applied);
+    Result<std::vector<Pose>> fast = EvaluatePoses(rig, &compiler, *times, frame_options, &verdicts);
     if (!fast.ok()) return fast.status();
     std::vector<std::size_t> frames(times->size());
     std::size_t worst = 0;
@@ -217,7 +219,8 @@ CommandResult Render(const RenderFlags& flags) {
       RenderInput exact = MakeInput(rig, (*full)[f]), emitted = MakeInput(rig, (*fast)[f]);
       exact.scalar_max = emitted.scalar_max = view->error_scale.value_or(ShownTolerance(applied->front()));
       const RenderDots dots = KeyPoints(*applied, (*full)[f]);
-      KPSA_RETURN_IF_ERROR(add(RenderComparison(exact, emitted, camera, view->options, &dots)));
+      KPSA_RETURN_IF_ERROR(add(RenderComparison(exact, emitted, camera, view->options, &dots,
+                                                PictureTitle(verdicts.records()[f].decision))));
     }
     if (!flags.quiet && !chosen)
       Say(fmt::format("the frame with the largest error, at {:.4g} s: {}", (*times)[worst],

@@ -210,7 +210,7 @@ std::string RatioText(double ratio, int digits) {
 std::string Plural(std::uint64_t count, const std::string& noun) {
   if (count == 1) return "1 " + noun;
   if (noun.ends_with("vertex")) return Thousands(count) + " " + noun.substr(0, noun.size() - 2) + "ices";
-  return Thousands(count) + " " + noun + (noun.ends_with("sh") ? "es" : "s");
+  return Thousands(count) + " " + noun + (noun.ends_with("sh") || noun.ends_with("ss") ? "es" : "s");
 }
 
 InterruptScope::InterruptScope() { ++scopes; }

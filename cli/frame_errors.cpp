@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "base/matrix.h"
 #include "cli/rig_frames.h"
@@ -62,15 +61,6 @@ void FrameErrors::Append(const FrameErrors& later) {
   append(&times, later.times);
   append(&projection, later.projection), append(&cueing, later.cueing), append(&storage, later.storage);
   append(&total, later.total), append(&soft_cache, later.soft_cache), append(&hit, later.hit);
-}
-
-double EmittedFullWeight(const AppliedSubspace& applied, double score) {
-  if (applied.config->data().always_miss) return 1;
-  const double tolerance =
-      applied.tolerance >= kAnyError ? std::numeric_limits<double>::infinity() : applied.tolerance;
-  const Subspace& s = *applied.subspace;
-  return FullWeight(score,
-                    Calibrate(s.calibration, tolerance, applied.violation_rate, s.blend_start).threshold);
 }
 
 bool HaveKeptModes(const std::vector<AppliedSubspace>& applied) {

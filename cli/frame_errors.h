@@ -22,9 +22,6 @@ struct FrameErrors {
 // What SoftCache decided: for each frame the share of the full evaluation in the points of each subspace.
 using FullWeights = std::vector<std::vector<double>>;
 
-// That share, from the KPSA node's score.
-double EmittedFullWeight(const AppliedSubspace& applied, double score);
-
 // Whether every subspace was trained with --keep-modes, which SplitFrames needs.
 bool HaveKeptModes(const std::vector<AppliedSubspace>& applied);
 

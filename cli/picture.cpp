@@ -396,7 +396,8 @@ RenderPart MakeDots(const RenderDots& dots, double radius) {
 }
 
 Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accelerated, const Camera& camera,
-                               const RenderOptions& options, const RenderDots* dots) {
+                               const RenderOptions& options, const RenderDots* dots,
+                               const std::string& title) {
   if (full.parts.size() != accelerated.parts.size()) {
     return Status::Usage("{} parts cannot be compared with {}", full.parts.size(), accelerated.parts.size());
   }
@@ -414,7 +415,7 @@ Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accel
   }
   RenderInput dotted;
   std::vector<std::pair<const RenderInput*, std::string>> panels = {
-      {&full, "full"}, {&accelerated, "accelerated"}, {&heat, "error " + Millimetres(largest) + " max"}};
+      {&full, "full"}, {&accelerated, title}, {&heat, "error " + Millimetres(largest) + " max"}};
   if (dots != nullptr) {
     dotted = full;
     Double3 center;
@@ -422,11 +423,11 @@ Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accel
     panels.insert(panels.begin() + 1, {&dotted, dots->title});
   }
   std::vector<Image> images;
-  for (const auto& [input, title] : panels) {
+  for (const auto& [input, caption] : panels) {
     Result<Image> image = RenderMesh(*input, camera, options);
     if (!image.ok()) return image.status();
     images.push_back(std::move(*image));
-    DrawTitle(images.back(), title);
+    DrawTitle(images.back(), caption);
   }
   DrawLegend(images.back(), full.scalar_max);
   return SideBySide(images);

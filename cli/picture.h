@@ -71,10 +71,11 @@ struct RenderDots {
 // Their surface. `radius` in metres.
 RenderPart MakeDots(const RenderDots& dots, double radius);
 
-// Three pictures side by side from one camera: "full", "accelerated" and the heat map of their distance,
-// titled with its maximum; with dots a fourth, of the full shape with them, after the first. `full` and
-// `accelerated` hold the same parts with different points.
+// Three pictures side by side from one camera: "full", the accelerated one with its title, and the heat map
+// of their distance, titled with its maximum; with dots a fourth, of the full shape with them, after the
+// first. `full` and `accelerated` hold the same parts with different points.
 Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accelerated, const Camera& camera,
-                               const RenderOptions& options = {}, const RenderDots* dots = nullptr);
+                               const RenderOptions& options = {}, const RenderDots* dots = nullptr,
+                               const std::string& title = "accelerated");
 
 }  // namespace kpsa

@@ -73,6 +73,12 @@ void Column::Read(const Evaluator& evaluator, std::vector<double>* numbers) cons
   }
 }
 
+std::string Column::Words(const Evaluator& evaluator) const {
+  const std::int64_t who = evaluator.Get<std::int64_t>(offender);
+  return MissText(*config, static_cast<MissReason>(evaluator.Get<std::int64_t>(output)),
+                  who < 0 ? kNoIndex : static_cast<Index>(who));
+}
+
 Result<std::vector<Column>> FindColumns(const Rig& rig, const std::vector<std::string>& plugs,
                                         Request* request) {
   std::vector<Column> columns;
@@ -101,6 +107,15 @@ Result<std::vector<Column>> FindColumns(const Rig& rig, const std::vector<std::s
     } else {
       column.output = static_cast<Index>(request->outputs.size());
       request->outputs.push_back(std::move(output));
+      if (const NodeId node = wanted->plug.node;
+          rig.graph->def(node).name == "kpsa" && attribute.name == "missReason") {
+        const NodeDef& def = rig.graph->def(node);
+        const Value* config = rig.graph->FindValue({node, def.FindAttribute("config"), -1, -1});
+        if (config != nullptr)
+          column.config = std::dynamic_pointer_cast<const KpsaConfig>(config->get<AssetPtr>());
+        column.offender = static_cast<Index>(request->outputs.size());
+        request->outputs.push_back({{node, def.FindAttribute("offender"), -1, -1}, {}});
+      }
     }
     columns.push_back(std::move(column));
   }

@@ -1,11 +1,13 @@
 // Plugs as columns of numbers, for tables over time.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "cli/request.h"
 #include "graph/evaluator.h"
+#include "kpsa/kpsa_node.h"
 
 namespace kpsa {
 
@@ -20,7 +22,11 @@ struct Column {
   std::string text;
   std::vector<std::string> suffixes;  // one a number
   Index points = 0;                   // of a points plug
+  // Of a KPSA node's missReason, which is told in words: the node's config, and its output offender.
+  std::shared_ptr<const KpsaConfig> config;
+  Index offender = kNoIndex;
 
+  std::string Words(const Evaluator& evaluator) const;
   void Read(const Evaluator& evaluator, std::vector<double>* numbers) const;
 };
 

@@ -105,14 +105,10 @@ Result<Request> AcceleratedRequest(Rig* rig, Compiler* compiler, const Accelerat
   }
   Result<Request> request = BuildRequest(*rig, wanted, vertices);
   if (!request.ok()) return request;
+  ReadColorsFrom(applied, *rig->graph, &*request);
   for (const AppliedSubspace& one : applied) {
-    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
-      if (!one.entry.points[p].colors) continue;
-      const PlugRef fast = one.Output(*rig->graph, p);
-      for (RequestedOutput& output : request->outputs) {
-        if (output.plug == one.entry.points[p].points) output.plug = fast;
-      }
-      if (wanted.empty() && !vertices.has_value()) request->outputs.push_back({fast, {}});
+    for (std::size_t p = 0; p < one.entry.points.size() && wanted.empty() && !vertices.has_value(); ++p) {
+      if (one.entry.points[p].colors) request->outputs.push_back({one.Output(*rig->graph, p), {}});
     }
   }
   return request;

@@ -1,5 +1,7 @@
 #include "cli/rig_frames.h"
 
+#include <algorithm>
+
 #include "cli/common.h"
 #include "cli/progress.h"
 
@@ -46,6 +48,21 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
       });
   if (!status.ok() && status.kind() == ErrorKind::kInterrupted) return InterruptedStatus();
   return status;
+}
+
+Status EvaluateTo(const Rig& rig, int frame, Evaluator* evaluator, Profile* profile) {
+  const Plan& plan = evaluator->plan();
+  const Index time = plan.FindVarying(rig.scene.time);
+  for (int f = plan.stateful_node().empty() ? frame - 1 : std::min(frame - 1, 0); f <= frame; ++f) {
+    if (Interrupted()) return InterruptedStatus();
+    if (f == frame && profile != nullptr) evaluator->Record(profile, f);
+    if (time != kNoIndex) evaluator->Set(time, f / rig.fps);
+    const Status status = evaluator->Evaluate();
+    if (status.ok()) continue;
+    const std::string& message = status.errors().front().message;
+    return Status::Evaluation("at frame {}: {}", f, message).At(PlaceOfMessage(rig, message));
+  }
+  return Status();
 }
 
 }  // namespace kpsa

@@ -37,4 +37,8 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
                      const std::vector<double>& times, const RigFrameOptions& options,
                      const RigFrameSink& sink);
 
+// Evaluates a frame after those that come before it: one, or all from 0 on where a node needs its past. A
+// profile, where one is given, is of the frame alone.
+Status EvaluateTo(const Rig& rig, int frame, Evaluator* evaluator, Profile* profile = nullptr);
+
 }  // namespace kpsa

@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 
+#include "cli/frames_range.h"
 #include "kpsa/subspace.h"
 
 namespace kpsa {
@@ -33,13 +34,16 @@ std::shared_ptr<const std::vector<float>> PointColors(const Rig& rig, std::size_
 }  // namespace
 
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
-                                        const RigFrameOptions& options) {
-  const auto plan = CompileFor(rig, compiler, ShownPoints(rig));
+                                        const RigFrameOptions& options, Verdicts* verdicts) {
+  Request request = ShownPoints(rig);
+  if (verdicts != nullptr) verdicts->Ask(rig, &request);
+  const auto plan = CompileFor(rig, compiler, request);
   if (!plan.ok()) return plan.status();
   const std::vector<std::size_t> shown = ShownMeshes(rig.scene);
   std::vector<Pose> poses(times.size(), Pose(rig.scene.meshes.size()));
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, times, options, [&](std::size_t frame, const Evaluator& evaluator) {
+        if (verdicts != nullptr) verdicts->Add(FrameNumber(times[frame], rig.fps), evaluator);
         for (Index output = 0; output < shown.size(); ++output) {
           const ConstPointsView points = evaluator.Points(output);
           std::vector<float>& xyz = poses[frame][shown[output]];

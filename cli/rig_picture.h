@@ -3,18 +3,19 @@
 
 #include <vector>
 
-#include "cli/acceleration.h"
 #include "cli/picture.h"
 #include "cli/rig_frames.h"
+#include "cli/verdicts.h"
 
 namespace kpsa {
 
 // The points of all meshes at one time, x y z interleaved; none of those that are hidden.
 using Pose = std::vector<std::vector<float>>;
 
-// The final points of the meshes that are shown, at the times.
+// The final points of the meshes that are shown, at the times; and what the rig's KPSA nodes decided, where
+// somebody asks.
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
-                                        const RigFrameOptions& options);
+                                        const RigFrameOptions& options, Verdicts* verdicts = nullptr);
 // One part a mesh, with the file's vertex colours if it has them; or one a primitive where materials have
 // colours. Refers to both arguments.
 RenderInput MakeInput(const Rig& rig, const Pose& pose);

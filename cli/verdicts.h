@@ -1,0 +1,99 @@
+// What the KPSA nodes decided, frame after frame: hits, blends and misses, and why.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cli/acceleration.h"
+#include "graph/evaluator.h"
+
+namespace kpsa {
+
+enum class FrameVerdict : std::uint8_t { kHit, kBlend, kMiss };
+const char* VerdictName(FrameVerdict verdict);  // "hit", "blend", "miss"
+
+// Of one node on one frame.
+struct FrameDecision {
+  std::string entry;       // the accelerate entry
+  double full_weight = 0;  // share of the full evaluation in its points: 0 a hit, 1 a miss
+  double score = 0;        // infinite where nothing was measured
+  std::string reason;      // "hit", or why not, with the plug or the point
+  FrameVerdict verdict() const {
+    return full_weight <= 0  ? FrameVerdict::kHit
+           : full_weight < 1 ? FrameVerdict::kBlend
+                             : FrameVerdict::kMiss;
+  }
+  bool hit() const { return verdict() == FrameVerdict::kHit; }
+};
+// "accelerated", "blend: 12 % full", "miss: fully evaluated": what a picture of such a frame shows.
+std::string PictureTitle(const FrameDecision& decision);
+// A JSON object of any type that is made as nlohmann's are; a score that is infinite is dumped as null.
+template <typename Json>
+Json DecisionJson(const FrameDecision& decision) {
+  return {{"verdict", VerdictName(decision.verdict())},
+          {"full_weight", decision.full_weight},
+          {"score", decision.score},
+          {"reason", decision.reason},
+          {"subspace", decision.entry}};
+}
+
+// Of all nodes: the decision of the one with the largest share of the full evaluation, of equal ones with the
+// largest score.
+struct FrameRecord {
+  std::int64_t frame = 0;
+  FrameDecision decision;
+};
+
+// Why frames were no hits, counted.
+class Reasons {
+ public:
+  void Add(const std::string& text, const std::string& frame);  // the name of the frame: "frame 12"
+  // "most frequent reason (28 frames, first at frame 10): jaw.matrix is outside its trained range"; "" where
+  // all hit.
+  std::string MostFrequent() const;
+
+ private:
+  struct Reason {
+    std::string text, first_frame;
+    std::size_t count = 0;
+  };
+  std::vector<Reason> reasons_;
+};
+
+class Verdicts {
+ public:
+  explicit Verdicts(const std::vector<AppliedSubspace>& applied) : applied_(&applied) {}
+  // Adds to a request what Add reads: four outputs a node.
+  void Ask(const Rig& rig, Request* request);
+  void Add(std::int64_t frame, const Evaluator& evaluator);  // its number, for texts
+
+  const std::vector<FrameRecord>& records() const { return records_; }
+  const std::vector<FrameDecision>& last() const { return last_; }  // of the last frame, one a node
+  std::size_t frames() const { return records_.size(); }
+  std::size_t count(FrameVerdict verdict) const { return counts_[static_cast<std::size_t>(verdict)]; }
+  std::size_t hits() const { return count(FrameVerdict::kHit); }
+  double hit_rate() const {
+    return frames() == 0 ? 0 : static_cast<double>(hits()) / static_cast<double>(frames());
+  }
+  // The largest of those that were measured; not a number where none was.
+  double worst_score() const { return worst_score_; }
+  std::string Text() const;  // one line: hits, blends, misses, worst score
+  std::string MostFrequentReason() const { return reasons_.MostFrequent(); }
+
+ private:
+  const std::vector<AppliedSubspace>* applied_;
+  Index first_output_ = 0;
+  std::size_t counts_[3] = {};
+  std::int64_t worst_frame_ = 0;
+  double worst_score_ = std::numeric_limits<double>::quiet_NaN();
+  std::vector<FrameRecord> records_;
+  std::vector<FrameDecision> last_;
+  Reasons reasons_;
+};
+
+// "200 hits, 12 blends, 28 misses"
+std::string CountsText(std::size_t hits, std::size_t blends, std::size_t misses);
+
+}  // namespace kpsa
