@@ -4,8 +4,9 @@
 // fully and accelerated; and walks controls out of their ranges, where points must not jump.
 //   bench_promise [--assets FOLDER] [--scenes FOLDER] [--rig NAME]... [--scale X]... [--seeds N] [--poses N]
 //                 [--quick] [--markdown]
-// Tables to stdout, progress to stderr. Exit code 1 if the promise is broken for poses that it is about:
-// the trainer's and mixtures of controls in their ranges; 2 usage, 3 a rig that cannot be tried.
+// Tables to stdout at the end, or at an interrupt of what there is; progress to stderr. Exit code 1 if the
+// promise is broken for poses that it is about: the trainer's and mixtures of controls in their ranges; 2
+// usage, 3 a rig that cannot be tried.
 #include <fmt/format.h>
 #include <stdlib.h>
 
@@ -146,14 +147,24 @@ class Bench {
  public:
   explicit Bench(const Options& options) : options_(options) {}
 
+  // Rows in the order of tolerances, then seeds; where it fails, those of the seeds before.
   Status TryRig(const std::string& name, const std::string& path) {
     Result<std::unique_ptr<PromiseRig>> rig = PromiseRig::Open(path);
     if (!rig.ok()) return rig.status();
-    for (const double scale : options_.scales) {
-      for (std::uint64_t seed = 1; seed <= options_.seeds; ++seed)
-        KPSA_RETURN_IF_ERROR(TryTraining(rig->get(), name, scale, seed));
-    }
-    return Status();
+    const auto first_row = static_cast<std::ptrdiff_t>(rows_.size());
+    const auto first_walk = static_cast<std::ptrdiff_t>(walks_.size());
+    Status status;
+    for (std::uint64_t seed = 1; seed <= options_.seeds && status.ok(); ++seed)
+      status = TrySeed(rig->get(), name, seed);
+    const auto order = [&](const auto& a, const auto& b) {
+      const auto rank = [&](double scale) {
+        return std::find(options_.scales.begin(), options_.scales.end(), scale) - options_.scales.begin();
+      };
+      return rank(a.of.scale) < rank(b.of.scale);
+    };
+    std::stable_sort(rows_.begin() + first_row, rows_.end(), order);
+    std::stable_sort(walks_.begin() + first_walk, walks_.end(), order);
+    return status;
   }
 
   int Report() const {
@@ -167,43 +178,50 @@ class Bench {
   }
 
  private:
-  Status TryTraining(PromiseRig* rig, const std::string& name, double scale, std::uint64_t seed) {
-    PromiseCase of{name, scale, scale * rig->tolerance(), seed, 0};
+  Status TrySeed(PromiseRig* rig, const std::string& name, std::uint64_t seed) {
+    std::vector<PromiseCase> cases;
+    std::vector<PromiseTraining> trainings;
     Stopwatch watch;
-    Seconds seconds;
-    Result<PromiseTraining> training = rig->Train(of.tolerance, seed);
-    if (!training.ok()) return training.status();
-    of.promised = training->subspace().violation_rate;
-    seconds.training = watch.Lap();
+    for (const double scale : options_.scales) {
+      PromiseCase& of = cases.emplace_back(PromiseCase{name, scale, scale * rig->tolerance(), seed, 0});
+      Result<PromiseTraining> training = rig->Train(of.tolerance, seed);
+      if (!training.ok()) return training.status();
+      of.promised = training->subspace().violation_rate;
+      trainings.push_back(std::move(*training));
+      const double seconds = watch.Lap();
+      total_.training += seconds;
+      Say(fmt::format("{} at {:g} tolerances, seed {}: trained in {:.1f} s", name, scale, seed, seconds));
+    }
     std::size_t poses_tried = 0, broken = 0;
     for (const PoseKind kind : kPoseKinds) {
+      if (Interrupted()) return Status::Make(ErrorKind::kInterrupted, "interrupted");
       const Result<std::vector<PromisePose>> poses = DrawPoses(rig, kind, options_.poses, seed);
       if (!poses.ok()) return poses.status();
       if (poses->empty()) continue;
-      const Result<std::vector<PromiseOutcome>> outcomes = rig->Try(*poses, &*training);
+      const Result<std::vector<std::vector<PromiseOutcome>>> outcomes = rig->Try(*poses, trainings);
       if (!outcomes.ok()) return outcomes.status();
-      rows_.push_back(CountOutcomes(of, kind, *outcomes));
+      for (std::size_t t = 0; t < cases.size(); ++t) {
+        rows_.push_back(CountOutcomes(cases[t], kind, (*outcomes)[t]));
+        broken += rows_.back().broken();
+      }
       poses_tried += poses->size();
-      broken += rows_.back().broken();
     }
-    seconds.poses = watch.Lap();
+    const double pose_seconds = watch.Lap();
     const Result<std::vector<PromiseWalk>> walks = DrawWalks(rig, options_.walks, seed);
     if (!walks.ok()) return walks.status();
-    const Result<std::vector<PromiseJump>> jumps = rig->Walk(*walks, kWalkSteps, &*training);
+    const Result<std::vector<std::vector<PromiseJump>>> jumps = rig->Walk(*walks, kWalkSteps, trainings);
     if (!jumps.ok()) return jumps.status();
-    WalkRow walk{of, walks->size(), 0, ""};
-    for (std::size_t w = 0; w < jumps->size(); ++w) {
-      const double jump = (*jumps)[w].excess / of.tolerance;
-      if (jump > walk.jump) walk.jump = jump, walk.control = rig->control_name((*walks)[w].control);
+    for (std::size_t t = 0; t < cases.size(); ++t) {
+      WalkRow& row = walks_.emplace_back(WalkRow{cases[t], walks->size(), 0, ""});
+      for (std::size_t w = 0; w < walks->size(); ++w) {
+        const double jump = (*jumps)[t][w].excess / cases[t].tolerance;
+        if (jump > row.jump) row.jump = jump, row.control = rig->control_name((*walks)[w].control);
+      }
     }
-    walks_.push_back(walk);
-    seconds.walks = watch.Lap();
-    Say(fmt::format(
-        "{} at {:g} tolerances, seed {}: trained in {:.1f} s; {} poses in {:.1f} s, {} kinds broken; "
-        "{} walks in {:.1f} s, largest jump {:.1f} tolerances",
-        name, scale, seed, seconds.training, poses_tried, seconds.poses, broken, walk.walks, seconds.walks,
-        walk.jump));
-    total_.training += seconds.training, total_.poses += seconds.poses, total_.walks += seconds.walks;
+    const double walk_seconds = watch.Lap();
+    total_.poses += pose_seconds, total_.walks += walk_seconds;
+    Say(fmt::format("{}, seed {}: {} poses in {:.1f} s, {} rows broken; {} walks in {:.1f} s", name, seed,
+                    poses_tried, pose_seconds, broken, walks->size(), walk_seconds));
     return Status();
   }
 
@@ -224,6 +242,7 @@ int Main(int argc, char** argv) {
     return options->rigs.empty() ||
            std::find(options->rigs.begin(), options->rigs.end(), name) != options->rigs.end();
   };
+  const InterruptScope scope;  // an interrupt ends the trying, and then there are tables still
   Bench bench(*options);
   Status failures;  // what can be tried is tried
   for (const std::string name : kScenes) {
@@ -232,7 +251,7 @@ int Main(int argc, char** argv) {
   }
   const ScratchFolder folder;
   for (const std::string name : kCharacters) {
-    if (!wanted(name) || options->assets.empty()) continue;
+    if (!wanted(name) || options->assets.empty() || Interrupted()) continue;
     const Result<std::string> rig =
         WriteStarterRig(options->assets + "/" + name + ".glb", name, folder.path());
     failures.Append(rig.ok() ? bench.TryRig(name, *rig) : rig.status());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <mutex>
 
@@ -26,6 +27,7 @@ TrainOptions OptionsOf(const Acceleration& entry, double tolerance, std::uint64_
   options.tolerance = tolerance;
   options.violation_rate = entry.violation_rate;
   options.seed = seed;
+  options.progress = [](const char*, double) { return !Interrupted(); };
   return options;
 }
 
@@ -337,32 +339,45 @@ Result<std::shared_ptr<const Plan>> PromiseRig::AcceleratedPlan(int clip, Promis
   return plan;
 }
 
-Result<std::vector<PromiseOutcome>> PromiseRig::Try(const std::vector<PromisePose>& poses,
-                                                    PromiseTraining* training) {
+Status PromiseRig::MakePlans(int clip, std::span<PromiseTraining> trainings) {
+  if (const auto plan = FullPlan(clip); !plan.ok()) return plan.status();
+  for (PromiseTraining& training : trainings) {
+    if (const auto plan = AcceleratedPlan(clip, &training); !plan.ok()) return plan.status();
+  }
+  return Status();
+}
+
+Result<std::vector<std::vector<PromiseOutcome>>> PromiseRig::Try(const std::vector<PromisePose>& poses,
+                                                                 std::span<PromiseTraining> trainings) {
   const PlugRef time = training_rig_.time;
   const auto outputs = static_cast<Index>(entry_.points.size());
-  std::vector<PromiseOutcome> outcomes(poses.size());
+  std::vector<std::vector<PromiseOutcome>> outcomes(trainings.size(),
+                                                    std::vector<PromiseOutcome>(poses.size()));
   for (int clip = -1; clip < static_cast<int>(clips_.size()); ++clip) {
     std::vector<std::size_t> mine;
     for (std::size_t p = 0; p < poses.size(); ++p) {
       if (poses[p].clip == clip) mine.push_back(p);
     }
     if (mine.empty()) continue;
-    const Result<std::shared_ptr<const Plan>> full_plan = FullPlan(clip),
-                                              plan = AcceleratedPlan(clip, training);
-    if (!full_plan.ok()) return full_plan.status();
-    if (!plan.ok()) return plan.status();
+    KPSA_RETURN_IF_ERROR(MakePlans(clip, trainings));
     FirstFailure failure;
     const std::size_t grain = mine.size() / static_cast<std::size_t>(4 * AllowedThreads()) + 1;
     ParallelFor(mine.size(), grain, [&](std::size_t begin, std::size_t end) {
-      Side full(*full_plan, time, controls()), fast(*plan, time, controls());
+      Side full(full_plans_.at(clip), time, controls());
+      std::deque<Side> fast;
+      for (const PromiseTraining& training : trainings)
+        fast.emplace_back(training.plans_.at(clip), time, controls());
       for (std::size_t i = begin; i < end; ++i) {
-        for (Side* side : {&full, &fast}) failure.Add(mine[i], side->Evaluate(*this, poses[mine[i]]));
-        PromiseOutcome& outcome = outcomes[mine[i]];
-        outcome.verdict = VerdictOf(fast.evaluator(), outputs);
-        for (Index o = 0; o < outputs; ++o) {
-          outcome.error = std::max(outcome.error,
-                                   LargestDistance(full.evaluator().Points(o), fast.evaluator().Points(o)));
+        const PromisePose& pose = poses[mine[i]];
+        failure.Add(mine[i], full.Evaluate(*this, pose));
+        for (std::size_t t = 0; t < fast.size(); ++t) {
+          failure.Add(mine[i], fast[t].Evaluate(*this, pose));
+          PromiseOutcome& outcome = outcomes[t][mine[i]];
+          outcome.verdict = VerdictOf(fast[t].evaluator(), outputs);
+          for (Index o = 0; o < outputs; ++o) {
+            outcome.error = std::max(
+                outcome.error, LargestDistance(full.evaluator().Points(o), fast[t].evaluator().Points(o)));
+          }
         }
       }
     });
@@ -371,30 +386,34 @@ Result<std::vector<PromiseOutcome>> PromiseRig::Try(const std::vector<PromisePos
   return outcomes;
 }
 
-Result<std::vector<PromiseJump>> PromiseRig::Walk(const std::vector<PromiseWalk>& walks, std::size_t steps,
-                                                  PromiseTraining* training) {
+Result<std::vector<std::vector<PromiseJump>>> PromiseRig::Walk(const std::vector<PromiseWalk>& walks,
+                                                               std::size_t steps,
+                                                               std::span<PromiseTraining> trainings) {
   const PlugRef time = training_rig_.time;
   const auto outputs = static_cast<Index>(entry_.points.size());
-  for (const PromiseWalk& walk : walks) {
-    if (const auto plan = FullPlan(walk.pose.clip); !plan.ok()) return plan.status();
-    if (const auto plan = AcceleratedPlan(walk.pose.clip, training); !plan.ok()) return plan.status();
-  }
-  std::vector<PromiseJump> jumps(walks.size());
+  for (const PromiseWalk& walk : walks) KPSA_RETURN_IF_ERROR(MakePlans(walk.pose.clip, trainings));
+  std::vector<std::vector<PromiseJump>> jumps(trainings.size(), std::vector<PromiseJump>(walks.size()));
   FirstFailure failure;
   ParallelFor(walks.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t w = begin; w < end; ++w) {
       PromisePose pose = walks[w].pose;
-      Side full(full_plans_.at(pose.clip), time, controls()),
-          fast(training->plans_.at(pose.clip), time, controls());
-      KeptPoints full_points, fast_points;
+      Side full(full_plans_.at(pose.clip), time, controls());
+      std::deque<Side> fast;
+      for (const PromiseTraining& training : trainings)
+        fast.emplace_back(training.plans_.at(pose.clip), time, controls());
+      KeptPoints full_points;
+      std::vector<KeptPoints> fast_points(trainings.size());
       for (std::size_t s = 0; s <= steps; ++s) {
         const double share = static_cast<double>(s) / static_cast<double>(steps);
         double& value = pose.values[walks[w].control];
         value = walks[w].from + share * (walks[w].to - walks[w].from);
-        for (Side* side : {&full, &fast}) failure.Add(w, side->Evaluate(*this, pose));
-        const double excess =
-            fast_points.Step(fast.evaluator(), outputs) - full_points.Step(full.evaluator(), outputs);
-        if (excess > jumps[w].excess) jumps[w] = {excess, value};
+        failure.Add(w, full.Evaluate(*this, pose));
+        const double full_step = full_points.Step(full.evaluator(), outputs);
+        for (std::size_t t = 0; t < fast.size(); ++t) {
+          failure.Add(w, fast[t].Evaluate(*this, pose));
+          const double excess = fast_points[t].Step(fast[t].evaluator(), outputs) - full_step;
+          if (excess > jumps[t][w].excess) jumps[t][w] = {excess, value};
+        }
       }
     }
   });

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -80,17 +81,19 @@ class PromiseRig {
   Result<std::vector<PromisePose>> Sample(std::size_t count, std::uint64_t seed);
   // As `kpsa train` with --tolerance and --seed.
   Result<PromiseTraining> Train(double tolerance, std::uint64_t seed);
-  // One outcome a pose.
-  Result<std::vector<PromiseOutcome>> Try(const std::vector<PromisePose>& poses, PromiseTraining* training);
-  // The largest jump of each walk over so many steps.
-  Result<std::vector<PromiseJump>> Walk(const std::vector<PromiseWalk>& walks, std::size_t steps,
-                                        PromiseTraining* training);
+  // By training, one outcome a pose. The full evaluation of a pose serves all trainings.
+  Result<std::vector<std::vector<PromiseOutcome>>> Try(const std::vector<PromisePose>& poses,
+                                                       std::span<PromiseTraining> trainings);
+  // By training, the largest jump of each walk over so many steps.
+  Result<std::vector<std::vector<PromiseJump>>> Walk(const std::vector<PromiseWalk>& walks, std::size_t steps,
+                                                     std::span<PromiseTraining> trainings);
 
  private:
   PromiseRig() = default;
   Status PrepareSampler();
   Result<std::shared_ptr<const Plan>> FullPlan(int clip);
   Result<std::shared_ptr<const Plan>> AcceleratedPlan(int clip, PromiseTraining* training);
+  Status MakePlans(int clip, std::span<PromiseTraining> trainings);
 
   std::string path_;
   std::unique_ptr<OpenRig> open_;

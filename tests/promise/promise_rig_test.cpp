@@ -56,10 +56,11 @@ TEST_F(PromiseRigTest, ComparesTheSamePose) {
   for (const PoseKind kind : kPoseKinds) {
     const Result<std::vector<PromisePose>> poses = DrawPoses(rig_.get(), kind, 200, 5);
     ASSERT_TRUE(poses.ok()) << poses.status().ToString();
-    const Result<std::vector<PromiseOutcome>> outcomes = rig_->Try(*poses, training_.get());
+    const auto outcomes = rig_->Try(*poses, {training_.get(), 1});
     ASSERT_TRUE(outcomes.ok()) << outcomes.status().ToString();
-    ASSERT_EQ(outcomes->size(), poses->size());
-    for (const PromiseOutcome& outcome : *outcomes) {
+    ASSERT_EQ(outcomes->size(), 1u);
+    ASSERT_EQ(outcomes->front().size(), poses->size());
+    for (const PromiseOutcome& outcome : outcomes->front()) {
       if (outcome.verdict == PromiseVerdict::kMiss) {
         ++misses;
         EXPECT_EQ(outcome.error, 0);
@@ -82,22 +83,42 @@ TEST_F(PromiseRigTest, MeasuresJumps) {
   const PromisePose rest = rig_->Rest();
   const std::vector<PromiseWalk> walks{
       {rest, 0, 0.2, 0.2}, {rest, 0, 2 * end, 2.5 * end}, {rest, 0, 0, 0.9 * end}, {rest, 0, 0, 2 * end}};
-  const Result<std::vector<PromiseJump>> jumps = rig_->Walk(walks, kSteps, training_.get());
-  ASSERT_TRUE(jumps.ok()) << jumps.status().ToString();
-  EXPECT_EQ((*jumps)[0].excess, 0) << "nothing moves";
-  EXPECT_EQ((*jumps)[1].excess, 0) << "misses";
-  EXPECT_GT((*jumps)[2].excess, 0) << "hits";
+  const auto walked = rig_->Walk(walks, kSteps, {training_.get(), 1});
+  ASSERT_TRUE(walked.ok()) << walked.status().ToString();
+  const std::vector<PromiseJump>& jumps = walked->front();
+  EXPECT_EQ(jumps[0].excess, 0) << "nothing moves";
+  EXPECT_EQ(jumps[1].excess, 0) << "misses";
+  EXPECT_GT(jumps[2].excess, 0) << "hits";
   std::vector<PromisePose> poses(kSteps + 1, rest);
   for (std::size_t s = 0; s <= kSteps; ++s) poses[s].values[0] = 2 * end * static_cast<double>(s) / kSteps;
-  const Result<std::vector<PromiseOutcome>> outcomes = rig_->Try(poses, training_.get());
-  ASSERT_TRUE(outcomes.ok());
-  EXPECT_EQ(outcomes->front().verdict, PromiseVerdict::kHit);
-  EXPECT_EQ(outcomes->back().verdict, PromiseVerdict::kMiss);
+  const auto tried = rig_->Try(poses, {training_.get(), 1});
+  ASSERT_TRUE(tried.ok());
+  const std::vector<PromiseOutcome>& outcomes = tried->front();
+  EXPECT_EQ(outcomes.front().verdict, PromiseVerdict::kHit);
+  EXPECT_EQ(outcomes.back().verdict, PromiseVerdict::kMiss);
   double most = 0;
-  for (std::size_t s = 1; s <= kSteps; ++s)
-    most = std::max(most, (*outcomes)[s - 1].error + (*outcomes)[s].error);
-  EXPECT_GT((*jumps)[3].excess, 0);
-  EXPECT_LE((*jumps)[3].excess, most);
+  for (std::size_t s = 1; s <= kSteps; ++s) most = std::max(most, outcomes[s - 1].error + outcomes[s].error);
+  EXPECT_GT(jumps[3].excess, 0);
+  EXPECT_LE(jumps[3].excess, most);
+}
+
+// Trainings beside each other are what each is alone.
+TEST_F(PromiseRigTest, TriesSeveralTrainingsAtOnce) {
+  Result<PromiseTraining> coarse = rig_->Train(5 * rig_->tolerance(), 3);
+  ASSERT_TRUE(coarse.ok()) << coarse.status().ToString();
+  const Result<std::vector<PromisePose>> poses = DrawPoses(rig_.get(), PoseKind::kMargin, 100, 5);
+  ASSERT_TRUE(poses.ok());
+  std::vector<PromiseTraining> both{*training_, *coarse};
+  const auto together = rig_->Try(*poses, both);
+  ASSERT_TRUE(together.ok()) << together.status().ToString();
+  for (std::size_t t = 0; t < both.size(); ++t) {
+    const auto alone = rig_->Try(*poses, {&both[t], 1});
+    ASSERT_TRUE(alone.ok());
+    for (std::size_t p = 0; p < poses->size(); ++p) {
+      EXPECT_EQ((*together)[t][p].verdict, alone->front()[p].verdict) << t << " " << p;
+      EXPECT_EQ((*together)[t][p].error, alone->front()[p].error) << t << " " << p;
+    }
+  }
 }
 
 TEST(PromiseRig, RefusesWhatHasNothingToTry) {
