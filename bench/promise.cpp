@@ -93,8 +93,9 @@ Result<Options> ReadOptions(int argc, char** argv) {
 class ScratchFolder {
  public:
   ScratchFolder() {
-    std::string name = (fs::temp_directory_path() / "kpsa_promise_XXXXXX").string();
-    if (::mkdtemp(name.data()) != nullptr) path_ = name;
+    std::error_code error;
+    std::string name = (fs::temp_directory_path(error) / "kpsa_promise_XXXXXX").string();
+    if (!error && ::mkdtemp(name.data()) != nullptr) path_ = name;
   }
   ~ScratchFolder() {
     std::error_code error;
@@ -111,6 +112,7 @@ class ScratchFolder {
 // What `kpsa init` writes, as a file in the folder.
 Result<std::string> WriteStarterRig(const std::string& character, const std::string& name,
                                     const fs::path& folder) {
+  if (folder.empty()) return Status::Invalid("no temporary folder for the rig").At({character});
   NodeRegistry registry;
   AddAllNodes(registry);
   StarterOptions options;
