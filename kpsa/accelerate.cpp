@@ -1,8 +1,9 @@
 #include "kpsa/accelerate.h"
 
 #include <algorithm>
-#include <charconv>
+#include <functional>
 #include <map>
+#include <set>
 
 #include "base/check.h"
 #include "kpsa/signature.h"
@@ -45,6 +46,34 @@ Status RestEntries(const Graph& graph, Compiler* compiler, const Signal& signal,
   return Status();
 }
 
+// What may vary, and what is set here without varying: guards look at both. What is set and was never moved
+// in training has no range that says how far it may go, and is a miss whatever its value.
+std::vector<PlugRef> GuardedPlugs(const Graph& graph, const AccelerationTarget& target,
+                                  const TrainingRecord& record,
+                                  const std::map<std::string, TrainedRange>& ranges,
+                                  const std::vector<SetHere>& set_here,
+                                  const std::function<void(const std::string&)>& always_miss) {
+  const std::set<std::string> controls(record.controls.begin(), record.controls.end());
+  std::vector<PlugRef> guarded = target.varying;
+  std::vector<std::string> untrained;
+  for (const SetHere& set : set_here) {
+    if (set.structural) continue;
+    const std::string name = target.within.Inner(graph.PlugName(set.plug));
+    if (set.carries || controls.count(name) != 0 || ranges.count(name) != 0) {
+      guarded.push_back(set.plug);
+    } else {
+      untrained.push_back(fmt::format("{} = {}", set.name, set.value));
+    }
+  }
+  if (untrained.size() == 1) {
+    always_miss(untrained[0] + " is set, and the subspace never saw it move");
+  } else if (!untrained.empty()) {
+    always_miss(fmt::format("{} and {} more are set, and the subspace never saw them move", untrained[0],
+                            untrained.size() - 1));
+  }
+  return guarded;
+}
+
 }  // namespace
 
 std::vector<PlugRef> AccelerationTarget::outputs() const {
@@ -72,20 +101,35 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
                              target.meshes[m].name);
     }
   }
-  const Signature trained = TrainedSignature(*subspace);
-  if (SignatureDigest(trained) != subspace->rig_hash)
+  const TrainingRecord record = ParseTraining(subspace->training);
+  if (SignatureDigest(record.signature) != subspace->rig_hash)
     return Status::Invalid("the subspace is corrupt: its rig hash is not that of the rig that it describes");
-  const std::string difference = SignatureDifference(
-      trained, RigSignature(*graph, target.outputs(), target.space, target.controls, within));
-  if (!difference.empty()) {
+  const auto always_miss = [&](const std::string& reason) {
+    if (!data.always_miss) data.always_miss_reason = reason;
+    data.always_miss = true;
+    result.notes.push_back(reason + ": every frame is evaluated fully");
+  };
+  Signature now = RigSignature(*graph, target.outputs(), target.space, target.controls, within);
+  const std::vector<SetHere> set_here =
+      TakeSetHere(*graph, target.outputs(), target.space, target.controls, within, record.signature, &now);
+  if (const std::string difference = SignatureDifference(record.signature, now); !difference.empty()) {
     if (!options.stale_is_miss) {
       return Status::Invalid(
           "the subspace is stale: since it was trained, {} changed; train it again, or use --stale miss",
           difference);
     }
-    data.always_miss = true;
-    result.notes.push_back(
-        fmt::format("the subspace is stale ({} changed): every frame is evaluated fully", difference));
+    always_miss(fmt::format("the subspace is stale ({} changed)", difference));
+  }
+  for (const SetHere& set : set_here) {
+    if (!set.structural) continue;
+    if (!options.stale_is_miss) {
+      return Status::Invalid(
+          "{} is set to {} here, the subspace was trained on what the rig says; evaluate without "
+          "--accelerate, or train a rig that says so",
+          set.name, set.value);
+    }
+    always_miss(fmt::format("{} is set to {} here, and the subspace was trained on what the rig says",
+                            set.name, set.value));
   }
   if (subspace->space != target.space_name) {
     return Status::Invalid("the subspace lives in space \"{}\", the rig asks for \"{}\"", subspace->space,
@@ -94,18 +138,15 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
 
   // Guards: what was trained, with its range, and what moves here although it never moved there, at its rest
   // value
-  std::vector<std::string> unguarded;
-  Result<std::vector<Signal>> signals =
-      FindSignals(*graph, compiler, target.outputs(), target.varying,
-                  target.space.empty() ? nullptr : &target.space[0], &unguarded);
-  if (!signals.ok()) return signals.status();
-  if (!unguarded.empty()) {
-    data.always_miss = true;
-    result.notes.push_back(
-        fmt::format("{} varies and cannot be guarded: every frame is evaluated fully", unguarded[0]));
-  }
   std::map<std::string, TrainedRange> ranges;
   for (const TrainedRange& range : subspace->ranges) ranges.emplace(range.plug, range);
+  const std::vector<PlugRef> varying = GuardedPlugs(*graph, target, record, ranges, set_here, always_miss);
+  std::vector<std::string> unguarded;
+  Result<std::vector<Signal>> signals =
+      FindSignals(*graph, compiler, target.outputs(), varying,
+                  target.space.empty() ? nullptr : &target.space[0], &unguarded);
+  if (!signals.ok()) return signals.status();
+  if (!unguarded.empty()) always_miss(unguarded[0] + " varies and cannot be guarded");
   Guards guards;
   for (const Signal& signal : *signals) {
     double rest[12];
@@ -163,17 +204,14 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
                                inputs[i].points.begin());
       }
     } else {
-      const std::size_t slash = cue.plug.rfind('/');
-      Result<Signal> signal = FindSignal(*graph, cue.plug.substr(0, slash), within);
+      const SignalEntry split = SplitEntryName(cue.plug);
+      Result<Signal> signal = FindSignal(*graph, split.signal, within);
       if (!signal.ok()) return signal.status();
-      Index entry = 0;
-      const char* const end = cue.plug.data() + cue.plug.size();
-      const char* const number = slash == std::string::npos ? end : cue.plug.data() + slash + 1;
-      if (signal->matrix && (std::from_chars(number, end, entry).ptr != end || number == end || entry > 11))
+      if (signal->matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
         return Status::Invalid(
             "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", cue.plug);
       row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
-      row.element = entry;
+      row.element = static_cast<Index>(split.entry.value_or(0));
       auto& list = signal->matrix ? guards.matrices : guards.scalars;
       const std::size_t before = list.size();
       row.input = Place(&list, *signal);

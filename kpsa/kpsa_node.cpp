@@ -329,6 +329,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   }
   hasher.Add(std::span<const char>(data_.outputs_in_space));
   hasher.Add(data_.always_miss);
+  hasher.Add(std::string_view(data_.always_miss_reason));
   digest_ = hasher.Finish();
 }
 
@@ -385,7 +386,7 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
     case MissReason::kNone:
       return "hit";
     case MissReason::kNeverHit:
-      return data.always_miss ? "the subspace is stale" : "the tolerance allows no hit";
+      return data.always_miss ? data.always_miss_reason : "the tolerance allows no hit";
     case MissReason::kOutOfRange:
       return fmt::format("{} is outside its trained range",
                          offender < data.guard_names.size() ? data.guard_names[offender] : "a control");

@@ -44,7 +44,8 @@ class KpsaConfig final : public Asset {
     std::vector<double> matrix_lo, matrix_hi;  // [12 * matrices] trained ranges; see MatrixEntries
     std::vector<double> scalar_lo, scalar_hi;  // [scalars]
     std::vector<std::string> guard_names;      // matrices, then scalars
-    bool always_miss = false;  // the subspace is stale, and the user asked for the full evaluation
+    bool always_miss = false;        // this rig is not, or not in ways that guards see, the one of training
+    std::string always_miss_reason;  // for MissText
   };
   explicit KpsaConfig(Data data);
   const char* kind() const override { return "kpsaConfig"; }

@@ -20,7 +20,7 @@
 
 namespace kpsa {
 
-inline constexpr int kSubspaceVersion = 2;
+inline constexpr int kSubspaceVersion = 3;
 inline constexpr const char* kLightUnits = "light";
 
 // Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
@@ -36,6 +36,7 @@ struct CueDescription {
 struct SubspaceOutput {
   std::string name;  // "head_mesh@mush"
   std::size_t points = 0;
+  std::string stage = {};  // of a mesh: what comes after its '@'; either may hold more of them
   friend bool operator==(const SubspaceOutput&, const SubspaceOutput&) = default;
 };
 

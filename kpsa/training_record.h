@@ -21,12 +21,13 @@ struct TrainingRecord {
   std::string mode;                           // "map" or "paper"
   std::string warning;
   double seconds = 0;
+  std::vector<std::string>
+      controls;  // plugs, as Graph::PlugName: what may be posed within the trained ranges
   Signature signature;
 };
 
 std::string TrainingJson(const TrainingRecord& record);
 // Missing parts come out empty; a text that is no JSON object gives an empty record.
 TrainingRecord ParseTraining(const std::string& json);
-Signature TrainedSignature(const Subspace& subspace);
 
 }  // namespace kpsa
