@@ -8,4 +8,14 @@ std::string Thousands(std::uint64_t number) {
   return text;
 }
 
+std::size_t LongestBefore(char separator, std::string_view text,
+                          const std::function<bool(std::string_view)>& known) {
+  std::size_t at = text.rfind(separator);
+  while (at != std::string_view::npos && at > 0) {
+    if (known(text.substr(0, at))) return at;
+    at = text.rfind(separator, at - 1);
+  }
+  return std::string_view::npos;
+}
+
 }  // namespace kpsa

@@ -174,10 +174,10 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
     one.tolerance = options.tolerance < 0 ? one.subspace->tolerance : options.tolerance;
     if (flags.every_frame) options.tolerance = kAnyError;
     one.violation_rate = options.violation_rate < 0 ? one.subspace->violation_rate : options.violation_rate;
-    std::string node_name = one.name + "_kpsa";
-    while (rig->graph->FindNode(node_name).ok()) node_name += "_";
-    KPSA_RETURN_IF_ERROR(
-        accelerator.Add(MakeTarget(*rig, one.entry), one.subspace, node_name, options).At({one.path}));
+    KPSA_RETURN_IF_ERROR(accelerator
+                             .Add(MakeTarget(*rig, one.entry), one.subspace,
+                                  rig->graph->FreeNodeName(one.name + "_kpsa"), options)
+                             .At({one.path}));
   }
   Result<std::vector<Accelerated>> accelerated = accelerator.Apply();
   if (!accelerated.ok()) return Status(accelerated.status()).At({rig->path});

@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/text.h"
 #include "cli/acceleration.h"
 #include "cli/explain_decision.h"
 #include "cli/explain_vertex.h"
@@ -60,10 +61,14 @@ Result<Target> FindTarget(const Rig& rig, const std::string& what) {
   const Result<PlugRef> plug = rig.graph->FindPlug(what);
   if (plug.ok())
     return Target{plug->node, fmt::format("{} is {}", rig.graph->PlugName(*plug), DriverText(rig, *plug))};
-  // A word without a dot was meant as a node
-  const Status status =
-      what.find('.') == std::string::npos ? rig.graph->FindNode(what).status() : plug.status();
-  return AsUsage(status);
+  // Without a dot it was meant as a node, and with one as well where a node is nearly called so
+  std::vector<std::string> names;
+  for (const NodeId node : rig.graph->Nodes()) names.push_back(rig.graph->name(node));
+  const bool of_node = LongestBefore('.', what, [&](std::string_view name) {
+                         return rig.graph->FindNode(name).ok();
+                       }) != std::string::npos;
+  const bool as_node = what.find('.') == std::string::npos || (!of_node && !DidYouMean(what, names).empty());
+  return AsUsage(as_node ? rig.graph->FindNode(what).status() : plug.status());
 }
 
 CommandResult ExplainDecisions(const ExplainFlags& flags, Rig* rig, int frame) {

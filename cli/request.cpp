@@ -1,5 +1,6 @@
 #include "cli/request.h"
 
+#include "base/text.h"
 #include "cli/frames_range.h"
 #include "cli/rig_frames.h"
 
@@ -25,7 +26,10 @@ const CharacterMesh* FindMesh(const Rig& rig, std::string_view name) {
 
 Result<MeshStage> FindMeshStage(const Rig& rig, std::string_view text) {
   if (const CharacterMesh* mesh = FindMesh(rig, text)) return MeshStage{mesh, mesh->points};
-  const std::size_t at = text.rfind('@');
+  // Both may have an @ in their names: the longest mesh that exists
+  const auto is_mesh = [&](std::string_view name) { return FindMesh(rig, name) != nullptr; };
+  std::size_t at = LongestBefore('@', text, is_mesh);
+  if (at == std::string_view::npos) at = text.rfind('@');
   const std::string_view name = text.substr(0, at);
   const CharacterMesh* mesh = FindMesh(rig, name);
   if (mesh == nullptr)
@@ -46,10 +50,13 @@ Result<MeshStage> FindMeshStage(const Rig& rig, std::string_view text) {
 }
 
 Result<WantedPlug> FindWanted(const Rig& rig, std::string_view text) {
-  const bool mesh_like = text.find('@') != std::string_view::npos || FindMesh(rig, text) != nullptr;
   const Result<PlugRef> plug = rig.graph->FindPlug(text);
   if (plug.ok()) return WantedPlug{*plug, nullptr};
-  if (mesh_like) {
+  // With an @ it was meant as a mesh's stage, but where it is in a node's own name
+  const bool of_node = LongestBefore('.', text, [&](std::string_view name) {
+                         return name.find('@') != std::string_view::npos && rig.graph->FindNode(name).ok();
+                       }) != std::string_view::npos;
+  if (FindMesh(rig, text) != nullptr || (text.find('@') != std::string_view::npos && !of_node)) {
     const Result<MeshStage> stage = FindMeshStage(rig, text);
     if (!stage.ok()) return stage.status();
     return WantedPlug{stage->points, stage->mesh};

@@ -109,7 +109,8 @@ Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
   AccelerateOptions options;
   options.tolerance = std::numeric_limits<double>::max();  // reconstruct whatever comes
   const Result<Accelerated> accelerated =
-      Accelerate(rig->graph.get(), &compiler, MakeTarget(*rig, entry), subspace, "check_kpsa", options);
+      Accelerate(rig->graph.get(), &compiler, MakeTarget(*rig, entry), subspace,
+                 rig->graph->FreeNodeName("check_kpsa"), options);
   if (!accelerated.ok()) return accelerated.status();
   const int out_points = rig->graph->def(accelerated->node).FindAttribute("outPoints");
   for (std::size_t p = 0; p < request.outputs.size(); ++p)

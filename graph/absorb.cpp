@@ -23,8 +23,10 @@ Result<Index> Graph::Absorb(Graph other, std::string_view prefix) {
     for (Connection& connection : node.inputs) move(&connection);
     for (Connection& connection : node.outputs) move(&connection);
     for (SetValue& set : node.values) set.plug.node.index += offset;
-    for (auto& [attribute, values] : node.unposed) {
-      for (SetValue& set : values) set.plug.node.index += offset;
+    for (auto* kept : {&node.unposed, &node.written}) {
+      for (auto& [attribute, values] : *kept) {
+        for (SetValue& set : values) set.plug.node.index += offset;
+      }
     }
     for (NodeId& delegate : node.delegates) delegate.index += offset;
     if (node.def != nullptr) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 #include <unordered_set>
 
@@ -257,9 +258,17 @@ Status Graph::Pose(const PlugRef& plug, Value value) {
   const std::span<const SetValue> set = Values(plug.node, plug.attribute);
   std::vector<SetValue> before(set.begin(), set.end());
   KPSA_RETURN_IF_ERROR(Set(plug, std::move(value)));
-  if (first && !def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].structural)
-    node(plug.node).unposed.emplace_back(plug.attribute, std::move(before));
+  Node& n = node(plug.node);
+  if (std::none_of(n.written.begin(), n.written.end(),
+                   [&](const auto& entry) { return entry.first == plug.attribute; }))
+    n.written.emplace_back(plug.attribute, before);
+  if (first && !n.def->attributes[static_cast<std::size_t>(plug.attribute)].structural)
+    n.unposed.emplace_back(plug.attribute, std::move(before));
   return Status();
+}
+
+void Graph::AdoptPoses() {
+  for (Node& n : nodes_) n.written.clear();
 }
 
 bool Graph::IsPosed(NodeId id, int attribute) const {
@@ -270,6 +279,13 @@ bool Graph::IsPosed(NodeId id, int attribute) const {
 
 std::span<const SetValue> Graph::RestValues(NodeId id, int attribute) const {
   for (const auto& [posed, values] : node(id).unposed) {
+    if (posed == attribute) return values;
+  }
+  return Values(id, attribute);
+}
+
+std::span<const SetValue> Graph::WrittenValues(NodeId id, int attribute) const {
+  for (const auto& [posed, values] : node(id).written) {
     if (posed == attribute) return values;
   }
   return Values(id, attribute);
@@ -308,8 +324,11 @@ void Graph::SetElementNames(NodeId id, int attribute, std::vector<std::string> n
   std::map<std::string_view, int> uses;
   for (const std::string& name : names) ++uses[name];
   std::vector<std::string> own = names;
+  std::set<std::string> given;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (!names[i].empty() && uses[names[i]] > 1) own[i] = fmt::format("{}#{}", names[i], i);
+    if (names[i].empty() || uses[names[i]] == 1) continue;
+    own[i] = fmt::format("{}#{}", names[i], i);
+    while (uses.count(own[i]) != 0 || !given.insert(own[i]).second) own[i] += '#';  // really called that
   }
   names = std::move(own);
   for (auto& [number, existing] : node(id).element_names) {

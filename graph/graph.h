@@ -58,6 +58,9 @@ class Graph {
   // The same for a pose: everything sees the value but rest states (node_def.h, Structural::rest), which keep
   // what was set on the attribute before its first pose. Structural attributes have no pose: they are set.
   Status Pose(const PlugRef& plug, Value value);
+  // Poses so far belong to what is written (a rig's own file); later ones, of structural attributes as well,
+  // are told from it by WrittenValues.
+  void AdoptPoses();
   // Types must agree (numbers convert); cycles are refused with their whole path. A destination takes one
   // connection; `replace` takes over an existing one. A refused edit changes nothing.
   Status Connect(const PlugRef& source, const PlugRef& destination, bool replace = false);
@@ -71,10 +74,13 @@ class Graph {
   void AddDelegate(NodeId node, NodeId delegate);
 
   // "node.attr", "node.attr[3].x", "node.attrX" for a child, "node.attr[name]", "node.attr[s,t,u]".
-  // The longest existing node name followed by '.' wins.
+  // Names may hold dots: the longest existing node name followed by '.' wins that has what follows.
   Result<PlugRef> FindPlug(std::string_view text) const;
   Result<NodeId> FindNode(std::string_view name) const;
   std::string PlugName(const PlugRef& plug) const;
+  std::string AuthoredName(const PlugRef& plug) const;  // the same as people write it: "jaw.rotateX"
+  // `wanted`, with as many '_' after it as it takes that no node is called so.
+  std::string FreeNodeName(std::string wanted) const;
   Type PlugType(const PlugRef& plug) const;  // of the element or component
   // Whether the plug names something that exists: its node lives, arrays have an element, others none, ...
   Status CheckPlug(const PlugRef& plug) const;
@@ -92,6 +98,8 @@ class Graph {
   std::span<const SetValue> Values(NodeId node, int attribute) const;
   bool IsPosed(NodeId node, int attribute) const;
   std::span<const SetValue> RestValues(NodeId node, int attribute) const;  // the same without poses
+  // The same as before the poses that came after AdoptPoses.
+  std::span<const SetValue> WrittenValues(NodeId node, int attribute) const;
   const Connection* FindConnection(const PlugRef& destination) const;
   // Connections into the node, by attribute, element and component of the destination.
   const std::vector<Connection>& Inputs(NodeId node) const;
@@ -107,6 +115,7 @@ class Graph {
     std::uint32_t version = 0;
     std::vector<SetValue> values;                                // sorted by plug, as are the inputs
     std::vector<std::pair<int, std::vector<SetValue>>> unposed;  // what was set on posed attributes
+    std::vector<std::pair<int, std::vector<SetValue>>> written;  // before poses since AdoptPoses
     std::vector<Connection> inputs, outputs;
     std::vector<std::pair<int, std::vector<std::string>>> element_names;
     std::vector<NodeId> delegates;

@@ -39,15 +39,19 @@ Result<NodeId> Graph::FindNode(std::string_view name) const {
 }
 
 Result<PlugRef> Graph::FindPlug(std::string_view text) const {
-  // The longest node name that is followed by '.' wins: names may contain dots themselves
+  // Names may contain dots themselves: of all nodes that are followed by one, the longest that has the rest
+  Status longest;
   for (std::size_t dot = text.rfind('.'); dot != std::string_view::npos && dot > 0;
        dot = text.rfind('.', dot - 1)) {
     const std::string key(text.substr(0, dot));
     if (by_name_.count(key) == 0 && by_alias_.count(key) == 0) continue;
-    Result<NodeId> id = FindNode(key);
-    if (!id.ok()) return id.status();
-    return FindAttribute(*id, text.substr(dot + 1), true);
+    const Result<NodeId> id = FindNode(key);
+    Result<PlugRef> plug =
+        id.ok() ? FindAttribute(*id, text.substr(dot + 1), true) : Result<PlugRef>(id.status());
+    if (plug.ok()) return plug;
+    if (longest.ok()) longest = plug.status();
   }
+  if (!longest.ok()) return longest;
   const std::size_t dot = text.find('.');
   if (dot == std::string_view::npos)
     return Status::Invalid("\"{}\" is no plug: expected node.attribute", text);
@@ -55,6 +59,20 @@ Result<PlugRef> Graph::FindPlug(std::string_view text) const {
                                                     ? text.rfind('.')
                                                     : text.substr(0, text.find('[')).rfind('.'));
   return Status::Invalid("unknown node \"{}\" in plug \"{}\"{}", guess, text, DidYouMean(guess, Names()));
+}
+
+std::string Graph::AuthoredName(const PlugRef& plug) const {
+  if (!IsAlive(plug.node) || plug.component < 0 || plug.element >= 0) return PlugName(plug);
+  PlugRef whole = plug;
+  whole.component = -1;
+  std::string text = PlugName(whole) + "XYZW"[plug.component];
+  const Result<PlugRef> read = FindPlug(text);  // an attribute of its own may be called so
+  return read.ok() && *read == plug ? text : PlugName(plug);
+}
+
+std::string Graph::FreeNodeName(std::string wanted) const {
+  while (by_name_.count(wanted) != 0 || by_alias_.count(wanted) != 0) wanted += '_';
+  return wanted;
 }
 
 Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool delegates) const {

@@ -1,6 +1,7 @@
 // `driver:` of deformers that follow another mesh at a stage of its stack, and of poseInterpolators.
 #include <algorithm>
 
+#include "base/text.h"
 #include "io/rig_build.h"
 
 namespace kpsa {
@@ -9,18 +10,13 @@ namespace kpsa {
 // the text up to its last @; without an @, all of it is the mesh.
 void RigBuild::SplitStage(const std::string& text, std::string* mesh, std::string* stage) const {
   const std::string whole = text;
-  const auto is_mesh = [&](const std::string& name) {
+  const auto is_mesh = [&](std::string_view name) {
     return std::any_of(rig_->scene.meshes.begin(), rig_->scene.meshes.end(), [&](const CharacterMesh& each) {
       return each.name == name || rig_->character->nodes[each.gltf_node].name == name;
     });
   };
-  std::size_t at = whole.rfind('@');
-  for (std::size_t shorter = at; shorter != std::string::npos && shorter > 0;
-       shorter = whole.rfind('@', shorter - 1)) {
-    if (!is_mesh(whole.substr(0, shorter))) continue;
-    at = shorter;
-    break;
-  }
+  std::size_t at = LongestBefore('@', whole, is_mesh);
+  if (at == std::string::npos) at = whole.rfind('@');
   *mesh = whole.substr(0, at);
   *stage = at == std::string::npos ? "" : whole.substr(at + 1);
 }

@@ -319,6 +319,7 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   }
   Result<LoadedRig> loaded = Loader(registry, options).Load(path, options.variant, nullptr);
   if (!loaded.ok()) return loaded.status();
+  loaded->rig.graph->AdoptPoses();
   return std::move(loaded->rig);
 }
 

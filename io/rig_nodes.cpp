@@ -1,6 +1,7 @@
 // The nodes of a rig file, the values of their attributes, and overrides.
 #include <algorithm>
 
+#include "base/text.h"
 #include "io/rig_build.h"
 #include "io/rig_references.h"
 #include "io/rig_words.h"
@@ -42,13 +43,11 @@ RigAttribute RigBuild::SpecialOf(const std::string& key, const RigOverride& over
 void RigBuild::ApplySpecialOverrides() {
   std::vector<RigOverride> others;
   for (RigOverride& override_ : file_->overrides) {
-    RigNode* longest = nullptr;
     const std::string& text = override_.plug.text;
-    for (std::size_t dot = text.rfind('.'); longest == nullptr && dot != std::string::npos && dot > 0;
-         dot = text.rfind('.', dot - 1)) {
-      const auto it = written_.find(text.substr(0, dot));
-      if (it != written_.end()) longest = &file_->nodes[it->second];
-    }
+    const std::size_t dot = LongestBefore(
+        '.', text, [&](std::string_view name) { return written_.count(std::string(name)) != 0; });
+    RigNode* const longest =
+        dot == std::string::npos ? nullptr : &file_->nodes[written_.at(text.substr(0, dot))];
     const NodeDef* def = longest == nullptr ? nullptr : graph().registry().Find(longest->type);
     const std::string key = longest == nullptr ? "" : text.substr(longest->name.size() + 1);
     if (def == nullptr || !IsRigWord(*def, key)) {

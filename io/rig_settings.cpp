@@ -1,6 +1,7 @@
 // Values from outside of the rig: --set and pose files.
 #include <algorithm>
 
+#include "base/text.h"
 #include "io/rig_builder.h"
 #include "io/rig_values.h"
 
@@ -35,7 +36,12 @@ Result<Setting> ReadSetting(const Rig& rig, const std::string& plug_text, const 
 }  // namespace
 
 Result<Setting> ParseSetting(const Rig& rig, std::string_view text) {
-  const std::size_t equals = text.rfind('=');
+  // Names may hold a '=', and so may values: the longest plug that exists
+  std::size_t equals = LongestBefore('=', text, [&](std::string_view plug) {
+    while (plug.ends_with(' ')) plug.remove_suffix(1);
+    return rig.graph->FindPlug(plug).ok();
+  });
+  if (equals == std::string_view::npos) equals = text.rfind('=');
   if (equals == std::string_view::npos || equals == 0 || equals + 1 == text.size()) {
     return Status::Usage("\"{}\": expected plug=value, as in jaw.rotateX=-20", text);
   }

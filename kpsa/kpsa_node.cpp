@@ -415,6 +415,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   hasher.Add(data_.space_scales);
   hasher.Add(std::span<const char>(data_.outputs_in_space));
   hasher.Add(data_.always_miss);
+  hasher.Add(std::string_view(data_.always_miss_reason));
   digest_ = hasher.Finish();
 }
 

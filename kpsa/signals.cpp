@@ -1,6 +1,7 @@
 #include "kpsa/signals.h"
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 #include <set>
 
@@ -37,6 +38,16 @@ void MatrixEntries(const Matrix4& m, double entries[12]) {
 
 std::string EntryName(const Signal& signal, std::size_t entry) {
   return signal.matrix ? fmt::format("{}/{}", signal.name, entry) : signal.name;
+}
+
+SignalEntry SplitEntryName(const std::string& name) {
+  const std::size_t slash = name.rfind('/');
+  if (slash == std::string::npos) return {name, std::nullopt};
+  std::size_t entry = 0;
+  const char* const end = name.data() + name.size();
+  const auto [stop, error] = std::from_chars(name.data() + slash + 1, end, entry);
+  if (stop != end || error != std::errc()) return {name, std::nullopt};
+  return {name.substr(0, slash), entry};
 }
 
 Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,

@@ -6,6 +6,7 @@
 // translation), so no angle has to be computed; a value as one entry.
 #pragma once
 
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -24,6 +25,13 @@ struct Signal {
 void MatrixEntries(const Matrix4& m, double entries[12]);
 // "jaw.matrix/3": entry 3 of a matrix; a value's name is its signal's.
 std::string EntryName(const Signal& signal, std::size_t entry);
+// The inverse: the signal's name, and the entry of a matrix. No attribute is a number, so that names with a
+// '/' in them, "a/b.outValue", are told from it.
+struct SignalEntry {
+  std::string signal;
+  std::optional<std::size_t> entry;
+};
+SignalEntry SplitEntryName(const std::string& name);
 
 // The nodes from `node` up through parentMatrix.
 std::vector<NodeId> ParentsFrom(const Graph& graph, NodeId node);

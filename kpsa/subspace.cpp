@@ -19,8 +19,9 @@ bool AllFinite(std::span<const T> values) {
 
 std::string CueName(const Subspace& subspace, const CueDescription& cue) {
   if (cue.kind == CueDescription::Kind::kScalar) return cue.plug;
-  const std::string& output = subspace.outputs[cue.mesh].name;  // "head_mesh@mush"
-  return output.substr(0, output.rfind('@')) + "@" + cue.stage;
+  const SubspaceOutput& output = subspace.outputs[cue.mesh];
+  const std::size_t suffix = output.stage.empty() ? 0 : output.stage.size() + 1;
+  return output.name.substr(0, output.name.size() - suffix) + "@" + cue.stage;
 }
 
 Status ValidateSubspace(const Subspace& s) {
@@ -76,6 +77,10 @@ Status ValidateSubspace(const Subspace& s) {
   }
   if (s.tiles.size() != s.outputs.size())
     return Status::Invalid("{} outputs, but {} sets of tiles", s.outputs.size(), s.tiles.size());
+  for (const SubspaceOutput& output : s.outputs) {
+    if (!output.stage.empty() && !output.name.ends_with("@" + output.stage))
+      return Status::Invalid("output \"{}\" is not at the stage \"{}\"", output.name, output.stage);
+  }
   for (std::size_t i = 0; i < s.outputs.size(); ++i) {
     if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != s.tile_inputs() ||
         s.tiles[i].data().components != s.components) {

@@ -36,6 +36,7 @@ struct CueDescription {
 struct SubspaceOutput {
   std::string name;  // "head_mesh@mush"
   std::size_t points = 0;
+  std::string stage = {};  // of a mesh: what comes after its '@'; either may hold more of them
   friend bool operator==(const SubspaceOutput&, const SubspaceOutput&) = default;
 };
 

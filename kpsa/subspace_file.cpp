@@ -97,7 +97,7 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
 std::map<std::string, std::string> Header(const Subspace& s) {
   Json outputs = Json::array(), cues = Json::array(), ranges = Json::array();
   for (const SubspaceOutput& output : s.outputs)
-    outputs.push_back({{"name", output.name}, {"points", output.points}});
+    outputs.push_back({{"name", output.name}, {"points", output.points}, {"stage", output.stage}});
   for (const CueDescription& cue : s.cues) {
     if (cue.kind == CueDescription::Kind::kScalar) {
       cues.push_back({{"kind", "scalar"}, {"plug", cue.plug}});
@@ -223,7 +223,7 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
   s->blend_start = reader.Number("blendStart");
   for (const Json& entry : *outputs) {
     Reader output(file.name() + ": an output", entry, &status);
-    s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints)});
+    s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints), output.Text("stage")});
   }
   for (const Json& entry : *cues) {
     Reader reader_of_cue(file.name() + ": a cue", entry, &status);

@@ -69,6 +69,8 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
         RigSignature(*rig_.graph, rig_.target.outputs(), rig_.target.space, rig_.target.controls);
+    for (const PlugRef& control : rig_.target.controls)
+      record_.controls.push_back(rig_.graph->PlugName(control));
     subspace->rig_hash = SignatureDigest(record_.signature);
     subspace->training = TrainingJson(record_);
     KPSA_RETURN_IF_ERROR(ValidateSubspace(*subspace));
@@ -418,8 +420,10 @@ class Trainer {
     record_.warning = estimator.warning;
     const Eigen::MatrixXd training = MeasuredPoses(layout_, cues_, poses);
     std::vector<SubspaceOutput> outputs;
-    for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m)
-      outputs.push_back({rig_.target.meshes[m].name, totals_[m]});
+    for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m) {
+      const AccelerationTarget::MeshPoints& mesh = rig_.target.meshes[m];
+      outputs.push_back({mesh.name, totals_[m], of_light() ? "" : mesh.stages.back().name});
+    }
     Subspace subspace =
         MakeSubspace(pca_, cues_, estimator, training, std::move(outputs),
                      TileOptions{kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance,

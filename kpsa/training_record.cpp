@@ -6,6 +6,34 @@ namespace kpsa {
 
 using nlohmann::json;
 
+namespace {
+
+json SignatureJson(const Signature& signature) {
+  json nodes = json::object();
+  for (const auto& [name, node] : signature)
+    nodes[name] = {{"node", node.node}, {"attributes", node.attributes}};
+  return nodes;
+}
+
+Signature ParseSignature(const json& nodes) {
+  Signature signature;
+  if (!nodes.is_object()) return signature;
+  for (const auto& [name, from] : nodes.items()) {
+    if (!from.is_object()) continue;
+    NodeSignature& node = signature[name];
+    if (const auto it = from.find("node"); it != from.end() && it->is_string())
+      node.node = it->get<std::string>();
+    const auto attributes = from.find("attributes");
+    if (attributes == from.end() || !attributes->is_object()) continue;
+    for (const auto& [attribute, digest] : attributes->items()) {
+      if (digest.is_string()) node.attributes[attribute] = digest.get<std::string>();
+    }
+  }
+  return signature;
+}
+
+}  // namespace
+
 std::string TrainingJson(const TrainingRecord& r) {
   const json object = {{"clips", r.clips},
                        {"clip_poses", r.clip_poses},
@@ -24,7 +52,8 @@ std::string TrainingJson(const TrainingRecord& r) {
                          {"time", r.worst.time},
                          {"controls", r.worst.controls},
                          {"error", r.worst.error}}},
-                       {"signature", r.signature}};
+                       {"controls", r.controls},
+                       {"signature", SignatureJson(r.signature)}};
   return object.dump();
 }
 
@@ -43,11 +72,16 @@ TrainingRecord ParseTraining(const std::string& text) {
     return object.contains(name) && object[name].is_string() ? object[name].get<std::string>()
                                                              : std::string();
   };
-  if (object.contains("clips") && object["clips"].is_array()) {
-    for (const json& clip : object["clips"]) {
-      if (clip.is_string()) r.clips.push_back(clip.get<std::string>());
+  const auto names = [&](const char* name) {
+    std::vector<std::string> list;
+    if (!object.contains(name) || !object[name].is_array()) return list;
+    for (const json& entry : object[name]) {
+      if (entry.is_string()) list.push_back(entry.get<std::string>());
     }
-  }
+    return list;
+  };
+  r.clips = names("clips");
+  r.controls = names("controls");
   r.clip_poses = count("clip_poses");
   r.sampled_poses = count("sampled_poses");
   r.calibration_poses = count("calibration_poses");
@@ -75,14 +109,8 @@ TrainingRecord ParseTraining(const std::string& text) {
       }
     }
   }
-  if (object.contains("signature") && object["signature"].is_object()) {
-    for (const auto& [name, digest] : object["signature"].items()) {
-      if (digest.is_string()) r.signature[name] = digest.get<std::string>();
-    }
-  }
+  if (object.contains("signature")) r.signature = ParseSignature(object["signature"]);
   return r;
 }
-
-Signature TrainedSignature(const Subspace& subspace) { return ParseTraining(subspace.training).signature; }
 
 }  // namespace kpsa

@@ -29,12 +29,13 @@ struct TrainingRecord {
     std::vector<std::pair<std::string, double>> controls;  // that are not at rest; metres, radians
     double error = 0;
   } worst;
+  std::vector<std::string>
+      controls;  // plugs, as Graph::PlugName: what may be posed within the trained ranges
   Signature signature;
 };
 
 std::string TrainingJson(const TrainingRecord& record);
 // Missing parts come out empty; a text that is no JSON object gives an empty record.
 TrainingRecord ParseTraining(const std::string& json);
-Signature TrainedSignature(const Subspace& subspace);
 
 }  // namespace kpsa

@@ -284,6 +284,61 @@ TEST_F(GraphTest, AliasesAndDelegates) {
   EXPECT_TRUE(Says(NameOf("mesh.weight[4]"), "no attribute"));
 }
 
+// Every name that is printed finds the same plug again, whatever it holds.
+TEST_F(GraphTest, NamesAreReadBackAsTheyArePrinted) {
+  const std::vector<std::string> nodes = {"a",     "a.b",     "a.b.c", "a.input", "upperarm01.L",
+                                          "x#1",   "ns:hand", "p/q",   "m@s.",    "left arm",
+                                          "größe", "w[1]",    "]",     "."};
+  for (const std::string& name : nodes) {
+    g.add("scale3", name);
+    const NodeId grid = g.add("grid", name + "|grid");
+    const int weight = g.graph.def(grid).FindAttribute("weight");
+    g.graph.SetElementNames(grid, weight, {"a.b", "x", "x#1", "x", "p/3", "[0]", "größe", "x#3"});
+    std::vector<PlugRef> plugs;
+    const int input = g.graph.def(g.plug(name + ".input").node).FindAttribute("input");
+    for (int c = -1; c < 3; ++c) plugs.push_back({g.plug(name + ".input").node, input, -1, c});
+    for (int e = 0; e < 8; ++e) plugs.push_back({grid, weight, e, -1});
+    for (const PlugRef& plug : plugs) {
+      for (const std::string& text : {g.graph.PlugName(plug), g.graph.AuthoredName(plug)}) {
+        const Result<PlugRef> found = g.graph.FindPlug(text);
+        ASSERT_TRUE(found.ok()) << found.status().ToString();
+        EXPECT_TRUE(*found == plug) << text << " is " << g.graph.PlugName(*found);
+      }
+    }
+  }
+  EXPECT_EQ(g.graph.AuthoredName(g.plug("a.b.input.y")), "a.b.inputY");
+  EXPECT_EQ(g.graph.AuthoredName(g.plug("a.b.input")), "a.b.input");
+  EXPECT_EQ(NameOf("a.input.factr"),
+            "node \"a.input\" (scale3) has no attribute \"factr\" (did you mean "
+            "\"factor\"?)");
+}
+
+TEST_F(GraphTest, FreeNodeNamesAreOfNobody) {
+  EXPECT_EQ(g.graph.FreeNodeName("check"), "check");
+  const NodeId check = g.add("add", "check");
+  g.graph.AddAlias(check, "check_");
+  EXPECT_EQ(g.graph.FreeNodeName("check"), "check__");
+}
+
+TEST_F(GraphTest, WhatIsWrittenIsToldFromLaterPoses) {
+  const NodeId s = g.add("scale3", "s", {{"input", Double3{1, 2, 3}}}), grid = g.add("grid", "grid");
+  const int input = g.plug("s.input").attribute, divisions = g.graph.def(grid).FindAttribute("divisions");
+  ASSERT_TRUE(g.graph.Pose(g.plug("s.input.y"), 5.0).ok());
+  g.graph.AdoptPoses();
+  EXPECT_EQ(g.graph.WrittenValues(s, input).size(), 2u);
+  EXPECT_EQ(g.graph.WrittenValues(s, input).data(), g.graph.Values(s, input).data());
+  ASSERT_TRUE(g.graph.Pose(g.plug("s.input"), Double3{7, 8, 9}).ok());
+  ASSERT_TRUE(g.graph.Pose(g.plug("s.input.x"), 4.0).ok());
+  ASSERT_EQ(g.graph.WrittenValues(s, input).size(), 2u);
+  EXPECT_EQ(g.graph.WrittenValues(s, input)[1].value.AsDouble(), 5);
+  EXPECT_EQ(g.graph.RestValues(s, input).size(), 1u);
+  // Structural ones have no pose, but are told as well
+  ASSERT_TRUE(g.graph.Pose({grid, divisions, -1, -1}, std::vector<std::int64_t>{2, 2, 2}).ok());
+  EXPECT_FALSE(g.graph.IsPosed(grid, divisions));
+  EXPECT_EQ(g.graph.Values(grid, divisions).size(), 1u);
+  EXPECT_EQ(g.graph.WrittenValues(grid, divisions).size(), 0u);
+}
+
 TEST_F(GraphTest, ElementsBeyondAnyReasonAreRefused) {
   g.add("sum", "t");
   PlugRef plug = g.plug("t.input[0]");

@@ -37,7 +37,7 @@ class SubspaceTest : public testing::TestWithParam<EstimatorMode> {
         GetParam() == EstimatorMode::kMap ? MapEstimator(pca_, cues_) : LeastSquaresEstimator(pca_, cues_);
     EXPECT_EQ(estimator_.mode, GetParam()) << estimator_.warning;
     subspace_ = MakeSubspace(pca_, cues_, estimator_, MeasuredPoses(training_.layout(), cues_, training_),
-                             {{"head@mush", 150}, {"teeth", 90}}, {.rms_budget = 1e-6});
+                             {{"head@mush", 150, "mush"}, {"teeth", 90}}, {.rms_budget = 1e-6});
     for (const CueRef cue : cues) {
       if (cue.kind == CueKind::kScalar) {
         subspace_.cues.push_back({.kind = CueDescription::Kind::kScalar,
@@ -227,6 +227,12 @@ TEST_P(SubspaceTest, CuesAreNamedByMeshAndStage) {
     EXPECT_EQ(CueName(subspace_, subspace_.cues[k]), expected[k]) << k;
   subspace_.cues[0].stage = "skin";  // measured before the stage that is reconstructed
   EXPECT_EQ(CueName(subspace_, subspace_.cues[0]), "head@skin");
+  subspace_.outputs[0] = {"head@1@mush@2.L", 150, "mush@2.L"};
+  EXPECT_EQ(CueName(subspace_, subspace_.cues[0]), "head@1@skin");
+  EXPECT_TRUE(ValidateSubspace(subspace_).ok());
+  subspace_.outputs[0].stage = "skin";
+  EXPECT_EQ(ValidateSubspace(subspace_).ToString(),
+            "output \"head@1@mush@2.L\" is not at the stage \"skin\"");
 }
 
 TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {

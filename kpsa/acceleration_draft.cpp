@@ -1,0 +1,287 @@
+#include "kpsa/acceleration_draft.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "graph/evaluator.h"
+#include "kpsa/signature.h"
+#include "kpsa/space_frame.h"
+#include "kpsa/training_record.h"
+
+namespace kpsa {
+namespace {
+
+// Position of a signal in a list, added if it is not there.
+Index Place(std::vector<Signal>* list, const Signal& signal) {
+  for (Index i = 0; i < list->size(); ++i) {
+    if ((*list)[i].name == signal.name) return i;
+  }
+  list->push_back(signal);
+  return static_cast<Index>(list->size() - 1);
+}
+
+Result<Signal> FindSignal(const Graph& graph, const std::string& name, const RigWithin& within) {
+  Result<PlugRef> plug = graph.FindPlug(within.prefix + name);
+  if (!plug.ok() && !within.prefix.empty()) plug = graph.FindPlug(name);  // time
+  if (!plug.ok()) return plug.status();
+  Signal signal{graph.PlugName(*plug), *plug, graph.PlugType(*plug) == Type::kMatrix};
+  return signal;
+}
+
+// The value of a signal at rest, by entries.
+Status RestEntries(const Graph& graph, Compiler* compiler, const Signal& signal, double entries[12]) {
+  Result<Value> rest = compiler->Rest(graph, signal.plug);
+  if (!rest.ok()) return rest.status();
+  if (signal.matrix) {
+    MatrixEntries(rest->get<Matrix4>(), entries);
+  } else {
+    entries[0] = rest->AsDouble();
+  }
+  return Status();
+}
+
+// What may vary, and what is set here without varying: guards look at both. What is set and was never moved
+// in training has no range that says how far it may go, and is a miss whatever its value.
+std::vector<PlugRef> GuardedPlugs(const Graph& graph, const AccelerationTarget& target,
+                                  const TrainingRecord& record,
+                                  const std::map<std::string, TrainedRange>& ranges,
+                                  const std::vector<SetHere>& set_here, AccelerationDraft* draft) {
+  const std::set<std::string> controls(record.controls.begin(), record.controls.end());
+  std::vector<PlugRef> guarded = target.varying;
+  std::vector<std::string> untrained;
+  for (const SetHere& set : set_here) {
+    if (set.structural) continue;
+    const std::string name = target.within.Inner(graph.PlugName(set.plug));
+    if (set.carries || controls.count(name) != 0 || ranges.count(name) != 0) {
+      guarded.push_back(set.plug);
+    } else {
+      untrained.push_back(fmt::format("{} = {}", set.name, set.value));
+    }
+  }
+  if (untrained.size() == 1) {
+    draft->AlwaysMiss(untrained[0] + " is set, and the subspace never saw it move");
+  } else if (!untrained.empty()) {
+    draft->AlwaysMiss(fmt::format("{} and {} more are set, and the subspace never saw them move",
+                                  untrained[0], untrained.size() - 1));
+  }
+  return guarded;
+}
+
+// The same rig as in training?
+Status CheckRig(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
+                const TrainingRecord& record, bool stale_is_miss, AccelerationDraft* draft,
+                std::vector<SetHere>* set_here) {
+  if (subspace.outputs.size() != target.meshes.size()) {
+    return Status::Invalid("the subspace is for {} meshes, the rig accelerates {}", subspace.outputs.size(),
+                           target.meshes.size());
+  }
+  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
+    if (subspace.outputs[m].name != target.meshes[m].name) {
+      return Status::Invalid("the subspace is for {}, the rig accelerates {}", subspace.outputs[m].name,
+                             target.meshes[m].name);
+    }
+  }
+  if (SignatureDigest(record.signature) != subspace.rig_hash)
+    return Status::Invalid("the subspace is corrupt: its rig hash is not that of the rig that it describes");
+  Signature now = RigSignature(graph, target.outputs(), target.space, target.controls, target.within);
+  *set_here = TakeSetHere(graph, target.outputs(), target.space, target.controls, target.within,
+                          record.signature, &now);
+  if (const std::string difference = SignatureDifference(record.signature, now); !difference.empty()) {
+    if (!stale_is_miss) {
+      return Status::Invalid(
+          "the subspace is stale: since it was trained, {} changed; train it again, or use --stale miss",
+          difference);
+    }
+    draft->AlwaysMiss(fmt::format("the subspace is stale ({} changed)", difference));
+  }
+  for (const SetHere& set : *set_here) {
+    if (!set.structural) continue;
+    if (!stale_is_miss) {
+      return Status::Invalid(
+          "{} is set to {} here, the subspace was trained on what the rig says; evaluate without "
+          "--accelerate, or train a rig that says so",
+          set.name, set.value);
+    }
+    draft->AlwaysMiss(fmt::format("{} is set to {} here, and the subspace was trained on what the rig says",
+                                  set.name, set.value));
+  }
+  if (subspace.space != target.space_name) {
+    return Status::Invalid("the subspace lives in space \"{}\", the rig asks for \"{}\"", subspace.space,
+                           target.space_name);
+  }
+  return Status();
+}
+
+// Transforms above the space that move the points with it: those that training found, and what a reference
+// hangs under, which moves all of the rig.
+std::set<Index> CarriedNodes(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace) {
+  std::set<Index> carried;
+  if (target.space.empty()) return carried;
+  for (const NodeId node : ParentsFrom(graph, target.space[0].node)) {
+    const std::string& name = graph.name(node);
+    const bool inner = name.starts_with(target.within.prefix) && !(node == target.within.root);
+    const std::string known = target.within.Inner(name);
+    if (!inner ||
+        std::find(subspace.carried.begin(), subspace.carried.end(), known) != subspace.carried.end())
+      carried.insert(node.index);
+  }
+  return carried;
+}
+
+// Guards of what varies or is set here: with its trained range, or, if it never moved there, its rest value.
+Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
+                 const Subspace& subspace, const TrainingRecord& record, const std::vector<SetHere>& set_here,
+                 AccelerationDraft* draft) {
+  KpsaConfig::Data& data = draft->data;
+  std::map<std::string, TrainedRange> ranges;
+  for (const TrainedRange& range : subspace.ranges) ranges.emplace(range.plug, range);
+  const std::vector<PlugRef> varying = GuardedPlugs(graph, target, record, ranges, set_here, draft);
+  std::vector<std::string> unguarded;
+  Result<std::vector<Signal>> signals = FindSignals(graph, compiler, target.outputs(), varying,
+                                                    CarriedNodes(graph, target, subspace), &unguarded);
+  if (!signals.ok()) return signals.status();
+  if (!unguarded.empty()) draft->AlwaysMiss(unguarded[0] + " varies and cannot be guarded");
+  for (const Signal& signal : *signals) {
+    double rest[12];
+    bool have_rest = false;
+    for (std::size_t e = 0; e < signal.entries(); ++e) {
+      TrainedRange range;
+      if (const auto it = ranges.find(target.within.Inner(EntryName(signal, e))); it != ranges.end()) {
+        range = it->second;
+      } else {
+        if (!have_rest) KPSA_RETURN_IF_ERROR(RestEntries(graph, compiler, signal, rest));
+        have_rest = true;
+        range = MakeTrainedRange("", rest[e], rest[e], 0, 0);
+      }
+      (signal.matrix ? data.matrix_lo : data.scalar_lo).push_back(range.lo);
+      (signal.matrix ? data.matrix_hi : data.scalar_hi).push_back(range.hi);
+      (signal.matrix ? data.matrix_ramp : data.scalar_ramp).push_back(range.ramp);
+    }
+    (signal.matrix ? draft->matrices : draft->scalars).push_back(signal);
+  }
+  return Status();
+}
+
+// Where the rows of the measurement come from.
+Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
+               AccelerationDraft* draft) {
+  KpsaConfig::Data* const data = &draft->data;
+  struct CueInput {  // points by mesh and stage
+    Index mesh;
+    std::size_t stage;
+    std::vector<Index> points;
+  };
+  std::vector<CueInput> inputs;
+  for (const CueDescription& cue : subspace.cues) {
+    if (cue.kind != CueDescription::Kind::kPoint) continue;
+    const auto& stages = target.meshes[cue.mesh].stages;
+    const auto stage =
+        std::find_if(stages.begin(), stages.end(), [&](const auto& s) { return s.name == cue.stage; });
+    if (stage == stages.end())
+      return Status::Invalid("the subspace measures at stage \"{}\" of {}, which the rig lacks", cue.stage,
+                             target.meshes[cue.mesh].name);
+    const auto number = static_cast<std::size_t>(stage - stages.begin());
+    auto input = std::find_if(inputs.begin(), inputs.end(),
+                              [&](const CueInput& i) { return i.mesh == cue.mesh && i.stage == number; });
+    if (input == inputs.end()) input = inputs.insert(inputs.end(), CueInput{cue.mesh, number, {}});
+    input->points.push_back(cue.point);
+  }
+  for (CueInput& input : inputs) {
+    std::sort(input.points.begin(), input.points.end());
+    input.points.erase(std::unique(input.points.begin(), input.points.end()), input.points.end());
+    data->cues.push_back({input.points, target.meshes[input.mesh].stages[input.stage].world});
+    draft->cues.push_back(target.meshes[input.mesh].stages[input.stage].points);
+  }
+  for (const CueDescription& cue : subspace.cues) {
+    KpsaConfig::Row row;
+    if (cue.kind == CueDescription::Kind::kPoint) {
+      for (std::size_t i = 0; i < inputs.size(); ++i) {
+        if (inputs[i].mesh != cue.mesh || target.meshes[cue.mesh].stages[inputs[i].stage].name != cue.stage)
+          continue;
+        row.input = static_cast<Index>(i);
+        row.element =
+            static_cast<Index>(std::lower_bound(inputs[i].points.begin(), inputs[i].points.end(), cue.point) -
+                               inputs[i].points.begin());
+      }
+    } else {
+      const SignalEntry split = SplitEntryName(cue.plug);
+      const Result<Signal> signal = FindSignal(graph, split.signal, target.within);
+      if (!signal.ok()) return signal.status();
+      if (signal->matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
+        return Status::Invalid(
+            "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", cue.plug);
+      row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
+      row.element = static_cast<Index>(split.entry.value_or(0));
+      auto& list = signal->matrix ? draft->matrices : draft->scalars;
+      const std::size_t before = list.size();
+      row.input = Place(&list, *signal);
+      if (list.size() != before) {  // a cue that needs no guard
+        constexpr double kAnything = std::numeric_limits<double>::infinity();
+        const auto add = [&](std::vector<double>* to, double value) {
+          to->insert(to->end(), signal->entries(), value);
+        };
+        add(signal->matrix ? &data->matrix_lo : &data->scalar_lo, -kAnything);
+        add(signal->matrix ? &data->matrix_hi : &data->scalar_hi, kAnything);
+        add(signal->matrix ? &data->matrix_ramp : &data->scalar_ramp, 0);
+      }
+    }
+    data->rows.push_back(row);
+  }
+  return Status();
+}
+
+// What may stretch the space, by name: transforms of its chain whose local matrix is no rotation now, else
+// those whose scale may vary, else the space.
+std::string StretchedName(const Graph& graph, Compiler* compiler, const AccelerationTarget& target) {
+  if (target.space.empty()) return "the space";
+  std::string varying;
+  for (const NodeId node : ParentsFrom(graph, target.space[0].node)) {
+    const int scale = graph.def(node).FindAttribute("scale"),
+              matrix = graph.def(node).FindAttribute("matrix");
+    if (scale < 0 || matrix < 0) continue;
+    const PlugRef plug{node, matrix, -1, -1};
+    const Result<Value> rest = compiler->Rest(graph, plug);
+    Request request;
+    request.outputs.push_back({plug, {}});
+    const auto plan = compiler->Compile(graph, request);
+    if (rest.ok() && plan.ok()) {
+      Evaluator evaluator(*plan);
+      if (evaluator.Evaluate().ok()) {
+        const SpaceFrame frame =
+            SpaceFrameOf(evaluator.Get<Matrix4>(0), InverseRestStretch(rest->get<Matrix4>()));
+        if (frame.stretch > 1e-6 || frame.scale != 1) return graph.name(node);
+      }
+    }
+    for (const PlugRef& v : target.varying) {
+      if (v.node == node && v.attribute == scale) varying = graph.name(node);
+    }
+  }
+  return varying.empty() ? graph.name(target.space[0].node) : varying;
+}
+
+}  // namespace
+
+Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compiler,
+                                            const AccelerationTarget& target,
+                                            std::shared_ptr<const Subspace> subspace, bool stale_is_miss) {
+  AccelerationDraft draft;
+  draft.data.subspace = subspace;
+  const TrainingRecord record = ParseTraining(subspace->training);
+  std::vector<SetHere> set_here;
+  KPSA_RETURN_IF_ERROR(CheckRig(graph, target, *subspace, record, stale_is_miss, &draft, &set_here));
+  KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, record, set_here, &draft));
+  KPSA_RETURN_IF_ERROR(AddCues(graph, target, *subspace, &draft));
+  for (const AccelerationTarget::MeshPoints& mesh : target.meshes)
+    draft.data.outputs_in_space.push_back(mesh.stages.back().world);
+  for (const auto* list : {&draft.matrices, &draft.scalars}) {
+    for (const Signal& signal : *list) draft.data.guard_names.push_back(signal.name);
+  }
+  draft.data.has_space = !target.space.empty();
+  // A reference hangs under its root as a whole, and grows with it
+  draft.data.space_scales = draft.data.has_space && (subspace->space_scales || subspace->space.empty());
+  if (draft.data.has_space) draft.data.stretched = StretchedName(graph, compiler, target);
+  return draft;
+}
+
+}  // namespace kpsa
