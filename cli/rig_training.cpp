@@ -57,6 +57,10 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) 
     out.name = target.within.Inner(mesh.name + "@" + mesh.stages[points.stage].name);
     target.meshes.push_back(std::move(out));
   }
+  for (const CharacterMesh& mesh : rig.scene.meshes) {
+    for (const Stage& stage : mesh.stages)
+      target.all_stages.push_back({stage.name, stage.points, stage.world});
+  }
   if (acceleration.space) {
     const NodeDef& def = rig.graph->def(*acceleration.space);
     target.space.push_back({*acceleration.space, def.FindAttribute("worldMatrix"), -1, -1});

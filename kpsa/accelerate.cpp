@@ -4,6 +4,7 @@
 #include <set>
 
 #include "kpsa/acceleration_draft.h"
+#include "kpsa/near_stack.h"
 
 namespace kpsa {
 namespace {
@@ -37,7 +38,7 @@ struct Accelerator::Entry {
   AccelerationTarget target;
   AccelerateOptions options;
   std::string node_name;
-  std::shared_ptr<const KpsaConfig> config;
+  KpsaConfig::Data data;
   std::vector<PlugRef> cues;
   std::vector<Signal> matrices, scalars;
   std::vector<std::string> notes;
@@ -49,9 +50,8 @@ Status Accelerator::Add(const AccelerationTarget& target, std::shared_ptr<const 
       DraftAcceleration(*graph_, compiler_, target, std::move(subspace), options.stale_is_miss);
   if (!draft.ok()) return draft.status();
   entries_.push_back(std::make_shared<const Entry>(
-      Entry{target, options, node_name, std::make_shared<const KpsaConfig>(std::move(draft->data)),
-            std::move(draft->cues), std::move(draft->matrices), std::move(draft->scalars),
-            std::move(draft->notes)}));
+      Entry{target, options, node_name, std::move(draft->data), std::move(draft->cues),
+            std::move(draft->matrices), std::move(draft->scalars), std::move(draft->notes)}));
   return Status();
 }
 
@@ -80,15 +80,25 @@ Result<std::vector<Accelerated>> Accelerator::Apply() {
     const auto plug = [&](const char* name, int element = -1) {
       return PlugRef{*node, def.FindAttribute(name), element, -1};
     };
-    const Subspace& subspace = *entry->config->data().subspace;
+    KpsaConfig::Data data = entry->data;
+    std::vector<PlugRef> cues = entry->cues;
+    if (data.has_space && !data.always_miss) {
+      NearStacks near(graph_, target, target.space[0], data.rest_origin);
+      for (std::size_t i = 0; i < cues.size(); ++i) {
+        const std::optional<PlugRef> moved = data.cues[i].in_space ? near.Near(cues[i]) : std::nullopt;
+        if (moved.has_value()) cues[i] = *moved, data.cues[i].near = true;
+      }
+    }
+    const auto config = std::make_shared<const KpsaConfig>(std::move(data));
+    const Subspace& subspace = *config->data().subspace;
     const AccelerateOptions& options = entry->options;
-    note(graph_->Set(plug("config"), Value(AssetPtr(entry->config))));
+    note(graph_->Set(plug("config"), Value(AssetPtr(config))));
     note(graph_->Set(plug("tolerance"),
                      std::min(options.tolerance < 0 ? subspace.tolerance : options.tolerance, kAnyError)));
     note(graph_->Set(plug("violationRate"),
                      options.violation_rate < 0 ? subspace.violation_rate : options.violation_rate));
-    for (std::size_t i = 0; i < entry->cues.size(); ++i)
-      note(graph_->Connect(entry->cues[i], plug("cues", static_cast<int>(i))));
+    for (std::size_t i = 0; i < cues.size(); ++i)
+      note(graph_->Connect(cues[i], plug("cues", static_cast<int>(i))));
     for (std::size_t j = 0; j < entry->matrices.size(); ++j)
       note(graph_->Connect(entry->matrices[j].plug, plug("matrices", static_cast<int>(j))));
     for (std::size_t k = 0; k < entry->scalars.size(); ++k)
@@ -104,7 +114,7 @@ Result<std::vector<Accelerated>> Accelerator::Apply() {
       for (const Connection& c : consumers[m])
         note(graph_->Connect(plug("outPoints", static_cast<int>(m)), c.destination, true));
     }
-    results.push_back({*node, entry->config, entry->notes});
+    results.push_back({*node, config, entry->notes});
   }
   if (!status.ok()) return status;
   return results;

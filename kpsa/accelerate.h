@@ -27,6 +27,7 @@ struct AccelerationTarget {
     std::vector<Stage> stages;  // up to and including the accelerated one, which is the last
   };
   std::vector<MeshPoints> meshes;
+  std::vector<Stage> all_stages;  // of all meshes of the rig: in which space points are
   bool colors = false;         // they are light at shading points, and no points of meshes
   std::vector<PlugRef> space;  // none, or the worldMatrix of the frame
   std::string space_name;      // "" for the world, or what is the world to a rig within another one

@@ -280,7 +280,13 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   draft.data.has_space = !target.space.empty();
   // A reference hangs under its root as a whole, and grows with it
   draft.data.space_scales = draft.data.has_space && (subspace->space_scales || subspace->space.empty());
-  if (draft.data.has_space) draft.data.stretched = StretchedName(graph, compiler, target);
+  if (draft.data.has_space) {
+    draft.data.stretched = StretchedName(graph, compiler, target);
+    const Result<Value> rest = compiler->Rest(graph, target.space[0]);
+    if (!rest.ok()) return rest.status();
+    const Matrix4& matrix = rest->get<Matrix4>();
+    draft.data.rest_origin = {matrix(0, 3), matrix(1, 3), matrix(2, 3)};
+  }
   return draft;
 }
 

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "base/matrix.h"
+#include "kpsa/near_stack.h"
 #include "kpsa/signals.h"
 #include "kpsa/space_frame.h"
 
@@ -146,6 +147,13 @@ void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4
             std::span<double> raw) {
   Matrix4 space_from_world;
   if (!(world_from_space == Matrix4())) space_from_world = InverseOrIdentity(world_from_space);
+  // Of points that have been moved by rest_origin - origin: that is taken back in double
+  Matrix4 space_from_near = space_from_world;
+  if (data.has_space) {
+    const Double3 moved =
+        Double3{world_from_space(0, 3), world_from_space(1, 3), world_from_space(2, 3)} - data.rest_origin;
+    space_from_near = space_from_world * Translation(moved);
+  }
   const ArrayView<ConstPointsView> cues = c.array<ConstPointsView>(kCues);
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
   const ArrayView<double> scalars = c.array<double>(kScalars);
@@ -155,7 +163,8 @@ void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4
       case KpsaConfig::Row::Kind::kPoint: {
         const ConstPointsView& points = cues[row.input];
         Double3 p{points.x[row.element], points.y[row.element], points.z[row.element]};
-        if (data.cues[row.input].in_space) p = TransformPoint(space_from_world, p);
+        const KpsaConfig::PointCues& of = data.cues[row.input];
+        if (of.in_space) p = TransformPoint(of.near ? space_from_near : space_from_world, p);
         raw[r] = p.x, raw[r + 1] = p.y, raw[r + 2] = p.z;
         r += 3;
         break;
@@ -394,6 +403,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   for (const PointCues& cues : data_.cues) {
     hasher.Add(std::span<const Index>(cues.points));
     hasher.Add(cues.in_space);
+    hasher.Add(cues.near);
   }
   for (const Row& row : data_.rows) {
     hasher.Add(row.kind);
@@ -411,6 +421,8 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   }
   hasher.Add(std::span<const double>(s.inverse_rest_stretch.m));
   hasher.Add(s.extent);
+  for (const double place : {data_.rest_origin.x, data_.rest_origin.y, data_.rest_origin.z})
+    hasher.Add(place);
   hasher.Add(data_.has_space);
   hasher.Add(data_.space_scales);
   hasher.Add(std::span<const char>(data_.outputs_in_space));
@@ -420,6 +432,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
 }
 
 void AddKpsaNode(NodeRegistry& registry) {
+  AddNearNodes(registry);
   registry
       .add(
           "kpsa",

@@ -29,6 +29,7 @@ class KpsaConfig final : public Asset {
   struct PointCues {            // of input cues[c]
     std::vector<Index> points;  // ascending
     bool in_space = true;       // measured in spaceMatrix's frame; false: as they are (mesh space)
+    bool near = false;          // less what the space has moved since rest (kpsa/near_stack.h)
   };
   // Where row r of the measurement comes from. Points take three rows in a row.
   struct Row {
@@ -45,6 +46,7 @@ class KpsaConfig final : public Asset {
     std::vector<double> matrix_lo, matrix_hi, matrix_ramp;  // [12 * matrices]
     std::vector<double> scalar_lo, scalar_hi, scalar_ramp;  // [scalars]
     std::vector<std::string> guard_names;                   // matrices, then scalars
+    Double3 rest_origin;                                    // of the space
     bool has_space = false;                                 // spaceMatrix is connected
     bool space_scales = false;                              // a uniform scale of it is taken into account
     std::string stretched;                                  // what may stretch it: a transform
