@@ -125,6 +125,13 @@ Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted) {
   return Status();
 }
 
+std::shared_ptr<const Subspace> WithOpenRanges(const Subspace& subspace) {
+  auto open = std::make_shared<Subspace>(subspace);
+  for (TrainedRange& range : open->ranges)
+    range.lo = -std::numeric_limits<double>::infinity(), range.hi = -range.lo;
+  return open;
+}
+
 Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compiler,
                                                        const AccelerationFlags& flags) {
   std::vector<AppliedSubspace> applied;
@@ -167,12 +174,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
   for (AppliedSubspace& one : applied) {
     one.name = one.entry.name;
     AccelerateOptions options;
-    if (flags.every_frame) {
-      auto open = std::make_shared<Subspace>(*one.subspace);
-      for (TrainedRange& range : open->ranges)
-        range.lo = -std::numeric_limits<double>::infinity(), range.hi = -range.lo;
-      one.subspace = std::move(open);
-    }
+    if (flags.every_frame) one.subspace = WithOpenRanges(*one.subspace);
     options.stale_is_miss = flags.stale.has_value() && *flags.stale == "miss";
     if (flags.tolerance.has_value()) options.tolerance = *ParseTolerance(*flags.tolerance);
     if (flags.violation_rate.has_value()) options.violation_rate = *ParseRate(*flags.violation_rate);

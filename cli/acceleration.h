@@ -54,6 +54,9 @@ struct AppliedSubspace {
   }
 };
 
+// A copy whose guards let everything pass that is a number.
+std::shared_ptr<const Subspace> WithOpenRanges(const Subspace& subspace);
+
 // Rewrites the rig's graph; final points that are accelerated are then those of the KPSA node
 // (CharacterMesh::points). Call it with the clip and the settings in place that will be evaluated. --kpsa M
 // replaces the file of the entry that has the same points; a rig without entries gets one from the subspace.
