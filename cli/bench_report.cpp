@@ -22,8 +22,9 @@ double Rms(const std::vector<double>& values) {
 // The error of every frame, and what it consists of; null where no modes are kept.
 OrderedJson FrameErrorsJson(const FrameErrors& e) {
   if (e.empty()) return {};
-  OrderedJson hits = OrderedJson::array();
+  OrderedJson hits = OrderedJson::array(), misses = OrderedJson::array();
   for (char hit : e.hit) hits.push_back(hit != 0);
+  for (char miss : e.miss) misses.push_back(miss != 0);
   return {{"rms",
            {{"projection", Rms(e.projection)},
             {"cueing", Rms(e.cueing)},
@@ -36,7 +37,8 @@ OrderedJson FrameErrorsJson(const FrameErrors& e) {
           {"storage", e.storage},
           {"total", e.total},
           {"soft_cache", e.soft_cache},
-          {"hit", hits}};
+          {"hit", hits},
+          {"miss", misses}};
 }
 
 OrderedJson RangeJson(const BenchResult::Range& range) { return {range.least, range.most}; }

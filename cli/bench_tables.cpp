@@ -165,8 +165,8 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
   Table costs({"character", "mode", ">full, ns a point", ">full, us", ">accelerated, us", ">graph", ">cues",
                ">projection", ">reconstruction", ">later stages", ">misses", ">bytes a point"});
   Table spent({"character", ">full, us", "of which"});
-  Table split(
-      {"character", "mode", ">projection", ">cueing", ">storage", ">total", ">with SoftCache", ">misses"});
+  Table split({"character", "mode", ">projection", ">cueing", ">storage", ">total", ">with SoftCache",
+               ">blends", ">misses"});
   for (const BenchDocument& document : documents) {
     const Result<std::vector<BenchJsonValue>> sides = ReadSides(document.path);
     if (!sides.ok()) return sides.status();
@@ -196,7 +196,9 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
         row = {NameOf(side), SideOf(side)};
         for (const char* part : {"projection", "cueing", "storage", "total", "soft_cache"})
           row.push_back(ShareOf(side, NumberAt(side, (std::string("/frame_errors/rms/") + part).c_str())));
-        row.push_back(fmt::format("{:.1f} %", 100 - 100 * ShareAt(side, "/hit_rate")));
+        const double blends = ShareAt(side, "/blend_rate");
+        row.push_back(fmt::format("{:.1f} %", 100 * blends));
+        row.push_back(fmt::format("{:.1f} %", 100 * std::max(0.0, 1 - ShareAt(side, "/hit_rate") - blends)));
         if (!IsRepeated(side, *sides)) split.Row(std::move(row));
       }
     } catch (const Refusal& refusal) {
@@ -234,8 +236,8 @@ Result<std::vector<LinePlot>> BenchPlots(const std::string& path) {
       LinePlot cached{title + ": SoftCache", "frame", "RMS error, % of the diagonal", {}, "", {}};
       cached.lines = {line("error with SoftCache", "soft_cache", "#208050")};
       cached.marks_name = "misses";
-      for (std::size_t f = 0; f < errors.at("hit").size(); ++f) {
-        if (!errors.at("hit")[f].get<bool>()) cached.marks.push_back(f);
+      for (std::size_t f = 0; f < errors.at("miss").size(); ++f) {
+        if (errors.at("miss")[f].get<bool>()) cached.marks.push_back(f);
       }
       plots.push_back(std::move(parts));
       plots.push_back(std::move(cached));

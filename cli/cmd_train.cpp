@@ -129,36 +129,39 @@ CommandResult RunTrain(const TrainFlags& flags) {
 
   // Nothing is written before the end, so an interrupt may end the program at any time
   const ThreadLimit limit(*threads);
-  Progress progress("train", 100, flags.quiet);
+  const auto begin = std::chrono::steady_clock::now();
+  Progress progress("train", 0, flags.quiet);
   std::string stage;
-  options.progress = [&](const char* what, double share) {
-    if (stage != what) progress.SetLabel(fmt::format("train: {}", what), 100);
+  // How long a stage takes depends on the rig, so only what is counted has a time left
+  options.progress = [&](const char* what, double) {
+    if (stage != what) progress.SetStage(fmt::format("train: {}", what));
     stage = what;
-    progress.Set(static_cast<std::size_t>(100 * share));
     return true;
   };
-  const auto begin = std::chrono::steady_clock::now();
   Result<Subspace> trained = Train(MakeTrainingRig(&rig, *entry), *clips, options);
   if (!trained.ok()) return Status(trained.status()).At({rig.path});
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const auto subspace = std::make_shared<const Subspace>(std::move(*trained));
   const TrainingRecord record = ParseTraining(subspace->training);
   const Calibration calibration =
       Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
-  const Result<SubspaceCheck> check =
-      CheckSubspace(&rig, *entry, subspace, subspace->of_light() ? kLightCheckPoses : kCheckPoses,
-                    options.seed ^ 0x9e3779b97f4a7c15ull);
-  if (!check.ok()) return check.status();
+  SubspaceCheckOptions check_options;
+  check_options.poses = subspace->of_light() ? kLightCheckPoses : kCheckPoses;
+  check_options.seed = options.seed ^ 0x9e3779b97f4a7c15ull;
+  check_options.groups = options.samples > 0 && !subspace->of_light();
+  progress.SetLabel("train: trying it, poses", check_options.poses);
+  check_options.progress = [&](std::size_t done, std::size_t) { progress.Set(done); };
+  const Result<SubspaceCheck> check = CheckSubspace(&rig, *entry, subspace, *clips, check_options);
+  if (!check.ok()) return Status(check.status()).At({rig.path});
+  progress.Clear();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const InterruptScope writing;
   KPSA_RETURN_IF_ERROR(WriteSubspace(*subspace, path));
-  const TrainResult result{flags.file,  path,  !flags.output.has_value(), subspace, record,
-                           calibration, *check, seconds};
+  const TrainResult result{flags.file, path,   !flags.output.has_value(), subspace, record, calibration,
+                           *check,     seconds};
   Print(flags.json ? TrainJson(result) : TrainText(result));
-  if (!flags.quiet) {
-    for (const std::string& warning : {record.warning, calibration.warning}) {
-      if (!warning.empty()) Say("warning: " + warning);
-    }
-  }
+  if (!flags.quiet && !record.warning.empty()) Say("warning: " + record.warning);
+  // What is not promised is told in any case
+  if (!calibration.warning.empty()) Say("warning: " + calibration.warning);
   return 0;
 }
 

@@ -61,6 +61,7 @@ void FrameErrors::Append(const FrameErrors& later) {
   append(&times, later.times);
   append(&projection, later.projection), append(&cueing, later.cueing), append(&storage, later.storage);
   append(&total, later.total), append(&soft_cache, later.soft_cache), append(&hit, later.hit);
+  append(&miss, later.miss);
 }
 
 bool HaveKeptModes(const std::vector<AppliedSubspace>& applied) {
@@ -119,6 +120,8 @@ Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acc
       errors.times.push_back(times[first + f]);
       errors.hit.push_back(std::all_of(weights[first + f].begin(), weights[first + f].end(),
                                        [](double weight) { return weight == 0; }));
+      errors.miss.push_back(std::any_of(weights[first + f].begin(), weights[first + f].end(),
+                                        [](double weight) { return weight >= 1; }));
       for (std::size_t k = 0; k < 5; ++k)
         lists[k]->push_back(std::sqrt(squares[k][f] / static_cast<double>(std::max<std::size_t>(1, points))));
     }

@@ -14,7 +14,7 @@ struct FrameErrors {
   std::vector<double> times;                               // seconds
   std::vector<double> projection, cueing, storage, total;  // every frame reconstructed
   std::vector<double> soft_cache;                          // of what is emitted: 0 at a full miss
-  std::vector<char> hit;
+  std::vector<char> hit, miss;                             // neither: a blend
   bool empty() const { return times.empty(); }
   void Append(const FrameErrors& later);
 };

@@ -14,11 +14,22 @@ Progress::Progress(std::string label, std::size_t total, bool quiet)
       total_(total),
       shown_(!quiet && ::isatty(STDERR_FILENO) == 1),
       color_(std::getenv("NO_COLOR") == nullptr),
-      begin_(std::chrono::steady_clock::now()),
-      last_(begin_) {}
+      start_(std::chrono::steady_clock::now()),
+      begin_(start_),
+      last_(start_) {}
 
-Progress::~Progress() {
-  if (drawn_) std::fputs("\r\033[K", stderr);
+Progress::~Progress() { Clear(); }
+
+void Progress::Clear() {
+  if (drawn_) std::fputs("\r\033[K", stderr), std::fflush(stderr);
+  drawn_ = false;
+}
+
+void Progress::SetStage(const std::string& text) {
+  if (!shown_) return;
+  const auto now = std::chrono::steady_clock::now();
+  Show(fmt::format("{} {}after {:.0f} s{}", text, color_ ? "\033[36m" : "",
+                   std::chrono::duration<double>(now - start_).count(), color_ ? "\033[0m" : ""));
 }
 
 void Progress::SetLabel(std::string label, std::size_t total) {
@@ -46,12 +57,17 @@ void Progress::Draw(std::size_t done) {
     const std::size_t full = std::min(kWidth, done * kWidth / total_);
     std::string bar(full, '=');
     bar.resize(kWidth, ' ');
-    const double left =
-        done > 0 ? seconds * static_cast<double>(total_ - std::min(done, total_)) / static_cast<double>(done)
-                 : 0;
-    line = fmt::format("{} {}[{}]{} {}/{}  {:.0f} s left", label_, color_ ? "\033[36m" : "", bar,
-                       color_ ? "\033[0m" : "", done, total_, left);
+    line = fmt::format("{} {}[{}]{} {}/{}", label_, color_ ? "\033[36m" : "", bar, color_ ? "\033[0m" : "",
+                       done, total_);
+    // Before anything is done nobody knows
+    if (done > 0)
+      line += fmt::format("  {:.0f} s left", seconds * static_cast<double>(total_ - std::min(done, total_)) /
+                                                 static_cast<double>(done));
   }
+  Show(line);
+}
+
+void Progress::Show(const std::string& line) {
   std::fprintf(stderr, "\r\033[K%s", line.c_str());
   std::fflush(stderr);
   drawn_ = true;

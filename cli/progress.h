@@ -18,13 +18,17 @@ class Progress {
   // Draws at most ten times a second. One thread at a time.
   void Set(std::size_t done);
   void SetLabel(std::string label, std::size_t total);
+  // A stage whose end nobody can tell: its text and how long everything took so far, drawn at once.
+  void SetStage(const std::string& text);
+  void Clear();  // the line; before anything else is printed
 
  private:
   void Draw(std::size_t done);
+  void Show(const std::string& line);
   std::string label_;
   std::size_t total_;
   bool shown_, color_, drawn_ = false;
-  std::chrono::steady_clock::time_point begin_, last_;
+  std::chrono::steady_clock::time_point start_, begin_, last_;  // of all, of the label, of the last drawing
 };
 
 }  // namespace kpsa

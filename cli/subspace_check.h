@@ -1,16 +1,20 @@
-// A fresh subspace tried on poses that it was not trained on: what it costs, and where it is worst.
+// A fresh subspace tried on poses that it was not trained on: what it costs, and where it is worst. Times are
+// those of the program's work (cli/frame_times.h), but for light.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "cli/acceleration.h"
+#include "kpsa/trainer.h"
 
 namespace kpsa {
 
 struct SubspaceCheck {
   struct Pose {
-    std::string controls;     // the three farthest from rest: "jaw.rotateX -22, smile 0.9"
+    std::string controls;     // and the clip: "wave at 0.53 s, jaw.rotateX -22, smile 0.9"
     std::string region;       // where its worst point is
     double max = 0, rms = 0;  // metres
   };
@@ -18,19 +22,28 @@ struct SubspaceCheck {
     std::string name;  // the joint that moves its points most, or the mesh
     double rms = 0, max = 0;
   };
-  std::size_t poses = 0;
-  std::vector<Pose> worst_poses;           // at most five, worst first
-  std::vector<Region> worst_regions;       // at most five, by RMS
-  double rms = 0, max = 0;                 // of the reconstruction without misses, metres
-  double full_ms = 0, accelerated_ms = 0;  // of a pose, medians; accelerated: a hit
+  std::size_t poses = 0, reconstructed = 0;  // all of them, unless something beyond guards prevents it
+  std::vector<Pose> worst_poses;             // at most five, worst first
+  std::vector<Region> worst_regions;         // at most five, by RMS
+  double rms = 0, max = 0;                   // of the reconstruction without misses, metres
+  double full_ms = 0, accelerated_ms = 0;    // of a pose, medians; accelerated: a hit
   // With that share of misses, each of which costs both.
   double PredictedSpeedup(double hit_rate) const;
 };
 
-// Evaluates sampled poses of the rig's controls at rest, fully and with every pose reconstructed. The rig's
-// graph is rewritten. A rig without controls gives no poses.
+struct SubspaceCheckOptions {
+  std::size_t poses = 60;
+  std::uint64_t seed = 1;
+  bool groups = true;                                               // DrawNewPoses
+  std::function<void(std::size_t done, std::size_t all)> progress;  // may be null
+};
+
+// Evaluates new poses, drawn as the held-out ones of training are, fully and with every pose reconstructed:
+// guards are lifted. The rig's graph is rewritten. A rig without controls and clips gives no poses. Errors: a
+// full evaluation that fails or is not finite names its pose.
 Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
-                                    std::shared_ptr<const Subspace> subspace, std::size_t poses,
-                                    std::uint64_t seed);
+                                    const std::shared_ptr<const Subspace>& subspace,
+                                    const std::vector<TrainingClip>& clips,
+                                    const SubspaceCheckOptions& options);
 
 }  // namespace kpsa

@@ -41,11 +41,13 @@ std::string TrainJson(const TrainResult& r) {
                              {"calibration",
                               {{"tolerance", r.subspace->tolerance},
                                {"violation_rate", r.calibration.alpha},
+                               {"attainable_rate", r.calibration.attainable_alpha},
                                {"hit_rate", r.calibration.hit_rate},
                                {"violations", r.calibration.violations},
                                {"warning", r.calibration.warning}}},
                              {"check",
                               {{"poses", r.check.poses},
+                               {"reconstructed", r.check.reconstructed},
                                {"rms", r.check.rms},
                                {"max", r.check.max},
                                {"worst_poses", poses},
@@ -61,21 +63,28 @@ std::string TrainText(const TrainResult& r) {
   const bool light = r.subspace->of_light();
   const auto error = [&](double value) { return ErrorText(value, light); };
   std::string text;
-  text += fmt::format("{}: {}, {} ({} numbers), {} modes, {:.1f} s\n", r.path, Plural(r.points(), "point"),
-                      Plural(r.subspace->cues.size(), "cue"), r.subspace->rows(), r.subspace->modes,
-                      r.seconds);
+  text +=
+      fmt::format("{}: {}, {} ({} numbers), {} modes, {:.1f} s\n", r.path, Plural(r.points(), "point"),
+                  Plural(r.subspace->cues.size(), "cue"), r.subspace->rows(), r.subspace->modes, r.seconds);
   text += fmt::format("trained on {} of {} and {}\n", Plural(r.record.clip_poses, "frame"),
                       r.record.clips.empty() ? "no clip" : fmt::format("{}", fmt::join(r.record.clips, ", ")),
                       Plural(r.record.sampled_poses, "sampled pose"));
   text +=
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
-  text += fmt::format("calibrated for {}{} in {:.3g} % of poses: {:.1f} % of held-out poses hit\n",
-                      light ? "an RMS of " : "", error(r.subspace->tolerance),
-                      100 * (1 - r.calibration.alpha), 100 * r.calibration.hit_rate);
+  // What these poses can promise, where that is less than what was asked for
+  const double promised = r.calibration.attainable_alpha;
+  text += fmt::format(
+      "calibrated for {}{} in {:.4g} % of poses{}: {:.1f} % of held-out poses hit\n",
+      light ? "an RMS of " : "", error(r.subspace->tolerance), 100 * (1 - promised),
+      promised > r.calibration.alpha
+          ? fmt::format(" ({:.4g} % was asked for, which {} cannot promise)", 100 * (1 - r.calibration.alpha),
+                        Plural(r.calibration.poses, "held-out pose"))
+          : "",
+      100 * r.calibration.hit_rate);
   if (r.check.poses > 0) {
     text += fmt::format(
-        "tried on {} of the controls: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "
+        "tried on {}: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "
         "{:.1f}x with these hits\n",
         Plural(r.check.poses, "new pose"), r.check.full_ms, r.check.accelerated_ms,
         r.check.PredictedSpeedup(r.calibration.hit_rate));
@@ -87,7 +96,7 @@ std::string TrainText(const TrainResult& r) {
                     "controls help\n"
                   : "slower than the full evaluation, which costs little here: leave this one as it is\n";
     }
-    Table poses({"worst of these poses (controls)", "where", ">max", ">RMS"});
+    Table poses({"worst of these poses", "where", ">max", ">RMS"});
     for (const auto& pose : r.check.worst_poses)
       poses.Row({pose.controls, pose.region, error(pose.max), error(pose.rms)});
     Table regions({"worst regions", ">RMS", ">max"});

@@ -17,7 +17,7 @@ struct TrainResult {
   TrainingRecord record;
   Calibration calibration;
   SubspaceCheck check;
-  double seconds = 0;  // that the training took
+  double seconds = 0;  // of training and the check
   std::size_t points() const;
 };
 

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "kpsa/carried.h"
+#include "kpsa/control_groups.h"
 #include "kpsa/cue_choice.h"
 #include "kpsa/cue_places.h"
 #include "kpsa/mode_choice.h"
@@ -37,9 +38,6 @@ constexpr double kNoiseShare = 5e-3;       // and a shift of a joint or a point,
 constexpr double kLightShift = 1e-4;       // metres; where the tolerance is no length: both, of a joint
 constexpr int kMaxLightModes = 120;        // that are looked at; noise is beyond
 constexpr std::size_t kJudges = 300;       // new poses that compare places for cues
-constexpr std::size_t kGroupPoints = 400;  // where the trainer looks which controls act together
-constexpr double kGroupShare = 0.2;        // of a control's largest displacement: it acts on a point
-constexpr std::size_t kGroupSize = 8;      // controls that move a point most
 
 class Trainer {
  public:
@@ -155,7 +153,7 @@ class Trainer {
     if (!rig_.controls.empty() && !of_light()) {
       PoseMatrix sweeps(layout_);
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, &sweeps));
-      groups_ = FindGroups(sweeps);
+      groups_ = FindControlGroups(sweeps, 0, rig_.controls.size());
     }
     if (options_.samples > 0) {
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, poses));
@@ -220,52 +218,6 @@ class Trainer {
     }
     return dense;
   }
-
-  // Which controls move the same points, from the sweeps. What moves a point by a good part of what it moves
-  // any point acts there.
-  ControlGroups FindGroups(const PoseMatrix& poses) const {
-    constexpr std::size_t first = 0;
-    const std::vector<Index> points = EvenSpread(static_cast<Index>(layout_.points), kGroupPoints);
-    std::vector<float> rest(
-        3 * points.size());  // the mean of all sweeps, since most of them leave a point at rest
-    const std::size_t n = rig_.controls.size();
-    const auto at = [&](std::size_t row, std::size_t p, std::size_t k) {
-      return poses.row(row)[3 * points[p] + k];
-    };
-    for (std::size_t i = 0; i < rest.size(); ++i) {
-      std::vector<float> values;
-      for (std::size_t s = 0; s < 2 * n; ++s) values.push_back(at(first + s, i / 3, i % 3));
-      std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n), values.end());
-      rest[i] = values[n];
-    }
-    std::vector<std::vector<std::pair<double, std::size_t>>> movers(
-        points.size());  // by point: displacement, control
-    for (std::size_t c = 0; c < n; ++c) {
-      std::vector<double> moved(points.size());
-      for (std::size_t p = 0; p < points.size(); ++p) {
-        for (std::size_t s = first + 2 * c; s < first + 2 * c + 2; ++s) {
-          const Double3 d{at(s, p, 0) - rest[3 * p], at(s, p, 1) - rest[3 * p + 1],
-                          at(s, p, 2) - rest[3 * p + 2]};
-          moved[p] = std::max(moved[p], Length(d));
-        }
-      }
-      const double most = *std::max_element(moved.begin(), moved.end());
-      for (std::size_t p = 0; p < points.size() && most > 0; ++p) {
-        if (moved[p] > kGroupShare * most) movers[p].emplace_back(moved[p], c);
-      }
-    }
-    ControlGroups groups;
-    for (auto& of_point : movers) {
-      std::sort(of_point.rbegin(), of_point.rend());
-      if (of_point.size() > kGroupSize) of_point.resize(kGroupSize);
-      if (of_point.size() < 2) continue;
-      std::vector<std::size_t>& group = groups.emplace_back();
-      for (const auto& [displacement, control] : of_point) group.push_back(control);
-      std::sort(group.begin(), group.end());
-    }
-    std::sort(groups.begin(), groups.end());
-    groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-    return groups;
   }
 
   // Of the training poses, and of the clips between frames: quaternion keys turn joints about axes there that

@@ -318,6 +318,8 @@ TEST(Acceleration, FirstFiveMinutes) {
   EXPECT_TRUE(std::filesystem::exists(subspace));
   EXPECT_GT(trained["cues"], 0);
   EXPECT_GE(trained["check"]["worst_poses"].size(), 1u);
+  EXPECT_EQ(trained["check"]["poses"], 60);
+  EXPECT_EQ(trained["check"]["reconstructed"], 60);
   EXPECT_EQ(RunKpsa({"train", rig, "--samples", "120"}).exit_code, 2) << "an existing subspace";
   EXPECT_EQ(OkJson({"inspect", subspace, "--json"})["kind"], "subspace");
 

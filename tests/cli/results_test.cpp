@@ -99,6 +99,7 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
                                                  {"/modes", 2.5},
                                                  {"/hit_rate", "0.9"},
                                                  {"/hit_rate", 7},
+                                                 {"/blend_rate", 7},
                                                  {"/beside/0/cues", -1},
                                                  {"/speedup", true},
                                                  {"/tolerance", nullptr},
@@ -134,6 +135,12 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
       // The map is stored in tiles: Pythagoras holds up to what these add (kpsa/error_split.h)
       EXPECT_NEAR(total * total, projection * projection + cueing * cueing,
                   2 * projection * storage + storage * storage + 1e-6 * total * total);
+      const std::string verdict = (*side)["per_frame"][f]["verdict"];
+      EXPECT_EQ(e["hit"][f].get<bool>(), verdict == "hit");
+      EXPECT_EQ(e["miss"][f].get<bool>(), verdict == "miss");
+      if (verdict == "miss") {
+        EXPECT_EQ(emitted, 0.0);
+      }
       if (e["hit"][f].get<bool>()) {
         EXPECT_EQ(emitted, total);
       } else {

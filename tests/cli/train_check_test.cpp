@@ -1,0 +1,107 @@
+// What kpsa train says of a fresh subspace: new poses like the held-out ones, all of them reconstructed, and
+// what is promised.
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "cli/check_poses.h"
+#include "cli/subspace_check.h"
+#include "tests/cli/hello_folder.h"
+#include "tests/cli/process.h"
+#include "tests/cli/rig_run.h"
+
+namespace kpsa {
+namespace {
+
+class TrainCheck : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { trained_ = TrainRig(kHello, QuickTraining(), {"wave"}); }
+  static void TearDownTestSuite() { trained_.reset(); }
+  void SetUp() override {
+    ASSERT_NE(trained_, nullptr);
+    RigOptions rest;
+    rest.rest = true;
+    Result<Rig> rig = LoadRig(AcceleratedRegistry(), kHello, rest);
+    ASSERT_TRUE(rig.ok()) << rig.status().ToString();
+    rig_ = std::make_unique<Rig>(std::move(*rig));
+    Result<std::vector<TrainingClip>> clips = ClipFrames(*rig_, {"wave"});
+    ASSERT_TRUE(clips.ok());
+    clips_ = std::move(*clips);
+  }
+  Result<SubspaceCheck> Check(const std::shared_ptr<const Subspace>& subspace) {
+    SubspaceCheckOptions options;
+    options.poses = 40;
+    options.seed = 5;
+    return CheckSubspace(rig_.get(), rig_->accelerate[0], subspace, clips_, options);
+  }
+  static inline std::shared_ptr<const Subspace> trained_;
+  std::unique_ptr<Rig> rig_;
+  std::vector<TrainingClip> clips_;
+};
+
+TEST_F(TrainCheck, DrawsPosesAsTrainingDoes) {
+  Compiler compiler;
+  const TrainingRig training = MakeTrainingRig(rig_.get(), rig_->accelerate[0]);
+  const auto draw = [&](const std::vector<TrainingClip>& clips, bool groups) {
+    Result<std::vector<SampledPose>> poses = DrawNewPoses(training, &compiler, clips, groups, 40, 5);
+    EXPECT_TRUE(poses.ok()) << poses.status().ToString();
+    return poses.ok() ? std::move(*poses) : std::vector<SampledPose>();
+  };
+  const std::vector<SampledPose> poses = draw(clips_, true), plain = draw({}, false);
+  ASSERT_EQ(poses.size(), 40u);
+  // Of the samplers shares: frames of the clip exaggerated (no clip plays), groups, and mixtures over a clip
+  EXPECT_GT(std::count_if(poses.begin(), poses.end(), [](const SampledPose& p) { return p.clip == 0; }), 3);
+  EXPECT_EQ(std::count_if(plain.begin(), plain.end(), [](const SampledPose& p) { return p.clip >= 0; }), 0);
+  EXPECT_NE(poses[9].values, draw(clips_, false)[9].values) << "groups";
+  const auto played =
+      std::find_if(poses.begin(), poses.end(), [](const SampledPose& p) { return p.clip == 0; });
+  ASSERT_NE(played, poses.end());
+  EXPECT_TRUE(PoseText(*rig_, training, clips_, *played).starts_with("wave at "));
+  EXPECT_GT(TimeOf(*played, clips_), 0);
+  EXPECT_LE(TimeOf(*played, clips_), clips_[0].times.back());
+}
+
+TEST_F(TrainCheck, GuardsAreLiftedSoThatEveryPoseIsReconstructed) {
+  const Result<SubspaceCheck> check = Check(trained_);
+  ASSERT_TRUE(check.ok()) << check.status().ToString();
+  EXPECT_EQ(check->poses, 40u);
+  EXPECT_EQ(check->reconstructed, 40u);
+  EXPECT_GT(check->rms, 0);
+  auto narrow = std::make_shared<Subspace>(*trained_);
+  for (TrainedRange& range : narrow->ranges) range.lo = range.hi = 1e3;  // where nothing ever is
+  SetUp();                                                               // the check rewrites the rig
+  const Result<SubspaceCheck> same = Check(narrow);
+  ASSERT_TRUE(same.ok()) << same.status().ToString();
+  EXPECT_EQ(same->reconstructed, 40u);
+  EXPECT_EQ(same->rms, check->rms);
+  EXPECT_EQ(same->max, check->max);
+  ASSERT_EQ(same->worst_poses.size(), 5u);
+  EXPECT_EQ(same->worst_poses[0].controls, check->worst_poses[0].controls);
+}
+
+TEST_F(TrainCheck, APoseThatIsNoNumberIsNamed) {
+  rig_->controls[0].max = kInfinity, rig_->controls[0].min = -kInfinity;
+  const Result<SubspaceCheck> check = Check(trained_);
+  ASSERT_FALSE(check.ok());
+  EXPECT_NE(check.status().ToString().find(rig_->controls[0].name + " "), std::string::npos)
+      << check.status().ToString();
+}
+
+TEST(TrainReport, PromisesWhatItsPosesCan) {
+  const HelloFolder folder;
+  const auto train = [&](const std::string& rate) {
+    return RunKpsa({"train", folder.rig(), "--samples", "60", "--calibration", "40", "--violation-rate", rate,
+                    "--tolerance", "5mm", "--force", "-q"});
+  };
+  const ProcessResult strict = train("0");
+  EXPECT_EQ(strict.exit_code, 0) << strict.err;
+  EXPECT_EQ(strict.out.find("in 100 % of poses"), std::string::npos) << strict.out;
+  EXPECT_NE(strict.out.find("(100 % was asked for, which 40 held-out poses cannot promise)"),
+            std::string::npos)
+      << strict.out;
+  EXPECT_NE(strict.err.find("warning: "), std::string::npos) << "also with -q";
+  EXPECT_EQ(train("20%").out.find("cannot promise"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace kpsa
