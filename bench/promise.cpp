@@ -214,9 +214,10 @@ class Bench {
     const Result<std::vector<std::vector<PromiseJump>>> jumps = rig->Walk(*walks, kWalkSteps, trainings);
     if (!jumps.ok()) return jumps.status();
     for (std::size_t t = 0; t < cases.size(); ++t) {
-      WalkRow& row = walks_.emplace_back(WalkRow{cases[t], walks->size(), 0, ""});
+      WalkRow& row = walks_.emplace_back(WalkRow{cases[t], walks->size(), 0, 0, ""});
       for (std::size_t w = 0; w < walks->size(); ++w) {
         const double jump = (*jumps)[t][w].excess / cases[t].tolerance;
+        row.accepted += (*jumps)[t][w].accepted;
         if (jump > row.jump) row.jump = jump, row.control = rig->control_name((*walks)[w].control);
       }
     }

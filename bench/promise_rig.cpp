@@ -405,14 +405,15 @@ Result<std::vector<std::vector<PromiseJump>>> PromiseRig::Walk(const std::vector
       std::vector<KeptPoints> fast_points(trainings.size());
       for (std::size_t s = 0; s <= steps; ++s) {
         const double share = static_cast<double>(s) / static_cast<double>(steps);
-        double& value = pose.values[walks[w].control];
-        value = walks[w].from + share * (walks[w].to - walks[w].from);
+        pose.values[walks[w].control] = walks[w].from + share * (walks[w].to - walks[w].from);
         failure.Add(w, full.Evaluate(*this, pose));
         const double full_step = full_points.Step(full.evaluator(), outputs);
         for (std::size_t t = 0; t < fast.size(); ++t) {
           failure.Add(w, fast[t].Evaluate(*this, pose));
           const double excess = fast_points[t].Step(fast[t].evaluator(), outputs) - full_step;
-          if (excess > jumps[t][w].excess) jumps[t][w] = {excess, value};
+          PromiseJump& jump = jumps[t][w];
+          jump.excess = std::max(jump.excess, excess);
+          jump.accepted = jump.accepted || VerdictOf(fast[t].evaluator(), outputs) != PromiseVerdict::kMiss;
         }
       }
     }

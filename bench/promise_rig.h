@@ -43,8 +43,8 @@ struct PromiseWalk {
 
 struct PromiseJump {
   double excess =
-      0;          // metres: the largest step of a point, accelerated, less the largest one fully evaluated
-  double at = 0;  // the value of the control after the step
+      0;  // metres: the largest step of a point, accelerated, less the largest one fully evaluated
+  bool accepted = false;  // at some step: where all are misses, there is nothing to see
 };
 
 // A subspace in memory with the plans that it was tried with.

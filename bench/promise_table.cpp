@@ -47,10 +47,11 @@ Table RowTable(std::span<const PromiseRow> rows) {
 }
 
 Table WalkTable(std::span<const WalkRow> walks) {
-  Table table({"rig", ">tolerance", ">seed", ">walks", ">largest jump", "of"});
+  Table table({"rig", ">tolerance", ">seed", ">walks", ">accepted", ">largest jump", "of"});
   for (const WalkRow& row : walks) {
     table.Row({row.of.rig, ScaleText(row.of), fmt::format("{}", row.of.seed), fmt::format("{}", row.walks),
-               row.walks == 0 ? "-" : fmt::format("{:.2f}", row.jump), row.control});
+               fmt::format("{}", row.accepted), row.accepted == 0 ? "-" : fmt::format("{:.2f}", row.jump),
+               row.control});
   }
   return table;
 }
@@ -73,7 +74,7 @@ Table Summary(std::span<const PromiseRow> rows, std::span<const WalkRow> walks) 
     first = end;
     std::vector<std::string> cells{mine[0].of.rig, ScaleText(mine[0].of),
                                    fmt::format("{:g} %", 100 * mine[0].of.promised)};
-    std::size_t broken = 0;
+    std::size_t broken = 0, accepted = 0;
     double worst = 0, jump = 0;
     for (const PoseKind kind : kPoseKinds) {
       std::size_t poses = 0, hits = 0, violations = 0;
@@ -90,10 +91,13 @@ Table Summary(std::span<const PromiseRow> rows, std::span<const WalkRow> walks) 
       cells.push_back(breaks ? fmt::format("**{}**", share) : share);
     }
     for (const WalkRow& walk : walks) {
-      if (SameTolerance(walk.of, mine[0].of)) jump = std::max(jump, walk.jump);
+      if (!SameTolerance(walk.of, mine[0].of)) continue;
+      jump = std::max(jump, walk.jump);
+      accepted += walk.accepted;
     }
-    cells.insert(cells.end(), {fmt::format("{:.1f}", worst), fmt::format("{:.1f}", jump),
-                               broken == 0 ? "" : fmt::format("{} of {}", broken, mine.size())});
+    cells.insert(cells.end(),
+                 {fmt::format("{:.1f}", worst), accepted == 0 ? "-" : fmt::format("{:.1f}", jump),
+                  broken == 0 ? "" : fmt::format("{} of {}", broken, mine.size())});
     table.Row(cells);
   }
   return table;

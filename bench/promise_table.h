@@ -37,9 +37,9 @@ PromiseRow CountOutcomes(const PromiseCase& of, PoseKind kind, std::span<const P
 // Walks of one training.
 struct WalkRow {
   PromiseCase of;
-  std::size_t walks = 0;
-  double jump = 0;      // the largest, in tolerances
-  std::string control;  // whose; empty where nothing jumped
+  std::size_t walks = 0, accepted = 0;  // of these, with a step that was accepted
+  double jump = 0;                      // the largest, in tolerances
+  std::string control;                  // whose; empty where nothing jumped
 };
 
 std::string PromiseText(std::span<const PromiseRow> rows, std::span<const WalkRow> walks);

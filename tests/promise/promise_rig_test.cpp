@@ -88,6 +88,8 @@ TEST_F(PromiseRigTest, MeasuresJumps) {
   const std::vector<PromiseJump>& jumps = walked->front();
   EXPECT_EQ(jumps[0].excess, 0) << "nothing moves";
   EXPECT_EQ(jumps[1].excess, 0) << "misses";
+  EXPECT_FALSE(jumps[1].accepted);
+  EXPECT_TRUE(jumps[3].accepted);
   EXPECT_GT(jumps[2].excess, 0) << "hits";
   std::vector<PromisePose> poses(kSteps + 1, rest);
   for (std::size_t s = 0; s <= kSteps; ++s) poses[s].values[0] = 2 * end * static_cast<double>(s) / kSteps;

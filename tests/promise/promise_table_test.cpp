@@ -58,11 +58,15 @@ TEST(PromiseTable, BrokenIsWhatChanceDoesNotExplain) {
 TEST(PromiseTable, PutsSeedsTogetherAndMarksWhatIsBroken) {
   std::vector<PromiseRow> rows{Row(6, 6, 600, 0.05), Row(60, 60, 600, 0.05)};
   rows[1].of.seed = 2;
-  const std::vector<WalkRow> walks{{rows[0].of, 12, 0.5, "a.rotateX"}, {rows[1].of, 12, 2.25, "b.rotateX"}};
+  const std::vector<WalkRow> walks{{rows[0].of, 12, 8, 0.5, "a.rotateX"},
+                                   {rows[1].of, 12, 9, 2.25, "b.rotateX"}};
   const std::string markdown = PromiseMarkdown(rows, walks);
   EXPECT_NE(markdown.find("| rig | 1 = 2 mm | 5 % | 100 % | **5.5 %** | - | - | - | 0.0 | 2.2 | 1 of 2 |"),
             std::string::npos)
       << markdown;
+  const std::vector<WalkRow> missed{{rows[0].of, 12, 0, 0, ""}};
+  EXPECT_NE(PromiseMarkdown(rows, missed).find("| 0.0 | - | 1 of 2 |"), std::string::npos)
+      << "walks of misses show nothing";
   const std::string text = PromiseText(rows, walks);
   EXPECT_NE(text.find("10.0 % [7.7, 12.7]"), std::string::npos) << text;
   EXPECT_EQ(text.find("BROKEN"), text.rfind("BROKEN")) << text;
