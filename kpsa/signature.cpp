@@ -1,6 +1,7 @@
 #include "kpsa/signature.h"
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <optional>
 #include <set>
