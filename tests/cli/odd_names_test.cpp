@@ -239,6 +239,13 @@ TEST_F(OddNames, AreFoundInEveryCommand) {
   EXPECT_EQ(got.exit_code, 0) << got.err;
   const ProcessResult inspected = Run({"inspect", "strips.kpsa"});
   EXPECT_NE(inspected.out.find("body@1@skin"), std::string::npos) << inspected.out;
+  // Names and values may both hold a '='
+  folder.Write("strips.yaml",
+               Replaced(kRig, "nodes:\n", "nodes:\n  \"e=1.L\": {type: expression, expression: \"5\"}\n"));
+  const ProcessResult equal =
+      Run({"get", "strips.yaml", "e=1.L.output", "--rest", "--json", "--set", "e=1.L.expression=2 >= 1"});
+  EXPECT_EQ(equal.exit_code, 0) << equal.err;
+  EXPECT_EQ(equal.out.find("5"), std::string::npos) << equal.out;
   // What is misspelt is told as what it was meant to be
   const auto says = [&](const std::vector<std::string>& arguments, const std::string& part) {
     const ProcessResult run = Run(arguments);
