@@ -1,6 +1,7 @@
 #include "kpsa/signature.h"
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -160,7 +161,8 @@ std::vector<SetHere> Different(const Graph& graph, NodeId node, int attribute) {
   };
   for (const SetValue& set : values) {
     const Type type = graph.PlugType(set.plug);
-    const int components = type == Type::kDouble3 ? 3 : type == Type::kQuaternion ? 4 : 0;
+    const bool point = IsPointType(a.type);  // told as a whole: what it is without being set is not known
+    const int components = point ? 0 : type == Type::kDouble3 ? 3 : type == Type::kQuaternion ? 4 : 0;
     if (components == 0) compare(set.plug);
     for (int c = 0; c < components; ++c) {
       PlugRef part = set.plug;

@@ -1,6 +1,8 @@
 // Scenes of several rigs, through the program and with their subspaces.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "io/npz.h"
 #include "kpsa/subspace.h"
 #include "tests/cli/hello_folder.h"
@@ -119,9 +121,19 @@ TEST_F(TwoHellos, AreAcceleratedAsTheRigAlone) {
   folder.Write("two.yaml", text + "overrides: {b.rotateY: 90}\n");
   const ProcessResult run = RunKpsa({"bench", two(), "--runs", "1", "--frames", "0:3"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
+  // What is set on one of them, too, is told from what was trained, by the names of the rig alone
+  folder.Write("two.yaml", text);
+  const auto miss = [&](const std::string& set) {
+    const ProcessResult eval = RunKpsa({"eval", two(), "--accelerate", "--tolerance", "1", "--rest", "--set",
+                                        set, "-o", folder / "x.npz", "--force", "--json"});
+    EXPECT_EQ(eval.exit_code, 0) << eval.err;
+    return nlohmann::json::parse(eval.out)["accelerated"]["worst_miss"].get<std::string>();
+  };
+  EXPECT_EQ(miss("a:upper.rotateX=12"), "");
+  EXPECT_NE(miss("a:upper.rotateY=20").find("a:upper.rotateY = 20 deg is set"), std::string::npos);
   folder.Write("two.yaml", text + "overrides: {'b:mush.iterations': 3}\n");
   const ProcessResult stale =
-      RunKpsa({"eval", two(), "--accelerate", "--frames", "0", "-o", folder / "x.npz"});
+      RunKpsa({"eval", two(), "--accelerate", "--frames", "0", "-o", folder / "y.npz"});
   EXPECT_EQ(stale.exit_code, 3) << stale.err;
   EXPECT_NE(stale.err.find("the subspace is stale: since it was trained, mush.iterations changed"),
             std::string::npos)

@@ -178,6 +178,29 @@ TEST_F(Stale, AnotherRestPoseIsAnotherRig) {
                 Edit("connections:\n", "overrides: {upper.rotateZ: -40}\nconnections:\n"));
 }
 
+// What is set from outside is not the rig: misses or refusals that say so.
+TEST_F(Stale, WhatIsSetIsToldFromWhatTheRigSays) {
+  const auto run = [](const std::string& set, int exit_code, const std::string& part) {
+    SCOPED_TRACE(set);
+    const SubspaceFolder folder;
+    folder.Write("hello.kpsa", trained_);
+    const ProcessResult result = folder.Run(
+        {"eval", "hello.yaml", "--accelerate", "--tolerance", "1", "--set", set, "-o", "out.npz", "--json"});
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_EQ(result.err.find("stale"), std::string::npos) << result.err;
+    EXPECT_NE(result.err.find(part), std::string::npos) << result.err;
+    if (exit_code == 0) {
+      EXPECT_EQ(json::parse(result.out)["accelerated"]["hits"], 0);
+    }
+  };
+  run("mush.iterations=150", 3, "mush.iterations is set to 150 here");
+  run("cage.divisions=[3, 5, 2]", 3, "cage.divisions is set to [3, 5, 2] here");
+  run("mush.envelope=0.5", 0, "mush.envelope = 0.5 is set, and the subspace never saw it move");
+  run("upper.rotateY=5", 0, "upper.rotateY = 5 deg is set");
+  run("lower.translateX=2", 0, "lower.translateX = 0.02 m is set");
+  run("cage.points[1,2,1]=[0, 0.5, 0]", 0, "cage.points[");
+}
+
 TEST_F(Stale, AsMissesTheRigIsExact) {
   ExpectMisses(Edit("iterations: 10", "iterations: 11"));
   ExpectMisses([](const SubspaceFolder& folder) { folder.WriteWeights(0.75); });
