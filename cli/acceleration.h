@@ -54,7 +54,6 @@ struct AppliedSubspace {
   }
 };
 
-
 // Rewrites the rig's graph; final points that are accelerated are then those of the KPSA node
 // (CharacterMesh::points). Call it with the clip and the settings in place that will be evaluated. --kpsa M
 // replaces the file of the entry that has the same points; a rig without entries gets one from the subspace.
