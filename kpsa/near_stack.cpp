@@ -141,12 +141,12 @@ void AddNearNodes(NodeRegistry& registry) {
       .structural("restOrigin", Double3(), {.unit = Unit::kLength, .doc = "where it is at rest"})
       .out("offset", Type::kDouble3, "restOrigin less the place of the matrix")
       .unit(Unit::kLength)
+      .compute([](ComputeContext& c) {
+        c.out_value<Double3>(0) = c.kernel_as<Double3>() - Origin(c.get<Matrix4>(0));
+      })
       .bind([](const Binding& binding) -> Result<BoundKernel> {
         return BoundKernel{
             std::make_shared<const Double3>(binding.structural().value("restOrigin").get<Double3>()), 0, 0};
-      })
-      .compute([](ComputeContext& c) {
-        c.out_value<Double3>(0) = c.kernel_as<Double3>() - Origin(c.get<Matrix4>(0));
       });
   registry.add("offsetMatrix", "A world matrix that is moved, and the inverse of one.")
       .category("acceleration")

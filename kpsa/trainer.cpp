@@ -33,11 +33,11 @@ constexpr double kTrainedBeyond = 0.5;  // of kBeyondShare: the rest of the way 
 constexpr std::size_t kBetween = 400;   // poses between the frames of all clips, at most
 constexpr std::size_t kChunk = 256;     // calibration poses that are held at once
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
-constexpr double kNoiseTurn = 1e-4;        // what a cue is not trusted below: a turn of a joint,
-constexpr double kNoiseShare = 5e-3;       // and a shift of a joint or a point, of the tolerance
-constexpr double kLightShift = 1e-4;       // metres; where the tolerance is no length: both, of a joint
-constexpr int kMaxLightModes = 120;        // that are looked at; noise is beyond
-constexpr std::size_t kJudges = 300;       // new poses that compare places for cues
+constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
+constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
+constexpr double kLightShift = 1e-4;  // metres; where the tolerance is no length: both, of a joint
+constexpr int kMaxLightModes = 120;   // that are looked at; noise is beyond
+constexpr std::size_t kJudges = 300;  // new poses that compare places for cues
 
 class Trainer {
  public:
@@ -217,7 +217,6 @@ class Trainer {
       place = std::fmod(place + 0.6180339887498949, 1.0);
     }
     return dense;
-  }
   }
 
   // Of the training poses, and of the clips between frames: quaternion keys turn joints about axes there that
