@@ -117,7 +117,7 @@ class Ablation {
     for (int clip = -1; clip < static_cast<int>(clips->size()); ++clip) {
       if (clip >= 0) KPSA_RETURN_IF_ERROR(SetClip(&rig_, (*clips)[static_cast<std::size_t>(clip)].name));
       Result<std::vector<Signal>> found = FindSignals(*rig_.graph, &compiler_, training_rig_.target.outputs(),
-                                                      VaryingPlugs(rig_), nullptr, nullptr);
+                                                      VaryingPlugs(rig_), {}, nullptr);
       if (!found.ok()) return found.status();
       for (Signal& signal : *found) {
         if (std::none_of(signals.begin(), signals.end(),

@@ -174,7 +174,7 @@ class Bench {
     Say(fmt::format("training {:.0f} s, poses {:.0f} s, walks {:.0f} s", total_.training, total_.poses,
                     total_.walks));
     const bool broken = std::any_of(rows_.begin(), rows_.end(), [](const PromiseRow& row) {
-      return (row.kind == PoseKind::kSampler || row.kind == PoseKind::kMixtures) && row.broken();
+      return (row.kind == TrialKind::kSampler || row.kind == TrialKind::kMixtures) && row.broken();
     });
     return broken ? 1 : 0;
   }
@@ -195,7 +195,7 @@ class Bench {
       Say(fmt::format("{} at {:g} tolerances, seed {}: trained in {:.1f} s", name, scale, seed, seconds));
     }
     std::size_t poses_tried = 0, broken = 0;
-    for (const PoseKind kind : kPoseKinds) {
+    for (const TrialKind kind : kTrialKinds) {
       if (Interrupted()) return Status::Make(ErrorKind::kInterrupted, "interrupted");
       const Result<std::vector<PromisePose>> poses = DrawPoses(rig, kind, options_.poses, seed);
       if (!poses.ok()) return poses.status();

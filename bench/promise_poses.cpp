@@ -16,9 +16,9 @@ constexpr double kSpeeds[] = {0.37, 0.73, 1.73};         // frames a frame
 constexpr double kOffset = 0.313;  // of a frame: with it, no step of those speeds meets one
 
 // The engine is the same everywhere, unlike the standard's distributions.
-class Random {
+class Dice {
  public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  explicit Dice(std::uint64_t seed) : engine_(seed) {}
   double Unit() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
   double Between(double a, double b) { return a + (b - a) * Unit(); }
   std::size_t Below(std::size_t n) { return static_cast<std::size_t>(engine_() % n); }
@@ -43,7 +43,7 @@ std::vector<std::size_t> FreeControls(const PromiseRig& rig, int clip, bool cont
 }
 
 std::vector<PromisePose> Mixtures(const PromiseRig& rig, std::size_t count, std::uint64_t seed) {
-  Random random(seed);
+  Dice random(seed);
   std::vector<PromisePose> poses;
   const std::vector<std::size_t> free = FreeControls(rig, -1, false);
   for (std::size_t p = 0; p < count && !free.empty(); ++p) {
@@ -57,7 +57,7 @@ std::vector<PromisePose> Mixtures(const PromiseRig& rig, std::size_t count, std:
 Result<std::vector<PromisePose>> Margin(PromiseRig* rig, std::size_t count, std::uint64_t seed) {
   Result<std::vector<PromisePose>> poses = rig->Sample(count, kMarginSeeds + seed);
   if (!poses.ok()) return poses;
-  Random random(seed);
+  Dice random(seed);
   for (PromisePose& pose : *poses) {
     const std::vector<std::size_t> free = FreeControls(*rig, pose.clip, true);
     if (free.empty()) return std::vector<PromisePose>();
@@ -72,7 +72,7 @@ Result<std::vector<PromisePose>> Margin(PromiseRig* rig, std::size_t count, std:
 
 // Half frames, and the frames of playback at odd speeds.
 std::vector<PromisePose> BetweenFrames(const PromiseRig& rig, std::size_t count, std::uint64_t seed) {
-  Random random(seed);
+  Dice random(seed);
   std::vector<PromisePose> poses;
   const std::size_t clips = rig.clips().size();
   for (std::size_t p = 0; p < count && clips > 0; ++p) {
@@ -95,30 +95,30 @@ std::vector<PromisePose> BetweenFrames(const PromiseRig& rig, std::size_t count,
 
 }  // namespace
 
-const char* PoseKindName(PoseKind kind) {
+const char* TrialKindName(TrialKind kind) {
   switch (kind) {
-    case PoseKind::kSampler:
+    case TrialKind::kSampler:
       return "sampler";
-    case PoseKind::kMixtures:
+    case TrialKind::kMixtures:
       return "mixtures";
-    case PoseKind::kMargin:
+    case TrialKind::kMargin:
       return "margin";
-    case PoseKind::kClips:
+    case TrialKind::kClips:
       return "clips";
   }
   return "";
 }
 
-Result<std::vector<PromisePose>> DrawPoses(PromiseRig* rig, PoseKind kind, std::size_t count,
+Result<std::vector<PromisePose>> DrawPoses(PromiseRig* rig, TrialKind kind, std::size_t count,
                                            std::uint64_t seed) {
   switch (kind) {
-    case PoseKind::kSampler:
+    case TrialKind::kSampler:
       return rig->Sample(count, kSampleSeeds + seed);
-    case PoseKind::kMixtures:
+    case TrialKind::kMixtures:
       return Mixtures(*rig, count, seed);
-    case PoseKind::kMargin:
+    case TrialKind::kMargin:
       return Margin(rig, count, seed);
-    case PoseKind::kClips:
+    case TrialKind::kClips:
       return BetweenFrames(*rig, count, seed);
   }
   return std::vector<PromisePose>();
@@ -142,7 +142,7 @@ Result<std::vector<PromiseWalk>> DrawWalks(PromiseRig* rig, std::size_t most, st
     }
     if (poses.empty()) poses.push_back(rig->Rest());
   }
-  Random random(seed);
+  Dice random(seed);
   std::vector<PromiseWalk> walks;
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     const ControlRange& control = rig->controls()[chosen[i]];

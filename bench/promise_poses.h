@@ -9,18 +9,18 @@
 
 namespace kpsa {
 
-enum class PoseKind : std::uint8_t {
+enum class TrialKind : std::uint8_t {
   kSampler,   // as the trainer draws them: what the promise is about
   kMixtures,  // 3 to 6 controls anywhere in their ranges, the others at rest
   kMargin,    // the trainer's, 1 to 3 controls 0 to 10 % of their range beyond an end
   kClips,     // the clips, trained and test, between their frames
 };
-inline constexpr std::array kPoseKinds{PoseKind::kSampler, PoseKind::kMixtures, PoseKind::kMargin,
-                                       PoseKind::kClips};
-const char* PoseKindName(PoseKind kind);
+inline constexpr std::array kTrialKinds{TrialKind::kSampler, TrialKind::kMixtures, TrialKind::kMargin,
+                                        TrialKind::kClips};
+const char* TrialKindName(TrialKind kind);
 
 // None where the rig has no controls, or no clips, for that kind.
-Result<std::vector<PromisePose>> DrawPoses(PromiseRig* rig, PoseKind kind, std::size_t count,
+Result<std::vector<PromisePose>> DrawPoses(PromiseRig* rig, TrialKind kind, std::size_t count,
                                            std::uint64_t seed);
 
 // Controls from 5 % of their range within an end to 20 % beyond, over sampled poses: all of at most `most`

@@ -11,6 +11,7 @@
 #include "cli/rig_training.h"
 #include "graph/evaluator.h"
 #include "kpsa/accelerate.h"
+#include "kpsa/control_groups.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/pose_recorder.h"
 
@@ -29,50 +30,6 @@ TrainOptions OptionsOf(const Acceleration& entry, double tolerance, std::uint64_
   options.seed = seed;
   options.progress = [](const char*, double) { return !Interrupted(); };
   return options;
-}
-
-// Which controls act on the same points, found from their sweeps as the trainer does (kpsa/trainer.cpp,
-// FindGroups): a control acts on a point that it moves by a fifth of what it moves any point, and of those
-// the eight that move it most are a group.
-ControlGroups GroupsFromSweeps(const PoseMatrix& sweeps, std::size_t point_count, std::size_t controls) {
-  constexpr std::size_t kPoints = 400, kSize = 8;
-  constexpr double kShare = 0.2;
-  const std::vector<Index> points = EvenSpread(point_count, kPoints);
-  const auto at = [&](std::size_t row, std::size_t p) {
-    const std::span<const float> values = sweeps.row(row).subspan(3 * points[p], 3);
-    return Double3{values[0], values[1], values[2]};
-  };
-  std::vector<std::vector<std::pair<double, std::size_t>>> movers(points.size());  // displacement, control
-  std::vector<Double3> rest(points.size());
-  for (std::size_t p = 0; p < points.size(); ++p) {
-    for (int a = 0; a < 3; ++a) {  // most sweeps leave a point at rest: the median
-      std::vector<double> values;
-      for (std::size_t row = 0; row < 2 * controls; ++row) values.push_back(at(row, p)[a]);
-      std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(controls), values.end());
-      rest[p][a] = values[controls];
-    }
-  }
-  for (std::size_t c = 0; c < controls; ++c) {
-    std::vector<double> moved(points.size());
-    for (std::size_t p = 0; p < points.size(); ++p)
-      moved[p] = std::max(Length(at(2 * c, p) - rest[p]), Length(at(2 * c + 1, p) - rest[p]));
-    const double most = *std::max_element(moved.begin(), moved.end());
-    for (std::size_t p = 0; p < points.size() && most > 0; ++p) {
-      if (moved[p] > kShare * most) movers[p].emplace_back(moved[p], c);
-    }
-  }
-  ControlGroups groups;
-  for (auto& of_point : movers) {
-    std::sort(of_point.rbegin(), of_point.rend());
-    if (of_point.size() > kSize) of_point.resize(kSize);
-    if (of_point.size() < 2) continue;
-    std::vector<std::size_t>& group = groups.emplace_back();
-    for (const auto& [displacement, control] : of_point) group.push_back(control);
-    std::sort(group.begin(), group.end());
-  }
-  std::sort(groups.begin(), groups.end());
-  groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
-  return groups;
 }
 
 // Where the points of an entry are in the world: at their stage, or at the end of their mesh's stack.
@@ -267,7 +224,7 @@ Status PromiseRig::PrepareSampler() {
   if (entry_.train_samples > 0 && !controls().empty()) {
     PoseMatrix sweeps(*layout);
     KPSA_RETURN_IF_ERROR(recorder.AddSamples(Sweeps(controls()), trained, &sweeps));
-    groups_ = GroupsFromSweeps(sweeps, layout->points, controls().size());
+    groups_ = FindControlGroups(sweeps, 0, controls().size());
   }
   sampler_ready_ = true;
   return Status();

@@ -12,7 +12,6 @@ namespace kpsa {
 namespace {
 
 constexpr double kConfidence = 0.95;
-constexpr double kShareOfHits = 2;      // in promised rates: violations among hits
 constexpr double kRounding = 1 + 1e-6;  // of floats: forgiven
 constexpr double kFar = 3;              // tolerances
 
@@ -36,7 +35,7 @@ Table RowTable(std::span<const PromiseRow> rows) {
   Table table({"rig", ">tolerance", ">seed", "poses of", ">poses", ">hits", ">blends", ">misses",
                ">violations", ">of hits", ">worst", ">beyond 3", ">promised", ""});
   for (const PromiseRow& row : rows) {
-    table.Row({row.of.rig, ScaleText(row.of), fmt::format("{}", row.of.seed), PoseKindName(row.kind),
+    table.Row({row.of.rig, ScaleText(row.of), fmt::format("{}", row.of.seed), TrialKindName(row.kind),
                fmt::format("{}", row.poses), fmt::format("{}", row.hits), fmt::format("{}", row.blends),
                fmt::format("{}", row.misses), ShareText(row.violations, row.poses),
                ShareText(row.hit_violations, row.hits), fmt::format("{:.2f}", row.worst),
@@ -64,7 +63,7 @@ bool SameTolerance(const PromiseCase& a, const PromiseCase& b) {
 // the worst of all.
 Table Summary(std::span<const PromiseRow> rows, std::span<const WalkRow> walks) {
   std::vector<std::string> headers{"rig", ">tolerance", ">promised", ">hits"};
-  for (const PoseKind kind : kPoseKinds) headers.push_back(fmt::format(">{}", PoseKindName(kind)));
+  for (const TrialKind kind : kTrialKinds) headers.push_back(fmt::format(">{}", TrialKindName(kind)));
   headers.insert(headers.end(), {">worst error", ">largest jump", "broken"});
   Table table(headers);
   for (std::size_t first = 0; first < rows.size();) {
@@ -76,7 +75,7 @@ Table Summary(std::span<const PromiseRow> rows, std::span<const WalkRow> walks) 
                                    fmt::format("{:g} %", 100 * mine[0].of.promised)};
     std::size_t broken = 0, accepted = 0;
     double worst = 0, jump = 0;
-    for (const PoseKind kind : kPoseKinds) {
+    for (const TrialKind kind : kTrialKinds) {
       std::size_t poses = 0, hits = 0, violations = 0;
       bool breaks = false;
       for (const PromiseRow& row : mine) {
@@ -86,7 +85,7 @@ Table Summary(std::span<const PromiseRow> rows, std::span<const WalkRow> walks) 
         broken += row.broken();
         worst = std::max(worst, row.worst);
       }
-      if (kind == PoseKind::kSampler) cells.push_back(fmt::format("{:.0f} %", 100 * Share(hits, poses)));
+      if (kind == TrialKind::kSampler) cells.push_back(fmt::format("{:.0f} %", 100 * Share(hits, poses)));
       const std::string share = poses == 0 ? "-" : fmt::format("{:.1f} %", 100 * Share(violations, poses));
       cells.push_back(breaks ? fmt::format("**{}**", share) : share);
     }
@@ -110,7 +109,7 @@ bool PromiseRow::broken() const {
          BinomialLowerBound(hit_violations, hits, kConfidence) > kShareOfHits * of.promised;
 }
 
-PromiseRow CountOutcomes(const PromiseCase& of, PoseKind kind, std::span<const PromiseOutcome> outcomes) {
+PromiseRow CountOutcomes(const PromiseCase& of, TrialKind kind, std::span<const PromiseOutcome> outcomes) {
   PromiseRow row;
   row.of = of;
   row.kind = kind;

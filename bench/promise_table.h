@@ -22,7 +22,7 @@ struct PromiseCase {
 // than the tolerance from where the full evaluation has it.
 struct PromiseRow {
   PromiseCase of;
-  PoseKind kind = PoseKind::kSampler;
+  TrialKind kind = TrialKind::kSampler;
   std::size_t poses = 0, hits = 0, blends = 0, misses = 0;
   std::size_t violations = 0, hit_violations = 0;
   std::size_t far = 0;  // accepted, and farther than three tolerances
@@ -32,7 +32,7 @@ struct PromiseRow {
   // that of violations among hits above twice it.
   bool broken() const;
 };
-PromiseRow CountOutcomes(const PromiseCase& of, PoseKind kind, std::span<const PromiseOutcome> outcomes);
+PromiseRow CountOutcomes(const PromiseCase& of, TrialKind kind, std::span<const PromiseOutcome> outcomes);
 
 // Walks of one training.
 struct WalkRow {

@@ -69,7 +69,9 @@ std::size_t Admitted(double rate, std::size_t n) {
 }
 
 bool FewAmongHits(std::size_t violations, std::size_t hits, double alpha) {
-  return static_cast<double>(violations + 1) <= kShareOfHits * alpha * static_cast<double>(hits + 1);
+  const double rate = std::min(1.0, kShareOfHits * alpha);
+  return static_cast<double>(violations + 1) <= rate * static_cast<double>(hits + 1) &&
+         BinomialUpperBound(violations, hits, kCalibrationConfidence) <= rate * (1 + 1e-12);
 }
 
 // The largest tau that all demands allow, or 0.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kpsa/random.h"
 #include "kpsa/space_points.h"
 
 namespace kpsa {
@@ -52,11 +53,8 @@ class Trial {
 
   // Whether no pose has a point that moves, in the space, with these links.
   Result<bool> Carries(std::span<const Link* const> links, bool scale) {
-    std::uint64_t seed = 0x9e3779b97f4a7c15ull;
-    const auto unit = [&] {  // -1 .. 1
-      seed = seed * 6364136223846793005ull + 1442695040888963407ull;
-      return static_cast<double>(seed >> 11) * 0x1p-52 - 1;
-    };
+    Random random(0x9e3779b97f4a7c15ull);
+    const auto unit = [&] { return 2 * random.Unit() - 1; };
     for (const auto& [time, values] : poses_) {
       SetPlug(evaluator_.get(), rig_.time, time);
       for (const auto& [plug, rest] : base_) SetPlug(evaluator_.get(), plug, rest);

@@ -88,8 +88,8 @@ class Chooser {
                         std::max<std::size_t>(1, poses_.poses() / kErrorPoses), options_.tolerance);
   }
 
-  // Share of the poses that SoftCache would not accept, calibrated with the judges: of these, which are new,
-  // and of the training poses, among them the frames of clips, in equal parts.
+  // Share of the poses that SoftCache would not accept, calibrated with the judges of all kinds: of the
+  // sampled ones, which are new, and of the training poses, among them the frames of clips, in equal parts.
   double Misses(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca_, chosen, noise_);
     const Estimator estimator = MapEstimator(pca_, cues);
@@ -99,7 +99,12 @@ class Chooser {
     const PointSurvey survey = SurveyPoints(pca_, cues, estimator, *options_.judges, 1);
     const std::vector<double> scores = Scores(model, judges);
     std::vector<CalibrationPair> pairs;
-    for (std::size_t t = 0; t < scores.size(); ++t) pairs.push_back({scores[t], survey.by_pose[t]});
+    const std::vector<int>& kinds = options_.judge_kinds;
+    std::vector<double> sampled;
+    for (std::size_t t = 0; t < scores.size(); ++t) {
+      pairs.push_back({scores[t], survey.by_pose[t], 0, kinds.empty() ? 0 : kinds[t]});
+      if (pairs.back().kind == 0) sampled.push_back(scores[t]);
+    }
     const SoftCacheThreshold threshold =
         Calibrate(pairs, options_.tolerance, options_.violation_rate).threshold;
     const auto missed = [&](const std::vector<double>& of) {
@@ -107,7 +112,7 @@ class Chooser {
                  std::ranges::count_if(of, [&](double score) { return !(score <= threshold.tau_lo()); })) /
              static_cast<double>(of.size());
     };
-    return (missed(scores) + missed(Scores(model, trained))) / 2;
+    return (missed(sampled) + missed(Scores(model, trained))) / 2;
   }
   static std::vector<double> Scores(const SoftCacheModel& model, const Eigen::MatrixXd& measured) {
     SoftCacheThreshold always;

@@ -26,6 +26,7 @@ struct CueChoiceOptions {
   // spends until the points among some cues are there, and what it spends on a miss (ns). Null: the first
   // place that has cues is taken.
   const PoseMatrix* judges = nullptr;
+  std::vector<int> judge_kinds = {};  // PoseKind of each; empty: all are sampled ones
   std::function<double(std::span<const CueRef>)> points_cost = {};
   double miss_cost = 0;
   double violation_rate = 0.01;

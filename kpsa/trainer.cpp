@@ -15,6 +15,7 @@
 #include "kpsa/pose_recorder.h"
 #include "kpsa/signal_reach.h"
 #include "kpsa/space_frame.h"
+#include "kpsa/tilts.h"
 
 namespace kpsa {
 namespace {
@@ -42,7 +43,7 @@ constexpr std::size_t kJudges = 300;  // new poses that compare places for cues
 class Trainer {
  public:
   Trainer(const TrainingRig& rig, const std::vector<TrainingClip>& clips, const TrainOptions& options)
-      : rig_(rig), clips_(clips), options_(options) {}
+      : rig_(WithTilts(rig)), drawn_(rig.controls), clips_(clips), options_(options) {}
 
   Result<Subspace> Run() {
     record_.seed = options_.seed;
@@ -152,11 +153,11 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Say("poses", 0.2));
     if (!rig_.controls.empty() && !of_light()) {
       PoseMatrix sweeps(layout_);
-      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, &sweeps));
-      groups_ = FindControlGroups(sweeps, 0, rig_.controls.size());
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, &sweeps));
+      groups_ = FindControlGroups(sweeps, 0, drawn_.size());
     }
     if (options_.samples > 0) {
-      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(Sweeps(rig_.controls), clips_, poses));
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
       if (of_light()) groups_ = {};
     }
     const auto sample = [&](PoseKind kind, std::size_t count, std::uint64_t seed, PoseMatrix* to) {
@@ -188,8 +189,30 @@ class Trainer {
     return Status();
   }
 
+  Status RecordJudges(PoseMatrix* judges) {
+    for (const auto& [kind, count] :
+         {std::pair{PoseKind::kSampled, kJudges}, std::pair{PoseKind::kMixture, kJudges / 3},
+          std::pair{PoseKind::kNeighbours, kJudges / 3}}) {
+      if (kind != PoseKind::kSampled && of_light()) continue;
+      const std::size_t before = judges->poses();
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SampleOf(kind, count, options_.seed ^ 0x2545f4914f6cdd1dull),
+                                                 clips_, judges));
+      judge_kinds_.insert(judge_kinds_.end(), judges->poses() - before, static_cast<int>(kind));
+    }
+    return Status();
+  }
+
   std::vector<SampledPose> SampleOf(PoseKind kind, std::size_t count, std::uint64_t seed) const {
-    return PosesOfKind(kind, rig_.controls, clip_poses_, groups_, clips_.size(), count, seed);
+    std::vector<SampledPose> poses =
+        PosesOfKind(kind, drawn_, clip_poses_, groups_, clips_.size(), count, seed);
+    AddTilts(rig_.controls, drawn_.size(), seed, &poses);
+    return poses;
+  }
+
+  std::vector<SampledPose> SweepsWithTilts() const {
+    std::vector<SampledPose> sweeps = Sweeps(drawn_);
+    AddTilts(rig_.controls, drawn_.size(), options_.seed ^ 0xbb67ae8584caa73bull, &sweeps);
+    return sweeps;
   }
 
   // Training ends half way beyond the ranges; on the other half guards come in, and calibration looks.
@@ -345,6 +368,7 @@ class Trainer {
     choice.by_rms = of_light();
     choice.places = places_;
     choice.judges = judges.poses() > 0 ? &judges : nullptr;
+    choice.judge_kinds = judge_kinds_;
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     Status priced;
     choice.points_cost = [&](std::span<const CueRef> cues) {
@@ -434,7 +458,7 @@ class Trainer {
 
   // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
   Status Calibrate(Subspace* subspace) {
-    std::vector<SampledPose> sweeps = Sweeps(rig_.controls), trial;
+    std::vector<SampledPose> sweeps = SweepsWithTilts(), trial;
     for (std::size_t i = 0; i < std::min(kTrialSweeps, sweeps.size()); ++i)
       trial.push_back(sweeps[i * sweeps.size() / std::min(kTrialSweeps, sweeps.size())]);
     for (SampledPose& pose :
@@ -526,7 +550,8 @@ class Trainer {
     record_.worst.time = clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
   }
 
-  const TrainingRig& rig_;
+  const TrainingRig rig_;                  // its controls are the rig's, then tilts
+  const std::vector<ControlRange> drawn_;  // the rig's
   const std::vector<TrainingClip>& clips_;
   const TrainOptions& options_;
   Compiler compiler_;
@@ -540,6 +565,7 @@ class Trainer {
   Matrix4 inverse_rest_stretch_;
   ClipPoses clip_poses_;
   ControlGroups groups_;
+  std::vector<int> judge_kinds_;
   Pca pca_;
   CueSet cues_;
   double diagonal_ = 0;

@@ -237,7 +237,7 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   options.max_modes = 60;
   options.rows = 60;
   options.tolerance = 0.05;  // nothing misses, so the least costly place for cues wins, the bare skin
-  options.range_margin = 0.5;
+  options.range_ramp = 0.5;
   Result<Subspace> subspace = Train(MakeTrainingRig(&*rig, rig->accelerate[0]), *clips, options);
   ASSERT_TRUE(subspace.ok()) << subspace.status().ToString();
   const auto trained = std::make_shared<const Subspace>(std::move(*subspace));

@@ -16,7 +16,7 @@ std::unique_ptr<PromiseRig> Open(const std::string& name) {
   return rig.ok() ? std::move(*rig) : nullptr;
 }
 
-std::vector<PromisePose> Draw(PromiseRig* rig, PoseKind kind, std::size_t count, std::uint64_t seed) {
+std::vector<PromisePose> Draw(PromiseRig* rig, TrialKind kind, std::size_t count, std::uint64_t seed) {
   Result<std::vector<PromisePose>> poses = DrawPoses(rig, kind, count, seed);
   EXPECT_TRUE(poses.ok()) << poses.status().ToString();
   return poses.ok() ? std::move(*poses) : std::vector<PromisePose>();
@@ -25,7 +25,7 @@ std::vector<PromisePose> Draw(PromiseRig* rig, PoseKind kind, std::size_t count,
 TEST(PromisePoses, MixturesMoveThreeToSixControlsWithinTheirRanges) {
   const std::unique_ptr<PromiseRig> rig = Open("face");
   std::set<std::size_t> counts;
-  for (const PromisePose& pose : Draw(rig.get(), PoseKind::kMixtures, 200, 1)) {
+  for (const PromisePose& pose : Draw(rig.get(), TrialKind::kMixtures, 200, 1)) {
     EXPECT_LT(pose.clip, 0);
     std::size_t moved = 0;
     for (std::size_t c = 0; c < pose.values.size(); ++c) {
@@ -42,7 +42,7 @@ TEST(PromisePoses, MixturesMoveThreeToSixControlsWithinTheirRanges) {
 TEST(PromisePoses, MarginIsBeyondEndsByATenthOfTheRangeAtMost) {
   const std::unique_ptr<PromiseRig> rig = Open("hello");
   std::size_t below = 0, above = 0;
-  for (const PromisePose& pose : Draw(rig.get(), PoseKind::kMargin, 200, 1)) {
+  for (const PromisePose& pose : Draw(rig.get(), TrialKind::kMargin, 200, 1)) {
     std::size_t beyond = 0;
     for (std::size_t c = 0; c < pose.values.size(); ++c) {
       const ControlRange& control = rig->controls()[c];
@@ -65,7 +65,7 @@ TEST(PromisePoses, ClipsPlayBetweenTheirFrames) {
   ASSERT_EQ(rig->clips().size(), 3u) << "two that are trained on, and the test clip";
   std::set<int> clips;
   std::size_t halves = 0;
-  const std::vector<PromisePose> poses = Draw(rig.get(), PoseKind::kClips, 300, 1);
+  const std::vector<PromisePose> poses = Draw(rig.get(), TrialKind::kClips, 300, 1);
   for (const PromisePose& pose : poses) {
     clips.insert(pose.clip);
     const std::vector<double>& times = rig->clips()[static_cast<std::size_t>(pose.clip)].times;
@@ -81,10 +81,10 @@ TEST(PromisePoses, ClipsPlayBetweenTheirFrames) {
 
 TEST(PromisePoses, SeedsDecide) {
   const std::unique_ptr<PromiseRig> rig = Open("hello");
-  for (const PoseKind kind : kPoseKinds) {
+  for (const TrialKind kind : kTrialKinds) {
     const std::vector<PromisePose> once = Draw(rig.get(), kind, 40, 1), again = Draw(rig.get(), kind, 40, 1),
                                    other = Draw(rig.get(), kind, 40, 2);
-    ASSERT_EQ(once.size(), 40u) << PoseKindName(kind);
+    ASSERT_EQ(once.size(), 40u) << TrialKindName(kind);
     const auto same = [](const PromisePose& a, const PromisePose& b) {
       return a.clip == b.clip && a.time == b.time && a.values == b.values;
     };

@@ -53,7 +53,7 @@ TEST_F(PromiseRigTest, TrainsAsTheProgramDoes) {
 // A full miss passes the full evaluation on, bit for bit: any distance would be between different poses.
 TEST_F(PromiseRigTest, ComparesTheSamePose) {
   std::size_t hits = 0, misses = 0;
-  for (const PoseKind kind : kPoseKinds) {
+  for (const TrialKind kind : kTrialKinds) {
     const Result<std::vector<PromisePose>> poses = DrawPoses(rig_.get(), kind, 200, 5);
     ASSERT_TRUE(poses.ok()) << poses.status().ToString();
     const auto outcomes = rig_->Try(*poses, {training_.get(), 1});
@@ -108,7 +108,7 @@ TEST_F(PromiseRigTest, MeasuresJumps) {
 TEST_F(PromiseRigTest, TriesSeveralTrainingsAtOnce) {
   Result<PromiseTraining> coarse = rig_->Train(5 * rig_->tolerance(), 3);
   ASSERT_TRUE(coarse.ok()) << coarse.status().ToString();
-  const Result<std::vector<PromisePose>> poses = DrawPoses(rig_.get(), PoseKind::kMargin, 100, 5);
+  const Result<std::vector<PromisePose>> poses = DrawPoses(rig_.get(), TrialKind::kMargin, 100, 5);
   ASSERT_TRUE(poses.ok());
   std::vector<PromiseTraining> both{*training_, *coarse};
   const auto together = rig_->Try(*poses, both);

@@ -27,8 +27,8 @@ TEST(PromiseTable, CountsWhatWasAccepted) {
                                      {PromiseVerdict::kBlend, 0.007},
                                      {PromiseVerdict::kBlend, 0.0005},
                                      {PromiseVerdict::kMiss, 0.1}};
-  const PromiseRow row = CountOutcomes(Case(0.05), PoseKind::kMargin, outcomes);
-  EXPECT_EQ(row.kind, PoseKind::kMargin);
+  const PromiseRow row = CountOutcomes(Case(0.05), TrialKind::kMargin, outcomes);
+  EXPECT_EQ(row.kind, TrialKind::kMargin);
   EXPECT_EQ(row.poses, 6u);
   EXPECT_EQ(row.hits, 3u);
   EXPECT_EQ(row.blends, 2u);
@@ -41,7 +41,7 @@ TEST(PromiseTable, CountsWhatWasAccepted) {
 
 TEST(PromiseTable, PointsThatAreNotFiniteAreViolations) {
   const PromiseOutcome outcomes[] = {{PromiseVerdict::kHit, std::numeric_limits<double>::infinity()}};
-  EXPECT_EQ(CountOutcomes(Case(0.05), PoseKind::kSampler, outcomes).violations, 1u);
+  EXPECT_EQ(CountOutcomes(Case(0.05), TrialKind::kSampler, outcomes).violations, 1u);
 }
 
 // One-sided 95 % lower bounds: 39 of 600 gives 4.92 %, 40 of 600 gives 5.07 %; 18 of 120 gives 9.9 %, 20 of
