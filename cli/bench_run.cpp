@@ -366,7 +366,7 @@ class Bench {
     const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(with_clip);
     if (!open.ok()) return open.status();
     const Rig& rig = (*open)->rig;
-    const Result<std::vector<double>> sampled = SampleTimes(with_clip, rig);
+    const Result<std::vector<double>> sampled = SampleTimes(with_clip, **open);
     if (!sampled.ok()) return sampled.status();
     const std::vector<double>& times = *sampled;
     Result<std::shared_ptr<const Plan>> full_plan = LoadSides(with_clip, rig, times.size(), false);

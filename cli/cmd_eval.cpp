@@ -42,7 +42,7 @@ CommandResult Eval(const EvalFlags& flags) {
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
-  const Result<std::vector<double>> times = SampleTimes(flags, rig);
+  const Result<std::vector<double>> times = SampleTimes(flags, **open);
   if (!times.ok()) return times.status();
   KPSA_RETURN_IF_ERROR(CheckNotInput(*flags.output, rig.files));
   Compiler compiler;

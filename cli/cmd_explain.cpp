@@ -78,13 +78,14 @@ CommandResult ExplainDecisions(const ExplainFlags& flags, Rig* rig, int frame) {
   return 0;
 }
 
-CommandResult ExplainVertex(const ExplainFlags& flags, const Rig& rig, const VertexName& vertex) {
+CommandResult ExplainVertex(const ExplainFlags& flags, const OpenRig& open, const VertexName& vertex) {
+  const Rig& rig = open.rig;
   if (flags.acceleration.wanted() || !flags.wanted.empty() || flags.vertices.has_value())
     return Status::Usage(
         "{}: a vertex is told of with its full stack: expected no --accelerate, --kpsa, --want or "
         "--vertices",
         flags.what);
-  const Result<std::vector<double>> times = SampleTimes(flags, rig);
+  const Result<std::vector<double>> times = SampleTimes(flags, open);
   if (!times.ok()) return times.status();
   if (times->size() != 1 && (flags.frames.has_value() || flags.times.has_value()))
     return Status::Usage("{}: expected one frame, found {}", flags.what, Thousands(times->size()));
@@ -128,7 +129,7 @@ CommandResult Explain(ExplainFlags flags) {
   if (!rig.graph->FindNode(flags.what).ok() && !rig.graph->FindPlug(flags.what).ok()) {
     const Result<std::optional<VertexName>> vertex = FindVertex(rig, flags.what);
     if (!vertex.ok()) return vertex.status();
-    if (vertex->has_value()) return ExplainVertex(flags, rig, **vertex);
+    if (vertex->has_value()) return ExplainVertex(flags, **open, **vertex);
   }
   Compiler compiler;
   const Result<Request> request =
@@ -139,7 +140,7 @@ CommandResult Explain(ExplainFlags flags) {
   const auto compiled = CompileFor(rig, &compiler, *request);
   if (!compiled.ok()) return compiled.status();
   const Plan& plan = **compiled;
-  const Result<std::vector<double>> times = SampleTimes(flags, rig);
+  const Result<std::vector<double>> times = SampleTimes(flags, **open);
   if (!times.ok()) return times.status();
   const InterruptScope interruptible;
   Profile profile(plan);

@@ -47,7 +47,7 @@ CommandResult Get(const GetFlags& flags) {
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
   KPSA_RETURN_IF_ERROR(CheckNotInput(place, rig.files));
-  const Result<std::vector<double>> times = SampleTimes(flags, rig);
+  const Result<std::vector<double>> times = SampleTimes(flags, **open);
   if (!times.ok()) return times.status();
   Compiler compiler;
   std::vector<AppliedSubspace> applied;

@@ -37,7 +37,7 @@ CommandResult DrawGraph(const GraphFlags& flags) {
   Profile profile(**plan);
   std::size_t frames = 1;
   if (flags.time) {
-    const Result<std::vector<double>> times = SampleTimes(flags, rig);
+    const Result<std::vector<double>> times = SampleTimes(flags, **open);
     if (!times.ok()) return times.status();
     frames = times->size();
     RigFrameOptions options;

@@ -112,7 +112,7 @@ CommandResult RunProfile(const ProfileFlags& flags) {
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
   if (flags.trace.has_value()) KPSA_RETURN_IF_ERROR(CheckNotInput(*flags.trace, rig.files));
-  const Result<std::vector<double>> times = SampleTimes(flags, rig);
+  const Result<std::vector<double>> times = SampleTimes(flags, **open);
   if (!times.ok()) return times.status();
   Compiler compiler;
   const Result<Request> request = AcceleratedRequest(&rig, &compiler, flags.acceleration, {}, {});

@@ -173,7 +173,7 @@ CommandResult Render(const RenderFlags& flags) {
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
-  Result<std::vector<double>> times = SampleTimes(flags, rig);
+  Result<std::vector<double>> times = SampleTimes(flags, **open);
   if (!times.ok()) return times.status();
   const bool chosen = flags.frames.has_value() || flags.times.has_value();
   if (!chosen && !flags.acceleration.wanted()) *times = {(*times)[times->size() / 2]};

@@ -1,6 +1,7 @@
 // kpsa train: a rig to a subspace.
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 
 #include "base/parallel.h"
@@ -156,8 +157,14 @@ CommandResult RunTrain(const TrainFlags& flags) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   const InterruptScope writing;
   KPSA_RETURN_IF_ERROR(WriteSubspace(*subspace, path));
-  const TrainResult result{flags.file, path,   !flags.output.has_value(), subspace, record, calibration,
-                           *check,     seconds};
+  std::string worst_path;
+  if (!record.worst.kind.empty()) {
+    worst_path = std::filesystem::path(path).replace_extension(".worst.yaml").string();
+    KPSA_RETURN_IF_ERROR(WriteText(worst_path, true, WorstPoseText(record, path)));
+  }
+  const TrainResult result{flags.file, path,    !flags.output.has_value(),
+                           subspace,   record,  calibration,
+                           *check,     seconds, worst_path};
   Print(flags.json ? TrainJson(result) : TrainText(result));
   if (!flags.quiet && !record.warning.empty()) Say("warning: " + record.warning);
   // What is not promised is told in any case

@@ -110,9 +110,16 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   if (flags.clip.has_value())
     KPSA_RETURN_IF_ERROR(AsUsage(SetClip(&open->rig, *flags.clip).At({flags.file})));
   if (flags.pose.has_value()) {
-    const Result<std::vector<Setting>> settings = ReadPoseFile(open->rig, *flags.pose);
-    if (!settings.ok()) return settings.status();
-    for (const Setting& setting : *settings)
+    const Result<PoseFile> pose = ReadPoseFile(open->rig, *flags.pose);
+    if (!pose.ok()) return pose.status();
+    // The pose belongs to its clip, unless the command line names another
+    if (pose->clip.has_value() && !flags.clip.has_value() && !flags.rest) {
+      const std::optional<std::string_view> clip =
+          pose->clip->empty() ? std::nullopt : std::optional<std::string_view>(*pose->clip);
+      KPSA_RETURN_IF_ERROR(SetClip(&open->rig, clip).At({*flags.pose}));
+      open->pose_time = pose->time.value_or(0);
+    }
+    for (const Setting& setting : pose->settings)
       KPSA_RETURN_IF_ERROR(ApplySetting(&open->rig, setting).At({*flags.pose}));
   }
   for (const std::string& text : flags.sets) {

@@ -57,6 +57,7 @@ Status LoadPlugins(const Flags& flags, PluginLoader* loader);
 struct OpenRig {
   NodeRegistry registry;
   Rig rig;
+  std::optional<double> pose_time;  // seconds, where a pose file says when in its clip it is
 };
 // Loads the rig of the flags, with the clip, the pose file and the settings that they name. Mistakes in flags
 // are usage errors.

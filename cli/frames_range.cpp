@@ -132,15 +132,17 @@ Status CheckTimeFlags(const Flags& flags) {
   return Status();
 }
 
-Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig) {
+Result<std::vector<double>> SampleTimes(const Flags& flags, const OpenRig& open) {
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
   if (flags.times.has_value()) return ParseTimes(*flags.times);
+  const Rig& rig = open.rig;
   std::vector<double> times;
   if (flags.frames.has_value()) {
     const Result<std::vector<std::int64_t>> frames = ParseFrames(*flags.frames);
     for (std::int64_t frame : *frames) times.push_back(static_cast<double>(frame) / rig.fps);
     return times;
   }
+  if (open.pose_time.has_value()) return std::vector<double>{*open.pose_time};
   double begin = 0, duration = 0;
   if (rig.playing.has_value()) begin = rig.playing->begin, duration = rig.playing->duration;
   for (const CharacterClip& clip : rig.scene.clips) {

@@ -26,9 +26,9 @@ Result<std::vector<double>> ParseTimes(std::string_view text);
 // "0:99,120": indices and ranges with both ends, ascending and each once, below `total`.
 Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view text, Index total);
 
-// The times of --frames or --times in seconds. Without them: every frame of the clip that plays, from 0 to
-// its end; time 0 alone if none plays.
-Result<std::vector<double>> SampleTimes(const Flags& flags, const Rig& rig);
+// The times of --frames or --times in seconds. Without them: when the pose file says that it is; else every
+// frame of the clip that plays, from 0 to its end; time 0 alone if none plays.
+Result<std::vector<double>> SampleTimes(const Flags& flags, const OpenRig& open);
 // The frame of the clip that is nearest to a time, for reports; held within +-1e15.
 std::int64_t FrameNumber(double seconds, double fps);
 // Whether all refusals of --frames and --times pass, before a rig is loaded.

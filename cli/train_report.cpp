@@ -4,6 +4,7 @@
 
 #include "cli/common.h"
 #include "cli/table.h"
+#include "kpsa/poses.h"
 
 namespace kpsa {
 
@@ -20,6 +21,15 @@ std::string TrainJson(const TrainResult& r) {
         {{"controls", pose.controls}, {"region", pose.region}, {"max", pose.max}, {"rms", pose.rms}});
   for (const auto& region : r.check.worst_regions)
     regions.push_back({{"name", region.name}, {"rms", region.rms}, {"max", region.max}});
+  nlohmann::ordered_json kinds = nlohmann::ordered_json::array();
+  for (const Calibration::Kind& kind : r.calibration.kinds) {
+    kinds.push_back({{"kind", PoseKindName(static_cast<PoseKind>(kind.kind))},
+                     {"poses", kind.poses},
+                     {"hits", kind.hits},
+                     {"accepted", kind.accepted},
+                     {"violations", kind.violations},
+                     {"rate_at_most", kind.upper_bound}});
+  }
   const nlohmann::ordered_json document =
       nlohmann::ordered_json{{"schema", "kpsa.train/1"},
                              {"subspace", r.path},
@@ -44,6 +54,11 @@ std::string TrainJson(const TrainResult& r) {
                                {"attainable_rate", r.calibration.attainable_alpha},
                                {"hit_rate", r.calibration.hit_rate},
                                {"violations", r.calibration.violations},
+                               {"severe", r.calibration.severe},
+                               {"violation_rate_at_most", r.calibration.upper_bound},
+                               {"kinds", kinds},
+                               {"worst_accepted", r.record.worst.error},
+                               {"worst_pose", r.worst_path},
                                {"warning", r.calibration.warning}}},
                              {"check",
                               {{"poses", r.check.poses},
@@ -57,6 +72,27 @@ std::string TrainJson(const TrainResult& r) {
                                {"accelerated_ms", r.check.accelerated_ms},
                                {"speedup", r.check.PredictedSpeedup(r.calibration.hit_rate)}}}};
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+namespace {
+
+// JSON's quotes are YAML's.
+std::string QuotedYaml(const std::string& text) {
+  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string WorstPoseText(const TrainingRecord& record, const std::string& subspace) {
+  std::string text = fmt::format(
+      "# The accepted pose that is farthest off among those that {} was calibrated with ({}).\nkpsa: 1\n"
+      "units: {{length: m, angle: rad}}\nclip: {}\n",
+      subspace, record.worst.kind, QuotedYaml(record.worst.clip));
+  if (!record.worst.clip.empty()) text += fmt::format("time: {}s\n", record.worst.time);
+  text += record.worst.controls.empty() ? "pose: {}\n" : "pose:\n";
+  for (const auto& [plug, value] : record.worst.controls)
+    text += fmt::format("  {}: {}\n", QuotedYaml(plug), value);
+  return text;
 }
 
 std::string TrainText(const TrainResult& r) {
@@ -82,6 +118,18 @@ std::string TrainText(const TrainResult& r) {
                         Plural(r.calibration.poses, "held-out pose"))
           : "",
       100 * r.calibration.hit_rate);
+  for (const Calibration::Kind& kind : r.calibration.kinds) {
+    text += fmt::format("  {:<18} {:>5} poses: {:5.1f} % hit, {} beyond (at most {:.2g} %, 9 in 10 times)\n",
+                        PoseKindName(static_cast<PoseKind>(kind.kind)), kind.poses,
+                        100.0 * static_cast<double>(kind.hits) / static_cast<double>(kind.poses),
+                        kind.violations, 100 * kind.upper_bound);
+  }
+  if (!r.worst_path.empty()) {
+    text += fmt::format("worst that is accepted: {} ({}{}); {} replays it\n", error(r.record.worst.error),
+                        r.record.worst.kind,
+                        r.record.worst.clip.empty() ? "" : fmt::format(", over {}", r.record.worst.clip),
+                        r.worst_path);
+  }
   if (r.check.poses > 0) {
     text += fmt::format(
         "tried on {}: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "

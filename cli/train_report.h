@@ -17,13 +17,16 @@ struct TrainResult {
   TrainingRecord record;
   Calibration calibration;
   SubspaceCheck check;
-  double seconds = 0;  // of training and the check
+  double seconds = 0;      // of training and the check
+  std::string worst_path;  // of the pose file, "": no pose is accepted
   std::size_t points() const;
 };
 
 // Times in milliseconds, lengths in metres.
 std::string TrainJson(const TrainResult& r);
 // For people, with the next command.
+// The accepted calibration pose that is farthest off, as a pose file (io/rig_builder.h).
+std::string WorstPoseText(const TrainingRecord& record, const std::string& subspace);
 std::string TrainText(const TrainResult& r);
 
 }  // namespace kpsa

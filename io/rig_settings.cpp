@@ -59,7 +59,7 @@ Result<Setting> ParseSetting(const Rig& rig, std::string_view text) {
   return setting;
 }
 
-Result<std::vector<Setting>> ReadPoseFile(const Rig& rig, const std::string& path) {
+Result<PoseFile> ReadPoseFile(const Rig& rig, const std::string& path) {
   Result<YamlNode> root = ReadYamlFile(path);
   if (!root.ok()) return root.status();
   YamlErrors errors;
@@ -67,14 +67,26 @@ Result<std::vector<Setting>> ReadPoseFile(const Rig& rig, const std::string& pat
   ReadVersion(&map, &errors);
   FileUnits units = rig.units;
   if (const YamlNode* node = map.Find("units")) ReadUnits(*node, &units, &errors);
-  std::vector<Setting> settings;
+  PoseFile file;
+  if (const YamlNode* clip = map.Find("clip")) {
+    if (clip->is_scalar()) {
+      file.clip = clip->scalar;
+    } else {
+      errors.Add(*clip, "clip: expected the name of a clip, or \"\" for the rest pose, found {}",
+                 clip->kind_name());
+    }
+  }
+  if (const YamlNode* time = map.Find("time")) {
+    double seconds = 0;
+    if (ReadNumber(*time, "time", Unit::kTime, units, &seconds, &errors)) file.time = seconds;
+  }
   if (const YamlNode* pose = map.Required("pose")) {
     if (!pose->is_map())
       errors.Add(*pose, "pose: expected a map of plugs and values, found {}", pose->kind_name());
     for (std::size_t i = 0; i < pose->keys.size(); ++i) {
       Result<Setting> setting = ReadSetting(rig, pose->keys[i].scalar, pose->items[i], units);
       if (setting.ok()) {
-        settings.push_back(std::move(*setting));
+        file.settings.push_back(std::move(*setting));
       } else {
         errors.Add(pose->keys[i], setting.status());
       }
@@ -82,7 +94,7 @@ Result<std::vector<Setting>> ReadPoseFile(const Rig& rig, const std::string& pat
   }
   map.RejectUnread();
   if (!errors.ok()) return errors.Take();
-  return settings;
+  return file;
 }
 
 Status ApplySetting(Rig* rig, const Setting& setting) {

@@ -70,6 +70,8 @@ class Trainer {
         RigSignature(*rig_.graph, rig_.target.outputs(), rig_.target.space, rig_.target.controls);
     for (const PlugRef& control : rig_.target.controls)
       record_.controls.push_back(rig_.graph->PlugName(control));
+    for (std::size_t c = drawn_.size(); c < rig_.controls.size(); ++c)
+      record_.controls.push_back(rig_.graph->PlugName(rig_.controls[c].plug));
     subspace->rig_hash = SignatureDigest(record_.signature);
     subspace->training = TrainingJson(record_);
     KPSA_RETURN_IF_ERROR(ValidateSubspace(*subspace));

@@ -280,12 +280,14 @@ TEST_F(RigBuilderTest, SettingsFromOutside) {
   ASSERT_TRUE(setting.ok());
   EXPECT_TRUE(Has(ApplySetting(&rig, *setting).ToString(), "is driven by"));
 
-  Result<std::vector<Setting>> pose = ReadPoseFile(
+  Result<PoseFile> pose = ReadPoseFile(
       rig,
-      folder.Write("p.yaml", "kpsa: 1\nunits: {length: mm}\npose: {a.translateX: 5, tip.rotateY: 1rad}\n"));
+      folder.Write("p.yaml", "kpsa: 1\nunits: {length: mm}\nclip: walk\ntime: 1.5s\npose: {a.translateX: 5, tip.rotateY: 1rad}\n"));
   ASSERT_TRUE(pose.ok()) << pose.status().ToString();
-  ASSERT_EQ(pose->size(), 2u);
-  EXPECT_DOUBLE_EQ((*pose)[0].value.AsDouble(), 0.005);
+  ASSERT_EQ(pose->settings.size(), 2u);
+  EXPECT_DOUBLE_EQ(pose->settings[0].value.AsDouble(), 0.005);
+  EXPECT_EQ(pose->clip, "walk");
+  EXPECT_EQ(pose->time, 1.5);
   const std::string bad =
       Short(ReadPoseFile(
                 rig, folder.Write("p.yaml", "kpsa: 1\npose:\n  a.translatX: 5\n  a.rotateX: [1]\nposes: 1\n"))
