@@ -1,5 +1,6 @@
 #include "cli/train_report.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "cli/common.h"
@@ -73,15 +74,17 @@ std::string TrainText(const TrainResult& r) {
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
   // What these poses can promise, where that is less than what was asked for
+  std::size_t fewest = r.calibration.poses;
+  for (const Calibration::Kind& kind : r.calibration.kinds) fewest = std::min(fewest, kind.poses);
   const double promised = r.calibration.attainable_alpha;
-  text += fmt::format(
-      "calibrated for {}{} in {:.4g} % of poses{}: {:.1f} % of held-out poses hit\n",
-      light ? "an RMS of " : "", error(r.subspace->tolerance), 100 * (1 - promised),
-      promised > r.calibration.alpha
-          ? fmt::format(" ({:.4g} % was asked for, which {} cannot promise)", 100 * (1 - r.calibration.alpha),
-                        Plural(r.calibration.poses, "held-out pose"))
-          : "",
-      100 * r.calibration.hit_rate);
+  text += fmt::format("calibrated for {}{} in {:.4g} % of poses{}: {:.1f} % of held-out poses hit\n",
+                      light ? "an RMS of " : "", error(r.subspace->tolerance), 100 * (1 - promised),
+                      promised > r.calibration.alpha
+                          ? fmt::format(" ({:.4g} % was asked for, which {}{} cannot promise)",
+                                        100 * (1 - r.calibration.alpha), Plural(fewest, "held-out pose"),
+                                        r.calibration.kinds.size() > 1 ? " of a kind" : "")
+                          : "",
+                      100 * r.calibration.hit_rate);
   if (r.check.poses > 0) {
     text += fmt::format(
         "tried on {}: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "
