@@ -192,7 +192,8 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--samples", "N", &flags->samples,
             "poses drawn from the controls; the rig's number if not given");
   AddOption(command, "--calibration", "N", &flags->calibration,
-            "held-out poses that the tolerance is calibrated with; 400 to 1000, by the rate, if not given");
+            "held-out poses of each kind that the tolerance is calibrated with; 400 to 1000, by the rate, if "
+            "not given");
   AddOption(command, "--seed", "N", &flags->seed, "of the sampled poses; 1 if not given");
   AddOption(command, "--rows", "N", &flags->rows,
             "numbers measured a frame (a point has three); 300 if not given");

@@ -1,5 +1,6 @@
 #include "cli/train_report.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "cli/common.h"
@@ -12,6 +13,12 @@ std::size_t TrainResult::points() const {
   std::size_t points = 0;
   for (const SubspaceOutput& output : subspace->outputs) points += output.points;
   return points;
+}
+
+double TrainResult::hit_rate() const {
+  if (calibration.kinds.empty()) return calibration.hit_rate;
+  const Calibration::Kind& sampled = calibration.kinds.front();
+  return static_cast<double>(sampled.hits) / static_cast<double>(std::max<std::size_t>(1, sampled.poses));
 }
 
 std::string TrainJson(const TrainResult& r) {
@@ -52,7 +59,7 @@ std::string TrainJson(const TrainResult& r) {
                               {{"tolerance", r.subspace->tolerance},
                                {"violation_rate", r.calibration.alpha},
                                {"attainable_rate", r.calibration.attainable_alpha},
-                               {"hit_rate", r.calibration.hit_rate},
+                               {"hit_rate", r.hit_rate()},
                                {"violations", r.calibration.violations},
                                {"severe", r.calibration.severe},
                                {"violation_rate_at_most", r.calibration.upper_bound},
@@ -70,7 +77,7 @@ std::string TrainJson(const TrainResult& r) {
                              {"predicted",
                               {{"full_ms", r.check.full_ms},
                                {"accelerated_ms", r.check.accelerated_ms},
-                               {"speedup", r.check.PredictedSpeedup(r.calibration.hit_rate)}}}};
+                               {"speedup", r.check.PredictedSpeedup(r.hit_rate())}}}};
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -109,15 +116,17 @@ std::string TrainText(const TrainResult& r) {
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
   // What these poses can promise, where that is less than what was asked for
+  std::size_t fewest = r.calibration.poses;
+  for (const Calibration::Kind& kind : r.calibration.kinds) fewest = std::min(fewest, kind.poses);
   const double promised = r.calibration.attainable_alpha;
-  text += fmt::format(
-      "calibrated for {}{} in {:.4g} % of poses{}: {:.1f} % of held-out poses hit\n",
-      light ? "an RMS of " : "", error(r.subspace->tolerance), 100 * (1 - promised),
-      promised > r.calibration.alpha
-          ? fmt::format(" ({:.4g} % was asked for, which {} cannot promise)", 100 * (1 - r.calibration.alpha),
-                        Plural(r.calibration.poses, "held-out pose"))
-          : "",
-      100 * r.calibration.hit_rate);
+  text += fmt::format("calibrated for {}{} in {:.4g} % of poses{}: {:.1f} % of sampled poses hit\n",
+                      light ? "an RMS of " : "", error(r.subspace->tolerance), 100 * (1 - promised),
+                      promised > r.calibration.alpha
+                          ? fmt::format(" ({:.4g} % was asked for, which {}{} cannot promise)",
+                                        100 * (1 - r.calibration.alpha), Plural(fewest, "held-out pose"),
+                                        r.calibration.kinds.size() > 1 ? " of a kind" : "")
+                          : "",
+                      100 * r.hit_rate());
   for (const Calibration::Kind& kind : r.calibration.kinds) {
     text += fmt::format("  {:<18} {:>5} poses: {:5.1f} % hit, {} beyond (at most {:.2g} %, 9 in 10 times)\n",
                         PoseKindName(static_cast<PoseKind>(kind.kind)), kind.poses,
@@ -135,10 +144,10 @@ std::string TrainText(const TrainResult& r) {
         "tried on {}: full {:.3f} ms, accelerated {:.3f} ms; predicted speedup "
         "{:.1f}x with these hits\n",
         Plural(r.check.poses, "new pose"), r.check.full_ms, r.check.accelerated_ms,
-        r.check.PredictedSpeedup(r.calibration.hit_rate));
+        r.check.PredictedSpeedup(r.hit_rate()));
     // What the user can do about it
-    if (r.check.PredictedSpeedup(r.calibration.hit_rate) < 1) {
-      text += r.calibration.hit_rate < 0.5
+    if (r.check.PredictedSpeedup(r.hit_rate()) < 1) {
+      text += r.hit_rate() < 0.5
                   ? "slower than the full evaluation, as so few poses hit: a larger --tolerance, more "
                     "--samples, or narrower "
                     "controls help\n"

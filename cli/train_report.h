@@ -20,6 +20,7 @@ struct TrainResult {
   double seconds = 0;      // of training and the check
   std::string worst_path;  // of the pose file, "": no pose is accepted
   std::size_t points() const;
+  double hit_rate() const;  // of held-out poses as the sampler draws them; of all where there are no kinds
 };
 
 // Times in milliseconds, lengths in metres.

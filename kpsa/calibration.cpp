@@ -185,8 +185,8 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   }
   if (!result.enough_poses) {
     result.warning = fmt::format(
-        "{} calibration poses cannot promise a violation rate of {:g}; the threshold keeps {:.3g} ({})",
-        fewest, alpha, result.attainable_alpha,
+        "{} calibration poses{} cannot promise a violation rate of {:g}; the threshold keeps {:.3g} ({})",
+        fewest, counts.size() > 1 ? " of a kind" : "", alpha, result.attainable_alpha,
         alpha > 0 ? fmt::format("at least {:.0f} poses are needed",
                                 std::ceil(std::log(1 - kCalibrationConfidence) / std::log1p(-alpha)))
                   : "no number of poses can");

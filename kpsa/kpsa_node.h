@@ -63,7 +63,7 @@ class KpsaConfig final : public Asset {
   Digest digest_;
 };
 
-// A tolerance from here on accepts everything that is finite and within the trained ranges.
+// A tolerance from here on accepts everything that is finite, whatever guards say.
 inline constexpr double kAnyError = 1e30;
 
 void AddKpsaNode(NodeRegistry& registry);

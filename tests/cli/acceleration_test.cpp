@@ -199,9 +199,11 @@ TEST_F(TrainedRig, FramesDoNotDependOnTheirOrder) {
   const double tolerance = 5e-4;
   Run forward = Start(&a, &tolerance), backward = Start(&b, &tolerance);
   std::vector<std::vector<float>> frames;
+  std::int64_t hits = 0;
   for (int frame = 0; frame < 30; ++frame) {
     Pose(a, frame, forward.evaluator.get());
     ASSERT_TRUE(forward.evaluator->Evaluate().ok());
+    hits += forward.evaluator->Get<std::int64_t>(1);
     frames.push_back(Points(*forward.evaluator));
   }
   for (int frame = 29; frame >= 0; --frame) {
@@ -209,11 +211,13 @@ TEST_F(TrainedRig, FramesDoNotDependOnTheirOrder) {
     ASSERT_TRUE(backward.evaluator->Evaluate().ok());
     ASSERT_EQ(frames[static_cast<std::size_t>(frame)], Points(*backward.evaluator)) << frame;
   }
+  EXPECT_GT(hits, 5);
 }
 
 TEST_F(TrainedRig, ControlsOutsideTheirTrainedRangeMiss) {
   Rig rig = Load();
-  Run run = Start(&rig, &kInfinity);
+  const double own = -1;
+  Run run = Start(&rig, &own, WithGuardsOnly(**subspace_));
   Pose(rig, 0, run.evaluator.get());
   ASSERT_TRUE(run.evaluator->Evaluate().ok());
   EXPECT_EQ(run.evaluator->Get<std::int64_t>(1), 1);

@@ -50,8 +50,8 @@ class HelloFolder : public TemporaryFolder {
 inline constexpr double kQuickTolerance = 2e-3;
 inline TrainOptions QuickTraining() {
   TrainOptions options;
-  options.samples = 300;
-  options.calibration_poses = 100;
+  options.samples = 600;
+  options.calibration_poses = 400;
   options.tolerance = kQuickTolerance;
   options.violation_rate = 0.05;
   return options;

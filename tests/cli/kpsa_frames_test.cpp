@@ -19,7 +19,7 @@ class KpsaFrames : public ::testing::Test {
     trained_ = TrainRig(kHello, QuickTraining());
     ASSERT_NE(trained_, nullptr);
     // Poses of which some leave the trained ranges; thresholds among the scores of the others
-    RigRun run(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+    RigRun run(kHello, {.subspace = WithGuardsOnly(*trained_)});
     ASSERT_TRUE(run.ok()) << run.error;
     poses_ = SmoothPoses(run.rig, 60, 1.3);
     std::vector<double> scores;
@@ -45,8 +45,13 @@ class KpsaFrames : public ::testing::Test {
     }
     return frames;
   }
-  static bool IsBlend(const RunFrame& frame) {
-    return !frame.hit && frame.score > tau_lo_ && frame.score < tau_;
+
+  static void ExpectBlend(const std::vector<float>& points, const std::vector<float>& reconstructed,
+                          const std::vector<float>& exact, double weight) {
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+      ASSERT_NEAR(points[i], reconstructed[i] + weight * (static_cast<double>(exact[i]) - reconstructed[i]),
+                  1e-7);
+    }
   }
 
   static inline std::shared_ptr<const Subspace> trained_, mixed_;
@@ -56,7 +61,7 @@ class KpsaFrames : public ::testing::Test {
 
 TEST_F(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
   RigRun full(kHello), pure(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
-  std::size_t hits = 0, blends = 0, misses = 0, outside = 0;
+  std::size_t hits = 0, blends = 0, misses = 0, guard_misses = 0;
   const std::vector<RunFrame> frames = InOrder();
   for (std::size_t f = 0; f < frames.size(); ++f) {
     SCOPED_TRACE(f);
@@ -64,32 +69,67 @@ TEST_F(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
     full.Pose(poses_[f]);
     pure.Pose(poses_[f]);
     const std::vector<float> exact = full.Evaluate().points, reconstructed = pure.Evaluate().points;
-    if (frame.reason == MissReason::kOutOfRange) {
-      ++outside;
-      EXPECT_TRUE(SameBytes(frame.points, exact));
-      continue;
-    }
     ASSERT_FALSE(SameBytes(exact, reconstructed));  // so that equality below says something
+    const bool guarded = frame.reason == MissReason::kOutOfRange;
+    EXPECT_EQ(frame.hit, frame.full_weight == 0);
     if (frame.hit) {
       ++hits;
+      EXPECT_EQ(frame.reason, MissReason::kNone);
+      EXPECT_LE(frame.score, tau_lo_);
       EXPECT_TRUE(SameBytes(frame.points, reconstructed));
-    } else if (IsBlend(frame)) {
-      ++blends;
-      const double u = (frame.score - tau_lo_) / (tau_ - tau_lo_), weight = u * u * (3 - 2 * u);
-      for (std::size_t i = 0; i < exact.size(); ++i) {
-        ASSERT_NEAR(frame.points[i],
-                    reconstructed[i] + weight * (static_cast<double>(exact[i]) - reconstructed[i]), 1e-7);
-      }
+    } else if (frame.full_weight < 1) {
+      blends += !guarded;
+      const double u = std::clamp((frame.score - tau_lo_) / (tau_ - tau_lo_), 0.0, 1.0),
+                   weight = u * u * (3 - 2 * u);
+      // The larger of the two counts
+      EXPECT_GT(frame.full_weight, guarded ? weight : weight - 1e-12);
+      ExpectBlend(frame.points, reconstructed, exact, guarded ? frame.full_weight : weight);
     } else {
-      ++misses;
+      ++(guarded ? guard_misses : misses);
+      EXPECT_TRUE(guarded || frame.reason == MissReason::kScore);
+      EXPECT_TRUE(guarded || frame.score >= tau_);
       EXPECT_TRUE(SameBytes(frame.points, exact));  // the full evaluation, bit for bit
-      EXPECT_EQ(frame.reason, MissReason::kScore);
     }
   }
   EXPECT_GE(hits, 5u);
   EXPECT_GE(blends, 5u);
   EXPECT_GE(misses, 5u);
-  EXPECT_GE(outside, 3u);
+  EXPECT_GE(guard_misses, 3u);
+}
+
+// Outside a trained range the full evaluation comes in as it does with the score, over the guard's ramp.
+TEST_F(KpsaFrames, GuardsBlendTheFullEvaluationIn) {
+  RigRun full(kHello), pure(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}}),
+      guarded(kHello, {.subspace = WithGuardsOnly(*trained_)});
+  ASSERT_TRUE(guarded.ok()) << guarded.error;
+  for (std::size_t c = 0; c < full.rig.controls.size(); ++c) {
+    std::size_t hits = 0, blends = 0, misses = 0;
+    double last = 0;
+    for (int step = 0; step <= 100; ++step) {
+      SCOPED_TRACE(testing::Message() << full.rig.controls[c].name << " " << step);
+      std::vector<double> pose(full.rig.controls.size(), 0.0);
+      pose[c] = (0.9 + 0.006 * step) * full.rig.controls[c].max;
+      for (RigRun* run : {&full, &pure, &guarded}) run->Pose(pose);
+      const RunFrame frame = guarded.Evaluate();
+      const std::vector<float> exact = full.Evaluate().points, reconstructed = pure.Evaluate().points;
+      ASSERT_FALSE(SameBytes(exact, reconstructed));
+      EXPECT_EQ(frame.hit, frame.full_weight == 0);
+      EXPECT_EQ(frame.reason, frame.hit ? MissReason::kNone : MissReason::kOutOfRange);
+      EXPECT_GE(frame.full_weight, last);  // farther out never less of it
+      EXPECT_LE(frame.full_weight, 1);
+      last = frame.full_weight;
+      if (frame.full_weight == 1) {
+        ++misses;
+        EXPECT_TRUE(SameBytes(frame.points, exact));
+        continue;
+      }
+      ++(frame.hit ? hits : blends);
+      ExpectBlend(frame.points, reconstructed, exact, frame.full_weight);
+    }
+    EXPECT_GE(hits, 5u);
+    EXPECT_GE(blends, 5u);
+    EXPECT_GE(misses, 5u);
+  }
 }
 
 TEST_F(KpsaFrames, DoNotDependOnWhatCameBefore) {
@@ -199,7 +239,7 @@ TEST_F(KpsaFrames, NothingPopsInTheBlendZone) {
 }
 
 TEST_F(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
-  RigRun run(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}}), full(kHello);
+  RigRun run(kHello, {.subspace = WithGuardsOnly(*trained_)}), full(kHello);
   const std::vector<double> rest(run.rig.controls.size(), 0.0);
   for (std::size_t c = 0; c < run.rig.controls.size(); ++c) {
     for (const double share : {1.0, 1.5}) {
@@ -214,6 +254,7 @@ TEST_F(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
         continue;
       }
       EXPECT_FALSE(frame.hit);
+      EXPECT_EQ(frame.full_weight, 1);
       EXPECT_EQ(frame.reason, MissReason::kOutOfRange);
       EXPECT_NE(frame.text.find("upper.matrix is outside its trained range"), std::string::npos)
           << frame.text;
@@ -223,7 +264,7 @@ TEST_F(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
 }
 
 TEST_F(KpsaFrames, AControlThatIsNoNumberMissesAndLeavesNothingBehind) {
-  RigRun run(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+  RigRun run(kHello, {.subspace = WithGuardsOnly(*trained_)});
   const std::vector<double> rest(run.rig.controls.size(), 0.0);
   run.Pose(rest);
   const RunFrame before = run.Evaluate();

@@ -80,7 +80,12 @@ TEST_F(TwoMeshes, HitsKeepTheToleranceAndLaterStagesAreExactOnThem) {
 }
 
 TEST_F(TwoMeshes, ToleranceInfiniteRunsNeitherMushAndTheStageAfterThemAlways) {
-  RigRun run(folder_->rig(), {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+  // At a tolerance at which nothing behind a mush has to be measured
+  TrainOptions options = QuickTraining();
+  options.tolerance = 1e-2;
+  const auto trained = TrainRig(folder_->rig(), options);
+  ASSERT_NE(trained, nullptr);
+  RigRun run(folder_->rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}});
   ASSERT_TRUE(run.ok()) << run.error;
   for (const auto& pose : SmoothPoses(run.rig, 10, 0.95)) {
     run.Pose(pose);
@@ -93,15 +98,16 @@ TEST_F(TwoMeshes, ToleranceInfiniteRunsNeitherMushAndTheStageAfterThemAlways) {
 
 TEST_F(TwoMeshes, ToleranceZeroAndMissesAreExactInEveryMesh) {
   RigRun full(folder_->rig()), zero(folder_->rig(), {.subspace = trained_, .accelerate = {.tolerance = 0}}),
-      pure(folder_->rig(), {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+      guarded(folder_->rig(), {.subspace = WithGuardsOnly(*trained_)});
   ASSERT_TRUE(zero.ok()) << zero.error;
   std::size_t misses = 0;
   for (const auto& pose : SmoothPoses(full.rig, 20, 1.4)) {
-    full.Pose(pose), zero.Pose(pose), pure.Pose(pose);
-    const RunFrame exact = full.Evaluate(), frame = pure.Evaluate();
+    full.Pose(pose), zero.Pose(pose), guarded.Pose(pose);
+    const RunFrame exact = full.Evaluate(), frame = guarded.Evaluate();
     EXPECT_TRUE(SameBytes(zero.Evaluate().points, exact.points));
-    misses += !frame.hit;
-    EXPECT_EQ(SameBytes(frame.points, exact.points), !frame.hit) << frame.text;
+    const bool miss = frame.full_weight == 1;
+    misses += miss;
+    EXPECT_EQ(SameBytes(frame.points, exact.points), miss) << frame.text;
   }
   EXPECT_GT(misses, 0u);
   EXPECT_LT(misses, 20u);
@@ -202,12 +208,13 @@ TEST_F(Travelling, WithoutASpaceItMisses) {
   const std::string path = Rig(folder, false);
   const auto trained = TrainRig(path, QuickTraining());
   ASSERT_NE(trained, nullptr);
-  RigRun run(path, {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .varying = moving_});
+  RigRun run(path, {.subspace = WithGuardsOnly(*trained), .varying = moving_});
   ASSERT_TRUE(run.ok()) << run.error;
   EXPECT_TRUE(run.Evaluate().hit);
   Travel(0.1, &run);
   const RunFrame frame = run.Evaluate();
   EXPECT_FALSE(frame.hit);
+  EXPECT_EQ(frame.full_weight, 1);
   EXPECT_EQ(frame.text, "lower.matrix is outside its trained range");
 }
 
@@ -269,6 +276,7 @@ TEST_F(Untrained, CombinationsMissOrKeepTheTolerance) {
   options.samples = 0;
   options.calibration_poses = 400;
   options.violation_rate = 0.01;
+  options.tolerance = 5e-3;  // one curve leaves errors of that size nearby
   const auto trained = TrainRig(folder.rig(), options, {"wave"});
   ASSERT_NE(trained, nullptr);
   RigRun full(folder.rig()), run(folder.rig(), {.subspace = trained}),
@@ -287,9 +295,9 @@ TEST_F(Untrained, CombinationsMissOrKeepTheTolerance) {
       const RunFrame frame = run.Evaluate();
       ++frames;
       hits += frame.hit;
-      violations += LargestDistance(frame.points, exact) > kTolerance;
+      violations += LargestDistance(frame.points, exact) > options.tolerance;
       const RunFrame any = pure.Evaluate();
-      unguarded += any.hit && LargestDistance(any.points, exact) > kTolerance;
+      unguarded += any.hit && LargestDistance(any.points, exact) > options.tolerance;
     }
   }
   EXPECT_GT(hits, 10u);
@@ -304,15 +312,16 @@ TEST_F(Untrained, AJointThatNeverMovedMissesByName) {
   const auto trained = TrainRig(folder.rig(), QuickTraining());
   ASSERT_NE(trained, nullptr);
   RigRun full(folder.rig(), {.clip = "sway"});
-  RigRun run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .clip = "sway"});
-  RigRun wave(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .clip = "wave"});
-  auto blind = std::make_shared<Subspace>(*trained);  // one that calls any motion of that joint trained
+  const auto guards_only = WithGuardsOnly(*trained);
+  RigRun run(folder.rig(), {.subspace = guards_only, .clip = "sway"});
+  RigRun wave(folder.rig(), {.subspace = guards_only, .clip = "wave"});
+  auto blind = std::make_shared<Subspace>(*guards_only);  // one that calls any motion of that joint trained
   for (int e = 0; e < 12; ++e) {
     const std::string name = "lower.matrix/" + std::to_string(e);
     std::erase_if(blind->ranges, [&](const TrainedRange& range) { return range.plug == name; });
     blind->ranges.push_back({name, -1e9, 1e9});
   }
-  RigRun unguarded(folder.rig(), {.subspace = blind, .accelerate = {.tolerance = kInfinity}, .clip = "sway"});
+  RigRun unguarded(folder.rig(), {.subspace = blind, .clip = "sway"});
   ASSERT_TRUE(run.ok() && wave.ok() && unguarded.ok()) << run.error << wave.error << unguarded.error;
   double worst = 0;
   for (int f = 6; f < 48; f += 6) {
@@ -336,12 +345,12 @@ TEST_F(Untrained, ANewControlMissesByName) {
   const auto trained = TrainRig(folder.rig(), QuickTraining());
   ASSERT_NE(trained, nullptr);
   folder.Edit("  upper.rotateX:", "  lower.rotateZ: {min: -40, max: 40}\n  upper.rotateX:");
-  RigRun run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}});
+  RigRun run(folder.rig(), {.subspace = WithGuardsOnly(*trained)});
   ASSERT_TRUE(run.ok()) << run.error;
   EXPECT_TRUE(run.Evaluate().hit);
   run.Set("lower.rotateZ", 0.01);
   const RunFrame frame = run.Evaluate();
-  EXPECT_FALSE(frame.hit);
+  EXPECT_EQ(frame.full_weight, 1);
   EXPECT_EQ(frame.text, "lower.matrix is outside its trained range");
 }
 
@@ -357,7 +366,7 @@ TEST_F(Untrained, ADrivenMatrixMissesByName) {
   ASSERT_NE(trained, nullptr);
   const std::vector<std::string> axis = {"m.input1.y"};
   RigRun full(folder.rig(), {.varying = axis}),
-      run(folder.rig(), {.subspace = trained, .accelerate = {.tolerance = kInfinity}, .varying = axis});
+      run(folder.rig(), {.subspace = WithGuardsOnly(*trained), .varying = axis});
   ASSERT_TRUE(run.ok()) << run.error;
   EXPECT_TRUE(run.Evaluate().hit);
   for (const char* plug : {"m.input1.x", "m.input1.y"}) {
@@ -370,7 +379,8 @@ TEST_F(Untrained, ADrivenMatrixMissesByName) {
   }
 }
 
-// An axis of a trained joint that is no control.
+// Another axis of a trained joint, which is no control: but for small tilts about the third axis, which are
+// trained.
 TEST_F(Untrained, AnotherAxisOfATrainedJointMisses) {
   const HelloFolder folder;
   const auto trained = TrainRig(folder.rig(), QuickTraining());
@@ -381,13 +391,13 @@ TEST_F(Untrained, AnotherAxisOfATrainedJointMisses) {
   for (const std::string& plug : axis) {
     std::size_t hits = 0;
     for (int step = 0; step <= 20; ++step) {
-      for (RigRun* r : {&full, &run}) r->Set(plug, 0.05 * step);
+      for (RigRun* r : {&full, &run}) r->Set(plug, 0.0025 * step * step);
       const RunFrame frame = run.Evaluate();
       hits += frame.hit;
       EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.2 * kTolerance)
           << plug << " " << step;
     }
-    EXPECT_GE(hits, 1u) << plug;
+    EXPECT_GE(hits, plug == "upper.rotateY" ? 3u : 1u) << plug;
     EXPECT_LT(hits, 10u) << plug;
     for (RigRun* r : {&full, &run}) r->Set(plug, 0);
   }

@@ -110,7 +110,8 @@ class OddNames : public ::testing::Test {
     all.insert(all.end(), flags.begin(), flags.end());
     const ProcessResult run = Run(all);
     EXPECT_EQ(run.exit_code, 0) << run.err;
-    return run.exit_code == 0 ? json::parse(run.out)["accelerated"] : json{{"hits", -1}, {"worst_miss", ""}};
+    return run.exit_code == 0 ? json::parse(run.out)["accelerated"]
+                              : json{{"hits", -1}, {"most_frequent_reason", ""}};
   }
   // The largest error of it against the exact rig, in metres.
   double Error(const std::vector<std::string>& flags) const {
@@ -123,8 +124,8 @@ class OddNames : public ::testing::Test {
   void ExpectMiss(const std::vector<std::string>& flags, const std::string& reason) const {
     SCOPED_TRACE(reason);
     const json told = Accelerated(flags);
-    EXPECT_EQ(told["hits"], 0);
-    EXPECT_NE(told["worst_miss"].get<std::string>().find(reason), std::string::npos) << told.dump();
+    EXPECT_EQ(told["misses"], 1) << told.dump();  // a full one
+    EXPECT_NE(told["most_frequent_reason"].get<std::string>().find(reason), std::string::npos) << told.dump();
     EXPECT_EQ(Error(flags), 0);
   }
   void ExpectRefused(const std::vector<std::string>& flags, const std::vector<std::string>& parts) const {
@@ -190,7 +191,7 @@ TEST_F(OddNames, StructuralSettingsAreRefusedAsWhatTheyAre) {
   ExpectRefused(set, {"strips.kpsa",
                       "soft/mush@2.L.iterations is set to 150 here, the subspace was trained on what the rig "
                       "says; evaluate without --accelerate, or train a rig that says so"});
-  EXPECT_NE(Accelerated({set[0], set[1], "--stale", "miss"})["worst_miss"].get<std::string>().find(
+  EXPECT_NE(Accelerated({set[0], set[1], "--stale", "miss"})["most_frequent_reason"].get<std::string>().find(
                 "soft/mush@2.L.iterations is set to 150 here"),
             std::string::npos);
   EXPECT_EQ(Error(set), 0);

@@ -127,7 +127,7 @@ TEST_F(TwoHellos, AreAcceleratedAsTheRigAlone) {
     const ProcessResult eval = RunKpsa({"eval", two(), "--accelerate", "--tolerance", "1", "--rest", "--set",
                                         set, "-o", folder / "x.npz", "--force", "--json"});
     EXPECT_EQ(eval.exit_code, 0) << eval.err;
-    return nlohmann::json::parse(eval.out)["accelerated"]["worst_miss"].get<std::string>();
+    return nlohmann::json::parse(eval.out)["accelerated"]["most_frequent_reason"].get<std::string>();
   };
   EXPECT_EQ(miss("a:upper.rotateX=12"), "");
   EXPECT_NE(miss("a:upper.rotateY=20").find("a:upper.rotateY = 20 deg is set"), std::string::npos);

@@ -40,6 +40,11 @@ std::shared_ptr<const Subspace> WithThreshold(const Subspace& subspace, double t
   return copy;
 }
 
+std::shared_ptr<const Subspace> WithGuardsOnly(const Subspace& subspace) {
+  constexpr double kBlendStart = 0.85, kAnyScore = 1e30;
+  return WithThreshold(subspace, kBlendStart * kAnyScore, kAnyScore);
+}
+
 double LargestDistance(const std::vector<float>& a, const std::vector<float>& b) {
   EXPECT_EQ(a.size(), b.size());
   const std::size_t n = a.size() / 3;
@@ -100,7 +105,7 @@ Status RigRun::Start(const std::string& path, const RigRunOptions& options) {
   for (const PlugRef& plug : finals) request.outputs.push_back({plug, {}});
   if (has_subspace_) {
     const NodeDef& def = rig.graph->def(accelerated.node);
-    for (const char* name : {"hit", "score", "missReason", "offender"}) {
+    for (const char* name : {"hit", "score", "missReason", "offender", "fullWeight"}) {
       request.outputs.push_back({{accelerated.node, def.FindAttribute(name), -1, -1}, {}});
     }
   }
@@ -157,6 +162,7 @@ RunFrame RigRun::Frame(const Evaluator& from) const {
   frame.score = from.Get<double>(meshes + 1);
   frame.reason = static_cast<MissReason>(from.Get<std::int64_t>(meshes + 2));
   const std::int64_t offender = from.Get<std::int64_t>(meshes + 3);
+  frame.full_weight = from.Get<double>(meshes + 4);
   frame.text =
       MissText(*accelerated.config, frame.reason, offender < 0 ? kNoIndex : static_cast<Index>(offender));
   return frame;

@@ -29,12 +29,16 @@ std::shared_ptr<const Subspace> TrainRig(const std::string& path, const TrainOpt
 // A copy of the subspace that calls a hit what scores at most `tau_lo`, and blends up to `tau`, at any finite
 // tolerance.
 std::shared_ptr<const Subspace> WithThreshold(const Subspace& subspace, double tau_lo, double tau);
+// A copy of the subspace that accepts any finite score, at any finite tolerance: nothing but its guards, its
+// space and cues that are no numbers ask for the full evaluation. (An infinite tolerance skips guards, too.)
+std::shared_ptr<const Subspace> WithGuardsOnly(const Subspace& subspace);
 
 // What one evaluation gave.
 struct RunFrame {
   std::vector<float> points;  // x, y, z of every mesh
   bool hit = false;           // false for a rig without a subspace
   double score = 0;
+  double full_weight = 0;  // share of the full evaluation: 0 a hit, 1 a full miss
   MissReason reason = MissReason::kNone;
   std::string text;  // of the reason
 };
