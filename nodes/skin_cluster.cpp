@@ -106,13 +106,13 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-constexpr int kMatrix = kFirstOwnInput, kOffset = kFirstOwnInput + 1;
+constexpr int kJointMatrices = kFirstOwnInput, kSkinOffset = kFirstOwnInput + 1;
 
 void ComputeSkin(ComputeContext& c) {
   const auto& bound = c.kernel_as<SkinBound>();
-  const ArrayView<Matrix4> matrix = c.array<Matrix4>(kMatrix);
+  const ArrayView<Matrix4> matrix = c.array<Matrix4>(kJointMatrices);
   auto* palette = reinterpret_cast<Matrix4*>(c.scratch);
-  const Double3& offset = c.get<Double3>(kOffset);
+  const Double3& offset = c.get<Double3>(kSkinOffset);
   const Matrix4 world_from_mesh = Translation(offset);
   const auto follow = [&](Index j) {
     palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j];
