@@ -8,7 +8,7 @@
 namespace kpsa {
 namespace {
 
-constexpr double kTolerance = 0.5e-3;
+constexpr double kWalkTolerance = 0.5e-3;
 
 // The largest of what a step of the accelerated points exceeds the full evaluation's by, in tolerances, over
 // 400 steps of a control from `inside` of its range within an end to `beyond` outside of it.
@@ -35,14 +35,14 @@ double LargestJump(RigRun* full, RigRun* fast, std::size_t control, bool up, dou
     }
     full_before = exact, fast_before = frame.points;
   }
-  return largest / kTolerance;
+  return largest / kWalkTolerance;
 }
 
 TEST(GuardWalks, NoStepIsMuchLargerThanTheFullEvaluations) {
   const HelloFolder folder;
   TrainOptions options;
   options.samples = 400;
-  options.tolerance = kTolerance;
+  options.tolerance = kWalkTolerance;
   options.violation_rate = 0.05;
   const auto trained = TrainRig(folder.rig(), options);
   ASSERT_NE(trained, nullptr);
