@@ -37,6 +37,7 @@ NodeSetUp SkinSetUp(const char* method) {
     s.given.push_back(Setting(std::string("bindPreMatrix") + element, InverseOrIdentity(bind)));
     s.given.push_back({std::string("matrix") + element, Moves::kFrame, bind, bind * random.Rigid(0.2)});
   }
+  s.given.push_back({"offset", Moves::kDirection, Double3(), Double3{0.1, -0.2, 0.3}});
   InMeshSpace(&s);
   return s;
 }
