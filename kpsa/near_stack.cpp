@@ -19,7 +19,7 @@ bool HasPointInputs(const NodeDef& def) {
 
 NearStacks::NearStacks(Graph* graph, const AccelerationTarget& target, const PlugRef& space_world,
                        Double3 rest_origin)
-    : graph_(graph) {
+    : graph_(graph), varying_(target.varying) {
   for (const AccelerationTarget::Stage& stage : target.all_stages)
     world_[{stage.points.node.index, stage.points.element}] = stage.world;
   const Result<NodeId> node = graph_->AddNode("spaceOffset", graph_->FreeNodeName("kpsa_offset"));
@@ -60,6 +60,18 @@ std::optional<PlugRef> NearStacks::NearMatrix(const PlugRef& source) {
   return moved;
 }
 
+// Its offset moves joints, and so only what it takes to them.
+bool NearStacks::SkinsInPart(NodeId skin) const {
+  for (const char* name : {"envelope", "weights"}) {
+    const int attribute = graph_->def(skin).FindAttribute(name);
+    if (!graph_->Values(skin, attribute).empty() || !graph_->Inputs(skin, attribute).empty()) return true;
+    for (const PlugRef& plug : varying_) {
+      if (plug.node == skin && plug.attribute == attribute) return true;
+    }
+  }
+  return false;
+}
+
 bool NearStacks::CopyInput(const PlugRef& from, const Connection& connection, const PlugRef& to) {
   const NodeDef& def = graph_->def(from.node);
   const AttributeDef& a = def.attributes[static_cast<std::size_t>(from.attribute)];
@@ -89,6 +101,7 @@ std::optional<PlugRef> NearStacks::Copy(const PlugRef& points) {
   if (const auto known = copies_.find(points.node.index); known != copies_.end()) return made(known->second);
   const NodeId from = points.node;
   const NodeDef& def = graph_->def(from);
+  if (def.FindAttribute("offset") >= 0 && SkinsInPart(from)) return std::nullopt;
   const Result<NodeId> copy = graph_->AddNode(def.name, graph_->FreeNodeName(graph_->name(from) + "_near"));
   if (!copy.ok()) return std::nullopt;
   for (std::size_t i = 0; i < def.attributes.size(); ++i) {

@@ -24,6 +24,7 @@ class NearStacks {
 
  private:
   std::optional<PlugRef> Copy(const PlugRef& points);
+  bool SkinsInPart(NodeId skin) const;
   bool CopyInput(const PlugRef& from, const Connection& connection, const PlugRef& to);
   std::optional<PlugRef> NearMatrix(const PlugRef& source);
 
@@ -32,6 +33,7 @@ class NearStacks {
       world_;                       // stages by node and element: whether they are in world space
   std::map<Index, NodeId> copies_;  // by node
   std::map<std::tuple<Index, int, int>, PlugRef> matrices_;
+  std::vector<PlugRef> varying_;
   PlugRef offset_;  // of the node that compares the space with rest
 };
 

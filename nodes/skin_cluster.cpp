@@ -113,7 +113,6 @@ void ComputeSkin(ComputeContext& c) {
   const ArrayView<Matrix4> matrix = c.array<Matrix4>(kJointMatrices);
   auto* palette = reinterpret_cast<Matrix4*>(c.scratch);
   const Double3& offset = c.get<Double3>(kSkinOffset);
-  const Matrix4 world_from_mesh = Translation(offset);
   const auto follow = [&](Index j) {
     palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j];
     palette[j](0, 3) += offset.x, palette[j](1, 3) += offset.y, palette[j](2, 3) += offset.z;
@@ -127,7 +126,7 @@ void ComputeSkin(ComputeContext& c) {
   const PointsView& out = c.out_points(0);
   float* scratch = c.scratch + bound.palette_floats;
   if (!bound.dual.has_value()) {
-    bound.linear->Run({all, envelope, world_from_mesh}, in, out, {scratch, bound.linear->ScratchFloats()},
+    bound.linear->Run({all, envelope, Matrix4()}, in, out, {scratch, bound.linear->ScratchFloats()},
                       &parallel);
     return;
   }
@@ -136,12 +135,12 @@ void ComputeSkin(ComputeContext& c) {
     const std::size_t row = PaddedCount(in.count);
     const PointsView apart{scratch, scratch + row, scratch + 2 * row, in.count};
     scratch += 3 * row;
-    bound.linear->Run({all, envelope, world_from_mesh}, in, apart, {scratch, bound.linear->ScratchFloats()},
+    bound.linear->Run({all, envelope, Matrix4()}, in, apart, {scratch, bound.linear->ScratchFloats()},
                       &parallel);
     scratch += bound.linear->ScratchFloats();
     linear = apart;
   }
-  bound.dual->Run({all, bound.centers, envelope, world_from_mesh, linear}, in, out,
+  bound.dual->Run({all, bound.centers, envelope, Matrix4(), linear}, in, out,
                   {scratch, bound.dual->ScratchFloats()}, &parallel);
 }
 
@@ -168,8 +167,7 @@ void AddSkinClusterNode(NodeRegistry& registry) {
                   "world space.");
   b.structural("influences", Type::kAsset, {.doc = "joints and weights of every point"}).per_geometry();
   b.in("matrix", Matrix4(), {.doc = "the joints' world matrices"}).array();
-  b.in("offset", Double3(),
-       {.unit = Unit::kLength, .doc = "moves the points, in double, before they are floats"});
+  b.in("offset", Double3(), {.unit = Unit::kLength, .doc = "moves all joints, in double"});
   b.structural("bindPreMatrix", Matrix4(), {.doc = "the joints' inverse bind matrices"}).array();
   b.enumeration("skinningMethod", {"classicLinear", "dualQuaternion", "weightBlended"}, true,
                 "how influences are blended: as matrices, as rigid motions (dual quaternions), or between "
