@@ -1,5 +1,7 @@
 #include "kpsa/near_stack.h"
 
+#include <algorithm>
+
 #include "base/matrix.h"
 #include "kpsa/signals.h"
 
@@ -118,12 +120,33 @@ std::optional<PlugRef> NearStacks::Copy(const PlugRef& points) {
     std::vector<Connection> connections;
     for (const Connection& c : graph_->Inputs(from, attribute)) connections.push_back(c);
     const bool followed = a.structural || IsPointType(a.type) || a.type == Type::kMatrix;
-    if (!followed) {  // numbers: whatever the original has, set, driven or varying
+    const bool varies = std::any_of(varying_.begin(), varying_.end(), [&](const PlugRef& plug) {
+      return plug.node == from && plug.attribute == attribute;
+    });
+    if (!followed && varies) {  // read off the original, whose plug is the one that is set
       const int size = a.array ? graph_->ArraySize(from, attribute) : 1;
       for (int e = 0; e < size; ++e) {
         const int element = a.array ? e : -1;
         if (!graph_->Connect({from, attribute, element, -1}, {*copy, attribute, element, -1}).ok())
           return std::nullopt;
+      }
+      continue;
+    }
+    if (!followed) {  // as it is: what rests where it does nothing is left out of plans here, too
+      for (const SetValue& set : graph_->RestValues(from, attribute)) {
+        PlugRef to = set.plug;
+        to.node = *copy;
+        if (!graph_->Set(to, set.value).ok()) return std::nullopt;
+      }
+      for (const SetValue& set : graph_->Values(from, attribute)) {
+        PlugRef to = set.plug;
+        to.node = *copy;
+        if (graph_->IsPosed(from, attribute) && !graph_->Pose(to, set.value).ok()) return std::nullopt;
+      }
+      for (const Connection& c : connections) {
+        PlugRef to = c.destination;
+        to.node = *copy;
+        if (!graph_->Connect(c.source, to).ok()) return std::nullopt;
       }
       continue;
     }

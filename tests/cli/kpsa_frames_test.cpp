@@ -82,7 +82,7 @@ TEST_F(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
       const double u = std::clamp((frame.score - tau_lo_) / (tau_ - tau_lo_), 0.0, 1.0),
                    weight = u * u * (3 - 2 * u);
       // The larger of the two counts
-      EXPECT_GT(frame.full_weight, guarded ? weight : weight - 1e-12);
+      EXPECT_GT(frame.full_weight, guarded ? weight : weight - 1e-9);
       ExpectBlend(frame.points, reconstructed, exact, guarded ? frame.full_weight : weight);
     } else {
       ++(guarded ? guard_misses : misses);
