@@ -8,7 +8,7 @@ cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/n
 cmake --build build --target kpsa
 mkdir -p out
 printf '\n== training on the face (half a minute)\n'
-build/kpsa train scenes/face/face.yaml -o out/face.kpsa --rows 96 --force
+build/kpsa train scenes/face/face.yaml -o out/face.kpsa --force
 printf '\n== full against accelerated, on a clip that it was not trained on\n'
 build/kpsa bench scenes/face/face.yaml --kpsa out/face.kpsa
 printf '\n== drawing\n'
