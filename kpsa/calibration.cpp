@@ -50,16 +50,16 @@ struct KindPoses {
 };
 
 // The smallest rate that n poses without a violation promise.
-double Attainable(double alpha, std::size_t n) {
-  return std::max(alpha, BinomialUpperBound(0, n, kCalibrationConfidence));
+double Attainable(double alpha, std::size_t n, double confidence) {
+  return std::max(alpha, BinomialUpperBound(0, n, confidence));
 }
 
 // Most violations among n poses that promise a rate; the rate is attainable.
-std::size_t Admitted(double rate, std::size_t n) {
+std::size_t Admitted(double rate, std::size_t n, double confidence) {
   std::size_t lo = 0, hi = n;  // lo is admitted
   while (lo < hi) {
     const std::size_t middle = lo + (hi - lo + 1) / 2;
-    if (BinomialUpperBound(middle, n, kCalibrationConfidence) <= rate * (1 + 1e-12)) {
+    if (BinomialUpperBound(middle, n, confidence) <= rate * (1 + 1e-12)) {
       lo = middle;
     } else {
       hi = middle - 1;
@@ -68,10 +68,10 @@ std::size_t Admitted(double rate, std::size_t n) {
   return lo;
 }
 
-bool FewAmongHits(std::size_t violations, std::size_t hits, double alpha) {
+bool FewAmongHits(std::size_t violations, std::size_t hits, double alpha, double confidence) {
   const double rate = std::min(1.0, kShareOfHits * alpha);
   return static_cast<double>(violations + 1) <= rate * static_cast<double>(hits + 1) &&
-         BinomialUpperBound(violations, hits, kCalibrationConfidence) <= rate * (1 + 1e-12);
+         BinomialUpperBound(violations, hits, confidence) <= rate * (1 + 1e-12);
 }
 
 // The largest tau that all demands allow, or 0.
@@ -101,10 +101,10 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
   for (auto& [number, kind] : kinds) {
     std::sort(kind.limits.begin(), kind.limits.end());
     std::sort(kind.scores.begin(), kind.scores.end());
-    kind.attainable = Attainable(wanted.alpha, kind.poses);
-    admitted[number] = Admitted(kind.attainable, kind.poses);
+    kind.attainable = Attainable(wanted.alpha, kind.poses, wanted.confidence);
+    admitted[number] = Admitted(kind.attainable, kind.poses, wanted.confidence);
   }
-  const std::size_t severe_admitted = Admitted(wanted.attainable_severe, pairs.size());
+  const std::size_t severe_admitted = Admitted(wanted.attainable_severe, pairs.size(), wanted.confidence);
   for (const double tau : candidates) {
     if (!(tau > 0)) break;
     if (static_cast<std::size_t>(std::lower_bound(severe.begin(), severe.end(), tau) - severe.begin()) >
@@ -114,10 +114,11 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     bool allowed = true;
     for (const auto& [number, kind] : kinds) {
       const std::size_t v = kind.Violations(tau), h = kind.Hits(tau * c);
-      allowed = allowed && v <= admitted[number] && (v == 0 || FewAmongHits(v, h, kind.attainable));
+      allowed = allowed && v <= admitted[number] &&
+                (v == 0 || FewAmongHits(v, h, kind.attainable, wanted.confidence));
       violations += v, hits += h;
     }
-    if (allowed && FewAmongHits(violations, hits, wanted.attainable_alpha)) return tau;
+    if (allowed && FewAmongHits(violations, hits, wanted.attainable_alpha, wanted.confidence)) return tau;
   }
   return 0;
 }
@@ -139,7 +140,7 @@ void Count(std::span<const CalibrationPair> pairs, double tolerance, Calibration
       c->worst = i, c->worst_error = error;
   }
   for (auto& [number, kind] : kinds) {
-    kind.upper_bound = BinomialUpperBound(kind.violations, kind.poses, kCalibrationConfidence);
+    kind.upper_bound = BinomialUpperBound(kind.violations, kind.poses, c->confidence);
     c->upper_bound = std::max(c->upper_bound, kind.upper_bound);
     c->hits += kind.hits, c->accepted += kind.accepted, c->violations += kind.violations;
     c->kinds.push_back(kind);
@@ -161,8 +162,9 @@ double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& thres
 }
 
 Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
-                      double blend_start) {
+                      double blend_start, double confidence) {
   Calibration result;
+  result.confidence = confidence;
   result.poses = pairs.size();
   result.alpha = alpha;
   result.threshold.blend_start = std::clamp(blend_start, 1e-3, 1.0);
@@ -170,8 +172,8 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   for (const CalibrationPair& pair : pairs) ++counts[pair.kind];
   std::size_t fewest = pairs.size();
   for (const auto& [kind, count] : counts) fewest = std::min(fewest, count);
-  result.attainable_alpha = Attainable(alpha, fewest);
-  result.attainable_severe = Attainable(kSevereShare * alpha, pairs.size());
+  result.attainable_alpha = Attainable(alpha, fewest, confidence);
+  result.attainable_severe = Attainable(kSevereShare * alpha, pairs.size(), confidence);
   result.enough_poses = result.attainable_alpha <= alpha;
   if (!(tolerance > 0)) return result;  // never a hit: the exact rig
   if (tolerance == kInfinity) {
@@ -188,7 +190,7 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
         "{} calibration poses{} cannot promise a violation rate of {:g}; the threshold keeps {:.3g} ({})",
         fewest, counts.size() > 1 ? " of a kind" : "", alpha, result.attainable_alpha,
         alpha > 0 ? fmt::format("at least {:.0f} poses are needed",
-                                std::ceil(std::log(1 - kCalibrationConfidence) / std::log1p(-alpha)))
+                                std::ceil(std::log(1 - confidence) / std::log1p(-alpha)))
                   : "no number of poses can");
   }
   const double tau = LargestAllowed(pairs, tolerance, result);

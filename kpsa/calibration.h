@@ -35,16 +35,17 @@ struct CalibrationPair {
 
 struct Calibration {
   SoftCacheThreshold threshold;
-  double alpha = 0;              // as asked
-  double attainable_alpha = 0;   // what the number of poses can promise: alpha, or more
-  double attainable_severe = 0;  // the same of severe violations: alpha / 10, or more
-  bool enough_poses = true;      // attainable_alpha is alpha
-  std::size_t poses = 0;         // n
+  double alpha = 0;                            // as asked
+  double attainable_alpha = 0;                 // what the number of poses can promise: alpha, or more
+  double attainable_severe = 0;                // the same of severe violations: alpha / 10, or more
+  double confidence = kCalibrationConfidence;  // as asked
+  bool enough_poses = true;                    // attainable_alpha is alpha
+  std::size_t poses = 0;                       // n
   // On the calibration poses themselves, at this threshold:
   struct Kind {
     int kind = 0;
     std::size_t poses = 0, hits = 0, accepted = 0, violations = 0;
-    double upper_bound = 0;  // of the rate of violations, with kCalibrationConfidence
+    double upper_bound = 0;  // of the rate of violations, with `confidence`
   };
   std::vector<Kind> kinds;                                         // by kind
   std::size_t hits = 0, accepted = 0, violations = 0, severe = 0;  // of all
@@ -61,7 +62,7 @@ struct Calibration {
 // ends at the largest calibration score / c: beyond what was seen nothing is promised. Pairs with a NaN count
 // as violations. A larger tolerance never gives a smaller threshold.
 Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
-                      double blend_start = 0.85);
+                      double blend_start = 0.85, double confidence = kCalibrationConfidence);
 
 // Share of the full evaluation, and largest point error, of what is emitted.
 double EmittedWeight(const CalibrationPair& pair, const SoftCacheThreshold& threshold);

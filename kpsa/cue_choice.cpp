@@ -21,6 +21,8 @@ constexpr double kHopeless =
     0.15;  // share of poses beyond the tolerance from which worst points are measured
 constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
 constexpr double kWorstShare = 0.1;                        // and of all points
+constexpr double kBlendStart = 0.85;
+constexpr double kEvenOdds = 0.5;    // the confidence where few judges stand for many calibration poses
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
 // Values that move more than they are trusted.
@@ -106,7 +108,7 @@ class Chooser {
       if (pairs.back().kind == 0) sampled.push_back(scores[t]);
     }
     const SoftCacheThreshold threshold =
-        Calibrate(pairs, options_.tolerance, options_.violation_rate).threshold;
+        Calibrate(pairs, options_.tolerance, options_.violation_rate, kBlendStart, kEvenOdds).threshold;
     const auto missed = [&](const std::vector<double>& of) {
       return static_cast<double>(
                  std::ranges::count_if(of, [&](double score) { return !(score <= threshold.tau_lo()); })) /

@@ -185,10 +185,7 @@ class Trainer {
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
-    if (places_.size() > 1)
-      KPSA_RETURN_IF_ERROR(
-          sample(PoseKind::kSampled, kJudges, options_.seed ^ 0x2545f4914f6cdd1dull, judges));
-    return Status();
+    return places_.size() > 1 ? RecordJudges(judges) : Status();
   }
 
   Status RecordJudges(PoseMatrix* judges) {
