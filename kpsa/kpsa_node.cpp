@@ -221,7 +221,7 @@ std::uint64_t Decide(ComputeContext& c) {
   Normalize(subspace, raw, y);
   for (std::size_t j = r; j < padded; ++j) y[j] = 0;
   Verdict& verdict = state.verdict;
-  verdict = Judge(subspace.soft_cache, ThresholdAt(kernel, frame.scale), y, g);
+  verdict = Judge(subspace, ThresholdAt(kernel, frame.scale), y, g);
   // The largest weight counts
   if (guard.weight > verdict.full_weight)
     verdict.full_weight = guard.weight, verdict.reason = MissReason::kOutOfRange,
@@ -399,6 +399,9 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(std::span<const float>(tiles.data().scale.span()));
     hasher.Add(std::span<const std::uint32_t>(tiles.data().columns));
     hasher.Add(std::span<const float>(tiles.data().mean.span()));
+    hasher.Add(std::span<const std::uint8_t>(tiles.data().pairs));
+    hasher.Add(std::span<const std::uint16_t>(tiles.data().w.span()));
+    hasher.Add(std::span<const std::uint16_t>(tiles.data().doubt.span()));
   }
   for (const PointCues& cues : data_.cues) {
     hasher.Add(std::span<const Index>(cues.points));
@@ -421,6 +424,8 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   }
   hasher.Add(std::span<const double>(s.inverse_rest_stretch.m));
   hasher.Add(s.extent);
+  hasher.Add(s.score.measured);
+  hasher.Add(s.score.doubt);
   for (const double place : {data_.rest_origin.x, data_.rest_origin.y, data_.rest_origin.z})
     hasher.Add(place);
   hasher.Add(data_.has_space);
@@ -489,6 +494,17 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
     case MissReason::kOutOfRange:
       return fmt::format("{} is outside its trained range",
                          offender < data.guard_names.size() ? data.guard_names[offender] : "a control");
+    case MissReason::kDoubt: {
+      Index tile = offender;
+      for (std::size_t m = 0; m < data.subspace->tiles.size(); ++m) {
+        const auto tiles = static_cast<Index>(data.subspace->tiles[m].tiles());
+        if (tile < tiles)
+          return fmt::format("bent farther than the trained poses (most at {}, points from {} on)",
+                             data.subspace->outputs[m].name, tile * kTilePoints);
+        tile -= tiles;
+      }
+      return "bent farther than the trained poses";
+    }
     case MissReason::kSpace:
       return fmt::format("{} is stretched, mirrored or scaled as it was not in training", data.stretched);
     case MissReason::kNotFinite:

@@ -11,11 +11,11 @@ namespace kpsa {
 PoseJudge::PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues)
     : subspace_(subspace), layout_(layout), cues_(cues) {}
 
-std::vector<CalibrationPair> PoseJudge::Judge(const PoseMatrix& poses) {
+std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
   struct Errors {
     double largest = 0, largest_mean = 0, sum = 0;  // squared
   };
-  std::vector<CalibrationPair> pairs(poses.poses());
+  std::vector<JudgedPose> pairs(poses.poses());
   std::vector<Errors> errors(poses.poses());
   SoftCacheThreshold always;
   always.tau = std::numeric_limits<double>::infinity();
@@ -32,7 +32,9 @@ std::vector<CalibrationPair> PoseJudge::Judge(const PoseMatrix& poses) {
         for (std::size_t k = 0; k < CueHeight(layout_, cue); ++k) raw[r++] = row[column + k];
       }
       Measure(subspace_, raw, &scratch);
-      pairs[t].score = kpsa::Judge(subspace_, always, &scratch).score;
+      pairs[t].measured = kpsa::Judge(subspace_.soft_cache, always, scratch.y.span(), scratch.g.span()).score;
+      if (!subspace_.of_light())
+        pairs[t].doubt = static_cast<double>(LargestDoubt(subspace_, scratch.inputs()).largest);
       std::size_t column = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         double output_sum = 0;

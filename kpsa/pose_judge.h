@@ -10,13 +10,17 @@
 
 namespace kpsa {
 
+struct JudgedPose {
+  double measured = 0, doubt = 0;  // parts of the score (ScoreMix)
+  double error = 0;                // as CalibrationPair's
+};
+
 class PoseJudge {
  public:
   // cues: those of the subspace, in terms of the layout.
   PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues);
-  // Every pose reconstructed, whatever its score: score and error; guard and kind are the caller's. Poses are
-  // not centred.
-  std::vector<CalibrationPair> Judge(const PoseMatrix& poses);
+  // Every pose reconstructed, whatever its score. Poses are not centred.
+  std::vector<JudgedPose> Judge(const PoseMatrix& poses);
   // Over all poses so far, of the pure reconstruction, metres (of light: its units).
   double rms() const;
   double max() const { return max_; }

@@ -145,6 +145,13 @@ Index FirstNotFinite(const SoftCacheModel& model, std::span<const float> y) {
   return kNoIndex;
 }
 
+void Spoil(Verdict* verdict) {
+  verdict->score = std::numeric_limits<double>::infinity();
+  verdict->full_weight = 1;
+  verdict->hit = false;
+  verdict->reason = MissReason::kNotFinite;
+}
+
 // Rows that span those of p = (coordinates) y, M <= r.
 Eigen::MatrixXd OrthonormalRows(const Eigen::MatrixXd& coordinates) {
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(coordinates.transpose());
@@ -262,19 +269,23 @@ RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y
   return raw;
 }
 
+Verdict JudgeFinite(const SoftCacheModel& model, std::span<const float> y) {
+  Verdict verdict;
+  verdict.offender = FirstNotFinite(model, y);
+  if (verdict.offender != kNoIndex) Spoil(&verdict);
+  return verdict;
+}
+
 Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g) {
+              std::span<float> g, double weight) {
   Verdict verdict;
   const RawScores raw = ComputeRawScores(model, y, g);
   // A NaN or an infinity anywhere in y spoils score 1
   if (!std::isfinite(raw.score1)) verdict.offender = FirstNotFinite(model, y);
-  verdict.score = std::max(raw.score1 / model.quantile1, raw.score2 / model.quantile2);
+  verdict.score = weight * std::max(raw.score1 / model.quantile1, raw.score2 / model.quantile2);
   if (verdict.offender != kNoIndex ||
       !std::isfinite(verdict.score)) {  // huge measurements overflow the score
-    verdict.score = std::numeric_limits<double>::infinity();
-    verdict.full_weight = 1;
-    verdict.hit = false;
-    verdict.reason = MissReason::kNotFinite;
+    Spoil(&verdict);
     if (verdict.offender == kNoIndex) verdict.offender = raw.worst_cue;
     return verdict;
   }

@@ -34,6 +34,7 @@ enum class MissReason : std::uint8_t {
   kNotFinite,   // a measurement is NaN or infinite; `offender` is its cue
   kOutOfRange,  // a value is outside its trained range; `offender` is its guard
   kNeverHit,    // the tolerance is zero, or no threshold keeps the violation rate
+  kDoubt,       // what a tile's products say is above tau_lo; `offender` is the tile (kpsa/subspace.h)
   kSpace,       // the space is stretched, mirrored or scaled as it was not in training
 };
 
@@ -82,9 +83,11 @@ struct RawScores {
 // Run time. y and g of at least padded_rows() floats, y with zeros beyond its rows; allocates nothing; the
 // same bits on every SIMD target.
 RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g);
-// The score and what follows from it. NaN or infinity in y is a miss.
+// The score, times its weight, and what follows from it. NaN or infinity in y is a miss.
 Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g);
+              std::span<float> g, double weight = 1);
+// A hit of score 0, or a miss where y is not finite.
+Verdict JudgeFinite(const SoftCacheModel& model, std::span<const float> y);
 
 // The trained range of a plug that may vary, and how far outside of it the full evaluation comes in.
 struct TrainedRange {

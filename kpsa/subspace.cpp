@@ -64,6 +64,11 @@ Status ValidateSubspace(const Subspace& s) {
     return Status::Invalid("the leave-one-out blocks have {} entries, expected {}",
                            s.soft_cache.leave_one_out.size(), blocks);
   }
+  if (!(s.score.measured >= 0) || !(s.score.doubt >= 0) || !(s.score.measured + s.score.doubt > 0) ||
+      !std::isfinite(s.score.measured + s.score.doubt)) {
+    return Status::Invalid("the score counts {} of the measurement and {} of the doubt", s.score.measured,
+                           s.score.doubt);
+  }
   if (!s.latent.empty() && (rows == 0 || s.latent.size() % rows != 0 || !AllFinite<float>(s.latent)))
     return Status::Invalid("the {} latent factors of {} rows make no sense", s.latent.size(), rows);
   if (!AllFinite<double>(s.cue_mean) || !AllFinite<double>(s.cue_scale) ||
@@ -123,7 +128,7 @@ Status ValidateSubspace(const Subspace& s) {
 
 Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                       const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
-                      const TileOptions& options) {
+                      const TileOptions& options, const PoseMatrix* poses, std::size_t clip_poses) {
   Subspace s;
   s.mode = estimator.mode;
   s.components = pca.layout.components;
@@ -134,7 +139,8 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   s.soft_cache = MakeSoftCacheModel(estimator, cues, training);
 
   // Some of the training poses, evenly spread, watch the largest errors
-  TileInputs inputs{estimator.covariance, {}, {}};
+  TileInputs inputs;
+  inputs.covariance = estimator.covariance;
   const Eigen::Index count = std::min<Eigen::Index>(training.cols(), kTileSamples);
   inputs.samples.resize(training.rows(), count);
   for (Eigen::Index i = 0; i < count; ++i)
@@ -153,6 +159,10 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
     const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
     KPSA_CHECK_LE(first + height, maps.rows());
     inputs.left_out = pca.row_residual.segment(first, height);
+    if (poses != nullptr && !latent) {
+      inputs.poses = poses, inputs.measured = &training, inputs.clip_poses = clip_poses;
+      inputs.first_column = static_cast<std::size_t>(first);
+    }
     s.tiles.push_back(BuildTiles(maps.middleRows(first, height), pca.mean.segment(first, height),
                                  s.components, inputs, options));
     first += height;
@@ -186,8 +196,39 @@ void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScra
   if (scratch->z.size() > 0) ToLatent(subspace, scratch->y.span(), scratch->z.span());
 }
 
+Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y) {
+  Doubt doubt;
+  Index first = 0;
+  for (const TileMap& tiles : subspace.tiles) {
+    const Doubt of = tiles.LargestDoubt(y);
+    if (of.largest > doubt.largest) doubt = {of.largest, first + of.tile};
+    first += static_cast<Index>(tiles.tiles());
+  }
+  return doubt;
+}
+
+Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
+              std::span<float> g) {
+  const ScoreMix& mix = subspace.score;
+  if (mix.doubt == 0) return Judge(subspace.soft_cache, threshold, y, g, mix.measured);
+  // The doubt is a number whatever y is: SoftCache looks at that
+  Verdict verdict = mix.measured > 0 ? Judge(subspace.soft_cache, threshold, y, g, mix.measured)
+                                     : JudgeFinite(subspace.soft_cache, y);
+  if (verdict.reason == MissReason::kNotFinite) return verdict;
+  const Doubt doubt = LargestDoubt(subspace, y);
+  const double score = mix.doubt * static_cast<double>(doubt.largest);
+  if (!(score > verdict.score)) return verdict;
+  verdict.score = score;
+  verdict.full_weight = FullWeight(score, threshold);
+  verdict.hit = verdict.full_weight == 0;
+  if (!verdict.hit) {
+    verdict.reason = threshold.tau > 0 ? MissReason::kDoubt : MissReason::kNeverHit;
+    verdict.offender = doubt.tile;
+  }
+  return verdict;
+}
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch) {
-  return Judge(subspace.soft_cache, threshold, scratch->y.span(), scratch->g.span());
+  return Judge(subspace, threshold, scratch->y.span(), scratch->g.span());
 }
 
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points) {

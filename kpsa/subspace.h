@@ -8,6 +8,7 @@
 // None of these allocates. The file is safetensors (base/safetensors.h) with kind "kpsa-subspace".
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,7 +21,7 @@
 
 namespace kpsa {
 
-inline constexpr int kSubspaceVersion = 3;
+inline constexpr int kSubspaceVersion = 4, kOldestVersion = 3;  // 3: without products
 inline constexpr const char* kLightUnits = "light";
 
 // Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
@@ -31,6 +32,16 @@ struct CueDescription {
   Index mesh = 0;     // points: index among the outputs
   Index point = 0;    // points: index within the mesh, in stored order
   friend bool operator==(const CueDescription&, const CueDescription&) = default;
+};
+
+// What the score of a pose is made of: the larger of SoftCache's own (kpsa/soft_cache.h) and of the largest
+// doubt of all tiles (kpsa/tiles.h, scene units), each times its weight; at 0 a part does not count.
+struct ScoreMix {
+  double measured = 1, doubt = 0;
+  double Of(double measured_score, double largest_doubt) const {
+    return std::max(measured * measured_score, doubt * largest_doubt);
+  }
+  friend bool operator==(const ScoreMix&, const ScoreMix&) = default;
 };
 
 struct SubspaceOutput {
@@ -48,6 +59,7 @@ struct Subspace {
   std::vector<CueDescription> cues;         // [K]
   std::vector<double> cue_mean, cue_scale;  // [r] y = (raw - mean) * scale
   SoftCacheModel soft_cache;
+  ScoreMix score;
   std::vector<CalibrationPair>
       calibration;  // held-out poses; the threshold follows from a tolerance (Calibrate)
   double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
@@ -80,11 +92,13 @@ std::string CueName(const Subspace& subspace, const CueDescription& cue);
 Status ValidateSubspace(const Subspace& subspace);
 
 // Tiles and SoftCache of a trained estimator (without its gain: by latent coordinates); rows of the PCA's
-// outputs are split over `outputs`. training: y of the training poses [r x T]. The caller fills cues,
+// outputs are split over `outputs`. training: y of the training poses [r x T]; where the poses themselves are
+// given, centred, tiles get products, and the score counts what these say. The caller fills cues,
 // calibration, ranges and names.
 Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                       const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
-                      const TileOptions& options);
+                      const TileOptions& options, const PoseMatrix* poses = nullptr,
+                      std::size_t clip_poses = 0);
 
 Status WriteSubspace(const Subspace& subspace, const std::string& path);
 // Subspace::kept_modes, which may be most of a file: copied and checked, or left out.
@@ -108,8 +122,13 @@ void Normalize(const Subspace& subspace, std::span<const double> raw, std::span<
 void ToLatent(const Subspace& subspace, std::span<const float> y, std::span<float> z);
 // raw [r] in scene units -> scratch->y and inputs().
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch);
-// The verdict on scratch->y. Ranges are checked by the caller (FirstOutside), before this.
+// The verdict on y, padded with zeros as SubspaceScratch has it (g: as many). Guards are the caller's. For
+// MissReason::kDoubt the offender is a tile, counted over all outputs.
+Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
+              std::span<float> g);
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);
+// The largest doubt of all outputs; the tile counts over them.
+Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y);
 // points = (1 - full_weight) * points + full_weight * full, where Verdict::full_weight is in (0, 1).
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points);
 

@@ -1,5 +1,6 @@
 // The .kpsa file: lists as JSON in the metadata, numbers as tensors. See kpsa/subspace.h and
 // base/safetensors.h.
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <map>
@@ -94,6 +95,13 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
   writer->Add<T>(key, {values.size()}, values, half);
 }
 
+// A subspace without products is what it was before there were any.
+int VersionOf(const Subspace& s) {
+  const bool products =
+      std::any_of(s.tiles.begin(), s.tiles.end(), [](const TileMap& t) { return t.has_products(); });
+  return products || s.score != ScoreMix() ? kSubspaceVersion : kOldestVersion;
+}
+
 std::map<std::string, std::string> Header(const Subspace& s) {
   Json outputs = Json::array(), cues = Json::array(), ranges = Json::array();
   for (const SubspaceOutput& output : s.outputs)
@@ -111,16 +119,17 @@ std::map<std::string, std::string> Header(const Subspace& s) {
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) frame["inverseRestStretch"].push_back(s.inverse_rest_stretch(r, c));
   }
-  const Json summary = {{"mode", s.mode == EstimatorMode::kMap ? "map" : "paper"},
-                        {"components", s.components},
-                        {"modes", s.modes},
-                        {"quantile1", s.soft_cache.quantile1},
-                        {"quantile2", s.soft_cache.quantile2},
-                        {"tolerance", s.tolerance},
-                        {"violationRate", s.violation_rate},
-                        {"blendStart", s.blend_start}};
+  Json summary = {{"mode", s.mode == EstimatorMode::kMap ? "map" : "paper"},
+                  {"components", s.components},
+                  {"modes", s.modes},
+                  {"quantile1", s.soft_cache.quantile1},
+                  {"quantile2", s.soft_cache.quantile2},
+                  {"tolerance", s.tolerance},
+                  {"violationRate", s.violation_rate},
+                  {"blendStart", s.blend_start}};
+  if (VersionOf(s) > kOldestVersion) summary["score"] = {s.score.measured, s.score.doubt};
   return {{"kind", kKind},
-          {"version", std::to_string(kSubspaceVersion)},
+          {"version", std::to_string(VersionOf(s))},
           {"summary", summary.dump()},
           {"outputs", outputs.dump()},
           {"cues", cues.dump()},
@@ -171,6 +180,12 @@ std::string ContentDigest(const Subspace& s) {
     hasher.Add(std::span<const std::uint16_t>(data.v.span()));
     hasher.Add(std::span<const std::uint8_t>(data.u.span()));
     hasher.Add(std::span<const float>(data.mean.span()));
+    if (data.products.empty()) continue;
+    hasher.Add(std::span<const std::uint32_t>(data.products));
+    hasher.Add(std::span<const std::uint8_t>(data.pairs));
+    hasher.Add(std::span<const float>(data.whitening.span()));
+    hasher.Add(std::span<const std::uint16_t>(data.w.span()));
+    hasher.Add(std::span<const std::uint16_t>(data.doubt.span()));
   }
   return hasher.Finish().ToHex();
 }
@@ -221,6 +236,12 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
   s->tolerance = reader.Number("tolerance");
   s->violation_rate = reader.Number("violationRate");
   s->blend_start = reader.Number("blendStart");
+  if (summary->contains("score")) {
+    const Json& score = (*summary)["score"];
+    if (!score.is_array() || score.size() != 2 || !score[0].is_number() || !score[1].is_number())
+      return Status::Invalid("{}: summary: \"score\" should be two numbers", file.name());
+    s->score = {score[0].get<double>(), score[1].get<double>()};
+  }
   for (const Json& entry : *outputs) {
     Reader output(file.name() + ": an output", entry, &status);
     s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints), output.Text("stage")});
@@ -275,6 +296,13 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "v", {kAny}, true), &data.v));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "u", {kAny}), &data.u));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "mean", {kAny}), &data.mean));
+    if (file.tensors().contains(prefix + "products")) {
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "products", {kAny}), &data.products));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "pairs", {kAny}), &data.pairs));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "whitening", {kAny}), &data.whitening));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "w", {kAny}, true), &data.w));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "doubt", {kAny}, true), &data.doubt));
+    }
     Result<TileMap> map =
         TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
     if (!map.ok()) return map.status();
@@ -329,6 +357,12 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     Add<std::uint16_t>(&writer, prefix + "v", data.v.span(), true);
     Add<std::uint8_t>(&writer, prefix + "u", data.u.span());
     Add<float>(&writer, prefix + "mean", data.mean.span());
+    if (data.products.empty()) continue;
+    Add<std::uint32_t>(&writer, prefix + "products", data.products);
+    Add<std::uint8_t>(&writer, prefix + "pairs", data.pairs);
+    Add<float>(&writer, prefix + "whitening", data.whitening.span());
+    Add<std::uint16_t>(&writer, prefix + "w", data.w.span(), true);
+    Add<std::uint16_t>(&writer, prefix + "doubt", data.doubt.span(), true);
   }
   if (s.kept_modes.size() > 0) {
     writer.Add<float>(
@@ -350,7 +384,7 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   }
   const Result<std::string> version = file.Metadata("version");
   if (!version.ok()) return version.status();
-  if (*version != std::to_string(kSubspaceVersion)) {
+  if (*version != std::to_string(kSubspaceVersion) && *version != std::to_string(kOldestVersion)) {
     return Status::Invalid(
         "{}: the subspace has format version {}, this program reads version {}; train it again or use the "
         "program that wrote it",

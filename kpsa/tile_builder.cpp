@@ -6,6 +6,7 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "kpsa/tile_factorer.h"
+#include "kpsa/tile_products.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa {
@@ -43,6 +44,41 @@ std::uint8_t* WriteColumns(const TileFactors& f, std::size_t components, std::si
   return to;
 }
 
+// The products of all tiles; nothing where no tile has some.
+void WriteProducts(const std::vector<TileFactors>& factors, const std::vector<TileProducts>& products,
+                   TileData* data) {
+  const auto put = [](const Eigen::MatrixXd& matrix, std::size_t rows, std::uint16_t* to) {
+    for (Eigen::Index q = 0; q < matrix.cols(); ++q, to += rows) {
+      for (Eigen::Index k = 0; k < matrix.rows(); ++k)
+        to[k] = HalfFromFloat(static_cast<float>(matrix(k, q)));
+    }
+    return to;
+  };
+  std::size_t w = 0, doubt = 0, whitening = 0;
+  for (std::size_t t = 0; t < factors.size(); ++t) {
+    const std::size_t count = products[t].pairs.size() / 2;
+    data->products.push_back(static_cast<std::uint32_t>(count));
+    data->pairs.insert(data->pairs.end(), products[t].pairs.begin(), products[t].pairs.end());
+    w += count * Padded16(static_cast<std::size_t>(factors[t].u.cols()));
+    doubt += 16 * count, whitening += count > 0 ? 32 : 0;
+  }
+  if (data->pairs.empty()) return data->products.clear();
+  data->whitening = AlignedArray<float>(whitening);
+  data->w = AlignedArray<std::uint16_t>(w);
+  data->doubt = AlignedArray<std::uint16_t>(doubt);
+  std::uint16_t *w_to = data->w.data(), *doubt_to = data->doubt.data();
+  float* whitening_to = data->whitening.data();
+  for (std::size_t t = 0; t < factors.size(); ++t) {
+    if (products[t].pairs.empty()) continue;
+    for (std::size_t i = 0; i < kLatents; ++i)
+      whitening_to[i] = static_cast<float>(products[t].whitening[static_cast<Eigen::Index>(i)]);
+    for (std::size_t i = 16; i < 32; ++i) whitening_to[i] = static_cast<float>(products[t].doubt_scale);
+    whitening_to += 32;
+    w_to = put(products[t].w, Padded16(static_cast<std::size_t>(factors[t].u.cols())), w_to);
+    doubt_to = put(products[t].doubt, 16, doubt_to);
+  }
+}
+
 }  // namespace
 
 TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components,
@@ -63,6 +99,7 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
       inputs.covariance.size() > 0 ? inputs.covariance
                                    : Eigen::MatrixXd(Eigen::MatrixXd::Identity(gain.cols(), gain.cols()));
   std::vector<TileFactors> factors(tiles);
+  std::vector<TileProducts> products(tiles);
   ParallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const std::size_t first = t * kTilePoints * c,
@@ -80,6 +117,16 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
         own.rms_budget = most;
       }
       factors[t] = FactorTile(part, covariance, inputs.samples, components, own);
+      if (inputs.poses == nullptr || components != 3 || factors[t].columns.empty()) continue;
+      TileInputs of_tile;
+      of_tile.poses = inputs.poses, of_tile.measured = inputs.measured,
+      of_tile.clip_poses = inputs.clip_poses;
+      of_tile.first_column = inputs.first_column + first;
+      TileFactors factored = factors[t].direct
+                                 ? FactorTile(part, covariance, inputs.samples, components, own, false)
+                                 : factors[t];
+      products[t] = FitProducts(of_tile, own, &factored);
+      if (!products[t].pairs.empty()) factors[t] = std::move(factored);
     }
   });
 
@@ -131,6 +178,7 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
     v += static_cast<std::size_t>(f.v.cols()) * k16;
     u = WriteColumns(f, c, panels(t), u);
   }
+  WriteProducts(factors, products, &data);
   if (report != nullptr) *report = found;
   Result<TileMap> map = TileMap::Make(std::move(data), "tiles");
   KPSA_CHECK(map.ok());

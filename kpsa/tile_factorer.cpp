@@ -37,8 +37,9 @@ double ScaleTo(double largest, int top) {
 class TileFactorer {
  public:
   TileFactorer(const Eigen::MatrixXd& gain, const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& samples,
-               int components, const TileOptions& options)
-      : gain_(gain),
+               int components, const TileOptions& options, bool may_be_direct)
+      : may_be_direct_(may_be_direct),
+        gain_(gain),
         covariance_(covariance),
         samples_(samples),
         components_(components),
@@ -172,7 +173,8 @@ class TileFactorer {
     // What is read: U and V, or their product
     const double factored =
         static_cast<double>(rank * gain_.rows()) + 2.0 * static_cast<double>(count * ((rank + 15) / 16 * 16));
-    f.direct = count <= kMostColumns && factored >= static_cast<double>(count * gain_.rows());
+    f.direct =
+        may_be_direct_ && count <= kMostColumns && factored >= static_cast<double>(count * gain_.rows());
     Eigen::VectorXd variances;  // of the inputs of U's columns
     if (f.direct) {
       f.u = basis_ * map;
@@ -278,6 +280,7 @@ class TileFactorer {
     return sample_errors_.maxCoeff();
   }
 
+  const bool may_be_direct_;
   const Eigen::MatrixXd& gain_;
   const Eigen::MatrixXd& covariance_;
   const Eigen::MatrixXd& samples_;
@@ -296,8 +299,9 @@ class TileFactorer {
 }  // namespace
 
 TileFactors FactorTile(const Eigen::MatrixXd& gain, const Eigen::MatrixXd& covariance,
-                       const Eigen::MatrixXd& samples, int components, const TileOptions& options) {
-  return TileFactorer(gain, covariance, samples, components, options).Run();
+                       const Eigen::MatrixXd& samples, int components, const TileOptions& options,
+                       bool may_be_direct) {
+  return TileFactorer(gain, covariance, samples, components, options, may_be_direct).Run();
 }
 
 }  // namespace kpsa

@@ -21,8 +21,10 @@ struct TileFactors {
   double largest = 0;        // largest point error in the samples
 };
 
-// gain: B of the tile [cn x r]; covariance G [r x r]; samples of y [r x S], may be empty.
+// gain: B of the tile [cn x r]; covariance G [r x r]; samples of y [r x S], may be empty. may_be_direct:
+// false where latents are wanted, which only factors have.
 TileFactors FactorTile(const Eigen::MatrixXd& gain, const Eigen::MatrixXd& covariance,
-                       const Eigen::MatrixXd& samples, int components, const TileOptions& options);
+                       const Eigen::MatrixXd& samples, int components, const TileOptions& options,
+                       bool may_be_direct = true);
 
 }  // namespace kpsa

@@ -1,7 +1,9 @@
 #include "kpsa/tiles.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 #undef HWY_TARGET_INCLUDE
@@ -43,17 +45,17 @@ constexpr int VectorsAtOnce() {
 }
 constexpr bool kManyRegisters = HWY_LANES(float) >= 16;
 
-// z[0, k16) = scale V y_J for one tile, 16 rows at a time: four sums in turn hide the latency of the
-// multiply-add.
+// z[0, first) = scale V y_J for the first of a tile's k16 rows, 16 at a time: four sums in turn hide the
+// latency of the multiply-add.
 void Inputs(const std::uint16_t* HWY_RESTRICT v, const float* HWY_RESTRICT scale, std::size_t k16,
-            const std::uint32_t* HWY_RESTRICT columns, std::size_t count, const float* HWY_RESTRICT y,
-            float* HWY_RESTRICT z) {
+            std::size_t first, const std::uint32_t* HWY_RESTRICT columns, std::size_t count,
+            const float* HWY_RESTRICT y, float* HWY_RESTRICT z) {
   const hn::CappedTag<float, 16> d;
   const hn::Rebind<hwy::float16_t, decltype(d)> dh;
   constexpr int kVectors = static_cast<int>(16 / HWY_MIN(HWY_LANES(float), 16));
   const std::size_t lanes = hn::Lanes(d);
   const auto* halfs = reinterpret_cast<const hwy::float16_t*>(v);
-  for (std::size_t group = 0; group < k16; group += 16) {
+  for (std::size_t group = 0; group < first; group += 16) {
     hn::Vec<decltype(d)> sum[4][kVectors];
 #pragma GCC unroll 4
     for (int q = 0; q < 4; ++q) {
@@ -251,6 +253,11 @@ std::size_t TilePanelCount(std::size_t points, std::size_t tile) {
   return Panels(std::min(kTilePoints, points - tile * kTilePoints));
 }
 std::size_t Padded16(std::size_t count) { return (count + 15) / 16 * 16; }
+constexpr auto kInOrder = [] {
+  std::array<std::uint32_t, kMaxProducts> order{};
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
+  return order;
+}();
 // Four byte columns each.
 std::size_t Groups(std::size_t rank, std::size_t wide) { return (rank + wide + 3) / 4; }
 
@@ -271,8 +278,9 @@ Result<TileMap> TileMap::Make(TileData data, const std::string& what) {
   std::size_t columns = 0, v_size = 0, u_size = 0, scales = 0;
   for (std::size_t t = 0; t < tiles; ++t) {
     const std::size_t rank = data.ranks[t], wide = data.wide[t], count = data.counts[t];
-    if (rank > count || rank > kMaxTileRank || count > data.inputs || wide > rank || data.direct[t] > 1 ||
-        (data.direct[t] == 1 && rank != count)) {
+    const bool has_products = t < data.products.size() && data.products[t] > 0;  // more columns than cues
+    if ((rank > count && !has_products) || rank > kMaxTileRank || count > data.inputs || wide > rank ||
+        data.direct[t] > 1 || (data.direct[t] == 1 && rank != count)) {
       return Status::Invalid("{}: tile {} has rank {} ({} wide) of {} cues, expected at most {}", what, t,
                              rank, wide, count, std::min(data.inputs, kMaxTileRank));
     }
@@ -295,13 +303,45 @@ Result<TileMap> TileMap::Make(TileData data, const std::string& what) {
     if (column >= data.inputs)
       return Status::Invalid("{}: a tile reads cue row {} of {}", what, column, data.inputs);
   }
+  if (!data.products.empty()) KPSA_RETURN_IF_ERROR(map.PlaceProducts(data, what));
   map.data_ = std::move(data);
   return map;
 }
 
+Status TileMap::PlaceProducts(const TileData& data, const std::string& what) {
+  if (data.products.size() != data.ranks.size())
+    return Status::Invalid("{}: {} numbers of products for {} tiles", what, data.products.size(),
+                           data.ranks.size());
+  Place next;
+  for (std::size_t t = 0; t < data.products.size(); ++t) {
+    const std::size_t count = data.products[t];
+    if (count > kMaxProducts || (count > 0 && (data.direct[t] == 1 || data.ranks[t] == 0)))
+      return Status::Invalid("{}: tile {} has {} products, expected at most {}, and none without latents",
+                             what, t, count, kMaxProducts);
+    product_begin_.push_back(next);
+    if (count == 0) continue;
+    for (std::size_t i = 2 * next.pairs; i < std::min(2 * (next.pairs + count), data.pairs.size()); ++i) {
+      const std::uint8_t latent = data.pairs[i];
+      if (latent != kUnitLatent && latent >= std::min<std::size_t>(data.ranks[t], kLatents))
+        return Status::Invalid("{}: tile {} has a product of latent {} of {}", what, t, latent,
+                               data.ranks[t]);
+    }
+    next.pairs += count, next.whitening += 32;
+    next.w += count * Padded16(data.ranks[t]), next.doubt += 16 * count;
+  }
+  if (data.pairs.size() != 2 * next.pairs || data.whitening.size() != next.whitening ||
+      data.w.size() != next.w || data.doubt.size() != next.doubt) {
+    return Status::Invalid("{}: products of {}, {}, {}, {} values, expected {}, {}, {}, {}", what,
+                           data.pairs.size(), data.whitening.size(), data.w.size(), data.doubt.size(),
+                           2 * next.pairs, next.whitening, next.w, next.doubt);
+  }
+  return {};
+}
+
 std::size_t TileMap::bytes() const {
   return data_.u.size() + 2 * data_.v.size() +
-         4 * (data_.scale.size() + data_.columns.size() + data_.mean.size());
+         4 * (data_.scale.size() + data_.columns.size() + data_.mean.size() + data_.whitening.size()) +
+         data_.pairs.size() + 2 * (data_.w.size() + data_.doubt.size());
 }
 double TileMap::bytes_per_point() const {
   return data_.points == 0 ? 0 : static_cast<double>(bytes()) / static_cast<double>(data_.points);
@@ -326,6 +366,59 @@ void TileMap::ReconstructTiles(std::span<const float> y, std::span<const Index> 
   if (!tiles.empty()) ReconstructBlock(y, {&out, 1}, tiles, {space, space == nullptr ? 0u : 1u});
 }
 
+// The latents' products of a tile with some, from its z [k16] to p [P].
+float* TileMap::ProductsOf(std::size_t tile, const float* t, float* p) const {
+  const Place& place = product_begin_[tile];
+  const float* whitening = data_.whitening.data() + place.whitening;
+  const std::uint8_t* pairs = data_.pairs.data() + 2 * place.pairs;
+  float z[16];
+  for (std::size_t i = 0; i < 15; ++i)
+    z[i] = std::max(-kLatentClip, std::min(kLatentClip, t[i] * whitening[i]));
+  z[kUnitLatent] = 1;
+  for (std::size_t q = 0; q < data_.products[tile]; ++q) p[q] = z[pairs[2 * q]] * z[pairs[2 * q + 1]];
+  return p;
+}
+
+// What U of a tile is multiplied by: t [k16].
+void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t) const {
+  const std::size_t rank = data_.ranks[tile], k16 = Padded16(rank);
+  const float* scale = data_.scale.data() + scale_begin_[tile];
+  const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
+  if (data_.direct[tile] == 1) {
+    for (std::size_t k = 0; k < rank; ++k) t[k] = y[columns[k]] * scale[k];
+    return;
+  }
+  const auto inputs = HWY_DYNAMIC_DISPATCH(Inputs);
+  inputs(data_.v.data() + v_begin_[tile], scale, k16, k16, columns, data_.counts[tile], y, t);
+  if (products(tile) == 0) return;
+  alignas(64) float p[kMaxProducts], w[kMaxTileRank];
+  inputs(data_.w.data() + product_begin_[tile].w, scale, k16, k16, kInOrder.data(), products(tile),
+         ProductsOf(tile, t, p), w);
+  for (std::size_t k = 0; k < k16; ++k) t[k] = t[k] + w[k];
+}
+
+Doubt TileMap::LargestDoubt(std::span<const float> y) const {
+  Doubt doubt;
+  const auto inputs = HWY_DYNAMIC_DISPATCH(Inputs);
+  alignas(64) float t[kMaxTileRank], p[kMaxProducts], d[16];
+  for (std::size_t tile = 0; tile < data_.products.size(); ++tile) {
+    if (data_.products[tile] == 0) continue;
+    const Place& place = product_begin_[tile];
+    inputs(data_.v.data() + v_begin_[tile], data_.scale.data() + scale_begin_[tile],
+           Padded16(data_.ranks[tile]), 16, data_.columns.data() + column_begin_[tile], data_.counts[tile],
+           y.data(), t);
+    inputs(data_.doubt.data() + place.doubt, data_.whitening.data() + place.whitening + 16, 16, 16,
+           kInOrder.data(), data_.products[tile], ProductsOf(tile, t, p), d);
+    for (std::size_t i = 0; i < kDoubtPoints; ++i) {
+      const float squared = d[i] * d[i] + d[kDoubtPoints + i] * d[kDoubtPoints + i] +
+                            d[2 * kDoubtPoints + i] * d[2 * kDoubtPoints + i];
+      if (squared > doubt.largest) doubt = {squared, static_cast<Index>(tile)};
+    }
+  }
+  doubt.largest = std::sqrt(doubt.largest);
+  return doubt;
+}
+
 void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
                                std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
   if (outs.empty()) return;
@@ -335,7 +428,6 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
   for (std::size_t i = 0; i < tiles.size(); ++i)
     KPSA_CHECK(tiles[i] < this->tiles() && (i == 0 || tiles[i - 1] < tiles[i]));
   const std::size_t rows = kPanelPoints * static_cast<std::size_t>(data_.components);
-  const auto inputs = HWY_DYNAMIC_DISPATCH(Inputs);
   const auto quantize = HWY_DYNAMIC_DISPATCH(QuantizeInputs);
   const auto tile_panels =
       data_.components == 3 ? HWY_DYNAMIC_DISPATCH(TilePanels3) : HWY_DYNAMIC_DISPATCH(TilePanels1);
@@ -353,16 +445,9 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
       const std::size_t ahead = std::min(kAhead, count - next);
       for (std::size_t i = 0; i < ahead; ++i) {
         const std::size_t tile = tiles.empty() ? next + i : tiles[next + i], rank = data_.ranks[tile];
-        const float* scale = data_.scale.data() + scale_begin_[tile];
-        const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
         for (std::size_t f = 0; f < frame_count; ++f) {
           const float* frame = y.data() + (first + f) * data_.inputs;
-          if (data_.direct[tile] == 1) {
-            for (std::size_t k = 0; k < rank; ++k) t[k] = frame[columns[k]] * scale[k];
-          } else {
-            inputs(data_.v.data() + v_begin_[tile], scale, Padded16(rank), columns, data_.counts[tile], frame,
-                   t);
-          }
+          TileInputsOf(tile, frame, t);
           frames[i][f].q = input[i][f].q;
           frames[i][f].out = outs[first + f];
           frames[i][f].space = spaces.empty() ? nullptr : &space[f];

@@ -18,6 +18,11 @@
 // columns, and the four bytes of a row together, each 128 too large. Everything is read front to back, tile
 // after tile.
 //
+// A tile may have products (kpsa/tile_products.h): z = V y_J, its first latents whitened and clipped, p = 1
+// and products of pairs of these, x = mean + U (z + W p). W is stored as V is. What the products add says how
+// far a pose is from where the linear map was good: for a few points of the tile it is computed apart, the
+// doubt.
+//
 // All floating-point values are computed in a fixed order: single frames, blocks of frames, all tiles or a
 // list, and every SIMD target give the same bits. Allocates nothing; const functions may run on any thread. A
 // NaN or an infinity in a cue that a tile reads spoils the points of the tile.
@@ -33,6 +38,7 @@
 #include "base/status.h"
 #include "base/types.h"
 #include "kpsa/aligned_array.h"
+#include "kpsa/pose_matrix.h"
 
 namespace kpsa {
 
@@ -40,6 +46,9 @@ inline constexpr std::size_t kTilePoints = 128;
 inline constexpr std::size_t kPanelPoints = 32;
 inline constexpr std::size_t kMaxTileRank = 256;
 inline constexpr std::size_t kBlockFrames = 4;  // frames that the kernel takes at a time
+inline constexpr std::size_t kLatents = 12;     // whose products a tile may have, at most
+inline constexpr float kLatentClip = 6;         // deviations
+inline constexpr std::size_t kDoubtPoints = 5;  // of a tile
 
 // The stored form of one output (one mesh). Plain arrays, as in the subspace file.
 struct TileData {
@@ -58,6 +67,20 @@ struct TileData {
   AlignedArray<std::uint8_t> u;   // [tile][panel][(k + wide) / 4, rounded up][32c][4] U + 128: high bytes of
                                   // the wide columns, their low bytes, the other columns
   AlignedArray<float> mean;       // [panels][32c]
+  // Products: nothing, or of every tile; the arrays below hold the tiles that have some, one after the other.
+  std::vector<std::uint32_t> products;  // [tiles] P, at most kMaxProducts; 0: none
+  std::vector<std::uint8_t> pairs;      // [P][2] latents below min(k, kLatents), or twice kUnitLatent: the 1
+  AlignedArray<float> whitening;        // [32] what the latents are multiplied by; the scale of the doubt
+  AlignedArray<std::uint16_t> w;        // [P][k16] halfs: z = scale (V y_J + W p)
+  AlignedArray<std::uint16_t> doubt;    // [P][16] halfs: x, y, z of kDoubtPoints points
+};
+inline constexpr std::size_t kMaxProducts = 1 + kLatents * (kLatents + 1) / 2;
+inline constexpr std::uint8_t kUnitLatent = 15;  // which is 1
+
+// The largest product term of the points that are watched, scene units, and its tile.
+struct Doubt {
+  float largest = 0;
+  Index tile = kNoIndex;
 };
 
 class TileMap {
@@ -74,6 +97,7 @@ class TileMap {
   double bytes_per_point() const;
   double mean_rank() const;
   double mean_cues() const;  // |J|
+  bool has_products() const { return !data_.products.empty(); }
 
   // y [r] -> all points, in the space of the mean, or through `space`: a tile at a time, as long as it is in
   // the cache.
@@ -84,13 +108,24 @@ class TileMap {
   // Frames: y [frames x r] row-major, one output each, and one space each or none. `tiles` empty: all.
   void ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
                         std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
+  // Of all tiles, for inputs that are finite. 0 and no tile without products.
+  Doubt LargestDoubt(std::span<const float> y) const;
 
  private:
+  struct Place {  // of a tile in the arrays of products
+    std::size_t pairs = 0, whitening = 0, w = 0, doubt = 0;
+  };
+  Status PlaceProducts(const TileData& data, const std::string& what);
+  std::size_t products(std::size_t tile) const { return data_.products.empty() ? 0 : data_.products[tile]; }
+  void TileInputsOf(std::size_t tile, const float* y, float* t) const;
+  float* ProductsOf(std::size_t tile, const float* t, float* p) const;
+
   TileData data_;
   std::vector<std::size_t> column_begin_;  // [tiles] first of columns
   std::vector<std::size_t> scale_begin_;   // [tiles] first of scale
   std::vector<std::size_t> v_begin_;       // [tiles] first half of V
   std::vector<std::size_t> u_begin_;       // [tiles] first byte of U
+  std::vector<Place> product_begin_;       // [tiles] or empty
 };
 
 struct TileOptions {
@@ -103,6 +138,12 @@ struct TileOptions {
 };
 // What is known of y.
 struct TileInputs {
+  // Poses that products are fitted to: their rows hold f - mu of the output from `first_column` on. Null:
+  // none.
+  const PoseMatrix* poses = nullptr;
+  const Eigen::MatrixXd* measured = nullptr;  // y of these poses [r x T]
+  std::size_t first_column = 0;
+  std::size_t clip_poses = 0;  // the first poses, neighbours in time of each other
   Eigen::MatrixXd covariance;  // [r x r]; empty: the identity
   Eigen::MatrixXd samples;     // [r x S] y of some poses, for max_budget; may be empty
   Eigen::VectorXd left_out;    // [cN] variance of every row that no y tells; empty: 0

@@ -13,6 +13,7 @@
 #include "kpsa/pca.h"
 #include "kpsa/pose_judge.h"
 #include "kpsa/pose_recorder.h"
+#include "kpsa/score_choice.h"
 #include "kpsa/signal_reach.h"
 #include "kpsa/space_frame.h"
 #include "kpsa/tilts.h"
@@ -398,10 +399,11 @@ class Trainer {
       const AccelerationTarget::MeshPoints& mesh = rig_.target.meshes[m];
       outputs.push_back({mesh.name, totals_[m], of_light() ? "" : mesh.stages.back().name});
     }
-    Subspace subspace =
-        MakeSubspace(pca_, cues_, estimator, training, std::move(outputs),
-                     TileOptions{kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance,
-                                 of_light() ? 0 : kTileRest});
+    Subspace subspace = MakeSubspace(
+        pca_, cues_, estimator, training, std::move(outputs),
+        TileOptions{kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance,
+                    of_light() ? 0 : kTileRest},
+        of_light() || estimator.mode == EstimatorMode::kPaper ? nullptr : &poses, record_.clip_poses);
     if (options_.keep_modes) subspace.kept_modes = pca_.output_modes().cast<float>();
     subspace.mode = estimator.mode;
     subspace.space = rig_.target.space_name;
@@ -474,36 +476,20 @@ class Trainer {
     if (count == 0)
       count =
           static_cast<std::size_t>(std::clamp(8.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
-    PoseJudge judge(*subspace, layout_, cues_);
-    std::vector<std::vector<float>> entries;
-    std::vector<SampledPose> held_out;
+    // Held-out poses of every kind; half as many new ones say how to score them.
+    PoseJudge judge(*subspace, layout_, cues_), score_judge(*subspace, layout_, cues_);
+    std::vector<ScoreJudge> held_out, score_judges;
+    std::vector<std::vector<float>> entries, score_entries;
+    std::vector<SampledPose> poses;
     for (int k = 0; k < (of_light() ? 1 : kPoseKinds); ++k) {
-      const auto kind = static_cast<PoseKind>(k);
-      const std::vector<SampledPose> poses =
-          SampleOf(kind, count, (options_.seed + static_cast<std::uint64_t>(k)) ^ 0x5deece66dull);
-      for (std::size_t first = 0; first < poses.size(); first += kChunk) {
-        KPSA_RETURN_IF_ERROR(Say("calibration", 0.9 + 0.025 * k));
-        // By clip, as the recorder writes them
-        std::vector<SampledPose> chunk(
-            poses.begin() + static_cast<std::ptrdiff_t>(first),
-            poses.begin() + static_cast<std::ptrdiff_t>(std::min(first + kChunk, poses.size())));
-        std::stable_sort(chunk.begin(), chunk.end(),
-                         [](const SampledPose& a, const SampledPose& b) { return a.clip < b.clip; });
-        PoseMatrix recorded(layout_);
-        KPSA_RETURN_IF_ERROR(recorder_->AddSamples(chunk, clips_, &recorded));
-        for (CalibrationPair& pair : judge.Judge(recorded)) {
-          pair.kind = k;
-          subspace->calibration.push_back(pair);
-        }
-        for (std::size_t t = 0; t < recorded.poses(); ++t) {
-          const std::span<const float> row = std::as_const(recorded).row(t).subspan(layout_.scalar_begin());
-          if (kind != PoseKind::kBeyond) Widen(row);
-          entries.emplace_back(row.begin(), row.end());
-        }
-        held_out.insert(held_out.end(), chunk.begin(), chunk.end());
-      }
+      KPSA_RETURN_IF_ERROR(Say("calibration", 0.9 + 0.025 * k));
+      KPSA_RETURN_IF_ERROR(JudgePoses(k, count, 0x5deece66dull, &judge, &held_out, &entries, &poses));
+      if (std::any_of(subspace->tiles.begin(), subspace->tiles.end(),
+                      [](const TileMap& tiles) { return tiles.has_products(); }))
+        KPSA_RETURN_IF_ERROR(
+            JudgePoses(k, count / 2, 0x3c6ef372fe94f82bull, &score_judge, &score_judges, &score_entries));
     }
-    record_.calibration_poses = held_out.size();
+    record_.calibration_poses = poses.size();
     record_.held_out_rms = judge.rms();
     record_.held_out_max = judge.max();
 
@@ -512,17 +498,57 @@ class Trainer {
     if (!ranges.ok()) return ranges.status();
     subspace->ranges = std::move(*ranges);
     const std::vector<char> guarded = GuardedEntries(carried->rigid);
-    for (std::size_t t = 0; t < entries.size(); ++t) {
-      double& guard = subspace->calibration[t].guard;
-      for (std::size_t e = 0; e < entries[t].size(); ++e) {
-        const TrainedRange& range = subspace->ranges[e];
-        if (guarded[e]) guard = std::max(guard, GuardWeight(range.lo, range.hi, range.ramp, entries[t][e]));
-      }
+    AskGuards(subspace->ranges, guarded, entries, &held_out);
+    AskGuards(subspace->ranges, guarded, score_entries, &score_judges);
+    subspace->score =
+        ChooseScore(score_judges, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
+    for (const ScoreJudge& held : held_out) {
+      subspace->calibration.push_back(
+          {subspace->score.Of(held.pose.measured, held.pose.doubt), held.pose.error, held.guard, held.kind});
     }
     const Calibration calibration = kpsa::Calibrate(subspace->calibration, subspace->tolerance,
                                                     subspace->violation_rate, subspace->blend_start);
-    if (calibration.worst != Calibration::kNoPose) SayWorst(held_out[calibration.worst], calibration);
+    if (calibration.worst != Calibration::kNoPose) SayWorst(poses[calibration.worst], calibration);
     return Status();
+  }
+
+  // `count` poses of a kind, a few at a time; `poses` may be null. All but those beyond the ranges widen
+  // these.
+  Status JudgePoses(int kind, std::size_t count, std::uint64_t seed, PoseJudge* judge,
+                    std::vector<ScoreJudge>* judged, std::vector<std::vector<float>>* entries,
+                    std::vector<SampledPose>* poses = nullptr) {
+    const auto of = static_cast<PoseKind>(kind);
+    const std::vector<SampledPose> drawn =
+        SampleOf(of, count, (options_.seed + static_cast<std::uint64_t>(kind)) ^ seed);
+    for (std::size_t first = 0; first < drawn.size(); first += kChunk) {
+      // By clip, as the recorder writes them
+      std::vector<SampledPose> chunk(
+          drawn.begin() + static_cast<std::ptrdiff_t>(first),
+          drawn.begin() + static_cast<std::ptrdiff_t>(std::min(first + kChunk, drawn.size())));
+      std::stable_sort(chunk.begin(), chunk.end(),
+                       [](const SampledPose& a, const SampledPose& b) { return a.clip < b.clip; });
+      PoseMatrix recorded(layout_);
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(chunk, clips_, &recorded));
+      for (const JudgedPose& pose : judge->Judge(recorded)) judged->push_back({pose, 0, kind});
+      for (std::size_t t = 0; t < recorded.poses(); ++t) {
+        const std::span<const float> row = std::as_const(recorded).row(t).subspan(layout_.scalar_begin());
+        if (of != PoseKind::kBeyond) Widen(row);
+        entries->emplace_back(row.begin(), row.end());
+      }
+      if (poses != nullptr) poses->insert(poses->end(), chunk.begin(), chunk.end());
+    }
+    return Status();
+  }
+
+  static void AskGuards(const std::vector<TrainedRange>& ranges, const std::vector<char>& guarded,
+                        const std::vector<std::vector<float>>& entries, std::vector<ScoreJudge>* judged) {
+    for (std::size_t t = 0; t < entries.size(); ++t) {
+      double& guard = (*judged)[t].guard;
+      for (std::size_t e = 0; e < entries[t].size(); ++e) {
+        if (guarded[e])
+          guard = std::max(guard, GuardWeight(ranges[e].lo, ranges[e].hi, ranges[e].ramp, entries[t][e]));
+      }
+    }
   }
 
   // By entry: whether it has a guard where the space carries the points.

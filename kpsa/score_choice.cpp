@@ -1,0 +1,63 @@
+#include "kpsa/score_choice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kpsa/poses.h"
+
+namespace kpsa {
+namespace {
+
+constexpr double kQuantile = 0.99;  // of the judges: where the two parts are made equal
+constexpr double kRatios[] = {0.125, 0.25, 0.5, 1, 2, 4, 8};  // of the doubt to SoftCache's own
+constexpr double kEvenOdds = 0.5;  // the confidence where few judges stand for many calibration poses
+constexpr double kAround[] = {0.7, 1, 1.4};  // tolerances, so that no single judge decides
+constexpr double kGain = 0.01;               // more hits that a mix has to bring
+
+double Quantile(std::vector<double> values) {
+  const auto nth =
+      values.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+}  // namespace
+
+ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
+                     double blend_start) {
+  std::vector<double> measured, doubts;
+  for (const ScoreJudge& judge : judges) {
+    measured.push_back(judge.pose.measured);
+    doubts.push_back(judge.pose.doubt);
+  }
+  if (judges.empty()) return {};
+  const double unit = Quantile(measured), doubt = Quantile(doubts);
+  if (!(unit > 0) || !(doubt > 0) || !std::isfinite(unit) || !std::isfinite(doubt)) return {};
+  // Share of the sampled poses that hit
+  const auto hits = [&](const ScoreMix& mix) {
+    double sum = 0;
+    for (const double around : kAround) {
+      std::vector<CalibrationPair> pairs;
+      for (const ScoreJudge& judge : judges)
+        pairs.push_back(
+            {mix.Of(judge.pose.measured, judge.pose.doubt), judge.pose.error, judge.guard, judge.kind});
+      const Calibration found = Calibrate(pairs, around * tolerance, violation_rate, blend_start, kEvenOdds);
+      for (const Calibration::Kind& kind : found.kinds) {
+        if (kind.kind == static_cast<int>(PoseKind::kSampled))
+          sum += static_cast<double>(kind.hits) / static_cast<double>(kind.poses);
+      }
+    }
+    return sum / static_cast<double>(std::size(kAround));
+  };
+  ScoreMix best;
+  double most = hits(best);
+  const auto try_mix = [&](const ScoreMix& mix, double gain) {
+    const double found = hits(mix);
+    if (found >= most + gain) best = mix, most = found;
+  };
+  try_mix({0, 1 / doubt}, 0);  // which spares SoftCache's factor
+  for (const double ratio : kRatios) try_mix({1, ratio * unit / doubt}, kGain);
+  return best;
+}
+
+}  // namespace kpsa
