@@ -58,8 +58,8 @@ struct KpsaKernel {
   std::vector<Output> outputs;
 };
 
-// Kept from decide to compute, per evaluator; the normalised measurement y follows it, padded to 16, and z
-// where tiles read that.
+// Kept from decide to compute, per evaluator; the normalised measurement y follows it, padded to 16, then z
+// where tiles read that, or the inputs of all tiles where the doubt has needed them.
 struct KpsaState {
   Verdict verdict;
   Matrix4 world_from_space;
@@ -71,6 +71,14 @@ float* Measured(const ComputeContext& c) {
 std::span<const float> TileInputsOf(const ComputeContext& c, const Subspace& subspace) {
   const std::size_t y = subspace.latent.empty() ? 0 : subspace.soft_cache.padded_rows();
   return {Measured(c) + y, subspace.tile_inputs()};
+}
+
+// Of output m, where the verdict has left them; else null.
+const float* DoubtInputsOf(const ComputeContext& c, const Subspace& subspace, std::size_t m) {
+  if (subspace.score.doubt == 0) return nullptr;
+  const float* inputs = Measured(c) + subspace.soft_cache.padded_rows();
+  for (std::size_t i = 0; i < m; ++i) inputs += subspace.tiles[i].input_size();
+  return inputs;
 }
 
 // What the guards ask for, and the one that asks most.
@@ -221,7 +229,8 @@ std::uint64_t Decide(ComputeContext& c) {
   Normalize(subspace, raw, y);
   for (std::size_t j = r; j < padded; ++j) y[j] = 0;
   Verdict& verdict = state.verdict;
-  verdict = Judge(subspace, ThresholdAt(kernel, frame.scale), y, g);
+  const std::span<float> inputs(Measured(c) + padded, subspace.score.doubt > 0 ? subspace.doubt_inputs() : 0);
+  verdict = Judge(subspace, ThresholdAt(kernel, frame.scale), y, g, inputs);
   // The largest weight counts
   if (guard.weight > verdict.full_weight)
     verdict.full_weight = guard.weight, verdict.reason = MissReason::kOutOfRange,
@@ -252,9 +261,15 @@ void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, Poi
   const bool in_space = kernel.config->data().outputs_in_space[m] != 0;
   const Matrix4* space = !in_space || matrix == Matrix4() ? nullptr : &matrix;
   const TileMap& tiles = subspace.tiles[m];
-  if (wanted.all) return tiles.Reconstruct(y, out, space);
+  const float* inputs = DoubtInputsOf(c, subspace, m);
+  const auto reconstruct = [&](std::span<const Index> of, const PointsView& to) {
+    const std::span<const Matrix4> spaces(space, space == nullptr ? 0 : 1);
+    if (inputs == nullptr) return tiles.ReconstructBlock(y, {&to, 1}, of, spaces);
+    tiles.ReconstructFrom({&inputs, 1}, {&to, 1}, of, spaces);
+  };
+  if (wanted.all) return reconstruct({}, out);
   const PointsView mesh{c.scratch, c.scratch + wanted.padded, c.scratch + 2 * wanted.padded, tiles.points()};
-  tiles.ReconstructTiles(y, wanted.tiles, mesh, space);
+  if (!wanted.tiles.empty()) reconstruct(wanted.tiles, mesh);
   for (std::size_t i = 0; i < wanted.points.size(); ++i) {
     out.x[i] = mesh.x[wanted.points[i]];
     out.y[i] = mesh.y[wanted.points[i]];
@@ -307,14 +322,22 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
       float* y = contexts[first].scratch;
       PointsView outs[kBlockFrames];
       Matrix4 spaces[kBlockFrames];
+      const float* inputs[kBlockFrames];
       bool moved = false;
       for (std::size_t f = 0; f < frames; ++f) {
-        std::memcpy(y + f * r, TileInputsOf(contexts[first + f], subspace).data(), r * sizeof(float));
+        inputs[f] = DoubtInputsOf(contexts[first + f], subspace, m);
+        if (inputs[f] == nullptr)
+          std::memcpy(y + f * r, TileInputsOf(contexts[first + f], subspace).data(), r * sizeof(float));
         outs[f] = contexts[first + f].out_points(kOutPoints, static_cast<std::uint32_t>(m));
         spaces[f] = contexts[first + f].state_as<KpsaState>().world_from_space;
         moved = moved || (kernel.config->data().outputs_in_space[m] != 0 && !(spaces[f] == Matrix4()));
       }
-      subspace.tiles[m].ReconstructBlock({y, frames * r}, {outs, frames}, {}, {spaces, moved ? frames : 0});
+      const std::span<const Matrix4> through(spaces, moved ? frames : 0);
+      if (inputs[0] == nullptr) {
+        subspace.tiles[m].ReconstructBlock({y, frames * r}, {outs, frames}, {}, through);
+      } else {
+        subspace.tiles[m].ReconstructFrom({inputs, frames}, {outs, frames}, {}, through);
+      }
     }
   }
 }
@@ -378,8 +401,10 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
   // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles) and g
   const std::size_t scratch = std::max(
       {whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())), 3 * padded});
-  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 +
-                            (padded + (subspace.latent.empty() ? 0 : subspace.tile_inputs())) * sizeof(float);
+  const std::size_t after = subspace.score.doubt > 0  ? subspace.doubt_inputs()
+                            : subspace.latent.empty() ? 0
+                                                      : subspace.tile_inputs();
+  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 + (padded + after) * sizeof(float);
   return BoundKernel{std::make_shared<const KpsaKernel>(std::move(kernel)), scratch, state};
 }
 

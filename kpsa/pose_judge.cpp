@@ -33,8 +33,9 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
       }
       Measure(subspace_, raw, &scratch);
       pairs[t].measured = kpsa::Judge(subspace_.soft_cache, always, scratch.y.span(), scratch.g.span()).score;
-      if (!subspace_.of_light())
-        pairs[t].doubt = static_cast<double>(LargestDoubt(subspace_, scratch.inputs()).largest);
+      if (scratch.t.size() > 0)
+        pairs[t].doubt =
+            static_cast<double>(LargestDoubt(subspace_, scratch.inputs(), scratch.t.span()).largest);
       std::size_t column = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         double output_sum = 0;

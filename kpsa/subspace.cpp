@@ -69,6 +69,8 @@ Status ValidateSubspace(const Subspace& s) {
     return Status::Invalid("the score counts {} of the measurement and {} of the doubt", s.score.measured,
                            s.score.doubt);
   }
+  if (s.score.doubt > 0 && (s.doubt_inputs() == 0 || !s.latent.empty()))
+    return Status::Invalid("the score counts doubts, but no tile has products");
   if (!s.latent.empty() && (rows == 0 || s.latent.size() % rows != 0 || !AllFinite<float>(s.latent)))
     return Status::Invalid("the {} latent factors of {} rows make no sense", s.latent.size(), rows);
   if (!AllFinite<double>(s.cue_mean) || !AllFinite<double>(s.cue_scale) ||
@@ -174,6 +176,7 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
 SubspaceScratch::SubspaceScratch(const Subspace& subspace)
     : y(subspace.soft_cache.padded_rows()),
       g(subspace.soft_cache.padded_rows()),
+      t(subspace.doubt_inputs()),
       z(subspace.latent.empty() ? 0 : subspace.tile_inputs()) {}
 
 void ToLatent(const Subspace& subspace, std::span<const float> y, std::span<float> z) {
@@ -196,11 +199,19 @@ void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScra
   if (scratch->z.size() > 0) ToLatent(subspace, scratch->y.span(), scratch->z.span());
 }
 
-Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y) {
+std::size_t Subspace::doubt_inputs() const {
+  std::size_t all = 0;
+  bool products = false;
+  for (const TileMap& map : tiles) all += map.input_size(), products = products || map.has_products();
+  return products ? all : 0;
+}
+
+Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span<float> inputs) {
   Doubt doubt;
   Index first = 0;
   for (const TileMap& tiles : subspace.tiles) {
-    const Doubt of = tiles.LargestDoubt(y);
+    const Doubt of = tiles.ComputeInputs(y, inputs.first(tiles.input_size()));
+    inputs = inputs.subspan(tiles.input_size());
     if (of.largest > doubt.largest) doubt = {of.largest, first + of.tile};
     first += static_cast<Index>(tiles.tiles());
   }
@@ -208,14 +219,14 @@ Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y) {
 }
 
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g) {
+              std::span<float> g, std::span<float> inputs) {
   const ScoreMix& mix = subspace.score;
   if (mix.doubt == 0) return Judge(subspace.soft_cache, threshold, y, g, mix.measured);
   // The doubt is a number whatever y is: SoftCache looks at that
   Verdict verdict = mix.measured > 0 ? Judge(subspace.soft_cache, threshold, y, g, mix.measured)
                                      : JudgeFinite(subspace.soft_cache, y);
   if (verdict.reason == MissReason::kNotFinite) return verdict;
-  const Doubt doubt = LargestDoubt(subspace, y);
+  const Doubt doubt = LargestDoubt(subspace, y, inputs);
   const double score = mix.doubt * static_cast<double>(doubt.largest);
   if (!(score > verdict.score)) return verdict;
   verdict.score = score;
@@ -228,7 +239,7 @@ Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std
   return verdict;
 }
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch) {
-  return Judge(subspace, threshold, scratch->y.span(), scratch->g.span());
+  return Judge(subspace, threshold, scratch->y.span(), scratch->g.span(), scratch->t.span());
 }
 
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points) {

@@ -82,6 +82,7 @@ struct Subspace {
   bool space_scales = false;         // a uniform scale above the space scales the points in it and no more
   std::string training = "{}";       // JSON: summary of the training, shown by `inspect`
   std::size_t rows() const { return cue_mean.size(); }  // r
+  std::size_t doubt_inputs() const;                     // what LargestDoubt leaves; 0 without products
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
 };
 
@@ -112,6 +113,7 @@ struct SubspaceScratch {
   explicit SubspaceScratch(const Subspace& subspace);
   AlignedFloats y;  // [r, padded to 16]
   AlignedFloats g;  // the same size
+  AlignedFloats t;  // [doubt_inputs()]
   AlignedFloats z;  // [M] what tiles read instead of y, or empty
   std::span<const float> inputs() const { return z.size() > 0 ? z.span() : y.span(); }
 };
@@ -123,12 +125,13 @@ void ToLatent(const Subspace& subspace, std::span<const float> y, std::span<floa
 // raw [r] in scene units -> scratch->y and inputs().
 void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScratch* scratch);
 // The verdict on y, padded with zeros as SubspaceScratch has it (g: as many). Guards are the caller's. For
-// MissReason::kDoubt the offender is a tile, counted over all outputs.
+// MissReason::kDoubt the offender is a tile, counted over all outputs. Where the score counts doubts, the
+// inputs of all tiles are left in `inputs` [doubt_inputs()], output after output, unless y is not finite.
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g);
+              std::span<float> g, std::span<float> inputs);
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);
-// The largest doubt of all outputs; the tile counts over them.
-Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y);
+// The largest doubt of all outputs; the tile counts over them. inputs: as above.
+Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span<float> inputs);
 // points = (1 - full_weight) * points + full_weight * full, where Verdict::full_weight is in (0, 1).
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points);
 

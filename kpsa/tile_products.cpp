@@ -11,11 +11,12 @@
 namespace kpsa {
 namespace {
 
-constexpr Eigen::Index kValidated = 5;  // every so manieth pose is not fitted to at first
-constexpr double kSupport = 30;         // poses that have to carry a product
-constexpr double kWorthwhile = 0.9;     // of the errors without products that may be left with them
-constexpr double kNegligible = 0.25;    // of the largest error that a tile may have
-constexpr double kExplained = 0.98;     // of what all products explain that those chosen have to
+constexpr Eigen::Index kValidated = 5;     // every so manieth pose is not fitted to at first
+constexpr double kSupport = 30;            // poses that have to carry a product
+constexpr double kWorthwhile = 0.9;        // of the errors without products that may be left with them
+constexpr double kNegligible = 0.25;       // of the largest error that a tile may have
+constexpr double kExplained = 0.98;        // of what all products explain that those chosen have to,
+constexpr std::size_t kMostProducts = 24;  // as far as so many can
 constexpr double kRidge[] = {1e-3, 1e-2, 1e-1, 1};  // of a product's variance
 constexpr double kExtraShare = 0.3;  // of the RMS budget: what the directions of products may leave out
 constexpr Eigen::Index kMostExtra = 24;
@@ -149,7 +150,7 @@ class ProductFitter {
     std::vector<Eigen::VectorXd> steps;
     std::vector<Eigen::Index> chosen;
     double explained = 0;
-    while (explained < kExplained * total && static_cast<Eigen::Index>(chosen.size()) < gram_.rows()) {
+    while (explained < kExplained * total && chosen.size() < kMostProducts) {
       Eigen::Index best = -1;
       double most = 0;
       for (Eigen::Index j = 0; j < gram_.rows(); ++j) {

@@ -45,17 +45,17 @@ constexpr int VectorsAtOnce() {
 }
 constexpr bool kManyRegisters = HWY_LANES(float) >= 16;
 
-// z[0, first) = scale V y_J for the first of a tile's k16 rows, 16 at a time: four sums in turn hide the
-// latency of the multiply-add.
+// z[0, k16) = scale V y_J for one tile, 16 rows at a time: four sums in turn hide the latency of the
+// multiply-add.
 void Inputs(const std::uint16_t* HWY_RESTRICT v, const float* HWY_RESTRICT scale, std::size_t k16,
-            std::size_t first, const std::uint32_t* HWY_RESTRICT columns, std::size_t count,
-            const float* HWY_RESTRICT y, float* HWY_RESTRICT z) {
+            const std::uint32_t* HWY_RESTRICT columns, std::size_t count, const float* HWY_RESTRICT y,
+            float* HWY_RESTRICT z) {
   const hn::CappedTag<float, 16> d;
   const hn::Rebind<hwy::float16_t, decltype(d)> dh;
   constexpr int kVectors = static_cast<int>(16 / HWY_MIN(HWY_LANES(float), 16));
   const std::size_t lanes = hn::Lanes(d);
   const auto* halfs = reinterpret_cast<const hwy::float16_t*>(v);
-  for (std::size_t group = 0; group < first; group += 16) {
+  for (std::size_t group = 0; group < k16; group += 16) {
     hn::Vec<decltype(d)> sum[4][kVectors];
 #pragma GCC unroll 4
     for (int q = 0; q < 4; ++q) {
@@ -367,7 +367,7 @@ void TileMap::ReconstructTiles(std::span<const float> y, std::span<const Index> 
 }
 
 // The latents' products of a tile with some, from its z [k16] to p [P].
-float* TileMap::ProductsOf(std::size_t tile, const float* t, float* p) const {
+void TileMap::ProductsOf(std::size_t tile, const float* t, float* p) const {
   const Place& place = product_begin_[tile];
   const float* whitening = data_.whitening.data() + place.whitening;
   const std::uint8_t* pairs = data_.pairs.data() + 2 * place.pairs;
@@ -376,12 +376,11 @@ float* TileMap::ProductsOf(std::size_t tile, const float* t, float* p) const {
     z[i] = std::max(-kLatentClip, std::min(kLatentClip, t[i] * whitening[i]));
   z[kUnitLatent] = 1;
   for (std::size_t q = 0; q < data_.products[tile]; ++q) p[q] = z[pairs[2 * q]] * z[pairs[2 * q + 1]];
-  return p;
 }
 
-// What U of a tile is multiplied by: t [k16].
-void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t) const {
-  const std::size_t rank = data_.ranks[tile], k16 = Padded16(rank);
+// What U of a tile is multiplied by: t [k16]; and its doubt, where that is the largest so far (squared).
+void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* doubt) const {
+  const std::size_t rank = data_.ranks[tile], k16 = Padded16(rank), count = products(tile);
   const float* scale = data_.scale.data() + scale_begin_[tile];
   const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
   if (data_.direct[tile] == 1) {
@@ -389,40 +388,52 @@ void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t) const {
     return;
   }
   const auto inputs = HWY_DYNAMIC_DISPATCH(Inputs);
-  inputs(data_.v.data() + v_begin_[tile], scale, k16, k16, columns, data_.counts[tile], y, t);
-  if (products(tile) == 0) return;
-  alignas(64) float p[kMaxProducts], w[kMaxTileRank];
-  inputs(data_.w.data() + product_begin_[tile].w, scale, k16, k16, kInOrder.data(), products(tile),
-         ProductsOf(tile, t, p), w);
+  inputs(data_.v.data() + v_begin_[tile], scale, k16, columns, data_.counts[tile], y, t);
+  if (count == 0) return;
+  const Place& place = product_begin_[tile];
+  alignas(64) float p[kMaxProducts], w[kMaxTileRank], d[16];
+  ProductsOf(tile, t, p);
+  inputs(data_.w.data() + place.w, scale, k16, kInOrder.data(), count, p, w);
   for (std::size_t k = 0; k < k16; ++k) t[k] = t[k] + w[k];
+  if (doubt == nullptr) return;
+  inputs(data_.doubt.data() + place.doubt, data_.whitening.data() + place.whitening + 16, 16, kInOrder.data(),
+         count, p, d);
+  for (std::size_t i = 0; i < kDoubtPoints; ++i) {
+    const float x = d[i], y_term = d[kDoubtPoints + i], z = d[2 * kDoubtPoints + i];
+    const float squared = x * x + y_term * y_term + z * z;
+    if (squared > doubt->largest) *doubt = {squared, static_cast<Index>(tile)};
+  }
 }
 
-Doubt TileMap::LargestDoubt(std::span<const float> y) const {
+Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs) const {
+  KPSA_CHECK(y.size() >= data_.inputs && inputs.size() >= input_size());
   Doubt doubt;
-  const auto inputs = HWY_DYNAMIC_DISPATCH(Inputs);
-  alignas(64) float t[kMaxTileRank], p[kMaxProducts], d[16];
-  for (std::size_t tile = 0; tile < data_.products.size(); ++tile) {
-    if (data_.products[tile] == 0) continue;
-    const Place& place = product_begin_[tile];
-    inputs(data_.v.data() + v_begin_[tile], data_.scale.data() + scale_begin_[tile],
-           Padded16(data_.ranks[tile]), 16, data_.columns.data() + column_begin_[tile], data_.counts[tile],
-           y.data(), t);
-    inputs(data_.doubt.data() + place.doubt, data_.whitening.data() + place.whitening + 16, 16, 16,
-           kInOrder.data(), data_.products[tile], ProductsOf(tile, t, p), d);
-    for (std::size_t i = 0; i < kDoubtPoints; ++i) {
-      const float squared = d[i] * d[i] + d[kDoubtPoints + i] * d[kDoubtPoints + i] +
-                            d[2 * kDoubtPoints + i] * d[2 * kDoubtPoints + i];
-      if (squared > doubt.largest) doubt = {squared, static_cast<Index>(tile)};
-    }
-  }
+  for (std::size_t tile = 0; tile < tiles(); ++tile)
+    TileInputsOf(tile, y.data(), inputs.data() + scale_begin_[tile], &doubt);
   doubt.largest = std::sqrt(doubt.largest);
   return doubt;
 }
 
 void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
                                std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
-  if (outs.empty()) return;
   KPSA_CHECK_LE(outs.size() * data_.inputs, y.size());
+  Run([&](std::size_t tile, std::size_t frame,
+          float* t) { TileInputsOf(tile, y.data() + frame * data_.inputs, t); },
+      outs, tiles, spaces);
+}
+
+void TileMap::ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
+                              std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
+  KPSA_CHECK_EQ(inputs.size(), outs.size());
+  Run([&](std::size_t tile, std::size_t frame,
+          float* t) { std::copy_n(inputs[frame] + scale_begin_[tile], Padded16(data_.ranks[tile]), t); },
+      outs, tiles, spaces);
+}
+
+template <typename InputsOf>
+void TileMap::Run(const InputsOf& inputs_of, std::span<const PointsView> outs, std::span<const Index> tiles,
+                  std::span<const Matrix4> spaces) const {
+  if (outs.empty()) return;
   for (const PointsView& out : outs) KPSA_CHECK_EQ(out.count, data_.points);
   KPSA_CHECK(spaces.empty() || (spaces.size() == outs.size() && data_.components == 3));
   for (std::size_t i = 0; i < tiles.size(); ++i)
@@ -446,8 +457,7 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
       for (std::size_t i = 0; i < ahead; ++i) {
         const std::size_t tile = tiles.empty() ? next + i : tiles[next + i], rank = data_.ranks[tile];
         for (std::size_t f = 0; f < frame_count; ++f) {
-          const float* frame = y.data() + (first + f) * data_.inputs;
-          TileInputsOf(tile, frame, t);
+          inputs_of(tile, first + f, t);
           frames[i][f].q = input[i][f].q;
           frames[i][f].out = outs[first + f];
           frames[i][f].space = spaces.empty() ? nullptr : &space[f];

@@ -108,8 +108,13 @@ class TileMap {
   // Frames: y [frames x r] row-major, one output each, and one space each or none. `tiles` empty: all.
   void ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
                         std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
-  // Of all tiles, for inputs that are finite. 0 and no tile without products.
-  Doubt LargestDoubt(std::span<const float> y) const;
+  // What U of every tile is multiplied by [input_size()], so that what the doubt needs is computed once; and
+  // the largest doubt, for y that are finite: 0 and no tile without products.
+  std::size_t input_size() const { return data_.scale.size(); }
+  Doubt ComputeInputs(std::span<const float> y, std::span<float> inputs) const;
+  // ReconstructBlock from these; as many of them as frames. The same bits.
+  void ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
+                       std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
 
  private:
   struct Place {  // of a tile in the arrays of products
@@ -117,8 +122,12 @@ class TileMap {
   };
   Status PlaceProducts(const TileData& data, const std::string& what);
   std::size_t products(std::size_t tile) const { return data_.products.empty() ? 0 : data_.products[tile]; }
-  void TileInputsOf(std::size_t tile, const float* y, float* t) const;
-  float* ProductsOf(std::size_t tile, const float* t, float* p) const;
+  void TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* doubt = nullptr) const;
+  void ProductsOf(std::size_t tile, const float* t, float* p) const;
+  // The tiles listed (none: all) of some frames; inputs_of(tile, frame, t) writes a tile's inputs to t.
+  template <typename InputsOf>
+  void Run(const InputsOf& inputs_of, std::span<const PointsView> outs, std::span<const Index> tiles,
+           std::span<const Matrix4> spaces) const;
 
   TileData data_;
   std::vector<std::size_t> column_begin_;  // [tiles] first of columns

@@ -220,6 +220,54 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   EXPECT_EQ(bytes(path_), first);
 }
 
+// Products and the doubt travel with the file; without them it is of the version that had none.
+TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
+  const auto version = [&] { return *SafetensorsFile::Read(path_)->Metadata("version"); };
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok());
+  EXPECT_EQ(version(), std::to_string(kOldestVersion));
+  if (GetParam() != EstimatorMode::kMap) return;
+  Subspace bent = MakeSubspace(pca_, cues_, estimator_, MeasuredPoses(training_.layout(), cues_, training_),
+                               subspace_.outputs, {.rms_budget = 1e-6}, &training_);
+  bent.cues = subspace_.cues;
+  bent.score = {0.5, 300};
+  ASSERT_GT(bent.doubt_inputs(), 0u);
+  ASSERT_TRUE(WriteSubspace(bent, path_).ok()) << WriteSubspace(bent, path_).ToString();
+  EXPECT_EQ(version(), std::to_string(kSubspaceVersion));
+  const Result<Subspace> read = ReadSubspace(path_);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->score, bent.score);
+  SubspaceScratch a(bent), b(*read);
+  bool doubted = false;
+  for (std::size_t t = 0; t < test_.poses(); ++t) {
+    Measure(bent, RawCues(t), &a);
+    Measure(*read, RawCues(t), &b);
+    const Verdict x = Judge(bent, {.tau = 0.3}, &a), y = Judge(*read, {.tau = 0.3}, &b);
+    EXPECT_EQ(x.score, y.score);
+    EXPECT_EQ(x.offender, y.offender);
+    if (x.reason == MissReason::kDoubt) {
+      doubted = true;
+      EXPECT_LT(x.offender, bent.tiles[0].tiles() + bent.tiles[1].tiles());
+    }
+    const float* inputs[2] = {a.t.data(), b.t.data()};
+    PointBuffer p(150), q(150);
+    const PointsView views[2] = {p.view(), q.view()};
+    bent.tiles[0].ReconstructFrom({inputs, 1}, {views, 1}, {});
+    read->tiles[0].ReconstructFrom({inputs + 1, 1}, {views + 1, 1}, {});
+    EXPECT_EQ(p.Interleaved(), q.Interleaved());
+  }
+  EXPECT_TRUE(doubted);
+  // A measurement that is no number is a miss, whatever the score counts
+  for (const ScoreMix& mix : {ScoreMix{0, 1}, ScoreMix{1, 1}}) {
+    bent.score = mix;
+    a.y.data()[4] = std::nanf("");
+    EXPECT_EQ(Judge(bent, {.tau = 1e9}, &a).reason, MissReason::kNotFinite);
+  }
+  bent.score = {0, 0};
+  EXPECT_NE(ValidateSubspace(bent).ToString().find("the score counts"), std::string::npos);
+  subspace_.score = {1, 1};
+  EXPECT_NE(ValidateSubspace(subspace_).ToString().find("no tile has products"), std::string::npos);
+}
+
 TEST_P(SubspaceTest, CuesAreNamedByMeshAndStage) {
   const std::vector<std::string> expected = {"head@mush", "teeth@mush", "twist.amount", "head@mush",
                                              "teeth@mush"};
