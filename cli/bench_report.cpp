@@ -151,7 +151,7 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
-      {"tolerances", ToleranceJson(r.tolerances, WordsOf(r))},
+      {"tolerances", ToleranceJson<OrderedJson>(r.tolerances, WordsOf(r))},
       {"per_frame", per_frame},
       {"notes", r.notes}};
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "cli/common.h"
 #include "cli/table.h"
@@ -64,13 +63,6 @@ ReachedSpeedup Reach(double wanted, double in_force, double largest, const Toler
     }
   }
   return result;
-}
-
-nlohmann::ordered_json RowJson(const ToleranceRow& row) {
-  nlohmann::ordered_json json = {{"tolerance", row.tolerance}, {"hit_rate", row.hits}, {"speedup", nullptr}};
-  if (std::isfinite(row.speedup)) json["speedup"] = row.speedup;
-  if (std::isfinite(row.worst)) json["worst_accepted"] = row.worst;
-  return json;
 }
 
 std::string Percent(double share) { return fmt::format("{:.1f} %", 100 * share); }
@@ -178,21 +170,6 @@ std::string ToleranceText(const ToleranceTable& table, const ToleranceWords& wor
   if (const std::string advice = ToleranceAdvice(table, words); !advice.empty()) text += advice + "\n";
   if (table.reached.has_value()) text += SpeedupText(*table.reached, words);
   return text;
-}
-
-nlohmann::ordered_json ToleranceJson(const ToleranceTable& table, const ToleranceWords& words) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array(), speedup;
-  for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    rows.push_back(RowJson(table.rows[r]));
-    rows.back()["in_force"] = r == table.in_force;
-  }
-  if (table.reached.has_value()) {
-    speedup = {{"wanted", table.reached->wanted}, {"reached", table.reached->reached}};
-    speedup.update(RowJson(table.reached->row));
-  }
-  return {{"rows", std::move(rows)},
-          {"advice", ToleranceAdvice(table, words)},
-          {"wanted_speedup", std::move(speedup)}};
 }
 
 }  // namespace kpsa

@@ -93,7 +93,7 @@ std::string TrainJson(const TrainResult& r) {
                               {{"full_ms", r.check.full_ms},
                                {"accelerated_ms", r.check.accelerated_ms},
                                {"speedup", r.check.PredictedSpeedup(r.hit_rate())}}},
-                             {"tolerances", ToleranceJson(r.tolerances, WordsOf(r))}};
+                             {"tolerances", ToleranceJson<nlohmann::ordered_json>(r.tolerances, WordsOf(r))}};
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 

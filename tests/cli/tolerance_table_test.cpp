@@ -103,7 +103,7 @@ TEST(ToleranceTable, FindsTheSmallestToleranceForASpeedup) {
   const auto untimed = [](double tolerance) { return ToleranceRow{tolerance, 1}; };
   const ToleranceTable table = MakeToleranceTable(1e-3, 4e-3, 2, untimed);
   EXPECT_NE(ToleranceText(table, kWords).find("nothing was timed"), std::string::npos);
-  EXPECT_TRUE(ToleranceJson(table, kWords)["wanted_speedup"]["speedup"].is_null());
+  EXPECT_TRUE(ToleranceJson<Json>(table, kWords)["wanted_speedup"]["speedup"].is_null());
 }
 
 TEST(StackCost, LittleIsLittleInTimeOrInShare) {
