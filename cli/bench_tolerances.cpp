@@ -1,11 +1,40 @@
 #include "cli/bench_tolerances.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "cli/rig_frames.h"
 #include "kpsa/kpsa_node.h"
 
 namespace kpsa {
+namespace {
+
+// As of CalibrationPair::error.
+double ErrorOf(ConstPointsView exact, ConstPointsView other, bool light) {
+  double largest = 0, sum = 0;
+  for (std::size_t i = 0; i < exact.count; ++i) {
+    const Double3 d{double{exact.x[i]} - other.x[i], double{exact.y[i]} - other.y[i],
+                    double{exact.z[i]} - other.z[i]};
+    const double square = Dot(d, d);
+    if (!std::isfinite(square)) return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, square), sum += square;
+  }
+  return std::sqrt(light ? sum / static_cast<double>(std::max<std::size_t>(1, exact.count)) : largest);
+}
+
+// The node that an output's points come from.
+std::size_t NodeOf(const Rig& rig, const std::vector<AppliedSubspace>& applied, const PlugRef& output) {
+  for (std::size_t n = 0; n < applied.size(); ++n) {
+    if (applied[n].node == output.node) return n;
+    for (const AcceleratedPoints& points : applied[n].entry.points) {
+      if (!points.colors && rig.scene.meshes[points.mesh].points == output) return n;
+    }
+  }
+  return applied.size();
+}
+
+}  // namespace
 
 Status BenchTolerances::Load(const Flags& clip_flags, const Compared& compared, bool parallel,
                              std::size_t frames, bool still) {
@@ -43,7 +72,9 @@ Status BenchTolerances::Load(const Flags& clip_flags, const Compared& compared, 
   const auto plan = CompileFor(open_->rig, &compiler, request);
   if (!plan.ok()) return plan.status();
   side_ = std::make_unique<Side>(open_->rig, *plan, parallel, frames, still);
-  errors_ = PointErrors(compared.outputs);
+  node_of_output_.clear();
+  for (std::size_t o = 0; o < compared.outputs; ++o)
+    node_of_output_.push_back(NodeOf(open_->rig, applied_, request.outputs[o].plug));
   return Status();
 }
 
@@ -51,8 +82,10 @@ Status BenchTolerances::AddFrame(double time, std::int64_t frame, const Evaluato
   if (side_ == nullptr) return Status();
   KPSA_RETURN_IF_ERROR(side_->Evaluate(time));
   verdicts_->Add(frame, *side_->evaluator);
-  const double worst = errors_.AddFrame(full, *side_->evaluator);
-  frames_.push_back({verdicts_->last(), light_ ? errors_.frame_rms() : worst});
+  Frame added{verdicts_->last(), {}};
+  for (Index o = 0; o < node_of_output_.size(); ++o)
+    added.errors.push_back(ErrorOf(full.Points(o), side_->evaluator->Points(o), light_));
+  frames_.push_back(std::move(added));
   return Status();
 }
 
@@ -90,18 +123,21 @@ ToleranceRow BenchTolerances::At(double tolerance) const {
   double worst = 0;
   for (const Frame& frame : frames_) {
     bool hit = true;
-    double emitted = 0;  // share of the error at the wide tolerance
-    bool any = false;
+    // Of the errors at the wide tolerance: by node, and the largest
+    std::vector<double> shares(thresholds.size() + 1, 0.0);
     for (std::size_t n = 0; n < thresholds.size(); ++n) {
       const FrameDecision& wide = frame.nodes[n];
       const double weight = std::max(FullWeight(wide.score, thresholds[n]), wide.full_weight);
       hit = hit && weight == 0;
       if (weight >= 1) continue;
-      any = true;
-      emitted = std::max(emitted, (1 - weight) / (1 - wide.full_weight));
+      shares[n] = (1 - weight) / (1 - wide.full_weight);
+      shares.back() = std::max(shares.back(), shares[n]);
     }
-    hits += hit, accepted += any;
-    if (any) worst = std::max(worst, emitted * frame.error);
+    hits += hit, accepted += shares.back() > 0;
+    for (std::size_t o = 0; o < frame.errors.size(); ++o) {
+      if (const double share = shares[node_of_output_[o]]; share > 0)
+        worst = std::max(worst, share * frame.errors[o]);
+    }
   }
   row.hits = static_cast<double>(hits) / static_cast<double>(std::max<std::size_t>(1, frames_.size()));
   if (accepted > 0) row.worst = worst / tolerance;

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "cli/bench_side.h"
-#include "cli/point_errors.h"
 #include "cli/tolerance_table.h"
 #include "cli/verdicts.h"
 
@@ -42,7 +41,7 @@ class BenchTolerances {
   };
   struct Frame {
     std::vector<FrameDecision> nodes;  // at the wide tolerance
-    double error = 0;                  // emitted there
+    std::vector<double> errors;        // emitted there, by output
   };
   ToleranceRow At(double tolerance) const;
 
@@ -50,7 +49,7 @@ class BenchTolerances {
   double in_force_ = 0, wide_ = 0;
   bool light_ = false;
   std::vector<Frame> frames_;
-  std::size_t clip_begin_ = 0;  // its first frame
+  std::size_t clip_begin_ = 0;  // in frames_
   double hit_ns_ = 0;           // of timed_hits_ frames
   std::size_t timed_hits_ = 0;
 
@@ -58,7 +57,7 @@ class BenchTolerances {
   std::vector<AppliedSubspace> applied_;
   std::unique_ptr<Verdicts> verdicts_;
   std::unique_ptr<Side> side_;
-  PointErrors errors_;
+  std::vector<std::size_t> node_of_output_;  // or as many as there are nodes: of none, it depends on any
 };
 
 }  // namespace kpsa

@@ -200,12 +200,13 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<TrainFlags>();
   CLI::App* command = AddCommand(
       program, "train", "Learn a subspace from a rig's clips and controls",
-      "Test clips of the rig are never trained on. An existing subspace is replaced with --force only, and "
-      "a\n"
-      "stack that is too cheap for acceleration to pay is trained with --force only (else exit status 1).\n"
+      "Test clips of the rig are never trained on. An existing subspace is replaced with --force only.\n"
+      "A stack that costs too little for acceleration to pay is trained with --force only, too (else: exit\n"
+      "status 1, and what a frame costs).\n"
       "Examples:\n"
       "  kpsa train head.yaml\n"
       "  kpsa train head.yaml --samples 4000 --tolerance 0.1mm -o fine.kpsa\n"
+      "  kpsa train head.yaml --speedup 10\n"
       "  kpsa train head.yaml --paper --key-points 80 -o paper.kpsa",
       chosen, [flags] { return RunTrain(*flags); });
   AddRigFlags(command, flags.get());
