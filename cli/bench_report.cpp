@@ -63,6 +63,10 @@ OrderedJson PromiseJson(const Promise& p) {
           {"worst_accepted", std::move(worst)}};
 }
 
+ToleranceWords WordsOf(const BenchResult& r) {
+  return {"frames", "train on clips that are like these, or on more samples", r.light};
+}
+
 OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
   nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
   for (const BenchNode& n : r.full_nodes) {
@@ -147,6 +151,7 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
+      {"tolerances", ToleranceJson<OrderedJson>(r.tolerances, WordsOf(r))},
       {"per_frame", per_frame},
       {"notes", r.notes}};
 }
@@ -218,6 +223,7 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
                               static_cast<std::ptrdiff_t>(std::min<std::size_t>(6, r.never_evaluated.size())),
                           ", "),
                 r.never_evaluated.size() > 6 ? ", ..." : ""));
+  if (!r.tolerances.rows.empty()) text += "\n" + ToleranceText(r.tolerances, WordsOf(r));
   return text;
 }
 

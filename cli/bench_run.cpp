@@ -10,6 +10,7 @@
 
 #include "base/parallel.h"
 #include "cli/bench_side.h"
+#include "cli/bench_tolerances.h"
 #include "cli/frames_range.h"
 #include "cli/point_errors.h"
 #include "cli/progress.h"
@@ -63,6 +64,7 @@ struct Contender {
   std::unique_ptr<Side> side;
   PointErrors clip_errors;
   FullWeights weights;
+  BenchTolerances tolerances;
 
   // The rig of the flags with the subspaces in place. `outputs` becomes what the full side has to compute.
   // Where nothing moves, the controls vary.
@@ -92,7 +94,8 @@ struct Contender {
     side = std::make_unique<Side>(rig, *plan, options.threads > 1, frames, still);
     clip_errors = PointErrors(compared);
     weights.clear();
-    return Status();
+    return tolerances.Load(clip_flags, {&flags, &applied, &request, compared}, options.threads > 1, frames,
+                           still);
   }
   void Describe();
   void Compare(std::int64_t frame, const Evaluator& full, const std::string& clip);
@@ -100,7 +103,7 @@ struct Contender {
   void AddTimes(const FrameTimes& full);
   void AddFullProfile(const Plan& plan, const RecordedSteps& recorded, double full_ns);
   void AddProfile(const RecordedSteps& recorded, double fast_ns);
-  void Finish();
+  void Finish(const BenchOptions& options);
 };
 
 void Contender::Describe() {
@@ -303,7 +306,7 @@ void NoteTimes(BenchResult* result) {
   }
 }
 
-void Contender::Finish() {
+void Contender::Finish(const BenchOptions& options) {
   const auto frames = static_cast<double>(std::max<std::size_t>(1, result.frames));
   const auto hits = static_cast<double>(std::max<std::size_t>(1, result.hits));
   const auto ms = [&](double ns) { return ns / frames / 1e6; };
@@ -348,6 +351,7 @@ void Contender::Finish() {
   result.error_p99 = errors.Percentile(0.99);
   result.motion_rms = errors.motion_rms();
   result.diagonal = errors.diagonal();
+  result.tolerances = tolerances.Table(result.full_ms, result.accelerated_ms_on_hits, options.speedup);
 }
 
 class Bench {
@@ -394,8 +398,11 @@ class Bench {
       for (Side* side : sides) {
         if (Status status = side->Evaluate(times[f]); !status.ok()) return std::move(status).At({rig.path});
       }
-      for (Contender& contender : contenders_)
-        contender.Compare(FrameNumber(times[f], rig.fps), *full.evaluator, rig.scene.clip.value_or("(rest)"));
+      const std::int64_t number = FrameNumber(times[f], rig.fps);
+      for (Contender& contender : contenders_) {
+        contender.Compare(number, *full.evaluator, rig.scene.clip.value_or("(rest)"));
+        KPSA_RETURN_IF_ERROR(contender.tolerances.AddFrame(times[f], number, *full.evaluator).At({rig.path}));
+      }
     }
     for (Contender& contender : contenders_) {
       contender.NoteClip(rig.scene.clip.value_or("(rest)"), still);
@@ -418,7 +425,11 @@ class Bench {
       }
     }
     for (Side* side : sides) side->times.Finish();
-    for (Contender& contender : contenders_) contender.AddTimes(full.times);
+    for (Contender& contender : contenders_) {
+      contender.AddTimes(full.times);
+      if (contender.verdicts->hits() == 0)
+        KPSA_RETURN_IF_ERROR(contender.tolerances.TimeHits(times).At({rig.path}));
+    }
     KPSA_RETURN_IF_ERROR(ProfileClip(sides, times));
     for (Contender& contender : contenders_) {
       if (!HaveKeptModes(contender.applied)) continue;
@@ -432,7 +443,7 @@ class Bench {
   std::vector<BenchResult> Finish() {
     std::vector<BenchResult> results;
     for (Contender& contender : contenders_) {
-      contender.Finish();
+      contender.Finish(options_);
       results.push_back(std::move(contender.result));
     }
     return results;

@@ -12,6 +12,7 @@
 #include "cli/acceleration.h"
 #include "cli/bench_promise.h"
 #include "cli/frame_errors.h"
+#include "cli/tolerance_table.h"
 #include "cli/verdicts.h"
 #include "graph/plan_report.h"
 
@@ -19,7 +20,8 @@ namespace kpsa {
 
 struct BenchOptions {
   int runs = 5;
-  int threads = 1;  // more: all sides evaluate steps and wide kernels in parallel
+  int threads = 1;     // more: all sides evaluate steps and wide kernels in parallel
+  double speedup = 0;  // for ToleranceTable::reached; 0: none
   bool quiet = false;
 };
 
@@ -85,6 +87,7 @@ struct BenchResult {
   std::size_t nodes_total = 0;                     // that the full evaluation computes
   std::vector<std::string> never_evaluated;        // of these, in the accelerated one
   double points_full = 0, points_accelerated = 0;  // computed a frame, over all nodes but KPSA's
+  ToleranceTable tolerances;                       // worst: blends by their shares
   FrameErrors frame_errors;                        // none where the subspaces keep no modes
 };
 

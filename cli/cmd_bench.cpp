@@ -13,7 +13,7 @@ namespace {
 struct BenchFlags : Flags {
   AccelerationFlags acceleration;             // what all sides share
   std::vector<std::string> kpsa, tolerances;  // of each; one tolerance is for all
-  std::optional<std::string> runs;
+  std::optional<std::string> runs, speedup;
   bool per_frame = false, check = false;
 };
 
@@ -64,6 +64,11 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   options.runs = *runs;
   options.threads = *threads == 0 ? 1 : *threads;
   options.quiet = flags.quiet;
+  if (flags.speedup.has_value()) {
+    const Result<double> speedup = ParseSpeedup(*flags.speedup);
+    if (!speedup.ok()) return speedup.status();
+    options.speedup = *speedup;
+  }
   std::vector<std::string> notes;
   const Result<std::vector<std::string>> clips = TestClips(flags, &notes);
   if (!clips.ok()) return clips.status();
@@ -117,6 +122,8 @@ void AddBenchCommand(CLI::App* program, Command* chosen) {
       "the largest error of a point, as in 0.2mm; own: the subspace's, any: accept every frame; one, or "
       "one for each --kpsa");
   AddSharedAccelerationFlags(command, &flags->acceleration);
+  AddOption(command, "--speedup", "FACTOR", &flags->speedup,
+            "tell the smallest tolerance that is expected to reach it on these frames, misses included");
   AddOption(command, "--runs", "N", &flags->runs, "timed evaluations of every frame; 5 if not given");
   AddOption(command, "--threads", "N", &flags->threads, "threads of both sides; 1 if not given");
   AddSwitch(command, "--per-frame", &flags->per_frame,

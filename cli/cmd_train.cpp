@@ -12,6 +12,7 @@
 #include "cli/output.h"
 #include "cli/progress.h"
 #include "cli/rig_training.h"
+#include "cli/stack_cost.h"
 #include "cli/train_report.h"
 
 namespace kpsa {
@@ -21,7 +22,7 @@ constexpr std::size_t kCheckPoses = 60, kLightCheckPoses = 4;  // light takes se
 
 struct TrainFlags : Flags {
   std::optional<std::string> name, samples, clips, seed, rows, modes, key_points, tolerance, violation_rate,
-      calibration;
+      calibration, speedup;
   bool paper = false, keep_modes = false;
 };
 
@@ -91,6 +92,12 @@ CommandResult RunTrain(const TrainFlags& flags) {
   if (!threads.ok()) return threads.status();
   TrainOptions options;
   KPSA_RETURN_IF_ERROR(ReadOptions(flags, &options));
+  double wanted_speedup = 0;
+  if (flags.speedup.has_value()) {
+    const Result<double> value = ParseSpeedup(*flags.speedup);
+    if (!value.ok()) return value.status();
+    wanted_speedup = *value;
+  }
   if (flags.output.has_value()) KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, {".kpsa"}));
   if (flags.output == "-") return Status::Usage("-o -: expected a file name that ends in .kpsa");
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
@@ -128,6 +135,14 @@ CommandResult RunTrain(const TrainFlags& flags) {
       ClipFrames(rig, flags.clips.has_value() ? SplitNames(*flags.clips) : entry->train_clips);
   if (!clips.ok()) return flags.clips.has_value() ? AsUsage(clips.status()) : clips.status();
 
+  if (!flags.force) {
+    // What cannot be timed goes to training, which says why
+    if (const auto cost = MeasureStack(**open, flags, *entry, *clips); cost.ok() && !cost->worth_it()) {
+      Print(flags.json ? NotWorthItJson(*cost) : NotWorthItText(*cost, flags.file));
+      return 1;
+    }
+  }
+
   // Nothing is written before the end, so an interrupt may end the program at any time
   const ThreadLimit limit(*threads);
   const auto begin = std::chrono::steady_clock::now();
@@ -162,9 +177,16 @@ CommandResult RunTrain(const TrainFlags& flags) {
     worst_path = std::filesystem::path(path).replace_extension(".worst.yaml").string();
     KPSA_RETURN_IF_ERROR(WriteText(worst_path, true, WorstPoseText(record, path)));
   }
-  const TrainResult result{flags.file, path,    !flags.output.has_value(),
-                           subspace,   record,  calibration,
-                           *check,     seconds, worst_path};
+  const TrainResult result{flags.file,
+                           path,
+                           !flags.output.has_value(),
+                           subspace,
+                           record,
+                           calibration,
+                           *check,
+                           seconds,
+                           worst_path,
+                           TrainedTolerances(*subspace, *check, wanted_speedup)};
   Print(flags.json ? TrainJson(result) : TrainText(result));
   if (!flags.quiet && !record.warning.empty()) Say("warning: " + record.warning);
   // What is not promised is told in any case
@@ -179,9 +201,12 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   CLI::App* command = AddCommand(
       program, "train", "Learn a subspace from a rig's clips and controls",
       "Test clips of the rig are never trained on. An existing subspace is replaced with --force only.\n"
+      "A stack that costs too little for acceleration to pay is trained with --force only, too (else: exit\n"
+      "status 1, and what a frame costs).\n"
       "Examples:\n"
       "  kpsa train head.yaml\n"
       "  kpsa train head.yaml --samples 4000 --tolerance 0.1mm -o fine.kpsa\n"
+      "  kpsa train head.yaml --speedup 10\n"
       "  kpsa train head.yaml --paper --key-points 80 -o paper.kpsa",
       chosen, [flags] { return RunTrain(*flags); });
   AddRigFlags(command, flags.get());
@@ -201,6 +226,9 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--tolerance", "LENGTH", &flags->tolerance, "the largest error of a point, as in 0.2mm");
   AddOption(command, "--violation-rate", "SHARE", &flags->violation_rate,
             "share of frames that may exceed it, as in 1%");
+  AddOption(
+      command, "--speedup", "FACTOR", &flags->speedup,
+      "tell the smallest tolerance that is expected to reach it, misses included; training stays as it is");
   AddSwitch(command, "--paper", &flags->paper,
             "the method of the paper: key points of varimax modes, least squares");
   AddOption(command, "--key-points", "N", &flags->key_points,

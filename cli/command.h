@@ -12,7 +12,8 @@ class App;
 
 namespace kpsa {
 
-// The exit code (0, or 1 where a check failed or things differ), or errors; see ExitCode in cli/common.h.
+// The exit code (0, or 1 where a check failed, things differ or training would not pay), or errors; see
+// ExitCode in cli/common.h.
 using CommandResult = Result<int>;
 using Command = std::function<CommandResult()>;
 

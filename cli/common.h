@@ -1,7 +1,7 @@
 // What the subcommands share: flags, loading a rig with them, exit codes, and printing.
 //
-// Data goes to stdout, everything else to stderr. Exit codes: 0 fine, 1 a check failed or things differ, 2
-// usage, 3 invalid input, 4 evaluation error, 130 interrupted.
+// Data goes to stdout, everything else to stderr. Exit codes: 0 fine, 1 a check failed, things
+// differ or training would not pay, 2 usage, 3 invalid input, 4 evaluation error, 130 interrupted.
 #pragma once
 
 #include <atomic>

@@ -102,8 +102,10 @@ int Main(int argc, char** argv) {
   AddGraphCommand(&program, &chosen);
   AddNodesCommand(&program, &chosen);
   AddWeightsCommand(&program, &chosen);
-  program.footer(kFirstMinutes + std::string("\nExit codes: 0 fine, 1 a check failed or things differ, 2 "
-                                             "usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
+  program.footer(
+      kFirstMinutes +
+      std::string("\nExit codes: 0 fine, 1 a check failed, things differ, or "
+                  "training would not pay, 2 usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
 
   try {
     program.parse(argc, argv);

@@ -15,11 +15,26 @@ std::size_t TrainResult::points() const {
   return points;
 }
 
-double TrainResult::hit_rate() const {
-  if (calibration.kinds.empty()) return calibration.hit_rate;
-  const Calibration::Kind& sampled = calibration.kinds.front();
-  return static_cast<double>(sampled.hits) / static_cast<double>(std::max<std::size_t>(1, sampled.poses));
+ToleranceTable TrainedTolerances(const Subspace& subspace, const SubspaceCheck& check,
+                                 double wanted_speedup) {
+  return MakeToleranceTable(
+      subspace.tolerance, LargestError(subspace.calibration), wanted_speedup, [&](double tolerance) {
+        ToleranceRow row;
+        row.tolerance = tolerance;
+        row.hits = SampledHitRate(
+            Calibrate(subspace.calibration, tolerance, subspace.violation_rate, subspace.blend_start));
+        row.speedup = SpeedupWithMisses(check.full_ms, check.accelerated_ms, row.hits);
+        return row;
+      });
 }
+
+namespace {
+
+ToleranceWords WordsOf(const TrainResult& r) {
+  return {"poses", "more --samples or narrower controls help", r.subspace->of_light()};
+}
+
+}  // namespace
 
 std::string TrainJson(const TrainResult& r) {
   nlohmann::ordered_json poses = nlohmann::ordered_json::array(), regions = poses;
@@ -77,7 +92,8 @@ std::string TrainJson(const TrainResult& r) {
                              {"predicted",
                               {{"full_ms", r.check.full_ms},
                                {"accelerated_ms", r.check.accelerated_ms},
-                               {"speedup", r.check.PredictedSpeedup(r.hit_rate())}}}};
+                               {"speedup", r.check.PredictedSpeedup(r.hit_rate())}}},
+                             {"tolerances", ToleranceJson<nlohmann::ordered_json>(r.tolerances, WordsOf(r))}};
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -147,7 +163,10 @@ std::string TrainText(const TrainResult& r) {
         r.check.PredictedSpeedup(r.hit_rate()));
     // What the user can do about it
     if (r.check.PredictedSpeedup(r.hit_rate()) < 1) {
-      text += r.hit_rate() < 0.5
+      const bool slow_anyway = !r.tolerances.rows.empty() &&
+                               std::none_of(r.tolerances.rows.begin(), r.tolerances.rows.end(),
+                                            [](const ToleranceRow& row) { return row.speedup >= 1; });
+      text += r.hit_rate() < 0.5 && !slow_anyway
                   ? "slower than the full evaluation, as so few poses hit: a larger --tolerance, more "
                     "--samples, or narrower "
                     "controls help\n"
@@ -161,6 +180,7 @@ std::string TrainText(const TrainResult& r) {
       regions.Row({region.name, error(region.rms), error(region.max)});
     text += "\n" + poses.Text() + "\n" + regions.Text();
   }
+  if (!r.tolerances.rows.empty()) text += "\n" + ToleranceText(r.tolerances, WordsOf(r));
   text += fmt::format("\nnext: kpsa bench {}{}\n", r.rig, r.own_path ? "" : " --kpsa " + r.path);
   return text;
 }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "cli/subspace_check.h"
+#include "cli/tolerance_table.h"
 #include "kpsa/calibration.h"
 #include "kpsa/training_record.h"
 
@@ -19,9 +20,13 @@ struct TrainResult {
   SubspaceCheck check;
   double seconds = 0;      // of training and the check
   std::string worst_path;  // of the pose file, "": no pose is accepted
+  ToleranceTable tolerances;
   std::size_t points() const;
-  double hit_rate() const;  // of held-out poses as the sampler draws them; of all where there are no kinds
+  double hit_rate() const { return SampledHitRate(calibration); }
 };
+
+// Of the held-out poses as the sampler draws them, and the times of the check. wanted_speedup 0: none.
+ToleranceTable TrainedTolerances(const Subspace& subspace, const SubspaceCheck& check, double wanted_speedup);
 
 // Times in milliseconds, lengths in metres.
 std::string TrainJson(const TrainResult& r);

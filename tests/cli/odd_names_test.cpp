@@ -88,7 +88,7 @@ class OddNames : public ::testing::Test {
   static void SetUpTestSuite() {
     const TemporaryFolder folder;
     Fill(folder);
-    const ProcessResult run = RunKpsa({"train", "strips.yaml", "--rows", "40"}, 60, folder.path());
+    const ProcessResult run = RunKpsa({"train", "strips.yaml", "--rows", "40", "--force"}, 60, folder.path());
     ASSERT_EQ(run.exit_code, 0) << run.err;
     trained_ = TemporaryFolder::Read(folder / "strips.kpsa");
   }
