@@ -398,7 +398,9 @@ class Writer {
     const int weight = rig_.graph->def(mesh.weights_node()).FindAttribute("weight");
     const auto& targets = mesh.geometry.targets->targets();
     std::vector<MotionRange> ranges = motions_[mesh.gltf_node].weights;
-    const bool still = ranges.empty();  // no clip moves any
+    const bool still = std::none_of(ranges.begin(), ranges.end(), [](const MotionRange& range) {
+      return range.size() >= kLeastWeight;
+    });  // no clip moves any
     if (still) ranges.assign(targets.size(), {0, 1});
     for (std::size_t k = 0; k < targets.size() && k < ranges.size(); ++k) {
       if (ranges[k].size() < kLeastWeight || (still && IsExpressed(mesh, k))) continue;
@@ -473,10 +475,10 @@ class Writer {
       text_ += fmt::format("    # Clips that move no point, and train nothing: {}\n",
                            InComment(fmt::format("{}", fmt::join(training->still, ", "))));
     if (test.empty()) {
-      remark_ =
-          "no clip moves its points: ranges of controls are guesses, and kpsa bench moves controls one by "
-          "one";
-      text_ += "    # There is no clip to test on; kpsa bench moves the controls\n";
+      remark_ = "no clip moves its points: controls alone train it, and kpsa bench has the rest pose only";
+      text_ +=
+          "    # No clip moves the points, so that there is none to test on; kpsa bench takes the rest "
+          "pose\n";
       return true;
     }
     const char* why = !training->parts.empty() ? ""
@@ -566,6 +568,7 @@ Result<std::string> StarterRig(const NodeRegistry& registry, const std::string& 
   if (!rig.ok()) return rig.status();
   Writer writer(&*rig, options);
   Result<std::string> text = writer.Write();
+  if (!text.ok()) return Status(text.status()).At({character_path});
   if (remark != nullptr) *remark = writer.remark();
   return text;
 }

@@ -9,7 +9,7 @@ namespace {
 constexpr double kStill = 1e-4;       // of the diagonal: who moves no farther does not move
 constexpr double kTestReach = 0.01;   // of the diagonal: how far a test clip moves its farthest point,
 constexpr double kTestShare = 0.5;    // or else of the clip that moves them most
-constexpr std::size_t kPoses = 6000;  // of all clips together, and
+constexpr std::size_t kPoses = 2000;  // of all clips together, and
 constexpr std::size_t kMostOfClip = 240, kLeastOfClip = 8;
 constexpr std::size_t kMostOfCut = 2000;
 constexpr std::int64_t kPeriod = 144;  // frames, about: one test and what is trained on about it
@@ -17,7 +17,7 @@ constexpr std::int64_t kMostTests = 4;
 constexpr std::int64_t kGap = 12;         // frames: half a second, of short clips less
 constexpr double kLeastTolerance = 1e-8;  // metres: less is not written
 constexpr double kTestMotion = 0.5;       // of the motion of the whole clip
-constexpr std::int64_t kSamplesBase = 300, kSamplesPerControl = 5;
+constexpr std::int64_t kSamplesBase = 300, kSamplesPerControl = 10;
 constexpr std::int64_t kLeastSamples = 400, kMostSamples = 2000, kMostPoses = 4500;
 
 std::int64_t FrameCount(const gltf::Clip& clip) {

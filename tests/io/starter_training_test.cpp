@@ -250,6 +250,27 @@ TEST_F(StarterTrainingTest, ControlsAloneTrain) {
   EXPECT_TRUE(Has(remark, "no clip moves its points")) << remark;
 }
 
+// Morph targets that no clip moves are controls, also where a clip holds them at 0.
+TEST_F(StarterTrainingTest, MorphTargetsAloneTrain) {
+  GltfBuilder builder = GltfBuilder::Character();
+  builder.root["nodes"][0].erase("skin");
+  builder.root["meshes"][0]["weights"] = {0};
+  nlohmann::json& clip = builder.root["animations"][0];
+  const int zeros = builder.Accessor<float>({0, 0, 0}, "SCALAR");
+  clip["samplers"][1]["output"] = zeros;
+  clip["channels"].erase(0);  // and nothing turns
+  for (const bool with_clip : {true, false}) {
+    if (!with_clip) builder.root.erase("animations");
+    const Result<std::string> text = StarterRig(StandardRegistry(), folder.Write("m.gltf", builder.Text()));
+    ASSERT_TRUE(text.ok()) << text.status().ToString();
+    const Rig rig = Reload(*text);
+    ASSERT_EQ(rig.controls.size(), 1u) << *text;
+    EXPECT_EQ(rig.controls[0].max, 1);
+    ASSERT_EQ(rig.accelerate.size(), 1u) << *text;
+    EXPECT_EQ(rig.accelerate[0].train_samples, 400);
+  }
+}
+
 TEST_F(StarterTrainingTest, Assets) {
   if (SharedFile("assets/head.glb").empty()) GTEST_SKIP() << "no assets beside the checkout";
   const std::vector<std::pair<const char*, double>> expected = {
