@@ -117,6 +117,8 @@ Status MotionMeter::Add(const Evaluator& evaluator, bool keep, PointPoses* poses
     if (!std::isfinite(p.x + p.y + p.z)) return Status::Evaluation("a point is not a number");
   }
   if (first_.empty()) first_ = points;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    poses->travel = std::max(poses->travel, Length(points[i] - first_[i]));
   for (std::size_t i = 0; i < points.size() && !poses->deforms; ++i) {
     for (const Index a : anchors_) {
       const double now = Length(points[i] - points[a]), rest = Length(rest_[i] - rest_[a]);
@@ -132,7 +134,6 @@ Status MotionMeter::Add(const Evaluator& evaluator, bool keep, PointPoses* poses
   poses->points = std::min(kMostPoints, points.size());
   for (std::size_t k = 0; k < poses->points; ++k) {
     const std::size_t i = k * points.size() / poses->points;
-    poses->travel = std::max(poses->travel, Length(points[i] - first_[i]));
     const Double3 p = TransformPoint(rest_from_world, points[i]);
     for (int axis = 0; axis < 3; ++axis) poses->rows.push_back(static_cast<float>(p[axis]));
   }
