@@ -21,10 +21,12 @@ CommandResult Init(const InitFlags& flags) {
   StarterOptions options;
   const Result<int> iterations = ParseCount("--iterations", flags.iterations.value_or("10"), 0, 200);
   if (!iterations.ok()) return iterations.status();
-  const Result<int> samples = ParseCount("--samples", flags.samples.value_or("2000"), 0, 1'000'000);
-  if (!samples.ok()) return samples.status();
   options.iterations = *iterations;
-  options.samples = *samples;
+  if (flags.samples.has_value()) {
+    const Result<int> samples = ParseCount("--samples", *flags.samples, 0, 1'000'000);
+    if (!samples.ok()) return samples.status();
+    options.samples = *samples;
+  }
   const std::string suffix = Suffix(flags.file);
   if (suffix != ".glb" && suffix != ".gltf" && suffix != ".vrm")
     return Status::Usage("expected a character, .glb, .gltf or .vrm").At({flags.file});
@@ -39,9 +41,11 @@ CommandResult Init(const InitFlags& flags) {
   options.subspace = (place == "-" ? stem : fs::path(place).stem().string()) + ".kpsa";
   NodeRegistry registry;
   AddAllNodes(registry);
-  const Result<std::string> text = StarterRig(registry, flags.file, options);
+  std::string remark;
+  const Result<std::string> text = StarterRig(registry, flags.file, options, &remark);
   if (!text.ok()) return text.status();
   KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, *text));
+  if (!flags.quiet && !remark.empty()) Say(fmt::format("note: {}: {}", flags.file, remark));
   if (!flags.quiet && place != "-")
     Say(fmt::format("{}: a starter rig; read it, it says what to change\nnext: kpsa {} {}", place,
                     text->find("\naccelerate:") != std::string::npos ? "train" : "eval", place));
@@ -65,7 +69,7 @@ void AddInitCommand(CLI::App* program, Command* chosen) {
                  "the rig; the character's name with .yaml, in this folder, if not given");
   AddOption(command, "--iterations", "N", &flags->iterations, "of the deltaMush; 10 if not given");
   AddOption(command, "--samples", "N", &flags->samples,
-            "training poses drawn from the controls; 2000 if not given");
+            "training poses drawn from the controls; by the number of controls if not given");
   AddQuietFlag(command, flags.get());
 }
 

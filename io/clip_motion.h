@@ -27,12 +27,14 @@ struct Motion {
 };
 
 using ClipMotion = std::map<Index, Motion>;  // by the glTF nodes that the clip animates
-// At its keys.
+// At its keys and, where it goes beyond them in between (cubic splines, angles of a turn), 4 times a frame.
 ClipMotion MeasureClip(const gltf::Character& character, const gltf::Clip& clip);
 
-// The clip whose motion goes least beyond that of all others together: one to test on what extremes have
-// taught. The first one of equals, or of more than kMostClipsCompared. `motions` is by clip; there is one.
-std::size_t TamestClip(const gltf::Character& character, const std::vector<ClipMotion>& motions);
+// The clip, of those that may be it, whose motion goes least beyond that of all others together: one to test
+// on what extremes have taught. The first one of equals, or of more than kMostClipsCompared. `motions` and
+// `may` are by clip; one may.
+std::size_t TamestClip(const gltf::Character& character, const std::vector<ClipMotion>& motions,
+                       const std::vector<bool>& may);
 inline constexpr std::size_t kMostClipsCompared = 64;
 
 }  // namespace kpsa

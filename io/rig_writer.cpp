@@ -6,10 +6,11 @@
 #include <map>
 
 #include "base/matrix.h"
+#include "base/scalar_math.h"
 #include "base/text.h"
-#include "io/clip_motion.h"
 #include "io/joint_roles.h"
 #include "io/rig_builder.h"
+#include "io/starter_training.h"
 
 namespace kpsa {
 namespace {
@@ -18,9 +19,10 @@ constexpr double kGuessDegrees = 15;        // where no clip tells a range
 constexpr double kLeastDegrees = 0.1;       // smaller motion is noise,
 constexpr double kLeastBesides = 0.01;      // unless the joint turns about another axis
 constexpr double kLeastTranslation = 1e-4;  // of the rest diagonal
-constexpr double kSpaceShare = 0.9;         // of the skin that the space's subtree carries
-constexpr double kLargeMetres = 20;         // more is seldom meant
-constexpr double kReach = 0.25;             // of a limb's length, that its target may go
+constexpr double kLeastWeight = 0.01;
+constexpr double kSpaceShare = 0.9;  // of the skin that the space's subtree carries
+constexpr double kLargeMetres = 20;  // more is seldom meant
+constexpr double kReach = 0.25;      // of a limb's length, that its target may go
 
 MotionRange RoundedOut(MotionRange range, double step) {
   // A step more or less is decided with some slack: 0.30000000000000004 stays 0.3
@@ -66,16 +68,17 @@ std::string InComment(std::string text) {
 
 class Writer {
  public:
-  Writer(const Rig& rig, const StarterOptions& options)
-      : rig_(rig),
-        character_(*rig.character),
+  Writer(Rig* rig, const StarterOptions& options)
+      : changed_(rig),
+        rig_(*rig),
+        character_(*rig->character),
         options_(options),
         roles_(JointRoles(character_)),
         motions_(character_.nodes.size()),
         carries_(character_.nodes.size(), 0.0),
         mush_(FreeName("mush")) {}
 
-  std::string Write() {
+  Result<std::string> Write() {
     MeasureCarried();
     for (const gltf::Clip& clip : character_.clips) {
       clips_.push_back(MeasureClip(character_, clip));
@@ -85,9 +88,11 @@ class Writer {
     WriteHead();
     WriteSkins();
     WriteControls();
-    const bool accelerates = WriteAcceleration();
-    return Title(accelerates) + text_;
+    const Result<bool> accelerates = WriteAcceleration();
+    if (!accelerates.ok()) return accelerates.status();
+    return Title(*accelerates) + text_;
   }
+  const std::string& remark() const { return remark_; }
 
  private:
   // By node: the share of all points that it and its descendants move.
@@ -158,6 +163,7 @@ class Writer {
         "character: {}\n",
         Quoted(File(), false));
     if (meshes.empty()) {
+      remark_ = "the scene shows no mesh, so that there is nothing to accelerate";
       text_ += "# The scene shows no mesh: there is nothing to deform or to accelerate.\n";
       return;
     }
@@ -254,6 +260,8 @@ class Writer {
       return;
     }
     ++group_->controls;
+    const double unit = plug.component < 0 ? 1 : attribute.starts_with("rotate") ? kPi / 180 : 0.01;
+    controls_.push_back({plug, {range.min * unit, range.max * unit}});
     group_->text += fmt::format("  {}: {{min: {}, max: {}}}\n", Quoted(name, false), Rounded(range.min),
                                 Rounded(range.max));
   }
@@ -279,14 +287,28 @@ class Writer {
     return &group;
   }
 
+  // Whether any clip takes anything away from rest.
+  bool AnyMotion() const {
+    return std::any_of(motions_.begin(), motions_.end(), [&](const Motion& motion) {
+      const auto beyond = [](double least) {
+        return [least](const MotionRange& range) { return range.size() > least; };
+      };
+      return std::any_of(motion.rotate, motion.rotate + 3, beyond(kLeastDegrees)) ||
+             std::any_of(motion.translate, motion.translate + 3,
+                         beyond(kLeastTranslation * rig_.rest_diagonal)) ||
+             std::any_of(motion.weights.begin(), motion.weights.end(), beyond(kLeastWeight));
+    });
+  }
+
   void WriteControls() {
-    const bool guess = character_.clips.empty();
+    const bool guess = !AnyMotion();
     std::string heading =
-        guess ? "\n# What may move, for animators and for training. The file has no clips: these ranges are "
-                "guesses, to be corrected.\ncontrols:\n"
-              : "\n# What may move, for animators and for training: what the clips move, as far as they do "
-                "(rounded outwards).\n"
-                "# Each is on top of the rest pose or of the clip that plays.\ncontrols:\n";
+        guess
+            ? "\n# What may move, for animators and for training. The file has no clip that moves anything: "
+              "these ranges are guesses, to be corrected.\ncontrols:\n"
+            : "\n# What may move, for animators and for training: what the clips move, as far as they do "
+              "(rounded outwards).\n"
+              "# Each is on top of the rest pose or of the clip that plays.\ncontrols:\n";
     const double step =
         std::pow(10.0, std::floor(std::log10(std::max(rig_.rest_diagonal, 1e-6) * 100 / 500)));  // cm
     std::vector<std::string> idle;
@@ -376,10 +398,12 @@ class Writer {
     const int weight = rig_.graph->def(mesh.weights_node()).FindAttribute("weight");
     const auto& targets = mesh.geometry.targets->targets();
     std::vector<MotionRange> ranges = motions_[mesh.gltf_node].weights;
-    const bool still = ranges.empty();  // no clip moves any
+    const bool still = std::none_of(ranges.begin(), ranges.end(), [](const MotionRange& range) {
+      return range.size() >= kLeastWeight;
+    });  // no clip moves any
     if (still) ranges.assign(targets.size(), {0, 1});
     for (std::size_t k = 0; k < targets.size() && k < ranges.size(); ++k) {
-      if (ranges[k].size() < 0.01 || (still && IsExpressed(mesh, k))) continue;
+      if (ranges[k].size() < kLeastWeight || (still && IsExpressed(mesh, k))) continue;
       const PlugRef plug{mesh.weights_node(), weight, static_cast<int>(k), -1};
       const BodySide side = SideOfName(targets[k].name);
       group_ = &groups_[first + static_cast<int>(side)];
@@ -397,33 +421,35 @@ class Writer {
   }
 
   // The deepest transform that carries nearly everything: in its space only what deforms is left to learn.
-  std::optional<std::string> Space() const {
-    std::optional<Index> best;
+  std::optional<NodeId> Space() const {
+    std::optional<NodeId> best;
     for (Index i :
          character_.order) {  // parents first: later ones are deeper along the one chain that qualifies
-      if (carries_[i] >= kSpaceShare && character_.nodes[i].mesh == kNoIndex) best = i;
+      if (carries_[i] >= kSpaceShare && character_.nodes[i].mesh == kNoIndex) best = rig_.scene.transforms[i];
     }
-    if (!best.has_value()) return std::nullopt;
-    return rig_.graph->name(rig_.scene.transforms[*best]);
+    return best;
   }
 
   // Whether there is anything to accelerate.
-  bool WriteAcceleration() {
-    if (rig_.scene.meshes.empty() || control_count_ == 0) return false;
-    std::vector<std::string> points, train, test;
+  Result<bool> WriteAcceleration() {
+    if (rig_.scene.meshes.empty()) return false;
+    if (control_count_ == 0) {
+      Remark("nothing of it moves, no clip, joint or morph target, so that there is nothing to accelerate");
+      return false;
+    }
+    const std::optional<NodeId> space = Space();
+    const Result<StarterTraining> training = ChooseTraining(changed_, space, clips_, controls_);
+    if (!training.ok()) return training.status();
+    if (!training->deforms) {
+      Remark("it only moves as a whole and never deforms, so that there is nothing to accelerate");
+      return false;
+    }
+    std::vector<std::string> train = training->train, test = training->test;
+    WriteParts(*training, &train, &test);
+    const std::string stem = std::filesystem::path(character_.path).stem().string();
+    std::vector<std::string> points;
     for (const std::size_t m : ShownMeshes(rig_.scene))
       points.push_back(rig_.scene.meshes[m].name + "@" + mush_);
-    if (!clips_.empty()) test.push_back(character_.clips[TamestClip(character_, clips_)].id);
-    for (const CharacterClip& clip : rig_.scene.clips) {
-      if (std::find(test.begin(), test.end(), clip.id) == test.end() &&
-          std::find(train.begin(), train.end(), clip.id) == train.end())
-        train.push_back(clip.id);
-    }
-    const std::string stem = std::filesystem::path(character_.path).stem().string();
-    // 0.3 % of the size or a bit less, as one round number: what lets most frames of a face be hits
-    const double raw = rig_.rest_diagonal * 1000 * 0.003;
-    const double power = std::pow(10.0, std::floor(std::log10(std::max(raw, 1e-9))));
-    const double tolerance = power * (raw >= 5 * power ? 5 : raw >= 2 * power ? 2 : 1);
     text_ += fmt::format(
         "\n# What kpsa train learns and kpsa bench measures. More clips and wider controls make it hold for "
         "more "
@@ -432,31 +458,90 @@ class Writer {
         Quoted(stem.empty() ? "character" : stem, false));
     text_ += fmt::format("    points: {}  # up to and including that stage; later stages run exactly\n",
                          QuotedList(points));
-    if (const std::optional<std::string> space = Space()) {
+    if (space.has_value()) {
       text_ +=
           fmt::format("    space: {}  # what carries nearly all points; motion in its space is learned\n",
-                      Quoted(*space, false));
+                      Quoted(rig_.graph->name(*space), false));
     }
     text_ += fmt::format("    subspace: {}  # kpsa train writes it\n",
                          Quoted(options_.subspace.empty() ? stem + ".kpsa" : options_.subspace, false));
-    text_ += fmt::format("    tolerance: {}  # the largest error of a point that is accepted\n",
-                         LengthOf(tolerance / 1000));
+    WriteTolerance(*training);
     text_ += "    violationRate: 3%  # of frames that may exceed it\n";
-    text_ += fmt::format("    train: {{{}samples: {}}}  # clips, and poses drawn from the controls\n",
-                         train.empty() ? "" : "clips: " + QuotedList(train) + ", ", options_.samples);
+    const int samples = options_.samples.value_or(StarterSamples(controls_.size(), training->frames));
+    text_ += fmt::format("    train: {{{}samples: {}}}  # clips, and poses drawn from {} control{}\n",
+                         train.empty() ? "" : "clips: " + QuotedList(train) + ", ", samples,
+                         Thousands(controls_.size()), controls_.size() == 1 ? "" : "s");
+    if (!training->still.empty())
+      text_ += fmt::format("    # Clips that move no point, and train nothing: {}\n",
+                           InComment(fmt::format("{}", fmt::join(training->still, ", "))));
     if (test.empty()) {
-      text_ += "    # The file has no clip to test on; kpsa bench takes the rest pose\n";
-    } else {
+      remark_ = "no clip moves its points: controls alone train it, and kpsa bench has the rest pose only";
       text_ +=
-          fmt::format("    test: {{clips: {}}}  # never trained on; what kpsa bench runs{}\n",
-                      QuotedList(test), train.empty() ? "" : ": the clip that goes least beyond the others");
+          "    # No clip moves the points, so that there is none to test on; kpsa bench takes the rest "
+          "pose\n";
+      return true;
     }
+    const char* why = !training->parts.empty() ? ""
+                      : train.empty()          ? ": the only one that moves the points, and short"
+                                               : ": of those that move the points well, the one that goes "
+                                                 "least beyond the others";
+    text_ += fmt::format("    test: {{clips: {}}}  # never trained on; what kpsa bench runs{}\n",
+                         QuotedList(test), why);
     return true;
+  }
+  void Remark(const char* sentence) {
+    remark_ = sentence;
+    text_ += fmt::format("\n# No accelerate section: {}.\n", sentence);
+  }
+
+  // The parts of a clip as clips of the rig, added to what trains and tests.
+  void WriteParts(const StarterTraining& training, std::vector<std::string>* train,
+                  std::vector<std::string>* test) {
+    if (training.parts.empty()) return;
+    text_ += fmt::format(
+        "\n# {} alone moves the points: parts of it train and others test, with gaps in between, as "
+        "neighbouring\n"
+        "# frames are nearly the same.\n"
+        "clips:\n",
+        InComment(training.cut));
+    for (const ClipPart& part : training.parts) {
+      std::vector<std::string>* list = part.test ? test : train;
+      std::string name;
+      for (int i = 1; name.empty() || character_.FindClip(name) != kNoIndex ||
+                      std::find(list->begin(), list->end(), name) != list->end();
+           ++i) {
+        name = fmt::format("{}_{}{}", training.cut, part.test ? "test" : "train", i);
+      }
+      list->push_back(name);
+      text_ += fmt::format("  {}: {{layers: [{{clip: {}}}], frames: [{}, {}]}}\n", Quoted(name, false),
+                           Quoted(training.cut, true), part.first, part.last);
+    }
+  }
+
+  void WriteTolerance(const StarterTraining& training) {
+    const double by_size = kToleranceOfSize * rig_.rest_diagonal,
+                 by_motion = kToleranceOfMotion * training.motion;
+    const auto about = [](double metres) {
+      const double unit = metres > 0 ? std::pow(10.0, std::floor(std::log10(metres)) - 2) : 1;
+      return LengthOf(std::round(metres / unit) * unit);
+    };
+    const std::string from =
+        training.motion > 0 && by_motion < by_size
+            ? fmt::format("{:.3g} % of how far {} move what moves most (RMS {})", kToleranceOfMotion * 100,
+                          training.by_clips ? "the clips" : "controls", about(training.motion))
+            : fmt::format("{:.3g} % of the size ({})", kToleranceOfSize * 100, about(rig_.rest_diagonal));
+    text_ += fmt::format(
+        "    tolerance: {}  # the largest error of a point that is accepted: {}, rounded; that is not seen\n",
+        LengthOf(StarterTolerance(rig_.rest_diagonal, training.motion)), from);
+    text_ +=
+        "    # Where kpsa bench says that few frames hit: a tolerance of 2 to 3 times as much is hardly "
+        "seen\n";
   }
   static std::string LengthOf(double metres) {
     if (metres >= 1) return Rounded(metres) + "m";
     return metres >= 0.01 ? Rounded(metres * 100) + "cm" : Rounded(metres * 1000) + "mm";
   }
+  Rig* changed_;  // rig_, for clips to play while motion is measured
   const Rig& rig_;
   const gltf::Character& character_;
   const StarterOptions& options_;
@@ -464,9 +549,10 @@ class Writer {
   std::vector<Limb> limbs_;
   std::vector<ClipMotion> clips_;
   std::vector<Motion> motions_;  // of all clips, by glTF node
+  std::vector<ControlPlug> controls_;
   std::vector<double> carries_;  // by glTF node
   std::string mush_, cage_;      // names; "": there is no cage
-  std::string text_;
+  std::string text_, remark_;
   std::map<int, Group> groups_;  // by their place in the file
   Group* group_ = nullptr;       // that controls are added to
   int control_count_ = 0;
@@ -475,12 +561,16 @@ class Writer {
 }  // namespace
 
 Result<std::string> StarterRig(const NodeRegistry& registry, const std::string& character_path,
-                               const StarterOptions& options) {
+                               const StarterOptions& options, std::string* remark) {
   RigOptions rig_options;
   rig_options.rest = true;
   Result<Rig> rig = LoadRig(registry, character_path, rig_options);
   if (!rig.ok()) return rig.status();
-  return Writer(*rig, options).Write();
+  Writer writer(&*rig, options);
+  Result<std::string> text = writer.Write();
+  if (!text.ok()) return Status(text.status()).At({character_path});
+  if (remark != nullptr) *remark = writer.remark();
+  return text;
 }
 
 }  // namespace kpsa

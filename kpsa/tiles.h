@@ -147,15 +147,15 @@ struct TileOptions {
 };
 // What is known of y.
 struct TileInputs {
+  Eigen::MatrixXd covariance;  // [r x r]; empty: the identity
+  Eigen::MatrixXd samples;     // [r x S] y of some poses, for max_budget; may be empty
+  Eigen::VectorXd left_out;    // [cN] variance of every row that no y tells; empty: 0
   // Poses that products are fitted to: their rows hold f - mu of the output from `first_column` on. Null:
   // none.
   const PoseMatrix* poses = nullptr;
   const Eigen::MatrixXd* measured = nullptr;  // y of these poses [r x T]
   std::size_t first_column = 0;
   std::size_t clip_poses = 0;  // the first poses, neighbours in time of each other
-  Eigen::MatrixXd covariance;  // [r x r]; empty: the identity
-  Eigen::MatrixXd samples;     // [r x S] y of some poses, for max_budget; may be empty
-  Eigen::VectorXd left_out;    // [cN] variance of every row that no y tells; empty: 0
 };
 // What the tiles cost in accuracy; scene units. Where precision or the number of attempts do not allow the
 // budgets, these exceed them.

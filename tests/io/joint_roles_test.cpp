@@ -117,13 +117,14 @@ TEST(ClipMotion, TheTamestClipStaysWithinTheOthers) {
   EXPECT_EQ(motions[0].at(0).translate[0].min, -2);
   EXPECT_EQ(motions[0].at(0).translate[0].max, 2);
   EXPECT_EQ(motions[2].count(0), 0u);
-  EXPECT_EQ(TamestClip(character, motions), 1u);
+  EXPECT_EQ(TamestClip(character, motions, {true, true, true}), 1u);
+  EXPECT_NE(TamestClip(character, motions, {true, false, true}), 1u);
   std::swap(character.clips[0], character.clips[1]);
   std::swap(motions[0], motions[1]);
-  EXPECT_EQ(TamestClip(character, motions), 0u);
+  EXPECT_EQ(TamestClip(character, motions, {true, true, true}), 0u);
   motions.resize(1);
   character.clips.resize(1);
-  EXPECT_EQ(TamestClip(character, motions), 0u);
+  EXPECT_EQ(TamestClip(character, motions, {true}), 0u);
 }
 
 }  // namespace

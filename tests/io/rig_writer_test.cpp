@@ -44,8 +44,8 @@ TEST_F(RigWriterTest, RangesControlsByTheClips) {
       << text;
   EXPECT_TRUE(Has(text, "stack: [gltf, mush]")) << text;
   EXPECT_TRUE(Has(text, "points: [body@mush]")) << text;
-  EXPECT_TRUE(Has(text, "test: {clips: [wave]}")) << text;
-  EXPECT_TRUE(Has(text, "train: {samples: 2000}")) << text;
+  EXPECT_TRUE(Has(text, "test: {clips: [wave_test1]}")) << text;
+  EXPECT_TRUE(Has(text, "train: {clips: [wave_train1, wave_train2], samples: 400}")) << text;
   const Rig rig = Reload(folder / "c.gltf");
   EXPECT_EQ(rig.controls.size(), 2u);
   EXPECT_EQ(rig.scene.meshes[0].stages.back().name, "mush");
