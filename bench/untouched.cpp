@@ -109,7 +109,7 @@ class Bench {
       if (options_.Wants(name) && !options_.assets.empty() && !Interrupted())
         failures.Append(Try(name, options_.assets + "/" + name));
     }
-    Print(options_.markdown ? RowsMarkdown(rows_) : RowsText(rows_));
+    if (!rows_.empty()) Print(options_.markdown ? RowsMarkdown(rows_) : RowsText(rows_));
     if (!failures.ok()) {
       PrintErrors("bench_untouched", failures, 20);
       return ExitCode(failures);

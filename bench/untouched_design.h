@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/scalar_math.h"
 #include "base/types.h"
 #include "kpsa/random.h"
 
@@ -79,7 +80,11 @@ struct Design {
     bones.push_back(std::move(bone));
     return static_cast<int>(bones.size()) - 1;
   }
-  void AddTurn(int bone, int axis, double low_degrees, double high_degrees, std::size_t group, int depth = 0);
+  void AddTurn(int bone, int axis, double low_degrees, double high_degrees, std::size_t group,
+               int depth = 0) {
+    motions.push_back({MotionKind::kTurn, static_cast<std::size_t>(bone), axis, low_degrees * kPi / 180,
+                       high_degrees * kPi / 180, group, depth});
+  }
 };
 
 // Between a and b.

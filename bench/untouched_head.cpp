@@ -172,9 +172,9 @@ class Head {
                                 "stern",  "lipsOut", "chinUp", "wide",  "narrow"};
     for (std::size_t k = 0; design_.morphs.size() < 40 || k < 4; ++k) {
       const double y = Between(random_, -0.8, 0.4);
-      AddMorph(both[k], OnFace(Between(random_, -0.15, 0.15), y, 0.9),
-               Double3{0, Between(random_, -0.008, 0.008), Between(random_, -0.006, 0.01)} * size,
-               Between(random_, 0.03, 0.06) * size,
+      const double radius = Between(random_, 0.03, 0.06), up = Between(random_, -0.008, 0.008),
+                   out = Between(random_, -0.006, 0.01), across = Between(random_, -0.15, 0.15);
+      AddMorph(both[k], OnFace(across, y, 0.9), Double3{0, up, out} * size, radius * size,
                y > 0      ? kUpper
                : y > -0.4 ? kMiddle
                           : kLower);

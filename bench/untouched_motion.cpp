@@ -106,7 +106,8 @@ class Maker {
       for (std::size_t g = 0; g < design_.groups.size(); ++g) takes_part.push_back(random_.Unit() < kInEvent);
       for (std::size_t m = 0; m < curves_.size(); ++m) {
         const bool chosen = random_.Unit() < kMotionInEvent;
-        double size = Between(random_, 0.3, 1) * (random_.Unit() < 0.5 ? -1 : 1);
+        double size = Between(random_, 0.3, 1);
+        if (random_.Unit() < 0.5) size = -size;
         // Each motion goes to either side once at least
         const std::size_t turn = (m + static_cast<std::size_t>(e)) % static_cast<std::size_t>(events);
         if (turn < 2) size = turn == 0 ? 1 : -1;
@@ -197,12 +198,6 @@ class Maker {
 };
 
 }  // namespace
-
-void Design::AddTurn(int bone, int axis, double low_degrees, double high_degrees, std::size_t group,
-                     int depth) {
-  motions.push_back({MotionKind::kTurn, static_cast<std::size_t>(bone), axis, low_degrees * kPi / 180,
-                     high_degrees * kPi / 180, group, depth});
-}
 
 Curves MakeCurves(const Design& design, const ClipDesign& clip, std::uint64_t seed) {
   return Maker(design, clip, seed).Make();

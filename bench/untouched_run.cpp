@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -73,6 +74,8 @@ Status ReadFigures(const std::string& trained, const std::string& benched, Row* 
     row->hits = bench->at("hit_rate").get<double>();
     row->speedup_on_hits = NumberOrNan(bench->at("speedup_on_hits"));
     row->speedup = NumberOrNan(bench->at("speedup"));
+    row->points = bench->at("output_points").get<std::size_t>();
+    row->accepts = !bench->at("promise").at("worst_accepted").is_null();
     const double error = bench->at("error").at("max").get<double>();
     row->largest_error = error < 0 ? std::numeric_limits<double>::infinity() : error / row->tolerance;
     row->kept = bench->at("promise").at("kept").get<bool>();
@@ -82,12 +85,11 @@ Status ReadFigures(const std::string& trained, const std::string& benched, Row* 
   return Status();
 }
 
-Status CountParts(const std::string& path, Row* row) {
+Status CountJointsAndMorphs(const std::string& path, Row* row) {
   const Result<gltf::Character> character = gltf::LoadGltf(path);
   if (!character.ok()) return character.status();
   for (const Index node : character->MeshNodes()) {
-    const gltf::Mesh& mesh = character->meshes[character->nodes[node].mesh];
-    row->points += mesh.vertex_count(), row->morphs += mesh.targets.size();
+    row->morphs += character->meshes[character->nodes[node].mesh].targets.size();
   }
   std::vector<bool> is_joint(character->nodes.size());
   for (const gltf::Skin& skin : character->skins) {
@@ -105,7 +107,7 @@ Table MakeTable(std::span<const Row> rows) {
                fmt::format("{:.0f} s", row.training_seconds), LengthText(row.tolerance),
                fmt::format("{:.0f} %", 100 * row.held_out_hits), row.test_clip,
                fmt::format("{:.0f} %", 100 * row.hits), RatioText(row.speedup_on_hits),
-               RatioText(row.speedup), fmt::format("{:.2f}", row.largest_error),
+               RatioText(row.speedup), row.accepts ? fmt::format("{:.2f}", row.largest_error) : "-",
                row.kept ? "kept" : "BROKEN"});
   }
   return table;
@@ -117,7 +119,7 @@ Result<Row> TryCharacter(const std::string& program, const std::string& name, co
                          const std::string& folder) {
   Row row;
   row.character = name;
-  KPSA_RETURN_IF_ERROR(CountParts(character, &row));
+  KPSA_RETURN_IF_ERROR(CountJointsAndMorphs(character, &row));
   const std::string stem = folder + "/" + fs::path(character).stem().string();
   const std::string rig = stem + ".yaml", trained = stem + ".train.json", benched = stem + ".bench.json";
   KPSA_RETURN_IF_ERROR(RunProgram({program, "init", character, "-o", rig, "--force", "-q"}, "/dev/null"));

@@ -19,6 +19,7 @@ struct Row {
   double hits = 0;                          // share of the test clip's frames
   double speedup_on_hits = 0, speedup = 0;  // not a number where there are none
   double largest_error = 0;                 // in tolerances; infinite where it is not finite
+  bool accepts = false;                     // at least one frame of the test clip, as a hit or a blend
   bool kept = false;                        // the promise, on the test clip
 };
 

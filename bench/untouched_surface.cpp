@@ -9,7 +9,8 @@ namespace {
 
 constexpr int kSearches = 5;  // for the size of a cell
 constexpr double kNearEnough = 0.01;
-constexpr int kRelaxations = 3;  // a grid leaves slivers
+constexpr double kSurelyClear = 0.4;  // of a distance, as distances are approximate
+constexpr int kRelaxations = 3;       // a grid leaves slivers
 
 class Net {
  public:
@@ -20,9 +21,7 @@ class Net {
     }
     values_.reserve(count_[0] * count_[1] * count_[2]);
     for (std::size_t z = 0; z < count_[2]; ++z) {
-      for (std::size_t y = 0; y < count_[1]; ++y) {
-        for (std::size_t x = 0; x < count_[0]; ++x) values_.push_back(part.distance(Corner(x, y, z)));
-      }
+      for (std::size_t y = 0; y < count_[1]; ++y) AddRow(y, z);
     }
   }
 
@@ -49,6 +48,16 @@ class Net {
     return origin_ + Double3{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)} * cell_;
   }
   std::size_t At(const Cell& c) const { return (c[2] * count_[1] + c[1]) * count_[0] + c[0]; }
+
+  // Far from the surface a value stands for those after it, too.
+  void AddRow(std::size_t y, std::size_t z) {
+    for (std::size_t x = 0; x < count_[0];) {
+      const double value = part_.distance(Corner(x, y, z));
+      const auto clear = static_cast<std::size_t>(kSurelyClear * std::fabs(value) / cell_);
+      const std::size_t end = std::min(x + std::max<std::size_t>(clear, 1), count_[0]);
+      for (; x < end; ++x) values_.push_back(value);
+    }
+  }
 
   // The mean of where the surface crosses the cell's edges.
   void AddVertex(const Cell& cell) {

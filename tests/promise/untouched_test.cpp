@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/digest.h"
 #include "bench/untouched_character.h"
 #include "bench/untouched_run.h"
 #include "cli/common.h"
@@ -188,6 +189,19 @@ TEST_P(UntouchedCharacter, DependsOnItsSeedAlone) {
   const std::string bytes = scenes::WriteGlb(scene_);
   EXPECT_EQ(bytes, scenes::WriteGlb(MakeCharacter(kind_, seed_, kFewPoints)));
   EXPECT_NE(bytes, scenes::WriteGlb(MakeCharacter(kind_, seed_ + 7, kFewPoints)));
+}
+
+// Figures of different versions of the program are of the same characters, whatever compiled them.
+TEST(UntouchedCharacters, AreTheSameEverywhere) {
+  std::vector<std::string> digests;
+  for (const Kind kind : kKinds) {
+    Hasher hasher;
+    hasher.Add(scenes::WriteGlb(MakeCharacter(kind, 1, kFewPoints)));
+    digests.push_back(hasher.Finish().ToHex());
+  }
+  EXPECT_EQ(digests,
+            (std::vector<std::string>{"debe364ee1b633014b358799643e9dbb", "ed1dab41681263f514e39d4e1effa96c",
+                                      "0c747c16e1b6f1bc91a4591f1eb487d3"}));
 }
 
 TEST(UntouchedRun, ReadsWhatTheProgramPrints) {
