@@ -125,13 +125,18 @@ class Head {
           design_.AddBone({Sided("eye", side), head, eye, eye + Double3{0, 0, f_.eye}, {1, 0, 0}, f_.eye});
       design_.AddTurn(ball, 2, -20, 20, kEyes);
       design_.AddTurn(ball, 1, -25, 25, kEyes);
-      const Double3 ear = OnFace(side, -0.05, -0.05), rim = ear + Double3{side * 0.02, 0.02, -0.02} * f_.ear;
+      const Double3 ear = OnFace(side, -0.05, -0.05),
+                    rim = ear + Double3{side * 0.006, 0.013, -0.006} * f_.ear;
       const int lobe = design_.AddBone({Sided("ear", side), head, ear, rim, {0, 1, 0}, 0.017 * f_.ear});
       design_.AddTurn(lobe, 2, -15, 15, kFaceJoints);
       design_.AddTurn(lobe, 0, -12, 12, kFaceJoints);
       if (tips) {
-        const int tip = design_.AddBone(
-            {Sided("earTip", side), lobe, rim, rim + Double3{0, 0.01, -0.005}, {0, 1, 0}, 0.01 * f_.ear});
+        const int tip = design_.AddBone({Sided("earTip", side),
+                                         lobe,
+                                         rim,
+                                         rim + Double3{0, 0.012, -0.003} * f_.ear,
+                                         {0, 1, 0},
+                                         0.012 * f_.ear});
         design_.AddTurn(tip, 2, -20, 20, kFaceJoints, 1);
       }
       if (cheeks) Pad("cheek", side, head, OnFace(side * 0.5, -0.25, 0.75));
