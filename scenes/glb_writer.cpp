@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "base/check.h"
+#include "base/matrix.h"
 
 namespace kpsa::scenes {
 namespace {
@@ -26,6 +27,20 @@ std::string Numbers(std::span<const float> values) {
   std::vector<std::string> items;
   for (float v : values) items.push_back(fmt::format("{}", v));
   return Joined(items);
+}
+
+std::array<float, 16> RigidInverse(const Matrix4& m) {
+  std::array<float, 16> out = {};
+  for (int row = 0; row < 3; ++row) {
+    double at = 0;
+    for (int k = 0; k < 3; ++k) {
+      out[static_cast<std::size_t>(4 * k + row)] = static_cast<float>(m(k, row));
+      at += m(k, row) * m(k, 3);
+    }
+    out[static_cast<std::size_t>(12 + row)] = static_cast<float>(-at);
+  }
+  out[15] = 1;
+  return out;
 }
 
 class Writer {
@@ -134,16 +149,22 @@ std::string Writer::Mesh(const GlbMesh& mesh) {
 
 std::string Writer::Clip(const GlbClip& clip) {
   std::vector<float> times;
-  for (int f = 0; f < clip.frames; ++f) times.push_back(static_cast<float>(f / kFramesPerSecond));
+  for (int f = 0; f < clip.frames; ++f) times.push_back(static_cast<float>(f / clip.frames_per_second));
   const int input = Accessor(View(std::span<const float>(times)), 5126, times.size(), "SCALAR",
                              fmt::format(",\"min\":[{}],\"max\":[{}]", times.front(), times.back()));
   std::vector<std::string> samplers, channels;
   for (const GlbChannel& channel : clip.channels) {
     const int view = View(std::span<const float>(channel.values));
-    const std::size_t count = channel.weights ? channel.values.size() : channel.values.size() / 4;
-    const int output = Accessor(view, 5126, count, channel.weights ? "SCALAR" : "VEC4");
+    const std::size_t width = channel.weights ? 1 : channel.translation ? 3 : 4;
+    const int output = Accessor(view, 5126, channel.values.size() / width,
+                                channel.weights       ? "SCALAR"
+                                : channel.translation ? "VEC3"
+                                                      : "VEC4");
     channels.push_back(fmt::format("{{\"sampler\":{},\"target\":{{\"node\":{},\"path\":\"{}\"}}}}",
-                                   samplers.size(), channel.node, channel.weights ? "weights" : "rotation"));
+                                   samplers.size(), channel.node,
+                                   channel.weights       ? "weights"
+                                   : channel.translation ? "translation"
+                                                         : "rotation"));
     samplers.push_back(
         fmt::format("{{\"input\":{},\"output\":{},\"interpolation\":\"LINEAR\"}}", input, output));
   }
@@ -158,12 +179,12 @@ std::string Writer::Finish(const GlbScene& scene) {
   std::vector<std::array<float, 16>> inverse_binds;
   for (int joint : scene.joints) {
     joints.push_back(fmt::format("{}", joint));
-    Double3 at = {};
+    Matrix4 world;
     for (int n = joint; n >= 0; n = scene.nodes[static_cast<std::size_t>(n)].parent) {
-      at = at + scene.nodes[static_cast<std::size_t>(n)].translation;
+      const GlbNode& node = scene.nodes[static_cast<std::size_t>(n)];
+      world = ComposeTrs(node.translation, node.rotation, {1, 1, 1}) * world;
     }
-    inverse_binds.push_back({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, static_cast<float>(-at.x),
-                             static_cast<float>(-at.y), static_cast<float>(-at.z), 1});
+    inverse_binds.push_back(RigidInverse(world));
   }
   const int inverse = Accessor(View(std::span<const std::array<float, 16>>(inverse_binds)), 5126,
                                inverse_binds.size(), "MAT4");
@@ -181,6 +202,12 @@ std::string Writer::Finish(const GlbScene& scene) {
       const float t[3] = {static_cast<float>(node.translation.x), static_cast<float>(node.translation.y),
                           static_cast<float>(node.translation.z)};
       text += ",\"translation\":" + Numbers(t);
+      if (!(node.rotation == Quaternion())) {
+        const Quaternion& q = node.rotation;
+        const float r[4] = {static_cast<float>(q.x), static_cast<float>(q.y), static_cast<float>(q.z),
+                            static_cast<float>(q.w)};
+        text += ",\"rotation\":" + Numbers(r);
+      }
     }
     if (!children.empty()) text += ",\"children\":" + Joined(children);
     if (node.hidden) text += R"(,"extensions":{"KHR_node_visibility":{"visible":false}})";

@@ -45,28 +45,31 @@ struct GlbNode {
   Double3 translation;
   int mesh = -1;        // skinned by the skin
   bool hidden = false;  // KHR_node_visibility: a cage that others follow
+  Quaternion rotation = {};
 };
 
-// Values at each frame: rotations are x y z w, weights one a target.
+inline constexpr double kFramesPerSecond = 24;  // of the scenes' clips
+
+// Values at each frame: rotations are x y z w, weights one a target, translations x y z.
 struct GlbChannel {
   int node = 0;
   bool weights = false;
   std::vector<float> values;
+  bool translation = false;
 };
 struct GlbClip {
   std::string name;
-  int frames = 0;  // keys at f / 24 s
+  int frames = 0;  // keys at f / frames_per_second
   std::vector<GlbChannel> channels;
+  double frames_per_second = kFramesPerSecond;
 };
 
 struct GlbScene {
   std::vector<GlbNode> nodes;
   std::vector<GlbMesh> meshes;
-  std::vector<int> joints;  // nodes, in the order of Influences::joints; translations only, no rest rotation
+  std::vector<int> joints;  // nodes, in the order of Influences::joints
   std::vector<GlbClip> clips;
 };
-
-inline constexpr double kFramesPerSecond = 24;
 
 // The bytes of the .glb file.
 std::string WriteGlb(const GlbScene& scene);
