@@ -43,7 +43,7 @@ Result<StarterTraining> ChooseTraining(Rig* rig, std::optional<NodeId> space,
 // What nobody sees: kToleranceOfSize of the diagonal, but no more than kToleranceOfMotion of the motion (0:
 // there is none to go by); as 1, 2 or 5 times a power of ten. Metres.
 double StarterTolerance(double diagonal, double motion);
-inline constexpr double kToleranceOfSize = 0.001, kToleranceOfMotion = 0.05;
+inline constexpr double kToleranceOfSize = 0.003, kToleranceOfMotion = 0.3;
 
 // Poses to draw from so many controls: enough that each is seen with others, and not so many that training
 // takes minutes.

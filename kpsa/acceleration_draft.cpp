@@ -25,7 +25,8 @@ Result<Signal> FindSignal(const Graph& graph, const std::string& name, const Rig
   Result<PlugRef> plug = graph.FindPlug(within.prefix + name);
   if (!plug.ok() && !within.prefix.empty()) plug = graph.FindPlug(name);  // time
   if (!plug.ok()) return plug.status();
-  Signal signal{graph.PlugName(*plug), *plug, graph.PlugType(*plug) == Type::kMatrix};
+  Signal signal{graph.PlugName(*plug), *plug, graph.PlugType(*plug) == Type::kMatrix,
+                IsWorldMatrix(graph, *plug)};
   return signal;
 }
 
@@ -274,6 +275,7 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   KPSA_RETURN_IF_ERROR(AddCues(graph, target, *subspace, &draft));
   for (const AccelerationTarget::MeshPoints& mesh : target.meshes)
     draft.data.outputs_in_space.push_back(mesh.stages.back().world);
+  for (const Signal& signal : draft.matrices) draft.data.relative.push_back(signal.relative);
   for (const auto* list : {&draft.matrices, &draft.scalars}) {
     for (const Signal& signal : *list) draft.data.guard_names.push_back(signal.name);
   }

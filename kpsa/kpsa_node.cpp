@@ -150,6 +150,15 @@ SoftCacheThreshold ThresholdAt(const KpsaKernel& kernel, double scale) {
   return threshold;
 }
 
+// An entry of a matrix, or of space_from_world times it.
+double Entry(const Matrix4& matrix, Index element, const Matrix4* space_from_world) {
+  const auto row = static_cast<int>(element % 3), column = static_cast<int>(element / 3);
+  if (space_from_world == nullptr) return matrix(row, column);
+  const Matrix4& s = *space_from_world;
+  return s(row, 0) * matrix(0, column) + s(row, 1) * matrix(1, column) + s(row, 2) * matrix(2, column) +
+         s(row, 3) * matrix(3, column);
+}
+
 // The raw measurement, in the order of the subspace's rows.
 void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4& world_from_space,
             std::span<double> raw) {
@@ -178,7 +187,8 @@ void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4
         break;
       }
       case KpsaConfig::Row::Kind::kMatrix:
-        raw[r++] = matrices[row.input](static_cast<int>(row.element % 3), static_cast<int>(row.element / 3));
+        raw[r++] = Entry(matrices[row.input], row.element,
+                         data.relative[row.input] != 0 ? &space_from_world : nullptr);
         break;
       case KpsaConfig::Row::Kind::kScalar:
         raw[r++] = scalars[row.input];
@@ -456,6 +466,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   hasher.Add(data_.has_space);
   hasher.Add(data_.space_scales);
   hasher.Add(std::span<const char>(data_.outputs_in_space));
+  hasher.Add(std::span<const char>(data_.relative));
   hasher.Add(data_.always_miss);
   hasher.Add(std::string_view(data_.always_miss_reason));
   digest_ = hasher.Finish();

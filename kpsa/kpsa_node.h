@@ -45,13 +45,14 @@ class KpsaConfig final : public Asset {
     // Trained ranges and how guards come in outside of them (TrainedRange); see MatrixEntries
     std::vector<double> matrix_lo, matrix_hi, matrix_ramp;  // [12 * matrices]
     std::vector<double> scalar_lo, scalar_hi, scalar_ramp;  // [scalars]
-    std::vector<std::string> guard_names;                   // matrices, then scalars
-    Double3 rest_origin;                                    // of the space
-    bool has_space = false;                                 // spaceMatrix is connected
-    bool space_scales = false;                              // a uniform scale of it is taken into account
-    std::string stretched;                                  // what may stretch it: a transform
-    bool always_miss = false;                               // every frame is evaluated fully:
-    std::string always_miss_reason;                         // why
+    std::vector<char> relative;  // [matrices] world matrices, measured relative to spaceMatrix's frame
+    std::vector<std::string> guard_names;  // matrices, then scalars
+    Double3 rest_origin;                   // of the space
+    bool has_space = false;                // spaceMatrix is connected
+    bool space_scales = false;             // a uniform scale of it is taken into account
+    std::string stretched;                 // what may stretch it: a transform
+    bool always_miss = false;              // every frame is evaluated fully:
+    std::string always_miss_reason;        // why
   };
   explicit KpsaConfig(Data data);
   const char* kind() const override { return "kpsaConfig"; }

@@ -50,15 +50,17 @@ Result<PoseLayout> PoseRecorder::Layout() {
   return layout_;
 }
 
+Matrix4 PoseRecorder::SpaceFromWorld(const Evaluator& evaluator) const {
+  if (rig_.target.space.empty()) return {};
+  const auto last = static_cast<Index>(evaluator.plan().outputs().size() - 1);
+  return InverseOrIdentity(
+      SpaceFrameOf(evaluator.Get<Matrix4>(last), inverse_rest_stretch_).world_from_space);
+}
+
 void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const {
   const AccelerationTarget& target = rig_.target;
-  Matrix4 space_from_world;
+  const Matrix4 space_from_world = SpaceFromWorld(evaluator);
   Index o = 0;
-  if (!target.space.empty()) {
-    const auto last = static_cast<Index>(evaluator.plan().outputs().size() - 1);
-    space_from_world =
-        InverseOrIdentity(SpaceFrameOf(evaluator.Get<Matrix4>(last), inverse_rest_stretch_).world_from_space);
-  }
   std::size_t column = 0;
   const auto store_points = [&](ConstPointsView points, bool in_space) {
     for (std::size_t i = 0; i < points.count; ++i) {
@@ -72,16 +74,18 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
   for (const auto& mesh : target.meshes) store_points(evaluator.Points(o++), mesh.stages.back().world);
   for (const CandidateStage& candidate : candidates_)
     store_points(evaluator.Points(o++), target.meshes[candidate.mesh].stages[candidate.stage].world);
-  StoreSignals(evaluator, o, row.subspan(column));
+  StoreSignals(evaluator, space_from_world, o, row.subspan(column));
   KPSA_CHECK_EQ(column + layout_.scalars, row.size());
 }
 
-void PoseRecorder::StoreSignals(const Evaluator& evaluator, Index o, std::span<float> entries) const {
+void PoseRecorder::StoreSignals(const Evaluator& evaluator, const Matrix4& space_from_world, Index o,
+                                std::span<float> entries) const {
   std::size_t column = 0;
   for (const Signal& signal : signals_) {
     if (signal.matrix) {
       double values[12];
-      MatrixEntries(evaluator.Get<Matrix4>(o++), values);
+      const Matrix4& matrix = evaluator.Get<Matrix4>(o++);
+      MatrixEntries(signal.relative ? space_from_world * matrix : matrix, values);
       for (double value : values) entries[column++] = static_cast<float>(value);
       continue;
     }
@@ -163,6 +167,7 @@ Status PoseRecorder::WidenRanges(const TrainingClip& clip, std::vector<double>* 
   KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
   Request request;
   for (const Signal& signal : signals_) request.outputs.push_back({signal.plug, {}});
+  for (const PlugRef& plug : rig_.target.space) request.outputs.push_back({plug, {}});
   request.varying = {rig_.time};
   Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
   if (!plan.ok()) return plan.status();
@@ -172,7 +177,7 @@ Status PoseRecorder::WidenRanges(const TrainingClip& clip, std::vector<double>* 
   for (const double t : clip.times) {
     evaluator.Set(time, t);
     KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
-    StoreSignals(evaluator, 0, entries);
+    StoreSignals(evaluator, SpaceFromWorld(evaluator), 0, entries);
     for (std::size_t e = 0; e < entries.size(); ++e) {
       (*lo)[e] = std::min<double>((*lo)[e], entries[e]);
       (*hi)[e] = std::max<double>((*hi)[e], entries[e]);

@@ -42,7 +42,10 @@ class PoseRecorder {
  private:
   Result<std::shared_ptr<const Plan>> CompileFor(const std::vector<PlugRef>& varying);
   std::string NameOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) const;
-  void StoreSignals(const Evaluator& evaluator, Index first_output, std::span<float> entries) const;
+  // Of the space, which is the last output of the plan.
+  Matrix4 SpaceFromWorld(const Evaluator& evaluator) const;
+  void StoreSignals(const Evaluator& evaluator, const Matrix4& space_from_world, Index first_output,
+                    std::span<float> entries) const;
   Status CheckFinite(std::span<const float> row) const;
   Status Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
                 const std::function<void(std::size_t, Evaluator&)>& set,

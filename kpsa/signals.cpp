@@ -50,6 +50,38 @@ SignalEntry SplitEntryName(const std::string& name) {
   return {name.substr(0, slash), entry};
 }
 
+bool IsWorldMatrix(const Graph& graph, const PlugRef& plug) {
+  const NodeDef& def = graph.def(plug.node);
+  return IsTransform(def) && plug.attribute == def.FindAttribute("worldMatrix");
+}
+
+Result<std::vector<Signal>> FindRelativeMatrices(const Graph& graph, Compiler* compiler,
+                                                 const std::vector<PlugRef>& outputs,
+                                                 const std::vector<PlugRef>& varying) {
+  Request request;
+  for (const PlugRef& output : outputs) request.outputs.push_back({output, {}});
+  request.varying = varying;
+  Result<std::shared_ptr<const Plan>> plan = compiler->Compile(graph, request);
+  if (!plan.ok()) return plan.status();
+  std::set<Index> nodes, with_points;
+  for (const Plan::StepInfo& info : (*plan)->infos()) {
+    if (info.node.index == kNoIndex) continue;
+    nodes.insert(info.node.index);
+    if (info.points_total > 0) with_points.insert(info.node.index);
+  }
+  std::map<std::string, Signal> found;
+  for (const Index index : with_points) {
+    for (const Connection& c : graph.Inputs(graph.IdAt(index))) {
+      if (nodes.count(c.source.node.index) == 0 || !IsWorldMatrix(graph, c.source)) continue;
+      const std::string name = graph.PlugName(c.source);
+      found.emplace(name, Signal{name, c.source, true, true});
+    }
+  }
+  std::vector<Signal> sorted;
+  for (auto& [name, signal] : found) sorted.push_back(std::move(signal));
+  return sorted;
+}
+
 Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
                                         const std::vector<PlugRef>& outputs,
                                         const std::vector<PlugRef>& varying, const std::set<Index>& carried,

@@ -19,6 +19,8 @@ struct Signal {
   std::string name;  // "jaw.matrix", "head_mesh_blendShape.weight[smile]", "cage.points[3].y"
   PlugRef plug;      // a matrix or a double (children of vectors are signals of their own)
   bool matrix = false;
+  // The world matrix of a transform, which is measured relative to the space of the points.
+  bool relative = false;
   std::size_t entries() const { return matrix ? 12 : 1; }
 };
 // The entries of a matrix, in the order above.
@@ -32,6 +34,15 @@ struct SignalEntry {
   std::optional<std::size_t> entry;
 };
 SignalEntry SplitEntryName(const std::string& name);
+
+// The world matrices of transforms that enter steps with points under `varying`, sorted by name: cues that a
+// skinCluster is linear in, as it is not in local matrices, which multiply along a chain (KPSA.md 2.12). No
+// guards. Errors as of FindSignals.
+Result<std::vector<Signal>> FindRelativeMatrices(const Graph& graph, Compiler* compiler,
+                                                 const std::vector<PlugRef>& outputs,
+                                                 const std::vector<PlugRef>& varying);
+// Whether a plug is the world matrix of a transform.
+bool IsWorldMatrix(const Graph& graph, const PlugRef& plug);
 
 // The nodes from `node` up through parentMatrix.
 std::vector<NodeId> ParentsFrom(const Graph& graph, NodeId node);

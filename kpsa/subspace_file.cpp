@@ -95,11 +95,14 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
   writer->Add<T>(key, {values.size()}, values, half);
 }
 
-// A subspace without products is what it was before there were any.
+// A subspace without products and world matrices is what it was before there were any.
 int VersionOf(const Subspace& s) {
   const bool products =
       std::any_of(s.tiles.begin(), s.tiles.end(), [](const TileMap& t) { return t.has_products(); });
-  return products || s.score != ScoreMix() ? kSubspaceVersion : kOldestVersion;
+  const bool relative = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
+    return cue.plug.find(".worldMatrix/") != std::string::npos;
+  });
+  return products || relative || s.score != ScoreMix() ? kSubspaceVersion : kOldestVersion;
 }
 
 std::map<std::string, std::string> Header(const Subspace& s) {

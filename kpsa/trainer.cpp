@@ -106,7 +106,7 @@ class Trainer {
     }
 
     // Signals: under the controls, and under each clip
-    std::vector<Signal> signals;
+    std::vector<Signal> signals, relative;
     for (int clip = -1; clip < static_cast<int>(clips_.size()); ++clip) {
       if (clip >= 0) KPSA_RETURN_IF_ERROR(rig_.set_clip(clips_[static_cast<std::size_t>(clip)].name));
       std::vector<PlugRef> varying{rig_.time};
@@ -116,14 +116,16 @@ class Trainer {
       Result<std::vector<Signal>> found =
           FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, {}, nullptr);
       if (!found.ok()) return found.status();
-      for (Signal& signal : *found) {
-        const bool known = std::any_of(signals.begin(), signals.end(),
-                                       [&](const Signal& s) { return s.name == signal.name; });
-        if (!known) signals.push_back(std::move(signal));
-      }
+      AddNew(std::move(*found), &signals);
+      if (of_light() || options_.mode == EstimatorMode::kPaper) continue;
+      Result<std::vector<Signal>> matrices =
+          FindRelativeMatrices(*rig_.graph, &compiler_, rig_.target.outputs(), varying);
+      if (!matrices.ok()) return matrices.status();
+      AddNew(std::move(*matrices), &relative);
     }
-    std::sort(signals.begin(), signals.end(),
-              [](const Signal& a, const Signal& b) { return a.name < b.name; });
+    for (std::vector<Signal>* list : {&signals, &relative}) std::ranges::sort(*list, {}, &Signal::name);
+    guards_ = signals;
+    signals.insert(signals.end(), relative.begin(), relative.end());
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     for (const PlugRef& space : rig_.target.space) {
       const Result<Value> rest = compiler_.Rest(*rig_.graph, space);
@@ -137,6 +139,13 @@ class Trainer {
     layout_ = *layout;
     totals_ = totals;
     return Status();
+  }
+
+  static void AddNew(std::vector<Signal> found, std::vector<Signal>* known) {
+    for (Signal& signal : found) {
+      if (std::ranges::find(*known, signal.name, &Signal::name) == known->end())
+        known->push_back(std::move(signal));
+    }
   }
 
   // To train on, and, where cues have places to choose from, to judge these by.
@@ -272,12 +281,12 @@ class Trainer {
     std::vector<double> reach(lo_.size(), 0);
     if (!of_light()) {
       Result<std::vector<double>> found =
-          FindReach(rig_, &compiler_, recorder_->signals(), inverse_rest_stretch_, diagonal_);
+          FindReach(rig_, &compiler_, guards_, inverse_rest_stretch_, diagonal_);
       if (!found.ok()) return found.status();
       reach = std::move(*found);
     }
     std::vector<TrainedRange> ranges;
-    for (const Signal& signal : recorder_->signals()) {
+    for (const Signal& signal : guards_) {
       for (std::size_t e = 0; e < signal.entries(); ++e) {
         const std::size_t i = ranges.size();
         const double extent = hi_[i] - lo_[i], noticed = options_.tolerance / reach[i];
@@ -544,7 +553,7 @@ class Trainer {
                         const std::vector<std::vector<float>>& entries, std::vector<ScoreJudge>* judged) {
     for (std::size_t t = 0; t < entries.size(); ++t) {
       double& guard = (*judged)[t].guard;
-      for (std::size_t e = 0; e < entries[t].size(); ++e) {
+      for (std::size_t e = 0; e < guarded.size(); ++e) {
         if (guarded[e])
           guard = std::max(guard, GuardWeight(ranges[e].lo, ranges[e].hi, ranges[e].ramp, entries[t][e]));
       }
@@ -554,7 +563,7 @@ class Trainer {
   // By entry: whether it has a guard where the space carries the points.
   std::vector<char> GuardedEntries(const std::vector<std::string>& carried) const {
     std::vector<char> guarded;
-    for (const Signal& signal : recorder_->signals()) {
+    for (const Signal& signal : guards_) {
       const bool free = signal.matrix && std::find(carried.begin(), carried.end(),
                                                    rig_.graph->name(signal.plug.node)) != carried.end();
       guarded.insert(guarded.end(), signal.entries(), !free);
@@ -586,6 +595,7 @@ class Trainer {
   std::vector<CuePlace> places_;
   double full_cost_ = 0;
   std::vector<Double3> positions_;
+  std::vector<Signal> guards_;   // the recorder's first signals: relative matrices follow, which only measure
   std::vector<double> lo_, hi_;  // of every entry of a signal
   Matrix4 inverse_rest_stretch_;
   ClipPoses clip_poses_;
