@@ -22,6 +22,7 @@ constexpr double kHopeless =
 constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
 constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kBlendStart = 0.85;
+constexpr double kScoreCost = 0.1;   // ns for the square of a row
 constexpr double kEvenOdds = 0.5;    // the confidence where few judges stand for many calibration poses
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
@@ -53,14 +54,15 @@ class Chooser {
           const CueChoiceOptions& options)
       : pca_(pca), positions_(positions), noise_(noise), poses_(poses), options_(options) {}
 
-  std::vector<CueRef> Run() {
+  CueChoice Run() {
     std::vector<CuePlace> places = options_.places;
     if (places.empty()) {
       const bool stages = pca_.layout.stage_points > 0;
       places.push_back(AllCandidates(pca_, kMinMotion, !stages, stages, false));
     }
-    const bool compares = places.size() > 1 && options_.judges != nullptr;
+    const bool compares = options_.judges != nullptr;
     for (const CuePlace& place : places) {
+      place_ = static_cast<std::size_t>(&place - places.data());
       chosen_.clear();
       SelectInRounds(place);
       if (chosen_.empty()) continue;
@@ -69,7 +71,7 @@ class Chooser {
       const bool early = std::any_of(chosen_.begin(), chosen_.end(),
                                      [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
       if (early && !options_.by_rms && AddWorstPoints()) better |= compares && KeepIfCheaper();
-      if (!compares) return std::move(chosen_);
+      if (!compares) return {std::move(chosen_), place_};
       if (!better) break;  // earlier ones see even less
     }
     return std::move(best_);
@@ -78,9 +80,12 @@ class Chooser {
  private:
   // Whether what is chosen is expected to cost less than the best so far, which it then is.
   bool KeepIfCheaper() {
-    const double cost = options_.points_cost(chosen_) + Misses(chosen_) * options_.miss_cost;
-    if (cost >= least_) return false;
-    least_ = cost, best_ = chosen_;
+    double rows = 0;
+    for (const CueRef& cue : chosen_) rows += cue.kind == CueKind::kScalar ? 1 : 3;
+    const double misses = Misses(chosen_), cost = options_.points_cost(chosen_) + kScoreCost * rows * rows +
+                                                  misses * options_.miss_cost;
+    if (!best_.cues.empty() && cost >= best_.cost) return false;
+    best_ = {chosen_, place_, cost, misses};
     return true;
   }
 
@@ -200,14 +205,15 @@ class Chooser {
   const CueNoise& noise_;
   const PoseMatrix& poses_;
   const CueChoiceOptions& options_;
-  std::vector<CueRef> chosen_, best_;
-  double least_ = std::numeric_limits<double>::infinity();  // expected cost of the best (ns)
+  std::size_t place_ = 0;
+  std::vector<CueRef> chosen_;
+  CueChoice best_;
 };
 
 }  // namespace
 
-std::vector<CueRef> ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
-                               const PoseMatrix& poses, const CueChoiceOptions& options) {
+CueChoice ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
+                     const PoseMatrix& poses, const CueChoiceOptions& options) {
   return Chooser(pca, positions, noise, poses, options).Run();
 }
 

@@ -40,8 +40,18 @@ struct CueChoiceOptions {
 // Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
 // deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are
 // measured themselves, besides `rows`; not if that does not help, or costs more than it saves.
-std::vector<CueRef> ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
-                               const PoseMatrix& poses, const CueChoiceOptions& options);
+// What SoftCache's own score costs, for the square of a row; ns on the scale of the nodes' costs.
+inline constexpr double kScoreCost = 0.1;
+
+struct CueChoice {
+  std::vector<CueRef> cues;
+  // Where judges compared places, of the one that was taken: its number, the expected time of a frame
+  // (points, score, misses), and the share of misses.
+  std::size_t place = 0;
+  double cost = 0, misses = 0;
+};
+CueChoice ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
+                     const PoseMatrix& poses, const CueChoiceOptions& options);
 
 // The paper's: two points for each varimax-rotated mode.
 std::vector<CueRef> ChoosePaperCues(const Pca& pca, std::span<const Double3> positions, double diagonal);

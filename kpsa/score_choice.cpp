@@ -10,9 +10,8 @@ namespace {
 
 constexpr double kQuantile = 0.99;  // of the judges: where the two parts are made equal
 constexpr double kRatios[] = {0.125, 0.25, 0.5, 1, 2, 4, 8};  // of the doubt to SoftCache's own
-constexpr double kEvenOdds = 0.5;  // the confidence where few judges stand for many calibration poses
-constexpr double kAround[] = {0.7, 1, 1.4};  // tolerances, so that no single judge decides
-constexpr double kGain = 0.01;               // more hits that a mix has to bring
+constexpr double kAround[] = {0.85, 1, 1.2};                  // tolerances, so that no single judge decides
+constexpr double kGain = 0.01;  // in hits, that a mix has to bring: chance brings some
 
 double Quantile(std::vector<double> values) {
   const auto nth =
@@ -24,7 +23,7 @@ double Quantile(std::vector<double> values) {
 }  // namespace
 
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
-                     double blend_start) {
+                     double blend_start, const ScoreCosts& costs) {
   std::vector<double> measured, doubts;
   for (const ScoreJudge& judge : judges) {
     measured.push_back(judge.pose.measured);
@@ -33,29 +32,30 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
   if (judges.empty()) return {};
   const double unit = Quantile(measured), doubt = Quantile(doubts);
   if (!(unit > 0) || !(doubt > 0) || !std::isfinite(unit) || !std::isfinite(doubt)) return {};
-  // Share of the sampled poses that hit
-  const auto hits = [&](const ScoreMix& mix) {
+  // Share of the sampled poses that hit, less what the score costs
+  const auto worth = [&](const ScoreMix& mix) {
     double sum = 0;
     for (const double around : kAround) {
       std::vector<CalibrationPair> pairs;
       for (const ScoreJudge& judge : judges)
         pairs.push_back(
             {mix.Of(judge.pose.measured, judge.pose.doubt), judge.pose.error, judge.guard, judge.kind});
-      const Calibration found = Calibrate(pairs, around * tolerance, violation_rate, blend_start, kEvenOdds);
+      const Calibration found = Calibrate(pairs, around * tolerance, violation_rate, blend_start);
       for (const Calibration::Kind& kind : found.kinds) {
         if (kind.kind == static_cast<int>(PoseKind::kSampled))
           sum += static_cast<double>(kind.hits) / static_cast<double>(kind.poses);
       }
     }
-    return sum / static_cast<double>(std::size(kAround));
+    return sum / static_cast<double>(std::size(kAround)) - (mix.measured > 0 ? costs.measured : 0) -
+           (mix.doubt > 0 ? costs.doubt : 0);
   };
   ScoreMix best;
-  double most = hits(best);
+  double most = worth(best);
   const auto try_mix = [&](const ScoreMix& mix, double gain) {
-    const double found = hits(mix);
+    const double found = worth(mix);
     if (found >= most + gain) best = mix, most = found;
   };
-  try_mix({0, 1 / doubt}, 0);  // which spares SoftCache's factor
+  try_mix({0, 1 / doubt}, kGain);
   for (const double ratio : kRatios) try_mix({1, ratio * unit / doubt}, kGain);
   return best;
 }

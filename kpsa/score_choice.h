@@ -17,9 +17,13 @@ struct ScoreJudge {
   int kind = 0;      // PoseKind
 };
 
-// Of the mixes under which, at the tolerance and some around it, the most sampled poses hit: the one that
-// costs least. Without doubts: SoftCache's own.
+// The mix under which a frame is expected to cost least: that of the score, and of the sampled poses that
+// miss, at the tolerance and some around it. Costs of both parts are in full evaluations. Without doubts:
+// SoftCache's own.
+struct ScoreCosts {
+  double measured = 0, doubt = 0;
+};
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
-                     double blend_start);
+                     double blend_start, const ScoreCosts& costs);
 
 }  // namespace kpsa

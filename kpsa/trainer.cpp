@@ -39,6 +39,10 @@ constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn
 constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
 constexpr double kLightShift = 1e-4;  // metres; where the tolerance is no length: both, of a joint
 constexpr int kMaxLightModes = 120;   // that are looked at; noise is beyond
+constexpr double kManyMisses = 0.05;  // from which finer cues are tried
+constexpr double kDoubtCost = 100;    // ns a tile, on the scale of the nodes' costs
+constexpr std::size_t kFineRows = 500;
+constexpr int kFineModes = 450;
 constexpr std::size_t kJudges = 300;  // new poses that compare places for cues
 
 class Trainer {
@@ -195,7 +199,8 @@ class Trainer {
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
-    return places_.size() > 1 ? RecordJudges(judges) : Status();
+    const bool compares = places_.size() > 1 || (options_.may_be_finer && !places_.empty());
+    return compares ? RecordJudges(judges) : Status();
   }
 
   Status RecordJudges(PoseMatrix* judges) {
@@ -327,6 +332,13 @@ class Trainer {
       residual = HonestResidual(residual, pca_.poses, pca_.mode_count());
   }
 
+  Result<Pca> ComputeModes(const PoseMatrix& poses, const Eigen::VectorXd& mean, int modes) const {
+    PcaOptions options;
+    options.max_modes = modes;
+    options.seed = options_.seed;
+    return ComputePca(poses, mean, options);
+  }
+
   Status FindModes(PoseMatrix* poses) {
     const Eigen::VectorXd mean = poses->Mean();
     // The model's size, from the mean shape
@@ -342,12 +354,10 @@ class Trainer {
     }
     diagonal_ = Length(hi - lo);
     poses->Subtract(mean);
-    PcaOptions pca_options;
-    pca_options.max_modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2)
-                                                                   : options_.max_modes;
-    pca_options.seed = options_.seed;
-    if (of_light()) pca_options.max_modes = std::min(pca_options.max_modes, kMaxLightModes);
-    Result<Pca> pca = ComputePca(*poses, mean, pca_options);
+    int modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2)
+                                                       : options_.max_modes;
+    if (of_light()) modes = std::min(modes, kMaxLightModes);
+    Result<Pca> pca = ComputeModes(*poses, mean, modes);
     if (!pca.ok()) return pca.status();
     pca_ = std::move(*pca);
     noise_ = MakeNoise();
@@ -388,12 +398,23 @@ class Trainer {
     choice.miss_cost = full_cost_;
     choice.violation_rate = options_.violation_rate;
     if (of_light()) choice.max_outputs = options_.max_light_candidates;
-    const std::vector<CueRef> chosen = options_.mode == EstimatorMode::kPaper
-                                           ? ChoosePaperCues(pca_, positions_, diagonal_)
-                                           : kpsa::ChooseCues(pca_, positions_, noise_, poses, choice);
+    CueChoice chosen = options_.mode == EstimatorMode::kPaper
+                           ? CueChoice{ChoosePaperCues(pca_, positions_, diagonal_)}
+                           : kpsa::ChooseCues(pca_, positions_, noise_, poses, choice);
     KPSA_RETURN_IF_ERROR(std::move(priced));
-    if (chosen.empty()) return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
-    cues_ = MakeCueSet(pca_, chosen, noise_);
+    if (chosen.cues.empty())
+      return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
+    if (options_.may_be_finer && choice.judges != nullptr && !of_light() && chosen.misses > kManyMisses) {
+      KPSA_RETURN_IF_ERROR(Say("finer cues", 0.75));
+      Result<Pca> fine = ComputeModes(poses, pca_.mean, kFineModes);
+      if (!fine.ok()) return fine.status();
+      choice.rows = kFineRows;
+      if (!places_.empty()) choice.places = {places_[chosen.place]};
+      CueChoice finer = kpsa::ChooseCues(*fine, positions_, noise_, poses, choice);
+      KPSA_RETURN_IF_ERROR(std::move(priced));
+      if (!finer.cues.empty() && finer.cost < chosen.cost) chosen = std::move(finer), pca_ = std::move(*fine);
+    }
+    cues_ = MakeCueSet(pca_, chosen.cues, noise_);
     return Status();
   }
 
@@ -485,7 +506,7 @@ class Trainer {
     if (count == 0)
       count =
           static_cast<std::size_t>(std::clamp(8.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
-    // Held-out poses of every kind; half as many new ones say how to score them.
+    // Held-out poses of every kind; as many new ones say how to score them.
     PoseJudge judge(*subspace, layout_, cues_), score_judge(*subspace, layout_, cues_);
     std::vector<ScoreJudge> held_out, score_judges;
     std::vector<std::vector<float>> entries, score_entries;
@@ -496,7 +517,7 @@ class Trainer {
       if (std::any_of(subspace->tiles.begin(), subspace->tiles.end(),
                       [](const TileMap& tiles) { return tiles.has_products(); }))
         KPSA_RETURN_IF_ERROR(
-            JudgePoses(k, count / 2, 0x3c6ef372fe94f82bull, &score_judge, &score_judges, &score_entries));
+            JudgePoses(k, count, 0x3c6ef372fe94f82bull, &score_judge, &score_judges, &score_entries));
     }
     record_.calibration_poses = poses.size();
     record_.held_out_rms = judge.rms();
@@ -509,8 +530,8 @@ class Trainer {
     const std::vector<char> guarded = GuardedEntries(carried->rigid);
     AskGuards(subspace->ranges, guarded, entries, &held_out);
     AskGuards(subspace->ranges, guarded, score_entries, &score_judges);
-    subspace->score =
-        ChooseScore(score_judges, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
+    subspace->score = ChooseScore(score_judges, subspace->tolerance, subspace->violation_rate,
+                                  subspace->blend_start, CostsOfScore(*subspace));
     for (const ScoreJudge& held : held_out) {
       subspace->calibration.push_back(
           {subspace->score.Of(held.pose.measured, held.pose.doubt), held.pose.error, held.guard, held.kind});
@@ -558,6 +579,16 @@ class Trainer {
           guard = std::max(guard, GuardWeight(ranges[e].lo, ranges[e].hi, ranges[e].ramp, entries[t][e]));
       }
     }
+  }
+
+  ScoreCosts CostsOfScore(const Subspace& subspace) const {
+    const auto rows = static_cast<double>(subspace.rows());
+    double tiles = 0;
+    for (const TileMap& map : subspace.tiles) {
+      for (const std::uint32_t count : map.data().products) tiles += count > 0 ? 1 : 0;
+    }
+    if (!(full_cost_ > 0)) return {};
+    return {kScoreCost * rows * rows / full_cost_, kDoubtCost * tiles / full_cost_};
   }
 
   // By entry: whether it has a guard where the space carries the points.

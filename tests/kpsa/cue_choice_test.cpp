@@ -52,7 +52,8 @@ struct Fold {
     noise.scalars = {0, 0, 1e-8};
   }
   std::vector<CueRef> Choose() const {
-    return ChooseCues(pca, positions, noise, poses, {.rows = 20, .min_points = 4, .tolerance = kTolerance});
+    return ChooseCues(pca, positions, noise, poses, {.rows = 20, .min_points = 4, .tolerance = kTolerance})
+        .cues;
   }
   double LargestError(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca, chosen, noise);
@@ -133,7 +134,7 @@ std::vector<CueRef> ChooseAmongPlaces(const Fold& fold, double output_cost, doub
     outputs.push_back({CueKind::kOutput, i});
   }
   options.places = {outputs, stage};
-  std::vector<CueRef> chosen = ChooseCues(fold.pca, fold.positions, fold.noise, fold.poses, options);
+  std::vector<CueRef> chosen = ChooseCues(fold.pca, fold.positions, fold.noise, fold.poses, options).cues;
   std::erase_if(chosen, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
   return chosen;
 }

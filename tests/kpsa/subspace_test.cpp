@@ -227,7 +227,7 @@ TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   EXPECT_EQ(version(), std::to_string(kOldestVersion));
   if (GetParam() != EstimatorMode::kMap) return;
   Subspace bent = MakeSubspace(pca_, cues_, estimator_, MeasuredPoses(training_.layout(), cues_, training_),
-                               subspace_.outputs, {.rms_budget = 1e-6}, &training_);
+                               subspace_.outputs, {.rms_budget = 1e-6, .max_budget = 1e-5}, &training_);
   bent.cues = subspace_.cues;
   bent.score = {0.5, 300};
   ASSERT_GT(bent.doubt_inputs(), 0u);
@@ -365,7 +365,7 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   EXPECT_EQ(message(header), "no error");
   EXPECT_NE(edited([](Json* j) {
               (*j)["__metadata__"]["version"] = "1";
-            }).find("format version 1, this program reads version 3; train it again"),
+            }).find("format version 1, this program reads version 4; train it again"),
             std::string::npos);
   EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"),
             std::string::npos);
