@@ -20,7 +20,7 @@ TEST(Init, OneClipTrainsAndBenchesAsItIs) {
   const ProcessResult init = RunKpsa({"init", glb, "-o", rig});
   ASSERT_EQ(init.exit_code, 0) << init.err;
   EXPECT_FALSE(Has(init.err, "note:")) << init.err;
-  const ProcessResult train = RunKpsa({"train", rig, "--calibration", "100", "--rows", "60"});
+  const ProcessResult train = RunKpsa({"train", rig, "--calibration", "100", "--rows", "60", "--force"});
   ASSERT_EQ(train.exit_code, 0) << train.err;
   const ProcessResult bench = RunKpsa({"bench", rig, "--check", "--runs", "1"});
   EXPECT_EQ(bench.exit_code, 0) << bench.err;

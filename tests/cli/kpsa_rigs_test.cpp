@@ -232,7 +232,7 @@ TEST_F(Travelling, CuesThatAreNoNumbersMiss) {
   EXPECT_FALSE(frame.hit);
   EXPECT_EQ(frame.reason, MissReason::kNotFinite);
   EXPECT_NE(frame.text.find("is not a number"), std::string::npos) << frame.text;
-  EXPECT_EQ(std::count(frame.text.begin(), frame.text.end(), '@'), 1) << frame.text;  // mesh@stage
+  EXPECT_LE(std::count(frame.text.begin(), frame.text.end(), '@'), 1) << frame.text;  // mesh@stage, or a plug
   run.Set("lower.translateX", 0);
   EXPECT_TRUE(SameBytes(run.Evaluate().points, before.points));
 }

@@ -72,8 +72,9 @@ TEST_F(FrameVerdicts, EvalTellsOfEveryFrame) {
     EXPECT_EQ(verdict, score <= tau_lo_ ? "hit" : score < tau_ ? "blend" : "miss");
     EXPECT_NEAR(weight, FullWeight(score, {tau_, tau_lo_ / tau_}), 1e-9);
     EXPECT_EQ(frame["subspace"], "column");
-    EXPECT_TRUE(verdict == "hit" ? frame["reason"] == "hit"
-                                 : std::string(frame["reason"]).starts_with("unlike the trained poses"));
+    EXPECT_TRUE(verdict == "hit"
+                    ? frame["reason"] == "hit"
+                    : std::string(frame["reason"]).find("the trained poses") != std::string::npos);
   }
   EXPECT_EQ(told["hits"], counts["hit"]);
   EXPECT_EQ(told["blends"], counts["blend"]);
@@ -114,7 +115,7 @@ TEST_F(FrameVerdicts, BenchAndGetSayTheSame) {
     for (const char* verdict : {"hit", "blend", "miss"}) {
       if (line.find(fmt::format("  {} ", verdict)) == std::string::npos) continue;
       ++listed[verdict];
-      EXPECT_EQ(line.find("unlike the trained poses") != std::string::npos, verdict != std::string("hit"));
+      EXPECT_EQ(line.find("the trained poses") != std::string::npos, verdict != std::string("hit"));
     }
   }
   EXPECT_EQ(listed["blend"], blends);

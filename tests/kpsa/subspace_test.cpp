@@ -226,8 +226,10 @@ TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok());
   EXPECT_EQ(version(), std::to_string(kOldestVersion));
   if (GetParam() != EstimatorMode::kMap) return;
-  Subspace bent = MakeSubspace(pca_, cues_, estimator_, MeasuredPoses(training_.layout(), cues_, training_),
-                               subspace_.outputs, {.rms_budget = 1e-6, .max_budget = 1e-5}, &training_);
+  PoseMatrix many = sheet_.RandomPoses(1500, 5, sheet_.Layout(false, true));
+  many.Subtract(pca_.mean);
+  Subspace bent = MakeSubspace(pca_, cues_, estimator_, MeasuredPoses(many.layout(), cues_, many),
+                               subspace_.outputs, {.rms_budget = 1e-6, .max_budget = 1e-5}, &many);
   bent.cues = subspace_.cues;
   bent.score = {0.5, 300};
   ASSERT_GT(bent.doubt_inputs(), 0u);

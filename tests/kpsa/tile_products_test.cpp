@@ -191,7 +191,8 @@ TEST(TileProducts, InconsistentDataAreRefused) {
   const auto refused = [&](auto change, const std::string& part) {
     EXPECT_NE(make(change).find(part), std::string::npos) << make(change);
   };
-  refused([](TileData* d) { d->products.pop_back(); }, "numbers of products");
+  refused([](TileData* d) { d->products.pop_back(); }, "tile 2 has rank");
+  refused([](TileData* d) { d->products.push_back(0); }, "numbers of products");
   refused([](TileData* d) { d->products[0] = 80; }, "80 products");
   refused([](TileData* d) { ++d->products[0]; }, "expected");
   refused([](TileData* d) { d->pairs[3] = 14; }, "product of latent 14");

@@ -211,7 +211,7 @@ TEST(UntouchedRun, ReadsWhatTheProgramPrints) {
   ASSERT_TRUE(row.ok()) << row.status().ToString();
   EXPECT_EQ(row->points, 794u);
   EXPECT_EQ(row->joints, 2u);
-  EXPECT_EQ(row->test_clip, "wave");
+  EXPECT_EQ(row->test_clip, "wave_test1");
   EXPECT_GT(row->training_seconds, 0);
   EXPECT_GT(row->tolerance, 0);
   EXPECT_GT(row->speedup, 0);
