@@ -59,7 +59,8 @@ TEST(GuardWalks, NoStepIsMuchLargerThanTheFullEvaluations) {
   EXPECT_GT(blends, 100u) << "the walks cross ramps";
 
   // The canary: where the approximation is coarse, guards without a ramp jump
-  options.max_modes = 3;
+  options.max_modes = 5;
+  options.may_be_finer = false;
   const auto coarse = TrainRig(folder.rig(), options);
   ASSERT_NE(coarse, nullptr);
   const auto worst = [&](std::shared_ptr<const Subspace> subspace) {

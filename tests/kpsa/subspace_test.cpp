@@ -226,11 +226,26 @@ TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok());
   EXPECT_EQ(version(), std::to_string(kOldestVersion));
   if (GetParam() != EstimatorMode::kMap) return;
-  PoseMatrix many = sheet_.RandomPoses(1500, 5, sheet_.Layout(false, true));
-  many.Subtract(pca_.mean);
-  Subspace bent = MakeSubspace(pca_, cues_, estimator_, MeasuredPoses(many.layout(), cues_, many),
-                               subspace_.outputs, {.rms_budget = 1e-6, .max_budget = 1e-5}, &many);
-  bent.cues = subspace_.cues;
+  // A sheet that bends and twists, and the values that say how far
+  const Sheet sheet(240, 2, 1);
+  PoseMatrix poses = sheet.RandomPoses(1500, 5, sheet.Layout(false, true));
+  const Eigen::VectorXd mean = poses.Mean();
+  poses.Subtract(mean);
+  const Pca pca = std::move(*ComputePca(poses, mean, {.max_modes = 4}));
+  std::vector<CueRef> scalars;
+  for (Index i = 0; i < 4; ++i) scalars.push_back({CueKind::kScalar, i});
+  const CueSet cues = MakeCueSet(pca, scalars, sheet.diagonal());
+  Subspace bent = MakeSubspace(pca, cues, MapEstimator(pca, cues), MeasuredPoses(poses.layout(), cues, poses),
+                               subspace_.outputs, {.rms_budget = 1e-5, .max_budget = 1e-4}, &poses);
+  const PoseMatrix fresh = sheet.RandomPoses(30, 6, sheet.Layout(false, true));
+  const auto raw = [&](std::size_t t) {
+    const std::span<const float> row = fresh.row(t).subspan(fresh.layout().scalar_begin());
+    return std::vector<double>(row.begin(), row.end());
+  };
+  bent.cues.clear();
+  for (const char* plug : {"a.x", "b.x", "c.x", "d.x"})
+    bent.cues.push_back(
+        {.kind = CueDescription::Kind::kScalar, .plug = plug, .stage = "", .mesh = 0, .point = 0});
   bent.score = {0.5, 300};
   ASSERT_GT(bent.doubt_inputs(), 0u);
   ASSERT_TRUE(WriteSubspace(bent, path_).ok()) << WriteSubspace(bent, path_).ToString();
@@ -240,9 +255,9 @@ TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   EXPECT_EQ(read->score, bent.score);
   SubspaceScratch a(bent), b(*read);
   bool doubted = false;
-  for (std::size_t t = 0; t < test_.poses(); ++t) {
-    Measure(bent, RawCues(t), &a);
-    Measure(*read, RawCues(t), &b);
+  for (std::size_t t = 0; t < fresh.poses(); ++t) {
+    Measure(bent, raw(t), &a);
+    Measure(*read, raw(t), &b);
     const Verdict x = Judge(bent, {.tau = 0.3}, &a), y = Judge(*read, {.tau = 0.3}, &b);
     EXPECT_EQ(x.score, y.score);
     EXPECT_EQ(x.offender, y.offender);
@@ -261,7 +276,7 @@ TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   // A measurement that is no number is a miss, whatever the score counts
   for (const ScoreMix& mix : {ScoreMix{0, 1}, ScoreMix{1, 1}}) {
     bent.score = mix;
-    a.y.data()[4] = std::nanf("");
+    a.y.data()[2] = std::nanf("");
     EXPECT_EQ(Judge(bent, {.tau = 1e9}, &a).reason, MissReason::kNotFinite);
   }
   bent.score = {0, 0};
