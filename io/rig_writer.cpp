@@ -531,11 +531,9 @@ class Writer {
                           training.by_clips ? "the clips" : "controls", about(training.motion))
             : fmt::format("{:.3g} % of the size ({})", kToleranceOfSize * 100, about(rig_.rest_diagonal));
     text_ += fmt::format(
-        "    tolerance: {}  # the largest error of a point that is accepted: {}, rounded; that is not seen\n",
+        "    tolerance: {}  # the largest error of a point that is accepted: {}, rounded\n",
         LengthOf(StarterTolerance(rig_.rest_diagonal, training.motion)), from);
-    text_ +=
-        "    # Where kpsa bench says that few frames hit: a tolerance of 2 to 3 times as much is hardly "
-        "seen\n";
+    text_ += "    # kpsa bench says which tolerance would hit how often, and how fast that is\n";
   }
   static std::string LengthOf(double metres) {
     if (metres >= 1) return Rounded(metres) + "m";

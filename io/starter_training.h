@@ -40,7 +40,7 @@ Result<StarterTraining> ChooseTraining(Rig* rig, std::optional<NodeId> space,
                                        const std::vector<ClipMotion>& motions,
                                        const std::vector<ControlPlug>& controls);
 
-// What nobody sees: kToleranceOfSize of the diagonal, but no more than kToleranceOfMotion of the motion (0:
+// What is hardly seen: kToleranceOfSize of the diagonal, but no more than kToleranceOfMotion of the motion (0:
 // there is none to go by); as 1, 2 or 5 times a power of ten. Metres.
 double StarterTolerance(double diagonal, double motion);
 inline constexpr double kToleranceOfSize = 0.003, kToleranceOfMotion = 0.3;

@@ -8,6 +8,7 @@
 #include "kpsa/carried.h"
 #include "kpsa/control_groups.h"
 #include "kpsa/cue_choice.h"
+#include "kpsa/cue_description.h"
 #include "kpsa/cue_places.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/pca.h"
@@ -443,48 +444,8 @@ class Trainer {
     subspace.tolerance = options_.tolerance;
     subspace.violation_rate = options_.violation_rate;
     subspace.cues.clear();
-    for (const CueRef& cue : cues_.cues) subspace.cues.push_back(Describe(cue));
+    for (const CueRef& cue : cues_.cues) subspace.cues.push_back(DescribeCue(rig_, *recorder_, totals_, cue));
     return subspace;
-  }
-
-  // Where output points are measured: stages that pass points through need not run.
-  const AccelerationTarget::Stage& OutputStage(const std::vector<AccelerationTarget::Stage>& stages) const {
-    std::size_t last = stages.size() - 1;
-    while (last > 0 && rig_.graph->def(stages[last].points.node).passes_points) --last;
-    return stages[last];
-  }
-
-  CueDescription Describe(CueRef cue) const {
-    CueDescription d;
-    Index index = cue.index;
-    if (cue.kind == CueKind::kScalar) {
-      d.kind = CueDescription::Kind::kScalar;
-      for (const Signal& signal : recorder_->signals()) {
-        if (index < signal.entries()) {
-          d.plug = EntryName(signal, index);
-          return d;
-        }
-        index -= static_cast<Index>(signal.entries());
-      }
-      KPSA_CHECK(false);
-    }
-    const auto put = [&](std::size_t m, const AccelerationTarget::Stage& stage, Index point) {
-      d.mesh = static_cast<Index>(m), d.stage = stage.name, d.point = point;
-      return d;
-    };
-    if (cue.kind == CueKind::kOutput) {
-      std::size_t m = 0;
-      for (; index >= totals_[m]; ++m) index -= totals_[m];
-      return put(m, OutputStage(rig_.target.meshes[m].stages), index);
-    }
-    for (const CandidateStage& candidate : recorder_->candidates()) {
-      if (index < candidate.points.size())
-        return put(candidate.mesh, rig_.target.meshes[candidate.mesh].stages[candidate.stage],
-                   candidate.points[index]);
-      index -= static_cast<Index>(candidate.points.size());
-    }
-    KPSA_CHECK(false);
-    return d;
   }
 
   // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
