@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kpsa/poses.h"
-
 namespace kpsa {
 namespace {
 
 constexpr double kQuantile = 0.99;  // of the judges: where the two parts are made equal
 constexpr double kRatios[] = {0.125, 0.25, 0.5, 1, 2, 4, 8};  // of the doubt to SoftCache's own
-constexpr double kAround[] = {0.85, 1, 1.2};                  // tolerances, so that no single judge decides
-constexpr double kGain = 0.01;  // in hits, that a mix has to bring: chance brings some
+constexpr double kAround[] = {0.5, 0.7, 1, 1.4};  // tolerances: where all poses hit, finer ones tell
+constexpr double kGain = 0.01;                    // in hits, that a mix has to bring: chance brings some
 
 double Quantile(std::vector<double> values) {
   const auto nth =
@@ -32,7 +30,7 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
   if (judges.empty()) return {};
   const double unit = Quantile(measured), doubt = Quantile(doubts);
   if (!(unit > 0) || !(doubt > 0) || !std::isfinite(unit) || !std::isfinite(doubt)) return {};
-  // Share of the sampled poses that hit, less what the score costs
+  // Share of the poses that hit, all kinds alike, less what the score costs
   const auto worth = [&](const ScoreMix& mix) {
     double sum = 0;
     for (const double around : kAround) {
@@ -41,10 +39,8 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
         pairs.push_back(
             {mix.Of(judge.pose.measured, judge.pose.doubt), judge.pose.error, judge.guard, judge.kind});
       const Calibration found = Calibrate(pairs, around * tolerance, violation_rate, blend_start);
-      for (const Calibration::Kind& kind : found.kinds) {
-        if (kind.kind == static_cast<int>(PoseKind::kSampled))
-          sum += static_cast<double>(kind.hits) / static_cast<double>(kind.poses);
-      }
+      for (const Calibration::Kind& kind : found.kinds)
+        sum += static_cast<double>(kind.hits) / static_cast<double>(kind.poses * found.kinds.size());
     }
     return sum / static_cast<double>(std::size(kAround)) - (mix.measured > 0 ? costs.measured : 0) -
            (mix.doubt > 0 ? costs.doubt : 0);

@@ -17,9 +17,9 @@ struct ScoreJudge {
   int kind = 0;      // PoseKind
 };
 
-// The mix under which a frame is expected to cost least: that of the score, and of the sampled poses that
-// miss, at the tolerance and some around it. Costs of both parts are in full evaluations. Without doubts:
-// SoftCache's own.
+// The mix under which a frame is expected to cost least: that of the score, and of the poses that miss,
+// all kinds alike, at the tolerance and some around it. Costs of both parts are in full evaluations. Without
+// doubts: SoftCache's own.
 struct ScoreCosts {
   double measured = 0, doubt = 0;
 };
