@@ -41,7 +41,7 @@ struct CueChoiceOptions {
 // deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are
 // measured themselves, besides `rows`; not if that does not help, or costs more than it saves.
 // What SoftCache's own score costs, for the square of a row; ns on the scale of the nodes' costs.
-inline constexpr double kScoreCost = 0.1;
+inline constexpr double kScoreCost = 0.04;
 
 struct CueChoice {
   std::vector<CueRef> cues;

@@ -9,7 +9,8 @@ namespace {
 constexpr double kQuantile = 0.99;  // of the judges: where the two parts are made equal
 constexpr double kRatios[] = {0.125, 0.25, 0.5, 1, 2, 4, 8};  // of the doubt to SoftCache's own
 constexpr double kAround[] = {0.5, 0.7, 1, 1.4};  // tolerances: where all poses hit, finer ones tell
-constexpr double kGain = 0.01;                    // in hits, that a mix has to bring: chance brings some
+// In hits, that another mix has to bring: chance brings some. SoftCache's own is known to hold on clips.
+constexpr double kGain = 0.01, kGainOverOwn = 0.05;
 
 double Quantile(std::vector<double> values) {
   const auto nth =
@@ -47,12 +48,12 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
   };
   ScoreMix best;
   double most = worth(best);
-  const auto try_mix = [&](const ScoreMix& mix, double gain) {
+  const auto try_mix = [&](const ScoreMix& mix) {
     const double found = worth(mix);
-    if (found >= most + gain) best = mix, most = found;
+    if (found >= most + (best == ScoreMix() ? kGainOverOwn : kGain)) best = mix, most = found;
   };
-  try_mix({0, 1 / doubt}, kGain);
-  for (const double ratio : kRatios) try_mix({1, ratio * unit / doubt}, kGain);
+  try_mix({0, 1 / doubt});
+  for (const double ratio : kRatios) try_mix({1, ratio * unit / doubt});
   return best;
 }
 
