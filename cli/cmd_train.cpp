@@ -222,8 +222,8 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
             "not given");
   AddOption(command, "--seed", "N", &flags->seed, "of the sampled poses; 1 if not given");
   AddOption(command, "--rows", "N", &flags->rows,
-            "numbers measured a frame (a point has three); 300 if not given");
-  AddOption(command, "--modes", "N", &flags->modes, "modes at most; 250 if not given");
+            "numbers measured a frame (a point has three), at most; as many as pay if not given");
+  AddOption(command, "--modes", "N", &flags->modes, "modes at most; as many as pay if not given");
   AddOption(command, "--tolerance", "LENGTH", &flags->tolerance, "the largest error of a point, as in 0.2mm");
   AddOption(command, "--violation-rate", "SHARE", &flags->violation_rate,
             "share of frames that may exceed it, as in 1%");

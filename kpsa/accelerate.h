@@ -28,9 +28,9 @@ struct AccelerationTarget {
   };
   std::vector<MeshPoints> meshes;
   std::vector<Stage> all_stages;  // of all meshes of the rig: in which space points are
-  bool colors = false;         // they are light at shading points, and no points of meshes
-  std::vector<PlugRef> space;  // none, or the worldMatrix of the frame
-  std::string space_name;      // "" for the world, or what is the world to a rig within another one
+  bool colors = false;            // they are light at shading points, and no points of meshes
+  std::vector<PlugRef> space;     // none, or the worldMatrix of the frame
+  std::string space_name;         // "" for the world, or what is the world to a rig within another one
   RigWithin within;
   std::vector<PlugRef> varying;   // time, controls: all that may vary
   std::vector<PlugRef> controls;  // of these, the ones whose held value is no part of the rig's identity

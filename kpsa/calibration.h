@@ -62,7 +62,7 @@ struct Calibration {
 // ends at the largest calibration score / c: beyond what was seen nothing is promised. Pairs with a NaN count
 // as violations. A larger tolerance never gives a smaller threshold.
 Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
-                      double blend_start = 0.85, double confidence = kCalibrationConfidence);
+                      double blend_start = kBlendStart, double confidence = kCalibrationConfidence);
 
 // Share of the full evaluation, and largest point error, of what is emitted.
 double EmittedWeight(const CalibrationPair& pair, const SoftCacheThreshold& threshold);

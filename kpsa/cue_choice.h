@@ -32,14 +32,6 @@ struct CueChoiceOptions {
   double violation_rate = 0.01;
 };
 
-// A-optimal cues (kpsa/cue_selection.h): points of one place and scalars, in rounds: after each share of the
-// rows, points count by the largest errors that training poses still have there. The least expected squared
-// error alone leaves small regions to chance (a tongue behind teeth). The place is the one of the least
-// expected cost: of its points, and of the full evaluation where SoftCache would miss.
-//
-// Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
-// deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are
-// measured themselves, besides `rows`; not if that does not help, or costs more than it saves.
 // What SoftCache's own score costs, for the square of a row; ns on the scale of the nodes' costs.
 inline constexpr double kScoreCost = 0.04;
 
@@ -50,6 +42,15 @@ struct CueChoice {
   std::size_t place = 0;
   double cost = 0, misses = 0;
 };
+
+// A-optimal cues (kpsa/cue_selection.h): points of one place and scalars, in rounds: after each share of the
+// rows, points count by the largest errors that training poses still have there. The least expected squared
+// error alone leaves small regions to chance (a tongue behind teeth). The place is the one of the least
+// expected cost: of its points, and of the full evaluation where SoftCache would miss.
+//
+// Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
+// deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are
+// measured themselves, besides `rows`; not if that does not help, or costs more than it saves.
 CueChoice ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
                      const PoseMatrix& poses, const CueChoiceOptions& options);
 

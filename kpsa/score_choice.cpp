@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kpsa/quantile.h"
+
 namespace kpsa {
 namespace {
 
@@ -11,13 +13,6 @@ constexpr double kRatios[] = {0.125, 0.25, 0.5, 1, 2, 4, 8};  // of the doubt to
 constexpr double kAround[] = {0.5, 0.7, 1, 1.4};  // tolerances: where all poses hit, finer ones tell
 // In hits, that another mix has to bring: chance brings some. SoftCache's own is known to hold on clips.
 constexpr double kGain = 0.01, kGainOverOwn = 0.05;
-
-double Quantile(std::vector<double> values) {
-  const auto nth =
-      values.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
 
 }  // namespace
 
@@ -29,7 +24,7 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
     doubts.push_back(judge.pose.doubt);
   }
   if (judges.empty()) return {};
-  const double unit = Quantile(measured), doubt = Quantile(doubts);
+  const double unit = Quantile(measured, kQuantile), doubt = Quantile(doubts, kQuantile);
   if (!(unit > 0) || !(doubt > 0) || !std::isfinite(unit) || !std::isfinite(doubt)) return {};
   // Share of the poses that hit, all kinds alike, less what the score costs
   const auto worth = [&](const ScoreMix& mix) {

@@ -108,6 +108,7 @@ HWY_AFTER_NAMESPACE();
 #include <cmath>
 
 #include "base/check.h"
+#include "kpsa/quantile.h"
 
 namespace kpsa {
 
@@ -116,13 +117,7 @@ HWY_EXPORT(Project);
 namespace {
 
 constexpr double kQuantile = 0.99;
-
-double Quantile(std::vector<double> values, double share) {
-  const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(rank, 1) - 1);
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
+constexpr float kHugeMeasurement = 1e15f;  // deviations, or metres: reconstruction would overflow soon
 
 // |block * g|^2 for a block of h x h, column-major.
 float BlockNorm(const float* block, const float* g, std::size_t h) {
@@ -136,10 +131,12 @@ float BlockNorm(const float* block, const float* g, std::size_t h) {
   return sum;
 }
 
-Index FirstNotFinite(const SoftCacheModel& model, std::span<const float> y) {
+// The first cue with a value that is not below `limit`.
+Index FirstNotFinite(const SoftCacheModel& model, std::span<const float> y,
+                     float limit = std::numeric_limits<float>::infinity()) {
   for (std::size_t k = 0; k < model.cues(); ++k) {
     for (Index j = model.offsets[k]; j < model.offsets[k + 1]; ++j) {
-      if (!std::isfinite(y[j])) return static_cast<Index>(k);
+      if (!(std::fabs(y[j]) < limit)) return static_cast<Index>(k);
     }
   }
   return kNoIndex;
@@ -271,7 +268,7 @@ RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y
 
 Verdict JudgeFinite(const SoftCacheModel& model, std::span<const float> y) {
   Verdict verdict;
-  verdict.offender = FirstNotFinite(model, y);
+  verdict.offender = FirstNotFinite(model, y, kHugeMeasurement);
   if (verdict.offender != kNoIndex) Spoil(&verdict);
   return verdict;
 }

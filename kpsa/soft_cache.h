@@ -46,10 +46,12 @@ struct Verdict {
   Index offender = kNoIndex;
 };
 
+inline constexpr double kBlendStart = 0.85;  // c, unless something else is asked for
+
 // What decides; from kpsa/calibration.h. tau < 0: nothing is ever a hit; infinity: everything finite is.
 struct SoftCacheThreshold {
   double tau = -1;
-  double blend_start = 0.85;  // c
+  double blend_start = kBlendStart;  // c
   double tau_lo() const { return tau * blend_start; }
 };
 
@@ -86,7 +88,7 @@ RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y
 // The score, times its weight, and what follows from it. NaN or infinity in y is a miss.
 Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, std::span<const float> y,
               std::span<float> g, double weight = 1);
-// A hit of score 0, or a miss where y is not finite.
+// A hit of score 0, or a miss where y is not finite or so large that points would not be.
 Verdict JudgeFinite(const SoftCacheModel& model, std::span<const float> y);
 
 // The trained range of a plug that may vary, and how far outside of it the full evaluation comes in.

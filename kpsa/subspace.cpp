@@ -228,7 +228,7 @@ Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std
   if (verdict.reason == MissReason::kNotFinite) return verdict;
   const Doubt doubt = LargestDoubt(subspace, y, inputs);
   const double score = mix.doubt * static_cast<double>(doubt.largest);
-  if (!(score > verdict.score)) return verdict;
+  if (mix.measured > 0 && !(score > verdict.score)) return verdict;
   verdict.score = score;
   verdict.full_weight = FullWeight(score, threshold);
   verdict.hit = verdict.full_weight == 0;

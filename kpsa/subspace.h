@@ -62,8 +62,9 @@ struct Subspace {
   ScoreMix score;
   std::vector<CalibrationPair>
       calibration;  // held-out poses; the threshold follows from a tolerance (Calibrate)
-  double tolerance = 0, violation_rate = 0.01, blend_start = 0.85;  // the trained defaults; scene units
-  std::vector<TileMap> tiles;                                       // [outputs]
+  double tolerance = 0, violation_rate = 0.01,
+         blend_start = kBlendStart;  // the trained defaults; scene units
+  std::vector<TileMap> tiles;        // [outputs]
   // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
   // split errors with it (kpsa/error_split.h); no frame needs it, so of a file it is copied and checked only
   // where asked for.

@@ -7,6 +7,7 @@
 
 #include "kpsa/eigen_solvers.h"
 #include "kpsa/gemm.h"
+#include "kpsa/greedy_columns.h"
 
 namespace kpsa {
 namespace {
@@ -20,17 +21,6 @@ constexpr double kByteShare = 0.1;  // and what rounding to bytes may cost
 constexpr double kByte = 127, kTwoBytes = 127 * 256 + 127;
 constexpr double kFirstWeight =
     0.25;  // of a sample with too large an error, in budgets a squared largest error
-
-double RoundToHalf(double value) {
-  return static_cast<double>(FloatFromHalf(HalfFromFloat(static_cast<float>(value))));
-}
-
-// The power of two that brings `largest` into [2^(top - 1), 2^top).
-double ScaleTo(double largest, int top) {
-  int exponent = 0;
-  if (largest > 0) std::frexp(largest, &exponent);
-  return std::ldexp(1.0, std::clamp(top - exponent, -100, 100));
-}
 
 // Everything is done in coordinates s of the tile's own motion, f - mu = basis * s, basis [cn x q] with
 // orthonormal columns.
@@ -113,33 +103,10 @@ class TileFactorer {
 
   // Takes cues until the others would add less than `left` to what is predicted.
   void Choose(double left) {
-    const Eigen::Index r = weighted_covariance_.rows();
     chosen_.clear();
-    std::vector<Eigen::VectorXd> steps;
-    Eigen::MatrixXd residual_cross = cross_;
-    Eigen::VectorXd residual_variance = weighted_covariance_.diagonal();
-    double remaining = variance_;
-    while (remaining > left && static_cast<Eigen::Index>(chosen_.size()) < r) {
-      Eigen::Index best = -1;
-      double best_gain = 0;
-      for (Eigen::Index j = 0; j < r; ++j) {
-        if (residual_variance[j] <= 1e-12 * weighted_covariance_(j, j)) continue;  // a sum of those chosen
-        const double fall = residual_cross.col(j).squaredNorm() / residual_variance[j];
-        if (fall > best_gain) best_gain = fall, best = j;
-      }
-      if (best < 0 || best_gain <= 1e-9 * left) break;
-      remaining -= best_gain;
-      // A step of a pivoted Cholesky decomposition of the covariance of y
-      Eigen::VectorXd step = weighted_covariance_.col(best);
-      for (const Eigen::VectorXd& before : steps) step -= before[best] * before;
-      step /= std::sqrt(residual_variance[best]);
-      const Eigen::VectorXd direction = residual_cross.col(best) / std::sqrt(residual_variance[best]);
-      residual_cross.noalias() -= direction * step.transpose();
-      residual_variance -= step.cwiseAbs2();
-      residual_variance[best] = 0;
-      steps.push_back(std::move(step));
-      chosen_.push_back(static_cast<std::uint32_t>(best));
-    }
+    for (const Eigen::Index j : GreedyColumns(weighted_covariance_, cross_,
+                                              {.total = variance_, .left = left, .least_gain = 1e-9 * left}))
+      chosen_.push_back(static_cast<std::uint32_t>(j));
   }
 
   // The best map from the chosen cues, with as few columns and bytes as the shares of `budget` allow.
@@ -213,7 +180,7 @@ class TileFactorer {
     const Eigen::Index rank = f->u.cols();
     f->scale = Eigen::VectorXd::Ones(rank);
     for (Eigen::Index k = 0; k < rank && !f->direct; ++k) {
-      const double up = ScaleTo(f->v.row(k).cwiseAbs().maxCoeff(), 10);
+      const double up = ScaleForHalfs(f->v.row(k).cwiseAbs().maxCoeff());
       f->v.row(k) = (f->v.row(k) * up).unaryExpr(&RoundToHalf);
       f->scale[k] /= up;
     }
@@ -297,6 +264,16 @@ class TileFactorer {
 };
 
 }  // namespace
+
+double RoundToHalf(double value) {
+  return static_cast<double>(FloatFromHalf(HalfFromFloat(static_cast<float>(value))));
+}
+
+double ScaleForHalfs(double largest) {
+  int exponent = 0;
+  if (largest > 0) std::frexp(largest, &exponent);
+  return std::ldexp(1.0, std::clamp(10 - exponent, -100, 100));
+}
 
 TileFactors FactorTile(const Eigen::MatrixXd& gain, const Eigen::MatrixXd& covariance,
                        const Eigen::MatrixXd& samples, int components, const TileOptions& options,

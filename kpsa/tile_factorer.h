@@ -27,4 +27,8 @@ TileFactors FactorTile(const Eigen::MatrixXd& gain, const Eigen::MatrixXd& covar
                        const Eigen::MatrixXd& samples, int components, const TileOptions& options,
                        bool may_be_direct = true);
 
+// As it is stored, and the power of two that brings the largest of some numbers into [512, 1024) before.
+double RoundToHalf(double value);
+double ScaleForHalfs(double largest);
+
 }  // namespace kpsa

@@ -7,6 +7,7 @@
 
 #include "kpsa/eigen_solvers.h"
 #include "kpsa/gemm.h"
+#include "kpsa/greedy_columns.h"
 
 namespace kpsa {
 namespace {
@@ -21,16 +22,6 @@ constexpr double kRidge[] = {1e-3, 1e-2, 1e-1, 1};  // of a product's variance
 constexpr double kExtraShare = 0.3;  // of the RMS budget: what the directions of products may leave out
 constexpr Eigen::Index kMostExtra = 24;
 constexpr double kByte = 127;
-
-double RoundToHalf(double value) {
-  return static_cast<double>(FloatFromHalf(HalfFromFloat(static_cast<float>(value))));
-}
-// The power of two that brings `largest` into [512, 1024).
-double ScaleUp(double largest) {
-  int exponent = 0;
-  if (largest > 0) std::frexp(largest, &exponent);
-  return std::ldexp(1.0, std::clamp(10 - exponent, -100, 100));
-}
 
 class ProductFitter {
  public:
@@ -143,33 +134,11 @@ class ProductFitter {
   // As few products as explain nearly as much as all: greedy, by a pivoted Cholesky decomposition.
   void ChooseProducts() {
     const Eigen::MatrixXd all = Solve(gram_, cross_, ridge_ * static_cast<double>(poses_));
-    const double total = (all * gram_).cwiseProduct(all).sum();
     const Eigen::MatrixXd wanted = all * gram_;  // of the fit, not of the noise that it leaves
-    Eigen::MatrixXd cross = wanted;
-    Eigen::VectorXd variance = gram_.diagonal();
-    std::vector<Eigen::VectorXd> steps;
-    std::vector<Eigen::Index> chosen;
-    double explained = 0;
-    while (explained < kExplained * total && chosen.size() < kMostProducts) {
-      Eigen::Index best = -1;
-      double most = 0;
-      for (Eigen::Index j = 0; j < gram_.rows(); ++j) {
-        if (variance[j] <= 1e-9 * gram_(j, j)) continue;
-        const double gain = cross.col(j).squaredNorm() / variance[j];
-        if (gain > most) most = gain, best = j;
-      }
-      if (best < 0) break;
-      explained += most;
-      Eigen::VectorXd step = gram_.col(best);
-      for (const Eigen::VectorXd& before : steps) step -= before[best] * before;
-      step /= std::sqrt(variance[best]);
-      const Eigen::VectorXd direction = cross.col(best) / std::sqrt(variance[best]);
-      cross.noalias() -= direction * step.transpose();
-      variance -= step.cwiseAbs2();
-      variance[best] = 0;
-      steps.push_back(std::move(step));
-      chosen.push_back(best);
-    }
+    const double total = wanted.cwiseProduct(all).sum();
+    std::vector<Eigen::Index> chosen = GreedyColumns(
+        gram_, wanted,
+        {.total = total, .left = (1 - kExplained) * total, .most = kMostProducts, .least_variance = 1e-9});
     std::sort(chosen.begin(), chosen.end());
     gram_ = gram_(chosen, chosen).eval();
     cross_ = cross_(Eigen::all, chosen).eval();
@@ -229,7 +198,7 @@ class ProductFitter {
     }
     for (Eigen::Index k = 0; k < w.rows(); ++k) {
       if (k >= w.rows() - grown_) {
-        const double up = ScaleUp(result->w.row(k).cwiseAbs().maxCoeff());
+        const double up = ScaleForHalfs(result->w.row(k).cwiseAbs().maxCoeff());
         f_.scale[k] = static_cast<double>(static_cast<float>(1 / up));
       }
       if (f_.scale[k] == 0) continue;
@@ -265,7 +234,7 @@ class ProductFitter {
       for (Eigen::Index c = 0; c < 3; ++c)
         result->doubt.row(c * static_cast<Eigen::Index>(kDoubtPoints) + i) = map.row(3 * best + c);
     }
-    const double up = ScaleUp(result->doubt.cwiseAbs().maxCoeff());
+    const double up = ScaleForHalfs(result->doubt.cwiseAbs().maxCoeff());
     result->doubt = (result->doubt * up).unaryExpr(&RoundToHalf);
     result->doubt_scale = 1 / up;
   }

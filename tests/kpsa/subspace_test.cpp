@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/safetensors.h"
@@ -276,9 +277,18 @@ TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   // A measurement that is no number is a miss, whatever the score counts
   for (const ScoreMix& mix : {ScoreMix{0, 1}, ScoreMix{1, 1}}) {
     bent.score = mix;
-    a.y.data()[2] = std::nanf("");
-    EXPECT_EQ(Judge(bent, {.tau = 1e9}, &a).reason, MissReason::kNotFinite);
+    for (const float bad : {std::nanf(""), 1e30f}) {  // the points of the second would be infinite
+      a.y.data()[2] = bad;
+      EXPECT_EQ(Judge(bent, {.tau = 1e30}, &a).reason, MissReason::kNotFinite) << bad;
+    }
   }
+  // A doubt of nothing is no hit where nothing is
+  Measure(bent, raw(0), &a);
+  bent.score = {0, std::numeric_limits<double>::denorm_min()};
+  const Verdict never = Judge(bent, {.tau = -1}, &a);
+  EXPECT_EQ(never.score, 0);
+  EXPECT_EQ(never.reason, MissReason::kNeverHit);
+  EXPECT_FALSE(never.hit);
   bent.score = {0, 0};
   EXPECT_NE(ValidateSubspace(bent).ToString().find("the score counts"), std::string::npos);
   subspace_.score = {1, 1};
