@@ -41,11 +41,15 @@ struct KindPoses {
   double attainable = 0;       // of alpha
   std::vector<double> limits;  // a pose violates where tau exceeds its limit
   std::vector<double> scores;  // of poses without a guard, which are hits where tau_lo reaches them
+  std::vector<double> partly;  // of poses with less than a full one, which are accepted below tau
   std::size_t Violations(double tau) const {
     return static_cast<std::size_t>(std::lower_bound(limits.begin(), limits.end(), tau) - limits.begin());
   }
   std::size_t Hits(double tau_lo) const {
     return static_cast<std::size_t>(std::upper_bound(scores.begin(), scores.end(), tau_lo) - scores.begin());
+  }
+  std::size_t Accepted(double tau) const {
+    return static_cast<std::size_t>(std::lower_bound(partly.begin(), partly.end(), tau) - partly.begin());
   }
 };
 
@@ -68,7 +72,7 @@ std::size_t Admitted(double rate, std::size_t n, double confidence) {
   return lo;
 }
 
-bool FewAmongHits(std::size_t violations, std::size_t hits, double alpha, double confidence) {
+bool FewAmong(std::size_t violations, std::size_t hits, double alpha, double confidence) {
   const double rate = std::min(1.0, kShareOfHits * alpha);
   return static_cast<double>(violations + 1) <= rate * static_cast<double>(hits + 1) &&
          BinomialUpperBound(violations, hits, confidence) <= rate * (1 + 1e-12);
@@ -86,6 +90,7 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     kind.limits.push_back(LargestHarmless(pair, tolerance, c));
     severe.push_back(LargestHarmless(pair, kSevere * tolerance, c));
     if (pair.guard == 0 && !std::isnan(pair.score)) kind.scores.push_back(pair.score);
+    if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(pair.score);
     if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
     for (const double limit : {kind.limits.back(), severe.back()}) {
       if (limit < kInfinity) candidates.push_back(limit);
@@ -101,6 +106,7 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
   for (auto& [number, kind] : kinds) {
     std::sort(kind.limits.begin(), kind.limits.end());
     std::sort(kind.scores.begin(), kind.scores.end());
+    std::sort(kind.partly.begin(), kind.partly.end());
     kind.attainable = Attainable(wanted.alpha, kind.poses, wanted.confidence);
     admitted[number] = Admitted(kind.attainable, kind.poses, wanted.confidence);
   }
@@ -115,10 +121,10 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     for (const auto& [number, kind] : kinds) {
       const std::size_t v = kind.Violations(tau), h = kind.Hits(tau * c);
       allowed = allowed && v <= admitted[number] &&
-                (v == 0 || FewAmongHits(v, h, kind.attainable, wanted.confidence));
+                (v == 0 || FewAmong(v, kind.Accepted(tau), kind.attainable, wanted.confidence));
       violations += v, hits += h;
     }
-    if (allowed && FewAmongHits(violations, hits, wanted.attainable_alpha, wanted.confidence)) return tau;
+    if (allowed && FewAmong(violations, hits, wanted.attainable_alpha, wanted.confidence)) return tau;
   }
   return 0;
 }

@@ -3,8 +3,8 @@
 // poses are of several kinds (PoseKind); among those whose thresholds satisfy all of the following, the
 // largest is taken (KPSA.md 2.11):
 //   of each kind, the rate of violations is at most alpha with 90 % confidence (exact binomial bound),
-//   of each kind that has any, and of all, the same of 2 alpha among hits, and (violations + 1) <= 2 alpha
-//   (hits + 1),
+//   of all, the same of 2 alpha among hits, and (violations + 1) <= 2 alpha (hits + 1); of each kind that has
+//   any among what is accepted, since violations are counted there: beyond the ranges most of that is blends,
 //   of all, violations beyond 3 tolerances keep alpha / 10 likewise.
 // The confidence is over the draw of the calibration poses: nine of ten trainings keep their rate, where
 // conformal risk control (arXiv 2208.02814) keeps it on the average over trainings. It is about poses that

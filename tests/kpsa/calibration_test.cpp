@@ -72,8 +72,10 @@ bool IsAllowed(std::span<const CalibrationPair> pairs, const SoftCacheThreshold&
     const std::size_t v = Violations(of_kind, threshold, tolerance);
     const auto h = static_cast<std::size_t>(std::count_if(
         of_kind.begin(), of_kind.end(), [&](const auto& p) { return EmittedWeight(p, threshold) == 0; }));
+    const auto accepted = static_cast<std::size_t>(std::count_if(
+        of_kind.begin(), of_kind.end(), [&](const auto& p) { return EmittedWeight(p, threshold) < 1; }));
     good = good && BinomialUpperBound(v, of_kind.size(), 0.9) <= rate * (1 + 1e-9) &&
-           (v == 0 || few(v, h, rate));
+           (v == 0 || few(v, accepted, rate));
     violations += v, hits += h, severe += Violations(of_kind, threshold, 3 * tolerance);
   }
   return good && few(violations, hits, attainable(alpha, fewest)) &&
