@@ -44,7 +44,7 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
   KPSA_RETURN_IF_ERROR(count("--key-points", flags.key_points, 2, 2000,
                              flags.paper ? &options->key_points : &options->min_points));
   if (flags.paper) options->mode = EstimatorMode::kPaper;
-  options->may_be_finer = !flags.rows && !flags.modes;
+  options->may_have_cues_by_tile = !flags.rows && !flags.modes;
   options->keep_modes = flags.keep_modes;
   if (flags.tolerance.has_value()) {
     const Result<double> value = ParseLength("--tolerance", *flags.tolerance);

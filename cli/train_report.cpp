@@ -52,6 +52,15 @@ std::string TrainJson(const TrainResult& r) {
                      {"violations", kind.violations},
                      {"rate_at_most", kind.upper_bound}});
   }
+  nlohmann::ordered_json tried = nlohmann::ordered_json::array();
+  for (const TrainingRecord::Tried& one : r.record.tried) {
+    tried.push_back({{"cues", one.what},
+                     {"count", one.cues},
+                     {"rows", one.rows},
+                     {"misses", one.misses},
+                     {"cost", one.cost},
+                     {"taken", one.taken}});
+  }
   const nlohmann::ordered_json document =
       nlohmann::ordered_json{{"schema", "kpsa.train/1"},
                              {"subspace", r.path},
@@ -70,6 +79,7 @@ std::string TrainJson(const TrainResult& r) {
                                {"rms", r.record.held_out_rms},
                                {"max", r.record.held_out_max}}},
                              {"motion", {{"rms", r.record.motion_rms}}},
+                             {"tried", tried},
                              {"calibration",
                               {{"tolerance", r.subspace->tolerance},
                                {"violation_rate", r.calibration.alpha},
@@ -131,6 +141,12 @@ std::string TrainText(const TrainResult& r) {
   text +=
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
+  for (const TrainingRecord::Tried& one : r.record.tried) {
+    text += fmt::format(
+        "{} cues {}: {} ({} numbers); a frame is expected to cost {:.2g} of a full one, {:.3g} % of new "
+        "poses miss\n",
+        one.taken ? "took" : "tried", one.what, one.cues, one.rows, one.cost, 100 * one.misses);
+  }
   // What these poses can promise, where that is less than what was asked for
   std::size_t fewest = r.calibration.poses;
   for (const Calibration::Kind& kind : r.calibration.kinds) fewest = std::min(fewest, kind.poses);

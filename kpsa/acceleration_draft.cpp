@@ -164,6 +164,23 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
   return Status();
 }
 
+// The input of a signal that is measured, whether a guard looks at it or not.
+Index PlaceCue(const Signal& signal, AccelerationDraft* draft) {
+  auto& list = signal.matrix ? draft->matrices : draft->scalars;
+  const std::size_t before = list.size();
+  const Index input = Place(&list, signal);
+  if (list.size() == before) return input;
+  constexpr double kAnything = std::numeric_limits<double>::infinity();
+  KpsaConfig::Data& data = draft->data;
+  const auto add = [&](std::vector<double>* to, double value) {
+    to->insert(to->end(), signal.entries(), value);
+  };
+  add(signal.matrix ? &data.matrix_lo : &data.scalar_lo, -kAnything);
+  add(signal.matrix ? &data.matrix_hi : &data.scalar_hi, kAnything);
+  add(signal.matrix ? &data.matrix_ramp : &data.scalar_ramp, 0);
+  return input;
+}
+
 // Where the rows of the measurement come from.
 Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
                AccelerationDraft* draft) {
@@ -214,18 +231,18 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
             "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", cue.plug);
       row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
       row.element = static_cast<Index>(split.entry.value_or(0));
-      auto& list = signal->matrix ? draft->matrices : draft->scalars;
-      const std::size_t before = list.size();
-      row.input = Place(&list, *signal);
-      if (list.size() != before) {  // a cue that needs no guard
-        constexpr double kAnything = std::numeric_limits<double>::infinity();
-        const auto add = [&](std::vector<double>* to, double value) {
-          to->insert(to->end(), signal->entries(), value);
-        };
-        add(signal->matrix ? &data->matrix_lo : &data->scalar_lo, -kAnything);
-        add(signal->matrix ? &data->matrix_hi : &data->scalar_hi, kAnything);
-        add(signal->matrix ? &data->matrix_ramp : &data->scalar_ramp, 0);
-      }
+      row.input = PlaceCue(*signal, draft);
+    }
+    if (!cue.joint.empty()) {
+      const Result<Signal> joint = FindSignal(graph, cue.joint, target.within);
+      if (!joint.ok()) return joint.status();
+      if (!joint->relative || row.kind == KpsaConfig::Row::Kind::kScalar)
+        return Status::Invalid("the subspace measures in the space of \"{}\", which is no world matrix",
+                               cue.joint);
+      const Index matrix = PlaceCue(*joint, draft);
+      const auto found = std::find(data->joints.begin(), data->joints.end(), matrix);
+      row.joint = static_cast<Index>(found - data->joints.begin());
+      if (found == data->joints.end()) data->joints.push_back(matrix);
     }
     data->rows.push_back(row);
   }

@@ -21,7 +21,6 @@ constexpr double kHopeless =
     0.15;  // share of poses beyond the tolerance from which worst points are measured
 constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
 constexpr double kWorstShare = 0.1;                        // and of all points
-constexpr double kEvenOdds = 0.5;    // the confidence where few judges stand for many calibration poses
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
 // Values that move more than they are trusted.

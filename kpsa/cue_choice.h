@@ -35,6 +35,9 @@ struct CueChoiceOptions {
 // What SoftCache's own score costs, for the square of a row; ns on the scale of the nodes' costs.
 inline constexpr double kScoreCost = 0.04;
 
+// The confidence of a calibration where few judges stand for many calibration poses.
+inline constexpr double kEvenOdds = 0.5;
+
 struct CueChoice {
   std::vector<CueRef> cues;
   // Where judges compared places, of the one that was taken: its number, the expected time of a frame

@@ -13,10 +13,8 @@ const AccelerationTarget::Stage& OutputStage(const Graph& graph,
   return stages[last];
 }
 
-}  // namespace
-
-CueDescription DescribeCue(const TrainingRig& rig, const PoseRecorder& recorder,
-                           std::span<const Index> totals, CueRef cue) {
+CueDescription Describe(const TrainingRig& rig, const PoseRecorder& recorder, std::span<const Index> totals,
+                        CueRef cue) {
   CueDescription d;
   Index index = cue.index;
   if (cue.kind == CueKind::kScalar) {
@@ -47,6 +45,20 @@ CueDescription DescribeCue(const TrainingRig& rig, const PoseRecorder& recorder,
   }
   KPSA_CHECK(false);
   return d;
+}
+
+}  // namespace
+
+CueDescription DescribeCue(const TrainingRig& rig, const PoseRecorder& recorder,
+                           std::span<const Index> totals, CueRef cue) {
+  CueDescription description = Describe(rig, recorder, totals, cue);
+  if (cue.joint == kNoIndex) return description;
+  Index first = 0;
+  for (const Signal& signal : recorder.signals()) {
+    if (first == cue.joint) description.joint = signal.name;
+    first += static_cast<Index>(signal.entries());
+  }
+  return description;
 }
 
 }  // namespace kpsa

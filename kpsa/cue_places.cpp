@@ -15,7 +15,8 @@ constexpr double kSaving = 0.01;          // of the full cost, from each place t
 // Candidates of a place at earlier stages, over all meshes: neighbours tell much the same, and modes are
 // found for the outputs, not for many more points of stages.
 constexpr std::size_t kStagePoints = 500;
-constexpr std::size_t kMinStagePoints = 50;  // of a mesh, however many there are beside it
+constexpr std::size_t kMinStagePoints = 50;                // of a mesh, however many there are beside it
+constexpr std::size_t kOfTiles = 3, kMostOfTiles = 12000;  // of the first place: every third point
 
 // What the compiler keeps for some points.
 struct Kept {
@@ -89,6 +90,7 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
     stages.push_back(std::move(*priced));
   }
   std::map<std::pair<std::size_t, std::size_t>, Index> recorded;  // mesh and stage: its first stage point
+  std::map<Index, std::size_t> recorded_points;                   // of each, by its first
   Index next = 0;
   for (std::size_t p = 0; p < count; ++p) {
     CuePlace& place = result.places.emplace_back();
@@ -97,16 +99,23 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
       const std::size_t stage = stages[m][std::min(p, stages[m].size() - 1)].stage;
       if (stage + 1 == meshes[m].stages.size()) {
         for (Index i = 0; i < totals[m]; ++i) place.push_back({CueKind::kOutput, output + i});
+        if (p == 0) result.of_tiles.insert(result.of_tiles.end(), place.end() - totals[m], place.end());
         continue;
       }
-      const std::vector<Index> points = StagePoints(totals[m], all);
       const auto [at, first] = recorded.emplace(std::pair(m, stage), next);
+      const std::size_t some = StagePoints(totals[m], all).size(),
+                        many = std::min<std::size_t>(totals[m] / kOfTiles, kMostOfTiles * totals[m] / all);
       if (first) {
+        const std::vector<Index> points = EvenSpread(totals[m], p == 0 ? std::max(some, many) : some);
+        recorded_points[at->second] = points.size();
         result.stages.push_back({m, stage, points});
         next += static_cast<Index>(points.size());
       }
-      for (std::size_t i = 0; i < points.size(); ++i)
-        place.push_back({CueKind::kStage, at->second + static_cast<Index>(i)});
+      const std::size_t count = recorded_points[at->second];
+      for (const Index i : EvenSpread(count, std::min(count, some)))
+        place.push_back({CueKind::kStage, at->second + i});
+      if (p > 0) continue;
+      for (Index i = 0; i < count; ++i) result.of_tiles.push_back({CueKind::kStage, at->second + i});
     }
   }
   return result;

@@ -15,6 +15,7 @@ namespace kpsa {
 struct CuePlaces {
   std::vector<CandidateStage> stages;  // whose points are recorded besides the outputs
   std::vector<CuePlace> places;        // the dearest first
+  CuePlace of_tiles;                   // the dearest with more points, where each tile has cues of its own
   double full_cost = 0;                // of all outputs (ns)
 };
 

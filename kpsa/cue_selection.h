@@ -27,6 +27,9 @@ enum class CueKind : std::uint8_t { kOutput, kStage, kScalar };
 struct CueRef {
   CueKind kind = CueKind::kOutput;
   Index index = 0;
+  // A point, or an entry of a relative matrix, is measured in the space of a joint: the scalar of the first
+  // entry of its relative matrix (kpsa/cue_values.h). Cues of single tiles alone.
+  Index joint = kNoIndex;
   friend bool operator==(const CueRef&, const CueRef&) = default;
 };
 // Its first column among the D columns of a pose, and how many it has.

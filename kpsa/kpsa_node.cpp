@@ -174,6 +174,14 @@ void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4
   const ArrayView<ConstPointsView> cues = c.array<ConstPointsView>(kCues);
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
   const ArrayView<double> scalars = c.array<double>(kScalars);
+  // After the raw values and g
+  Matrix4* const joint_from_world =
+      reinterpret_cast<Matrix4*>(c.scratch + 3 * data.subspace->soft_cache.padded_rows());
+  Matrix4* const joint_from_space = joint_from_world + data.joints.size();
+  for (std::size_t j = 0; j < data.joints.size(); ++j) {
+    joint_from_world[j] = InverseOrIdentity(matrices[data.joints[j]]);
+    joint_from_space[j] = joint_from_world[j] * world_from_space;
+  }
   std::size_t r = 0;
   for (const KpsaConfig::Row& row : data.rows) {
     switch (row.kind) {
@@ -182,13 +190,16 @@ void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4
         Double3 p{points.x[row.element], points.y[row.element], points.z[row.element]};
         const KpsaConfig::PointCues& of = data.cues[row.input];
         if (of.in_space) p = TransformPoint(of.near ? space_from_near : space_from_world, p);
+        if (row.joint != kNoIndex) p = TransformPoint(joint_from_space[row.joint], p);
         raw[r] = p.x, raw[r + 1] = p.y, raw[r + 2] = p.z;
         r += 3;
         break;
       }
       case KpsaConfig::Row::Kind::kMatrix:
         raw[r++] = Entry(matrices[row.input], row.element,
-                         data.relative[row.input] != 0 ? &space_from_world : nullptr);
+                         row.joint != kNoIndex           ? &joint_from_world[row.joint]
+                         : data.relative[row.input] != 0 ? &space_from_world
+                                                         : nullptr);
         break;
       case KpsaConfig::Row::Kind::kScalar:
         raw[r++] = scalars[row.input];
@@ -408,9 +419,11 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
     kernel.outputs.push_back(std::move(output));
   }
   const std::size_t padded = subspace.soft_cache.padded_rows();
-  // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles) and g
-  const std::size_t scratch = std::max(
-      {whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())), 3 * padded});
+  // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles), g, joints
+  const std::size_t joints = 2 * data.joints.size() * (sizeof(Matrix4) / sizeof(float));
+  const std::size_t scratch =
+      std::max({whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())),
+                3 * padded + joints});
   const std::size_t after = subspace.score.doubt > 0  ? subspace.doubt_inputs()
                             : subspace.latent.empty() ? 0
                                                       : subspace.tile_inputs();
@@ -437,6 +450,8 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(std::span<const std::uint8_t>(tiles.data().pairs));
     hasher.Add(std::span<const std::uint16_t>(tiles.data().w.span()));
     hasher.Add(std::span<const std::uint16_t>(tiles.data().doubt.span()));
+    hasher.Add(std::span<const std::uint32_t>(tiles.data().joints));
+    hasher.Add(std::span<const std::uint32_t>(tiles.data().joint_rows));
   }
   for (const PointCues& cues : data_.cues) {
     hasher.Add(std::span<const Index>(cues.points));
@@ -447,7 +462,9 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(row.kind);
     hasher.Add(row.input);
     hasher.Add(row.element);
+    hasher.Add(row.joint);
   }
+  hasher.Add(std::span<const Index>(data_.joints));
   for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.matrix_ramp, &data_.scalar_lo,
                             &data_.scalar_hi, &data_.scalar_ramp})
     hasher.Add(std::span<const double>(*range));

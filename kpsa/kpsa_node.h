@@ -34,8 +34,9 @@ class KpsaConfig final : public Asset {
   // Where row r of the measurement comes from. Points take three rows in a row.
   struct Row {
     enum class Kind : std::uint8_t { kPoint, kMatrix, kScalar } kind = Kind::kPoint;
-    Index input = 0;    // which cues[], matrices[] or scalars[]
-    Index element = 0;  // position among the cue points; entry of the matrix
+    Index input = 0;         // which cues[], matrices[] or scalars[]
+    Index element = 0;       // position among the cue points; entry of the matrix
+    Index joint = kNoIndex;  // into joints: measured in its space
   };
   struct Data {
     std::shared_ptr<const Subspace> subspace;
@@ -45,6 +46,7 @@ class KpsaConfig final : public Asset {
     // Trained ranges and how guards come in outside of them (TrainedRange); see MatrixEntries
     std::vector<double> matrix_lo, matrix_hi, matrix_ramp;  // [12 * matrices]
     std::vector<double> scalar_lo, scalar_hi, scalar_ramp;  // [scalars]
+    std::vector<Index> joints;   // into matrices: in whose spaces cues are measured, at most kMaxCueJoints
     std::vector<char> relative;  // [matrices] world matrices, measured relative to spaceMatrix's frame
     std::vector<std::string> guard_names;  // matrices, then scalars
     Double3 rest_origin;                   // of the space

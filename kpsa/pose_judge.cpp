@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/parallel.h"
+#include "kpsa/cue_values.h"
 
 namespace kpsa {
 
@@ -27,12 +28,15 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
     for (std::size_t t = begin; t < end; ++t) {
       const std::span<const float> row = poses.row(t);
       std::size_t r = 0;
+      CueReader reader(layout_, row, nullptr);
       for (const CueRef& cue : cues_.cues) {
-        const std::size_t column = CueColumn(layout_, cue);
-        for (std::size_t k = 0; k < CueHeight(layout_, cue); ++k) raw[r++] = row[column + k];
+        reader.Read(cue, raw.data() + r);
+        r += CueHeight(layout_, cue);
       }
       Measure(subspace_, raw, &scratch);
-      pairs[t].measured = kpsa::Judge(subspace_.soft_cache, always, scratch.y.span(), scratch.g.span()).score;
+      if (subspace_.soft_cache.factor.size() > 0)
+        pairs[t].measured =
+            kpsa::Judge(subspace_.soft_cache, always, scratch.y.span(), scratch.g.span()).score;
       if (scratch.t.size() > 0)
         pairs[t].doubt =
             static_cast<double>(LargestDoubt(subspace_, scratch.inputs(), scratch.t.span()).largest);

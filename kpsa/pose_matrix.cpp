@@ -9,6 +9,15 @@ namespace kpsa {
 
 std::span<float> PoseMatrix::AddPose() {
   KPSA_CHECK(!centered_);
+  return Grow();
+}
+
+void PoseMatrix::Append(const PoseMatrix& other) {
+  KPSA_CHECK(layout_ == other.layout_ && (centered_ == other.centered_ || other.poses_ == 0));
+  for (std::size_t t = 0; t < other.poses_; ++t) std::ranges::copy(other.row(t), Grow().begin());
+}
+
+std::span<float> PoseMatrix::Grow() {
   if (poses_ % kBlockPoses == 0) blocks_.push_back(std::make_unique<float[]>(kBlockPoses * columns()));
   return row(poses_++);
 }

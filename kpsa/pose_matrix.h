@@ -21,6 +21,7 @@ struct PoseLayout {
   int components = 3;            // c: 3 or 1
   std::size_t stage_points = 0;  // P
   std::size_t scalars = 0;       // S
+  Index relative_begin = 0;      // scalars from here on are matrices of twelve entries, relative to the space
   std::size_t outputs() const { return points * static_cast<std::size_t>(components); }
   std::size_t stage_begin() const { return outputs(); }
   std::size_t scalar_begin() const { return outputs() + 3 * stage_points; }
@@ -51,8 +52,12 @@ class PoseMatrix {
   // Subtracts a mean in place (double difference, rounded once). The matrix remembers that it is centred.
   void Subtract(const Eigen::VectorXd& mean);
   bool centered() const { return centered_; }
+  // The poses of another matrix of the same layout, both centred with the same mean, or neither.
+  void Append(const PoseMatrix& other);
 
  private:
+  std::span<float> Grow();
+
   PoseLayout layout_;
   std::size_t poses_ = 0;
   bool centered_ = false;

@@ -46,7 +46,10 @@ Result<PoseLayout> PoseRecorder::Layout() {
   std::size_t o = 0;
   for (; o < rig_.target.meshes.size(); ++o) layout_.points += (*plan)->outputs()[o].points.size();
   for (const CandidateStage& candidate : candidates_) layout_.stage_points += candidate.points.size();
-  for (const Signal& signal : signals_) layout_.scalars += signal.entries();
+  for (const Signal& signal : signals_) {
+    layout_.scalars += signal.entries();
+    if (!signal.relative) layout_.relative_begin = static_cast<Index>(layout_.scalars);  // these come last
+  }
   return layout_;
 }
 

@@ -16,6 +16,13 @@ constexpr double kGain = 0.01, kGainOverOwn = 0.05;
 
 }  // namespace
 
+ScoreMix DoubtAlone(std::span<const ScoreJudge> judges) {
+  std::vector<double> doubts;
+  for (const ScoreJudge& judge : judges) doubts.push_back(judge.pose.doubt);
+  const double doubt = doubts.empty() ? 0 : Quantile(doubts, kQuantile);
+  return {0, doubt > 0 && std::isfinite(1 / doubt) ? 1 / doubt : 1};
+}
+
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
                      double blend_start, const ScoreCosts& costs) {
   std::vector<double> measured, doubts;

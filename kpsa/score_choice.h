@@ -23,6 +23,8 @@ struct ScoreJudge {
 struct ScoreCosts {
   double measured = 0, doubt = 0;
 };
+// The doubt alone, its 99 % quantile the unit: where there is nothing else.
+ScoreMix DoubtAlone(std::span<const ScoreJudge> judges);
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
                      double blend_start, const ScoreCosts& costs);
 

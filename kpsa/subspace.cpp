@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "base/check.h"
 
@@ -27,6 +28,13 @@ std::string CueName(const Subspace& subspace, const CueDescription& cue) {
 Status ValidateSubspace(const Subspace& s) {
   const std::size_t rows = s.rows();
   std::size_t counted = 0;
+  std::set<std::string> joints;
+  for (const CueDescription& cue : s.cues) {
+    if (!cue.joint.empty()) joints.insert(cue.joint);
+  }
+  if (joints.size() > kMaxCueJoints)
+    return Status::Invalid("cues are measured in the spaces of {} joints, expected at most {}", joints.size(),
+                           kMaxCueJoints);
   for (std::size_t k = 0; k < s.cues.size(); ++k) {
     const CueDescription& cue = s.cues[k];
     const std::size_t height =
@@ -48,15 +56,17 @@ Status ValidateSubspace(const Subspace& s) {
     return Status::Invalid("the {} cues have {} rows, but {} means and {} scales", s.cues.size(), counted,
                            rows, s.cue_scale.size());
   }
+  // Where the tiles' doubts alone are the score, SoftCache's own may be missing
+  const bool has_score = s.score.measured > 0 || s.soft_cache.factor.size() > 0;
   if (s.soft_cache.mode != s.mode || s.soft_cache.modes != s.modes ||
-      s.soft_cache.factor.size() != s.soft_cache.factor_size()) {
+      s.soft_cache.factor.size() != (has_score ? s.soft_cache.factor_size() : 0)) {
     return Status::Invalid("the factor of the cues has {} entries, expected {}", s.soft_cache.factor.size(),
                            s.soft_cache.factor_size());
   }
   if (s.mode == EstimatorMode::kPaper && s.modes > rows)
     return Status::Invalid("{} measured values cannot determine {} modes", rows, s.modes);
   std::size_t blocks = 0;
-  for (std::size_t k = 0; k < s.cues.size() && s.mode == EstimatorMode::kMap; ++k) {
+  for (std::size_t k = 0; k < s.cues.size() && s.mode == EstimatorMode::kMap && has_score; ++k) {
     const std::size_t height = s.soft_cache.offsets[k + 1] - s.soft_cache.offsets[k];
     blocks += height * height;
   }
@@ -128,6 +138,14 @@ Status ValidateSubspace(const Subspace& s) {
   return {};
 }
 
+Eigen::MatrixXd SampledColumns(const Eigen::MatrixXd& training) {
+  const Eigen::Index count = std::min<Eigen::Index>(training.cols(), kTileSamples);
+  Eigen::MatrixXd samples(training.rows(), count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    samples.col(i) = training.col((2 * i + 1) * training.cols() / (2 * count));
+  return samples;
+}
+
 Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                       const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
                       const TileOptions& options, const PoseMatrix* poses, std::size_t clip_poses) {
@@ -140,13 +158,9 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   s.cue_scale.assign(cues.scale.data(), cues.scale.data() + cues.scale.size());
   s.soft_cache = MakeSoftCacheModel(estimator, cues, training);
 
-  // Some of the training poses, evenly spread, watch the largest errors
   TileInputs inputs;
   inputs.covariance = estimator.covariance;
-  const Eigen::Index count = std::min<Eigen::Index>(training.cols(), kTileSamples);
-  inputs.samples.resize(training.rows(), count);
-  for (Eigen::Index i = 0; i < count; ++i)
-    inputs.samples.col(i) = training.col((2 * i + 1) * training.cols() / (2 * count));
+  inputs.samples = SampledColumns(training);
   const bool latent = estimator.gain.size() == 0;
   using Map = Eigen::Ref<const Eigen::MatrixXd>;
   const Map maps = latent ? Map(pca.output_modes()) : Map(estimator.gain);

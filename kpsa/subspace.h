@@ -22,6 +22,7 @@
 namespace kpsa {
 
 inline constexpr int kSubspaceVersion = 4, kOldestVersion = 3;  // 3: without products
+inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
 // Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
@@ -31,6 +32,9 @@ struct CueDescription {
   std::string stage;  // points: the stage of the deformer stack, "mush"
   Index mesh = 0;     // points: index among the outputs
   Index point = 0;    // points: index within the mesh, in stored order
+  // The joint in whose space it is measured, by its world matrix, or "": points, and entries of world
+  // matrices.
+  std::string joint = {};
   friend bool operator==(const CueDescription&, const CueDescription&) = default;
 };
 
@@ -101,6 +105,9 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
                       const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
                       const TileOptions& options, const PoseMatrix* poses = nullptr,
                       std::size_t clip_poses = 0);
+
+// Some of the training poses, evenly spread: they watch the largest errors of tiles.
+Eigen::MatrixXd SampledColumns(const Eigen::MatrixXd& training);
 
 Status WriteSubspace(const Subspace& subspace, const std::string& path);
 // Subspace::kept_modes, which may be most of a file: copied and checked, or left out.

@@ -115,6 +115,7 @@ std::map<std::string, std::string> Header(const Subspace& s) {
     } else {
       cues.push_back({{"kind", "point"}, {"stage", cue.stage}, {"mesh", cue.mesh}, {"point", cue.point}});
     }
+    if (!cue.joint.empty()) cues.back()["joint"] = cue.joint;
   }
   for (const TrainedRange& range : s.ranges)
     ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}, {"ramp", range.ramp}});
@@ -183,6 +184,12 @@ std::string ContentDigest(const Subspace& s) {
     hasher.Add(std::span<const std::uint16_t>(data.v.span()));
     hasher.Add(std::span<const std::uint8_t>(data.u.span()));
     hasher.Add(std::span<const float>(data.mean.span()));
+    if (!data.joints.empty()) {
+      for (const auto* list : {&data.joints, &data.joint_rows})
+        hasher.Add(std::span<const std::uint32_t>(*list));
+      for (const auto* list : {&data.joint_mean, &data.joint_deviation})
+        hasher.Add(std::span<const double>(*list));
+    }
     if (data.products.empty()) continue;
     hasher.Add(std::span<const std::uint32_t>(data.products));
     hasher.Add(std::span<const std::uint8_t>(data.pairs));
@@ -263,6 +270,7 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
     } else if (status.ok()) {
       return Status::Invalid("{}: a cue is of kind \"{}\", expected point or scalar", file.name(), kind);
     }
+    if (entry.is_object() && entry.contains("joint")) cue.joint = reader_of_cue.Text("joint");
     s->cues.push_back(std::move(cue));
   }
   for (const Json& entry : *ranges) {
@@ -305,6 +313,14 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
       KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "whitening", {kAny}), &data.whitening));
       KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "w", {kAny}, true), &data.w));
       KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "doubt", {kAny}, true), &data.doubt));
+    }
+    if (file.tensors().contains(prefix + "joints")) {
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "joints", {kAny}), &data.joints));
+      KPSA_RETURN_IF_ERROR(
+          Assign(file.Values<std::uint32_t>(prefix + "jointRows", {kAny}), &data.joint_rows));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<double>(prefix + "jointMean", {kAny}), &data.joint_mean));
+      KPSA_RETURN_IF_ERROR(
+          Assign(file.Values<double>(prefix + "jointDeviation", {kAny}), &data.joint_deviation));
     }
     Result<TileMap> map =
         TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
@@ -360,6 +376,12 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     Add<std::uint16_t>(&writer, prefix + "v", data.v.span(), true);
     Add<std::uint8_t>(&writer, prefix + "u", data.u.span());
     Add<float>(&writer, prefix + "mean", data.mean.span());
+    if (!data.joints.empty()) {
+      Add<std::uint32_t>(&writer, prefix + "joints", data.joints);
+      Add<std::uint32_t>(&writer, prefix + "jointRows", data.joint_rows);
+      Add<double>(&writer, prefix + "jointMean", data.joint_mean);
+      Add<double>(&writer, prefix + "jointDeviation", data.joint_deviation);
+    }
     if (data.products.empty()) continue;
     Add<std::uint32_t>(&writer, prefix + "products", data.products);
     Add<std::uint8_t>(&writer, prefix + "pairs", data.pairs);
@@ -408,7 +430,8 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
     }
   }
   KPSA_RETURN_IF_ERROR(
-      Assign(file.Values<float>("factor", {s.soft_cache.factor_size()}), &s.soft_cache.factor));
+      Assign(file.Values<float>("factor", {s.score.measured > 0 ? s.soft_cache.factor_size() : kAny}),
+             &s.soft_cache.factor));
   KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
   if (file.tensors().contains(kLatent)) {
     KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(kLatent, {kAny}), &s.latent));

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
+#include <numeric>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -79,6 +81,59 @@ void WriteProducts(const std::vector<TileFactors>& factors, const std::vector<Ti
   }
 }
 
+// The joints in whose spaces tiles lie, each once; nothing where there are none.
+void WriteJoints(const std::vector<std::vector<std::uint32_t>>& rows_of_tile, const TileInputs& inputs,
+                 TileData* data) {
+  std::map<std::vector<std::uint32_t>, std::uint32_t> number;
+  std::vector<std::uint32_t> joints;
+  for (const std::vector<std::uint32_t>& rows : rows_of_tile) {
+    if (rows.empty()) {
+      joints.push_back(0);
+      continue;
+    }
+    KPSA_CHECK_EQ(rows.size(), 12u);
+    const auto [found, is_new] = number.emplace(rows, static_cast<std::uint32_t>(number.size() + 1));
+    joints.push_back(found->second);
+    if (!is_new) continue;
+    for (const std::uint32_t row : rows) {
+      data->joint_rows.push_back(row);
+      data->joint_mean.push_back(inputs.row_mean[row]);
+      data->joint_deviation.push_back(1 / inputs.row_scale[row]);
+    }
+  }
+  if (!number.empty()) data->joints = std::move(joints);
+}
+
+// What the poses are in some columns. [height x T]
+Eigen::MatrixXd TargetOf(const PoseMatrix& poses, std::size_t first, std::size_t height) {
+  Eigen::MatrixXd target(static_cast<Eigen::Index>(height), static_cast<Eigen::Index>(poses.poses()));
+  for (std::size_t t = 0; t < poses.poses(); ++t) {
+    target.col(static_cast<Eigen::Index>(t)) =
+        Eigen::Map<const Eigen::VectorXf>(poses.row(t).data() + first, static_cast<Eigen::Index>(height))
+            .cast<double>();
+  }
+  return target;
+}
+
+// Where more is left out anyway than the budget of a tile, that is the budget.
+TileOptions OwnOptions(const TileOptions& options, double left_out) {
+  TileOptions own = options;
+  if (!(options.left_out_share > 0)) return own;
+  own.rms_budget = std::max(options.rms_budget, options.left_out_share * std::sqrt(left_out));
+  own.max_budget *= own.rms_budget / options.rms_budget;
+  return own;
+}
+
+TileFactors FactorModel(const TileModel& model, const Eigen::MatrixXd& samples, int components,
+                        const TileOptions& options, bool may_be_direct) {
+  const bool all = samples.size() == 0 || samples.rows() == static_cast<Eigen::Index>(model.columns.size());
+  TileFactors factors = FactorTile(model.gain, model.covariance,
+                                   all ? samples : Eigen::MatrixXd(samples(model.columns, Eigen::all)),
+                                   components, options, may_be_direct);
+  for (std::uint32_t& column : factors.columns) column = model.columns[column];
+  return factors;
+}
+
 }  // namespace
 
 TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components,
@@ -86,46 +141,56 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
   KPSA_CHECK(components == 1 || components == 3);
   KPSA_CHECK_EQ(gain.rows(), mean.size());
   KPSA_CHECK(inputs.left_out.size() == 0 || inputs.left_out.size() == gain.rows());
+  const auto model = [&](std::size_t tile) {
+    const auto tile_rows = static_cast<Eigen::Index>(kTilePoints) * components;
+    const Eigen::Index first = static_cast<Eigen::Index>(tile) * tile_rows,
+                       height = std::min(tile_rows, gain.rows() - first);
+    TileModel all;
+    all.columns.resize(static_cast<std::size_t>(gain.cols()));
+    std::iota(all.columns.begin(), all.columns.end(), 0u);
+    all.gain = gain.middleRows(first, height);
+    all.covariance = inputs.covariance.size() > 0
+                         ? inputs.covariance
+                         : Eigen::MatrixXd(Eigen::MatrixXd::Identity(gain.cols(), gain.cols()));
+    if (inputs.left_out.size() > 0)
+      all.left_out = inputs.left_out.segment(first, height).sum() / static_cast<double>(height / components);
+    return all;
+  };
+  return BuildTiles(model, mean, components, static_cast<std::size_t>(gain.cols()), inputs, options, report);
+}
+
+TileMap BuildTiles(const std::function<TileModel(std::size_t tile)>& models, const Eigen::VectorXd& mean,
+                   int components, std::size_t inputs_count, const TileInputs& inputs,
+                   const TileOptions& options, TileReport* report) {
   TileData data;
   const auto c = static_cast<std::size_t>(components);
-  data.points = static_cast<std::size_t>(gain.rows()) / c;
+  data.points = static_cast<std::size_t>(mean.size()) / c;
   data.components = components;
-  data.inputs = static_cast<std::size_t>(gain.cols());
+  data.inputs = inputs_count;
   const std::size_t tiles = (data.points + kTilePoints - 1) / kTilePoints, rows = kPanelPoints * c;
   const auto panels = [&](std::size_t tile) {
     return (std::min(kTilePoints, data.points - tile * kTilePoints) + kPanelPoints - 1) / kPanelPoints;
   };
-  const Eigen::MatrixXd covariance =
-      inputs.covariance.size() > 0 ? inputs.covariance
-                                   : Eigen::MatrixXd(Eigen::MatrixXd::Identity(gain.cols(), gain.cols()));
   std::vector<TileFactors> factors(tiles);
   std::vector<TileProducts> products(tiles);
+  std::vector<std::vector<std::uint32_t>> joint_rows(tiles);
+  std::vector<Eigen::VectorXd> means(tiles);
   ParallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      const std::size_t first = t * kTilePoints * c,
-                        height = std::min(kTilePoints * c, data.points * c - first);
-      const Eigen::MatrixXd part =
-          gain.middleRows(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height));
-      TileOptions own = options;
-      if (inputs.left_out.size() > 0 && options.left_out_share > 0) {
-        const double square =
-            inputs.left_out.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height))
-                .sum() /
-            static_cast<double>(height / c);
-        const double most = std::max(options.rms_budget, options.left_out_share * std::sqrt(square));
-        own.max_budget *= most / options.rms_budget;
-        own.rms_budget = most;
-      }
-      factors[t] = FactorTile(part, covariance, inputs.samples, components, own);
+      const TileModel model = models(t);
+      const TileOptions own = OwnOptions(options, model.left_out);
+      factors[t] = FactorModel(model, inputs.samples, components, own, true);
+      joint_rows[t] = model.joint_rows;
+      means[t] = model.mean;
       if (inputs.poses == nullptr || components != 3 || factors[t].columns.empty()) continue;
-      TileInputs of_tile;
-      of_tile.poses = inputs.poses, of_tile.measured = inputs.measured,
-      of_tile.clip_poses = inputs.clip_poses;
-      of_tile.first_column = inputs.first_column + first;
-      TileFactors factored = factors[t].direct
-                                 ? FactorTile(part, covariance, inputs.samples, components, own, false)
-                                 : factors[t];
-      products[t] = FitProducts(of_tile, own, &factored);
+      TileFactors factored =
+          factors[t].direct ? FactorModel(model, inputs.samples, components, own, false) : factors[t];
+      const Eigen::MatrixXd target = model.target.size() > 0
+                                         ? Eigen::MatrixXd()
+                                         : TargetOf(*inputs.poses, inputs.first_column + t * kTilePoints * c,
+                                                    static_cast<std::size_t>(model.gain.rows()));
+      products[t] = FitProducts(model.target.size() > 0 ? model.target : target, *inputs.measured,
+                                inputs.clip_poses, own, &factored);
       if (!products[t].pairs.empty()) factors[t] = std::move(factored);
     }
   });
@@ -160,7 +225,9 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
   for (std::size_t i = 0; i < data.points * c; ++i) {
     const std::size_t point = i / c;
     data.mean.data()[point / kPanelPoints * rows + i % c * kPanelPoints + point % kPanelPoints] =
-        static_cast<float>(mean[static_cast<Eigen::Index>(i)]);
+        static_cast<float>(means[point / kTilePoints].size() > 0
+                               ? means[point / kTilePoints][static_cast<Eigen::Index>(i % (kTilePoints * c))]
+                               : mean[static_cast<Eigen::Index>(i)]);
   }
   float* scale = data.scale.data();
   std::uint16_t* v = data.v.data();
@@ -179,6 +246,7 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
     u = WriteColumns(f, c, panels(t), u);
   }
   WriteProducts(factors, products, &data);
+  WriteJoints(joint_rows, inputs, &data);
   if (report != nullptr) *report = found;
   Result<TileMap> map = TileMap::Make(std::move(data), "tiles");
   KPSA_CHECK(map.ok());

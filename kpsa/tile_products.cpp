@@ -25,8 +25,14 @@ constexpr double kByte = 127;
 
 class ProductFitter {
  public:
-  ProductFitter(const TileInputs& inputs, const TileOptions& options, TileFactors* factors)
-      : inputs_(inputs), options_(options), f_(*factors), poses_(inputs.measured->cols()) {}
+  ProductFitter(const Eigen::MatrixXd& target, const Eigen::MatrixXd& measured, std::size_t clip_poses,
+                const TileOptions& options, TileFactors* factors)
+      : target_(target),
+        measured_(measured),
+        clip_poses_(clip_poses),
+        options_(options),
+        f_(*factors),
+        poses_(measured.cols()) {}
 
   TileProducts Run() {
     TileProducts result;
@@ -48,7 +54,7 @@ class ProductFitter {
   void FindLatents(Eigen::Index latents) {
     Eigen::MatrixXd y(static_cast<Eigen::Index>(f_.columns.size()), poses_);
     for (Eigen::Index j = 0; j < y.rows(); ++j)
-      y.row(j) = inputs_.measured->row(static_cast<Eigen::Index>(f_.columns[static_cast<std::size_t>(j)]));
+      y.row(j) = measured_.row(static_cast<Eigen::Index>(f_.columns[static_cast<std::size_t>(j)]));
     moved_ = f_.scale.asDiagonal() * (f_.v * y);
     whitening_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(kLatents));
     z_.resize(latents, poses_);
@@ -63,11 +69,7 @@ class ProductFitter {
 
   // What the linear tile is off by. [3n x T]
   void FindResiduals() {
-    residual_.resize(f_.u.rows(), poses_);
-    for (Eigen::Index t = 0; t < poses_; ++t) {
-      const float* row = inputs_.poses->row(static_cast<std::size_t>(t)).data() + inputs_.first_column;
-      for (Eigen::Index i = 0; i < f_.u.rows(); ++i) residual_(i, t) = static_cast<double>(row[i]);
-    }
+    residual_ = target_;
     residual_.noalias() -= f_.u * moved_;
   }
 
@@ -82,7 +84,7 @@ class ProductFitter {
   }
 
   bool validated(Eigen::Index t) const {
-    return t % kValidated == kValidated - 1 && t >= static_cast<Eigen::Index>(inputs_.clip_poses);
+    return t % kValidated == kValidated - 1 && t >= static_cast<Eigen::Index>(clip_poses_);
   }
 
   // p of all poses: mean free, of unit variance.
@@ -239,7 +241,8 @@ class ProductFitter {
     result->doubt_scale = 1 / up;
   }
 
-  const TileInputs& inputs_;
+  const Eigen::MatrixXd &target_, &measured_;
+  const std::size_t clip_poses_;
   const TileOptions& options_;
   TileFactors& f_;
   const Eigen::Index poses_;
@@ -254,8 +257,9 @@ class ProductFitter {
 
 }  // namespace
 
-TileProducts FitProducts(const TileInputs& inputs, const TileOptions& options, TileFactors* factors) {
-  return ProductFitter(inputs, options, factors).Run();
+TileProducts FitProducts(const Eigen::MatrixXd& target, const Eigen::MatrixXd& measured,
+                         std::size_t clip_poses, const TileOptions& options, TileFactors* factors) {
+  return ProductFitter(target, measured, clip_poses, options, factors).Run();
 }
 
 }  // namespace kpsa

@@ -20,8 +20,10 @@ struct TileProducts {
   double doubt_scale = 1;
 };
 
-// `factors`: of a tile of `components` = 3, not direct, of which `rows` begin in column inputs.first_column
-// of the poses; U grows by at most kMaxTileRank columns. Errors below options.max_budget / 4 are left alone.
-TileProducts FitProducts(const TileInputs& inputs, const TileOptions& options, TileFactors* factors);
+// `factors`: of a tile of 3 components, not direct, with what the poses are there (target [3n x T], less the
+// mean) and y of them (measured [r x T]), the first clip_poses of clips; U grows by at most kMaxTileRank
+// columns. Errors below options.max_budget / 4 are left alone.
+TileProducts FitProducts(const Eigen::MatrixXd& target, const Eigen::MatrixXd& measured,
+                         std::size_t clip_poses, const TileOptions& options, TileFactors* factors);
 
 }  // namespace kpsa

@@ -237,6 +237,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 #include "base/check.h"
+#include "base/matrix.h"
 #include "kpsa/rigid_points.h"
 
 namespace kpsa {
@@ -258,6 +259,12 @@ constexpr auto kInOrder = [] {
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
   return order;
 }();
+// Twelve entries, column by column.
+Matrix4 MatrixOf(const float* entries) {
+  Matrix4 matrix;
+  for (int e = 0; e < 12; ++e) matrix(e % 3, e / 3) = static_cast<double>(entries[e]);
+  return matrix;
+}
 // Four byte columns each.
 std::size_t Groups(std::size_t rank, std::size_t wide) { return (rank + wide + 3) / 4; }
 
@@ -304,6 +311,7 @@ Result<TileMap> TileMap::Make(TileData data, const std::string& what) {
       return Status::Invalid("{}: a tile reads cue row {} of {}", what, column, data.inputs);
   }
   if (!data.products.empty()) KPSA_RETURN_IF_ERROR(map.PlaceProducts(data, what));
+  KPSA_RETURN_IF_ERROR(map.CheckJoints(data, what));
   map.data_ = std::move(data);
   return map;
 }
@@ -334,6 +342,27 @@ Status TileMap::PlaceProducts(const TileData& data, const std::string& what) {
     return Status::Invalid("{}: products of {}, {}, {}, {} values, expected {}, {}, {}, {}", what,
                            data.pairs.size(), data.whitening.size(), data.w.size(), data.doubt.size(),
                            2 * next.pairs, next.whitening, next.w, next.doubt);
+  }
+  return {};
+}
+
+Status TileMap::CheckJoints(const TileData& data, const std::string& what) const {
+  const std::size_t joints = data.joint_rows.size() / 12;
+  if ((!data.joints.empty() && data.joints.size() != data.ranks.size()) || joints > kMaxTileJoints ||
+      data.joint_rows.size() % 12 != 0 || data.joint_mean.size() != data.joint_rows.size() ||
+      data.joint_deviation.size() != data.joint_rows.size() || (joints > 0 && data.components != 3)) {
+    return Status::Invalid("{}: {}, {}, {}, {} values of joints for {} tiles, expected at most {} joints",
+                           what, data.joints.size(), data.joint_rows.size(), data.joint_mean.size(),
+                           data.joint_deviation.size(), data.ranks.size(), kMaxTileJoints);
+  }
+  for (const std::uint32_t joint : data.joints) {
+    if (joint > joints) return Status::Invalid("{}: a tile lies in joint {} of {}", what, joint, joints);
+  }
+  for (std::size_t e = 0; e < data.joint_rows.size(); ++e) {
+    if (data.joint_rows[e] >= data.inputs || !std::isfinite(data.joint_mean[e]) ||
+        !std::isfinite(data.joint_deviation[e]))
+      return Status::Invalid("{}: entry {} of the joints is not finite, or reads cue row {} of {}", what, e,
+                             data.joint_rows[e], data.inputs);
   }
   return {};
 }
@@ -405,11 +434,19 @@ void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* do
   }
 }
 
+void TileMap::JointMatricesOf(const float* y, float* entries) const {
+  for (std::size_t e = 0; e < data_.joint_rows.size(); ++e) {
+    entries[e] = static_cast<float>(data_.joint_mean[e] +
+                                    data_.joint_deviation[e] * static_cast<double>(y[data_.joint_rows[e]]));
+  }
+}
+
 Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs) const {
   KPSA_CHECK(y.size() >= data_.inputs && inputs.size() >= input_size());
   Doubt doubt;
   for (std::size_t tile = 0; tile < tiles(); ++tile)
     TileInputsOf(tile, y.data(), inputs.data() + scale_begin_[tile], &doubt);
+  JointMatricesOf(y.data(), inputs.data() + data_.scale.size());
   doubt.largest = std::sqrt(doubt.largest);
   return doubt;
 }
@@ -419,6 +456,7 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
   KPSA_CHECK_LE(outs.size() * data_.inputs, y.size());
   Run([&](std::size_t tile, std::size_t frame,
           float* t) { TileInputsOf(tile, y.data() + frame * data_.inputs, t); },
+      [&](std::size_t frame, float* entries) { JointMatricesOf(y.data() + frame * data_.inputs, entries); },
       outs, tiles, spaces);
 }
 
@@ -427,12 +465,15 @@ void TileMap::ReconstructFrom(std::span<const float* const> inputs, std::span<co
   KPSA_CHECK_EQ(inputs.size(), outs.size());
   Run([&](std::size_t tile, std::size_t frame,
           float* t) { std::copy_n(inputs[frame] + scale_begin_[tile], Padded16(data_.ranks[tile]), t); },
+      [&](std::size_t frame, float* entries) {
+        std::copy_n(inputs[frame] + data_.scale.size(), data_.joint_rows.size(), entries);
+      },
       outs, tiles, spaces);
 }
 
-template <typename InputsOf>
-void TileMap::Run(const InputsOf& inputs_of, std::span<const PointsView> outs, std::span<const Index> tiles,
-                  std::span<const Matrix4> spaces) const {
+template <typename InputsOf, typename JointsOf>
+void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::span<const PointsView> outs,
+                  std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
   if (outs.empty()) return;
   for (const PointsView& out : outs) KPSA_CHECK_EQ(out.count, data_.points);
   KPSA_CHECK(spaces.empty() || (spaces.size() == outs.size() && data_.components == 3));
@@ -448,10 +489,20 @@ void TileMap::Run(const InputsOf& inputs_of, std::span<const PointsView> outs, s
   TileInput input[kAhead][kBlockFrames];
   TileFrame frames[kAhead][kBlockFrames];
   alignas(64) float t[2 * kMaxTileRank + 16];
+  const std::size_t joint_count = data_.joint_rows.size() / 12;
+  FloatMatrix joint_space[kBlockFrames][kMaxTileJoints];
   for (std::size_t first = 0; first < outs.size(); first += kBlockFrames) {
     const std::size_t frame_count = std::min(kBlockFrames, outs.size() - first);
     FloatMatrix space[kBlockFrames];
     for (std::size_t f = 0; f < frame_count && !spaces.empty(); ++f) space[f] = ToFloats(spaces[first + f]);
+    for (std::size_t f = 0; f < frame_count && joint_count > 0; ++f) {
+      float entries[12 * kMaxTileJoints];
+      joints_of(first + f, entries);
+      for (std::size_t j = 0; j < joint_count; ++j) {
+        const Matrix4 joint = MatrixOf(entries + 12 * j);
+        joint_space[f][j] = ToFloats(spaces.empty() ? joint : spaces[first + f] * joint);
+      }
+    }
     for (std::size_t next = 0; next < count; next += kAhead) {
       const std::size_t ahead = std::min(kAhead, count - next);
       for (std::size_t i = 0; i < ahead; ++i) {
@@ -460,7 +511,8 @@ void TileMap::Run(const InputsOf& inputs_of, std::span<const PointsView> outs, s
           inputs_of(tile, first + f, t);
           frames[i][f].q = input[i][f].q;
           frames[i][f].out = outs[first + f];
-          frames[i][f].space = spaces.empty() ? nullptr : &space[f];
+          const std::size_t joint = data_.joints.empty() ? 0 : data_.joints[tile];
+          frames[i][f].space = joint > 0 ? &joint_space[f][joint - 1] : spaces.empty() ? nullptr : &space[f];
           quantize(data_.wide[tile], rank, t, input[i][f].q, &frames[i][f]);
         }
       }

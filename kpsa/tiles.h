@@ -23,6 +23,10 @@
 // far a pose is from where the linear map was good: for a few points of the tile it is computed apart, the
 // doubt.
 //
+// A tile may lie in the space of a joint: what bends it is then told by few cues, whatever the joints above
+// do, and its points go through the world matrix of the joint, relative to the space of the points, which is
+// among the cues (twelve rows).
+//
 // All floating-point values are computed in a fixed order: single frames, blocks of frames, all tiles or a
 // list, and every SIMD target give the same bits. Allocates nothing; const functions may run on any thread. A
 // NaN or an infinity in a cue that a tile reads spoils the points of the tile.
@@ -30,6 +34,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -45,10 +50,11 @@ namespace kpsa {
 inline constexpr std::size_t kTilePoints = 128;
 inline constexpr std::size_t kPanelPoints = 32;
 inline constexpr std::size_t kMaxTileRank = 256;
-inline constexpr std::size_t kBlockFrames = 4;  // frames that the kernel takes at a time
-inline constexpr std::size_t kLatents = 12;     // whose products a tile may have, at most
-inline constexpr float kLatentClip = 6;         // deviations
-inline constexpr std::size_t kDoubtPoints = 5;  // of a tile
+inline constexpr std::size_t kBlockFrames = 4;     // frames that the kernel takes at a time
+inline constexpr std::size_t kLatents = 12;        // whose products a tile may have, at most
+inline constexpr float kLatentClip = 6;            // deviations
+inline constexpr std::size_t kDoubtPoints = 5;     // of a tile
+inline constexpr std::size_t kMaxTileJoints = 64;  // of one output
 
 // The stored form of one output (one mesh). Plain arrays, as in the subspace file.
 struct TileData {
@@ -73,6 +79,11 @@ struct TileData {
   AlignedArray<float> whitening;        // [32] what the latents are multiplied by; the scale of the doubt
   AlignedArray<std::uint16_t> w;        // [P][k16] halfs: z = scale (V y_J + W p)
   AlignedArray<std::uint16_t> doubt;    // [P][16] halfs: x, y, z of kDoubtPoints points
+  // Joints: nothing, or of every tile 0, or 1 + the joint whose space it lies in. Of each joint the rows of y
+  // that are its matrix, column by column (kpsa/signals.h): entry = mean + deviation y.
+  std::vector<std::uint32_t> joints;                // [tiles]
+  std::vector<std::uint32_t> joint_rows;            // [joints][12]
+  std::vector<double> joint_mean, joint_deviation;  // likewise
 };
 inline constexpr std::size_t kMaxProducts = 1 + kLatents * (kLatents + 1) / 2;
 inline constexpr std::uint8_t kUnitLatent = 15;  // which is 1
@@ -110,7 +121,7 @@ class TileMap {
                         std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
   // What U of every tile is multiplied by [input_size()], so that what the doubt needs is computed once; and
   // the largest doubt, for y that are finite: 0 and no tile without products.
-  std::size_t input_size() const { return data_.scale.size(); }
+  std::size_t input_size() const { return data_.scale.size() + (data_.joint_rows.size() + 15) / 16 * 16; }
   Doubt ComputeInputs(std::span<const float> y, std::span<float> inputs) const;
   // ReconstructBlock from these; as many of them as frames. The same bits.
   void ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
@@ -124,10 +135,13 @@ class TileMap {
   std::size_t products(std::size_t tile) const { return data_.products.empty() ? 0 : data_.products[tile]; }
   void TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* doubt = nullptr) const;
   void ProductsOf(std::size_t tile, const float* t, float* p) const;
+  Status CheckJoints(const TileData& data, const std::string& what) const;
+  void JointMatricesOf(const float* y, float* entries) const;  // [joints][12]
   // The tiles listed (none: all) of some frames; inputs_of(tile, frame, t) writes a tile's inputs to t.
-  template <typename InputsOf>
-  void Run(const InputsOf& inputs_of, std::span<const PointsView> outs, std::span<const Index> tiles,
-           std::span<const Matrix4> spaces) const;
+  // joints_of(frame, entries): as JointMatricesOf.
+  template <typename InputsOf, typename JointsOf>
+  void Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::span<const PointsView> outs,
+           std::span<const Index> tiles, std::span<const Matrix4> spaces) const;
 
   TileData data_;
   std::vector<std::size_t> column_begin_;  // [tiles] first of columns
@@ -155,7 +169,8 @@ struct TileInputs {
   const PoseMatrix* poses = nullptr;
   const Eigen::MatrixXd* measured = nullptr;  // y of these poses [r x T]
   std::size_t first_column = 0;
-  std::size_t clip_poses = 0;  // the first poses, neighbours in time of each other
+  std::size_t clip_poses = 0;                     // the first poses, neighbours in time of each other
+  Eigen::VectorXd row_mean = {}, row_scale = {};  // [r] of y = (raw - mean) * scale, where tiles have joints
 };
 // What the tiles cost in accuracy; scene units. Where precision or the number of attempts do not allow the
 // budgets, these exceed them.
@@ -167,6 +182,20 @@ struct TileReport {
 // gain: B [cN x r]; mean [cN] interleaved. Rows of one output.
 TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components,
                    const TileInputs& inputs, const TileOptions& options, TileReport* report = nullptr);
+// The same where each tile has a map of its own, from some of the cues: asked for tile after tile, from
+// several threads; r as TileInputs has it. Of the inputs, covariance and left_out are the models'.
+struct TileModel {
+  std::vector<std::uint32_t> columns;     // of y, ascending
+  Eigen::MatrixXd gain;                   // [3n x |columns|]
+  Eigen::MatrixXd covariance;             // of these columns
+  double left_out = 0;                    // variance of a point that they do not tell
+  std::vector<std::uint32_t> joint_rows;  // where the tile lies in the space of a joint: those of its matrix
+  Eigen::VectorXd mean;                   // [3n], there; empty: as BuildTiles has it
+  Eigen::MatrixXd target;  // [3n x T] less the mean, of the poses that products are fitted to; empty: theirs
+};
+TileMap BuildTiles(const std::function<TileModel(std::size_t tile)>& models, const Eigen::VectorXd& mean,
+                   int components, std::size_t inputs_count, const TileInputs& inputs,
+                   const TileOptions& options, TileReport* report = nullptr);
 
 // IEEE half precision, round to nearest even; overflow gives infinity.
 std::uint16_t HalfFromFloat(float value);

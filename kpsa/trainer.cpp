@@ -10,40 +10,36 @@
 #include "kpsa/cue_choice.h"
 #include "kpsa/cue_description.h"
 #include "kpsa/cue_places.h"
+#include "kpsa/frame_cost.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/pca.h"
 #include "kpsa/pose_judge.h"
 #include "kpsa/pose_recorder.h"
-#include "kpsa/score_choice.h"
-#include "kpsa/signal_reach.h"
 #include "kpsa/space_frame.h"
+#include "kpsa/tile_candidates.h"
+#include "kpsa/tile_subspace.h"
 #include "kpsa/tilts.h"
+#include "kpsa/trained_ranges.h"
 
 namespace kpsa {
 namespace {
 
 constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
 constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
+constexpr double kOwnShare = 0.03, kOwnMaxShare = 0.2;  // the same where tiles have cues of their own
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
-constexpr double kStillTurn = 5e-4;  // of light: a turn (radians) of a joint that is none
-// Of the tolerance, as displacements of points: what an entry may do unnoticed; an entry that moved less than
-// `kHardlyMoved` in training has its guard fully there after `kStillRamp`, others after `kLeastRamp` at
-// least.
-constexpr double kSlackShare = 0.05, kHardlyMoved = 2, kStillRamp = 1, kLeastRamp = 0.25;
-constexpr double kTrainedBeyond = 0.5;  // of kBeyondShare: the rest of the way the guards come in
-constexpr std::size_t kBetween = 400;   // poses between the frames of all clips, at most
-constexpr std::size_t kChunk = 256;     // calibration poses that are held at once
+constexpr std::size_t kBetween = 400;                  // poses between the frames of all clips, at most
+constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, where more are drawn for tiles
+constexpr std::size_t kChunk = 256;                    // calibration poses that are held at once
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
 constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
-constexpr double kLightShift = 1e-4;  // metres; where the tolerance is no length: both, of a joint
 constexpr int kMaxLightModes = 120;   // that are looked at; noise is beyond
-constexpr double kManyMisses = 0.05;  // from which finer cues are tried
-constexpr double kDoubtCost = 100;    // ns a tile, on the scale of the nodes' costs
-constexpr std::size_t kFineRows = 500;
-constexpr int kFineModes = 450;
+constexpr double kManyMisses = 0.05;  // from which cues of each tile are tried
+constexpr double kClearly = 0.5;      // of the expected cost of the others: cues of tiles are taken
+constexpr double kTurnReach = 0.03;   // of the diagonal: how far an entry of a rotation moves points, about
 constexpr std::size_t kJudges = 300;  // new poses that compare places for cues
 
 class Trainer {
@@ -59,15 +55,20 @@ class Trainer {
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
-    KPSA_RETURN_IF_ERROR(FindRanges(poses));
+    ranges_ = RangeFinder(layout_);
+    ranges_.Widen(poses);
+    if (!of_light()) KPSA_RETURN_IF_ERROR(ranges_.Widen(clips_, recorder_.get()));
     if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
-    if (judges.poses() > 0) judges.Subtract(pca_.mean);
-    if (of_light() && judges.poses() > 0) TruncateModes(judges);
+    PoseMatrix centered(layout_);  // the judges
+    for (std::size_t t = 0; t < judges.poses(); ++t)
+      std::ranges::copy(std::as_const(judges).row(t), centered.AddPose().begin());
+    if (judges.poses() > 0) centered.Subtract(pca_.mean);
+    if (of_light() && judges.poses() > 0) TruncateModes(centered);
     KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
-    KPSA_RETURN_IF_ERROR(ChooseCues(poses, judges));
+    KPSA_RETURN_IF_ERROR(ChooseCues(poses, centered));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
-    Result<Subspace> subspace = Assemble(poses);
+    Result<Subspace> subspace = Assemble(&poses, judges);
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
@@ -107,6 +108,7 @@ class Trainer {
       if (!places.ok()) return places.status();
       candidates = std::move(places->stages);
       places_ = std::move(places->places);
+      of_tiles_ = std::move(places->of_tiles);
       full_cost_ = places->full_cost;
     }
 
@@ -177,31 +179,32 @@ class Trainer {
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
       if (of_light()) groups_ = {};
     }
-    const auto sample = [&](PoseKind kind, std::size_t count, std::uint64_t seed, PoseMatrix* to) {
-      return recorder_->AddSamples(SampleOf(kind, count, seed), clips_, to);
-    };
-    // The sampler's kind, and some of the others
-    std::size_t rest = options_.samples;
-    if (!of_light()) {
-      for (const auto& [kind, share] :
-           {std::pair{PoseKind::kBeyond, 0.08}, std::pair{PoseKind::kMixture, 0.06},
-            std::pair{PoseKind::kNeighbours, 0.06}}) {
-        std::vector<SampledPose> some =
-            SampleOf(kind, static_cast<std::size_t>(share * static_cast<double>(options_.samples)),
-                     options_.seed + static_cast<std::uint64_t>(kind));
-        if (kind == PoseKind::kBeyond) HalfAsFarBeyond(&some);
-        rest -= some.size();
-        KPSA_RETURN_IF_ERROR(recorder_->AddSamples(some, clips_, poses));
-      }
-    }
-    KPSA_RETURN_IF_ERROR(sample(PoseKind::kSampled, rest, options_.seed, poses));
+    KPSA_RETURN_IF_ERROR(AddSampled(options_.samples, options_.seed, poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3)
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
-    const bool compares = places_.size() > 1 || (options_.may_be_finer && !places_.empty());
+    const bool compares = places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty());
     return compares ? RecordJudges(judges) : Status();
+  }
+
+  // The sampler's kind, and some of the others.
+  Status AddSampled(std::size_t count, std::uint64_t seed, PoseMatrix* poses) {
+    std::size_t rest = count;
+    if (!of_light()) {
+      for (const auto& [kind, share] :
+           {std::pair{PoseKind::kBeyond, 0.08}, std::pair{PoseKind::kMixture, 0.06},
+            std::pair{PoseKind::kNeighbours, 0.06}}) {
+        std::vector<SampledPose> some =
+            SampleOf(kind, static_cast<std::size_t>(share * static_cast<double>(count)),
+                     seed + static_cast<std::uint64_t>(kind));
+        if (kind == PoseKind::kBeyond) HalfAsFarBeyond(rig_.controls, &some);
+        rest -= some.size();
+        KPSA_RETURN_IF_ERROR(recorder_->AddSamples(some, clips_, poses));
+      }
+    }
+    return recorder_->AddSamples(SampleOf(PoseKind::kSampled, rest, seed), clips_, poses);
   }
 
   Status RecordJudges(PoseMatrix* judges) {
@@ -228,86 +231,6 @@ class Trainer {
     std::vector<SampledPose> sweeps = Sweeps(drawn_);
     AddTilts(rig_.controls, drawn_.size(), options_.seed ^ 0xbb67ae8584caa73bull, &sweeps);
     return sweeps;
-  }
-
-  // Training ends half way beyond the ranges; on the other half guards come in, and calibration looks.
-  void HalfAsFarBeyond(std::vector<SampledPose>* poses) const {
-    for (SampledPose& pose : *poses) {
-      for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
-        const ControlRange& control = rig_.controls[c];
-        double& value = pose.values[c];
-        const double inside = std::clamp(value, control.min, control.max);
-        value = inside + kTrainedBeyond * (value - inside);
-      }
-    }
-  }
-
-  // A share of the spans between two times gets one more, at all places in between.
-  static TrainingClip WithTimesBetween(const TrainingClip& clip, double share) {
-    TrainingClip dense{clip.name, {}};
-    double due = 0, place = 0.5;
-    for (std::size_t i = 0; i < clip.times.size(); ++i) {
-      dense.times.push_back(clip.times[i]);
-      due += share;
-      if (i + 1 == clip.times.size() || due < 1) continue;
-      due -= 1;
-      dense.times.push_back(clip.times[i] + place * (clip.times[i + 1] - clip.times[i]));
-      place = std::fmod(place + 0.6180339887498949, 1.0);
-    }
-    return dense;
-  }
-
-  // Of the training poses, and of the clips between frames: quaternion keys turn joints about axes there that
-  // no frame has.
-  Status FindRanges(const PoseMatrix& poses) {
-    const std::span<const float> first = poses.row(0).subspan(layout_.scalar_begin());
-    lo_.assign(first.begin(), first.end());
-    hi_ = lo_;
-    for (std::size_t t = 0; t < poses.poses(); ++t) Widen(poses.row(t).subspan(layout_.scalar_begin()));
-    for (const TrainingClip& clip : clips_) {
-      TrainingClip fine{clip.name, {}};
-      for (std::size_t i = 0; i < clip.times.size(); ++i) {
-        const double next = clip.times[std::min(i + 1, clip.times.size() - 1)];
-        for (const double part : {0.0, 0.25, 0.5, 0.75})
-          fine.times.push_back(clip.times[i] + part * (next - clip.times[i]));
-      }
-      if (!of_light()) KPSA_RETURN_IF_ERROR(recorder_->WidenRanges(fine, &lo_, &hi_));
-    }
-    return Status();
-  }
-  void Widen(std::span<const float> entries) {
-    for (std::size_t e = 0; e < entries.size(); ++e) {
-      lo_[e] = std::min<double>(lo_[e], entries[e]);
-      hi_[e] = std::max<double>(hi_[e], entries[e]);
-    }
-  }
-
-  // Where the guard of every entry begins, and how far it takes to be fully there.
-  Result<std::vector<TrainedRange>> MakeRanges() {
-    std::vector<double> reach(lo_.size(), 0);
-    if (!of_light()) {
-      Result<std::vector<double>> found =
-          FindReach(rig_, &compiler_, guards_, inverse_rest_stretch_, diagonal_);
-      if (!found.ok()) return found.status();
-      reach = std::move(*found);
-    }
-    std::vector<TrainedRange> ranges;
-    for (const Signal& signal : guards_) {
-      for (std::size_t e = 0; e < signal.entries(); ++e) {
-        const std::size_t i = ranges.size();
-        const double extent = hi_[i] - lo_[i], noticed = options_.tolerance / reach[i];
-        double slack = kSlackShare * noticed;
-        // What hardly moved comes in slowly enough to be no jump; what did, within what calibration looks at
-        double ramp = std::max(options_.range_ramp * extent,
-                               (extent < kHardlyMoved * noticed ? kStillRamp : kLeastRamp) * noticed);
-        if (of_light()) {
-          slack = !signal.matrix ? 0 : e < 9 ? kStillTurn : kLightShift;
-          ramp = std::max(options_.range_ramp * extent, slack);
-        }
-        ranges.push_back(MakeTrainedRange(EntryName(signal, e), lo_[i], hi_[i], slack, ramp));
-      }
-    }
-    return ranges;
   }
 
   bool of_light() const { return rig_.target.colors; }
@@ -405,37 +328,42 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(std::move(priced));
     if (chosen.cues.empty())
       return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
-    if (options_.may_be_finer && choice.judges != nullptr && !of_light() && chosen.misses > kManyMisses) {
-      KPSA_RETURN_IF_ERROR(Say("finer cues", 0.75));
-      Result<Pca> fine = ComputeModes(poses, pca_.mean, kFineModes);
-      if (!fine.ok()) return fine.status();
-      choice.rows = kFineRows;
-      if (!places_.empty()) choice.places = {places_[chosen.place]};
-      CueChoice finer = kpsa::ChooseCues(*fine, positions_, noise_, poses, choice);
-      KPSA_RETURN_IF_ERROR(std::move(priced));
-      if (!finer.cues.empty() && finer.cost < chosen.cost) chosen = std::move(finer), pca_ = std::move(*fine);
-    }
     cues_ = MakeCueSet(pca_, chosen.cues, noise_);
+    chosen_ = std::move(chosen);
     return Status();
   }
 
-  Result<Subspace> Assemble(const PoseMatrix& poses) {
-    const Estimator estimator = options_.mode == EstimatorMode::kPaper
-                                    ? LeastSquaresEstimator(pca_, cues_)
-                                    : MapEstimator(pca_, cues_, !of_light());
-    record_.warning = estimator.warning;
-    const Eigen::MatrixXd training = MeasuredPoses(layout_, cues_, poses);
+  std::vector<SubspaceOutput> Outputs() const {
     std::vector<SubspaceOutput> outputs;
     for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m) {
       const AccelerationTarget::MeshPoints& mesh = rig_.target.meshes[m];
       outputs.push_back({mesh.name, totals_[m], of_light() ? "" : mesh.stages.back().name});
     }
-    Subspace subspace = MakeSubspace(
-        pca_, cues_, estimator, training, std::move(outputs),
-        TileOptions{kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance,
-                    of_light() ? 0 : kTileRest},
-        of_light() || estimator.mode == EstimatorMode::kPaper ? nullptr : &poses, record_.clip_poses);
+    return outputs;
+  }
+  TileOptions TileBudgets() const {
+    return {kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance, of_light() ? 0 : kTileRest};
+  }
+
+  Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
+    const Estimator estimator = options_.mode == EstimatorMode::kPaper
+                                    ? LeastSquaresEstimator(pca_, cues_)
+                                    : MapEstimator(pca_, cues_, !of_light());
+    record_.warning = estimator.warning;
+    const auto for_all_points = [&] {
+      return MakeSubspace(
+          pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(),
+          of_light() || estimator.mode == EstimatorMode::kPaper ? nullptr : poses, record_.clip_poses);
+    };
+    Subspace subspace;
+    if (options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses) {
+      KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, for_all_points, &subspace));
+    } else {
+      subspace = for_all_points();
+    }
     if (options_.keep_modes) subspace.kept_modes = pca_.output_modes().cast<float>();
+    if (options_.keep_modes)
+      subspace.modes = subspace.soft_cache.modes = static_cast<std::size_t>(pca_.mode_count());
     subspace.mode = estimator.mode;
     subspace.space = rig_.target.space_name;
     subspace.inverse_rest_stretch = inverse_rest_stretch_;
@@ -446,6 +374,84 @@ class Trainer {
     subspace.cues.clear();
     for (const CueRef& cue : cues_.cues) subspace.cues.push_back(DescribeCue(rig_, *recorder_, totals_, cue));
     return subspace;
+  }
+
+  // The subspace with which a frame is expected to cost less: with cues for all points, or of each tile.
+  Status CompareWithTiles(PoseMatrix* poses, const PoseMatrix& judges,
+                          const std::function<Subspace()>& for_all_points, Subspace* subspace) {
+    KPSA_RETURN_IF_ERROR(Say("cues of tiles", 0.8));
+    Result<TileSubspace> tiles = MakeTiles(poses);
+    if (!tiles.ok()) return tiles.status();
+    const bool doubts = tiles->subspace.doubt_inputs() > 0;  // which alone judge it
+    FrameCost cost{1, std::numeric_limits<double>::infinity()};
+    if (doubts) {
+      const Result<FrameCost> priced = Price(&tiles->subspace, tiles->cues, judges);
+      if (!priced.ok()) return priced.status();
+      cost = *priced;
+    }
+    const auto tried = [&](const char* what, std::size_t cues, std::size_t rows, double misses, double ns,
+                           bool taken) {
+      record_.tried.push_back({what, cues, rows, misses, ns / full_cost_, taken});
+    };
+    const auto rows = static_cast<std::size_t>(cues_.rows());
+    if (cost.ns < kClearly * chosen_.cost) {  // as chosen, without products: not worth more time
+      tried(kForAllPoints, cues_.cues.size(), rows, chosen_.misses, chosen_.cost, false);
+      tried(kByTile, tiles->cues.cues.size(), tiles->subspace.rows(), cost.misses, cost.ns, true);
+      *subspace = std::move(tiles->subspace), cues_ = std::move(tiles->cues);
+      return Status();
+    }
+    KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
+    *subspace = for_all_points();
+    const Result<FrameCost> before = Price(subspace, cues_, judges);
+    if (!before.ok()) return before.status();
+    const bool better = cost.ns < before->ns;
+    tried(kForAllPoints, cues_.cues.size(), rows, before->misses, before->ns, !better);
+    if (doubts) tried(kByTile, tiles->cues.cues.size(), tiles->subspace.rows(), cost.misses, cost.ns, better);
+    if (better) *subspace = std::move(tiles->subspace), cues_ = std::move(tiles->cues);
+    return Status();
+  }
+
+  // With more poses, which regressions on few cues are glad of.
+  Result<TileSubspace> MakeTiles(PoseMatrix* poses) {
+    const std::size_t fit = kMostPoseBytes / (sizeof(float) * layout_.columns());
+    const std::size_t count = std::min(options_.samples, fit - std::min(fit, poses->poses()));
+    PoseMatrix more(layout_);
+    KPSA_RETURN_IF_ERROR(AddSampled(count, options_.seed ^ 0xa54ff53a5f1d36f1ull, &more));
+    record_.sampled_poses += more.poses();
+    if (more.poses() > 0) more.Subtract(pca_.mean);
+    poses->Append(more);
+    TileCandidateOptions of;
+    of.layout = layout_, of.totals = totals_, of.signals = recorder_->signals();
+    of.points = of_tiles_, of.positions = positions_, of.stages = recorder_->candidates();
+    const Result<std::vector<TileCandidates>> candidates = FindTileCandidates(rig_, &compiler_, clips_, of);
+    if (!candidates.ok()) return candidates.status();
+    TileCueOptions choice;
+    choice.tolerance = options_.tolerance;
+    choice.mean = &pca_.mean;
+    choice.turn_reach = kTurnReach * diagonal_;
+    Index entry = 0;
+    for (const Signal& signal : recorder_->signals()) {
+      const CueRef cue{CueKind::kScalar, entry};
+      entry += static_cast<Index>(signal.entries());
+      const auto column = static_cast<Eigen::Index>(CueColumn(layout_, cue));
+      if (!signal.matrix && pca_.row_variance[column] > noise_.scalars[cue.index])
+        choice.values.push_back(cue);
+    }
+    return MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, *candidates, choice, Outputs(),
+                            {kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest});
+  }
+
+  // The subspace is given its best score by the judges, and is then priced.
+  Result<FrameCost> Price(Subspace* subspace, const CueSet& cues, const PoseMatrix& judges) {
+    const Result<double> points = CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues.cues);
+    if (!points.ok()) return points.status();
+    std::vector<ScoreJudge> judged;
+    for (const JudgedPose& pose : PoseJudge(*subspace, layout_, cues).Judge(judges))
+      judged.push_back({pose, 0, judge_kinds_[judged.size()]});
+    subspace->tolerance = options_.tolerance;
+    subspace->violation_rate = options_.violation_rate;
+    subspace->score = ScoreOf(*subspace, judged, full_cost_);
+    return ExpectedCost(*subspace, judged, *points, full_cost_);
   }
 
   // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
@@ -485,14 +491,15 @@ class Trainer {
     record_.held_out_max = judge.max();
 
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
-    Result<std::vector<TrainedRange>> ranges = MakeRanges();
+    Result<std::vector<TrainedRange>> ranges =
+        ranges_.Make(rig_, &compiler_, guards_,
+                     {options_.tolerance, options_.range_ramp, diagonal_, inverse_rest_stretch_});
     if (!ranges.ok()) return ranges.status();
     subspace->ranges = std::move(*ranges);
     const std::vector<char> guarded = GuardedEntries(carried->rigid);
     AskGuards(subspace->ranges, guarded, entries, &held_out);
     AskGuards(subspace->ranges, guarded, score_entries, &score_judges);
-    subspace->score = ChooseScore(score_judges, subspace->tolerance, subspace->violation_rate,
-                                  subspace->blend_start, CostsOfScore(*subspace));
+    subspace->score = ScoreOf(*subspace, score_judges, full_cost_);
     for (const ScoreJudge& held : held_out) {
       subspace->calibration.push_back(
           {subspace->score.Of(held.pose.measured, held.pose.doubt), held.pose.error, held.guard, held.kind});
@@ -523,33 +530,12 @@ class Trainer {
       for (const JudgedPose& pose : judge->Judge(recorded)) judged->push_back({pose, 0, kind});
       for (std::size_t t = 0; t < recorded.poses(); ++t) {
         const std::span<const float> row = std::as_const(recorded).row(t).subspan(layout_.scalar_begin());
-        if (of != PoseKind::kBeyond) Widen(row);
+        if (of != PoseKind::kBeyond) ranges_.Widen(row);
         entries->emplace_back(row.begin(), row.end());
       }
       if (poses != nullptr) poses->insert(poses->end(), chunk.begin(), chunk.end());
     }
     return Status();
-  }
-
-  static void AskGuards(const std::vector<TrainedRange>& ranges, const std::vector<char>& guarded,
-                        const std::vector<std::vector<float>>& entries, std::vector<ScoreJudge>* judged) {
-    for (std::size_t t = 0; t < entries.size(); ++t) {
-      double& guard = (*judged)[t].guard;
-      for (std::size_t e = 0; e < guarded.size(); ++e) {
-        if (guarded[e])
-          guard = std::max(guard, GuardWeight(ranges[e].lo, ranges[e].hi, ranges[e].ramp, entries[t][e]));
-      }
-    }
-  }
-
-  ScoreCosts CostsOfScore(const Subspace& subspace) const {
-    const auto rows = static_cast<double>(subspace.rows());
-    double tiles = 0;
-    for (const TileMap& map : subspace.tiles) {
-      for (const std::uint32_t count : map.data().products) tiles += count > 0 ? 1 : 0;
-    }
-    if (!(full_cost_ > 0)) return {};
-    return {kScoreCost * rows * rows / full_cost_, kDoubtCost * tiles / full_cost_};
   }
 
   // By entry: whether it has a guard where the space carries the points.
@@ -585,10 +571,12 @@ class Trainer {
   PoseLayout layout_;
   std::vector<Index> totals_;
   std::vector<CuePlace> places_;
+  CuePlace of_tiles_;
+  CueChoice chosen_;  // the cues for all points
   double full_cost_ = 0;
   std::vector<Double3> positions_;
-  std::vector<Signal> guards_;   // the recorder's first signals: relative matrices follow, which only measure
-  std::vector<double> lo_, hi_;  // of every entry of a signal
+  std::vector<Signal> guards_;  // the recorder's first signals: relative matrices follow, which only measure
+  RangeFinder ranges_;
   Matrix4 inverse_rest_stretch_;
   ClipPoses clip_poses_;
   ControlGroups groups_;

@@ -23,8 +23,8 @@ struct TrainOptions {
   EstimatorMode mode = EstimatorMode::kMap;
   int max_modes = 250;     // map; paper mode takes key_points / 2
   std::size_t rows = 300;  // of measurements: a point takes 3, an entry of a signal 1
-  // More of both (kFineRows, kFineModes) where that is expected to cost less: poses that miss are dear.
-  bool may_be_finer = true;
+  // Cues of each tile (kpsa/tile_cues.h) instead of these where that is expected to cost less.
+  bool may_have_cues_by_tile = true;
   std::size_t min_points = 16;        // that are measured
   std::size_t key_points = 80;        // paper mode
   std::size_t samples = 0;            // of the controls, besides the clips

@@ -35,7 +35,17 @@ Signature ParseSignature(const json& nodes) {
 }  // namespace
 
 std::string TrainingJson(const TrainingRecord& r) {
-  const json object = {{"clips", r.clips},
+  json tried = json::array();
+  for (const TrainingRecord::Tried& one : r.tried) {
+    tried.push_back({{"cues", one.what},
+                     {"count", one.cues},
+                     {"rows", one.rows},
+                     {"misses", one.misses},
+                     {"cost", one.cost},
+                     {"taken", one.taken}});
+  }
+  const json object = {{"tried", tried},
+                       {"clips", r.clips},
                        {"clip_poses", r.clip_poses},
                        {"sampled_poses", r.sampled_poses},
                        {"calibration_poses", r.calibration_poses},
@@ -64,10 +74,11 @@ TrainingRecord ParseTraining(const std::string& text) {
   const auto number = [&](const json& from, const char* name) {
     return from.contains(name) && from[name].is_number() ? from[name].get<double>() : 0.0;
   };
-  const auto count = [&](const char* name) {
-    const double v = number(object, name);
+  const auto count_in = [&](const json& from, const char* name) {
+    const double v = number(from, name);
     return v > 0 && v < 1e15 ? static_cast<std::size_t>(v) : std::size_t{0};
   };
+  const auto count = [&](const char* name) { return count_in(object, name); };
   const auto words = [&](const char* name) {
     return object.contains(name) && object[name].is_string() ? object[name].get<std::string>()
                                                              : std::string();
@@ -107,6 +118,15 @@ TrainingRecord ParseTraining(const std::string& text) {
         if (control.is_array() && control.size() == 2 && control[0].is_string() && control[1].is_number())
           r.worst.controls.emplace_back(control[0].get<std::string>(), control[1].get<double>());
       }
+    }
+  }
+  if (object.contains("tried") && object["tried"].is_array()) {
+    for (const json& one : object["tried"]) {
+      if (!one.is_object()) continue;
+      const bool named = one.contains("cues") && one["cues"].is_string();
+      r.tried.push_back({named ? one["cues"].get<std::string>() : std::string(), count_in(one, "count"),
+                         count_in(one, "rows"), number(one, "misses"), number(one, "cost"),
+                         one.contains("taken") && one["taken"].is_boolean() && one["taken"].get<bool>()});
     }
   }
   if (object.contains("signature")) r.signature = ParseSignature(object["signature"]);

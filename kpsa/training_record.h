@@ -12,6 +12,8 @@
 
 namespace kpsa {
 
+inline constexpr const char *kForAllPoints = "for all points", *kByTile = "of each tile";
+
 struct TrainingRecord {
   std::vector<std::string> clips;
   std::size_t clip_poses = 0, sampled_poses = 0, calibration_poses = 0;
@@ -22,6 +24,15 @@ struct TrainingRecord {
   double tile_rms = 0;                        // what tiles and half precision add
   std::string mode;                           // "map" or "paper"
   std::string warning;
+  // What was tried, where there was a choice: its cues, the rows that these measure, and what judges say.
+  struct Tried {
+    std::string what;
+    std::size_t cues = 0, rows = 0;
+    double misses = 0;  // share of the judges
+    double cost = 0;    // of a frame, misses included, in full evaluations
+    bool taken = false;
+  };
+  std::vector<Tried> tried;
   // The accepted calibration pose with the largest error of what is emitted, at the trained tolerance.
   struct Worst {
     std::string kind, clip;  // PoseKindName; clip "" is the rest pose, no kind: nothing is accepted

@@ -60,7 +60,7 @@ TEST(GuardWalks, NoStepIsMuchLargerThanTheFullEvaluations) {
 
   // The canary: where the approximation is coarse, guards without a ramp jump
   options.max_modes = 5;
-  options.may_be_finer = false;
+  options.may_have_cues_by_tile = false;
   const auto coarse = TrainRig(folder.rig(), options);
   ASSERT_NE(coarse, nullptr);
   const auto worst = [&](std::shared_ptr<const Subspace> subspace) {

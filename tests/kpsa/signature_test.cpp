@@ -63,7 +63,13 @@ TEST(Signature, TrainingRecordsKeepIt) {
   TrainingRecord record;
   record.signature = Some();
   record.controls = {"upperarm01.L.rotate.x", "p/3.envelope"};
+  record.tried = {{kForAllPoints, 3, 9, 0.5, 0.6, false}, {kByTile, 40, 44, 0.125, 0.25, true}};
   const TrainingRecord read = ParseTraining(TrainingJson(record));
+  ASSERT_EQ(read.tried.size(), 2u);
+  EXPECT_EQ(read.tried[1].what, kByTile);
+  EXPECT_EQ(read.tried[1].rows, 44u);
+  EXPECT_EQ(read.tried[1].misses, 0.125);
+  EXPECT_TRUE(read.tried[1].taken && !read.tried[0].taken);
   EXPECT_EQ(read.signature, record.signature);
   EXPECT_EQ(read.controls, record.controls);
   // The flat form of earlier versions is no signature, and neither is anything else

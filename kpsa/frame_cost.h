@@ -1,0 +1,30 @@
+// What a frame is expected to cost with a subspace: the quantity that training minimises. Internal to
+// training.
+#pragma once
+
+#include <span>
+
+#include "kpsa/score_choice.h"
+#include "kpsa/subspace.h"
+
+namespace kpsa {
+
+// What guards ask for in each judge's pose. entries: of the signals with ranges, by pose; guarded: by entry.
+void AskGuards(std::span<const TrainedRange> ranges, const std::vector<char>& guarded,
+               const std::vector<std::vector<float>>& entries, std::vector<ScoreJudge>* judges);
+
+// full: what the whole evaluation costs (ns, on the scale of the nodes' costs); 0: unknown.
+ScoreCosts CostsOfScore(const Subspace& subspace, double full);
+// How a subspace is judged best: by what its tiles doubt alone where it has no score of its own.
+ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, double full);
+
+struct FrameCost {
+  double misses = 0;  // share of the judges, all kinds alike
+  double ns = 0;      // of a frame
+};
+// With the score of the subspace, its tolerance and rate. points: what the graph spends until the points
+// among its cues are there (ns).
+FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
+                       double full);
+
+}  // namespace kpsa
