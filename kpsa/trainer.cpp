@@ -37,9 +37,10 @@ constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say
 constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
 constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
 constexpr int kMaxLightModes = 120;   // that are looked at; noise is beyond
-constexpr double kManyMisses = 0.05;  // from which cues of each tile are tried
-constexpr double kClearly = 0.5;      // of the expected cost of the others: cues of tiles are taken
-constexpr double kTurnReach = 0.03;   // of the diagonal: how far an entry of a rotation moves points, about
+constexpr double kManyMisses =
+    0.15;                            // of new poses, which are harder than clips: cues of each tile are tried
+constexpr double kClearly = 0.5;     // of the expected cost of the others: cues of tiles are taken
+constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
 constexpr std::size_t kJudges = 300;  // new poses that compare places for cues
 
 class Trainer {
