@@ -269,13 +269,13 @@ class Ablation {
         request.outputs.push_back({target.meshes[candidate.mesh].stages[candidate.stage].points,
                                    PointSet::Of(stage, totals_[candidate.mesh])});
     }
-    std::size_t column = 0;
+    const std::vector<Index> first = FirstScalars(recorder_->signals(), recorder_->layout());
     for (const Signal& signal : recorder_->signals()) {
+      const Index column = first[static_cast<std::size_t>(&signal - recorder_->signals().data())];
       const bool wanted = std::any_of(cues.begin(), cues.end(), [&](const CueRef& cue) {
         return cue.kind == CueKind::kScalar && cue.index >= column && cue.index < column + signal.entries();
       });
       if (wanted) request.outputs.push_back({signal.plug, {}});
-      column += signal.entries();
     }
     Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
     return plan.ok() ? *plan : nullptr;

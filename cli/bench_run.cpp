@@ -134,8 +134,10 @@ void Contender::Describe() {
     result.cues += one.subspace->cues.size();
     result.modes += one.subspace->modes;
     for (const CueDescription& cue : one.subspace->cues) {
-      const bool scalar = cue.kind == CueDescription::Kind::kScalar;
-      ++stages[scalar ? "scalars" : "points of " + CueName(*one.subspace, cue)];
+      const bool scalar = cue.kind != CueDescription::Kind::kPoint;
+      ++stages[cue.kind == CueDescription::Kind::kProduct ? "products of scalars"
+               : scalar                                   ? "scalars"
+                                                          : "points of " + CueName(*one.subspace, cue)];
       result.cue_points += !scalar;
     }
     const TrainingRecord record = ParseTraining(one.subspace->training);

@@ -255,9 +255,11 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
   }
   FactTable cues{"cues", {"kind", "where", ">point"}, {}};
   for (const CueDescription& cue : subspace->cues) {
-    const bool scalar = cue.kind == CueDescription::Kind::kScalar;
-    cues.rows.push_back({std::string(scalar ? "scalar" : "point"), CueName(*subspace, cue),
-                         scalar ? Cell(std::string()) : Count(cue.point)});
+    const bool scalar = cue.kind != CueDescription::Kind::kPoint;
+    cues.rows.push_back({std::string(cue.kind == CueDescription::Kind::kProduct ? "product"
+                                     : scalar                                   ? "scalar"
+                                                                                : "point"),
+                         CueName(*subspace, cue), scalar ? Cell(std::string()) : Count(cue.point)});
   }
   FactTable ranges{"trained ranges", {"plug", ">min", ">max"}, {}};
   for (const TrainedRange& range : subspace->ranges) ranges.rows.push_back({range.plug, range.lo, range.hi});

@@ -108,7 +108,7 @@ RenderDots KeyPoints(const std::vector<AppliedSubspace>& applied, const Pose& po
   for (const AppliedSubspace& one : applied) {
     paper = paper && one.subspace->mode == EstimatorMode::kPaper;
     for (const CueDescription& cue : one.subspace->cues) {
-      if (cue.kind == CueDescription::Kind::kScalar || one.entry.points[cue.mesh].colors) {
+      if (cue.kind != CueDescription::Kind::kPoint || one.entry.points[cue.mesh].colors) {
         ++scalars;
         continue;
       }

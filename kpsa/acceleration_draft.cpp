@@ -181,6 +181,22 @@ Index PlaceCue(const Signal& signal, AccelerationDraft* draft) {
   return input;
 }
 
+// The row of a scalar, which may be an entry of a matrix.
+Result<KpsaConfig::Row> ScalarRow(const Graph& graph, const AccelerationTarget& target,
+                                  const std::string& plug, AccelerationDraft* draft) {
+  const SignalEntry split = SplitEntryName(plug);
+  const Result<Signal> signal = FindSignal(graph, split.signal, target.within);
+  if (!signal.ok()) return signal.status();
+  if (signal->matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
+    return Status::Invalid("the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)",
+                           plug);
+  KpsaConfig::Row row;
+  row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
+  row.element = static_cast<Index>(split.entry.value_or(0));
+  row.input = PlaceCue(*signal, draft);
+  return row;
+}
+
 // Where the rows of the measurement come from.
 Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
                AccelerationDraft* draft) {
@@ -222,21 +238,31 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
             static_cast<Index>(std::lower_bound(inputs[i].points.begin(), inputs[i].points.end(), cue.point) -
                                inputs[i].points.begin());
       }
+    } else if (cue.kind == CueDescription::Kind::kScalar) {
+      const Result<KpsaConfig::Row> scalar = ScalarRow(graph, target, cue.plug, draft);
+      if (!scalar.ok()) return scalar.status();
+      row = *scalar;
     } else {
-      const SignalEntry split = SplitEntryName(cue.plug);
-      const Result<Signal> signal = FindSignal(graph, split.signal, target.within);
-      if (!signal.ok()) return signal.status();
-      if (signal->matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
-        return Status::Invalid(
-            "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", cue.plug);
-      row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
-      row.element = static_cast<Index>(split.entry.value_or(0));
-      row.input = PlaceCue(*signal, draft);
+      KpsaConfig::Product product;
+      product.lo = cue.lo, product.hi = cue.hi;
+      for (std::size_t f = 0; f < cue.factors.size(); ++f) {
+        const Result<KpsaConfig::Row> factor = ScalarRow(graph, target, cue.factors[f].plug, draft);
+        if (!factor.ok()) return factor.status();
+        (f == 0 ? product.a : product.b) = *factor;
+        (f == 0 ? product.of_a : product.of_b) = cue.factors[f].curve;
+        if (factor->kind == KpsaConfig::Row::Kind::kMatrix && draft->matrices[factor->input].relative)
+          return Status::Invalid("the subspace multiplies \"{}\", which is an entry of a world matrix",
+                                 cue.factors[f].plug);
+      }
+      row.kind = KpsaConfig::Row::Kind::kProduct;
+      row.input = static_cast<Index>(data->products.size());
+      data->products.push_back(product);
     }
     if (!cue.joint.empty()) {
       const Result<Signal> joint = FindSignal(graph, cue.joint, target.within);
       if (!joint.ok()) return joint.status();
-      if (!joint->relative || row.kind == KpsaConfig::Row::Kind::kScalar)
+      if (!joint->relative ||
+          (row.kind != KpsaConfig::Row::Kind::kMatrix && row.kind != KpsaConfig::Row::Kind::kPoint))
         return Status::Invalid("the subspace measures in the space of \"{}\", which is no world matrix",
                                cue.joint);
       const Index matrix = PlaceCue(*joint, draft);

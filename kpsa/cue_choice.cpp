@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "kpsa/calibration.h"
 #include "kpsa/estimator.h"
@@ -16,6 +17,8 @@ namespace {
 constexpr std::size_t kSelectionRounds = 4;  // shares of the cues, each chosen for what the last ones left
 constexpr std::size_t kErrorPoses = 800;     // training poses that say where errors are left
 constexpr double kErrorPower = 3;            // of a point's largest error in its weight
+constexpr double kDear = 0.4;                // share of the cost, from which points are priced
+constexpr double kPointPrice = 12;           // rows: what a point then has to be worth
 constexpr double kMinMotion = 1e-3;          // of the largest: points that move less are no cues
 constexpr double kHopeless =
     0.15;  // share of poses beyond the tolerance from which worst points are measured
@@ -61,10 +64,16 @@ class Chooser {
     for (const CuePlace& place : places) {
       place_ = static_cast<std::size_t>(&place - places.data());
       chosen_.clear();
-      SelectInRounds(place);
+      SelectInRounds(place, 3);
       if (chosen_.empty()) continue;
       AddPoints(place);
       bool better = compares && KeepIfCheaper();
+      if (better && !options_.by_rms && options_.points_cost(chosen_) > kDear * best_.cost) {
+        const std::vector<CueRef> many = std::exchange(chosen_, {});
+        SelectInRounds(place, kPointPrice);
+        AddPoints(place);
+        if (!KeepIfCheaper()) chosen_ = many;
+      }
       const bool early = std::any_of(chosen_.begin(), chosen_.end(),
                                      [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
       if (early && !options_.by_rms && AddWorstPoints()) better |= compares && KeepIfCheaper();
@@ -131,7 +140,7 @@ class Chooser {
   }
 
   // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them.
-  void SelectInRounds(const std::vector<CueRef>& place) {
+  void SelectInRounds(const std::vector<CueRef>& place, double point_price) {
     const std::vector<CueRef> candidates = Candidates(pca_, noise_, place, options_.max_outputs);
     std::vector<double> weights;
     const std::size_t rounds = options_.by_rms ? 1 : kSelectionRounds;
@@ -139,9 +148,12 @@ class Chooser {
       CueSelectionOptions selection;
       selection.fixed = chosen_;
       selection.count = options_.rows;
-      selection.max_cost = static_cast<double>(options_.rows * round) / static_cast<double>(rounds);
-      selection.marginal_cost = [](CueRef cue, std::span<const CueRef>) {
-        return cue.kind == CueKind::kScalar ? 1.0 : 3.0;
+      // At other prices as many points fit in as have to be there
+      const double budget =
+          static_cast<double>(options_.rows) + (point_price - 3) * static_cast<double>(options_.min_points);
+      selection.max_cost = budget * static_cast<double>(round) / static_cast<double>(rounds);
+      selection.marginal_cost = [point_price](CueRef cue, std::span<const CueRef>) {
+        return cue.kind == CueKind::kScalar ? 1.0 : point_price;
       };
       selection.point_weights = weights;
       chosen_ = SelectCues(pca_, candidates, positions_, noise_, selection).cues;

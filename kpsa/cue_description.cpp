@@ -1,5 +1,7 @@
 #include "kpsa/cue_description.h"
 
+#include <algorithm>
+
 #include "base/check.h"
 
 namespace kpsa {
@@ -13,20 +15,31 @@ const AccelerationTarget::Stage& OutputStage(const Graph& graph,
   return stages[last];
 }
 
+std::string ScalarName(const PoseRecorder& recorder, Index scalar) {
+  const std::vector<Index> first = FirstScalars(recorder.signals(), recorder.layout());
+  std::size_t s = first.size();
+  while (s > 0 && first[s - 1] > scalar) --s;
+  KPSA_CHECK(s > 0 && scalar < first[s - 1] + recorder.signals()[s - 1].entries());
+  return EntryName(recorder.signals()[s - 1], scalar - first[s - 1]);
+}
+
 CueDescription Describe(const TrainingRig& rig, const PoseRecorder& recorder, std::span<const Index> totals,
                         CueRef cue) {
   CueDescription d;
   Index index = cue.index;
   if (cue.kind == CueKind::kScalar) {
-    d.kind = CueDescription::Kind::kScalar;
-    for (const Signal& signal : recorder.signals()) {
-      if (index < signal.entries()) {
-        d.plug = EntryName(signal, index);
-        return d;
-      }
-      index -= static_cast<Index>(signal.entries());
+    const PoseLayout& layout = recorder.layout();
+    if (index < layout.products_begin() || index >= layout.relative_begin) {
+      d.kind = CueDescription::Kind::kScalar;
+      d.plug = ScalarName(recorder, index);
+      return d;
     }
-    KPSA_CHECK(false);
+    d.kind = CueDescription::Kind::kProduct;
+    const CueProduct& product = recorder.products()[index - layout.products_begin()];
+    d.factors.push_back({ScalarName(recorder, product.a), product.of_a});
+    if (product.b != kNoIndex) d.factors.push_back({ScalarName(recorder, product.b), product.of_b});
+    d.lo = product.lo, d.hi = product.hi;
+    return d;
   }
   const auto put = [&](std::size_t m, const AccelerationTarget::Stage& stage, Index point) {
     d.mesh = static_cast<Index>(m), d.stage = stage.name, d.point = point;
@@ -53,11 +66,10 @@ CueDescription DescribeCue(const TrainingRig& rig, const PoseRecorder& recorder,
                            std::span<const Index> totals, CueRef cue) {
   CueDescription description = Describe(rig, recorder, totals, cue);
   if (cue.joint == kNoIndex) return description;
-  Index first = 0;
-  for (const Signal& signal : recorder.signals()) {
-    if (first == cue.joint) description.joint = signal.name;
-    first += static_cast<Index>(signal.entries());
-  }
+  const std::vector<Index> first = FirstScalars(recorder.signals(), recorder.layout());
+  const auto found = std::ranges::find(first, cue.joint);
+  KPSA_CHECK(found != first.end());
+  description.joint = recorder.signals()[static_cast<std::size_t>(found - first.begin())].name;
   return description;
 }
 

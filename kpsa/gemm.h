@@ -43,5 +43,10 @@ Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
                          const Eigen::Ref<const Eigen::MatrixXd>& b);
 // a * a^T, symmetric to the last bit.
 Eigen::MatrixXd Gram(const GemmOperand& a);
+// rows * rows^T, and a * b^T: of values by poses.
+inline Eigen::MatrixXd GramOf(const Eigen::MatrixXd& rows) { return Gram(GemmOperand::Dense(rows)); }
+inline Eigen::MatrixXd CrossOf(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  return Multiply(GemmOperand::Dense(a), GemmOperand::Dense(b).Transposed());
+}
 
 }  // namespace kpsa

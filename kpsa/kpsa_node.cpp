@@ -159,6 +159,12 @@ double Entry(const Matrix4& matrix, Index element, const Matrix4* space_from_wor
          s(row, 3) * matrix(3, column);
 }
 
+double Value(const ArrayView<Matrix4>& matrices, const ArrayView<double>& scalars,
+             const KpsaConfig::Row& row) {
+  return row.kind == KpsaConfig::Row::Kind::kMatrix ? Entry(matrices[row.input], row.element, nullptr)
+                                                    : scalars[row.input];
+}
+
 // The raw measurement, in the order of the subspace's rows.
 void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4& world_from_space,
             std::span<double> raw) {
@@ -204,6 +210,14 @@ void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4
       case KpsaConfig::Row::Kind::kScalar:
         raw[r++] = scalars[row.input];
         break;
+      case KpsaConfig::Row::Kind::kProduct: {
+        const KpsaConfig::Product& product = data.products[row.input];
+        double value = product.of_a.Of(Value(matrices, scalars, product.a));
+        if (product.b.kind != KpsaConfig::Row::Kind::kPoint)
+          value *= product.of_b.Of(Value(matrices, scalars, product.b));
+        raw[r++] = value < product.lo ? product.lo : value > product.hi ? product.hi : value;  // NaN stays
+        break;
+      }
     }
   }
 }
@@ -463,6 +477,20 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(row.input);
     hasher.Add(row.element);
     hasher.Add(row.joint);
+  }
+  for (const Product& product : data_.products) {
+    for (const Row* row : {&product.a, &product.b}) {
+      hasher.Add(row->kind);
+      hasher.Add(row->input);
+      hasher.Add(row->element);
+    }
+    for (const ProductCurve* curve : {&product.of_a, &product.of_b}) {
+      hasher.Add(curve->centre);
+      hasher.Add(curve->scale);
+      hasher.Add(curve->hinge);
+    }
+    hasher.Add(product.lo);
+    hasher.Add(product.hi);
   }
   hasher.Add(std::span<const Index>(data_.joints));
   for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.matrix_ramp, &data_.scalar_lo,

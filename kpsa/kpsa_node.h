@@ -33,15 +33,22 @@ class KpsaConfig final : public Asset {
   };
   // Where row r of the measurement comes from. Points take three rows in a row.
   struct Row {
-    enum class Kind : std::uint8_t { kPoint, kMatrix, kScalar } kind = Kind::kPoint;
-    Index input = 0;         // which cues[], matrices[] or scalars[]
+    enum class Kind : std::uint8_t { kPoint, kMatrix, kScalar, kProduct } kind = Kind::kPoint;
+    Index input = 0;         // which cues[], matrices[], scalars[] or Data::products
     Index element = 0;       // position among the cue points; entry of the matrix
     Index joint = kNoIndex;  // into joints: measured in its space
+  };
+  // Of entries of matrices or of scalars; b may be missing (Row::Kind::kPoint).
+  struct Product {
+    Row a, b;
+    ProductCurve of_a, of_b;
+    double lo = 0, hi = 0;
   };
   struct Data {
     std::shared_ptr<const Subspace> subspace;
     std::vector<PointCues> cues;
-    std::vector<Row> rows;               // one a cue, in the order of the subspace's
+    std::vector<Row> rows;  // one a cue, in the order of the subspace's
+    std::vector<Product> products;
     std::vector<char> outputs_in_space;  // [outputs] as of cues: they are given in spaceMatrix's frame
     // Trained ranges and how guards come in outside of them (TrainedRange); see MatrixEntries
     std::vector<double> matrix_lo, matrix_hi, matrix_ramp;  // [12 * matrices]

@@ -21,11 +21,13 @@ struct PoseLayout {
   int components = 3;            // c: 3 or 1
   std::size_t stage_points = 0;  // P
   std::size_t scalars = 0;       // S
-  Index relative_begin = 0;      // scalars from here on are matrices of twelve entries, relative to the space
+  std::size_t products = 0;      // of which so many are products of others (kpsa/cue_products.h), and
+  Index relative_begin = 0;      // after these, matrices of twelve entries, relative to the space
   std::size_t outputs() const { return points * static_cast<std::size_t>(components); }
   std::size_t stage_begin() const { return outputs(); }
   std::size_t scalar_begin() const { return outputs() + 3 * stage_points; }
   std::size_t columns() const { return scalar_begin() + scalars; }  // D
+  std::size_t products_begin() const { return relative_begin - products; }
   friend bool operator==(const PoseLayout&, const PoseLayout&) = default;
 };
 

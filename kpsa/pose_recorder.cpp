@@ -39,7 +39,41 @@ Result<std::shared_ptr<const Plan>> PoseRecorder::CompileFor(const std::vector<P
   return compiler_->Compile(*rig_.graph, request);
 }
 
-Result<PoseLayout> PoseRecorder::Layout() {
+std::vector<Index> FirstScalars(std::span<const Signal> signals, const PoseLayout& layout) {
+  std::vector<Index> first;
+  Index next = 0;
+  for (const Signal& signal : signals) {
+    if (signal.relative && next < layout.relative_begin) next = layout.relative_begin;
+    first.push_back(next);
+    next += static_cast<Index>(signal.entries());
+  }
+  return first;
+}
+
+std::vector<std::size_t> PoseRecorder::FreeControls(bool playing) const {
+  std::vector<std::size_t> controls;
+  for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
+    if (!playing || !rig_.controls[c].by_clip) controls.push_back(c);
+  }
+  return controls;
+}
+
+PoseRecorder::PlanResult PoseRecorder::PlanOf(const std::string* clip, bool sampled) {
+  // No clip is named like this
+  const std::pair<std::string, bool> key(clip == nullptr ? std::string(1, '\0') : *clip, sampled);
+  if (const auto known = plans_.find(key); known != plans_.end()) return known->second;
+  KPSA_RETURN_IF_ERROR(
+      rig_.set_clip(clip == nullptr ? std::nullopt : std::optional<std::string_view>(*clip)));
+  std::vector<PlugRef> varying{rig_.time};
+  if (sampled) {
+    for (const std::size_t c : FreeControls(clip != nullptr)) varying.push_back(rig_.controls[c].plug);
+  }
+  PlanResult plan = CompileFor(varying);
+  if (plan.ok()) plans_.emplace(key, *plan);
+  return plan;
+}
+
+Result<PoseLayout> PoseRecorder::Layout(std::size_t products) {
   Result<std::shared_ptr<const Plan>> plan = CompileFor({rig_.time});
   if (!plan.ok()) return plan.status();
   layout_ = PoseLayout();
@@ -50,6 +84,9 @@ Result<PoseLayout> PoseRecorder::Layout() {
     layout_.scalars += signal.entries();
     if (!signal.relative) layout_.relative_begin = static_cast<Index>(layout_.scalars);  // these come last
   }
+  layout_.products = products;
+  layout_.relative_begin += static_cast<Index>(products);
+  layout_.scalars += products;
   return layout_;
 }
 
@@ -78,6 +115,7 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
   for (const CandidateStage& candidate : candidates_)
     store_points(evaluator.Points(o++), target.meshes[candidate.mesh].stages[candidate.stage].world);
   StoreSignals(evaluator, space_from_world, o, row.subspan(column));
+  StoreProducts(products_, layout_, row);
   KPSA_CHECK_EQ(column + layout_.scalars, row.size());
 }
 
@@ -85,6 +123,7 @@ void PoseRecorder::StoreSignals(const Evaluator& evaluator, const Matrix4& space
                                 std::span<float> entries) const {
   std::size_t column = 0;
   for (const Signal& signal : signals_) {
+    if (signal.relative) column = std::max<std::size_t>(column, layout_.relative_begin);
     if (signal.matrix) {
       double values[12];
       const Matrix4& matrix = evaluator.Get<Matrix4>(o++);
@@ -117,9 +156,10 @@ Status PoseRecorder::CheckFinite(std::span<const float> row) const {
   }
   if (column >= layout_.scalar_begin()) {
     column -= layout_.scalar_begin();
-    for (const Signal& signal : signals_) {
-      if (column < signal.entries()) return Status::Evaluation("{} is not a number", signal.name);
-      column -= signal.entries();
+    const std::vector<Index> first = FirstScalars(signals_, layout_);
+    for (std::size_t s = 0; s < signals_.size(); ++s) {
+      if (column >= first[s] && column < first[s] + signals_[s].entries())
+        return Status::Evaluation("{} is not a number", signals_[s].name);
     }
   }
   return Status::Evaluation("a point of an earlier stage is not a number");
@@ -157,8 +197,7 @@ Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t
 }
 
 Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
-  KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
-  Result<std::shared_ptr<const Plan>> plan = CompileFor({rig_.time});
+  const PlanResult plan = PlanOf(&clip.name, false);
   if (!plan.ok()) return plan.status();
   const Index time = (*plan)->FindVarying(rig_.time);
   return Record(
@@ -265,16 +304,8 @@ Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples,
     }
     if (mine.empty()) continue;
     const TrainingClip* playing = clip < 0 ? nullptr : &clips[static_cast<std::size_t>(clip)];
-    KPSA_RETURN_IF_ERROR(
-        rig_.set_clip(playing == nullptr ? std::nullopt : std::optional<std::string_view>(playing->name)));
-    std::vector<PlugRef> varying{rig_.time};
-    std::vector<std::size_t> used;
-    for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
-      if (playing != nullptr && rig_.controls[c].by_clip) continue;
-      used.push_back(c);
-      varying.push_back(rig_.controls[c].plug);
-    }
-    Result<std::shared_ptr<const Plan>> plan = CompileFor(varying);
+    const std::vector<std::size_t> used = FreeControls(playing != nullptr);
+    const PlanResult plan = PlanOf(playing == nullptr ? nullptr : &playing->name, true);
     if (!plan.ok()) return plan.status();
     std::vector<Index> numbers;
     for (std::size_t c : used) numbers.push_back((*plan)->FindVarying(rig_.controls[c].plug));

@@ -3,7 +3,10 @@
 // that names it. Internal to training.
 #pragma once
 
+#include <map>
+
 #include "graph/evaluator.h"
+#include "kpsa/cue_products.h"
 #include "kpsa/pose_matrix.h"
 #include "kpsa/trainer.h"
 
@@ -15,6 +18,9 @@ struct CandidateStage {
   std::vector<Index> points;        // of the mesh
 };
 
+// The scalar of each signal's first entry.
+std::vector<Index> FirstScalars(std::span<const Signal> signals, const PoseLayout& layout);
+
 class PoseRecorder {
  public:
   PoseRecorder(const TrainingRig& rig, Compiler* compiler, std::vector<CandidateStage> candidates,
@@ -24,7 +30,11 @@ class PoseRecorder {
         candidates_(std::move(candidates)),
         signals_(std::move(signals)),
         inverse_rest_stretch_(inverse_rest_stretch) {}
-  Result<PoseLayout> Layout();
+  // Scalars of the layout: signals that are not relative, `products` of them, relative matrices.
+  Result<PoseLayout> Layout(std::size_t products = 0);
+  // What is recorded from now on has them.
+  void SetProducts(std::vector<CueProduct> products) { products_ = std::move(products); }
+  const std::vector<CueProduct>& products() const { return products_; }
   // Appends a row for each time of a clip.
   Status AddClip(const TrainingClip& clip, PoseMatrix* poses);
   // Appends a row for each sampled pose.
@@ -38,9 +48,14 @@ class PoseRecorder {
   Result<ClipPoses> ControlsOfClips(const std::vector<TrainingClip>& clips);
   const std::vector<Signal>& signals() const { return signals_; }
   const std::vector<CandidateStage>& candidates() const { return candidates_; }
+  const PoseLayout& layout() const { return layout_; }
 
  private:
-  Result<std::shared_ptr<const Plan>> CompileFor(const std::vector<PlugRef>& varying);
+  using PlanResult = Result<std::shared_ptr<const Plan>>;
+  PlanResult CompileFor(const std::vector<PlugRef>& varying);
+  // The plan of a clip, or with none: sampled, with the controls that the clip leaves free, else with time.
+  PlanResult PlanOf(const std::string* clip, bool sampled);
+  std::vector<std::size_t> FreeControls(bool playing) const;
   std::string NameOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) const;
   // Of the space, which is the last output of the plan.
   Matrix4 SpaceFromWorld(const Evaluator& evaluator) const;
@@ -56,6 +71,8 @@ class PoseRecorder {
   Compiler* compiler_;
   std::vector<CandidateStage> candidates_;
   std::vector<Signal> signals_;
+  std::vector<CueProduct> products_;
+  std::map<std::pair<std::string, bool>, std::shared_ptr<const Plan>> plans_;  // binding wraps takes long
   Matrix4 inverse_rest_stretch_;
   PoseLayout layout_;
 };

@@ -69,14 +69,17 @@ Result<std::vector<Signal>> FindRelativeMatrices(const Graph& graph, Compiler* c
     nodes.insert(info.node.index);
     if (info.points_total > 0) with_points.insert(info.node.index);
   }
-  std::map<std::string, Signal> found;
+  std::map<std::string, Signal> found, still;
   for (const Index index : with_points) {
     for (const Connection& c : graph.Inputs(graph.IdAt(index))) {
-      if (nodes.count(c.source.node.index) == 0 || !IsWorldMatrix(graph, c.source)) continue;
+      if (!IsWorldMatrix(graph, c.source)) continue;
       const std::string name = graph.PlugName(c.source);
-      found.emplace(name, Signal{name, c.source, true, true});
+      (nodes.count(c.source.node.index) > 0 ? found : still)
+          .emplace(name, Signal{name, c.source, true, true});
     }
   }
+  // Relative to a space that moves, they all move by the same matrix
+  if (!still.empty()) found.insert(*still.begin());
   std::vector<Signal> sorted;
   for (auto& [name, signal] : found) sorted.push_back(std::move(signal));
   return sorted;

@@ -16,10 +16,26 @@ bool AllFinite(std::span<const T> values) {
   return std::all_of(values.begin(), values.end(), [](T value) { return std::isfinite(value); });
 }
 
+Status CheckProduct(const CueDescription& cue, std::size_t k, std::size_t height) {
+  if (cue.factors.empty() || cue.factors.size() > 2 || height != 1)
+    return Status::Invalid("cue {} is a product of {} factors with {} rows, expected 1 or 2 factors, 1 row",
+                           k, cue.factors.size(), height);
+  bool sound = std::isfinite(cue.lo) && std::isfinite(cue.hi) && cue.lo <= cue.hi;
+  for (const CueDescription::Factor& factor : cue.factors)
+    sound &= !factor.plug.empty() && std::isfinite(factor.curve.centre) && std::isfinite(factor.curve.scale);
+  return sound ? Status() : Status::Invalid("cue {} is a product with a factor or a range that is none", k);
+}
+
 }  // namespace
 
 std::string CueName(const Subspace& subspace, const CueDescription& cue) {
   if (cue.kind == CueDescription::Kind::kScalar) return cue.plug;
+  if (cue.kind == CueDescription::Kind::kProduct) {
+    std::string name;
+    for (const CueDescription::Factor& factor : cue.factors)
+      name += (name.empty() ? "" : " * ") + factor.plug;
+    return name;
+  }
   const SubspaceOutput& output = subspace.outputs[cue.mesh];
   const std::size_t suffix = output.stage.empty() ? 0 : output.stage.size() + 1;
   return output.name.substr(0, output.name.size() - suffix) + "@" + cue.stage;
@@ -44,6 +60,8 @@ Status ValidateSubspace(const Subspace& s) {
     if (cue.kind == CueDescription::Kind::kScalar) {
       if (cue.plug.empty() || height != 1)
         return Status::Invalid("cue {} is a scalar, but names no plug or has 3 rows", k);
+    } else if (cue.kind == CueDescription::Kind::kProduct) {
+      KPSA_RETURN_IF_ERROR(CheckProduct(cue, k, height));
     } else if (cue.mesh >= s.outputs.size()) {
       return Status::Invalid("cue {} lies on mesh {}, there are {}", k, cue.mesh, s.outputs.size());
     } else if (cue.point >= s.outputs[cue.mesh].points) {

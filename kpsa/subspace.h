@@ -21,13 +21,25 @@
 
 namespace kpsa {
 
-inline constexpr int kSubspaceVersion = 4, kOldestVersion = 3;  // 3: without products
+// 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues
+inline constexpr int kSubspaceVersion = 5, kProductTilesVersion = 4, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
-// Where a cue is measured. A point has 3 rows (x, y, z), a scalar 1; rows follow the order of the cues.
+// A factor of a product, of a measured value: (value - centre) * scale, as a hinge at least 0.
+struct ProductCurve {
+  double centre = 0, scale = 1;
+  bool hinge = false;
+  double Of(double value) const {
+    const double moved = (value - centre) * scale;
+    return hinge && moved < 0 ? 0 : moved;  // not a number stays that
+  }
+  friend bool operator==(const ProductCurve&, const ProductCurve&) = default;
+};
+
+// Where a cue is measured. A point has 3 rows (x, y, z), others 1; rows follow the order of the cues.
 struct CueDescription {
-  enum class Kind : std::uint8_t { kPoint, kScalar } kind = Kind::kPoint;
+  enum class Kind : std::uint8_t { kPoint, kScalar, kProduct } kind = Kind::kPoint;
   std::string plug;   // scalars: "node.attr"; points: ""
   std::string stage;  // points: the stage of the deformer stack, "mush"
   Index mesh = 0;     // points: index among the outputs
@@ -35,6 +47,14 @@ struct CueDescription {
   // The joint in whose space it is measured, by its world matrix, or "": points, and entries of world
   // matrices.
   std::string joint = {};
+  // Products: of one or two scalars (kpsa/cue_products.h), within [lo, hi].
+  struct Factor {
+    std::string plug;
+    ProductCurve curve;
+    friend bool operator==(const Factor&, const Factor&) = default;
+  };
+  std::vector<Factor> factors = {};
+  double lo = 0, hi = 0;
   friend bool operator==(const CueDescription&, const CueDescription&) = default;
 };
 

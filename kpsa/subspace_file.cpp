@@ -95,14 +95,18 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
   writer->Add<T>(key, {values.size()}, values, half);
 }
 
-// A subspace without products and world matrices is what it was before there were any.
+// A subspace without any of what is new is what it was before.
 int VersionOf(const Subspace& s) {
   const bool products =
       std::any_of(s.tiles.begin(), s.tiles.end(), [](const TileMap& t) { return t.has_products(); });
   const bool relative = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
     return cue.plug.find(".worldMatrix/") != std::string::npos;
   });
-  return products || relative || s.score != ScoreMix() ? kSubspaceVersion : kOldestVersion;
+  const bool multiplied = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
+    return cue.kind == CueDescription::Kind::kProduct;
+  });
+  if (multiplied) return kSubspaceVersion;
+  return products || relative || s.score != ScoreMix() ? kProductTilesVersion : kOldestVersion;
 }
 
 std::map<std::string, std::string> Header(const Subspace& s) {
@@ -112,6 +116,15 @@ std::map<std::string, std::string> Header(const Subspace& s) {
   for (const CueDescription& cue : s.cues) {
     if (cue.kind == CueDescription::Kind::kScalar) {
       cues.push_back({{"kind", "scalar"}, {"plug", cue.plug}});
+    } else if (cue.kind == CueDescription::Kind::kProduct) {
+      Json factors = Json::array();
+      for (const CueDescription::Factor& factor : cue.factors) {
+        factors.push_back({{"plug", factor.plug},
+                           {"centre", factor.curve.centre},
+                           {"scale", factor.curve.scale},
+                           {"hinge", factor.curve.hinge}});
+      }
+      cues.push_back({{"kind", "product"}, {"factors", factors}, {"lo", cue.lo}, {"hi", cue.hi}});
     } else {
       cues.push_back({{"kind", "point"}, {"stage", cue.stage}, {"mesh", cue.mesh}, {"point", cue.point}});
     }
@@ -267,8 +280,19 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
       cue.stage = reader_of_cue.Text("stage");
       cue.mesh = static_cast<Index>(reader_of_cue.Count("mesh", kMaxOutputs));
       cue.point = static_cast<Index>(reader_of_cue.Count("point", kMaxPoints));
+    } else if (kind == "product") {
+      cue.kind = CueDescription::Kind::kProduct;
+      cue.lo = reader_of_cue.Number("lo"), cue.hi = reader_of_cue.Number("hi");
+      if (!entry.contains("factors") || !entry["factors"].is_array())
+        return Status::Invalid("{}: a cue: \"factors\" should be an array", file.name());
+      for (const Json& part : entry["factors"]) {
+        Reader factor(file.name() + ": a factor", part, &status);
+        cue.factors.push_back({factor.Text("plug"), {factor.Number("centre"), factor.Number("scale")}});
+        cue.factors.back().curve.hinge = part.is_object() && part.value("hinge", Json(false)) == Json(true);
+      }
     } else if (status.ok()) {
-      return Status::Invalid("{}: a cue is of kind \"{}\", expected point or scalar", file.name(), kind);
+      return Status::Invalid("{}: a cue is of kind \"{}\", expected point, scalar or product", file.name(),
+                             kind);
     }
     if (entry.is_object() && entry.contains("joint")) cue.joint = reader_of_cue.Text("joint");
     s->cues.push_back(std::move(cue));
@@ -409,11 +433,13 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   }
   const Result<std::string> version = file.Metadata("version");
   if (!version.ok()) return version.status();
-  if (*version != std::to_string(kSubspaceVersion) && *version != std::to_string(kOldestVersion)) {
+  bool known = false;
+  for (int v = kOldestVersion; v <= kSubspaceVersion; ++v) known |= *version == std::to_string(v);
+  if (!known) {
     return Status::Invalid(
-        "{}: the subspace has format version {}, this program reads version {}; train it again or use the "
-        "program that wrote it",
-        path, *version, kSubspaceVersion);
+        "{}: the subspace has format version {}, this program reads versions {} to {}; train it again or use "
+        "the program that wrote it",
+        path, *version, kOldestVersion, kSubspaceVersion);
   }
   Subspace s;
   KPSA_RETURN_IF_ERROR(ReadHeader(file, &s));

@@ -29,6 +29,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
   for (const Index total : totals) tiles += (total + kTilePoints - 1) / kTilePoints;
   const std::size_t together = (tiles * (clips.size() + 1) + kMostPlans - 1) / kMostPlans;
   std::vector<std::set<Index>> movers(tiles);
+  std::vector<char> moves(signals.size(), 0);
   for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
     KPSA_RETURN_IF_ERROR(
         rig.set_clip(clip < 0 ? std::nullopt
@@ -51,6 +52,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
         for (const Plan::StepInfo& info : (*plan)->infos()) {
           const auto found = matrices.find(info.node.index);
           if (found == matrices.end()) continue;
+          moves[static_cast<std::size_t>(found->second)] = 1;
           for (std::size_t i = t; i < std::min(t + together, count); ++i)
             movers[first_tile + i].insert(found->second);
         }
@@ -59,6 +61,11 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
     }
   }
   KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+  for (const auto& [node, signal] : matrices) {  // what stands still in the world moves in the space
+    for (std::set<Index>& of_tile : movers) {
+      if (!moves[static_cast<std::size_t>(signal)]) of_tile.insert(signal);
+    }
+  }
   std::vector<std::vector<Index>> result;
   for (const std::set<Index>& of_tile : movers) result.emplace_back(of_tile.begin(), of_tile.end());
   return result;
@@ -124,12 +131,7 @@ Result<std::vector<TileCandidates>> FindTileCandidates(const TrainingRig& rig, C
   const Result<std::vector<std::vector<Index>>> movers =
       FindTileMovers(rig, compiler, clips, options.totals, options.signals);
   if (!movers.ok()) return movers.status();
-  std::vector<Index> first_entry;  // of each signal
-  Index entries = 0;
-  for (const Signal& signal : options.signals) {
-    first_entry.push_back(entries);
-    entries += static_cast<Index>(signal.entries());
-  }
+  const std::vector<Index> first_entry = FirstScalars(options.signals, options.layout);
   const std::vector<std::vector<NearPoint>> points = ByMesh(options);
   std::vector<TileCandidates> tiles;
   Index mesh_begin = 0;

@@ -41,10 +41,6 @@ constexpr Eigen::Index kResidualDirections = 24;     // of what is left
 constexpr double kWeighed = 0.1, kMostWeight = 100;  // the same in the map: tolerances, times
 constexpr int kWeighings = 2;
 
-Eigen::MatrixXd GramOf(const Eigen::MatrixXd& rows) { return Gram(GemmOperand::Dense(rows)); }
-Eigen::MatrixXd CrossOf(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  return Multiply(GemmOperand::Dense(a), GemmOperand::Dense(b).Transposed());
-}
 Eigen::LLT<Eigen::MatrixXd> Damped(const Eigen::MatrixXd& gram, double ridge) {
   Eigen::MatrixXd damped = gram;
   damped.diagonal().array() += ridge * std::max(gram.trace() / static_cast<double>(gram.rows()), 1e-300);

@@ -37,11 +37,13 @@ constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say
 constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
 constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
 constexpr int kMaxLightModes = 120;   // that are looked at; noise is beyond
-constexpr double kManyMisses =
-    0.15;                            // of new poses, which are harder than clips: cues of each tile are tried
-constexpr double kClearly = 0.5;     // of the expected cost of the others: cues of tiles are taken
-constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
-constexpr std::size_t kJudges = 300;  // new poses that compare places for cues
+constexpr double kManyMisses = 0.05;  // of new poses: cues of each tile are tried
+constexpr double kClearly = 0.5;      // of the expected cost of the others: cues of tiles are taken
+constexpr double kTurnReach = 0.03;   // of the diagonal: how far an entry of a rotation moves points, about
+constexpr std::size_t kCueProducts = 160;                  // cues that are products of others
+constexpr double kFactorTurn = 1e-2, kFactorValue = 1e-3;  // deviations of factors that count as none,
+constexpr double kFactorShift = 0.2;                       // tolerances: and of shifts
+constexpr std::size_t kJudges = 300;                       // new poses that compare places for cues
 
 class Trainer {
  public:
@@ -56,6 +58,7 @@ class Trainer {
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
+    if (layout_.products > 0) ChooseProducts(&poses, &judges);
     ranges_ = RangeFinder(layout_);
     ranges_.Widen(poses);
     if (!of_light()) KPSA_RETURN_IF_ERROR(ranges_.Widen(clips_, recorder_.get()));
@@ -142,7 +145,8 @@ class Trainer {
     }
     recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals),
                                                inverse_rest_stretch_);
-    Result<PoseLayout> layout = recorder_->Layout();
+    const bool multiplies = !of_light() && options_.mode == EstimatorMode::kMap;
+    Result<PoseLayout> layout = recorder_->Layout(multiplies ? kCueProducts : 0);
     if (!layout.ok()) return layout.status();
     layout_ = *layout;
     totals_ = totals;
@@ -188,6 +192,29 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
     const bool compares = places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty());
     return compares ? RecordJudges(judges) : Status();
+  }
+
+  // Products of scalars, which are cues as others are from here on.
+  void ChooseProducts(PoseMatrix* poses, PoseMatrix* judges) {
+    CueProductOptions options;
+    options.most = layout_.products;
+    options.tolerance = options_.tolerance;
+    options.still.assign(layout_.scalars, kFactorValue);
+    const std::vector<Index> first = FirstScalars(recorder_->signals(), layout_);
+    for (std::size_t s = 0; s < first.size(); ++s) {
+      const Signal& signal = recorder_->signals()[s];
+      for (Index e = 0; e < signal.entries(); ++e) {
+        const Index scalar = first[s] + e;
+        if (signal.matrix) options.still[scalar] = e < 9 ? kFactorTurn : kFactorShift * options_.tolerance;
+        if (!signal.relative) options.factors.push_back(scalar);
+        options.regressors.push_back(scalar);
+      }
+    }
+    recorder_->SetProducts(ChooseCueProducts(*poses, options));
+    for (PoseMatrix* matrix : {poses, judges}) {
+      for (std::size_t t = 0; t < matrix->poses(); ++t)
+        StoreProducts(recorder_->products(), layout_, matrix->row(t));
+    }
   }
 
   // The sampler's kind, and some of the others.
@@ -298,9 +325,11 @@ class Trainer {
     for (const Signal& signal : recorder_->signals()) {
       for (std::size_t e = 0; e < signal.entries(); ++e) {
         const double still = !signal.matrix ? 0 : e < 9 ? kNoiseTurn : of_light() ? kLightShift : shift;
+        if (noise.scalars.size() == layout_.products_begin()) noise.scalars.resize(layout_.relative_begin, 0);
         noise.scalars.push_back(still * still);
       }
     }
+    noise.scalars.resize(layout_.scalars, 0);
     return noise;
   }
 
@@ -430,13 +459,14 @@ class Trainer {
     choice.tolerance = options_.tolerance;
     choice.mean = &pca_.mean;
     choice.turn_reach = kTurnReach * diagonal_;
-    Index entry = 0;
-    for (const Signal& signal : recorder_->signals()) {
-      const CueRef cue{CueKind::kScalar, entry};
-      entry += static_cast<Index>(signal.entries());
-      const auto column = static_cast<Eigen::Index>(CueColumn(layout_, cue));
-      if (!signal.matrix && pca_.row_variance[column] > noise_.scalars[cue.index])
+    const auto add = [&](Index scalar) {
+      const CueRef cue{CueKind::kScalar, scalar};
+      if (pca_.row_variance[static_cast<Eigen::Index>(CueColumn(layout_, cue))] > noise_.scalars[scalar])
         choice.values.push_back(cue);
+    };
+    const std::vector<Index> first = FirstScalars(recorder_->signals(), layout_);
+    for (std::size_t s = 0; s < first.size(); ++s) {
+      if (!recorder_->signals()[s].matrix) add(first[s]);
     }
     return MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, *candidates, choice, Outputs(),
                             {kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest});

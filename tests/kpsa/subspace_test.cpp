@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -221,6 +222,34 @@ TEST_P(SubspaceTest, FileRoundTripKeepsEveryBit) {
   EXPECT_EQ(bytes(path_), first);
 }
 
+// So do cues that are products of scalars.
+TEST_P(SubspaceTest, CuesThatAreProductsTravelWithTheFile) {
+  const auto scalar = std::ranges::find(subspace_.cues, CueDescription::Kind::kScalar, &CueDescription::kind);
+  ASSERT_NE(scalar, subspace_.cues.end());
+  CueDescription product;
+  product.kind = CueDescription::Kind::kProduct;
+  product.factors = {{"jaw.matrix/3", {0.25, 4, false}}, {"a * b/c.x", {-1.5, 0.1, true}}};
+  product.lo = -2, product.hi = 1e-3;
+  *scalar = product;
+  ASSERT_TRUE(WriteSubspace(subspace_, path_).ok());
+  EXPECT_EQ(*SafetensorsFile::Read(path_)->Metadata("version"), std::to_string(kSubspaceVersion));
+  const Result<Subspace> read = ReadSubspace(path_);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->cues, subspace_.cues);
+  EXPECT_EQ(CueName(*read, product), "jaw.matrix/3 * a * b/c.x");
+  const auto refused = [&](auto edit) {
+    *scalar = product;
+    edit(&*scalar);
+    return !ValidateSubspace(subspace_).ok();
+  };
+  EXPECT_FALSE(refused([](CueDescription*) {}));
+  EXPECT_TRUE(refused([](CueDescription* c) { c->factors.clear(); }));
+  EXPECT_TRUE(refused([](CueDescription* c) { c->factors.push_back(c->factors[0]); }));
+  EXPECT_TRUE(refused([](CueDescription* c) { c->factors[1].plug = ""; }));
+  EXPECT_TRUE(refused([](CueDescription* c) { c->factors[0].curve.scale = std::nan(""); }));
+  EXPECT_TRUE(refused([](CueDescription* c) { c->lo = 1; }));
+}
+
 // Products and the doubt travel with the file; without them it is of the version that had none.
 TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   const auto version = [&] { return *SafetensorsFile::Read(path_)->Metadata("version"); };
@@ -250,7 +279,7 @@ TEST_P(SubspaceTest, ProductsTravelWithTheFile) {
   bent.score = {0.5, 300};
   ASSERT_GT(bent.doubt_inputs(), 0u);
   ASSERT_TRUE(WriteSubspace(bent, path_).ok()) << WriteSubspace(bent, path_).ToString();
-  EXPECT_EQ(version(), std::to_string(kSubspaceVersion));
+  EXPECT_EQ(version(), std::to_string(kProductTilesVersion));
   const Result<Subspace> read = ReadSubspace(path_);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   EXPECT_EQ(read->score, bent.score);
@@ -392,7 +421,7 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   EXPECT_EQ(message(header), "no error");
   EXPECT_NE(edited([](Json* j) {
               (*j)["__metadata__"]["version"] = "1";
-            }).find("format version 1, this program reads version 4; train it again"),
+            }).find("format version 1, this program reads versions 3 to 5; train it again"),
             std::string::npos);
   EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"),
             std::string::npos);
