@@ -26,7 +26,8 @@ namespace {
 
 constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
 constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
-constexpr double kOwnShare = 0.03, kOwnMaxShare = 0.2;  // the same where tiles have cues of their own
+// The same where tiles have cues of their own, or many poses would miss: there errors count more than bytes
+constexpr double kOwnShare = 0.03, kOwnMaxShare = 0.2;
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
@@ -371,7 +372,8 @@ class Trainer {
     }
     return outputs;
   }
-  TileOptions TileBudgets() const {
+  TileOptions TileBudgets(bool fine) const {
+    if (fine) return {kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest};
     return {kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance, of_light() ? 0 : kTileRest};
   }
 
@@ -380,13 +382,15 @@ class Trainer {
                                     ? LeastSquaresEstimator(pca_, cues_)
                                     : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
+    const bool may_miss =
+        options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses;
     const auto for_all_points = [&] {
       return MakeSubspace(
-          pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(),
+          pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(may_miss),
           of_light() || estimator.mode == EstimatorMode::kPaper ? nullptr : poses, record_.clip_poses);
     };
     Subspace subspace;
-    if (options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses) {
+    if (may_miss) {
       KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, for_all_points, &subspace));
     } else {
       subspace = for_all_points();
@@ -469,7 +473,7 @@ class Trainer {
       if (!recorder_->signals()[s].matrix) add(first[s]);
     }
     return MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, *candidates, choice, Outputs(),
-                            {kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest});
+                            TileBudgets(true));
   }
 
   // The subspace is given its best score by the judges, and is then priced.
