@@ -52,15 +52,6 @@ std::string TrainJson(const TrainResult& r) {
                      {"violations", kind.violations},
                      {"rate_at_most", kind.upper_bound}});
   }
-  nlohmann::ordered_json tried = nlohmann::ordered_json::array();
-  for (const TrainingRecord::Tried& one : r.record.tried) {
-    tried.push_back({{"cues", one.what},
-                     {"count", one.cues},
-                     {"rows", one.rows},
-                     {"misses", one.misses},
-                     {"cost", one.cost},
-                     {"taken", one.taken}});
-  }
   const nlohmann::ordered_json document =
       nlohmann::ordered_json{{"schema", "kpsa.train/1"},
                              {"subspace", r.path},
@@ -79,7 +70,7 @@ std::string TrainJson(const TrainResult& r) {
                                {"rms", r.record.held_out_rms},
                                {"max", r.record.held_out_max}}},
                              {"motion", {{"rms", r.record.motion_rms}}},
-                             {"tried", tried},
+                             {"tried", nlohmann::ordered_json::parse(r.subspace->training)["tried"]},
                              {"calibration",
                               {{"tolerance", r.subspace->tolerance},
                                {"violation_rate", r.calibration.alpha},

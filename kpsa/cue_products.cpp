@@ -13,6 +13,7 @@
 namespace kpsa {
 namespace {
 
+constexpr std::size_t kEnoughPoses = 1000;  // fewer fit some of the thousands of candidates by chance
 constexpr std::size_t kChoosingPoses = 2400, kChoosingPoints = 400;  // that choose
 constexpr Eigen::Index kLeftDirections = 64;                         // of what is left of the points
 constexpr double kRegressorRidge = 1e-7;                             // of the mean variance
@@ -24,7 +25,8 @@ constexpr double kCarryingPoses = 30;    // poses that have to carry a product
 constexpr double kLeastDeviation = 0.2;  // of a product of two of deviation 1
 constexpr double kProductOwn =
     3e-3;  // of a product's variance: less than this beyond the regressors is noise
-constexpr double kBeyondNoise = 0.3;   // of what a column of noise would explain on average
+constexpr double kBeyondNoise =
+    4;  // times what a column of noise would explain on average: many stand for choice
 constexpr double kProductSeen = 1e-3;  // tolerances (RMS) that one has to tell
 
 // What a ridge regression on the rows of x leaves of those of y.
@@ -147,8 +149,9 @@ class ProductChooser {
     z_ = z_(std::vector<Eigen::Index>(order.begin(), order.end()), Eigen::all).eval();
   }
 
-  // What many poses carry, mean free and of deviation 1, else nothing. Returns the deviation.
-  double Carried(Eigen::RowVectorXd* row, double least) const {
+  // Makes what many poses carry mean free and of deviation 1. Returns the deviation that it had; 0: too few
+  // poses carry it.
+  double Standardize(Eigen::RowVectorXd* row, double least) const {
     row->array() -= row->mean();
     const double square = row->squaredNorm(), fourth = row->cwiseAbs2().squaredNorm();
     const double deviation = std::sqrt(square / static_cast<double>(count()));
@@ -196,7 +199,7 @@ class ProductChooser {
       for (const double knot : kKnots) {
         const double at = lo + knot * (hi - lo);
         Eigen::RowVectorXd row = (z.array() - at).cwiseMax(0.0).matrix();
-        const double deviation = Carried(&row, 1e-3);
+        const double deviation = Standardize(&row, 1e-3);
         if (!(deviation > 0)) continue;
         const ProductCurve& of = factors_[i].curve;
         hinges.push_back({factors_[i].scalar, {of.centre + at / of.scale, of.scale / deviation, true}});
@@ -243,7 +246,7 @@ class ProductChooser {
       Eigen::Index rows = 0;
       for (Eigen::Index b = a; b < z_.rows(); ++b) {
         Eigen::RowVectorXd row = Pair(a, b);
-        if (!(Carried(&row, kLeastDeviation) > 0)) continue;
+        if (!(Standardize(&row, kLeastDeviation) > 0)) continue;
         some.row(rows++) = row;
         pairs.emplace_back(a, b);
       }
@@ -256,7 +259,7 @@ class ProductChooser {
     std::vector<double> deviations;
     for (std::size_t i = 0; i < kept.size(); ++i) {
       Eigen::RowVectorXd row = Pair(pairs[kept[i]].first, pairs[kept[i]].second);
-      deviations.push_back(Carried(&row, 0));
+      deviations.push_back(Standardize(&row, 0));
       candidates.row(static_cast<Eigen::Index>(i)) = row;
     }
     for (const Eigen::Index i : Choose(candidates, options_.most - chosen_.size())) {
@@ -304,6 +307,7 @@ double ValueOf(const CueProduct& product, std::span<const float> scalars) {
 
 std::vector<CueProduct> ChooseCueProducts(const PoseMatrix& poses, const CueProductOptions& options) {
   KPSA_CHECK(!poses.centered());
+  if (poses.poses() < kEnoughPoses) return {};
   return ProductChooser(poses, options).Run();
 }
 

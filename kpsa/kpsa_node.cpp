@@ -447,76 +447,6 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
 
 }  // namespace
 
-KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
-  Hasher hasher;
-  const Subspace& s = *data_.subspace;
-  hasher.Add(std::string_view(s.rig_hash));
-  hasher.Add(std::string_view(s.training));
-  hasher.Add(std::span<const double>(s.cue_mean));
-  hasher.Add(std::span<const float>(s.soft_cache.factor.span()));
-  hasher.Add(std::span<const float>(s.latent));
-  for (const TileMap& tiles : s.tiles) {
-    hasher.Add(std::span<const std::uint8_t>(tiles.data().u.span()));
-    hasher.Add(std::span<const std::uint16_t>(tiles.data().v.span()));
-    hasher.Add(std::span<const float>(tiles.data().scale.span()));
-    hasher.Add(std::span<const std::uint32_t>(tiles.data().columns));
-    hasher.Add(std::span<const float>(tiles.data().mean.span()));
-    hasher.Add(std::span<const std::uint8_t>(tiles.data().pairs));
-    hasher.Add(std::span<const std::uint16_t>(tiles.data().w.span()));
-    hasher.Add(std::span<const std::uint16_t>(tiles.data().doubt.span()));
-    hasher.Add(std::span<const std::uint32_t>(tiles.data().joints));
-    hasher.Add(std::span<const std::uint32_t>(tiles.data().joint_rows));
-  }
-  for (const PointCues& cues : data_.cues) {
-    hasher.Add(std::span<const Index>(cues.points));
-    hasher.Add(cues.in_space);
-    hasher.Add(cues.near);
-  }
-  for (const Row& row : data_.rows) {
-    hasher.Add(row.kind);
-    hasher.Add(row.input);
-    hasher.Add(row.element);
-    hasher.Add(row.joint);
-  }
-  for (const Product& product : data_.products) {
-    for (const Row* row : {&product.a, &product.b}) {
-      hasher.Add(row->kind);
-      hasher.Add(row->input);
-      hasher.Add(row->element);
-    }
-    for (const ProductCurve* curve : {&product.of_a, &product.of_b}) {
-      hasher.Add(curve->centre);
-      hasher.Add(curve->scale);
-      hasher.Add(curve->hinge);
-    }
-    hasher.Add(product.lo);
-    hasher.Add(product.hi);
-  }
-  hasher.Add(std::span<const Index>(data_.joints));
-  for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.matrix_ramp, &data_.scalar_lo,
-                            &data_.scalar_hi, &data_.scalar_ramp})
-    hasher.Add(std::span<const double>(*range));
-  for (const CalibrationPair& pair : s.calibration) {
-    hasher.Add(pair.score);
-    hasher.Add(pair.error);
-    hasher.Add(pair.guard);
-    hasher.Add(pair.kind);
-  }
-  hasher.Add(std::span<const double>(s.inverse_rest_stretch.m));
-  hasher.Add(s.extent);
-  hasher.Add(s.score.measured);
-  hasher.Add(s.score.doubt);
-  for (const double place : {data_.rest_origin.x, data_.rest_origin.y, data_.rest_origin.z})
-    hasher.Add(place);
-  hasher.Add(data_.has_space);
-  hasher.Add(data_.space_scales);
-  hasher.Add(std::span<const char>(data_.outputs_in_space));
-  hasher.Add(std::span<const char>(data_.relative));
-  hasher.Add(data_.always_miss);
-  hasher.Add(std::string_view(data_.always_miss_reason));
-  digest_ = hasher.Finish();
-}
-
 void AddKpsaNode(NodeRegistry& registry) {
   AddNearNodes(registry);
   registry
@@ -563,44 +493,6 @@ void AddKpsaNode(NodeRegistry& registry) {
                    : 0;
       })
       .cost(20000, 5);
-}
-
-std::string MissText(const KpsaConfig& config, MissReason reason, Index offender) {
-  const KpsaConfig::Data& data = config.data();
-  switch (reason) {
-    case MissReason::kNone:
-      return "hit";
-    case MissReason::kNeverHit:
-      return data.always_miss ? data.always_miss_reason : "the tolerance allows no hit";
-    case MissReason::kOutOfRange:
-      return fmt::format("{} is outside its trained range",
-                         offender < data.guard_names.size() ? data.guard_names[offender] : "a control");
-    case MissReason::kDoubt: {
-      Index tile = offender;
-      for (std::size_t m = 0; m < data.subspace->tiles.size(); ++m) {
-        const auto tiles = static_cast<Index>(data.subspace->tiles[m].tiles());
-        if (tile < tiles)
-          return fmt::format("bent farther than the trained poses (most at {}, points from {} on)",
-                             data.subspace->outputs[m].name, tile * kTilePoints);
-        tile -= tiles;
-      }
-      return "bent farther than the trained poses";
-    }
-    case MissReason::kSpace:
-      return fmt::format("{} is stretched, mirrored or scaled as it was not in training", data.stretched);
-    case MissReason::kNotFinite:
-    case MissReason::kScore: {
-      std::string cue = "a cue";
-      if (offender < data.subspace->cues.size()) {
-        const CueDescription& d = data.subspace->cues[offender];
-        cue = CueName(*data.subspace, d);
-        if (d.kind == CueDescription::Kind::kPoint) cue += fmt::format(" point {}", d.point);
-      }
-      return reason == MissReason::kScore ? fmt::format("unlike the trained poses (most at {})", cue)
-                                          : fmt::format("{} is not a number", cue);
-    }
-  }
-  return "";
 }
 
 void MeasureKpsaTimes(bool on) { measure_times = on; }

@@ -59,8 +59,7 @@ std::vector<std::size_t> PoseRecorder::FreeControls(bool playing) const {
 }
 
 PoseRecorder::PlanResult PoseRecorder::PlanOf(const std::string* clip, bool sampled) {
-  // No clip is named like this
-  const std::pair<std::string, bool> key(clip == nullptr ? std::string(1, '\0') : *clip, sampled);
+  const std::pair key(clip == nullptr ? std::optional<std::string>() : *clip, sampled);
   if (const auto known = plans_.find(key); known != plans_.end()) return known->second;
   KPSA_RETURN_IF_ERROR(
       rig_.set_clip(clip == nullptr ? std::nullopt : std::optional<std::string_view>(*clip)));

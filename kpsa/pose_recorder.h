@@ -4,6 +4,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 
 #include "graph/evaluator.h"
 #include "kpsa/cue_products.h"
@@ -72,7 +73,8 @@ class PoseRecorder {
   std::vector<CandidateStage> candidates_;
   std::vector<Signal> signals_;
   std::vector<CueProduct> products_;
-  std::map<std::pair<std::string, bool>, std::shared_ptr<const Plan>> plans_;  // binding wraps takes long
+  // By clip (none: the rest pose), and whether controls are sampled; binding wraps takes long
+  std::map<std::pair<std::optional<std::string>, bool>, std::shared_ptr<const Plan>> plans_;
   Matrix4 inverse_rest_stretch_;
   PoseLayout layout_;
 };

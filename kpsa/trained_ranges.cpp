@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kpsa/signal_noise.h"
 #include "kpsa/signal_reach.h"
 
 namespace kpsa {

@@ -6,8 +6,6 @@
 
 namespace kpsa {
 
-inline constexpr double kLightShift = 1e-4;  // of light: metres that no one would see a joint move
-
 class RangeFinder {
  public:
   RangeFinder() = default;

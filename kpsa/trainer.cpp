@@ -15,6 +15,7 @@
 #include "kpsa/pca.h"
 #include "kpsa/pose_judge.h"
 #include "kpsa/pose_recorder.h"
+#include "kpsa/signal_noise.h"
 #include "kpsa/space_frame.h"
 #include "kpsa/tile_candidates.h"
 #include "kpsa/tile_subspace.h"
@@ -35,16 +36,12 @@ constexpr std::size_t kBetween = 400;                  // poses between the fram
 constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, where more are drawn for tiles
 constexpr std::size_t kChunk = 256;                    // calibration poses that are held at once
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
-constexpr double kNoiseTurn = 1e-4;   // what a cue is not trusted below: a turn of a joint,
-constexpr double kNoiseShare = 5e-3;  // and a shift of a joint or a point, of the tolerance
-constexpr int kMaxLightModes = 120;   // that are looked at; noise is beyond
-constexpr double kManyMisses = 0.05;  // of new poses: cues of each tile are tried
-constexpr double kClearly = 0.5;      // of the expected cost of the others: cues of tiles are taken
-constexpr double kTurnReach = 0.03;   // of the diagonal: how far an entry of a rotation moves points, about
-constexpr std::size_t kCueProducts = 160;                  // cues that are products of others
-constexpr double kFactorTurn = 1e-2, kFactorValue = 1e-3;  // deviations of factors that count as none,
-constexpr double kFactorShift = 0.2;                       // tolerances: and of shifts
-constexpr std::size_t kJudges = 300;                       // new poses that compare places for cues
+constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
+constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
+constexpr double kClearly = 0.5;     // of the expected cost of the others: cues of tiles are taken
+constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
+constexpr std::size_t kCueProducts = 160;  // cues that are products of others
+constexpr std::size_t kJudges = 300;       // new poses that compare places for cues
 
 class Trainer {
  public:
@@ -197,20 +194,7 @@ class Trainer {
 
   // Products of scalars, which are cues as others are from here on.
   void ChooseProducts(PoseMatrix* poses, PoseMatrix* judges) {
-    CueProductOptions options;
-    options.most = layout_.products;
-    options.tolerance = options_.tolerance;
-    options.still.assign(layout_.scalars, kFactorValue);
-    const std::vector<Index> first = FirstScalars(recorder_->signals(), layout_);
-    for (std::size_t s = 0; s < first.size(); ++s) {
-      const Signal& signal = recorder_->signals()[s];
-      for (Index e = 0; e < signal.entries(); ++e) {
-        const Index scalar = first[s] + e;
-        if (signal.matrix) options.still[scalar] = e < 9 ? kFactorTurn : kFactorShift * options_.tolerance;
-        if (!signal.relative) options.factors.push_back(scalar);
-        options.regressors.push_back(scalar);
-      }
-    }
+    const CueProductOptions options = ProductOptionsOf(recorder_->signals(), layout_, options_.tolerance);
     recorder_->SetProducts(ChooseCueProducts(*poses, options));
     for (PoseMatrix* matrix : {poses, judges}) {
       for (std::size_t t = 0; t < matrix->poses(); ++t)
@@ -313,25 +297,10 @@ class Trainer {
     Result<Pca> pca = ComputeModes(*poses, mean, modes);
     if (!pca.ok()) return pca.status();
     pca_ = std::move(*pca);
-    noise_ = MakeNoise();
+    noise_ = NoiseOf(recorder_->signals(), layout_, diagonal_, options_.tolerance, of_light());
     record_.diagonal = diagonal_;
     record_.motion_rms = std::sqrt(pca_.total_energy / static_cast<double>(poses->poses() * layout_.points));
     return Status();
-  }
-
-  CueNoise MakeNoise() const {
-    CueNoise noise(diagonal_);
-    const double shift = kNoiseShare * options_.tolerance;
-    noise.point = std::max(noise.point, shift * shift);
-    for (const Signal& signal : recorder_->signals()) {
-      for (std::size_t e = 0; e < signal.entries(); ++e) {
-        const double still = !signal.matrix ? 0 : e < 9 ? kNoiseTurn : of_light() ? kLightShift : shift;
-        if (noise.scalars.size() == layout_.products_begin()) noise.scalars.resize(layout_.relative_begin, 0);
-        noise.scalars.push_back(still * still);
-      }
-    }
-    noise.scalars.resize(layout_.scalars, 0);
-    return noise;
   }
 
   Status ChooseCues(const PoseMatrix& poses, const PoseMatrix& judges) {
@@ -428,7 +397,8 @@ class Trainer {
       record_.tried.push_back({what, cues, rows, misses, ns / full_cost_, taken});
     };
     const auto rows = static_cast<std::size_t>(cues_.rows());
-    if (cost.ns < kClearly * chosen_.cost) {  // as chosen, without products: not worth more time
+    // As chosen, without products of tiles: others with these would hardly do better, and take their time
+    if (cost.misses < kManyMisses && cost.ns < kClearly * chosen_.cost) {
       tried(kForAllPoints, cues_.cues.size(), rows, chosen_.misses, chosen_.cost, false);
       tried(kByTile, tiles->cues.cues.size(), tiles->subspace.rows(), cost.misses, cost.ns, true);
       *subspace = std::move(tiles->subspace), cues_ = std::move(tiles->cues);

@@ -66,10 +66,15 @@ TEST(CueProducts, FindWhatActsTogetherAndWhatBeginsLate) {
     together |= product.a == 0 && product.b == 1 && !product.of_a.hinge && !product.of_b.hinge;
     late |= product.a == 2 && product.b == kNoIndex && product.of_a.hinge &&
             std::fabs(product.of_a.centre - 0.5) < 0.02;
+    EXPECT_NE(product.a, 3u) << "the idle weight";
+    EXPECT_NE(product.b, 3u) << "the idle weight";
   }
   EXPECT_TRUE(together);
   EXPECT_TRUE(late);
 }
+
+// Some of the thousands of candidates fit a few hundred poses by chance.
+TEST(CueProducts, AreNoneOfFewPoses) { EXPECT_TRUE(ChooseFor(FacePoses(900, 0.01, 0.02, 1)).empty()); }
 
 TEST(CueProducts, AreNoneWhereScalarsSayAll) { EXPECT_TRUE(ChooseFor(FacePoses(1500, 0, 0, 1)).empty()); }
 
