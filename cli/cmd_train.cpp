@@ -14,6 +14,7 @@
 #include "cli/rig_training.h"
 #include "cli/stack_cost.h"
 #include "cli/train_report.h"
+#include "io/quantity.h"
 
 namespace kpsa {
 namespace {
@@ -22,7 +23,7 @@ constexpr std::size_t kCheckPoses = 60, kLightCheckPoses = 4;  // light takes se
 
 struct TrainFlags : Flags {
   std::optional<std::string> name, samples, clips, seed, rows, modes, key_points, tolerance, violation_rate,
-      calibration, speedup;
+      calibration, speedup, time;
   bool paper = false, keep_modes = false;
 };
 
@@ -50,6 +51,12 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
     const Result<double> value = ParseLength("--tolerance", *flags.tolerance);
     if (!value.ok()) return value.status();
     options->tolerance = *value;
+  }
+  if (flags.time.has_value()) {
+    const Result<double> value = ParseQuantity(*flags.time, Unit::kTime, FileUnits());
+    if (!value.ok() || !(*value > 0))
+      return Status::Usage("--time \"{}\": expected seconds above 0, as in 60s", *flags.time);
+    options->seconds = *value;
   }
   if (flags.violation_rate.has_value()) {
     const Result<double> value = ParseRate(*flags.violation_rate);
@@ -230,6 +237,10 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddOption(
       command, "--speedup", "FACTOR", &flags->speedup,
       "tell the smallest tolerance that is expected to reach it, misses included; training stays as it is");
+  AddOption(
+      command, "--time", "SECONDS", &flags->time,
+      "about how long to train at most, as in 60s: fewer poses, and no cues of each tile, where that is "
+      "too short");
   AddSwitch(command, "--paper", &flags->paper,
             "the method of the paper: key points of varimax modes, least squares");
   AddOption(command, "--key-points", "N", &flags->key_points,

@@ -65,6 +65,7 @@ std::string TrainJson(const TrainResult& r) {
                                {"clip_poses", r.record.clip_poses},
                                {"sampled_poses", r.record.sampled_poses}}},
                              {"seconds", r.seconds},
+                             {"limited", r.record.limited},
                              {"held_out",
                               {{"poses", r.record.calibration_poses},
                                {"rms", r.record.held_out_rms},
@@ -132,6 +133,7 @@ std::string TrainText(const TrainResult& r) {
   text +=
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
+  if (!r.record.limited.empty()) text += fmt::format("in the time given: {}\n", r.record.limited);
   for (const TrainingRecord::Tried& one : r.record.tried) {
     text += fmt::format(
         "{} cues {}: {} ({} numbers); a frame is expected to cost {:.2g} of a full one, {:.3g} % of new "

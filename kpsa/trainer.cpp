@@ -20,6 +20,7 @@
 #include "kpsa/tile_candidates.h"
 #include "kpsa/tile_subspace.h"
 #include "kpsa/tilts.h"
+#include "kpsa/time_limit.h"
 #include "kpsa/trained_ranges.h"
 
 namespace kpsa {
@@ -33,20 +34,27 @@ constexpr double kOwnShare = 0.03, kOwnMaxShare = 0.2;
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
 constexpr std::size_t kBetween = 400;                  // poses between the frames of all clips, at most
-constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, where more are drawn for tiles
-constexpr std::size_t kChunk = 256;                    // calibration poses that are held at once
+constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, and
+constexpr std::size_t kMostJudgeBytes = 400'000'000;   // of those that judge: huge meshes have fewer, but
+constexpr std::size_t kLeastSamples = 200;
+constexpr std::size_t kChunk = 256;                            // calibration poses that are held at once
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
-constexpr double kClearly = 0.5;     // of the expected cost of the others: cues of tiles are taken
-constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
+constexpr double kTilesInModes = 3.5;  // how long these take, in the time that modes took
+constexpr double kClearly = 0.5;       // of the expected cost of the others: cues of tiles are taken
+constexpr double kTurnReach = 0.03;    // of the diagonal: how far an entry of a rotation moves points, about
 constexpr std::size_t kCueProducts = 160;  // cues that are products of others
 constexpr std::size_t kJudges = 300;       // new poses that compare places for cues
 
 class Trainer {
  public:
   Trainer(const TrainingRig& rig, const std::vector<TrainingClip>& clips, const TrainOptions& options)
-      : rig_(WithTilts(rig)), drawn_(rig.controls), clips_(clips), options_(options) {}
+      : rig_(WithTilts(rig)),
+        drawn_(rig.controls),
+        clips_(clips),
+        options_(options),
+        limit_(options.seconds) {}
 
   Result<Subspace> Run() {
     record_.seed = options_.seed;
@@ -55,20 +63,17 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Prepare());
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
+    if (!of_light()) FitIntoTime(&poses);
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
+    const double before_modes = limit_.elapsed();
     if (layout_.products > 0) ChooseProducts(&poses, &judges);
     ranges_ = RangeFinder(layout_);
     ranges_.Widen(poses);
     if (!of_light()) KPSA_RETURN_IF_ERROR(ranges_.Widen(clips_, recorder_.get()));
     if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
-    PoseMatrix centered(layout_);  // the judges
-    for (std::size_t t = 0; t < judges.poses(); ++t)
-      std::ranges::copy(std::as_const(judges).row(t), centered.AddPose().begin());
-    if (judges.poses() > 0) centered.Subtract(pca_.mean);
-    if (of_light() && judges.poses() > 0) TruncateModes(centered);
-    KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
-    KPSA_RETURN_IF_ERROR(ChooseCues(poses, centered));
+    modes_seconds_ = limit_.elapsed() - before_modes;
+    KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
     Result<Subspace> subspace = Assemble(&poses, judges);
     if (!subspace.ok()) return subspace;
@@ -182,7 +187,8 @@ class Trainer {
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
       if (of_light()) groups_ = {};
     }
-    KPSA_RETURN_IF_ERROR(AddSampled(options_.samples, options_.seed, poses));
+    const std::size_t room = std::max(RoomBeside(*poses), kLeastSamples);
+    KPSA_RETURN_IF_ERROR(AddSampled(std::min(options_.samples, room), options_.seed, poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3)
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
@@ -190,6 +196,28 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
     const bool compares = places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty());
     return compares ? RecordJudges(judges) : Status();
+  }
+
+  // As many poses as there is time for, of all of them.
+  void FitIntoTime(PoseMatrix* poses) {
+    const std::size_t all = poses->poses(), within = PosesWithin(limit_.left(), *poses);
+    if (within >= all) return;
+    PoseMatrix kept(layout_);
+    std::size_t of_clips = 0;
+    for (const Index t : EvenSpread(all, within)) {
+      std::ranges::copy(std::as_const(*poses).row(t), kept.AddPose().begin());
+      of_clips += t < record_.clip_poses;
+    }
+    *poses = std::move(kept);
+    record_.clip_poses = of_clips;
+    record_.sampled_poses = within - of_clips;
+    record_.limited = fmt::format("{} of {} poses", within, all);
+  }
+  // The largest step, and one that can be done without.
+  bool HasTimeForTiles() {
+    if (limit_.left() > kTilesInModes * modes_seconds_) return true;
+    record_.limited += std::string(record_.limited.empty() ? "" : ", ") + "no cues of each tile";
+    return false;
   }
 
   // Products of scalars, which are cues as others are from here on.
@@ -200,6 +228,12 @@ class Trainer {
       for (std::size_t t = 0; t < matrix->poses(); ++t)
         StoreProducts(recorder_->products(), layout_, matrix->row(t));
     }
+  }
+
+  std::size_t PoseBytes() const { return sizeof(float) * layout_.columns(); }
+  std::size_t RoomBeside(const PoseMatrix& poses) const {
+    const std::size_t fit = kMostPoseBytes / PoseBytes();
+    return fit - std::min(fit, poses.poses());
   }
 
   // The sampler's kind, and some of the others.
@@ -221,9 +255,10 @@ class Trainer {
   }
 
   Status RecordJudges(PoseMatrix* judges) {
+    const std::size_t most = std::min(kJudges, kMostJudgeBytes / PoseBytes());
     for (const auto& [kind, count] :
-         {std::pair{PoseKind::kSampled, kJudges}, std::pair{PoseKind::kMixture, kJudges / 3},
-          std::pair{PoseKind::kNeighbours, kJudges / 3}}) {
+         {std::pair{PoseKind::kSampled, most}, std::pair{PoseKind::kMixture, most / 3},
+          std::pair{PoseKind::kNeighbours, most / 3}}) {
       if (kind != PoseKind::kSampled && of_light()) continue;
       const std::size_t before = judges->poses();
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SampleOf(kind, count, options_.seed ^ 0x2545f4914f6cdd1dull),
@@ -303,6 +338,16 @@ class Trainer {
     return Status();
   }
 
+  Status CenterAndChooseCues(const PoseMatrix& poses, const PoseMatrix& judges) {
+    PoseMatrix centered(layout_);
+    for (std::size_t t = 0; t < judges.poses(); ++t)
+      std::ranges::copy(judges.row(t), centered.AddPose().begin());
+    if (judges.poses() > 0) centered.Subtract(pca_.mean);
+    if (of_light() && judges.poses() > 0) TruncateModes(centered);
+    KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
+    return ChooseCues(poses, centered);
+  }
+
   Status ChooseCues(const PoseMatrix& poses, const PoseMatrix& judges) {
     CueChoiceOptions choice;
     choice.rows = options_.rows;
@@ -359,7 +404,7 @@ class Trainer {
           of_light() || estimator.mode == EstimatorMode::kPaper ? nullptr : poses, record_.clip_poses);
     };
     Subspace subspace;
-    if (may_miss) {
+    if (may_miss && HasTimeForTiles()) {
       KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, for_all_points, &subspace));
     } else {
       subspace = for_all_points();
@@ -417,8 +462,7 @@ class Trainer {
 
   // With more poses, which regressions on few cues are glad of.
   Result<TileSubspace> MakeTiles(PoseMatrix* poses) {
-    const std::size_t fit = kMostPoseBytes / (sizeof(float) * layout_.columns());
-    const std::size_t count = std::min(options_.samples, fit - std::min(fit, poses->poses()));
+    const std::size_t count = std::min(options_.samples, RoomBeside(*poses));
     PoseMatrix more(layout_);
     KPSA_RETURN_IF_ERROR(AddSampled(count, options_.seed ^ 0xa54ff53a5f1d36f1ull, &more));
     record_.sampled_poses += more.poses();
@@ -579,6 +623,8 @@ class Trainer {
   CuePlace of_tiles_;
   CueChoice chosen_;  // the cues for all points
   double full_cost_ = 0;
+  const TimeLimit limit_;
+  double modes_seconds_ = 0;
   std::vector<Double3> positions_;
   std::vector<Signal> guards_;  // the recorder's first signals: relative matrices follow, which only measure
   RangeFinder ranges_;

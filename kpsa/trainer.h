@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,9 @@ struct TrainOptions {
   bool keep_modes = false;                         // in the subspace, for reports (Subspace::kept_modes)
   double range_ramp = 0.05;                        // of a trained extent: how fast guards come in
   std::size_t max_light_candidates = 4000;         // shading points that may become cues
+  // About how long training may take: fewer poses, and no cues of tiles, where that is too short. Which poses
+  // fit depends on the machine; with time enough, the subspace is that without a limit.
+  double seconds = std::numeric_limits<double>::infinity();
   std::function<bool(const char* what, double share)> progress;  // false cancels; may be null
 };
 

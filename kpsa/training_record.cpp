@@ -44,26 +44,27 @@ std::string TrainingJson(const TrainingRecord& r) {
                      {"cost", one.cost},
                      {"taken", one.taken}});
   }
-  const json object = {{"tried", tried},
-                       {"clips", r.clips},
-                       {"clip_poses", r.clip_poses},
-                       {"sampled_poses", r.sampled_poses},
-                       {"calibration_poses", r.calibration_poses},
-                       {"seed", r.seed},
-                       {"motion_rms", r.motion_rms},
-                       {"diagonal", r.diagonal},
-                       {"held_out", {{"rms", r.held_out_rms}, {"max", r.held_out_max}}},
-                       {"tile_rms", r.tile_rms},
-                       {"mode", r.mode},
-                       {"warning", r.warning},
-                       {"worst",
-                        {{"kind", r.worst.kind},
-                         {"clip", r.worst.clip},
-                         {"time", r.worst.time},
-                         {"controls", r.worst.controls},
-                         {"error", r.worst.error}}},
-                       {"controls", r.controls},
-                       {"signature", SignatureJson(r.signature)}};
+  json object = {{"tried", tried},
+                 {"clips", r.clips},
+                 {"clip_poses", r.clip_poses},
+                 {"sampled_poses", r.sampled_poses},
+                 {"calibration_poses", r.calibration_poses},
+                 {"seed", r.seed},
+                 {"motion_rms", r.motion_rms},
+                 {"diagonal", r.diagonal},
+                 {"held_out", {{"rms", r.held_out_rms}, {"max", r.held_out_max}}},
+                 {"tile_rms", r.tile_rms},
+                 {"mode", r.mode},
+                 {"warning", r.warning},
+                 {"worst",
+                  {{"kind", r.worst.kind},
+                   {"clip", r.worst.clip},
+                   {"time", r.worst.time},
+                   {"controls", r.worst.controls},
+                   {"error", r.worst.error}}},
+                 {"controls", r.controls},
+                 {"signature", SignatureJson(r.signature)}};
+  if (!r.limited.empty()) object["limited"] = r.limited;
   return object.dump();
 }
 
@@ -106,6 +107,7 @@ TrainingRecord ParseTraining(const std::string& text) {
   r.tile_rms = number(object, "tile_rms");
   r.mode = words("mode");
   r.warning = words("warning");
+  r.limited = words("limited");
   if (object.contains("worst") && object["worst"].is_object()) {
     const json& worst = object["worst"];
     const auto text = [&](const char* name) {

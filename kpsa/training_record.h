@@ -24,6 +24,7 @@ struct TrainingRecord {
   double tile_rms = 0;                        // what tiles and half precision add
   std::string mode;                           // "map" or "paper"
   std::string warning;
+  std::string limited;  // what was left out for want of time
   // What was tried, where there was a choice: its cues, the rows that these measure, and what judges say.
   struct Tried {
     std::string what;
