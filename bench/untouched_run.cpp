@@ -68,6 +68,7 @@ Status ReadFigures(const std::string& trained, const std::string& benched, Row* 
   if (!bench.ok()) return bench.status();
   try {
     row->training_seconds = training->at("seconds").get<double>();
+    row->predicted = NumberOrNan(training->at("predicted").at("speedup"));
     row->held_out_hits = training->at("calibration").at("hit_rate").get<double>();
     row->test_clip = bench->at("clip").get<std::string>();
     row->tolerance = bench->at("tolerance").get<double>();
@@ -101,14 +102,15 @@ Status CountJointsAndMorphs(const std::string& path, Row* row) {
 
 Table MakeTable(std::span<const Row> rows) {
   Table table({"character", ">points", ">joints", ">morphs", ">training", ">tolerance", ">held-out hits",
-               "test clip", ">hits", ">speed of hits", ">misses included", ">largest error", "promise"});
+               "test clip", ">hits", ">speed of hits", ">predicted", ">misses included", ">largest error",
+               "promise"});
   for (const Row& row : rows) {
     table.Row({row.character, Thousands(row.points), std::to_string(row.joints), std::to_string(row.morphs),
                fmt::format("{:.0f} s", row.training_seconds), LengthText(row.tolerance),
                fmt::format("{:.0f} %", 100 * row.held_out_hits), row.test_clip,
                fmt::format("{:.0f} %", 100 * row.hits), RatioText(row.speedup_on_hits),
-               RatioText(row.speedup), row.accepts ? fmt::format("{:.2f}", row.largest_error) : "-",
-               row.kept ? "kept" : "BROKEN"});
+               RatioText(row.predicted), RatioText(row.speedup),
+               row.accepts ? fmt::format("{:.2f}", row.largest_error) : "-", row.kept ? "kept" : "BROKEN"});
   }
   return table;
 }

@@ -16,6 +16,7 @@ struct Row {
   double training_seconds = 0;
   double tolerance = 0;                     // metres
   double held_out_hits = 0;                 // share of the trainer's own poses
+  double predicted = 0;                     // speedup, by the trainer
   double hits = 0;                          // share of the test clip's frames
   double speedup_on_hits = 0, speedup = 0;  // not a number where there are none
   double largest_error = 0;                 // in tolerances; infinite where it is not finite

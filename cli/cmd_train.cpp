@@ -66,35 +66,6 @@ Status ReadOptions(const TrainFlags& flags, TrainOptions* options) {
   return Status();
 }
 
-// The entry of the rig's accelerate section, by name where there are several.
-Result<Acceleration> ChooseEntry(const Rig& rig, const TrainFlags& flags) {
-  if (rig.accelerate.empty())
-    return Status::Invalid(
-               "has no accelerate section, so nothing to train; kpsa init writes a rig that has one")
-        .At({rig.path});
-  std::vector<std::string> names;
-  for (const Acceleration& entry : rig.accelerate) names.push_back(entry.name);
-  if (!flags.name.has_value()) {
-    if (names.size() == 1) return rig.accelerate.front();
-    return Status::Usage("the rig accelerates {}: expected one of them with --name", fmt::join(names, ", "));
-  }
-  const auto found = std::find(names.begin(), names.end(), *flags.name);
-  if (found == names.end())
-    return Status::Usage("--name {}: the rig accelerates {}{}", *flags.name, fmt::join(names, ", "),
-                         DidYouMean(*flags.name, names));
-  return rig.accelerate[static_cast<std::size_t>(found - names.begin())];
-}
-
-std::vector<std::string> SplitNames(const std::string& text) {
-  std::vector<std::string> names;
-  for (std::size_t begin = 0; begin <= text.size();) {
-    const std::size_t end = std::min(text.find(',', begin), text.size());
-    if (end > begin) names.push_back(text.substr(begin, end - begin));
-    begin = end + 1;
-  }
-  return names;
-}
-
 CommandResult RunTrain(const TrainFlags& flags) {
   const Result<int> threads = ThreadCount(flags);
   if (!threads.ok()) return threads.status();
@@ -111,7 +82,7 @@ CommandResult RunTrain(const TrainFlags& flags) {
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
-  const Result<Acceleration> entry = ChooseEntry(rig, flags);
+  const Result<Acceleration> entry = ChooseEntry(rig, flags.name);
   if (!entry.ok()) return entry.status();
   if (entry->reference >= 0) {
     const Reference& from = rig.references[static_cast<std::size_t>(entry->reference)];

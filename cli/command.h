@@ -26,6 +26,7 @@ void AddEvalCommand(CLI::App* program, Command* chosen);
 void AddGetCommand(CLI::App* program, Command* chosen);
 void AddRenderCommand(CLI::App* program, Command* chosen);
 void AddTrainCommand(CLI::App* program, Command* chosen);
+void AddLearnCommand(CLI::App* program, Command* chosen);
 void AddBenchCommand(CLI::App* program, Command* chosen);
 void AddReportCommand(CLI::App* program, Command* chosen);
 void AddCompileCommand(CLI::App* program, Command* chosen);

@@ -93,6 +93,7 @@ int Main(int argc, char** argv) {
   AddGetCommand(&program, &chosen);
   AddRenderCommand(&program, &chosen);
   AddTrainCommand(&program, &chosen);
+  AddLearnCommand(&program, &chosen);
   AddBenchCommand(&program, &chosen);
   AddReportCommand(&program, &chosen);
   AddCompileCommand(&program, &chosen);

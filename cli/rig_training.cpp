@@ -125,4 +125,32 @@ Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<s
   return frames;
 }
 
+Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name) {
+  if (rig.accelerate.empty())
+    return Status::Invalid(
+               "has no accelerate section, so nothing to train; kpsa init writes a rig that has one")
+        .At({rig.path});
+  std::vector<std::string> names;
+  for (const Acceleration& entry : rig.accelerate) names.push_back(entry.name);
+  if (!name.has_value()) {
+    if (names.size() == 1) return rig.accelerate.front();
+    return Status::Usage("the rig accelerates {}: expected one of them with --name", fmt::join(names, ", "));
+  }
+  const auto found = std::find(names.begin(), names.end(), *name);
+  if (found == names.end())
+    return Status::Usage("--name {}: the rig accelerates {}{}", *name, fmt::join(names, ", "),
+                         DidYouMean(*name, names));
+  return rig.accelerate[static_cast<std::size_t>(found - names.begin())];
+}
+
+std::vector<std::string> SplitNames(const std::string& text) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    if (end > begin) names.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return names;
+}
+
 }  // namespace kpsa

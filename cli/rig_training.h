@@ -1,6 +1,7 @@
 // Between rig files and the trainer: what an `accelerate:` entry of a rig means in plugs.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,10 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration);
 TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration);
 // Every frame of the clips at the rig's rate. Errors: a clip that the character lacks.
 Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips);
+// The entry of the rig's accelerate section, by name where there are several. Errors: none, or not that one.
+Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name);
+// "a,b" of a flag; empty names are left out.
+std::vector<std::string> SplitNames(const std::string& text);
 // What may vary when a clip plays: time, and the controls that the clip does not drive.
 std::vector<PlugRef> VaryingPlugs(const Rig& rig);
 

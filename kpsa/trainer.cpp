@@ -59,7 +59,16 @@ class Trainer {
   Result<Subspace> Run() {
     record_.seed = options_.seed;
     record_.mode = options_.mode == EstimatorMode::kMap ? "map" : "paper";
-    for (const TrainingClip& clip : clips_) record_.clips.push_back(clip.name);
+    record_.asked = {options_.samples,
+                     options_.calibration_poses,
+                     options_.rows,
+                     static_cast<std::size_t>(options_.max_modes),
+                     options_.mode == EstimatorMode::kPaper ? options_.key_points : options_.min_points,
+                     options_.may_have_cues_by_tile};
+    for (const TrainingClip& clip : clips_) {
+      if (clip.learnt) record_.learnt.emplace_back(clip.name, clip.times);
+      if (!clip.learnt) record_.clips.push_back(clip.name);
+    }
     KPSA_RETURN_IF_ERROR(Prepare());
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));

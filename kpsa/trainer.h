@@ -18,6 +18,7 @@ namespace kpsa {
 struct TrainingClip {
   std::string name;
   std::vector<double> times;  // seconds
+  bool learnt = false;        // frames that missed once (kpsa learn), not a clip that the rig trains on
 };
 
 struct TrainOptions {

@@ -46,6 +46,13 @@ std::string TrainingJson(const TrainingRecord& r) {
   }
   json object = {{"tried", tried},
                  {"clips", r.clips},
+                 {"asked",
+                  {{"samples", r.asked.samples},
+                   {"calibration", r.asked.calibration},
+                   {"rows", r.asked.rows},
+                   {"modes", r.asked.modes},
+                   {"points", r.asked.points},
+                   {"by_tile", r.asked.by_tile}}},
                  {"clip_poses", r.clip_poses},
                  {"sampled_poses", r.sampled_poses},
                  {"calibration_poses", r.calibration_poses},
@@ -65,6 +72,7 @@ std::string TrainingJson(const TrainingRecord& r) {
                  {"controls", r.controls},
                  {"signature", SignatureJson(r.signature)}};
   if (!r.limited.empty()) object["limited"] = r.limited;
+  for (const auto& [clip, times] : r.learnt) object["learnt"].push_back({{"clip", clip}, {"times", times}});
   return object.dump();
 }
 
@@ -108,6 +116,21 @@ TrainingRecord ParseTraining(const std::string& text) {
   r.mode = words("mode");
   r.warning = words("warning");
   r.limited = words("limited");
+  if (object.contains("asked") && object["asked"].is_object()) {
+    const json& asked = object["asked"];
+    r.asked = {count_in(asked, "samples"), count_in(asked, "calibration"),
+               count_in(asked, "rows"),    count_in(asked, "modes"),
+               count_in(asked, "points"),  !asked.contains("by_tile") || asked["by_tile"] != false};
+  }
+  if (object.contains("learnt") && object["learnt"].is_array()) {
+    for (const json& from : object["learnt"]) {
+      if (!from.is_object() || !from.contains("clip") || !from["clip"].is_string()) continue;
+      auto& [clip, times] = r.learnt.emplace_back(from["clip"].get<std::string>(), std::vector<double>());
+      for (const json& time : from.value("times", json::array())) {
+        if (time.is_number()) times.push_back(time.get<double>());
+      }
+    }
+  }
   if (object.contains("worst") && object["worst"].is_object()) {
     const json& worst = object["worst"];
     const auto text = [&](const char* name) {

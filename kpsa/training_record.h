@@ -16,6 +16,12 @@ inline constexpr const char *kForAllPoints = "for all points", *kByTile = "of ea
 
 struct TrainingRecord {
   std::vector<std::string> clips;
+  std::vector<std::pair<std::string, std::vector<double>>> learnt;  // clips, and the times that were learnt
+  // What was asked for, so that the same can be asked again (TrainOptions).
+  struct Asked {
+    std::size_t samples = 0, calibration = 0, rows = 0, modes = 0, points = 0;
+    bool by_tile = true;
+  } asked;
   std::size_t clip_poses = 0, sampled_poses = 0, calibration_poses = 0;
   std::uint64_t seed = 1;
   double motion_rms = 0, diagonal = 0;        // metres
