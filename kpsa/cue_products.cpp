@@ -26,7 +26,7 @@ constexpr double kLeastDeviation = 0.2;  // of a product of two of deviation 1
 constexpr double kProductOwn =
     3e-3;  // of a product's variance: less than this beyond the regressors is noise
 constexpr double kBeyondNoise =
-    4;  // times what a column of noise would explain on average: many stand for choice
+    1.5;  // times what a column of noise would explain on average: many stand for choice
 constexpr double kProductSeen = 1e-3;  // tolerances (RMS) that one has to tell
 
 // What a ridge regression on the rows of x leaves of those of y.

@@ -3,11 +3,13 @@
 #include <algorithm>
 
 #include "kpsa/cue_choice.h"
+#include "kpsa/poses.h"
 
 namespace kpsa {
 namespace {
 
 constexpr double kDoubtCost = 100;  // ns a tile, on the scale of the nodes' costs
+constexpr double kByteCost = 0.03;  // ns a byte of the tiles, likewise
 constexpr double kRowCost = 5;      // ns a row that is measured, likewise
 
 }  // namespace
@@ -40,21 +42,25 @@ ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, d
 }
 
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
-                       double full) {
+                       double full, double confidence) {
   std::vector<CalibrationPair> pairs;
   for (const ScoreJudge& judge : judges) {
     pairs.push_back({subspace.score.Of(judge.pose.measured, judge.pose.doubt), judge.pose.error, judge.guard,
                      judge.kind});
   }
   const Calibration found =
-      Calibrate(pairs, subspace.tolerance, subspace.violation_rate, subspace.blend_start, kEvenOdds);
+      Calibrate(pairs, subspace.tolerance, subspace.violation_rate, subspace.blend_start, confidence);
   FrameCost cost;
+  double kinds = 0, bytes = 0;
   for (const Calibration::Kind& kind : found.kinds) {
-    cost.misses += (1 - static_cast<double>(kind.hits) / static_cast<double>(kind.poses)) /
-                   static_cast<double>(found.kinds.size());
+    if (kind.kind == static_cast<int>(PoseKind::kBeyond)) continue;
+    cost.misses += 1 - static_cast<double>(kind.hits) / static_cast<double>(kind.poses);
+    kinds += 1;
   }
+  cost.misses /= std::max(kinds, 1.0);
+  for (const TileMap& tiles : subspace.tiles) bytes += static_cast<double>(tiles.bytes());
   const ScoreCosts score = CostsOfScore(subspace, full);
-  cost.ns = points + kRowCost * static_cast<double>(subspace.rows()) +
+  cost.ns = points + kRowCost * static_cast<double>(subspace.rows()) + kByteCost * bytes +
             ((subspace.score.measured > 0 ? score.measured : 0) +
              (subspace.score.doubt > 0 ? score.doubt : 0) + cost.misses) *
                 full;

@@ -41,6 +41,7 @@ constexpr std::size_t kChunk = 256;                            // calibration po
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
+constexpr double kFewMisses = 0.01;                            // likewise: finer tiles for these
 constexpr double kTilesInModes = 3.5;  // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;       // of the expected cost of the others: cues of tiles are taken
 constexpr double kTurnReach = 0.03;    // of the diagonal: how far an entry of a rotation moves points, about
@@ -88,6 +89,9 @@ class Trainer {
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
+    if (!fine_ && !of_light() && options_.mode == EstimatorMode::kMap && cost_.misses > kFewMisses &&
+        limit_.left() > modes_seconds_)
+      KPSA_RETURN_IF_ERROR(TryFiner(&poses, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
         RigSignature(*rig_.graph, rig_.target.outputs(), rig_.target.space, rig_.target.controls);
@@ -400,28 +404,56 @@ class Trainer {
     return {kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance, of_light() ? 0 : kTileRest};
   }
 
-  Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
-    const Estimator estimator = options_.mode == EstimatorMode::kPaper
-                                    ? LeastSquaresEstimator(pca_, cues_)
-                                    : MapEstimator(pca_, cues_, !of_light());
+  Subspace ForAllPoints(PoseMatrix* poses, bool fine) {
+    const bool paper = options_.mode == EstimatorMode::kPaper;
+    const Estimator estimator =
+        paper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
-    const bool may_miss =
+    return MakeSubspace(pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(),
+                        TileBudgets(fine), of_light() || paper ? nullptr : poses, record_.clip_poses);
+  }
+
+  Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
+    fine_ =
         options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses;
-    const auto for_all_points = [&] {
-      return MakeSubspace(
-          pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(may_miss),
-          of_light() || estimator.mode == EstimatorMode::kPaper ? nullptr : poses, record_.clip_poses);
-    };
     Subspace subspace;
-    if (may_miss && HasTimeForTiles()) {
-      KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, for_all_points, &subspace));
+    if (fine_ && HasTimeForTiles()) {
+      KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, &subspace));
     } else {
-      subspace = for_all_points();
+      subspace = ForAllPoints(poses, fine_);
     }
+    Describe(&subspace);
+    return subspace;
+  }
+
+  // Bytes count less than misses, and what these are is known from here on.
+  Status TryFiner(PoseMatrix* poses, Subspace* subspace) {
+    const TrainingRecord before = record_;
+    const FrameCost cost = cost_;
+    KPSA_RETURN_IF_ERROR(Say("finer tiles", 0.95));
+    Subspace fine = ForAllPoints(poses, true);
+    Describe(&fine);
+    KPSA_RETURN_IF_ERROR(Calibrate(&fine));
+    const bool better = cost_.ns < cost.ns;
+    const FrameCost finer = cost_;
+    if (better) *subspace = std::move(fine);
+    if (!better) record_ = before, cost_ = cost;
+    const auto tried = [&](const char* what, const FrameCost& of, bool taken) {
+      record_.tried.push_back({what, cues_.cues.size(), static_cast<std::size_t>(cues_.rows()), of.misses,
+                               of.ns / full_cost_, taken});
+    };
+    tried(kForAllPoints, cost, !better);
+    tried(kFinelyStored, finer, better);
+    return Status();
+  }
+
+  // What does not depend on how its cues were found.
+  void Describe(Subspace* described) const {
+    Subspace& subspace = *described;
     if (options_.keep_modes) subspace.kept_modes = pca_.output_modes().cast<float>();
     if (options_.keep_modes)
       subspace.modes = subspace.soft_cache.modes = static_cast<std::size_t>(pca_.mode_count());
-    subspace.mode = estimator.mode;
+    subspace.mode = options_.mode;
     subspace.space = rig_.target.space_name;
     subspace.inverse_rest_stretch = inverse_rest_stretch_;
     subspace.extent = of_light() ? 0 : diagonal_;
@@ -430,12 +462,10 @@ class Trainer {
     subspace.violation_rate = options_.violation_rate;
     subspace.cues.clear();
     for (const CueRef& cue : cues_.cues) subspace.cues.push_back(DescribeCue(rig_, *recorder_, totals_, cue));
-    return subspace;
   }
 
   // The subspace with which a frame is expected to cost less: with cues for all points, or of each tile.
-  Status CompareWithTiles(PoseMatrix* poses, const PoseMatrix& judges,
-                          const std::function<Subspace()>& for_all_points, Subspace* subspace) {
+  Status CompareWithTiles(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("cues of tiles", 0.8));
     Result<TileSubspace> tiles = MakeTiles(poses);
     if (!tiles.ok()) return tiles.status();
@@ -459,7 +489,7 @@ class Trainer {
       return Status();
     }
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
-    *subspace = for_all_points();
+    *subspace = ForAllPoints(poses, true);
     const Result<FrameCost> before = Price(subspace, cues_, judges);
     if (!before.ok()) return before.status();
     const bool better = cost.ns < before->ns;
@@ -509,7 +539,7 @@ class Trainer {
     subspace->tolerance = options_.tolerance;
     subspace->violation_rate = options_.violation_rate;
     subspace->score = ScoreOf(*subspace, judged, full_cost_);
-    return ExpectedCost(*subspace, judged, *points, full_cost_);
+    return ExpectedCost(*subspace, judged, *points, full_cost_, kEvenOdds);
   }
 
   // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
@@ -558,6 +588,8 @@ class Trainer {
     AskGuards(subspace->ranges, guarded, entries, &held_out);
     AskGuards(subspace->ranges, guarded, score_entries, &score_judges);
     subspace->score = ScoreOf(*subspace, score_judges, full_cost_);
+    cost_ = ExpectedCost(*subspace, score_judges.empty() ? held_out : score_judges, 0, full_cost_,
+                         kCalibrationConfidence);
     for (const ScoreJudge& held : held_out) {
       subspace->calibration.push_back(
           {subspace->score.Of(held.pose.measured, held.pose.doubt), held.pose.error, held.guard, held.kind});
@@ -630,7 +662,9 @@ class Trainer {
   std::vector<Index> totals_;
   std::vector<CuePlace> places_;
   CuePlace of_tiles_;
-  CueChoice chosen_;  // the cues for all points
+  CueChoice chosen_;   // the cues for all points
+  bool fine_ = false;  // tiles
+  FrameCost cost_;     // by the last calibration, but points
   double full_cost_ = 0;
   const TimeLimit limit_;
   double modes_seconds_ = 0;

@@ -12,7 +12,8 @@
 
 namespace kpsa {
 
-inline constexpr const char *kForAllPoints = "for all points", *kByTile = "of each tile";
+inline constexpr const char *kForAllPoints = "for all points", *kByTile = "of each tile",
+                            *kFinelyStored = "for all points, tiles stored finely";
 
 struct TrainingRecord {
   std::vector<std::string> clips;
