@@ -32,6 +32,7 @@ struct ControlRange {
   // What the attribute itself admits, where that is more than [min, max]; whole numbers admit nothing more.
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
+  double tilt = 0;  // training turns it so far from rest, though its range is less (kpsa/tilts.h)
 };
 
 // Control values of one pose (by control), and where in the training clips it plays: clip < 0 is the rest

@@ -136,8 +136,8 @@ TEST_F(ReadmeTest, CanaryOfInventedLines) {
 TEST_F(ReadmeTest, CanaryOfInventedScripts) {
   EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "set -e\nbuild/kpsa bench scenes/hello/hello.yaml --json\n")),
             "");
-  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa learn scenes/hello/hello.yaml\n")),
-            "no command learn");
+  EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa forget scenes/hello/hello.yaml\n")),
+            "no command forget");
   EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa bench scenes/hello/hello.yaml --swift\n")),
             "bench has no option --swift");
   EXPECT_EQ(ScriptProblem(folder_.Write("a.sh", "build/kpsa bench scenes/none.yaml\n")),
