@@ -6,7 +6,6 @@
 
 #include "base/check.h"
 #include "kpsa/carried.h"
-#include "kpsa/control_groups.h"
 #include "kpsa/cue_choice.h"
 #include "kpsa/cue_description.h"
 #include "kpsa/cue_places.h"
@@ -22,6 +21,7 @@
 #include "kpsa/tilts.h"
 #include "kpsa/time_limit.h"
 #include "kpsa/trained_ranges.h"
+#include "kpsa/training_sampler.h"
 
 namespace kpsa {
 namespace {
@@ -33,11 +33,8 @@ constexpr double kOwnShare = 0.03, kOwnMaxShare = 0.2;
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
-constexpr std::size_t kBetween = 400;                  // poses between the frames of all clips, at most
-constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, and
-constexpr std::size_t kMostJudgeBytes = 400'000'000;   // of those that judge: huge meshes have fewer, but
-constexpr std::size_t kLeastSamples = 200;
-constexpr std::size_t kChunk = 256;                            // calibration poses that are held at once
+constexpr std::size_t kBetween = 400;  // poses between the frames of all clips, at most
+constexpr std::size_t kChunk = 256;    // calibration poses that are held at once
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
@@ -46,7 +43,6 @@ constexpr double kTilesInModes = 3.5;  // how long these take, in the time that 
 constexpr double kClearly = 0.5;       // of the expected cost of the others: cues of tiles are taken
 constexpr double kTurnReach = 0.03;    // of the diagonal: how far an entry of a rotation moves points, about
 constexpr std::size_t kCueProducts = 160;  // cues that are products of others
-constexpr std::size_t kJudges = 300;       // new poses that compare places for cues
 
 class Trainer {
  public:
@@ -165,6 +161,7 @@ class Trainer {
     Result<PoseLayout> layout = recorder_->Layout(multiplies ? kCueProducts : 0);
     if (!layout.ok()) return layout.status();
     layout_ = *layout;
+    sampler_ = std::make_unique<TrainingSampler>(rig_, drawn_, clips_, options_, recorder_.get(), layout_);
     totals_ = totals;
     return Status();
   }
@@ -187,28 +184,16 @@ class Trainer {
       KPSA_RETURN_IF_ERROR(recorder_->AddClip(WithTimesBetween(clips_[c], between), poses));
     }
     record_.clip_poses = poses->poses();
-    Result<ClipPoses> clip_poses = recorder_->ControlsOfClips(clips_);
-    if (!clip_poses.ok()) return clip_poses.status();
-    clip_poses_ = std::move(*clip_poses);
     KPSA_RETURN_IF_ERROR(Say("poses", 0.2));
-    if (!rig_.controls.empty() && !of_light()) {
-      PoseMatrix sweeps(layout_);
-      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, &sweeps));
-      groups_ = FindControlGroups(sweeps, 0, drawn_.size());
-    }
-    if (options_.samples > 0) {
-      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
-      if (of_light()) groups_ = {};
-    }
-    const std::size_t room = std::max(RoomBeside(*poses), kLeastSamples);
-    KPSA_RETURN_IF_ERROR(AddSampled(std::min(options_.samples, room), options_.seed, poses));
+    KPSA_RETURN_IF_ERROR(sampler_->LearnHowControlsMove());
+    KPSA_RETURN_IF_ERROR(sampler_->AddTraining(poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3)
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
     const bool compares = places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty());
-    return compares ? RecordJudges(judges) : Status();
+    return compares ? sampler_->AddJudges(judges, &judge_kinds_) : Status();
   }
 
   // As many poses as there is time for, of all of them.
@@ -241,57 +226,6 @@ class Trainer {
       for (std::size_t t = 0; t < matrix->poses(); ++t)
         StoreProducts(recorder_->products(), layout_, matrix->row(t));
     }
-  }
-
-  std::size_t PoseBytes() const { return sizeof(float) * layout_.columns(); }
-  std::size_t RoomBeside(const PoseMatrix& poses) const {
-    const std::size_t fit = kMostPoseBytes / PoseBytes();
-    return fit - std::min(fit, poses.poses());
-  }
-
-  // The sampler's kind, and some of the others.
-  Status AddSampled(std::size_t count, std::uint64_t seed, PoseMatrix* poses) {
-    std::size_t rest = count;
-    if (!of_light()) {
-      for (const auto& [kind, share] :
-           {std::pair{PoseKind::kBeyond, 0.08}, std::pair{PoseKind::kMixture, 0.06},
-            std::pair{PoseKind::kNeighbours, 0.06}}) {
-        std::vector<SampledPose> some =
-            SampleOf(kind, static_cast<std::size_t>(share * static_cast<double>(count)),
-                     seed + static_cast<std::uint64_t>(kind));
-        if (kind == PoseKind::kBeyond) HalfAsFarBeyond(rig_.controls, &some);
-        rest -= some.size();
-        KPSA_RETURN_IF_ERROR(recorder_->AddSamples(some, clips_, poses));
-      }
-    }
-    return recorder_->AddSamples(SampleOf(PoseKind::kSampled, rest, seed), clips_, poses);
-  }
-
-  Status RecordJudges(PoseMatrix* judges) {
-    const std::size_t most = std::min(kJudges, kMostJudgeBytes / PoseBytes());
-    for (const auto& [kind, count] :
-         {std::pair{PoseKind::kSampled, most}, std::pair{PoseKind::kMixture, most / 3},
-          std::pair{PoseKind::kNeighbours, most / 3}}) {
-      if (kind != PoseKind::kSampled && of_light()) continue;
-      const std::size_t before = judges->poses();
-      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SampleOf(kind, count, options_.seed ^ 0x2545f4914f6cdd1dull),
-                                                 clips_, judges));
-      judge_kinds_.insert(judge_kinds_.end(), judges->poses() - before, static_cast<int>(kind));
-    }
-    return Status();
-  }
-
-  std::vector<SampledPose> SampleOf(PoseKind kind, std::size_t count, std::uint64_t seed) const {
-    std::vector<SampledPose> poses =
-        PosesOfKind(kind, drawn_, clip_poses_, groups_, clips_.size(), count, seed);
-    AddTilts(rig_.controls, drawn_.size(), seed, &poses);
-    return poses;
-  }
-
-  std::vector<SampledPose> SweepsWithTilts() const {
-    std::vector<SampledPose> sweeps = Sweeps(drawn_);
-    AddTilts(rig_.controls, drawn_.size(), options_.seed ^ 0xbb67ae8584caa73bull, &sweeps);
-    return sweeps;
   }
 
   bool of_light() const { return rig_.target.colors; }
@@ -501,9 +435,8 @@ class Trainer {
 
   // With more poses, which regressions on few cues are glad of.
   Result<TileSubspace> MakeTiles(PoseMatrix* poses) {
-    const std::size_t count = std::min(options_.samples, RoomBeside(*poses));
     PoseMatrix more(layout_);
-    KPSA_RETURN_IF_ERROR(AddSampled(count, options_.seed ^ 0xa54ff53a5f1d36f1ull, &more));
+    KPSA_RETURN_IF_ERROR(sampler_->AddMore(*poses, &more));
     record_.sampled_poses += more.poses();
     if (more.poses() > 0) more.Subtract(pca_.mean);
     poses->Append(more);
@@ -544,11 +477,11 @@ class Trainer {
 
   // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
   Status Calibrate(Subspace* subspace) {
-    std::vector<SampledPose> sweeps = SweepsWithTilts(), trial;
+    std::vector<SampledPose> sweeps = sampler_->SweepsWithTilts(), trial;
     for (std::size_t i = 0; i < std::min(kTrialSweeps, sweeps.size()); ++i)
       trial.push_back(sweeps[i * sweeps.size() / std::min(kTrialSweeps, sweeps.size())]);
     for (SampledPose& pose :
-         SampleOf(PoseKind::kSampled, kTrialSamples, options_.seed ^ 0x6a09e667f3bcc908ull))
+         sampler_->Of(PoseKind::kSampled, kTrialSamples, options_.seed ^ 0x6a09e667f3bcc908ull))
       trial.push_back(std::move(pose));
     const Result<Carried> carried =
         FindCarried(rig_, &compiler_, clips_, trial, inverse_rest_stretch_, diagonal_, options_.tolerance);
@@ -607,7 +540,7 @@ class Trainer {
                     std::vector<SampledPose>* poses = nullptr) {
     const auto of = static_cast<PoseKind>(kind);
     const std::vector<SampledPose> drawn =
-        SampleOf(of, count, (options_.seed + static_cast<std::uint64_t>(kind)) ^ seed);
+        sampler_->Of(of, count, (options_.seed + static_cast<std::uint64_t>(kind)) ^ seed);
     for (std::size_t first = 0; first < drawn.size(); first += kChunk) {
       // By clip, as the recorder writes them
       std::vector<SampledPose> chunk(
@@ -658,6 +591,7 @@ class Trainer {
   const TrainOptions& options_;
   Compiler compiler_;
   std::unique_ptr<PoseRecorder> recorder_;
+  std::unique_ptr<TrainingSampler> sampler_;
   PoseLayout layout_;
   std::vector<Index> totals_;
   std::vector<CuePlace> places_;
@@ -672,8 +606,6 @@ class Trainer {
   std::vector<Signal> guards_;  // the recorder's first signals: relative matrices follow, which only measure
   RangeFinder ranges_;
   Matrix4 inverse_rest_stretch_;
-  ClipPoses clip_poses_;
-  ControlGroups groups_;
   std::vector<int> judge_kinds_;
   Pca pca_;
   CueSet cues_;
