@@ -84,12 +84,6 @@ CommandResult RunTrain(const TrainFlags& flags) {
   Rig& rig = (*open)->rig;
   const Result<Acceleration> entry = ChooseEntry(rig, flags.name);
   if (!entry.ok()) return entry.status();
-  if (entry->reference >= 0) {
-    const Reference& from = rig.references[static_cast<std::size_t>(entry->reference)];
-    return Status::Usage(
-        "accelerate: \"{}\" is an entry of {}: train that rig; its subspace serves here, too", entry->name,
-        from.file);
-  }
   const std::string path = flags.output.value_or(entry->subspace);
   if (path.empty())
     return Status::Usage("accelerate: \"{}\" names no subspace file: expected -o FILE.kpsa", entry->name);

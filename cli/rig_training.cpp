@@ -132,15 +132,19 @@ Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string
         .At({rig.path});
   std::vector<std::string> names;
   for (const Acceleration& entry : rig.accelerate) names.push_back(entry.name);
-  if (!name.has_value()) {
-    if (names.size() == 1) return rig.accelerate.front();
+  if (!name.has_value() && names.size() > 1)
     return Status::Usage("the rig accelerates {}: expected one of them with --name", fmt::join(names, ", "));
-  }
-  const auto found = std::find(names.begin(), names.end(), *name);
+  const auto found = name.has_value() ? std::find(names.begin(), names.end(), *name) : names.begin();
   if (found == names.end())
     return Status::Usage("--name {}: the rig accelerates {}{}", *name, fmt::join(names, ", "),
                          DidYouMean(*name, names));
-  return rig.accelerate[static_cast<std::size_t>(found - names.begin())];
+  const Acceleration& entry = rig.accelerate[static_cast<std::size_t>(found - names.begin())];
+  if (entry.reference >= 0) {
+    return Status::Usage(
+        "accelerate: \"{}\" is an entry of {}: train that rig; its subspace serves here, too", entry.name,
+        rig.references[static_cast<std::size_t>(entry.reference)].file);
+  }
+  return entry;
 }
 
 std::vector<std::string> SplitNames(const std::string& text) {

@@ -16,7 +16,8 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration);
 TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration);
 // Every frame of the clips at the rig's rate. Errors: a clip that the character lacks.
 Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips);
-// The entry of the rig's accelerate section, by name where there are several. Errors: none, or not that one.
+// The entry of the rig's accelerate section, by name where there are several. Errors: none, not that one,
+// or one of a reference, which is trained there.
 Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name);
 // "a,b" of a flag; empty names are left out.
 std::vector<std::string> SplitNames(const std::string& text);

@@ -81,9 +81,13 @@ TEST_F(TwoHellos, AllCommandsTakeThem) {
   const ProcessResult untrained = RunKpsa({"bench", two()});
   EXPECT_NE(untrained.err.find("kpsa train " + folder.rig() + " writes it"), std::string::npos)
       << untrained.err;
-  const ProcessResult train = RunKpsa({"train", two(), "--name", "a:column"});
-  EXPECT_EQ(train.exit_code, 2);
-  EXPECT_NE(train.err.find("accelerate: \"a:column\" is an entry of "), std::string::npos) << train.err;
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"train", two(), "--name", "a:column"},
+        std::vector<std::string>{"learn", two(), "--name", "a:column", "--clip", "a:wave"}}) {
+    const ProcessResult refused = RunKpsa(command);
+    EXPECT_EQ(refused.exit_code, 2) << command[0];
+    EXPECT_NE(refused.err.find("accelerate: \"a:column\" is an entry of "), std::string::npos) << refused.err;
+  }
 }
 
 // A subspace of the rig alone serves wherever the rig stands.
