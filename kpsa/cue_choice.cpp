@@ -20,8 +20,9 @@ constexpr double kErrorPower = 3;            // of a point's largest error in it
 constexpr double kDear = 0.4;                // share of the cost, from which points are priced
 constexpr double kPointPrice = 12;           // rows: what a point then has to be worth
 constexpr double kMinMotion = 1e-3;          // of the largest: points that move less are no cues
-constexpr double kHopeless =
-    0.15;  // share of poses beyond the tolerance from which worst points are measured
+// Share of the poses beyond the tolerance from which worst points are measured: where no judge says what
+// misses, and where more than kMissed of the judges do
+constexpr double kHopeless = 0.15, kFewBeyond = 0.01, kMissed = 0.02;
 constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
 constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
@@ -76,7 +77,8 @@ class Chooser {
       }
       const bool early = std::any_of(chosen_.begin(), chosen_.end(),
                                      [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
-      if (early && !options_.by_rms && AddWorstPoints()) better |= compares && KeepIfCheaper();
+      const double hopeless = compares && best_.misses > kMissed ? kFewBeyond : kHopeless;
+      if (early && !options_.by_rms && AddWorstPoints(hopeless)) better |= compares && KeepIfCheaper();
       if (!compares) return {std::move(chosen_), place_};
       if (!better) break;  // earlier ones see even less
     }
@@ -179,10 +181,10 @@ class Chooser {
   }
 
   // Whether it added any.
-  bool AddWorstPoints() {
+  bool AddWorstPoints(double hopeless) {
     PointSurvey survey = Survey(chosen_);
     const std::size_t before = survey.poses_beyond(options_.tolerance);
-    if (static_cast<double>(before) < kHopeless * static_cast<double>(survey.poses())) return false;
+    if (static_cast<double>(before) < hopeless * static_cast<double>(survey.poses())) return false;
     const auto most = static_cast<std::size_t>(kWorstShare * static_cast<double>(pca_.layout.points));
     std::vector<CueRef> more = chosen_;
     for (std::size_t round = 0; round < kWorstRounds && survey.poses_beyond(options_.tolerance) > 0;

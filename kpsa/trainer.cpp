@@ -39,6 +39,7 @@ constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say
 constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
 constexpr double kFewMisses = 0.01;                            // likewise: finer tiles for these
+constexpr double kTooManyMisses = 0.15;                        // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;  // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;       // of the expected cost of the others: cues of tiles are taken
 constexpr double kTurnReach = 0.03;    // of the diagonal: how far an entry of a rotation moves points, about
@@ -79,15 +80,15 @@ class Trainer {
     if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
     modes_seconds_ = limit_.elapsed() - before_modes;
-    KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges));
+    KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges, options_.tolerance));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
     Result<Subspace> subspace = Assemble(&poses, judges);
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
-    if (!fine_ && !of_light() && options_.mode == EstimatorMode::kMap && cost_.misses > kFewMisses &&
+    if (!by_tile_ && !of_light() && options_.mode == EstimatorMode::kMap && cost_.misses > kFewMisses &&
         limit_.left() > modes_seconds_)
-      KPSA_RETURN_IF_ERROR(TryFiner(&poses, &*subspace));
+      KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
         RigSignature(*rig_.graph, rig_.target.outputs(), rig_.target.space, rig_.target.controls);
@@ -285,21 +286,21 @@ class Trainer {
     return Status();
   }
 
-  Status CenterAndChooseCues(const PoseMatrix& poses, const PoseMatrix& judges) {
+  Status CenterAndChooseCues(const PoseMatrix& poses, const PoseMatrix& judges, double tolerance) {
     PoseMatrix centered(layout_);
     for (std::size_t t = 0; t < judges.poses(); ++t)
       std::ranges::copy(judges.row(t), centered.AddPose().begin());
     if (judges.poses() > 0) centered.Subtract(pca_.mean);
     if (of_light() && judges.poses() > 0) TruncateModes(centered);
     KPSA_RETURN_IF_ERROR(Say("cues", 0.7));
-    return ChooseCues(poses, centered);
+    return ChooseCues(poses, centered, tolerance);
   }
 
-  Status ChooseCues(const PoseMatrix& poses, const PoseMatrix& judges) {
+  Status ChooseCues(const PoseMatrix& poses, const PoseMatrix& judges, double tolerance) {
     CueChoiceOptions choice;
     choice.rows = options_.rows;
     choice.min_points = options_.min_points;
-    choice.tolerance = options_.tolerance;
+    choice.tolerance = tolerance;
     choice.by_rms = of_light();
     choice.places = places_;
     choice.judges = judges.poses() > 0 ? &judges : nullptr;
@@ -360,24 +361,47 @@ class Trainer {
     return subspace;
   }
 
-  // Bytes count less than misses, and what these are is known from here on.
-  Status TryFiner(PoseMatrix* poses, Subspace* subspace) {
-    const TrainingRecord before = record_;
-    const FrameCost cost = cost_;
+  // What misses is known from here on, and counts more than bytes: tiles stored finely, then cues as for half
+  // the tolerance, which measure more of the points that are farthest off. The cheapest stays.
+  Status TryFiner(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("finer tiles", 0.95));
-    Subspace fine = ForAllPoints(poses, true);
-    Describe(&fine);
-    KPSA_RETURN_IF_ERROR(Calibrate(&fine));
-    const bool better = cost_.ns < cost.ns;
-    const FrameCost finer = cost_;
-    if (better) *subspace = std::move(fine);
-    if (!better) record_ = before, cost_ = cost;
-    const auto tried = [&](const char* what, const FrameCost& of, bool taken) {
-      record_.tried.push_back({what, cues_.cues.size(), static_cast<std::size_t>(cues_.rows()), of.misses,
-                               of.ns / full_cost_, taken});
+    const TrainingRecord before = record_;
+    std::vector<TrainingRecord::Tried> tried;
+    Subspace best, now = std::move(*subspace);
+    CueSet best_cues;
+    TrainingRecord best_record;
+    FrameCost best_cost;
+    std::size_t best_of = 0;
+    double least = std::numeric_limits<double>::infinity();
+    const auto compare = [&](const char* what) {
+      const Result<double> points =
+          CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues_.cues);
+      if (!points.ok()) return points.status();
+      const double cost = cost_.ns + *points;
+      tried.push_back({what, cues_.cues.size(), static_cast<std::size_t>(cues_.rows()), cost_.misses,
+                       cost / full_cost_, false});
+      if (cost >= least) return Status();
+      best = std::move(now), best_cues = cues_, best_record = record_, best_cost = cost_;
+      best_of = tried.size() - 1, least = cost;
+      return Status();
     };
-    tried(kForAllPoints, cost, !better);
-    tried(kFinelyStored, finer, better);
+    const auto again = [&](const char* what) {
+      record_ = before;
+      now = ForAllPoints(poses, true);
+      Describe(&now);
+      KPSA_RETURN_IF_ERROR(Calibrate(&now));
+      return compare(what);
+    };
+    KPSA_RETURN_IF_ERROR(compare(fine_ ? kFinelyStored : kForAllPoints));
+    if (!fine_) KPSA_RETURN_IF_ERROR(again(kFinelyStored));
+    if (best_cost.misses > kTooManyMisses && limit_.left() > modes_seconds_) {
+      KPSA_RETURN_IF_ERROR(CenterAndChooseCues(*poses, judges, options_.tolerance / 2));
+      KPSA_RETURN_IF_ERROR(again(kForHalf));
+    }
+    tried[best_of].taken = true;
+    *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
+    cost_ = best_cost;
+    record_.tried.insert(record_.tried.end(), tried.begin(), tried.end());
     return Status();
   }
 
@@ -420,6 +444,7 @@ class Trainer {
       tried(kForAllPoints, cues_.cues.size(), rows, chosen_.misses, chosen_.cost, false);
       tried(kByTile, tiles->cues.cues.size(), tiles->subspace.rows(), cost.misses, cost.ns, true);
       *subspace = std::move(tiles->subspace), cues_ = std::move(tiles->cues);
+      by_tile_ = true;
       return Status();
     }
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
@@ -430,6 +455,7 @@ class Trainer {
     tried(kForAllPoints, cues_.cues.size(), rows, before->misses, before->ns, !better);
     if (doubts) tried(kByTile, tiles->cues.cues.size(), tiles->subspace.rows(), cost.misses, cost.ns, better);
     if (better) *subspace = std::move(tiles->subspace), cues_ = std::move(tiles->cues);
+    by_tile_ = better;
     return Status();
   }
 
@@ -596,9 +622,10 @@ class Trainer {
   std::vector<Index> totals_;
   std::vector<CuePlace> places_;
   CuePlace of_tiles_;
-  CueChoice chosen_;   // the cues for all points
-  bool fine_ = false;  // tiles
-  FrameCost cost_;     // by the last calibration, but points
+  CueChoice chosen_;      // the cues for all points
+  bool fine_ = false;     // tiles
+  bool by_tile_ = false;  // its cues
+  FrameCost cost_;        // by the last calibration, but points
   double full_cost_ = 0;
   const TimeLimit limit_;
   double modes_seconds_ = 0;

@@ -13,7 +13,8 @@
 namespace kpsa {
 
 inline constexpr const char *kForAllPoints = "for all points", *kByTile = "of each tile",
-                            *kFinelyStored = "for all points, tiles stored finely";
+                            *kFinelyStored = "for all points, tiles stored finely",
+                            *kForHalf = "for all points, as for half the tolerance";
 
 struct TrainingRecord {
   std::vector<std::string> clips;

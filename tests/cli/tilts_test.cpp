@@ -1,12 +1,10 @@
-// What training turns though no control or hardly one does (kpsa/tilts.h), and how finely it stores tiles.
+// What training turns though no control or hardly one does (kpsa/tilts.h).
 #include "kpsa/tilts.h"
 
 #include <cmath>
 
 #include "cli/rig_training.h"
-#include "kpsa/training_record.h"
 #include "tests/cli/hello_folder.h"
-#include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
 namespace kpsa {
@@ -76,47 +74,6 @@ TEST_F(Tilts, AThirdAxisWithoutAControlGetsOne) {
   const TrainingRig rig = With("  upper.rotateX: {min: -30, max: 30}\n"), with = WithTilts(rig);
   ASSERT_EQ(with.controls.size(), rig.controls.size() + 1);
   EXPECT_EQ(rig_->graph->PlugName(with.controls.back().plug), "upper.rotate.y");
-}
-
-// Storing costs errors: where poses miss, tiles are stored finely if that pays, and that is told.
-class FinerTiles : public ::testing::Test {
- protected:
-  // What training compared; tiles stored finely are in it only where they were tried.
-  static std::vector<TrainingRecord::Tried> Tried(TrainOptions options) {
-    options.may_have_cues_by_tile = false;  // whose tiles are stored finely anyway
-    const auto trained = TrainRig(kHello, options);
-    EXPECT_NE(trained, nullptr);
-    return trained == nullptr ? std::vector<TrainingRecord::Tried>() : ParseTraining(trained->training).tried;
-  }
-  static void ExpectTheCheaperIsTaken(const TrainOptions& options) {
-    const std::vector<TrainingRecord::Tried> tried = Tried(options);
-    const auto coarse = std::ranges::find(tried, kForAllPoints, &TrainingRecord::Tried::what);
-    const auto fine = std::ranges::find(tried, kFinelyStored, &TrainingRecord::Tried::what);
-    ASSERT_NE(coarse, tried.end());
-    ASSERT_NE(fine, tried.end());
-    EXPECT_GT(coarse->misses, 0.2);
-    EXPECT_EQ(fine->taken, fine->cost < coarse->cost);
-    EXPECT_NE(coarse->taken, fine->taken);
-  }
-};
-
-TEST_F(FinerTiles, AreTriedWherePosesMissAndTakenWhereTheyCostLess) {
-  TrainOptions options = QuickTraining();
-  options.max_modes = 3;  // too few: hardly a pose is within the tolerance
-  ExpectTheCheaperIsTaken(options);
-  options = QuickTraining();
-  options.samples = 100;  // of which a tolerance of microns is too much to ask
-  for (const double tolerance : {1.5e-5, 2e-5, 2.5e-5}) {
-    options.tolerance = tolerance;
-    ExpectTheCheaperIsTaken(options);
-  }
-}
-
-TEST_F(FinerTiles, AreNotTriedWhereHardlyAnyPoseMisses) {
-  TrainOptions options = QuickTraining();
-  options.tolerance = 1e-3;
-  const std::vector<TrainingRecord::Tried> tried = Tried(options);
-  EXPECT_EQ(std::ranges::find(tried, kFinelyStored, &TrainingRecord::Tried::what), tried.end());
 }
 
 }  // namespace
