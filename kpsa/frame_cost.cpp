@@ -42,14 +42,14 @@ ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, d
 }
 
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
-                       double full, double confidence) {
+                       double full, double tolerance, double confidence) {
   std::vector<CalibrationPair> pairs;
   for (const ScoreJudge& judge : judges) {
     pairs.push_back({subspace.score.Of(judge.pose.measured, judge.pose.doubt), judge.pose.error, judge.guard,
                      judge.kind});
   }
   const Calibration found =
-      Calibrate(pairs, subspace.tolerance, subspace.violation_rate, subspace.blend_start, confidence);
+      Calibrate(pairs, tolerance, subspace.violation_rate, subspace.blend_start, confidence);
   FrameCost cost;
   double kinds = 0, bytes = 0;
   for (const Calibration::Kind& kind : found.kinds) {

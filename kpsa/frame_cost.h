@@ -22,10 +22,10 @@ struct FrameCost {
   double misses = 0;  // share of the judges, all kinds alike
   double ns = 0;      // of a frame
 };
-// With the score of the subspace, its tolerance and rate; confidence: of the calibration with these judges.
-// Poses beyond the ranges, where guards decide, do not count. points: what the graph spends until the points
-// among its cues are there (ns).
+// With the score of the subspace and its rate; tolerance (scene units) and confidence: of the calibration
+// with these judges. Poses beyond the ranges, where guards decide, do not count. points: what the graph
+// spends until the points among its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
-                       double full, double confidence);
+                       double full, double tolerance, double confidence);
 
 }  // namespace kpsa

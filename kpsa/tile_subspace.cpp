@@ -4,6 +4,7 @@
 #include <map>
 
 #include "base/check.h"
+#include "base/parallel.h"
 #include "kpsa/cue_values.h"
 
 namespace kpsa {
@@ -53,19 +54,62 @@ void DropUnread(TileSubspace* made) {
   made->cues = Subset(made->cues, kept);
 }
 
+// The rows that a tile reads.
+std::vector<std::uint32_t> ColumnsOf(const TileChoice& choice, std::size_t tile) {
+  const CueSet& cues = choice.cues;
+  std::vector<std::uint32_t> columns;
+  for (const std::uint32_t cue : choice.tiles.of_tile[tile]) {
+    for (Index j = cues.offsets[cue]; j < cues.offsets[cue + 1]; ++j) columns.push_back(j);
+  }
+  return columns;
+}
+
 }  // namespace
 
+TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                       std::vector<TileCandidates> candidates, const TileCueOptions& options) {
+  TileChoice choice;
+  choice.candidates = std::move(candidates);
+  choice.options = options;
+  choice.tiles = ChooseTileCues(poses, choice.candidates, options);
+  choice.cues = MeasureCues(poses, mean, choice.tiles.cues, &choice.measured);
+  return choice;
+}
+
+double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance) {
+  const auto count = static_cast<Eigen::Index>(poses.poses());
+  std::vector<Eigen::VectorXd> largest(choice.candidates.size());  // squared, by tile
+  ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const TileModel fitted = FitTile(poses, choice.measured, choice.cues, choice.options,
+                                       choice.candidates[t], choice.tiles.joint[t], ColumnsOf(choice, t));
+      Eigen::MatrixXd left = fitted.target;
+      if (!fitted.columns.empty()) left -= fitted.gain * choice.measured(fitted.columns, Eigen::all);
+      largest[t].setZero(count);
+      for (Eigen::Index i = 0; i + 2 < left.rows(); i += 3) {
+        largest[t] = largest[t].cwiseMax(left.middleRows<3>(i).colwise().squaredNorm().transpose());
+      }
+    }
+  });
+  Eigen::Index beyond = 0;
+  for (Eigen::Index t = 0; t < count; ++t) {
+    beyond += std::any_of(largest.begin(), largest.end(),
+                          [&](const Eigen::VectorXd& of) { return of[t] > tolerance * tolerance; });
+  }
+  return static_cast<double>(beyond) / static_cast<double>(std::max<Eigen::Index>(count, 1));
+}
+
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,
-                              std::span<const TileCandidates> candidates, const TileCueOptions& cue_options,
-                              std::vector<SubspaceOutput> outputs, const TileOptions& options) {
+                              const TileChoice& choice, std::vector<SubspaceOutput> outputs,
+                              const TileOptions& options) {
   TileSubspace made;
   Subspace& s = made.subspace;
   s.outputs = std::move(outputs);
   s.components = poses.layout().components;
-  const TileCues chosen = ChooseTileCues(poses, candidates, cue_options);
-  Eigen::MatrixXd measured;
-  made.cues = MeasureCues(poses, mean, chosen.cues, &measured);
-  const CueSet& cues = made.cues;
+  const TileCues& chosen = choice.tiles;
+  const Eigen::MatrixXd& measured = choice.measured;
+  made.cues = choice.cues;
+  const CueSet& cues = choice.cues;
 
   TileInputs inputs;
   inputs.samples = SampledColumns(measured);
@@ -79,13 +123,9 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
   std::size_t tile = 0, first = 0;
   for (const SubspaceOutput& output : s.outputs) {
     const auto model = [&](std::size_t t) {
-      std::vector<std::uint32_t> columns;
-      for (const std::uint32_t cue : chosen.of_tile[tile + t]) {
-        for (Index j = cues.offsets[cue]; j < cues.offsets[cue + 1]; ++j) columns.push_back(j);
-      }
       const Index joint = chosen.joint[tile + t];
-      TileModel fitted =
-          FitTile(poses, measured, cues, cue_options, candidates[tile + t], joint, std::move(columns));
+      TileModel fitted = FitTile(poses, measured, cues, choice.options, choice.candidates[tile + t], joint,
+                                 ColumnsOf(choice, tile + t));
       for (Index e = 0; e < 12 && joint != kNoIndex; ++e) fitted.joint_rows.push_back(row_of.at(joint + e));
       return fitted;
     };
@@ -97,11 +137,11 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
     tile += s.tiles.back().tiles();
     first += height;
   }
-  KPSA_CHECK_EQ(tile, candidates.size());
+  KPSA_CHECK_EQ(tile, choice.candidates.size());
   DropUnread(&made);
-  s.cue_mean.assign(cues.mean.data(), cues.mean.data() + cues.mean.size());
-  s.cue_scale.assign(cues.scale.data(), cues.scale.data() + cues.scale.size());
-  s.soft_cache.offsets = cues.offsets;
+  s.cue_mean.assign(made.cues.mean.data(), made.cues.mean.data() + made.cues.mean.size());
+  s.cue_scale.assign(made.cues.scale.data(), made.cues.scale.data() + made.cues.scale.size());
+  s.soft_cache.offsets = made.cues.offsets;
   s.score = {0, 1};
   return made;
 }

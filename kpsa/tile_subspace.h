@@ -12,10 +12,25 @@ struct TileSubspace {
   CueSet cues;  // those that a tile reads, in the order of the subspace's rows
 };
 
-// poses: centred with `mean`, the first clip_poses of clips. candidates: by tile, of all outputs one after
-// the other. The caller fills what MakeSubspace's does.
+// What tiles measure, and of which poses: chosen once, for tiles of any budget.
+struct TileChoice {
+  std::vector<TileCandidates> candidates;
+  TileCueOptions options;
+  TileCues tiles;
+  CueSet cues;
+  Eigen::MatrixXd measured;  // [rows x poses]
+};
+
+// poses: centred with `mean`. candidates: by tile, of all outputs one after the other.
+TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                       std::vector<TileCandidates> candidates, const TileCueOptions& options);
+
+// Share of the same poses in which a point of those tiles would be farther off, were they stored exactly.
+double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance);
+
+// The first clip_poses of the same poses are of clips. The caller fills what MakeSubspace's does.
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,
-                              std::span<const TileCandidates> candidates, const TileCueOptions& cue_options,
-                              std::vector<SubspaceOutput> outputs, const TileOptions& options);
+                              const TileChoice& choice, std::vector<SubspaceOutput> outputs,
+                              const TileOptions& options);
 
 }  // namespace kpsa

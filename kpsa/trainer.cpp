@@ -39,10 +39,14 @@ constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say
 constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
 constexpr double kFewMisses = 0.01;                            // likewise: finer tiles for these
-constexpr double kTooManyMisses = 0.15;                        // and cues as for half the tolerance
-constexpr double kTilesInModes = 3.5;  // how long these take, in the time that modes took
-constexpr double kClearly = 0.5;       // of the expected cost of the others: cues of tiles are taken
-constexpr double kTurnReach = 0.03;    // of the diagonal: how far an entry of a rotation moves points, about
+constexpr std::size_t kTrialTiles = 8;  // of so many, one says whether cues of each tile pay:
+constexpr double kTrialBeyond = 0.02;   // share of poses farther off than half the tolerance, at most
+constexpr double kCautious = 0.9;  // of the tolerance: what misses, where a few more poses beyond it would
+constexpr double kHopeless = 0.3;  // not for cues of tiles that miss so many
+constexpr double kTooManyMisses = 0.15;  // and cues as for half the tolerance
+constexpr double kTilesInModes = 3.5;    // how long these take, in the time that modes took
+constexpr double kClearly = 0.5;         // of the expected cost of the others: cues of tiles are taken
+constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
 constexpr std::size_t kCueProducts = 160;  // cues that are products of others
 
 class Trainer {
@@ -86,7 +90,8 @@ class Trainer {
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
-    if (!by_tile_ && !of_light() && options_.mode == EstimatorMode::kMap && cost_.misses > kFewMisses &&
+    const double bearable = !fine_ ? kFewMisses : by_tile_ ? 1 : kTooManyMisses;
+    if (!of_light() && options_.mode == EstimatorMode::kMap && cost_.misses > bearable &&
         limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
@@ -349,12 +354,13 @@ class Trainer {
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
-    fine_ =
+    const bool misses =
         options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses;
     Subspace subspace;
-    if (fine_ && HasTimeForTiles()) {
+    if (misses && HasTimeForTiles()) {
       KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, &subspace));
     } else {
+      fine_ = misses;
       subspace = ForAllPoints(poses, fine_);
     }
     Describe(&subspace);
@@ -365,7 +371,8 @@ class Trainer {
   // the tolerance, which measure more of the points that are farthest off. The cheapest stays.
   Status TryFiner(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("finer tiles", 0.95));
-    const TrainingRecord before = record_;
+    TrainingRecord before = record_;
+    for (TrainingRecord::Tried& earlier : before.tried) earlier.taken = false;
     std::vector<TrainingRecord::Tried> tried;
     Subspace best, now = std::move(*subspace);
     CueSet best_cues;
@@ -386,21 +393,31 @@ class Trainer {
       return Status();
     };
     const auto again = [&](const char* what) {
-      record_ = before;
-      now = ForAllPoints(poses, true);
+      if (by_tile_) {
+        TileSubspace tiles = OfTiles(*poses, true);
+        now = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
+      } else {
+        now = ForAllPoints(poses, true);
+      }
       Describe(&now);
       KPSA_RETURN_IF_ERROR(Calibrate(&now));
       return compare(what);
     };
-    KPSA_RETURN_IF_ERROR(compare(fine_ ? kFinelyStored : kForAllPoints));
-    if (!fine_) KPSA_RETURN_IF_ERROR(again(kFinelyStored));
-    if (best_cost.misses > kTooManyMisses && limit_.left() > modes_seconds_) {
+    const char* const fine = by_tile_ ? kByTileFinely : kFinelyStored;
+    const char* const first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
+    std::erase_if(before.tried, [&](const TrainingRecord::Tried& earlier) { return earlier.what == first; });
+    KPSA_RETURN_IF_ERROR(compare(first));
+    record_ = before;
+    if (!fine_) KPSA_RETURN_IF_ERROR(again(fine));
+    if (!by_tile_ && best_cost.misses > kTooManyMisses && limit_.left() > modes_seconds_) {
+      record_ = before;
       KPSA_RETURN_IF_ERROR(CenterAndChooseCues(*poses, judges, options_.tolerance / 2));
       KPSA_RETURN_IF_ERROR(again(kForHalf));
     }
     tried[best_of].taken = true;
     *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
     cost_ = best_cost;
+    record_.tried = before.tried;
     record_.tried.insert(record_.tried.end(), tried.begin(), tried.end());
     return Status();
   }
@@ -425,42 +442,50 @@ class Trainer {
   // The subspace with which a frame is expected to cost less: with cues for all points, or of each tile.
   Status CompareWithTiles(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("cues of tiles", 0.8));
-    Result<TileSubspace> tiles = MakeTiles(poses);
-    if (!tiles.ok()) return tiles.status();
-    const bool doubts = tiles->subspace.doubt_inputs() > 0;  // which alone judge it
-    FrameCost cost{1, std::numeric_limits<double>::infinity()};
-    if (doubts) {
-      const Result<FrameCost> priced = Price(&tiles->subspace, tiles->cues, judges);
-      if (!priced.ok()) return priced.status();
-      cost = *priced;
-    }
-    const auto tried = [&](const char* what, std::size_t cues, std::size_t rows, double misses, double ns,
-                           bool taken) {
-      record_.tried.push_back({what, cues, rows, misses, ns / full_cost_, taken});
+    const Result<bool> promising = ChooseTiles(poses);
+    if (!promising.ok()) return promising.status();
+    const auto tried = [&](const char* what, std::size_t cues, std::size_t rows, double misses, double ns) {
+      record_.tried.push_back({what, cues, rows, misses, ns / full_cost_, false});
     };
+    // Their doubts alone judge them; stored finely where poses miss
+    TileSubspace tiles;
+    FrameCost cost{1, std::numeric_limits<double>::infinity()};
+    std::size_t best = 0;
+    for (const bool fine : {false, true}) {
+      if (!*promising) break;
+      TileSubspace made = OfTiles(*poses, fine);
+      if (made.subspace.doubt_inputs() == 0) break;
+      const Result<FrameCost> priced = Price(&made.subspace, made.cues, judges);
+      if (!priced.ok()) return priced.status();
+      tried(fine ? kByTileFinely : kByTile, made.cues.cues.size(), made.subspace.rows(), priced->misses,
+            priced->ns);
+      if (priced->ns < cost.ns) {
+        cost = *priced, tiles = std::move(made), fine_ = fine;
+        best = record_.tried.size() - 1;
+      }
+      if (cost.misses <= kFewMisses || cost.misses > kHopeless) break;
+    }
     const auto rows = static_cast<std::size_t>(cues_.rows());
     // As chosen, without products of tiles: others with these would hardly do better, and take their time
-    if (cost.misses < kManyMisses && cost.ns < kClearly * chosen_.cost) {
-      tried(kForAllPoints, cues_.cues.size(), rows, chosen_.misses, chosen_.cost, false);
-      tried(kByTile, tiles->cues.cues.size(), tiles->subspace.rows(), cost.misses, cost.ns, true);
-      *subspace = std::move(tiles->subspace), cues_ = std::move(tiles->cues);
-      by_tile_ = true;
-      return Status();
+    by_tile_ = cost.misses < kManyMisses && cost.ns < kClearly * chosen_.cost;
+    if (by_tile_) {
+      tried(kForAllPoints, cues_.cues.size(), rows, chosen_.misses, chosen_.cost);
+    } else {
+      KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
+      *subspace = ForAllPoints(poses, true);
+      const Result<FrameCost> others = Price(subspace, cues_, judges);
+      if (!others.ok()) return others.status();
+      by_tile_ = cost.ns < others->ns;
+      tried(kFinelyStored, cues_.cues.size(), rows, others->misses, others->ns);
+      if (!by_tile_) best = record_.tried.size() - 1, fine_ = true;
     }
-    KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
-    *subspace = ForAllPoints(poses, true);
-    const Result<FrameCost> before = Price(subspace, cues_, judges);
-    if (!before.ok()) return before.status();
-    const bool better = cost.ns < before->ns;
-    tried(kForAllPoints, cues_.cues.size(), rows, before->misses, before->ns, !better);
-    if (doubts) tried(kByTile, tiles->cues.cues.size(), tiles->subspace.rows(), cost.misses, cost.ns, better);
-    if (better) *subspace = std::move(tiles->subspace), cues_ = std::move(tiles->cues);
-    by_tile_ = better;
+    record_.tried[best].taken = true;
+    if (by_tile_) *subspace = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
     return Status();
   }
 
-  // With more poses, which regressions on few cues are glad of.
-  Result<TileSubspace> MakeTiles(PoseMatrix* poses) {
+  // With more poses, which regressions on few cues are glad of. Whether they may hit often enough.
+  Result<bool> ChooseTiles(PoseMatrix* poses) {
     PoseMatrix more(layout_);
     KPSA_RETURN_IF_ERROR(sampler_->AddMore(*poses, &more));
     record_.sampled_poses += more.poses();
@@ -469,7 +494,7 @@ class Trainer {
     TileCandidateOptions of;
     of.layout = layout_, of.totals = totals_, of.signals = recorder_->signals();
     of.points = of_tiles_, of.positions = positions_, of.stages = recorder_->candidates();
-    const Result<std::vector<TileCandidates>> candidates = FindTileCandidates(rig_, &compiler_, clips_, of);
+    Result<std::vector<TileCandidates>> candidates = FindTileCandidates(rig_, &compiler_, clips_, of);
     if (!candidates.ok()) return candidates.status();
     TileCueOptions choice;
     choice.tolerance = options_.tolerance;
@@ -484,8 +509,18 @@ class Trainer {
     for (std::size_t s = 0; s < first.size(); ++s) {
       if (!recorder_->signals()[s].matrix) add(first[s]);
     }
-    return MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, *candidates, choice, Outputs(),
-                            TileBudgets(true));
+    // Some of them say whether the others are worth their time
+    if (candidates->size() > kTrialTiles * kTrialTiles) {
+      std::vector<TileCandidates> some;
+      for (std::size_t t = 0; t < candidates->size(); t += kTrialTiles) some.push_back((*candidates)[t]);
+      const TileChoice trial = kpsa::ChooseTiles(pca_.mean, *poses, std::move(some), choice);
+      if (ShareBeyond(*poses, trial, options_.tolerance / 2) > kTrialBeyond) return false;
+    }
+    tiles_ = kpsa::ChooseTiles(pca_.mean, *poses, std::move(*candidates), choice);
+    return true;
+  }
+  TileSubspace OfTiles(const PoseMatrix& poses, bool fine) const {
+    return MakeTileSubspace(pca_.mean, poses, record_.clip_poses, tiles_, Outputs(), TileBudgets(fine));
   }
 
   // The subspace is given its best score by the judges, and is then priced.
@@ -498,7 +533,7 @@ class Trainer {
     subspace->tolerance = options_.tolerance;
     subspace->violation_rate = options_.violation_rate;
     subspace->score = ScoreOf(*subspace, judged, full_cost_);
-    return ExpectedCost(*subspace, judged, *points, full_cost_, kEvenOdds);
+    return ExpectedCost(*subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds);
   }
 
   // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
@@ -548,7 +583,7 @@ class Trainer {
     AskGuards(subspace->ranges, guarded, score_entries, &score_judges);
     subspace->score = ScoreOf(*subspace, score_judges, full_cost_);
     cost_ = ExpectedCost(*subspace, score_judges.empty() ? held_out : score_judges, 0, full_cost_,
-                         kCalibrationConfidence);
+                         kCautious * options_.tolerance, kCalibrationConfidence);
     for (const ScoreJudge& held : held_out) {
       subspace->calibration.push_back(
           {subspace->score.Of(held.pose.measured, held.pose.doubt), held.pose.error, held.guard, held.kind});
@@ -625,6 +660,7 @@ class Trainer {
   CueChoice chosen_;      // the cues for all points
   bool fine_ = false;     // tiles
   bool by_tile_ = false;  // its cues
+  TileChoice tiles_;      // where they were tried
   FrameCost cost_;        // by the last calibration, but points
   double full_cost_ = 0;
   const TimeLimit limit_;

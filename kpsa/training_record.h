@@ -12,9 +12,11 @@
 
 namespace kpsa {
 
-inline constexpr const char *kForAllPoints = "for all points", *kByTile = "of each tile",
+// What is tried (TrainingRecord::Tried)
+inline constexpr const char *kForAllPoints = "for all points",
                             *kFinelyStored = "for all points, tiles stored finely",
-                            *kForHalf = "for all points, as for half the tolerance";
+                            *kForHalf = "for all points, as for half the tolerance",
+                            *kByTile = "of each tile", *kByTileFinely = "of each tile, tiles stored finely";
 
 struct TrainingRecord {
   std::vector<std::string> clips;

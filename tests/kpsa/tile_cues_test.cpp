@@ -78,8 +78,9 @@ struct Limb {
     TileCueOptions options;
     options.tolerance = kLimbTolerance, options.mean = &mean, options.turn_reach = 0.03;
     options.values = {{CueKind::kScalar, 0}};
-    chosen = ChooseTileCues(poses, tiles, options);
-    made = MakeTileSubspace(mean, poses, 0, tiles, options, {{"limb", kLimbPoints}},
+    const TileChoice choice = ChooseTiles(mean, poses, tiles, options);
+    chosen = choice.tiles;
+    made = MakeTileSubspace(mean, poses, 0, choice, {{"limb", kLimbPoints}},
                             {.rms_budget = 0.03 * kLimbTolerance, .max_budget = 0.2 * kLimbTolerance});
   }
   double LargestError(const PoseMatrix& fresh) const {
