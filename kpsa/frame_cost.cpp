@@ -55,14 +55,15 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
   for (const Calibration::Kind& kind : found.kinds) {
     if (kind.kind == static_cast<int>(PoseKind::kBeyond)) continue;
     cost.misses += 1 - static_cast<double>(kind.hits) / static_cast<double>(kind.poses);
+    cost.wrong += static_cast<double>(kind.violations) / static_cast<double>(kind.poses);
     kinds += 1;
   }
-  cost.misses /= std::max(kinds, 1.0);
+  cost.misses /= std::max(kinds, 1.0), cost.wrong /= std::max(kinds, 1.0);
   for (const TileMap& tiles : subspace.tiles) bytes += static_cast<double>(tiles.bytes());
   const ScoreCosts score = CostsOfScore(subspace, full);
   cost.ns = points + kRowCost * static_cast<double>(subspace.rows()) + kByteCost * bytes +
             ((subspace.score.measured > 0 ? score.measured : 0) +
-             (subspace.score.doubt > 0 ? score.doubt : 0) + cost.misses) *
+             (subspace.score.doubt > 0 ? score.doubt : 0) + cost.lost()) *
                 full;
   return cost;
 }

@@ -20,7 +20,10 @@ ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, d
 
 struct FrameCost {
   double misses = 0;  // share of the judges, all kinds alike
-  double ns = 0;      // of a frame
+  double wrong = 0;   // likewise: accepted, and beyond the tolerance
+  double ns = 0;      // of a frame; a wrong one counts as so many that miss
+  double lost() const { return misses + kWrongCost * wrong; }
+  static constexpr double kWrongCost = 0.5;
 };
 // With the score of the subspace and its rate; tolerance (scene units) and confidence: of the calibration
 // with these judges. Poses beyond the ranges, where guards decide, do not count. points: what the graph

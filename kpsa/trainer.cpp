@@ -28,8 +28,8 @@ namespace {
 
 constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
 constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
-// The same where tiles have cues of their own, or many poses would miss: there errors count more than bytes
-constexpr double kOwnShare = 0.03, kOwnMaxShare = 0.2;
+// The same where tiles have cues of their own, and where many poses would miss: errors count more than bytes
+constexpr double kOwnShare = 0.04, kOwnMaxShare = 0.3, kFineShare = 0.03, kFineMaxShare = 0.2;
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
@@ -91,7 +91,7 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
     const double bearable = !fine_ ? kFewMisses : by_tile_ ? 1 : kTooManyMisses;
-    if (!of_light() && options_.mode == EstimatorMode::kMap && cost_.misses > bearable &&
+    if (!of_light() && options_.mode == EstimatorMode::kMap && cost_.lost() > bearable &&
         limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
@@ -340,7 +340,7 @@ class Trainer {
     return outputs;
   }
   TileOptions TileBudgets(bool fine) const {
-    if (fine) return {kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest};
+    if (fine) return {kFineShare * options_.tolerance, kFineMaxShare * options_.tolerance, kTileRest};
     return {kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance, of_light() ? 0 : kTileRest};
   }
 
@@ -449,7 +449,7 @@ class Trainer {
     };
     // Their doubts alone judge them; stored finely where poses miss
     TileSubspace tiles;
-    FrameCost cost{1, std::numeric_limits<double>::infinity()};
+    FrameCost cost{.misses = 1, .ns = std::numeric_limits<double>::infinity()};
     std::size_t best = 0;
     for (const bool fine : {false, true}) {
       if (!*promising) break;
@@ -463,7 +463,7 @@ class Trainer {
         cost = *priced, tiles = std::move(made), fine_ = fine;
         best = record_.tried.size() - 1;
       }
-      if (cost.misses <= kFewMisses || cost.misses > kHopeless) break;
+      if (cost.lost() <= kFewMisses || cost.misses > kHopeless) break;
     }
     const auto rows = static_cast<std::size_t>(cues_.rows());
     // As chosen, without products of tiles: others with these would hardly do better, and take their time
@@ -520,7 +520,10 @@ class Trainer {
     return true;
   }
   TileSubspace OfTiles(const PoseMatrix& poses, bool fine) const {
-    return MakeTileSubspace(pca_.mean, poses, record_.clip_poses, tiles_, Outputs(), TileBudgets(fine));
+    return MakeTileSubspace(
+        pca_.mean, poses, record_.clip_poses, tiles_, Outputs(),
+        fine ? TileBudgets(true)
+             : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest});
   }
 
   // The subspace is given its best score by the judges, and is then priced.

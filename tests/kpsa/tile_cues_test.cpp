@@ -78,7 +78,7 @@ struct Limb {
     TileCueOptions options;
     options.tolerance = kLimbTolerance, options.mean = &mean, options.turn_reach = 0.03;
     options.values = {{CueKind::kScalar, 0}};
-    const TileChoice choice = ChooseTiles(mean, poses, tiles, options);
+    choice = ChooseTiles(mean, poses, tiles, options);
     chosen = choice.tiles;
     made = MakeTileSubspace(mean, poses, 0, choice, {{"limb", kLimbPoints}},
                             {.rms_budget = 0.03 * kLimbTolerance, .max_budget = 0.2 * kLimbTolerance});
@@ -91,6 +91,7 @@ struct Limb {
   }
   PoseMatrix poses;
   Eigen::VectorXd mean;
+  TileChoice choice;
   TileCues chosen;
   TileSubspace made;
 };
@@ -112,6 +113,29 @@ TEST(TileCues, ALimbIsToldInTheSpaceOfItsJoint) {
     const Index begin = limb.made.cues.offsets[k], end = limb.made.cues.offsets[k + 1];
     EXPECT_TRUE(std::any_of(read.begin() + begin, read.begin() + end, [](char r) { return r != 0; })) << k;
   }
+}
+
+// Before any tile is stored: what is beyond even then is the least that they miss.
+TEST(TileCues, SayWhatTheyWouldMiss) {
+  const Limb limb(true);
+  double farthest = 0;
+  for (const JudgedPose& pose : PoseJudge(limb.made.subspace, LimbLayout(), limb.made.cues).Judge([&] {
+         PoseMatrix same(LimbLayout());
+         for (std::size_t t = 0; t < limb.poses.poses(); ++t) {
+           const std::span<float> row = same.AddPose();
+           for (std::size_t i = 0; i < row.size(); ++i)
+             row[i] = std::as_const(limb.poses).row(t)[i] +
+                      static_cast<float>(limb.mean[static_cast<Eigen::Index>(i)]);
+         }
+         return same;
+       }()))
+    farthest = std::max(farthest, pose.error);
+  EXPECT_EQ(ShareBeyond(limb.poses, limb.choice, farthest), 0) << "storing adds to the errors";
+  EXPECT_EQ(ShareBeyond(limb.poses, limb.choice, 0), 1);
+  // Without the entries of a joint hardly a pose is told
+  TileChoice blind = limb.choice;
+  for (std::vector<std::uint32_t>& cues : blind.tiles.of_tile) cues.clear();
+  EXPECT_GT(ShareBeyond(limb.poses, blind, kLimbTolerance), 0.5);
 }
 
 // The run time's way, against y, the stored joint and the points in its space, one by one.
