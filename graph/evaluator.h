@@ -109,6 +109,7 @@ class Evaluator final {
   bool RunLevels(const Plan::Segment& segment, Index begin, Index end);
   bool Decide(Index step, Index* cause);
   bool RunChosen(Index step);
+  bool RunAll(Index segment);
   void OwnWorkspace();
   void AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns);
   void RecordFailure(Index step, std::string_view message);

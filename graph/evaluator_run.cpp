@@ -141,6 +141,17 @@ bool Evaluator::Decide(Index number, Index* cause) {
   return !host.failed;
 }
 
+// A segment of lazy inputs: all of what is chosen is needed.
+bool Evaluator::RunAll(Index g) {
+  const Plan::Segment& segment = plan_->segments()[g];
+  if (segment.uses_workspace) OwnWorkspace();
+  const bool wanted_only = wanted_only_;
+  wanted_only_ = false;
+  const bool fine = Run(segment, segment.begin, segment.end);
+  wanted_only_ = wanted_only;
+  return fine;
+}
+
 bool Evaluator::RunChosen(Index number) {
   const Index b = plan_->steps()[number].branch;
   const Plan::Branch& branch = plan_->branches()[b];
@@ -148,14 +159,10 @@ bool Evaluator::RunChosen(Index number) {
   for (std::size_t i = 0; i < branch.segment_of_lazy.size(); ++i) {
     const Index g = branch.segment_of_lazy[i];
     if ((chosen_[b] >> branch.bit_of_lazy[i] & 1) == 0 || g == kNoIndex || g == before) continue;
+    if (before == kNoIndex && branch.shared_segment != kNoIndex && !RunAll(branch.shared_segment))
+      return false;
     before = g;
-    const Plan::Segment& segment = plan_->segments()[g];
-    if (segment.uses_workspace) OwnWorkspace();
-    const bool wanted_only = wanted_only_;
-    wanted_only_ = false;  // all of a chosen segment is needed
-    const bool fine = Run(segment, segment.begin, segment.end);
-    wanted_only_ = wanted_only;
-    if (!fine) return false;
+    if (!RunAll(g)) return false;
   }
   return true;
 }

@@ -3,8 +3,10 @@
 // refer to the graph that it was made from.
 //
 // Steps belong to segments. Segment 0 is evaluated whenever asked; every lazy input opens a child segment,
-// evaluated only when its owner's decide chooses it. A segment's steps are a contiguous range, ordered by
-// level: steps of one level do not depend on each other.
+// evaluated only when its owner's decide chooses it. What several lazy inputs of one owner share, and nobody
+// else reads, has a segment between the owner's and theirs, evaluated before the chosen ones if there are
+// any. A segment's steps are a contiguous range, ordered by level: steps of one level do not depend on each
+// other.
 #pragma once
 
 #include <memory>
@@ -63,9 +65,10 @@ class Plan {
     std::vector<std::uint8_t> bit_of_lazy;  // its bit in what decide returns
     std::vector<Index> segment_of_lazy;     // kNoIndex where it needs no step
     std::vector<Index> lazy_deps;           // its producer; kNoIndex for none
+    Index shared_segment = kNoIndex;        // the parent of segments of lazy inputs that share steps
   };
   struct Segment {
-    Index parent = kNoIndex, owner = kNoIndex;  // owner: the step whose lazy input it serves
+    Index parent = kNoIndex, owner = kNoIndex;  // owner: the step whose lazy inputs it serves
     Index begin = 0, end = 0;                   // steps
     std::vector<Index> levels;                  // begin of every level, and end
     bool uses_workspace = false;

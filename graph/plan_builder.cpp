@@ -278,6 +278,7 @@ void PlanBuilder::FillSteps() {
       branch.compute_block = group->compute_block;
       branch.bit_of_lazy = draft.lazy_bits;
       branch.segment_of_lazy = draft.lazy_segments;
+      branch.shared_segment = draft.shared_segment;
       for (const DraftInput& input : draft.inputs) {
         if (input.lazy) branch.lazy_deps.push_back(ProducerOf(input));
       }

@@ -50,6 +50,7 @@ class Drafter {
       uses_[*it] = {};
     }
     InsertGathers();
+    DropEmptyShared();
     return std::move(draft_);
   }
 
@@ -186,6 +187,9 @@ class Drafter {
     return Status();
   }
 
+  bool Varies(const Source& source) const {
+    return source.kind == Source::Kind::kInstance && draft_.varying[source.instance];
+  }
   int Depth(Index segment) const { return draft_.segments[segment].depth; }
   Index AncestorAt(Index segment, int depth) const {
     while (Depth(segment) > depth) segment = draft_.segments[segment].parent;
@@ -250,6 +254,24 @@ class Drafter {
     return Status();
   }
 
+  // How many segments the lazy inputs of a step open: one a bit with something to evaluate.
+  int LazySegments(const Instance& instance) const {
+    int count = 0, together = -1;
+    for (const Input& input : instance.inputs) {
+      if (!input.lazy || !Varies(input.source) || together == input.position) continue;
+      if (table_.input_def(instance, input.position).lazy_together) together = input.position;
+      ++count;
+    }
+    return count;
+  }
+
+  // Opens a segment for what a step evaluates on demand.
+  Index OpenSegment(Index parent, Index owner) {
+    const int owners = draft_.segments[draft_.steps[owner].segment].owners + 1;
+    draft_.segments.push_back({parent, owner, Depth(parent) + 1, owners});
+    return static_cast<Index>(draft_.segments.size() - 1);
+  }
+
   Status MakeStep(Index number, Index segment, const std::vector<Use>& uses) {
     const Instance& instance = table_.instances()[number];
     const auto step_number = static_cast<Index>(draft_.steps.size());
@@ -278,6 +300,10 @@ class Drafter {
     draft_.steps.push_back(std::move(step));
     for (const Use& use : uses) Answer(use, step_number);
 
+    // What only its lazy inputs share runs before those that are chosen, and not at all where none is
+    Index lazy_parent = segment;
+    if (LazySegments(instance) > 1)
+      draft_.steps[step_number].shared_segment = lazy_parent = OpenSegment(segment, step_number);
     Index together = kNoIndex;
     int together_position = -1, bits = 0;
     for (std::size_t i = 0; i < instance.inputs.size(); ++i) {
@@ -302,13 +328,11 @@ class Drafter {
                                    kMaxLazyInputs);
           }
         }
-        const Source& s = input.source;
         Index child = kNoIndex;
-        if (s.kind == Source::Kind::kInstance && draft_.varying[s.instance]) {
+        if (Varies(input.source)) {
           if (together == kNoIndex) {
-            together = static_cast<Index>(draft_.segments.size());
-            draft_.segments.push_back({segment, step_number, Depth(segment) + 1});
-            if (Depth(together) > kMaxLazyDepth) {
+            together = OpenSegment(lazy_parent, step_number);
+            if (draft_.segments[together].owners > kMaxLazyDepth) {
               return Status::Invalid("{}: lazy inputs are nested more than {} deep",
                                      Describe(table_, instance), kMaxLazyDepth);
             }
@@ -374,6 +398,33 @@ class Drafter {
       }
     }
     for (DraftInput& output : draft_.outputs) serve(output, 0);
+  }
+
+  // Most owners have lazy inputs that share nothing.
+  void DropEmptyShared() {
+    std::vector<bool> used(draft_.segments.size(), false), dropped = used;
+    for (const DraftStep& step : draft_.steps) used[step.segment] = true;
+    for (DraftStep& step : draft_.steps) {
+      if (step.shared_segment == kNoIndex || used[step.shared_segment]) continue;
+      dropped[step.shared_segment] = true;
+      step.shared_segment = kNoIndex;
+    }
+    std::vector<Index> number;  // parents come before their children
+    std::vector<DraftSegment> kept;
+    for (Index g = 0; g < draft_.segments.size(); ++g) {
+      DraftSegment segment = draft_.segments[g];
+      if (segment.parent != kNoIndex) segment.parent = number[segment.parent];
+      number.push_back(dropped[g] ? segment.parent : static_cast<Index>(kept.size()));
+      if (!dropped[g]) kept.push_back(segment);
+    }
+    draft_.segments = std::move(kept);
+    for (DraftStep& step : draft_.steps) {
+      step.segment = number[step.segment];
+      if (step.shared_segment != kNoIndex) step.shared_segment = number[step.shared_segment];
+      for (Index& child : step.lazy_segments) {
+        if (child != kNoIndex) child = number[child];
+      }
+    }
   }
 
   InstanceTable& table_;

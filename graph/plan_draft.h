@@ -29,12 +29,14 @@ struct DraftStep {
   std::vector<DraftInput> inputs;
   std::vector<Index> lazy_segments;     // by lazy input, in order; kNoIndex where nothing has to be evaluated
   std::vector<std::uint8_t> lazy_bits;  // by lazy input: its bit in what decide returns
+  Index shared_segment = kNoIndex;      // parent of its lazy segments, where these share steps
   Type gather_type = Type::kPoints;
 };
 
 struct DraftSegment {
-  Index parent = kNoIndex, owner = kNoIndex;  // owner: a draft step of the parent
-  int depth = 0;
+  Index parent = kNoIndex, owner = kNoIndex;  // owner: a draft step of the parent, or of the one above
+  int depth = 0;                              // below segment 0
+  int owners = 0;                             // that have to decide before it runs
 };
 
 struct PlanDraft {

@@ -122,7 +122,7 @@ TEST_F(Allocations, CanaryTheCounterSeesEveryWay) {
   other.join();
 }
 
-// Arithmetic, vectors, arrays, lazy branches, stacks in place, gathers; wide enough for threads.
+// Arithmetic, vectors, arrays, lazy branches that share, stacks in place, gathers; wide enough for threads.
 void BuildWide(TestGraph& g) {
   g.add("add", "time");
   g.vary("time.a");
@@ -149,6 +149,15 @@ void BuildWide(TestGraph& g) {
     g.connect("total" + n + ".out", "side" + n + ".a");
     g.connect("scale" + n + ".out.y", "side" + n + ".b");
     g.connect("side" + n + ".out", "all.input[" + n + "]");
+    for (const char* name : {"root", "left", "right"}) g.add("add", name + n);
+    g.add("together", "both" + n);
+    g.connect("time.out", "root" + n + ".a");
+    g.connect("root" + n + ".out", "left" + n + ".a");
+    g.connect("root" + n + ".out", "right" + n + ".a");
+    g.connect("left" + n + ".out", "both" + n + ".input[0]");
+    g.connect("right" + n + ".out", "both" + n + ".other");
+    g.connect("time.out", "both" + n + ".wanted");
+    g.connect("both" + n + ".out", "all.input[" + std::to_string(24 + i) + "]");
     g.vary("src" + n + ".step");
     g.vary("cache" + n + ".threshold");
     g.want("m2_" + n + ".outPoints", PointSet::Of({1, 5, 9}, 400));
