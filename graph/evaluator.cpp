@@ -38,6 +38,7 @@ Evaluator::Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options)
   chosen_.assign(plan_->branches().size(), 0);
   dirty_.assign(steps / 64 + 1, 0);
   wanted_.assign(steps / 64 + 1, 0);
+  taking_.assign(plan_->segments().size(), 0);
   stack_.reserve(steps);
   block_host_ = std::make_unique<StepHost>(this, kNoIndex);
   if (options_.parallel) ready_.reserve(steps);
@@ -228,7 +229,7 @@ std::size_t Evaluator::MemoryBytes() const {
   const auto bytes = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof(*this) + plan_->initial_values().size() + buffers_.size() * 4 + state_.size() * 4 +
          bytes(changed_) + bytes(computed_) + bytes(chosen_) + bytes(dirty_) + bytes(wanted_) +
-         bytes(stack_) + bytes(ready_);
+         bytes(taking_) + bytes(stack_) + bytes(ready_);
 }
 
 }  // namespace kpsa

@@ -110,7 +110,7 @@ class Evaluator final {
   bool Decide(Index step, Index* cause);
   bool RunChosen(Index step);
   bool RunAll(Index segment);
-  void OwnWorkspace();
+  void OwnWorkspace(Index segment);
   void AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns);
   void RecordFailure(Index step, std::string_view message);
   Status TakeFailure();
@@ -132,6 +132,8 @@ class Evaluator final {
   std::vector<std::uint64_t> chosen_;          // by branch
   std::vector<std::uint64_t> dirty_, wanted_;  // bits, by step; wanted_ only during a pull of one output
   bool wanted_only_ = false;
+  std::vector<std::uint64_t> taking_;  // by segment: the taking of the workspace in which it ran
+  std::uint64_t takings_ = 0;
   std::vector<Index> stack_;  // steps to visit
   std::vector<Index> ready_;  // first steps of units of a level, for the parallel evaluation
   Index cursor_ = 0;          // of RunUntil

@@ -144,7 +144,7 @@ bool Evaluator::Decide(Index number, Index* cause) {
 // A segment of lazy inputs: all of what is chosen is needed.
 bool Evaluator::RunAll(Index g) {
   const Plan::Segment& segment = plan_->segments()[g];
-  if (segment.uses_workspace) OwnWorkspace();
+  if (segment.uses_workspace) OwnWorkspace(g);
   const bool wanted_only = wanted_only_;
   wanted_only_ = false;
   const bool fine = Run(segment, segment.begin, segment.end);
@@ -167,16 +167,18 @@ bool Evaluator::RunChosen(Index number) {
   return true;
 }
 
-void Evaluator::OwnWorkspace() {
-  if (workspace_->owner_ == this) return;
-  // Another evaluator used these buffers since: what this one left in them is gone
-  workspace_->owner_ = this;
-  for (std::size_t g = 1; g < plan_->segments().size(); ++g) {
-    const Plan::Segment& segment = plan_->segments()[g];
-    if (!segment.uses_workspace) continue;
-    std::fill(computed_.begin() + segment.begin, computed_.begin() + segment.end, 0);
-    SetDirty(segment.begin, segment.end);
+// Where another evaluator used the buffers since this segment ran, what it left in them is gone. Segments
+// that do not run now are left as they are: marked as dirty, they would hide later changes from their owners.
+void Evaluator::OwnWorkspace(Index g) {
+  if (workspace_->owner_ != this) {
+    workspace_->owner_ = this;
+    ++takings_;
   }
+  if (taking_[g] == takings_) return;
+  taking_[g] = takings_;
+  const Plan::Segment& segment = plan_->segments()[g];
+  std::fill(computed_.begin() + segment.begin, computed_.begin() + segment.end, 0);
+  SetDirty(segment.begin, segment.end);
 }
 
 template <bool kRecord>

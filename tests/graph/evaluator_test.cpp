@@ -264,5 +264,48 @@ TEST(Evaluator, EvaluatorsShareAWorkspace) {
   }
 }
 
+TEST(Evaluator, WhatAnotherTookOfTheWorkspaceStillHearsOfChanges) {
+  // Two caches; more varying plugs than there are closures kept for, so that changes are walked
+  TestGraph g(ToyRegistry());
+  g.add("sum", "many");
+  std::string end = "many.out";
+  for (int i = 0; i < 300; ++i) {
+    const std::string n = std::to_string(i);
+    g.add("add", "n" + n);
+    g.connect(end, "n" + n + ".a");
+    end = "n" + n + ".out";
+    g.hold("many.input[" + n + "]", 0.0);
+    g.vary("many.input[" + n + "]");
+  }
+  g.want(end);
+  g.add("source", "src", {{"count", 100}});
+  for (const std::string name : {"one", "two"}) {
+    g.add("move", name + "_full");
+    g.add("cached", name, {{"cues", std::vector<std::int64_t>{5}}, {"threshold", -1.0}});
+    g.connect("src.outPoints", name + "_full.points");
+    g.connect("src.outPoints", name + ".cuePoints");
+    g.connect(name + "_full.outPoints", name + ".full");
+    g.vary(name + ".threshold");
+    g.vary(name + "_full.offset");
+    g.want(name + ".outPoints");
+  }
+  ASSERT_TRUE(g.compile().ok());
+  const Index one_threshold = 300, one_offset = 301, two_offset = 303;
+  ASSERT_TRUE(g.plan->closure(two_offset).empty());
+  Workspace workspace(*g.plan);
+  Evaluator a(g.plan, {false, &workspace}), b(g.plan, {false, &workspace});
+  a.Set(one_threshold, 1e9);  // two's full points only
+  ASSERT_TRUE(a.Evaluate().ok());
+  ASSERT_TRUE(b.Evaluate().ok());
+  a.Set(one_threshold, -1.0);  // one's, too: b has used the workspace since
+  a.Set(one_offset, 1.0);
+  ASSERT_TRUE(a.Evaluate().ok());
+  EXPECT_FLOAT_EQ(a.Points(1).x[50], 51.0f);
+  EXPECT_FLOAT_EQ(a.Points(2).x[50], 50.0f);
+  a.Set(two_offset, 2.0);
+  ASSERT_TRUE(a.Evaluate().ok());
+  EXPECT_FLOAT_EQ(a.Points(2).x[50], 52.0f);
+}
+
 }  // namespace
 }  // namespace kpsa
