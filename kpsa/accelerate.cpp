@@ -109,6 +109,10 @@ Result<std::vector<Accelerated>> Accelerator::Apply() {
       names.push_back(target.meshes[m].name);
       note(graph_->Connect(target.meshes[m].stages.back().points, plug("fullPoints", static_cast<int>(m))));
     }
+    const std::size_t regions = config->data().patches.empty() ? 0 : subspace.patches.regions.size();
+    for (std::size_t r = 0; r < regions; ++r)
+      note(graph_->Connect(target.meshes[subspace.patches.regions[r].output].stages.back().points,
+                           plug("regionPoints", static_cast<int>(r))));
     graph_->SetElementNames(*node, def.FindAttribute("outPoints"), names);
     for (std::size_t m = 0; m < consumers.size(); ++m) {
       for (const Connection& c : consumers[m])

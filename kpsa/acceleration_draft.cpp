@@ -304,6 +304,23 @@ std::string StretchedName(const Graph& graph, Compiler* compiler, const Accelera
   return varying.empty() ? graph.name(target.space[0].node) : varying;
 }
 
+// Where the points of the patches lie, from the points at rest.
+Status AddPatches(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
+                  AccelerationDraft* draft) {
+  const std::size_t tiles = draft->data.subspace->patches.tiles;
+  if (tiles == 0 || draft->data.always_miss) return Status();
+  std::vector<std::vector<Double3>> positions;
+  for (const AccelerationTarget::MeshPoints& mesh : target.meshes) {
+    const Result<Value> rest = compiler->Rest(graph, mesh.stages.back().points);
+    if (!rest.ok()) return rest.status();
+    const ConstPointsView points = rest->points()->view();
+    std::vector<Double3>& of = positions.emplace_back();
+    for (std::size_t i = 0; i < points.count; ++i) of.push_back({points.x[i], points.y[i], points.z[i]});
+  }
+  draft->data.patches = MakePatches(positions, tiles);
+  return Status();
+}
+
 }  // namespace
 
 Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compiler,
@@ -322,6 +339,7 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   for (const auto* list : {&draft.matrices, &draft.scalars}) {
     for (const Signal& signal : *list) draft.data.guard_names.push_back(signal.name);
   }
+  KPSA_RETURN_IF_ERROR(AddPatches(graph, compiler, target, &draft));
   draft.data.has_space = !target.space.empty();
   // A reference hangs under its root as a whole, and grows with it
   draft.data.space_scales = draft.data.has_space && (subspace->space_scales || subspace->space.empty());

@@ -25,15 +25,25 @@ double InverseSmoothstep(double w) {
   return hi;
 }
 
-// The largest tau at which the pose is no farther than the tolerance: the blend then takes just enough of the
+// The largest tau at which points are no farther than the tolerance: the blend then takes just enough of the
 // full evaluation.
+double LargestHarmless(double score, double error, double guard, double tolerance, double blend_start) {
+  if (std::isnan(score) || std::isnan(error) || std::isnan(guard)) return 0;
+  if ((1 - guard) * error <= tolerance) return kInfinity;
+  const double u = error == kInfinity ? 1 : InverseSmoothstep(1 - tolerance / error);
+  return score / (blend_start + u * (1 - blend_start));
+}
 double LargestHarmless(const CalibrationPair& pair, double tolerance, double blend_start) {
   if (pair.guard >= 1) return kInfinity;
-  if (std::isnan(pair.score) || std::isnan(pair.error) || std::isnan(pair.guard)) return 0;
-  if ((1 - pair.guard) * pair.error <= tolerance) return kInfinity;
-  const double u = pair.error == kInfinity ? 1 : InverseSmoothstep(1 - tolerance / pair.error);
-  return pair.score / (blend_start + u * (1 - blend_start));
+  if (pair.patches.empty() || std::isnan(pair.score))
+    return LargestHarmless(pair.score, pair.error, pair.guard, tolerance, blend_start);
+  double least = kInfinity;
+  for (const PatchPair& patch : pair.patches)
+    least = std::min(least, LargestHarmless(patch.score, patch.error, pair.guard, tolerance, blend_start));
+  return std::max(least, pair.middle);
 }
+// Below which no point of the pose is accepted.
+double AcceptedFrom(const CalibrationPair& pair) { return pair.patches.empty() ? pair.score : pair.middle; }
 
 // What is known of the poses of one kind, sorted.
 struct KindPoses {
@@ -84,13 +94,15 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
   std::map<int, KindPoses> kinds;
   std::vector<double> severe, candidates;
   double largest_score = 0;
+  bool by_patch = false;
   for (const CalibrationPair& pair : pairs) {
     KindPoses& kind = kinds[pair.kind];
     ++kind.poses;
     kind.limits.push_back(LargestHarmless(pair, tolerance, c));
     severe.push_back(LargestHarmless(pair, kSevere * tolerance, c));
     if (pair.guard == 0 && !std::isnan(pair.score)) kind.scores.push_back(pair.score);
-    if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(pair.score);
+    if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(AcceptedFrom(pair));
+    by_patch = by_patch || !pair.patches.empty();
     if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
     for (const double limit : {kind.limits.back(), severe.back()}) {
       if (limit < kInfinity) candidates.push_back(limit);
@@ -119,10 +131,10 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     std::size_t violations = 0, hits = 0;
     bool allowed = true;
     for (const auto& [number, kind] : kinds) {
-      const std::size_t v = kind.Violations(tau), h = kind.Hits(tau * c);
+      const std::size_t v = kind.Violations(tau), accepted = kind.Accepted(tau);
       allowed = allowed && v <= admitted[number] &&
-                (v == 0 || FewAmong(v, kind.Accepted(tau), kind.attainable, wanted.confidence));
-      violations += v, hits += h;
+                (v == 0 || FewAmong(v, accepted, kind.attainable, wanted.confidence));
+      violations += v, hits += by_patch ? accepted : kind.Hits(tau * c);
     }
     if (allowed && FewAmong(violations, hits, wanted.attainable_alpha, wanted.confidence)) return tau;
   }
@@ -157,14 +169,32 @@ void Count(std::span<const CalibrationPair> pairs, double tolerance, Calibration
 
 }  // namespace
 
+std::vector<PatchPair> OutstandingPatches(std::vector<PatchPair> patches) {
+  std::sort(patches.begin(), patches.end(), [](const PatchPair& a, const PatchPair& b) {
+    return a.score != b.score ? a.score < b.score : a.error > b.error;
+  });
+  std::vector<PatchPair> kept;
+  for (const PatchPair& patch : patches) {
+    if (kept.empty() || patch.error > kept.back().error) kept.push_back(patch);
+  }
+  return kept;
+}
+
 double EmittedWeight(const CalibrationPair& pair, const SoftCacheThreshold& threshold) {
-  const double score = std::isnan(pair.score) ? 1 : FullWeight(pair.score, threshold);
-  return threshold.tau == kInfinity ? score : std::max(score, std::isnan(pair.guard) ? 1 : pair.guard);
+  double weight = std::isnan(pair.score) ? 1 : FullWeight(pair.score, threshold);
+  if (!pair.patches.empty() && weight > 0 && !std::isnan(pair.score))
+    weight = 0.5 * (weight + FullWeight(pair.middle, threshold));
+  return threshold.tau == kInfinity ? weight : std::max(weight, std::isnan(pair.guard) ? 1 : pair.guard);
 }
 
 double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& threshold) {
   const double weight = EmittedWeight(pair, threshold);
-  return weight == 1 ? 0 : (1 - weight) * pair.error;
+  if (weight == 1) return 0;
+  if (pair.patches.empty()) return (1 - weight) * pair.error;
+  double error = 0;
+  for (const PatchPair& patch : pair.patches)
+    error = std::max(error, (1 - std::max(pair.guard, FullWeight(patch.score, threshold))) * patch.error);
+  return error;
 }
 
 Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,

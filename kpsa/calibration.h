@@ -4,7 +4,8 @@
 // largest is taken (KPSA.md 2.11):
 //   of each kind, the rate of violations is at most alpha with 90 % confidence (exact binomial bound),
 //   of all, the same of 2 alpha among hits, and (violations + 1) <= 2 alpha (hits + 1); of each kind that has
-//   any among what is accepted, since violations are counted there: beyond the ranges most of that is blends,
+//   any among what is accepted, since violations are counted there: beyond the ranges most of that is blends;
+//   where patches miss by themselves, of all among what is accepted, too,
 //   of all, violations beyond 3 tolerances keep alpha / 10 likewise.
 // The confidence is over the draw of the calibration poses: nine of ten trainings keep their rate, where
 // conformal risk control (arXiv 2208.02814) keeps it on the average over trainings. It is about poses that
@@ -24,6 +25,12 @@ inline constexpr double kSevere = 3;         // tolerances: a violation beyond t
 inline constexpr double kSevereShare = 0.1;  // of alpha: what may be severe
 inline constexpr double kShareOfHits = 2;    // in alphas: violations among the hits
 
+// One patch of a pose (kpsa/patches.h): its own score, and the largest error of its points.
+struct PatchPair {
+  double score = 0, error = 0;
+  friend bool operator==(const PatchPair&, const PatchPair&) = default;
+};
+
 // One calibration pose.
 struct CalibrationPair {
   double score = 0;
@@ -31,7 +38,13 @@ struct CalibrationPair {
                      // output's points, the largest of all outputs
   double guard = 0;  // share of the full evaluation that the guards ask for (GuardWeight)
   int kind = 0;      // PoseKind (kpsa/poses.h)
+  // Where patches miss by themselves: those that no other one outdoes with a lower score and a larger error,
+  // by score; and the score that half of all patches reach, from which on all points are exact (AllWeight).
+  std::vector<PatchPair> patches = {};
+  double middle = 0;
 };
+// Keeps what CalibrationPair::patches says, of the patches of a pose in any order.
+std::vector<PatchPair> OutstandingPatches(std::vector<PatchPair> patches);
 
 struct Calibration {
   SoftCacheThreshold threshold;
@@ -64,7 +77,8 @@ struct Calibration {
 Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, double alpha,
                       double blend_start = kBlendStart, double confidence = kCalibrationConfidence);
 
-// Share of the full evaluation, and largest point error, of what is emitted.
+// Share of the full evaluation, and largest point error, of what is emitted. Where patches miss by themselves
+// the share is 0 for a hit, 1 where all points are exact, and anything between for the rest.
 double EmittedWeight(const CalibrationPair& pair, const SoftCacheThreshold& threshold);
 double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& threshold);
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <numeric>
 
+#include "graph/plan_report.h"
 #include "kpsa/mode_choice.h"
 
 namespace kpsa {
@@ -16,6 +17,7 @@ constexpr double kSaving = 0.01;          // of the full cost, from each place t
 // found for the outputs, not for many more points of stages.
 constexpr std::size_t kStagePoints = 500;
 constexpr std::size_t kMinStagePoints = 50;                // of a mesh, however many there are beside it
+constexpr double kSeldomRead = 1.5;                        // what points cost whose data are not in the cache
 constexpr std::size_t kOfTiles = 3, kMostOfTiles = 12000;  // of the first place: every third point
 
 // What the compiler keeps for some points.
@@ -150,6 +152,47 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
   const Result<Kept> kept = KeptFor(rig, compiler, std::move(outputs), 0);
   if (!kept.ok()) return kept.status();
   return kept->cost;
+}
+
+Result<std::vector<double>> CostsOfRegions(const TrainingRig& rig, Compiler* compiler,
+                                           std::span<const std::vector<Double3>> positions,
+                                           const PatchLayout& layout) {
+  const auto cost = [&](std::vector<RequestedOutput> outputs) -> Result<double> {
+    Request request;
+    request.outputs = std::move(outputs);
+    request.varying = {rig.time};
+    for (const ControlRange& control : rig.controls) request.varying.push_back(control.plug);
+    const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
+    if (!plan.ok()) return plan.status();
+    double sum = 0;
+    for (Index s = 0; s < (*plan)->infos().size(); ++s) {
+      // A deformer that spreads works on all that it reads
+      const Plan::StepInfo& info = (*plan)->infos()[s];
+      Index read = info.points;
+      for (const Index producer : Producers(**plan, s)) {
+        if (producer >= (*plan)->infos().size()) continue;
+        const Plan::StepInfo& of = (*plan)->infos()[producer];
+        if (of.points_total == info.points_total) read = std::max(read, of.points);
+      }
+      const double both = static_cast<double>(read) + info.points;
+      sum += static_cast<double>(info.cost_ns) * (info.points == 0 ? 1 : both / (2 * info.points));
+    }
+    return sum;
+  };
+  std::vector<PatchPoints> patches = MakePatches(positions, layout.tiles);
+  std::vector<RequestedOutput> outputs;
+  for (const auto& mesh : rig.target.meshes) outputs.push_back({mesh.stages.back().points, {}});
+  const Result<double> full = cost(std::move(outputs));
+  if (!full.ok()) return full.status();
+  std::vector<double> costs;
+  for (const PatchRegion& region : layout.regions) {
+    const PlugRef plug = rig.target.meshes[region.output].stages.back().points;
+    const auto total = static_cast<Index>(positions[region.output].size());
+    const Result<double> own = cost({{plug, PointSet::Of(PointsOfRegion(region, patches), total)}});
+    if (!own.ok()) return own.status();
+    costs.push_back(kSeldomRead * *own / *full);
+  }
+  return costs;
 }
 
 }  // namespace kpsa

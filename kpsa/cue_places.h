@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "kpsa/cue_choice.h"
+#include "kpsa/patches.h"
 #include "kpsa/pose_recorder.h"
 
 namespace kpsa {
@@ -26,5 +27,11 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
 // What the points among the cues cost together (ns); stages: as FindCuePlaces gave them.
 Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
                             std::span<const CandidateStage> stages, std::span<const CueRef> cues);
+
+// What each region of patches costs by itself, of the full evaluation: with the points that deformers ask for
+// about it, and since what it reads was seldom read lately. positions: of each output.
+Result<std::vector<double>> CostsOfRegions(const TrainingRig& rig, Compiler* compiler,
+                                           std::span<const std::vector<Double3>> positions,
+                                           const PatchLayout& layout);
 
 }  // namespace kpsa

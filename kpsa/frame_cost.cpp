@@ -1,6 +1,8 @@
 #include "kpsa/frame_cost.h"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "kpsa/cue_choice.h"
 #include "kpsa/poses.h"
@@ -10,7 +12,20 @@ namespace {
 
 constexpr double kDoubtCost = 100;  // ns a tile, on the scale of the nodes' costs
 constexpr double kByteCost = 0.03;  // ns a byte of the tiles, likewise
-constexpr double kRowCost = 5;      // ns a row that is measured, likewise
+// What patches have to spare, of a full evaluation, to do without SoftCache's own score (kpsa/score_choice)
+constexpr double kGainOverMeasured = 0.05;
+constexpr double kPartial = 0.4;  // of a full evaluation: what patches cost that are worth a try
+// Shares of the largest doubt that are tried (PatchLayout::share)
+constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
+constexpr double kRowCost = 5;  // ns a row that is measured, likewise
+
+// Whether a patch costs clearly less than all points, as patches do on the average.
+bool ArePartial(const PatchLayout& layout) {
+  double sum = 0;
+  for (std::size_t r = 0; r < layout.regions.size(); ++r)
+    sum += layout.regions[r].level == 0 ? layout.costs[r] : 0;
+  return sum < kPartial * static_cast<double>(layout.patches);
+}
 
 }  // namespace
 
@@ -38,23 +53,24 @@ ScoreCosts CostsOfScore(const Subspace& subspace, double full) {
 ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, double full) {
   if (subspace.soft_cache.factor.size() == 0) return DoubtAlone(judges);
   return ChooseScore(judges, subspace.tolerance, subspace.violation_rate, subspace.blend_start,
-                     CostsOfScore(subspace, full));
+                     CostsOfScore(subspace, full), subspace.patches);
 }
 
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence) {
   std::vector<CalibrationPair> pairs;
-  for (const ScoreJudge& judge : judges) {
-    pairs.push_back({subspace.score.Of(judge.pose.measured, judge.pose.doubt), judge.pose.error, judge.guard,
-                     judge.kind});
-  }
+  for (const ScoreJudge& judge : judges)
+    pairs.push_back(PairOf(judge.pose, subspace.score, subspace.patches, judge.guard, judge.kind));
   const Calibration found =
       Calibrate(pairs, tolerance, subspace.violation_rate, subspace.blend_start, confidence);
   FrameCost cost;
   double kinds = 0, bytes = 0;
+  std::map<int, double> costs;
+  for (const ScoreJudge& judge : judges)
+    costs[judge.kind] += ShareOfFull(judge, subspace.score, found.threshold, subspace.patches);
   for (const Calibration::Kind& kind : found.kinds) {
     if (kind.kind == static_cast<int>(PoseKind::kBeyond)) continue;
-    cost.misses += 1 - static_cast<double>(kind.hits) / static_cast<double>(kind.poses);
+    cost.misses += costs[kind.kind] / static_cast<double>(kind.poses);
     cost.wrong += static_cast<double>(kind.violations) / static_cast<double>(kind.poses);
     kinds += 1;
   }
@@ -66,6 +82,35 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
              (subspace.score.doubt > 0 ? score.doubt : 0) + cost.lost()) *
                 full;
   return cost;
+}
+
+FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
+                       double tolerance, double confidence) {
+  const auto cost = [&](std::span<const ScoreJudge> of) {
+    return ExpectedCost(*subspace, of, points, full, tolerance, confidence);
+  };
+  PatchLayout patches = std::exchange(subspace->patches, {});
+  std::vector<ScoreJudge> whole(judges.begin(), judges.end());
+  for (ScoreJudge& judge : whole) judge.pose.patches.clear();
+  subspace->score = ScoreOf(*subspace, whole, full);
+  FrameCost least = cost(whole);
+  if (patches.tiles == 0) return least;
+  ScoreMix best = subspace->score;
+  PatchLayout taken;
+  const double owed = best.measured > 0 ? kGainOverMeasured * full : 0;
+  subspace->patches = patches;
+  // What SoftCache's own score refuses it refuses everywhere
+  subspace->score = DoubtAlone(judges);
+  for (const double share : kShares) {
+    subspace->patches.share = share;
+    const FrameCost with = cost(judges);
+    // Of equal ones, since a clip may go where no judge has been
+    if (least.misses == with.misses && !ArePartial(patches)) continue;
+    if (taken.tiles == 0 ? with.ns <= least.ns - owed : with.ns < least.ns)
+      least = with, best = subspace->score, taken = subspace->patches;
+  }
+  subspace->score = best, subspace->patches = taken;
+  return least;
 }
 
 }  // namespace kpsa

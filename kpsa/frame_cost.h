@@ -19,7 +19,7 @@ ScoreCosts CostsOfScore(const Subspace& subspace, double full);
 ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, double full);
 
 struct FrameCost {
-  double misses = 0;  // share of the judges, all kinds alike
+  double misses = 0;  // share of the judges, all kinds alike; those of patches count as what they cost
   double wrong = 0;   // likewise: accepted, and beyond the tolerance
   double ns = 0;      // of a frame; a wrong one counts as so many that miss
   double lost() const { return misses + kWrongCost * wrong; }
@@ -30,5 +30,9 @@ struct FrameCost {
 // spends until the points among its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
+// The same where its score is yet to be chosen, and whether its patches miss by themselves: both as a frame
+// costs least.
+FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
+                       double tolerance, double confidence);
 
 }  // namespace kpsa

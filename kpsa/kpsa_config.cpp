@@ -56,6 +56,19 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(pair.error);
     hasher.Add(pair.guard);
     hasher.Add(pair.kind);
+    hasher.Add(pair.middle);
+    for (const PatchPair& patch : pair.patches) {
+      hasher.Add(patch.score);
+      hasher.Add(patch.error);
+    }
+  }
+  hasher.Add(s.patches.tiles);
+  hasher.Add(s.patches.share);
+  hasher.Add(std::span<const double>(s.patches.costs));
+  for (const PatchPoints& patch : data_.patches) {
+    hasher.Add(patch.output);
+    hasher.Add(std::span<const Index>(patch.points));
+    hasher.Add(std::span<const float>(patch.weights));
   }
   hasher.Add(std::span<const double>(s.inverse_rest_stretch.m));
   hasher.Add(s.extent);

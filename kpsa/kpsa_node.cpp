@@ -1,9 +1,12 @@
 #include "kpsa/kpsa_node.h"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 #include "base/check.h"
 #include "base/matrix.h"
@@ -15,10 +18,14 @@ namespace kpsa {
 namespace {
 
 // Inputs and outputs by position.
-enum In { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints };
+enum In { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints, kRegionPoints };
+// What decide returns: all points, or regions.
+constexpr std::uint64_t kFullBit = 1;
+constexpr int kFirstRegionBit = 1;
 enum Out { kOutPoints, kScore, kHit, kFullWeight, kMissReason, kOffender };
 
-constexpr int kGrowthSteps = 16;  // of sqrt(2): a space that is 256 times as large as at rest
+constexpr double kLeastWeight = 1e-6;  // of the full evaluation, in what is no hit
+constexpr int kGrowthSteps = 16;       // of sqrt(2): a space that is 256 times as large as at rest
 
 std::atomic<bool> measure_times{false};
 std::atomic<std::uint64_t> cue_ns{0}, projection_ns{0}, reconstruction_ns{0};
@@ -56,13 +63,27 @@ struct KpsaKernel {
     std::size_t padded = 0;     // floats of a component of the whole mesh, for the scratch
   };
   std::vector<Output> outputs;
+  struct Patch {
+    Index output = 0;
+    std::vector<Index> places;   // of its wanted points, in what is written
+    std::vector<float> weights;  // theirs
+    struct Held {
+      Index region;
+      std::vector<Index> places;  // of these points, in those of the region
+    };
+    std::vector<Held> held;  // by regions that it belongs to
+  };
+  std::vector<Patch> patches;
+  std::size_t tiles = 0;  // whose doubts are kept where there are patches
 };
 
 // Kept from decide to compute, per evaluator; the normalised measurement y follows it, padded to 16, then z
-// where tiles read that, or the inputs of all tiles where the doubt has needed them.
+// where tiles read that, or the inputs of all tiles where the doubt has needed them, then the doubts of tiles
+// where there are patches.
 struct KpsaState {
   Verdict verdict;
   Matrix4 world_from_space;
+  PatchChoice patches;
 };
 float* Measured(const ComputeContext& c) {
   return reinterpret_cast<float*>(c.state + (sizeof(KpsaState) + 63) / 64 * 64);
@@ -228,15 +249,14 @@ std::uint64_t Decide(ComputeContext& c) {
   const Subspace& subspace = *data.subspace;
   KpsaState& state = c.state_as<KpsaState>();
   state.verdict = Verdict{};
-  std::uint64_t all = 0;
-  for (std::size_t m = 0; m < subspace.outputs.size(); ++m) all |= std::uint64_t{1} << m;
+  state.patches.all = 1;
   const auto miss = [&](MissReason reason, Index offender) {
     state.verdict.hit = false;
     state.verdict.full_weight = 1;
     state.verdict.score = std::numeric_limits<double>::infinity();
     state.verdict.reason = reason;
     state.verdict.offender = offender;
-    return all;
+    return kFullBit;
   };
   // What comes after it binds to the rest points: to the exact ones
   if (c.at_rest || data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
@@ -265,17 +285,35 @@ std::uint64_t Decide(ComputeContext& c) {
   for (std::size_t j = r; j < padded; ++j) y[j] = 0;
   Verdict& verdict = state.verdict;
   const std::span<float> inputs(Measured(c) + padded, subspace.score.doubt > 0 ? subspace.doubt_inputs() : 0);
-  verdict = Judge(subspace, ThresholdAt(kernel, frame.scale), y, g, inputs);
-  // The largest weight counts
-  if (guard.weight > verdict.full_weight)
-    verdict.full_weight = guard.weight, verdict.reason = MissReason::kOutOfRange,
-    verdict.offender = guard.offender;
-  if (stretch > verdict.full_weight)
-    verdict.full_weight = stretch, verdict.reason = MissReason::kSpace, verdict.offender = kNoIndex;
+  const SoftCacheThreshold threshold = ThresholdAt(kernel, frame.scale);
+  std::array<double, kMaxPatches> scores;
+  const std::size_t patches = kernel.patches.size();
+  verdict = JudgePatches(subspace, threshold, y, g, inputs, {inputs.data() + inputs.size(), kernel.tiles},
+                         {scores.data(), patches});
+  const bool finite = verdict.reason != MissReason::kNotFinite;
+  // The largest weight counts: of all points, or of patches
+  double all = patches == 0 || !finite ? verdict.full_weight : 0;
+  const auto ask = [&](double weight, MissReason reason, Index offender) {
+    all = std::max(all, weight);
+    if (weight > verdict.full_weight)
+      verdict.full_weight = weight, verdict.reason = reason, verdict.offender = offender;
+  };
+  ask(guard.weight, MissReason::kOutOfRange, guard.offender);
+  ask(stretch, MissReason::kSpace, kNoIndex);
   verdict.hit = verdict.full_weight == 0;
+  state.patches.all = all;
+  if (patches > 0 && finite) {
+    for (std::size_t p = 0; p < patches; ++p)
+      state.patches.weights[p] = static_cast<float>(FullWeight(scores[p], threshold));
+    ChooseRegions(subspace.patches, all, &state.patches);
+    if (!verdict.hit)
+      verdict.full_weight =
+          state.patches.all + (1 - state.patches.all) * std::max(state.patches.mean, kLeastWeight);
+  }
   if (!subspace.latent.empty() && verdict.full_weight < 1)
     ToLatent(subspace, y, {Measured(c) + padded, subspace.tile_inputs()});
-  return verdict.hit ? 0 : all;
+  if (verdict.hit) return 0;
+  return patches == 0 || !finite || state.patches.full ? kFullBit : state.patches.regions << kFirstRegionBit;
 }
 
 void WriteVerdict(const ComputeContext& c) {
@@ -318,10 +356,42 @@ void CopyFull(ConstPointsView from, PointsView to) {
   std::memcpy(to.z, from.z, from.count * sizeof(float));
 }
 
+// Points that have been reconstructed go over into exact ones where a patch is doubtful. from: the places of
+// its points in these.
+void BlendPatch(const KpsaKernel::Patch& patch, float weight, ConstPointsView exact,
+                const std::vector<Index>& from, PointsView out) {
+  float* const to[3] = {out.x, out.y, out.z};
+  const float* const of[3] = {exact.x, exact.y, exact.z};
+  for (std::size_t i = 0; i < patch.places.size(); ++i) {
+    const float w = weight * patch.weights[i];
+    const Index place = patch.places[i];
+    for (int a = 0; a < 3; ++a) {
+      const float value = of[a][from[i]];
+      to[a][place] = w >= 1 ? value : to[a][place] + w * (value - to[a][place]);
+    }
+  }
+}
+
+void BlendPatches(ComputeContext& c, const KpsaKernel& kernel, std::uint32_t m, PointsView out) {
+  const PatchChoice& choice = c.state_as<KpsaState>().patches;
+  const ArrayView<ConstPointsView> full = c.array<ConstPointsView>(kFullPoints),
+                                   regions = c.array<ConstPointsView>(kRegionPoints);
+  for (std::size_t p = 0; p < kernel.patches.size(); ++p) {
+    const KpsaKernel::Patch& patch = kernel.patches[p];
+    if (patch.output != m || patch.places.empty() || !(choice.weights[p] > 0)) continue;
+    if (choice.full) BlendPatch(patch, choice.weights[p], full[m], patch.places, out);
+    for (const KpsaKernel::Patch::Held& held : patch.held) {
+      if ((choice.regions >> held.region & 1) != 0)
+        BlendPatch(patch, choice.weights[p], regions[held.region], held.places, out);
+    }
+  }
+}
+
 void Compute(ComputeContext& c) {
   const auto& kernel = c.kernel_as<KpsaKernel>();
   WriteVerdict(c);
-  const Verdict& verdict = c.state_as<KpsaState>().verdict;
+  const KpsaState& state = c.state_as<KpsaState>();
+  const Verdict& verdict = state.verdict;
   const ArrayView<ConstPointsView> full = c.array<ConstPointsView>(kFullPoints);
   for (std::uint32_t m = 0; m < kernel.outputs.size(); ++m) {
     const PointsView& out = c.out_points(kOutPoints, m);
@@ -332,7 +402,9 @@ void Compute(ComputeContext& c) {
     }
     const Stopwatch watch(reconstruction_ns);
     Reconstruct(c, kernel, m, out);
-    if (!verdict.hit) BlendPoints(verdict.full_weight, full[m], out);
+    if (verdict.hit) continue;
+    BlendPatches(c, kernel, m, out);
+    if (state.patches.all > 0) BlendPoints(state.patches.all, full[m], out);
   }
 }
 
@@ -377,6 +449,13 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
   }
 }
 
+// Those of the points that are wanted.
+PointSet Wanted(const std::vector<Index>& points, const PointSet& wanted) {
+  std::vector<Index> of;
+  std::ranges::copy_if(points, std::back_inserter(of), [&](Index point) { return wanted.Contains(point); });
+  return PointSet::Of(std::move(of), wanted.total());
+}
+
 void DemandKpsa(Demand& demand) {
   const auto* config = demand.structural().asset<KpsaConfig>("config");
   if (config == nullptr) return;
@@ -389,6 +468,13 @@ void DemandKpsa(Demand& demand) {
   }
   for (std::size_t m = 0; m < config->data().subspace->outputs.size(); ++m) {
     demand.Require("fullPoints", static_cast<int>(m), demand.output("outPoints", static_cast<int>(m)));
+  }
+  if (config->data().patches.empty()) return;
+  const std::vector<PatchRegion>& regions = config->data().subspace->patches.regions;
+  for (std::size_t r = 0; r < regions.size(); ++r) {
+    const PointSet& wanted = demand.output("outPoints", static_cast<int>(regions[r].output));
+    demand.Require("regionPoints", static_cast<int>(r),
+                   Wanted(PointsOfRegion(regions[r], config->data().patches), wanted));
   }
 }
 
@@ -432,6 +518,24 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
     }
     kernel.outputs.push_back(std::move(output));
   }
+  for (std::size_t p = 0; p < data.patches.size(); ++p) {
+    const PatchPoints& patch = data.patches[p];
+    const PointSet& wanted = binding.output("outPoints", static_cast<int>(patch.output));
+    KpsaKernel::Patch bound{patch.output, {}, {}, {}};
+    const PointSet points = Wanted(patch.points, wanted);
+    bound.places = wanted.PositionsOf(points);
+    for (std::size_t i = 0; i < patch.points.size(); ++i) {
+      if (wanted.Contains(patch.points[i])) bound.weights.push_back(patch.weights[i]);
+    }
+    for (std::size_t r = 0; r < subspace.patches.regions.size(); ++r) {
+      const PatchRegion& region = subspace.patches.regions[r];
+      if (p < region.first || p >= region.first + region.count) continue;
+      const PointSet& held = binding.input("regionPoints", static_cast<int>(r));
+      bound.held.push_back({static_cast<Index>(r), held.PositionsOf(points)});
+    }
+    kernel.patches.push_back(std::move(bound));
+  }
+  kernel.tiles = data.patches.empty() ? 0 : subspace.tile_count();
   const std::size_t padded = subspace.soft_cache.padded_rows();
   // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles), g, joints
   const std::size_t joints = 2 * data.joints.size() * (sizeof(Matrix4) / sizeof(float));
@@ -441,7 +545,8 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
   const std::size_t after = subspace.score.doubt > 0  ? subspace.doubt_inputs()
                             : subspace.latent.empty() ? 0
                                                       : subspace.tile_inputs();
-  const std::size_t state = (sizeof(KpsaState) + 63) / 64 * 64 + (padded + after) * sizeof(float);
+  const std::size_t state =
+      (sizeof(KpsaState) + 63) / 64 * 64 + (padded + after + kernel.tiles) * sizeof(float);
   return BoundKernel{std::make_shared<const KpsaKernel>(std::move(kernel)), scratch, state};
 }
 
@@ -466,6 +571,9 @@ void AddKpsaNode(NodeRegistry& registry) {
       .points_in("fullPoints", "the full evaluation")
       .array()
       .lazy(true)
+      .points_in("regionPoints", "the full evaluation of each region that may miss by itself")
+      .array()
+      .lazy()
       .structural("config", Type::kAsset)
       .structural("tolerance", 1e-4,
                   {.min = 0, .unit = Unit::kLength, .doc = "largest point error that may pass"})

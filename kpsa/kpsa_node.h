@@ -8,6 +8,7 @@
 //   scalars[k]      other values: guards and cues
 //   spaceMatrix     the frame that the subspace lives in, world space (identity: none)
 //   fullPoints[m]   the full evaluation of each mesh; lazy, all together
+//   regionPoints[r] the full evaluation of each region of patches (kpsa/patches.h); lazy, each by itself
 //   config          KpsaConfig (structural)
 //   tolerance       metres, violationRate (structural): SoftCache's threshold follows from the calibration
 //   poses outPoints[m], score, hit, fullWeight, missReason, offender
@@ -49,6 +50,7 @@ class KpsaConfig final : public Asset {
     std::vector<PointCues> cues;
     std::vector<Row> rows;  // one a cue, in the order of the subspace's
     std::vector<Product> products;
+    std::vector<PatchPoints> patches;    // [patches of the subspace]
     std::vector<char> outputs_in_space;  // [outputs] as of cues: they are given in spaceMatrix's frame
     // Trained ranges and how guards come in outside of them (TrainedRange); see MatrixEntries
     std::vector<double> matrix_lo, matrix_hi, matrix_ramp;  // [12 * matrices]

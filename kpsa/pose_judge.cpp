@@ -2,12 +2,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "base/parallel.h"
 #include "kpsa/cue_values.h"
 
 namespace kpsa {
+
+CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchLayout& layout, double guard,
+                       int kind) {
+  CalibrationPair pair{mix.Of(pose.measured, pose.doubt), pose.error, guard, kind};
+  if (pose.patches.empty()) return pair;
+  std::vector<PatchPair> patches;
+  std::vector<double> scores;
+  for (const PatchPair& patch : pose.patches) {
+    scores.push_back(mix.Of(pose.measured, PatchDoubt(layout, patch.score, pose.doubt)));
+    patches.push_back({scores.back(), patch.error});
+  }
+  // As many as kWholeAt asks for have at least this one
+  const auto half = static_cast<std::size_t>(std::ceil(kWholeAt * static_cast<double>(scores.size())));
+  std::nth_element(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(half - 1), scores.end(),
+                   std::greater<>());
+  pair.middle = scores[half - 1];
+  pair.patches = OutstandingPatches(std::move(patches));
+  return pair;
+}
 
 PoseJudge::PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues)
     : subspace_(subspace), layout_(layout), cues_(cues) {}
@@ -25,6 +45,10 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
     std::vector<double> raw(subspace_.rows());
     std::vector<PointBuffer> buffers;
     for (const SubspaceOutput& output : subspace_.outputs) buffers.emplace_back(output.points);
+    const std::size_t patches = subspace_.patches.patches,
+                      patch_points = subspace_.patches.tiles * kTilePoints;
+    std::vector<float> doubts(patches == 0 ? 0 : subspace_.tile_count());
+    std::vector<double> of_patches(patches);
     for (std::size_t t = begin; t < end; ++t) {
       const std::span<const float> row = poses.row(t);
       std::size_t r = 0;
@@ -39,8 +63,10 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
             kpsa::Judge(subspace_.soft_cache, always, scratch.y.span(), scratch.g.span()).score;
       if (scratch.t.size() > 0)
         pairs[t].doubt =
-            static_cast<double>(LargestDoubt(subspace_, scratch.inputs(), scratch.t.span()).largest);
-      std::size_t column = 0;
+            static_cast<double>(LargestDoubt(subspace_, scratch.inputs(), scratch.t.span(), doubts).largest);
+      if (patches > 0) DoubtsOfPatches(subspace_, doubts, of_patches);
+      for (const double doubt : of_patches) pairs[t].patches.push_back({doubt, 0});
+      std::size_t column = 0, first_patch = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         double output_sum = 0;
         subspace_.tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
@@ -52,11 +78,16 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
           const double squared = Dot(d, d);
           output_sum += squared;
           errors[t].largest = std::max(errors[t].largest, squared);
+          if (patches == 0) continue;
+          double& of_patch = pairs[t].patches[first_patch + i / patch_points].error;
+          of_patch = std::max(of_patch, squared);
         }
+        if (patches > 0) first_patch += (p.count + patch_points - 1) / patch_points;
         errors[t].sum += output_sum;
         errors[t].largest_mean = std::max(
             errors[t].largest_mean, output_sum / static_cast<double>(std::max<std::size_t>(1, p.count)));
       }
+      for (PatchPair& patch : pairs[t].patches) patch.error = std::sqrt(patch.error);
       pairs[t].error = std::sqrt(subspace_.of_light() ? errors[t].largest_mean : errors[t].largest);
     }
   });

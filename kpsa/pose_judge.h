@@ -11,9 +11,13 @@
 namespace kpsa {
 
 struct JudgedPose {
-  double measured = 0, doubt = 0;  // parts of the score (ScoreMix)
-  double error = 0;                // as CalibrationPair's
+  double measured = 0, doubt = 0;       // parts of the score (ScoreMix)
+  double error = 0;                     // as CalibrationPair's
+  std::vector<PatchPair> patches = {};  // of each patch, where the subspace has some: its doubt and its error
 };
+// What it is to a calibration with this score, and these patches.
+CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchLayout& patches, double guard,
+                       int kind);
 
 class PoseJudge {
  public:

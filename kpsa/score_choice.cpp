@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "kpsa/quantile.h"
 
@@ -23,8 +24,24 @@ ScoreMix DoubtAlone(std::span<const ScoreJudge> judges) {
   return {0, doubt > 0 && std::isfinite(1 / doubt) ? 1 / doubt : 1};
 }
 
+double ShareOfFull(const ScoreJudge& judge, const ScoreMix& mix, const SoftCacheThreshold& threshold,
+                   const PatchLayout& patches) {
+  const JudgedPose& pose = judge.pose;
+  const double score = mix.Of(pose.measured, pose.doubt);
+  if (judge.guard >= 1 || std::isnan(score) || !(threshold.tau > 0)) return 1;
+  if (judge.guard == 0 && FullWeight(score, threshold) == 0) return 0;
+  if (pose.patches.empty()) return 1;
+  PatchChoice choice;
+  for (std::size_t p = 0; p < pose.patches.size(); ++p) {
+    choice.weights[p] = static_cast<float>(
+        FullWeight(mix.Of(pose.measured, PatchDoubt(patches, pose.patches[p].score, pose.doubt)), threshold));
+  }
+  ChooseRegions(patches, judge.guard, &choice);
+  return choice.cost;
+}
+
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
-                     double blend_start, const ScoreCosts& costs) {
+                     double blend_start, const ScoreCosts& costs, const PatchLayout& patches) {
   std::vector<double> measured, doubts;
   for (const ScoreJudge& judge : judges) {
     measured.push_back(judge.pose.measured);
@@ -33,17 +50,19 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
   if (judges.empty()) return {};
   const double unit = Quantile(measured, kQuantile), doubt = Quantile(doubts, kQuantile);
   if (!(unit > 0) || !(doubt > 0) || !std::isfinite(unit) || !std::isfinite(doubt)) return {};
-  // Share of the poses that hit, all kinds alike, less what the score costs
+  // What is spared of a full evaluation, all kinds alike, less what the score costs
   const auto worth = [&](const ScoreMix& mix) {
     double sum = 0;
     for (const double around : kAround) {
       std::vector<CalibrationPair> pairs;
       for (const ScoreJudge& judge : judges)
-        pairs.push_back(
-            {mix.Of(judge.pose.measured, judge.pose.doubt), judge.pose.error, judge.guard, judge.kind});
+        pairs.push_back(PairOf(judge.pose, mix, patches, judge.guard, judge.kind));
       const Calibration found = Calibrate(pairs, around * tolerance, violation_rate, blend_start);
+      std::map<int, double> weights;
       for (const Calibration::Kind& kind : found.kinds)
-        sum += static_cast<double>(kind.hits) / static_cast<double>(kind.poses * found.kinds.size());
+        weights[kind.kind] = 1 / static_cast<double>(kind.poses * found.kinds.size());
+      for (const ScoreJudge& judge : judges)
+        sum += weights[judge.kind] * (1 - ShareOfFull(judge, mix, found.threshold, patches));
     }
     return sum / static_cast<double>(std::size(kAround)) - (mix.measured > 0 ? costs.measured : 0) -
            (mix.doubt > 0 ? costs.doubt : 0);

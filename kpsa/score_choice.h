@@ -17,6 +17,11 @@ struct ScoreJudge {
   int kind = 0;      // PoseKind
 };
 
+// What a pose costs of a full evaluation: nothing for a hit, 1 for a miss, or for a blend of all points; what
+// its patches cost, where these miss by themselves.
+double ShareOfFull(const ScoreJudge& judge, const ScoreMix& mix, const SoftCacheThreshold& threshold,
+                   const PatchLayout& patches);
+
 // The mix under which a frame is expected to cost least: that of the score, and of the poses that miss,
 // all kinds alike, at the tolerance and some around it. Costs of both parts are in full evaluations. Without
 // doubts: SoftCache's own.
@@ -26,6 +31,6 @@ struct ScoreCosts {
 // The doubt alone, its 99 % quantile the unit: where there is nothing else.
 ScoreMix DoubtAlone(std::span<const ScoreJudge> judges);
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
-                     double blend_start, const ScoreCosts& costs);
+                     double blend_start, const ScoreCosts& costs, const PatchLayout& patches = {});
 
 }  // namespace kpsa

@@ -26,6 +26,33 @@ Status CheckProduct(const CueDescription& cue, std::size_t k, std::size_t height
   return sound ? Status() : Status::Invalid("cue {} is a product with a factor or a range that is none", k);
 }
 
+Status CheckPatches(const Subspace& s) {
+  const PatchLayout& patches = s.patches;
+  if (patches.tiles == 0 && patches.costs.empty()) return {};
+  const PatchLayout made = MakePatchLayout(s.tiles_of_outputs());
+  if (patches.tiles != made.tiles || patches.regions != made.regions ||
+      patches.costs.size() != made.regions.size())
+    return Status::Invalid("the {} costs of patches of {} tiles are not those of {} outputs",
+                           patches.costs.size(), patches.tiles, s.outputs.size());
+  if (s.score.doubt == 0 || s.of_light())
+    return Status::Invalid("patches miss by themselves, but the score counts no doubts");
+  if (!(patches.share > 0 && patches.share <= 1))
+    return Status::Invalid("patches miss from {} of the largest doubt on, expected a share", patches.share);
+  for (const double cost : patches.costs) {
+    if (!(cost >= 0) || !std::isfinite(cost)) return Status::Invalid("a patch costs {}", cost);
+  }
+  return {};
+}
+Status CheckPatches(const CalibrationPair& pair) {
+  if (!(pair.middle >= 0)) return Status::Invalid("half of a calibration pose has score {}", pair.middle);
+  for (const PatchPair& patch : pair.patches) {
+    if (!(patch.score >= 0) || !(patch.error >= 0))
+      return Status::Invalid("a patch of a calibration pose has score {} and error {}", patch.score,
+                             patch.error);
+  }
+  return {};
+}
+
 }  // namespace
 
 std::string CueName(const Subspace& subspace, const CueDescription& cue) {
@@ -99,6 +126,7 @@ Status ValidateSubspace(const Subspace& s) {
   }
   if (s.score.doubt > 0 && (s.doubt_inputs() == 0 || !s.latent.empty()))
     return Status::Invalid("the score counts doubts, but no tile has products");
+  KPSA_RETURN_IF_ERROR(CheckPatches(s));
   if (!s.latent.empty() && (rows == 0 || s.latent.size() % rows != 0 || !AllFinite<float>(s.latent)))
     return Status::Invalid("the {} latent factors of {} rows make no sense", s.latent.size(), rows);
   if (!AllFinite<double>(s.cue_mean) || !AllFinite<double>(s.cue_scale) ||
@@ -141,6 +169,7 @@ Status ValidateSubspace(const Subspace& s) {
     }
   }
   for (const CalibrationPair& pair : s.calibration) {
+    KPSA_RETURN_IF_ERROR(CheckPatches(pair));
     if (!(pair.score >= 0) || !(pair.error >= 0) || !(pair.guard >= 0 && pair.guard <= 1) || pair.kind < 0)
       return Status::Invalid("a calibration pose of kind {} has score {}, error {} and guard {}", pair.kind,
                              pair.score, pair.error, pair.guard);
@@ -238,11 +267,24 @@ std::size_t Subspace::doubt_inputs() const {
   return products ? all : 0;
 }
 
-Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span<float> inputs) {
+std::size_t Subspace::tile_count() const {
+  std::size_t all = 0;
+  for (const TileMap& map : tiles) all += map.tiles();
+  return all;
+}
+std::vector<std::size_t> Subspace::tiles_of_outputs() const {
+  std::vector<std::size_t> counts;
+  for (const TileMap& map : tiles) counts.push_back(map.tiles());
+  return counts;
+}
+
+Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span<float> inputs,
+                   std::span<float> doubts) {
   Doubt doubt;
   Index first = 0;
   for (const TileMap& tiles : subspace.tiles) {
-    const Doubt of = tiles.ComputeInputs(y, inputs.first(tiles.input_size()));
+    const Doubt of = tiles.ComputeInputs(y, inputs.first(tiles.input_size()),
+                                         doubts.empty() ? doubts : doubts.subspan(first, tiles.tiles()));
     inputs = inputs.subspan(tiles.input_size());
     if (of.largest > doubt.largest) doubt = {of.largest, first + of.tile};
     first += static_cast<Index>(tiles.tiles());
@@ -250,17 +292,36 @@ Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span
   return doubt;
 }
 
-Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
-              std::span<float> g, std::span<float> inputs) {
+void DoubtsOfPatches(const Subspace& subspace, std::span<const float> doubts, std::span<double> patches) {
+  std::size_t tile = 0, patch = 0;
+  for (const TileMap& tiles : subspace.tiles) {
+    for (std::size_t t = 0; t < tiles.tiles(); t += subspace.patches.tiles, ++patch) {
+      float largest = 0;
+      for (std::size_t i = t; i < std::min(t + subspace.patches.tiles, tiles.tiles()); ++i)
+        largest = std::max(largest, doubts[tile++]);
+      patches[patch] = static_cast<double>(largest);
+    }
+  }
+}
+
+Verdict JudgePatches(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
+                     std::span<float> g, std::span<float> inputs, std::span<float> doubts,
+                     std::span<double> scores) {
   const ScoreMix& mix = subspace.score;
+  std::fill(scores.begin(), scores.end(), 0.0);
   if (mix.doubt == 0) return Judge(subspace.soft_cache, threshold, y, g, mix.measured);
   // The doubt is a number whatever y is: SoftCache looks at that
   Verdict verdict = mix.measured > 0 ? Judge(subspace.soft_cache, threshold, y, g, mix.measured)
                                      : JudgeFinite(subspace.soft_cache, y);
   if (verdict.reason == MissReason::kNotFinite) return verdict;
-  const Doubt doubt = LargestDoubt(subspace, y, inputs);
+  const double measured = verdict.score;
+  const Doubt doubt = LargestDoubt(subspace, y, inputs, doubts);
+  if (!scores.empty()) DoubtsOfPatches(subspace, doubts, scores);
+  for (double& score : scores)
+    score = std::max(measured,
+                     mix.doubt * PatchDoubt(subspace.patches, score, static_cast<double>(doubt.largest)));
   const double score = mix.doubt * static_cast<double>(doubt.largest);
-  if (mix.measured > 0 && !(score > verdict.score)) return verdict;
+  if (mix.measured > 0 && !(score > measured)) return verdict;
   verdict.score = score;
   verdict.full_weight = FullWeight(score, threshold);
   verdict.hit = verdict.full_weight == 0;
@@ -269,6 +330,10 @@ Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std
     verdict.offender = doubt.tile;
   }
   return verdict;
+}
+Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
+              std::span<float> g, std::span<float> inputs) {
+  return JudgePatches(subspace, threshold, y, g, inputs, {}, {});
 }
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch) {
   return Judge(subspace, threshold, scratch->y.span(), scratch->g.span(), scratch->t.span());

@@ -16,13 +16,16 @@
 
 #include "base/status.h"
 #include "kpsa/calibration.h"
+#include "kpsa/patches.h"
 #include "kpsa/soft_cache.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa {
 
-// 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues
-inline constexpr int kSubspaceVersion = 5, kProductTilesVersion = 4, kOldestVersion = 3;
+// 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues; 5: without
+// patches
+inline constexpr int kSubspaceVersion = 6, kProductCuesVersion = 5, kProductTilesVersion = 4,
+                     kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
@@ -84,6 +87,7 @@ struct Subspace {
   std::vector<double> cue_mean, cue_scale;  // [r] y = (raw - mean) * scale
   SoftCacheModel soft_cache;
   ScoreMix score;
+  PatchLayout patches;  // what may miss by itself; only where the score counts doubts
   std::vector<CalibrationPair>
       calibration;  // held-out poses; the threshold follows from a tolerance (Calibrate)
   double tolerance = 0, violation_rate = 0.01,
@@ -109,6 +113,8 @@ struct Subspace {
   std::size_t rows() const { return cue_mean.size(); }  // r
   std::size_t doubt_inputs() const;                     // what LargestDoubt leaves; 0 without products
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
+  std::size_t tile_count() const;  // of all outputs
+  std::vector<std::size_t> tiles_of_outputs() const;
 };
 
 // Where a cue is measured, in words: "head_mesh@skin", the mesh of a point at its stage, or a scalar's plug.
@@ -158,8 +164,17 @@ void Measure(const Subspace& subspace, std::span<const double> raw, SubspaceScra
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
               std::span<float> g, std::span<float> inputs);
 Verdict Judge(const Subspace& subspace, const SoftCacheThreshold& threshold, SubspaceScratch* scratch);
-// The largest doubt of all outputs; the tile counts over them. inputs: as above.
-Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span<float> inputs);
+// The same where patches miss by themselves: the verdict is that of the worst of them; and the score of each
+// patch. doubts: [tile_count()], as scratch.
+Verdict JudgePatches(const Subspace& subspace, const SoftCacheThreshold& threshold, std::span<const float> y,
+                     std::span<float> g, std::span<float> inputs, std::span<float> doubts,
+                     std::span<double> scores);
+// The largest doubt of all outputs; the tile counts over them. inputs: as above. doubts: of every tile
+// [tile_count()], or empty.
+Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span<float> inputs,
+                   std::span<float> doubts = {});
+// The largest doubt of each patch itself, from those of all tiles.
+void DoubtsOfPatches(const Subspace& subspace, std::span<const float> doubts, std::span<double> patches);
 // points = (1 - full_weight) * points + full_weight * full, where Verdict::full_weight is in (0, 1).
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points);
 

@@ -105,7 +105,8 @@ int VersionOf(const Subspace& s) {
   const bool multiplied = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
     return cue.kind == CueDescription::Kind::kProduct;
   });
-  if (multiplied) return kSubspaceVersion;
+  if (s.patches.tiles > 0) return kSubspaceVersion;
+  if (multiplied) return kProductCuesVersion;
   return products || relative || s.score != ScoreMix() ? kProductTilesVersion : kOldestVersion;
 }
 
@@ -145,6 +146,10 @@ std::map<std::string, std::string> Header(const Subspace& s) {
                   {"violationRate", s.violation_rate},
                   {"blendStart", s.blend_start}};
   if (VersionOf(s) > kOldestVersion) summary["score"] = {s.score.measured, s.score.doubt};
+  if (s.patches.tiles > 0) {
+    summary["tilesOfPatch"] = s.patches.tiles;
+    summary["patchShare"] = s.patches.share;
+  }
   return {{"kind", kKind},
           {"version", std::to_string(VersionOf(s))},
           {"summary", summary.dump()},
@@ -187,7 +192,14 @@ std::string ContentDigest(const Subspace& s) {
     hasher.Add(pair.error);
     hasher.Add(pair.guard);
     hasher.Add(pair.kind);
+    if (s.patches.tiles == 0) continue;
+    hasher.Add(pair.middle);
+    for (const PatchPair& patch : pair.patches) {
+      hasher.Add(patch.score);
+      hasher.Add(patch.error);
+    }
   }
+  hasher.Add(std::span<const double>(s.patches.costs));
   for (const TileMap& tiles : s.tiles) {
     const TileData& data = tiles.data();
     for (const auto* list : {&data.ranks, &data.wide, &data.counts, &data.columns})
@@ -264,6 +276,10 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
     if (!score.is_array() || score.size() != 2 || !score[0].is_number() || !score[1].is_number())
       return Status::Invalid("{}: summary: \"score\" should be two numbers", file.name());
     s->score = {score[0].get<double>(), score[1].get<double>()};
+  }
+  if (summary->contains("tilesOfPatch")) {
+    s->patches.tiles = reader.Count("tilesOfPatch", kMaxPoints);
+    s->patches.share = reader.Number("patchShare");
   }
   for (const Json& entry : *outputs) {
     Reader output(file.name() + ": an output", entry, &status);
@@ -354,6 +370,54 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
   return {};
 }
 
+// What each patch costs, and what calibration says of patches.
+constexpr char kPatchCosts[] = "patchCosts", kMiddles[] = "calibrationMiddles",
+               kPatchCounts[] = "calibrationPatchCounts", kPatchPairs[] = "calibrationPatches";
+
+Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
+  constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
+  const std::size_t tiles = s->patches.tiles;
+  const double share = s->patches.share;
+  s->patches = MakePatchLayout(s->tiles_of_outputs());
+  if (s->patches.tiles != tiles)
+    return Status::Invalid("{}: patches of {} tiles, expected {}", file.name(), tiles, s->patches.tiles);
+  s->patches.share = share;
+  KPSA_RETURN_IF_ERROR(Assign(file.Values<double>(kPatchCosts, {kAny}), &s->patches.costs));
+  const Result<std::vector<double>> middles = file.Values<double>(kMiddles, {s->calibration.size()}),
+                                    pairs = file.Values<double>(kPatchPairs, {kAny, 2});
+  const Result<std::vector<std::uint32_t>> counts =
+      file.Values<std::uint32_t>(kPatchCounts, {s->calibration.size()});
+  for (const Status& status : {middles.status(), pairs.status(), counts.status()})
+    KPSA_RETURN_IF_ERROR(status);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < s->calibration.size(); ++i) {
+    CalibrationPair& pair = s->calibration[i];
+    pair.middle = (*middles)[i];
+    if ((*counts)[i] > kMaxPatches || next + (*counts)[i] > pairs->size() / 2)
+      return Status::Invalid("{}: calibration pose {} has {} patches", file.name(), i, (*counts)[i]);
+    for (std::size_t p = 0; p < (*counts)[i]; ++p, ++next)
+      pair.patches.push_back({(*pairs)[2 * next], (*pairs)[2 * next + 1]});
+  }
+  if (next != pairs->size() / 2)
+    return Status::Invalid("{}: {} patches of calibration poses belong to none", file.name(),
+                           pairs->size() / 2 - next);
+  return {};
+}
+
+void AddPatches(const Subspace& s, SafetensorsWriter* writer) {
+  std::vector<double> middles, pairs;
+  std::vector<std::uint32_t> counts;
+  for (const CalibrationPair& pair : s.calibration) {
+    middles.push_back(pair.middle);
+    counts.push_back(static_cast<std::uint32_t>(pair.patches.size()));
+    for (const PatchPair& patch : pair.patches) pairs.insert(pairs.end(), {patch.score, patch.error});
+  }
+  Add<double>(writer, kPatchCosts, s.patches.costs);
+  Add<double>(writer, kMiddles, middles);
+  Add<std::uint32_t>(writer, kPatchCounts, counts);
+  writer->Add<double>(kPatchPairs, {pairs.size() / 2, 2}, pairs);
+}
+
 // Column by column: a row of the tensor is a mode.
 Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
   std::uint64_t rows = 0;
@@ -388,6 +452,7 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     calibration.insert(calibration.end(),
                        {pair.score, pair.error, pair.guard, static_cast<double>(pair.kind)});
   writer.Add<double>("calibration", {s.calibration.size(), 4}, calibration);
+  if (s.patches.tiles > 0) AddPatches(s, &writer);
   for (std::size_t i = 0; i < s.tiles.size(); ++i) {
     const TileData& data = s.tiles[i].data();
     const std::string prefix = fmt::format("tiles.{}.", i);
@@ -472,6 +537,7 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
     s.calibration.push_back({row[0], row[1], row[2], kind});
   }
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
+  if (s.patches.tiles > 0) KPSA_RETURN_IF_ERROR(ReadPatches(file, &s));
   if (modes == KeptModes::kRead &&
       (file.tensors().contains(kModes) || file.metadata().contains(kModesDigest)))
     KPSA_RETURN_IF_ERROR(ReadKeptModes(file, &s));

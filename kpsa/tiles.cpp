@@ -407,8 +407,8 @@ void TileMap::ProductsOf(std::size_t tile, const float* t, float* p) const {
   for (std::size_t q = 0; q < data_.products[tile]; ++q) p[q] = z[pairs[2 * q]] * z[pairs[2 * q + 1]];
 }
 
-// What U of a tile is multiplied by: t [k16]; and its doubt, where that is the largest so far (squared).
-void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* doubt) const {
+// What U of a tile is multiplied by: t [k16]; and its doubt, squared.
+void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t, float* doubt) const {
   const std::size_t rank = data_.ranks[tile], k16 = Padded16(rank), count = products(tile);
   const float* scale = data_.scale.data() + scale_begin_[tile];
   const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
@@ -430,7 +430,7 @@ void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* do
   for (std::size_t i = 0; i < kDoubtPoints; ++i) {
     const float x = d[i], y_term = d[kDoubtPoints + i], z = d[2 * kDoubtPoints + i];
     const float squared = x * x + y_term * y_term + z * z;
-    if (squared > doubt->largest) *doubt = {squared, static_cast<Index>(tile)};
+    if (squared > *doubt) *doubt = squared;
   }
 }
 
@@ -441,11 +441,17 @@ void TileMap::JointMatricesOf(const float* y, float* entries) const {
   }
 }
 
-Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs) const {
+Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs,
+                             std::span<float> doubts) const {
   KPSA_CHECK(y.size() >= data_.inputs && inputs.size() >= input_size());
+  KPSA_CHECK(doubts.empty() || doubts.size() >= tiles());
   Doubt doubt;
-  for (std::size_t tile = 0; tile < tiles(); ++tile)
-    TileInputsOf(tile, y.data(), inputs.data() + scale_begin_[tile], &doubt);
+  for (std::size_t tile = 0; tile < tiles(); ++tile) {
+    float squared = 0;
+    TileInputsOf(tile, y.data(), inputs.data() + scale_begin_[tile], &squared);
+    if (squared > doubt.largest) doubt = {squared, static_cast<Index>(tile)};
+    if (!doubts.empty()) doubts[tile] = std::sqrt(squared);
+  }
   JointMatricesOf(y.data(), inputs.data() + data_.scale.size());
   doubt.largest = std::sqrt(doubt.largest);
   return doubt;

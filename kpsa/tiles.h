@@ -122,7 +122,8 @@ class TileMap {
   // What U of every tile is multiplied by [input_size()], so that what the doubt needs is computed once; and
   // the largest doubt, for y that are finite: 0 and no tile without products.
   std::size_t input_size() const { return data_.scale.size() + (data_.joint_rows.size() + 15) / 16 * 16; }
-  Doubt ComputeInputs(std::span<const float> y, std::span<float> inputs) const;
+  // doubts: of every tile [tiles()], or empty.
+  Doubt ComputeInputs(std::span<const float> y, std::span<float> inputs, std::span<float> doubts = {}) const;
   // ReconstructBlock from these; as many of them as frames. The same bits.
   void ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
                        std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
@@ -133,7 +134,8 @@ class TileMap {
   };
   Status PlaceProducts(const TileData& data, const std::string& what);
   std::size_t products(std::size_t tile) const { return data_.products.empty() ? 0 : data_.products[tile]; }
-  void TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* doubt = nullptr) const;
+  // doubt: the square of the tile's, or null
+  void TileInputsOf(std::size_t tile, const float* y, float* t, float* doubt = nullptr) const;
   void ProductsOf(std::size_t tile, const float* t, float* p) const;
   Status CheckJoints(const TileData& data, const std::string& what) const;
   void JointMatricesOf(const float* y, float* entries) const;  // [joints][12]

@@ -86,6 +86,7 @@ class Trainer {
     modes_seconds_ = limit_.elapsed() - before_modes;
     KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges, options_.tolerance));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
+    KPSA_RETURN_IF_ERROR(PricePatches());
     Result<Subspace> subspace = Assemble(&poses, judges);
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
@@ -344,6 +345,26 @@ class Trainer {
     return {kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance, of_light() ? 0 : kTileRest};
   }
 
+  // What patches would cost that miss by themselves, whatever the cues.
+  Status PricePatches() {
+    if (of_light() || options_.mode == EstimatorMode::kPaper || !(full_cost_ > 0)) return Status();
+    std::vector<std::size_t> tiles;
+    std::vector<std::vector<Double3>> positions;
+    auto next = positions_.begin();
+    for (const Index total : totals_) {
+      tiles.push_back((total + kTilePoints - 1) / kTilePoints);
+      positions.emplace_back(next, next + total);
+      next += total;
+    }
+    patches_ = MakePatchLayout(tiles);
+    if (patches_.tiles == 0) return Status();
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+    Result<std::vector<double>> costs = CostsOfRegions(rig_, &compiler_, positions, patches_);
+    if (!costs.ok()) return costs.status();
+    patches_.costs = std::move(*costs);
+    return Status();
+  }
+
   Subspace ForAllPoints(PoseMatrix* poses, bool fine) {
     const bool paper = options_.mode == EstimatorMode::kPaper;
     const Estimator estimator =
@@ -530,13 +551,13 @@ class Trainer {
   Result<FrameCost> Price(Subspace* subspace, const CueSet& cues, const PoseMatrix& judges) {
     const Result<double> points = CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues.cues);
     if (!points.ok()) return points.status();
+    if (subspace->doubt_inputs() > 0) subspace->patches = patches_;
     std::vector<ScoreJudge> judged;
     for (const JudgedPose& pose : PoseJudge(*subspace, layout_, cues).Judge(judges))
       judged.push_back({pose, 0, judge_kinds_[judged.size()]});
     subspace->tolerance = options_.tolerance;
     subspace->violation_rate = options_.violation_rate;
-    subspace->score = ScoreOf(*subspace, judged, full_cost_);
-    return ExpectedCost(*subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds);
+    return ChooseMisses(subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds);
   }
 
   // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
@@ -558,6 +579,7 @@ class Trainer {
     if (count == 0)
       count =
           static_cast<std::size_t>(std::clamp(8.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
+    if (subspace->doubt_inputs() > 0) subspace->patches = patches_;
     // Held-out poses of every kind; as many new ones say how to score them.
     PoseJudge judge(*subspace, layout_, cues_), score_judge(*subspace, layout_, cues_);
     std::vector<ScoreJudge> held_out, score_judges;
@@ -584,12 +606,18 @@ class Trainer {
     const std::vector<char> guarded = GuardedEntries(carried->rigid);
     AskGuards(subspace->ranges, guarded, entries, &held_out);
     AskGuards(subspace->ranges, guarded, score_entries, &score_judges);
-    subspace->score = ScoreOf(*subspace, score_judges, full_cost_);
-    cost_ = ExpectedCost(*subspace, score_judges.empty() ? held_out : score_judges, 0, full_cost_,
-                         kCautious * options_.tolerance, kCalibrationConfidence);
-    for (const ScoreJudge& held : held_out) {
+    if (score_judges.empty()) {
+      subspace->score = ScoreOf(*subspace, score_judges, full_cost_);
+      cost_ = ExpectedCost(*subspace, held_out, 0, full_cost_, kCautious * options_.tolerance,
+                           kCalibrationConfidence);
+    } else {
+      cost_ = ChooseMisses(subspace, score_judges, 0, full_cost_, kCautious * options_.tolerance,
+                           kCalibrationConfidence);
+    }
+    for (ScoreJudge& held : held_out) {
+      if (subspace->patches.tiles == 0) held.pose.patches.clear();
       subspace->calibration.push_back(
-          {subspace->score.Of(held.pose.measured, held.pose.doubt), held.pose.error, held.guard, held.kind});
+          PairOf(held.pose, subspace->score, subspace->patches, held.guard, held.kind));
     }
     const Calibration calibration = kpsa::Calibrate(subspace->calibration, subspace->tolerance,
                                                     subspace->violation_rate, subspace->blend_start);
@@ -664,6 +692,7 @@ class Trainer {
   bool fine_ = false;     // tiles
   bool by_tile_ = false;  // its cues
   TileChoice tiles_;      // where they were tried
+  PatchLayout patches_;   // what may miss by itself
   FrameCost cost_;        // by the last calibration, but points
   double full_cost_ = 0;
   const TimeLimit limit_;

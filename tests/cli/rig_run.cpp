@@ -36,6 +36,7 @@ std::shared_ptr<const Subspace> WithThreshold(const Subspace& subspace, double t
   auto copy = std::make_shared<Subspace>(subspace);
   copy->blend_start = tau_lo / tau;
   copy->violation_rate = 0.05;
+  copy->patches = {};
   copy->calibration.assign(100, CalibrationPair{tau_lo, 0});  // harmless, and the last score that was seen
   return copy;
 }

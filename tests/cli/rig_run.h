@@ -27,7 +27,7 @@ const NodeRegistry& AcceleratedRegistry();
 std::shared_ptr<const Subspace> TrainRig(const std::string& path, const TrainOptions& options,
                                          const std::vector<std::string>& clips = {});
 // A copy of the subspace that calls a hit what scores at most `tau_lo`, and blends up to `tau`, at any finite
-// tolerance.
+// tolerance; misses are of all points.
 std::shared_ptr<const Subspace> WithThreshold(const Subspace& subspace, double tau_lo, double tau);
 // A copy of the subspace that accepts any finite score, at any finite tolerance: nothing but its guards, its
 // space and cues that are no numbers ask for the full evaluation. (An infinite tolerance skips guards, too.)

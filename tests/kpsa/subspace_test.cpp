@@ -232,7 +232,7 @@ TEST_P(SubspaceTest, CuesThatAreProductsTravelWithTheFile) {
   product.lo = -2, product.hi = 1e-3;
   *scalar = product;
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok());
-  EXPECT_EQ(*SafetensorsFile::Read(path_)->Metadata("version"), std::to_string(kSubspaceVersion));
+  EXPECT_EQ(*SafetensorsFile::Read(path_)->Metadata("version"), std::to_string(kProductCuesVersion));
   const Result<Subspace> read = ReadSubspace(path_);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   EXPECT_EQ(read->cues, subspace_.cues);
@@ -421,7 +421,7 @@ TEST_P(SubspaceTest, DamagedFilesGiveOneClearMessage) {
   EXPECT_EQ(message(header), "no error");
   EXPECT_NE(edited([](Json* j) {
               (*j)["__metadata__"]["version"] = "1";
-            }).find("format version 1, this program reads versions 3 to 5; train it again"),
+            }).find("format version 1, this program reads versions 3 to 6; train it again"),
             std::string::npos);
   EXPECT_NE(edited([](Json* j) { (*j)["__metadata__"]["kind"] = "poem"; }).find("not a subspace"),
             std::string::npos);

@@ -1,0 +1,159 @@
+#include "kpsa/patches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "kpsa/tiles.h"
+
+namespace kpsa {
+namespace {
+
+constexpr double kBorder = 3;              // typical distances of neighbours
+constexpr std::size_t kFewestOfLevel = 3;  // regions; fewer would be most of an output each
+
+double SmoothStep(double from, double to, double x) {
+  const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+// The median distance of points to the nearest other one of the same tile.
+double TypicalDistance(std::span<const Double3> tile) {
+  std::vector<double> nearest;
+  for (std::size_t i = 0; i < tile.size(); ++i) {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t j = 0; j < tile.size(); ++j) {
+      const Double3 d = tile[i] - tile[j];
+      if (i != j && Dot(d, d) > 0) least = std::min(least, Dot(d, d));
+    }
+    if (std::isfinite(least)) nearest.push_back(std::sqrt(least));
+  }
+  if (nearest.empty()) return 0;
+  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
+  std::nth_element(nearest.begin(), middle, nearest.end());
+  return *middle;
+}
+
+// Points by their x, so that near ones are found without looking at all of them.
+struct ByX {
+  std::vector<std::pair<double, Index>> points;
+  ByX(std::span<const Double3> positions, Index first, Index count) {
+    for (Index i = first; i < first + count; ++i) {
+      if (std::isfinite(Dot(positions[i], positions[i]))) points.emplace_back(positions[i].x, i);
+    }
+    std::sort(points.begin(), points.end());
+  }
+  // Distance to the nearest one, at most `within`.
+  double Nearest(std::span<const Double3> positions, const Double3& at, double within) const {
+    double least = within * within;
+    auto it = std::lower_bound(points.begin(), points.end(), std::pair(at.x - within, Index{0}));
+    for (; it != points.end() && it->first <= at.x + within; ++it) {
+      const Double3 d = positions[it->second] - at;
+      least = std::min(least, Dot(d, d));
+    }
+    return std::sqrt(least);
+  }
+};
+
+}  // namespace
+
+PatchLayout MakePatchLayout(std::span<const std::size_t> tiles_of_outputs) {
+  PatchLayout layout;
+  std::size_t all = 0;
+  for (const std::size_t tiles : tiles_of_outputs) all += tiles;
+  if (all < kFewestTiles || tiles_of_outputs.size() > kMaxPatches) return layout;
+  do {
+    ++layout.tiles;
+    layout.regions.clear();
+    layout.patches = 0;
+    for (std::size_t m = 0; m < tiles_of_outputs.size(); ++m) {
+      std::size_t count = (tiles_of_outputs[m] + layout.tiles - 1) / layout.tiles;
+      const auto output = static_cast<Index>(m), first = static_cast<Index>(layout.patches);
+      layout.patches += count;
+      const auto end = static_cast<Index>(layout.patches);
+      for (Index p = first; p < end; ++p) layout.regions.push_back({output, p, 1, 0, kNoIndex, 0});
+      for (Index level = 1, below = static_cast<Index>(layout.regions.size() - count);; ++level) {
+        const Index belows = static_cast<Index>(count);
+        count = (count + 1) / 2;
+        if (count < kFewestOfLevel || layout.regions.size() > kMaxRegions) break;
+        const Index next = static_cast<Index>(layout.regions.size());
+        for (Index r = 0; r < count; ++r) {
+          const Index begin = first + (r << level), of = std::min<Index>(2, belows - 2 * r);
+          layout.regions.push_back(
+              {output, begin, std::min<Index>(Index{1} << level, end - begin), level, below + 2 * r, of});
+        }
+        below = next;
+      }
+      for (std::size_t r = layout.regions.size(); r-- > 0 && layout.regions[r].output == output;)
+        layout.regions[r].top = layout.regions[r].level == layout.regions.back().level;
+    }
+  } while (layout.regions.size() > kMaxRegions);
+  return layout;
+}
+
+std::vector<PatchPoints> MakePatches(std::span<const std::vector<Double3>> positions,
+                                     std::size_t tiles_of_patch) {
+  std::vector<PatchPoints> patches;
+  for (std::size_t m = 0; m < positions.size(); ++m) {
+    const std::span<const Double3> of(positions[m]);
+    const auto total = static_cast<Index>(of.size()), size = static_cast<Index>(tiles_of_patch * kTilePoints);
+    for (Index first = 0; first < total; first += size) {
+      PatchPoints& patch = patches.emplace_back();
+      patch.output = static_cast<Index>(m);
+      const Index count = std::min(size, total - first);
+      double border = 0;
+      for (Index tile = first; tile < first + count; tile += kTilePoints)
+        border = std::max(border, kBorder * TypicalDistance(of.subspan(
+                                                tile, std::min<Index>(kTilePoints, first + count - tile))));
+      const ByX own(of, first, count);
+      for (Index i = 0; i < total; ++i) {
+        double weight = i >= first && i < first + count ? 1 : 0;
+        if (weight == 0 && border > 0 && std::isfinite(Dot(of[i], of[i])))
+          weight = 1 - SmoothStep(0, border, own.Nearest(of, of[i], border));
+        if (!(weight > 0)) continue;
+        patch.points.push_back(i);
+        patch.weights.push_back(static_cast<float>(weight));
+      }
+    }
+  }
+  return patches;
+}
+
+std::vector<Index> PointsOfRegion(const PatchRegion& region, std::span<const PatchPoints> patches) {
+  std::vector<Index> points;
+  for (const PatchPoints& patch : patches.subspan(region.first, region.count))
+    points.insert(points.end(), patch.points.begin(), patch.points.end());
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  return points;
+}
+
+void ChooseRegions(const PatchLayout& layout, double all, PatchChoice* choice) {
+  double sum = 0;
+  std::array<double, kMaxRegions> least;         // what the patches of a region cost
+  std::array<std::uint64_t, kMaxRegions> cover;  // and by which regions
+  choice->cost = 0;
+  choice->regions = 0;
+  for (std::size_t r = 0; r < layout.regions.size(); ++r) {
+    const PatchRegion& region = layout.regions[r];
+    if (region.level == 0) {
+      const float weight = choice->weights[region.first];
+      sum += static_cast<double>(weight);
+      least[r] = weight > 0 ? layout.costs[r] : 0;
+      cover[r] = weight > 0 ? std::uint64_t{1} << r : 0;
+    } else {
+      least[r] = 0, cover[r] = 0;
+      for (Index i = region.below; i < region.below + region.belows; ++i) {
+        least[r] += least[i], cover[r] |= cover[i];
+      }
+      if (least[r] > layout.costs[r]) least[r] = layout.costs[r], cover[r] = std::uint64_t{1} << r;
+    }
+    if (region.top) choice->cost += least[r], choice->regions |= cover[r];
+  }
+  choice->mean = layout.patches == 0 ? 0 : sum / static_cast<double>(layout.patches);
+  choice->all = std::max(all, SmoothStep(kWholeFrom, kWholeAt, choice->mean));
+  choice->full = choice->all > 0 || choice->cost > kMostOfFull;
+  if (choice->full) choice->cost = 1, choice->regions = 0;
+}
+
+}  // namespace kpsa

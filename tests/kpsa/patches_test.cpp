@@ -1,0 +1,290 @@
+// Patches that miss by themselves: their layout, their points and borders, which regions are evaluated, and
+// what calibration makes of them.
+#include "kpsa/patches.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "kpsa/frame_cost.h"
+#include "kpsa/tiles.h"
+
+namespace kpsa {
+namespace {
+
+TEST(Patches, EveryLevelHoldsEveryPatchOnce) {
+  std::mt19937 random(1);
+  for (int round = 0; round < 300; ++round) {
+    std::vector<std::size_t> tiles(1 + random() % (round % 3 == 0 ? 20 : 3));
+    for (std::size_t& of : tiles) of = random() % (round % 2 == 0 ? 300 : 12);
+    std::size_t all = 0;
+    for (const std::size_t of : tiles) all += of;
+    const PatchLayout layout = MakePatchLayout(tiles);
+    SCOPED_TRACE(testing::Message() << round << ": " << all << " tiles of " << tiles.size() << " outputs");
+    EXPECT_EQ(layout.tiles > 0, all >= kFewestTiles);
+    EXPECT_LE(layout.regions.size(), kMaxRegions);
+    std::size_t patches = 0;
+    for (std::size_t m = 0; m < tiles.size() && layout.tiles > 0; ++m) {
+      const std::size_t count = (tiles[m] + layout.tiles - 1) / layout.tiles;
+      for (Index level = 0, levels = 1; level < levels; ++level) {
+        Index next = static_cast<Index>(patches);
+        for (const PatchRegion& region : layout.regions) {
+          if (region.output != m) continue;
+          levels = std::max(levels, region.level + 1);
+          if (region.level != level) continue;
+          EXPECT_EQ(region.first, next);
+          next += region.count;
+          if (level == 0) continue;
+          // Two of the level below, or one
+          Index below = region.first;
+          for (Index b = region.below; b < region.below + region.belows; ++b) {
+            EXPECT_EQ(layout.regions[b].level + 1, level);
+            EXPECT_EQ(layout.regions[b].first, below);
+            below += layout.regions[b].count;
+          }
+          EXPECT_EQ(below, next);
+        }
+        if (count > 0) {
+          EXPECT_EQ(next, patches + count) << "level " << level;
+        }
+      }
+      patches += count;
+    }
+    if (layout.tiles > 0) {
+      EXPECT_EQ(layout.patches, patches);
+    }
+  }
+  EXPECT_EQ(MakePatchLayout(std::vector<std::size_t>(kMaxPatches + 1, 5)).tiles, 0u) << "too many outputs";
+}
+
+// A square grid of 32 x 32 points, tile after tile four rows of it.
+std::vector<Double3> Grid() {
+  std::vector<Double3> points;
+  for (int i = 0; i < 1024; ++i) points.push_back({0.5 * (i % 32), 0.5 * (i / 32), 0});
+  return points;
+}
+
+TEST(Patches, GoOverIntoTheRestWithinThreeDistances) {
+  std::vector<Double3> grid = Grid();
+  const double nan = std::nan("");
+  grid[1000] = {nan, 0, 0};
+  const std::vector<PatchPoints> patches = MakePatches(std::vector<std::vector<Double3>>{grid}, 2);
+  ASSERT_EQ(patches.size(), 4u);
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    std::vector<double> weights(1024, 0.0);
+    for (std::size_t i = 0; i < patches[p].points.size(); ++i)
+      weights[patches[p].points[i]] = static_cast<double>(patches[p].weights[i]);
+    for (int i = 0; i < 1024; ++i) {
+      const int row = i / 32, first = static_cast<int>(8 * p);
+      const int away = row < first ? first - row : row >= first + 8 ? row - first - 7 : 0;
+      if (i == 1000) {
+        EXPECT_EQ(weights[1000], p == 3 ? 1 : 0) << "lies nowhere, so only where it belongs";
+      } else if (i % 32 != 8 || row < 28) {  // the neighbours of that point may be nearer to others
+        const double t = away / 3.0;
+        EXPECT_NEAR(weights[static_cast<std::size_t>(i)], t >= 1 ? 0 : 1 - t * t * (3 - 2 * t), 1e-6)
+            << p << " " << i;
+      }
+    }
+  }
+}
+
+TEST(Patches, ChosenRegionsCostLeast) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> unit(0, 1);
+  PatchLayout layout = MakePatchLayout(std::vector<std::size_t>{6, 3});
+  ASSERT_EQ(layout.tiles, 1u);
+  ASSERT_LE(layout.regions.size(), 16u);
+  int partly = 0, full = 0;
+  for (int round = 0; round < 400; ++round) {
+    layout.costs.clear();
+    for (const PatchRegion& region : layout.regions)
+      layout.costs.push_back(0.05 * (0.3 + unit(random)) * region.count);
+    if (round % 7 == 0) layout.costs[random() % layout.costs.size()] = 2;
+    PatchChoice choice;
+    std::vector<std::size_t> doubtful;
+    double sum = 0;
+    for (std::size_t p = 0; p < layout.patches; ++p) {
+      if (unit(random) < 0.3) choice.weights[p] = static_cast<float>(unit(random));
+      if (choice.weights[p] > 0) doubtful.push_back(p);
+      sum += static_cast<double>(choice.weights[p]);
+    }
+    ChooseRegions(layout, 0, &choice);
+    // Every set of regions that holds them
+    double least = 1e9;
+    for (std::uint64_t set = 0; set < std::uint64_t{1} << layout.regions.size(); ++set) {
+      std::uint64_t held = 0;
+      double cost = 0;
+      for (std::size_t r = 0; r < layout.regions.size(); ++r) {
+        if ((set >> r & 1) == 0) continue;
+        cost += layout.costs[r];
+        for (Index p = 0; p < layout.regions[r].count; ++p)
+          held |= std::uint64_t{1} << (layout.regions[r].first + p);
+      }
+      bool all = true;
+      for (const std::size_t p : doubtful) all = all && (held >> p & 1) != 0;
+      if (all) least = std::min(least, cost);
+    }
+    const double share = sum / static_cast<double>(layout.patches);
+    EXPECT_NEAR(choice.mean, share, 1e-6);
+    EXPECT_EQ(choice.all > 0, share > kWholeFrom);
+    if (choice.full) {
+      ++full;
+      EXPECT_TRUE(least > kMostOfFull || share > kWholeFrom);
+      EXPECT_EQ(choice.regions, 0u);
+      EXPECT_EQ(choice.cost, 1);
+      continue;
+    }
+    partly += !doubtful.empty();
+    EXPECT_NEAR(choice.cost, least, 1e-9);
+    std::uint64_t held = 0;
+    for (std::size_t r = 0; r < layout.regions.size(); ++r) {
+      if ((choice.regions >> r & 1) == 0) continue;
+      for (Index p = 0; p < layout.regions[r].count; ++p) {
+        const std::uint64_t bit = std::uint64_t{1} << (layout.regions[r].first + p);
+        EXPECT_EQ(held & bit, 0u) << "a patch is evaluated twice";
+        held |= bit;
+      }
+    }
+    for (const std::size_t p : doubtful) EXPECT_NE(held >> p & 1, 0u);
+  }
+  EXPECT_GT(partly, 100);
+  EXPECT_GT(full, 20);
+}
+
+TEST(Patches, AllPointsComeInWhereManyPatchesAreDoubtful) {
+  PatchLayout layout = MakePatchLayout(std::vector<std::size_t>{10});
+  layout.costs.assign(layout.regions.size(), 0.01);
+  double before = 0;
+  for (int step = 0; step <= 1000; ++step) {
+    PatchChoice choice;
+    for (std::size_t p = 0; p < 8; ++p) choice.weights[p] = static_cast<float>(step) / 1000;
+    ChooseRegions(layout, 0, &choice);
+    EXPECT_LT(choice.all - before, 0.01) << "no jump";
+    EXPECT_GE(choice.all, before);
+    before = choice.all;
+    EXPECT_EQ(choice.full, choice.all > 0);
+  }
+  EXPECT_EQ(before, 1);
+  PatchChoice guarded;
+  ChooseRegions(layout, 0.3, &guarded);
+  EXPECT_EQ(guarded.all, 0.3);
+  EXPECT_TRUE(guarded.full);
+}
+
+// What patches emit at a threshold, all of them looked at.
+struct Emitted {
+  double weight = 0, error = 0;  // the least weight, and the largest error
+};
+Emitted EmittedBy(const JudgedPose& pose, const ScoreMix& mix, const PatchLayout& layout, double guard,
+                  const SoftCacheThreshold& threshold) {
+  std::size_t exact = 0;
+  Emitted emitted{1, 0};
+  for (const PatchPair& patch : pose.patches) {
+    const double score = mix.doubt * std::min(pose.doubt, patch.score / layout.share);
+    const double weight = std::max(guard, FullWeight(score, threshold));
+    exact += FullWeight(score, threshold) == 1;
+    emitted.weight = std::min(emitted.weight, weight);
+    emitted.error = std::max(emitted.error, (1 - weight) * patch.error);
+  }
+  if (2 * exact >= pose.patches.size() || guard == 1) return {1, 0};
+  return emitted;
+}
+
+std::vector<ScoreJudge> RandomJudges(std::size_t count, std::size_t patches, unsigned seed) {
+  std::mt19937 random(seed);
+  std::lognormal_distribution<double> size(0, 0.7), noise(0, 0.4);
+  std::vector<ScoreJudge> judges(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    ScoreJudge& judge = judges[t];
+    judge.kind = static_cast<int>(t % 3);
+    if (t % 11 == 0) judge.guard = t % 2 == 0 ? 1 : 0.4;
+    const double strange = size(random);
+    for (std::size_t p = 0; p < patches; ++p) {
+      const double difficulty = 0.3 * strange * size(random);
+      judge.pose.patches.push_back({difficulty * noise(random), 1e-3 * difficulty * noise(random)});
+      judge.pose.doubt = std::max(judge.pose.doubt, judge.pose.patches.back().score);
+      judge.pose.error = std::max(judge.pose.error, judge.pose.patches.back().error);
+    }
+  }
+  return judges;
+}
+
+TEST(Patches, CalibrationCountsWhatTheyEmit) {
+  const ScoreMix mix{0, 2};
+  PatchLayout layout;
+  layout.share = 0.4;
+  const std::vector<ScoreJudge> judges = RandomJudges(1500, 9, 3);
+  std::vector<CalibrationPair> pairs;
+  std::size_t kept = 0;
+  for (const ScoreJudge& judge : judges) {
+    pairs.push_back(PairOf(judge.pose, mix, layout, judge.guard, judge.kind));
+    kept += pairs.back().patches.size();
+  }
+  EXPECT_LT(kept, 9 * judges.size() / 2) << "most are outdone by others";
+  for (const double tolerance : {3e-4, 6e-4, 1e-3, 3e-3}) {
+    const Calibration found = Calibrate(pairs, tolerance, 0.05);
+    SCOPED_TRACE(tolerance);
+    ASSERT_GT(found.threshold.tau, 0);
+    std::size_t violations = 0, accepted = 0, hits = 0;
+    for (std::size_t t = 0; t < judges.size(); ++t) {
+      const Emitted emitted = EmittedBy(judges[t].pose, mix, layout, judges[t].guard, found.threshold);
+      EXPECT_NEAR(EmittedError(pairs[t], found.threshold), emitted.error, 1e-15) << t;
+      violations += emitted.weight < 1 && emitted.error > tolerance * (1 + 1e-9);
+      accepted += EmittedWeight(pairs[t], found.threshold) < 1;
+      hits += FullWeight(2 * judges[t].pose.doubt, found.threshold) == 0 && judges[t].guard == 0;
+    }
+    EXPECT_EQ(found.violations, violations);
+    EXPECT_EQ(found.accepted, accepted);
+    EXPECT_EQ(found.hits, hits);
+    EXPECT_GT(accepted, hits + 20) << "some poses miss in part";
+    for (const Calibration::Kind& kind : found.kinds) EXPECT_LE(kind.upper_bound, 0.05 + 1e-9);
+  }
+}
+
+// The largest doubt of a pose is `strange`; one patch is wrong, and its own doubt is `told` of that.
+std::vector<ScoreJudge> OneWrongPatch(std::size_t wrong_every, double told) {
+  std::vector<ScoreJudge> judges(1200);
+  for (std::size_t t = 0; t < judges.size(); ++t) {
+    ScoreJudge& judge = judges[t];
+    judge.kind = static_cast<int>(t % 2);
+    judge.pose.patches.assign(12, {0.01, 1e-4});
+    const bool wrong = t % wrong_every == 3;
+    judge.pose.doubt = wrong ? 1 + 0.001 * static_cast<double>(t % 90) : 0.1;
+    judge.pose.patches[t % 12].score = judge.pose.doubt;
+    if (wrong) judge.pose.patches[(t + 5) % 12] = {told * judge.pose.doubt, 3e-3};
+    judge.pose.error = wrong ? 3e-3 : 1e-4;
+  }
+  return judges;
+}
+
+TEST(Patches, AreTakenWhereTheySpareTime) {
+  const auto choose = [](const std::vector<ScoreJudge>& judges, double cost) {
+    Subspace subspace;
+    subspace.violation_rate = 0.03;
+    subspace.tolerance = 1e-3;
+    subspace.patches = MakePatchLayout(std::vector<std::size_t>{12});
+    subspace.patches.costs.assign(subspace.patches.regions.size(), cost);
+    const FrameCost found = ChooseMisses(&subspace, judges, 0, 1e5, 1e-3, 0.9);
+    return std::pair(subspace.patches, found);
+  };
+  // Wrong where the largest doubt tells, and the patch's own at .3 of that
+  const auto [told, told_cost] = choose(OneWrongPatch(5, 0.3), 0.1);
+  ASSERT_GT(told.tiles, 0u);
+  EXPECT_LE(told.share, 0.3);
+  EXPECT_LT(told_cost.misses, 0.05);
+  EXPECT_EQ(told_cost.wrong, 0);
+  // Patches that cost as much as all points, or that do not tell, are no gain
+  EXPECT_EQ(choose(OneWrongPatch(5, 0.3), 0.9).first.tiles, 0u);
+  EXPECT_EQ(choose(OneWrongPatch(5, 0.001), 0.1).first.tiles, 0u);
+  // Where no judge misses, clips may: as cautious as can be
+  const auto [none, none_cost] = choose(OneWrongPatch(100000, 1), 0.1);
+  EXPECT_GT(none.tiles, 0u);
+  EXPECT_EQ(none.share, 0.15);
+  EXPECT_EQ(none_cost.misses, 0);
+}
+
+}  // namespace
+}  // namespace kpsa
