@@ -108,7 +108,7 @@ Status BenchTolerances::TimeHits(const std::vector<double>& times) {
   return Status();
 }
 
-ToleranceRow BenchTolerances::At(double tolerance) const {
+ToleranceRow BenchTolerances::At(double tolerance, double full_ms, double accelerated_ms) const {
   std::vector<SoftCacheThreshold> thresholds;
   for (const Subspaces& node : nodes_) {
     // All grow as the largest does
@@ -141,6 +141,9 @@ ToleranceRow BenchTolerances::At(double tolerance) const {
   }
   row.hits = static_cast<double>(hits) / static_cast<double>(std::max<std::size_t>(1, frames_.size()));
   if (accepted > 0) row.worst = worst / tolerance;
+  const bool ever_hits = std::any_of(thresholds.begin(), thresholds.end(),
+                                     [](const SoftCacheThreshold& one) { return one.tau >= 0; });
+  row.speedup = SpeedupWithMisses(full_ms, accelerated_ms, row.hits, ever_hits);
   return row;
 }
 
@@ -148,11 +151,8 @@ ToleranceTable BenchTolerances::Table(double full_ms, double accelerated_ms, dou
   if (frames_.empty()) return {};
   if (!(accelerated_ms > 0) && timed_hits_ > 0)
     accelerated_ms = hit_ns_ / static_cast<double>(timed_hits_) / 1e6;
-  return MakeToleranceTable(in_force_, wide_, wanted_speedup, [&](double tolerance) {
-    ToleranceRow row = At(tolerance);
-    row.speedup = SpeedupWithMisses(full_ms, accelerated_ms, row.hits);
-    return row;
-  });
+  return MakeToleranceTable(in_force_, wide_, wanted_speedup,
+                            [&](double tolerance) { return At(tolerance, full_ms, accelerated_ms); });
 }
 
 }  // namespace kpsa

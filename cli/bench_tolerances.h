@@ -43,7 +43,7 @@ class BenchTolerances {
     std::vector<FrameDecision> nodes;  // at the wide tolerance
     std::vector<double> errors;        // emitted there, by output
   };
-  ToleranceRow At(double tolerance) const;
+  ToleranceRow At(double tolerance, double full_ms, double accelerated_ms) const;
 
   std::vector<Subspaces> nodes_;
   double in_force_ = 0, wide_ = 0;

@@ -137,6 +137,10 @@ CommandResult RunTrain(const TrainFlags& flags) {
   check_options.poses = subspace->of_light() ? kLightCheckPoses : kCheckPoses;
   check_options.seed = options.seed ^ 0x9e3779b97f4a7c15ull;
   check_options.groups = options.samples > 0 && !subspace->of_light();
+  progress.SetStage("train: timing it");
+  const Result<PlaybackTimes> played = TimePlayback(flags, *entry, subspace, *clips);
+  if (!played.ok()) return Status(played.status()).At({rig.path});
+  check_options.played = *played;
   progress.SetLabel("train: trying it, poses", check_options.poses);
   check_options.progress = [&](std::size_t done, std::size_t) { progress.Set(done); };
   const Result<SubspaceCheck> check = CheckSubspace(&rig, *entry, subspace, *clips, check_options);

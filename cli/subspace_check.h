@@ -1,5 +1,5 @@
-// A fresh subspace tried on poses that it was not trained on: what it costs, and where it is worst. Times are
-// those of the program's work (cli/frame_times.h), but for light.
+// A fresh subspace tried on poses that it was not trained on: where it is worst, and what it costs. That is
+// told by frames of clips, where there are any: poses move all controls at once, which no playback does.
 #pragma once
 
 #include <functional>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cli/acceleration.h"
+#include "cli/playback_times.h"
 #include "kpsa/trainer.h"
 
 namespace kpsa {
@@ -26,15 +27,15 @@ struct SubspaceCheck {
   std::vector<Pose> worst_poses;             // at most five, worst first
   std::vector<Region> worst_regions;         // at most five, by RMS
   double rms = 0, max = 0;                   // of the reconstruction without misses, metres
-  double full_ms = 0, accelerated_ms = 0;    // of a pose, medians; accelerated: a hit
-  // With that share of misses, each of which costs both.
-  double PredictedSpeedup(double hit_rate) const;
+  std::size_t clip_frames = 0;               // that were timed; 0: the poses were
+  double full_ms = 0, accelerated_ms = 0;    // of a frame, means, or of a pose, medians; accelerated: a hit
 };
 
 struct SubspaceCheckOptions {
   std::size_t poses = 60;
   std::uint64_t seed = 1;
   bool groups = true;                                               // DrawNewPoses
+  PlaybackTimes played;                                             // no hits: the poses are timed
   std::function<void(std::size_t done, std::size_t all)> progress;  // may be null
 };
 

@@ -54,6 +54,10 @@ ReachedSpeedup Reach(double wanted, double in_force, double largest, const Toler
   result.reached = result.row.speedup >= wanted;
   if (std::isnan(result.row.speedup)) return result;
   const double least = result.reached ? wanted : result.row.speedup;
+  if (const ToleranceRow row = model(OnGrid(low)); row.speedup >= least) {
+    result.reached = row.speedup >= wanted, result.row = row;
+    return result;
+  }
   while (low < high) {
     const int middle = low + (high - low) / 2;
     if (const ToleranceRow row = model(OnGrid(middle)); row.speedup >= least) {
@@ -105,9 +109,9 @@ ToleranceTable MakeToleranceTable(double in_force, double largest, double wanted
   return table;
 }
 
-double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits) {
-  const double cost = accelerated_ms + (1 - hits) * full_ms;
-  return full_ms > 0 && accelerated_ms > 0 ? full_ms / cost : std::numeric_limits<double>::quiet_NaN();
+double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits) {
+  if (!(full_ms > 0 && accelerated_ms > 0)) return std::numeric_limits<double>::quiet_NaN();
+  return ever_hits ? full_ms / (accelerated_ms + (1 - hits) * full_ms) : 1;
 }
 
 double SampledHitRate(const Calibration& calibration) {

@@ -22,7 +22,7 @@ struct ToleranceRow {
   double worst = std::numeric_limits<double>::quiet_NaN();    // error that is accepted, in tolerances; NaN:
                                                               // not known
 };
-// Hits and speedup must not fall as the tolerance grows.
+// Hits must not fall as the tolerance grows, nor must speedup, but for the 1 of tolerances that allow no hit.
 using ToleranceModel = std::function<ToleranceRow(double tolerance)>;
 
 // The smallest tolerance of a fine grid (two digits, steps of at most 10 %) that reaches a speedup.
@@ -44,8 +44,9 @@ std::vector<double> TolerancesAround(double tolerance);
 ToleranceTable MakeToleranceTable(double in_force, double largest, double wanted_speedup,
                                   const ToleranceModel& model);
 
-// full / (accelerated + the share of misses * full), where a miss costs both; NaN where it is not known.
-double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits);
+// full / (accelerated + the share of misses * full), where a miss costs both; NaN where it is not known. 1
+// where nothing is ever a hit: then nothing is measured.
+double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits = true);
 // Of poses as the sampler draws them; of all where there are no kinds.
 double SampledHitRate(const Calibration& calibration);
 // Of pairs that a tolerance can accept; 0 of none.

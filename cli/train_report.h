@@ -11,6 +11,9 @@
 
 namespace kpsa {
 
+// Misses included, with the share of them among held-out poses as the sampler draws them.
+double ExpectedSpeedup(const SubspaceCheck& check, const Calibration& calibration);
+
 struct TrainResult {
   std::string rig, path;  // of the files
   bool own_path = true;   // the rig names this subspace itself
@@ -23,9 +26,10 @@ struct TrainResult {
   ToleranceTable tolerances;
   std::size_t points() const;
   double hit_rate() const { return SampledHitRate(calibration); }
+  double speedup() const { return ExpectedSpeedup(check, calibration); }
 };
 
-// Of the held-out poses as the sampler draws them, and the times of the check. wanted_speedup 0: none.
+// ExpectedSpeedup at other tolerances. wanted_speedup 0: none.
 ToleranceTable TrainedTolerances(const Subspace& subspace, const SubspaceCheck& check, double wanted_speedup);
 
 // Times in milliseconds, lengths in metres.
