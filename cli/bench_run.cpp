@@ -353,7 +353,8 @@ void Contender::Finish(const BenchOptions& options) {
   result.error_p99 = errors.Percentile(0.99);
   result.motion_rms = errors.motion_rms();
   result.diagonal = errors.diagonal();
-  result.tolerances = tolerances.Table(result.full_ms, result.accelerated_ms_on_hits, options.speedup);
+  result.tolerances =
+      tolerances.Table(result.full_ms, result.accelerated_ms_on_hits, result.accelerated_ms, options.speedup);
 }
 
 class Bench {

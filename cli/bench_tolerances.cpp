@@ -108,7 +108,7 @@ Status BenchTolerances::TimeHits(const std::vector<double>& times) {
   return Status();
 }
 
-ToleranceRow BenchTolerances::At(double tolerance, double full_ms, double accelerated_ms) const {
+ToleranceRow BenchTolerances::At(double tolerance, double full_ms, double hit_ms, double miss) const {
   std::vector<SoftCacheThreshold> thresholds;
   for (const Subspaces& node : nodes_) {
     // All grow as the largest does
@@ -143,16 +143,25 @@ ToleranceRow BenchTolerances::At(double tolerance, double full_ms, double accele
   if (accepted > 0) row.worst = worst / tolerance;
   const bool ever_hits = std::any_of(thresholds.begin(), thresholds.end(),
                                      [](const SoftCacheThreshold& one) { return one.tau >= 0; });
-  row.speedup = SpeedupWithMisses(full_ms, accelerated_ms, row.hits, ever_hits);
+  row.speedup = SpeedupWithMisses(full_ms, hit_ms, row.hits, ever_hits, miss);
   return row;
 }
 
-ToleranceTable BenchTolerances::Table(double full_ms, double accelerated_ms, double wanted_speedup) const {
+double BenchTolerances::CostOfMiss(double full_ms, double hit_ms, double mean_ms) const {
+  const bool in_parts = std::any_of(nodes_.begin(), nodes_.end(),
+                                    [](const Subspaces& node) { return node.subspace->patches.tiles > 0; });
+  const double hits = in_parts ? At(in_force_, full_ms, hit_ms, 1).hits : 1;
+  if (!(hits < 1) || !(full_ms > 0) || !(hit_ms > 0)) return 1;
+  return std::clamp((mean_ms - hit_ms) / ((1 - hits) * full_ms), 0.0, 1.0);
+}
+
+ToleranceTable BenchTolerances::Table(double full_ms, double hit_ms, double mean_ms,
+                                      double wanted_speedup) const {
   if (frames_.empty()) return {};
-  if (!(accelerated_ms > 0) && timed_hits_ > 0)
-    accelerated_ms = hit_ns_ / static_cast<double>(timed_hits_) / 1e6;
+  if (!(hit_ms > 0) && timed_hits_ > 0) hit_ms = hit_ns_ / static_cast<double>(timed_hits_) / 1e6;
+  const double miss = CostOfMiss(full_ms, hit_ms, mean_ms);
   return MakeToleranceTable(in_force_, wide_, wanted_speedup,
-                            [&](double tolerance) { return At(tolerance, full_ms, accelerated_ms); });
+                            [&](double tolerance) { return At(tolerance, full_ms, hit_ms, miss); });
 }
 
 }  // namespace kpsa

@@ -109,9 +109,9 @@ ToleranceTable MakeToleranceTable(double in_force, double largest, double wanted
   return table;
 }
 
-double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits) {
+double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits, double miss) {
   if (!(full_ms > 0 && accelerated_ms > 0)) return std::numeric_limits<double>::quiet_NaN();
-  return ever_hits ? full_ms / (accelerated_ms + (1 - hits) * full_ms) : 1;
+  return ever_hits ? full_ms / (accelerated_ms + (1 - hits) * miss * full_ms) : 1;
 }
 
 double SampledHitRate(const Calibration& calibration) {

@@ -44,9 +44,11 @@ std::vector<double> TolerancesAround(double tolerance);
 ToleranceTable MakeToleranceTable(double in_force, double largest, double wanted_speedup,
                                   const ToleranceModel& model);
 
-// full / (accelerated + the share of misses * full), where a miss costs both; NaN where it is not known. 1
-// where nothing is ever a hit: then nothing is measured.
-double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits = true);
+// full / (accelerated + the share of misses * what one adds, of a full evaluation): a miss costs both, or a
+// part where parts miss by themselves; NaN where it is not known. 1 where nothing is ever a hit: then nothing
+// is measured.
+double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits = true,
+                         double miss = 1);
 // Of poses as the sampler draws them; of all where there are no kinds.
 double SampledHitRate(const Calibration& calibration);
 // Of pairs that a tolerance can accept; 0 of none.

@@ -413,9 +413,9 @@ class Trainer {
       best_of = tried.size() - 1, least = cost;
       return Status();
     };
-    const auto again = [&](const char* what) {
+    const auto again = [&](const char* what, bool finely = true) {
       if (by_tile_) {
-        TileSubspace tiles = OfTiles(*poses, true);
+        TileSubspace tiles = OfTiles(*poses, finely);
         now = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
       } else {
         now = ForAllPoints(poses, true);
@@ -434,6 +434,18 @@ class Trainer {
       record_ = before;
       KPSA_RETURN_IF_ERROR(CenterAndChooseCues(*poses, judges, options_.tolerance / 2));
       KPSA_RETURN_IF_ERROR(again(kForHalf));
+    }
+    // Cues of tiles, where nothing had said before that so many would miss
+    if (!tried_tiles_ && options_.may_have_cues_by_tile && judges.poses() > 0 &&
+        best_cost.misses > kManyMisses && HasTimeForTiles()) {
+      record_ = before;
+      const Result<bool> promising = ChooseTiles(poses);
+      if (!promising.ok()) return promising.status();
+      by_tile_ = *promising;
+      for (const bool finely : {false, true}) {
+        if (!by_tile_ || (finely && cost_.lost() <= kFewMisses)) break;
+        KPSA_RETURN_IF_ERROR(again(finely ? kByTileFinely : kByTile, finely));
+      }
     }
     tried[best_of].taken = true;
     *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
@@ -507,6 +519,7 @@ class Trainer {
 
   // With more poses, which regressions on few cues are glad of. Whether they may hit often enough.
   Result<bool> ChooseTiles(PoseMatrix* poses) {
+    tried_tiles_ = true;
     PoseMatrix more(layout_);
     KPSA_RETURN_IF_ERROR(sampler_->AddMore(*poses, &more));
     record_.sampled_poses += more.poses();
@@ -691,9 +704,10 @@ class Trainer {
   CueChoice chosen_;      // the cues for all points
   bool fine_ = false;     // tiles
   bool by_tile_ = false;  // its cues
-  TileChoice tiles_;      // where they were tried
-  PatchLayout patches_;   // what may miss by itself
-  FrameCost cost_;        // by the last calibration, but points
+  bool tried_tiles_ = false;
+  TileChoice tiles_;     // where they were tried
+  PatchLayout patches_;  // what may miss by itself
+  FrameCost cost_;       // by the last calibration, but points
   double full_cost_ = 0;
   const TimeLimit limit_;
   double modes_seconds_ = 0;
