@@ -15,7 +15,7 @@
 namespace kpsa {
 namespace {
 
-constexpr std::size_t kBlocks = 5, kBlockFrames = 8;
+constexpr std::size_t kPlaybackBlocks = 5, kPlaybackBlockFrames = 8;
 constexpr int kPlaybackRuns = 5;
 
 // Sums over blocks.
@@ -73,7 +73,8 @@ Result<PlaybackSums> TimeAt(double tolerance, const Flags& flags, const Accelera
   std::unique_ptr<OpenRig> open;  // of the clip of the block before
   PlaybackPlans plans;
   std::size_t clip = clips.size();
-  for (const PlaybackBlock& block : PlaybackBlocks(clips, light ? 1 : kBlocks, light ? 1 : kBlockFrames)) {
+  for (const PlaybackBlock& block :
+       PlaybackBlocks(clips, light ? 1 : kPlaybackBlocks, light ? 1 : kPlaybackBlockFrames)) {
     if (block.clip != clip) {
       clip = block.clip;
       Result<std::unique_ptr<OpenRig>> loaded = LoadRigOf(flags);

@@ -305,8 +305,8 @@ std::string StretchedName(const Graph& graph, Compiler* compiler, const Accelera
 }
 
 // Where the points of the patches lie, from the points at rest.
-Status AddPatches(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
-                  AccelerationDraft* draft) {
+Status PlacePatches(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
+                    AccelerationDraft* draft) {
   const std::size_t tiles = draft->data.subspace->patches.tiles;
   if (tiles == 0 || draft->data.always_miss) return Status();
   std::vector<std::vector<Double3>> positions;
@@ -339,7 +339,7 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   for (const auto* list : {&draft.matrices, &draft.scalars}) {
     for (const Signal& signal : *list) draft.data.guard_names.push_back(signal.name);
   }
-  KPSA_RETURN_IF_ERROR(AddPatches(graph, compiler, target, &draft));
+  KPSA_RETURN_IF_ERROR(PlacePatches(graph, compiler, target, &draft));
   draft.data.has_space = !target.space.empty();
   // A reference hangs under its root as a whole, and grows with it
   draft.data.space_scales = draft.data.has_space && (subspace->space_scales || subspace->space.empty());

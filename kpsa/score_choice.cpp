@@ -9,7 +9,7 @@
 namespace kpsa {
 namespace {
 
-constexpr double kQuantile = 0.99;  // of the judges: where the two parts are made equal
+constexpr double kEqualAt = 0.99;  // of the judges: where the two parts are made equal
 constexpr double kRatios[] = {0.125, 0.25, 0.5, 1, 2, 4, 8};  // of the doubt to SoftCache's own
 constexpr double kAround[] = {0.5, 0.7, 1, 1.4};  // tolerances: where all poses hit, finer ones tell
 // In hits, that another mix has to bring: chance brings some. SoftCache's own is known to hold on clips.
@@ -20,7 +20,7 @@ constexpr double kGain = 0.01, kGainOverOwn = 0.05;
 ScoreMix DoubtAlone(std::span<const ScoreJudge> judges) {
   std::vector<double> doubts;
   for (const ScoreJudge& judge : judges) doubts.push_back(judge.pose.doubt);
-  const double doubt = doubts.empty() ? 0 : Quantile(doubts, kQuantile);
+  const double doubt = doubts.empty() ? 0 : Quantile(doubts, kEqualAt);
   return {0, doubt > 0 && std::isfinite(1 / doubt) ? 1 / doubt : 1};
 }
 
@@ -48,7 +48,7 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
     doubts.push_back(judge.pose.doubt);
   }
   if (judges.empty()) return {};
-  const double unit = Quantile(measured, kQuantile), doubt = Quantile(doubts, kQuantile);
+  const double unit = Quantile(measured, kEqualAt), doubt = Quantile(doubts, kEqualAt);
   if (!(unit > 0) || !(doubt > 0) || !std::isfinite(unit) || !std::isfinite(doubt)) return {};
   // What is spared of a full evaluation, all kinds alike, less what the score costs
   const auto worth = [&](const ScoreMix& mix) {

@@ -42,7 +42,7 @@ constexpr double kFewMisses = 0.01;                            // likewise: fine
 constexpr std::size_t kTrialTiles = 8;  // of so many, one says whether cues of each tile pay:
 constexpr double kTrialBeyond = 0.02;   // share of poses farther off than half the tolerance, at most
 constexpr double kCautious = 0.9;  // of the tolerance: what misses, where a few more poses beyond it would
-constexpr double kHopeless = 0.3;  // not for cues of tiles that miss so many
+constexpr double kHopelessTiles = 0.3;   // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;  // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;    // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;         // of the expected cost of the others: cues of tiles are taken
@@ -496,7 +496,7 @@ class Trainer {
         cost = *priced, tiles = std::move(made), fine_ = fine;
         best = record_.tried.size() - 1;
       }
-      if (cost.lost() <= kFewMisses || cost.misses > kHopeless) break;
+      if (cost.lost() <= kFewMisses || cost.misses > kHopelessTiles) break;
     }
     const auto rows = static_cast<std::size_t>(cues_.rows());
     // As chosen, without products of tiles: others with these would hardly do better, and take their time
