@@ -94,6 +94,8 @@ struct Doubt {
   Index tile = kNoIndex;
 };
 
+struct TileTerms;  // kpsa/tile_inputs.h
+
 class TileMap {
  public:
   TileMap() = default;
@@ -122,23 +124,23 @@ class TileMap {
   // What U of every tile is multiplied by [input_size()], so that what the doubt needs is computed once; and
   // the largest doubt, for y that are finite: 0 and no tile without products.
   std::size_t input_size() const { return data_.scale.size() + (data_.joint_rows.size() + 15) / 16 * 16; }
-  Doubt ComputeInputs(std::span<const float> y, std::span<float> inputs) const;
+  // doubts: of every tile [tiles()], or empty.
+  Doubt ComputeInputs(std::span<const float> y, std::span<float> inputs, std::span<float> doubts = {}) const;
   // ReconstructBlock from these; as many of them as frames. The same bits.
   void ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
                        std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
 
  private:
   struct Place {  // of a tile in the arrays of products
-    std::size_t pairs = 0, whitening = 0, w = 0, doubt = 0;
+    std::size_t pairs = 0, lanes = 0, whitening = 0, w = 0, doubt = 0;
   };
   Status PlaceProducts(const TileData& data, const std::string& what);
   std::size_t products(std::size_t tile) const { return data_.products.empty() ? 0 : data_.products[tile]; }
-  void TileInputsOf(std::size_t tile, const float* y, float* t, Doubt* doubt = nullptr) const;
-  void ProductsOf(std::size_t tile, const float* t, float* p) const;
+  void SetTerms(std::size_t tile, float* z, float* doubt, TileTerms* terms) const;
   Status CheckJoints(const TileData& data, const std::string& what) const;
   void JointMatricesOf(const float* y, float* entries) const;  // [joints][12]
-  // The tiles listed (none: all) of some frames; inputs_of(tile, frame, t) writes a tile's inputs to t.
-  // joints_of(frame, entries): as JointMatricesOf.
+  // The tiles listed (none: all) of some frames; inputs_of(tiles, frame, t) writes the inputs of a few tiles
+  // to t. joints_of(frame, entries): as JointMatricesOf.
   template <typename InputsOf, typename JointsOf>
   void Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::span<const PointsView> outs,
            std::span<const Index> tiles, std::span<const Matrix4> spaces) const;
@@ -149,6 +151,7 @@ class TileMap {
   std::vector<std::size_t> v_begin_;       // [tiles] first half of V
   std::vector<std::size_t> u_begin_;       // [tiles] first byte of U
   std::vector<Place> product_begin_;       // [tiles] or empty
+  AlignedArray<std::uint8_t> lanes_;       // pairs as kpsa/tile_inputs.h reads them
 };
 
 struct TileOptions {
