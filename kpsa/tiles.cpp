@@ -45,54 +45,6 @@ constexpr int VectorsAtOnce() {
 }
 constexpr bool kManyRegisters = HWY_LANES(float) >= 16;
 
-// z[0, k16) = scale V y_J for one tile, 16 rows at a time: four sums in turn hide the latency of the
-// multiply-add.
-void Inputs(const std::uint16_t* HWY_RESTRICT v, const float* HWY_RESTRICT scale, std::size_t k16,
-            const std::uint32_t* HWY_RESTRICT columns, std::size_t count, const float* HWY_RESTRICT y,
-            float* HWY_RESTRICT z) {
-  const hn::CappedTag<float, 16> d;
-  const hn::Rebind<hwy::float16_t, decltype(d)> dh;
-  constexpr int kVectors = static_cast<int>(16 / HWY_MIN(HWY_LANES(float), 16));
-  const std::size_t lanes = hn::Lanes(d);
-  const auto* halfs = reinterpret_cast<const hwy::float16_t*>(v);
-  for (std::size_t group = 0; group < k16; group += 16) {
-    hn::Vec<decltype(d)> sum[4][kVectors];
-#pragma GCC unroll 4
-    for (int q = 0; q < 4; ++q) {
-#pragma GCC unroll 16
-      for (int i = 0; i < kVectors; ++i) sum[q][i] = hn::Zero(d);
-    }
-    const hwy::float16_t* column = halfs + group;
-    std::size_t j = 0;
-    for (; j + 4 <= count; j += 4, column += 4 * k16) {
-#pragma GCC unroll 4
-      for (std::size_t q = 0; q < 4; ++q) {
-        const auto factor = hn::Set(d, y[columns[j + q]]);
-#pragma GCC unroll 16
-        for (int i = 0; i < kVectors; ++i) {
-          sum[q][i] =
-              Fma(hn::PromoteTo(d, hn::LoadU(dh, column + q * k16 + static_cast<std::size_t>(i) * lanes)),
-                  factor, sum[q][i]);
-        }
-      }
-    }
-    for (std::size_t q = 0; j + q < count; ++q) {
-      const auto factor = hn::Set(d, y[columns[j + q]]);
-      for (int i = 0; i < kVectors; ++i) {
-        sum[q][i] =
-            Fma(hn::PromoteTo(d, hn::LoadU(dh, column + q * k16 + static_cast<std::size_t>(i) * lanes)),
-                factor, sum[q][i]);
-      }
-    }
-#pragma GCC unroll 16
-    for (int i = 0; i < kVectors; ++i) {
-      const std::size_t at = group + static_cast<std::size_t>(i) * lanes;
-      const auto all = hn::Add(hn::Add(sum[0][i], sum[1][i]), hn::Add(sum[2][i], sum[3][i]));
-      hn::StoreU(hn::Mul(all, hn::LoadU(d, scale + at)), d, z + at);
-    }
-  }
-}
-
 // The inputs of the byte columns: q = round(t / step) of 16 bits, with the step that the largest asks for. z
 // [rank, padded to 16 with zeros] is overwritten.
 void QuantizeInputs(std::size_t wide, std::size_t rank, float* HWY_RESTRICT t, std::int16_t* HWY_RESTRICT q16,
@@ -239,10 +191,10 @@ HWY_AFTER_NAMESPACE();
 #include "base/check.h"
 #include "base/matrix.h"
 #include "kpsa/rigid_points.h"
+#include "kpsa/tile_inputs.h"
 
 namespace kpsa {
 
-HWY_EXPORT(Inputs);
 HWY_EXPORT(QuantizeInputs);
 HWY_EXPORT(TilePanels3);
 HWY_EXPORT(TilePanels1);
@@ -254,17 +206,17 @@ std::size_t TilePanelCount(std::size_t points, std::size_t tile) {
   return Panels(std::min(kTilePoints, points - tile * kTilePoints));
 }
 std::size_t Padded16(std::size_t count) { return (count + 15) / 16 * 16; }
-constexpr auto kInOrder = [] {
-  std::array<std::uint32_t, kMaxProducts> order{};
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<std::uint32_t>(i);
-  return order;
-}();
 // Twelve entries, column by column.
 Matrix4 MatrixOf(const float* entries) {
   Matrix4 matrix;
   for (int e = 0; e < 12; ++e) matrix(e % 3, e / 3) = static_cast<double>(entries[e]);
   return matrix;
 }
+constexpr std::size_t kTilesAhead = 4;  // whose inputs are computed before their points
+static_assert(kTilesAhead <= kTilesAtOnce);
+struct InputSpace {
+  alignas(64) float t[2 * kMaxTileRank + 16];
+};
 // Four byte columns each.
 std::size_t Groups(std::size_t rank, std::size_t wide) { return (rank + wide + 3) / 4; }
 
@@ -334,7 +286,7 @@ Status TileMap::PlaceProducts(const TileData& data, const std::string& what) {
         return Status::Invalid("{}: tile {} has a product of latent {} of {}", what, t, latent,
                                data.ranks[t]);
     }
-    next.pairs += count, next.whitening += 32;
+    next.pairs += count, next.whitening += 32, next.lanes += 2 * Padded16(count);
     next.w += count * Padded16(data.ranks[t]), next.doubt += 16 * count;
   }
   if (data.pairs.size() != 2 * next.pairs || data.whitening.size() != next.whitening ||
@@ -342,6 +294,17 @@ Status TileMap::PlaceProducts(const TileData& data, const std::string& what) {
     return Status::Invalid("{}: products of {}, {}, {}, {} values, expected {}, {}, {}, {}", what,
                            data.pairs.size(), data.whitening.size(), data.w.size(), data.doubt.size(),
                            2 * next.pairs, next.whitening, next.w, next.doubt);
+  }
+  // First latents and second ones apart; what is beyond the last is one times one
+  lanes_ = AlignedArray<std::uint8_t>(next.lanes);
+  std::fill_n(lanes_.data(), next.lanes, kUnitLatent);
+  for (std::size_t t = 0; t < data.products.size(); ++t) {
+    for (std::size_t q = 0; q < data.products[t]; ++q) {
+      const std::size_t lane = q / kProductLanes * 2 * kProductLanes + q % kProductLanes;
+      std::uint8_t* to = lanes_.data() + product_begin_[t].lanes + lane;
+      to[0] = data.pairs[2 * (product_begin_[t].pairs + q)];
+      to[kProductLanes] = data.pairs[2 * (product_begin_[t].pairs + q) + 1];
+    }
   }
   return {};
 }
@@ -395,43 +358,21 @@ void TileMap::ReconstructTiles(std::span<const float> y, std::span<const Index> 
   if (!tiles.empty()) ReconstructBlock(y, {&out, 1}, tiles, {space, space == nullptr ? 0u : 1u});
 }
 
-// The latents' products of a tile with some, from its z [k16] to p [P].
-void TileMap::ProductsOf(std::size_t tile, const float* t, float* p) const {
+// What the inputs of a tile are computed from, and where they and its doubt (squared, or null) go.
+void TileMap::SetTerms(std::size_t tile, float* z, float* doubt, TileTerms* terms) const {
+  terms->rank = data_.ranks[tile], terms->k16 = Padded16(terms->rank);
+  terms->count = data_.counts[tile], terms->products = products(tile);
+  terms->scale = data_.scale.data() + scale_begin_[tile];
+  terms->columns = data_.columns.data() + column_begin_[tile];
+  terms->direct = data_.direct[tile] == 1;
+  terms->v = data_.v.data() + v_begin_[tile];
+  terms->z = z, terms->doubt = doubt;
+  if (terms->products == 0) return;
   const Place& place = product_begin_[tile];
-  const float* whitening = data_.whitening.data() + place.whitening;
-  const std::uint8_t* pairs = data_.pairs.data() + 2 * place.pairs;
-  float z[16];
-  for (std::size_t i = 0; i < 15; ++i)
-    z[i] = std::max(-kLatentClip, std::min(kLatentClip, t[i] * whitening[i]));
-  z[kUnitLatent] = 1;
-  for (std::size_t q = 0; q < data_.products[tile]; ++q) p[q] = z[pairs[2 * q]] * z[pairs[2 * q + 1]];
-}
-
-// What U of a tile is multiplied by: t [k16]; and its doubt, squared.
-void TileMap::TileInputsOf(std::size_t tile, const float* y, float* t, float* doubt) const {
-  const std::size_t rank = data_.ranks[tile], k16 = Padded16(rank), count = products(tile);
-  const float* scale = data_.scale.data() + scale_begin_[tile];
-  const std::uint32_t* columns = data_.columns.data() + column_begin_[tile];
-  if (data_.direct[tile] == 1) {
-    for (std::size_t k = 0; k < rank; ++k) t[k] = y[columns[k]] * scale[k];
-    return;
-  }
-  const auto inputs = HWY_DYNAMIC_DISPATCH(Inputs);
-  inputs(data_.v.data() + v_begin_[tile], scale, k16, columns, data_.counts[tile], y, t);
-  if (count == 0) return;
-  const Place& place = product_begin_[tile];
-  alignas(64) float p[kMaxProducts], w[kMaxTileRank], d[16];
-  ProductsOf(tile, t, p);
-  inputs(data_.w.data() + place.w, scale, k16, kInOrder.data(), count, p, w);
-  for (std::size_t k = 0; k < k16; ++k) t[k] = t[k] + w[k];
-  if (doubt == nullptr) return;
-  inputs(data_.doubt.data() + place.doubt, data_.whitening.data() + place.whitening + 16, 16, kInOrder.data(),
-         count, p, d);
-  for (std::size_t i = 0; i < kDoubtPoints; ++i) {
-    const float x = d[i], y_term = d[kDoubtPoints + i], z = d[2 * kDoubtPoints + i];
-    const float squared = x * x + y_term * y_term + z * z;
-    if (squared > *doubt) *doubt = squared;
-  }
+  terms->lanes = lanes_.data() + place.lanes;
+  terms->whitening = data_.whitening.data() + place.whitening;
+  terms->w = data_.w.data() + place.w;
+  terms->doubt_of = data_.doubt.data() + place.doubt;
 }
 
 void TileMap::JointMatricesOf(const float* y, float* entries) const {
@@ -446,11 +387,17 @@ Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs,
   KPSA_CHECK(y.size() >= data_.inputs && inputs.size() >= input_size());
   KPSA_CHECK(doubts.empty() || doubts.size() >= tiles());
   Doubt doubt;
-  for (std::size_t tile = 0; tile < tiles(); ++tile) {
-    float squared = 0;
-    TileInputsOf(tile, y.data(), inputs.data() + scale_begin_[tile], &squared);
-    if (squared > doubt.largest) doubt = {squared, static_cast<Index>(tile)};
-    if (!doubts.empty()) doubts[tile] = std::sqrt(squared);
+  TileTerms terms[kTilesAtOnce];
+  float squared[kTilesAtOnce];
+  for (std::size_t first = 0; first < tiles(); first += kTilesAtOnce) {
+    const std::size_t count = std::min(kTilesAtOnce, tiles() - first);
+    for (std::size_t i = 0; i < count; ++i)
+      SetTerms(first + i, inputs.data() + scale_begin_[first + i], squared + i, terms + i);
+    ComputeTileInputs({terms, count}, y.data());
+    for (std::size_t i = 0; i < count; ++i) {
+      if (squared[i] > doubt.largest) doubt = {squared[i], static_cast<Index>(first + i)};
+      if (!doubts.empty()) doubts[first + i] = std::sqrt(squared[i]);
+    }
   }
   JointMatricesOf(y.data(), inputs.data() + data_.scale.size());
   doubt.largest = std::sqrt(doubt.largest);
@@ -460,8 +407,12 @@ Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs,
 void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
                                std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
   KPSA_CHECK_LE(outs.size() * data_.inputs, y.size());
-  Run([&](std::size_t tile, std::size_t frame,
-          float* t) { TileInputsOf(tile, y.data() + frame * data_.inputs, t); },
+  Run(
+      [&](std::span<const std::size_t> some, std::size_t frame, InputSpace* t) {
+        TileTerms terms[kTilesAhead];
+        for (std::size_t i = 0; i < some.size(); ++i) SetTerms(some[i], t[i].t, nullptr, terms + i);
+        ComputeTileInputs({terms, some.size()}, y.data() + frame * data_.inputs);
+      },
       [&](std::size_t frame, float* entries) { JointMatricesOf(y.data() + frame * data_.inputs, entries); },
       outs, tiles, spaces);
 }
@@ -469,8 +420,11 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
 void TileMap::ReconstructFrom(std::span<const float* const> inputs, std::span<const PointsView> outs,
                               std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
   KPSA_CHECK_EQ(inputs.size(), outs.size());
-  Run([&](std::size_t tile, std::size_t frame,
-          float* t) { std::copy_n(inputs[frame] + scale_begin_[tile], Padded16(data_.ranks[tile]), t); },
+  Run(
+      [&](std::span<const std::size_t> some, std::size_t frame, InputSpace* t) {
+        for (std::size_t i = 0; i < some.size(); ++i)
+          std::copy_n(inputs[frame] + scale_begin_[some[i]], Padded16(data_.ranks[some[i]]), t[i].t);
+      },
       [&](std::size_t frame, float* entries) {
         std::copy_n(inputs[frame] + data_.scale.size(), data_.joint_rows.size(), entries);
       },
@@ -491,10 +445,10 @@ void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::spa
       data_.components == 3 ? HWY_DYNAMIC_DISPATCH(TilePanels3) : HWY_DYNAMIC_DISPATCH(TilePanels1);
   const std::size_t count = tiles.empty() ? this->tiles() : tiles.size();
   // The inputs of some tiles, then their points: short chains of dependent instructions, which overlap
-  constexpr std::size_t kAhead = 4;
-  TileInput input[kAhead][kBlockFrames];
-  TileFrame frames[kAhead][kBlockFrames];
-  alignas(64) float t[2 * kMaxTileRank + 16];
+  TileInput input[kTilesAhead][kBlockFrames];
+  TileFrame frames[kTilesAhead][kBlockFrames];
+  InputSpace t[kTilesAhead];
+  std::size_t some[kTilesAhead];
   const std::size_t joint_count = data_.joint_rows.size() / 12;
   FloatMatrix joint_space[kBlockFrames][kMaxTileJoints];
   for (std::size_t first = 0; first < outs.size(); first += kBlockFrames) {
@@ -509,21 +463,21 @@ void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::spa
         joint_space[f][j] = ToFloats(spaces.empty() ? joint : spaces[first + f] * joint);
       }
     }
-    for (std::size_t next = 0; next < count; next += kAhead) {
-      const std::size_t ahead = std::min(kAhead, count - next);
-      for (std::size_t i = 0; i < ahead; ++i) {
-        const std::size_t tile = tiles.empty() ? next + i : tiles[next + i], rank = data_.ranks[tile];
-        for (std::size_t f = 0; f < frame_count; ++f) {
-          inputs_of(tile, first + f, t);
+    for (std::size_t next = 0; next < count; next += kTilesAhead) {
+      const std::size_t ahead = std::min(kTilesAhead, count - next);
+      for (std::size_t i = 0; i < ahead; ++i) some[i] = tiles.empty() ? next + i : tiles[next + i];
+      for (std::size_t f = 0; f < frame_count; ++f) {
+        inputs_of({some, ahead}, first + f, t);
+        for (std::size_t i = 0; i < ahead; ++i) {
           frames[i][f].q = input[i][f].q;
           frames[i][f].out = outs[first + f];
-          const std::size_t joint = data_.joints.empty() ? 0 : data_.joints[tile];
+          const std::size_t joint = data_.joints.empty() ? 0 : data_.joints[some[i]];
           frames[i][f].space = joint > 0 ? &joint_space[f][joint - 1] : spaces.empty() ? nullptr : &space[f];
-          quantize(data_.wide[tile], rank, t, input[i][f].q, &frames[i][f]);
+          quantize(data_.wide[some[i]], data_.ranks[some[i]], t[i].t, input[i][f].q, &frames[i][f]);
         }
       }
       for (std::size_t i = 0; i < ahead; ++i) {
-        const std::size_t tile = tiles.empty() ? next + i : tiles[next + i], begin = tile * kTilePoints;
+        const std::size_t tile = some[i], begin = tile * kTilePoints;
         tile_panels(data_.u.data() + u_begin_[tile], TilePanelCount(data_.points, tile),
                     Groups(data_.ranks[tile], data_.wide[tile]),
                     data_.mean.data() + tile * (kTilePoints / kPanelPoints) * rows, begin, frames[i],

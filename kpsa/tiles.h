@@ -94,6 +94,8 @@ struct Doubt {
   Index tile = kNoIndex;
 };
 
+struct TileTerms;  // kpsa/tile_inputs.h
+
 class TileMap {
  public:
   TileMap() = default;
@@ -130,17 +132,15 @@ class TileMap {
 
  private:
   struct Place {  // of a tile in the arrays of products
-    std::size_t pairs = 0, whitening = 0, w = 0, doubt = 0;
+    std::size_t pairs = 0, lanes = 0, whitening = 0, w = 0, doubt = 0;
   };
   Status PlaceProducts(const TileData& data, const std::string& what);
   std::size_t products(std::size_t tile) const { return data_.products.empty() ? 0 : data_.products[tile]; }
-  // doubt: the square of the tile's, or null
-  void TileInputsOf(std::size_t tile, const float* y, float* t, float* doubt = nullptr) const;
-  void ProductsOf(std::size_t tile, const float* t, float* p) const;
+  void SetTerms(std::size_t tile, float* z, float* doubt, TileTerms* terms) const;
   Status CheckJoints(const TileData& data, const std::string& what) const;
   void JointMatricesOf(const float* y, float* entries) const;  // [joints][12]
-  // The tiles listed (none: all) of some frames; inputs_of(tile, frame, t) writes a tile's inputs to t.
-  // joints_of(frame, entries): as JointMatricesOf.
+  // The tiles listed (none: all) of some frames; inputs_of(tiles, frame, t) writes the inputs of a few tiles
+  // to t. joints_of(frame, entries): as JointMatricesOf.
   template <typename InputsOf, typename JointsOf>
   void Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::span<const PointsView> outs,
            std::span<const Index> tiles, std::span<const Matrix4> spaces) const;
@@ -151,6 +151,7 @@ class TileMap {
   std::vector<std::size_t> v_begin_;       // [tiles] first half of V
   std::vector<std::size_t> u_begin_;       // [tiles] first byte of U
   std::vector<Place> product_begin_;       // [tiles] or empty
+  AlignedArray<std::uint8_t> lanes_;       // pairs as kpsa/tile_inputs.h reads them
 };
 
 struct TileOptions {
