@@ -12,9 +12,7 @@ namespace {
 
 constexpr double kDoubtCost = 100;  // ns a tile, on the scale of the nodes' costs
 constexpr double kByteCost = 0.03;  // ns a byte of the tiles, likewise
-// What patches have to spare, of a full evaluation, to do without SoftCache's own score (kpsa/score_choice)
-constexpr double kGainOverMeasured = 0.05;
-constexpr double kPartial = 0.4;  // of a full evaluation: what patches cost that are worth a try
+constexpr double kPartial = 0.4;    // of a full evaluation: what patches cost that are worth a try
 // Shares of the largest doubt that are tried (PatchLayout::share)
 constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
 constexpr double kRowCost = 5;  // ns a row that is measured, likewise
@@ -97,7 +95,6 @@ FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, d
   if (patches.tiles == 0) return least;
   ScoreMix best = subspace->score;
   PatchLayout taken;
-  const double owed = best.measured > 0 ? kGainOverMeasured * full : 0;
   subspace->patches = patches;
   // What SoftCache's own score refuses it refuses everywhere
   subspace->score = DoubtAlone(judges);
@@ -106,7 +103,7 @@ FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, d
     const FrameCost with = cost(judges);
     // Of equal ones, since a clip may go where no judge has been
     if (least.misses == with.misses && !ArePartial(patches)) continue;
-    if (taken.tiles == 0 ? with.ns <= least.ns - owed : with.ns < least.ns)
+    if (taken.tiles == 0 ? with.ns <= least.ns : with.ns < least.ns)
       least = with, best = subspace->score, taken = subspace->patches;
   }
   subspace->score = best, subspace->patches = taken;

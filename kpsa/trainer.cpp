@@ -560,11 +560,15 @@ class Trainer {
              : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest});
   }
 
+  // SoftCache's own score speaks of all points, and would say of no part that it misses.
+  static bool JudgedByDoubts(const Subspace& subspace) {
+    return subspace.doubt_inputs() > 0 && subspace.soft_cache.factor.size() == 0;
+  }
   // The subspace is given its best score by the judges, and is then priced.
   Result<FrameCost> Price(Subspace* subspace, const CueSet& cues, const PoseMatrix& judges) {
     const Result<double> points = CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues.cues);
     if (!points.ok()) return points.status();
-    if (subspace->doubt_inputs() > 0) subspace->patches = patches_;
+    if (JudgedByDoubts(*subspace)) subspace->patches = patches_;
     std::vector<ScoreJudge> judged;
     for (const JudgedPose& pose : PoseJudge(*subspace, layout_, cues).Judge(judges))
       judged.push_back({pose, 0, judge_kinds_[judged.size()]});
@@ -592,7 +596,7 @@ class Trainer {
     if (count == 0)
       count =
           static_cast<std::size_t>(std::clamp(8.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
-    if (subspace->doubt_inputs() > 0) subspace->patches = patches_;
+    if (JudgedByDoubts(*subspace)) subspace->patches = patches_;
     // Held-out poses of every kind; as many new ones say how to score them.
     PoseJudge judge(*subspace, layout_, cues_), score_judge(*subspace, layout_, cues_);
     std::vector<ScoreJudge> held_out, score_judges;
