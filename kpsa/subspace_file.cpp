@@ -199,7 +199,7 @@ std::string ContentDigest(const Subspace& s) {
       hasher.Add(patch.error);
     }
   }
-  hasher.Add(std::span<const double>(s.patches.costs));
+  if (s.patches.tiles > 0) hasher.Add(std::span<const double>(s.patches.costs));
   for (const TileMap& tiles : s.tiles) {
     const TileData& data = tiles.data();
     for (const auto* list : {&data.ranks, &data.wide, &data.counts, &data.columns})

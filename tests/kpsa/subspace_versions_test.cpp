@@ -1,0 +1,75 @@
+// Subspaces of earlier versions of the file are written as they always were, so that files that are there
+// stay readable: their digests are those of the program that had no later version.
+#include <gtest/gtest.h>
+
+#include "base/safetensors.h"
+#include "kpsa/subspace.h"
+#include "tests/support/temporary_folder.h"
+
+namespace kpsa {
+namespace {
+
+// 130 points that stand still, and one scalar that is measured; exact numbers, whatever rounds them.
+Subspace SmallestSubspace() {
+  Subspace s;
+  s.outputs = {{"column@mush", 130, "mush"}};
+  s.cues.resize(1);
+  s.cues[0].kind = CueDescription::Kind::kScalar;
+  s.cues[0].plug = "lid.weight";
+  s.cue_mean = {0.5}, s.cue_scale = {4};
+  s.modes = s.soft_cache.modes = 1;
+  s.soft_cache.offsets = {0, 1};
+  s.soft_cache.factor = AlignedArray<float>(s.soft_cache.factor_size());
+  for (float& entry : s.soft_cache.factor.span()) entry = 0.25f;
+  s.soft_cache.leave_one_out = {2};
+  TileData data;
+  data.points = 130, data.inputs = 1;
+  for (auto* of : {&data.ranks, &data.wide, &data.counts}) of->assign(2, 0);
+  data.direct.assign(2, 0);
+  data.mean = AlignedArray<float>(5 * 3 * kPanelPoints);
+  for (std::size_t i = 0; i < data.mean.size(); ++i) data.mean.data()[i] = static_cast<float>(i) / 8;
+  Result<TileMap> tiles = TileMap::Make(std::move(data), "column");
+  EXPECT_TRUE(tiles.ok()) << tiles.status().ToString();
+  s.tiles.push_back(std::move(*tiles));
+  s.calibration = {{0.5, 0.125, 0, 0}, {1.5, 0.25, 0.25, 3}};
+  s.ranges = {{"lid.weight", 0, 1, 0.125}};
+  s.tolerance = 0.25, s.violation_rate = 0.0625, s.blend_start = 0.875;
+  s.rig_hash = "0123456789abcdef";
+  return s;
+}
+
+struct Written {
+  std::string version, digest;
+};
+Written WrittenAs(const Subspace& subspace) {
+  TemporaryFolder folder;
+  const std::string path = folder / "small.kpsa";
+  const Status status = WriteSubspace(subspace, path);
+  EXPECT_TRUE(status.ok()) << status.ToString();
+  const Result<Subspace> read = ReadSubspace(path);
+  EXPECT_TRUE(read.ok()) << read.status().ToString();
+  const Result<SafetensorsFile> file = SafetensorsFile::Read(path);
+  if (!file.ok()) return {};
+  return {*file->Metadata("version"), *file->Metadata("digest")};
+}
+
+TEST(SubspaceVersions, OfEarlierFilesKeepTheirDigests) {
+  Subspace subspace = SmallestSubspace();
+  const Written oldest = WrittenAs(subspace);
+  EXPECT_EQ(oldest.version, "3");
+  EXPECT_EQ(oldest.digest, "acbae0fd8c59a50dc6781358dd62e2f7");
+  subspace.cues[0].plug = "lid.worldMatrix/3";
+  const Written relative = WrittenAs(subspace);
+  EXPECT_EQ(relative.version, "4");
+  EXPECT_EQ(relative.digest, "ea0376d40e28c5ae8c8be9c8190fa877");
+  subspace.cues[0] = {};
+  subspace.cues[0].kind = CueDescription::Kind::kProduct;
+  subspace.cues[0].factors = {{"lid.weight", {0.5, 2, true}}};
+  subspace.cues[0].lo = -1, subspace.cues[0].hi = 1;
+  const Written product = WrittenAs(subspace);
+  EXPECT_EQ(product.version, "5");
+  EXPECT_EQ(product.digest, "718bafc5a03fa1cd25cb890c93e270fe");
+}
+
+}  // namespace
+}  // namespace kpsa
