@@ -16,4 +16,7 @@ double Log(double x);  // NaN below 0, -inf at 0
 
 inline constexpr double kPi = 3.14159265358979323846;
 
+// 3 t^2 - 2 t^3 of t in [0, 1].
+constexpr double Smoothstep(double t) { return t * t * (3 - 2 * t); }
+
 }  // namespace kpsa

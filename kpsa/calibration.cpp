@@ -8,6 +8,7 @@
 #include <map>
 #include <vector>
 
+#include "base/scalar_math.h"
 #include "kpsa/binomial.h"
 
 namespace kpsa {
@@ -20,7 +21,7 @@ double InverseSmoothstep(double w) {
   double lo = 0, hi = 1;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (lo + hi);
-    (middle * middle * (3 - 2 * middle) < w ? lo : hi) = middle;
+    (Smoothstep(middle) < w ? lo : hi) = middle;
   }
   return hi;
 }

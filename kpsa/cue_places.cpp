@@ -6,6 +6,7 @@
 
 #include "graph/plan_report.h"
 #include "kpsa/mode_choice.h"
+#include "kpsa/tiles.h"
 
 namespace kpsa {
 namespace {
@@ -22,9 +23,21 @@ constexpr std::size_t kOfTiles = 3, kMostOfTiles = 12000;  // of the first place
 
 // What the compiler keeps for some points.
 struct Kept {
-  double cost = 0;   // ns of the steps with points
-  Index points = 0;  // most of a step over `total` points
+  double cost = 0;    // ns of the steps with points
+  double spread = 0;  // likewise, of all steps, where a deformer that spreads works on all that it reads
+  Index points = 0;   // most of a step over `total` points
 };
+// The mean of what a step reads and what it writes; at least 1.
+double ReadPoints(const Plan& plan, Index step) {
+  const Plan::StepInfo& info = plan.infos()[step];
+  Index read = info.points;
+  for (const Index producer : Producers(plan, step)) {
+    if (producer >= plan.infos().size()) continue;
+    const Plan::StepInfo& of = plan.infos()[producer];
+    if (of.points_total == info.points_total) read = std::max(read, of.points);
+  }
+  return info.points == 0 ? 1 : (static_cast<double>(read) + info.points) / 2;
+}
 Result<Kept> KeptFor(const TrainingRig& rig, Compiler* compiler, std::vector<RequestedOutput> outputs,
                      Index total) {
   Request request;
@@ -34,9 +47,12 @@ Result<Kept> KeptFor(const TrainingRig& rig, Compiler* compiler, std::vector<Req
   const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
   if (!plan.ok()) return plan.status();
   Kept kept;
-  for (const Plan::StepInfo& info : (*plan)->infos()) {
+  for (Index s = 0; s < (*plan)->infos().size(); ++s) {
+    const Plan::StepInfo& info = (*plan)->infos()[s];
+    const auto cost = static_cast<double>(info.cost_ns);
+    kept.spread += cost * ReadPoints(**plan, s) / std::max<Index>(info.points, 1);
     if (info.points_total == 0) continue;
-    kept.cost += static_cast<double>(info.cost_ns);
+    kept.cost += cost;
     if (info.points_total == total) kept.points = std::max(kept.points, info.points);
   }
   return kept;
@@ -154,45 +170,31 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
   return kept->cost;
 }
 
-Result<std::vector<double>> CostsOfRegions(const TrainingRig& rig, Compiler* compiler,
-                                           std::span<const std::vector<Double3>> positions,
-                                           const PatchLayout& layout) {
-  const auto cost = [&](std::vector<RequestedOutput> outputs) -> Result<double> {
-    Request request;
-    request.outputs = std::move(outputs);
-    request.varying = {rig.time};
-    for (const ControlRange& control : rig.controls) request.varying.push_back(control.plug);
-    const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
-    if (!plan.ok()) return plan.status();
-    double sum = 0;
-    for (Index s = 0; s < (*plan)->infos().size(); ++s) {
-      // A deformer that spreads works on all that it reads
-      const Plan::StepInfo& info = (*plan)->infos()[s];
-      Index read = info.points;
-      for (const Index producer : Producers(**plan, s)) {
-        if (producer >= (*plan)->infos().size()) continue;
-        const Plan::StepInfo& of = (*plan)->infos()[producer];
-        if (of.points_total == info.points_total) read = std::max(read, of.points);
-      }
-      const double both = static_cast<double>(read) + info.points;
-      sum += static_cast<double>(info.cost_ns) * (info.points == 0 ? 1 : both / (2 * info.points));
-    }
-    return sum;
-  };
-  std::vector<PatchPoints> patches = MakePatches(positions, layout.tiles);
+Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
+                                 std::span<const Double3> points) {
+  std::vector<std::size_t> tiles;
+  std::vector<std::vector<Double3>> positions;
   std::vector<RequestedOutput> outputs;
-  for (const auto& mesh : rig.target.meshes) outputs.push_back({mesh.stages.back().points, {}});
-  const Result<double> full = cost(std::move(outputs));
+  for (std::size_t m = 0; m < totals.size(); ++m) {
+    tiles.push_back((totals[m] + kTilePoints - 1) / kTilePoints);
+    positions.emplace_back(points.begin(), points.begin() + totals[m]);
+    points = points.subspan(totals[m]);
+    outputs.push_back({rig.target.meshes[m].stages.back().points, {}});
+  }
+  PatchLayout layout = MakePatchLayout(tiles);
+  if (layout.tiles == 0) return layout;
+  const Result<Kept> full = KeptFor(rig, compiler, std::move(outputs), 0);
   if (!full.ok()) return full.status();
-  std::vector<double> costs;
+  if (!(full->cost > 0)) return PatchLayout();
+  const std::vector<PatchPoints> patches = MakePatches(positions, layout.tiles);
   for (const PatchRegion& region : layout.regions) {
     const PlugRef plug = rig.target.meshes[region.output].stages.back().points;
-    const auto total = static_cast<Index>(positions[region.output].size());
-    const Result<double> own = cost({{plug, PointSet::Of(PointsOfRegion(region, patches), total)}});
+    const PointSet of = PointSet::Of(PointsOfRegion(region, patches), totals[region.output]);
+    const Result<Kept> own = KeptFor(rig, compiler, {{plug, of}}, 0);
     if (!own.ok()) return own.status();
-    costs.push_back(kSeldomRead * *own / *full);
+    layout.costs.push_back(kSeldomRead * own->spread / full->spread);
   }
-  return costs;
+  return layout;
 }
 
 }  // namespace kpsa

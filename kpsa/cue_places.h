@@ -28,10 +28,10 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
 Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
                             std::span<const CandidateStage> stages, std::span<const CueRef> cues);
 
-// What each region of patches costs by itself, of the full evaluation: with the points that deformers ask for
-// about it, and since what it reads was seldom read lately. positions: of each output.
-Result<std::vector<double>> CostsOfRegions(const TrainingRig& rig, Compiler* compiler,
-                                           std::span<const std::vector<Double3>> positions,
-                                           const PatchLayout& layout);
+// Patches that could miss by themselves, whatever the cues, and what each region of them costs of the full
+// evaluation: with the points that deformers ask for about it, and since what it reads was seldom read
+// lately. positions: of the points of all outputs, on the average. tiles 0 where nothing would be local.
+Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
+                                 std::span<const Double3> positions);
 
 }  // namespace kpsa

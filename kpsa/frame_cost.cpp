@@ -51,7 +51,11 @@ ScoreCosts CostsOfScore(const Subspace& subspace, double full) {
 ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, double full) {
   if (subspace.soft_cache.factor.size() == 0) return DoubtAlone(judges);
   return ChooseScore(judges, subspace.tolerance, subspace.violation_rate, subspace.blend_start,
-                     CostsOfScore(subspace, full), subspace.patches);
+                     CostsOfScore(subspace, full));
+}
+
+void GivePatches(const PatchLayout& patches, Subspace* subspace) {
+  if (subspace->doubt_inputs() > 0 && subspace->soft_cache.factor.size() == 0) subspace->patches = patches;
 }
 
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
@@ -93,20 +97,16 @@ FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, d
   subspace->score = ScoreOf(*subspace, whole, full);
   FrameCost least = cost(whole);
   if (patches.tiles == 0) return least;
-  ScoreMix best = subspace->score;
   PatchLayout taken;
   subspace->patches = patches;
-  // What SoftCache's own score refuses it refuses everywhere
-  subspace->score = DoubtAlone(judges);
   for (const double share : kShares) {
     subspace->patches.share = share;
     const FrameCost with = cost(judges);
     // Of equal ones, since a clip may go where no judge has been
     if (least.misses == with.misses && !ArePartial(patches)) continue;
-    if (taken.tiles == 0 ? with.ns <= least.ns : with.ns < least.ns)
-      least = with, best = subspace->score, taken = subspace->patches;
+    if (taken.tiles == 0 ? with.ns <= least.ns : with.ns < least.ns) least = with, taken = subspace->patches;
   }
-  subspace->score = best, subspace->patches = taken;
+  subspace->patches = taken;
   return least;
 }
 

@@ -18,6 +18,10 @@ ScoreCosts CostsOfScore(const Subspace& subspace, double full);
 // How a subspace is judged best: by what its tiles doubt alone where it has no score of its own.
 ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, double full);
 
+// Parts may miss by themselves where doubts judge alone: SoftCache's own score speaks of all points, and
+// would say of no part that it misses.
+void GivePatches(const PatchLayout& patches, Subspace* subspace);
+
 struct FrameCost {
   double misses = 0;  // share of the judges, all kinds alike; those of patches count as what they cost
   double wrong = 0;   // likewise: accepted, and beyond the tolerance

@@ -10,6 +10,8 @@
 
 #include "base/check.h"
 #include "base/matrix.h"
+#include "kpsa/bound_patches.h"
+#include "kpsa/cue_gather.h"
 #include "kpsa/near_stack.h"
 #include "kpsa/signals.h"
 #include "kpsa/space_frame.h"
@@ -63,17 +65,8 @@ struct KpsaKernel {
     std::size_t padded = 0;     // floats of a component of the whole mesh, for the scratch
   };
   std::vector<Output> outputs;
-  struct Patch {
-    Index output = 0;
-    std::vector<Index> places;   // of its wanted points, in what is written
-    std::vector<float> weights;  // theirs
-    struct Held {
-      Index region;
-      std::vector<Index> places;  // of these points, in those of the region
-    };
-    std::vector<Held> held;  // by regions that it belongs to
-  };
-  std::vector<Patch> patches;
+  BoundPatches patches;
+  CueGather gather;
   std::size_t tiles = 0;  // whose doubts are kept where there are patches
 };
 
@@ -171,78 +164,6 @@ SoftCacheThreshold ThresholdAt(const KpsaKernel& kernel, double scale) {
   return threshold;
 }
 
-// An entry of a matrix, or of space_from_world times it.
-double Entry(const Matrix4& matrix, Index element, const Matrix4* space_from_world) {
-  const auto row = static_cast<int>(element % 3), column = static_cast<int>(element / 3);
-  if (space_from_world == nullptr) return matrix(row, column);
-  const Matrix4& s = *space_from_world;
-  return s(row, 0) * matrix(0, column) + s(row, 1) * matrix(1, column) + s(row, 2) * matrix(2, column) +
-         s(row, 3) * matrix(3, column);
-}
-
-double Value(const ArrayView<Matrix4>& matrices, const ArrayView<double>& scalars,
-             const KpsaConfig::Row& row) {
-  return row.kind == KpsaConfig::Row::Kind::kMatrix ? Entry(matrices[row.input], row.element, nullptr)
-                                                    : scalars[row.input];
-}
-
-// The raw measurement, in the order of the subspace's rows.
-void Gather(const ComputeContext& c, const KpsaConfig::Data& data, const Matrix4& world_from_space,
-            std::span<double> raw) {
-  Matrix4 space_from_world;
-  if (!(world_from_space == Matrix4())) space_from_world = InverseOrIdentity(world_from_space);
-  // Of points that have been moved by rest_origin - origin: that is taken back in double
-  Matrix4 space_from_near = space_from_world;
-  if (data.has_space) {
-    const Double3 moved =
-        Double3{world_from_space(0, 3), world_from_space(1, 3), world_from_space(2, 3)} - data.rest_origin;
-    space_from_near = space_from_world * Translation(moved);
-  }
-  const ArrayView<ConstPointsView> cues = c.array<ConstPointsView>(kCues);
-  const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
-  const ArrayView<double> scalars = c.array<double>(kScalars);
-  // After the raw values and g
-  Matrix4* const joint_from_world =
-      reinterpret_cast<Matrix4*>(c.scratch + 3 * data.subspace->soft_cache.padded_rows());
-  Matrix4* const joint_from_space = joint_from_world + data.joints.size();
-  for (std::size_t j = 0; j < data.joints.size(); ++j) {
-    joint_from_world[j] = InverseOrIdentity(matrices[data.joints[j]]);
-    joint_from_space[j] = joint_from_world[j] * world_from_space;
-  }
-  std::size_t r = 0;
-  for (const KpsaConfig::Row& row : data.rows) {
-    switch (row.kind) {
-      case KpsaConfig::Row::Kind::kPoint: {
-        const ConstPointsView& points = cues[row.input];
-        Double3 p{points.x[row.element], points.y[row.element], points.z[row.element]};
-        const KpsaConfig::PointCues& of = data.cues[row.input];
-        if (of.in_space) p = TransformPoint(of.near ? space_from_near : space_from_world, p);
-        if (row.joint != kNoIndex) p = TransformPoint(joint_from_space[row.joint], p);
-        raw[r] = p.x, raw[r + 1] = p.y, raw[r + 2] = p.z;
-        r += 3;
-        break;
-      }
-      case KpsaConfig::Row::Kind::kMatrix:
-        raw[r++] = Entry(matrices[row.input], row.element,
-                         row.joint != kNoIndex           ? &joint_from_world[row.joint]
-                         : data.relative[row.input] != 0 ? &space_from_world
-                                                         : nullptr);
-        break;
-      case KpsaConfig::Row::Kind::kScalar:
-        raw[r++] = scalars[row.input];
-        break;
-      case KpsaConfig::Row::Kind::kProduct: {
-        const KpsaConfig::Product& product = data.products[row.input];
-        double value = product.of_a.Of(Value(matrices, scalars, product.a));
-        if (product.b.kind != KpsaConfig::Row::Kind::kPoint)
-          value *= product.of_b.Of(Value(matrices, scalars, product.b));
-        raw[r++] = value < product.lo ? product.lo : value > product.hi ? product.hi : value;  // NaN stays
-        break;
-      }
-    }
-  }
-}
-
 std::uint64_t Decide(ComputeContext& c) {
   const auto& kernel = c.kernel_as<KpsaKernel>();
   const KpsaConfig::Data& data = kernel.config->data();
@@ -278,7 +199,9 @@ std::uint64_t Decide(ComputeContext& c) {
       stretch = StretchWeight(data, frame);
       if (stretch >= 1) return miss(MissReason::kSpace, kNoIndex);
     }
-    Gather(c, data, frame.world_from_space, raw);
+    kernel.gather.Gather({c.array<ConstPointsView>(kCues), c.array<Matrix4>(kMatrices),
+                          c.array<double>(kScalars), frame.world_from_space},
+                         c.scratch + 3 * padded, raw);
   }
   const Stopwatch watch(projection_ns);
   Normalize(subspace, raw, y);
@@ -287,7 +210,7 @@ std::uint64_t Decide(ComputeContext& c) {
   const std::span<float> inputs(Measured(c) + padded, subspace.score.doubt > 0 ? subspace.doubt_inputs() : 0);
   const SoftCacheThreshold threshold = ThresholdAt(kernel, frame.scale);
   std::array<double, kMaxPatches> scores;
-  const std::size_t patches = kernel.patches.size();
+  const std::size_t patches = kernel.patches.count();
   verdict = JudgePatches(subspace, threshold, y, g, inputs, {inputs.data() + inputs.size(), kernel.tiles},
                          {scores.data(), patches});
   const bool finite = verdict.reason != MissReason::kNotFinite;
@@ -356,43 +279,13 @@ void CopyFull(ConstPointsView from, PointsView to) {
   std::memcpy(to.z, from.z, from.count * sizeof(float));
 }
 
-// Points that have been reconstructed go over into exact ones where a patch is doubtful. from: the places of
-// its points in these.
-void BlendPatch(const KpsaKernel::Patch& patch, float weight, ConstPointsView exact,
-                const std::vector<Index>& from, PointsView out) {
-  float* const to[3] = {out.x, out.y, out.z};
-  const float* const of[3] = {exact.x, exact.y, exact.z};
-  for (std::size_t i = 0; i < patch.places.size(); ++i) {
-    const float w = weight * patch.weights[i];
-    const Index place = patch.places[i];
-    for (int a = 0; a < 3; ++a) {
-      const float value = of[a][from[i]];
-      to[a][place] = w >= 1 ? value : to[a][place] + w * (value - to[a][place]);
-    }
-  }
-}
-
-void BlendPatches(ComputeContext& c, const KpsaKernel& kernel, std::uint32_t m, PointsView out) {
-  const PatchChoice& choice = c.state_as<KpsaState>().patches;
-  const ArrayView<ConstPointsView> full = c.array<ConstPointsView>(kFullPoints),
-                                   regions = c.array<ConstPointsView>(kRegionPoints);
-  for (std::size_t p = 0; p < kernel.patches.size(); ++p) {
-    const KpsaKernel::Patch& patch = kernel.patches[p];
-    if (patch.output != m || patch.places.empty() || !(choice.weights[p] > 0)) continue;
-    if (choice.full) BlendPatch(patch, choice.weights[p], full[m], patch.places, out);
-    for (const KpsaKernel::Patch::Held& held : patch.held) {
-      if ((choice.regions >> held.region & 1) != 0)
-        BlendPatch(patch, choice.weights[p], regions[held.region], held.places, out);
-    }
-  }
-}
-
 void Compute(ComputeContext& c) {
   const auto& kernel = c.kernel_as<KpsaKernel>();
   WriteVerdict(c);
   const KpsaState& state = c.state_as<KpsaState>();
   const Verdict& verdict = state.verdict;
-  const ArrayView<ConstPointsView> full = c.array<ConstPointsView>(kFullPoints);
+  const ArrayView<ConstPointsView> full = c.array<ConstPointsView>(kFullPoints),
+                                   regions = c.array<ConstPointsView>(kRegionPoints);
   for (std::uint32_t m = 0; m < kernel.outputs.size(); ++m) {
     const PointsView& out = c.out_points(kOutPoints, m);
     if (out.count == 0) continue;
@@ -403,7 +296,7 @@ void Compute(ComputeContext& c) {
     const Stopwatch watch(reconstruction_ns);
     Reconstruct(c, kernel, m, out);
     if (verdict.hit) continue;
-    BlendPatches(c, kernel, m, out);
+    kernel.patches.Blend(state.patches, m, full[m], regions, out);
     if (state.patches.all > 0) BlendPoints(state.patches.all, full[m], out);
   }
 }
@@ -449,13 +342,6 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
   }
 }
 
-// Those of the points that are wanted.
-PointSet Wanted(const std::vector<Index>& points, const PointSet& wanted) {
-  std::vector<Index> of;
-  std::ranges::copy_if(points, std::back_inserter(of), [&](Index point) { return wanted.Contains(point); });
-  return PointSet::Of(std::move(of), wanted.total());
-}
-
 void DemandKpsa(Demand& demand) {
   const auto* config = demand.structural().asset<KpsaConfig>("config");
   if (config == nullptr) return;
@@ -474,7 +360,7 @@ void DemandKpsa(Demand& demand) {
   for (std::size_t r = 0; r < regions.size(); ++r) {
     const PointSet& wanted = demand.output("outPoints", static_cast<int>(regions[r].output));
     demand.Require("regionPoints", static_cast<int>(r),
-                   Wanted(PointsOfRegion(regions[r], config->data().patches), wanted));
+                   WantedOfRegion(regions[r], config->data().patches, wanted));
   }
 }
 
@@ -518,30 +404,17 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
     }
     kernel.outputs.push_back(std::move(output));
   }
-  for (std::size_t p = 0; p < data.patches.size(); ++p) {
-    const PatchPoints& patch = data.patches[p];
-    const PointSet& wanted = binding.output("outPoints", static_cast<int>(patch.output));
-    KpsaKernel::Patch bound{patch.output, {}, {}, {}};
-    const PointSet points = Wanted(patch.points, wanted);
-    bound.places = wanted.PositionsOf(points);
-    for (std::size_t i = 0; i < patch.points.size(); ++i) {
-      if (wanted.Contains(patch.points[i])) bound.weights.push_back(patch.weights[i]);
-    }
-    for (std::size_t r = 0; r < subspace.patches.regions.size(); ++r) {
-      const PatchRegion& region = subspace.patches.regions[r];
-      if (p < region.first || p >= region.first + region.count) continue;
-      const PointSet& held = binding.input("regionPoints", static_cast<int>(r));
-      bound.held.push_back({static_cast<Index>(r), held.PositionsOf(points)});
-    }
-    kernel.patches.push_back(std::move(bound));
-  }
+  kernel.patches = BoundPatches(
+      subspace.patches, data.patches,
+      [&](Index output) { return binding.output("outPoints", static_cast<int>(output)); },
+      [&](Index region) { return binding.input("regionPoints", static_cast<int>(region)); });
   kernel.tiles = data.patches.empty() ? 0 : subspace.tile_count();
+  kernel.gather = CueGather(data);
   const std::size_t padded = subspace.soft_cache.padded_rows();
   // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles), g, joints
-  const std::size_t joints = 2 * data.joints.size() * (sizeof(Matrix4) / sizeof(float));
   const std::size_t scratch =
       std::max({whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())),
-                3 * padded + joints});
+                3 * padded + kernel.gather.scratch_floats()});
   const std::size_t after = subspace.score.doubt > 0  ? subspace.doubt_inputs()
                             : subspace.latent.empty() ? 0
                                                       : subspace.tile_inputs();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/scalar_math.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa {
@@ -11,11 +12,6 @@ namespace {
 
 constexpr double kBorder = 3;              // typical distances of neighbours
 constexpr std::size_t kFewestOfLevel = 3;  // regions; fewer would be most of an output each
-
-double SmoothStep(double from, double to, double x) {
-  const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
 
 // The median distance of points to the nearest other one of the same tile.
 double TypicalDistance(std::span<const Double3> tile) {
@@ -109,7 +105,7 @@ std::vector<PatchPoints> MakePatches(std::span<const std::vector<Double3>> posit
       for (Index i = 0; i < total; ++i) {
         double weight = i >= first && i < first + count ? 1 : 0;
         if (weight == 0 && border > 0 && std::isfinite(Dot(of[i], of[i])))
-          weight = 1 - SmoothStep(0, border, own.Nearest(of, of[i], border));
+          weight = 1 - Smoothstep(own.Nearest(of, of[i], border) / border);
         if (!(weight > 0)) continue;
         patch.points.push_back(i);
         patch.weights.push_back(static_cast<float>(weight));
@@ -151,7 +147,8 @@ void ChooseRegions(const PatchLayout& layout, double all, PatchChoice* choice) {
     if (region.top) choice->cost += least[r], choice->regions |= cover[r];
   }
   choice->mean = layout.patches == 0 ? 0 : sum / static_cast<double>(layout.patches);
-  choice->all = std::max(all, SmoothStep(kWholeFrom, kWholeAt, choice->mean));
+  choice->all =
+      std::max(all, Smoothstep(std::clamp((choice->mean - kWholeFrom) / (kWholeAt - kWholeFrom), 0.0, 1.0)));
   choice->full = choice->all > 0 || choice->cost > kMostOfFull;
   if (choice->full) choice->cost = 1, choice->regions = 0;
 }

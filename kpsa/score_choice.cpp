@@ -41,7 +41,7 @@ double ShareOfFull(const ScoreJudge& judge, const ScoreMix& mix, const SoftCache
 }
 
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
-                     double blend_start, const ScoreCosts& costs, const PatchLayout& patches) {
+                     double blend_start, const ScoreCosts& costs) {
   std::vector<double> measured, doubts;
   for (const ScoreJudge& judge : judges) {
     measured.push_back(judge.pose.measured);
@@ -56,13 +56,13 @@ ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, doubl
     for (const double around : kAround) {
       std::vector<CalibrationPair> pairs;
       for (const ScoreJudge& judge : judges)
-        pairs.push_back(PairOf(judge.pose, mix, patches, judge.guard, judge.kind));
+        pairs.push_back(PairOf(judge.pose, mix, {}, judge.guard, judge.kind));
       const Calibration found = Calibrate(pairs, around * tolerance, violation_rate, blend_start);
       std::map<int, double> weights;
       for (const Calibration::Kind& kind : found.kinds)
         weights[kind.kind] = 1 / static_cast<double>(kind.poses * found.kinds.size());
       for (const ScoreJudge& judge : judges)
-        sum += weights[judge.kind] * (1 - ShareOfFull(judge, mix, found.threshold, patches));
+        sum += weights[judge.kind] * (1 - ShareOfFull(judge, mix, found.threshold, {}));
     }
     return sum / static_cast<double>(std::size(kAround)) - (mix.measured > 0 ? costs.measured : 0) -
            (mix.doubt > 0 ? costs.doubt : 0);

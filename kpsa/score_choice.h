@@ -31,6 +31,6 @@ struct ScoreCosts {
 // The doubt alone, its 99 % quantile the unit: where there is nothing else.
 ScoreMix DoubtAlone(std::span<const ScoreJudge> judges);
 ScoreMix ChooseScore(std::span<const ScoreJudge> judges, double tolerance, double violation_rate,
-                     double blend_start, const ScoreCosts& costs, const PatchLayout& patches = {});
+                     double blend_start, const ScoreCosts& costs);
 
 }  // namespace kpsa

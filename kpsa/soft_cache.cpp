@@ -190,8 +190,7 @@ double FullWeight(double score, const SoftCacheThreshold& threshold) {
   if (!(threshold.tau > 0) || !(score < threshold.tau)) return 1;
   const double lo = threshold.tau_lo();
   if (score <= lo) return 0;
-  const double t = (score - lo) / (threshold.tau - lo);
-  return t * t * (3 - 2 * t);
+  return Smoothstep((score - lo) / (threshold.tau - lo));
 }
 
 SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,

@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "base/scalar_math.h"
 #include "base/types.h"
 #include "kpsa/aligned_array.h"
 #include "kpsa/estimator.h"
@@ -106,8 +107,7 @@ inline double GuardWeight(double lo, double hi, double ramp, double value) {
   const double outside = value < lo ? lo - value : value - hi;
   if (outside <= 0) return 0;
   if (!(outside < ramp)) return 1;
-  const double t = outside / ramp;
-  return t * t * (3 - 2 * t);
+  return Smoothstep(outside / ramp);
 }
 // "head.rotateX = 1.2 is outside its trained range [-0.5, 0.5]"
 std::string OutsideMessage(const TrainedRange& range, double value);

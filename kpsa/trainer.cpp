@@ -4,8 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "base/check.h"
-#include "kpsa/carried.h"
+#include "kpsa/calibrate_subspace.h"
 #include "kpsa/cue_choice.h"
 #include "kpsa/cue_description.h"
 #include "kpsa/cue_places.h"
@@ -22,6 +21,7 @@
 #include "kpsa/time_limit.h"
 #include "kpsa/trained_ranges.h"
 #include "kpsa/training_sampler.h"
+#include "kpsa/training_signals.h"
 
 namespace kpsa {
 namespace {
@@ -33,15 +33,12 @@ constexpr double kOwnShare = 0.04, kOwnMaxShare = 0.3, kFineShare = 0.03, kFineM
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
-constexpr std::size_t kBetween = 400;  // poses between the frames of all clips, at most
-constexpr std::size_t kChunk = 256;    // calibration poses that are held at once
-constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
-constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
-constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
-constexpr double kFewMisses = 0.01;                            // likewise: finer tiles for these
-constexpr std::size_t kTrialTiles = 8;  // of so many, one says whether cues of each tile pay:
-constexpr double kTrialBeyond = 0.02;   // share of poses farther off than half the tolerance, at most
-constexpr double kCautious = 0.9;  // of the tolerance: what misses, where a few more poses beyond it would
+constexpr std::size_t kBetween = 400;    // poses between the frames of all clips, at most
+constexpr int kMaxLightModes = 120;      // that are looked at; noise is beyond
+constexpr double kManyMisses = 0.05;     // of new poses: cues of each tile are tried
+constexpr double kFewMisses = 0.01;      // likewise: finer tiles for these
+constexpr std::size_t kTrialTiles = 8;   // of so many, one says whether cues of each tile pay:
+constexpr double kTrialBeyond = 0.02;    // share of poses farther off than half the tolerance, at most
 constexpr double kHopelessTiles = 0.3;   // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;  // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;    // how long these take, in the time that modes took
@@ -86,7 +83,12 @@ class Trainer {
     modes_seconds_ = limit_.elapsed() - before_modes;
     KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges, options_.tolerance));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
-    KPSA_RETURN_IF_ERROR(PricePatches());
+    if (!of_light() && options_.mode == EstimatorMode::kMap) {
+      KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+      Result<PatchLayout> patches = PricePatches(rig_, &compiler_, totals_, positions_);
+      if (!patches.ok()) return patches.status();
+      patches_ = std::move(*patches);
+    }
     Result<Subspace> subspace = Assemble(&poses, judges);
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
@@ -109,11 +111,7 @@ class Trainer {
   }
 
  private:
-  Status Say(const char* what, double share) {
-    if (options_.progress && !options_.progress(what, share))
-      return Status::Make(ErrorKind::kInterrupted, "interrupted");
-    return Status();
-  }
+  Status Say(const char* what, double share) { return SayStage(options_, what, share); }
 
   Status Prepare() {
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
@@ -135,28 +133,12 @@ class Trainer {
       full_cost_ = places->full_cost;
     }
 
-    // Signals: under the controls, and under each clip
-    std::vector<Signal> signals, relative;
-    for (int clip = -1; clip < static_cast<int>(clips_.size()); ++clip) {
-      if (clip >= 0) KPSA_RETURN_IF_ERROR(rig_.set_clip(clips_[static_cast<std::size_t>(clip)].name));
-      std::vector<PlugRef> varying{rig_.time};
-      for (const ControlRange& control : rig_.controls) {
-        if (clip < 0 || !control.by_clip) varying.push_back(control.plug);
-      }
-      Result<std::vector<Signal>> found =
-          FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, {}, nullptr);
-      if (!found.ok()) return found.status();
-      AddNew(std::move(*found), &signals);
-      if (of_light() || options_.mode == EstimatorMode::kPaper) continue;
-      Result<std::vector<Signal>> matrices =
-          FindRelativeMatrices(*rig_.graph, &compiler_, rig_.target.outputs(), varying);
-      if (!matrices.ok()) return matrices.status();
-      AddNew(std::move(*matrices), &relative);
-    }
-    for (std::vector<Signal>* list : {&signals, &relative}) std::ranges::sort(*list, {}, &Signal::name);
-    guards_ = signals;
-    signals.insert(signals.end(), relative.begin(), relative.end());
-    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+    const bool of_map = !of_light() && options_.mode == EstimatorMode::kMap;
+    Result<TrainingSignals> found = FindTrainingSignals(rig_, &compiler_, clips_, of_map);
+    if (!found.ok()) return found.status();
+    guards_ = std::move(found->watched);
+    std::vector<Signal> signals = guards_;
+    signals.insert(signals.end(), found->relative.begin(), found->relative.end());
     for (const PlugRef& space : rig_.target.space) {
       const Result<Value> rest = compiler_.Rest(*rig_.graph, space);
       if (!rest.ok()) return rest.status();
@@ -164,20 +146,12 @@ class Trainer {
     }
     recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals),
                                                inverse_rest_stretch_);
-    const bool multiplies = !of_light() && options_.mode == EstimatorMode::kMap;
-    Result<PoseLayout> layout = recorder_->Layout(multiplies ? kCueProducts : 0);
+    Result<PoseLayout> layout = recorder_->Layout(of_map ? kCueProducts : 0);
     if (!layout.ok()) return layout.status();
     layout_ = *layout;
     sampler_ = std::make_unique<TrainingSampler>(rig_, drawn_, clips_, options_, recorder_.get(), layout_);
     totals_ = totals;
     return Status();
-  }
-
-  static void AddNew(std::vector<Signal> found, std::vector<Signal>* known) {
-    for (Signal& signal : found) {
-      if (std::ranges::find(*known, signal.name, &Signal::name) == known->end())
-        known->push_back(std::move(signal));
-    }
   }
 
   // To train on, and, where cues have places to choose from, to judge these by.
@@ -343,26 +317,6 @@ class Trainer {
   TileOptions TileBudgets(bool fine) const {
     if (fine) return {kFineShare * options_.tolerance, kFineMaxShare * options_.tolerance, kTileRest};
     return {kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance, of_light() ? 0 : kTileRest};
-  }
-
-  // What patches would cost that miss by themselves, whatever the cues.
-  Status PricePatches() {
-    if (of_light() || options_.mode == EstimatorMode::kPaper || !(full_cost_ > 0)) return Status();
-    std::vector<std::size_t> tiles;
-    std::vector<std::vector<Double3>> positions;
-    auto next = positions_.begin();
-    for (const Index total : totals_) {
-      tiles.push_back((total + kTilePoints - 1) / kTilePoints);
-      positions.emplace_back(next, next + total);
-      next += total;
-    }
-    patches_ = MakePatchLayout(tiles);
-    if (patches_.tiles == 0) return Status();
-    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
-    Result<std::vector<double>> costs = CostsOfRegions(rig_, &compiler_, positions, patches_);
-    if (!costs.ok()) return costs.status();
-    patches_.costs = std::move(*costs);
-    return Status();
   }
 
   Subspace ForAllPoints(PoseMatrix* poses, bool fine) {
@@ -560,15 +514,11 @@ class Trainer {
              : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest});
   }
 
-  // SoftCache's own score speaks of all points, and would say of no part that it misses.
-  static bool JudgedByDoubts(const Subspace& subspace) {
-    return subspace.doubt_inputs() > 0 && subspace.soft_cache.factor.size() == 0;
-  }
   // The subspace is given its best score by the judges, and is then priced.
   Result<FrameCost> Price(Subspace* subspace, const CueSet& cues, const PoseMatrix& judges) {
     const Result<double> points = CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues.cues);
     if (!points.ok()) return points.status();
-    if (JudgedByDoubts(*subspace)) subspace->patches = patches_;
+    GivePatches(patches_, subspace);
     std::vector<ScoreJudge> judged;
     for (const JudgedPose& pose : PoseJudge(*subspace, layout_, cues).Judge(judges))
       judged.push_back({pose, 0, judge_kinds_[judged.size()]});
@@ -577,121 +527,15 @@ class Trainer {
     return ChooseMisses(subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds);
   }
 
-  // Poses of every kind, a few at a time: scores, errors, guards; and the ranges that the guards keep.
+  // Also says what a frame is expected to cost, but points.
   Status Calibrate(Subspace* subspace) {
-    std::vector<SampledPose> sweeps = sampler_->SweepsWithTilts(), trial;
-    for (std::size_t i = 0; i < std::min(kTrialSweeps, sweeps.size()); ++i)
-      trial.push_back(sweeps[i * sweeps.size() / std::min(kTrialSweeps, sweeps.size())]);
-    for (SampledPose& pose :
-         sampler_->Of(PoseKind::kSampled, kTrialSamples, options_.seed ^ 0x6a09e667f3bcc908ull))
-      trial.push_back(std::move(pose));
-    const Result<Carried> carried =
-        FindCarried(rig_, &compiler_, clips_, trial, inverse_rest_stretch_, diagonal_, options_.tolerance);
-    if (!carried.ok()) return carried.status();
-    subspace->carried = carried->rigid;
-    subspace->space_scales = carried->scales;
-    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
-
-    std::size_t count = options_.calibration_poses;
-    if (count == 0)
-      count =
-          static_cast<std::size_t>(std::clamp(8.0 / std::max(options_.violation_rate, 1e-4), 400.0, 1000.0));
-    if (JudgedByDoubts(*subspace)) subspace->patches = patches_;
-    // Held-out poses of every kind; as many new ones say how to score them.
-    PoseJudge judge(*subspace, layout_, cues_), score_judge(*subspace, layout_, cues_);
-    std::vector<ScoreJudge> held_out, score_judges;
-    std::vector<std::vector<float>> entries, score_entries;
-    std::vector<SampledPose> poses;
-    for (int k = 0; k < (of_light() ? 1 : kPoseKinds); ++k) {
-      KPSA_RETURN_IF_ERROR(Say("calibration", 0.9 + 0.025 * k));
-      KPSA_RETURN_IF_ERROR(JudgePoses(k, count, 0x5deece66dull, &judge, &held_out, &entries, &poses));
-      if (std::any_of(subspace->tiles.begin(), subspace->tiles.end(),
-                      [](const TileMap& tiles) { return tiles.has_products(); }))
-        KPSA_RETURN_IF_ERROR(
-            JudgePoses(k, count, 0x3c6ef372fe94f82bull, &score_judge, &score_judges, &score_entries));
-    }
-    record_.calibration_poses = poses.size();
-    record_.held_out_rms = judge.rms();
-    record_.held_out_max = judge.max();
-
-    KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
-    Result<std::vector<TrainedRange>> ranges =
-        ranges_.Make(rig_, &compiler_, guards_,
-                     {options_.tolerance, options_.range_ramp, diagonal_, inverse_rest_stretch_});
-    if (!ranges.ok()) return ranges.status();
-    subspace->ranges = std::move(*ranges);
-    const std::vector<char> guarded = GuardedEntries(carried->rigid);
-    AskGuards(subspace->ranges, guarded, entries, &held_out);
-    AskGuards(subspace->ranges, guarded, score_entries, &score_judges);
-    if (score_judges.empty()) {
-      subspace->score = ScoreOf(*subspace, score_judges, full_cost_);
-      cost_ = ExpectedCost(*subspace, held_out, 0, full_cost_, kCautious * options_.tolerance,
-                           kCalibrationConfidence);
-    } else {
-      cost_ = ChooseMisses(subspace, score_judges, 0, full_cost_, kCautious * options_.tolerance,
-                           kCalibrationConfidence);
-    }
-    for (ScoreJudge& held : held_out) {
-      if (subspace->patches.tiles == 0) held.pose.patches.clear();
-      subspace->calibration.push_back(
-          PairOf(held.pose, subspace->score, subspace->patches, held.guard, held.kind));
-    }
-    const Calibration calibration = kpsa::Calibrate(subspace->calibration, subspace->tolerance,
-                                                    subspace->violation_rate, subspace->blend_start);
-    if (calibration.worst != Calibration::kNoPose) SayWorst(poses[calibration.worst], calibration);
+    const Calibrator calibrator{
+        rig_, clips_, options_, guards_, layout_, patches_, diagonal_, full_cost_, inverse_rest_stretch_};
+    const Result<FrameCost> cost = CalibrateSubspace(
+        calibrator, {&compiler_, recorder_.get(), sampler_.get(), &ranges_, &record_}, cues_, subspace);
+    if (!cost.ok()) return cost.status();
+    cost_ = *cost;
     return Status();
-  }
-
-  // `count` poses of a kind, a few at a time; `poses` may be null. All but those beyond the ranges widen
-  // these.
-  Status JudgePoses(int kind, std::size_t count, std::uint64_t seed, PoseJudge* judge,
-                    std::vector<ScoreJudge>* judged, std::vector<std::vector<float>>* entries,
-                    std::vector<SampledPose>* poses = nullptr) {
-    const auto of = static_cast<PoseKind>(kind);
-    const std::vector<SampledPose> drawn =
-        sampler_->Of(of, count, (options_.seed + static_cast<std::uint64_t>(kind)) ^ seed);
-    for (std::size_t first = 0; first < drawn.size(); first += kChunk) {
-      // By clip, as the recorder writes them
-      std::vector<SampledPose> chunk(
-          drawn.begin() + static_cast<std::ptrdiff_t>(first),
-          drawn.begin() + static_cast<std::ptrdiff_t>(std::min(first + kChunk, drawn.size())));
-      std::stable_sort(chunk.begin(), chunk.end(),
-                       [](const SampledPose& a, const SampledPose& b) { return a.clip < b.clip; });
-      PoseMatrix recorded(layout_);
-      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(chunk, clips_, &recorded));
-      for (const JudgedPose& pose : judge->Judge(recorded)) judged->push_back({pose, 0, kind});
-      for (std::size_t t = 0; t < recorded.poses(); ++t) {
-        const std::span<const float> row = std::as_const(recorded).row(t).subspan(layout_.scalar_begin());
-        if (of != PoseKind::kBeyond) ranges_.Widen(row);
-        entries->emplace_back(row.begin(), row.end());
-      }
-      if (poses != nullptr) poses->insert(poses->end(), chunk.begin(), chunk.end());
-    }
-    return Status();
-  }
-
-  // By entry: whether it has a guard where the space carries the points.
-  std::vector<char> GuardedEntries(const std::vector<std::string>& carried) const {
-    std::vector<char> guarded;
-    for (const Signal& signal : guards_) {
-      const bool free = signal.matrix && std::find(carried.begin(), carried.end(),
-                                                   rig_.graph->name(signal.plug.node)) != carried.end();
-      guarded.insert(guarded.end(), signal.entries(), !free);
-    }
-    return guarded;
-  }
-
-  void SayWorst(const SampledPose& pose, const Calibration& calibration) {
-    record_.worst.error = calibration.worst_error;
-    record_.worst.kind = PoseKindName(pose.kind);
-    for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
-      if (pose.values[c] != rig_.controls[c].rest && !(pose.clip >= 0 && rig_.controls[c].by_clip))
-        record_.worst.controls.emplace_back(rig_.graph->PlugName(rig_.controls[c].plug), pose.values[c]);
-    }
-    if (pose.clip < 0) return;
-    const TrainingClip& clip = clips_[static_cast<std::size_t>(pose.clip)];
-    record_.worst.clip = clip.name;
-    record_.worst.time = clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
   }
 
   const TrainingRig rig_;                  // its controls are the rig's, then tilts

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/prefetch.h"
+#include "base/scalar_math.h"
 #include "graph/geometry.h"
 #include "nodes/clip_keys.h"
 #include "nodes/deformer.h"
@@ -285,7 +286,7 @@ void ComputeAnimCurve(ComputeContext& c) {
   const double a = k.values[next - 1], b = k.values[next];
   double u = (t - k.times[next - 1]) / (k.times[next] - k.times[next - 1]);
   if (k.interpolation == 1) u = 0;
-  if (k.interpolation == 2) u = u * u * (3 - 2 * u);
+  if (k.interpolation == 2) u = Smoothstep(u);
   c.out_value<double>(0) = a + (b - a) * u;
 }
 

@@ -29,10 +29,7 @@ double ClampTo(double x, double low, double high) { return std::min(std::max(x, 
 double LinearStep(double low, double high, double x) {
   return high == low ? (x < low ? 0 : 1) : ClampTo((x - low) / (high - low), 0, 1);
 }
-double SmoothStep(double low, double high, double x) {
-  const double t = LinearStep(low, high, x);
-  return t * t * (3 - 2 * t);
-}
+double SmoothStep(double low, double high, double x) { return Smoothstep(LinearStep(low, high, x)); }
 double Least(const double* values, int count) { return *std::min_element(values, values + count); }
 double Greatest(const double* values, int count) { return *std::max_element(values, values + count); }
 double Negative(double x) { return -x; }

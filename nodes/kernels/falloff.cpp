@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "base/scalar_math.h"
+
 namespace kpsa {
 
 Status FalloffProfile::Validate() const {
@@ -27,7 +29,7 @@ double FalloffProfile::Evaluate(double t) const {
     case FalloffCurve::kLinear:
       return 1 - t;
     case FalloffCurve::kSmooth:
-      return 1 - t * t * (3 - 2 * t);
+      return 1 - Smoothstep(t);
     case FalloffCurve::kSpline:
       return (1 - t * t) * (1 - t * t);
     case FalloffCurve::kRamp:

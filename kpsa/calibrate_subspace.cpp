@@ -1,0 +1,151 @@
+#include "kpsa/calibrate_subspace.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "kpsa/carried.h"
+#include "kpsa/pose_judge.h"
+
+namespace kpsa {
+namespace {
+
+constexpr std::size_t kPosesAtOnce = 256;                      // are held
+constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
+constexpr double kCautious = 0.9;  // of the tolerance: what misses, where a few more poses beyond it would
+constexpr std::uint64_t kHeldOutSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
+                        kTrialSeed = 0x6a09e667f3bcc908ull;
+
+// Judged poses of every kind.
+struct JudgedSet {
+  std::vector<ScoreJudge> judges;
+  std::vector<std::vector<float>> entries;  // of the signals, by pose
+  std::vector<SampledPose> poses;
+};
+
+std::size_t PosesOfKind(const TrainOptions& options) {
+  if (options.calibration_poses > 0) return options.calibration_poses;
+  return static_cast<std::size_t>(std::clamp(8.0 / std::max(options.violation_rate, 1e-4), 400.0, 1000.0));
+}
+
+// What carries the points rigidly is tried at a few poses.
+Result<Carried> TryCarried(const Calibrator& of, const CalibrationWork& work) {
+  std::vector<SampledPose> sweeps = work.sampler->SweepsWithTilts(), trial;
+  const std::size_t count = std::min(kTrialSweeps, sweeps.size());
+  for (std::size_t i = 0; i < count; ++i) trial.push_back(sweeps[i * sweeps.size() / count]);
+  for (SampledPose& pose : work.sampler->Of(PoseKind::kSampled, kTrialSamples, of.options.seed ^ kTrialSeed))
+    trial.push_back(std::move(pose));
+  return FindCarried(of.rig, work.compiler, of.clips, trial, of.inverse_rest_stretch, of.diagonal,
+                     of.options.tolerance);
+}
+
+// New poses of a kind, a few at a time. All but those beyond the ranges widen these.
+Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, std::uint64_t seed,
+                  PoseJudge* judge, JudgedSet* judged) {
+  const auto pose_kind = static_cast<PoseKind>(kind);
+  const std::vector<SampledPose> drawn = work.sampler->Of(
+      pose_kind, PosesOfKind(of.options), (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed);
+  for (std::size_t first = 0; first < drawn.size(); first += kPosesAtOnce) {
+    // By clip, as the recorder writes them
+    std::vector<SampledPose> some(
+        drawn.begin() + static_cast<std::ptrdiff_t>(first),
+        drawn.begin() + static_cast<std::ptrdiff_t>(std::min(first + kPosesAtOnce, drawn.size())));
+    std::ranges::stable_sort(some, {}, &SampledPose::clip);
+    PoseMatrix recorded(of.layout);
+    KPSA_RETURN_IF_ERROR(work.recorder->AddSamples(some, of.clips, &recorded));
+    for (const JudgedPose& pose : judge->Judge(recorded)) judged->judges.push_back({pose, 0, kind});
+    for (std::size_t t = 0; t < recorded.poses(); ++t) {
+      const std::span<const float> row = std::as_const(recorded).row(t).subspan(of.layout.scalar_begin());
+      if (pose_kind != PoseKind::kBeyond) work.ranges->Widen(row);
+      judged->entries.emplace_back(row.begin(), row.end());
+    }
+    judged->poses.insert(judged->poses.end(), some.begin(), some.end());
+  }
+  return Status();
+}
+
+// By entry: whether it has a guard where the space carries the points.
+std::vector<char> GuardedEntries(const Calibrator& of, const std::vector<std::string>& carried) {
+  std::vector<char> guarded;
+  for (const Signal& signal : of.guards) {
+    const bool free =
+        signal.matrix && std::ranges::find(carried, of.rig.graph->name(signal.plug.node)) != carried.end();
+    guarded.insert(guarded.end(), signal.entries(), !free);
+  }
+  return guarded;
+}
+
+void RecordWorst(const Calibrator& of, const SampledPose& pose, double error, TrainingRecord* record) {
+  record->worst.error = error;
+  record->worst.kind = PoseKindName(pose.kind);
+  for (std::size_t c = 0; c < of.rig.controls.size(); ++c) {
+    const ControlRange& control = of.rig.controls[c];
+    if (pose.values[c] != control.rest && !(pose.clip >= 0 && control.by_clip))
+      record->worst.controls.emplace_back(of.rig.graph->PlugName(control.plug), pose.values[c]);
+  }
+  if (pose.clip < 0) return;
+  const TrainingClip& clip = of.clips[static_cast<std::size_t>(pose.clip)];
+  record->worst.clip = clip.name;
+  record->worst.time = clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
+}
+
+}  // namespace
+
+Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
+                                    Subspace* subspace) {
+  const Result<Carried> carried = TryCarried(of, work);
+  if (!carried.ok()) return carried.status();
+  subspace->carried = carried->rigid;
+  subspace->space_scales = carried->scales;
+  KPSA_RETURN_IF_ERROR(of.rig.set_clip(std::nullopt));
+
+  GivePatches(of.patches, subspace);
+  // Held-out poses of every kind; as many new ones say how to score them.
+  const bool doubts = std::ranges::any_of(subspace->tiles, &TileMap::has_products);
+  PoseJudge judge(*subspace, of.layout, cues), score_judge(*subspace, of.layout, cues);
+  JudgedSet held_out, scoring;
+  for (int k = 0; k < (of.rig.target.colors ? 1 : kPoseKinds); ++k) {
+    KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.9 + 0.025 * k));
+    KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kHeldOutSeed, &judge, &held_out));
+    if (doubts) KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kScoreSeed, &score_judge, &scoring));
+  }
+  work.record->calibration_poses = held_out.poses.size();
+  work.record->held_out_rms = judge.rms();
+  work.record->held_out_max = judge.max();
+
+  KPSA_RETURN_IF_ERROR(of.rig.set_clip(std::nullopt));
+  Result<std::vector<TrainedRange>> ranges =
+      work.ranges->Make(of.rig, work.compiler, of.guards,
+                        {of.options.tolerance, of.options.range_ramp, of.diagonal, of.inverse_rest_stretch});
+  if (!ranges.ok()) return ranges.status();
+  subspace->ranges = std::move(*ranges);
+  const std::vector<char> guarded = GuardedEntries(of, carried->rigid);
+  AskGuards(subspace->ranges, guarded, held_out.entries, &held_out.judges);
+  AskGuards(subspace->ranges, guarded, scoring.entries, &scoring.judges);
+  FrameCost cost;
+  const double cautious = kCautious * of.options.tolerance;
+  if (scoring.judges.empty()) {
+    subspace->score = ScoreOf(*subspace, scoring.judges, of.full_cost);
+    cost = ExpectedCost(*subspace, held_out.judges, 0, of.full_cost, cautious, kCalibrationConfidence);
+  } else {
+    cost = ChooseMisses(subspace, scoring.judges, 0, of.full_cost, cautious, kCalibrationConfidence);
+  }
+  for (ScoreJudge& held : held_out.judges) {
+    if (subspace->patches.tiles == 0) held.pose.patches.clear();
+    subspace->calibration.push_back(
+        PairOf(held.pose, subspace->score, subspace->patches, held.guard, held.kind));
+  }
+  const Calibration calibration =
+      Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
+  if (calibration.worst != Calibration::kNoPose)
+    RecordWorst(of, held_out.poses[calibration.worst], calibration.worst_error, work.record);
+  return cost;
+}
+
+Status SayStage(const TrainOptions& options, const char* what, double share) {
+  if (options.progress && !options.progress(what, share))
+    return Status::Make(ErrorKind::kInterrupted, "interrupted");
+  return Status();
+}
+
+}  // namespace kpsa

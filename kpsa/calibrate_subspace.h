@@ -1,0 +1,38 @@
+// What a finished subspace misses and promises: evaluates new poses of every kind, finds the ranges that
+// guards keep, and pairs scores with errors. Internal to training.
+#pragma once
+
+#include "kpsa/frame_cost.h"
+#include "kpsa/trained_ranges.h"
+#include "kpsa/training_sampler.h"
+
+namespace kpsa {
+
+// All references must outlive it.
+struct Calibrator {
+  const TrainingRig& rig;  // with tilts
+  const std::vector<TrainingClip>& clips;
+  const TrainOptions& options;
+  const std::vector<Signal>& guards;  // the recorder's first signals
+  const PoseLayout& layout;
+  const PatchLayout& patches;  // that may miss by themselves
+  double diagonal = 0, full_cost = 0;
+  Matrix4 inverse_rest_stretch;
+};
+// What it works with, and leaves behind: wider ranges, and the record of the calibration.
+struct CalibrationWork {
+  Compiler* compiler = nullptr;
+  PoseRecorder* recorder = nullptr;
+  const TrainingSampler* sampler = nullptr;
+  RangeFinder* ranges = nullptr;
+  TrainingRecord* record = nullptr;
+};
+// Gives the subspace its score, ranges and calibration; cues: its own. The expected cost of a frame comes
+// without that of its points.
+Result<FrameCost> CalibrateSubspace(const Calibrator& calibrator, const CalibrationWork& work,
+                                    const CueSet& cues, Subspace* subspace);
+
+// A stage of training and how much of it is done; kInterrupted where nobody wants to go on.
+Status SayStage(const TrainOptions& options, const char* what, double share);
+
+}  // namespace kpsa

@@ -1,0 +1,111 @@
+#include "kpsa/cue_gather.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <tuple>
+
+#include "base/matrix.h"
+
+namespace kpsa {
+namespace {
+
+using RowKind = KpsaConfig::Row::Kind;
+
+constexpr std::uint32_t ElementOf(Index entry) { return 4 * (entry / 3) + entry % 3; }
+
+// An entry each of a and b, summed over k in this order, for all entries of the upper three rows.
+void MultiplyUpper(const Matrix4& a, const Matrix4& b, std::array<double, 16>* product) {
+  for (std::size_t column = 0; column < 4; ++column) {
+    const double* of = b.m.data() + 4 * column;
+    for (std::size_t row = 0; row < 4; ++row)
+      (*product)[4 * column + row] =
+          a.m[row] * of[0] + a.m[4 + row] * of[1] + a.m[8 + row] * of[2] + a.m[12 + row] * of[3];
+  }
+}
+
+double ValueOf(const ArrayView<Matrix4>& matrices, const ArrayView<double>& scalars,
+               const KpsaConfig::Row& row) {
+  return row.kind == RowKind::kMatrix ? matrices[row.input].m[ElementOf(row.element)] : scalars[row.input];
+}
+
+}  // namespace
+
+CueGather::CueGather(const KpsaConfig::Data& data)
+    : has_space_(data.has_space), rest_origin_(data.rest_origin), joints_(data.joints) {
+  std::map<std::tuple<Index, Index, bool>, std::vector<Entry>> blocks;
+  std::size_t next = 0;
+  for (const KpsaConfig::Row& row : data.rows) {
+    switch (row.kind) {
+      case RowKind::kPoint: {
+        const KpsaConfig::PointCues& of = data.cues[row.input];
+        points_.push_back({row.input, row.element, row.joint, of.in_space, of.near, next});
+        next += 2;
+        break;
+      }
+      case RowKind::kMatrix:
+        blocks[{row.joint, row.input, data.relative[row.input] != 0}].push_back(
+            {ElementOf(row.element), static_cast<std::uint32_t>(next)});
+        break;
+      case RowKind::kScalar:
+        scalars_.push_back({row.input, next});
+        break;
+      case RowKind::kProduct:
+        products_.push_back({data.products[row.input], next});
+        break;
+    }
+    ++next;
+  }
+  for (const auto& [of, entries] : blocks) {
+    const auto begin = static_cast<std::uint32_t>(entries_.size());
+    entries_.insert(entries_.end(), entries.begin(), entries.end());
+    const auto& [joint, matrix, relative] = of;
+    blocks_.push_back({matrix, joint, relative, begin, static_cast<std::uint32_t>(entries_.size())});
+  }
+}
+
+void CueGather::Gather(const Inputs& in, float* scratch, std::span<double> raw) const {
+  const Matrix4& world_from_space = in.world_from_space;
+  Matrix4 space_from_world;
+  if (!(world_from_space == Matrix4())) space_from_world = InverseOrIdentity(world_from_space);
+  // Of points that have been moved by rest_origin - origin: that is taken back in double
+  Matrix4 space_from_near = space_from_world;
+  if (has_space_) {
+    const Double3 moved =
+        Double3{world_from_space(0, 3), world_from_space(1, 3), world_from_space(2, 3)} - rest_origin_;
+    space_from_near = space_from_world * Translation(moved);
+  }
+  Matrix4* const joint_from_world = reinterpret_cast<Matrix4*>(scratch);
+  Matrix4* const joint_from_space = joint_from_world + joints_.size();
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    joint_from_world[j] = InverseOrIdentity(in.matrices[joints_[j]]);
+    if (!points_.empty()) joint_from_space[j] = joint_from_world[j] * world_from_space;
+  }
+  for (const Point& point : points_) {
+    const ConstPointsView& points = in.cues[point.input];
+    Double3 p{points.x[point.element], points.y[point.element], points.z[point.element]};
+    if (point.in_space) p = TransformPoint(point.near ? space_from_near : space_from_world, p);
+    if (point.joint != kNoIndex) p = TransformPoint(joint_from_space[point.joint], p);
+    raw[point.row] = p.x, raw[point.row + 1] = p.y, raw[point.row + 2] = p.z;
+  }
+  std::array<double, 16> product;
+  for (const Block& block : blocks_) {
+    const Matrix4& matrix = in.matrices[block.matrix];
+    const double* values = matrix.m.data();
+    if (block.joint != kNoIndex || block.relative) {
+      MultiplyUpper(block.joint != kNoIndex ? joint_from_world[block.joint] : space_from_world, matrix,
+                    &product);
+      values = product.data();
+    }
+    for (std::uint32_t e = block.begin; e < block.end; ++e)
+      raw[entries_[e].row] = values[entries_[e].element];
+  }
+  for (const Scalar& scalar : scalars_) raw[scalar.row] = in.scalars[scalar.input];
+  for (const Product& of : products_) {
+    double value = of.of.of_a.Of(ValueOf(in.matrices, in.scalars, of.of.a));
+    if (of.of.b.kind != RowKind::kPoint) value *= of.of.of_b.Of(ValueOf(in.matrices, in.scalars, of.of.b));
+    raw[of.row] = value < of.of.lo ? of.of.lo : value > of.of.hi ? of.of.hi : value;  // NaN stays
+  }
+}
+
+}  // namespace kpsa
