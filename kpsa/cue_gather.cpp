@@ -1,7 +1,6 @@
 #include "kpsa/cue_gather.h"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <tuple>
 
@@ -13,16 +12,6 @@ namespace {
 using RowKind = KpsaConfig::Row::Kind;
 
 constexpr std::uint32_t ElementOf(Index entry) { return 4 * (entry / 3) + entry % 3; }
-
-// An entry each of a and b, summed over k in this order, for all entries of the upper three rows.
-void MultiplyUpper(const Matrix4& a, const Matrix4& b, std::array<double, 16>* product) {
-  for (std::size_t column = 0; column < 4; ++column) {
-    const double* of = b.m.data() + 4 * column;
-    for (std::size_t row = 0; row < 4; ++row)
-      (*product)[4 * column + row] =
-          a.m[row] * of[0] + a.m[4 + row] * of[1] + a.m[8 + row] * of[2] + a.m[12 + row] * of[3];
-  }
-}
 
 double ValueOf(const ArrayView<Matrix4>& matrices, const ArrayView<double>& scalars,
                const KpsaConfig::Row& row) {
@@ -88,17 +77,14 @@ void CueGather::Gather(const Inputs& in, float* scratch, std::span<double> raw) 
     if (point.joint != kNoIndex) p = TransformPoint(joint_from_space[point.joint], p);
     raw[point.row] = p.x, raw[point.row + 1] = p.y, raw[point.row + 2] = p.z;
   }
-  std::array<double, 16> product;
   for (const Block& block : blocks_) {
     const Matrix4& matrix = in.matrices[block.matrix];
-    const double* values = matrix.m.data();
-    if (block.joint != kNoIndex || block.relative) {
-      MultiplyUpper(block.joint != kNoIndex ? joint_from_world[block.joint] : space_from_world, matrix,
-                    &product);
-      values = product.data();
-    }
+    Matrix4 product;
+    if (block.joint != kNoIndex || block.relative)
+      product = (block.joint != kNoIndex ? joint_from_world[block.joint] : space_from_world) * matrix;
+    const Matrix4& values = block.joint != kNoIndex || block.relative ? product : matrix;
     for (std::uint32_t e = block.begin; e < block.end; ++e)
-      raw[entries_[e].row] = values[entries_[e].element];
+      raw[entries_[e].row] = values.m[entries_[e].element];
   }
   for (const Scalar& scalar : scalars_) raw[scalar.row] = in.scalars[scalar.input];
   for (const Product& of : products_) {

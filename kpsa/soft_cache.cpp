@@ -105,7 +105,9 @@ HWY_AFTER_NAMESPACE();
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "base/check.h"
 #include "kpsa/quantile.h"
@@ -134,6 +136,13 @@ float BlockNorm(const float* block, const float* g, std::size_t h) {
 // The first cue with a value that is not below `limit`.
 Index FirstNotFinite(const SoftCacheModel& model, std::span<const float> y,
                      float limit = std::numeric_limits<float>::infinity()) {
+  // As whole numbers, which are in order as magnitudes are, infinity and NaN last: no branch for each
+  constexpr std::int32_t kMagnitude = 0x7fffffff;
+  const auto least = std::bit_cast<std::int32_t>(limit);
+  std::int32_t spoilt = 0;
+  for (const float value : y.first(model.rows()))
+    spoilt |= (std::bit_cast<std::int32_t>(value) & kMagnitude) >= least ? -1 : 0;
+  if (spoilt == 0) return kNoIndex;
   for (std::size_t k = 0; k < model.cues(); ++k) {
     for (Index j = model.offsets[k]; j < model.offsets[k + 1]; ++j) {
       if (!(std::fabs(y[j]) < limit)) return static_cast<Index>(k);
