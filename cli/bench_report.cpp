@@ -67,6 +67,21 @@ ToleranceWords WordsOf(const BenchResult& r) {
   return {"frames", "train on clips that are like these, or on more samples", r.light};
 }
 
+OrderedJson ReferenceJson(const ReferenceTable& table) {
+  if (table.rows.empty()) return {};
+  OrderedJson rows = OrderedJson::array();
+  for (const FromReference& row : table.rows) {
+    OrderedJson rms = OrderedJson::array();
+    for (const double error : row.rms) rms.push_back(Finite(error));
+    rows.push_back({{"name", row.name}, {"rms", rms}, {"ms_per_frame", row.ms}, {"frames", row.frames}});
+  }
+  return {{"variant", table.variant},
+          {"outputs", table.outputs},
+          {"points", table.points},
+          {"of_points", table.of_points},
+          {"rows", rows}};
+}
+
 OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
   nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
   for (const BenchNode& n : r.full_nodes) {
@@ -148,12 +163,30 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
         {"worst_clip", r.worst_clip},
         {"worst_frame", r.worst_clip.empty() ? OrderedJson() : OrderedJson(r.worst_frame)}}},
       {"frame_errors", FrameErrorsJson(r.frame_errors)},
+      {"reference", ReferenceJson(r.reference)},
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
       {"tolerances", ToleranceJson<OrderedJson>(r.tolerances, WordsOf(r))},
       {"per_frame", per_frame},
       {"notes", r.notes}};
+}
+
+std::string ReferenceText(const BenchResult& r) {
+  if (r.reference.rows.empty()) return "";
+  std::vector<std::string> header{"RMS from " + r.reference.variant};
+  for (const std::string& output : r.reference.outputs) header.push_back(">" + output);
+  header.insert(header.end(), {">ms/frame", ">accelerated is"});
+  Table table(header);
+  for (const FromReference& row : r.reference.rows) {
+    std::vector<std::string> cells{row.name};
+    for (const double error : row.rms) cells.push_back(ErrorText(error, r.light));
+    cells.push_back(fmt::format("{:.3f}", row.ms));
+    const bool itself = row.name == r.reference.rows.front().name;
+    cells.push_back(itself ? "" : RatioText(Ratio(row.ms, r.accelerated_ms), 1) + " as fast");
+    table.Row(cells);
+  }
+  return fmt::format("\n{}at {} of {} points\n", table.Text(), r.reference.points, r.reference.of_points);
 }
 
 std::string SideText(const BenchResult& r, const BenchContext& context) {
@@ -224,7 +257,7 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
                           ", "),
                 r.never_evaluated.size() > 6 ? ", ..." : ""));
   if (!r.tolerances.rows.empty()) text += "\n" + ToleranceText(r.tolerances, WordsOf(r));
-  return text;
+  return text + ReferenceText(r);
 }
 
 }  // namespace
@@ -239,16 +272,24 @@ std::string BenchJson(const std::vector<BenchResult>& results, const BenchContex
 std::string FramesText(const std::vector<BenchResult>& results) {
   std::string text;
   for (const BenchResult& r : results) {
-    Table table({"clip", ">frame", "", ">full", ">score", ">RMS", ">max", ">full ms", ">accelerated ms",
-                 ">speedup", "why"});
-    for (const BenchResult::Frame& f : r.per_frame) {
+    std::vector<std::string> header{"clip", ">frame", "", ">full", ">score", ">RMS", ">max"};
+    header.insert(header.end(), {">full ms", ">accelerated ms", ">speedup"});
+    for (const FromReference& row : r.reference.rows)
+      header.push_back(fmt::format(">{} from {}", row.name, r.reference.variant));
+    header.emplace_back("why");
+    Table table(header);
+    for (std::size_t i = 0; i < r.per_frame.size(); ++i) {
+      const BenchResult::Frame& f = r.per_frame[i];
       const FrameDecision& d = f.decision;
-      table.Row({f.clip, fmt::format("{}", f.number), VerdictName(d.verdict()),
-                 fmt::format("{:.0f} %", 100 * d.full_weight),
-                 std::isfinite(d.score) ? fmt::format("{:.3g}", d.score) : "-", ErrorText(f.rms, r.light),
-                 ErrorText(f.max, r.light), fmt::format("{:.3f}", f.full_ms),
-                 fmt::format("{:.3f}", f.accelerated_ms), RatioText(Ratio(f.full_ms, f.accelerated_ms)),
-                 d.hit() ? "" : d.reason});
+      std::vector<std::string> cells{f.clip, fmt::format("{}", f.number), VerdictName(d.verdict())};
+      cells.push_back(fmt::format("{:.0f} %", 100 * d.full_weight));
+      cells.push_back(std::isfinite(d.score) ? fmt::format("{:.3g}", d.score) : "-");
+      for (const double error : {f.rms, f.max}) cells.push_back(ErrorText(error, r.light));
+      for (const double ms : {f.full_ms, f.accelerated_ms}) cells.push_back(fmt::format("{:.3f}", ms));
+      cells.push_back(RatioText(Ratio(f.full_ms, f.accelerated_ms)));
+      for (const FromReference& row : r.reference.rows) cells.push_back(ErrorText(row.frames[i], r.light));
+      cells.push_back(d.hit() ? "" : d.reason);
+      table.Row(cells);
     }
     if (results.size() > 1) text += r.subspace + "\n";
     text += table.Text();

@@ -359,7 +359,8 @@ void Contender::Finish(const BenchOptions& options) {
 
 class Bench {
  public:
-  Bench(const std::vector<AccelerationFlags>& sides, const BenchOptions& options) : options_(options) {
+  Bench(const std::vector<AccelerationFlags>& sides, const BenchOptions& options)
+      : options_(options), reference_(options.reference, options.rival) {
     contenders_.resize(sides.size());
     for (std::size_t i = 0; i < sides.size(); ++i) {
       contenders_[i].flags = sides[i];
@@ -390,6 +391,7 @@ class Bench {
       contender.Describe();
       sides.push_back(contender.side.get());
     }
+    KPSA_RETURN_IF_ERROR(reference_.Load(with_clip, **full_plan, options_.threads > 1, times.size(), still));
     if (still) {
       contenders_.front().result.notes.push_back(
           "nothing moves: timed is the evaluation of this pose from its controls, all of it every time");
@@ -406,6 +408,7 @@ class Bench {
         contender.Compare(number, *full.evaluator, rig.scene.clip.value_or("(rest)"));
         KPSA_RETURN_IF_ERROR(contender.tolerances.AddFrame(times[f], number, *full.evaluator).At({rig.path}));
       }
+      KPSA_RETURN_IF_ERROR(reference_.AddFrame(times[f], sides).At({rig.path}));
     }
     for (Contender& contender : contenders_) {
       contender.NoteClip(rig.scene.clip.value_or("(rest)"), still);
@@ -415,19 +418,22 @@ class Bench {
 
     // Times. The sides take turns by blocks of frames: each keeps its caches as in playback, and all see the
     // same machine
+    std::vector<Side*> timed = sides;
+    if (reference_.rival() != nullptr) timed.push_back(reference_.rival());
     for (int run = 0; run < options_.runs; ++run) {
-      for (Side* side : sides) side->StartAgain();
+      for (Side* side : timed) side->StartAgain();
       for (std::size_t first = 0, block = 0; first < times.size(); first += kTurnFrames, ++block) {
         const std::size_t end = std::min(first + kTurnFrames, times.size());
-        for (std::size_t turn = 0; turn < sides.size(); ++turn) {
-          Side* const side = sides[(static_cast<std::size_t>(run) + block + turn) % sides.size()];
+        for (std::size_t turn = 0; turn < timed.size(); ++turn) {
+          Side* const side = timed[(static_cast<std::size_t>(run) + block + turn) % timed.size()];
           if (Status status = side->Turn(times, first, end); !status.ok())
             return std::move(status).At({rig.path});
         }
         for (std::size_t f = first; f < end; ++f) progress->Set(done_++);
       }
     }
-    for (Side* side : sides) side->times.Finish();
+    for (Side* side : timed) side->times.Finish();
+    reference_.AddTimes();
     for (Contender& contender : contenders_) {
       contender.AddTimes(full.times);
       if (contender.verdicts->hits() == 0)
@@ -447,6 +453,8 @@ class Bench {
     std::vector<BenchResult> results;
     for (Contender& contender : contenders_) {
       contender.Finish(options_);
+      contender.result.reference =
+          reference_.Table(results.size(), contender.result.full_ms, contender.result.accelerated_ms);
       results.push_back(std::move(contender.result));
     }
     return results;
@@ -496,6 +504,7 @@ class Bench {
   }
 
   const BenchOptions& options_;
+  BenchReference reference_;
   std::deque<Contender> contenders_;  // stay where they are: their verdicts refer to them
   std::size_t done_ = 0;
 };

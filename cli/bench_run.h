@@ -6,11 +6,13 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/acceleration.h"
 #include "cli/bench_promise.h"
+#include "cli/bench_reference.h"
 #include "cli/frame_errors.h"
 #include "cli/tolerance_table.h"
 #include "cli/verdicts.h"
@@ -20,8 +22,9 @@ namespace kpsa {
 
 struct BenchOptions {
   int runs = 5;
-  int threads = 1;     // more: all sides evaluate steps and wide kernels in parallel
-  double speedup = 0;  // for ToleranceTable::reached; 0: none
+  int threads = 1;                              // more: all sides evaluate steps and wide kernels in parallel
+  double speedup = 0;                           // for ToleranceTable::reached; 0: none
+  std::optional<std::string> reference, rival;  // variants; a rival only with a reference
   bool quiet = false;
 };
 
@@ -88,6 +91,7 @@ struct BenchResult {
   std::vector<std::string> never_evaluated;        // of these, in the accelerated one
   double points_full = 0, points_accelerated = 0;  // computed a frame, over all nodes but KPSA's
   ToleranceTable tolerances;                       // worst: blends by their shares
+  ReferenceTable reference;                        // without rows where none is asked for
   FrameErrors frame_errors;                        // none where the subspaces keep no modes
 };
 

@@ -13,7 +13,7 @@ namespace {
 struct BenchFlags : Flags {
   AccelerationFlags acceleration;             // what all sides share
   std::vector<std::string> kpsa, tolerances;  // of each; one tolerance is for all
-  std::optional<std::string> runs, speedup;
+  std::optional<std::string> runs, speedup, reference, rival;
   bool per_frame = false, check = false;
 };
 
@@ -64,6 +64,9 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   options.runs = *runs;
   options.threads = *threads == 0 ? 1 : *threads;
   options.quiet = flags.quiet;
+  options.reference = flags.reference, options.rival = flags.rival;
+  if (flags.rival.has_value() && !flags.reference.has_value())
+    return Status::Usage("--rival {}: expected --reference, too, which says what is right", *flags.rival);
   if (flags.speedup.has_value()) {
     const Result<double> speedup = ParseSpeedup(*flags.speedup);
     if (!speedup.ok()) return speedup.status();
@@ -124,6 +127,11 @@ void AddBenchCommand(CLI::App* program, Command* chosen) {
   AddSharedAccelerationFlags(command, &flags->acceleration);
   AddOption(command, "--speedup", "FACTOR", &flags->speedup,
             "tell the smallest tolerance that is expected to reach it on these frames, misses included");
+  AddOption(
+      command, "--reference", "VARIANT", &flags->reference,
+      "a variant of the rig that says what is right (light by more paths): how far both sides are from it");
+  AddOption(command, "--rival", "VARIANT", &flags->rival,
+            "a cheaper variant of the rig, fully evaluated: its time, and how far it is from --reference");
   AddOption(command, "--runs", "N", &flags->runs, "timed evaluations of every frame; 5 if not given");
   AddOption(command, "--threads", "N", &flags->threads, "threads of both sides; 1 if not given");
   AddSwitch(command, "--per-frame", &flags->per_frame,

@@ -32,6 +32,21 @@ std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
   return shown;
 }
 
+// Where light is measured by fewer paths than pictures have: keySamples of its node.
+std::optional<PlugRef> KeyLight(const Graph& graph, PlugRef light) {
+  const NodeDef& def = graph.def(light.node);
+  const std::string& name = def.attributes[static_cast<std::size_t>(light.attribute)].name;
+  const int samples = def.FindAttribute("keySamples");
+  light.attribute = def.FindAttribute(name == "irradiance"        ? "keyIrradiance"
+                                      : name == "pointIrradiance" ? "keyPointIrradiance"
+                                                                  : "");
+  if (samples < 0 || light.attribute < 0) return std::nullopt;
+  const Value* set = graph.FindValue({light.node, samples, -1, -1});
+  const Value& value =
+      set != nullptr ? *set : def.attributes[static_cast<std::size_t>(samples)].default_value;
+  return value.AsInt() > 0 ? std::optional(light) : std::nullopt;
+}
+
 }  // namespace
 
 AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) {
@@ -44,6 +59,8 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) 
     AccelerationTarget::MeshPoints out;
     if (points.colors) {
       out.name = target.within.Inner(rig.graph->PlugName(points.points));
+      if (const std::optional<PlugRef> key = KeyLight(*rig.graph, points.points))
+        out.stages.push_back({"key", *key, false});
       out.stages.push_back({"colors", points.points, false});
       target.meshes.push_back(std::move(out));
       target.colors = true;

@@ -90,7 +90,8 @@ void RigBuild::ConnectLights() {
       }
     }
     edit.Set(made.id, "carriedMeshes", carried);
-    graph().SetElementNames(made.id, graph().def(made.id).FindAttribute("pointIrradiance"), carried_names);
+    for (const char* at_points : {"pointIrradiance", "keyPointIrradiance"})
+      graph().SetElementNames(made.id, graph().def(made.id).FindAttribute(at_points), carried_names);
     if (const RigAttribute* camera = find("camera")) {
       if (const std::optional<NodeId> node = FindWithOutputs(camera->value, {"worldFromScreen"}, "camera"))
         edit.Connect(edit.Plug(*node, "worldFromScreen"), edit.Plug(made.id, "worldFromScreen"));

@@ -68,6 +68,8 @@ struct PricedStage {
 Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* compiler,
                                              const AccelerationTarget::MeshPoints& mesh, Index total,
                                              double saving) {
+  if (rig.target.colors && mesh.stages.size() > 1)
+    return std::vector<PricedStage>(1);  // that is what it is for
   std::vector<PricedStage> priced;
   const std::vector<Index> probe = EvenSpread(total, kProbePoints);
   const auto local = static_cast<Index>(kMaxPointsPerCue * static_cast<double>(probe.size()));
@@ -82,14 +84,16 @@ Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* c
   return priced;
 }
 
-// The candidates of a mesh at an earlier stage.
-std::vector<Index> StagePoints(Index total, std::size_t of_all) {
-  return EvenSpread(total, std::max(kMinStagePoints, kStagePoints * total / of_all));
+// How many candidates a mesh has at an earlier stage, of so many over all meshes.
+std::size_t StagePoints(Index total, std::size_t of_all, std::size_t most) {
+  if (most >= of_all) return total;
+  return std::min<std::size_t>(total, std::max(kMinStagePoints, most * total / of_all));
 }
 
 }  // namespace
 
-Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals) {
+Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
+                                std::size_t max_light_points) {
   const auto& meshes = rig.target.meshes;
   CuePlaces result;
   std::vector<RequestedOutput> outputs;
@@ -121,10 +125,13 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
         continue;
       }
       const auto [at, first] = recorded.emplace(std::pair(m, stage), next);
-      const std::size_t some = StagePoints(totals[m], all).size(),
+      const bool colors = rig.target.colors;
+      const std::size_t some = StagePoints(totals[m], all, colors ? max_light_points : kStagePoints),
                         many = std::min<std::size_t>(totals[m] / kOfTiles, kMostOfTiles * totals[m] / all);
       if (first) {
-        const std::vector<Index> points = EvenSpread(totals[m], p == 0 ? std::max(some, many) : some);
+        const std::vector<Index> points = colors
+                                              ? GoldenSpread(totals[m], some)
+                                              : EvenSpread(totals[m], p == 0 ? std::max(some, many) : some);
         recorded_points[at->second] = points.size();
         result.stages.push_back({m, stage, points});
         next += static_cast<Index>(points.size());

@@ -4,6 +4,7 @@
 // varying; no clip may play, since it would drive some of them.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,8 +22,10 @@ struct CuePlaces {
 };
 
 // The dearest place is, for each mesh, the latest stage at which a point costs little more than itself; the
-// others cost less and less. totals: points of each mesh.
-Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals);
+// others cost less and less. totals: points of each mesh. Light that has an earlier stage is measured there,
+// at max_light_points of its points at most.
+Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
+                                std::size_t max_light_points = std::numeric_limits<std::size_t>::max());
 
 // What the points among the cues cost together (ns); stages: as FindCuePlaces gave them.
 Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,

@@ -125,7 +125,7 @@ class Trainer {
     }
     std::vector<CandidateStage> candidates;
     if (options_.mode == EstimatorMode::kMap) {  // the paper's key points are output points
-      Result<CuePlaces> places = FindCuePlaces(rig_, &compiler_, totals);
+      Result<CuePlaces> places = FindCuePlaces(rig_, &compiler_, totals, options_.max_light_candidates);
       if (!places.ok()) return places.status();
       candidates = std::move(places->stages);
       places_ = std::move(places->places);
@@ -173,7 +173,9 @@ class Trainer {
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
-    const bool compares = places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty());
+    // Light has those that Split takes away
+    const bool compares =
+        !of_light() && (places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty()));
     return compares ? sampler_->AddJudges(judges, &judge_kinds_) : Status();
   }
 
@@ -224,8 +226,10 @@ class Trainer {
   // As many modes as new poses confirm, and noise as new poses have it.
   void TruncateModes(const PoseMatrix& judges) {
     std::vector<CueRef> cues;
-    for (const Index point : GoldenSpread(layout_.points, std::max<std::size_t>(options_.min_points, 100)))
-      cues.push_back({CueKind::kOutput, point});
+    const bool apart = layout_.stage_points > 0;  // from the pictures
+    for (const Index point : GoldenSpread(apart ? layout_.stage_points : layout_.points,
+                                          std::max<std::size_t>(options_.min_points, 100)))
+      cues.push_back({apart ? CueKind::kStage : CueKind::kOutput, point});
     for (Index s = 0; s < layout_.scalars; ++s) cues.push_back({CueKind::kScalar, s});
     pca_ = TruncatedPca(pca_, ChooseModeCount(pca_, cues, noise_, judges));
     for (double& residual : pca_.row_residual)

@@ -87,7 +87,6 @@ Status TrainingSampler::AddJudges(PoseMatrix* judges, std::vector<int>* kinds) c
   for (const auto& [kind, count] :
        {std::pair{PoseKind::kSampled, most}, std::pair{PoseKind::kMixture, most / 3},
         std::pair{PoseKind::kNeighbours, most / 3}}) {
-    if (kind != PoseKind::kSampled && of_light()) continue;
     const std::size_t before = judges->poses();
     KPSA_RETURN_IF_ERROR(
         recorder_->AddSamples(Of(kind, count, options_.seed ^ 0x2545f4914f6cdd1dull), clips_, judges));

@@ -15,8 +15,10 @@ namespace kpsa {
 namespace {
 
 enum Input { kPoints, kCamera, kLightMatrix, kLightColor };
-enum Output { kIrradiance, kPointIrradiance };
+enum Output { kIrradiance, kPointIrradiance, kKeyIrradiance, kKeyPointIrradiance };
 constexpr Index kLargestSide = 4096;
+
+bool AtPixels(std::string_view output) { return output == "irradiance" || output == "keyIrradiance"; }
 
 // A tracer with room for the inputs of one evaluation.
 struct Workplace {
@@ -25,12 +27,19 @@ struct Workplace {
   std::vector<DiffuseLight> lights;
 };
 
-struct IlluminationKernel {
+// Shading points whose light is computed with the same number of paths.
+struct ShadingPoints {
+  Output at_pixels = kIrradiance, at_points = kPointIrradiance;
+  int samples = 0;
   std::vector<Index> pixels;
-  std::vector<std::vector<Index>> carried;  // by element of pointIrradiance: points, of all meshes' points
-  std::vector<Index> triangles;             // over all meshes' points, one after the other
-  std::vector<float> albedo;                // three a triangle
-  std::vector<std::uint8_t> unseen;         // triangles of carried meshes
+  std::vector<std::vector<Index>> carried;  // by element of at_points: points, of all meshes' points
+};
+
+struct IlluminationKernel {
+  ShadingPoints shown, keys;         // of pictures, and where these are measured
+  std::vector<Index> triangles;      // over all meshes' points, one after the other
+  std::vector<float> albedo;         // three a triangle
+  std::vector<std::uint8_t> unseen;  // triangles of carried meshes
   PointBuffer rest;
   std::vector<DiffuseLight::Kind> lights;
   Index width = 0, height = 0;
@@ -45,7 +54,7 @@ const std::vector<std::int64_t>& CarriedMeshes(const Structural& s) {
 }
 
 Result<Index> ShadingPointCount(const Structural& s, std::string_view output, int element) {
-  if (output == "irradiance") {
+  if (AtPixels(output)) {
     const int width = s.get_int("width"), height = s.get_int("height");
     return static_cast<Index>(width) * static_cast<Index>(height);
   }
@@ -96,6 +105,20 @@ Status BindMeshes(const Binding& binding, IlluminationKernel* kernel, std::vecto
   return Status();
 }
 
+Status BindShading(const Binding& binding, const std::vector<Index>& first_points, const char* at_pixels,
+                   const char* at_points, ShadingPoints* shading) {
+  shading->pixels = binding.output(at_pixels).ToVector();
+  int element = 0;
+  for (std::int64_t mesh : CarriedMeshes(binding.structural())) {
+    if (mesh < 0 || static_cast<std::size_t>(mesh) >= first_points.size())
+      return Status::Invalid("carriedMeshes: {} is none of the {} meshes", mesh, first_points.size());
+    std::vector<Index>& points =
+        shading->carried.emplace_back(binding.output(at_points, element++).ToVector());
+    for (Index& point : points) point += first_points[static_cast<std::size_t>(mesh)];
+  }
+  return Status();
+}
+
 Result<std::unique_ptr<Workplace>> MakeWorkplace(const IlluminationKernel& kernel) {
   std::vector<DiffuseLight> lights(kernel.lights.size());
   Result<PathTracer> tracer = PathTracer::Build(std::as_const(kernel.rest).view(), kernel.triangles,
@@ -108,21 +131,19 @@ Result<std::unique_ptr<Workplace>> MakeWorkplace(const IlluminationKernel& kerne
 Result<BoundKernel> BindIllumination(const Binding& binding) {
   const Structural& s = binding.structural();
   IlluminationKernel kernel;
-  kernel.pixels = binding.output("irradiance").ToVector();
   kernel.width = static_cast<Index>(s.get_int("width"));
   kernel.height = static_cast<Index>(s.get_int("height"));
-  kernel.paths = {static_cast<std::uint32_t>(s.get_int("seed")), s.get_int("samples"), s.get_int("bounces"),
+  kernel.paths = {static_cast<std::uint32_t>(s.get_int("seed")), 0, s.get_int("bounces"),
                   s.get_double("largestContribution")};
   std::vector<Index> first_points;
   KPSA_RETURN_IF_ERROR(BindMeshes(binding, &kernel, &first_points));
-  int element = 0;
-  for (std::int64_t mesh : CarriedMeshes(s)) {
-    if (mesh < 0 || static_cast<std::size_t>(mesh) >= first_points.size())
-      return Status::Invalid("carriedMeshes: {} is none of the {} meshes", mesh, first_points.size());
-    std::vector<Index>& points =
-        kernel.carried.emplace_back(binding.output("pointIrradiance", element++).ToVector());
-    for (Index& point : points) point += first_points[static_cast<std::size_t>(mesh)];
-  }
+  const int samples = s.get_int("samples"), key_samples = s.get_int("keySamples");
+  KPSA_RETURN_IF_ERROR(BindShading(binding, first_points, "irradiance", "pointIrradiance", &kernel.shown));
+  KPSA_RETURN_IF_ERROR(
+      BindShading(binding, first_points, "keyIrradiance", "keyPointIrradiance", &kernel.keys));
+  kernel.shown.samples = samples;
+  kernel.keys.samples = key_samples > 0 ? key_samples : samples;
+  kernel.keys.at_pixels = kKeyIrradiance, kernel.keys.at_points = kKeyPointIrradiance;
   const auto& kinds = s.value("lightKinds").get<std::vector<std::int64_t>>();
   for (std::int64_t kind : kinds) {
     if (kind < 0 || kind > 3)
@@ -159,10 +180,12 @@ Status SetUp(const ComputeContext& c, const IlluminationKernel& kernel, Workplac
   return place->tracer.Update(std::as_const(place->points).view(), place->lights, &parallel);
 }
 
-void Illuminate(ComputeContext& c, const IlluminationKernel& kernel, const PathTracer& tracer) {
+void Illuminate(ComputeContext& c, const IlluminationKernel& kernel, const ShadingPoints& shading,
+                const PathTracer& tracer) {
   const Parallel parallel = HostParallel(c);
   const auto gather = [&](const ShadingPlace& at, Index own, const PointsView& out, std::size_t i) {
     PathOptions paths = kernel.paths;
+    paths.samples = shading.samples;
     paths.seed ^= own * 0x9e3779b1u;
     const Double3 light = tracer.Indirect(at, paths);
     out.x[i] = static_cast<float>(light.x);
@@ -170,18 +193,18 @@ void Illuminate(ComputeContext& c, const IlluminationKernel& kernel, const PathT
     out.z[i] = static_cast<float>(light.z);
   };
   const Matrix4& camera = c.get<Matrix4>(kCamera);
-  ForRanges(&parallel, kernel.pixels.size(), 64, [&](std::size_t begin, std::size_t end) {
+  ForRanges(&parallel, shading.pixels.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Double3 origin, direction;
-      PixelRay(camera, kernel.pixels[i], kernel.width, kernel.height, &origin, &direction);
-      gather(tracer.See(origin, direction), kernel.pixels[i], c.out_points(kIrradiance), i);
+      PixelRay(camera, shading.pixels[i], kernel.width, kernel.height, &origin, &direction);
+      gather(tracer.See(origin, direction), shading.pixels[i], c.out_points(shading.at_pixels), i);
     }
   });
-  for (std::uint32_t e = 0; e < kernel.carried.size(); ++e) {
-    const std::vector<Index>& points = kernel.carried[e];
+  for (std::uint32_t e = 0; e < shading.carried.size(); ++e) {
+    const std::vector<Index>& points = shading.carried[e];
     ForRanges(&parallel, points.size(), 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        gather(tracer.OnPoint(points[i]), ~points[i], c.out_points(kPointIrradiance, e), i);
+        gather(tracer.OnPoint(points[i]), ~points[i], c.out_points(shading.at_points, e), i);
     });
   }
 }
@@ -195,7 +218,8 @@ void ComputeIllumination(ComputeContext& c) {
     place = std::move(*made);
   }
   if (const Status status = SetUp(c, kernel, place.get()); status.ok()) {
-    Illuminate(c, kernel, place->tracer);
+    for (const ShadingPoints* shading : {&kernel.shown, &kernel.keys})
+      Illuminate(c, kernel, *shading, place->tracer);
   } else {
     c.host->Fail(status.errors().front().message);
   }
@@ -224,6 +248,11 @@ void AddIlluminationNodes(NodeRegistry& registry) {
   b.structural("height", 400, {.min = 1, .max = kLargestSide, .doc = "pixels"});
   b.structural("samples", 16,
                {.min = 1, .max = 65536, .doc = "paths a shading point; powers of two are even"});
+  b.structural(
+      "keySamples", 0,
+      {.min = 0,
+       .max = 65536,
+       .doc = "paths where a subspace of the light measures it: the first of the others. 0: as many"});
   b.structural("bounces", 2, {.min = 1, .max = 64, .doc = "surfaces a path may meet"});
   b.structural(
       "largestContribution", 0.0,
@@ -234,6 +263,8 @@ void AddIlluminationNodes(NodeRegistry& registry) {
   b.out("irradiance", Type::kColors,
         "at each pixel, row by row from the top left; 0 where there is no surface");
   b.out("pointIrradiance", Type::kColors, "at each point of a carried mesh").array();
+  b.out("keyIrradiance", Type::kColors, "irradiance by keySamples paths");
+  b.out("keyPointIrradiance", Type::kColors, "pointIrradiance by keySamples paths").array();
   b.compute(&ComputeIllumination)
       .demand(DemandGeometry)
       .bind(BindIllumination)

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "kpsa/mode_choice.h"
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
@@ -63,6 +64,27 @@ class CuePlacesTest : public testing::Test {
   TrainingRig rig_;
   std::vector<Index> totals_;
 };
+
+// A picture is measured where its rig says, whatever that costs, at points that lie in no rows.
+TEST_F(CuePlacesTest, LightIsMeasuredAtItsFirstStage) {
+  rig_.target.colors = true;
+  const Result<CuePlaces> found = FindCuePlaces(rig_, &compiler_, totals_, 100);
+  ASSERT_TRUE(found.ok()) << found.status().ToString();
+  ASSERT_EQ(found->places.size(), 1u);
+  ASSERT_EQ(found->stages.size(), 1u);
+  EXPECT_EQ(found->stages[0].stage, 0u);
+  EXPECT_EQ(found->stages[0].points, GoldenSpread(kMeshPoints, 100));
+  ASSERT_EQ(found->places[0].size(), 100u);
+  for (const CueRef& cue : found->places[0]) EXPECT_EQ(cue.kind, CueKind::kStage);
+
+  // A picture that has no other stage is measured itself
+  rig_.target.meshes[0].stages.erase(rig_.target.meshes[0].stages.begin() + 1,
+                                     rig_.target.meshes[0].stages.end());
+  const CuePlaces plain = Find();
+  ASSERT_EQ(plain.places.size(), 1u);
+  EXPECT_EQ(plain.places[0].size(), kMeshPoints);
+  EXPECT_EQ(plain.places[0][0].kind, CueKind::kOutput);
+}
 
 TEST_F(CuePlacesTest, TheDearestIsTheLatestLocalStage) {
   const CuePlaces found = Find();

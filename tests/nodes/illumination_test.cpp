@@ -211,6 +211,38 @@ TEST(IndirectIllumination, PixelsLookThroughWhatIsCarried) {
   EXPECT_NE(status.ToString().find("2 is none of the 2 meshes"), std::string::npos) << status.ToString();
 }
 
+// Light is measured by the first of the paths that pictures have.
+TEST(IndirectIllumination, KeysHaveTheirOwnPaths) {
+  const auto light = [](int samples, int key_samples, const char* output) {
+    Carrying room;
+    room.hold("gi.carriedMeshes", Value(std::vector<std::int64_t>{1}));
+    room.hold("gi.samples", samples);
+    room.hold("gi.keySamples", key_samples);
+    return room.pull_points(output);
+  };
+  for (const auto& [shown, key] : {std::pair{"gi.irradiance", "gi.keyIrradiance"},
+                                   std::pair{"gi.pointIrradiance[0]", "gi.keyPointIrradiance[0]"}}) {
+    EXPECT_EQ(light(16, 4, key), light(4, 0, shown)) << key;
+    EXPECT_EQ(light(16, 4, shown), light(16, 0, shown)) << shown;
+    EXPECT_EQ(light(16, 0, key), light(16, 0, shown)) << key;
+    EXPECT_NE(light(16, 4, key), light(16, 4, shown)) << key;
+  }
+  // Both at once, and a few keys
+  Room both, few_paths;
+  few_paths.hold("gi.samples", 4);
+  both.hold("gi.keySamples", 4);
+  both.want("gi.irradiance");
+  both.want("gi.keyIrradiance", PointSet::Of({204, 228}, 24 * 16));
+  const std::vector<float> keys = both.pull_points("gi.keyIrradiance"),
+                           all = few_paths.pull_points("gi.irradiance");
+  ASSERT_EQ(keys.size(), 6u);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(keys[k], all[3 * 204 + k]);
+    EXPECT_EQ(keys[3 + k], all[3 * 228 + k]);
+  }
+  EXPECT_EQ(both.pull_points("gi.irradiance"), Room().pull_points("gi.irradiance"));
+}
+
 TEST(IndirectIllumination, ItsColoursMayGoWherePointsDo) {
   Room room;
   room.add("tripwire", "trip");
