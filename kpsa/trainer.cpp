@@ -86,14 +86,14 @@ class Trainer {
     modes_seconds_ = limit_.elapsed() - before_modes;
     KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges, options_.tolerance));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
-    KPSA_RETURN_IF_ERROR(PricePatches());
+    if (!options_.without.patches) KPSA_RETURN_IF_ERROR(PricePatches());
     Result<Subspace> subspace = Assemble(&poses, judges);
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
     const double bearable = !fine_ ? kFewMisses : by_tile_ ? 1 : kTooManyMisses;
-    if (!of_light() && options_.mode == EstimatorMode::kMap && cost_.lost() > bearable &&
-        limit_.left() > modes_seconds_)
+    if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.miss_costs &&
+        cost_.lost() > bearable && limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
@@ -147,7 +147,8 @@ class Trainer {
           FindSignals(*rig_.graph, &compiler_, rig_.target.outputs(), varying, {}, nullptr);
       if (!found.ok()) return found.status();
       AddNew(std::move(*found), &signals);
-      if (of_light() || options_.mode == EstimatorMode::kPaper) continue;
+      if (of_light() || options_.mode == EstimatorMode::kPaper || options_.without.relative_matrices)
+        continue;
       Result<std::vector<Signal>> matrices =
           FindRelativeMatrices(*rig_.graph, &compiler_, rig_.target.outputs(), varying);
       if (!matrices.ok()) return matrices.status();
@@ -164,7 +165,8 @@ class Trainer {
     }
     recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals),
                                                inverse_rest_stretch_);
-    const bool multiplies = !of_light() && options_.mode == EstimatorMode::kMap;
+    const bool multiplies =
+        !of_light() && options_.mode == EstimatorMode::kMap && !options_.without.cue_products;
     Result<PoseLayout> layout = recorder_->Layout(multiplies ? kCueProducts : 0);
     if (!layout.ok()) return layout.status();
     layout_ = *layout;
@@ -227,7 +229,8 @@ class Trainer {
 
   // Products of scalars, which are cues as others are from here on.
   void ChooseProducts(PoseMatrix* poses, PoseMatrix* judges) {
-    const CueProductOptions options = ProductOptionsOf(recorder_->signals(), layout_, options_.tolerance);
+    CueProductOptions options = ProductOptionsOf(recorder_->signals(), layout_, options_.tolerance);
+    options.hinges = !options_.without.hinges;
     recorder_->SetProducts(ChooseCueProducts(*poses, options));
     for (PoseMatrix* matrix : {poses, judges}) {
       for (std::size_t t = 0; t < matrix->poses(); ++t)
@@ -309,7 +312,7 @@ class Trainer {
     choice.tolerance = tolerance;
     choice.by_rms = of_light();
     choice.places = places_;
-    choice.judges = judges.poses() > 0 ? &judges : nullptr;
+    choice.judges = judges.poses() > 0 && !options_.without.miss_costs ? &judges : nullptr;
     choice.judge_kinds = judge_kinds_;
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     Status priced;
@@ -370,8 +373,9 @@ class Trainer {
     const Estimator estimator =
         paper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
-    return MakeSubspace(pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(),
-                        TileBudgets(fine), of_light() || paper ? nullptr : poses, record_.clip_poses);
+    return MakeSubspace(
+        pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(fine),
+        of_light() || paper || options_.without.tile_products ? nullptr : poses, record_.clip_poses);
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
