@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
-#include <cmath>
-#include <cstdio>
+#include <algorithm>
 #include <cstdlib>
 #include <set>
+#include <span>
 
 #include "bench/ablation_parts.h"
 #include "bench/ablation_points.h"
@@ -69,7 +69,9 @@ TEST(Ablation, ComparesCuesOfTheSmallestRig) {
     for (const PointsScore& score : row.scores) {
       EXPECT_GT(score.rms, 0) << row.cues;
       EXPECT_LT(score.rms, score.max) << row.cues;
-      if (row.estimator == std::string("MAP")) EXPECT_LT(score.rms, motion) << row.cues;
+      if (row.estimator == std::string("MAP")) {
+        EXPECT_LT(score.rms, motion) << row.cues;
+      }
     }
   }
   EXPECT_EQ(rows.size(), 17u);
@@ -112,6 +114,29 @@ TEST(Ablation, BaselinesReadTheSamePoses) {
   EXPECT_NE(list.find("diagonal <f8\n"), std::string::npos) << list;
 }
 
+TEST(Ablation, TimesWhatIsTrained) {
+  const TemporaryFolder folder;
+  PartsOptions options;
+  options.folder = folder.path();
+  options.samples = kFewSamples;
+  options.calibration_poses = 60;
+  options.key_points = 10;
+  options.runs = 1;
+  const std::vector<Part> parts = Parts();
+  const Result<std::vector<PartsRow>> rows = CompareParts(kHelloRig, std::span(parts).first(2), options);
+  ASSERT_TRUE(rows.ok()) << rows.status().ToString();
+  ASSERT_EQ(rows->size(), 2u);
+  for (const PartsRow& row : *rows) {
+    EXPECT_GT(row.full_ms, 0) << row.what;
+    EXPECT_GT(row.ms, 0) << row.what;
+    EXPECT_GT(row.rms, 0) << row.what;  // of reconstructed frames, whatever hits
+    EXPECT_LT(row.rms, row.max) << row.what;
+  }
+  EXPECT_EQ((*rows)[1].what, "paper mode");
+  EXPECT_EQ((*rows)[1].cue_points, 10u);
+  EXPECT_EQ((*rows)[1].cue_scalars + (*rows)[1].cue_products, 0u);
+}
+
 TEST(Ablation, TrainsWithoutEachPart) {
   NodeRegistry registry;
   AddStandardNodes(registry);
@@ -124,7 +149,7 @@ TEST(Ablation, TrainsWithoutEachPart) {
     TrainOptions options;
     options.samples = 1200;
     options.calibration_poses = 60;
-    options.tolerance = 1e-5;  // misses, so that everything is tried
+    options.tolerance = 5e-4;
     options.without = {without, without, without, without, without, without};
     options.may_have_cues_by_tile = !without;
     Result<Subspace> trained = Train(MakeTrainingRig(&*rig, rig->accelerate[0]), {}, options);
@@ -139,9 +164,8 @@ TEST(Ablation, TrainsWithoutEachPart) {
   const auto matrix = [](const CueDescription& cue) {
     return cue.plug.find("worldMatrix") != std::string::npos;
   };
-  std::printf("all: %zu cues %ld products %ld matrices, doubts %zu, patches %zu tried %s\n", all.cues.size(),
-              count(all, product), count(all, matrix), all.doubt_inputs(), all.patches.tiles,
-              all.training.substr(0, 1500).c_str());
+  EXPECT_GT(count(all, product), 0);
+  EXPECT_GT(count(all, matrix), 0);
   EXPECT_GT(all.doubt_inputs(), 0u);
   EXPECT_EQ(count(none, product), 0);
   EXPECT_EQ(count(none, matrix), 0);
