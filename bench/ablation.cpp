@@ -6,6 +6,7 @@
 //   bench_ablation --dump FILE.npz [RIG] [SAMPLES]    the same poses for bench/baselines.py
 //   bench_ablation --parts [RIG] [SAMPLES]            trained without one part at a time, misses included
 // The rig's first accelerate entry; scenes/face/face.yaml and its number of samples if not given.
+//   --only PART     in --parts, besides everything; may be given several times; all if not given
 //   --key-points N  of paper mode in --parts; 80 if not given
 //   --runs N        timed evaluations of every frame in --parts; 5 if not given
 //   --markdown      the table of --parts as Markdown
@@ -13,7 +14,10 @@
 #include <fmt/format.h>
 #include <stdlib.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "bench/ablation_parts.h"
 #include "bench/ablation_points.h"
@@ -27,6 +31,7 @@ constexpr std::size_t kPointCounts[] = {10, 20, 40, 80};
 
 struct AblationOptions {
   std::string rig = "scenes/face/face.yaml", dump;
+  std::vector<std::string> only;
   bool parts = false, markdown = false;
   int samples = 0, key_points = 80, runs = 5;  // samples 0: the rig's
 };
@@ -38,18 +43,18 @@ Result<AblationOptions> ReadAblationOptions(int argc, char** argv) {
     const std::string name = argv[i];
     if (name == "--parts" || name == "--markdown") {
       (name == "--parts" ? options.parts : options.markdown) = true;
-    } else if (name == "--dump" || name == "--key-points" || name == "--runs") {
+    } else if (name == "--dump" || name == "--only" || name == "--key-points" || name == "--runs") {
       if (++i == argc) return Status::Usage("{}: expected a value", name);
-      if (name == "--dump") {
-        options.dump = argv[i];
-        continue;
-      }
+      if (name == "--dump") options.dump = argv[i];
+      if (name == "--only") options.only.emplace_back(argv[i]);
+      if (name == "--dump" || name == "--only") continue;
       const Result<int> count = ParseCount(name, argv[i], 2, 1000);
       if (!count.ok()) return count.status();
       (name == "--runs" ? options.runs : options.key_points) = *count;
     } else if (name.starts_with("-") || positional == 2) {
       return Status::Usage(
-          "{}: expected [RIG] [SAMPLES], --dump FILE.npz, --parts, --key-points N, --runs N or --markdown",
+          "{}: expected [RIG] [SAMPLES], --dump FILE.npz, --parts, --only PART, --key-points N, --runs N or "
+          "--markdown",
           name);
     } else if (positional++ == 0) {
       options.rig = name;
@@ -58,6 +63,12 @@ Result<AblationOptions> ReadAblationOptions(int argc, char** argv) {
       if (!samples.ok()) return samples.status();
       options.samples = *samples;
     }
+  }
+  for (const std::string& name : options.only) {
+    std::vector<std::string> known;
+    for (const Part& part : Parts()) known.emplace_back(part.what);
+    if (std::ranges::find(known, name) == known.end())
+      return Status::Usage("--only {}: expected {}", name, fmt::join(known, ", "));
   }
   if (options.parts && !options.dump.empty()) return Status::Usage("--dump: not with --parts");
   return options;
@@ -92,7 +103,15 @@ Status RunParts(const AblationOptions& options) {
   parts.key_points = static_cast<std::size_t>(options.key_points);
   parts.samples = static_cast<std::size_t>(options.samples);
   parts.progress = [](const std::string& what) { Say(what + " ..."); };
-  const Result<std::vector<PartsRow>> rows = CompareParts(options.rig, Parts(), parts);
+  std::vector<Part> wanted = Parts();
+  if (!options.only.empty()) {
+    wanted.erase(std::remove_if(wanted.begin() + 1, wanted.end(),
+                                [&](const Part& part) {
+                                  return std::ranges::find(options.only, part.what) == options.only.end();
+                                }),
+                 wanted.end());
+  }
+  const Result<std::vector<PartsRow>> rows = CompareParts(options.rig, wanted, parts);
   if (!rows.ok()) return rows.status();
   Print(options.markdown ? PartsMarkdown(*rows) : PartsText(*rows));
   return FlushOutput();
