@@ -55,7 +55,7 @@ class ProductChooser {
     FindFactors();
     if (factors_.empty()) return {};
     FindResidual();
-    ChooseHinges();
+    if (options_.hinges) ChooseHinges();
     ChoosePairs();
     for (CueProduct& product : chosen_) FindRange(&product);
     return std::move(chosen_);

@@ -27,6 +27,7 @@ struct CueProductOptions {
   std::vector<double> still;      // [scalars] deviations that count as none
   double tolerance = 1e-4;        // scene units
   std::size_t most = 160;
+  bool hinges = true;  // of one factor, with a knot; else products of two alone
 };
 // Those that explain most of what a linear regression on the regressors leaves of the outputs, greedily, as
 // long as they tell clearly more than a column of noise would, and more than is seen. poses: not centred,

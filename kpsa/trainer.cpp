@@ -83,7 +83,7 @@ class Trainer {
     modes_seconds_ = limit_.elapsed() - before_modes;
     KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges, options_.tolerance));
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.85));
-    if (!of_light() && options_.mode == EstimatorMode::kMap) {
+    if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.patches) {
       KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
       Result<PatchLayout> patches = PricePatches(rig_, &compiler_, totals_, positions_);
       if (!patches.ok()) return patches.status();
@@ -94,8 +94,8 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
     const double bearable = !fine_ ? kFewMisses : by_tile_ ? 1 : kTooManyMisses;
-    if (!of_light() && options_.mode == EstimatorMode::kMap && cost_.lost() > bearable &&
-        limit_.left() > modes_seconds_)
+    if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.miss_costs &&
+        cost_.lost() > bearable && limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
@@ -134,7 +134,8 @@ class Trainer {
     }
 
     const bool of_map = !of_light() && options_.mode == EstimatorMode::kMap;
-    Result<TrainingSignals> found = FindTrainingSignals(rig_, &compiler_, clips_, of_map);
+    Result<TrainingSignals> found =
+        FindTrainingSignals(rig_, &compiler_, clips_, of_map && !options_.without.relative_matrices);
     if (!found.ok()) return found.status();
     guards_ = std::move(found->watched);
     std::vector<Signal> signals = guards_;
@@ -146,7 +147,8 @@ class Trainer {
     }
     recorder_ = std::make_unique<PoseRecorder>(rig_, &compiler_, std::move(candidates), std::move(signals),
                                                inverse_rest_stretch_);
-    Result<PoseLayout> layout = recorder_->Layout(of_map ? kCueProducts : 0);
+    Result<PoseLayout> layout =
+        recorder_->Layout(of_map && !options_.without.cue_products ? kCueProducts : 0);
     if (!layout.ok()) return layout.status();
     layout_ = *layout;
     sampler_ = std::make_unique<TrainingSampler>(rig_, drawn_, clips_, options_, recorder_.get(), layout_);
@@ -203,7 +205,8 @@ class Trainer {
 
   // Products of scalars, which are cues as others are from here on.
   void ChooseProducts(PoseMatrix* poses, PoseMatrix* judges) {
-    const CueProductOptions options = ProductOptionsOf(recorder_->signals(), layout_, options_.tolerance);
+    CueProductOptions options = ProductOptionsOf(recorder_->signals(), layout_, options_.tolerance);
+    options.hinges = !options_.without.hinges;
     recorder_->SetProducts(ChooseCueProducts(*poses, options));
     for (PoseMatrix* matrix : {poses, judges}) {
       for (std::size_t t = 0; t < matrix->poses(); ++t)
@@ -287,7 +290,7 @@ class Trainer {
     choice.tolerance = tolerance;
     choice.by_rms = of_light();
     choice.places = places_;
-    choice.judges = judges.poses() > 0 ? &judges : nullptr;
+    choice.judges = judges.poses() > 0 && !options_.without.miss_costs ? &judges : nullptr;
     choice.judge_kinds = judge_kinds_;
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     Status priced;
@@ -328,8 +331,9 @@ class Trainer {
     const Estimator estimator =
         paper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
-    return MakeSubspace(pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(),
-                        TileBudgets(fine), of_light() || paper ? nullptr : poses, record_.clip_poses);
+    return MakeSubspace(
+        pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(fine),
+        of_light() || paper || options_.without.tile_products ? nullptr : poses, record_.clip_poses);
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {

@@ -39,6 +39,15 @@ struct TrainOptions {
   // About how long training may take: fewer poses, and no cues of tiles, where that is too short. Which poses
   // fit depends on the machine; with time enough, the subspace is that without a limit.
   double seconds = std::numeric_limits<double>::infinity();
+  // Parts that training does without, to tell what each is worth (bench_ablation --parts).
+  struct Without {
+    bool relative_matrices = false;  // as cues
+    bool cue_products = false;       // hinges included
+    bool hinges = false;
+    bool tile_products = false;  // where all points share cues: SoftCache's own score alone judges them
+    bool patches = false;        // every miss is one of all points
+    bool miss_costs = false;  // cues by the error they leave, at the first place; no finer tiles for misses
+  } without;
   std::function<bool(const char* what, double share)> progress;  // false cancels; may be null
 };
 

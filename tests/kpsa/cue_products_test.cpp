@@ -45,8 +45,9 @@ PoseMatrix FacePoses(std::size_t count, double together, double late, unsigned s
   return poses;
 }
 
-std::vector<CueProduct> ChooseFor(const PoseMatrix& poses) {
+std::vector<CueProduct> ChooseFor(const PoseMatrix& poses, bool hinges = true) {
   CueProductOptions options;
+  options.hinges = hinges;
   options.factors = {0, 1, 2, 3};
   options.regressors = options.factors;
   options.still.assign(poses.layout().scalars, 1e-5);
@@ -71,6 +72,12 @@ TEST(CueProducts, FindWhatActsTogetherAndWhatBeginsLate) {
   }
   EXPECT_TRUE(together);
   EXPECT_TRUE(late);
+}
+
+TEST(CueProducts, HaveNoHingesWhereNoneAreWanted) {
+  const std::vector<CueProduct> products = ChooseFor(FacePoses(1500, 0.01, 0.02, 1), false);
+  EXPECT_FALSE(products.empty());
+  for (const CueProduct& product : products) EXPECT_FALSE(product.of_a.hinge || product.of_b.hinge);
 }
 
 // Some of the thousands of candidates fit a few hundred poses by chance.
