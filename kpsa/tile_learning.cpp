@@ -118,10 +118,10 @@ TileTrial TryTiles(const TileSubspace& made, const Eigen::VectorXd& mean, const 
   return trial;
 }
 
-std::vector<char> TilesToTeach(const TileTrial& trial, double error, double doubt) {
+std::vector<char> TilesToTeach(const TileTrial& trial, const TileTrial& known, double error, double doubt) {
   std::vector<char> taught;
   for (std::size_t t = 0; t < trial.errors.size(); ++t)
-    taught.push_back(!(trial.errors[t] <= error && trial.doubts[t] <= doubt));
+    taught.push_back(!(trial.errors[t] <= error && trial.doubts[t] <= std::max(doubt, known.doubts[t])));
   return taught;
 }
 

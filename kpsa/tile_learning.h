@@ -25,8 +25,8 @@ TileTrial TryTiles(const TileSubspace& made, const Eigen::VectorXd& mean, const 
                    std::size_t first = 0, std::size_t stride = 1);
 
 // The tiles that have something to learn from poses: a point of theirs is farther off than the error, or they
-// doubt more than that.
-std::vector<char> TilesToTeach(const TileTrial& trial, double error, double doubt);
+// doubt more than they do in poses that they know, and more than `doubt`.
+std::vector<char> TilesToTeach(const TileTrial& trial, const TileTrial& known, double error, double doubt);
 
 // These made anew of all poses, centred; candidates: of all tiles.
 TileSubspace TeachTiles(const TileSubspace& made, std::span<const char> taught, const PoseMatrix& poses,

@@ -39,7 +39,7 @@ constexpr std::size_t kBetween = 400;  // poses between the frames of all clips,
 constexpr std::size_t kChunk = 256;    // calibration poses that are held at once
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr double kLearntWell = 0.5;                            // of the tolerance: a tile may be off there
-constexpr std::size_t kDoubtPoses = 400;                       // that say how much tiles doubt what they know
+constexpr std::size_t kDoubtPoses = 800;                       // that say how much tiles doubt what they know
 constexpr int kMaxLightModes = 120;                            // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;                           // of new poses: cues of each tile are tried
 constexpr double kFewMisses = 0.01;                            // likewise: finer tiles for these
@@ -599,13 +599,14 @@ class Trainer {
   void Teach(const TileOptions& storage, PoseMatrix* poses, TileSubspace* made) const {
     const std::size_t trained = poses->poses();
     const TileTraining training{&pca_.mean, record_.clip_poses, tiles_.options, storage};
-    const double doubt =
-        Quantile(TryTiles(*made, pca_.mean, *poses, 0, trained / kDoubtPoses + 1).of_poses, 0.5);
+    std::optional<double> doubt;  // in half of the poses before
     for (const PoseMatrix& learnt : learnt_) {
       const std::size_t first = poses->poses();
+      const TileTrial known = TryTiles(*made, pca_.mean, *poses, 0, first / kDoubtPoses + 1);
+      if (!doubt) doubt = Quantile(known.of_poses, 0.5);
       poses->Append(learnt);
       const TileTrial trial = TryTiles(*made, pca_.mean, *poses, first);
-      *made = TeachTiles(*made, TilesToTeach(trial, kLearntWell * options_.tolerance, doubt), *poses,
+      *made = TeachTiles(*made, TilesToTeach(trial, known, kLearntWell * options_.tolerance, *doubt), *poses,
                          learning_tiles_, training);
     }
     poses->Truncate(trained);

@@ -83,12 +83,14 @@ class TileLearning : public ::testing::Test {
     return poses;
   }
   std::vector<char> ToTeach(const TileSubspace& made, const PoseMatrix& poses) const {
-    return TilesToTeach(TryTiles(made, mean_, poses), kFlapTolerance / 2, doubt_);
+    return TilesToTeach(TryTiles(made, mean_, poses), TryTiles(made, mean_, poses_), kFlapTolerance / 2,
+                        doubt_);
   }
   // From all poses so far, and these.
   TileSubspace Teach(const TileSubspace& made, const PoseMatrix& lesson) {
+    const std::vector<char> taught = ToTeach(made, lesson);
     poses_.Append(lesson);
-    return TeachTiles(made, ToTeach(made, lesson), poses_, candidates_, training_);
+    return TeachTiles(made, taught, poses_, candidates_, training_);
   }
   // What a tile reads.
   static std::vector<std::pair<CueRef, std::uint32_t>> Read(const TileSubspace& made, std::size_t tile) {
