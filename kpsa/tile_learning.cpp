@@ -13,7 +13,7 @@ namespace kpsa {
 namespace {
 
 using CueKey = std::pair<std::pair<CueKind, Index>, Index>;
-CueKey KeyOf(const CueRef& cue) { return {{cue.kind, cue.index}, cue.joint}; }
+CueKey CueKeyOf(const CueRef& cue) { return {{cue.kind, cue.index}, cue.joint}; }
 
 // As the run time measures them, before they are rounded.
 void ReadCues(const CueSet& set, const PoseMatrix& poses, std::size_t pose, const Eigen::VectorXd& mean,
@@ -23,7 +23,7 @@ void ReadCues(const CueSet& set, const PoseMatrix& poses, std::size_t pose, cons
 }
 
 // y of all poses. [r x T]
-Eigen::MatrixXd Measured(const CueSet& set, const PoseMatrix& poses, const Eigen::VectorXd& mean) {
+Eigen::MatrixXd MeasureWith(const CueSet& set, const PoseMatrix& poses, const Eigen::VectorXd& mean) {
   Eigen::MatrixXd measured(set.rows(), static_cast<Eigen::Index>(poses.poses()));
   ParallelFor(poses.poses(), 16, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t)
@@ -50,12 +50,12 @@ TileCues ChooseWithin(const TileSubspace& made, const PoseMatrix& poses, std::ve
 }
 
 // Into `set`, behind what is there; where in it each of the cues is.
-std::vector<std::size_t> AddCues(const CueSet& fresh, CueSet* set) {
+std::vector<std::size_t> AddToSet(const CueSet& fresh, CueSet* set) {
   std::map<CueKey, std::size_t> number;
-  for (std::size_t k = 0; k < set->cues.size(); ++k) number.emplace(KeyOf(set->cues[k]), k);
+  for (std::size_t k = 0; k < set->cues.size(); ++k) number.emplace(CueKeyOf(set->cues[k]), k);
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < fresh.cues.size(); ++k) {
-    const auto [found, is_new] = number.emplace(KeyOf(fresh.cues[k]), set->cues.size());
+    const auto [found, is_new] = number.emplace(CueKeyOf(fresh.cues[k]), set->cues.size());
     places.push_back(found->second);
     if (!is_new) continue;
     const Index first = fresh.offsets[k], rows = fresh.offsets[k + 1] - first;
@@ -139,8 +139,8 @@ TileSubspace TeachTiles(const TileSubspace& made, std::span<const char> taught, 
   CueSet& set = next.cues;
   Eigen::MatrixXd measured;
   const std::vector<std::size_t> places =
-      AddCues(MeasureCues(poses, *training.mean, chosen.cues, &measured), &set);
-  measured = Measured(set, poses, *training.mean);
+      AddToSet(MeasureCues(poses, *training.mean, chosen.cues, &measured), &set);
+  measured = MeasureWith(set, poses, *training.mean);
   const Eigen::VectorXd middle = measured.rowwise().mean();  // y is 0 at another pose than the mean of these
   const Eigen::MatrixXd centered = measured.colwise() - middle;
   std::map<Index, std::uint32_t> row_of;  // of scalars
