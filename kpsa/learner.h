@@ -44,7 +44,7 @@ using LearnerRigFactory = std::function<Result<LearnerRig>()>;
 struct LearnerOptions {
   std::size_t most_misses = 100'000;  // that are kept until they are learnt; more are dropped
   int threads = 1;                    // that training takes, its own among them; 0: all
-  std::function<bool(const char* what, double share)> progress;  // as TrainOptions has it
+  std::function<bool(const char* what, double share)> progress = {};  // as TrainOptions has it
 };
 
 // All functions may be called from any thread.
