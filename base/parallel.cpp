@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
 #if defined(KPSA_WITH_TSAN)
@@ -66,6 +67,12 @@ ThreadLimit::ThreadLimit(int threads)
                                     static_cast<std::size_t>(threads > 0 ? threads : HardwareThreads()))) {}
 
 ThreadLimit::~ThreadLimit() { delete static_cast<tbb::global_control*>(impl_); }
+
+void WithThreads(int threads, const std::function<void()>& body) {
+  if (threads <= 0) return body();
+  tbb::task_arena arena(threads);
+  arena.execute(body);
+}
 
 int HardwareThreads() { return tbb::info::default_concurrency(); }
 

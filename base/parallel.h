@@ -36,6 +36,9 @@ class ThreadLimit {
  private:
   void* impl_;
 };
+// Runs the body on this thread; ParallelFor within it uses at most so many (this one among them; 0: all), so
+// that work in the background leaves the others to what shows.
+void WithThreads(int threads, const std::function<void()>& body);
 int HardwareThreads();
 int AllowedThreads();  // as limited
 

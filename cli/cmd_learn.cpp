@@ -16,6 +16,8 @@
 #include "cli/rig_frames.h"
 #include "cli/rig_training.h"
 #include "cli/verdicts.h"
+#include "kpsa/learner.h"
+#include "kpsa/tile_splice.h"
 #include "kpsa/training_record.h"
 
 namespace kpsa {
@@ -27,7 +29,7 @@ struct LearnFlags : Flags {
 
 // What a subspace makes of the frames of a clip.
 struct ClipTrial {
-  std::vector<double> times;  // of the frames, seconds
+  std::vector<Miss> missed;
   std::size_t hits = 0, blends = 0, misses = 0;
   std::string reason;  // the most frequent one
 };
@@ -50,53 +52,59 @@ Result<ClipTrial> TryClip(Flags flags, const std::string& clip, const std::strin
   verdicts.Ask(rig, &request);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
+  ClipTrial trial;
   RigFrameOptions options;
   options.quiet = true;
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
         verdicts.Add(FrameNumber((*times)[frame], rig.fps), evaluator);
+        if (!verdicts.records().back().decision.hit()) trial.missed.push_back({clip, (*times)[frame]});
         return Status();
       }));
-  ClipTrial trial;
-  trial.times = *times;
   trial.hits = verdicts.hits();
   trial.blends = verdicts.count(FrameVerdict::kBlend), trial.misses = verdicts.count(FrameVerdict::kMiss);
   trial.reason = verdicts.MostFrequentReason();
   return trial;
 }
 
-// All frames of a clip of which some miss, besides those that were learnt before: what lies between two
-// misses is as new as these, and a few poses among thousands would weigh nothing. Returns how many are new.
-std::size_t Learn(const ClipTrial& trial, const std::string& clip, std::vector<TrainingClip>* learnt) {
-  if (trial.blends + trial.misses == 0) return 0;
-  auto known = std::ranges::find(*learnt, clip, &TrainingClip::name);
-  if (known == learnt->end()) known = learnt->insert(learnt->end(), {clip, {}, true});
-  const std::size_t before = known->times.size();
-  known->times.insert(known->times.end(), trial.times.begin(), trial.times.end());
-  std::ranges::sort(known->times);
-  known->times.erase(std::unique(known->times.begin(), known->times.end()), known->times.end());
-  return known->times.size() - before;
+// The rig of the flags once more, for the learner alone.
+Result<LearnerRig> OpenForLearner(const LearnFlags& flags) {
+  Result<std::unique_ptr<OpenRig>> opened = LoadRigOf(flags);
+  if (!opened.ok()) return opened.status();
+  const std::shared_ptr<OpenRig> open = std::move(*opened);
+  const Result<Acceleration> entry = ChooseEntry(open->rig, flags.name);
+  if (!entry.ok()) return entry.status();
+  LearnerRig rig;
+  rig.owner = open;
+  rig.training = MakeTrainingRig(&open->rig, *entry);
+  rig.frames = [open](const std::string& clip) -> Result<TrainingClip> {
+    Result<std::vector<TrainingClip>> clips = ClipFrames(open->rig, {clip});
+    if (!clips.ok()) return clips.status();
+    return std::move(clips->front());
+  };
+  rig.samples = static_cast<std::size_t>(std::max<std::int64_t>(0, entry->train_samples));
+  return rig;
 }
 
-// As that training was asked for; what an older file does not tell is as the rig has it.
-TrainOptions OptionsOf(const Subspace& subspace, const TrainingRecord& record, const Acceleration& entry) {
-  TrainOptions options;
-  options.seed = record.seed;
-  options.tolerance = subspace.tolerance, options.violation_rate = subspace.violation_rate;
-  options.keep_modes = subspace.kept_modes.size() > 0;
-  if (record.mode == "paper") options.mode = EstimatorMode::kPaper;
-  const TrainingRecord::Asked& asked = record.asked;
-  const bool told = asked.rows > 0;
-  options.samples = told ? std::min<std::size_t>(asked.samples, 1'000'000)
-                         : static_cast<std::size_t>(std::max<std::int64_t>(0, entry.train_samples));
-  if (!told) return options;
-  options.calibration_poses = std::min<std::size_t>(asked.calibration, 100'000);
-  options.rows = std::clamp<std::size_t>(asked.rows, 3, 3000);
-  options.max_modes = static_cast<int>(std::clamp<std::size_t>(asked.modes, 1, 2000));
-  (options.mode == EstimatorMode::kPaper ? options.key_points : options.min_points) =
-      std::clamp<std::size_t>(asked.points, 2, 2000);
-  options.may_have_cues_by_tile = asked.by_tile;
-  return options;
+// Of tiles that learn by themselves: how many there are, and how many learnt nothing.
+struct TileCounts {
+  std::size_t all = 0, kept = 0;
+};
+TileCounts CountTiles(const Subspace& before, const Subspace& after) {
+  TileCounts counts;
+  if (!before.by_tile() || !after.by_tile()) return counts;
+  for (std::size_t m = 0; m < std::min(before.tiles.size(), after.tiles.size()); ++m) {
+    const std::vector<char> same = SameTiles(before.tiles[m], after.tiles[m]);
+    counts.all += same.size();
+    counts.kept += static_cast<std::size_t>(std::ranges::count(same, 1));
+  }
+  return counts;
+}
+
+std::size_t LearntFrames(const Subspace& subspace) {
+  std::size_t frames = 0;
+  for (const auto& [clip, times] : ParseTraining(subspace.training).learnt) frames += times.size();
+  return frames;
 }
 
 struct Learnt {
@@ -105,26 +113,30 @@ struct Learnt {
 };
 
 std::string LearnJson(const std::string& path, const std::vector<Learnt>& clips, std::size_t poses,
-                      double seconds) {
+                      const TileCounts& tiles, double seconds) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   const auto counts = [](const ClipTrial& trial) {
     return nlohmann::ordered_json{{"hits", trial.hits}, {"blends", trial.blends}, {"misses", trial.misses}};
   };
   for (const Learnt& one : clips)
     list.push_back({{"clip", one.clip}, {"before", counts(one.before)}, {"after", counts(one.after)}});
-  const nlohmann::ordered_json document = {{"schema", "kpsa.learn/1"},
-                                           {"subspace", path},
-                                           {"learnt", poses},
-                                           {"clips", list},
-                                           {"seconds", seconds}};
+  nlohmann::ordered_json document = {{"schema", "kpsa.learn/1"},
+                                     {"subspace", path},
+                                     {"learnt", poses},
+                                     {"clips", list},
+                                     {"seconds", seconds}};
+  if (tiles.all > 0) document["tiles"] = {{"all", tiles.all}, {"kept", tiles.kept}};
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 std::string LearnText(const std::string& path, const std::vector<Learnt>& clips, std::size_t poses,
-                      double seconds) {
+                      const TileCounts& tiles, double seconds) {
   std::string text = poses == 0 ? fmt::format("{}: there is nothing new to learn\n", path)
                                 : fmt::format("{}: {} learnt, trained again in {:.1f} s\n", path,
                                               Plural(poses, "frame"), seconds);
+  if (tiles.all > 0)
+    text += fmt::format("{} of {} had nothing to learn, and are as they were\n", tiles.kept,
+                        Plural(tiles.all, "tile"));
   for (const Learnt& one : clips) {
     const auto counts = [](const ClipTrial& t) { return CountsText(t.hits, t.blends, t.misses); };
     text += fmt::format("{}: {}", one.clip, counts(one.before));
@@ -156,51 +168,52 @@ CommandResult RunLearn(LearnFlags flags) {
     return Status::Usage("accelerate: \"{}\" names no subspace file: expected --kpsa FILE.kpsa", entry->name);
   const std::string path = flags.output.value_or(from);
   KPSA_RETURN_IF_ERROR(CheckOutput(path, flags.force, {".kpsa"}));
-  const Result<Subspace> old = ReadSubspace(from);
-  if (!old.ok()) return old.status();
+  Result<Subspace> read = ReadSubspace(from, KeptModes::kRead);
+  if (!read.ok()) return read.status();
+  const auto old = std::make_shared<const Subspace>(std::move(*read));
   if (old->of_light()) return Status::Usage("{}: it is of light, which has no frames to learn from", from);
-  const TrainingRecord record = ParseTraining(old->training);
 
   const ThreadLimit limit(*threads);
   const auto begin = std::chrono::steady_clock::now();
-  std::vector<TrainingClip> learnt;
-  for (const auto& [clip, times] : record.learnt) learnt.push_back({clip, times, true});
-  std::size_t poses = 0;
-  std::vector<Learnt> result;
-  for (const std::string& name : names) {
-    Result<ClipTrial> trial = TryClip(flags, name, from);
-    if (!trial.ok()) return trial.status();
-    poses += Learn(*trial, name, &learnt);
-    result.push_back({name, std::move(*trial), {}});
-  }
-  const auto report = [&] {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    Print(flags.json ? LearnJson(path, result, poses, seconds) : LearnText(path, result, poses, seconds));
-  };
-  if (poses == 0) {  // a file of its own all the same, where one was asked for
-    for (Learnt& one : result) one.after = one.before;
-    if (path != from) KPSA_RETURN_IF_ERROR(WriteSubspace(*old, path));
-    report();
-    return 0;
-  }
-
-  Result<std::vector<TrainingClip>> clips = ClipFrames(rig, record.clips);
-  if (!clips.ok()) return Status(clips.status()).At({from});
-  clips->insert(clips->end(), learnt.begin(), learnt.end());
-  TrainOptions options = OptionsOf(*old, record, *entry);
   Progress progress("learn", 0, flags.quiet);
   std::string stage;
+  LearnerOptions options;
+  options.threads = 0;  // nothing else is done meanwhile
   options.progress = [&](const char* what, double) {
     if (stage != what) progress.SetStage(fmt::format("learn: {}", what));
     stage = what;
     return true;
   };
-  const Result<Subspace> trained = Train(MakeTrainingRig(&rig, *entry), *clips, options);
-  if (!trained.ok()) return Status(trained.status()).At({rig.path});
+  Learner learner(
+      old, [&flags] { return OpenForLearner(flags); }, std::move(options));
+  std::size_t poses = 0;
+  TileCounts tiles;
+  std::vector<Learnt> result;
+  for (const std::string& name : names) {
+    Result<ClipTrial> trial = TryClip(flags, name, from);
+    if (!trial.ok()) return trial.status();
+    for (const Miss& miss : trial->missed) learner.Add(miss);
+    result.push_back({name, std::move(*trial), {}});
+  }
+  const auto report = [&] {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    Print(flags.json ? LearnJson(path, result, poses, tiles, seconds)
+                     : LearnText(path, result, poses, tiles, seconds));
+  };
+  if (!learner.Learn()) {  // a file of its own all the same, where one was asked for
+    for (Learnt& one : result) one.after = one.before;
+    if (path != from) KPSA_RETURN_IF_ERROR(WriteSubspace(*old, path));
+    report();
+    return 0;
+  }
+  KPSA_RETURN_IF_ERROR(learner.Wait().At({rig.path}));
+  const std::shared_ptr<const Subspace> learnt = learner.TakeNewest();
+  poses = LearntFrames(*learnt) - LearntFrames(*old);
+  tiles = CountTiles(*old, *learnt);
   progress.Clear();
   {
     const InterruptScope writing;
-    KPSA_RETURN_IF_ERROR(WriteSubspace(*trained, path));
+    KPSA_RETURN_IF_ERROR(WriteSubspace(*learnt, path));
   }
   for (Learnt& one : result) {
     Result<ClipTrial> trial = TryClip(flags, one.clip, path);

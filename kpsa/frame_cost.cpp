@@ -55,7 +55,7 @@ ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, d
 }
 
 void GivePatches(const PatchLayout& patches, Subspace* subspace) {
-  if (subspace->doubt_inputs() > 0 && subspace->soft_cache.factor.size() == 0) subspace->patches = patches;
+  if (subspace->by_tile()) subspace->patches = patches;
 }
 
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,

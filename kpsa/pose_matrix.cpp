@@ -17,6 +17,11 @@ void PoseMatrix::Append(const PoseMatrix& other) {
   for (std::size_t t = 0; t < other.poses_; ++t) std::ranges::copy(other.row(t), Grow().begin());
 }
 
+void PoseMatrix::Truncate(std::size_t poses) {
+  poses_ = std::min(poses_, poses);
+  blocks_.resize((poses_ + kBlockPoses - 1) / kBlockPoses);
+}
+
 std::span<float> PoseMatrix::Grow() {
   if (poses_ % kBlockPoses == 0) blocks_.push_back(std::make_unique<float[]>(kBlockPoses * columns()));
   return row(poses_++);

@@ -56,6 +56,8 @@ class PoseMatrix {
   bool centered() const { return centered_; }
   // The poses of another matrix of the same layout, both centred with the same mean, or neither.
   void Append(const PoseMatrix& other);
+  // Keeps the first poses.
+  void Truncate(std::size_t poses);
 
  private:
   std::span<float> Grow();

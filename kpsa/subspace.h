@@ -102,6 +102,9 @@ struct Subspace {
   std::vector<float> latent;
   std::vector<TrainedRange> ranges;  // every varying plug upstream
   bool of_light() const { return units == kLightUnits; }
+  // Tiles have cues of their own, and their doubts alone judge: SoftCache's own score speaks of all points,
+  // and would say of no part that it misses.
+  bool by_tile() const { return doubt_inputs() > 0 && soft_cache.factor.size() == 0; }
   std::string rig_hash;          // what it was trained on (KPSA.md, section 3)
   std::string units = "m";       // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
   std::string space;             // "" world or mesh space, else the joint

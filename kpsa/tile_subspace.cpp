@@ -76,6 +76,14 @@ TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
   return choice;
 }
 
+void FinishTiles(TileSubspace* made) {
+  DropUnread(made);
+  Subspace& s = made->subspace;
+  s.cue_mean.assign(made->cues.mean.data(), made->cues.mean.data() + made->cues.mean.size());
+  s.cue_scale.assign(made->cues.scale.data(), made->cues.scale.data() + made->cues.scale.size());
+  s.soft_cache.offsets = made->cues.offsets;
+}
+
 double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance) {
   const auto count = static_cast<Eigen::Index>(poses.poses());
   std::vector<Eigen::VectorXd> largest(choice.candidates.size());  // squared, by tile
@@ -138,11 +146,8 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
     first += height;
   }
   KPSA_CHECK_EQ(tile, choice.candidates.size());
-  DropUnread(&made);
-  s.cue_mean.assign(made.cues.mean.data(), made.cues.mean.data() + made.cues.mean.size());
-  s.cue_scale.assign(made.cues.scale.data(), made.cues.scale.data() + made.cues.scale.size());
-  s.soft_cache.offsets = made.cues.offsets;
   s.score = {0, 1};
+  FinishTiles(&made);
   return made;
 }
 

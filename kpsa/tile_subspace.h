@@ -25,6 +25,9 @@ struct TileChoice {
 TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                        std::vector<TileCandidates> candidates, const TileCueOptions& options);
 
+// Leaves out the cues that no tile reads, and tells the subspace of the others.
+void FinishTiles(TileSubspace* made);
+
 // Share of the same poses in which a point of those tiles would be farther off, were they stored exactly.
 double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance);
 

@@ -13,9 +13,11 @@
 #include "kpsa/pca.h"
 #include "kpsa/pose_judge.h"
 #include "kpsa/pose_recorder.h"
+#include "kpsa/quantile.h"
 #include "kpsa/signal_noise.h"
 #include "kpsa/space_frame.h"
 #include "kpsa/tile_candidates.h"
+#include "kpsa/tile_learning.h"
 #include "kpsa/tile_subspace.h"
 #include "kpsa/tilts.h"
 #include "kpsa/time_limit.h"
@@ -33,16 +35,18 @@ constexpr double kOwnShare = 0.04, kOwnMaxShare = 0.3, kFineShare = 0.03, kFineM
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
-constexpr std::size_t kBetween = 400;    // poses between the frames of all clips, at most
-constexpr int kMaxLightModes = 120;      // that are looked at; noise is beyond
-constexpr double kManyMisses = 0.05;     // of new poses: cues of each tile are tried
-constexpr double kFewMisses = 0.01;      // likewise: finer tiles for these
-constexpr std::size_t kTrialTiles = 8;   // of so many, one says whether cues of each tile pay:
-constexpr double kTrialBeyond = 0.02;    // share of poses farther off than half the tolerance, at most
-constexpr double kHopelessTiles = 0.3;   // not for cues of tiles that miss so many
-constexpr double kTooManyMisses = 0.15;  // and cues as for half the tolerance
-constexpr double kTilesInModes = 3.5;    // how long these take, in the time that modes took
-constexpr double kClearly = 0.5;         // of the expected cost of the others: cues of tiles are taken
+constexpr std::size_t kBetween = 400;     // poses between the frames of all clips, at most
+constexpr double kLearntWell = 0.5;       // of the tolerance: a tile may be off there
+constexpr std::size_t kDoubtPoses = 800;  // that say how much tiles doubt what they know
+constexpr int kMaxLightModes = 120;       // that are looked at; noise is beyond
+constexpr double kManyMisses = 0.05;      // of new poses: cues of each tile are tried
+constexpr double kFewMisses = 0.01;       // likewise: finer tiles for these
+constexpr std::size_t kTrialTiles = 8;    // of so many, one says whether cues of each tile pay:
+constexpr double kTrialBeyond = 0.02;     // share of poses farther off than half the tolerance, at most
+constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so many
+constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
+constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
+constexpr double kClearly = 0.5;          // of the expected cost of the others: cues of tiles are taken
 constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
 constexpr std::size_t kCueProducts = 160;  // cues that are products of others
 
@@ -52,6 +56,10 @@ class Trainer {
       : rig_(WithTilts(rig)),
         drawn_(rig.controls),
         clips_(clips),
+        trained_clips_(clips.begin(), std::ranges::find_if(clips,
+                                                           [&](const TrainingClip& clip) {
+                                                             return options.by_tile_as_before && clip.learnt;
+                                                           })),
         options_(options),
         limit_(options.seconds) {}
 
@@ -68,6 +76,7 @@ class Trainer {
       if (clip.learnt) record_.learnt.emplace_back(clip.name, clip.times);
       if (!clip.learnt) record_.clips.push_back(clip.name);
     }
+    record_.learnt_poses = options_.learnt_poses;
     KPSA_RETURN_IF_ERROR(Prepare());
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
@@ -77,6 +86,7 @@ class Trainer {
     if (layout_.products > 0) ChooseProducts(&poses, &judges);
     ranges_ = RangeFinder(layout_);
     ranges_.Widen(poses);
+    for (const PoseMatrix& learnt : learnt_) ranges_.Widen(learnt);
     if (!of_light()) KPSA_RETURN_IF_ERROR(ranges_.Widen(clips_, recorder_.get()));
     if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
@@ -151,7 +161,11 @@ class Trainer {
         recorder_->Layout(of_map && !options_.without.cue_products ? kCueProducts : 0);
     if (!layout.ok()) return layout.status();
     layout_ = *layout;
-    sampler_ = std::make_unique<TrainingSampler>(rig_, drawn_, clips_, options_, recorder_.get(), layout_);
+    sampler_ = std::make_shared<TrainingSampler>(rig_, drawn_, clips_, options_, recorder_.get(), layout_);
+    trained_sampler_ = sampler_;
+    if (options_.by_tile_as_before)
+      trained_sampler_ =
+          std::make_shared<TrainingSampler>(rig_, drawn_, trained_clips_, options_, recorder_.get(), layout_);
     totals_ = totals;
     return Status();
   }
@@ -159,17 +173,31 @@ class Trainer {
   // To train on, and, where cues have places to choose from, to judge these by.
   Status RecordPoses(PoseMatrix* poses, PoseMatrix* judges) {
     std::size_t frames = 0;
-    for (const TrainingClip& clip : clips_) frames += clip.times.size();
+    for (const TrainingClip& clip : trained_clips_) frames += clip.times.size();
     const double between =
         of_light() ? 0 : std::min(1.0, static_cast<double>(kBetween) / static_cast<double>(frames + 1));
-    for (std::size_t c = 0; c < clips_.size(); ++c) {
-      KPSA_RETURN_IF_ERROR(Say("poses", 0.2 * static_cast<double>(c) / static_cast<double>(clips_.size())));
-      KPSA_RETURN_IF_ERROR(recorder_->AddClip(WithTimesBetween(clips_[c], between), poses));
+    for (std::size_t c = 0; c < trained_clips_.size(); ++c) {
+      KPSA_RETURN_IF_ERROR(
+          Say("poses", 0.2 * static_cast<double>(c) / static_cast<double>(trained_clips_.size())));
+      KPSA_RETURN_IF_ERROR(recorder_->AddClip(WithTimesBetween(trained_clips_[c], between), poses));
     }
     record_.clip_poses = poses->poses();
     KPSA_RETURN_IF_ERROR(Say("poses", 0.2));
+    const Result<std::vector<SampledPose>> learnt = SamplesOf(options_.learnt_poses, rig_, clips_);
+    if (!learnt.ok()) return learnt.status();
+    if (options_.by_tile_as_before) {
+      for (std::size_t c = trained_clips_.size(); c < clips_.size(); ++c) {
+        learnt_.emplace_back(layout_);
+        KPSA_RETURN_IF_ERROR(recorder_->AddClip(WithTimesBetween(clips_[c], 1), &learnt_.back()));
+      }
+      learnt_.emplace_back(layout_);
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(*learnt, clips_, &learnt_.back()));
+    } else {
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(*learnt, clips_, poses));
+    }
     KPSA_RETURN_IF_ERROR(sampler_->LearnHowControlsMove());
-    KPSA_RETURN_IF_ERROR(sampler_->AddTraining(poses));
+    if (options_.by_tile_as_before) KPSA_RETURN_IF_ERROR(trained_sampler_->LearnHowControlsMove());
+    KPSA_RETURN_IF_ERROR(trained_sampler_->AddTraining(poses));
     record_.sampled_poses = poses->poses() - record_.clip_poses;
     if (poses->poses() < 3)
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
@@ -178,7 +206,7 @@ class Trainer {
     // Light has those that Split takes away
     const bool compares =
         !of_light() && (places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty()));
-    return compares ? sampler_->AddJudges(judges, &judge_kinds_) : Status();
+    return compares ? trained_sampler_->AddJudges(judges, &judge_kinds_) : Status();
   }
 
   // As many poses as there is time for, of all of them.
@@ -261,6 +289,7 @@ class Trainer {
     }
     diagonal_ = Length(hi - lo);
     poses->Subtract(mean);
+    for (PoseMatrix& learnt : learnt_) learnt.Subtract(mean);
     int modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2)
                                                        : options_.max_modes;
     if (of_light()) modes = std::min(modes, kMaxLightModes);
@@ -377,7 +406,7 @@ class Trainer {
     };
     const auto again = [&](const char* what, bool finely = true) {
       if (by_tile_) {
-        TileSubspace tiles = OfTiles(*poses, finely);
+        TileSubspace tiles = OfTiles(poses, finely);
         now = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
       } else {
         now = ForAllPoints(poses, true);
@@ -448,7 +477,7 @@ class Trainer {
     std::size_t best = 0;
     for (const bool fine : {false, true}) {
       if (!*promising) break;
-      TileSubspace made = OfTiles(*poses, fine);
+      TileSubspace made = OfTiles(poses, fine);
       if (made.subspace.doubt_inputs() == 0) break;
       const Result<FrameCost> priced = Price(&made.subspace, made.cues, judges);
       if (!priced.ok()) return priced.status();
@@ -483,15 +512,20 @@ class Trainer {
   Result<bool> ChooseTiles(PoseMatrix* poses) {
     tried_tiles_ = true;
     PoseMatrix more(layout_);
-    KPSA_RETURN_IF_ERROR(sampler_->AddMore(*poses, &more));
+    KPSA_RETURN_IF_ERROR(trained_sampler_->AddMore(*poses, &more));
     record_.sampled_poses += more.poses();
     if (more.poses() > 0) more.Subtract(pca_.mean);
     poses->Append(more);
     TileCandidateOptions of;
     of.layout = layout_, of.totals = totals_, of.signals = recorder_->signals();
     of.points = of_tiles_, of.positions = positions_, of.stages = recorder_->candidates();
-    Result<std::vector<TileCandidates>> candidates = FindTileCandidates(rig_, &compiler_, clips_, of);
+    Result<std::vector<TileCandidates>> candidates = FindTileCandidates(rig_, &compiler_, trained_clips_, of);
     if (!candidates.ok()) return candidates.status();
+    if (!learnt_.empty()) {
+      Result<std::vector<TileCandidates>> learning = FindTileCandidates(rig_, &compiler_, clips_, of);
+      if (!learning.ok()) return learning.status();
+      learning_tiles_ = std::move(*learning);
+    }
     TileCueOptions choice;
     choice.tolerance = options_.tolerance;
     choice.mean = &pca_.mean;
@@ -515,11 +549,29 @@ class Trainer {
     tiles_ = kpsa::ChooseTiles(pca_.mean, *poses, std::move(*candidates), choice);
     return true;
   }
-  TileSubspace OfTiles(const PoseMatrix& poses, bool fine) const {
-    return MakeTileSubspace(
-        pca_.mean, poses, record_.clip_poses, tiles_, Outputs(),
+  TileSubspace OfTiles(PoseMatrix* poses, bool fine) const {
+    const TileOptions storage =
         fine ? TileBudgets(true)
-             : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest});
+             : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest};
+    TileSubspace made = MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, tiles_, Outputs(), storage);
+    if (!learnt_.empty()) Teach(storage, poses, &made);
+    return made;
+  }
+  // One clip after the other, so that those which were learnt before find what they found then.
+  void Teach(const TileOptions& storage, PoseMatrix* poses, TileSubspace* made) const {
+    const std::size_t trained = poses->poses();
+    const TileTraining training{&pca_.mean, record_.clip_poses, tiles_.options, storage};
+    std::optional<double> doubt;  // in half of the poses before
+    for (const PoseMatrix& learnt : learnt_) {
+      const std::size_t first = poses->poses();
+      const TileTrial known = TryTiles(*made, pca_.mean, *poses, 0, first / kDoubtPoses + 1);
+      if (!doubt) doubt = Quantile(known.of_poses, 0.5);
+      poses->Append(learnt);
+      const TileTrial trial = TryTiles(*made, pca_.mean, *poses, first);
+      *made = TeachTiles(*made, TilesToTeach(trial, known, kLearntWell * options_.tolerance, *doubt), *poses,
+                         learning_tiles_, training);
+    }
+    poses->Truncate(trained);
   }
 
   // The subspace is given its best score by the judges, and is then priced.
@@ -549,10 +601,12 @@ class Trainer {
   const TrainingRig rig_;                  // its controls are the rig's, then tilts
   const std::vector<ControlRange> drawn_;  // the rig's
   const std::vector<TrainingClip>& clips_;
+  // Of these, what modes and tiles are made of: all, or those before the learnt ones
+  const std::vector<TrainingClip> trained_clips_;
   const TrainOptions& options_;
   Compiler compiler_;
   std::unique_ptr<PoseRecorder> recorder_;
-  std::unique_ptr<TrainingSampler> sampler_;
+  std::shared_ptr<TrainingSampler> sampler_, trained_sampler_;  // the latter without what was learnt
   PoseLayout layout_;
   std::vector<Index> totals_;
   std::vector<CuePlace> places_;
@@ -561,7 +615,9 @@ class Trainer {
   bool fine_ = false;     // tiles
   bool by_tile_ = false;  // its cues
   bool tried_tiles_ = false;
-  TileChoice tiles_;     // where they were tried
+  TileChoice tiles_;                // where they were tried
+  std::vector<PoseMatrix> learnt_;  // TrainOptions::by_tile_as_before: of each clip, then posed
+  std::vector<TileCandidates> learning_tiles_;
   PatchLayout patches_;  // what may miss by itself
   FrameCost cost_;       // by the last calibration, but points
   double full_cost_ = 0;
@@ -583,7 +639,11 @@ class Trainer {
 
 Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                        const TrainOptions& options) {
-  return Trainer(rig, clips, options).Run();
+  Result<Subspace> trained = Trainer(rig, clips, options).Run();
+  if (!trained.ok() || !options.by_tile_as_before || trained->by_tile()) return trained;
+  TrainOptions together = options;  // with cues for all points, what is learnt changes all of them
+  together.by_tile_as_before = false;
+  return Trainer(rig, clips, together).Run();
 }
 
 }  // namespace kpsa

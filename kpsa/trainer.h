@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "kpsa/accelerate.h"
+#include "kpsa/miss.h"
 #include "kpsa/poses.h"
 #include "kpsa/training_record.h"
 
@@ -18,7 +19,7 @@ namespace kpsa {
 struct TrainingClip {
   std::string name;
   std::vector<double> times;  // seconds
-  bool learnt = false;        // frames that missed once (kpsa learn), not a clip that the rig trains on
+  bool learnt = false;        // frames about misses (kpsa/learner.h), not a clip that the rig trains on
 };
 
 struct TrainOptions {
@@ -36,6 +37,10 @@ struct TrainOptions {
   bool keep_modes = false;                         // in the subspace, for reports (Subspace::kept_modes)
   double range_ramp = 0.05;                        // of a trained extent: how fast guards come in
   std::size_t max_light_candidates = 4000;         // shading points that may become cues
+  std::vector<Miss> learnt_poses;                  // posed misses; their clips are trained on
+  // Where tiles have cues of their own: what was learnt teaches only those that miss it, and all others are
+  // those of the training without it, byte for byte (kpsa/tile_learning.h).
+  bool by_tile_as_before = false;
   // About how long training may take: fewer poses, and no cues of tiles, where that is too short. Which poses
   // fit depends on the machine; with time enough, the subspace is that without a limit.
   double seconds = std::numeric_limits<double>::infinity();

@@ -73,6 +73,8 @@ std::string TrainingJson(const TrainingRecord& r) {
                  {"signature", SignatureJson(r.signature)}};
   if (!r.limited.empty()) object["limited"] = r.limited;
   for (const auto& [clip, times] : r.learnt) object["learnt"].push_back({{"clip", clip}, {"times", times}});
+  for (const Miss& pose : r.learnt_poses)
+    object["learnt_poses"].push_back({{"clip", pose.clip}, {"time", pose.time}, {"controls", pose.controls}});
   return object.dump();
 }
 
@@ -131,6 +133,21 @@ TrainingRecord ParseTraining(const std::string& text) {
       }
     }
   }
+  const auto controls = [](const json& from) {
+    std::vector<std::pair<std::string, double>> values;
+    if (!from.contains("controls") || !from["controls"].is_array()) return values;
+    for (const json& control : from["controls"]) {
+      if (control.is_array() && control.size() == 2 && control[0].is_string() && control[1].is_number())
+        values.emplace_back(control[0].get<std::string>(), control[1].get<double>());
+    }
+    return values;
+  };
+  if (object.contains("learnt_poses") && object["learnt_poses"].is_array()) {
+    for (const json& from : object["learnt_poses"]) {
+      if (!from.is_object() || !from.contains("clip") || !from["clip"].is_string()) continue;
+      r.learnt_poses.push_back({from["clip"].get<std::string>(), number(from, "time"), controls(from)});
+    }
+  }
   if (object.contains("worst") && object["worst"].is_object()) {
     const json& worst = object["worst"];
     const auto text = [&](const char* name) {
@@ -138,12 +155,7 @@ TrainingRecord ParseTraining(const std::string& text) {
     };
     r.worst.kind = text("kind"), r.worst.clip = text("clip");
     r.worst.time = number(worst, "time"), r.worst.error = number(worst, "error");
-    if (worst.contains("controls") && worst["controls"].is_array()) {
-      for (const json& control : worst["controls"]) {
-        if (control.is_array() && control.size() == 2 && control[0].is_string() && control[1].is_number())
-          r.worst.controls.emplace_back(control[0].get<std::string>(), control[1].get<double>());
-      }
-    }
+    r.worst.controls = controls(worst);
   }
   if (object.contains("tried") && object["tried"].is_array()) {
     for (const json& one : object["tried"]) {

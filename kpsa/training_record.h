@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "kpsa/miss.h"
 #include "kpsa/signature.h"
 #include "kpsa/subspace.h"
 
@@ -21,6 +22,7 @@ inline constexpr const char *kForAllPoints = "for all points",
 struct TrainingRecord {
   std::vector<std::string> clips;
   std::vector<std::pair<std::string, std::vector<double>>> learnt;  // clips, and the times that were learnt
+  std::vector<Miss> learnt_poses;                                   // that are posed
   // What was asked for, so that the same can be asked again (TrainOptions).
   struct Asked {
     std::size_t samples = 0, calibration = 0, rows = 0, modes = 0, points = 0;

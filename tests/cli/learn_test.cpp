@@ -15,7 +15,7 @@ class Learning : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_.AddSway();
-    const ProcessResult trained = Run({"train", "hello.yaml", "-q"});
+    const ProcessResult trained = Run({"train", "hello.yaml", "--keep-modes", "-q"});
     ASSERT_EQ(trained.exit_code, 0) << trained.err;
   }
   ProcessResult Run(const std::vector<std::string>& arguments) const {
@@ -51,8 +51,9 @@ TEST_F(Learning, WhatMissedHitsAfterwardsAndStaysLearnt) {
   EXPECT_LE(errors["max"].get<double>(), 1e-3);
   EXPECT_GT(errors["max"].get<double>(), 0);
 
-  const Result<Subspace> subspace = ReadSubspace(folder_ / "new.kpsa");
+  const Result<Subspace> subspace = ReadSubspace(folder_ / "new.kpsa", KeptModes::kRead);
   ASSERT_TRUE(subspace.ok());
+  EXPECT_GT(subspace->kept_modes.size(), 0) << "as before";
   const TrainingRecord record = ParseTraining(subspace->training);
   ASSERT_EQ(record.learnt.size(), 1u);
   EXPECT_EQ(record.learnt[0].first, "sway");
