@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/acceleration.h"
+#include "cli/bench_idle.h"
 #include "cli/bench_promise.h"
 #include "cli/frame_errors.h"
 #include "cli/tolerance_table.h"
@@ -89,6 +90,7 @@ struct BenchResult {
   double points_full = 0, points_accelerated = 0;  // computed a frame, over all nodes but KPSA's
   ToleranceTable tolerances;                       // worst: blends by their shares
   FrameErrors frame_errors;                        // none where the subspaces keep no modes
+  IdleDeformers idle;                              // none where it was not asked for
 };
 
 // Every frame of the clips ("": the one that the flags choose), or the times of the flags. The rig is loaded
