@@ -202,7 +202,7 @@ END
 
 ## Heavy stacks
 
-\`boy_heavy.yaml\`, \`car_heavy.yaml\` and \`animal_heavy.yaml\`: three proximityWraps and a wrap, three lattices, squash, bends and a twist, and no
+The rigs \`scenes/*/*_heavy.yaml\`: three proximityWraps and a wrap, three lattices, squash, bends and a twist, and no
 deltaMush. The reference's stacks cost what they cost in 2007; these were chosen with its ratios in sight: a stack that costs tens of nanoseconds
 a point leaves less to save than one that costs microseconds.
 
