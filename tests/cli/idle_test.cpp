@@ -15,15 +15,16 @@ namespace {
 class Idle : public ::testing::Test {
  protected:
   Idle() {
-    folder.Edit("  mush: {type: deltaMush, iterations: 10}\n",
-                "  mush: {type: deltaMush, iterations: 10}\n"
-                "  still: {type: lattice, divisions: [2, 2, 2], members: all}\n"
-                "  shift: {type: remapValue, input: upper.poseRotateZ, inputMin: 0, inputMax: -60, outputMin: 0, "
-                "outputMax: 0.03}\n"
-                "  handA: {type: transform, translateX: shift.outValue}\n"
-                "  handB: {type: transform, translateX: shift.outValue}\n"
-                "  moveA: {type: cluster, matrix: handA.worldMatrix}\n"
-                "  moveB: {type: cluster, matrix: handB.worldMatrix}\n");
+    folder.Edit(
+        "  mush: {type: deltaMush, iterations: 10}\n",
+        "  mush: {type: deltaMush, iterations: 10}\n"
+        "  still: {type: lattice, divisions: [2, 2, 2], members: all}\n"
+        "  shift: {type: remapValue, input: upper.poseRotateZ, inputMin: 0, inputMax: -60, outputMin: 0, "
+        "outputMax: 0.03}\n"
+        "  handA: {type: transform, translateX: shift.outValue}\n"
+        "  handB: {type: transform, translateX: shift.outValue}\n"
+        "  moveA: {type: cluster, matrix: handA.worldMatrix}\n"
+        "  moveB: {type: cluster, matrix: handB.worldMatrix}\n");
     folder.Edit("stack: [skin, cage, mush]", "stack: [skin, cage, still, moveA, moveB, mush]");
     flags.file = folder.rig();
   }
@@ -35,9 +36,14 @@ class Idle : public ::testing::Test {
 
   HelloFolder folder;
   Flags flags;
-  const std::map<std::string, double> kFullMs = {{"column_skinCluster", 1}, {"cage", 2},  {"squeeze", 0.25},
-                                                 {"still", 4},              {"moveA", 8}, {"moveB", 8},
-                                                 {"mush", 8},               {"upper", 0.75}};
+  const std::map<std::string, double> kFullMs = {{"column_skinCluster", 1},
+                                                 {"cage", 2},
+                                                 {"squeeze", 0.25},
+                                                 {"still", 4},
+                                                 {"moveA", 8},
+                                                 {"moveB", 8},
+                                                 {"mush", 8},
+                                                 {"upper", 0.75}};
 };
 
 TEST_F(Idle, WhatMovesNothingIsOffAtAnyTolerance) {
