@@ -41,6 +41,35 @@ OrderedJson FrameErrorsJson(const FrameErrors& e) {
           {"miss", misses}};
 }
 
+// Null where it was not asked for.
+OrderedJson IdleJson(const IdleDeformers& idle) {
+  if (!idle.measured()) return {};
+  OrderedJson deformers = OrderedJson::array();
+  for (const IdleDeformers::Deformer& each : idle.deformers) {
+    deformers.push_back({{"name", each.name},
+                         {"type", each.type},
+                         {"difference", Finite(each.difference)},
+                         {"off", each.off}});
+  }
+  return {{"share", idle.share},
+          {"ms_per_frame", idle.ms_per_frame},
+          {"difference", idle.difference},
+          {"frames", idle.frames},
+          {"deformers", std::move(deformers)}};
+}
+
+std::string IdleText(const IdleDeformers& idle) {
+  const std::vector<std::string> off = idle.Off();
+  if (off.empty())
+    return fmt::format("idle       none of {} makes less than {} on {}\n",
+                       Plural(idle.deformers.size(), "deformer"), LengthText(idle.tolerance),
+                       Plural(idle.frames, "frame"));
+  return fmt::format(
+      "idle       {:.0f} % of the full cost makes less than {} on {} ({} together):\n           {}\n",
+      100 * idle.share, LengthText(idle.tolerance), Plural(idle.frames, "frame"), LengthText(idle.difference),
+      fmt::join(off, ", "));
+}
+
 OrderedJson RangeJson(const BenchResult::Range& range) { return {range.least, range.most}; }
 
 OrderedJson PromiseJson(const Promise& p) {
@@ -164,6 +193,7 @@ OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
         {"worst_frame", r.worst_clip.empty() ? OrderedJson() : OrderedJson(r.worst_frame)}}},
       {"frame_errors", FrameErrorsJson(r.frame_errors)},
       {"reference", ReferenceJson(r.reference)},
+      {"idle", IdleJson(r.idle)},
       {"motion", {{"rms", r.motion_rms}}},
       {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
       {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
@@ -242,6 +272,7 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
         error(Rms(e.projection)), error(Rms(e.cueing)), error(Rms(e.storage)), error(Rms(e.total)),
         error(Rms(e.soft_cache)));
   }
+  if (r.idle.measured()) text += IdleText(r.idle);
   text += fmt::format(
       "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
       Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),

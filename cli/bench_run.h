@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cli/acceleration.h"
+#include "cli/bench_idle.h"
 #include "cli/bench_promise.h"
 #include "cli/bench_reference.h"
 #include "cli/frame_errors.h"
@@ -93,6 +94,7 @@ struct BenchResult {
   ToleranceTable tolerances;                       // worst: blends by their shares
   ReferenceTable reference;                        // without rows where none is asked for
   FrameErrors frame_errors;                        // none where the subspaces keep no modes
+  IdleDeformers idle;                              // none where it was not asked for
 };
 
 // Every frame of the clips ("": the one that the flags choose), or the times of the flags. The rig is loaded

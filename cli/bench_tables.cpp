@@ -154,17 +154,40 @@ std::string CeilingWithReconstruction(const BenchJsonValue& side) {
   return RatioText(ms > 0 ? NumberAt(side, "/full/ms_per_frame") / ms : NAN);
 }
 
+// Of the full cost, in deformers that are off together within the tolerance; "" where it was not measured.
+bool HasIdle(const BenchJsonValue& side) { return side.contains("idle") && !side.at("idle").is_null(); }
+
+std::string IdleShareOf(const BenchJsonValue& side) {
+  return HasIdle(side) ? fmt::format("{:.0f} %", 100 * ShareAt(side, "/idle/share")) : "";
+}
+
+// The first side that measured them: "hoodTop:mod, tail:mod and 3 more within 0.4 mm".
+std::string IdleNamesOf(const std::vector<BenchJsonValue>& sides) {
+  constexpr std::size_t kNamed = 6;
+  const auto side = std::find_if(sides.begin(), sides.end(), HasIdle);
+  if (side == sides.end()) return "-";
+  std::string text;
+  std::size_t off = 0;
+  for (const BenchJsonValue& deformer : side->at("idle").at("deformers")) {
+    if (!deformer.at("off").get<bool>() || ++off > kNamed) continue;
+    text += (text.empty() ? "" : ", ") + deformer.at("name").get<std::string>();
+  }
+  if (off == 0) return "none";
+  if (off > kNamed) text += fmt::format(" and {} more", off - kNamed);
+  return fmt::format("{} ({} together)", text, LengthText(NumberAt(*side, "/idle/difference")));
+}
+
 std::string Microseconds(double ms) { return fmt::format("{:.1f}", 1e3 * ms); }
 
 }  // namespace
 
-Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
+Result<std::string> BenchTables(const std::vector<BenchDocument>& documents, bool with_any) {
   Table reached({"character", ">points", "mode", "measured", ">modes", ">hits", ">speedup of hits",
                  ">of all frames", ">the reference", ">ceiling", ">with reconstruction", ">RMS", ">max",
-                 ">tolerance"});
+                 ">tolerance", ">full cost within it"});
   Table costs({"character", "mode", ">full, ns a point", ">full, us", ">accelerated, us", ">graph", ">cues",
                ">projection", ">reconstruction", ">later stages", ">misses", ">bytes a point"});
-  Table spent({"character", ">full, us", "of which"});
+  Table spent({"character", ">full, us", "of which", "deformers within the tolerance"});
   Table split({"character", "mode", ">projection", ">cueing", ">storage", ">total", ">with SoftCache",
                ">blends", ">misses"});
   for (const BenchDocument& document : documents) {
@@ -172,10 +195,11 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
     if (!sides.ok()) return sides.status();
     try {
       spent.Row({NameOf(sides->front()), Microseconds(NumberAt(sides->front(), "/full/ms_per_frame")),
-                 FullSpentOf(sides->front())});
+                 FullSpentOf(sides->front()), IdleNamesOf(*sides)});
       for (const BenchJsonValue& side : *sides) {
         const bool paper = side.at("mode") == "paper";
         const double tolerance = ToleranceOf(side);
+        if (!with_any && tolerance >= kAnyError) continue;
         reached.Row({NameOf(side), Thousands(CountAt(side, "/points")), ModeOf(side), MeasuredOf(side),
                      std::to_string(CountAt(side, "/modes")),
                      fmt::format("{:.1f} %", 100 * ShareAt(side, "/hit_rate")),
@@ -183,7 +207,7 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents) {
                      paper ? document.reference : "", RatioText(NumberAt(side, "/ceiling/speedup")),
                      CeilingWithReconstruction(side), ShareOf(side, ErrorAt(side, "/error/rms")),
                      ShareOf(side, ErrorAt(side, "/error/max")),
-                     tolerance >= kAnyError ? "any" : LengthText(tolerance)});
+                     tolerance >= kAnyError ? "any" : LengthText(tolerance), IdleShareOf(side)});
         const double accelerated = NumberAt(side, "/accelerated/ms_per_frame");
         std::vector<std::string> row = {
             NameOf(side), SideOf(side), fmt::format("{:.1f}", NumberAt(side, "/full/ns_per_point")),

@@ -14,9 +14,9 @@ struct BenchDocument {
   std::string reference;  // beside the paper mode of this rig; may be empty
 };
 
-// Markdown: what is reached, what it costs, and how its errors are composed. Errors: a file that is no bench
-// of this program.
-Result<std::string> BenchTables(const std::vector<BenchDocument>& documents);
+// Markdown: what is reached, what it costs, and how its errors are composed; `with_any`: sides that accept
+// every frame, too. Errors: a file that is no bench of this program.
+Result<std::string> BenchTables(const std::vector<BenchDocument>& documents, bool with_any = true);
 
 // Two plots for each side that has errors by frame: projection, cueing and total of every frame
 // reconstructed; and the error with SoftCache, misses marked. Errors also: no side has them.

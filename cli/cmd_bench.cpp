@@ -1,5 +1,6 @@
 // kpsa bench: full against accelerated on the same frames.
 #include <algorithm>
+#include <map>
 #include <memory>
 
 #include "cli/bench_report.h"
@@ -14,7 +15,7 @@ struct BenchFlags : Flags {
   AccelerationFlags acceleration;             // what all sides share
   std::vector<std::string> kpsa, tolerances;  // of each; one tolerance is for all
   std::optional<std::string> runs, speedup, reference, rival;
-  bool per_frame = false, check = false;
+  bool per_frame = false, check = false, idle = false;
 };
 
 // The rig's test clips; without them, what the flags choose ("").
@@ -52,6 +53,31 @@ Result<std::vector<AccelerationFlags>> SidesOf(const BenchFlags& flags) {
   return sides;
 }
 
+// What the tolerance of each side leaves to do nothing; the same for sides of the same tolerance.
+Status AddIdle(const BenchFlags& flags, const std::vector<std::string>& clips,
+               std::vector<BenchResult>* results) {
+  for (std::size_t i = 0; i < results->size(); ++i) {
+    BenchResult& result = (*results)[i];
+    const double tolerance = result.promise.tolerance;
+    if (result.light || !result.promise.promised()) continue;
+    const auto same = std::find_if(
+        results->begin(), results->begin() + static_cast<std::ptrdiff_t>(i),
+        [&](const BenchResult& other) { return other.idle.measured() && other.idle.tolerance == tolerance; });
+    if (same != results->begin() + static_cast<std::ptrdiff_t>(i)) {
+      result.idle = same->idle;
+      continue;
+    }
+    std::map<std::string, double> full_ms;
+    for (const BenchNode& node : result.full_nodes) full_ms[node.name] = node.ms_per_frame;
+    Result<IdleDeformers> idle = MeasureIdle(flags, clips, tolerance, full_ms);
+    if (!idle.ok()) return idle.status();
+    result.idle = std::move(*idle);
+    if (!result.idle.measured())
+      result.notes.push_back("--idle: no deformer of this stack can be switched off by an envelope");
+  }
+  return Status();
+}
+
 CommandResult RunBenchCommand(const BenchFlags& flags) {
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
   const Result<std::vector<AccelerationFlags>> sides = SidesOf(flags);
@@ -78,6 +104,7 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   const InterruptScope interruptible;
   Result<std::vector<BenchResult>> results = RunBench(flags, *sides, *clips, options);
   if (!results.ok()) return results.status();
+  if (flags.idle) KPSA_RETURN_IF_ERROR(AddIdle(flags, *clips, &*results));
   results->front().notes.insert(results->front().notes.begin(), notes.begin(), notes.end());
   const BenchContext context{flags.file, flags.kpsa, options};
   Print(flags.json ? BenchJson(*results, context) : BenchText(*results, context));
@@ -136,6 +163,9 @@ void AddBenchCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--threads", "N", &flags->threads, "threads of both sides; 1 if not given");
   AddSwitch(command, "--per-frame", &flags->per_frame,
             "a line a frame: hit, blend or miss and why, error, times");
+  AddSwitch(
+      command, "--idle", &flags->idle,
+      "tell which deformers make less than the tolerance on these frames, and how much of the full cost");
   AddSwitch(command, "--check", &flags->check,
             "exit status 1 where more frames are beyond the tolerance than the calibration promises");
   AddQuietFlag(command, flags.get());

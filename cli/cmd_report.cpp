@@ -13,6 +13,7 @@ namespace {
 struct ReportFlags : Flags {
   std::vector<std::string> files, references;
   std::optional<std::string> plot;
+  bool without_any = false;
 };
 
 CommandResult Report(const ReportFlags& flags) {
@@ -28,7 +29,7 @@ CommandResult Report(const ReportFlags& flags) {
   std::vector<BenchDocument> documents;
   for (std::size_t i = 0; i < flags.files.size(); ++i)
     documents.push_back({flags.files[i], i < flags.references.size() ? flags.references[i] : ""});
-  const Result<std::string> tables = BenchTables(documents);
+  const Result<std::string> tables = BenchTables(documents, !flags.without_any);
   if (!tables.ok()) return tables.status();
   if (flags.plot.has_value()) {
     const Result<std::vector<LinePlot>> plots = BenchPlots(flags.files.front());
@@ -53,6 +54,7 @@ void AddReportCommand(CLI::App* program, Command* chosen) {
   AddRepeated(command, "BENCH.json", "", &flags->files, "outputs of kpsa bench --json");
   AddRepeated(command, "--reference", "TEXT", &flags->references,
               "a figure to stand beside a bench's paper mode, in the order of the files");
+  AddSwitch(command, "--without-any", &flags->without_any, "leave out sides that accept every frame");
   AddOption(command, "--plot", "FILE.svg", &flags->plot,
             "errors over the frames, of subspaces trained with --keep-modes; then no tables without -o");
   AddOutputFlags(command, flags.get(), "the tables, .md, instead of stdout");

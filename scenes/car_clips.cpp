@@ -1,4 +1,5 @@
-// The clips of the car: what the trainer may see (`extreme`, `talk_train`), and `talk`, which it may not.
+// The clips of the car: what the trainer may see (`extreme`, `talk_train`), and what it may not: `talk`, and
+// `emotions` and `race`, which are written by hand (keyed_clips.h).
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -7,6 +8,7 @@
 #include "base/matrix.h"
 #include "base/scalar_math.h"
 #include "scenes/car_model.h"
+#include "scenes/keyed_clips.h"
 
 namespace kpsa::scenes::car {
 namespace {
@@ -54,6 +56,34 @@ class Track {
       turns_[Size(frame * kTurnCount + turn)] +=
           share >= 0 ? share * kTurns[turn].high : -share * kTurns[turn].low;
     }
+  }
+
+  // The control of a keyed clip: an expression, or "joint.axis", where eyes go together; -1: none.
+  int FindKeyed(const std::string& control) const {
+    const auto it = std::find(names_.begin(), names_.end(), control);
+    if (it != names_.end()) return static_cast<int>(it - names_.begin());
+    for (int t = 0; t < kTurnCount; ++t) {
+      const Turn& turn = kTurns[t];
+      const std::string joint =
+          turn.joints[0] == turn.joints[1] ? CarJoints()[Size(turn.joints[0])].name : "eyes";
+      if (control == joint + "." + static_cast<char>('x' + turn.axis)) return weights() + t;
+    }
+    return -1;
+  }
+  // Weights are shares already, turns degrees.
+  void Play(const KeyedClip& clip) {
+    const auto share = [&](int control, double value) {
+      if (control < weights()) return value;
+      const Turn& turn = kTurns[control - weights()];
+      return value >= 0 ? value / turn.high : value / -turn.low;
+    };
+    scenes::Play(
+        clip, [&](const std::string& control) { return FindKeyed(control) >= 0; },
+        [&](const std::string& name, int frame, double value) {
+          const int control = FindKeyed(name);
+          KPSA_CHECK(control >= 0);
+          Add(frame, control, share(control, value));
+        });
   }
 
   // Shapes that have no control of their own rest: their columns are 0.
@@ -193,7 +223,14 @@ std::vector<GlbClip> CarClips(const std::vector<std::string>& expressions, int b
     const bool turn = c > jaw;
     Wander(&talk, c, &other, turn ? 12 : 7, turn ? 30 : 20, turn ? 0.2 : 0.6, turn ? 0.4 : 0.7);
   }
-  return {finish(extreme, "extreme"), finish(train, "talk_train"), finish(talk, "talk")};
+  std::vector<GlbClip> clips = {finish(extreme, "extreme"), finish(train, "talk_train"),
+                                finish(talk, "talk")};
+  for (const KeyedClip* keyed : {&CarEmotions(), &CarRace()}) {
+    Track own = track(keyed->frames);
+    own.Play(*keyed);
+    clips.push_back(finish(own, keyed->name));
+  }
+  return clips;
 }
 
 }  // namespace kpsa::scenes::car

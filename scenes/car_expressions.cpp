@@ -175,6 +175,11 @@ void Maker::Corrections() {
   Pair("browPinch", [](const Place& q) {
     return Double3{-3, 1, 3} * (Share(q.p, {8, 148, 4}, {16, 18, 18}) * (1 - q.eye) * q.left);
   });
+  // Where the jaw hangs down, the bumper's sides are drawn in
+  Center("jawDrop", [](const Place& q) {
+    const Double3 side = {std::fabs(q.p.x), q.p.y, q.p.z};
+    return Double3{-0.06 * q.p.x, 1.2, -1.5} * (Share(side, {56, 46, 150}, {24, 24, 36}) * (1 - q.inside));
+  });
   Pair("smileSquint", [](const Place& q) {
     return Double3{0.5, 2.2, 1.2} * (Share(q.p, {27, 98, 34}, {28, 14, 18}) * q.left);
   });

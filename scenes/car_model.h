@@ -76,7 +76,7 @@ std::map<std::string, std::vector<double>> CarWeightMaps(const CarShape& shape);
 std::vector<Expression> CarExpressions(const CarShape& shape);
 std::vector<Expression> MuscleExpressions(const CarCage& cage);
 
-// The clips `extreme`, `talk_train` and `talk`; node indices as CarJoints.
+// The clips `extreme`, `talk_train`, `talk`, `emotions` and `race`; node indices as CarJoints.
 std::vector<GlbClip> CarClips(const std::vector<std::string>& expressions, int body_node,
                               const std::vector<std::string>& muscles, int muscle_node);
 

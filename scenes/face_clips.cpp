@@ -1,13 +1,16 @@
-// The clips of a head: what the trainer may see (`extreme`, `talk_train`), `talk`, which it may not, and
-// `emotions`.
+// The clips of a head: what the trainer may see (`extreme`, `talk_train`), and what it may not: `talk`,
+// `emotions`, and one of its own that is written by hand (keyed_clips.h).
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <functional>
+#include <utility>
 
 #include "base/check.h"
 #include "base/matrix.h"
 #include "base/scalar_math.h"
 #include "scenes/face_model.h"
+#include "scenes/keyed_clips.h"
 
 namespace kpsa::scenes {
 namespace {
@@ -332,12 +335,47 @@ GlbClip Emotions(const HeadDesign& design, const std::vector<std::string>& names
   return track.Finish("emotions", mesh_node);
 }
 
+GlbClip Keyed(const KeyedClip& clip, const HeadDesign& design, const std::vector<std::string>& names,
+              int mesh_node) {
+  constexpr std::pair<const char*, Joint> kJoints[] = {{"neck.", kNeck}, {"head.", kHead}, {"jaw.", kJaw},
+                                                       {"eyes.", kEyeL}, {"earL.", kEarL}, {"earR.", kEarR}};
+  const auto joint_of = [&](const std::string& control) {
+    for (const auto& [begin, joint] : kJoints) {
+      if (control.starts_with(begin) && control.size() == std::strlen(begin) + 1) return joint;
+    }
+    return kRoot;
+  };
+  Track track(design, names, clip.frames);
+  Play(
+      clip,
+      [&](const std::string& control) {
+        return joint_of(control) != kRoot || std::find(names.begin(), names.end(), control) != names.end();
+      },
+      [&](const std::string& control, int frame, double value) {
+        const Joint joint = joint_of(control);
+        const int axis = control.back() - 'x';
+        if (joint == kRoot) {
+          track.Weight(frame, track.Find(control)) += value;
+        } else if (joint == kEyeL) {
+          track.Look(frame, axis, value);
+        } else {
+          track.Degrees(frame, joint, axis) += value;
+        }
+      });
+  return track.Finish(clip.name, mesh_node);
+}
+
 }  // namespace
 
 std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::string>& expressions,
                                int mesh_node) {
-  return {Extreme(design, expressions, mesh_node), TalkTrain(design, expressions, mesh_node),
-          Talk(design, expressions, mesh_node), Emotions(design, expressions, mesh_node)};
+  std::vector<GlbClip> clips = {
+      Extreme(design, expressions, mesh_node), TalkTrain(design, expressions, mesh_node),
+      Talk(design, expressions, mesh_node), Emotions(design, expressions, mesh_node)};
+  if (design.production)
+    clips.push_back(Keyed(Track(design, expressions, 1).ears() ? AnimalSniff() : BoyScene(), design,
+                          expressions, mesh_node));
+  return clips;
 }
 
 }  // namespace kpsa::scenes

@@ -89,6 +89,7 @@ class Maker {
   void Others();
   void Inbetweens();
   void Combinations();
+  void Poses();
   std::vector<Expression> Take() { return std::move(expressions_); }
 
  private:
@@ -247,6 +248,7 @@ void Maker::Others() {
 
 constexpr const char* kInbetween = "_half";
 constexpr const char* kCombination = "_and_";
+constexpr const char* kPose = "_pose";
 
 // Shapes on the way, at a weight of one half: lids go around the eyeball, corners of the mouth outwards
 // first.
@@ -307,6 +309,20 @@ void Maker::Combinations() {
   });
 }
 
+// What turns of the joints need besides the skin: hollow cheeks of a dropped jaw, the muscle that stands out
+// at the neck on the side that a head turns away from.
+void Maker::Poses() {
+  const auto pose = [](const char* name) { return std::string(name) + kPose; };
+  Center(pose("jawOpen"), kJawRegion, [](const Point& q) {
+    const double cheeks = Ball({std::fabs(q.p.x), q.p.y, q.p.z}, {4.2, 11.2, 5.4}, {2.8, 4.2, 3.8});
+    return Double3{-0.09 * q.p.x, 0.08, -0.16} * (cheeks * (1 - q.ear) * (1 - q.inside));
+  });
+  Pair(pose("headTurn"), kThroatRegion, [](const Point& q) {
+    const double band = Ball(q.p, {3.0, 5.6, 2.2}, {1.7, 5.0, 3.2});
+    return Double3{0.26, 0.04, 0.34} * (band * q.left * Smooth(0, 2.5, q.p.y));
+  });
+}
+
 }  // namespace
 
 SparseTarget TargetOf(const Expression& expression, double smallest) {
@@ -321,7 +337,7 @@ SparseTarget TargetOf(const Expression& expression, double smallest) {
 
 bool IsCorrective(const std::string& expression) {
   return expression.find(kInbetween) != std::string::npos ||
-         expression.find(kCombination) != std::string::npos;
+         expression.find(kCombination) != std::string::npos || expression.find(kPose) != std::string::npos;
 }
 
 std::vector<Expression> FaceExpressions(const HeadDesign& design, const HeadShape& shape) {
@@ -334,6 +350,7 @@ std::vector<Expression> FaceExpressions(const HeadDesign& design, const HeadShap
   if (design.production) {
     maker.Inbetweens();
     maker.Combinations();
+    maker.Poses();
   }
   return maker.Take();
 }

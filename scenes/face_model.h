@@ -25,8 +25,9 @@ SparseTarget TargetOf(const Expression& expression, double smallest);
 std::vector<Expression> FaceExpressions(const HeadDesign& design, const HeadShape& shape);
 bool IsCorrective(const std::string& expression);
 
-// The clips `extreme`, `talk_train`, `talk` and `emotions` for expressions of these names, of which
-// correctives stay 0; node indices as the design's joints, the mesh node is `mesh_node`.
+// The clips `extreme`, `talk_train`, `talk`, `emotions`, and `scene` or `sniff` of a production's head, for
+// expressions of these names, of which correctives stay 0; node indices as the design's joints, the mesh node
+// is `mesh_node`.
 std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::string>& expressions,
                                int mesh_node);
 

@@ -133,8 +133,11 @@ std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& desi
     const double left = 1 - Smooth(0, shape.lid_ring - 1, static_cast<double>(ring));
     eye_ring(ring, [&](std::size_t i) { maps["flesh"][i] *= left, maps["muscles"][i] *= left; });
   }
+  // Nor is the lining of the mouth smoothed, which is folded
   for (std::size_t ring = contact; ring < shape.mouth_rings.size(); ++ring) {
+    const double smoothed = ring == contact ? 0.5 : ring == contact + 1 ? 0.25 : 0;
     for (int i : shape.mouth_rings[ring]) {
+      maps["mush"][static_cast<std::size_t>(i)] = smoothed;
       maps["flesh"][static_cast<std::size_t>(i)] *= 0.6;
       maps["muscles"][static_cast<std::size_t>(i)] *= 0.6;
     }

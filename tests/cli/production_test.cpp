@@ -135,8 +135,8 @@ TEST(HiddenMeshes, AreShownWhereTheyAreAccelerated) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Rigs, Production,
-                         ::testing::Values("boy/boy.yaml", "boy/boy_mush.yaml", "animal/animal.yaml",
-                                           "animal/animal_mush.yaml"));
+                         ::testing::Values("boy/boy.yaml", "boy/boy_heavy.yaml", "animal/animal.yaml",
+                                           "animal/animal_heavy.yaml"));
 
 }  // namespace
 }  // namespace kpsa

@@ -68,9 +68,10 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
   ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
   const std::string text = TemporaryFolder::Read(folder / "results.md");
   for (const char* words : {"10 key points", "paper mode, all frames accepted", "| default |", "| 1x |",
-                            "| with reconstruction |", "## Another clip", "% deltaMush (1)"})
+                            "| with reconstruction |", "| full cost within it |", "## Other clips",
+                            "% deltaMush (1)", "## Heavy stacks"})
     EXPECT_NE(text.find(words), std::string::npos) << words << "\n" << text;
-  EXPECT_EQ(text.find("animal_mush"), std::string::npos) << "was not measured";
+  EXPECT_EQ(text.find("animal_heavy"), std::string::npos) << "was not measured";
   // Every picture is there
   std::size_t pictures = 0;
   for (std::size_t at = text.find("](results/"); at != std::string::npos;
