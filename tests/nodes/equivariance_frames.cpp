@@ -192,15 +192,17 @@ void AddIllumination(std::vector<NodeSetUp>* all) {
                  Setting("lightKinds", std::vector<std::int64_t>{0}),
                  Setting("width", 6),
                  Setting("height", 4),
-                 Setting("samples", 4)},
-                {{"irradiance", Moves::kNot}},
+                 Setting("samples", 4),
+                 Setting("keySamples", 16)},
+                {{"irradiance", Moves::kNot}, {"keyIrradiance", Moves::kNot}},
                 kAllTurned | kNowTurned,
                 "the few samples of a pixel lie about the world's axes"};
   all->push_back(lit);
   lit.given[3].idle = true;
   lit.given.push_back(
       Setting("bounces", 1));  // those of points turn with the surface, but not what they meet
-  lit.what = "at points", lit.gives = {{"pointIrradiance[0]", Moves::kNot}};
+  lit.what = "at points",
+  lit.gives = {{"pointIrradiance[0]", Moves::kNot}, {"keyPointIrradiance[0]", Moves::kNot}};
   lit.unless = 0, lit.why = "";
   all->push_back(lit);
 }
