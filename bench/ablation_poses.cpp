@@ -5,9 +5,11 @@
 #include <cmath>
 
 #include "io/npz.h"
+#include "kpsa/cue_places.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/poses.h"
 #include "kpsa/signal_noise.h"
+#include "kpsa/training_signals.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa::ablation {
@@ -15,13 +17,6 @@ namespace {
 
 constexpr int kModes = 200;
 constexpr std::size_t kStageCandidates = 2000, kProducts = 160, kFrameStep = 3;
-
-void AddNew(std::vector<Signal> found, std::vector<Signal>* known) {
-  for (Signal& signal : found) {
-    if (std::ranges::find(*known, signal.name, &Signal::name) == known->end())
-      known->push_back(std::move(signal));
-  }
-}
 
 }  // namespace
 
@@ -57,39 +52,22 @@ Status AblationPoses::Load(const std::string& path, std::size_t samples) {
 // Candidates of the last stage but one of each mesh, evenly spread; signals under the controls and every
 // clip.
 Status AblationPoses::MakeRecorder(const std::vector<TrainingClip>& clips) {
+  Result<std::vector<Index>> totals = PointTotals(training_rig_, &compiler_);
+  if (!totals.ok()) return totals.status();
+  totals_ = std::move(*totals);
   std::vector<CandidateStage> candidates;
-  for (const auto& mesh : training_rig_.target.meshes) {
-    Request request;
-    request.outputs.push_back({mesh.stages.back().points, {}});
-    Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig.graph, request);
-    if (!plan.ok()) return plan.status();
-    totals_.push_back((*plan)->outputs()[0].points.total());
-    if (mesh.stages.size() < 2) continue;
-    candidates.push_back(
-        {totals_.size() - 1, mesh.stages.size() - 2, EvenSpread(totals_.back(), kStageCandidates)});
-    stage = mesh.stages[candidates.back().stage].name;
+  for (std::size_t m = 0; m < totals_.size(); ++m) {
+    const auto& stages = training_rig_.target.meshes[m].stages;
+    if (stages.size() < 2) continue;
+    candidates.push_back({m, stages.size() - 2, EvenSpread(totals_[m], kStageCandidates)});
+    stage = stages[candidates.back().stage].name;
   }
-  std::vector<Signal> signals, matrices;
-  KPSA_RETURN_IF_ERROR(AddSignals(&signals, &matrices));
-  for (const TrainingClip& clip : clips) {
-    KPSA_RETURN_IF_ERROR(SetClip(&rig, clip.name));
-    KPSA_RETURN_IF_ERROR(AddSignals(&signals, &matrices));
-  }
-  KPSA_RETURN_IF_ERROR(SetClip(&rig, std::nullopt));
-  signals.insert(signals.end(), matrices.begin(), matrices.end());
+  Result<TrainingSignals> found = FindTrainingSignals(training_rig_, &compiler_, clips, true);
+  if (!found.ok()) return found.status();
+  std::vector<Signal> signals = std::move(found->watched);
+  signals.insert(signals.end(), found->relative.begin(), found->relative.end());
   recorder_ =
       std::make_unique<PoseRecorder>(training_rig_, &compiler_, std::move(candidates), std::move(signals));
-  return Status();
-}
-
-Status AblationPoses::AddSignals(std::vector<Signal>* signals, std::vector<Signal>* matrices) {
-  const std::vector<PlugRef> outputs = training_rig_.target.outputs(), varying = VaryingPlugs(rig);
-  Result<std::vector<Signal>> local = FindSignals(*rig.graph, &compiler_, outputs, varying, {}, nullptr),
-                              relative = FindRelativeMatrices(*rig.graph, &compiler_, outputs, varying);
-  if (!local.ok()) return local.status();
-  if (!relative.ok()) return relative.status();
-  AddNew(std::move(*local), signals);
-  AddNew(std::move(*relative), matrices);
   return Status();
 }
 
@@ -129,14 +107,9 @@ Status AblationPoses::FindModes() {
   Result<Pca> found = ComputePca(*training, mean, options);
   if (!found.ok()) return found.status();
   pca = std::move(*found);
-  Double3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-  for (std::size_t i = 0; i < layout.points + layout.stage_points; ++i) {
-    const auto at = static_cast<Eigen::Index>(3 * i);
-    positions.push_back({mean[at], mean[at + 1], mean[at + 2]});
-    for (int a = 0; a < 3 && i < layout.points; ++a)
-      lo[a] = std::min(lo[a], positions[i][a]), hi[a] = std::max(hi[a], positions[i][a]);
-  }
-  diagonal = Length(hi - lo);
+  MeanShape shape = MeanShapeOf(layout, mean);
+  positions = std::move(shape.positions);
+  diagonal = shape.diagonal;
   noise = NoiseOf(recorder_->signals(), layout, diagonal, entry.tolerance, false);
   double energy = 0;
   for (std::size_t t = 0; t < test->poses(); ++t) {

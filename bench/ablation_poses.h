@@ -47,7 +47,6 @@ struct AblationPoses {
  private:
   Status Record(const std::vector<TrainingClip>& clips, const TrainingClip& test_clip, std::size_t samples);
   Status MakeRecorder(const std::vector<TrainingClip>& clips);
-  Status AddSignals(std::vector<Signal>* signals, std::vector<Signal>* matrices);
   void AddProducts();
   Status FindModes();
 

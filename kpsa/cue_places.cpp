@@ -92,6 +92,18 @@ std::size_t StagePoints(Index total, std::size_t of_all, std::size_t most) {
 
 }  // namespace
 
+Result<std::vector<Index>> PointTotals(const TrainingRig& rig, Compiler* compiler) {
+  std::vector<Index> totals;
+  for (const auto& mesh : rig.target.meshes) {
+    Request request;
+    request.outputs.push_back({mesh.stages.back().points, {}});
+    const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
+    if (!plan.ok()) return plan.status();
+    totals.push_back((*plan)->outputs()[0].points.total());
+  }
+  return totals;
+}
+
 Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
                                 std::size_t max_light_points) {
   const auto& meshes = rig.target.meshes;
@@ -100,7 +112,7 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
   for (const auto& mesh : meshes) outputs.push_back({mesh.stages.back().points, {}});
   const Result<Kept> full = KeptFor(rig, compiler, std::move(outputs), 0);
   if (!full.ok()) return full.status();
-  result.full_cost = full->cost;
+  result.full_cost = full->spread;
   const std::size_t all = std::accumulate(totals.begin(), totals.end(), std::size_t{0});
   std::vector<std::vector<PricedStage>> stages;  // by mesh
   std::size_t count = 0;
@@ -174,7 +186,7 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
   if (outputs.empty()) return 0.0;
   const Result<Kept> kept = KeptFor(rig, compiler, std::move(outputs), 0);
   if (!kept.ok()) return kept.status();
-  return kept->cost;
+  return kept->spread;
 }
 
 Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,

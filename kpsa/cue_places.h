@@ -14,6 +14,9 @@
 
 namespace kpsa {
 
+// The number of points of each mesh of the target.
+Result<std::vector<Index>> PointTotals(const TrainingRig& rig, Compiler* compiler);
+
 struct CuePlaces {
   std::vector<CandidateStage> stages;  // whose points are recorded besides the outputs
   std::vector<CuePlace> places;        // the dearest first
@@ -27,7 +30,9 @@ struct CuePlaces {
 Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
                                 std::size_t max_light_points = std::numeric_limits<std::size_t>::max());
 
-// What the points among the cues cost together (ns); stages: as FindCuePlaces gave them.
+// What the points among the cues cost together (ns): with all that deformers which spread read for them,
+// since a few points behind a deltaMush cost what their neighbourhoods do. stages: as FindCuePlaces gave
+// them.
 Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
                             std::span<const CandidateStage> stages, std::span<const CueRef> cues);
 

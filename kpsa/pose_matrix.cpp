@@ -17,6 +17,15 @@ void PoseMatrix::Append(const PoseMatrix& other) {
   for (std::size_t t = 0; t < other.poses_; ++t) std::ranges::copy(other.row(t), Grow().begin());
 }
 
+PoseMatrix PoseMatrix::TakeEvery(std::size_t count) {
+  PoseMatrix kept(layout_), taken(layout_);
+  kept.centered_ = taken.centered_ = centered_;
+  for (std::size_t t = 0; t < poses_; ++t)
+    std::ranges::copy(std::as_const(*this).row(t), (t % count == count - 1 ? taken : kept).Grow().begin());
+  *this = std::move(kept);
+  return taken;
+}
+
 void PoseMatrix::Truncate(std::size_t poses) {
   poses_ = std::min(poses_, poses);
   blocks_.resize((poses_ + kBlockPoses - 1) / kBlockPoses);
@@ -76,6 +85,21 @@ void StorePoints(ConstPointsView points, int components, std::size_t first_colum
     target[3 * i + 1] = points.y[i];
     target[3 * i + 2] = points.z[i];
   }
+}
+
+MeanShape MeanShapeOf(const PoseLayout& layout, const Eigen::VectorXd& mean) {
+  MeanShape shape;
+  Double3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+  for (std::size_t i = 0; i < layout.points + layout.stage_points; ++i) {
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    shape.positions.push_back({mean[at], mean[at + 1], mean[at + 2]});
+    for (int a = 0; a < 3 && i < layout.points; ++a) {
+      lo[a] = std::min(lo[a], shape.positions[i][a]);
+      hi[a] = std::max(hi[a], shape.positions[i][a]);
+    }
+  }
+  shape.diagonal = Length(hi - lo);
+  return shape;
 }
 
 }  // namespace kpsa

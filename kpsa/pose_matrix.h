@@ -58,6 +58,8 @@ class PoseMatrix {
   void Append(const PoseMatrix& other);
   // Keeps the first poses.
   void Truncate(std::size_t poses);
+  // Takes the last of so many poses away, again and again.
+  PoseMatrix TakeEvery(std::size_t count);
 
  private:
   std::span<float> Grow();
@@ -70,5 +72,13 @@ class PoseMatrix {
 
 // Writes the points of a mesh into a row from its point `first` on, interleaved.
 void StorePoints(ConstPointsView points, int components, std::size_t first_column, std::span<float> row);
+
+// The places of all points on the average, those at stages behind the outputs', and the diagonal of the box
+// around the outputs'. mean: of all columns.
+struct MeanShape {
+  std::vector<Double3> positions;
+  double diagonal = 0;
+};
+MeanShape MeanShapeOf(const PoseLayout& layout, const Eigen::VectorXd& mean);
 
 }  // namespace kpsa

@@ -3,14 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "base/parallel.h"
 #include "kpsa/cue_values.h"
+#include "kpsa/quantile.h"
 #include "kpsa/tile_splice.h"
 
 namespace kpsa {
 namespace {
+
+constexpr double kLearntWell = 0.5;       // of the tolerance: a tile may be off there
+constexpr std::size_t kDoubtPoses = 800;  // that say how much tiles doubt what they know
 
 using CueKey = std::pair<std::pair<CueKind, Index>, Index>;
 CueKey CueKeyOf(const CueRef& cue) { return {{cue.kind, cue.index}, cue.joint}; }
@@ -194,6 +199,22 @@ TileSubspace TeachTiles(const TileSubspace& made, std::span<const char> taught, 
   }
   FinishTiles(&next);
   return next;
+}
+
+void TeachClips(std::span<const PoseMatrix> learnt, std::span<const TileCandidates> candidates,
+                const TileTraining& training, double tolerance, PoseMatrix* poses, TileSubspace* made) {
+  const std::size_t trained = poses->poses();
+  std::optional<double> doubt;  // in half of the poses before
+  for (const PoseMatrix& clip : learnt) {
+    const std::size_t first = poses->poses();
+    const TileTrial known = TryTiles(*made, *training.mean, *poses, 0, first / kDoubtPoses + 1);
+    if (!doubt) doubt = Quantile(known.of_poses, 0.5);
+    poses->Append(clip);
+    const TileTrial trial = TryTiles(*made, *training.mean, *poses, first);
+    *made = TeachTiles(*made, TilesToTeach(trial, known, kLearntWell * tolerance, *doubt), *poses, candidates,
+                       training);
+  }
+  poses->Truncate(trained);
 }
 
 }  // namespace kpsa

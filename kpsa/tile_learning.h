@@ -32,4 +32,9 @@ std::vector<char> TilesToTeach(const TileTrial& trial, const TileTrial& known, d
 TileSubspace TeachTiles(const TileSubspace& made, std::span<const char> taught, const PoseMatrix& poses,
                         std::span<const TileCandidates> candidates, const TileTraining& training);
 
+// All of it, one clip after the other, so that those which were learnt before find what they found then.
+// learnt: centred poses of each clip; poses: those that the tiles were made of, which it leaves as they are.
+void TeachClips(std::span<const PoseMatrix> learnt, std::span<const TileCandidates> candidates,
+                const TileTraining& training, double tolerance, PoseMatrix* poses, TileSubspace* made);
+
 }  // namespace kpsa

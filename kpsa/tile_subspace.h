@@ -2,6 +2,8 @@
 // Internal to training.
 #pragma once
 
+#include <optional>
+
 #include "kpsa/subspace.h"
 #include "kpsa/tile_cues.h"
 
@@ -24,6 +26,12 @@ struct TileChoice {
 // poses: centred with `mean`. candidates: by tile, of all outputs one after the other.
 TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                        std::vector<TileCandidates> candidates, const TileCueOptions& options);
+
+// The same where an eighth of many tiles says that the others are worth their time: few poses would be
+// farther off than half the tolerance.
+std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                                               std::vector<TileCandidates> candidates,
+                                               const TileCueOptions& options);
 
 // Leaves out the cues that no tile reads, and tells the subspace of the others.
 void FinishTiles(TileSubspace* made);

@@ -13,7 +13,6 @@
 #include "kpsa/pca.h"
 #include "kpsa/pose_judge.h"
 #include "kpsa/pose_recorder.h"
-#include "kpsa/quantile.h"
 #include "kpsa/signal_noise.h"
 #include "kpsa/space_frame.h"
 #include "kpsa/tile_candidates.h"
@@ -36,13 +35,10 @@ constexpr double kOwnShare = 0.04, kOwnMaxShare = 0.3, kFineShare = 0.03, kFineM
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
 constexpr std::size_t kBetween = 400;     // poses between the frames of all clips, at most
-constexpr double kLearntWell = 0.5;       // of the tolerance: a tile may be off there
-constexpr std::size_t kDoubtPoses = 800;  // that say how much tiles doubt what they know
+constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 constexpr int kMaxLightModes = 120;       // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;      // of new poses: cues of each tile are tried
 constexpr double kFewMisses = 0.01;       // likewise: finer tiles for these
-constexpr std::size_t kTrialTiles = 8;    // of so many, one says whether cues of each tile pay:
-constexpr double kTrialBeyond = 0.02;     // share of poses farther off than half the tolerance, at most
 constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
@@ -88,7 +84,7 @@ class Trainer {
     ranges_.Widen(poses);
     for (const PoseMatrix& learnt : learnt_) ranges_.Widen(learnt);
     if (!of_light()) KPSA_RETURN_IF_ERROR(ranges_.Widen(clips_, recorder_.get()));
-    if (of_light() && options_.mode == EstimatorMode::kMap) Split(&poses, &judges);
+    if (of_light() && options_.mode == EstimatorMode::kMap) judges = poses.TakeEvery(kJudgeOfLight);
     KPSA_RETURN_IF_ERROR(FindModes(&poses));
     modes_seconds_ = limit_.elapsed() - before_modes;
     KPSA_RETURN_IF_ERROR(CenterAndChooseCues(poses, judges, options_.tolerance));
@@ -125,17 +121,12 @@ class Trainer {
 
   Status Prepare() {
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
-    std::vector<Index> totals;
-    for (const auto& mesh : rig_.target.meshes) {
-      Request request;
-      request.outputs.push_back({mesh.stages.back().points, {}});
-      Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
-      if (!plan.ok()) return plan.status();
-      totals.push_back((*plan)->outputs()[0].points.total());
-    }
+    Result<std::vector<Index>> totals = PointTotals(rig_, &compiler_);
+    if (!totals.ok()) return totals.status();
+    totals_ = std::move(*totals);
     std::vector<CandidateStage> candidates;
     if (options_.mode == EstimatorMode::kMap) {  // the paper's key points are output points
-      Result<CuePlaces> places = FindCuePlaces(rig_, &compiler_, totals, options_.max_light_candidates);
+      Result<CuePlaces> places = FindCuePlaces(rig_, &compiler_, totals_, options_.max_light_candidates);
       if (!places.ok()) return places.status();
       candidates = std::move(places->stages);
       places_ = std::move(places->places);
@@ -166,7 +157,6 @@ class Trainer {
     if (options_.by_tile_as_before)
       trained_sampler_ =
           std::make_shared<TrainingSampler>(rig_, drawn_, trained_clips_, options_, recorder_.get(), layout_);
-    totals_ = totals;
     return Status();
   }
 
@@ -203,7 +193,7 @@ class Trainer {
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
-    // Light has those that Split takes away
+    // Light takes some of these away
     const bool compares =
         !of_light() && (places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty()));
     return compares ? trained_sampler_->AddJudges(judges, &judge_kinds_) : Status();
@@ -244,16 +234,6 @@ class Trainer {
 
   bool of_light() const { return rig_.target.colors; }
 
-  // Takes every fifth pose away.
-  void Split(PoseMatrix* poses, PoseMatrix* judges) const {
-    PoseMatrix kept(layout_);
-    for (std::size_t t = 0; t < poses->poses(); ++t) {
-      const std::span<const float> row = std::as_const(*poses).row(t);
-      std::copy(row.begin(), row.end(), (t % 5 == 4 ? *judges : kept).AddPose().begin());
-    }
-    *poses = std::move(kept);
-  }
-
   // As many modes as new poses confirm, and noise as new poses have it.
   void TruncateModes(const PoseMatrix& judges) {
     std::vector<CueRef> cues;
@@ -267,33 +247,19 @@ class Trainer {
       residual = HonestResidual(residual, pca_.poses, pca_.mode_count());
   }
 
-  Result<Pca> ComputeModes(const PoseMatrix& poses, const Eigen::VectorXd& mean, int modes) const {
-    PcaOptions options;
-    options.max_modes = modes;
-    options.seed = options_.seed;
-    return ComputePca(poses, mean, options);
-  }
-
   Status FindModes(PoseMatrix* poses) {
     const Eigen::VectorXd mean = poses->Mean();
-    // The model's size, from the mean shape
-    Double3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
-    for (std::size_t i = 0; i < layout_.points + layout_.stage_points; ++i) {
-      const auto at = static_cast<Eigen::Index>(3 * i);
-      positions_.push_back({mean[at], mean[at + 1], mean[at + 2]});
-      if (i >= layout_.points) continue;
-      for (int a = 0; a < 3; ++a) {
-        lo[a] = std::min(lo[a], positions_.back()[a]);
-        hi[a] = std::max(hi[a], positions_.back()[a]);
-      }
-    }
-    diagonal_ = Length(hi - lo);
+    MeanShape shape = MeanShapeOf(layout_, mean);
+    positions_ = std::move(shape.positions);
+    diagonal_ = shape.diagonal;
     poses->Subtract(mean);
     for (PoseMatrix& learnt : learnt_) learnt.Subtract(mean);
-    int modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2)
-                                                       : options_.max_modes;
-    if (of_light()) modes = std::min(modes, kMaxLightModes);
-    Result<Pca> pca = ComputeModes(*poses, mean, modes);
+    PcaOptions pca_options;
+    pca_options.seed = options_.seed;
+    pca_options.max_modes = options_.mode == EstimatorMode::kPaper ? static_cast<int>(options_.key_points / 2)
+                                                                   : options_.max_modes;
+    if (of_light()) pca_options.max_modes = std::min(pca_options.max_modes, kMaxLightModes);
+    Result<Pca> pca = ComputePca(*poses, mean, pca_options);
     if (!pca.ok()) return pca.status();
     pca_ = std::move(*pca);
     noise_ = NoiseOf(recorder_->signals(), layout_, diagonal_, options_.tolerance, of_light());
@@ -319,6 +285,7 @@ class Trainer {
     choice.tolerance = tolerance;
     choice.by_rms = of_light();
     choice.places = places_;
+    choice.more = of_tiles_;
     choice.judges = judges.poses() > 0 && !options_.without.miss_costs ? &judges : nullptr;
     choice.judge_kinds = judge_kinds_;
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
@@ -338,6 +305,7 @@ class Trainer {
     if (chosen.cues.empty())
       return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
     cues_ = MakeCueSet(pca_, chosen.cues, noise_);
+    without_worst_ = chosen.without_worst.empty() ? CueSet() : MakeCueSet(pca_, chosen.without_worst, noise_);
     chosen_ = std::move(chosen);
     return Status();
   }
@@ -366,14 +334,18 @@ class Trainer {
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
-    const bool misses =
-        options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses;
+    const bool compares = options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light();
+    const bool misses = compares && chosen_.misses > kManyMisses;
     Subspace subspace;
     if (misses && HasTimeForTiles()) {
       KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, &subspace));
     } else {
       fine_ = misses;
-      subspace = ForAllPoints(poses, fine_);
+      if (!compares || without_worst_.cues.empty()) {
+        subspace = ForAllPoints(poses, fine_);
+      } else {
+        KPSA_RETURN_IF_ERROR(CompareForAllPoints(poses, judges, &subspace).status());
+      }
     }
     Describe(&subspace);
     return subspace;
@@ -384,7 +356,6 @@ class Trainer {
   Status TryFiner(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("finer tiles", 0.95));
     TrainingRecord before = record_;
-    for (TrainingRecord::Tried& earlier : before.tried) earlier.taken = false;
     std::vector<TrainingRecord::Tried> tried;
     Subspace best, now = std::move(*subspace);
     CueSet best_cues;
@@ -392,7 +363,7 @@ class Trainer {
     FrameCost best_cost;
     std::size_t best_of = 0;
     double least = std::numeric_limits<double>::infinity();
-    const auto compare = [&](const char* what) {
+    const auto compare = [&](const std::string& what) {
       const Result<double> points =
           CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues_.cues);
       if (!points.ok()) return points.status();
@@ -416,7 +387,10 @@ class Trainer {
       return compare(what);
     };
     const char* const fine = by_tile_ ? kByTileFinely : kFinelyStored;
-    const char* const first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
+    std::string first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
+    for (TrainingRecord::Tried& earlier : before.tried) {
+      if (std::exchange(earlier.taken, false)) first = earlier.what;
+    }
     std::erase_if(before.tried, [&](const TrainingRecord::Tried& earlier) { return earlier.what == first; });
     KPSA_RETURN_IF_ERROR(compare(first));
     record_ = before;
@@ -437,6 +411,12 @@ class Trainer {
         if (!by_tile_ || (finely && cost_.lost() <= kFewMisses)) break;
         KPSA_RETURN_IF_ERROR(again(finely ? kByTileFinely : kByTile, finely));
       }
+    }
+    // What was taken misses more than it seemed to: what it was compared with may cost less
+    if (least > runner_up_cost_ && limit_.left() > modes_seconds_) {
+      record_ = before;
+      by_tile_ = false, cues_ = std::move(runner_up_);
+      KPSA_RETURN_IF_ERROR(again(kFinelyStored));
     }
     tried[best_of].taken = true;
     *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
@@ -468,9 +448,6 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Say("cues of tiles", 0.8));
     const Result<bool> promising = ChooseTiles(poses);
     if (!promising.ok()) return promising.status();
-    const auto tried = [&](const char* what, std::size_t cues, std::size_t rows, double misses, double ns) {
-      record_.tried.push_back({what, cues, rows, misses, ns / full_cost_, false});
-    };
     // Their doubts alone judge them; stored finely where poses miss
     TileSubspace tiles;
     FrameCost cost{.misses = 1, .ns = std::numeric_limits<double>::infinity()};
@@ -481,31 +458,68 @@ class Trainer {
       if (made.subspace.doubt_inputs() == 0) break;
       const Result<FrameCost> priced = Price(&made.subspace, made.cues, judges);
       if (!priced.ok()) return priced.status();
-      tried(fine ? kByTileFinely : kByTile, made.cues.cues.size(), made.subspace.rows(), priced->misses,
-            priced->ns);
+      Tried(fine ? kByTileFinely : kByTile, made.cues, priced->misses, priced->ns);
       if (priced->ns < cost.ns) {
         cost = *priced, tiles = std::move(made), fine_ = fine;
         best = record_.tried.size() - 1;
       }
       if (cost.lost() <= kFewMisses || cost.misses > kHopelessTiles) break;
     }
-    const auto rows = static_cast<std::size_t>(cues_.rows());
     // As chosen, without products of tiles: others with these would hardly do better, and take their time
     by_tile_ = cost.misses < kManyMisses && cost.ns < kClearly * chosen_.cost;
     if (by_tile_) {
-      tried(kForAllPoints, cues_.cues.size(), rows, chosen_.misses, chosen_.cost);
+      Tried(kForAllPoints, cues_, chosen_.misses, chosen_.cost);
     } else {
-      KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
-      *subspace = ForAllPoints(poses, true);
-      const Result<FrameCost> others = Price(subspace, cues_, judges);
+      const bool finely = std::exchange(fine_, true);
+      const Result<double> others = CompareForAllPoints(poses, judges, subspace);
       if (!others.ok()) return others.status();
-      by_tile_ = cost.ns < others->ns;
-      tried(kFinelyStored, cues_.cues.size(), rows, others->misses, others->ns);
-      if (!by_tile_) best = record_.tried.size() - 1, fine_ = true;
+      by_tile_ = cost.ns < *others;
+      if (by_tile_) {
+        for (TrainingRecord::Tried& other : record_.tried) other.taken = false;
+        fine_ = finely, runner_up_ = std::move(cues_), runner_up_cost_ = *others;
+      }
     }
+    if (!by_tile_) return Status();
     record_.tried[best].taken = true;
-    if (by_tile_) *subspace = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
+    *subspace = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
     return Status();
+  }
+  void Tried(const char* what, const CueSet& cues, double misses, double ns) {
+    record_.tried.push_back(
+        {what, cues.cues.size(), static_cast<std::size_t>(cues.rows()), misses, ns / full_cost_, false});
+  }
+
+  // With the cues as chosen, or without the worst output points among them: what a frame is expected to cost
+  // (ns).
+  Result<double> CompareForAllPoints(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
+    KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
+    std::vector<CueSet> variants = {cues_};
+    if (!without_worst_.cues.empty() && limit_.left() > modes_seconds_) variants.push_back(without_worst_);
+    double least = std::numeric_limits<double>::infinity();
+    std::size_t best = 0;
+    CueSet taken;
+    for (CueSet& variant : variants) {
+      const bool chosen = &variant == variants.data();
+      cues_ = std::move(variant);
+      Subspace made = ForAllPoints(poses, fine_);
+      const Result<FrameCost> priced = Price(&made, cues_, judges);
+      if (!priced.ok()) return priced.status();
+      Tried(!chosen ? kNoWorstPoints
+            : fine_ ? kFinelyStored
+                    : kForAllPoints,
+            cues_, priced->misses, priced->ns);
+      runner_up_cost_ = std::max(least, priced->ns);
+      if (priced->ns >= least) {
+        runner_up_ = std::move(cues_);
+        continue;
+      }
+      runner_up_ = std::move(taken), taken = std::move(cues_);
+      least = priced->ns, best = record_.tried.size() - 1;
+      *subspace = std::move(made);
+    }
+    cues_ = std::move(taken);
+    record_.tried[best].taken = true;
+    return least;
   }
 
   // With more poses, which regressions on few cues are glad of. Whether they may hit often enough.
@@ -539,14 +553,10 @@ class Trainer {
     for (std::size_t s = 0; s < first.size(); ++s) {
       if (!recorder_->signals()[s].matrix) add(first[s]);
     }
-    // Some of them say whether the others are worth their time
-    if (candidates->size() > kTrialTiles * kTrialTiles) {
-      std::vector<TileCandidates> some;
-      for (std::size_t t = 0; t < candidates->size(); t += kTrialTiles) some.push_back((*candidates)[t]);
-      const TileChoice trial = kpsa::ChooseTiles(pca_.mean, *poses, std::move(some), choice);
-      if (ShareBeyond(*poses, trial, options_.tolerance / 2) > kTrialBeyond) return false;
-    }
-    tiles_ = kpsa::ChooseTiles(pca_.mean, *poses, std::move(*candidates), choice);
+    std::optional<TileChoice> chosen =
+        ChoosePromisingTiles(pca_.mean, *poses, std::move(*candidates), choice);
+    if (!chosen) return false;
+    tiles_ = std::move(*chosen);
     return true;
   }
   TileSubspace OfTiles(PoseMatrix* poses, bool fine) const {
@@ -554,24 +564,9 @@ class Trainer {
         fine ? TileBudgets(true)
              : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest};
     TileSubspace made = MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, tiles_, Outputs(), storage);
-    if (!learnt_.empty()) Teach(storage, poses, &made);
+    TeachClips(learnt_, learning_tiles_, {&pca_.mean, record_.clip_poses, tiles_.options, storage},
+               options_.tolerance, poses, &made);
     return made;
-  }
-  // One clip after the other, so that those which were learnt before find what they found then.
-  void Teach(const TileOptions& storage, PoseMatrix* poses, TileSubspace* made) const {
-    const std::size_t trained = poses->poses();
-    const TileTraining training{&pca_.mean, record_.clip_poses, tiles_.options, storage};
-    std::optional<double> doubt;  // in half of the poses before
-    for (const PoseMatrix& learnt : learnt_) {
-      const std::size_t first = poses->poses();
-      const TileTrial known = TryTiles(*made, pca_.mean, *poses, 0, first / kDoubtPoses + 1);
-      if (!doubt) doubt = Quantile(known.of_poses, 0.5);
-      poses->Append(learnt);
-      const TileTrial trial = TryTiles(*made, pca_.mean, *poses, first);
-      *made = TeachTiles(*made, TilesToTeach(trial, known, kLearntWell * options_.tolerance, *doubt), *poses,
-                         learning_tiles_, training);
-    }
-    poses->Truncate(trained);
   }
 
   // The subspace is given its best score by the judges, and is then priced.
@@ -629,7 +624,9 @@ class Trainer {
   Matrix4 inverse_rest_stretch_;
   std::vector<int> judge_kinds_;
   Pca pca_;
-  CueSet cues_;
+  CueSet cues_, without_worst_;
+  CueSet runner_up_;  // for all points, found to cost more than what was taken: so much
+  double runner_up_cost_ = std::numeric_limits<double>::infinity();
   double diagonal_ = 0;
   CueNoise noise_{0};
   TrainingRecord record_;

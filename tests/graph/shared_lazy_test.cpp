@@ -4,129 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <random>
 #include <set>
 
 #include "base/parallel.h"
 #include "graph/frames.h"
 #include "graph/plan_report.h"
+#include "tests/graph/lazy_toys.h"
 #include "tests/support/test_graph.h"
-#include "tests/support/toy_nodes.h"
 
 namespace kpsa {
 namespace {
-
-constexpr Index kPatchPoints = 210;
-
-struct PatchKernel {
-  std::vector<std::pair<std::uint32_t, Index>> from;  // by output point: the patch, and where in it
-};
-
-std::uint32_t PatchOf(Index point, int patches) { return point % static_cast<Index>(patches); }
-
-void ComputePatches(ComputeContext& c) {
-  const auto chosen = static_cast<std::uint64_t>(c.get<std::int64_t>(0));
-  const ArrayView<ConstPointsView> patch = c.array<ConstPointsView>(1), all = c.array<ConstPointsView>(2);
-  const PointsView& out = c.out_points(0);
-  const auto& from = c.kernel_as<PatchKernel>().from;
-  for (std::size_t i = 0; i < out.count; ++i) {
-    out.x[i] = out.y[i] = out.z[i] = -1;
-    if ((chosen >> patch.size() & 1) != 0) {
-      out.x[i] = all[0].x[i], out.y[i] = all[0].y[i], out.z[i] = all[0].z[i];
-    } else if ((chosen >> from[i].first & 1) != 0) {
-      const ConstPointsView& p = patch[from[i].first];
-      const Index at = from[i].second;
-      out.x[i] = p.x[at], out.y[i] = p.y[at], out.z[i] = p.z[at];
-    }
-  }
-}
-
-// The toys, and: patches (chosen, patch[n] lazy, all[0] lazy together -> points, those of each chosen patch:
-// every n-th point, or all of `all` by bit n), pick (chosen, input[n] lazy -> sum of the chosen ones). In the
-// eager twin nothing is lazy.
-void AddLazyToys(NodeRegistry& registry, bool lazy) {
-  AddToyNodes(registry);
-  NodeBuilder patches = registry.add("patches", "Each point from a patch of its own.");
-  patches.structural("count", std::int64_t{kPatchPoints}).in("chosen", 0).points_in("patch").array();
-  if (lazy) patches.lazy();
-  patches.points_in("all").array();
-  if (lazy) patches.lazy(true);
-  patches.out("outPoints", Type::kPoints).compute(ComputePatches);
-  if (lazy) {
-    patches.decide([](ComputeContext& c) -> std::uint64_t {
-      return static_cast<std::uint64_t>(c.get<std::int64_t>(0));
-    });
-  }
-  patches
-      .demand([](Demand& d) {
-        const int count = d.structural().array_size("patch");
-        std::vector<std::vector<Index>> points(static_cast<std::size_t>(count));
-        for (Index point : d.output("outPoints").ToVector()) points[PatchOf(point, count)].push_back(point);
-        for (int e = 0; e < count; ++e)
-          d.Require("patch", e, PointSet::Of(points[static_cast<std::size_t>(e)], kPatchPoints));
-        d.Require("all", 0, d.output("outPoints"));
-      })
-      .bind([](const Binding& b) -> Result<BoundKernel> {
-        auto kernel = std::make_shared<PatchKernel>();
-        const int count = b.structural().array_size("patch");
-        for (Index point : b.output("outPoints").ToVector()) {
-          const std::uint32_t e = PatchOf(point, count);
-          const PointSet one = PointSet::Of({point}, kPatchPoints);
-          kernel->from.emplace_back(e, b.input("patch", static_cast<int>(e)).PositionsOf(one)[0]);
-        }
-        return BoundKernel{kernel, 0, 0};
-      })
-      .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
-        return static_cast<Index>(s.get_int("count"));
-      })
-      .cost(20000, 2);
-  NodeBuilder pick = registry.add("pick", "The sum of some.");
-  pick.in("chosen", 0).in("input", 0.0).array();
-  if (lazy) pick.lazy();
-  pick.out("out", Type::kDouble).compute([](std::int64_t chosen, ArrayView<double> input) {
-    double sum = 0;
-    for (std::uint32_t i = 0; i < input.size(); ++i) sum += (chosen >> i & 1) != 0 ? input[i] : 0;
-    return sum;
-  });
-  if (lazy) {
-    pick.decide([](ComputeContext& c) -> std::uint64_t {
-      return static_cast<std::uint64_t>(c.get<std::int64_t>(0));
-    });
-  }
-}
-const NodeRegistry& LazyToys(bool lazy) {
-  static const NodeRegistry* const registries = [] {
-    auto* both = new NodeRegistry[2];
-    AddLazyToys(both[0], false);
-    AddLazyToys(both[1], true);
-    return both;
-  }();
-  return registries[lazy ? 1 : 0];
-}
-
-int SharedSegments(const Plan& plan) {
-  int count = 0;
-  for (const Plan::Branch& branch : plan.branches()) count += branch.shared_segment != kNoIndex;
-  return count;
-}
-
-// Of all outputs.
-std::string OutputBytes(const Evaluator& evaluator) {
-  std::string bytes;
-  const auto add = [&](const void* from, std::size_t size) {
-    bytes.append(static_cast<const char*>(from), size);
-  };
-  for (Index i = 0; i < evaluator.plan().outputs().size(); ++i) {
-    if (evaluator.plan().outputs()[i].type != Type::kPoints) {
-      add(&evaluator.Get<double>(i), sizeof(double));
-      continue;
-    }
-    const ConstPointsView points = evaluator.Points(i);
-    for (const float* component : {points.x, points.y, points.z})
-      add(component, points.count * sizeof(float));
-  }
-  return bytes;
-}
 
 // Deformers over points, read by 50 patches and whole; `world` and what leads to it are all that they share,
 // among it points (probe measures them), and an owner of its own (side).
@@ -325,7 +212,7 @@ TEST_F(SharedLazyTest, EachPatchAndCombinationsHaveTheFullPointsBitForBit) {
     const ConstPointsView expected = whole.evaluator->Points(2), got = g.evaluator->Points(0);
     ASSERT_EQ(got.count, kPatchPoints);
     for (Index i = 0; i < kPatchPoints; ++i) {
-      if ((chosen >> PatchOf(i, kPatches) & 1) == 0 && chosen < kAllOfThem) continue;
+      if ((chosen >> i % kPatches & 1) == 0 && chosen < kAllOfThem) continue;
       EXPECT_EQ(std::memcmp(got.x + i, expected.x + i, sizeof(float)), 0) << i << " " << chosen;
       EXPECT_EQ(std::memcmp(got.y + i, expected.y + i, sizeof(float)), 0) << i << " " << chosen;
       EXPECT_EQ(std::memcmp(got.z + i, expected.z + i, sizeof(float)), 0) << i << " " << chosen;
@@ -476,147 +363,6 @@ TEST_F(SharedLazyTest, All64BitsAndDeepNests) {
   deep.set("s0.chosen", 2);
   deep.set("root.a", 4.0);
   EXPECT_DOUBLE_EQ(deep.pull<double>(from), 4);
-}
-
-// Random graphs of owners with several bits, in each other's lazy inputs, beside their eager twins.
-struct RandomOwners {
-  RandomOwners(unsigned seed, bool lazy) : g(LazyToys(lazy)), random(seed) {
-    g.add("add", "time");
-    g.add("source", "src", {{"count", std::int64_t{kPatchPoints}}, {"step", 0.25}});
-    g.vary("time.a");
-    g.vary("src.step");
-    numbers = {"time.out"};
-    points = {"src.outPoints"};
-    for (int i = 0; i < 36; ++i) AddNode("n" + std::to_string(i));
-    for (int i = 0; i < 3; ++i) {
-      const std::vector<std::string>& from = Below(2) == 0 ? numbers : points;
-      const std::string plug = from[from.size() - 1 - Below(std::min<std::size_t>(from.size(), 4))];
-      std::vector<Index> some;
-      for (int k = 0; k < 20; ++k) some.push_back(static_cast<Index>(Below(kPatchPoints)));
-      const bool part = Below(2) == 0 && &from == &points;
-      g.want(plug, part ? PointSet::Of(some, kPatchPoints) : PointSet());
-    }
-    EXPECT_TRUE(g.compile().ok());
-  }
-  std::size_t Below(std::size_t count) { return random() % count; }
-  const std::string& Any(const std::vector<std::string>& from) {  // late ones more often
-    return from[std::max(Below(from.size()), Below(from.size()))];
-  }
-  void AddNode(const std::string& name) {
-    switch (Below(8)) {
-      case 0:
-        g.add("add", name, {{"b", 0.5}});
-        g.connect(Any(numbers), name + ".a");
-        if (Below(2) == 0) g.connect(Any(numbers), name + ".b");
-        break;
-      case 1:
-        g.add("measure", name);
-        g.connect(Any(points), name + ".points");
-        break;
-      case 2:
-      case 3:
-        g.add("move", name);
-        g.connect(Any(points), name + ".points");
-        g.connect(Any(numbers), name + ".offset");
-        points.push_back(name + ".outPoints");
-        return;
-      case 4:
-        g.add("smooth", name);
-        g.connect(Any(points), name + ".points");
-        points.push_back(name + ".outPoints");
-        return;
-      case 5: {
-        g.add("patches", name);
-        const std::string most = Any(points);
-        for (int e = 0; e < 5; ++e)
-          g.connect(Below(4) == 0 ? Any(points) : most, name + ".patch[" + std::to_string(e) + "]");
-        g.connect(Any(points), name + ".all[0]");
-        g.vary(name + ".chosen");
-        points.push_back(name + ".outPoints");
-        return;
-      }
-      default:
-        g.add("pick", name);
-        for (int e = 0; e < 3; ++e) g.connect(Any(numbers), name + ".input[" + std::to_string(e) + "]");
-        g.vary(name + ".chosen");
-    }
-    numbers.push_back(name + ".out");
-  }
-  void Set(Evaluator& e, unsigned round, std::vector<std::int64_t>* chosen) const {
-    std::mt19937 values(round);
-    chosen->resize(g.plan->varying().size(), 0);
-    for (Index v = 0; v < g.plan->varying().size(); ++v) {
-      const std::uint32_t value = values();
-      if (round > 0 && value % 3 == 0) continue;  // it keeps what it has
-      if (v < 2) {
-        e.Set(v, static_cast<double>(value >> 8 & 7) / 4);
-      } else {
-        (*chosen)[v] = (value >> 8) % 4 == 0 ? 0 : value >> 16 & 63;
-        e.SetInt(v, (*chosen)[v]);
-      }
-    }
-  }
-
-  TestGraph g;
-  std::mt19937 random;
-  std::vector<std::string> numbers, points;
-};
-
-TEST(RandomSharedLazy, AgreesWithItsEagerTwin) {
-  int shared = 0, nested = 0, with_points = 0, slept = 0;
-  for (unsigned seed = 0; seed < 150; ++seed) {
-    SCOPED_TRACE(seed);
-    RandomOwners lazy(seed, true), eager(seed, false);
-    const Plan& plan = *lazy.g.plan;
-    ASSERT_EQ(plan.varying().size(), eager.g.plan->varying().size());
-    shared += SharedSegments(plan);
-    for (const Plan::Branch& branch : plan.branches()) {
-      if (branch.shared_segment == kNoIndex) continue;
-      const Plan::Segment& segment = plan.segments()[branch.shared_segment];
-      EXPECT_LT(segment.begin, segment.end);
-      nested += segment.parent != 0;
-      with_points += segment.uses_workspace;
-    }
-    Workspace workspace(plan);
-    Evaluator parallel(lazy.g.plan, {true, nullptr}), sharing(lazy.g.plan, {false, &workspace}),
-        other(lazy.g.plan, {false, &workspace});
-    Evaluator* const all[] = {lazy.g.evaluator.get(), &parallel, &sharing, eager.g.evaluator.get()};
-    std::vector<std::int64_t> chosen, of_other;  // by varying plug
-    for (unsigned round = 0; round < 30; ++round) {
-      const std::vector<std::uint64_t> before = lazy.g.profile->counts();
-      if (round % 2 == 1) {  // it leaves other values in the workspace
-        lazy.Set(other, round + 1000, &of_other);
-        ASSERT_TRUE(other.Evaluate().ok());
-      }
-      for (Evaluator* e : all) {
-        lazy.Set(*e, round, &chosen);
-        if (round % 4 == 3) {
-          ASSERT_TRUE(e->Pull(round % static_cast<Index>(plan.outputs().size())).ok());
-        }
-        ASSERT_TRUE(e->Evaluate().ok());
-      }
-      const std::vector<std::uint64_t> after = lazy.g.profile->counts();
-      for (std::size_t s = 0; s < after.size(); ++s) EXPECT_LE(after[s], before[s] + 1);
-      for (const Plan::Branch& branch : plan.branches()) {
-        if (branch.shared_segment == kNoIndex) continue;
-        const Plan::Segment& segment = plan.segments()[branch.shared_segment];
-        const NodeId owner = plan.infos()[segment.owner].node;
-        const Index varying =
-            plan.FindVarying({owner, lazy.g.graph.def(owner).FindAttribute("chosen"), -1, -1});
-        if (chosen[varying] != 0) continue;
-        ++slept;
-        for (Index s = segment.begin; s < segment.end; ++s)
-          EXPECT_EQ(after[s], before[s]) << plan.step_name(s);
-      }
-      for (Evaluator* e : all)
-        ASSERT_EQ(OutputBytes(*e), OutputBytes(*eager.g.evaluator)) << "round " << round;
-    }
-  }
-  // What the graphs were to contain
-  EXPECT_GT(shared, 100);
-  EXPECT_GT(nested, 20);
-  EXPECT_GT(with_points, 20);
-  EXPECT_GT(slept, 800);
 }
 
 }  // namespace
