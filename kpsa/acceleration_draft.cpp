@@ -146,6 +146,7 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
   for (const Signal& signal : *signals) {
     double rest[12];
     bool have_rest = false;
+    std::uint64_t patches = 0;
     for (std::size_t e = 0; e < signal.entries(); ++e) {
       TrainedRange range;
       if (const auto it = ranges.find(target.within.Inner(EntryName(signal, e))); it != ranges.end()) {
@@ -158,7 +159,9 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
       (signal.matrix ? data.matrix_lo : data.scalar_lo).push_back(range.lo);
       (signal.matrix ? data.matrix_hi : data.scalar_hi).push_back(range.hi);
       (signal.matrix ? data.matrix_ramp : data.scalar_ramp).push_back(range.ramp);
+      patches |= range.patches;
     }
+    (signal.matrix ? data.matrix_patches : data.scalar_patches).push_back(patches);
     (signal.matrix ? draft->matrices : draft->scalars).push_back(signal);
   }
   return Status();
@@ -178,6 +181,7 @@ Index PlaceCue(const Signal& signal, AccelerationDraft* draft) {
   add(signal.matrix ? &data.matrix_lo : &data.scalar_lo, -kAnything);
   add(signal.matrix ? &data.matrix_hi : &data.scalar_hi, kAnything);
   add(signal.matrix ? &data.matrix_ramp : &data.scalar_ramp, 0);
+  (signal.matrix ? data.matrix_patches : data.scalar_patches).push_back(kAllPatches);
   return input;
 }
 

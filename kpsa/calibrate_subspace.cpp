@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "kpsa/carried.h"
+#include "kpsa/guard_parts.h"
 #include "kpsa/pose_judge.h"
 
 namespace kpsa {
@@ -75,6 +76,19 @@ std::vector<char> GuardedEntries(const Calibrator& of, const std::vector<std::st
   return guarded;
 }
 
+// A range speaks of the patches that need what it watches, where patches miss by themselves.
+Status GuardPatches(const Calibrator& of, const CalibrationWork& work, Subspace* subspace) {
+  if (subspace->patches.tiles == 0) return Status();
+  const Result<std::vector<std::uint64_t>> patches = FindGuardedPatches(
+      of.rig, work.compiler, of.clips, work.recorder->signals(), of.guards.size(), *subspace);
+  if (!patches.ok()) return patches.status();
+  auto range = subspace->ranges.begin();
+  for (std::size_t s = 0; s < of.guards.size(); ++s) {
+    for (std::size_t e = 0; e < of.guards[s].entries(); ++e) (range++)->patches = (*patches)[s];
+  }
+  return Status();
+}
+
 void RecordWorst(const Calibrator& of, const SampledPose& pose, double error, TrainingRecord* record) {
   record->worst.error = error;
   record->worst.kind = PoseKindName(pose.kind);
@@ -120,8 +134,9 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   if (!ranges.ok()) return ranges.status();
   subspace->ranges = std::move(*ranges);
   const std::vector<char> guarded = GuardedEntries(of, carried->rigid);
-  AskGuards(subspace->ranges, guarded, held_out.entries, &held_out.judges);
-  AskGuards(subspace->ranges, guarded, scoring.entries, &scoring.judges);
+  KPSA_RETURN_IF_ERROR(GuardPatches(of, work, subspace));
+  AskGuards(subspace->ranges, guarded, held_out.entries, subspace->patches.patches, &held_out.judges);
+  AskGuards(subspace->ranges, guarded, scoring.entries, subspace->patches.patches, &scoring.judges);
   FrameCost cost;
   const double cautious = kCautious * of.options.tolerance;
   if (scoring.judges.empty()) {
@@ -130,10 +145,13 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   } else {
     cost = ChooseMisses(subspace, scoring.judges, 0, of.full_cost, cautious, kCalibrationConfidence);
   }
-  for (ScoreJudge& held : held_out.judges) {
-    if (subspace->patches.tiles == 0) held.pose.patches.clear();
+  if (subspace->patches.tiles == 0) {
+    for (TrainedRange& range : subspace->ranges) range.patches = kAllPatches;
+    std::ranges::transform(held_out.judges, held_out.judges.begin(), WithoutPatches);
+  }
+  for (const ScoreJudge& held : held_out.judges) {
     subspace->calibration.push_back(
-        PairOf(held.pose, subspace->score, subspace->patches, held.guard, held.kind));
+        PairOf(held.pose, subspace->score, subspace->patches, held.guard, held.kind, held.guards_of_patches));
   }
   const Calibration calibration =
       Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <tuple>
 #include <vector>
 
 #include "base/scalar_math.h"
@@ -40,7 +41,8 @@ double LargestHarmless(const CalibrationPair& pair, double tolerance, double ble
     return LargestHarmless(pair.score, pair.error, pair.guard, tolerance, blend_start);
   double least = kInfinity;
   for (const PatchPair& patch : pair.patches)
-    least = std::min(least, LargestHarmless(patch.score, patch.error, pair.guard, tolerance, blend_start));
+    least = std::min(least, LargestHarmless(patch.score, patch.error, std::max(pair.guard, patch.guard),
+                                            tolerance, blend_start));
   return std::max(least, pair.middle);
 }
 // Below which no point of the pose is accepted.
@@ -104,7 +106,7 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     if (pair.guard == 0 && !std::isnan(pair.score)) kind.scores.push_back(pair.score);
     if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(AcceptedFrom(pair));
     by_patch = by_patch || !pair.patches.empty();
-    if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
+    if (pair.score < kNoHit) largest_score = std::max(largest_score, pair.score);
     for (const double limit : {kind.limits.back(), severe.back()}) {
       if (limit < kInfinity) candidates.push_back(limit);
     }
@@ -172,11 +174,14 @@ void Count(std::span<const CalibrationPair> pairs, double tolerance, Calibration
 
 std::vector<PatchPair> OutstandingPatches(std::vector<PatchPair> patches) {
   std::sort(patches.begin(), patches.end(), [](const PatchPair& a, const PatchPair& b) {
-    return a.score != b.score ? a.score < b.score : a.error > b.error;
+    return std::tuple(a.score, -a.error, a.guard) < std::tuple(b.score, -b.error, b.guard);
   });
   std::vector<PatchPair> kept;
   for (const PatchPair& patch : patches) {
-    if (kept.empty() || patch.error > kept.back().error) kept.push_back(patch);
+    const bool outdone = std::ranges::any_of(kept, [&](const PatchPair& other) {
+      return other.error >= patch.error && other.guard <= patch.guard;
+    });
+    if (!outdone) kept.push_back(patch);
   }
   return kept;
 }
@@ -194,7 +199,8 @@ double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& thres
   if (pair.patches.empty()) return (1 - weight) * pair.error;
   double error = 0;
   for (const PatchPair& patch : pair.patches)
-    error = std::max(error, (1 - std::max(pair.guard, FullWeight(patch.score, threshold))) * patch.error);
+    error = std::max(
+        error, (1 - std::max({pair.guard, patch.guard, FullWeight(patch.score, threshold)})) * patch.error);
   return error;
 }
 

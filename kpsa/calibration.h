@@ -25,9 +25,13 @@ inline constexpr double kSevere = 3;         // tolerances: a violation beyond t
 inline constexpr double kSevereShare = 0.1;  // of alpha: what may be severe
 inline constexpr double kShareOfHits = 2;    // in alphas: violations among the hits
 
-// One patch of a pose (kpsa/patches.h): its own score, and the largest error of its points.
+// The score of a pose of which guards ask for patches: at no threshold a hit.
+inline constexpr double kNoHit = 1e300;
+
+// One patch of a pose (kpsa/patches.h): its own score, the largest error of its points, and what guards ask
+// of it.
 struct PatchPair {
-  double score = 0, error = 0;
+  double score = 0, error = 0, guard = 0;
   friend bool operator==(const PatchPair&, const PatchPair&) = default;
 };
 
@@ -38,8 +42,9 @@ struct CalibrationPair {
                      // output's points, the largest of all outputs
   double guard = 0;  // share of the full evaluation that the guards ask for (GuardWeight)
   int kind = 0;      // PoseKind (kpsa/poses.h)
-  // Where patches miss by themselves: those that no other one outdoes with a lower score and a larger error,
-  // by score; and the score that half of all patches reach, from which on all points are exact (AllWeight).
+  // Where patches miss by themselves: those that no other one outdoes with a lower score, a lower guard and a
+  // larger error, by score; and the score that half of all patches reach, from which on all points are exact
+  // (AllWeight).
   std::vector<PatchPair> patches = {};
   double middle = 0;
 };

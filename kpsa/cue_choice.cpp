@@ -8,6 +8,7 @@
 
 #include "kpsa/calibration.h"
 #include "kpsa/estimator.h"
+#include "kpsa/frame_cost.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/varimax.h"
 
@@ -85,13 +86,17 @@ class Chooser {
   }
 
  private:
-  // Whether what is chosen is expected to cost less than the best so far, which it then is.
-  bool KeepIfCheaper() {
+  // Whether what is chosen is expected to cost less than the best so far, which it then is; of_a_place: or,
+  // where both would cost more than a full evaluation, misses less (RankOf).
+  bool KeepIfCheaper(bool of_a_place = false) {
     double rows = 0;
     for (const CueRef& cue : chosen_) rows += cue.kind == CueKind::kScalar ? 1 : 3;
     const double misses = Misses(chosen_), cost = options_.points_cost(chosen_) + kScoreCost * rows * rows +
                                                   misses * options_.miss_cost;
-    if (!best_.cues.empty() && cost >= best_.cost) return false;
+    const auto rank = [&](double ns, double missed) {
+      return of_a_place ? RankOf(ns, missed, options_.miss_cost) : ns;
+    };
+    if (!best_.cues.empty() && rank(cost, misses) >= rank(best_.cost, best_.misses)) return false;
     best_ = {chosen_, without_worst_, place_, cost, misses};
     return true;
   }
@@ -234,7 +239,7 @@ class Chooser {
       }
       if (added == 0) break;
       survey = Survey(chosen_);
-      if (compares) better |= KeepIfCheaper();
+      if (compares) better |= KeepIfCheaper(true);
     }
     return compares
                ? better

@@ -1,6 +1,7 @@
 #include "kpsa/frame_cost.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -28,12 +29,23 @@ bool ArePartial(const PatchLayout& layout) {
 }  // namespace
 
 void AskGuards(std::span<const TrainedRange> ranges, const std::vector<char>& guarded,
-               const std::vector<std::vector<float>>& entries, std::vector<ScoreJudge>* judges) {
+               const std::vector<std::vector<float>>& entries, std::size_t patches,
+               std::vector<ScoreJudge>* judges) {
   for (std::size_t t = 0; t < entries.size(); ++t) {
-    double& guard = (*judges)[t].guard;
+    ScoreJudge& judge = (*judges)[t];
     for (std::size_t e = 0; e < guarded.size(); ++e) {
-      if (guarded[e])
-        guard = std::max(guard, GuardWeight(ranges[e].lo, ranges[e].hi, ranges[e].ramp, entries[t][e]));
+      const TrainedRange& range = ranges[e];
+      const double asked = guarded[e] ? GuardWeight(range.lo, range.hi, range.ramp, entries[t][e]) : 0;
+      if (!(asked > 0)) continue;
+      if (range.patches == kAllPatches) {
+        judge.guard = std::max(judge.guard, asked);
+        continue;
+      }
+      judge.guards_of_patches.resize(patches);
+      for (std::size_t p = 0; p < patches; ++p) {
+        if ((range.patches >> p & 1) != 0)
+          judge.guards_of_patches[p] = std::max(judge.guards_of_patches[p], static_cast<float>(asked));
+      }
     }
   }
 }
@@ -62,7 +74,8 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
                        double full, double tolerance, double confidence) {
   std::vector<CalibrationPair> pairs;
   for (const ScoreJudge& judge : judges)
-    pairs.push_back(PairOf(judge.pose, subspace.score, subspace.patches, judge.guard, judge.kind));
+    pairs.push_back(PairOf(judge.pose, subspace.score, subspace.patches, judge.guard, judge.kind,
+                           judge.guards_of_patches));
   const Calibration found =
       Calibrate(pairs, tolerance, subspace.violation_rate, subspace.blend_start, confidence);
   FrameCost cost;
@@ -92,8 +105,8 @@ FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, d
     return ExpectedCost(*subspace, of, points, full, tolerance, confidence);
   };
   PatchLayout patches = std::exchange(subspace->patches, {});
-  std::vector<ScoreJudge> whole(judges.begin(), judges.end());
-  for (ScoreJudge& judge : whole) judge.pose.patches.clear();
+  std::vector<ScoreJudge> whole;
+  std::ranges::transform(judges, std::back_inserter(whole), WithoutPatches);
   subspace->score = ScoreOf(*subspace, whole, full);
   FrameCost least = cost(whole);
   if (patches.tiles == 0) return least;

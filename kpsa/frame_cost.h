@@ -9,9 +9,11 @@
 
 namespace kpsa {
 
-// What guards ask for in each judge's pose. entries: of the signals with ranges, by pose; guarded: by entry.
+// What guards ask for in each judge's pose. entries: of the signals with ranges, by pose; guarded: by entry;
+// patches: how many those that do not speak of all of them may speak of.
 void AskGuards(std::span<const TrainedRange> ranges, const std::vector<char>& guarded,
-               const std::vector<std::vector<float>>& entries, std::vector<ScoreJudge>* judges);
+               const std::vector<std::vector<float>>& entries, std::size_t patches,
+               std::vector<ScoreJudge>* judges);
 
 // full: what the whole evaluation costs (ns, on the scale of the nodes' costs); 0: unknown.
 ScoreCosts CostsOfScore(const Subspace& subspace, double full);
@@ -29,6 +31,9 @@ struct FrameCost {
   double lost() const { return misses + kWrongCost * wrong; }
   static constexpr double kWrongCost = 0.5;
 };
+// What subspaces are compared by: the expected time; where that is more than a full evaluation, so that none
+// of them pays on poses all over the ranges, by what they miss, since clips stay nearer to what was trained.
+inline double RankOf(double ns, double misses, double full) { return ns < full ? ns : full * (1 + misses); }
 // With the score of the subspace and its rate; tolerance (scene units) and confidence: of the calibration
 // with these judges. Poses beyond the ranges, where guards decide, do not count. points: what the graph
 // spends until the points among its cues are there (ns).

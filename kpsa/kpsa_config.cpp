@@ -51,6 +51,8 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.matrix_ramp, &data_.scalar_lo,
                             &data_.scalar_hi, &data_.scalar_ramp})
     hasher.Add(std::span<const double>(*range));
+  for (const auto* patches : {&data_.matrix_patches, &data_.scalar_patches})
+    hasher.Add(std::span<const std::uint64_t>(*patches));
   for (const CalibrationPair& pair : s.calibration) {
     hasher.Add(pair.score);
     hasher.Add(pair.error);
@@ -60,6 +62,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     for (const PatchPair& patch : pair.patches) {
       hasher.Add(patch.score);
       hasher.Add(patch.error);
+      hasher.Add(patch.guard);
     }
   }
   hasher.Add(s.patches.tiles);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -95,16 +96,27 @@ const float* DoubtInputsOf(const ComputeContext& c, const Subspace& subspace, st
   return inputs;
 }
 
-// What the guards ask for, and the one that asks most.
+// What the guards ask for, of all points and of patches, and the ones that ask most.
 struct GuardVerdict {
-  double weight = 0;
-  Index offender = kNoIndex;
-  void Add(double other, Index guard) {
-    if (other > weight) weight = other, offender = guard;
+  double all = 0, part = 0;
+  Index offender = kNoIndex, offender_of_part = kNoIndex;
+  std::array<float, kMaxPatches> patches{};
+  void Add(double weight, Index guard, std::uint64_t of) {
+    if (!(weight > 0)) return;
+    if (of == kAllPatches) {
+      if (weight > all) all = weight, offender = guard;
+      return;
+    }
+    if (weight > part) part = weight, offender_of_part = guard;
+    for (; of != 0; of &= of - 1) {
+      float& patch = patches[static_cast<std::size_t>(std::countr_zero(of))];
+      patch = std::max(patch, static_cast<float>(weight));
+    }
   }
 };
 
-GuardVerdict AskGuards(const ComputeContext& c, const KpsaConfig::Data& data) {
+// in_parts: patches miss by themselves; else every guard is one of all points.
+GuardVerdict AskGuards(const ComputeContext& c, const KpsaConfig::Data& data, bool in_parts) {
   GuardVerdict verdict;
   const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
   for (std::uint32_t j = 0; j < matrices.size(); ++j) {
@@ -121,15 +133,16 @@ GuardVerdict AskGuards(const ComputeContext& c, const KpsaConfig::Data& data) {
     if (inside) continue;
     const double* ramp = data.matrix_ramp.data() + 12 * j;
     for (std::size_t e = 0; e < 12; ++e)
-      verdict.Add(GuardWeight(lo[e], hi[e], ramp[e], m.m[4 * (e / 3) + e % 3]), j);
-    if (verdict.weight >= 1) return verdict;
+      verdict.Add(GuardWeight(lo[e], hi[e], ramp[e], m.m[4 * (e / 3) + e % 3]), j,
+                  in_parts ? data.matrix_patches[j] : kAllPatches);
+    if (verdict.all >= 1) return verdict;
   }
   const ArrayView<double> scalars = c.array<double>(kScalars);
   for (std::uint32_t k = 0; k < scalars.size(); ++k) {
     if (scalars[k] >= data.scalar_lo[k] && scalars[k] <= data.scalar_hi[k]) continue;
     verdict.Add(GuardWeight(data.scalar_lo[k], data.scalar_hi[k], data.scalar_ramp[k], scalars[k]),
-                matrices.size() + k);
-    if (verdict.weight >= 1) return verdict;
+                matrices.size() + k, in_parts ? data.scalar_patches[k] : kAllPatches);
+    if (verdict.all >= 1) return verdict;
   }
   return verdict;
 }
@@ -189,13 +202,14 @@ std::uint64_t Decide(ComputeContext& c) {
   const std::span<double> raw(reinterpret_cast<double*>(c.scratch), r);
   const std::size_t padded = subspace.soft_cache.padded_rows();
   const std::span<float> y(Measured(c), padded), g(c.scratch + 2 * padded, padded);
+  const std::size_t patches = kernel.patches.count();
   GuardVerdict guard;
   double stretch = 0;
   {
     const Stopwatch watch(cue_ns);
     if (!any) {
-      guard = AskGuards(c, data);
-      if (guard.weight >= 1) return miss(MissReason::kOutOfRange, guard.offender);
+      guard = AskGuards(c, data, patches > 0);
+      if (guard.all >= 1) return miss(MissReason::kOutOfRange, guard.offender);
       stretch = StretchWeight(data, frame);
       if (stretch >= 1) return miss(MissReason::kSpace, kNoIndex);
     }
@@ -210,24 +224,25 @@ std::uint64_t Decide(ComputeContext& c) {
   const std::span<float> inputs(Measured(c) + padded, subspace.score.doubt > 0 ? subspace.doubt_inputs() : 0);
   const SoftCacheThreshold threshold = ThresholdAt(kernel, frame.scale);
   std::array<double, kMaxPatches> scores;
-  const std::size_t patches = kernel.patches.count();
   verdict = JudgePatches(subspace, threshold, y, g, inputs, {inputs.data() + inputs.size(), kernel.tiles},
                          {scores.data(), patches});
   const bool finite = verdict.reason != MissReason::kNotFinite;
   // The largest weight counts: of all points, or of patches
   double all = patches == 0 || !finite ? verdict.full_weight : 0;
   const auto ask = [&](double weight, MissReason reason, Index offender) {
-    all = std::max(all, weight);
     if (weight > verdict.full_weight)
       verdict.full_weight = weight, verdict.reason = reason, verdict.offender = offender;
   };
-  ask(guard.weight, MissReason::kOutOfRange, guard.offender);
+  all = std::max({all, guard.all, stretch});
+  ask(guard.all, MissReason::kOutOfRange, guard.offender);
+  ask(guard.part, MissReason::kOutOfRange, guard.offender_of_part);
   ask(stretch, MissReason::kSpace, kNoIndex);
   verdict.hit = verdict.full_weight == 0;
   state.patches.all = all;
   if (patches > 0 && finite) {
     for (std::size_t p = 0; p < patches; ++p)
-      state.patches.weights[p] = static_cast<float>(FullWeight(scores[p], threshold));
+      state.patches.weights[p] =
+          std::max(static_cast<float>(FullWeight(scores[p], threshold)), guard.patches[p]);
     ChooseRegions(subspace.patches, all, &state.patches);
     if (!verdict.hit)
       verdict.full_weight =

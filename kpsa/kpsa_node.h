@@ -53,8 +53,9 @@ class KpsaConfig final : public Asset {
     std::vector<PatchPoints> patches;    // [patches of the subspace]
     std::vector<char> outputs_in_space;  // [outputs] as of cues: they are given in spaceMatrix's frame
     // Trained ranges and how guards come in outside of them (TrainedRange); see MatrixEntries
-    std::vector<double> matrix_lo, matrix_hi, matrix_ramp;  // [12 * matrices]
-    std::vector<double> scalar_lo, scalar_hi, scalar_ramp;  // [scalars]
+    std::vector<double> matrix_lo, matrix_hi, matrix_ramp;      // [12 * matrices]
+    std::vector<double> scalar_lo, scalar_hi, scalar_ramp;      // [scalars]
+    std::vector<std::uint64_t> matrix_patches, scalar_patches;  // [matrices], [scalars] TrainedRange::patches
     std::vector<Index> joints;   // into matrices: in whose spaces cues are measured, at most kMaxCueJoints
     std::vector<char> relative;  // [matrices] world matrices, measured relative to spaceMatrix's frame
     std::vector<std::string> guard_names;  // matrices, then scalars

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/scalar_math.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa {
@@ -147,8 +146,7 @@ void ChooseRegions(const PatchLayout& layout, double all, PatchChoice* choice) {
     if (region.top) choice->cost += least[r], choice->regions |= cover[r];
   }
   choice->mean = layout.patches == 0 ? 0 : sum / static_cast<double>(layout.patches);
-  choice->all =
-      std::max(all, Smoothstep(std::clamp((choice->mean - kWholeFrom) / (kWholeAt - kWholeFrom), 0.0, 1.0)));
+  choice->all = std::max(all, WholeWeight(choice->mean));
   choice->full = choice->all > 0 || choice->cost > kMostOfFull;
   if (choice->full) choice->cost = 1, choice->regions = 0;
 }

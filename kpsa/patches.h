@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/matrix.h"
+#include "base/scalar_math.h"
 #include "base/types.h"
 
 namespace kpsa {
@@ -75,6 +76,10 @@ struct PatchChoice {
   bool full = false;                         // all points are evaluated,
   std::uint64_t regions = 0;                 // or these; bit by region
 };
+// How much of all points comes in, by the mean of the patches' weights.
+inline double WholeWeight(double mean) {
+  return Smoothstep(std::clamp((mean - kWholeFrom) / (kWholeAt - kWholeFrom), 0.0, 1.0));
+}
 // From the weights, and what all points ask for anyway (guards): the regions that hold all patches with a
 // weight, and together cost least.
 void ChooseRegions(const PatchLayout& layout, double all, PatchChoice* choice);

@@ -11,15 +11,22 @@
 namespace kpsa {
 
 CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchLayout& layout, double guard,
-                       int kind) {
+                       int kind, std::span<const float> guards) {
   CalibrationPair pair{mix.Of(pose.measured, pose.doubt), pose.error, guard, kind};
   if (pose.patches.empty()) return pair;
   std::vector<PatchPair> patches;
   std::vector<double> scores;
-  for (const PatchPair& patch : pose.patches) {
-    scores.push_back(mix.Of(pose.measured, PatchDoubt(layout, patch.score, pose.doubt)));
-    patches.push_back({scores.back(), patch.error});
+  double guarded = 0;
+  for (std::size_t p = 0; p < pose.patches.size(); ++p) {
+    const PatchPair& patch = pose.patches[p];
+    const double asked = guards.empty() ? 0 : static_cast<double>(guards[p]);
+    guarded += asked / static_cast<double>(pose.patches.size());
+    if (asked > 0 && !std::isnan(pair.score)) pair.score = kNoHit;
+    scores.push_back(asked >= 1 ? kNoHit
+                                : mix.Of(pose.measured, PatchDoubt(layout, patch.score, pose.doubt)));
+    if (asked < 1) patches.push_back({scores.back(), patch.error, asked});
   }
+  pair.guard = std::max(pair.guard, WholeWeight(guarded));
   // As many as kWholeAt asks for have at least this one
   const auto half = static_cast<std::size_t>(std::ceil(kWholeAt * static_cast<double>(scores.size())));
   std::nth_element(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(half - 1), scores.end(),

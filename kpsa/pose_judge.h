@@ -15,9 +15,10 @@ struct JudgedPose {
   double error = 0;                     // as CalibrationPair's
   std::vector<PatchPair> patches = {};  // of each patch, where the subspace has some: its doubt and its error
 };
-// What it is to a calibration with this score, and these patches.
+// What it is to a calibration with this score, and these patches. guard: what guards ask for of all points;
+// guards_of_patches: of each patch, or empty.
 CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchLayout& patches, double guard,
-                       int kind);
+                       int kind, std::span<const float> guards_of_patches = {});
 
 class PoseJudge {
  public:

@@ -29,12 +29,14 @@ double ShareOfFull(const ScoreJudge& judge, const ScoreMix& mix, const SoftCache
   const JudgedPose& pose = judge.pose;
   const double score = mix.Of(pose.measured, pose.doubt);
   if (judge.guard >= 1 || std::isnan(score) || !(threshold.tau > 0)) return 1;
-  if (judge.guard == 0 && FullWeight(score, threshold) == 0) return 0;
+  const std::vector<float>& guards = judge.guards_of_patches;
+  if (judge.guard == 0 && guards.empty() && FullWeight(score, threshold) == 0) return 0;
   if (pose.patches.empty()) return 1;
   PatchChoice choice;
   for (std::size_t p = 0; p < pose.patches.size(); ++p) {
     choice.weights[p] = static_cast<float>(
         FullWeight(mix.Of(pose.measured, PatchDoubt(patches, pose.patches[p].score, pose.doubt)), threshold));
+    if (!guards.empty()) choice.weights[p] = std::max(choice.weights[p], guards[p]);
   }
   ChooseRegions(patches, judge.guard, &choice);
   return choice.cost;

@@ -3,6 +3,7 @@
 // both.
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -13,9 +14,18 @@ namespace kpsa {
 // A pose that was neither trained on nor is calibrated with.
 struct ScoreJudge {
   JudgedPose pose;
-  double guard = 0;  // as CalibrationPair's
-  int kind = 0;      // PoseKind
+  double guard = 0;                           // as CalibrationPair's
+  int kind = 0;                               // PoseKind
+  std::vector<float> guards_of_patches = {};  // what guards ask for of single patches; empty: nothing
 };
+// Where no patch misses by itself.
+inline ScoreJudge WithoutPatches(ScoreJudge judge) {
+  for (const float asked : judge.guards_of_patches)
+    judge.guard = std::max(judge.guard, static_cast<double>(asked));
+  judge.guards_of_patches.clear();
+  judge.pose.patches.clear();
+  return judge;
+}
 
 // What a pose costs of a full evaluation: nothing for a hit, 1 for a miss, or for a blend of all points; what
 // its patches cost, where these miss by themselves.

@@ -92,11 +92,14 @@ Verdict Judge(const SoftCacheModel& model, const SoftCacheThreshold& threshold, 
 // A hit of score 0, or a miss where y is not finite or so large that points would not be.
 Verdict JudgeFinite(const SoftCacheModel& model, std::span<const float> y);
 
+inline constexpr std::uint64_t kAllPatches = ~std::uint64_t{0};
+
 // The trained range of a plug that may vary, and how far outside of it the full evaluation comes in.
 struct TrainedRange {
   std::string plug;
   double lo = 0, hi = 0;  // seen in training, or too near to it to matter
   double ramp = 0;  // from lo - ramp down and hi + ramp up nothing but the full evaluation is left, >= 0
+  std::uint64_t patches = kAllPatches;  // that it speaks of, a bit each (kpsa/patches.h)
 };
 // [min, max] widened on both sides by `slack` (what moves no point noticeably) and by rounding (1e-6 of the
 // magnitude, of at least 1: an entry that rested at 0 in training may come out as 1e-11).

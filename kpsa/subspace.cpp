@@ -46,9 +46,9 @@ Status CheckPatches(const Subspace& s) {
 Status CheckPatches(const CalibrationPair& pair) {
   if (!(pair.middle >= 0)) return Status::Invalid("half of a calibration pose has score {}", pair.middle);
   for (const PatchPair& patch : pair.patches) {
-    if (!(patch.score >= 0) || !(patch.error >= 0))
-      return Status::Invalid("a patch of a calibration pose has score {} and error {}", patch.score,
-                             patch.error);
+    if (!(patch.score >= 0) || !(patch.error >= 0) || !(patch.guard >= 0 && patch.guard < 1))
+      return Status::Invalid("a patch of a calibration pose has score {}, error {} and guard {}", patch.score,
+                             patch.error, patch.guard);
   }
   return {};
 }
@@ -167,6 +167,8 @@ Status ValidateSubspace(const Subspace& s) {
       return Status::Invalid("the trained range of \"{}\" is [{}, {}], with a ramp of {}", range.plug,
                              range.lo, range.hi, range.ramp);
     }
+    if (range.patches != kAllPatches && range.patches >> std::min(s.patches.patches, kMaxPatches) != 0)
+      return Status::Invalid("the trained range of \"{}\" speaks of patches that there are not", range.plug);
   }
   for (const CalibrationPair& pair : s.calibration) {
     KPSA_RETURN_IF_ERROR(CheckPatches(pair));

@@ -95,6 +95,8 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
   writer->Add<T>(key, {values.size()}, values, half);
 }
 
+constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
+
 // A subspace without any of what is new is what it was before.
 int VersionOf(const Subspace& s) {
   const bool products =
@@ -105,7 +107,9 @@ int VersionOf(const Subspace& s) {
   const bool multiplied = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
     return cue.kind == CueDescription::Kind::kProduct;
   });
-  if (s.patches.tiles > 0) return kSubspaceVersion;
+  if (std::ranges::any_of(s.ranges, [](const TrainedRange& r) { return r.patches != kAllPatches; }))
+    return kSubspaceVersion;
+  if (s.patches.tiles > 0) return kPatchesVersion;
   if (multiplied) return kProductCuesVersion;
   return products || relative || s.score != ScoreMix() ? kProductTilesVersion : kOldestVersion;
 }
@@ -131,8 +135,14 @@ std::map<std::string, std::string> Header(const Subspace& s) {
     }
     if (!cue.joint.empty()) cues.back()["joint"] = cue.joint;
   }
-  for (const TrainedRange& range : s.ranges)
+  for (const TrainedRange& range : s.ranges) {
     ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}, {"ramp", range.ramp}});
+    if (range.patches == kAllPatches) continue;
+    Json& patches = ranges.back()[kRangePatches] = Json::array();
+    for (std::size_t p = 0; p < kMaxPatches; ++p) {
+      if ((range.patches >> p & 1) != 0) patches.push_back(p);
+    }
+  }
   Json frame = {{"extent", s.extent}, {"scales", s.space_scales}, {"carried", s.carried}};
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) frame["inverseRestStretch"].push_back(s.inverse_rest_stretch(r, c));
@@ -197,6 +207,7 @@ std::string ContentDigest(const Subspace& s) {
     for (const PatchPair& patch : pair.patches) {
       hasher.Add(patch.score);
       hasher.Add(patch.error);
+      if (patch.guard > 0) hasher.Add(patch.guard);
     }
   }
   if (s.patches.tiles > 0) hasher.Add(std::span<const double>(s.patches.costs));
@@ -316,6 +327,17 @@ Status ReadHeader(const SafetensorsFile& file, Subspace* s) {
   for (const Json& entry : *ranges) {
     Reader range(file.name() + ": a trained range", entry, &status);
     s->ranges.push_back({range.Text("plug"), range.Number("lo"), range.Number("hi"), range.Number("ramp")});
+    if (!entry.is_object() || !entry.contains(kRangePatches)) continue;
+    const Json& patches = entry[kRangePatches];
+    s->ranges.back().patches = 0;
+    bool known = patches.is_array() && !patches.empty();
+    for (std::size_t i = 0; known && i < patches.size(); ++i) {
+      known = patches[i].is_number_unsigned() && patches[i].get<std::uint64_t>() < kMaxPatches;
+      if (known) s->ranges.back().patches |= std::uint64_t{1} << patches[i].get<std::uint64_t>();
+    }
+    if (!known)
+      return Status::Invalid("{}: a trained range: \"{}\" should be numbers of patches", file.name(),
+                             kRangePatches);
   }
   s->extent = Reader(file.name() + ": frame", *frame, &status).Number("extent");
   KPSA_RETURN_IF_ERROR(ReadFrame(file, *frame, s));
@@ -372,7 +394,8 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
 
 // What each patch costs, and what calibration says of patches.
 constexpr char kPatchCosts[] = "patchCosts", kMiddles[] = "calibrationMiddles",
-               kPatchCounts[] = "calibrationPatchCounts", kPatchPairs[] = "calibrationPatches";
+               kPatchCounts[] = "calibrationPatchCounts", kPatchPairs[] = "calibrationPatches",
+               kPatchGuards[] = "calibrationPatchGuards";  // only where there are some
 
 Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
   constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
@@ -389,6 +412,9 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
       file.Values<std::uint32_t>(kPatchCounts, {s->calibration.size()});
   for (const Status& status : {middles.status(), pairs.status(), counts.status()})
     KPSA_RETURN_IF_ERROR(status);
+  std::vector<double> guards(pairs->size() / 2);
+  if (file.tensors().contains(kPatchGuards))
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<double>(kPatchGuards, {pairs->size() / 2}), &guards));
   std::size_t next = 0;
   for (std::size_t i = 0; i < s->calibration.size(); ++i) {
     CalibrationPair& pair = s->calibration[i];
@@ -396,7 +422,7 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
     if ((*counts)[i] > kMaxPatches || next + (*counts)[i] > pairs->size() / 2)
       return Status::Invalid("{}: calibration pose {} has {} patches", file.name(), i, (*counts)[i]);
     for (std::size_t p = 0; p < (*counts)[i]; ++p, ++next)
-      pair.patches.push_back({(*pairs)[2 * next], (*pairs)[2 * next + 1]});
+      pair.patches.push_back({(*pairs)[2 * next], (*pairs)[2 * next + 1], guards[next]});
   }
   if (next != pairs->size() / 2)
     return Status::Invalid("{}: {} patches of calibration poses belong to none", file.name(),
@@ -405,17 +431,22 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
 }
 
 void AddPatches(const Subspace& s, SafetensorsWriter* writer) {
-  std::vector<double> middles, pairs;
+  std::vector<double> middles, pairs, guards;
   std::vector<std::uint32_t> counts;
   for (const CalibrationPair& pair : s.calibration) {
     middles.push_back(pair.middle);
     counts.push_back(static_cast<std::uint32_t>(pair.patches.size()));
-    for (const PatchPair& patch : pair.patches) pairs.insert(pairs.end(), {patch.score, patch.error});
+    for (const PatchPair& patch : pair.patches) {
+      pairs.insert(pairs.end(), {patch.score, patch.error});
+      guards.push_back(patch.guard);
+    }
   }
   Add<double>(writer, kPatchCosts, s.patches.costs);
   Add<double>(writer, kMiddles, middles);
   Add<std::uint32_t>(writer, kPatchCounts, counts);
   writer->Add<double>(kPatchPairs, {pairs.size() / 2, 2}, pairs);
+  if (std::ranges::any_of(guards, [](double guard) { return guard > 0; }))
+    Add<double>(writer, kPatchGuards, guards);
 }
 
 // Column by column: a row of the tensor is a mode.

@@ -370,9 +370,10 @@ class Trainer {
       const double cost = cost_.ns + *points;
       tried.push_back({what, cues_.cues.size(), static_cast<std::size_t>(cues_.rows()), cost_.misses,
                        cost / full_cost_, false});
-      if (cost >= least) return Status();
+      const double rank = RankOf(cost, cost_.misses, full_cost_);
+      if (rank >= least) return Status();
       best = std::move(now), best_cues = cues_, best_record = record_, best_cost = cost_;
-      best_of = tried.size() - 1, least = cost;
+      best_of = tried.size() - 1, least = rank;
       return Status();
     };
     const auto again = [&](const char* what, bool finely = true) {
@@ -413,7 +414,7 @@ class Trainer {
       }
     }
     // What was taken misses more than it seemed to: what it was compared with may cost less
-    if (least > runner_up_cost_ && limit_.left() > modes_seconds_) {
+    if (least > runner_up_rank_ && limit_.left() > modes_seconds_) {
       record_ = before;
       by_tile_ = false, cues_ = std::move(runner_up_);
       KPSA_RETURN_IF_ERROR(again(kFinelyStored));
@@ -473,10 +474,10 @@ class Trainer {
       const bool finely = std::exchange(fine_, true);
       const Result<double> others = CompareForAllPoints(poses, judges, subspace);
       if (!others.ok()) return others.status();
-      by_tile_ = cost.ns < *others;
+      by_tile_ = RankOf(cost.ns, cost.misses, full_cost_) < *others;
       if (by_tile_) {
         for (TrainingRecord::Tried& other : record_.tried) other.taken = false;
-        fine_ = finely, runner_up_ = std::move(cues_), runner_up_cost_ = *others;
+        fine_ = finely, runner_up_ = std::move(cues_), runner_up_rank_ = *others;
       }
     }
     if (!by_tile_) return Status();
@@ -489,8 +490,7 @@ class Trainer {
         {what, cues.cues.size(), static_cast<std::size_t>(cues.rows()), misses, ns / full_cost_, false});
   }
 
-  // With the cues as chosen, or without the worst output points among them: what a frame is expected to cost
-  // (ns).
+  // With the cues as chosen, or without the worst output points among them: the better one's rank.
   Result<double> CompareForAllPoints(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
     std::vector<CueSet> variants = {cues_};
@@ -508,13 +508,14 @@ class Trainer {
             : fine_ ? kFinelyStored
                     : kForAllPoints,
             cues_, priced->misses, priced->ns);
-      runner_up_cost_ = std::max(least, priced->ns);
-      if (priced->ns >= least) {
+      const double rank = RankOf(priced->ns, priced->misses, full_cost_);
+      runner_up_rank_ = std::max(least, rank);
+      if (rank >= least) {
         runner_up_ = std::move(cues_);
         continue;
       }
       runner_up_ = std::move(taken), taken = std::move(cues_);
-      least = priced->ns, best = record_.tried.size() - 1;
+      least = rank, best = record_.tried.size() - 1;
       *subspace = std::move(made);
     }
     cues_ = std::move(taken);
@@ -625,8 +626,8 @@ class Trainer {
   std::vector<int> judge_kinds_;
   Pca pca_;
   CueSet cues_, without_worst_;
-  CueSet runner_up_;  // for all points, found to cost more than what was taken: so much
-  double runner_up_cost_ = std::numeric_limits<double>::infinity();
+  CueSet runner_up_;  // for all points, found to be worse than what was taken; its rank
+  double runner_up_rank_ = std::numeric_limits<double>::infinity();
   double diagonal_ = 0;
   CueNoise noise_{0};
   TrainingRecord record_;

@@ -180,7 +180,14 @@ TEST_F(LocalMisses, CostAPart) {
     }
     EXPECT_EQ(MushedPoints(whole), exact_[f].size() / 3);
     EXPECT_GT(MushedPoints(part), 0u);
-    if (frame.full_weight > 1.0 / 7 + 1e-6) continue;  // one of seven patches
+    const bool of_one = std::ranges::any_of(part.accelerated.config->data().patches, [&](const auto& patch) {
+      for (std::size_t i = 0; i < exact_[f].size() / 3; ++i) {
+        const bool differs = At(frame.points, i, 0) != At(reconstructed_[f], i, 0);
+        if (differs && !std::ranges::binary_search(patch.points, static_cast<Index>(i))) return false;
+      }
+      return true;
+    });
+    if (!of_one) continue;
     ++compared;
     EXPECT_LE(2 * MushedPoints(part), MushedPoints(whole)) << f;
   }
@@ -214,6 +221,58 @@ TEST_F(LocalMisses, AnyOrderThreadsAndBlocksGiveTheSameBytes) {
   for (const std::size_t f : order) {
     parallel.Pose(poses_[f]);
     ASSERT_TRUE(SameBytes(parallel.Evaluate().points, expected[f].points)) << f;
+  }
+}
+
+// A value outside its range is a miss of the patches that it speaks of, and of no others.
+TEST_F(LocalMisses, AreWhatAGuardOfSomePatchesAsksFor) {
+  auto guarded = std::make_shared<Subspace>(*cheap_);
+  TrainedRange& range =
+      *std::ranges::max_element(guarded->ranges, {}, [](const TrainedRange& one) { return one.hi - one.lo; });
+  constexpr std::size_t kPatch = 2;
+  range.hi = (range.lo + range.hi) / 2, range.ramp = (range.hi - range.lo) / 20;
+  auto of_all = std::make_shared<Subspace>(*guarded);
+  for (TrainedRange& one : guarded->ranges) one.patches = std::uint64_t{1} << kPatch;
+  const std::vector<RunFrame> frames = Frames(guarded), whole = Frames(of_all), before = Frames(cheap_);
+  RigRun run(kHello, {.subspace = guarded});
+  const PatchPoints& patch = run.accelerated.config->data().patches[kPatch];
+  const std::size_t own = guarded->patches.tiles * kTilePoints;
+  std::size_t exact = 0, blended = 0;
+  for (std::size_t f = 0; f < frames.size(); ++f) {
+    SCOPED_TRACE(f);
+    if (!before[f].hit) continue;  // what its doubts ask for is told apart elsewhere
+    if (whole[f].hit) {
+      EXPECT_TRUE(frames[f].hit);
+      continue;
+    }
+    EXPECT_FALSE(frames[f].hit);
+    EXPECT_EQ(frames[f].reason, MissReason::kOutOfRange);
+    EXPECT_EQ(frames[f].text, whole[f].text) << "the same guard";
+    EXPECT_LE(frames[f].full_weight, 1.0 / static_cast<double>(guarded->patches.patches) + 1e-6);
+    const bool full = whole[f].full_weight == 1;
+    exact += full, blended += !full;
+    for (std::size_t i = 0; i < frames[f].points.size() / 3; ++i) {
+      const bool reached = std::ranges::binary_search(patch.points, static_cast<Index>(i));
+      for (std::size_t a = 0; a < 3; ++a) {
+        if (!reached) {
+          ASSERT_EQ(At(frames[f].points, i, a), At(reconstructed_[f], i, a)) << i;
+        } else if (full && i / own == kPatch) {
+          ASSERT_EQ(At(frames[f].points, i, a), At(exact_[f], i, a)) << i;
+        }
+      }
+    }
+  }
+  EXPECT_GT(exact, 5u);
+  EXPECT_GT(exact + blended, 8u);
+  // And the full side computes a part
+  for (std::size_t f = 0; f < poses_.size(); ++f) {
+    if (!before[f].hit || frames[f].hit) continue;
+    RigRun part(kHello, {.subspace = guarded});
+    part.Pose(poses_[f]);
+    part.Evaluate();
+    EXPECT_GT(MushedPoints(part), 0u);
+    EXPECT_LT(2 * MushedPoints(part), exact_[f].size() / 3);
+    break;
   }
 }
 
@@ -324,15 +383,18 @@ TEST_F(LocalMisses, OnlySomePointsMayBeAskedFor) {
 TEST_F(LocalMisses, AFileKeepsThemAndDamageIsRefused) {
   TemporaryFolder folder;
   auto held = std::make_shared<Subspace>(*cheap_);
-  held->calibration[3].patches = {{0.1, 1e-4}, {0.4, 2e-4}};
+  held->calibration[3].patches = {{0.1, 1e-4}, {0.4, 2e-4, 0.25}};
   held->calibration[3].middle = 0.05;
   held->calibration[7].patches = {{0.2, 3e-4}};
   held->patches.costs[2] = 0.125;
+  held->ranges[1].patches = 0b101;
   const std::string path = folder / "held.kpsa";
   ASSERT_TRUE(WriteSubspace(*held, path).ok());
   const Result<Subspace> read = ReadSubspace(path);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   EXPECT_EQ(read->patches, held->patches);
+  for (std::size_t r = 0; r < held->ranges.size(); ++r)
+    EXPECT_EQ(read->ranges[r].patches, held->ranges[r].patches) << r;
   for (std::size_t i = 0; i < held->calibration.size(); ++i) {
     EXPECT_EQ(read->calibration[i].patches, held->calibration[i].patches);
     EXPECT_EQ(read->calibration[i].middle, held->calibration[i].middle);
@@ -350,6 +412,8 @@ TEST_F(LocalMisses, AFileKeepsThemAndDamageIsRefused) {
   refused([](Subspace* s) { s->patches.costs[0] = std::nan(""); }, "costs");
   refused([](Subspace* s) { s->patches.regions[1].first = 99; }, "patches");
   refused([](Subspace* s) { s->patches.share = 0; }, "share");
+  refused([](Subspace* s) { s->ranges[1].patches = std::uint64_t{1} << s->patches.patches; },
+          "speaks of patches");
   refused([](Subspace* s) { s->score = {1, 0}; }, "doubts");
   refused([](Subspace* s) { s->calibration[3].patches[1].error = -1; }, "patch");
   refused([](Subspace* s) { s->calibration[3].middle = std::nan(""); }, "half");

@@ -244,6 +244,65 @@ TEST(Patches, CalibrationCountsWhatTheyEmit) {
   }
 }
 
+// Guards of patches are no hits, and no worse than it is counted.
+TEST(Patches, CalibrationCountsGuardsOfPatches) {
+  const ScoreMix mix{0, 2};
+  PatchLayout layout = MakePatchLayout(std::vector<std::size_t>{9});
+  ASSERT_EQ(layout.patches, 9u);
+  for (const PatchRegion& region : layout.regions)
+    layout.costs.push_back(static_cast<double>(region.count) / 9);
+  layout.share = 0.4;
+  std::vector<ScoreJudge> judges = RandomJudges(3000, 9, 5);
+  std::mt19937 random(6);
+  for (std::size_t t = 0; t < judges.size(); t += 3) {
+    judges[t].guards_of_patches.assign(9, 0);
+    for (std::size_t k = 0; k < 1 + t % 6; ++k)
+      judges[t].guards_of_patches[random() % 9] = random() % 2 == 0 ? 1 : 0.5f;
+  }
+  std::vector<CalibrationPair> pairs;
+  for (const ScoreJudge& judge : judges)
+    pairs.push_back(PairOf(judge.pose, mix, layout, judge.guard, judge.kind, judge.guards_of_patches));
+  const double tolerance = 6e-4;
+  const Calibration found = Calibrate(pairs, tolerance, 0.05);
+  ASSERT_GT(found.threshold.tau, 0);
+  std::size_t hits = 0, exact = 0, helped = 0, whole = 0, partly = 0;
+  for (std::size_t t = 0; t < judges.size(); ++t) {
+    const ScoreJudge& judge = judges[t];
+    Emitted emitted = EmittedBy(judge.pose, mix, layout, judge.guard, found.threshold);
+    const bool guarded = !judge.guards_of_patches.empty();
+    hits += !guarded && judge.guard == 0 && FullWeight(2 * judge.pose.doubt, found.threshold) == 0;
+    EXPECT_TRUE(!guarded || EmittedWeight(pairs[t], found.threshold) > 0);
+    EXPECT_TRUE(!guarded || ShareOfFull(judge, mix, found.threshold, layout) > 0);
+    if (!guarded) continue;
+    const double without = emitted.error;
+    double mean = 0;
+    emitted = {1, 0};
+    for (std::size_t p = 0; p < 9; ++p) {
+      const double score = mix.doubt * std::min(judge.pose.doubt, judge.pose.patches[p].score / layout.share);
+      const double weight = std::max(
+          {judge.guard, FullWeight(score, found.threshold), static_cast<double>(judge.guards_of_patches[p])});
+      mean += weight / 9;
+      emitted.error = std::max(emitted.error, (1 - weight) * judge.pose.patches[p].error);
+    }
+    if (mean >= kWholeAt) emitted.error = 0, ++whole;
+    if (mean < kWholeFrom) {
+      EXPECT_NEAR(EmittedError(pairs[t], found.threshold), emitted.error, 1e-15) << t;
+      ++partly;
+    }
+    EXPECT_GE(EmittedError(pairs[t], found.threshold), (1 - WholeWeight(mean)) * emitted.error - 1e-15) << t;
+    EXPECT_LE(EmittedError(pairs[t], found.threshold), without + 1e-15) << t;
+    exact += emitted.error == 0;
+    helped += emitted.error < without;
+  }
+  EXPECT_EQ(found.hits, hits);
+  EXPECT_GT(hits, 100u);
+  EXPECT_GT(helped, 100u);
+  EXPECT_GT(exact, 30u);
+  EXPECT_GT(whole, 30u);
+  EXPECT_GT(partly, 30u);
+  for (const Calibration::Kind& kind : found.kinds) EXPECT_LE(kind.upper_bound, 0.05 + 1e-9);
+}
+
 // The largest doubt of a pose is `strange`; one patch is wrong, and its own doubt is `told` of that.
 std::vector<ScoreJudge> OneWrongPatch(std::size_t wrong_every, double told) {
   std::vector<ScoreJudge> judges(1200);
