@@ -102,8 +102,8 @@ class Plan {
     NodeId node;
     std::uint32_t name = 0, type = 0, label = 0;
     Index segment = 0;
-    Index points = 0, points_total = 0;        // 0 for steps without points
-    float cost_ns = 0, cost_ns_per_point = 0;  // the former with all points
+    Index points = 0, points_total = 0;  // 0 for steps without points
+    float cost_ns = 0;
   };
   struct Excluded {
     std::string node_name, reason;

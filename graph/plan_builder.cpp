@@ -319,7 +319,6 @@ void PlanBuilder::FillSteps() {
     info.cost_ns = group == nullptr
                        ? 10.0f + 0.5f * static_cast<float>(info.points)
                        : group->cost_ns + group->cost_ns_per_point * static_cast<float>(info.points);
-    info.cost_ns_per_point = group == nullptr ? 0.5f : group->cost_ns_per_point;
   }
 }
 

@@ -8,7 +8,6 @@
 
 #include "kpsa/calibration.h"
 #include "kpsa/estimator.h"
-#include "kpsa/frame_cost.h"
 #include "kpsa/mode_choice.h"
 #include "kpsa/varimax.h"
 
@@ -24,8 +23,8 @@ constexpr double kMinMotion = 1e-3;          // of the largest: points that move
 // Share of the poses beyond the tolerance from which worst points are measured: where no judge says what
 // misses, and where more than kMissed of the judges do
 constexpr double kHopeless = 0.15, kFewBeyond = 0.01, kMissed = 0.02;
-constexpr std::size_t kWorstPoints[] = {2, 2, 4, 4, 8, 8, 8, 8};  // added one share after the other
-constexpr double kWorstShare = 0.1;                               // and of all points
+constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many times so many
+constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
 // Values that move more than they are trusted.
@@ -65,7 +64,7 @@ class Chooser {
     const bool compares = options_.judges != nullptr;
     for (const CuePlace& place : places) {
       place_ = static_cast<std::size_t>(&place - places.data());
-      chosen_.clear(), without_worst_.clear();
+      chosen_.clear();
       SelectInRounds(place, 3);
       if (chosen_.empty()) continue;
       AddPoints(place);
@@ -78,26 +77,23 @@ class Chooser {
       }
       const bool early = std::any_of(chosen_.begin(), chosen_.end(),
                                      [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
-      if (early && !options_.by_rms) better |= MeasureWorst(StagePointsOf(place), compares);
-      if (!compares) return {std::move(chosen_), {}, place_};
+      const double hopeless = compares && best_.misses > kMissed ? kFewBeyond : kHopeless;
+      if (early && !options_.by_rms && AddWorstPoints(hopeless)) better |= compares && KeepIfCheaper();
+      if (!compares) return {std::move(chosen_), place_};
       if (!better) break;  // earlier ones see even less
     }
     return std::move(best_);
   }
 
  private:
-  // Whether what is chosen is expected to cost less than the best so far, which it then is; of_a_place: or,
-  // where both would cost more than a full evaluation, misses less (RankOf).
-  bool KeepIfCheaper(bool of_a_place = false) {
+  // Whether what is chosen is expected to cost less than the best so far, which it then is.
+  bool KeepIfCheaper() {
     double rows = 0;
     for (const CueRef& cue : chosen_) rows += cue.kind == CueKind::kScalar ? 1 : 3;
     const double misses = Misses(chosen_), cost = options_.points_cost(chosen_) + kScoreCost * rows * rows +
                                                   misses * options_.miss_cost;
-    const auto rank = [&](double ns, double missed) {
-      return of_a_place ? RankOf(ns, missed, options_.miss_cost) : ns;
-    };
-    if (!best_.cues.empty() && rank(cost, misses) >= rank(best_.cost, best_.misses)) return false;
-    best_ = {chosen_, without_worst_, place_, cost, misses};
+    if (!best_.cues.empty() && cost >= best_.cost) return false;
+    best_ = {chosen_, place_, cost, misses};
     return true;
   }
 
@@ -184,67 +180,35 @@ class Chooser {
     chosen_ = SelectCues(pca_, points, positions_, noise_, more).cues;
   }
 
-  // Points about the worst ones are measured, too: at the stages where that is cheap, then, if that does not
-  // tell, the worst points themselves. Whether judges find it the best so far.
-  bool MeasureWorst(const std::vector<CueRef>& stages, bool compares) {
-    bool better = false;
-    for (const std::vector<CueRef>& about : {stages, std::vector<CueRef>()}) {
-      const double hopeless = compares && best_.misses > kMissed ? kFewBeyond : kHopeless;
-      const std::vector<CueRef> before = chosen_;
-      if (about.empty()) without_worst_ = before;
-      if (AddWorstPoints(hopeless, about, compares)) {
-        better |= compares;
-        if (compares) chosen_ = best_.cues;
-      } else {
-        chosen_ = before;
-      }
-    }
-    return better;
-  }
-  // Those of a place, with all that are known of the first.
-  std::vector<CueRef> StagePointsOf(const CuePlace& place) const {
-    std::vector<CueRef> points = place;
-    if (place_ == 0) points.insert(points.end(), options_.more.begin(), options_.more.end());
-    std::erase_if(points, [](const CueRef& cue) { return cue.kind != CueKind::kStage; });
-    return points;
-  }
-  // The one of these points that is nearest to an output point; the output itself where there are none.
-  CueRef About(Index point, const std::vector<CueRef>& points) const {
-    if (points.empty()) return {CueKind::kOutput, point};
-    return *std::ranges::min_element(points, {}, [&](const CueRef& cue) {
-      return Length(positions_[pca_.layout.points + cue.index] - positions_[point]);
-    });
-  }
-  // Whether it added any: as many as judges find best, or where there are none, all if that helps.
-  bool AddWorstPoints(double hopeless, const std::vector<CueRef>& about, bool compares) {
+  // Whether it added any.
+  bool AddWorstPoints(double hopeless) {
     PointSurvey survey = Survey(chosen_);
     const std::size_t before = survey.poses_beyond(options_.tolerance);
     if (static_cast<double>(before) < hopeless * static_cast<double>(survey.poses())) return false;
-    const std::size_t first = chosen_.size();
     const auto most = static_cast<std::size_t>(kWorstShare * static_cast<double>(pca_.layout.points));
-    bool better = false;
-    for (const std::size_t share : kWorstPoints) {
-      if (survey.poses_beyond(options_.tolerance) == 0) break;
+    std::vector<CueRef> more = chosen_;
+    for (std::size_t round = 0; round < kWorstRounds && survey.poses_beyond(options_.tolerance) > 0;
+         ++round) {
       std::vector<Index> order(pca_.layout.points);
       std::iota(order.begin(), order.end(), Index{0});
       std::stable_sort(order.begin(), order.end(),
                        [&](Index a, Index b) { return survey.beyond[a] > survey.beyond[b]; });
       std::size_t added = 0;
       for (const Index point : order) {
-        if (added == share || chosen_.size() == first + most || survey.beyond[point] == 0) break;
-        const CueRef cue = About(point, about);
-        if (std::find(chosen_.begin(), chosen_.end(), cue) != chosen_.end()) continue;
-        chosen_.push_back(cue);
+        if (added == kWorstPoints || more.size() == chosen_.size() + most || survey.beyond[point] == 0) break;
+        const CueRef cue{CueKind::kOutput, point};
+        if (std::find(more.begin(), more.end(), cue) != more.end()) continue;
+        more.push_back(cue);
         ++added;
       }
       if (added == 0) break;
-      survey = Survey(chosen_);
-      if (compares) better |= KeepIfCheaper(true);
+      survey = Survey(more);
     }
-    return compares
-               ? better
-               : chosen_.size() > first && static_cast<double>(survey.poses_beyond(options_.tolerance)) <=
-                                               kWorthwhile * static_cast<double>(before);
+    if (more.size() == chosen_.size() || static_cast<double>(survey.poses_beyond(options_.tolerance)) >
+                                             kWorthwhile * static_cast<double>(before))
+      return false;
+    chosen_ = std::move(more);
+    return true;
   }
 
   const Pca& pca_;
@@ -253,7 +217,7 @@ class Chooser {
   const PoseMatrix& poses_;
   const CueChoiceOptions& options_;
   std::size_t place_ = 0;
-  std::vector<CueRef> chosen_, without_worst_;
+  std::vector<CueRef> chosen_;
   CueChoice best_;
 };
 

@@ -22,7 +22,6 @@ struct CueChoiceOptions {
   // Where points may be measured, the dearest place first, each seeing more than the next
   // (kpsa/cue_places.h); empty: the points of stages, or where there are none, the outputs.
   std::vector<CuePlace> places = {};
-  CuePlace more = {};  // points of the first place, where errors are left that its own do not tell
   // With what places are compared: poses that were not trained on, centred with pca.mean; what the graph
   // spends until the points among some cues are there, and what it spends on a miss (ns). Null: the first
   // place that has cues is taken.
@@ -41,9 +40,6 @@ inline constexpr double kEvenOdds = 0.5;
 
 struct CueChoice {
   std::vector<CueRef> cues;
-  // Where worst output points are among them: those of the same place without them, which may do where the
-  // shape bends in known ways (products of tiles), and cost less.
-  std::vector<CueRef> without_worst = {};
   // Where judges compared places, of the one that was taken: its number, the expected time of a frame
   // (points, score, misses), and the share of misses.
   std::size_t place = 0;
@@ -56,9 +52,8 @@ struct CueChoice {
 // expected cost: of its points, and of the full evaluation where SoftCache would miss.
 //
 // Where earlier stages do not tell what the last one does in a few places (the inside of a bent elbow, where
-// deltaMush's frames turn over), so that the tolerance would hardly ever be kept, points of the place about
-// the worst output points are measured besides `rows`, then these themselves; not if that does not help, or
-// costs more than it saves.
+// deltaMush's frames turn over), so that the tolerance would hardly ever be kept, the worst output points are
+// measured themselves, besides `rows`; not if that does not help, or costs more than it saves.
 CueChoice ChooseCues(const Pca& pca, std::span<const Double3> positions, const CueNoise& noise,
                      const PoseMatrix& poses, const CueChoiceOptions& options);
 

@@ -17,10 +17,8 @@ constexpr double kSaving = 0.01;          // of the full cost, from each place t
 // Candidates of a place at earlier stages, over all meshes: neighbours tell much the same, and modes are
 // found for the outputs, not for many more points of stages.
 constexpr std::size_t kStagePoints = 500;
-constexpr std::size_t kMinStagePoints = 50;  // of a mesh, however many there are beside it
-// What a few points cost: what they read is seldom in the cache, where all points are more than that holds
-constexpr double kSeldomRead = 1.5;
-constexpr std::size_t kCachedPoints = 4000;
+constexpr std::size_t kMinStagePoints = 50;                // of a mesh, however many there are beside it
+constexpr double kSeldomRead = 1.5;                        // what points cost whose data are not in the cache
 constexpr std::size_t kOfTiles = 3, kMostOfTiles = 12000;  // of the first place: every third point
 
 // What the compiler keeps for some points.
@@ -29,7 +27,7 @@ struct Kept {
   double spread = 0;  // likewise, of all steps, where a deformer that spreads works on all that it reads
   Index points = 0;   // most of a step over `total` points
 };
-// The mean of what a step reads and what it writes.
+// The mean of what a step reads and what it writes; at least 1.
 double ReadPoints(const Plan& plan, Index step) {
   const Plan::StepInfo& info = plan.infos()[step];
   Index read = info.points;
@@ -38,7 +36,7 @@ double ReadPoints(const Plan& plan, Index step) {
     const Plan::StepInfo& of = plan.infos()[producer];
     if (of.points_total == info.points_total) read = std::max(read, of.points);
   }
-  return (static_cast<double>(read) + info.points) / 2;
+  return info.points == 0 ? 1 : (static_cast<double>(read) + info.points) / 2;
 }
 Result<Kept> KeptFor(const TrainingRig& rig, Compiler* compiler, std::vector<RequestedOutput> outputs,
                      Index total) {
@@ -51,8 +49,8 @@ Result<Kept> KeptFor(const TrainingRig& rig, Compiler* compiler, std::vector<Req
   Kept kept;
   for (Index s = 0; s < (*plan)->infos().size(); ++s) {
     const Plan::StepInfo& info = (*plan)->infos()[s];
-    const auto cost = static_cast<double>(info.cost_ns), point = static_cast<double>(info.cost_ns_per_point);
-    kept.spread += cost + point * (ReadPoints(**plan, s) - info.points);
+    const auto cost = static_cast<double>(info.cost_ns);
+    kept.spread += cost * ReadPoints(**plan, s) / std::max<Index>(info.points, 1);
     if (info.points_total == 0) continue;
     kept.cost += cost;
     if (info.points_total == total) kept.points = std::max(kept.points, info.points);
@@ -92,10 +90,6 @@ std::size_t StagePoints(Index total, std::size_t of_all, std::size_t most) {
   return std::min<std::size_t>(total, std::max(kMinStagePoints, most * total / of_all));
 }
 
-double SeldomRead(std::span<const Index> totals) {
-  return std::accumulate(totals.begin(), totals.end(), std::size_t{0}) > kCachedPoints ? kSeldomRead : 1;
-}
-
 }  // namespace
 
 Result<std::vector<Index>> PointTotals(const TrainingRig& rig, Compiler* compiler) {
@@ -118,7 +112,7 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
   for (const auto& mesh : meshes) outputs.push_back({mesh.stages.back().points, {}});
   const Result<Kept> full = KeptFor(rig, compiler, std::move(outputs), 0);
   if (!full.ok()) return full.status();
-  result.full_cost = full->spread;
+  result.full_cost = full->cost;
   const std::size_t all = std::accumulate(totals.begin(), totals.end(), std::size_t{0});
   std::vector<std::vector<PricedStage>> stages;  // by mesh
   std::size_t count = 0;
@@ -192,7 +186,7 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
   if (outputs.empty()) return 0.0;
   const Result<Kept> kept = KeptFor(rig, compiler, std::move(outputs), 0);
   if (!kept.ok()) return kept.status();
-  return SeldomRead(totals) * kept->spread;
+  return kept->cost;
 }
 
 Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
@@ -217,7 +211,7 @@ Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std
     const PointSet of = PointSet::Of(PointsOfRegion(region, patches), totals[region.output]);
     const Result<Kept> own = KeptFor(rig, compiler, {{plug, of}}, 0);
     if (!own.ok()) return own.status();
-    layout.costs.push_back(SeldomRead(totals) * own->spread / full->spread);
+    layout.costs.push_back(kSeldomRead * own->spread / full->spread);
   }
   return layout;
 }

@@ -30,9 +30,7 @@ struct CuePlaces {
 Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
                                 std::size_t max_light_points = std::numeric_limits<std::size_t>::max());
 
-// What the points among the cues cost together (ns): with all that deformers which spread read for them,
-// since a few points behind a deltaMush cost what their neighbourhoods do. stages: as FindCuePlaces gave
-// them.
+// What the points among the cues cost together (ns); stages: as FindCuePlaces gave them.
 Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::span<const Index> totals,
                             std::span<const CandidateStage> stages, std::span<const CueRef> cues);
 

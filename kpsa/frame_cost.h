@@ -31,9 +31,6 @@ struct FrameCost {
   double lost() const { return misses + kWrongCost * wrong; }
   static constexpr double kWrongCost = 0.5;
 };
-// What subspaces are compared by: the expected time; where that is more than a full evaluation, so that none
-// of them pays on poses all over the ranges, by what they miss, since clips stay nearer to what was trained.
-inline double RankOf(double ns, double misses, double full) { return ns < full ? ns : full * (1 + misses); }
 // With the score of the subspace and its rate; tolerance (scene units) and confidence: of the calibration
 // with these judges. Poses beyond the ranges, where guards decide, do not count. points: what the graph
 // spends until the points among its cues are there (ns).

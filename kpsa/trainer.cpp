@@ -285,7 +285,6 @@ class Trainer {
     choice.tolerance = tolerance;
     choice.by_rms = of_light();
     choice.places = places_;
-    choice.more = of_tiles_;
     choice.judges = judges.poses() > 0 && !options_.without.miss_costs ? &judges : nullptr;
     choice.judge_kinds = judge_kinds_;
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
@@ -305,7 +304,6 @@ class Trainer {
     if (chosen.cues.empty())
       return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
     cues_ = MakeCueSet(pca_, chosen.cues, noise_);
-    without_worst_ = chosen.without_worst.empty() ? CueSet() : MakeCueSet(pca_, chosen.without_worst, noise_);
     chosen_ = std::move(chosen);
     return Status();
   }
@@ -334,18 +332,14 @@ class Trainer {
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
-    const bool compares = options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light();
-    const bool misses = compares && chosen_.misses > kManyMisses;
+    const bool misses =
+        options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses;
     Subspace subspace;
     if (misses && HasTimeForTiles()) {
       KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, &subspace));
     } else {
       fine_ = misses;
-      if (!compares || without_worst_.cues.empty()) {
-        subspace = ForAllPoints(poses, fine_);
-      } else {
-        KPSA_RETURN_IF_ERROR(CompareForAllPoints(poses, judges, &subspace).status());
-      }
+      subspace = ForAllPoints(poses, fine_);
     }
     Describe(&subspace);
     return subspace;
@@ -356,6 +350,7 @@ class Trainer {
   Status TryFiner(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("finer tiles", 0.95));
     TrainingRecord before = record_;
+    for (TrainingRecord::Tried& earlier : before.tried) earlier.taken = false;
     std::vector<TrainingRecord::Tried> tried;
     Subspace best, now = std::move(*subspace);
     CueSet best_cues;
@@ -363,17 +358,16 @@ class Trainer {
     FrameCost best_cost;
     std::size_t best_of = 0;
     double least = std::numeric_limits<double>::infinity();
-    const auto compare = [&](const std::string& what) {
+    const auto compare = [&](const char* what) {
       const Result<double> points =
           CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues_.cues);
       if (!points.ok()) return points.status();
       const double cost = cost_.ns + *points;
       tried.push_back({what, cues_.cues.size(), static_cast<std::size_t>(cues_.rows()), cost_.misses,
                        cost / full_cost_, false});
-      const double rank = RankOf(cost, cost_.misses, full_cost_);
-      if (rank >= least) return Status();
+      if (cost >= least) return Status();
       best = std::move(now), best_cues = cues_, best_record = record_, best_cost = cost_;
-      best_of = tried.size() - 1, least = rank;
+      best_of = tried.size() - 1, least = cost;
       return Status();
     };
     const auto again = [&](const char* what, bool finely = true) {
@@ -388,10 +382,7 @@ class Trainer {
       return compare(what);
     };
     const char* const fine = by_tile_ ? kByTileFinely : kFinelyStored;
-    std::string first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
-    for (TrainingRecord::Tried& earlier : before.tried) {
-      if (std::exchange(earlier.taken, false)) first = earlier.what;
-    }
+    const char* const first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
     std::erase_if(before.tried, [&](const TrainingRecord::Tried& earlier) { return earlier.what == first; });
     KPSA_RETURN_IF_ERROR(compare(first));
     record_ = before;
@@ -412,12 +403,6 @@ class Trainer {
         if (!by_tile_ || (finely && cost_.lost() <= kFewMisses)) break;
         KPSA_RETURN_IF_ERROR(again(finely ? kByTileFinely : kByTile, finely));
       }
-    }
-    // What was taken misses more than it seemed to: what it was compared with may cost less
-    if (least > runner_up_rank_ && limit_.left() > modes_seconds_) {
-      record_ = before;
-      by_tile_ = false, cues_ = std::move(runner_up_);
-      KPSA_RETURN_IF_ERROR(again(kFinelyStored));
     }
     tried[best_of].taken = true;
     *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
@@ -471,56 +456,21 @@ class Trainer {
     if (by_tile_) {
       Tried(kForAllPoints, cues_, chosen_.misses, chosen_.cost);
     } else {
-      const bool finely = std::exchange(fine_, true);
-      const Result<double> others = CompareForAllPoints(poses, judges, subspace);
+      KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
+      *subspace = ForAllPoints(poses, true);
+      const Result<FrameCost> others = Price(subspace, cues_, judges);
       if (!others.ok()) return others.status();
-      by_tile_ = RankOf(cost.ns, cost.misses, full_cost_) < *others;
-      if (by_tile_) {
-        for (TrainingRecord::Tried& other : record_.tried) other.taken = false;
-        fine_ = finely, runner_up_ = std::move(cues_), runner_up_rank_ = *others;
-      }
+      by_tile_ = cost.ns < others->ns;
+      Tried(kFinelyStored, cues_, others->misses, others->ns);
+      if (!by_tile_) best = record_.tried.size() - 1, fine_ = true;
     }
-    if (!by_tile_) return Status();
     record_.tried[best].taken = true;
-    *subspace = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
+    if (by_tile_) *subspace = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
     return Status();
   }
   void Tried(const char* what, const CueSet& cues, double misses, double ns) {
     record_.tried.push_back(
         {what, cues.cues.size(), static_cast<std::size_t>(cues.rows()), misses, ns / full_cost_, false});
-  }
-
-  // With the cues as chosen, or without the worst output points among them: the better one's rank.
-  Result<double> CompareForAllPoints(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
-    KPSA_RETURN_IF_ERROR(Say("subspace", 0.87));
-    std::vector<CueSet> variants = {cues_};
-    if (!without_worst_.cues.empty() && limit_.left() > modes_seconds_) variants.push_back(without_worst_);
-    double least = std::numeric_limits<double>::infinity();
-    std::size_t best = 0;
-    CueSet taken;
-    for (CueSet& variant : variants) {
-      const bool chosen = &variant == variants.data();
-      cues_ = std::move(variant);
-      Subspace made = ForAllPoints(poses, fine_);
-      const Result<FrameCost> priced = Price(&made, cues_, judges);
-      if (!priced.ok()) return priced.status();
-      Tried(!chosen ? kNoWorstPoints
-            : fine_ ? kFinelyStored
-                    : kForAllPoints,
-            cues_, priced->misses, priced->ns);
-      const double rank = RankOf(priced->ns, priced->misses, full_cost_);
-      runner_up_rank_ = std::max(least, rank);
-      if (rank >= least) {
-        runner_up_ = std::move(cues_);
-        continue;
-      }
-      runner_up_ = std::move(taken), taken = std::move(cues_);
-      least = rank, best = record_.tried.size() - 1;
-      *subspace = std::move(made);
-    }
-    cues_ = std::move(taken);
-    record_.tried[best].taken = true;
-    return least;
   }
 
   // With more poses, which regressions on few cues are glad of. Whether they may hit often enough.
@@ -625,9 +575,7 @@ class Trainer {
   Matrix4 inverse_rest_stretch_;
   std::vector<int> judge_kinds_;
   Pca pca_;
-  CueSet cues_, without_worst_;
-  CueSet runner_up_;  // for all points, found to be worse than what was taken; its rank
-  double runner_up_rank_ = std::numeric_limits<double>::infinity();
+  CueSet cues_;
   double diagonal_ = 0;
   CueNoise noise_{0};
   TrainingRecord record_;

@@ -16,7 +16,6 @@ namespace kpsa {
 // What is tried (TrainingRecord::Tried)
 inline constexpr const char *kForAllPoints = "for all points",
                             *kFinelyStored = "for all points, tiles stored finely",
-                            *kNoWorstPoints = "for all points, no output point among them",
                             *kForHalf = "for all points, as for half the tolerance",
                             *kByTile = "of each tile", *kByTileFinely = "of each tile, tiles stored finely";
 
