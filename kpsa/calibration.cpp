@@ -106,7 +106,7 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     if (pair.guard == 0 && !std::isnan(pair.score)) kind.scores.push_back(pair.score);
     if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(AcceptedFrom(pair));
     by_patch = by_patch || !pair.patches.empty();
-    if (pair.score < kNoHit) largest_score = std::max(largest_score, pair.score);
+    if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
     for (const double limit : {kind.limits.back(), severe.back()}) {
       if (limit < kInfinity) candidates.push_back(limit);
     }

@@ -25,8 +25,8 @@ inline constexpr double kSevere = 3;         // tolerances: a violation beyond t
 inline constexpr double kSevereShare = 0.1;  // of alpha: what may be severe
 inline constexpr double kShareOfHits = 2;    // in alphas: violations among the hits
 
-// The score of a pose of which guards ask for patches: at no threshold a hit.
-inline constexpr double kNoHit = 1e300;
+// The guard of a pose of which guards ask for patches alone: no hit, and nothing of the others is asked for.
+inline constexpr double kSomeGuard = 1e-12;
 
 // One patch of a pose (kpsa/patches.h): its own score, the largest error of its points, and what guards ask
 // of it.

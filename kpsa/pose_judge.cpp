@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "base/parallel.h"
@@ -21,8 +22,8 @@ CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchL
     const PatchPair& patch = pose.patches[p];
     const double asked = guards.empty() ? 0 : static_cast<double>(guards[p]);
     guarded += asked / static_cast<double>(pose.patches.size());
-    if (asked > 0 && !std::isnan(pair.score)) pair.score = kNoHit;
-    scores.push_back(asked >= 1 ? kNoHit
+    if (asked > 0) pair.guard = std::max(pair.guard, kSomeGuard);
+    scores.push_back(asked >= 1 ? std::numeric_limits<double>::infinity()
                                 : mix.Of(pose.measured, PatchDoubt(layout, patch.score, pose.doubt)));
     if (asked < 1) patches.push_back({scores.back(), patch.error, asked});
   }

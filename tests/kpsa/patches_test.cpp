@@ -303,6 +303,28 @@ TEST(Patches, CalibrationCountsGuardsOfPatches) {
   for (const Calibration::Kind& kind : found.kinds) EXPECT_LE(kind.upper_bound, 0.05 + 1e-9);
 }
 
+// Where nothing is wrong, thresholds reach as far as judges do, those of which guards ask for patches among
+// them.
+TEST(Patches, GuardsOfPatchesLeaveWhatWasSeen) {
+  const ScoreMix mix{0, 2};
+  PatchLayout layout;
+  layout.share = 0.4;
+  std::vector<CalibrationPair> pairs;
+  double largest = 0;
+  for (ScoreJudge judge : RandomJudges(1500, 9, 5)) {
+    if (judge.guard > 0) continue;
+    std::vector<float> guards(9, 0);
+    if (judge.pose.doubt > 0.05) guards[2] = 1;  // all that are strange
+    judge.pose.error = 0;
+    for (PatchPair& patch : judge.pose.patches) patch.error = 0;
+    pairs.push_back(PairOf(judge.pose, mix, layout, 0, judge.kind, guards));
+    largest = std::max(largest, mix.doubt * judge.pose.doubt);
+    EXPECT_EQ(pairs.back().guard > 0, guards[2] > 0);
+  }
+  ASSERT_GT(largest, 0.2);
+  EXPECT_NEAR(Calibrate(pairs, 1e-3, 0.05).threshold.tau_lo(), largest, 1e-9);
+}
+
 // The largest doubt of a pose is `strange`; one patch is wrong, and its own doubt is `told` of that.
 std::vector<ScoreJudge> OneWrongPatch(std::size_t wrong_every, double told) {
   std::vector<ScoreJudge> judges(1200);
