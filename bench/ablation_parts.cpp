@@ -152,6 +152,7 @@ std::vector<Part> Parts() {
        }},
       {"no cues of tiles", [](TrainOptions* options) { options->may_have_cues_by_tile = false; }},
       {"no misses of parts", [](TrainOptions* options) { options->without.patches = true; }},
+      {"all doubts alike", [](TrainOptions* options) { options->without.trust = true; }},
       {"misses not priced", [](TrainOptions* options) { options->without.miss_costs = true; }},
   };
 }

@@ -7,6 +7,8 @@
 #include "kpsa/carried.h"
 #include "kpsa/guard_parts.h"
 #include "kpsa/pose_judge.h"
+#include "kpsa/range_margins.h"
+#include "kpsa/tile_trust.h"
 
 namespace kpsa {
 namespace {
@@ -42,10 +44,11 @@ Result<Carried> TryCarried(const Calibrator& of, const CalibrationWork& work) {
 
 // New poses of a kind, a few at a time. All but those beyond the ranges widen these.
 Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, std::uint64_t seed,
-                  PoseJudge* judge, JudgedSet* judged) {
+                  std::span<const double> margins, PoseJudge* judge, JudgedSet* judged) {
   const auto pose_kind = static_cast<PoseKind>(kind);
-  const std::vector<SampledPose> drawn = work.sampler->Of(
-      pose_kind, PosesOfKind(of.options), (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed);
+  const std::vector<SampledPose> drawn =
+      work.sampler->Of(pose_kind, PosesOfKind(of.options),
+                       (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
   for (std::size_t first = 0; first < drawn.size(); first += kPosesAtOnce) {
     // By clip, as the recorder writes them
     std::vector<SampledPose> some(
@@ -116,12 +119,20 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   GivePatches(of.patches, subspace);
   // Held-out poses of every kind; as many new ones say how to score them.
   const bool doubts = std::ranges::any_of(subspace->tiles, &TileMap::has_products);
-  PoseJudge judge(*subspace, of.layout, cues), score_judge(*subspace, of.layout, cues);
+  const bool of_tiles = !of.options.without.trust;
+  PoseJudge judge(*subspace, of.layout, cues, of_tiles), score_judge(*subspace, of.layout, cues, of_tiles);
+  std::vector<double> margins;
+  if (!of.rig.target.colors) {
+    KPSA_RETURN_IF_ERROR(SayStage(of.options, "margins", 0.9));
+    Result<std::vector<double>> found = WidenByMargins(of, work, cues, *subspace);
+    if (!found.ok()) return found.status();
+    margins = std::move(*found);
+  }
   JudgedSet held_out, scoring;
   for (int k = 0; k < (of.rig.target.colors ? 1 : kPoseKinds); ++k) {
     KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.9 + 0.025 * k));
-    KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kHeldOutSeed, &judge, &held_out));
-    if (doubts) KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kScoreSeed, &score_judge, &scoring));
+    KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kHeldOutSeed, margins, &judge, &held_out));
+    if (doubts) KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kScoreSeed, margins, &score_judge, &scoring));
   }
   work.record->calibration_poses = held_out.poses.size();
   work.record->held_out_rms = judge.rms();
@@ -143,7 +154,13 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     subspace->score = ScoreOf(*subspace, scoring.judges, of.full_cost);
     cost = ExpectedCost(*subspace, held_out.judges, 0, of.full_cost, cautious, kCalibrationConfidence);
   } else {
-    cost = ChooseMisses(subspace, scoring.judges, 0, of.full_cost, cautious, kCalibrationConfidence);
+    const ChosenMisses chosen =
+        ChooseMisses(subspace, scoring.judges, 0, of.full_cost, cautious, kCalibrationConfidence);
+    cost = chosen.cost;
+    if (!chosen.trust.empty()) {
+      WeighDoubts(chosen.trust, *subspace, held_out.judges);
+      WeighTiles(chosen.trust, subspace);
+    }
   }
   if (subspace->patches.tiles == 0) {
     for (TrainedRange& range : subspace->ranges) range.patches = kAllPatches;

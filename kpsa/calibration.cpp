@@ -11,6 +11,7 @@
 
 #include "base/scalar_math.h"
 #include "kpsa/binomial.h"
+#include "kpsa/poses.h"
 
 namespace kpsa {
 namespace {
@@ -91,11 +92,31 @@ bool FewAmong(std::size_t violations, std::size_t hits, double alpha, double con
          BinomialUpperBound(violations, hits, confidence) <= rate * (1 + 1e-12);
 }
 
+// A pose within the ranges that no guard keeps from hitting.
+struct ToldPose {
+  double score = 0;
+  bool wrong = false;  // by more than the tolerance
+};
+// The score above which most of them are wrong, whatever part of that tail is looked at; `largest` where
+// there is none. Never falls with the tolerance: of the poses up to any score, those that become right are no
+// fewer than of those up to a smaller one.
+double MostlyRightUpTo(std::vector<ToldPose> poses, double largest) {
+  std::ranges::stable_sort(poses, {}, &ToldPose::score);
+  double up_to = 0;
+  std::ptrdiff_t lead = 0, most = 0;  // of right ones over wrong ones
+  for (const ToldPose& pose : poses) {
+    lead += pose.wrong ? -1 : 1;
+    if (lead >= most) most = lead, up_to = pose.score;
+  }
+  return poses.empty() || up_to == poses.back().score ? largest : up_to;
+}
+
 // The largest tau that all demands allow, or 0.
 double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, const Calibration& wanted) {
   const double c = wanted.threshold.blend_start;
   std::map<int, KindPoses> kinds;
   std::vector<double> severe, candidates;
+  std::vector<ToldPose> told;
   double largest_score = 0;
   bool by_patch = false;
   for (const CalibrationPair& pair : pairs) {
@@ -107,10 +128,14 @@ double LargestAllowed(std::span<const CalibrationPair> pairs, double tolerance, 
     if (pair.guard < 1 && !std::isnan(pair.score)) kind.partly.push_back(AcceptedFrom(pair));
     by_patch = by_patch || !pair.patches.empty();
     if (std::isfinite(pair.score)) largest_score = std::max(largest_score, pair.score);
+    if (pair.guard == 0 && std::isfinite(pair.score) && pair.kind != static_cast<int>(PoseKind::kBeyond))
+      told.push_back({pair.score, !(pair.error <= tolerance)});
     for (const double limit : {kind.limits.back(), severe.back()}) {
       if (limit < kInfinity) candidates.push_back(limit);
     }
   }
+  // Where patches miss by themselves, what scores high is exact where it would be wrong
+  if (!by_patch) largest_score = MostlyRightUpTo(std::move(told), largest_score);
   const double cap = largest_score / c * (1 + 1e-12);
   for (double& candidate : candidates) candidate = std::min(candidate, cap);
   candidates.push_back(cap);

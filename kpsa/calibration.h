@@ -6,7 +6,8 @@
 //   of all, the same of 2 alpha among hits, and (violations + 1) <= 2 alpha (hits + 1); of each kind that has
 //   any among what is accepted, since violations are counted there: beyond the ranges most of that is blends;
 //   where patches miss by themselves, of all among what is accepted, too,
-//   of all, violations beyond 3 tolerances keep alpha / 10 likewise.
+//   of all, violations beyond 3 tolerances keep alpha / 10 likewise;
+//   it is not beyond a score from which on most poses within the ranges are wrong, even if they are few.
 // The confidence is over the draw of the calibration poses: nine of ten trainings keep their rate, where
 // conformal risk control (arXiv 2208.02814) keeps it on the average over trainings. It is about poses that
 // are exchangeable with those of a kind; for single neighbouring frames of a clip it claims nothing.

@@ -7,6 +7,7 @@
 
 #include "kpsa/cue_choice.h"
 #include "kpsa/poses.h"
+#include "kpsa/tile_trust.h"
 
 namespace kpsa {
 namespace {
@@ -16,6 +17,8 @@ constexpr double kByteCost = 0.03;  // ns a byte of the tiles, likewise
 constexpr double kPartial = 0.4;    // of a full evaluation: what patches cost that are worth a try
 // Shares of the largest doubt that are tried (PatchLayout::share)
 constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
+// Of the cost with a score of all points: known to hold on clips, it stays where parts do not spare more
+constexpr double kClearlyLess = 0.95;
 constexpr double kRowCost = 5;  // ns a row that is measured, likewise
 
 // Whether a patch costs clearly less than all points, as patches do on the average.
@@ -42,10 +45,7 @@ void AskGuards(std::span<const TrainedRange> ranges, const std::vector<char>& gu
         continue;
       }
       judge.guards_of_patches.resize(patches);
-      for (std::size_t p = 0; p < patches; ++p) {
-        if ((range.patches >> p & 1) != 0)
-          judge.guards_of_patches[p] = std::max(judge.guards_of_patches[p], static_cast<float>(asked));
-      }
+      RaisePatches(range.patches, static_cast<float>(asked), judge.guards_of_patches);
     }
   }
 }
@@ -67,7 +67,7 @@ ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, d
 }
 
 void GivePatches(const PatchLayout& patches, Subspace* subspace) {
-  if (subspace->by_tile()) subspace->patches = patches;
+  if (subspace->doubt_inputs() > 0) subspace->patches = patches;
 }
 
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
@@ -99,28 +99,55 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
   return cost;
 }
 
-FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
-                       double tolerance, double confidence) {
+namespace {
+
+// With doubts as they are.
+FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> judges, double points,
+                              double full, double tolerance, double confidence) {
   const auto cost = [&](std::span<const ScoreJudge> of) {
     return ExpectedCost(*subspace, of, points, full, tolerance, confidence);
   };
   PatchLayout patches = std::exchange(subspace->patches, {});
   std::vector<ScoreJudge> whole;
   std::ranges::transform(judges, std::back_inserter(whole), WithoutPatches);
-  subspace->score = ScoreOf(*subspace, whole, full);
+  const ScoreMix of_all = ScoreOf(*subspace, whole, full);
+  subspace->score = of_all;
   FrameCost least = cost(whole);
   if (patches.tiles == 0) return least;
+  // SoftCache's own score speaks of all points, and would say of no part that it misses
+  const ScoreMix of_parts = of_all.measured > 0 ? DoubtAlone(whole) : of_all;
+  const double bar = of_all.measured > 0 ? kClearlyLess * least.ns : least.ns;
   PatchLayout taken;
   subspace->patches = patches;
+  subspace->score = of_parts;
   for (const double share : kShares) {
     subspace->patches.share = share;
     const FrameCost with = cost(judges);
     // Of equal ones, since a clip may go where no judge has been
     if (least.misses == with.misses && !ArePartial(patches)) continue;
-    if (taken.tiles == 0 ? with.ns <= least.ns : with.ns < least.ns) least = with, taken = subspace->patches;
+    if (taken.tiles == 0 ? with.ns <= bar : with.ns < least.ns) least = with, taken = subspace->patches;
   }
+  if (taken.tiles == 0) subspace->score = of_all;
   subspace->patches = taken;
   return least;
+}
+
+}  // namespace
+
+ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
+                          double tolerance, double confidence) {
+  const PatchLayout patches = subspace->patches;
+  ChosenMisses as_they_are{ChooseScoreAndParts(subspace, judges, points, full, tolerance, confidence), {}};
+  ChosenMisses believed{{}, TrustInTiles(judges)};
+  if (believed.trust.empty()) return as_they_are;
+  const ScoreMix score = std::exchange(subspace->score, {});
+  const PatchLayout taken = std::exchange(subspace->patches, patches);
+  std::vector<ScoreJudge> weighed(judges.begin(), judges.end());
+  WeighDoubts(believed.trust, *subspace, weighed);
+  believed.cost = ChooseScoreAndParts(subspace, weighed, points, full, tolerance, confidence);
+  if (believed.cost.ns < kClearlyLess * as_they_are.cost.ns) return believed;
+  subspace->score = score, subspace->patches = taken;
+  return as_they_are;
 }
 
 }  // namespace kpsa

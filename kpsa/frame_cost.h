@@ -3,6 +3,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include "kpsa/score_choice.h"
 #include "kpsa/subspace.h"
@@ -36,9 +37,13 @@ struct FrameCost {
 // spends until the points among its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
-// The same where its score is yet to be chosen, and whether its patches miss by themselves: both as a frame
-// costs least.
-FrameCost ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
-                       double tolerance, double confidence);
+// The same where its score is yet to be chosen, how far its tiles are believed, and whether its patches miss
+// by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of WeighTiles.
+struct ChosenMisses {
+  FrameCost cost;
+  std::vector<double> trust;  // in the doubts of tiles; empty: as they are
+};
+ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
+                          double tolerance, double confidence);
 
 }  // namespace kpsa

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -108,10 +107,7 @@ struct GuardVerdict {
       return;
     }
     if (weight > part) part = weight, offender_of_part = guard;
-    for (; of != 0; of &= of - 1) {
-      float& patch = patches[static_cast<std::size_t>(std::countr_zero(of))];
-      patch = std::max(patch, static_cast<float>(weight));
-    }
+    RaisePatches(of, static_cast<float>(weight), patches);
   }
 };
 

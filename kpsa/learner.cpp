@@ -174,6 +174,8 @@ Result<Subspace> Learner::TrainWith(const Subspace& before, const Misses& misses
   if (!lesson.ok()) return lesson.status();
   TrainOptions options = OptionsOf(before, record, rig->samples);
   options.by_tile_as_before = before.by_tile();
+  // What is learnt is to hit, not to miss in a part
+  options.without.patches = !before.by_tile();
   options.learnt_poses = std::move(lesson->poses);
   options.progress = [&](const char* what, double share) {
     return !stop.stop_requested() && (!options_.progress || options_.progress(what, share));

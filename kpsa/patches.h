@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -76,6 +77,13 @@ struct PatchChoice {
   bool full = false;                         // all points are evaluated,
   std::uint64_t regions = 0;                 // or these; bit by region
 };
+// At least this weight for the patches of a mask (TrainedRange::patches).
+inline void RaisePatches(std::uint64_t mask, float weight, std::span<float> weights) {
+  for (; mask != 0; mask &= mask - 1) {
+    float& patch = weights[static_cast<std::size_t>(std::countr_zero(mask))];
+    patch = std::max(patch, weight);
+  }
+}
 // How much of all points comes in, by the mean of the patches' weights.
 inline double WholeWeight(double mean) {
   return Smoothstep(std::clamp((mean - kWholeFrom) / (kWholeAt - kWholeFrom), 0.0, 1.0));

@@ -32,13 +32,14 @@ CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchL
   const auto half = static_cast<std::size_t>(std::ceil(kWholeAt * static_cast<double>(scores.size())));
   std::nth_element(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(half - 1), scores.end(),
                    std::greater<>());
-  pair.middle = scores[half - 1];
+  // Guards that ask for so many ask for all points
+  pair.middle = std::isinf(scores[half - 1]) ? pair.score : scores[half - 1];
   pair.patches = OutstandingPatches(std::move(patches));
   return pair;
 }
 
-PoseJudge::PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues)
-    : subspace_(subspace), layout_(layout), cues_(cues) {}
+PoseJudge::PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues, bool of_tiles)
+    : subspace_(subspace), layout_(layout), cues_(cues), of_tiles_(of_tiles && subspace.doubt_inputs() > 0) {}
 
 std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
   struct Errors {
@@ -53,10 +54,9 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
     std::vector<double> raw(subspace_.rows());
     std::vector<PointBuffer> buffers;
     for (const SubspaceOutput& output : subspace_.outputs) buffers.emplace_back(output.points);
-    const std::size_t patches = subspace_.patches.patches,
-                      patch_points = subspace_.patches.tiles * kTilePoints;
-    std::vector<float> doubts(patches == 0 ? 0 : subspace_.tile_count());
-    std::vector<double> of_patches(patches);
+    std::vector<float> doubts(subspace_.doubt_inputs() == 0 ? 0 : subspace_.tile_count()),
+        of_tiles(subspace_.tile_count());
+    std::vector<double> of_patches(subspace_.patches.patches);
     for (std::size_t t = begin; t < end; ++t) {
       const std::span<const float> row = poses.row(t);
       std::size_t r = 0;
@@ -72,9 +72,9 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
       if (scratch.t.size() > 0)
         pairs[t].doubt =
             static_cast<double>(LargestDoubt(subspace_, scratch.inputs(), scratch.t.span(), doubts).largest);
-      if (patches > 0) DoubtsOfPatches(subspace_, doubts, of_patches);
-      for (const double doubt : of_patches) pairs[t].patches.push_back({doubt, 0});
-      std::size_t column = 0, first_patch = 0;
+      std::ranges::fill(of_tiles, 0.0f);
+      std::size_t column = 0;
+      float* of_tile = of_tiles.data();
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         double output_sum = 0;
         subspace_.tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
@@ -86,16 +86,21 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
           const double squared = Dot(d, d);
           output_sum += squared;
           errors[t].largest = std::max(errors[t].largest, squared);
-          if (patches == 0) continue;
-          double& of_patch = pairs[t].patches[first_patch + i / patch_points].error;
-          of_patch = std::max(of_patch, squared);
+          of_tile[i / kTilePoints] = std::max(of_tile[i / kTilePoints], static_cast<float>(squared));
         }
-        if (patches > 0) first_patch += (p.count + patch_points - 1) / patch_points;
+        of_tile += subspace_.tiles[m].tiles();
         errors[t].sum += output_sum;
         errors[t].largest_mean = std::max(
             errors[t].largest_mean, output_sum / static_cast<double>(std::max<std::size_t>(1, p.count)));
       }
-      for (PatchPair& patch : pairs[t].patches) patch.error = std::sqrt(patch.error);
+      for (float& error : of_tiles) error = std::sqrt(error);
+      if (!of_patches.empty()) {
+        LargestOfPatches(subspace_, doubts, of_patches);
+        for (const double doubt : of_patches) pairs[t].patches.push_back({doubt, 0});
+        LargestOfPatches(subspace_, of_tiles, of_patches);
+        for (std::size_t p = 0; p < of_patches.size(); ++p) pairs[t].patches[p].error = of_patches[p];
+      }
+      if (of_tiles_) pairs[t].tile_doubts = doubts, pairs[t].tile_errors = of_tiles;
       pairs[t].error = std::sqrt(subspace_.of_light() ? errors[t].largest_mean : errors[t].largest);
     }
   });

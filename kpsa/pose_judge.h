@@ -14,6 +14,7 @@ struct JudgedPose {
   double measured = 0, doubt = 0;       // parts of the score (ScoreMix)
   double error = 0;                     // as CalibrationPair's
   std::vector<PatchPair> patches = {};  // of each patch, where the subspace has some: its doubt and its error
+  std::vector<float> tile_doubts = {}, tile_errors = {};  // likewise of tiles, where they have doubts
 };
 // What it is to a calibration with this score, and these patches. guard: what guards ask for of all points;
 // guards_of_patches: of each patch, or empty.
@@ -22,8 +23,8 @@ CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchL
 
 class PoseJudge {
  public:
-  // cues: those of the subspace, in terms of the layout.
-  PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues);
+  // cues: those of the subspace, in terms of the layout. of_tiles: what is told of each tile is wanted.
+  PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues, bool of_tiles);
   // Every pose reconstructed, whatever its score. Poses are not centred.
   std::vector<JudgedPose> Judge(const PoseMatrix& poses);
   // Over all poses so far, of the pure reconstruction, metres (of light: its units).
@@ -34,6 +35,7 @@ class PoseJudge {
   const Subspace& subspace_;
   const PoseLayout& layout_;
   const CueSet& cues_;
+  const bool of_tiles_;
   double sum_ = 0, max_ = 0;
   std::size_t poses_ = 0;
 };

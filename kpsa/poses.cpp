@@ -69,7 +69,7 @@ class Sampler {
     const std::size_t count = std::min<std::size_t>(controls_.size(), 1 + random_.Below(3));
     for (const std::size_t i : Some(controls_.size(), count)) {
       const ControlRange& c = controls_[i];
-      const double beyond = kBeyondShare * (c.max - c.min) * random_.Unit();
+      const double beyond = (kBeyondShare + c.margin) * (c.max - c.min) * random_.Unit();
       const bool up = random_.Unit() < 0.5 || c.min == c.rest;
       pose->values[i] = std::clamp(up ? c.max + beyond : c.min - beyond, c.lowest, c.highest);
     }

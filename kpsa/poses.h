@@ -16,7 +16,8 @@ enum class PoseKind : std::uint8_t {
   kSampled,     // SamplePoses
   kMixture,     // 3 to 6 controls anywhere in their ranges, the others at rest
   kNeighbours,  // 2 to 6 controls that move the same points, at 50 to 100 % of their reach
-  kBeyond,      // a sampled pose with 1 to 3 controls up to kBeyondShare of their range beyond an end
+  kBeyond,      // a sampled pose with 1 to 3 controls up to kBeyondShare of their range, and their margins,
+                // beyond an end
 };
 inline constexpr int kPoseKinds = 4;
 inline constexpr double kBeyondShare = 0.1;
@@ -32,6 +33,7 @@ struct ControlRange {
   // What the attribute itself admits, where that is more than [min, max]; whole numbers admit nothing more.
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
+  double margin = 0;  // of its range: how far beyond its ends guards let it (kpsa/range_margins.h)
   double tilt = 0;  // training turns it so far from rest, though its range is less (kpsa/tilts.h)
 };
 

@@ -44,7 +44,8 @@ Status CheckPatches(const Subspace& s) {
   return {};
 }
 Status CheckPatches(const CalibrationPair& pair) {
-  if (!(pair.middle >= 0)) return Status::Invalid("half of a calibration pose has score {}", pair.middle);
+  if (!(pair.middle >= 0) || std::isinf(pair.middle))
+    return Status::Invalid("half of a calibration pose has score {}", pair.middle);
   for (const PatchPair& patch : pair.patches) {
     if (!(patch.score >= 0) || !(patch.error >= 0) || !(patch.guard >= 0 && patch.guard < 1))
       return Status::Invalid("a patch of a calibration pose has score {}, error {} and guard {}", patch.score,
@@ -294,13 +295,13 @@ Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span
   return doubt;
 }
 
-void DoubtsOfPatches(const Subspace& subspace, std::span<const float> doubts, std::span<double> patches) {
+void LargestOfPatches(const Subspace& subspace, std::span<const float> of_tiles, std::span<double> patches) {
   std::size_t tile = 0, patch = 0;
   for (const TileMap& tiles : subspace.tiles) {
     for (std::size_t t = 0; t < tiles.tiles(); t += subspace.patches.tiles, ++patch) {
       float largest = 0;
       for (std::size_t i = t; i < std::min(t + subspace.patches.tiles, tiles.tiles()); ++i)
-        largest = std::max(largest, doubts[tile++]);
+        largest = std::max(largest, of_tiles[tile++]);
       patches[patch] = static_cast<double>(largest);
     }
   }
@@ -318,7 +319,7 @@ Verdict JudgePatches(const Subspace& subspace, const SoftCacheThreshold& thresho
   if (verdict.reason == MissReason::kNotFinite) return verdict;
   const double measured = verdict.score;
   const Doubt doubt = LargestDoubt(subspace, y, inputs, doubts);
-  if (!scores.empty()) DoubtsOfPatches(subspace, doubts, scores);
+  if (!scores.empty()) LargestOfPatches(subspace, doubts, scores);
   for (double& score : scores)
     score = std::max(measured,
                      mix.doubt * PatchDoubt(subspace.patches, score, static_cast<double>(doubt.largest)));

@@ -176,8 +176,8 @@ Verdict JudgePatches(const Subspace& subspace, const SoftCacheThreshold& thresho
 // [tile_count()], or empty.
 Doubt LargestDoubt(const Subspace& subspace, std::span<const float> y, std::span<float> inputs,
                    std::span<float> doubts = {});
-// The largest doubt of each patch itself, from those of all tiles.
-void DoubtsOfPatches(const Subspace& subspace, std::span<const float> doubts, std::span<double> patches);
+// The largest of each patch, of something that all tiles have: doubts, errors.
+void LargestOfPatches(const Subspace& subspace, std::span<const float> of_tiles, std::span<double> patches);
 // points = (1 - full_weight) * points + full_weight * full, where Verdict::full_weight is in (0, 1).
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points);
 

@@ -382,6 +382,17 @@ void TileMap::JointMatricesOf(const float* y, float* entries) const {
   }
 }
 
+TileMap TileMap::WithDoubts(std::span<const double> factors) const {
+  KPSA_CHECK_EQ(factors.size(), tiles());
+  TileMap result = *this;
+  for (std::size_t t = 0; t < tiles(); ++t) {
+    if (products(t) == 0) continue;
+    float* scales = result.data_.whitening.data() + product_begin_[t].whitening + 16;
+    for (std::size_t i = 0; i < 16; ++i) scales[i] *= static_cast<float>(factors[t]);
+  }
+  return result;
+}
+
 Doubt TileMap::ComputeInputs(std::span<const float> y, std::span<float> inputs,
                              std::span<float> doubts) const {
   KPSA_CHECK(y.size() >= data_.inputs && inputs.size() >= input_size());

@@ -88,7 +88,8 @@ struct TileData {
 inline constexpr std::size_t kMaxProducts = 1 + kLatents * (kLatents + 1) / 2;
 inline constexpr std::uint8_t kUnitLatent = 15;  // which is 1
 
-// The largest product term of the points that are watched, scene units, and its tile.
+// The largest product term of the points that are watched (scene units), as far as it is believed
+// (kpsa/tile_trust.h), and its tile.
 struct Doubt {
   float largest = 0;
   Index tile = kNoIndex;
@@ -111,6 +112,8 @@ class TileMap {
   double mean_rank() const;
   double mean_cues() const;  // |J|
   bool has_products() const { return !data_.products.empty(); }
+  // The same with doubts that many times as large. [tiles()]
+  TileMap WithDoubts(std::span<const double> factors) const;
 
   // y [r] -> all points, in the space of the mean, or through `space`: a tile at a time, as long as it is in
   // the cache.

@@ -526,11 +526,11 @@ class Trainer {
     if (!points.ok()) return points.status();
     GivePatches(patches_, subspace);
     std::vector<ScoreJudge> judged;
-    for (const JudgedPose& pose : PoseJudge(*subspace, layout_, cues).Judge(judges))
+    for (const JudgedPose& pose : PoseJudge(*subspace, layout_, cues, !options_.without.trust).Judge(judges))
       judged.push_back({pose, 0, judge_kinds_[judged.size()]});
     subspace->tolerance = options_.tolerance;
     subspace->violation_rate = options_.violation_rate;
-    return ChooseMisses(subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds);
+    return ChooseMisses(subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds).cost;
   }
 
   // Also says what a frame is expected to cost, but points.

@@ -39,9 +39,12 @@ Status TrainingSampler::LearnHowControlsMove() {
   return Status();
 }
 
-std::vector<SampledPose> TrainingSampler::Of(PoseKind kind, std::size_t count, std::uint64_t seed) const {
+std::vector<SampledPose> TrainingSampler::Of(PoseKind kind, std::size_t count, std::uint64_t seed,
+                                             std::span<const double> margins) const {
+  std::vector<ControlRange> controls = drawn_;
+  for (std::size_t c = 0; c < margins.size(); ++c) controls[c].margin = margins[c];
   std::vector<SampledPose> poses =
-      PosesOfKind(kind, drawn_, clip_poses_, groups_, clips_.size(), count, seed);
+      PosesOfKind(kind, controls, clip_poses_, groups_, clips_.size(), count, seed);
   AddTilts(rig_.controls, drawn_.size(), seed, &poses);
   return poses;
 }

@@ -2,6 +2,7 @@
 // (kpsa/tilts.h), and records them. Internal to training.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "kpsa/control_groups.h"
@@ -20,8 +21,11 @@ class TrainingSampler {
   // What the clips do with the controls, and which of these act together: first of all.
   Status LearnHowControlsMove();
 
+  const std::vector<ControlRange>& drawn() const { return drawn_; }  // the rig's own controls
   // Without recording them.
-  std::vector<SampledPose> Of(PoseKind kind, std::size_t count, std::uint64_t seed) const;
+  // margins: by control (ControlRange), or none.
+  std::vector<SampledPose> Of(PoseKind kind, std::size_t count, std::uint64_t seed,
+                              std::span<const double> margins = {}) const;
   std::vector<SampledPose> SweepsWithTilts() const;  // each control alone
 
   // Sweeps, and as many samples as the options want and memory holds: the sampler's kind, and some of the

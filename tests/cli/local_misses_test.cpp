@@ -16,7 +16,9 @@ namespace {
 class LocalMisses : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    const std::shared_ptr<const Subspace> trained = TrainRig(kHello, QuickTraining());
+    TrainOptions options = QuickTraining();
+    options.without.trust = true;  // doubts as they are: thresholds among them make it happen
+    const std::shared_ptr<const Subspace> trained = TrainRig(kHello, options);
     ASSERT_NE(trained, nullptr);
     auto doubting = std::make_shared<Subspace>(*trained);
     ASSERT_GT(doubting->doubt_inputs(), 0u);
@@ -180,14 +182,7 @@ TEST_F(LocalMisses, CostAPart) {
     }
     EXPECT_EQ(MushedPoints(whole), exact_[f].size() / 3);
     EXPECT_GT(MushedPoints(part), 0u);
-    const bool of_one = std::ranges::any_of(part.accelerated.config->data().patches, [&](const auto& patch) {
-      for (std::size_t i = 0; i < exact_[f].size() / 3; ++i) {
-        const bool differs = At(frame.points, i, 0) != At(reconstructed_[f], i, 0);
-        if (differs && !std::ranges::binary_search(patch.points, static_cast<Index>(i))) return false;
-      }
-      return true;
-    });
-    if (!of_one) continue;
+    if (frame.full_weight > 1.0 / 7 + 1e-6) continue;  // one of seven patches
     ++compared;
     EXPECT_LE(2 * MushedPoints(part), MushedPoints(whole)) << f;
   }

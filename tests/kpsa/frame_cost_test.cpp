@@ -3,6 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "kpsa/tile_trust.h"
+
 namespace kpsa {
 namespace {
 
@@ -53,6 +57,59 @@ TEST(FrameCost, ASmallerToleranceIsAskedOfTheSamePoses) {
   const std::vector<ScoreJudge> judges = MadeUpJudges(0, 0);
   EXPECT_EQ(CostOf(judges, kAsked).misses, 0);
   EXPECT_EQ(CostOf(judges, 0.4 * kAsked).misses, 1) << "all are half the tolerance off";
+}
+
+// Two tiles: the first doubts much and is right, the second doubts little, and is wrong where it does.
+std::vector<ScoreJudge> TilesThatDiffer(bool second_is_wrong) {
+  std::vector<ScoreJudge> judges;
+  for (std::size_t t = 0; t < 600; ++t) {
+    const float far = static_cast<float>(t % 50) / 50, strange = t % 12 == 5 ? 0.3f : 0.02f;
+    ScoreJudge judge;
+    judge.kind = static_cast<int>(t % 2);
+    judge.pose.tile_doubts = {far, strange};
+    judge.pose.tile_errors = {0.1f * static_cast<float>(kAsked) * far,
+                              (second_is_wrong ? 5.0f : 0.3f) * static_cast<float>(kAsked) * strange};
+    judge.pose.doubt = static_cast<double>(std::max(far, strange));
+    judge.pose.error = static_cast<double>(std::ranges::max(judge.pose.tile_errors));
+    judges.push_back(judge);
+  }
+  return judges;
+}
+
+TEST(FrameCost, TilesAreBelievedAsFarAsTheyAreRight) {
+  const std::vector<ScoreJudge> judges = TilesThatDiffer(true);
+  Subspace subspace = DoubtedAlone();
+  const double as_they_are = ExpectedCost(subspace, judges, 0, kFullFrame, kAsked, 0.9).misses;
+  EXPECT_GT(as_they_are, 0.5) << "the doubt of the first tile hides that of the second";
+  const ChosenMisses chosen = ChooseMisses(&subspace, judges, 0, kFullFrame, kAsked, 0.9);
+  ASSERT_EQ(chosen.trust.size(), 2u);
+  EXPECT_EQ(chosen.trust[1], 1);
+  EXPECT_EQ(chosen.trust[0], kLeastTrust) << "a fiftieth, but a clip may go elsewhere";
+  EXPECT_LT(chosen.cost.misses, 0.1);
+  EXPECT_EQ(chosen.cost.wrong, 0);
+  // With these doubts the score that was chosen does what the cost says
+  std::vector<ScoreJudge> weighed = judges;
+  WeighDoubts(chosen.trust, subspace, weighed);
+  EXPECT_EQ(weighed[7].pose.tile_doubts[1], judges[7].pose.tile_doubts[1]);
+  EXPECT_FLOAT_EQ(weighed[7].pose.tile_doubts[0], 0.1f * judges[7].pose.tile_doubts[0]);
+  EXPECT_EQ(ExpectedCost(subspace, weighed, 0, kFullFrame, kAsked, 0.9).misses, chosen.cost.misses);
+}
+
+TEST(FrameCost, DoubtsStayWhereNothingIsWrong) {
+  Subspace subspace = DoubtedAlone();
+  const ChosenMisses chosen = ChooseMisses(&subspace, TilesThatDiffer(false), 0, kFullFrame, kAsked, 0.9);
+  EXPECT_TRUE(chosen.trust.empty());
+  EXPECT_EQ(chosen.cost.misses, 0);
+  // What guards keep from hitting says nothing of tiles
+  std::vector<ScoreJudge> kept = TilesThatDiffer(true);
+  const std::vector<double> trust = TrustInTiles(kept);
+  for (std::size_t t = 0; t < 100; ++t) {
+    kept.push_back(kept[t]);
+    kept.back().guard = 1;
+    kept.back().pose.tile_errors[0] = 1;
+  }
+  EXPECT_EQ(TrustInTiles(kept), trust);
+  EXPECT_TRUE(TrustInTiles({}).empty());
 }
 
 }  // namespace

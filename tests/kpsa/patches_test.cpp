@@ -303,6 +303,22 @@ TEST(Patches, CalibrationCountsGuardsOfPatches) {
   for (const Calibration::Kind& kind : found.kinds) EXPECT_LE(kind.upper_bound, 0.05 + 1e-9);
 }
 
+// Files hold what is finite: where guards ask for half of the patches, they ask for all points.
+TEST(Patches, GuardsOfHalfOfThemLeaveNoInfinity) {
+  PatchLayout layout = MakePatchLayout(std::vector<std::size_t>{8});
+  ScoreJudge judge = RandomJudges(1, 8, 5)[0];
+  for (std::size_t asked = 0; asked <= 8; ++asked) {
+    std::vector<float> guards(8, 0);
+    std::fill_n(guards.begin(), asked, 1.0f);
+    const CalibrationPair pair = PairOf(judge.pose, {0, 2}, layout, 0, 0, guards);
+    SCOPED_TRACE(asked);
+    EXPECT_TRUE(std::isfinite(pair.middle));
+    EXPECT_EQ(pair.guard >= 1, asked >= 4);
+    EXPECT_LE(pair.patches.size(), 8 - asked);
+    for (const PatchPair& patch : pair.patches) EXPECT_TRUE(std::isfinite(patch.score));
+  }
+}
+
 // Where nothing is wrong, thresholds reach as far as judges do, those of which guards ask for patches among
 // them.
 TEST(Patches, GuardsOfPatchesLeaveWhatWasSeen) {
@@ -348,7 +364,7 @@ TEST(Patches, AreTakenWhereTheySpareTime) {
     subspace.tolerance = 1e-3;
     subspace.patches = MakePatchLayout(std::vector<std::size_t>{12});
     subspace.patches.costs.assign(subspace.patches.regions.size(), cost);
-    const FrameCost found = ChooseMisses(&subspace, judges, 0, 1e5, 1e-3, 0.9);
+    const FrameCost found = ChooseMisses(&subspace, judges, 0, 1e5, 1e-3, 0.9).cost;
     return std::pair(subspace.patches, found);
   };
   // Wrong where the largest doubt tells, and the patch's own at .3 of that

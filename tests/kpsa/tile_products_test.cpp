@@ -110,6 +110,24 @@ TEST(TileProducts, TheDoubtIsWhatTheLinearMapIsOffBy) {
   EXPECT_NEAR(doubts.mean() / errors.mean(), 1, 0.2);
 }
 
+TEST(TileProducts, DoubtsMayCountForLess) {
+  const Bent bent(2e-3);
+  const TileMap tiles = bent.Tiles(true);
+  std::vector<double> factors;
+  for (std::size_t t = 0; t < tiles.tiles(); ++t) factors.push_back(t % 2 == 0 ? 0.5 : 0.125);
+  const TileMap believed = tiles.WithDoubts(factors);
+  const Eigen::VectorXf y = RandomNormal(kInputs, 1, 79).cast<float>();
+  const std::span<const float> in(y.data(), static_cast<std::size_t>(kInputs));
+  std::vector<float> inputs(tiles.input_size()), of(tiles.input_size()), doubts(tiles.tiles()),
+      fewer(tiles.tiles());
+  tiles.ComputeInputs(in, inputs, doubts);
+  believed.ComputeInputs(in, of, fewer);
+  ASSERT_GT(doubts[0], 0);
+  for (std::size_t t = 0; t < tiles.tiles(); ++t)
+    EXPECT_EQ(fewer[t], static_cast<float>(factors[t]) * doubts[t]) << "powers of two are exact";
+  EXPECT_EQ(of, inputs) << "and points are the same";
+}
+
 TEST(TileProducts, NoneWhereTheLinearMapIsGoodEnough) {
   EXPECT_FALSE(Bent(0).Tiles(true).has_products());
   EXPECT_FALSE(Bent(1e-7).Tiles(true).has_products());

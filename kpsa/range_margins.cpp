@@ -1,0 +1,138 @@
+#include "kpsa/range_margins.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "kpsa/pose_judge.h"
+#include "kpsa/random.h"
+
+namespace kpsa {
+namespace {
+
+constexpr double kMargins[] = {1.0 / 3, 1.0 / 6};  // of the range, the larger one first
+constexpr std::size_t kPoses = 12;                 // that try a joint, each at its ends and beyond
+constexpr std::size_t kMostPoses = 4000;           // of all joints: where there are many, fewer try each,
+constexpr std::size_t kLeastPoses = 4;             // and with fewer than these none does
+constexpr std::size_t kTriedAtOnce = 256;          // are held
+constexpr double kGrowth = 1.1;                    // of the errors at the ends
+constexpr std::uint64_t kSeed = 0x510e527fade682d1ull;
+
+using Joint = std::vector<std::size_t>;  // controls
+
+std::vector<Joint> JointsOf(const std::vector<ControlRange>& controls) {
+  std::vector<Joint> joints;
+  for (std::size_t c = 0; c < controls.size(); ++c) {
+    const PlugRef& plug = controls[c].plug;
+    if (!(controls[c].max > controls[c].min)) continue;
+    if (joints.empty() || plug.element >= 0 || controls[joints.back()[0]].plug.node != plug.node)
+      joints.emplace_back();
+    joints.back().push_back(c);
+  }
+  return joints;
+}
+
+// One control at an end and `margin` beyond it; in every second pair of poses the others of the joint are
+// anywhere as far.
+void GoBeyond(const std::vector<ControlRange>& controls, const Joint& joint, std::size_t number,
+              double margin, Random* random, SampledPose* pose) {
+  for (std::size_t k = 0; k < joint.size(); ++k) {
+    const ControlRange& c = controls[joint[k]];
+    const double beyond = margin * (c.max - c.min), share = random->Unit();
+    double& value = pose->values[joint[k]];
+    if (k == number / 2 % joint.size()) {
+      value = c.max > c.rest && (number % 2 == 0 || c.min == c.rest) ? c.max + beyond : c.min - beyond;
+    } else if (number % 4 >= 2) {
+      value = c.min - beyond + share * (c.max - c.min + 2 * beyond);
+    }
+    value = std::clamp(value, c.lowest, c.highest);
+  }
+}
+
+class MarginFinder {
+ public:
+  MarginFinder(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
+               const Subspace& subspace)
+      : of_(of),
+        work_(work),
+        controls_(work.sampler->drawn()),
+        joints_(JointsOf(controls_)),
+        judge_(subspace, of.layout, cues, false) {}
+
+  Result<std::vector<double>> Run() {
+    std::vector<double> margins(controls_.size(), 0);
+    each_ = std::min(kPoses, kMostPoses / std::max<std::size_t>(joints_.size(), 1));
+    if (each_ < kLeastPoses) return margins;
+    std::vector<std::size_t> left(joints_.size());
+    for (std::size_t j = 0; j < left.size(); ++j) left[j] = j;
+    const Result<std::vector<Tried>> ends = Try(left, 0);
+    if (!ends.ok()) return ends.status();
+    for (const double margin : kMargins) {
+      const Result<std::vector<Tried>> tried = Try(left, margin);
+      if (!tried.ok()) return tried.status();
+      std::vector<std::size_t> too_far;
+      for (std::size_t k = 0; k < left.size(); ++k) {
+        const Tried& beyond = (*tried)[k];
+        if (beyond.error > std::max(of_.options.tolerance, kGrowth * (*ends)[left[k]].error)) {
+          too_far.push_back(left[k]);
+          continue;
+        }
+        for (const std::vector<float>& entries : beyond.entries) work_.ranges->Widen(entries);
+        for (const std::size_t c : joints_[left[k]]) margins[c] = margin;
+      }
+      left = std::move(too_far);
+    }
+    return margins;
+  }
+
+ private:
+  struct Tried {
+    double error = 0;                         // the largest
+    std::vector<std::vector<float>> entries;  // of the signals, by pose
+  };
+  Result<std::vector<Tried>> Try(const std::vector<std::size_t>& joints, double margin) {
+    std::vector<SampledPose> poses;
+    for (const std::size_t j : joints) {
+      std::vector<SampledPose> some =
+          work_.sampler->Of(PoseKind::kSampled, each_, of_.options.seed ^ kSeed ^ j);
+      Random random(kSeed ^ j);
+      for (std::size_t k = 0; k < some.size(); ++k) {
+        some[k].clip = -1;  // which would have its way
+        GoBeyond(controls_, joints_[j], k, margin, &random, &some[k]);
+      }
+      std::ranges::move(some, std::back_inserter(poses));
+    }
+    std::vector<Tried> tried(joints.size());
+    for (std::size_t first = 0; first < poses.size(); first += kTriedAtOnce) {
+      const auto begin = poses.begin() + static_cast<std::ptrdiff_t>(first);
+      const std::size_t count = std::min(kTriedAtOnce, poses.size() - first);
+      PoseMatrix recorded(of_.layout);
+      KPSA_RETURN_IF_ERROR(work_.recorder->AddSamples({begin, begin + static_cast<std::ptrdiff_t>(count)},
+                                                      of_.clips, &recorded));
+      const std::vector<JudgedPose> judged = judge_.Judge(recorded);
+      for (std::size_t t = 0; t < count; ++t) {
+        Tried& of = tried[(first + t) / each_];
+        of.error = std::max(of.error, judged[t].error);
+        const std::span<const float> row = std::as_const(recorded).row(t).subspan(of_.layout.scalar_begin());
+        of.entries.emplace_back(row.begin(), row.end());
+      }
+    }
+    return tried;
+  }
+
+  const Calibrator& of_;
+  const CalibrationWork& work_;
+  const std::vector<ControlRange>& controls_;
+  const std::vector<Joint> joints_;
+  PoseJudge judge_;
+  std::size_t each_ = 0;
+};
+
+}  // namespace
+
+Result<std::vector<double>> WidenByMargins(const Calibrator& of, const CalibrationWork& work,
+                                           const CueSet& cues, const Subspace& subspace) {
+  return MarginFinder(of, work, cues, subspace).Run();
+}
+
+}  // namespace kpsa
