@@ -27,6 +27,8 @@ constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many ti
 constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
+constexpr double kStricter = 0.5;  // of the tolerance: clips that nobody trained on err up to so much more
+
 // Values that move more than they are trusted.
 std::vector<CueRef> Candidates(const Pca& pca, const CueNoise& noise, const std::vector<CueRef>& place,
                                std::size_t max_outputs) {
@@ -90,10 +92,11 @@ class Chooser {
   bool KeepIfCheaper() {
     double rows = 0;
     for (const CueRef& cue : chosen_) rows += cue.kind == CueKind::kScalar ? 1 : 3;
-    const double misses = Misses(chosen_), cost = options_.points_cost(chosen_) + kScoreCost * rows * rows +
-                                                  misses * options_.miss_cost;
+    const Missed missed = Misses(chosen_);
+    const double cost =
+        options_.points_cost(chosen_) + kScoreCost * rows * rows + missed.share * options_.miss_cost;
     if (!best_.cues.empty() && cost >= best_.cost) return false;
-    best_ = {chosen_, place_, cost, misses};
+    best_ = {chosen_, place_, cost, missed.share, missed.of_stricter};
     return true;
   }
 
@@ -105,7 +108,10 @@ class Chooser {
 
   // Share of the poses that SoftCache would not accept, calibrated with the judges of all kinds: of the
   // sampled ones, which are new, and of the training poses, among them the frames of clips, in equal parts.
-  double Misses(const std::vector<CueRef>& chosen) const {
+  struct Missed {
+    double share = 0, of_stricter = 0;  // with the tolerance, and with kStricter of it
+  };
+  Missed Misses(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca_, chosen, noise_);
     const Estimator estimator = MapEstimator(pca_, cues);
     const Eigen::MatrixXd trained = MeasuredPoses(pca_.layout, cues, poses_),
@@ -120,14 +126,18 @@ class Chooser {
       pairs.push_back({scores[t], survey.by_pose[t], 0, kinds.empty() ? 0 : kinds[t]});
       if (pairs.back().kind == 0) sampled.push_back(scores[t]);
     }
-    const SoftCacheThreshold threshold =
-        Calibrate(pairs, options_.tolerance, options_.violation_rate, kBlendStart, kEvenOdds).threshold;
-    const auto missed = [&](const std::vector<double>& of) {
-      return static_cast<double>(
-                 std::ranges::count_if(of, [&](double score) { return !(score <= threshold.tau_lo()); })) /
-             static_cast<double>(of.size());
+    const std::vector<double> of_trained = Scores(model, trained);
+    const auto missed = [&](double tolerance) {
+      const double hits =
+          Calibrate(pairs, tolerance, options_.violation_rate, kBlendStart, kEvenOdds).threshold.tau_lo();
+      const auto share = [&](const std::vector<double>& of) {
+        return static_cast<double>(
+                   std::ranges::count_if(of, [&](double score) { return !(score <= hits); })) /
+               static_cast<double>(of.size());
+      };
+      return (share(sampled) + share(of_trained)) / 2;
     };
-    return (missed(sampled) + missed(Scores(model, trained))) / 2;
+    return {missed(options_.tolerance), missed(kStricter * options_.tolerance)};
   }
   static std::vector<double> Scores(const SoftCacheModel& model, const Eigen::MatrixXd& measured) {
     SoftCacheThreshold always;

@@ -41,9 +41,9 @@ inline constexpr double kEvenOdds = 0.5;
 struct CueChoice {
   std::vector<CueRef> cues;
   // Where judges compared places, of the one that was taken: its number, the expected time of a frame
-  // (points, score, misses), and the share of misses.
+  // (points, score, misses), and the share of misses; likewise with half the tolerance.
   std::size_t place = 0;
-  double cost = 0, misses = 0;
+  double cost = 0, misses = 0, misses_of_stricter = 0;
 };
 
 // A-optimal cues (kpsa/cue_selection.h): points of one place and scalars, in rounds: after each share of the

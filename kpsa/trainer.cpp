@@ -43,6 +43,7 @@ constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so 
 constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;          // of the expected cost of the others: cues of tiles are taken
+constexpr double kLess = 0.95;            // likewise, where the others are as fine
 constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
 constexpr std::size_t kCueProducts = 160;  // cues that are products of others
 
@@ -99,7 +100,7 @@ class Trainer {
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
-    const double bearable = !fine_ ? kFewMisses : by_tile_ ? 1 : kTooManyMisses;
+    const double bearable = !fine_ ? kFewMisses : kTooManyMisses;
     if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.miss_costs &&
         cost_.lost() > bearable && limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
@@ -332,8 +333,9 @@ class Trainer {
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
-    const bool misses =
-        options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() && chosen_.misses > kManyMisses;
+    // Where few of the judges miss, but narrowly, a clip that nobody trained on may miss more
+    const bool misses = options_.may_have_cues_by_tile && judges.poses() > 0 && !of_light() &&
+                        std::max(chosen_.misses, chosen_.misses_of_stricter) > kManyMisses;
     Subspace subspace;
     if (misses && HasTimeForTiles()) {
       KPSA_RETURN_IF_ERROR(CompareWithTiles(poses, judges, &subspace));
@@ -383,10 +385,14 @@ class Trainer {
     };
     const char* const fine = by_tile_ ? kByTileFinely : kFinelyStored;
     const char* const first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
-    std::erase_if(before.tried, [&](const TrainingRecord::Tried& earlier) { return earlier.what == first; });
     KPSA_RETURN_IF_ERROR(compare(first));
     record_ = before;
     if (!fine_) KPSA_RETURN_IF_ERROR(again(fine));
+    if (by_tile_ && best_cost.misses > kTooManyMisses) {  // more than the judges of both had said
+      record_ = before;
+      cues_ = MakeCueSet(pca_, chosen_.cues, noise_), by_tile_ = false;
+      KPSA_RETURN_IF_ERROR(again(kFinelyStored));
+    }
     if (!by_tile_ && best_cost.misses > kTooManyMisses && limit_.left() > modes_seconds_) {
       record_ = before;
       KPSA_RETURN_IF_ERROR(CenterAndChooseCues(*poses, judges, options_.tolerance / 2));
@@ -407,6 +413,9 @@ class Trainer {
     tried[best_of].taken = true;
     *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
     cost_ = best_cost;
+    std::erase_if(before.tried, [&](const TrainingRecord::Tried& earlier) {
+      return std::ranges::find(tried, earlier.what, &TrainingRecord::Tried::what) != tried.end();
+    });
     record_.tried = before.tried;
     record_.tried.insert(record_.tried.end(), tried.begin(), tried.end());
     return Status();
@@ -460,7 +469,7 @@ class Trainer {
       *subspace = ForAllPoints(poses, true);
       const Result<FrameCost> others = Price(subspace, cues_, judges);
       if (!others.ok()) return others.status();
-      by_tile_ = cost.ns < others->ns;
+      by_tile_ = cost.ns < kLess * others->ns;
       Tried(kFinelyStored, cues_, others->misses, others->ns);
       if (!by_tile_) best = record_.tried.size() - 1, fine_ = true;
     }
