@@ -30,7 +30,7 @@ namespace {
 constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
 constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
 // The same where tiles have cues of their own, and where many poses would miss: errors count more than bytes
-constexpr double kOwnShare = 0.04, kOwnMaxShare = 0.3, kFineShare = 0.03, kFineMaxShare = 0.2;
+constexpr double kOwnShare = 0.05, kOwnMaxShare = 0.4, kFineShare = 0.03, kFineMaxShare = 0.2;
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
