@@ -23,7 +23,7 @@ Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
   return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
 }
 
-constexpr Eigen::Index kSmall = 400;  // below this the dense solver is as fast
+constexpr Eigen::Index kSmall = 160;  // below this the dense solver is as fast
 
 }  // namespace
 

@@ -33,8 +33,9 @@ struct FrameCost {
   static constexpr double kWrongCost = 0.5;
 };
 // With the score of the subspace and its rate; tolerance (scene units) and confidence: of the calibration
-// with these judges. Poses beyond the ranges, where guards decide, do not count. points: what the graph
-// spends until the points among its cues are there (ns).
+// with these judges, on the average of sets drawn of them (bootstrap), as calibration has others. Poses beyond
+// the ranges, where guards decide, do not count. points: what the graph spends until the points among its cues
+// are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
 // The same where its score is yet to be chosen, how far its tiles are believed, and whether its patches miss

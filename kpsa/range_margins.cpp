@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMargins[] = {1.0 / 3, 1.0 / 6};  // of the range, the larger one first
 constexpr std::size_t kPoses = 12;                 // that try a joint, each at its ends and beyond
-constexpr std::size_t kMostPoses = 4000;           // of all joints: where there are many, fewer try each,
+constexpr std::size_t kMostPoses = 1600;           // of all joints: where there are many, fewer try each,
 constexpr std::size_t kLeastPoses = 4;             // and with fewer than these none does
 constexpr std::size_t kTriedAtOnce = 256;          // are held
 constexpr double kGrowth = 1.1;                    // of the errors at the ends

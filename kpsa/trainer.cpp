@@ -23,6 +23,7 @@
 #include "kpsa/trained_ranges.h"
 #include "kpsa/training_sampler.h"
 #include "kpsa/training_signals.h"
+#include "kpsa/training_trials.h"
 
 namespace kpsa {
 namespace {
@@ -39,6 +40,7 @@ constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 constexpr int kMaxLightModes = 120;       // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;      // of new poses: cues of each tile are tried
 constexpr double kFewMisses = 0.01;       // likewise: finer tiles for these
+constexpr double kWorthTrying = 0.25;     // of what a frame costs: what others could save
 constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
@@ -102,7 +104,8 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
     const double bearable = !fine_ ? kFewMisses : kTooManyMisses;
     if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.miss_costs &&
-        cost_.lost() > bearable && limit_.left() > modes_seconds_)
+        cost_.lost() > bearable && cost_.lost() * full_cost_ > kWorthTrying * cost_.ns &&
+        limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
@@ -352,27 +355,16 @@ class Trainer {
   Status TryFiner(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("finer tiles", 0.95));
     TrainingRecord before = record_;
-    for (TrainingRecord::Tried& earlier : before.tried) earlier.taken = false;
-    std::vector<TrainingRecord::Tried> tried;
-    Subspace best, now = std::move(*subspace);
-    CueSet best_cues;
-    TrainingRecord best_record;
-    FrameCost best_cost;
-    std::size_t best_of = 0;
-    double least = std::numeric_limits<double>::infinity();
-    const auto compare = [&](const char* what) {
+    TrainingTrials trials(full_cost_);
+    const auto add = [&](const char* what, Subspace tried) {
       const Result<double> points =
           CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues_.cues);
       if (!points.ok()) return points.status();
-      const double cost = cost_.ns + *points;
-      tried.push_back({what, cues_.cues.size(), static_cast<std::size_t>(cues_.rows()), cost_.misses,
-                       cost / full_cost_, false});
-      if (cost >= least) return Status();
-      best = std::move(now), best_cues = cues_, best_record = record_, best_cost = cost_;
-      best_of = tried.size() - 1, least = cost;
+      trials.Add(what, *points, {std::move(tried), cues_, record_, cost_});
       return Status();
     };
     const auto again = [&](const char* what, bool finely = true) {
+      Subspace now;
       if (by_tile_) {
         TileSubspace tiles = OfTiles(poses, finely);
         now = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
@@ -380,44 +372,36 @@ class Trainer {
         now = ForAllPoints(poses, true);
       }
       Describe(&now);
+      record_ = before;
       KPSA_RETURN_IF_ERROR(Calibrate(&now));
-      return compare(what);
+      return add(what, std::move(now));
     };
     const char* const fine = by_tile_ ? kByTileFinely : kFinelyStored;
-    const char* const first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
-    KPSA_RETURN_IF_ERROR(compare(first));
-    record_ = before;
+    KPSA_RETURN_IF_ERROR(add(fine_ ? fine : by_tile_ ? kByTile : kForAllPoints, std::move(*subspace)));
     if (!fine_) KPSA_RETURN_IF_ERROR(again(fine));
-    if (by_tile_ && best_cost.misses > kTooManyMisses) {  // more than the judges of both had said
-      record_ = before;
+    if (by_tile_ && trials.least().misses > kTooManyMisses) {  // more than the judges of both had said
       cues_ = MakeCueSet(pca_, chosen_.cues, noise_), by_tile_ = false;
       KPSA_RETURN_IF_ERROR(again(kFinelyStored));
     }
-    if (!by_tile_ && best_cost.misses > kTooManyMisses && limit_.left() > modes_seconds_) {
-      record_ = before;
+    if (!by_tile_ && trials.least().misses > kTooManyMisses && limit_.left() > modes_seconds_) {
       KPSA_RETURN_IF_ERROR(CenterAndChooseCues(*poses, judges, options_.tolerance / 2));
       KPSA_RETURN_IF_ERROR(again(kForHalf));
     }
     // Cues of tiles, where nothing had said before that so many would miss
     if (!tried_tiles_ && options_.may_have_cues_by_tile && judges.poses() > 0 &&
-        best_cost.misses > kManyMisses && HasTimeForTiles()) {
-      record_ = before;
+        trials.least().misses > kManyMisses && HasTimeForTiles()) {
       const Result<bool> promising = ChooseTiles(poses);
       if (!promising.ok()) return promising.status();
+      before.sampled_poses = record_.sampled_poses;
       by_tile_ = *promising;
       for (const bool finely : {false, true}) {
         if (!by_tile_ || (finely && cost_.lost() <= kFewMisses)) break;
         KPSA_RETURN_IF_ERROR(again(finely ? kByTileFinely : kByTile, finely));
       }
     }
-    tried[best_of].taken = true;
-    *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
-    cost_ = best_cost;
-    std::erase_if(before.tried, [&](const TrainingRecord::Tried& earlier) {
-      return std::ranges::find(tried, earlier.what, &TrainingRecord::Tried::what) != tried.end();
-    });
-    record_.tried = before.tried;
-    record_.tried.insert(record_.tried.end(), tried.begin(), tried.end());
+    CalibratedSubspace best = trials.Take(std::move(before.tried));
+    *subspace = std::move(best.subspace), cues_ = std::move(best.cues), record_ = std::move(best.record);
+    cost_ = best.cost;
     return Status();
   }
 
@@ -544,10 +528,11 @@ class Trainer {
 
   // Also says what a frame is expected to cost, but points.
   Status Calibrate(Subspace* subspace) {
+    RangeFinder ranges = ranges_;  // its own margins beyond
     const Calibrator calibrator{
         rig_, clips_, options_, guards_, layout_, patches_, diagonal_, full_cost_, inverse_rest_stretch_};
     const Result<FrameCost> cost = CalibrateSubspace(
-        calibrator, {&compiler_, recorder_.get(), sampler_.get(), &ranges_, &record_}, cues_, subspace);
+        calibrator, {&compiler_, recorder_.get(), sampler_.get(), &ranges, &record_}, cues_, subspace);
     if (!cost.ok()) return cost.status();
     cost_ = *cost;
     return Status();

@@ -380,7 +380,7 @@ TEST(Patches, AreTakenWhereTheySpareTime) {
   const auto [none, none_cost] = choose(OneWrongPatch(100000, 1), 0.1);
   EXPECT_GT(none.tiles, 0u);
   EXPECT_EQ(none.share, 0.15);
-  EXPECT_EQ(none_cost.misses, 0);
+  EXPECT_LT(none_cost.misses, 1e-3) << "of the sets that are drawn of them some have the wrong one often";
 }
 
 }  // namespace
