@@ -40,7 +40,7 @@ constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 constexpr int kMaxLightModes = 120;       // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;      // of new poses: cues of each tile are tried
 constexpr double kFewMisses = 0.01;       // likewise: finer tiles for these
-constexpr double kWorthTrying = 0.25;     // of what a frame costs: what others could save
+constexpr double kWorthTrying = 0.35;     // of what a frame costs: what others could save
 constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
@@ -81,10 +81,13 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
     if (!of_light()) FitIntoTime(&poses);
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
+    clip_poses_ = record_.clip_poses;
+    if (!of_light()) spare_ = SpareForModes(&poses, &clip_poses_);
     const double before_modes = limit_.elapsed();
     if (layout_.products > 0) ChooseProducts(&poses, &judges);
     ranges_ = RangeFinder(layout_);
     ranges_.Widen(poses);
+    if (spare_) ranges_.Widen(*spare_);
     for (const PoseMatrix& learnt : learnt_) ranges_.Widen(learnt);
     if (!of_light()) KPSA_RETURN_IF_ERROR(ranges_.Widen(clips_, recorder_.get()));
     if (of_light() && options_.mode == EstimatorMode::kMap) judges = poses.TakeEvery(kJudgeOfLight);
@@ -102,10 +105,8 @@ class Trainer {
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
-    const double bearable = !fine_ ? kFewMisses : kTooManyMisses;
     if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.miss_costs &&
-        cost_.lost() > bearable && cost_.lost() * full_cost_ > kWorthTrying * cost_.ns &&
-        limit_.left() > modes_seconds_)
+        IsWorthTrying(cost_) && (!fine_ || cost_.lost() > kTooManyMisses) && limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
@@ -207,15 +208,8 @@ class Trainer {
   void FitIntoTime(PoseMatrix* poses) {
     const std::size_t all = poses->poses(), within = PosesWithin(limit_.left(), *poses);
     if (within >= all) return;
-    PoseMatrix kept(layout_);
-    std::size_t of_clips = 0;
-    for (const Index t : EvenSpread(all, within)) {
-      std::ranges::copy(std::as_const(*poses).row(t), kept.AddPose().begin());
-      of_clips += t < record_.clip_poses;
-    }
-    *poses = std::move(kept);
-    record_.clip_poses = of_clips;
-    record_.sampled_poses = within - of_clips;
+    KeepSpread(within, poses, &record_.clip_poses);
+    record_.sampled_poses = within - record_.clip_poses;
     record_.limited = fmt::format("{} of {} poses", within, all);
   }
   // The largest step, and one that can be done without.
@@ -330,9 +324,9 @@ class Trainer {
     const Estimator estimator =
         paper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
-    return MakeSubspace(
-        pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(fine),
-        of_light() || paper || options_.without.tile_products ? nullptr : poses, record_.clip_poses);
+    return MakeSubspace(pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(),
+                        TileBudgets(fine),
+                        of_light() || paper || options_.without.tile_products ? nullptr : poses, clip_poses_);
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
@@ -350,6 +344,10 @@ class Trainer {
     return subspace;
   }
 
+  bool IsWorthTrying(const FrameCost& cost) const {
+    return cost.lost() > kFewMisses && cost.lost() * full_cost_ > kWorthTrying * cost.ns;
+  }
+
   // What misses is known from here on, and counts more than bytes: tiles stored finely, then cues as for half
   // the tolerance, which measure more of the points that are farthest off. The cheapest stays.
   Status TryFiner(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
@@ -363,6 +361,12 @@ class Trainer {
       trials.Add(what, *points, {std::move(tried), cues_, record_, cost_});
       return Status();
     };
+    const auto calibrated = [&](const char* what, Subspace now) {
+      Describe(&now);
+      record_ = before;
+      KPSA_RETURN_IF_ERROR(Calibrate(&now));
+      return add(what, std::move(now));
+    };
     const auto again = [&](const char* what, bool finely = true) {
       Subspace now;
       if (by_tile_) {
@@ -371,15 +375,17 @@ class Trainer {
       } else {
         now = ForAllPoints(poses, true);
       }
-      Describe(&now);
-      record_ = before;
-      KPSA_RETURN_IF_ERROR(Calibrate(&now));
-      return add(what, std::move(now));
+      return calibrated(what, std::move(now));
     };
     const char* const fine = by_tile_ ? kByTileFinely : kFinelyStored;
     KPSA_RETURN_IF_ERROR(add(fine_ ? fine : by_tile_ ? kByTile : kForAllPoints, std::move(*subspace)));
-    if (!fine_) KPSA_RETURN_IF_ERROR(again(fine));
-    if (by_tile_ && trials.least().misses > kTooManyMisses) {  // more than the judges of both had said
+    bool may_be_for_all = by_tile_;
+    if (by_tile_ && others_ns_ < trials.least_ns()) {  // calibration misses more than the judges of both did
+      cues_ = MakeCueSet(pca_, chosen_.cues, noise_), may_be_for_all = false;
+      KPSA_RETURN_IF_ERROR(calibrated(kFinelyStored, std::move(others_)));
+    }
+    if (!fine_ && IsWorthTrying(trials.least())) KPSA_RETURN_IF_ERROR(again(fine));
+    if (may_be_for_all && trials.least().misses > kTooManyMisses) {
       cues_ = MakeCueSet(pca_, chosen_.cues, noise_), by_tile_ = false;
       KPSA_RETURN_IF_ERROR(again(kFinelyStored));
     }
@@ -442,7 +448,7 @@ class Trainer {
         cost = *priced, tiles = std::move(made), fine_ = fine;
         best = record_.tried.size() - 1;
       }
-      if (cost.lost() <= kFewMisses || cost.misses > kHopelessTiles) break;
+      if (!IsWorthTrying(cost) || cost.misses > kHopelessTiles) break;
     }
     // As chosen, without products of tiles: others with these would hardly do better, and take their time
     by_tile_ = cost.misses < kManyMisses && cost.ns < kClearly * chosen_.cost;
@@ -456,6 +462,7 @@ class Trainer {
       by_tile_ = cost.ns < kLess * others->ns;
       Tried(kFinelyStored, cues_, others->misses, others->ns);
       if (!by_tile_) best = record_.tried.size() - 1, fine_ = true;
+      if (by_tile_) others_ = std::move(*subspace), others_ns_ = others->ns;
     }
     record_.tried[best].taken = true;
     if (by_tile_) *subspace = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
@@ -474,6 +481,10 @@ class Trainer {
     record_.sampled_poses += more.poses();
     if (more.poses() > 0) more.Subtract(pca_.mean);
     poses->Append(more);
+    if (spare_) {
+      spare_->Subtract(pca_.mean);
+      poses->Append(*std::exchange(spare_, std::nullopt));
+    }
     TileCandidateOptions of;
     of.layout = layout_, of.totals = totals_, of.signals = recorder_->signals();
     of.points = of_tiles_, of.positions = positions_, of.stages = recorder_->candidates();
@@ -507,8 +518,8 @@ class Trainer {
     const TileOptions storage =
         fine ? TileBudgets(true)
              : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest};
-    TileSubspace made = MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, tiles_, Outputs(), storage);
-    TeachClips(learnt_, learning_tiles_, {&pca_.mean, record_.clip_poses, tiles_.options, storage},
+    TileSubspace made = MakeTileSubspace(pca_.mean, *poses, clip_poses_, tiles_, Outputs(), storage);
+    TeachClips(learnt_, learning_tiles_, {&pca_.mean, clip_poses_, tiles_.options, storage},
                options_.tolerance, poses, &made);
     return made;
   }
@@ -523,7 +534,8 @@ class Trainer {
       judged.push_back({pose, 0, judge_kinds_[judged.size()]});
     subspace->tolerance = options_.tolerance;
     subspace->violation_rate = options_.violation_rate;
-    return ChooseMisses(subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds).cost;
+    return ChooseMisses(subspace, judged, *points, full_cost_, kCautious * options_.tolerance, kEvenOdds)
+        .cost;
   }
 
   // Also says what a frame is expected to cost, but points.
@@ -555,7 +567,9 @@ class Trainer {
   bool fine_ = false;     // tiles
   bool by_tile_ = false;  // its cues
   bool tried_tiles_ = false;
-  TileChoice tiles_;                // where they were tried
+  Subspace others_;  // with cues for all points, where those of tiles were taken: not calibrated,
+  double others_ns_ = std::numeric_limits<double>::infinity();  // and what it was expected to cost
+  TileChoice tiles_;                                            // where they were tried
   std::vector<PoseMatrix> learnt_;  // TrainOptions::by_tile_as_before: of each clip, then posed
   std::vector<TileCandidates> learning_tiles_;
   PatchLayout patches_;  // what may miss by itself
@@ -568,6 +582,8 @@ class Trainer {
   RangeFinder ranges_;
   Matrix4 inverse_rest_stretch_;
   std::vector<int> judge_kinds_;
+  std::optional<PoseMatrix> spare_;  // not for modes
+  std::size_t clip_poses_ = 0;       // of those for modes, the first ones
   Pca pca_;
   CueSet cues_;
   double diagonal_ = 0;

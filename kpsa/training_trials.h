@@ -25,6 +25,7 @@ class TrainingTrials {
   void Add(const char* what, double points, CalibratedSubspace tried);
 
   const FrameCost& least() const { return best_.cost; }
+  double least_ns() const { return best_ns_; }  // with its points
   // The cheapest; its record tells of all, after those that were tried `earlier` by other names.
   CalibratedSubspace Take(std::vector<TrainingRecord::Tried> earlier);
 

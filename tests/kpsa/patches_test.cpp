@@ -372,7 +372,7 @@ TEST(Patches, AreTakenWhereTheySpareTime) {
   ASSERT_GT(told.tiles, 0u);
   EXPECT_LE(told.share, 0.3);
   EXPECT_LT(told_cost.misses, 0.05);
-  EXPECT_EQ(told_cost.wrong, 0);
+  EXPECT_LT(told_cost.wrong, 0.01);
   // Patches that cost as much as all points, or that do not tell, are no gain
   EXPECT_EQ(choose(OneWrongPatch(5, 0.3), 0.9).first.tiles, 0u);
   EXPECT_EQ(choose(OneWrongPatch(5, 0.001), 0.1).first.tiles, 0u);
