@@ -23,7 +23,9 @@ Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
   return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
 }
 
-constexpr Eigen::Index kSmall = 400;  // below this the dense solver is as fast
+constexpr int kMostPasses = 8;
+constexpr double kOrthogonal = 1e-8;  // of a unit vector: what may lie within; rounding after the last pass
+constexpr Eigen::Index kSmall = 160;  // below this the dense solver is as fast
 
 }  // namespace
 
@@ -48,10 +50,17 @@ SymmetricEigen LargestEigen(const Eigen::MatrixXd& matrix, Eigen::Index m, std::
   Eigen::Index used = 0, next_check = std::min(limit, 2 * m + 2 * block);
   Eigen::MatrixXd fresh = ThinQ(RandomNormal(n, block, seed));
   while (true) {
-    // Orthogonalise twice against what is there: once leaves what rounding made of it
-    for (int pass = 0; pass < 2; ++pass) {
-      if (used > 0) fresh -= Multiply(space.leftCols(used), TransposedProduct(space.leftCols(used), fresh));
+    // Orthogonalise against what is there, again where that left little but rounding, which has parts of it:
+    // the image of a space that holds all that the matrix moves
+    for (int pass = 0; pass < kMostPasses; ++pass) {
+      double within = 0;
+      if (used > 0) {
+        const Eigen::MatrixXd part = TransposedProduct(space.leftCols(used), fresh);
+        within = part.cwiseAbs().maxCoeff();
+        fresh -= Multiply(space.leftCols(used), part);
+      }
       fresh = ThinQ(fresh);
+      if (pass > 0 && within < kOrthogonal) break;
     }
     space.middleCols(used, block) = fresh;
     image.middleCols(used, block) = Multiply(matrix, fresh);

@@ -7,6 +7,7 @@
 
 #include "kpsa/cue_choice.h"
 #include "kpsa/poses.h"
+#include "kpsa/random.h"
 #include "kpsa/tile_trust.h"
 
 namespace kpsa {
@@ -19,7 +20,11 @@ constexpr double kPartial = 0.4;    // of a full evaluation: what patches cost t
 constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
 // Of the cost with a score of all points: known to hold on clips, it stays where parts do not spare more
 constexpr double kClearlyLess = 0.95;
+constexpr double kFewMisses = 0.02;
 constexpr double kRowCost = 5;  // ns a row that is measured, likewise
+// Sets of as many judges, drawn of them anew: where a few poses decide, others would decide otherwise
+constexpr int kDraws = 8;
+constexpr std::uint64_t kDrawSeed = 0x9b05688c2b3e6c1full;
 
 // Whether a patch costs clearly less than all points, as patches do on the average.
 bool ArePartial(const PatchLayout& layout) {
@@ -73,23 +78,41 @@ void GivePatches(const PatchLayout& patches, Subspace* subspace) {
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence) {
   std::vector<CalibrationPair> pairs;
-  for (const ScoreJudge& judge : judges)
+  std::map<int, std::vector<std::size_t>> kinds;
+  for (std::size_t j = 0; j < judges.size(); ++j) {
+    const ScoreJudge& judge = judges[j];
     pairs.push_back(PairOf(judge.pose, subspace.score, subspace.patches, judge.guard, judge.kind,
                            judge.guards_of_patches));
-  const Calibration found =
-      Calibrate(pairs, tolerance, subspace.violation_rate, subspace.blend_start, confidence);
-  FrameCost cost;
-  double kinds = 0, bytes = 0;
-  std::map<int, double> costs;
-  for (const ScoreJudge& judge : judges)
-    costs[judge.kind] += ShareOfFull(judge, subspace.score, found.threshold, subspace.patches);
-  for (const Calibration::Kind& kind : found.kinds) {
-    if (kind.kind == static_cast<int>(PoseKind::kBeyond)) continue;
-    cost.misses += costs[kind.kind] / static_cast<double>(kind.poses);
-    cost.wrong += static_cast<double>(kind.violations) / static_cast<double>(kind.poses);
-    kinds += 1;
+    kinds[judge.kind].push_back(j);
   }
-  cost.misses /= std::max(kinds, 1.0), cost.wrong /= std::max(kinds, 1.0);
+  FrameCost cost;
+  Random random(kDrawSeed);
+  std::vector<CalibrationPair> drawn = pairs;
+  double bytes = 0;
+  for (int draw = 0; draw <= kDraws; ++draw) {  // first as they are
+    if (draw > 0) {
+      drawn.clear();
+      for (const auto& [kind, of_kind] : kinds) {
+        for (std::size_t k = 0; k < of_kind.size(); ++k)
+          drawn.push_back(pairs[of_kind[random.Below(of_kind.size())]]);
+      }
+    }
+    const SoftCacheThreshold threshold =
+        Calibrate(drawn, tolerance, subspace.violation_rate, subspace.blend_start, confidence).threshold;
+    for (const auto& [kind, of_kind] : kinds) {
+      if (kind == static_cast<int>(PoseKind::kBeyond)) continue;
+      double misses = 0, wrong = 0;
+      for (const std::size_t j : of_kind) {
+        misses += ShareOfFull(judges[j], subspace.score, threshold, subspace.patches);
+        wrong += EmittedError(pairs[j], threshold) > tolerance * (1 + 1e-9) ? 1 : 0;
+      }
+      cost.misses += misses / static_cast<double>(of_kind.size());
+      cost.wrong += wrong / static_cast<double>(of_kind.size());
+    }
+  }
+  const auto counted = static_cast<double>(kinds.size() - kinds.count(static_cast<int>(PoseKind::kBeyond)));
+  const double all = std::max(counted, 1.0) * (kDraws + 1);
+  cost.misses /= all, cost.wrong /= all;
   for (const TileMap& tiles : subspace.tiles) bytes += static_cast<double>(tiles.bytes());
   const ScoreCosts score = CostsOfScore(subspace, full);
   cost.ns = points + kRowCost * static_cast<double>(subspace.rows()) + kByteCost * bytes +
@@ -113,8 +136,9 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
   const ScoreMix of_all = ScoreOf(*subspace, whole, full);
   subspace->score = of_all;
   FrameCost least = cost(whole);
-  if (patches.tiles == 0) return least;
-  // SoftCache's own score speaks of all points, and would say of no part that it misses
+  // SoftCache's own score speaks of all points, and would say of no part that it misses. Where it misses next
+  // to nothing, parts could spare next to nothing.
+  if (patches.tiles == 0 || (of_all.measured > 0 && least.misses < kFewMisses)) return least;
   const ScoreMix of_parts = of_all.measured > 0 ? DoubtAlone(whole) : of_all;
   const double bar = of_all.measured > 0 ? kClearlyLess * least.ns : least.ns;
   PatchLayout taken;

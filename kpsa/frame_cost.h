@@ -10,6 +10,9 @@
 
 namespace kpsa {
 
+// Of the tolerance: where training asks what misses, since calibration may have a few more poses beyond it.
+inline constexpr double kCautious = 0.9;
+
 // What guards ask for in each judge's pose. entries: of the signals with ranges, by pose; guarded: by entry;
 // patches: how many those that do not speak of all of them may speak of.
 void AskGuards(std::span<const TrainedRange> ranges, const std::vector<char>& guarded,
@@ -33,8 +36,9 @@ struct FrameCost {
   static constexpr double kWrongCost = 0.5;
 };
 // With the score of the subspace and its rate; tolerance (scene units) and confidence: of the calibration
-// with these judges. Poses beyond the ranges, where guards decide, do not count. points: what the graph
-// spends until the points among its cues are there (ns).
+// with these judges, on the average of sets drawn of them (bootstrap), as calibration has others. Poses
+// beyond the ranges, where guards decide, do not count. points: what the graph spends until the points among
+// its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
 // The same where its score is yet to be chosen, how far its tiles are believed, and whether its patches miss

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMargins[] = {1.0 / 3, 1.0 / 6};  // of the range, the larger one first
 constexpr std::size_t kPoses = 12;                 // that try a joint, each at its ends and beyond
-constexpr std::size_t kMostPoses = 4000;           // of all joints: where there are many, fewer try each,
+constexpr std::size_t kMostPoses = 1600;           // of all joints: where there are many, fewer try each,
 constexpr std::size_t kLeastPoses = 4;             // and with fewer than these none does
 constexpr std::size_t kTriedAtOnce = 256;          // are held
 constexpr double kGrowth = 1.1;                    // of the errors at the ends
@@ -59,12 +59,17 @@ class MarginFinder {
         joints_(JointsOf(controls_)),
         judge_(subspace, of.layout, cues, false) {}
 
-  Result<std::vector<double>> Run() {
-    std::vector<double> margins(controls_.size(), 0);
+  Result<std::vector<RangeMargins>> Run() {
+    careful_.of_controls.assign(controls_.size(), 0);
+    told_ = careful_;
+    told_.told_by_doubts = true;
     each_ = std::min(kPoses, kMostPoses / std::max<std::size_t>(joints_.size(), 1));
-    if (each_ < kLeastPoses) return margins;
+    std::vector<RangeMargins> found{careful_};
+    if (each_ < kLeastPoses) return found;
+    drawn_ = work_.sampler->Of(PoseKind::kSampled, each_ * joints_.size(), of_.options.seed ^ kSeed);
     std::vector<std::size_t> left(joints_.size());
     for (std::size_t j = 0; j < left.size(); ++j) left[j] = j;
+    std::vector<char> is_told(joints_.size(), 0);
     const Result<std::vector<Tried>> ends = Try(left, 0);
     if (!ends.ok()) return ends.status();
     for (const double margin : kMargins) {
@@ -72,35 +77,53 @@ class MarginFinder {
       if (!tried.ok()) return tried.status();
       std::vector<std::size_t> too_far;
       for (std::size_t k = 0; k < left.size(); ++k) {
-        const Tried& beyond = (*tried)[k];
-        if (beyond.error > std::max(of_.options.tolerance, kGrowth * (*ends)[left[k]].error)) {
-          too_far.push_back(left[k]);
-          continue;
+        const std::size_t j = left[k];
+        const Tried &beyond = (*tried)[k], &end = (*ends)[j];
+        const double least = std::max(of_.options.tolerance, kGrowth * end.error);
+        if (!is_told[j] && beyond.ErrorUpTo(kGrowth * end.doubt) <= least) {
+          is_told[j] = 1;
+          Take(beyond, j, margin, &told_);
         }
-        for (const std::vector<float>& entries : beyond.entries) work_.ranges->Widen(entries);
-        for (const std::size_t c : joints_[left[k]]) margins[c] = margin;
+        if (beyond.error <= least) {
+          Take(beyond, j, margin, &careful_);
+        } else {
+          too_far.push_back(j);
+        }
       }
       left = std::move(too_far);
     }
-    return margins;
+    for (RangeMargins* wider : {&careful_, &told_}) {
+      if (wider->of_controls != found.back().of_controls) found.push_back(std::move(*wider));
+    }
+    return found;
   }
 
  private:
   struct Tried {
-    double error = 0;                         // the largest
+    double error = 0, doubt = 0;  // the largest
+    std::vector<JudgedPose> poses;
     std::vector<std::vector<float>> entries;  // of the signals, by pose
+
+    double ErrorUpTo(double most_doubt) const {
+      double largest = 0;
+      for (const JudgedPose& pose : poses)
+        largest = std::max(largest, pose.doubt <= most_doubt ? pose.error : 0);
+      return largest;
+    }
   };
+  void Take(const Tried& beyond, std::size_t joint, double margin, RangeMargins* margins) const {
+    margins->entries.insert(margins->entries.end(), beyond.entries.begin(), beyond.entries.end());
+    for (const std::size_t c : joints_[joint]) margins->of_controls[c] = margin;
+  }
   Result<std::vector<Tried>> Try(const std::vector<std::size_t>& joints, double margin) {
     std::vector<SampledPose> poses;
     for (const std::size_t j : joints) {
-      std::vector<SampledPose> some =
-          work_.sampler->Of(PoseKind::kSampled, each_, of_.options.seed ^ kSeed ^ j);
       Random random(kSeed ^ j);
-      for (std::size_t k = 0; k < some.size(); ++k) {
-        some[k].clip = -1;  // which would have its way
-        GoBeyond(controls_, joints_[j], k, margin, &random, &some[k]);
+      for (std::size_t k = 0; k < each_; ++k) {
+        SampledPose& pose = poses.emplace_back(drawn_[j * each_ + k]);
+        pose.clip = -1;  // which would have its way
+        GoBeyond(controls_, joints_[j], k, margin, &random, &pose);
       }
-      std::ranges::move(some, std::back_inserter(poses));
     }
     std::vector<Tried> tried(joints.size());
     for (std::size_t first = 0; first < poses.size(); first += kTriedAtOnce) {
@@ -113,6 +136,8 @@ class MarginFinder {
       for (std::size_t t = 0; t < count; ++t) {
         Tried& of = tried[(first + t) / each_];
         of.error = std::max(of.error, judged[t].error);
+        of.doubt = std::max(of.doubt, judged[t].doubt);
+        of.poses.push_back(judged[t]);
         const std::span<const float> row = std::as_const(recorded).row(t).subspan(of_.layout.scalar_begin());
         of.entries.emplace_back(row.begin(), row.end());
       }
@@ -126,12 +151,14 @@ class MarginFinder {
   const std::vector<Joint> joints_;
   PoseJudge judge_;
   std::size_t each_ = 0;
+  std::vector<SampledPose> drawn_;  // so many a joint
+  RangeMargins careful_, told_;
 };
 
 }  // namespace
 
-Result<std::vector<double>> WidenByMargins(const Calibrator& of, const CalibrationWork& work,
-                                           const CueSet& cues, const Subspace& subspace) {
+Result<std::vector<RangeMargins>> FindMargins(const Calibrator& of, const CalibrationWork& work,
+                                              const CueSet& cues, const Subspace& subspace) {
   return MarginFinder(of, work, cues, subspace).Run();
 }
 

@@ -7,11 +7,17 @@
 
 namespace kpsa {
 
-// Tries each joint (the controls of a node together, a weight by itself) a third and a sixth of its range
-// beyond its ends, in sampled poses. Where they all keep the tolerance, or err hardly more than at the ends,
-// `work.ranges` are widened by them. By control of the sampler, the margin that is taken: calibration looks
-// beyond it.
-Result<std::vector<double>> WidenByMargins(const Calibrator& of, const CalibrationWork& work,
-                                           const CueSet& cues, const Subspace& subspace);
+struct RangeMargins {
+  std::vector<double> of_controls;          // of the sampler's, in their ranges: calibration looks beyond
+  std::vector<std::vector<float>> entries;  // of the signals, by pose: what ranges are to hold
+  bool told_by_doubts = false;              // needs a score that knows these
+};
+// Each wider than the one before it; the first is none. Tries each joint (the controls of a node together, a
+// weight by itself) a third and a sixth of its range beyond its ends, in sampled poses. The second takes a
+// margin where all of these keep the tolerance, or err hardly more than at the ends; the third asks this only
+// of poses whose tiles doubt them no more than those at the ends: the others miss by themselves, if the
+// threshold stays.
+Result<std::vector<RangeMargins>> FindMargins(const Calibrator& of, const CalibrationWork& work,
+                                              const CueSet& cues, const Subspace& subspace);
 
 }  // namespace kpsa

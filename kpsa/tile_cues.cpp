@@ -21,11 +21,11 @@ namespace {
 
 constexpr double kFirstRidge = 1e-7;  // of the mean variance of what is measured
 constexpr double kMapRidge[] = {1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4};
-constexpr std::size_t kMapValidated = 8;  // every so manieth pose says which of them
-constexpr std::size_t kStride = 2;        // poses that choose,
-constexpr std::size_t kTrialStride = 4;   // and those that compare spaces, at
-constexpr Eigen::Index kTrialPoints = 4;  // every so manieth point,
-constexpr Eigen::Index kTried = 5;        // as of every so manieth of these poses
+constexpr std::size_t kMapValidated = 8;     // every so manieth pose says which of them
+constexpr std::size_t kStride = 2;           // poses that choose, every so manieth,
+constexpr std::size_t kMostChoosing = 1600;  // but no more than these; half of them compare spaces, at
+constexpr Eigen::Index kTrialPoints = 4;     // every so manieth point,
+constexpr Eigen::Index kTried = 5;           // as of every so manieth of these poses
 constexpr std::size_t kSpaceProbes = 6,
                       kProbePoses = 240;  // points and poses that say which joints carry a tile,
 constexpr std::size_t kSpaces = 3;        // of which so many are compared
@@ -158,11 +158,14 @@ class View {
 class TileChooser {
  public:
   TileChooser(const PoseMatrix& poses, const TileCandidates& tile, const TileCueOptions& options)
-      : poses_(poses), tile_(tile), options_(options) {}
+      : poses_(poses),
+        tile_(tile),
+        options_(options),
+        stride_(std::max(kStride, (poses.poses() + kMostChoosing - 1) / kMostChoosing)) {}
 
   std::vector<CueRef> Run() {
     ChooseSpace();
-    const View view(poses_, options_, joint_, kStride);
+    const View view(poses_, options_, joint_, stride_);
     y_ = view.Points(tile_.first_column, tile_.height);
     ChooseScalars(view);
     FindResidual();
@@ -209,7 +212,7 @@ class TileChooser {
 
   // Mean fourth power of a point's error in poses that are not fitted to.
   double ErrorIn(Index joint) const {
-    const View view(poses_, options_, joint, kTrialStride);
+    const View view(poses_, options_, joint, 2 * stride_);
     if (view.empty()) return std::numeric_limits<double>::infinity();
     const Eigen::MatrixXd all = view.Points(tile_.first_column, tile_.height),
                           x = Moving(view.Cues(ScalarsIn(joint)), nullptr);
@@ -326,6 +329,7 @@ class TileChooser {
   const PoseMatrix& poses_;
   const TileCandidates& tile_;
   const TileCueOptions& options_;
+  const std::size_t stride_;
   std::vector<CueRef> chosen_;
   bool has_values_ = false;
   Index joint_ = kNoIndex;

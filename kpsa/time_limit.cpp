@@ -4,11 +4,13 @@
 #include <cmath>
 
 #include "kpsa/gemm.h"
+#include "kpsa/mode_choice.h"
 
 namespace kpsa {
 namespace {
 
 constexpr std::size_t kProbedPoses = 256, kLeastPosesWithin = 250;
+constexpr std::size_t kSpared = 4;
 constexpr double kOfGram = 8;  // training without cues of tiles, in Gram matrices of its poses
 
 }  // namespace
@@ -26,6 +28,25 @@ std::size_t PosesWithin(double seconds, const PoseMatrix& poses) {
   const double within = std::sqrt(std::max(0.0, seconds) / std::max(kOfGram * a_pair, 1e-15));
   return within >= static_cast<double>(all) ? all
                                             : std::max(kLeastPosesWithin, static_cast<std::size_t>(within));
+}
+
+void KeepSpread(std::size_t count, PoseMatrix* poses, std::size_t* of_clips) {
+  PoseMatrix kept(poses->layout());
+  std::size_t clips = 0;
+  for (const Index t : EvenSpread(poses->poses(), count)) {
+    std::ranges::copy(std::as_const(*poses).row(t), kept.AddPose().begin());
+    clips += t < *of_clips;
+  }
+  *poses = std::move(kept);
+  *of_clips = clips;
+}
+
+std::optional<PoseMatrix> SpareForModes(PoseMatrix* poses, std::size_t* of_clips, double most_work) {
+  const auto count = static_cast<double>(poses->poses());
+  if (count * count * static_cast<double>(poses->columns()) <= most_work) return std::nullopt;
+  PoseMatrix spare = poses->TakeEvery(kSpared);
+  *of_clips -= *of_clips / kSpared;
+  return spare;
 }
 
 }  // namespace kpsa

@@ -1,8 +1,9 @@
-// How long training may take: what is left of it, and how many poses can be worked through in that.
-// Internal to training.
+// How long training takes: what is left of the time it is given, and with how many poses. Internal to
+// training.
 #pragma once
 
 #include <chrono>
+#include <optional>
 
 #include "kpsa/pose_matrix.h"
 
@@ -22,5 +23,14 @@ class TimeLimit {
 // How many of the poses (not centred) can be trained on within so many seconds, by what products of some of
 // them take here; at least 250.
 std::size_t PosesWithin(double seconds, const PoseMatrix& poses);
+
+// Leaves `count` of the poses, spread evenly; of_clips: how many of them, first, are of clips.
+void KeepSpread(std::size_t count, PoseMatrix* poses, std::size_t* of_clips);
+
+// Modes take the square of the poses, times their columns. Where that would be most of the time of a
+// training, every fourth pose is taken out, for what grows with their number alone; of_clips as above.
+inline constexpr double kMostModeWork = 8.5e11;  // ten to fifteen seconds
+std::optional<PoseMatrix> SpareForModes(PoseMatrix* poses, std::size_t* of_clips,
+                                        double most_work = kMostModeWork);
 
 }  // namespace kpsa

@@ -23,6 +23,7 @@
 #include "kpsa/trained_ranges.h"
 #include "kpsa/training_sampler.h"
 #include "kpsa/training_signals.h"
+#include "kpsa/training_trials.h"
 
 namespace kpsa {
 namespace {
@@ -30,7 +31,7 @@ namespace {
 constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
 constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
 // The same where tiles have cues of their own, and where many poses would miss: errors count more than bytes
-constexpr double kOwnShare = 0.04, kOwnMaxShare = 0.3, kFineShare = 0.03, kFineMaxShare = 0.2;
+constexpr double kOwnShare = 0.05, kOwnMaxShare = 0.4, kFineShare = 0.03, kFineMaxShare = 0.2;
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
@@ -39,6 +40,7 @@ constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 constexpr int kMaxLightModes = 120;       // that are looked at; noise is beyond
 constexpr double kManyMisses = 0.05;      // of new poses: cues of each tile are tried
 constexpr double kFewMisses = 0.01;       // likewise: finer tiles for these
+constexpr double kWorthTrying = 0.35;     // of what a frame costs: what others could save
 constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
@@ -79,10 +81,13 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
     if (!of_light()) FitIntoTime(&poses);
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
+    clip_poses_ = record_.clip_poses;
+    if (!of_light()) spare_ = SpareForModes(&poses, &clip_poses_);
     const double before_modes = limit_.elapsed();
     if (layout_.products > 0) ChooseProducts(&poses, &judges);
     ranges_ = RangeFinder(layout_);
     ranges_.Widen(poses);
+    if (spare_) ranges_.Widen(*spare_);
     for (const PoseMatrix& learnt : learnt_) ranges_.Widen(learnt);
     if (!of_light()) KPSA_RETURN_IF_ERROR(ranges_.Widen(clips_, recorder_.get()));
     if (of_light() && options_.mode == EstimatorMode::kMap) judges = poses.TakeEvery(kJudgeOfLight);
@@ -100,9 +105,8 @@ class Trainer {
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
-    const double bearable = !fine_ ? kFewMisses : kTooManyMisses;
     if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.miss_costs &&
-        cost_.lost() > bearable && limit_.left() > modes_seconds_)
+        IsWorthTrying(cost_) && (!fine_ || cost_.lost() > kTooManyMisses) && limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
@@ -204,15 +208,8 @@ class Trainer {
   void FitIntoTime(PoseMatrix* poses) {
     const std::size_t all = poses->poses(), within = PosesWithin(limit_.left(), *poses);
     if (within >= all) return;
-    PoseMatrix kept(layout_);
-    std::size_t of_clips = 0;
-    for (const Index t : EvenSpread(all, within)) {
-      std::ranges::copy(std::as_const(*poses).row(t), kept.AddPose().begin());
-      of_clips += t < record_.clip_poses;
-    }
-    *poses = std::move(kept);
-    record_.clip_poses = of_clips;
-    record_.sampled_poses = within - of_clips;
+    KeepSpread(within, poses, &record_.clip_poses);
+    record_.sampled_poses = within - record_.clip_poses;
     record_.limited = fmt::format("{} of {} poses", within, all);
   }
   // The largest step, and one that can be done without.
@@ -327,9 +324,9 @@ class Trainer {
     const Estimator estimator =
         paper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
-    return MakeSubspace(
-        pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(), TileBudgets(fine),
-        of_light() || paper || options_.without.tile_products ? nullptr : poses, record_.clip_poses);
+    return MakeSubspace(pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(),
+                        TileBudgets(fine),
+                        of_light() || paper || options_.without.tile_products ? nullptr : poses, clip_poses_);
   }
 
   Result<Subspace> Assemble(PoseMatrix* poses, const PoseMatrix& judges) {
@@ -347,77 +344,70 @@ class Trainer {
     return subspace;
   }
 
+  bool IsWorthTrying(const FrameCost& cost) const {
+    return cost.lost() > kFewMisses && cost.lost() * full_cost_ > kWorthTrying * cost.ns;
+  }
+
   // What misses is known from here on, and counts more than bytes: tiles stored finely, then cues as for half
   // the tolerance, which measure more of the points that are farthest off. The cheapest stays.
   Status TryFiner(PoseMatrix* poses, const PoseMatrix& judges, Subspace* subspace) {
     KPSA_RETURN_IF_ERROR(Say("finer tiles", 0.95));
     TrainingRecord before = record_;
-    for (TrainingRecord::Tried& earlier : before.tried) earlier.taken = false;
-    std::vector<TrainingRecord::Tried> tried;
-    Subspace best, now = std::move(*subspace);
-    CueSet best_cues;
-    TrainingRecord best_record;
-    FrameCost best_cost;
-    std::size_t best_of = 0;
-    double least = std::numeric_limits<double>::infinity();
-    const auto compare = [&](const char* what) {
+    TrainingTrials trials(full_cost_);
+    const auto add = [&](const char* what, Subspace tried) {
       const Result<double> points =
           CostOfPoints(rig_, &compiler_, totals_, recorder_->candidates(), cues_.cues);
       if (!points.ok()) return points.status();
-      const double cost = cost_.ns + *points;
-      tried.push_back({what, cues_.cues.size(), static_cast<std::size_t>(cues_.rows()), cost_.misses,
-                       cost / full_cost_, false});
-      if (cost >= least) return Status();
-      best = std::move(now), best_cues = cues_, best_record = record_, best_cost = cost_;
-      best_of = tried.size() - 1, least = cost;
+      trials.Add(what, *points, {std::move(tried), cues_, record_, cost_});
       return Status();
     };
+    const auto calibrated = [&](const char* what, Subspace now) {
+      Describe(&now);
+      record_ = before;
+      KPSA_RETURN_IF_ERROR(Calibrate(&now));
+      return add(what, std::move(now));
+    };
     const auto again = [&](const char* what, bool finely = true) {
+      Subspace now;
       if (by_tile_) {
         TileSubspace tiles = OfTiles(poses, finely);
         now = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
       } else {
         now = ForAllPoints(poses, true);
       }
-      Describe(&now);
-      KPSA_RETURN_IF_ERROR(Calibrate(&now));
-      return compare(what);
+      return calibrated(what, std::move(now));
     };
     const char* const fine = by_tile_ ? kByTileFinely : kFinelyStored;
-    const char* const first = fine_ ? fine : by_tile_ ? kByTile : kForAllPoints;
-    KPSA_RETURN_IF_ERROR(compare(first));
-    record_ = before;
-    if (!fine_) KPSA_RETURN_IF_ERROR(again(fine));
-    if (by_tile_ && best_cost.misses > kTooManyMisses) {  // more than the judges of both had said
-      record_ = before;
+    KPSA_RETURN_IF_ERROR(add(fine_ ? fine : by_tile_ ? kByTile : kForAllPoints, std::move(*subspace)));
+    bool may_be_for_all = by_tile_;
+    if (by_tile_ && others_ns_ < trials.least_ns()) {  // calibration misses more than the judges of both did
+      cues_ = MakeCueSet(pca_, chosen_.cues, noise_), may_be_for_all = false;
+      KPSA_RETURN_IF_ERROR(calibrated(kFinelyStored, std::move(others_)));
+    }
+    if (!fine_ && IsWorthTrying(trials.least())) KPSA_RETURN_IF_ERROR(again(fine));
+    if (may_be_for_all && trials.least().misses > kTooManyMisses) {
       cues_ = MakeCueSet(pca_, chosen_.cues, noise_), by_tile_ = false;
       KPSA_RETURN_IF_ERROR(again(kFinelyStored));
     }
-    if (!by_tile_ && best_cost.misses > kTooManyMisses && limit_.left() > modes_seconds_) {
-      record_ = before;
+    if (!by_tile_ && trials.least().misses > kTooManyMisses && limit_.left() > modes_seconds_) {
       KPSA_RETURN_IF_ERROR(CenterAndChooseCues(*poses, judges, options_.tolerance / 2));
       KPSA_RETURN_IF_ERROR(again(kForHalf));
     }
     // Cues of tiles, where nothing had said before that so many would miss
     if (!tried_tiles_ && options_.may_have_cues_by_tile && judges.poses() > 0 &&
-        best_cost.misses > kManyMisses && HasTimeForTiles()) {
-      record_ = before;
+        trials.least().misses > kManyMisses && HasTimeForTiles()) {
       const Result<bool> promising = ChooseTiles(poses);
       if (!promising.ok()) return promising.status();
+      before.sampled_poses = record_.sampled_poses;
       by_tile_ = *promising;
       for (const bool finely : {false, true}) {
         if (!by_tile_ || (finely && cost_.lost() <= kFewMisses)) break;
         KPSA_RETURN_IF_ERROR(again(finely ? kByTileFinely : kByTile, finely));
       }
     }
-    tried[best_of].taken = true;
-    *subspace = std::move(best), cues_ = std::move(best_cues), record_ = std::move(best_record);
-    cost_ = best_cost;
-    std::erase_if(before.tried, [&](const TrainingRecord::Tried& earlier) {
-      return std::ranges::find(tried, earlier.what, &TrainingRecord::Tried::what) != tried.end();
-    });
-    record_.tried = before.tried;
-    record_.tried.insert(record_.tried.end(), tried.begin(), tried.end());
+    CalibratedSubspace best = trials.Take(std::move(before.tried));
+    *subspace = std::move(best.subspace), cues_ = std::move(best.cues), record_ = std::move(best.record);
+    cost_ = best.cost;
     return Status();
   }
 
@@ -458,7 +448,7 @@ class Trainer {
         cost = *priced, tiles = std::move(made), fine_ = fine;
         best = record_.tried.size() - 1;
       }
-      if (cost.lost() <= kFewMisses || cost.misses > kHopelessTiles) break;
+      if (!IsWorthTrying(cost) || cost.misses > kHopelessTiles) break;
     }
     // As chosen, without products of tiles: others with these would hardly do better, and take their time
     by_tile_ = cost.misses < kManyMisses && cost.ns < kClearly * chosen_.cost;
@@ -472,6 +462,7 @@ class Trainer {
       by_tile_ = cost.ns < kLess * others->ns;
       Tried(kFinelyStored, cues_, others->misses, others->ns);
       if (!by_tile_) best = record_.tried.size() - 1, fine_ = true;
+      if (by_tile_) others_ = std::move(*subspace), others_ns_ = others->ns;
     }
     record_.tried[best].taken = true;
     if (by_tile_) *subspace = std::move(tiles.subspace), cues_ = std::move(tiles.cues);
@@ -490,6 +481,10 @@ class Trainer {
     record_.sampled_poses += more.poses();
     if (more.poses() > 0) more.Subtract(pca_.mean);
     poses->Append(more);
+    if (spare_) {
+      spare_->Subtract(pca_.mean);
+      poses->Append(*std::exchange(spare_, std::nullopt));
+    }
     TileCandidateOptions of;
     of.layout = layout_, of.totals = totals_, of.signals = recorder_->signals();
     of.points = of_tiles_, of.positions = positions_, of.stages = recorder_->candidates();
@@ -523,8 +518,8 @@ class Trainer {
     const TileOptions storage =
         fine ? TileBudgets(true)
              : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest};
-    TileSubspace made = MakeTileSubspace(pca_.mean, *poses, record_.clip_poses, tiles_, Outputs(), storage);
-    TeachClips(learnt_, learning_tiles_, {&pca_.mean, record_.clip_poses, tiles_.options, storage},
+    TileSubspace made = MakeTileSubspace(pca_.mean, *poses, clip_poses_, tiles_, Outputs(), storage);
+    TeachClips(learnt_, learning_tiles_, {&pca_.mean, clip_poses_, tiles_.options, storage},
                options_.tolerance, poses, &made);
     return made;
   }
@@ -539,15 +534,17 @@ class Trainer {
       judged.push_back({pose, 0, judge_kinds_[judged.size()]});
     subspace->tolerance = options_.tolerance;
     subspace->violation_rate = options_.violation_rate;
-    return ChooseMisses(subspace, judged, *points, full_cost_, options_.tolerance, kEvenOdds).cost;
+    return ChooseMisses(subspace, judged, *points, full_cost_, kCautious * options_.tolerance, kEvenOdds)
+        .cost;
   }
 
   // Also says what a frame is expected to cost, but points.
   Status Calibrate(Subspace* subspace) {
+    RangeFinder ranges = ranges_;  // its own margins beyond
     const Calibrator calibrator{
         rig_, clips_, options_, guards_, layout_, patches_, diagonal_, full_cost_, inverse_rest_stretch_};
     const Result<FrameCost> cost = CalibrateSubspace(
-        calibrator, {&compiler_, recorder_.get(), sampler_.get(), &ranges_, &record_}, cues_, subspace);
+        calibrator, {&compiler_, recorder_.get(), sampler_.get(), &ranges, &record_}, cues_, subspace);
     if (!cost.ok()) return cost.status();
     cost_ = *cost;
     return Status();
@@ -570,7 +567,9 @@ class Trainer {
   bool fine_ = false;     // tiles
   bool by_tile_ = false;  // its cues
   bool tried_tiles_ = false;
-  TileChoice tiles_;                // where they were tried
+  Subspace others_;  // with cues for all points, where those of tiles were taken: not calibrated,
+  double others_ns_ = std::numeric_limits<double>::infinity();  // and what it was expected to cost
+  TileChoice tiles_;                                            // where they were tried
   std::vector<PoseMatrix> learnt_;  // TrainOptions::by_tile_as_before: of each clip, then posed
   std::vector<TileCandidates> learning_tiles_;
   PatchLayout patches_;  // what may miss by itself
@@ -583,6 +582,8 @@ class Trainer {
   RangeFinder ranges_;
   Matrix4 inverse_rest_stretch_;
   std::vector<int> judge_kinds_;
+  std::optional<PoseMatrix> spare_;  // not for modes
+  std::size_t clip_poses_ = 0;       // of those for modes, the first ones
   Pca pca_;
   CueSet cues_;
   double diagonal_ = 0;

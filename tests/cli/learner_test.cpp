@@ -135,7 +135,7 @@ TEST_F(BackgroundLearning, MissesAreBoundedAndNeverKeptTwice) {
   EXPECT_TRUE(learner.Add({"sway", 0.2}));
   EXPECT_FALSE(learner.Add({"sway", 0.1}));
   EXPECT_FALSE(learner.Add({"sway", kInfinity}));
-  EXPECT_TRUE(learner.Add({"", 0, {{"upper.rotate.x", 0.8}}}));
+  EXPECT_TRUE(learner.Add({"", 0, {{"upper.rotate.x", 1.05}}}));
   EXPECT_FALSE(learner.Add({"wave", 0.1}));
   EXPECT_FALSE(learner.Add({"sway", 0.2}));
   const Learner::State state = learner.state();
@@ -198,11 +198,11 @@ TEST_F(BackgroundLearning, ItsEndGivesUpWhatIsBeingLearnt) {
 }
 
 TEST_F(BackgroundLearning, LearnsPosesOfControls) {
-  // Farther than the ranges of the controls, which is a miss
+  // Farther than the ranges of the controls and the margins beyond, which is a miss
   RigRun run(folder_->rig(), {.subspace = trained_});
   ASSERT_TRUE(run.ok()) << run.error;
   std::vector<std::vector<double>> poses;
-  for (const double x : {0.7, 0.75, 0.8}) {
+  for (const double x : {0.95, 1.0, 1.05}) {
     std::vector<double> values;
     for (const Control& control : run.rig.controls)
       values.push_back(run.rig.graph->PlugName(control.plug) == "upper.rotate.x" ? x : 0);
@@ -218,7 +218,7 @@ TEST_F(BackgroundLearning, LearnsPosesOfControls) {
   };
   ASSERT_EQ(misses(&run), poses.size());
   Learner learner(trained_, OpenRig, {.threads = 2});
-  EXPECT_TRUE(learner.Add({"", 0, {{"upper.rotate.x", 0.8}}}));
+  EXPECT_TRUE(learner.Add({"", 0, {{"upper.rotate.x", 1.05}}}));
   EXPECT_TRUE(learner.Learn());
   const Status learnt = learner.Wait();
   ASSERT_TRUE(learnt.ok()) << learnt.ToString();
@@ -227,10 +227,10 @@ TEST_F(BackgroundLearning, LearnsPosesOfControls) {
   ASSERT_TRUE(adopted.ok()) << adopted.error;
   EXPECT_EQ(misses(&adopted), 0u);
   const TrainingRecord record = ParseTraining(newer->training);
-  EXPECT_EQ(record.learnt_poses, (std::vector<Miss>{{"", 0, {{"upper.rotate.x", 0.8}}}}));
+  EXPECT_EQ(record.learnt_poses, (std::vector<Miss>{{"", 0, {{"upper.rotate.x", 1.05}}}}));
   EXPECT_TRUE(record.learnt.empty());
   // Over a clip, with the clip
-  EXPECT_TRUE(learner.Add({"wave", 0.5, {{"upper.rotate.x", 0.8}}}));
+  EXPECT_TRUE(learner.Add({"wave", 0.5, {{"upper.rotate.x", 1.05}}}));
   EXPECT_TRUE(learner.Add({"", 0, {{"upper.rotate.q", 0.8}}}));
   EXPECT_TRUE(learner.Learn());
   EXPECT_NE(learner.Wait().ToString().find("upper.rotate.q"), std::string::npos);

@@ -19,12 +19,12 @@ Subspace DoubtedAlone() {
   subspace.score = {0, 1};
   return subspace;
 }
-// 400 poses of two kinds, of which `beyond` are twice as far off as the tolerance allows, their doubts above
-// all others' by `told`.
-std::vector<ScoreJudge> MadeUpJudges(std::size_t beyond, double told) {
+// Poses of two kinds, of which `beyond` are twice as far off as the tolerance allows, their doubts above all
+// others' by `told`.
+std::vector<ScoreJudge> MadeUpJudges(std::size_t beyond, double told, std::size_t poses = 400) {
   std::vector<ScoreJudge> judges;
-  for (std::size_t t = 0; t < 400; ++t) {
-    const bool wrong = t % (400 / std::max<std::size_t>(beyond, 1)) == 7 && beyond > 0;
+  for (std::size_t t = 0; t < poses; ++t) {
+    const bool wrong = beyond > 0 && t % (poses / beyond) == 7 && t / (poses / beyond) < beyond;
     ScoreJudge judge;
     judge.pose.doubt = 0.1 + 1e-4 * static_cast<double>(t % 50) + (wrong ? told : 0);
     judge.pose.error = (wrong ? 2 : 0.5) * kAsked;
@@ -42,15 +42,32 @@ TEST(FrameCost, FramesThatAreWrongCountBesideMisses) {
   EXPECT_EQ(right.misses, 0);
   EXPECT_EQ(right.wrong, 0);
   // Few enough to be accepted where nothing tells them apart
-  const FrameCost wrong = CostOf(MadeUpJudges(2, 0), kAsked);
+  const FrameCost wrong = CostOf(MadeUpJudges(10, 0, 4000), kAsked);
   EXPECT_EQ(wrong.misses, 0);
-  EXPECT_NEAR(wrong.wrong, 2.0 / 400, 1e-12);
+  EXPECT_NEAR(wrong.wrong, 10.0 / 4000, 1e-12);
   EXPECT_NEAR(wrong.ns - right.ns, kFullFrame * wrong.lost(), 1e-6);
   EXPECT_GT(wrong.lost(), 0);
   // Told by their doubts, many are missed, and none is wrong
   const FrameCost told = CostOf(MadeUpJudges(40, 1), kAsked);
   EXPECT_GT(told.misses, 0.05);
   EXPECT_LT(told.wrong, 0.03);
+}
+
+// A calibration with as many wrong poses as a threshold may accept hits all, and one with another such pose
+// misses all; other poses than these judges may have that one.
+TEST(FrameCost, WhereOnePoseDecidesNeitherSideOfItIsTheCost) {
+  std::size_t admitted = 0;
+  const auto all_hit = [](std::size_t beyond) {
+    std::vector<CalibrationPair> pairs;
+    for (const ScoreJudge& judge : MadeUpJudges(beyond, 0))
+      pairs.push_back({judge.pose.doubt, judge.pose.error, 0, judge.kind});
+    return Calibrate(pairs, kAsked, 0.03, DoubtedAlone().blend_start, 0.9).hit_rate == 1;
+  };
+  while (all_hit(admitted + 1)) ++admitted;
+  ASSERT_GT(admitted, 0u);
+  const FrameCost cost = CostOf(MadeUpJudges(admitted, 0), kAsked);
+  EXPECT_GT(cost.misses, 0.2);
+  EXPECT_LT(cost.misses, 0.8);
 }
 
 TEST(FrameCost, ASmallerToleranceIsAskedOfTheSamePoses) {

@@ -86,6 +86,30 @@ TEST(EigenSolvers, KrylovFindsTheLargestPairsOfASteepAndOfAFlatSpectrum) {
   }
 }
 
+// What a rig with few controls gives: soon nothing is left that the matrix moves.
+TEST(EigenSolvers, VectorsAreOrthonormalWhereTheRankIsLow) {
+  for (const Eigen::Index rank : {1, 5, 16, 28, 40}) {
+    for (const auto& [n, m] :
+         {std::pair<Eigen::Index, Eigen::Index>{210, 24}, {210, 68}, {384, 96}, {700, 24}}) {
+      // Half of what there is stands still
+      Eigen::MatrixXd q = Eigen::MatrixXd::Zero(n, rank);
+      q.topRows(n / 2) = RandomNormal(n / 2, rank, static_cast<std::uint64_t>(n + rank));
+      if (rank == 16) q = Eigen::MatrixXd::Identity(n, rank);
+      Orthonormalize(&q);
+      const Eigen::VectorXd values = Eigen::pow(10.0, Eigen::ArrayXd::LinSpaced(rank, 0, -6));
+      const Eigen::MatrixXd matrix = q * values.asDiagonal() * q.transpose();
+      const SymmetricEigen eigen = LargestEigen(matrix, m, 1);
+      const Eigen::Index k = eigen.vectors.cols();
+      EXPECT_LT(Difference(eigen.vectors.transpose() * eigen.vectors, Eigen::MatrixXd::Identity(k, k)), 1e-9)
+          << rank << " of " << n;
+      const Eigen::Index kept = std::min(rank, k);
+      EXPECT_LT((eigen.values.head(kept) - values.head(kept)).cwiseAbs().maxCoeff(), 1e-9)
+          << rank << " of " << n;
+      EXPECT_LT(eigen.values.tail(k - kept).cwiseAbs().sum(), 1e-9) << rank << " of " << n;
+    }
+  }
+}
+
 TEST(EigenSolvers, OrthonormalizeKeepsTheSpanOfDependentColumns) {
   Eigen::MatrixXd a = RandomNormal(300, 20, 7);
   for (Eigen::Index k = 0; k < 20; ++k)
