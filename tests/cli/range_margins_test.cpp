@@ -27,7 +27,7 @@ TEST(RangeMargins, AreAsWideAsTheToleranceIsKept) {
   const HelloFolder folder;
   RigRun full(folder.rig());
   std::vector<double> guarded_from;
-  for (const double tolerance : {0.03e-3, 10e-3}) {
+  for (const double tolerance : {0.03e-3, 20e-3}) {
     TrainOptions options = QuickTraining();
     options.tolerance = tolerance;
     const auto trained = TrainRig(folder.rig(), options);
