@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kPosesAtOnce = 256;                      // are held
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
-constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips go beyond
+constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips may go farther
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kHeldOutSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
                         kTrialSeed = 0x6a09e667f3bcc908ull;
@@ -98,11 +98,12 @@ Status GuardPatches(const Calibrator& of, const CalibrationWork& work, Subspace*
 struct Guarded {
   Subspace subspace;
   ChosenMisses chosen;  // nothing where there are no judges
+  double outside = 0;   // CostOutside
 };
-// judged: poses within the ranges; those beyond come from here.
+// judged: poses within the ranges; those beyond come from here. outside: of FoundMargins.
 Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const RangeMargins& margins,
                       const std::vector<char>& guarded, const Subspace& subspace, PoseJudge* judge,
-                      JudgedSet judged) {
+                      JudgedSet judged, JudgedSet outside) {
   KPSA_RETURN_IF_ERROR(of.rig.set_clip(std::nullopt));
   RangeFinder finder = *work.ranges;
   for (const std::vector<float>& entries : margins.entries) finder.Widen(entries);
@@ -110,14 +111,23 @@ Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const R
       finder.Make(of.rig, work.compiler, of.guards,
                   {of.options.tolerance, of.options.range_ramp, of.diagonal, of.inverse_rest_stretch});
   if (!ranges.ok()) return ranges.status();
-  Guarded result{subspace, {}};
+  Guarded result{subspace, {}, 0};
   result.subspace.ranges = std::move(*ranges);
   KPSA_RETURN_IF_ERROR(GuardPatches(of, work, &result.subspace));
   if (judged.judges.empty()) return result;
   KPSA_RETURN_IF_ERROR(JudgePoses(of, work, kBeyond, kScoreSeed, margins.of_controls, judge, &judged));
   AskGuards(result.subspace.ranges, guarded, judged.entries, result.subspace.patches.patches, &judged.judges);
-  result.chosen = ChooseMisses(&result.subspace, judged.judges, 0, of.full_cost,
-                               kCautious * of.options.tolerance, kCalibrationConfidence);
+  const double tolerance = kCautious * of.options.tolerance;
+  result.chosen =
+      ChooseMisses(&result.subspace, judged.judges, 0, of.full_cost, tolerance, kCalibrationConfidence);
+  AskGuards(result.subspace.ranges, guarded, outside.entries, subspace.patches.patches, &outside.judges);
+  for (JudgedSet* set : {&judged, &outside}) {
+    if (!result.chosen.trust.empty()) WeighDoubts(result.chosen.trust, result.subspace, set->judges);
+    if (result.subspace.patches.tiles == 0)
+      std::ranges::transform(set->judges, set->judges.begin(), WithoutPatches);
+  }
+  result.outside = CostOutside(result.subspace, judged.judges, outside.judges, of.full_cost, tolerance,
+                               kCalibrationConfidence);
   return result;
 }
 
@@ -152,11 +162,13 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   const bool of_tiles = !of.options.without.trust;
   PoseJudge judge(*subspace, of.layout, cues, of_tiles), score_judge(*subspace, of.layout, cues, of_tiles);
   std::vector<RangeMargins> margins(1);
+  JudgedSet outside;
   if (!of.rig.target.colors) {
     KPSA_RETURN_IF_ERROR(SayStage(of.options, "margins", 0.9));
-    Result<std::vector<RangeMargins>> found = FindMargins(of, work, cues, *subspace);
+    Result<FoundMargins> found = FindMargins(of, work, cues, *subspace);
     if (!found.ok()) return found.status();
-    margins = std::move(*found);
+    margins = std::move(found->sets);
+    outside = {std::move(found->outside), std::move(found->entries), {}};
   }
   JudgedSet held_out, scoring;
   for (int k = 0; k < (of.rig.target.colors ? 1 : kPoseKinds); ++k) {
@@ -173,9 +185,9 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   double least = std::numeric_limits<double>::infinity();
   for (const RangeMargins& some : margins) {
     if (some.told_by_doubts && taken.subspace.score.doubt == 0) continue;
-    Result<Guarded> tried = Guard(of, work, some, guarded, *subspace, &score_judge, scoring);
+    Result<Guarded> tried = Guard(of, work, some, guarded, *subspace, &score_judge, scoring, outside);
     if (!tried.ok()) return tried.status();
-    const double ns = tried->chosen.cost.ns;
+    const double ns = tried->chosen.cost.ns + tried->outside;
     if (of_taken == nullptr || ns <= kAsGood * least) taken = std::move(*tried), of_taken = &some;
     least = std::min(least, ns);
   }

@@ -21,7 +21,8 @@ constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
 // Of the cost with a score of all points: known to hold on clips, it stays where parts do not spare more
 constexpr double kClearlyLess = 0.95;
 constexpr double kFewMisses = 0.02;
-constexpr double kRowCost = 5;  // ns a row that is measured, likewise
+constexpr double kOutside = 0.03;  // of a clip's frames, on the average of generated characters
+constexpr double kRowCost = 5;     // ns a row that is measured, likewise
 // Sets of as many judges, drawn of them anew: where a few poses decide, others would decide otherwise
 constexpr int kDraws = 8;
 constexpr std::uint64_t kDrawSeed = 0x9b05688c2b3e6c1full;
@@ -75,16 +76,26 @@ void GivePatches(const PatchLayout& patches, Subspace* subspace) {
   if (subspace->doubt_inputs() > 0) subspace->patches = patches;
 }
 
-FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
-                       double full, double tolerance, double confidence) {
+namespace {
+
+std::vector<CalibrationPair> PairsOf(const Subspace& subspace, std::span<const ScoreJudge> judges) {
   std::vector<CalibrationPair> pairs;
-  std::map<int, std::vector<std::size_t>> kinds;
-  for (std::size_t j = 0; j < judges.size(); ++j) {
-    const ScoreJudge& judge = judges[j];
+  for (const ScoreJudge& judge : judges)
     pairs.push_back(PairOf(judge.pose, subspace.score, subspace.patches, judge.guard, judge.kind,
                            judge.guards_of_patches));
-    kinds[judge.kind].push_back(j);
-  }
+  return pairs;
+}
+bool IsWrong(const CalibrationPair& pair, const SoftCacheThreshold& threshold, double tolerance) {
+  return EmittedError(pair, threshold) > tolerance * (1 + 1e-9);
+}
+
+}  // namespace
+
+FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
+                       double full, double tolerance, double confidence) {
+  const std::vector<CalibrationPair> pairs = PairsOf(subspace, judges);
+  std::map<int, std::vector<std::size_t>> kinds;
+  for (std::size_t j = 0; j < judges.size(); ++j) kinds[judges[j].kind].push_back(j);
   FrameCost cost;
   Random random(kDrawSeed);
   std::vector<CalibrationPair> drawn = pairs;
@@ -104,7 +115,7 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
       double misses = 0, wrong = 0;
       for (const std::size_t j : of_kind) {
         misses += ShareOfFull(judges[j], subspace.score, threshold, subspace.patches);
-        wrong += EmittedError(pairs[j], threshold) > tolerance * (1 + 1e-9) ? 1 : 0;
+        wrong += IsWrong(pairs[j], threshold, tolerance) ? 1 : 0;
       }
       cost.misses += misses / static_cast<double>(of_kind.size());
       cost.wrong += wrong / static_cast<double>(of_kind.size());
@@ -120,6 +131,21 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
              (subspace.score.doubt > 0 ? score.doubt : 0) + cost.lost()) *
                 full;
   return cost;
+}
+
+double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
+                   std::span<const ScoreJudge> outside, double full, double tolerance, double confidence) {
+  if (outside.empty()) return 0;
+  const SoftCacheThreshold threshold = Calibrate(PairsOf(subspace, judges), tolerance,
+                                                 subspace.violation_rate, subspace.blend_start, confidence)
+                                           .threshold;
+  const std::vector<CalibrationPair> pairs = PairsOf(subspace, outside);
+  FrameCost cost;
+  for (std::size_t j = 0; j < outside.size(); ++j) {
+    cost.misses += ShareOfFull(outside[j], subspace.score, threshold, subspace.patches);
+    cost.wrong += IsWrong(pairs[j], threshold, tolerance) ? 1 : 0;
+  }
+  return kOutside * full * cost.lost() / static_cast<double>(outside.size());
 }
 
 namespace {

@@ -41,7 +41,11 @@ struct FrameCost {
 // its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
-// The same where its score is yet to be chosen, how far its tiles are believed, and whether its patches miss
+// What is added to that by frames a little beyond the trained ranges, of which clips have a few percent: that
+// guards miss them, or that they are wrong (ns). outside: such poses, of which guards have been asked.
+double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
+                   std::span<const ScoreJudge> outside, double full, double tolerance, double confidence);
+// ExpectedCost where its score is yet to be chosen, how far its tiles are believed, and whether its patches miss
 // by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of WeighTiles.
 struct ChosenMisses {
   FrameCost cost;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "kpsa/pose_judge.h"
@@ -11,11 +12,14 @@ namespace kpsa {
 namespace {
 
 constexpr double kMargins[] = {1.0 / 3, 1.0 / 6};  // of the range, the larger one first
+constexpr double kOutside = 1.0 / 12;              // how far clips go beyond, where they do
+constexpr std::size_t kOutsidePoses = 4;           // of each joint
 constexpr std::size_t kPoses = 12;                 // that try a joint, each at its ends and beyond
 constexpr std::size_t kMostPoses = 1600;           // of all joints: where there are many, fewer try each,
 constexpr std::size_t kLeastPoses = 4;             // and with fewer than these none does
 constexpr std::size_t kTriedAtOnce = 256;          // are held
 constexpr double kGrowth = 1.1;                    // of the errors at the ends
+constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kSeed = 0x510e527fade682d1ull;
 
 using Joint = std::vector<std::size_t>;  // controls
@@ -57,23 +61,24 @@ class MarginFinder {
         work_(work),
         controls_(work.sampler->drawn()),
         joints_(JointsOf(controls_)),
-        judge_(subspace, of.layout, cues, false) {}
+        judge_(subspace, of.layout, cues, !of.options.without.trust) {}
 
-  Result<std::vector<RangeMargins>> Run() {
+  Result<FoundMargins> Run() {
     careful_.of_controls.assign(controls_.size(), 0);
     told_ = careful_;
     told_.told_by_doubts = true;
     each_ = std::min(kPoses, kMostPoses / std::max<std::size_t>(joints_.size(), 1));
-    std::vector<RangeMargins> found{careful_};
+    FoundMargins found{{careful_}, {}, {}};
     if (each_ < kLeastPoses) return found;
     drawn_ = work_.sampler->Of(PoseKind::kSampled, each_ * joints_.size(), of_.options.seed ^ kSeed);
-    std::vector<std::size_t> left(joints_.size());
-    for (std::size_t j = 0; j < left.size(); ++j) left[j] = j;
+    std::vector<std::size_t> all(joints_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    std::vector<std::size_t> left = all;
     std::vector<char> is_told(joints_.size(), 0);
-    const Result<std::vector<Tried>> ends = Try(left, 0);
+    const Result<std::vector<Tried>> ends = Try(left, 0, each_);
     if (!ends.ok()) return ends.status();
     for (const double margin : kMargins) {
-      const Result<std::vector<Tried>> tried = Try(left, margin);
+      const Result<std::vector<Tried>> tried = Try(left, margin, each_);
       if (!tried.ok()) return tried.status();
       std::vector<std::size_t> too_far;
       for (std::size_t k = 0; k < left.size(); ++k) {
@@ -93,7 +98,14 @@ class MarginFinder {
       left = std::move(too_far);
     }
     for (RangeMargins* wider : {&careful_, &told_}) {
-      if (wider->of_controls != found.back().of_controls) found.push_back(std::move(*wider));
+      if (wider->of_controls != found.sets.back().of_controls) found.sets.push_back(std::move(*wider));
+    }
+    if (found.sets.size() == 1) return found;
+    Result<std::vector<Tried>> outside = Try(all, kOutside, std::min(kOutsidePoses, each_));
+    if (!outside.ok()) return outside.status();
+    for (Tried& of_joint : *outside) {
+      for (JudgedPose& pose : of_joint.poses) found.outside.push_back({std::move(pose), 0, kBeyond});
+      std::ranges::move(of_joint.entries, std::back_inserter(found.entries));
     }
     return found;
   }
@@ -115,11 +127,11 @@ class MarginFinder {
     margins->entries.insert(margins->entries.end(), beyond.entries.begin(), beyond.entries.end());
     for (const std::size_t c : joints_[joint]) margins->of_controls[c] = margin;
   }
-  Result<std::vector<Tried>> Try(const std::vector<std::size_t>& joints, double margin) {
+  Result<std::vector<Tried>> Try(const std::vector<std::size_t>& joints, double margin, std::size_t each) {
     std::vector<SampledPose> poses;
     for (const std::size_t j : joints) {
       Random random(kSeed ^ j);
-      for (std::size_t k = 0; k < each_; ++k) {
+      for (std::size_t k = 0; k < each; ++k) {
         SampledPose& pose = poses.emplace_back(drawn_[j * each_ + k]);
         pose.clip = -1;  // which would have its way
         GoBeyond(controls_, joints_[j], k, margin, &random, &pose);
@@ -134,7 +146,7 @@ class MarginFinder {
                                                       of_.clips, &recorded));
       const std::vector<JudgedPose> judged = judge_.Judge(recorded);
       for (std::size_t t = 0; t < count; ++t) {
-        Tried& of = tried[(first + t) / each_];
+        Tried& of = tried[(first + t) / each];
         of.error = std::max(of.error, judged[t].error);
         of.doubt = std::max(of.doubt, judged[t].doubt);
         of.poses.push_back(judged[t]);
@@ -157,8 +169,8 @@ class MarginFinder {
 
 }  // namespace
 
-Result<std::vector<RangeMargins>> FindMargins(const Calibrator& of, const CalibrationWork& work,
-                                              const CueSet& cues, const Subspace& subspace) {
+Result<FoundMargins> FindMargins(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
+                                 const Subspace& subspace) {
   return MarginFinder(of, work, cues, subspace).Run();
 }
 

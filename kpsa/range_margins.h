@@ -12,12 +12,17 @@ struct RangeMargins {
   std::vector<std::vector<float>> entries;  // of the signals, by pose: what ranges are to hold
   bool told_by_doubts = false;              // needs a score that knows these
 };
-// Each wider than the one before it; the first is none. Tries each joint (the controls of a node together, a
-// weight by itself) a third and a sixth of its range beyond its ends, in sampled poses. The second takes a
-// margin where all of these keep the tolerance, or err hardly more than at the ends; the third asks this only
-// of poses whose tiles doubt them no more than those at the ends: the others miss by themselves, if the
-// threshold stays.
-Result<std::vector<RangeMargins>> FindMargins(const Calibrator& of, const CalibrationWork& work,
-                                              const CueSet& cues, const Subspace& subspace);
+struct FoundMargins {
+  std::vector<RangeMargins> sets;  // each wider than the one before it; the first is none
+  // Where there are more sets than that: poses with one joint a little beyond its range, as clips have them
+  std::vector<ScoreJudge> outside;
+  std::vector<std::vector<float>> entries;  // of the signals in these
+};
+// Tries each joint (the controls of a node together, a weight by itself) a third and a sixth of its range
+// beyond its ends, in sampled poses. The second set takes a margin where all of these keep the tolerance, or
+// err hardly more than at the ends; the third asks this only of poses whose tiles doubt them no more than
+// those at the ends: the others miss by themselves, if the threshold stays.
+Result<FoundMargins> FindMargins(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
+                                 const Subspace& subspace);
 
 }  // namespace kpsa

@@ -1,4 +1,5 @@
-// Subspaces that training calibrated one after the other, of which the cheapest stays. Internal to training.
+// Subspaces that training calibrated one after the other, of which the cheapest stays; one with cues of tiles
+// only if it is clearly cheaper than those with cues for all points. Internal to training.
 #pragma once
 
 #include "kpsa/cue_selection.h"
@@ -33,7 +34,7 @@ class TrainingTrials {
   double full_;
   std::vector<TrainingRecord::Tried> tried_;
   CalibratedSubspace best_;
-  double best_ns_ = 0;
+  double best_ns_ = 0, least_weighed_ = 0;
   std::size_t best_of_ = 0;
 };
 

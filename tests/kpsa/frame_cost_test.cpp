@@ -76,6 +76,24 @@ TEST(FrameCost, ASmallerToleranceIsAskedOfTheSamePoses) {
   EXPECT_EQ(CostOf(judges, 0.4 * kAsked).misses, 1) << "all are half the tolerance off";
 }
 
+// Frames a little beyond the ranges: what guards keep from hitting costs as a miss, what they let pass
+// nothing if it is right, and half a miss if it is wrong.
+TEST(FrameCost, FramesOutsideCostWhatGuardsAskOfThem) {
+  const std::vector<ScoreJudge> judges = MadeUpJudges(0, 0);
+  const auto outside = [&](double guard, double error) {
+    std::vector<ScoreJudge> poses = MadeUpJudges(0, 0, 40);
+    for (ScoreJudge& pose : poses) pose.guard = guard, pose.pose.error = error * kAsked;
+    return CostOutside(DoubtedAlone(), judges, poses, kFullFrame, kAsked, 0.9);
+  };
+  EXPECT_EQ(CostOutside(DoubtedAlone(), judges, {}, kFullFrame, kAsked, 0.9), 0);
+  EXPECT_EQ(outside(0, 0.5), 0);
+  const double missed = outside(1, 0.5);
+  EXPECT_GT(missed, 0.005 * kFullFrame);
+  EXPECT_LT(missed, 0.1 * kFullFrame) << "clips have few such frames";
+  EXPECT_EQ(outside(1, 5), missed);
+  EXPECT_NEAR(outside(0, 5), FrameCost::kWrongCost * missed, 1e-9);
+}
+
 // Two tiles: the first doubts much and is right, the second doubts little, and is wrong where it does.
 std::vector<ScoreJudge> TilesThatDiffer(bool second_is_wrong) {
   std::vector<ScoreJudge> judges;
