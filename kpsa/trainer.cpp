@@ -35,6 +35,8 @@ constexpr double kOwnShare = 0.05, kOwnMaxShare = 0.4, kFineShare = 0.03, kFineM
 // Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
 // ones would buy nothing. Of light that is noise, which nobody wants.
 constexpr double kTileRest = 0.25;
+constexpr double kStill = 0.05;  // of the tolerance: what all points together move by, if it is no motion
+constexpr std::size_t kStillRows = 12;    // measured then
 constexpr std::size_t kBetween = 400;     // poses between the frames of all clips, at most
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 constexpr int kMaxLightModes = 120;       // that are looked at; noise is beyond
@@ -260,6 +262,10 @@ class Trainer {
     Result<Pca> pca = ComputePca(*poses, mean, pca_options);
     if (!pca.ok()) return pca.status();
     pca_ = std::move(*pca);
+    const double still = kStill * options_.tolerance;
+    still_ = !of_light() && options_.mode == EstimatorMode::kMap &&
+             pca_.total_energy < still * still * static_cast<double>(poses->poses());
+    if (still_) pca_ = TruncatedPca(pca_, 1);  // more would be of rounding: the space carries all points
     noise_ = NoiseOf(recorder_->signals(), layout_, diagonal_, options_.tolerance, of_light());
     record_.diagonal = diagonal_;
     record_.motion_rms = std::sqrt(pca_.total_energy / static_cast<double>(poses->poses() * layout_.points));
@@ -278,8 +284,8 @@ class Trainer {
 
   Status ChooseCues(const PoseMatrix& poses, const PoseMatrix& judges, double tolerance) {
     CueChoiceOptions choice;
-    choice.rows = options_.rows;
-    choice.min_points = options_.min_points;
+    choice.rows = still_ ? std::min<std::size_t>(kStillRows, options_.rows) : options_.rows;
+    choice.min_points = still_ ? 1 : options_.min_points;
     choice.tolerance = tolerance;
     choice.by_rms = of_light();
     choice.places = places_;
@@ -567,7 +573,8 @@ class Trainer {
   bool fine_ = false;     // tiles
   bool by_tile_ = false;  // its cues
   bool tried_tiles_ = false;
-  Subspace others_;  // with cues for all points, where those of tiles were taken: not calibrated,
+  bool still_ = false;  // nothing moves in the space
+  Subspace others_;     // with cues for all points, where those of tiles were taken: not calibrated,
   double others_ns_ = std::numeric_limits<double>::infinity();  // and what it was expected to cost
   TileChoice tiles_;                                            // where they were tried
   std::vector<PoseMatrix> learnt_;  // TrainOptions::by_tile_as_before: of each clip, then posed

@@ -105,5 +105,32 @@ TEST(TrainReport, PromisesWhatItsPosesCan) {
   EXPECT_EQ(train("20%").out.find("cannot promise"), std::string::npos);
 }
 
+// A skin that a single joint carries: what its points do in the space of that joint is the rounding of
+// floats.
+TEST(TrainedStillPoints, AreOfOneModeAndFewCues) {
+  const HelloFolder folder;
+  GlbParts glb(HelloFolder::Glb());
+  const nlohmann::json attributes = glb.json["meshes"][0]["primitives"][0]["attributes"];
+  const int joints = attributes["JOINTS_0"];
+  const nlohmann::json accessor = glb.json["accessors"][static_cast<std::size_t>(joints)];
+  ASSERT_EQ(accessor["componentType"], 5121) << "bytes";
+  for (std::size_t i = 0; i < accessor["count"].get<std::size_t>(); ++i)
+    std::fill_n(glb.At<std::uint8_t>(joints, i, 4), 4, std::uint8_t{1});  // all weights are of "upper"
+  folder.Write("hello.glb", glb.Bytes());
+  folder.Edit("stack: [skin, cage, mush]", "stack: [skin]");
+  folder.Edit("points: [column@mush]", "points: [column@skin], space: upper");
+  TrainOptions options = QuickTraining();
+  options.samples = 100;
+  const auto trained = TrainRig(folder.rig(), options, {"wave"});
+  ASSERT_NE(trained, nullptr);
+  EXPECT_LE(trained->modes, 1u);
+  EXPECT_LE(trained->rows(), 20u);
+  RigRun full(folder.rig(), {.clip = "wave"}), fast(folder.rig(), {.subspace = trained, .clip = "wave"});
+  ASSERT_TRUE(fast.ok()) << fast.error;
+  const RunFrame frame = fast.Evaluate();
+  EXPECT_TRUE(frame.hit);
+  EXPECT_LT(LargestDistance(frame.points, full.Evaluate().points), 1e-6);
+}
+
 }  // namespace
 }  // namespace kpsa
