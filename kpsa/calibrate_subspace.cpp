@@ -121,11 +121,7 @@ Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const R
   result.chosen =
       ChooseMisses(&result.subspace, judged.judges, 0, of.full_cost, tolerance, kCalibrationConfidence);
   AskGuards(result.subspace.ranges, guarded, outside.entries, subspace.patches.patches, &outside.judges);
-  for (JudgedSet* set : {&judged, &outside}) {
-    if (!result.chosen.trust.empty()) WeighDoubts(result.chosen.trust, result.subspace, set->judges);
-    if (result.subspace.patches.tiles == 0)
-      std::ranges::transform(set->judges, set->judges.begin(), WithoutPatches);
-  }
+  for (JudgedSet* set : {&judged, &outside}) AsChosen(result.chosen, result.subspace, &set->judges);
   result.outside = CostOutside(result.subspace, judged.judges, outside.judges, of.full_cost, tolerance,
                                kCalibrationConfidence);
   return result;
@@ -204,18 +200,13 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     subspace->score = ScoreOf(*subspace, {}, of.full_cost);
     cost = ExpectedCost(*subspace, held_out.judges, 0, of.full_cost, kCautious * of.options.tolerance,
                         kCalibrationConfidence);
-  } else if (!taken.chosen.trust.empty()) {
-    WeighDoubts(taken.chosen.trust, *subspace, held_out.judges);
-    WeighTiles(taken.chosen.trust, subspace);
   }
+  AsChosen(taken.chosen, *subspace, &held_out.judges);
+  if (!taken.chosen.trust.empty()) WeighTiles(taken.chosen.trust, subspace);
   if (subspace->patches.tiles == 0) {
     for (TrainedRange& range : subspace->ranges) range.patches = kAllPatches;
-    std::ranges::transform(held_out.judges, held_out.judges.begin(), WithoutPatches);
   }
-  for (const ScoreJudge& held : held_out.judges) {
-    subspace->calibration.push_back(
-        PairOf(held.pose, subspace->score, subspace->patches, held.guard, held.kind, held.guards_of_patches));
-  }
+  subspace->calibration = PairsOf(*subspace, held_out.judges);
   const Calibration calibration =
       Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
   if (calibration.worst != Calibration::kNoPose)

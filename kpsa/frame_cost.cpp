@@ -20,9 +20,9 @@ constexpr double kPartial = 0.4;    // of a full evaluation: what patches cost t
 constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
 // Of the cost with a score of all points: known to hold on clips, it stays where parts do not spare more
 constexpr double kClearlyLess = 0.95;
-constexpr double kFewMisses = 0.02;
-constexpr double kOutside = 0.03;  // of a clip's frames, on the average of generated characters
-constexpr double kRowCost = 5;     // ns a row that is measured, likewise
+constexpr double kFewMisses = 0.02;  // of the judges, by SoftCache's own score: parts are not tried
+constexpr double kOutside = 0.03;    // of a clip's frames, on the average of generated characters
+constexpr double kRowCost = 5;       // ns a row that is measured, likewise
 // Sets of as many judges, drawn of them anew: where a few poses decide, others would decide otherwise
 constexpr int kDraws = 8;
 constexpr std::uint64_t kDrawSeed = 0x9b05688c2b3e6c1full;
@@ -76,8 +76,6 @@ void GivePatches(const PatchLayout& patches, Subspace* subspace) {
   if (subspace->doubt_inputs() > 0) subspace->patches = patches;
 }
 
-namespace {
-
 std::vector<CalibrationPair> PairsOf(const Subspace& subspace, std::span<const ScoreJudge> judges) {
   std::vector<CalibrationPair> pairs;
   for (const ScoreJudge& judge : judges)
@@ -85,6 +83,9 @@ std::vector<CalibrationPair> PairsOf(const Subspace& subspace, std::span<const S
                            judge.guards_of_patches));
   return pairs;
 }
+
+namespace {
+
 bool IsWrong(const CalibrationPair& pair, const SoftCacheThreshold& threshold, double tolerance) {
   return EmittedError(pair, threshold) > tolerance * (1 + 1e-9);
 }
@@ -183,6 +184,11 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
 }
 
 }  // namespace
+
+void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<ScoreJudge>* judges) {
+  if (!chosen.trust.empty()) WeighDoubts(chosen.trust, subspace, *judges);
+  if (subspace.patches.tiles == 0) std::ranges::transform(*judges, judges->begin(), WithoutPatches);
+}
 
 ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
                           double tolerance, double confidence) {

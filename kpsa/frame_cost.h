@@ -28,6 +28,9 @@ ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, d
 // would say of no part that it misses.
 void GivePatches(const PatchLayout& patches, Subspace* subspace);
 
+// Scores and errors of poses, with the score and the patches of the subspace.
+std::vector<CalibrationPair> PairsOf(const Subspace& subspace, std::span<const ScoreJudge> judges);
+
 struct FrameCost {
   double misses = 0;  // share of the judges, all kinds alike; those of patches count as what they cost
   double wrong = 0;   // likewise: accepted, and beyond the tolerance
@@ -45,12 +48,15 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
 // guards miss them, or that they are wrong (ns). outside: such poses, of which guards have been asked.
 double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
                    std::span<const ScoreJudge> outside, double full, double tolerance, double confidence);
-// ExpectedCost where its score is yet to be chosen, how far its tiles are believed, and whether its patches miss
-// by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of WeighTiles.
+// ExpectedCost where its score is yet to be chosen, how far its tiles are believed, and whether its patches
+// miss by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of
+// WeighTiles.
 struct ChosenMisses {
   FrameCost cost;
   std::vector<double> trust;  // in the doubts of tiles; empty: as they are
 };
+// Judges as that choice has them: doubts weighed, and patches only where these miss by themselves.
+void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<ScoreJudge>* judges);
 ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
                           double tolerance, double confidence);
 

@@ -10,6 +10,16 @@
 #include "kpsa/gemm.h"
 
 namespace kpsa {
+namespace {
+
+constexpr double kStill = 0.05;  // of the tolerance: the norm of all displacements, RMS over the poses
+
+}  // namespace
+
+bool IsStill(const Pca& pca, double tolerance) {
+  const double still = kStill * tolerance;
+  return pca.total_energy < still * still * static_cast<double>(pca.poses);
+}
 
 double HonestResidual(double residual, std::size_t poses, Eigen::Index modes) {
   const auto t = static_cast<double>(poses), left = t - 1 - static_cast<double>(modes);

@@ -1,6 +1,7 @@
-// How many modes to keep where poses are noisy (light by path tracing). There every further mode lowers what
-// training leaves over and, from some number on, learns the noise of the training poses; then the estimator
-// trusts its cues too much and fails on new poses.
+// How many modes to keep where poses are noisy: light by path tracing, and the rounding of points that
+// nothing moves in their space. There every further mode lowers what training leaves over and, from some
+// number on, learns the noise of the training poses; then the estimator trusts its cues too much and fails on
+// new poses.
 #pragma once
 
 #include <vector>
@@ -9,6 +10,10 @@
 #include "kpsa/pose_matrix.h"
 
 namespace kpsa {
+
+// Whether what all points together move by is far below the tolerance (scene units), so that modes would be
+// of rounding: the space carries the points.
+bool IsStill(const Pca& pca, double tolerance);
 
 // The smallest number of modes whose MAP estimate from `cues` (any good spread of them) comes within 1 % of
 // the least RMS error on `held_out`: poses centred with pca.mean that the PCA has not seen. The noise of a

@@ -15,6 +15,7 @@
 #include "kpsa/pose_recorder.h"
 #include "kpsa/signal_noise.h"
 #include "kpsa/space_frame.h"
+#include "kpsa/tile_budgets.h"
 #include "kpsa/tile_candidates.h"
 #include "kpsa/tile_learning.h"
 #include "kpsa/tile_subspace.h"
@@ -28,15 +29,7 @@
 namespace kpsa {
 namespace {
 
-constexpr double kTileShare = 0.05;    // of the tolerance: RMS error that tiles and bytes may add
-constexpr double kTileMaxShare = 0.6;  // of the tolerance: the largest error that they may add
-// The same where tiles have cues of their own, and where many poses would miss: errors count more than bytes
-constexpr double kOwnShare = 0.05, kOwnMaxShare = 0.4, kFineShare = 0.03, kFineMaxShare = 0.2;
-// Of what the modes leave out (RMS): where few of them leave out more than the tolerance asks of tiles, finer
-// ones would buy nothing. Of light that is noise, which nobody wants.
-constexpr double kTileRest = 0.25;
-constexpr double kStill = 0.05;  // of the tolerance: what all points together move by, if it is no motion
-constexpr std::size_t kStillRows = 12;    // measured then
+constexpr std::size_t kStillRows = 12;    // that are measured where nothing moves in the space
 constexpr std::size_t kBetween = 400;     // poses between the frames of all clips, at most
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 constexpr int kMaxLightModes = 120;       // that are looked at; noise is beyond
@@ -262,10 +255,8 @@ class Trainer {
     Result<Pca> pca = ComputePca(*poses, mean, pca_options);
     if (!pca.ok()) return pca.status();
     pca_ = std::move(*pca);
-    const double still = kStill * options_.tolerance;
-    still_ = !of_light() && options_.mode == EstimatorMode::kMap &&
-             pca_.total_energy < still * still * static_cast<double>(poses->poses());
-    if (still_) pca_ = TruncatedPca(pca_, 1);  // more would be of rounding: the space carries all points
+    still_ = !of_light() && options_.mode == EstimatorMode::kMap && IsStill(pca_, options_.tolerance);
+    if (still_) pca_ = TruncatedPca(pca_, 1);
     noise_ = NoiseOf(recorder_->signals(), layout_, diagonal_, options_.tolerance, of_light());
     record_.diagonal = diagonal_;
     record_.motion_rms = std::sqrt(pca_.total_energy / static_cast<double>(poses->poses() * layout_.points));
@@ -320,18 +311,15 @@ class Trainer {
     }
     return outputs;
   }
-  TileOptions TileBudgets(bool fine) const {
-    if (fine) return {kFineShare * options_.tolerance, kFineMaxShare * options_.tolerance, kTileRest};
-    return {kTileShare * options_.tolerance, kTileMaxShare * options_.tolerance, of_light() ? 0 : kTileRest};
-  }
 
   Subspace ForAllPoints(PoseMatrix* poses, bool fine) {
     const bool paper = options_.mode == EstimatorMode::kPaper;
     const Estimator estimator =
         paper ? LeastSquaresEstimator(pca_, cues_) : MapEstimator(pca_, cues_, !of_light());
     record_.warning = estimator.warning;
+    const TileStorage coarse = of_light() ? TileStorage::kLight : TileStorage::kForAllPoints;
     return MakeSubspace(pca_, cues_, estimator, MeasuredPoses(layout_, cues_, *poses), Outputs(),
-                        TileBudgets(fine),
+                        TileBudget(fine ? TileStorage::kFinely : coarse, options_.tolerance),
                         of_light() || paper || options_.without.tile_products ? nullptr : poses, clip_poses_);
   }
 
@@ -522,8 +510,7 @@ class Trainer {
   }
   TileSubspace OfTiles(PoseMatrix* poses, bool fine) const {
     const TileOptions storage =
-        fine ? TileBudgets(true)
-             : TileOptions{kOwnShare * options_.tolerance, kOwnMaxShare * options_.tolerance, kTileRest};
+        TileBudget(fine ? TileStorage::kFinely : TileStorage::kOwnCues, options_.tolerance);
     TileSubspace made = MakeTileSubspace(pca_.mean, *poses, clip_poses_, tiles_, Outputs(), storage);
     TeachClips(learnt_, learning_tiles_, {&pca_.mean, clip_poses_, tiles_.options, storage},
                options_.tolerance, poses, &made);
