@@ -126,13 +126,10 @@ Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<s
   std::vector<TrainingClip> frames;
   for (const std::string& name : clips) {
     const CharacterClip* found = nullptr;
-    std::vector<std::string> known;
     for (const CharacterClip& clip : rig.scene.clips) {
-      known.push_back(clip.id);
       if (clip.id == name) found = &clip;
     }
-    if (found == nullptr)
-      return Status::Invalid("the character has no clip \"{}\"{}", name, DidYouMean(name, known));
+    if (found == nullptr) return NoSuchClip(rig.scene, name);
     TrainingClip clip{name, {}};
     const double first = std::ceil(found->begin * rig.fps - 1e-6);
     const auto count = static_cast<std::size_t>(std::floor(found->duration * rig.fps + 1e-6) - first) + 1;

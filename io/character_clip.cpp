@@ -75,6 +75,12 @@ Result<FoundClip> FindClip(const gltf::Character& character, const CharacterGrap
   }
   found.index = character.FindClip(clip);
   if (found.index != kNoIndex || found.layered != nullptr) return found;
+  return NoSuchClip(scene, clip);
+}
+
+}  // namespace
+
+Status NoSuchClip(const CharacterGraph& scene, std::string_view clip) {
   std::vector<std::string> ids;
   for (const CharacterClip& known : scene.clips) ids.push_back(known.id);
   if (ids.empty()) return Status::Invalid("the character has no clips, so none named \"{}\"", clip);
@@ -84,8 +90,6 @@ Result<FoundClip> FindClip(const gltf::Character& character, const CharacterGrap
   return Status::Invalid("the character has no clip \"{}\"{}; its clips are {}{}", clip,
                          DidYouMean(clip, ids), fmt::join(shown, ", "), ids.size() > kShown ? ", ..." : "");
 }
-
-}  // namespace
 
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph) {

@@ -118,6 +118,8 @@ inline constexpr std::uint64_t kMaxCharacterPoints = 100'000'000;
 inline constexpr std::size_t kMaxSkinJoints = 8192;
 inline constexpr std::size_t kMaxMorphTargets = 8192;
 
+// The error of a name that no clip has: with the nearest one, and those that there are.
+Status NoSuchClip(const CharacterGraph& scene, std::string_view clip);
 // Replaces the clip that plays; none: the rest pose. Plugs that somebody else drives are left alone.
 Status SetClip(const gltf::Character& character, std::optional<std::string_view> clip, CharacterGraph* scene,
                Graph* graph);

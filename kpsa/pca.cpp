@@ -145,7 +145,10 @@ Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, con
       weighted ? std::span<const double>(scale) : std::span<const double>();
   for (std::size_t i = 0; i < columns; ++i)
     pca.total_energy += energies[static_cast<Eigen::Index>(i)] * scale[i] * scale[i];
-  if (!(pca.total_energy > 0)) return Status::Invalid("nothing moves in the {} training poses", pca.poses);
+  if (!(pca.total_energy > 0))
+    return Status::Invalid(
+        "nothing moves in the {} training poses: widen the controls, or name clips that move these points",
+        pca.poses);
   pca.output_orthonormal = !weighted;
 
   // Modes, then the finish: orthonormal columns A, coordinates P = X A, and the SVD of P turns both into X =

@@ -123,7 +123,7 @@ TEST(Arguments, UsageMistakes) {
       {{"init", "none.glb"}, 3, "none.glb"},
       {{"train", kHelloGlb}, 3, "accelerate"},
       {{"train", kHello, "--samples", "-1", "-o", "x.kpsa"}, 2, "--samples"},
-      {{"train", kHello, "--clips", "wavy", "-o", "x.kpsa"}, 2, "did you mean \"wave\""},
+      {{"train", kHello, "--clips", "wavy", "-o", "x.kpsa"}, 2, "(did you mean \"wave\"?); its clips are wave"},
       {{"train", kHello, "--clips", "wave", "-o", "x.kpsa"}, 2, "never trained on"},
       {{"train", kHello, "-o", "x.npz"}, 2, ".kpsa"},
       {{"train", kHello, "--name", "colum", "-o", "x.kpsa"}, 2, "did you mean \"column\""},
