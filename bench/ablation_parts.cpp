@@ -78,7 +78,7 @@ class PartsBench {
     Describe(*subspace, &row);
     const Calibration calibration = Calibrate(subspace->calibration, subspace->tolerance,
                                               subspace->violation_rate, subspace->blend_start);
-    row.held_out_hits = SampledHitRate(calibration);
+    row.held_out_hits = ExpectedHitRate(calibration);
     const Result<PlaybackTimes> played = TimePlayback(flags_, entry, subspace, *clips);
     if (!played.ok()) return played.status();
     row.expected_speedup =

@@ -26,7 +26,7 @@ struct PartsRow {
   bool by_tile = false, in_parts = false;  // cues of each tile; parts miss by themselves
   std::size_t cue_points = 0, cue_scalars = 0, cue_products = 0;
   double training_seconds = 0, bytes_per_point = 0;
-  double held_out_hits = 0;                 // of sampled poses
+  double held_out_hits = 0;                 // ExpectedHitRate
   double expected_speedup = 0;              // as `kpsa train` predicts it: of such poses, misses included
   double hits = 0;                          // of the test frames
   double ms = 0, full_ms = 0;               // a test frame, misses included

@@ -114,7 +114,9 @@ double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, boo
   return ever_hits ? full_ms / (accelerated_ms + (1 - hits) * miss * full_ms) : 1;
 }
 
-double SampledHitRate(const Calibration& calibration) {
+double ExpectedHitRate(const Calibration& calibration) {
+  if (calibration.near_clips > 0)
+    return static_cast<double>(calibration.hits_near_clips) / static_cast<double>(calibration.near_clips);
   if (calibration.kinds.empty()) return calibration.hit_rate;
   const Calibration::Kind& sampled = calibration.kinds.front();
   return static_cast<double>(sampled.hits) / static_cast<double>(std::max<std::size_t>(1, sampled.poses));

@@ -49,8 +49,9 @@ ToleranceTable MakeToleranceTable(double in_force, double largest, double wanted
 // is measured.
 double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits = true,
                          double miss = 1);
-// Of poses as the sampler draws them; of all where there are no kinds.
-double SampledHitRate(const Calibration& calibration);
+// Of held-out poses that are made of frames of the training clips, as other clips may be; where there are
+// none, of poses as the sampler draws them; of all where there are no kinds.
+double ExpectedHitRate(const Calibration& calibration);
 // Of pairs that a tolerance can accept; 0 of none.
 double LargestError(std::span<const CalibrationPair> pairs);
 

@@ -16,7 +16,7 @@ std::size_t TrainResult::points() const {
 }
 
 double ExpectedSpeedup(const SubspaceCheck& check, const Calibration& calibration) {
-  return SpeedupWithMisses(check.full_ms, check.accelerated_ms, SampledHitRate(calibration),
+  return SpeedupWithMisses(check.full_ms, check.accelerated_ms, ExpectedHitRate(calibration),
                            calibration.threshold.tau >= 0);
 }
 
@@ -28,7 +28,7 @@ ToleranceTable TrainedTolerances(const Subspace& subspace, const SubspaceCheck& 
             Calibrate(subspace.calibration, tolerance, subspace.violation_rate, subspace.blend_start);
         ToleranceRow row;
         row.tolerance = tolerance;
-        row.hits = SampledHitRate(calibration);
+        row.hits = ExpectedHitRate(calibration);
         row.speedup = ExpectedSpeedup(check, calibration);
         return row;
       });
@@ -58,6 +58,7 @@ std::string TrainJson(const TrainResult& r) {
                      {"violations", kind.violations},
                      {"rate_at_most", kind.upper_bound}});
   }
+  const auto training = nlohmann::ordered_json::parse(r.subspace->training);
   const nlohmann::ordered_json document =
       nlohmann::ordered_json{{"schema", "kpsa.train/1"},
                              {"subspace", r.path},
@@ -77,7 +78,8 @@ std::string TrainJson(const TrainResult& r) {
                                {"rms", r.record.held_out_rms},
                                {"max", r.record.held_out_max}}},
                              {"motion", {{"rms", r.record.motion_rms}}},
-                             {"tried", nlohmann::ordered_json::parse(r.subspace->training)["tried"]},
+                             {"tried", training["tried"]},
+                             {"rules", training["rules"]},
                              {"calibration",
                               {{"tolerance", r.subspace->tolerance},
                                {"violation_rate", r.calibration.alpha},
@@ -147,18 +149,23 @@ std::string TrainText(const TrainResult& r) {
         "poses miss\n",
         one.taken ? "took" : "tried", one.what, one.cues, one.rows, one.cost, 100 * one.misses);
   }
+  for (const TrainingRecord::Rule& one : r.record.rules) {
+    text += fmt::format("{} to judge by {}: {:.2g} of a full frame and its points, {:.3g} % miss\n",
+                        one.taken ? "took" : "tried", one.what, one.cost, 100 * one.misses);
+  }
   // What these poses can promise, where that is less than what was asked for
   std::size_t fewest = r.calibration.poses;
   for (const Calibration::Kind& kind : r.calibration.kinds) fewest = std::min(fewest, kind.poses);
   const double promised = r.calibration.attainable_alpha;
-  text += fmt::format("calibrated for {}{} in {:.4g} % of poses{}: {:.1f} % of sampled poses hit\n",
+  text += fmt::format("calibrated for {}{} in {:.4g} % of poses{}: {:.1f} % of {} hit\n",
                       light ? "an RMS of " : "", error(r.subspace->tolerance), 100 * (1 - promised),
                       promised > r.calibration.alpha
                           ? fmt::format(" ({:.4g} % was asked for, which {}{} cannot promise)",
                                         100 * (1 - r.calibration.alpha), Plural(fewest, "held-out pose"),
                                         r.calibration.kinds.size() > 1 ? " of a kind" : "")
                           : "",
-                      100 * r.hit_rate());
+                      100 * r.hit_rate(),
+                      r.calibration.near_clips > 0 ? "new poses made of the clips" : "sampled poses");
   for (const Calibration::Kind& kind : r.calibration.kinds) {
     text += fmt::format("  {:<18} {:>5} poses: {:5.1f} % hit, {} beyond (at most {:.2g} %, 9 in 10 times)\n",
                         PoseKindName(static_cast<PoseKind>(kind.kind)), kind.poses,

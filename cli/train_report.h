@@ -25,7 +25,7 @@ struct TrainResult {
   std::string worst_path;  // of the pose file, "": no pose is accepted
   ToleranceTable tolerances;
   std::size_t points() const;
-  double hit_rate() const { return SampledHitRate(calibration); }
+  double hit_rate() const { return ExpectedHitRate(calibration); }
   double speedup() const { return ExpectedSpeedup(check, calibration); }
 };
 

@@ -17,6 +17,7 @@ namespace {
 constexpr std::size_t kPosesAtOnce = 256;                      // are held
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips may go farther
+constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kHeldOutSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
                         kTrialSeed = 0x6a09e667f3bcc908ull;
@@ -27,11 +28,6 @@ struct JudgedSet {
   std::vector<std::vector<float>> entries;  // of the signals, by pose
   std::vector<SampledPose> poses;
 };
-
-std::size_t PosesOfKind(const TrainOptions& options) {
-  if (options.calibration_poses > 0) return options.calibration_poses;
-  return static_cast<std::size_t>(std::clamp(8.0 / std::max(options.violation_rate, 1e-4), 400.0, 1000.0));
-}
 
 // What carries the points rigidly is tried at a few poses.
 Result<Carried> TryCarried(const Calibrator& of, const CalibrationWork& work) {
@@ -48,9 +44,8 @@ Result<Carried> TryCarried(const Calibrator& of, const CalibrationWork& work) {
 Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, std::uint64_t seed,
                   std::span<const double> margins, PoseJudge* judge, JudgedSet* judged) {
   const auto pose_kind = static_cast<PoseKind>(kind);
-  const std::vector<SampledPose> drawn =
-      work.sampler->Of(pose_kind, PosesOfKind(of.options),
-                       (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
+  const std::vector<SampledPose> drawn = work.sampler->Of(
+      pose_kind, of.poses_of_kind, (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
   for (std::size_t first = 0; first < drawn.size(); first += kPosesAtOnce) {
     // By clip, as the recorder writes them
     std::vector<SampledPose> some(
@@ -127,6 +122,30 @@ Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const R
   return result;
 }
 
+std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
+  std::string name = rule.score.doubt == 0      ? "likeness to the trained poses"
+                     : rule.score.measured == 0 ? "doubts of tiles"
+                                                : "likeness and doubts of tiles";
+  if (rule.weighs) name += " (weighed)";
+  name += rule.tiles > 0 ? fmt::format(", parts of {} tiles", rule.tiles) : ", all points at once";
+  const auto wider = std::ranges::count_if(margins.of_controls, [](double margin) { return margin > 0; });
+  if (wider > 0) name += fmt::format(", {} of {} ranges widened", wider, margins.of_controls.size());
+  return name;
+}
+
+// Of margins that were taken all that was tried, of others the best.
+std::vector<TrainingRecord::Rule> TriedRules(const ChosenMisses& chosen, const RangeMargins& margins,
+                                             double outside, double full, bool all) {
+  std::vector<TrainingRecord::Rule> rules;
+  for (std::size_t r = 0; r < chosen.tried.size(); ++r) {
+    const MissRule& rule = chosen.tried[r];
+    if (all || r == chosen.taken)
+      rules.push_back({RuleName(rule, margins), rule.cost.misses, (rule.cost.ns + outside) / full,
+                       all && r == chosen.taken});
+  }
+  return rules;
+}
+
 void RecordWorst(const Calibrator& of, const SampledPose& pose, double error, TrainingRecord* record) {
   record->worst.error = error;
   record->worst.kind = PoseKindName(pose.kind);
@@ -142,6 +161,17 @@ void RecordWorst(const Calibrator& of, const SampledPose& pose, double error, Tr
 }
 
 }  // namespace
+
+std::size_t PosesOfKind(const TrainOptions& options) {
+  if (options.calibration_poses > 0) return options.calibration_poses;
+  return static_cast<std::size_t>(std::clamp(8.0 / std::max(options.violation_rate, 1e-4), 400.0, 1000.0));
+}
+
+std::size_t FewestPosesOfKind(const TrainOptions& options) {
+  const double rate = std::clamp(options.violation_rate, 1e-4, 0.5);
+  const double fewest = kSpared * std::log(1 - kCalibrationConfidence) / std::log1p(-rate);
+  return std::min(PosesOfKind(options), static_cast<std::size_t>(std::ceil(fewest)));
+}
 
 Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
                                     Subspace* subspace) {
@@ -159,7 +189,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   PoseJudge judge(*subspace, of.layout, cues, of_tiles), score_judge(*subspace, of.layout, cues, of_tiles);
   std::vector<RangeMargins> margins(1);
   JudgedSet outside;
-  if (!of.rig.target.colors) {
+  if (!of.rig.target.colors && of.margins) {
     KPSA_RETURN_IF_ERROR(SayStage(of.options, "margins", 0.9));
     Result<FoundMargins> found = FindMargins(of, work, cues, *subspace);
     if (!found.ok()) return found.status();
@@ -179,14 +209,26 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   Guarded taken;
   const RangeMargins* of_taken = nullptr;
   double least = std::numeric_limits<double>::infinity();
+  std::vector<TrainingRecord::Rule>& rules = work.record->rules;
+  rules.clear();
+  const auto tell = [&](const Guarded& of_some, const RangeMargins& some, bool as_taken) {
+    const auto told = TriedRules(of_some.chosen, some, of_some.outside, of.full_cost, as_taken);
+    rules.insert(rules.end(), told.begin(), told.end());
+  };
   for (const RangeMargins& some : margins) {
     if (some.told_by_doubts && taken.subspace.score.doubt == 0) continue;
     Result<Guarded> tried = Guard(of, work, some, guarded, *subspace, &score_judge, scoring, outside);
     if (!tried.ok()) return tried.status();
     const double ns = tried->chosen.cost.ns + tried->outside;
-    if (of_taken == nullptr || ns <= kAsGood * least) taken = std::move(*tried), of_taken = &some;
+    if (of_taken != nullptr && ns > kAsGood * least) {
+      tell(*tried, some, false);
+      continue;
+    }
+    if (of_taken != nullptr) tell(taken, *of_taken, false);
+    taken = std::move(*tried), of_taken = &some;
     least = std::min(least, ns);
   }
+  tell(taken, *of_taken, true);
   *subspace = std::move(taken.subspace);
   if (!of.rig.target.colors)
     KPSA_RETURN_IF_ERROR(
@@ -207,6 +249,10 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     for (TrainedRange& range : subspace->ranges) range.patches = kAllPatches;
   }
   subspace->calibration = PairsOf(*subspace, held_out.judges);
+  for (std::size_t i = 0; i < held_out.poses.size(); ++i) {
+    const SampledPose& pose = held_out.poses[i];
+    subspace->calibration[i].near_clips = pose.near_clips && pose.kind == PoseKind::kSampled;
+  }
   const Calibration calibration =
       Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
   if (calibration.worst != Calibration::kNoPose)

@@ -18,7 +18,13 @@ struct Calibrator {
   const PatchLayout& patches;  // that may miss by themselves
   double diagonal = 0, full_cost = 0;
   Matrix4 inverse_rest_stretch;
+  std::size_t poses_of_kind = 0;  // to calibrate with, and as many to choose by
+  bool margins = true;            // ranges may reach beyond what was trained
 };
+// As many poses of a kind as the options ask for, or as their rate needs; and the fewest that can promise
+// this rate at all, with some to spare.
+std::size_t PosesOfKind(const TrainOptions& options);
+std::size_t FewestPosesOfKind(const TrainOptions& options);
 // What it works with, and leaves behind: wider ranges, and the record of the calibration.
 struct CalibrationWork {
   Compiler* compiler = nullptr;

@@ -179,6 +179,7 @@ void Count(std::span<const CalibrationPair> pairs, double tolerance, Calibration
     const double weight = EmittedWeight(pair, c->threshold), error = EmittedError(pair, c->threshold);
     ++kind.poses;
     kind.hits += weight == 0;
+    c->near_clips += pair.near_clips, c->hits_near_clips += pair.near_clips && weight == 0;
     kind.accepted += weight < 1;
     kind.violations += weight < 1 && !(error <= tolerance * (1 + 1e-9));
     c->severe += weight < 1 && !(error <= kSevere * tolerance * (1 + 1e-9));

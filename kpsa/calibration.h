@@ -48,6 +48,7 @@ struct CalibrationPair {
   // (AllWeight).
   std::vector<PatchPair> patches = {};
   double middle = 0;
+  bool near_clips = false;  // SampledPose::near_clips, of the sampled kind: hits of these are those to expect
 };
 // Keeps what CalibrationPair::patches says, of the patches of a pose in any order.
 std::vector<PatchPair> OutstandingPatches(std::vector<PatchPair> patches);
@@ -67,6 +68,7 @@ struct Calibration {
     double upper_bound = 0;  // of the rate of violations, with `confidence`
   };
   std::vector<Kind> kinds;                                         // by kind
+  std::size_t near_clips = 0, hits_near_clips = 0;                 // of them, CalibrationPair::near_clips
   std::size_t hits = 0, accepted = 0, violations = 0, severe = 0;  // of all
   double hit_rate = 0;                                             // of all: score <= tau_lo and no guard
   double accepted_rate = 0;                                        // of all: the full evaluation is not alone

@@ -15,10 +15,11 @@ namespace {
 
 constexpr std::size_t kEnoughPoses = 1000;  // fewer fit some of the thousands of candidates by chance
 constexpr std::size_t kChoosingPoses = 2400, kChoosingPoints = 400;  // that choose
-constexpr Eigen::Index kLeftDirections = 64;                         // of what is left of the points
-constexpr double kRegressorRidge = 1e-7;                             // of the mean variance
-constexpr double kTwins = 1 - 1e-8;                                  // correlation of scalars that are one
-constexpr double kKnots[] = {0.2, 0.35, 0.5, 0.65, 0.8};             // of a range
+constexpr std::size_t kMostRegressors = 2;    // a pose: with more of them a regression leaves nothing
+constexpr Eigen::Index kLeftDirections = 64;  // of what is left of the points
+constexpr double kRegressorRidge = 1e-7;      // of the mean variance
+constexpr double kTwins = 1 - 1e-8;           // correlation of scalars that are one
+constexpr double kKnots[] = {0.2, 0.35, 0.5, 0.65, 0.8};  // of a range
 constexpr std::size_t kMostHinges = 24;
 constexpr std::size_t kMostFactors = 300, kShortlist = 1500;
 constexpr double kCarryingPoses = 30;    // poses that have to carry a product
@@ -52,6 +53,7 @@ class ProductChooser {
   }
 
   std::vector<CueProduct> Run() {
+    if (options_.regressors.size() > kMostRegressors * taken_.size()) return {};
     FindFactors();
     if (factors_.empty()) return {};
     FindResidual();

@@ -32,7 +32,7 @@ struct CueProductOptions {
 // Those that explain most of what a linear regression on the regressors leaves of the outputs, greedily, as
 // long as they tell clearly more than a column of noise would, and more than is seen. poses: not centred,
 // without products. Only products that many poses carry: (sum p^2)^2 / sum p^4 >= 30; of fewer than 1,000
-// poses none.
+// poses none, nor where there are far more regressors than poses.
 std::vector<CueProduct> ChooseCueProducts(const PoseMatrix& poses, const CueProductOptions& options);
 
 // Puts their values into the scalars that a layout reserves for them.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -153,7 +154,7 @@ namespace {
 
 // With doubts as they are.
 FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> judges, double points,
-                              double full, double tolerance, double confidence) {
+                              double full, double tolerance, double confidence, ChosenMisses* chosen) {
   const auto cost = [&](std::span<const ScoreJudge> of) {
     return ExpectedCost(*subspace, of, points, full, tolerance, confidence);
   };
@@ -163,23 +164,29 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
   const ScoreMix of_all = ScoreOf(*subspace, whole, full);
   subspace->score = of_all;
   FrameCost least = cost(whole);
+  const bool weighs = !chosen->trust.empty();
+  chosen->tried.push_back({of_all, 0, weighs, least});
   // SoftCache's own score speaks of all points, and would say of no part that it misses. Where it misses next
   // to nothing, parts could spare next to nothing.
   if (patches.tiles == 0 || (of_all.measured > 0 && least.misses < kFewMisses)) return least;
   const ScoreMix of_parts = of_all.measured > 0 ? DoubtAlone(whole) : of_all;
   const double bar = of_all.measured > 0 ? kClearlyLess * least.ns : least.ns;
   PatchLayout taken;
+  MissRule in_parts{of_parts, patches.tiles, weighs, {.ns = std::numeric_limits<double>::infinity()}};
   subspace->patches = patches;
   subspace->score = of_parts;
   for (const double share : kShares) {
     subspace->patches.share = share;
     const FrameCost with = cost(judges);
+    if (with.ns < in_parts.cost.ns) in_parts.cost = with;
     // Of equal ones, since a clip may go where no judge has been
     if (least.misses == with.misses && !ArePartial(patches)) continue;
     if (taken.tiles == 0 ? with.ns <= bar : with.ns < least.ns) least = with, taken = subspace->patches;
   }
   if (taken.tiles == 0) subspace->score = of_all;
   subspace->patches = taken;
+  chosen->tried.push_back(in_parts);
+  chosen->taken = chosen->tried.size() - (taken.tiles == 0 ? 2 : 1);
   return least;
 }
 
@@ -193,15 +200,20 @@ void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<
 ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
                           double tolerance, double confidence) {
   const PatchLayout patches = subspace->patches;
-  ChosenMisses as_they_are{ChooseScoreAndParts(subspace, judges, points, full, tolerance, confidence), {}};
-  ChosenMisses believed{{}, TrustInTiles(judges)};
+  ChosenMisses as_they_are, believed;
+  as_they_are.cost = ChooseScoreAndParts(subspace, judges, points, full, tolerance, confidence, &as_they_are);
+  believed.trust = TrustInTiles(judges);
   if (believed.trust.empty()) return as_they_are;
   const ScoreMix score = std::exchange(subspace->score, {});
   const PatchLayout taken = std::exchange(subspace->patches, patches);
   std::vector<ScoreJudge> weighed(judges.begin(), judges.end());
   WeighDoubts(believed.trust, *subspace, weighed);
-  believed.cost = ChooseScoreAndParts(subspace, weighed, points, full, tolerance, confidence);
-  if (believed.cost.ns < kClearlyLess * as_they_are.cost.ns) return believed;
+  believed.cost = ChooseScoreAndParts(subspace, weighed, points, full, tolerance, confidence, &believed);
+  if (believed.cost.ns < kClearlyLess * as_they_are.cost.ns) {
+    believed.tried.insert(believed.tried.end(), as_they_are.tried.begin(), as_they_are.tried.end());
+    return believed;
+  }
+  as_they_are.tried.insert(as_they_are.tried.end(), believed.tried.begin(), believed.tried.end());
   subspace->score = score, subspace->patches = taken;
   return as_they_are;
 }

@@ -51,9 +51,17 @@ double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
 // ExpectedCost where its score is yet to be chosen, how far its tiles are believed, and whether its patches
 // miss by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of
 // WeighTiles.
+struct MissRule {
+  ScoreMix score;
+  std::size_t tiles = 0;  // of a part that misses by itself; 0: all points miss together
+  bool weighs = false;    // the doubts of tiles, by how far they are believed
+  FrameCost cost;
+};
 struct ChosenMisses {
   FrameCost cost;
-  std::vector<double> trust;  // in the doubts of tiles; empty: as they are
+  std::vector<double> trust;    // in the doubts of tiles; empty: as they are
+  std::vector<MissRule> tried;  // the best of each sort, and
+  std::size_t taken = 0;        // which of them it is
 };
 // Judges as that choice has them: doubts weighed, and patches only where these miss by themselves.
 void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<ScoreJudge>* judges);

@@ -166,12 +166,14 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
     SampledPose pose = sampler.Rest();
     if (!frames.empty() && p % 20 < 9) {
       sampler.MixFrames(&pose);
+      pose.near_clips = true;
     } else if (!groups.empty() && p % 20 < 13) {
       sampler.MixGroups(groups, &pose);
     } else {
       if (clips > 0 && (p % 2 == 0 || controls.empty())) {
         pose.clip = static_cast<int>(sampler.random().Below(clips));
         pose.phase = sampler.random().Unit();
+        pose.near_clips = true;
       }
       if (!controls.empty()) sampler.MoveMany(&pose);
     }

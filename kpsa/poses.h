@@ -34,7 +34,7 @@ struct ControlRange {
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
   double margin = 0;  // of its range: how far beyond its ends guards let it (kpsa/range_margins.h)
-  double tilt = 0;  // training turns it so far from rest, though its range is less (kpsa/tilts.h)
+  double tilt = 0;    // training turns it so far from rest, though its range is less (kpsa/tilts.h)
 };
 
 // Control values of one pose (by control), and where in the training clips it plays: clip < 0 is the rest
@@ -44,6 +44,7 @@ struct SampledPose {
   int clip = -1;
   double phase = 0;  // 0..1 of the clip
   PoseKind kind = PoseKind::kSampled;
+  bool near_clips = false;  // made of frames of the clips: what playback resembles
 };
 
 // What the controls have to be at the frames of the training clips to give the same pose without a clip: one

@@ -24,8 +24,8 @@ namespace kpsa {
 
 // 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues; 5: without
 // patches; 6: without guards of patches
-inline constexpr int kSubspaceVersion = 7, kPatchesVersion = 6, kProductCuesVersion = 5,
-                     kProductTilesVersion = 4, kOldestVersion = 3;
+inline constexpr int kSubspaceVersion = 8, kGuardedPatchesVersion = 7, kPatchesVersion = 6,
+                     kProductCuesVersion = 5, kProductTilesVersion = 4, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 

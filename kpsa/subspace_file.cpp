@@ -95,7 +95,12 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
   writer->Add<T>(key, {values.size()}, values, half);
 }
 
-constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
+constexpr char kRangePatches[] = "patches";            // that a range speaks of; missing: of all
+constexpr char kNearClips[] = "calibrationNearClips";  // only where there are some
+
+bool AnyNearClips(const Subspace& s) {
+  return std::ranges::any_of(s.calibration, &CalibrationPair::near_clips);
+}
 
 // A subspace without any of what is new is what it was before.
 int VersionOf(const Subspace& s) {
@@ -107,8 +112,9 @@ int VersionOf(const Subspace& s) {
   const bool multiplied = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
     return cue.kind == CueDescription::Kind::kProduct;
   });
+  if (AnyNearClips(s)) return kSubspaceVersion;
   if (std::ranges::any_of(s.ranges, [](const TrainedRange& r) { return r.patches != kAllPatches; }))
-    return kSubspaceVersion;
+    return kGuardedPatchesVersion;
   if (s.patches.tiles > 0) return kPatchesVersion;
   if (multiplied) return kProductCuesVersion;
   return products || relative || s.score != ScoreMix() ? kProductTilesVersion : kOldestVersion;
@@ -197,7 +203,9 @@ std::string ContentDigest(const Subspace& s) {
   hasher.Add(std::span<const float>(s.soft_cache.factor.span()));
   hasher.Add(std::span<const float>(s.soft_cache.leave_one_out));
   if (!s.latent.empty()) hasher.Add(std::span<const float>(s.latent));
+  const bool near_clips = AnyNearClips(s);
   for (const CalibrationPair& pair : s.calibration) {
+    if (near_clips) hasher.Add(static_cast<std::uint8_t>(pair.near_clips));
     hasher.Add(pair.score);
     hasher.Add(pair.error);
     hasher.Add(pair.guard);
@@ -483,6 +491,11 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     calibration.insert(calibration.end(),
                        {pair.score, pair.error, pair.guard, static_cast<double>(pair.kind)});
   writer.Add<double>("calibration", {s.calibration.size(), 4}, calibration);
+  if (AnyNearClips(s)) {
+    std::vector<std::uint8_t> near_clips;
+    for (const CalibrationPair& pair : s.calibration) near_clips.push_back(pair.near_clips);
+    Add<std::uint8_t>(&writer, kNearClips, near_clips);
+  }
   if (s.patches.tiles > 0) AddPatches(s, &writer);
   for (std::size_t i = 0; i < s.tiles.size(); ++i) {
     const TileData& data = s.tiles[i].data();
@@ -566,6 +579,12 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
     const std::span<const double> row(calibration->data() + i, 4);
     const int kind = row[3] >= 0 && row[3] < kPoseKinds ? static_cast<int>(row[3]) : -1;  // refused below
     s.calibration.push_back({row[0], row[1], row[2], kind});
+  }
+  if (file.tensors().contains(kNearClips)) {
+    const Result<std::vector<std::uint8_t>> near_clips =
+        file.Values<std::uint8_t>(kNearClips, {s.calibration.size()});
+    if (!near_clips.ok()) return near_clips.status();
+    for (std::size_t i = 0; i < near_clips->size(); ++i) s.calibration[i].near_clips = (*near_clips)[i] != 0;
   }
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
   if (s.patches.tiles > 0) KPSA_RETURN_IF_ERROR(ReadPatches(file, &s));

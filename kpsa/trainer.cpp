@@ -39,6 +39,7 @@ constexpr double kWorthTrying = 0.35;     // of what a frame costs: what others 
 constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
+constexpr double kJudging = 1.5;          // that a pose is judged, in the time that it took to train on
 constexpr double kClearly = 0.5;          // of the expected cost of the others: cues of tiles are taken
 constexpr double kLess = 0.95;            // likewise, where the others are as fine
 constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
@@ -74,6 +75,7 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Prepare());
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
+    pose_seconds_ = limit_.elapsed() / static_cast<double>(poses.poses() + judges.poses());
     if (!of_light()) FitIntoTime(&poses);
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
     clip_poses_ = record_.clip_poses;
@@ -210,7 +212,7 @@ class Trainer {
   // The largest step, and one that can be done without.
   bool HasTimeForTiles() {
     if (limit_.left() > kTilesInModes * modes_seconds_) return true;
-    record_.limited += std::string(record_.limited.empty() ? "" : ", ") + "no cues of each tile";
+    Leave("no cues of each tile");
     return false;
   }
 
@@ -531,11 +533,29 @@ class Trainer {
         .cost;
   }
 
+  // As many poses of a kind as there is time for, and whether there is for margins, too.
+  std::pair<std::size_t, bool> CalibrationWithin() {
+    const std::size_t wanted = PosesOfKind(options_);
+    const auto within = static_cast<std::size_t>(
+        std::clamp(limit_.left() / (2 * kPoseKinds * kJudging * pose_seconds_), 0.0, 1e9));
+    if (options_.calibration_poses > 0 || of_light() || within > 2 * wanted) return {wanted, true};
+    const std::size_t poses = std::clamp(within, FewestPosesOfKind(options_), wanted);
+    if (poses < wanted) Leave(fmt::format("{} of {} poses of a kind to calibrate with", poses, wanted));
+    Leave("no ranges beyond the trained ones");
+    return {poses, false};
+  }
+  void Leave(const std::string& what) {
+    if (record_.limited.find(what) != std::string::npos) return;
+    record_.limited += (record_.limited.empty() ? "" : ", ") + what;
+  }
+
   // Also says what a frame is expected to cost, but points.
   Status Calibrate(Subspace* subspace) {
     RangeFinder ranges = ranges_;  // its own margins beyond
+    const auto [poses, margins] = CalibrationWithin();
     const Calibrator calibrator{
-        rig_, clips_, options_, guards_, layout_, patches_, diagonal_, full_cost_, inverse_rest_stretch_};
+        rig_,  clips_, options_, guards_, layout_, patches_, diagonal_, full_cost_, inverse_rest_stretch_,
+        poses, margins};
     const Result<FrameCost> cost = CalibrateSubspace(
         calibrator, {&compiler_, recorder_.get(), sampler_.get(), &ranges, &record_}, cues_, subspace);
     if (!cost.ok()) return cost.status();
@@ -570,7 +590,7 @@ class Trainer {
   FrameCost cost_;       // by the last calibration, but points
   double full_cost_ = 0;
   const TimeLimit limit_;
-  double modes_seconds_ = 0;
+  double modes_seconds_ = 0, pose_seconds_ = 0;
   std::vector<Double3> positions_;
   std::vector<Signal> guards_;  // the recorder's first signals: relative matrices follow, which only measure
   RangeFinder ranges_;

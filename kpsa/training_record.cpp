@@ -44,7 +44,11 @@ std::string TrainingJson(const TrainingRecord& r) {
                      {"cost", one.cost},
                      {"taken", one.taken}});
   }
+  json rules = json::array();
+  for (const TrainingRecord::Rule& one : r.rules)
+    rules.push_back({{"rule", one.what}, {"misses", one.misses}, {"cost", one.cost}, {"taken", one.taken}});
   json object = {{"tried", tried},
+                 {"rules", rules},
                  {"clips", r.clips},
                  {"asked",
                   {{"samples", r.asked.samples},
@@ -163,6 +167,15 @@ TrainingRecord ParseTraining(const std::string& text) {
       const bool named = one.contains("cues") && one["cues"].is_string();
       r.tried.push_back({named ? one["cues"].get<std::string>() : std::string(), count_in(one, "count"),
                          count_in(one, "rows"), number(one, "misses"), number(one, "cost"),
+                         one.contains("taken") && one["taken"].is_boolean() && one["taken"].get<bool>()});
+    }
+  }
+  if (object.contains("rules") && object["rules"].is_array()) {
+    for (const json& one : object["rules"]) {
+      if (!one.is_object()) continue;
+      const bool named = one.contains("rule") && one["rule"].is_string();
+      r.rules.push_back({named ? one["rule"].get<std::string>() : std::string(), number(one, "misses"),
+                         number(one, "cost"),
                          one.contains("taken") && one["taken"].is_boolean() && one["taken"].get<bool>()});
     }
   }

@@ -46,6 +46,13 @@ struct TrainingRecord {
     bool taken = false;
   };
   std::vector<Tried> tried;
+  // Likewise how frames are told to miss (TriedRules); cost: besides that of measured points.
+  struct Rule {
+    std::string what;
+    double misses = 0, cost = 0;
+    bool taken = false;
+  };
+  std::vector<Rule> rules;
   // The accepted calibration pose with the largest error of what is emitted, at the trained tolerance.
   struct Worst {
     std::string kind, clip;  // PoseKindName; clip "" is the rest pose, no kind: nothing is accepted

@@ -69,6 +69,10 @@ TEST(SubspaceVersions, OfEarlierFilesKeepTheirDigests) {
   const Written product = WrittenAs(subspace);
   EXPECT_EQ(product.version, "5");
   EXPECT_EQ(product.digest, "718bafc5a03fa1cd25cb890c93e270fe");
+  subspace.calibration[0].near_clips = true;
+  const Written near_clips = WrittenAs(subspace);
+  EXPECT_EQ(near_clips.version, "8");
+  EXPECT_NE(near_clips.digest, product.digest);
 }
 
 }  // namespace
