@@ -1,0 +1,116 @@
+// init, train and bench where a character is out of the ordinary: without clips, with clips in which nothing
+// moves, with thousands of controls, with a hundred thousand points and more. What is small has tests
+// elsewhere: two controls and a single clip (init_test.cpp), points that a joint carries
+// (train_check_test.cpp).
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/process.h"
+#include "tests/support/sheet_character.h"
+#include "tests/support/temporary_folder.h"
+
+namespace kpsa {
+namespace {
+
+#if defined(__SANITIZE_ADDRESS__)
+constexpr bool kSanitized = true;
+#elif defined(__has_feature)
+constexpr bool kSanitized = __has_feature(address_sanitizer);
+#else
+constexpr bool kSanitized = false;
+#endif
+constexpr char kTakesLong[] = "takes many minutes with sanitizers";
+
+bool Has(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+
+class Corners : public ::testing::Test {
+ protected:
+  // The starter rig of the character.
+  void Init(const SheetCharacter& character) {
+    folder_.Write("sheet.glb", character.builder.Glb());
+    init_ = Run({"init", "sheet.glb", "-o", "sheet.yaml"});
+    ASSERT_EQ(init_.exit_code, 0) << init_.err;
+  }
+  ProcessResult Run(const std::vector<std::string>& arguments) const {
+    return RunKpsa(arguments, 600, folder_.path());
+  }
+  // What train and bench say, as JSON; null where they fail.
+  nlohmann::json Json(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(), {"--json", "-q"});
+    const ProcessResult run = Run(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return nlohmann::json::parse(run.out, nullptr, false);
+  }
+
+  const TemporaryFolder folder_;
+  ProcessResult init_;
+};
+
+TEST_F(Corners, WithoutAClipControlsTrainAndTheRestPoseIsMeasured) {
+  Init(SheetCharacter(20, 2, 5));
+  EXPECT_TRUE(Has(init_.err, "no clip moves its points: controls alone train it")) << init_.err;
+  const nlohmann::json train =
+      Json({"train", "sheet.yaml", "--force", "--samples", "300", "--calibration", "100"});
+  ASSERT_TRUE(train.is_object());
+  EXPECT_EQ(train["trained_on"]["clip_poses"], 0);
+  EXPECT_EQ(train["predicted"]["clip_frames"], 0) << "poses are timed";
+  EXPECT_GT(train["predicted"]["speedup"], 0.0);
+  const nlohmann::json bench = Json({"bench", "sheet.yaml", "--runs", "1"});
+  ASSERT_TRUE(bench.is_object());
+  EXPECT_EQ(bench["frames"], 1);
+  EXPECT_EQ(bench["promise"]["kept"], true) << bench["promise"];
+}
+
+TEST_F(Corners, ClipsThatStandStillAreNoMotion) {
+  SheetCharacter character(20, 1, 1);
+  character.Swing("still", 30, 0);
+  character.Swing("idle", 30, 0);
+  folder_.Write("sheet.glb", character.builder.Glb());
+  folder_.Write(
+      "sheet.yaml",
+      "kpsa: 1\ncharacter: sheet.glb\naccelerate:\n  sheet: {points: [sheet@skin], subspace: sheet.kpsa, "
+      "tolerance: 1mm, train: {clips: [still], samples: 0}, test: {clips: [idle]}}\n");
+  const ProcessResult train = Run({"train", "sheet.yaml", "--force"});
+  EXPECT_EQ(train.exit_code, 3) << train.out << train.err;
+  EXPECT_TRUE(Has(train.err, "nothing moves")) << train.err;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "sheet.kpsa"));
+}
+
+TEST_F(Corners, TwoThousandControlsTrain) {
+  if (kSanitized) GTEST_SKIP() << kTakesLong;
+  SheetCharacter character(25, 29, 23);
+  character.Swing("a", 40, 0.2f);
+  character.Swing("b", 30, 0.15f);
+  Init(character);
+  const std::string rig = TemporaryFolder::Read(folder_ / "sheet.yaml");
+  std::size_t controls = 0;
+  for (std::size_t at = rig.find(".rotate"); at != std::string::npos; at = rig.find(".rotate", at + 1))
+    ++controls;
+  EXPECT_GE(controls, 2000u - 667);
+  const nlohmann::json train =
+      Json({"train", "sheet.yaml", "--force", "--samples", "100", "--calibration", "100"});
+  ASSERT_TRUE(train.is_object());
+  EXPECT_GT(train["trained_on"]["sampled_poses"], controls) << "each alone";
+  EXPECT_EQ(Json({"bench", "sheet.yaml", "--runs", "1"})["promise"]["kept"], true);
+}
+
+TEST_F(Corners, TwoHundredThousandPointsTrain) {
+  if (kSanitized) GTEST_SKIP() << kTakesLong;
+  SheetCharacter character(448, 2, 3);
+  character.Swing("a", 20, 0.4f);
+  character.Swing("b", 10, 0.3f);
+  Init(character);
+  const nlohmann::json train = Json({"train", "sheet.yaml", "--samples", "40", "--calibration", "40",
+                                     "--violation-rate", "10%", "--rows", "60", "--modes", "40"});
+  ASSERT_TRUE(train.is_object());
+  EXPECT_GT(train["points"], 200'000);
+  const nlohmann::json bench = Json({"bench", "sheet.yaml", "--runs", "1"});
+  ASSERT_TRUE(bench.is_object());
+  EXPECT_EQ(bench["promise"]["kept"], true) << bench["promise"];
+  EXPECT_GT(bench["hit_rate"], 0.5);
+}
+
+}  // namespace
+}  // namespace kpsa
