@@ -14,6 +14,7 @@
 #include "kpsa/gemm.h"
 #include "kpsa/greedy_columns.h"
 #include "kpsa/quantile.h"
+#include "kpsa/ridge.h"
 #include "kpsa/subspace.h"
 
 namespace kpsa {
@@ -41,24 +42,6 @@ constexpr Eigen::Index kResidualDirections = 24;     // of what is left
 constexpr double kWeighed = 0.1, kMostWeight = 100;  // the same in the map: tolerances, times
 constexpr int kWeighings = 2;
 
-Eigen::LLT<Eigen::MatrixXd> Damped(const Eigen::MatrixXd& gram, double ridge) {
-  Eigen::MatrixXd damped = gram;
-  damped.diagonal().array() += ridge * std::max(gram.trace() / static_cast<double>(gram.rows()), 1e-300);
-  return damped.llt();
-}
-// (x^T x + r) where x has more rows than columns: there a ridge regression on x costs less by its columns,
-// x^T (x x^T + r)^-1 = (x^T x + r)^-1 x^T.
-Eigen::LLT<Eigen::MatrixXd> DampedColumns(const Eigen::MatrixXd& columns, Eigen::Index rows, double ridge) {
-  Eigen::MatrixXd damped = columns;
-  damped.diagonal().array() += ridge * std::max(columns.trace() / static_cast<double>(rows), 1e-300);
-  return damped.llt();
-}
-// What a ridge regression of yf on xf [p x T] gives at xh.
-Eigen::MatrixXd RidgeAt(const Eigen::MatrixXd& xf, const Eigen::MatrixXd& yf, const Eigen::MatrixXd& xh) {
-  if (xf.rows() <= xf.cols()) return Damped(GramOf(xf), kFirstRidge).solve(CrossOf(xf, yf)).transpose() * xh;
-  const Eigen::MatrixXd columns = xf.transpose();
-  return yf * DampedColumns(GramOf(columns), xf.rows(), kFirstRidge).solve(Multiply(columns, xh));
-}
 Eigen::MatrixXd Centered(Eigen::MatrixXd rows) {
   const Eigen::VectorXd mean = rows.rowwise().mean();
   rows.colwise() -= mean;
@@ -237,7 +220,7 @@ class TileChooser {
     Eigen::MatrixXd left = y(Eigen::all, held);
     if (x.rows() > 0) {
       const Eigen::MatrixXd xf = x(Eigen::all, fitted), yf = y(Eigen::all, fitted);
-      left -= RidgeAt(xf, yf, x(Eigen::all, held));
+      left -= RidgeAt(xf, yf, x(Eigen::all, held), kFirstRidge);
     }
     return PointErrors(left).array().square().square().mean();
   }
@@ -253,17 +236,6 @@ class TileChooser {
     return rows(moving, Eigen::all);
   }
 
-  // How much of y_ a ridge regression on all rows of x tells; gram, cross: of x, and of y_ with it.
-  double ToldBy(const Eigen::MatrixXd& x, const Eigen::MatrixXd& gram, const Eigen::MatrixXd& cross) const {
-    if (x.rows() <= x.cols()) {
-      const Eigen::MatrixXd map = Damped(gram, kFirstRidge).solve(cross.transpose());
-      return map.cwiseProduct(cross.transpose()).sum();
-    }
-    const Eigen::MatrixXd columns = GramOf(x.transpose());
-    const Eigen::MatrixXd solved = DampedColumns(columns, x.rows(), kFirstRidge).solve(y_.transpose());
-    return Multiply(columns, solved).cwiseProduct(y_.transpose()).sum();
-  }
-
   // Those of the scalars that tell what all of them do.
   void ChooseScalars(const View& view) {
     const std::vector<CueRef> scalars = ScalarsIn(joint_);
@@ -272,7 +244,7 @@ class TileChooser {
     x_.resize(0, y_.cols());
     if (kept.empty()) return;
     const Eigen::MatrixXd gram = GramOf(all), cross = CrossOf(y_, all);
-    const double total = y_.squaredNorm(), told = ToldBy(all, gram, cross);
+    const double total = y_.squaredNorm(), told = ToldByRidge(all, y_, gram, cross, kFirstRidge);
     const double seen = kSeen * options_.tolerance,
                  least = kCueGain * std::max(total - told, seen * seen * static_cast<double>(y_.size() / 3));
     const std::vector<Eigen::Index> found = GreedyColumns(

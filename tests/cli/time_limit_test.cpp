@@ -36,6 +36,25 @@ TEST(TimeLimits, ThatAreTooShortLeaveAsFewPosesAsCanBeTrainedOn) {
   EXPECT_LE(wrong, 4u);
 }
 
+// Calibration, too, where nobody asks for a number of poses: as many as can promise the rate, and no margins.
+TEST(TimeLimits, ShortenACalibrationThatNobodyAskedFor) {
+  TrainOptions options = WithSeconds(1e-6);
+  options.calibration_poses = 0;
+  const auto some = TrainRig(kHello, options, {"wave"});
+  options.seconds = kInfinity;
+  const auto all = TrainRig(kHello, options, {"wave"});
+  ASSERT_TRUE(all != nullptr && some != nullptr);
+  const TrainingRecord full = ParseTraining(all->training), limited = ParseTraining(some->training);
+  EXPECT_NE(limited.limited.find(" of 400 poses of a kind to calibrate with, no ranges beyond"),
+            std::string::npos)
+      << limited.limited;
+  EXPECT_LT(limited.calibration_poses, full.calibration_poses / 3);
+  const Calibration calibration =
+      Calibrate(some->calibration, some->tolerance, some->violation_rate, some->blend_start);
+  EXPECT_TRUE(calibration.enough_poses) << calibration.warning;
+  EXPECT_GT(calibration.hits, 0u);
+}
+
 TEST(TimeLimits, ThatAreLongEnoughChangeNothing) {
   const auto without = TrainRig(kHello, QuickTraining(), {"wave"}),
              with = TrainRig(kHello, WithSeconds(1e6), {"wave"});

@@ -47,6 +47,21 @@ TEST(ToleranceTable, MissesCostBoth) {
   EXPECT_TRUE(std::isnan(SpeedupWithMisses(1, 0, 1)) && std::isnan(SpeedupWithMisses(0, 0, 1)));
 }
 
+TEST(ToleranceTable, ExpectsTheHitsOfPosesThatAreMadeOfClips) {
+  std::vector<CalibrationPair> pairs;
+  for (int i = 0; i < 400; ++i) {
+    const bool near_clips = i % 2 == 0, bad = i % 40 == 0 || i % 8 == 1;  // 10 of 200, and 50
+    pairs.push_back({bad ? 2.0 : 1.0, bad ? 1e-2 : 1e-4, 0, i < 300 ? 0 : 1, {}, 0, near_clips && i < 300});
+  }
+  const Calibration of_clips = Calibrate(pairs, 1e-3, 0.01, 1);
+  EXPECT_EQ(of_clips.near_clips, 150u);
+  EXPECT_DOUBLE_EQ(ExpectedHitRate(of_clips), 1 - 8.0 / 150);
+  for (CalibrationPair& pair : pairs) pair.near_clips = false;
+  const Calibration without = Calibrate(pairs, 1e-3, 0.01, 1);
+  EXPECT_EQ(without.threshold.tau, of_clips.threshold.tau) << "the promise is of all";
+  EXPECT_NEAR(ExpectedHitRate(without), 1 - (8 + 37.5) / 300, 2e-3) << "of the sampled ones";
+}
+
 TEST(ToleranceTable, SaysWhichToleranceGainsALot) {
   const ToleranceTable table = MakeToleranceTable(1e-3, 4e-3, 0, Growing(0.98));
   ASSERT_EQ(table.rows.size(), 7u);

@@ -89,6 +89,27 @@ TEST_F(TrainCheck, APoseThatIsNoNumberIsNamed) {
       << check.status().ToString();
 }
 
+TEST(TrainReport, TellsWhatItTriedToJudgeBy) {
+  const HelloFolder folder;
+  const ProcessResult run = RunKpsa({"train", folder.rig(), "--samples", "300", "--calibration", "100",
+                                     "--tolerance", "10mm", "--force", "--json", "-q"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const nlohmann::json train = nlohmann::json::parse(run.out);
+  std::size_t taken = 0;
+  double least = kInfinity, cost = 0;
+  for (const nlohmann::json& rule : train["rules"]) {
+    taken += rule["taken"].get<bool>();
+    least = std::min(least, rule["cost"].get<double>());
+    if (rule["taken"].get<bool>()) cost = rule["cost"].get<double>();
+  }
+  EXPECT_EQ(taken, 1u) << train["rules"];
+  EXPECT_GT(least, 0);
+  EXPECT_LE(cost, 1.05 * least) << "wider margins may cost a little more";
+  EXPECT_NE(RunKpsa({"train", folder.rig(), "--samples", "300", "--calibration", "100", "--force", "-q"})
+                .out.find("\ntook to judge by "),
+            std::string::npos);
+}
+
 TEST(TrainReport, PromisesWhatItsPosesCan) {
   const HelloFolder folder;
   const auto train = [&](const std::string& rate) {
