@@ -194,8 +194,8 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddOption(command, "--samples", "N", &flags->samples,
             "poses drawn from the controls; the rig's number if not given");
   AddOption(command, "--calibration", "N", &flags->calibration,
-            "held-out poses of each kind that the tolerance is calibrated with; 400 to 1000, by the rate, if "
-            "not given");
+            "held-out poses of each kind that the tolerance is calibrated with; 400 to 1000, by the rate, "
+            "and fewer where --time is short, if not given");
   AddOption(command, "--seed", "N", &flags->seed, "of the sampled poses; 1 if not given");
   AddOption(command, "--rows", "N", &flags->rows,
             "numbers measured a frame (a point has three), at most; as many as pay if not given");
@@ -206,10 +206,9 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddOption(
       command, "--speedup", "FACTOR", &flags->speedup,
       "tell the smallest tolerance that is expected to reach it, misses included; training stays as it is");
-  AddOption(
-      command, "--time", "SECONDS", &flags->time,
-      "about how long to train at most, as in 60s: fewer poses, and no cues of each tile, where that is "
-      "too short");
+  AddOption(command, "--time", "SECONDS", &flags->time,
+            "about how long to train at most, as in 60s: fewer poses, no cues of each tile, and a shorter "
+            "calibration, where that is too short");
   AddSwitch(command, "--paper", &flags->paper,
             "the method of the paper: key points of varimax modes, least squares");
   AddOption(command, "--key-points", "N", &flags->key_points,

@@ -11,7 +11,7 @@
 
 namespace kpsa {
 
-// Misses included, with the share of them among held-out poses as the sampler draws them.
+// Misses included, with the share of them that ExpectedHitRate says.
 double ExpectedSpeedup(const SubspaceCheck& check, const Calibration& calibration);
 
 struct TrainResult {

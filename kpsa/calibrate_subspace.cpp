@@ -17,6 +17,7 @@ namespace {
 constexpr std::size_t kPosesAtOnce = 256;                      // are held
 constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
 constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips may go farther
+constexpr double kJudging = 1.5;  // that a pose is judged, in the time that it took to train on
 constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kHeldOutSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
@@ -45,7 +46,7 @@ Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, s
                   std::span<const double> margins, PoseJudge* judge, JudgedSet* judged) {
   const auto pose_kind = static_cast<PoseKind>(kind);
   const std::vector<SampledPose> drawn = work.sampler->Of(
-      pose_kind, of.poses_of_kind, (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
+      pose_kind, of.size.poses, (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
   for (std::size_t first = 0; first < drawn.size(); first += kPosesAtOnce) {
     // By clip, as the recorder writes them
     std::vector<SampledPose> some(
@@ -126,7 +127,7 @@ std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
   std::string name = rule.score.doubt == 0      ? "likeness to the trained poses"
                      : rule.score.measured == 0 ? "doubts of tiles"
                                                 : "likeness and doubts of tiles";
-  if (rule.weighs) name += " (weighed)";
+  if (rule.weighs && rule.score.doubt > 0) name += " (weighed)";
   name += rule.tiles > 0 ? fmt::format(", parts of {} tiles", rule.tiles) : ", all points at once";
   const auto wider = std::ranges::count_if(margins.of_controls, [](double margin) { return margin > 0; });
   if (wider > 0) name += fmt::format(", {} of {} ranges widened", wider, margins.of_controls.size());
@@ -137,6 +138,7 @@ std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
 std::vector<TrainingRecord::Rule> TriedRules(const ChosenMisses& chosen, const RangeMargins& margins,
                                              double outside, double full, bool all) {
   std::vector<TrainingRecord::Rule> rules;
+  if (!(full > 0)) return rules;  // the paper's way: nothing was priced
   for (std::size_t r = 0; r < chosen.tried.size(); ++r) {
     const MissRule& rule = chosen.tried[r];
     if (all || r == chosen.taken)
@@ -162,15 +164,20 @@ void RecordWorst(const Calibrator& of, const SampledPose& pose, double error, Tr
 
 }  // namespace
 
-std::size_t PosesOfKind(const TrainOptions& options) {
-  if (options.calibration_poses > 0) return options.calibration_poses;
-  return static_cast<std::size_t>(std::clamp(8.0 / std::max(options.violation_rate, 1e-4), 400.0, 1000.0));
-}
-
-std::size_t FewestPosesOfKind(const TrainOptions& options) {
+CalibrationSize CalibrationWithin(double pose_seconds, const TrainOptions& options, TimeLimit* limit) {
+  if (options.calibration_poses > 0) return {options.calibration_poses, true};
   const double rate = std::clamp(options.violation_rate, 1e-4, 0.5);
+  const auto wanted = static_cast<std::size_t>(std::clamp(8.0 / rate, 400.0, 1000.0));
+  const auto within = static_cast<std::size_t>(
+      std::clamp(limit->left() / (2 * kPoseKinds * kJudging * pose_seconds), 0.0, 1e9));
+  if (within > 2 * wanted) return {wanted, true};
   const double fewest = kSpared * std::log(1 - kCalibrationConfidence) / std::log1p(-rate);
-  return std::min(PosesOfKind(options), static_cast<std::size_t>(std::ceil(fewest)));
+  const std::size_t poses =
+      std::clamp(within, std::min(wanted, static_cast<std::size_t>(std::ceil(fewest))), wanted);
+  if (poses < wanted)
+    limit->LeaveOut(fmt::format("{} of {} poses of a kind to calibrate with", poses, wanted));
+  limit->LeaveOut("no ranges beyond the trained ones");
+  return {poses, false};
 }
 
 Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
@@ -189,7 +196,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   PoseJudge judge(*subspace, of.layout, cues, of_tiles), score_judge(*subspace, of.layout, cues, of_tiles);
   std::vector<RangeMargins> margins(1);
   JudgedSet outside;
-  if (!of.rig.target.colors && of.margins) {
+  if (!of.rig.target.colors && of.size.margins) {
     KPSA_RETURN_IF_ERROR(SayStage(of.options, "margins", 0.9));
     Result<FoundMargins> found = FindMargins(of, work, cues, *subspace);
     if (!found.ok()) return found.status();

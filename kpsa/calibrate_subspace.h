@@ -3,10 +3,20 @@
 #pragma once
 
 #include "kpsa/frame_cost.h"
+#include "kpsa/time_limit.h"
 #include "kpsa/trained_ranges.h"
 #include "kpsa/training_sampler.h"
 
 namespace kpsa {
+
+struct CalibrationSize {
+  std::size_t poses = 0;  // of a kind, to calibrate with; as many others to choose by
+  bool margins = true;    // ranges may reach beyond what was trained
+};
+// As many poses as the options ask for, or as their rate needs. Where there is no time for these, and nobody
+// asks for a number: no margins, and fewer poses, but more than the fewest that can promise this rate at all.
+// pose_seconds: what a pose took to train on.
+CalibrationSize CalibrationWithin(double pose_seconds, const TrainOptions& options, TimeLimit* limit);
 
 // All references must outlive it.
 struct Calibrator {
@@ -18,13 +28,8 @@ struct Calibrator {
   const PatchLayout& patches;  // that may miss by themselves
   double diagonal = 0, full_cost = 0;
   Matrix4 inverse_rest_stretch;
-  std::size_t poses_of_kind = 0;  // to calibrate with, and as many to choose by
-  bool margins = true;            // ranges may reach beyond what was trained
+  CalibrationSize size;
 };
-// As many poses of a kind as the options ask for, or as their rate needs; and the fewest that can promise
-// this rate at all, with some to spare.
-std::size_t PosesOfKind(const TrainOptions& options);
-std::size_t FewestPosesOfKind(const TrainOptions& options);
 // What it works with, and leaves behind: wider ranges, and the record of the calibration.
 struct CalibrationWork {
   Compiler* compiler = nullptr;

@@ -184,6 +184,7 @@ FrameCost ChooseScoreAndParts(Subspace* subspace, std::span<const ScoreJudge> ju
     if (taken.tiles == 0 ? with.ns <= bar : with.ns < least.ns) least = with, taken = subspace->patches;
   }
   if (taken.tiles == 0) subspace->score = of_all;
+  if (taken.tiles > 0) in_parts.cost = least;
   subspace->patches = taken;
   chosen->tried.push_back(in_parts);
   chosen->taken = chosen->tried.size() - (taken.tiles == 0 ? 2 : 1);

@@ -48,9 +48,7 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
 // guards miss them, or that they are wrong (ns). outside: such poses, of which guards have been asked.
 double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
                    std::span<const ScoreJudge> outside, double full, double tolerance, double confidence);
-// ExpectedCost where its score is yet to be chosen, how far its tiles are believed, and whether its patches
-// miss by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of
-// WeighTiles.
+// What frames may be told to miss by, and what that is expected to cost.
 struct MissRule {
   ScoreMix score;
   std::size_t tiles = 0;  // of a part that misses by itself; 0: all points miss together
@@ -65,6 +63,9 @@ struct ChosenMisses {
 };
 // Judges as that choice has them: doubts weighed, and patches only where these miss by themselves.
 void AsChosen(const ChosenMisses& chosen, const Subspace& subspace, std::vector<ScoreJudge>* judges);
+// ExpectedCost where its score is yet to be chosen, how far its tiles are believed, and whether its patches
+// miss by themselves: all as a frame costs least. Tiles stay as they are, the score is for those of
+// WeighTiles.
 ChosenMisses ChooseMisses(Subspace* subspace, std::span<const ScoreJudge> judges, double points, double full,
                           double tolerance, double confidence);
 

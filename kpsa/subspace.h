@@ -23,7 +23,7 @@
 namespace kpsa {
 
 // 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues; 5: without
-// patches; 6: without guards of patches
+// patches; 6: without guards of patches; 7: without calibration poses near clips
 inline constexpr int kSubspaceVersion = 8, kGuardedPatchesVersion = 7, kPatchesVersion = 6,
                      kProductCuesVersion = 5, kProductTilesVersion = 4, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;

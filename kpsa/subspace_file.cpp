@@ -584,7 +584,12 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
     const Result<std::vector<std::uint8_t>> near_clips =
         file.Values<std::uint8_t>(kNearClips, {s.calibration.size()});
     if (!near_clips.ok()) return near_clips.status();
-    for (std::size_t i = 0; i < near_clips->size(); ++i) s.calibration[i].near_clips = (*near_clips)[i] != 0;
+    for (std::size_t i = 0; i < near_clips->size(); ++i) {
+      const std::uint8_t flag = (*near_clips)[i];
+      if (flag > 1 || (flag == 1 && s.calibration[i].kind != static_cast<int>(PoseKind::kSampled)))
+        return Status::Invalid("{}: calibration pose {} cannot be near clips ({})", path, i, flag);
+      s.calibration[i].near_clips = flag == 1;
+    }
   }
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
   if (s.patches.tiles > 0) KPSA_RETURN_IF_ERROR(ReadPatches(file, &s));

@@ -19,6 +19,11 @@ double TimeLimit::elapsed() const {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
 }
 
+void TimeLimit::LeaveOut(const std::string& what) {
+  if (std::ranges::find(left_out_, what) == left_out_.end()) left_out_.push_back(what);
+}
+std::string TimeLimit::left_out() const { return fmt::format("{}", fmt::join(left_out_, ", ")); }
+
 std::size_t PosesWithin(double seconds, const PoseMatrix& poses) {
   const std::size_t all = poses.poses(), probed = std::min(all, kProbedPoses);
   if (!std::isfinite(seconds) || all <= kLeastPosesWithin) return all;

@@ -4,6 +4,8 @@
 
 #include <chrono>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "kpsa/pose_matrix.h"
 
@@ -14,9 +16,13 @@ class TimeLimit {
   explicit TimeLimit(double seconds) : seconds_(seconds) {}  // infinity: none
   double elapsed() const;                                    // seconds since it was made
   double left() const { return seconds_ - elapsed(); }
+  // What is left out for want of time, once each: told at the end.
+  void LeaveOut(const std::string& what);
+  std::string left_out() const;
 
  private:
   double seconds_;
+  std::vector<std::string> left_out_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 

@@ -39,7 +39,6 @@ constexpr double kWorthTrying = 0.35;     // of what a frame costs: what others 
 constexpr double kHopelessTiles = 0.3;    // not for cues of tiles that miss so many
 constexpr double kTooManyMisses = 0.15;   // and cues as for half the tolerance
 constexpr double kTilesInModes = 3.5;     // how long these take, in the time that modes took
-constexpr double kJudging = 1.5;          // that a pose is judged, in the time that it took to train on
 constexpr double kClearly = 0.5;          // of the expected cost of the others: cues of tiles are taken
 constexpr double kLess = 0.95;            // likewise, where the others are as fine
 constexpr double kTurnReach = 0.03;  // of the diagonal: how far an entry of a rotation moves points, about
@@ -75,7 +74,6 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Prepare());
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
-    pose_seconds_ = limit_.elapsed() / static_cast<double>(poses.poses() + judges.poses());
     if (!of_light()) FitIntoTime(&poses);
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
     clip_poses_ = record_.clip_poses;
@@ -101,9 +99,11 @@ class Trainer {
     Result<Subspace> subspace = Assemble(&poses, judges);
     if (!subspace.ok()) return subspace;
     KPSA_RETURN_IF_ERROR(Say("calibration", 0.95));
+    calibration_ = CalibrationWithin(pose_seconds_, options_, &limit_);
     KPSA_RETURN_IF_ERROR(Calibrate(&*subspace));
     if (!of_light() && options_.mode == EstimatorMode::kMap && !options_.without.miss_costs &&
-        IsWorthTrying(cost_) && (!fine_ || cost_.lost() > kTooManyMisses) && limit_.left() > modes_seconds_)
+        calibration_.margins && IsWorthTrying(cost_) && (!fine_ || cost_.lost() > kTooManyMisses) &&
+        limit_.left() > modes_seconds_)
       KPSA_RETURN_IF_ERROR(TryFiner(&poses, judges, &*subspace));
     KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
     record_.signature =
@@ -112,6 +112,7 @@ class Trainer {
       record_.controls.push_back(rig_.graph->PlugName(control));
     for (std::size_t c = drawn_.size(); c < rig_.controls.size(); ++c)
       record_.controls.push_back(rig_.graph->PlugName(rig_.controls[c].plug));
+    record_.limited = limit_.left_out();
     subspace->rig_hash = SignatureDigest(record_.signature);
     subspace->training = TrainingJson(record_);
     KPSA_RETURN_IF_ERROR(ValidateSubspace(*subspace));
@@ -164,6 +165,7 @@ class Trainer {
 
   // To train on, and, where cues have places to choose from, to judge these by.
   Status RecordPoses(PoseMatrix* poses, PoseMatrix* judges) {
+    const double before = limit_.elapsed();
     std::size_t frames = 0;
     for (const TrainingClip& clip : trained_clips_) frames += clip.times.size();
     const double between =
@@ -195,6 +197,8 @@ class Trainer {
       return Status::Invalid("{} training poses are too few: name clips or samples to train on",
                              poses->poses());
     KPSA_RETURN_IF_ERROR(Say("poses", 0.4));
+    const std::size_t sweeps = rig_.controls.empty() ? 0 : sampler_->SweepsWithTilts().size();
+    pose_seconds_ = (limit_.elapsed() - before) / static_cast<double>(poses->poses() + sweeps);
     // Light takes some of these away
     const bool compares =
         !of_light() && (places_.size() > 1 || (options_.may_have_cues_by_tile && !places_.empty()));
@@ -207,12 +211,12 @@ class Trainer {
     if (within >= all) return;
     KeepSpread(within, poses, &record_.clip_poses);
     record_.sampled_poses = within - record_.clip_poses;
-    record_.limited = fmt::format("{} of {} poses", within, all);
+    limit_.LeaveOut(fmt::format("{} of {} poses", within, all));
   }
   // The largest step, and one that can be done without.
   bool HasTimeForTiles() {
     if (limit_.left() > kTilesInModes * modes_seconds_) return true;
-    Leave("no cues of each tile");
+    limit_.LeaveOut("no cues of each tile");
     return false;
   }
 
@@ -533,29 +537,13 @@ class Trainer {
         .cost;
   }
 
-  // As many poses of a kind as there is time for, and whether there is for margins, too.
-  std::pair<std::size_t, bool> CalibrationWithin() {
-    const std::size_t wanted = PosesOfKind(options_);
-    const auto within = static_cast<std::size_t>(
-        std::clamp(limit_.left() / (2 * kPoseKinds * kJudging * pose_seconds_), 0.0, 1e9));
-    if (options_.calibration_poses > 0 || of_light() || within > 2 * wanted) return {wanted, true};
-    const std::size_t poses = std::clamp(within, FewestPosesOfKind(options_), wanted);
-    if (poses < wanted) Leave(fmt::format("{} of {} poses of a kind to calibrate with", poses, wanted));
-    Leave("no ranges beyond the trained ones");
-    return {poses, false};
-  }
-  void Leave(const std::string& what) {
-    if (record_.limited.find(what) != std::string::npos) return;
-    record_.limited += (record_.limited.empty() ? "" : ", ") + what;
-  }
-
   // Also says what a frame is expected to cost, but points.
   Status Calibrate(Subspace* subspace) {
     RangeFinder ranges = ranges_;  // its own margins beyond
-    const auto [poses, margins] = CalibrationWithin();
-    const Calibrator calibrator{
-        rig_,  clips_, options_, guards_, layout_, patches_, diagonal_, full_cost_, inverse_rest_stretch_,
-        poses, margins};
+    const Calibrator calibrator{rig_,        clips_,     options_,
+                                guards_,     layout_,    patches_,
+                                diagonal_,   full_cost_, inverse_rest_stretch_,
+                                calibration_};
     const Result<FrameCost> cost = CalibrateSubspace(
         calibrator, {&compiler_, recorder_.get(), sampler_.get(), &ranges, &record_}, cues_, subspace);
     if (!cost.ok()) return cost.status();
@@ -589,8 +577,9 @@ class Trainer {
   PatchLayout patches_;  // what may miss by itself
   FrameCost cost_;       // by the last calibration, but points
   double full_cost_ = 0;
-  const TimeLimit limit_;
+  TimeLimit limit_;
   double modes_seconds_ = 0, pose_seconds_ = 0;
+  CalibrationSize calibration_;
   std::vector<Double3> positions_;
   std::vector<Signal> guards_;  // the recorder's first signals: relative matrices follow, which only measure
   RangeFinder ranges_;

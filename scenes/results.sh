@@ -136,7 +136,7 @@ Written by \`sh scenes/results.sh --assets FOLDER\`. All settings but the rigs' 
 ## Characters that nobody tuned for
 
 \`kpsa init\`, \`train\` and \`bench\` with nothing changed. The first three are made from a seed by \`build/bench_untouched\`
-([benchmarks.md](benchmarks.md) says how), the others are files of that folder. *Held-out hits* are of the trainer's own new poses, *predicted* is the
+([benchmarks.md](benchmarks.md) says how), the others are files of that folder. *Held-out hits* are of the trainer's own new poses that are made of the training clips, *predicted* is the
 speedup that \`train\` tells, *misses included* the one of the test clip, its largest accepted error is in tolerances.
 
 END

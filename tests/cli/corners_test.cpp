@@ -14,10 +14,8 @@
 namespace kpsa {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(KPSA_WITH_ASAN) || defined(KPSA_WITH_TSAN)
 constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-constexpr bool kSanitized = __has_feature(address_sanitizer);
 #else
 constexpr bool kSanitized = false;
 #endif
@@ -56,10 +54,11 @@ TEST_F(Corners, WithoutAClipControlsTrainAndTheRestPoseIsMeasured) {
   ASSERT_TRUE(train.is_object());
   EXPECT_EQ(train["trained_on"]["clip_poses"], 0);
   EXPECT_EQ(train["predicted"]["clip_frames"], 0) << "poses are timed";
-  EXPECT_GT(train["predicted"]["speedup"], 0.0);
+  EXPECT_GT(train["calibration"]["hit_rate"], 0.5);
   const nlohmann::json bench = Json({"bench", "sheet.yaml", "--runs", "1"});
   ASSERT_TRUE(bench.is_object());
   EXPECT_EQ(bench["frames"], 1);
+  EXPECT_EQ(bench["hit_rate"], 1.0);
   EXPECT_EQ(bench["promise"]["kept"], true) << bench["promise"];
 }
 
@@ -88,7 +87,7 @@ TEST_F(Corners, TwoThousandControlsTrain) {
   std::size_t controls = 0;
   for (std::size_t at = rig.find(".rotate"); at != std::string::npos; at = rig.find(".rotate", at + 1))
     ++controls;
-  EXPECT_GE(controls, 2000u - 667);
+  EXPECT_GE(controls, 2000u);
   const nlohmann::json train =
       Json({"train", "sheet.yaml", "--force", "--samples", "100", "--calibration", "100"});
   ASSERT_TRUE(train.is_object());

@@ -104,7 +104,12 @@ TEST(TrainReport, TellsWhatItTriedToJudgeBy) {
   }
   EXPECT_EQ(taken, 1u) << train["rules"];
   EXPECT_GT(least, 0);
-  EXPECT_LE(cost, 1.05 * least) << "wider margins may cost a little more";
+  EXPECT_LE(cost, 1.15 * least)
+      << "parts and belief in tiles have to save 5 % each, wider margins may cost 2 %";
+  const ProcessResult paper = RunKpsa({"train", folder.rig(), "--paper", "--key-points", "20", "--samples",
+                                       "100", "--calibration", "100", "--force", "--json", "-q"});
+  ASSERT_EQ(paper.exit_code, 0) << paper.err;
+  EXPECT_TRUE(nlohmann::json::parse(paper.out)["rules"].empty()) << "nothing is priced";
   EXPECT_NE(RunKpsa({"train", folder.rig(), "--samples", "300", "--calibration", "100", "--force", "-q"})
                 .out.find("\ntook to judge by "),
             std::string::npos);
@@ -124,6 +129,18 @@ TEST(TrainReport, PromisesWhatItsPosesCan) {
       << strict.out;
   EXPECT_NE(strict.err.find("warning: "), std::string::npos) << "also with -q";
   EXPECT_EQ(train("20%").out.find("cannot promise"), std::string::npos);
+}
+
+TEST_F(TrainCheck, HeldOutPosesThatAreMadeOfClipsAreKnown) {
+  std::size_t sampled = 0, near_clips = 0, others = 0;
+  for (const CalibrationPair& pair : trained_->calibration) {
+    sampled += pair.kind == static_cast<int>(PoseKind::kSampled);
+    near_clips += pair.near_clips;
+    others += pair.near_clips && pair.kind != static_cast<int>(PoseKind::kSampled);
+  }
+  EXPECT_EQ(sampled, 400u);
+  EXPECT_EQ(near_clips, 240u) << "nine of twenty are mixed of frames, three lie over one";
+  EXPECT_EQ(others, 0u);
 }
 
 // A skin that a single joint carries: what its points do in the space of that joint is the rounding of

@@ -45,11 +45,12 @@ PoseMatrix FacePoses(std::size_t count, double together, double late, unsigned s
   return poses;
 }
 
-std::vector<CueProduct> ChooseFor(const PoseMatrix& poses, bool hinges = true) {
+std::vector<CueProduct> ChooseFor(const PoseMatrix& poses, bool hinges = true, std::size_t idle = 0) {
   CueProductOptions options;
   options.hinges = hinges;
   options.factors = {0, 1, 2, 3};
   options.regressors = options.factors;
+  options.regressors.insert(options.regressors.end(), idle, 3);
   options.still.assign(poses.layout().scalars, 1e-5);
   options.tolerance = kFaceTolerance;
   options.most = kReserved;
@@ -82,6 +83,12 @@ TEST(CueProducts, HaveNoHingesWhereNoneAreWanted) {
 
 // Some of the thousands of candidates fit a few hundred poses by chance.
 TEST(CueProducts, AreNoneOfFewPoses) { EXPECT_TRUE(ChooseFor(FacePoses(900, 0.01, 0.02, 1)).empty()); }
+
+TEST(CueProducts, AreNoneWhereThereAreFarMoreScalarsThanPoses) {
+  const PoseMatrix poses = FacePoses(1200, 0.01, 0.02, 1);
+  EXPECT_FALSE(ChooseFor(poses, true, 100).empty());
+  EXPECT_TRUE(ChooseFor(poses, true, 2500).empty());
+}
 
 TEST(CueProducts, AreNoneWhereScalarsSayAll) { EXPECT_TRUE(ChooseFor(FacePoses(1500, 0, 0, 1)).empty()); }
 

@@ -64,12 +64,18 @@ TEST(Signature, TrainingRecordsKeepIt) {
   record.signature = Some();
   record.controls = {"upperarm01.L.rotate.x", "p/3.envelope"};
   record.tried = {{kForAllPoints, 3, 9, 0.5, 0.6, false}, {kByTile, 40, 44, 0.125, 0.25, true}};
+  record.rules = {{"doubts", 0.25, 0.5, true}, {"likeness", 0.5, 0.75, false}};
   const TrainingRecord read = ParseTraining(TrainingJson(record));
   ASSERT_EQ(read.tried.size(), 2u);
   EXPECT_EQ(read.tried[1].what, kByTile);
   EXPECT_EQ(read.tried[1].rows, 44u);
   EXPECT_EQ(read.tried[1].misses, 0.125);
   EXPECT_TRUE(read.tried[1].taken && !read.tried[0].taken);
+  ASSERT_EQ(read.rules.size(), 2u);
+  EXPECT_EQ(read.rules[0].what, "doubts");
+  EXPECT_EQ(read.rules[0].misses, 0.25);
+  EXPECT_EQ(read.rules[0].cost, 0.5);
+  EXPECT_TRUE(read.rules[0].taken && !read.rules[1].taken);
   EXPECT_EQ(read.signature, record.signature);
   EXPECT_EQ(read.controls, record.controls);
   // The flat form of earlier versions is no signature, and neither is anything else

@@ -72,7 +72,24 @@ TEST(SubspaceVersions, OfEarlierFilesKeepTheirDigests) {
   subspace.calibration[0].near_clips = true;
   const Written near_clips = WrittenAs(subspace);
   EXPECT_EQ(near_clips.version, "8");
-  EXPECT_NE(near_clips.digest, product.digest);
+  subspace.calibration[0].near_clips = false;
+  subspace.calibration[0].kind = subspace.calibration[1].kind = 0;
+  subspace.calibration[0].near_clips = true;
+  const Written first = WrittenAs(subspace);
+  std::swap(subspace.calibration[0].near_clips, subspace.calibration[1].near_clips);
+  EXPECT_NE(first.digest, WrittenAs(subspace).digest) << "which one it is belongs to the contents";
+}
+
+TEST(SubspaceVersions, OnlySampledPosesAreNearClips) {
+  Subspace subspace = SmallestSubspace();
+  subspace.calibration[1].near_clips = true;  // of those beyond the ranges
+  const TemporaryFolder folder;
+  ASSERT_TRUE(WriteSubspace(subspace, folder / "small.kpsa").ok());
+  const Result<Subspace> read = ReadSubspace(folder / "small.kpsa");
+  ASSERT_FALSE(read.ok());
+  EXPECT_NE(read.status().ToString().find("small.kpsa: calibration pose 1 cannot be near clips"),
+            std::string::npos)
+      << read.status().ToString();
 }
 
 }  // namespace
