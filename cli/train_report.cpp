@@ -85,6 +85,7 @@ std::string TrainJson(const TrainResult& r) {
                                {"violation_rate", r.calibration.alpha},
                                {"attainable_rate", r.calibration.attainable_alpha},
                                {"hit_rate", r.hit_rate()},
+                               {"hit_rate_of", r.calibration.near_clips > 0 ? "clips" : "sampled"},
                                {"violations", r.calibration.violations},
                                {"severe", r.calibration.severe},
                                {"violation_rate_at_most", r.calibration.upper_bound},
@@ -150,7 +151,7 @@ std::string TrainText(const TrainResult& r) {
         one.taken ? "took" : "tried", one.what, one.cues, one.rows, one.cost, 100 * one.misses);
   }
   for (const TrainingRecord::Rule& one : r.record.rules) {
-    text += fmt::format("{} to judge by {}: {:.2g} of a full frame and its points, {:.3g} % miss\n",
+    text += fmt::format("{} to judge by {}: {:.2g} of a full frame, measured points aside, {:.3g} % miss\n",
                         one.taken ? "took" : "tried", one.what, one.cost, 100 * one.misses);
   }
   // What these poses can promise, where that is less than what was asked for

@@ -141,6 +141,8 @@ std::vector<TrainingRecord::Rule> TriedRules(const ChosenMisses& chosen, const R
   if (!(full > 0)) return rules;  // the paper's way: nothing was priced
   for (std::size_t r = 0; r < chosen.tried.size(); ++r) {
     const MissRule& rule = chosen.tried[r];
+    if (rule.weighs && rule.score.doubt == 0 && r != chosen.taken)
+      continue;  // weighs nothing: the same again
     if (all || r == chosen.taken)
       rules.push_back({RuleName(rule, margins), rule.cost.misses, (rule.cost.ns + outside) / full,
                        all && r == chosen.taken});

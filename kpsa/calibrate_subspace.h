@@ -13,9 +13,9 @@ struct CalibrationSize {
   std::size_t poses = 0;  // of a kind, to calibrate with; as many others to choose by
   bool margins = true;    // ranges may reach beyond what was trained
 };
-// As many poses as the options ask for, or as their rate needs. Where there is no time for these, and nobody
-// asks for a number: no margins, and fewer poses, but more than the fewest that can promise this rate at all.
-// pose_seconds: what a pose took to train on.
+// As many poses as the options ask for, or as their rate needs (8 / violation_rate, 400 to 1,000). Where
+// there is no time for these, and nobody asks for a number: no margins, and fewer poses, but more than the
+// fewest that can promise this rate at all. pose_seconds: what a pose took to train on.
 CalibrationSize CalibrationWithin(double pose_seconds, const TrainOptions& options, TimeLimit* limit);
 
 // All references must outlive it.

@@ -46,6 +46,14 @@ void KeepSpread(std::size_t count, PoseMatrix* poses, std::size_t* of_clips) {
   *of_clips = clips;
 }
 
+bool FitIntoTime(PoseMatrix* poses, std::size_t* of_clips, TimeLimit* limit) {
+  const std::size_t all = poses->poses(), within = PosesWithin(limit->left(), *poses);
+  if (within >= all) return false;
+  KeepSpread(within, poses, of_clips);
+  limit->LeaveOut(fmt::format("{} of {} poses", within, all));
+  return true;
+}
+
 std::optional<PoseMatrix> SpareForModes(PoseMatrix* poses, std::size_t* of_clips, double most_work) {
   const auto count = static_cast<double>(poses->poses());
   if (count * count * static_cast<double>(poses->columns()) <= most_work) return std::nullopt;

@@ -74,7 +74,8 @@ class Trainer {
     KPSA_RETURN_IF_ERROR(Prepare());
     PoseMatrix poses(layout_), judges(layout_);
     KPSA_RETURN_IF_ERROR(RecordPoses(&poses, &judges));
-    if (!of_light()) FitIntoTime(&poses);
+    if (!of_light() && FitIntoTime(&poses, &record_.clip_poses, &limit_))
+      record_.sampled_poses = poses.poses() - record_.clip_poses;
     KPSA_RETURN_IF_ERROR(Say("modes", 0.45));
     clip_poses_ = record_.clip_poses;
     if (!of_light()) spare_ = SpareForModes(&poses, &clip_poses_);
@@ -205,14 +206,6 @@ class Trainer {
     return compares ? trained_sampler_->AddJudges(judges, &judge_kinds_) : Status();
   }
 
-  // As many poses as there is time for, of all of them.
-  void FitIntoTime(PoseMatrix* poses) {
-    const std::size_t all = poses->poses(), within = PosesWithin(limit_.left(), *poses);
-    if (within >= all) return;
-    KeepSpread(within, poses, &record_.clip_poses);
-    record_.sampled_poses = within - record_.clip_poses;
-    limit_.LeaveOut(fmt::format("{} of {} poses", within, all));
-  }
   // The largest step, and one that can be done without.
   bool HasTimeForTiles() {
     if (limit_.left() > kTilesInModes * modes_seconds_) return true;
@@ -271,8 +264,7 @@ class Trainer {
 
   Status CenterAndChooseCues(const PoseMatrix& poses, const PoseMatrix& judges, double tolerance) {
     PoseMatrix centered(layout_);
-    for (std::size_t t = 0; t < judges.poses(); ++t)
-      std::ranges::copy(judges.row(t), centered.AddPose().begin());
+    centered.Append(judges);
     if (judges.poses() > 0) centered.Subtract(pca_.mean);
     if (of_light() && judges.poses() > 0) TruncateModes(centered);
     KPSA_RETURN_IF_ERROR(Say("cues", 0.7));

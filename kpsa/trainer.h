@@ -31,8 +31,7 @@ struct TrainOptions {
   std::size_t min_points = 16;        // that are measured
   std::size_t key_points = 80;        // paper mode
   std::size_t samples = 0;            // of the controls, besides the clips
-  std::size_t calibration_poses = 0;  // of each kind (PoseKind); 0: 8 / violation_rate, 400 to
-                                      // 1,000, and fewer where there is no time
+  std::size_t calibration_poses = 0;  // of each kind (PoseKind); 0: CalibrationWithin
   std::uint64_t seed = 1;
   double tolerance = 1e-4, violation_rate = 0.01;  // metres, or light; share of frames
   bool keep_modes = false;                         // in the subspace, for reports (Subspace::kept_modes)
@@ -42,9 +41,9 @@ struct TrainOptions {
   // Where tiles have cues of their own: what was learnt teaches only those that miss it, and all others are
   // those of the training without it, byte for byte (kpsa/tile_learning.h).
   bool by_tile_as_before = false;
-  // About how long training may take: fewer poses, no cues of tiles, and fewer poses to
-  // calibrate with where that is too short. Which poses
-  // fit depends on the machine; with time enough, the subspace is that without a limit.
+  // About how long training may take: fewer poses, no cues of tiles, and a shorter calibration, where
+  // that is too short. Which poses fit depends on the machine; with time enough, the subspace is that without
+  // a limit.
   double seconds = std::numeric_limits<double>::infinity();
   // Parts that training does without, to tell what each is worth (bench_ablation --parts).
   struct Without {

@@ -94,10 +94,13 @@ TrainingRecord ParseTraining(const std::string& text) {
     return v > 0 && v < 1e15 ? static_cast<std::size_t>(v) : std::size_t{0};
   };
   const auto count = [&](const char* name) { return count_in(object, name); };
-  const auto words = [&](const char* name) {
-    return object.contains(name) && object[name].is_string() ? object[name].get<std::string>()
-                                                             : std::string();
+  const auto words_in = [](const json& from, const char* name) {
+    return from.contains(name) && from[name].is_string() ? from[name].get<std::string>() : std::string();
   };
+  const auto is_true_in = [](const json& from, const char* name) {
+    return from.contains(name) && from[name].is_boolean() && from[name].get<bool>();
+  };
+  const auto words = [&](const char* name) { return words_in(object, name); };
   const auto names = [&](const char* name) {
     std::vector<std::string> list;
     if (!object.contains(name) || !object[name].is_array()) return list;
@@ -154,31 +157,24 @@ TrainingRecord ParseTraining(const std::string& text) {
   }
   if (object.contains("worst") && object["worst"].is_object()) {
     const json& worst = object["worst"];
-    const auto text = [&](const char* name) {
-      return worst.contains(name) && worst[name].is_string() ? worst[name].get<std::string>() : std::string();
-    };
-    r.worst.kind = text("kind"), r.worst.clip = text("clip");
+    r.worst.kind = words_in(worst, "kind"), r.worst.clip = words_in(worst, "clip");
     r.worst.time = number(worst, "time"), r.worst.error = number(worst, "error");
     r.worst.controls = controls(worst);
   }
-  if (object.contains("tried") && object["tried"].is_array()) {
-    for (const json& one : object["tried"]) {
-      if (!one.is_object()) continue;
-      const bool named = one.contains("cues") && one["cues"].is_string();
-      r.tried.push_back({named ? one["cues"].get<std::string>() : std::string(), count_in(one, "count"),
-                         count_in(one, "rows"), number(one, "misses"), number(one, "cost"),
-                         one.contains("taken") && one["taken"].is_boolean() && one["taken"].get<bool>()});
+  const auto each_of = [&](const char* list, const auto& take) {
+    if (!object.contains(list) || !object[list].is_array()) return;
+    for (const json& one : object[list]) {
+      if (one.is_object()) take(one);
     }
-  }
-  if (object.contains("rules") && object["rules"].is_array()) {
-    for (const json& one : object["rules"]) {
-      if (!one.is_object()) continue;
-      const bool named = one.contains("rule") && one["rule"].is_string();
-      r.rules.push_back({named ? one["rule"].get<std::string>() : std::string(), number(one, "misses"),
-                         number(one, "cost"),
-                         one.contains("taken") && one["taken"].is_boolean() && one["taken"].get<bool>()});
-    }
-  }
+  };
+  each_of("tried", [&](const json& one) {
+    r.tried.push_back({words_in(one, "cues"), count_in(one, "count"), count_in(one, "rows"),
+                       number(one, "misses"), number(one, "cost"), is_true_in(one, "taken")});
+  });
+  each_of("rules", [&](const json& one) {
+    r.rules.push_back(
+        {words_in(one, "rule"), number(one, "misses"), number(one, "cost"), is_true_in(one, "taken")});
+  });
   if (object.contains("signature")) r.signature = ParseSignature(object["signature"]);
   return r;
 }

@@ -2,6 +2,9 @@
 // stay readable: their digests are those of the program that had no later version.
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <nlohmann/json.hpp>
+
 #include "base/safetensors.h"
 #include "kpsa/subspace.h"
 #include "tests/support/temporary_folder.h"
@@ -90,6 +93,29 @@ TEST(SubspaceVersions, OnlySampledPosesAreNearClips) {
   EXPECT_NE(read.status().ToString().find("small.kpsa: calibration pose 1 cannot be near clips"),
             std::string::npos)
       << read.status().ToString();
+}
+
+TEST(SubspaceVersions, FlagsOfAnotherTypeOrValueAreRefused) {
+  Subspace subspace = SmallestSubspace();
+  subspace.calibration[0].near_clips = true;
+  const TemporaryFolder folder;
+  const std::string path = folder / "small.kpsa";
+  ASSERT_TRUE(WriteSubspace(subspace, path).ok());
+  const std::string good = TemporaryFolder::Read(path);
+  std::uint64_t size = 0;
+  std::memcpy(&size, good.data(), sizeof(size));
+  const auto header = nlohmann::json::parse(good.substr(8, size));
+  const auto refused = [&](std::size_t at, std::string_view bytes) {
+    folder.Write("small.kpsa", std::string(good).replace(at, bytes.size(), bytes));
+    const Result<Subspace> read = ReadSubspace(path);
+    return read.ok() ? "" : read.status().ToString();
+  };
+  const std::size_t flags = 8 + size + header["calibrationNearClips"]["data_offsets"][0].get<std::size_t>();
+  EXPECT_EQ(refused(flags, "\x01"), "") << "as it was";
+  EXPECT_NE(refused(flags, "\x02").find("calibration pose 0 cannot be near clips (2)"), std::string::npos);
+  EXPECT_NE(refused(flags, std::string_view("\0", 1)).find("the file is damaged"), std::string::npos);
+  const std::size_t type = good.find("U8", good.find("calibrationNearClips"));
+  EXPECT_NE(refused(type, "I8").find("calibrationNearClips"), std::string::npos);
 }
 
 }  // namespace
