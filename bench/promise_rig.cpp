@@ -68,24 +68,12 @@ class Side {
   Side(const std::shared_ptr<const Plan>& plan, const PlugRef& time,
        const std::vector<ControlRange>& controls)
       : evaluator_(plan), time_(plan->FindVarying(time)) {
-    for (const ControlRange& control : controls) {
-      Slot slot{plan->FindVarying(control.plug), control.plug.component};
-      if (slot.varying == kNoIndex) {
-        PlugRef whole = control.plug;
-        whole.component = -1;
-        slot.varying = plan->FindVarying(whole);
-      }
-      if (slot.varying != kNoIndex) {
-        const Type type = plan->varying()[slot.varying].type;
-        slot.whole_number = type == Type::kInt || type == Type::kBool || type == Type::kEnum;
-      }
-      slots_.push_back(slot);
-    }
+    for (const ControlRange& control : controls) slots_.push_back(plan->Handle(control.plug));
   }
   void Set(std::size_t control, double value) {
-    const Slot& slot = slots_[control];
-    if (slot.varying == kNoIndex) return;  // moves no point, or a clip drives it
-    if (slot.whole_number) {
+    const PlugHandle& slot = slots_[control];
+    if (!slot) return;  // moves no point, or a clip drives it
+    if (slot.IsWholeNumber()) {
       evaluator_.SetInt(slot.varying, std::llround(value));
     } else {
       evaluator_.Set(slot.varying, value, slot.component);
@@ -101,14 +89,9 @@ class Side {
   Evaluator& evaluator() { return evaluator_; }
 
  private:
-  struct Slot {
-    Index varying = kNoIndex;
-    int component = -1;
-    bool whole_number = false;
-  };
   Evaluator evaluator_;
   Index time_;
-  std::vector<Slot> slots_;
+  std::vector<PlugHandle> slots_;
 };
 
 // Infinite where a point is not finite.

@@ -134,17 +134,6 @@ void DrawHalf(const DrawnHalf& half, const PictureFrame& frame, Image* image, in
   canvas.CopyTo(image, left);
 }
 
-Status SetVarying(Evaluator* evaluator, Index varying, const Value& value) {
-  if (const auto* number = value.get_if<double>()) {
-    evaluator->Set(varying, *number);
-  } else if (const auto* matrix = value.get_if<Matrix4>()) {
-    evaluator->Set(varying, *matrix);
-  } else {
-    return Status::Invalid("a pose of {}, expected a number or a matrix", value.ToString());
-  }
-  return {};
-}
-
 // The example's graph at rest and in its pose.
 Status EvaluateExample(const NodeRegistry& registry, const NodeExample& example, DrawnHalf* before,
                        DrawnHalf* after) {
@@ -188,9 +177,9 @@ Status EvaluateExample(const NodeRegistry& registry, const NodeExample& example,
   const Double3 warm{1, 0.84, 0.62}, brown{0.93, 0.55, 0.3}, cool{0.82, 0.9, 0.98}, blue{0.58, 0.72, 0.9};
   if (request.outputs.size() > 2) before->push_back(surface(2, example.driver, cool, blue));
   for (std::size_t i = 0; i < example.pose.size(); ++i) {
-    const Result<Index> varying = evaluator.FindVarying(graph, request.varying[i]);
-    if (!varying.ok()) return varying.status();
-    KPSA_RETURN_IF_ERROR(SetVarying(&evaluator, *varying, example.pose[i].second));
+    const Result<PlugHandle> handle = evaluator.FindVarying(graph, request.varying[i]);
+    if (!handle.ok()) return handle.status();
+    KPSA_RETURN_IF_ERROR(evaluator.Set(*handle, example.pose[i].second));
   }
   KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
   if (request.outputs.size() > 2) after->push_back(surface(2, example.driver, cool, blue));

@@ -9,6 +9,7 @@
 #include "cli/rig_frames.h"
 #include "cli/rig_training.h"
 #include "kpsa/accelerate.h"
+#include "kpsa/space_points.h"
 
 namespace kpsa {
 namespace {
@@ -47,22 +48,9 @@ std::vector<Index> RegionsOf(const Rig& rig, const CharacterMesh& mesh,
 }
 
 void SetPose(const TrainingRig& training, const SampledPose& pose, double time, Evaluator* evaluator) {
-  const Plan& plan = evaluator->plan();
-  if (const Index varying = plan.FindVarying(training.time); varying != kNoIndex)
-    evaluator->Set(varying, time);
-  for (std::size_t c = 0; c < pose.values.size(); ++c) {
-    PlugRef whole = training.controls[c].plug;
-    const int component = std::exchange(whole.component, -1);
-    Index varying = plan.FindVarying(training.controls[c].plug);
-    if (varying == kNoIndex) varying = plan.FindVarying(whole);
-    if (varying == kNoIndex) continue;  // a clip plays it
-    const Type type = plan.varying()[varying].type;
-    if (type == Type::kDouble || type == Type::kDouble3) {
-      evaluator->Set(varying, pose.values[c], type == Type::kDouble3 ? component : -1);
-    } else {
-      evaluator->SetInt(varying, static_cast<std::int64_t>(pose.values[c]));
-    }
-  }
+  SetPlug(evaluator, training.time, time);
+  for (std::size_t c = 0; c < pose.values.size(); ++c)
+    SetPlug(evaluator, training.controls[c].plug, pose.values[c]);  // nothing where a clip plays it
 }
 
 class Checker {

@@ -75,9 +75,11 @@ void Evaluator::Restart() {
   Invalidate();
 }
 
-Result<Index> Evaluator::FindVarying(const Graph& graph, const PlugRef& plug) const {
-  const Index varying = plan_->FindVarying(plug);
-  if (varying != kNoIndex) return varying;
+Result<PlugHandle> Evaluator::FindVarying(const Graph& graph, const PlugRef& plug) const {
+  if (const PlugHandle handle = plan_->Handle(plug)) return handle;
+  if (plan_->FindVarying(plug) != kNoIndex)
+    return Status::Invalid("{} is a part of points that vary together: set all of them",
+                           graph.PlugName(plug));
   return Status::Invalid("{} does not vary in this plan: name it in Request::varying", graph.PlugName(plug));
 }
 

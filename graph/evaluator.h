@@ -33,16 +33,24 @@ class Evaluator final {
   Evaluator& operator=(const Evaluator&) = delete;
   const Plan& plan() const { return *plan_; }
 
-  // The number of a varying plug, for Set. A plug that the request did not name as varying is an error.
-  Result<Index> FindVarying(const Graph& graph, const PlugRef& plug) const;
-  // Setting an equal value changes nothing. `component` sets one number of a double3 or quaternion.
+  // Where a plug takes values. A plug that the request did not name as varying is an error.
+  Result<PlugHandle> FindVarying(const Graph& graph, const PlugRef& plug) const;
+  // Sets what a handle of this plan names, in the runtime's units; an equal value changes nothing. A value of
+  // another type (whole numbers fit doubles, and doubles without a fraction fit int, enum and bool), one that
+  // is not finite or outside of the attribute's range, and a handle of another plan are errors, and change
+  // nothing.
+  Status Set(const PlugHandle& plug, const Value& value);
+  // As many points as the plug had when the plan was made.
+  Status SetPoints(const PlugHandle& plug, ConstPointsView points);
+
+  // The same without a check of the value, for numbers of varying plugs that Plan::FindVarying gave: a wrong
+  // type is a programmer's error. `component` sets one number of a double3 or quaternion.
   void Set(Index varying, double value, int component = -1);
   void SetInt(Index varying, std::int64_t value);
   void Set(Index varying, const Double3& value);
   void Set(Index varying, const Quaternion& value);
   void Set(Index varying, const Matrix4& value);
-  void SetPoints(Index varying,
-                 ConstPointsView points);  // as many points as the plug had when the plan was made
+  void SetPoints(Index varying, ConstPointsView points);
 
   // Brings outputs up to date: all of them, or one. On failure the error names the node; other outputs may be
   // fine.
@@ -61,8 +69,8 @@ class Evaluator final {
 #endif
   // Forgets every computed value (not the set ones): the next pull computes everything.
   void Invalidate();
-  // As Invalidate; nodes that remember their previous frame (NodeDef::stateful) forget it, too, so that frames
-  // may start from the first one again.
+  // As Invalidate; nodes that remember their previous frame (NodeDef::stateful) forget it, too, so that
+  // frames may start from the first one again.
   void Restart();
   std::size_t MemoryBytes() const;
 

@@ -78,7 +78,10 @@ std::vector<NodeId> Graph::Nodes() const {
   return ids;
 }
 
+Graph::Graph(const NodeRegistry& registry) : registry_(&registry), registry_status_(registry.status()) {}
+
 Result<NodeId> Graph::AddNode(std::string_view type, std::string_view name) {
+  if (!registry_status_.ok()) return registry_status_;
   const NodeDef* def = registry_->Find(type);
   if (def == nullptr) {
     return Status::Invalid("unknown node type \"{}\"{}", type, DidYouMean(type, registry_->Names()));

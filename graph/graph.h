@@ -41,9 +41,11 @@ struct SetValue {
 
 class Graph {
  public:
-  explicit Graph(const NodeRegistry& registry) : registry_(&registry) {}
+  // Outlived by the registry, which is complete by now.
+  explicit Graph(const NodeRegistry& registry);
   const NodeRegistry& registry() const { return *registry_; }
 
+  // Refused, too, while anything is wrong with the registry's declarations (NodeRegistry::status).
   Result<NodeId> AddNode(std::string_view type, std::string_view name);
   Status RemoveNode(NodeId node);  // with its connections and values
   // Takes over all nodes of another graph of the same registry. Names and aliases begin with `prefix` then,
@@ -132,6 +134,7 @@ class Graph {
   std::vector<std::string> Names() const;
 
   const NodeRegistry* registry_;
+  Status registry_status_;
   std::vector<Node> nodes_;
   std::unordered_map<std::string, Index> by_name_;
   std::unordered_map<std::string, std::vector<Index>> by_alias_;  // several: ambiguous

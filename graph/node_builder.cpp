@@ -2,28 +2,50 @@
 
 #include <algorithm>
 
-#include "base/check.h"
-
 namespace kpsa {
 namespace {
 
-Type TypeOfDefault(const Value& value) {
-  if (value.get_if<double>() != nullptr) return Type::kDouble;
-  if (value.get_if<std::int64_t>() != nullptr) return Type::kInt;
-  if (value.get_if<Double3>() != nullptr) return Type::kDouble3;
-  if (value.get_if<Quaternion>() != nullptr) return Type::kQuaternion;
-  if (value.get_if<Matrix4>() != nullptr) return Type::kMatrix;
-  if (value.get_if<std::string>() != nullptr) return Type::kString;
-  if (value.get_if<std::vector<std::int64_t>>() != nullptr) return Type::kInts;
-  if (value.get_if<std::vector<double>>() != nullptr) return Type::kDoubles;
-  KPSA_CHECK(false);
-  return Type::kDouble;
+// Whether a default tells a type; assets and buffers do not.
+bool TypeOfDefault(const Value& value, Type* type) {
+  if (value.get_if<double>() != nullptr) return *type = Type::kDouble, true;
+  if (value.get_if<std::int64_t>() != nullptr) return *type = Type::kInt, true;
+  if (value.get_if<Double3>() != nullptr) return *type = Type::kDouble3, true;
+  if (value.get_if<Quaternion>() != nullptr) return *type = Type::kQuaternion, true;
+  if (value.get_if<Matrix4>() != nullptr) return *type = Type::kMatrix, true;
+  if (value.get_if<std::string>() != nullptr) return *type = Type::kString, true;
+  if (value.get_if<std::vector<std::int64_t>>() != nullptr) return *type = Type::kInts, true;
+  if (value.get_if<std::vector<double>>() != nullptr) return *type = Type::kDoubles, true;
+  return false;
 }
 
 }  // namespace
 
+void NodeBuilder::problem(std::string_view attribute, std::string_view text) {
+  def_->problems.push_back(
+      attribute.empty() ? fmt::format("node type \"{}\": {}", def_->name, text)
+                        : fmt::format("node type \"{}\", attribute \"{}\": {}", def_->name, attribute, text));
+}
+
+AttributeDef& NodeBuilder::attribute() {
+  if (def_->attributes.empty()) {
+    problem("", "an attribute is changed before one is declared");
+    def_->attributes.emplace_back();
+  }
+  return def_->attributes.back();
+}
+
+ComputeGroup& NodeBuilder::group() {
+  if (def_->groups.empty()) {
+    problem("", "a word that follows compute() stands before it");
+    def_->groups.emplace_back();
+  }
+  return def_->groups.back();
+}
+
 NodeBuilder& NodeBuilder::add(AttributeDef attribute) {
-  KPSA_CHECK_EQ(def_->FindAttribute(attribute.name), -1);
+  if (attribute.name.empty()) problem("", "an attribute has no name");
+  if (def_->FindAttribute(attribute.name) >= 0)
+    problem(attribute.name, "declared twice; expected each name once");
   def_->attributes.push_back(std::move(attribute));
   return *this;
 }
@@ -31,7 +53,10 @@ NodeBuilder& NodeBuilder::add(AttributeDef attribute) {
 NodeBuilder& NodeBuilder::in(std::string name, Value default_value, AttributeOptions options) {
   AttributeDef a;
   a.name = std::move(name);
-  a.type = TypeOfDefault(default_value);
+  if (!TypeOfDefault(default_value, &a.type))
+    problem(
+        a.name,
+        "its default tells no type; expected a number, a vector, a quaternion, a matrix, a text or a list");
   a.default_value = std::move(default_value);
   a.min = options.min, a.max = options.max, a.unit = options.unit, a.doc = std::move(options.doc),
   a.diagnostic = options.diagnostic;
@@ -67,7 +92,7 @@ NodeBuilder& NodeBuilder::enumeration(std::string name, std::vector<std::string>
 }
 
 NodeBuilder& NodeBuilder::points_in(std::string name, std::string doc, Type type) {
-  KPSA_CHECK(IsPointType(type));
+  if (!IsPointType(type)) problem(name, "points_in() of another type; expected points, colors or weights");
   AttributeDef a;
   a.name = std::move(name);
   a.type = type;
@@ -76,7 +101,8 @@ NodeBuilder& NodeBuilder::points_in(std::string name, std::string doc, Type type
 }
 
 NodeBuilder& NodeBuilder::out(std::string name, Type type, std::string doc) {
-  KPSA_CHECK(SlotSize(type) > 0);
+  if (SlotSize(type) == 0)
+    problem(name, fmt::format("an output of type {}; expected one that flows at run time", TypeName(type)));
   AttributeDef a;
   a.name = std::move(name);
   a.type = type;
@@ -99,7 +125,8 @@ NodeBuilder& NodeBuilder::lazy(bool together) {
   return *this;
 }
 NodeBuilder& NodeBuilder::world_place() {
-  KPSA_CHECK(attribute().type == Type::kMatrix && !attribute().array && !attribute().output);
+  if (attribute().type != Type::kMatrix || attribute().array || attribute().output)
+    problem(attribute().name, "world_place() of something else; expected a matrix input that is no array");
   attribute().world_place = true;
   return *this;
 }
@@ -116,9 +143,9 @@ NodeBuilder& NodeBuilder::default_from(std::function<Value(const Structural&)> f
   return *this;
 }
 
-NodeBuilder& NodeBuilder::group_compute(ComputeFn compute) {
+NodeBuilder& NodeBuilder::group_compute(CheckedCompute compute) {
   ComputeGroup g;
-  g.compute = compute;
+  g.compute = compute.function;
   for (std::size_t i = 0; i < def_->attributes.size(); ++i) {
     const AttributeDef& a = def_->attributes[i];
     const int number = static_cast<int>(i);
@@ -126,43 +153,65 @@ NodeBuilder& NodeBuilder::group_compute(ComputeFn compute) {
     if (!a.output && !a.structural) g.inputs.push_back(number);
   }
   def_->groups.push_back(std::move(g));
-  finish_group();
+  finish_group(compute);
   return *this;
 }
 
 NodeBuilder& NodeBuilder::group_for(std::vector<std::string> outputs, std::vector<std::string> inputs,
-                                    ComputeFn compute) {
+                                    CheckedCompute compute) {
   ComputeGroup g;
-  g.compute = compute;
+  g.compute = compute.function;
   for (const std::string& name : outputs) {
     const int number = def_->FindAttribute(name);
-    KPSA_CHECK(number >= 0 && def_->attributes[static_cast<std::size_t>(number)].output);
-    KPSA_CHECK_EQ(def_->GroupOfOutput(number), -1);
-    g.outputs.push_back(number);
+    if (number < 0 || !attribute_of(number).output) {
+      problem(name, "compute_for() names it as an output, which it is not");
+    } else if (def_->GroupOfOutput(number) >= 0) {
+      problem(name, "computed twice; expected one compute for each output");
+    } else {
+      g.outputs.push_back(number);
+    }
   }
   for (const std::string& name : inputs) {
     const int number = def_->FindAttribute(name);
-    KPSA_CHECK(number >= 0 && !def_->attributes[static_cast<std::size_t>(number)].output);
-    g.inputs.push_back(number);
+    if (number < 0 || attribute_of(number).output) {
+      problem(name, "compute_for() names it as an input, which it is not");
+    } else {
+      g.inputs.push_back(number);
+    }
   }
   def_->groups.push_back(std::move(g));
-  finish_group();
+  finish_group(compute);
   return *this;
 }
 
-void NodeBuilder::finish_group() {
+void NodeBuilder::finish_group(const CheckedCompute& compute) {
   ComputeGroup& g = group();
-  KPSA_CHECK(!g.outputs.empty());
+  if (g.outputs.empty())
+    problem("", "a compute() has no output left to compute; expected an out() before it");
   for (int output : g.outputs) {
-    if (def_->attributes[static_cast<std::size_t>(output)].per_geometry) g.per_geometry = true;
+    if (attribute_of(output).per_geometry) g.per_geometry = true;
   }
+  if (g.compute == nullptr) problem("", "a compute() without a function");
+  if (!compute.signature.has_value()) return;
+  for (std::string& text : SignatureProblems(*def_, g, *compute.signature))
+    def_->problems.push_back(std::move(text));
 }
 
 int NodeBuilder::input_position(std::string_view input) {
   const auto& inputs = group().inputs;
   const auto it = std::find(inputs.begin(), inputs.end(), def_->FindAttribute(input));
-  KPSA_CHECK(it != inputs.end());
+  if (it == inputs.end()) {
+    problem(input, "the compute before it has no such input");
+    return -1;
+  }
   return static_cast<int>(it - inputs.begin());
+}
+
+bool NodeBuilder::one_output(std::string_view word) {
+  const std::size_t outputs = group().outputs.size();
+  if (outputs != 1)
+    problem("", fmt::format("{}() of a compute with {} outputs; expected one", word, outputs));
+  return outputs == 1;
 }
 
 NodeBuilder& NodeBuilder::in_place(std::string_view input) {
@@ -171,12 +220,14 @@ NodeBuilder& NodeBuilder::in_place(std::string_view input) {
 }
 
 NodeBuilder& NodeBuilder::batch(BindBatchFn bind, ComputeBatchFn f) {
-  KPSA_CHECK_EQ(group().outputs.size(), std::size_t{1});
-  KPSA_CHECK(group().decide == nullptr && group().compute_block == nullptr);
+  one_output("batch");
+  if (group().decide != nullptr || group().compute_block != nullptr)
+    problem("", "batch() of a compute with decide() or block(); expected neither");
   for (const std::vector<int>* numbers : {&group().inputs, &group().outputs}) {
     for (int number : *numbers) {
-      const AttributeDef& a = def_->attributes[static_cast<std::size_t>(number)];
-      KPSA_CHECK(!a.array && IsSmallType(a.type));
+      const AttributeDef& a = attribute_of(number);
+      if (a.array || !IsSmallType(a.type))
+        problem(a.name, "batch() of a compute with arrays or points; expected small values only");
     }
   }
   group().bind_batch = std::move(bind);
@@ -185,17 +236,20 @@ NodeBuilder& NodeBuilder::batch(BindBatchFn bind, ComputeBatchFn f) {
 }
 
 NodeBuilder& NodeBuilder::passes(std::string_view input, const std::vector<std::string>& held) {
-  KPSA_CHECK_EQ(group().outputs.size(), std::size_t{1});
-  group().passed_input = input_position(input);
-  const auto type_of = [&](int number) { return def_->attributes[static_cast<std::size_t>(number)].type; };
-  KPSA_CHECK(type_of(group().inputs[static_cast<std::size_t>(group().passed_input)]) ==
-             type_of(group().outputs[0]));
-  for (const std::string& name : held) group().held_inputs.push_back(input_position(name));
+  const int position = input_position(input);
+  if (!one_output("passes") || position < 0) return *this;
+  group().passed_input = position;
+  if (attribute_of(group().inputs[static_cast<std::size_t>(position)]).type !=
+      attribute_of(group().outputs[0]).type)
+    problem(input, "passes() as an output of another type");
+  for (const std::string& name : held) {
+    if (const int at = input_position(name); at >= 0) group().held_inputs.push_back(at);
+  }
   return *this;
 }
 
 NodeBuilder& NodeBuilder::touches(std::string_view input, TouchFn f) {
-  KPSA_CHECK_EQ(group().outputs.size(), std::size_t{1});
+  one_output("touches");
   group().touched_input = input_position(input);
   group().touches = std::move(f);
   return *this;
@@ -203,9 +257,10 @@ NodeBuilder& NodeBuilder::touches(std::string_view input, TouchFn f) {
 
 NodeBuilder& NodeBuilder::strength(std::string_view input) {
   const int position = input_position(input);
-  const int attribute = group().inputs[static_cast<std::size_t>(position)];
-  const AttributeDef& a = def_->attributes[static_cast<std::size_t>(attribute)];
-  KPSA_CHECK(a.type == Type::kDouble && !a.array && group().touched_input >= 0);
+  if (position < 0) return *this;
+  const AttributeDef& a = attribute_of(group().inputs[static_cast<std::size_t>(position)]);
+  if (a.type != Type::kDouble || a.array || group().touched_input < 0)
+    problem(input, "strength() of something else; expected one double, after touches()");
   group().strength_input = position;
   return *this;
 }

@@ -6,16 +6,24 @@
 //       .compute([](double value, double lo, double hi) { return (value - lo) / (hi - lo); });
 //
 // compute() of a captureless function takes its inputs in the order of declaration (structural ones left out)
-// and returns the one output: bool, std::int64_t (int, enum), double, Double3, Quaternion, const Matrix4&,
-// ArrayView<T>.
+// and returns the one output: bool, std::int64_t or any integer (int, enum), a scoped enum (enum), double,
+// Double3, Quaternion, const Matrix4&, ConstPointsView, ArrayView<T>. Number and types are held against the
+// declaration.
+//
+// Nothing here aborts: what is wrong with a declaration is noted in NodeDef::problems, one sentence each with
+// node, attribute, what was expected and what was given; NodeRegistry::status() tells, and no graph takes
+// such a type.
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "graph/compute_signature.h"
 #include "graph/node_def.h"
 
 namespace kpsa {
@@ -99,19 +107,17 @@ class NodeBuilder {
   // Closes a group: computes all outputs that no group has yet, from all non-structural inputs.
   template <typename F>
   NodeBuilder& compute(F f) {
-    return group_compute(Thunk(f));
+    return group_compute(Checked(f));
   }
-  NodeBuilder& compute(ComputeFn f) { return group_compute(f); }
+  NodeBuilder& compute(ComputeFn f) { return group_compute({f, std::nullopt}); }
   // As compute, of the named outputs from the named inputs only.
   template <typename F>
   NodeBuilder& compute_for(std::vector<std::string> outputs, std::vector<std::string> inputs, F f) {
-    ComputeFn compute;
     if constexpr (std::is_convertible_v<F, ComputeFn>) {
-      compute = f;
+      return group_for(std::move(outputs), std::move(inputs), {f, std::nullopt});
     } else {
-      compute = Thunk(f);
+      return group_for(std::move(outputs), std::move(inputs), Checked(f));
     }
-    return group_for(std::move(outputs), std::move(inputs), compute);
   }
 
   // Change the group that was closed last.
@@ -148,7 +154,7 @@ class NodeBuilder {
     return *this;
   }
   NodeBuilder& in_place(std::string_view input);
-  // Of an input in the group that was closed last.
+  // Of an input in the group that was closed last; -1, and a problem, if it has none of that name.
   int input_position(std::string_view input);
   NodeBuilder& cost(float ns, float ns_per_point) {
     group().cost_ns = ns;
@@ -157,12 +163,18 @@ class NodeBuilder {
   }
 
  private:
+  // A compute function, and what it says of its inputs and output; nothing of one that takes a
+  // ComputeContext.
+  struct CheckedCompute {
+    ComputeFn function = nullptr;
+    std::optional<ComputeSignature> signature;
+  };
   template <typename T>
   struct Argument {  // a value by its slot
     static decltype(auto) Get(const ComputeContext& context, int i) {
       if constexpr (std::is_same_v<T, bool>) {
         return context.get<std::int64_t>(i) != 0;
-      } else if constexpr (std::is_integral_v<T>) {
+      } else if constexpr (std::is_integral_v<T> || std::is_enum_v<T>) {
         return static_cast<T>(context.get<std::int64_t>(i));
       } else {
         return context.get<T>(i);
@@ -175,38 +187,46 @@ class NodeBuilder {
   };
 
   template <typename F, typename R, typename... Args, std::size_t... I>
-  static ComputeFn ThunkOf(R (F::*)(Args...) const, std::index_sequence<I...>) {
+  static ComputeFn ThunkOf(std::index_sequence<I...>) {
     return [](ComputeContext& context) {
-      auto result = F{}(Argument<std::decay_t<Args>>::Get(context, static_cast<int>(I))...);
-      using Out = decltype(result);
-      if constexpr (std::is_integral_v<Out>) {
+      const R result = F{}(Argument<std::decay_t<Args>>::Get(context, static_cast<int>(I))...);
+      if constexpr (std::is_integral_v<R> || std::is_enum_v<R>) {
         context.out_value<std::int64_t>(0) = static_cast<std::int64_t>(result);
       } else {
-        context.out_value<Out>(0) = result;
+        context.out_value<R>(0) = result;
       }
     };
   }
   template <typename F, typename R, typename... Args>
-  static ComputeFn ThunkWith(R (F::*call)(Args...) const) {
-    return ThunkOf<F>(call, std::index_sequence_for<Args...>{});
+  static CheckedCompute CheckedAs(R (F::*)(Args...) const) {
+    return {ThunkOf<F, R, Args...>(std::index_sequence_for<Args...>{}), SignatureOf<R, Args...>()};
+  }
+  template <typename F, typename R, typename... Args>
+  static CheckedCompute CheckedAs(R (F::*)(Args...) const noexcept) {
+    return {ThunkOf<F, R, Args...>(std::index_sequence_for<Args...>{}), SignatureOf<R, Args...>()};
   }
   template <typename F>
-  static ComputeFn Thunk(F) {
+  static CheckedCompute Checked(F) {
     static_assert(std::is_empty_v<F>, "compute must capture nothing: it may run on any thread");
     if constexpr (std::is_invocable_v<F, ComputeContext&>) {
-      return [](ComputeContext& context) { F{}(context); };
+      return {[](ComputeContext& context) { F{}(context); }, std::nullopt};
     } else {
-      return ThunkWith(&F::operator());
+      return CheckedAs(&F::operator());
     }
   }
 
-  AttributeDef& attribute() { return def_->attributes.back(); }
-  ComputeGroup& group() { return def_->groups.back(); }
+  AttributeDef& attribute();  // the latest; a problem where there is none
+  ComputeGroup& group();
+  const AttributeDef& attribute_of(int number) const {
+    return def_->attributes[static_cast<std::size_t>(number)];
+  }
   NodeBuilder& add(AttributeDef attribute);
-  NodeBuilder& group_compute(ComputeFn compute);
+  NodeBuilder& group_compute(CheckedCompute compute);
   NodeBuilder& group_for(std::vector<std::string> outputs, std::vector<std::string> inputs,
-                         ComputeFn compute);
-  void finish_group();
+                         CheckedCompute compute);
+  void finish_group(const CheckedCompute& compute);
+  bool one_output(std::string_view word);
+  void problem(std::string_view attribute, std::string_view text);
 
   NodeDef* def_;
 };

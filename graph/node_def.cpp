@@ -23,6 +23,20 @@ int NodeDef::GroupOfOutput(int attribute) const {
   return -1;
 }
 
+std::vector<std::string> NodeDef::Problems() const {
+  std::vector<std::string> all = problems;
+  if (name.empty()) all.push_back("a node type has no name");
+  for (std::size_t i = 0; i < attributes.size(); ++i) {
+    const AttributeDef& a = attributes[i];
+    if (a.output && GroupOfOutput(static_cast<int>(i)) < 0)
+      all.push_back(
+          fmt::format("node type \"{}\", attribute \"{}\": nothing computes this output; expected a "
+                      "compute() after it is declared",
+                      name, a.name));
+  }
+  return all;
+}
+
 std::vector<std::string> NodeDef::AttributeNames() const {
   std::vector<std::string> names;
   for (const AttributeDef& attribute : attributes) names.push_back(attribute.name);

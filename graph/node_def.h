@@ -138,6 +138,10 @@ struct NodeDef {
   bool passes_points = false;        // its points are those that come in, where it succeeds
   std::vector<AttributeDef> attributes;
   std::vector<ComputeGroup> groups;
+  std::vector<std::string> problems;  // of the declaration, noted while it was built
+
+  // All that is wrong with it: `problems`, outputs that nothing computes, a name or a group that is missing.
+  std::vector<std::string> Problems() const;
 
   int FindAttribute(std::string_view attribute_name) const;  // -1 if there is none
   int GroupOfOutput(int attribute) const;                    // -1 if no group computes it

@@ -1,29 +1,38 @@
 #include "graph/node_registry.h"
 
-#include "base/check.h"
-
 namespace kpsa {
-
-NodeRegistry::NodeRegistry(Duplicates duplicates) : on_duplicates_(duplicates) {}
 
 NodeBuilder NodeRegistry::add(std::string name, std::string doc) {
   auto def = std::make_unique<NodeDef>();
   def->name = name;
   def->doc = std::move(doc);
   NodeDef* raw = def.get();
-  if (defs_.find(name) != defs_.end()) {
-    KPSA_CHECK(on_duplicates_ == Duplicates::kCollect);
-    duplicates_.push_back(std::move(name));
-    refused_.push_back(std::move(def));
-    return NodeBuilder(raw);
+  if (const auto [at, added] = defs_.try_emplace(std::move(name), nullptr); added) {
+    at->second = std::move(def);
+  } else {
+    duplicates_.push_back(std::move(def));
   }
-  defs_.emplace(std::move(name), std::move(def));
   return NodeBuilder(raw);
 }
 
+Status NodeRegistry::status() const {
+  Status status;
+  for (const auto& [name, def] : defs_) {
+    for (const std::string& problem : def->Problems()) status.Append(Status::Invalid("{}", problem));
+  }
+  for (const auto& def : duplicates_)
+    status.Append(
+        Status::Invalid("node type \"{}\" is registered twice; expected each name once", def->name));
+  return status;
+}
+
 void NodeRegistry::Take(NodeRegistry&& other) {
-  for (const auto& [name, def] : other.defs_) KPSA_CHECK(defs_.find(name) == defs_.end());
   defs_.merge(other.defs_);
+  for (auto& [name, def] : other.defs_)
+    duplicates_.push_back(std::move(def));  // the names that stayed behind
+  for (auto& def : other.duplicates_) duplicates_.push_back(std::move(def));
+  other.defs_.clear();
+  other.duplicates_.clear();
 }
 
 const NodeDef* NodeRegistry::Find(std::string_view name) const {

@@ -15,24 +15,23 @@ namespace kpsa {
 
 class NodeRegistry {
  public:
-  // Of a name that is added twice: a programmer's error, or noted in duplicates().
-  enum class Duplicates { kRefuse, kCollect };
-  explicit NodeRegistry(Duplicates duplicates = Duplicates::kRefuse);
+  NodeRegistry() = default;
   NodeRegistry(const NodeRegistry&) = delete;
   NodeRegistry& operator=(const NodeRegistry&) = delete;
-  // Starts a new type; complete it through the builder.
+  // Starts a new type; complete it through the builder. A name that is taken is a problem, see status().
   NodeBuilder add(std::string name, std::string doc);
   const NodeDef* Find(std::string_view name) const;  // null if there is none
   std::vector<std::string> Names() const;            // sorted
-  const std::vector<std::string>& duplicates() const { return duplicates_; }
-  // Moves all types of another registry here; no name may be in both. Pointers to definitions stay valid.
+  // What is wrong with the declarations of all types, each problem an error. While it is not ok, no graph
+  // takes nodes of this registry: a wrong declaration would be read as memory of another type.
+  Status status() const;
+  // Moves all types of another registry here, with what is wrong with them; a name that is in both is a
+  // problem. Pointers to definitions stay valid.
   void Take(NodeRegistry&& other);
 
  private:
-  Duplicates on_duplicates_;
   std::map<std::string, std::unique_ptr<NodeDef>, std::less<>> defs_;
-  std::vector<std::string> duplicates_;
-  std::vector<std::unique_ptr<NodeDef>> refused_;  // what builders of duplicates write to
+  std::vector<std::unique_ptr<NodeDef>> duplicates_;  // of names that were taken
 };
 
 }  // namespace kpsa

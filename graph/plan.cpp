@@ -13,6 +13,15 @@ Index Plan::FindVarying(const PlugRef& plug) const {
   return kNoIndex;
 }
 
+PlugHandle Plan::Handle(const PlugRef& plug) const {
+  const Index varying = FindVarying(plug);
+  if (varying == kNoIndex) return {};
+  const bool one = plug.component >= 0;
+  if (IsPointType(varying_[varying].type) && (one || plug.element != varying_[varying].plug.element))
+    return {};
+  return {varying, plug.component, one ? Type::kDouble : varying_[varying].type};
+}
+
 std::size_t Plan::MemoryBytes() const {
   const auto bytes = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   std::size_t total = sizeof(*this) + bytes(steps_) + bytes(tables_) + bytes(deps_) + bytes(consumers_) +

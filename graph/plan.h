@@ -30,6 +30,16 @@ struct Request {
   std::vector<PlugRef> varying;
 };
 
+// A plug that varies in a plan, or one number of it: where an evaluator of that plan takes a value from
+// outside.
+struct PlugHandle {
+  Index varying = kNoIndex;   // kNoIndex: the plug does not vary
+  int component = -1;         // of a double3 or quaternion; -1: all of the plug
+  Type type = Type::kDouble;  // of what is set: the component's, if there is one
+  explicit operator bool() const { return varying != kNoIndex; }
+  bool IsWholeNumber() const { return type == Type::kBool || type == Type::kInt || type == Type::kEnum; }
+};
+
 class Plan {
  public:
   // One run of compute. 64 bytes, read in order.
@@ -145,7 +155,10 @@ class Plan {
   std::size_t buffer_floats() const { return buffer_floats_; }
   std::size_t workspace_floats() const { return workspace_floats_; }
   std::size_t state_bytes() const { return state_bytes_; }
-  Index FindVarying(const PlugRef& plug) const;  // kNoIndex if the plug does not vary
+  // Of a plug, the varying plug that it is or that holds it (an element's, of a component); kNoIndex if none
+  // is.
+  Index FindVarying(const PlugRef& plug) const;
+  PlugHandle Handle(const PlugRef& plug) const;  // of single points there is none: points are set together
   std::size_t MemoryBytes() const;               // of this object without kernels and names
 
  private:

@@ -116,6 +116,9 @@ void PlanBuilder::AddVarying() {
     varying.type = graph.PlugType(plug);
     const AttributeDef& a = graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
     varying.min = a.min, varying.max = a.max;
+    if (varying.type == Type::kBool) varying.min = 0, varying.max = 1;
+    if (varying.type == Type::kEnum)
+      varying.min = 0, varying.max = static_cast<double>(a.enum_names.size()) - 1;
     const Value* held = table_.HeldValue(plug.node, plug.attribute, plug.element);
     varying.slot = AddSlot(SlotSize(varying.type));
     if (IsPointType(varying.type)) {

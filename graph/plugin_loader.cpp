@@ -82,7 +82,7 @@ Status PluginLoader::Load(const std::string& path) {
         "plugin \"{}\" is of ABI version {}, expected {}: compile it with the headers of this kpsa", path,
         version, kPluginAbi);
 
-  NodeRegistry added(NodeRegistry::Duplicates::kCollect);
+  NodeRegistry added;
   try {
     add(added);
   } catch (const std::exception& error) {
@@ -90,11 +90,13 @@ Status PluginLoader::Load(const std::string& path) {
   } catch (...) {
     return Status::Invalid("plugin \"{}\" failed to register its node types: unknown exception", path);
   }
-  if (!added.duplicates().empty())
-    return Status::Invalid("plugin \"{}\" registers the node type \"{}\" twice; expected each name once",
-                           path, added.duplicates().front());
+  if (const Status problems = added.status(); !problems.ok()) {
+    Status refused;
+    for (const Error& error : problems.errors())
+      refused.Append(Status::Invalid("plugin \"{}\": {}", path, error.message));
+    return refused;
+  }
   for (const std::string& name : added.Names()) {
-    if (name.empty()) return Status::Invalid("plugin \"{}\" registers a node type without a name", path);
     if (registry_->Find(name) == nullptr) continue;
     const auto from = origin_.find(name);
     return Status::Invalid(

@@ -69,17 +69,12 @@ FreeTransform FreePlugs(const Graph& graph, NodeId node) {
 }
 
 void SetPlug(Evaluator* evaluator, const PlugRef& plug, double value) {
-  const Plan& plan = evaluator->plan();
-  PlugRef whole = plug;
-  whole.component = -1;
-  Index varying = plan.FindVarying(plug);
-  if (varying == kNoIndex) varying = plan.FindVarying(whole);
-  if (varying == kNoIndex) return;
-  const Type type = plan.varying()[varying].type;
-  if (type == Type::kInt || type == Type::kBool || type == Type::kEnum) {
-    evaluator->SetInt(varying, static_cast<std::int64_t>(value));
+  const PlugHandle handle = evaluator->plan().Handle(plug);
+  if (!handle) return;
+  if (handle.IsWholeNumber()) {
+    evaluator->SetInt(handle.varying, static_cast<std::int64_t>(value));
   } else {
-    evaluator->Set(varying, value, type == Type::kDouble ? -1 : plug.component);
+    evaluator->Set(handle.varying, value, handle.component);
   }
 }
 

@@ -88,9 +88,13 @@ TEST_F(Plugins, BadLibrariesAreRefused) {
       {Broken("mute"), {"exports no kpsa_register", "KPSA_PLUGIN"}},
       {Broken("old"), {fmt::format("is of ABI version {}, expected {}", kPluginAbi - 1, kPluginAbi)}},
       {Broken("unresolved"), {"cannot be loaded", "a_function_that_nobody_has"}},
-      {Broken("twice"), {"registers the node type \"half\" twice"}},
+      {Broken("twice"), {"node type \"half\" is registered twice; expected each name once"}},
       {Broken("taken"), {"registers the node type \"transform\", which kpsa itself has already"}},
-      {Broken("nameless"), {"registers a node type without a name"}},
+      {Broken("nameless"), {"a node type has no name"}},
+      {Broken("mistyped"),
+       {"node type \"three\": compute takes 3 parameters; expected 2",
+        "attribute \"output\" (double): compute returns "
+        "an integer; expected double"}},
       {Broken("throwing"), {"no licence found"}},
   };
   for (const auto& [path, parts] : cases) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kpsa/space_points.h"
 #include "nodes/standard_nodes.h"
 
 namespace kpsa {
@@ -122,26 +123,13 @@ Status RigRun::Start(const std::string& path, const RigRunOptions& options) {
 void RigRun::Set(const std::string& name, double value, Evaluator* to) const {
   const Result<PlugRef> plug = rig.graph->FindPlug(name);
   ASSERT_TRUE(plug.ok()) << plug.status().ToString();
-  PlugRef whole = *plug;
-  whole.component = -1;
-  Index varying = plan->FindVarying(*plug);
-  if (varying == kNoIndex) varying = plan->FindVarying(whole);
-  ASSERT_NE(varying, kNoIndex) << name << " does not vary";
-  const Type type = plan->varying()[varying].type;
-  if (type == Type::kDouble || type == Type::kDouble3) {
-    to->Set(varying, value, type == Type::kDouble3 ? plug->component : -1);
-  } else {
-    to->SetInt(varying, std::llround(value));
-  }
+  ASSERT_TRUE(plan->Handle(*plug)) << name << " does not vary";
+  SetPlug(to, *plug, value);
 }
 
 void RigRun::Pose(std::span<const double> values, Evaluator* to) const {
-  for (std::size_t c = 0; c < rig.controls.size() && c < values.size(); ++c) {
-    const PlugRef& plug = rig.controls[c].plug;
-    const Index varying = plan->FindVarying(plug);
-    if (varying == kNoIndex) continue;  // a clip plays it
-    to->Set(varying, values[c], plan->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
-  }
+  for (std::size_t c = 0; c < rig.controls.size() && c < values.size(); ++c)
+    SetPlug(to, rig.controls[c].plug, values[c]);  // nothing where a clip plays it
 }
 
 RunFrame RigRun::Evaluate() {

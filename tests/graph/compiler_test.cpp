@@ -41,7 +41,7 @@ TEST_F(CompilerTest, RequestsThatNameWhatCannotVary) {
   g.request.outputs.pop_back();
   ASSERT_TRUE(g.compile().ok());
   // Setting what the request did not name
-  const Result<Index> varying = g.evaluator->FindVarying(g.graph, g.plug("b.b"));
+  const Result<PlugHandle> varying = g.evaluator->FindVarying(g.graph, g.plug("b.b"));
   EXPECT_EQ(varying.status().ToString(), "b.b does not vary in this plan: name it in Request::varying");
 }
 

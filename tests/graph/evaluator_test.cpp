@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
@@ -71,9 +73,58 @@ TEST(Evaluator, FoldsWhatDependsOnNothingThatVaries) {
   ASSERT_EQ(g.plan->excluded().size(), 1u);
   EXPECT_EQ(g.plan->excluded()[0].node_name, "constant");
   // A plug that was not named as varying cannot be set
-  const Result<Index> varying = g.evaluator->FindVarying(g.graph, g.plug("constant.a"));
+  const Result<PlugHandle> varying = g.evaluator->FindVarying(g.graph, g.plug("constant.a"));
   ASSERT_FALSE(varying.ok());
   EXPECT_NE(varying.status().ToString().find("constant.a"), std::string::npos);
+}
+
+TEST(Evaluator, ValuesFromOutsideAreCheckedAndARefusedOneChangesNothing) {
+  NodeRegistry registry;
+  registry.add("mixed", "One of each.")
+      .in("v", Double3{1, 2, 3}, {.min = -10, .max = 10})
+      .in("q", Quaternion{})
+      .in("count", 2)
+      .in("on", true)
+      .enumeration("side", {"left", "right"}, false)
+      .out("out", Type::kDouble)
+      .compute([](const Double3& v, const Quaternion& q, int count, bool on, int side) {
+        return v.x + 10 * v.y + 100 * v.z + q.w + count + (on ? 1000 : 0) + 10000 * side;
+      });
+  TestGraph g(registry);
+  g.add("mixed", "n");
+  for (const char* plug : {"n.v", "n.q", "n.count", "n.on", "n.side"}) g.vary(plug);
+  EXPECT_EQ(g.pull<double>("n.out"), 1324);
+  const auto set = [&](const char* name, const Value& value) {
+    const Result<PlugHandle> handle = g.evaluator->FindVarying(g.graph, g.plug(name));
+    EXPECT_TRUE(handle.ok()) << handle.status().ToString();
+    return g.evaluator->Set(*handle, value).ToString();
+  };
+  // A component, by the handle of its plug: this aborted the host
+  EXPECT_EQ(set("n.v.y", 5.0), "");
+  EXPECT_EQ(g.pull<double>("n.out"), 1354);
+  EXPECT_EQ(set("n.v.z", 4), "");
+  EXPECT_EQ(set("n.on", 0.0), "");
+  EXPECT_EQ(set("n.side", 1), "");
+  EXPECT_EQ(set("n.count", 7.0), "");
+  EXPECT_EQ(g.pull<double>("n.out"), 10459);
+
+  EXPECT_EQ(set("n.v", 5.0), "n.v: expected double3, got 5");
+  EXPECT_EQ(set("n.v.y", Double3{1, 1, 1}), "n.v.y: expected double, got [1, 1, 1]");
+  EXPECT_EQ(set("n.v.x", 11.0), "n.v.x: 11 is outside of [-10, 10]");
+  EXPECT_EQ(set("n.v.x", std::nan("")), "n.v.x: expected a finite value, got nan");
+  EXPECT_EQ(set("n.q", Double3{}), "n.q: expected quaternion, got [0, 0, 0]");
+  EXPECT_EQ(set("n.count", 2.5), "n.count: expected int, got 2.5");
+  EXPECT_EQ(set("n.count", 1e300), "n.count: expected int, got 1e+300");
+  EXPECT_EQ(set("n.on", 2), "n.on: 2 is outside of [0, 1]");
+  EXPECT_EQ(set("n.side", 2), "n.side: 2 is outside of [0, 1]");
+  EXPECT_EQ(set("n.side", "left"), "n.side: expected enum, got left");
+  EXPECT_FALSE(g.evaluator->Set(PlugHandle(), 1.0).ok());
+  EXPECT_FALSE(g.evaluator->Set(PlugHandle{999, -1, Type::kDouble}, 1.0).ok());
+  EXPECT_FALSE(g.evaluator->Set(PlugHandle{0, 7, Type::kDouble}, 1.0).ok());
+  EXPECT_FALSE(g.evaluator->Set(PlugHandle{0, -1, Type::kMatrix}, Matrix4{}).ok());
+  EXPECT_FALSE(g.evaluator->SetPoints(PlugHandle{0, -1, Type::kDouble3}, {}).ok());
+  EXPECT_EQ(g.pull<double>("n.out"), 10459);
+  EXPECT_EQ(g.computes("n"), 3u) << "a refused value made something stale";
 }
 
 TEST(Evaluator, ElementsOfPointArraysVaryByThemselves) {
@@ -96,10 +147,17 @@ TEST(Evaluator, ElementsOfPointArraysVaryByThemselves) {
   g.add("last", "n", {{"sheets[0]", PointBufferPtr(at(1))}, {"sheets[1]", PointBufferPtr(at(2))}});
   for (const char* plug : {"n.sheets[0]", "n.sheets[1]"}) g.vary(plug);
   EXPECT_EQ(g.pull<double>("n.out"), 12);
-  g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("n.sheets[1]")), at(5)->view());
+  EXPECT_TRUE(
+      g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("n.sheets[1]")), at(5)->view()).ok());
   EXPECT_EQ(g.pull<double>("n.out"), 15);
-  g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("n.sheets[0]")), at(3)->view());
+  EXPECT_TRUE(
+      g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("n.sheets[0]")), at(3)->view()).ok());
   EXPECT_EQ(g.pull<double>("n.out"), 35);
+  const PlugHandle whole = *g.evaluator->FindVarying(g.graph, g.plug("n.sheets[0]"));
+  const PointBuffer two = PointBuffer::FromInterleaved(std::vector<float>(6));
+  EXPECT_EQ(g.evaluator->SetPoints(whole, two.view()).ToString(), "n.sheets[0]: expected 1 points, got 2");
+  EXPECT_EQ(g.evaluator->SetPoints(whole, at(std::nanf(""))->view()).ToString(),
+            "n.sheets[0]: expected finite points");
 }
 
 TEST(Evaluator, ChildrenOfVectorsAsSourcesAndDestinations) {

@@ -54,13 +54,13 @@ void CompareFile(Compiler* compiler, Rig* rig, const ExpectedFile& file) {
   Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig->graph, request);
   ASSERT_TRUE(plan.ok()) << plan.status().ToString();
   Evaluator evaluator(*plan);
-  const Result<Index> time = evaluator.FindVarying(*rig->graph, rig->scene.time);
+  const Result<PlugHandle> time = evaluator.FindVarying(*rig->graph, rig->scene.time);
   ASSERT_TRUE(time.ok()) << time.status().ToString();
 
   double worst = 0;
   const std::size_t step = std::max<std::size_t>(1, expected.times.size() / kMaxFrames);
   for (std::size_t t = 0; t < expected.times.size(); t += step) {
-    evaluator.Set(*time, expected.times[t]);
+    ASSERT_TRUE(evaluator.Set(*time, expected.times[t]).ok());
     const Status status = evaluator.Evaluate();
     ASSERT_TRUE(status.ok()) << status.ToString();
     for (std::size_t m = 0; m < rig->scene.meshes.size(); ++m) {

@@ -56,15 +56,16 @@ std::vector<std::vector<float>> PlayedFrames(const Rig& rig, const PlugRef& poin
   Evaluator evaluator(*plan);
   for (int frame = 0; frame < 4; ++frame) {
     for (std::size_t v = 0; v < request.varying.size(); ++v) {
-      const Result<Index> varying = evaluator.FindVarying(*rig.graph, request.varying[v]);
-      if (!varying.ok()) continue;  // nothing wanted depends on it
+      const Result<PlugHandle> handle = evaluator.FindVarying(*rig.graph, request.varying[v]);
+      if (!handle.ok()) continue;  // nothing wanted depends on it
       if (v == 0) {
-        evaluator.Set(*varying, 0.25 * frame);
+        EXPECT_TRUE(evaluator.Set(*handle, 0.25 * frame).ok());
         continue;
       }
       const Control& control = rig.controls[v - 1];
       const double share = 0.5 + 0.45 * std::sin(1.7 * frame + static_cast<double>(v));
-      evaluator.Set(*varying, control.min + share * (control.max - control.min), control.plug.component);
+      const Status set = evaluator.Set(*handle, control.min + share * (control.max - control.min));
+      EXPECT_TRUE(set.ok()) << set.ToString();
     }
     const Status status = evaluator.Evaluate();
     EXPECT_TRUE(status.ok()) << status.ToString();

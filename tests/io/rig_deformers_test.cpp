@@ -164,9 +164,9 @@ TEST_F(RigDeformers, SomePointsHaveTheBitsOfAll) {
     EXPECT_TRUE(plan.ok()) << plan.status().ToString();
     Evaluator evaluator(*plan);
     for (const Control& control : rig->controls) {
-      const Result<Index> varying = evaluator.FindVarying(*rig->graph, control.plug);
-      EXPECT_TRUE(varying.ok());
-      evaluator.Set(*varying, control.unit == Unit::kLength ? 0.1 : 0.4, control.plug.component);
+      const Result<PlugHandle> handle = evaluator.FindVarying(*rig->graph, control.plug);
+      EXPECT_TRUE(handle.ok());
+      EXPECT_TRUE(evaluator.Set(*handle, control.unit == Unit::kLength ? 0.1 : 0.4).ok());
     }
     EXPECT_TRUE(evaluator.Evaluate().ok());
     const ConstPointsView view = evaluator.Points(0);

@@ -35,9 +35,10 @@ class RigPlayer {
     ASSERT_NE(evaluator_, nullptr);
     const Result<PlugRef> plug = rig.graph->FindPlug(name);
     ASSERT_TRUE(plug.ok()) << plug.status().ToString();
-    const Result<Index> varying = evaluator_->FindVarying(*rig.graph, *plug);
-    ASSERT_TRUE(varying.ok()) << varying.status().ToString();
-    evaluator_->Set(*varying, value, plug->component);
+    const Result<PlugHandle> handle = evaluator_->FindVarying(*rig.graph, *plug);
+    ASSERT_TRUE(handle.ok()) << handle.status().ToString();
+    const Status set = evaluator_->Set(*handle, value);
+    ASSERT_TRUE(set.ok()) << set.ToString();
     settings_.emplace_back(name, value);
   }
   // Points in their own order: of a mesh's last stage, or of one by name (head_mesh@skin is Points("skin",

@@ -79,8 +79,8 @@ TEST_F(ClipBatchTest, GivesTheSameBytesAsOneByOne) {
   for (double t : {0.0, -3.0, 0.1, 0.25, 0.6, 0.75, 0.7999, 1.1, 1.25, 7.0,
                    std::numeric_limits<double>::quiet_NaN(), 0.3}) {
     for (Evaluator* evaluator : {&together, g.evaluator.get()}) {  // the latter records: one by one
-      evaluator->Set(*evaluator->FindVarying(g.graph, g.plug("time.time")), t);
-      evaluator->Set(*evaluator->FindVarying(g.graph, g.plug("late.time")), t - 0.37);
+      evaluator->Set(evaluator->plan().FindVarying(g.plug("time.time")), t);
+      evaluator->Set(evaluator->plan().FindVarying(g.plug("late.time")), t - 0.37);
       ASSERT_TRUE(evaluator->Evaluate().ok());
     }
     for (int i = 0; i < kTransforms; ++i) {

@@ -81,17 +81,16 @@ double ValuesApart(const Value& a, const Value& b, Moves moves) {
 }
 
 void SetNow(TestGraph* g, const std::string& name, const Value& value) {
-  const Result<Index> varying = g->evaluator->FindVarying(g->graph, g->plug(name));
-  if (!varying.ok()) {
+  const Result<PlugHandle> handle = g->evaluator->FindVarying(g->graph, g->plug(name));
+  if (!handle.ok()) {
     ADD_FAILURE() << g->graph.def(g->plug(name).node).name << ": no output depends on " << name;
     return;
   }
-  if (const auto* number = value.get_if<double>()) g->evaluator->Set(*varying, *number);
-  if (const auto* number = value.get_if<std::int64_t>()) g->evaluator->SetInt(*varying, *number);
-  if (const auto* v = value.get_if<Double3>()) g->evaluator->Set(*varying, *v);
-  if (const auto* q = value.get_if<Quaternion>()) g->evaluator->Set(*varying, *q);
-  if (const auto* m = value.get_if<Matrix4>()) g->evaluator->Set(*varying, *m);
-  if (const PointBuffer* points = value.points()) g->evaluator->SetPoints(*varying, points->view());
+  if (value.get_if<std::string>() != nullptr) return;  // the choice stays
+  const PointBuffer* points = value.points();
+  const Status set = points != nullptr ? g->evaluator->SetPoints(*handle, points->view())
+                                       : g->evaluator->Set(*handle, value);
+  EXPECT_TRUE(set.ok()) << set.ToString();
 }
 
 Value OutputOf(const TestGraph& g, Index output) {

@@ -137,7 +137,8 @@ class SplineNode {
   void Move(const std::vector<float>& xyz) {
     ASSERT_TRUE(g.compile().ok());
     const PointBuffer points = PointBuffer::FromInterleaved(xyz);
-    g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("c.cv")), points.view());
+    ASSERT_TRUE(
+        g.evaluator->SetPoints(*g.evaluator->FindVarying(g.graph, g.plug("c.cv")), points.view()).ok());
   }
   TestGraph g;
 };

@@ -33,6 +33,12 @@ KPSA_PLUGIN(registry) {
   AddOne(registry, "wobble");
 #elif defined(KPSA_BROKEN_nameless)
   AddOne(registry, "");
+#elif defined(KPSA_BROKEN_mistyped)
+  registry.add("three", "Reads one value more than there are.")
+      .in("a", 0.0)
+      .in("b", 0.0)
+      .out("output", kpsa::Type::kDouble)
+      .compute([](double a, double b, double c) { return static_cast<int>(a + b + c); });
 #elif defined(KPSA_BROKEN_throwing)
   throw std::runtime_error("no licence found");
 #endif

@@ -75,14 +75,15 @@ class TestGraph {
   void set(const std::string& name, const T& value) {
     ASSERT_TRUE(compile().ok());
     const PlugRef p = plug(name);
-    Result<Index> varying = evaluator->FindVarying(graph, p);
-    ASSERT_TRUE(varying.ok()) << varying.status().ToString();
+    const Result<PlugHandle> handle = evaluator->FindVarying(graph, p);
+    ASSERT_TRUE(handle.ok()) << handle.status().ToString();
+    // Without the check of values: nodes must bear impossible ones
     if constexpr (std::is_integral_v<T>) {
-      evaluator->SetInt(*varying, value);
+      evaluator->SetInt(handle->varying, value);
     } else if constexpr (std::is_same_v<T, double>) {
-      evaluator->Set(*varying, value, p.component);
+      evaluator->Set(handle->varying, value, handle->component);
     } else {
-      evaluator->Set(*varying, value);
+      evaluator->Set(handle->varying, value);
     }
   }
   Status try_pull(const std::string& name) {

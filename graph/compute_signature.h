@@ -1,0 +1,103 @@
+// What the parameters and the result of a compute function say in C++, to be held against the attributes that
+// a node declares (graph/node_builder.h). What no attribute can be is refused by the compiler; whether number
+// and types agree is checked when the node type is registered.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/points.h"
+#include "base/types.h"
+#include "graph/compute_context.h"
+#include "graph/value.h"
+
+namespace kpsa {
+
+enum class SlotKind : std::uint8_t {
+  kBool,     // of Type::kBool
+  kInteger,  // of Type::kInt and kEnum
+  kChoice,   // a scoped enum: of Type::kEnum
+  kDouble,
+  kDouble3,
+  kQuaternion,
+  kMatrix,
+  kPoints,  // ConstPointsView: of points, colors and weights
+  kOther,   // of none
+};
+
+// The kind of slots that a C++ type reads and writes.
+template <typename T>
+constexpr SlotKind SlotKindOf() {
+  if constexpr (std::is_same_v<T, bool>)
+    return SlotKind::kBool;
+  else if constexpr (std::is_integral_v<T>)
+    return SlotKind::kInteger;
+  else if constexpr (std::is_enum_v<T>)
+    return SlotKind::kChoice;
+  else if constexpr (std::is_same_v<T, double>)
+    return SlotKind::kDouble;
+  else if constexpr (std::is_same_v<T, Double3>)
+    return SlotKind::kDouble3;
+  else if constexpr (std::is_same_v<T, Quaternion>)
+    return SlotKind::kQuaternion;
+  else if constexpr (std::is_same_v<T, Matrix4>)
+    return SlotKind::kMatrix;
+  else if constexpr (std::is_same_v<T, ConstPointsView>)
+    return SlotKind::kPoints;
+  else
+    return SlotKind::kOther;
+}
+
+struct ComputeParameter {
+  SlotKind kind = SlotKind::kOther;
+  bool array = false;  // ArrayView
+};
+
+// A parameter as it is written: T, const T& or ArrayView<T>.
+template <typename P>
+struct ParameterOf {
+  using Bare = std::remove_cv_t<std::remove_reference_t<P>>;
+  static_assert(!std::is_reference_v<P> || std::is_const_v<std::remove_reference_t<P>>,
+                "a compute reads its inputs: take them by value or by const reference");
+  static constexpr ComputeParameter value{SlotKindOf<Bare>(), false};
+  static_assert(value.kind != SlotKind::kOther,
+                "no attribute is of this parameter's type: take bool, an integer, an enum, double, Double3, "
+                "Quaternion, Matrix4, ConstPointsView, or an ArrayView of one of them");
+};
+template <typename T>
+struct ParameterOf<ArrayView<T>> {
+  static constexpr ComputeParameter value{SlotKindOf<T>(), true};
+  // Elements are read where they stand, eight bytes each at least
+  static_assert(value.kind != SlotKind::kOther && (!std::is_integral_v<T> || sizeof(T) == 8) &&
+                    !std::is_same_v<T, bool> && !std::is_enum_v<T>,
+                "no array attribute has elements of this type; those of bool, int and enum are std::int64_t");
+};
+template <typename T>
+struct ParameterOf<const ArrayView<T>&> : ParameterOf<ArrayView<T>> {};
+
+struct ComputeSignature {
+  std::vector<ComputeParameter> parameters;
+  ComputeParameter result;
+};
+
+template <typename R, typename... Args>
+ComputeSignature SignatureOf() {
+  static_assert(!std::is_reference_v<R>, "a compute returns its output by value");
+  static_assert(SlotKindOf<R>() != SlotKind::kOther && SlotKindOf<R>() != SlotKind::kPoints,
+                "no output is of this type: return bool, an integer, an enum, double, Double3, Quaternion or "
+                "Matrix4; points are written through a ComputeContext");
+  return {{ParameterOf<Args>::value...}, {SlotKindOf<R>(), false}};
+}
+
+struct NodeDef;
+struct ComputeGroup;
+
+// What is wrong with a function of this signature for that group of `def`, a sentence each; nothing if it
+// fits.
+std::vector<std::string> SignatureProblems(const NodeDef& def, const ComputeGroup& group,
+                                           const ComputeSignature& signature);
+
+}  // namespace kpsa
