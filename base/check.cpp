@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 void CheckFailed(const char* file, int line, const char* expression, const std::string& detail) {
   std::fprintf(stderr, "%s:%d: check failed: %s%s%s\n", file, line, expression, detail.empty() ? "" : ": ",
@@ -11,4 +11,4 @@ void CheckFailed(const char* file, int line, const char* expression, const std::
   std::abort();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

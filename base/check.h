@@ -6,7 +6,7 @@
 
 #include <string>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 [[noreturn]] void CheckFailed(const char* file, int line, const char* expression, const std::string& detail);
 
@@ -19,11 +19,11 @@ std::string CheckText(const T& value) {
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
 #define KPSA_CHECK(condition)                                                  \
   do {                                                                         \
-    if (!(condition)) ::kpsa::CheckFailed(__FILE__, __LINE__, #condition, ""); \
+    if (!(condition)) ::kpsa::engine::CheckFailed(__FILE__, __LINE__, #condition, ""); \
   } while (false)
 
 #define KPSA_CHECK_OP(a, op, b)                                                                 \
@@ -31,8 +31,8 @@ std::string CheckText(const T& value) {
     const auto& kpsa_a = (a);                                                                   \
     const auto& kpsa_b = (b);                                                                   \
     if (!(kpsa_a op kpsa_b))                                                                    \
-      ::kpsa::CheckFailed(__FILE__, __LINE__, #a " " #op " " #b,                                \
-                          ::kpsa::CheckText(kpsa_a) + " against " + ::kpsa::CheckText(kpsa_b)); \
+      ::kpsa::engine::CheckFailed(__FILE__, __LINE__, #a " " #op " " #b,                                \
+                          ::kpsa::engine::CheckText(kpsa_a) + " against " + ::kpsa::engine::CheckText(kpsa_b)); \
   } while (false)
 
 #define KPSA_CHECK_EQ(a, b) KPSA_CHECK_OP(a, ==, b)

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A bijective mix of 64 bits (xor-shift and odd multiplications).
@@ -44,4 +44,4 @@ Digest Hasher::Finish() const {
   return {a ^ Rotate(b, 17), b};
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

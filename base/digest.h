@@ -8,7 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct Digest {
   std::uint64_t lo = 0, hi = 0;
@@ -45,4 +45,4 @@ class Hasher {
   std::uint64_t length_ = 0;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,6 +1,6 @@
 #include "base/embree.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 RTCDevice EmbreeDevice() {
   static RTCDevice device = rtcNewDevice(nullptr);
@@ -32,4 +32,4 @@ RTCError RefitEmbreeScene(const EmbreeScene& scene, RTCGeometry geometry) {
   return rtcGetDeviceError(EmbreeDevice());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include <memory>
 #include <type_traits>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // One for the process (devices are costly, and every scene holds a reference). Null where Embree cannot
 // start.
@@ -25,4 +25,4 @@ EmbreeScene CommitEmbreeScene(RTCGeometry geometry, RTCError* error);
 // After the geometry has moved; its buffers must be marked before. The scene is of no use after an error.
 RTCError RefitEmbreeScene(const EmbreeScene& scene, RTCGeometry geometry);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

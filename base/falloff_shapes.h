@@ -6,7 +6,7 @@
 
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // How the weight gets from 0 at the rim to 1: t is 0 at the rim, 1 in the middle.
 enum class FalloffFade : std::uint8_t { kSmooth, kLinear };
@@ -38,4 +38,4 @@ inline double PlaneFalloff(Double3 p, Double3 at, Double3 normal, double from, d
   return Fade(fade, (to - Dot(p - at, normal)) / (to - from));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

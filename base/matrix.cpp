@@ -5,7 +5,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 namespace {
 
@@ -243,4 +243,4 @@ Double3 RotationVector(Quaternion q) {
   return {q.x * f, q.y * f, q.z * f};
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,7 +3,7 @@
 
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Matrix4 operator*(const Matrix4& a, const Matrix4& b);
 
@@ -47,4 +47,4 @@ Quaternion Slerp(Quaternion a, Quaternion b, double t);
 // Axis times angle in radians, |angle| <= pi, of a unit quaternion.
 Double3 RotationVector(Quaternion q);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -22,7 +22,7 @@ extern "C" const char* __tsan_default_suppressions() {
 }
 #endif
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // What a thread did before Publish, another one sees after Observe.
@@ -80,4 +80,4 @@ int AllowedThreads() {
   return static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

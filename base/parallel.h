@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <functional>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A reference to a callable; does not own it. Two pointers, so passing one allocates nothing.
 class RangeBody {
@@ -42,4 +42,4 @@ void WithThreads(int threads, const std::function<void()>& body);
 int HardwareThreads();
 int AllowedThreads();  // as limited
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

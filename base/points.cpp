@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 AlignedFloats::AlignedFloats(std::size_t size) : size_(size) {
   if (size == 0) return;
@@ -97,4 +97,4 @@ void CopyPoints(ConstPointsView in, PointsView out) {
   if (out.z != nullptr && in.z != out.z) std::memcpy(out.z, in.z, bytes);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr std::size_t kPointAlignment = 64;  // bytes
 inline constexpr std::size_t kPointPadding = 16;    // floats
@@ -89,4 +89,4 @@ struct CsrView {
   }
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

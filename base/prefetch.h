@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline void Prefetch(const void* begin, std::size_t bytes) {
   const auto at = reinterpret_cast<std::uintptr_t>(begin);
@@ -12,4 +12,4 @@ inline void Prefetch(const void* begin, std::size_t bytes) {
     __builtin_prefetch(reinterpret_cast<const void*>(line));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // pi/2 in three parts; the first two have trailing zero bits, so that k * part is exact for |k| < 2^20.
@@ -156,4 +156,4 @@ double Log(double x) {
   return exponent * 0.69314718055994530942 + 2 * (t + t * s);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,7 +3,7 @@
 // ulp.
 #pragma once
 
-namespace kpsa {
+namespace kpsa::engine {
 
 double Sin(double radians);
 double Cos(double radians);
@@ -19,4 +19,4 @@ inline constexpr double kPi = 3.14159265358979323846;
 // 3 t^2 - 2 t^3 of t in [0, 1].
 constexpr double Smoothstep(double t) { return t * t * (3 - 2 * t); }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -13,7 +13,7 @@
 #include "hwy/highway.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -38,7 +38,7 @@ HWY_INLINE V Fma(V a, V b, V c) {
 #endif
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #endif  // include guard

@@ -4,7 +4,7 @@
 
 #include "hwy/targets.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct Choice {
@@ -42,4 +42,4 @@ std::string SimdTargetName() {
   return "scalar";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 //   #undef HWY_TARGET_INCLUDE
 //   #define HWY_TARGET_INCLUDE "nodes/kernels/skin.cpp"
 //   #include "hwy/foreach_target.h"
-//   #include "base/simd-inl.h"        // kpsa::HWY_NAMESPACE::Fma and friends, after foreach_target
+//   #include "base/simd-inl.h"        // kpsa::engine::HWY_NAMESPACE::Fma and friends, after foreach_target
 //
 // All targets give the same bits: they have fused multiply-add, or emulate it lane by lane (base/simd-inl.h).
 // The environment variable KPSA_SIMD (avx512, avx2, scalar) limits the choice; ApplySimdChoice reads it.
@@ -12,7 +12,7 @@
 
 #include <string>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Reads KPSA_SIMD and restricts dispatch to that target; an unknown or unsupported name gives a message.
 // Returns "" if all is well. Call once at start, before the first kernel runs. Not thread-safe.
@@ -22,4 +22,4 @@ bool SelectSimdTarget(const std::string& name);
 // The name of the target in use.
 std::string SimdTargetName();
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include <atomic>
 #include <memory>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 template <typename T>
 class Spares {
@@ -45,4 +45,4 @@ class Spares {
   std::array<std::atomic<T*>, 64> free_ = {};
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::string SourceLocation::ToString() const {
   if (line <= 0) return file;
@@ -31,6 +31,13 @@ void Status::Append(Status other) {
 Status Status::At(const SourceLocation& where) && {
   for (Error& error : errors_) {
     if (error.where.file.empty()) error.where = where;
+  }
+  return std::move(*this);
+}
+
+Status Status::OfNode(std::string_view node) && {
+  for (Error& error : errors_) {
+    if (error.node.empty()) error.node = node;
   }
   return std::move(*this);
 }
@@ -90,4 +97,4 @@ std::string DidYouMean(std::string_view word, const std::vector<std::string>& ca
   return nearest == nullptr ? "" : fmt::format(" (did you mean \"{}\"?)", *nearest);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What kind of failure; the command line maps it to an exit code.
 enum class ErrorKind : std::uint8_t {
@@ -34,6 +34,7 @@ struct Error {
   ErrorKind kind = ErrorKind::kInvalidInput;
   SourceLocation where;
   std::string message;  // one sentence: what is wrong, what was expected, what to do; at most five lines
+  std::string node = {};  // that it is about, by its name in the graph; "" if none
   std::string ToString() const;  // "rig.yaml:41:7: message"
 };
 
@@ -65,6 +66,8 @@ class [[nodiscard]] Status {
   void Append(Status other);  // takes over the other's errors
   // The same errors, with a place for those that have none.
   Status At(const SourceLocation& where) &&;
+  // Likewise with a node.
+  Status OfNode(std::string_view node) &&;
   std::string ToString() const;  // one error a line
 
  private:
@@ -94,9 +97,9 @@ class [[nodiscard]] Result {
 // " (did you mean "envelope"?)" for the nearest of the candidates, or "" if none is near.
 std::string DidYouMean(std::string_view word, const std::vector<std::string>& candidates);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
 #define KPSA_RETURN_IF_ERROR(expression)                                                  \
   do {                                                                                    \
-    if (::kpsa::Status kpsa_status = (expression); !kpsa_status.ok()) return kpsa_status; \
+    if (::kpsa::engine::Status kpsa_status = (expression); !kpsa_status.ok()) return kpsa_status; \
   } while (false)

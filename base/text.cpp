@@ -1,6 +1,6 @@
 #include "base/text.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::string Thousands(std::uint64_t number) {
   std::string text = std::to_string(number);
@@ -18,4 +18,4 @@ std::size_t LongestBefore(char separator, std::string_view text,
   return std::string_view::npos;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::string Thousands(std::uint64_t number);  // 17,121
 
@@ -15,4 +15,4 @@ std::string Thousands(std::uint64_t number);  // 17,121
 std::size_t LongestBefore(char separator, std::string_view text,
                           const std::function<bool(std::string_view)>& known);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

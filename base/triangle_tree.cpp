@@ -7,7 +7,7 @@
 #include "base/check.h"
 #include "base/embree.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -347,4 +347,4 @@ LineHit TriangleTree::FirstHit(Double3 origin, Double3 direction) const {
   return line.best;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

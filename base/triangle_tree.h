@@ -19,7 +19,7 @@
 #include "base/points.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A place on a mesh: sum of weights[k] * corner k of the triangle.
 struct SurfacePoint {
@@ -70,4 +70,4 @@ class TriangleTree {
   std::unique_ptr<Impl> impl_;  // null without triangles
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -12,7 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 using Index = std::uint32_t;
 inline constexpr Index kNoIndex = 0xffffffffu;
@@ -53,7 +53,10 @@ struct Matrix4 {
   friend bool operator==(const Matrix4&, const Matrix4&) = default;
 };
 
+// What a number measures; the runtime counts in metres, radians and seconds.
+enum class Unit : std::uint8_t { kNone, kLength, kAngle, kTime };
+
 // The order in which rotations about the axes are applied: kXyz turns about X first, as Maya does.
 enum class RotateOrder : std::uint8_t { kXyz, kYzx, kZxy, kXzy, kYxz, kZyx };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

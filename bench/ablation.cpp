@@ -24,7 +24,7 @@
 #include "cli/common.h"
 #include "cli/frames_range.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 namespace {
 
 constexpr std::size_t kPointCounts[] = {10, 20, 40, 80};
@@ -147,6 +147,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation
 
-int main(int argc, char** argv) { return kpsa::ablation::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::ablation::Main(argc, argv); }

@@ -8,11 +8,11 @@
 
 #include "cli/bench_run.h"
 #include "cli/playback_times.h"
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "cli/table.h"
 #include "cli/tolerance_table.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -166,4 +166,4 @@ std::string PartsText(std::span<const PartsRow> rows) { return PartsTable(rows).
 
 std::string PartsMarkdown(std::span<const PartsRow> rows) { return PartsTable(rows).Markdown(); }
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

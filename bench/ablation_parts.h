@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "base/status.h"
-#include "kpsa/trainer.h"
+#include "kpsa/training/trainer.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 
 struct PartsOptions {
   std::string folder;  // for the subspaces
@@ -51,4 +51,4 @@ Result<std::vector<PartsRow>> CompareParts(const std::string& rig, std::span<con
 std::string PartsText(std::span<const PartsRow> rows);
 std::string PartsMarkdown(std::span<const PartsRow> rows);
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

@@ -6,10 +6,10 @@
 #include <random>
 
 #include "bench/ablation_q_deim.h"
-#include "kpsa/estimator.h"
-#include "kpsa/varimax.h"
+#include "kpsa/training/estimator.h"
+#include "kpsa/training/varimax.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 namespace {
 
 constexpr std::size_t kScalars = 80;
@@ -183,4 +183,4 @@ std::string PointsText(const PointsRow& row) {
   return text + "\n";
 }
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

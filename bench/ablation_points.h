@@ -10,7 +10,7 @@
 
 #include "bench/ablation_poses.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 
 struct PointsScore {
   double rms = 0, max = 0;  // of the test clip, % of the diagonal
@@ -30,4 +30,4 @@ void ComparePoints(AblationPoses* poses, std::span<const std::size_t> counts,
 std::string PointsHeader(std::span<const std::size_t> counts);
 std::string PointsText(const PointsRow& row);
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

@@ -4,15 +4,15 @@
 #include <chrono>
 #include <cmath>
 
-#include "io/npz.h"
-#include "kpsa/cue_places.h"
-#include "kpsa/mode_choice.h"
-#include "kpsa/poses.h"
-#include "kpsa/signal_noise.h"
-#include "kpsa/training_signals.h"
+#include "files/npz.h"
+#include "kpsa/training/cue_places.h"
+#include "kpsa/training/mode_choice.h"
+#include "kpsa/training/poses.h"
+#include "kpsa/training/signal_noise.h"
+#include "kpsa/training/training_signals.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 namespace {
 
 constexpr int kModes = 200;
@@ -235,4 +235,4 @@ Status AblationPoses::Dump(const std::string& path) const {
   return file->Finish();
 }
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

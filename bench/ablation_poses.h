@@ -6,11 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/rig_training.h"
 #include "graph/evaluator.h"
-#include "kpsa/pose_recorder.h"
+#include "host/rig_training.h"
+#include "kpsa/training/cue_selection.h"
+#include "kpsa/training/pca.h"
+#include "kpsa/training/pose_recorder.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 
 struct AblationPoses {
   AblationPoses() = default;
@@ -57,4 +59,4 @@ struct AblationPoses {
   std::vector<Index> totals_;  // points of each mesh
 };
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

@@ -3,7 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 namespace {
 
 constexpr double kSpanned = 1e-9;  // of the longest column: what is left of one that others span is rounding
@@ -61,4 +61,4 @@ std::vector<Index> QDeimPoints(const Eigen::MatrixXd& modes, int components, std
   return points;
 }
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

@@ -7,7 +7,7 @@
 
 #include "base/types.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 
 // The first `count` pivots of a QR factorisation of the transposed modes [cN x M] with column pivoting. A
 // point's c rows are one pivot: the point is taken of whose rows most (Frobenius norm) is outside of the span
@@ -15,4 +15,4 @@ namespace kpsa::ablation {
 // the others.
 std::vector<Index> QDeimPoints(const Eigen::MatrixXd& modes, int components, std::size_t count);
 
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

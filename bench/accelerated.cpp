@@ -14,7 +14,7 @@
 #include "cli/acceleration.h"
 #include "cli/rig_frames.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -138,6 +138,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
-int main(int argc, char** argv) { return kpsa::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::Main(argc, argv); }

@@ -18,7 +18,7 @@
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kGoalColdNs = 25, kGoalBytes = 200;  // a node
@@ -277,6 +277,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
-int main(int argc, char** argv) { return kpsa::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::Main(argc, argv); }

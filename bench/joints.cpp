@@ -10,10 +10,10 @@
 
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
-#include "io/rig_builder.h"
+#include "rig/build/rig_builder.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -121,6 +121,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
-int main(int argc, char** argv) { return kpsa::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::Main(argc, argv); }

@@ -22,7 +22,7 @@
 #include "nodes/kernels/wrap.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct Float3 {
@@ -489,6 +489,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
-int main(int argc, char** argv) { return kpsa::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::Main(argc, argv); }

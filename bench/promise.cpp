@@ -17,9 +17,9 @@
 
 #include "bench/promise_table.h"
 #include "cli/frames_range.h"
-#include "io/rig_writer.h"
+#include "rig/build/writer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 namespace fs = std::filesystem;
@@ -266,6 +266,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
-int main(int argc, char** argv) { return kpsa::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::Main(argc, argv); }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Away from the trainer's own: it takes its seed, and that seed with constants over it.
@@ -157,4 +157,4 @@ Result<std::vector<PromiseWalk>> DrawWalks(PromiseRig* rig, std::size_t most, st
   return walks;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 
 #include "bench/promise_rig.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class TrialKind : std::uint8_t {
   kSampler,   // as the trainer draws them: what the promise is about
@@ -27,4 +27,4 @@ Result<std::vector<PromisePose>> DrawPoses(PromiseRig* rig, TrialKind kind, std:
 // controls, else `most` evenly chosen ones. Other seeds take the other end and other controls.
 Result<std::vector<PromiseWalk>> DrawWalks(PromiseRig* rig, std::size_t most, std::uint64_t seed);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,14 +8,14 @@
 
 #include "base/parallel.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "graph/evaluator.h"
 #include "kpsa/accelerate.h"
-#include "kpsa/control_groups.h"
-#include "kpsa/mode_choice.h"
-#include "kpsa/pose_recorder.h"
+#include "kpsa/training/control_groups.h"
+#include "kpsa/training/mode_choice.h"
+#include "kpsa/training/pose_recorder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // What training takes of an accelerate entry (cli/cmd_train.cpp does the same).
@@ -230,7 +230,7 @@ Result<std::vector<PromisePose>> PromiseRig::Sample(std::size_t count, std::uint
 Result<PromiseTraining> PromiseRig::Train(double tolerance, std::uint64_t seed) {
   const std::vector<TrainingClip> trained(clips_.begin(),
                                           clips_.begin() + static_cast<std::ptrdiff_t>(trained_clips_));
-  Result<Subspace> subspace = kpsa::Train(training_rig_, trained, OptionsOf(entry_, tolerance, seed));
+  Result<Subspace> subspace = kpsa::engine::Train(training_rig_, trained, OptionsOf(entry_, tolerance, seed));
   if (!subspace.ok()) return Status(subspace.status()).At({path_});
   PromiseTraining training;
   training.subspace_ = std::make_shared<const Subspace>(std::move(*subspace));
@@ -362,4 +362,4 @@ Result<std::vector<std::vector<PromiseJump>>> PromiseRig::Walk(const std::vector
   return jumps;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -15,11 +15,11 @@
 #include "base/status.h"
 #include "cli/common.h"
 #include "graph/plan.h"
-#include "kpsa/poses.h"
+#include "kpsa/training/poses.h"
 #include "kpsa/subspace.h"
-#include "kpsa/trainer.h"
+#include "kpsa/training/trainer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct PromisePose {
   int clip = -1;               // of PromiseRig::clips(); below 0: the rest pose
@@ -109,4 +109,4 @@ class PromiseRig {
   std::map<int, std::shared_ptr<const Plan>> full_plans_;  // by clip
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "cli/table.h"
 #include "kpsa/binomial.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kConfidence = 0.95;
@@ -139,4 +139,4 @@ std::string PromiseMarkdown(std::span<const PromiseRow> rows, std::span<const Wa
          WalkTable(walks).Markdown();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

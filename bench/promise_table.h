@@ -8,7 +8,7 @@
 
 #include "bench/promise_poses.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What was trained.
 struct PromiseCase {
@@ -46,4 +46,4 @@ std::string PromiseText(std::span<const PromiseRow> rows, std::span<const WalkRo
 // A table of rigs and tolerances, all seeds together, and then all rows.
 std::string PromiseMarkdown(std::span<const PromiseRow> rows, std::span<const WalkRow> walks);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

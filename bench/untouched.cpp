@@ -17,7 +17,7 @@
 #include "cli/common.h"
 #include "cli/frames_range.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 namespace fs = std::filesystem;
@@ -158,6 +158,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched
 
-int main(int argc, char** argv) { return kpsa::untouched::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::untouched::Main(argc, argv); }

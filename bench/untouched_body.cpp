@@ -5,7 +5,7 @@
 #include "bench/untouched_design.h"
 #include "scenes/implicit.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 using scenes::Cone;
@@ -281,4 +281,4 @@ class Body {
 
 Design DesignBody(std::uint64_t seed) { return Body(seed).Make(); }
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

@@ -8,7 +8,7 @@
 #include "base/matrix.h"
 #include "bench/untouched_motion.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 using scenes::Float3;
@@ -245,4 +245,4 @@ scenes::GlbScene MakeCharacter(Kind kind, std::uint64_t seed, std::size_t points
 
 std::string TestClip(Kind kind) { return MakeDesign(kind, 1).clips.back().name; }
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

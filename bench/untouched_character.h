@@ -8,7 +8,7 @@
 #include "bench/untouched_surface.h"
 #include "scenes/glb_writer.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 
 enum class Kind : std::uint8_t { kBody, kHead, kCreature };
 inline constexpr std::array kKinds{Kind::kBody, Kind::kHead, Kind::kCreature};
@@ -25,4 +25,4 @@ std::string TestClip(Kind kind);
 // hangs on it or it hangs on; smoothed over the surface. The four strongest.
 std::vector<scenes::Influences> WeighSurface(const Design& design, const Part& part, const Surface& surface);
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

@@ -6,7 +6,7 @@
 #include "bench/untouched_design.h"
 #include "scenes/implicit.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 using scenes::Cone;
@@ -99,4 +99,4 @@ Design DesignCreature(std::uint64_t seed) {
   return design;
 }
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

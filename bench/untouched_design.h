@@ -9,9 +9,9 @@
 
 #include "base/scalar_math.h"
 #include "base/types.h"
-#include "kpsa/random.h"
+#include "kpsa/training/random.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 
 // A joint at `at` whose X axis points to `tip`; turning about its Z axis, which is near `hinge`, bends it.
 struct Bone {
@@ -99,4 +99,4 @@ Design DesignBody(std::uint64_t seed);
 Design DesignHead(std::uint64_t seed);
 Design DesignCreature(std::uint64_t seed);
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

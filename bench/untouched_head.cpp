@@ -5,7 +5,7 @@
 #include "bench/untouched_design.h"
 #include "scenes/implicit.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 using scenes::Cone;
@@ -249,4 +249,4 @@ class Head {
 
 Design DesignHead(std::uint64_t seed) { return Head(seed).Make(); }
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

@@ -6,7 +6,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 constexpr double kInEvent = 0.6;        // odds of a group,
@@ -203,4 +203,4 @@ Curves MakeCurves(const Design& design, const ClipDesign& clip, std::uint64_t se
   return Maker(design, clip, seed).Make();
 }
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

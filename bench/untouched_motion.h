@@ -5,7 +5,7 @@
 
 #include "bench/untouched_design.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 
 inline constexpr double kClipFps = 30;
 
@@ -15,4 +15,4 @@ inline constexpr double kClipFps = 30;
 using Curves = std::vector<std::vector<double>>;
 Curves MakeCurves(const Design& design, const ClipDesign& clip, std::uint64_t seed);
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

@@ -16,10 +16,10 @@
 
 #include "cli/common.h"
 #include "cli/table.h"
-#include "io/file.h"
-#include "io/gltf_import.h"
+#include "files/file.h"
+#include "gltf/import.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 namespace fs = std::filesystem;
@@ -135,4 +135,4 @@ std::string RowsText(std::span<const Row> rows) { return MakeTable(rows).Text();
 
 std::string RowsMarkdown(std::span<const Row> rows) { return MakeTable(rows).Markdown(); }
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

@@ -7,7 +7,7 @@
 
 #include "base/status.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 
 // Figures as `kpsa train --json` and `kpsa bench --json` give them.
 struct Row {
@@ -32,4 +32,4 @@ Result<Row> TryCharacter(const std::string& program, const std::string& name, co
 std::string RowsText(std::span<const Row> rows);
 std::string RowsMarkdown(std::span<const Row> rows);
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

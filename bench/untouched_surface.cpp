@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 constexpr int kSearches = 5;  // for the size of a cell
@@ -172,4 +172,4 @@ Surface MakeSurface(const Part& part, std::size_t points) {
   return best;
 }
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

@@ -5,7 +5,7 @@
 
 #include "bench/untouched_design.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 
 struct Surface {
   std::vector<Double3> points;
@@ -16,4 +16,4 @@ struct Surface {
 // About so many points: within a few per cent, unless that is less than what the shape needs at all.
 Surface MakeSurface(const Part& part, std::size_t points);
 
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

@@ -1,73 +1,11 @@
 #include "cli/acceleration.h"
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-
 #include "cli/frames_range.h"
 #include "cli/options.h"
-#include "cli/request.h"
-#include "cli/rig_training.h"
-#include "io/quantity.h"
-#include "kpsa/accelerate.h"
+#include "files/quantity.h"
+#include "kpsa/kpsa_node.h"
 
-namespace kpsa {
-namespace {
-
-std::vector<std::string> PointNames(const Subspace& subspace) {
-  std::vector<std::string> names;
-  for (const SubspaceOutput& output : subspace.outputs) names.push_back(output.name);
-  return names;
-}
-
-// An entry for a rig that has none: what the subspace says of itself.
-Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std::string& path) {
-  Acceleration entry;
-  entry.name = std::filesystem::path(path).stem().string();
-  for (const SubspaceOutput& output : subspace.outputs) {
-    if (const Result<PlugRef> plug = rig.graph->FindPlug(output.name);
-        plug.ok() && rig.graph->PlugType(*plug) == Type::kColors) {
-      entry.points.push_back({0, 0, *plug, true});
-      continue;
-    }
-    const Result<MeshStage> found = FindMeshStage(rig, output.name);
-    if (!found.ok())
-      return Status::Invalid("the subspace is for {}; {}", output.name,
-                             found.status().errors().front().message)
-          .At({path});
-    AcceleratedPoints points;
-    points.mesh = static_cast<std::size_t>(found->mesh - rig.scene.meshes.data());
-    points.points = found->points;
-    while (!(found->mesh->stages[points.stage].points == found->points)) ++points.stage;
-    entry.points.push_back(points);
-  }
-  if (!subspace.space.empty()) {
-    const Result<NodeId> space = rig.graph->FindNode(subspace.space);
-    if (!space.ok()) return Status(space.status()).At({path});
-    entry.space = *space;
-  }
-  return entry;
-}
-
-// `rig`: the path of the one that is trained for it.
-Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, const std::string& path,
-                                                     bool with_modes) {
-  std::error_code error;
-  if (!std::filesystem::exists(path, error))
-    return Status::Invalid("no such file; kpsa train {} writes it", rig).At({path});
-  Result<Subspace> subspace = ReadSubspace(path, with_modes ? KeptModes::kRead : KeptModes::kSkip);
-  if (!subspace.ok()) return subspace.status();
-  return std::make_shared<const Subspace>(std::move(*subspace));
-}
-
-}  // namespace
-
-std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
-  std::vector<std::string> names;
-  for (const AccelerationTarget::MeshPoints& points : MakeTarget(rig, entry).meshes)
-    names.push_back(points.name);
-  return names;
-}
+namespace kpsa::engine {
 
 void AddAccelerationFlags(CLI::App* command, AccelerationFlags* flags) {
   AddSwitch(command, "--accelerate", &flags->accelerate, "with the rig's own subspaces");
@@ -125,95 +63,20 @@ Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted) {
   return Status();
 }
 
+AccelerationChoice ChoiceOf(const AccelerationFlags& flags) {
+  AccelerationChoice choice;
+  choice.subspace = flags.kpsa.value_or("");
+  if (flags.tolerance.has_value()) choice.tolerance = *ParseTolerance(*flags.tolerance);
+  if (flags.violation_rate.has_value()) choice.violation_rate = *ParseRate(*flags.violation_rate);
+  choice.stale_is_miss = flags.stale == "miss";
+  choice.every_frame = flags.every_frame;
+  choice.with_modes = flags.with_modes;
+  return choice;
+}
+
 Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compiler,
                                                        const AccelerationFlags& flags) {
-  std::vector<AppliedSubspace> applied;
-  if (flags.kpsa.has_value()) {
-    const auto subspace = LoadSubspace(rig->path, *flags.kpsa, flags.with_modes);
-    if (!subspace.ok()) return subspace.status();
-    AppliedSubspace one;
-    one.subspace = *subspace;
-    one.path = *flags.kpsa;
-    const auto found = std::find_if(
-        rig->accelerate.begin(), rig->accelerate.end(),
-        [&](const Acceleration& entry) { return PointNames(*rig, entry) == PointNames(**subspace); });
-    if (found != rig->accelerate.end()) {
-      one.entry = *found;
-    } else {
-      Result<Acceleration> entry = EntryOf(*rig, **subspace, *flags.kpsa);
-      if (!entry.ok()) return entry.status();
-      one.entry = std::move(*entry);
-    }
-    applied.push_back(std::move(one));
-  } else {
-    if (rig->accelerate.empty())
-      return Status::Invalid("has no accelerate section, so nothing to accelerate; --kpsa names a subspace")
-          .At({rig->path});
-    for (const Acceleration& entry : rig->accelerate) {
-      if (entry.subspace.empty())
-        return Status::Invalid("accelerate: \"{}\" names no subspace file; --kpsa names one", entry.name)
-            .At(entry.where);
-      const auto subspace = LoadSubspace(
-          entry.reference < 0 ? rig->path : rig->references[static_cast<std::size_t>(entry.reference)].file,
-          entry.subspace, flags.with_modes);
-      if (!subspace.ok()) return subspace.status();
-      AppliedSubspace one;
-      one.path = entry.subspace;
-      one.entry = entry;
-      one.subspace = *subspace;
-      applied.push_back(std::move(one));
-    }
-  }
-  Accelerator accelerator(rig->graph.get(), compiler);
-  for (AppliedSubspace& one : applied) {
-    one.name = one.entry.name;
-    AccelerateOptions options;
-    options.stale_is_miss = flags.stale.has_value() && *flags.stale == "miss";
-    if (flags.tolerance.has_value()) options.tolerance = *ParseTolerance(*flags.tolerance);
-    if (flags.violation_rate.has_value()) options.violation_rate = *ParseRate(*flags.violation_rate);
-    one.tolerance = options.tolerance < 0 ? one.subspace->tolerance : options.tolerance;
-    if (flags.every_frame) options.tolerance = kAnyError;
-    one.violation_rate = options.violation_rate < 0 ? one.subspace->violation_rate : options.violation_rate;
-    KPSA_RETURN_IF_ERROR(accelerator
-                             .Add(MakeTarget(*rig, one.entry), one.subspace,
-                                  rig->graph->FreeNodeName(one.name + "_kpsa"), options)
-                             .At({one.path}));
-  }
-  Result<std::vector<Accelerated>> accelerated = accelerator.Apply();
-  if (!accelerated.ok()) return Status(accelerated.status()).At({rig->path});
-  for (std::size_t e = 0; e < applied.size(); ++e) {
-    AppliedSubspace& one = applied[e];
-    one.node = (*accelerated)[e].node;
-    one.config = (*accelerated)[e].config;
-    one.notes = std::move((*accelerated)[e].notes);
-    const NodeDef& def = rig->graph->def(one.node);
-    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
-      if (one.entry.points[p].colors) continue;
-      CharacterMesh& mesh = rig->scene.meshes[one.entry.points[p].mesh];
-      if (mesh.points == mesh.stages[one.entry.points[p].stage].points) {
-        mesh.points = {one.node, def.FindAttribute("outPoints"), static_cast<int>(p), -1};
-      }
-    }
-  }
-  return applied;
+  return ApplyAcceleration(rig, compiler, ChoiceOf(flags));
 }
 
-void ReadColorsFrom(const std::vector<AppliedSubspace>& applied, const Graph& graph, Request* request) {
-  for (const AppliedSubspace& one : applied) {
-    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
-      if (!one.entry.points[p].colors) continue;
-      for (RequestedOutput& output : request->outputs) {
-        if (output.plug == one.entry.points[p].points) output.plug = one.Output(graph, p);
-      }
-    }
-  }
-}
-
-Calibration CalibrationInForce(const AppliedSubspace& applied) {
-  const Subspace& s = *applied.subspace;
-  const double tolerance =
-      applied.tolerance >= kAnyError ? std::numeric_limits<double>::infinity() : applied.tolerance;
-  return Calibrate(s.calibration, tolerance, applied.violation_rate, s.blend_start);
-}
-
-}  // namespace kpsa
+}  // namespace kpsa::engine

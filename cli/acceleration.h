@@ -1,19 +1,14 @@
-// A rig with subspaces in the place of its stacks, as --accelerate and --kpsa ask for.
+// Flags that ask for subspaces in the place of a rig's stacks: --accelerate, --kpsa and their kin.
 #pragma once
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/common.h"
-#include "graph/compiler.h"
-#include "kpsa/calibration.h"
+#include "host/acceleration.h"
 
-namespace kpsa {
-
-class KpsaConfig;
-struct Subspace;
+namespace kpsa::engine {
 
 struct AccelerationFlags {
   bool accelerate = false;
@@ -34,37 +29,9 @@ Result<double> ParseLength(const std::string& what, const std::string& text);
 Result<double> ParseTolerance(const std::string& text);
 Result<double> ParseRate(const std::string& text);
 
-// What an entry accelerates, as its subspace calls it: "head_mesh@mush" without the namespace of a reference,
-// or the plug of colours.
-std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry);
-
-// One accelerate entry of the rig with its subspace in place.
-struct AppliedSubspace {
-  std::string name;  // of the entry
-  std::string path;  // of the subspace file
-  Acceleration entry;
-  std::shared_ptr<const Subspace> subspace;
-  NodeId node;                               // the KPSA node
-  std::shared_ptr<const KpsaConfig> config;  // of the node
-  std::vector<std::string> notes;            // what may surprise
-  double tolerance = 0, violation_rate = 0;  // in force
-  // What takes the place of entry.points[p].
-  PlugRef Output(const Graph& graph, std::size_t p) const {
-    return {node, graph.def(node).FindAttribute("outPoints"), static_cast<int>(p), -1};
-  }
-};
-
-// Rewrites the rig's graph; final points that are accelerated are then those of the KPSA node
-// (CharacterMesh::points). Call it with the clip and the settings in place that will be evaluated. --kpsa M
-// replaces the file of the entry that has the same points; a rig without entries gets one from the subspace.
-// Errors: no such file (and which command makes it), a stale subspace (unless `stale` is "miss").
+// As the flags say, which CheckAccelerationFlags found fit.
+AccelerationChoice ChoiceOf(const AccelerationFlags& flags);
 Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compiler,
                                                        const AccelerationFlags& flags);
 
-// Colours that an entry accelerates are asked of its node instead.
-void ReadColorsFrom(const std::vector<AppliedSubspace>& applied, const Graph& graph, Request* request);
-
-// The thresholds that the node of an entry works with, and what they promise.
-Calibration CalibrationInForce(const AppliedSubspace& applied);
-
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "cli/frames_range.h"
 #include "cli/rig_frames.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMostFrames = 48;  // of a clip
@@ -226,4 +226,4 @@ Result<IdleDeformers> MeasureIdle(const Flags& flags, const std::vector<std::str
   return idle;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

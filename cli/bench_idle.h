@@ -12,7 +12,7 @@
 
 #include "cli/common.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct IdleDeformers {
   struct Deformer {
@@ -34,4 +34,4 @@ struct IdleDeformers {
 Result<IdleDeformers> MeasureIdle(const Flags& flags, const std::vector<std::string>& clips, double tolerance,
                                   const std::map<std::string, double>& full_ms);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

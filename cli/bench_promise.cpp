@@ -5,7 +5,7 @@
 
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double Share(std::size_t part, std::size_t all) {
@@ -68,4 +68,4 @@ std::string Promise::Text(const std::string& indent) const {
   return text;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 
 #include "cli/verdicts.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct Promise {
   double tolerance = 0;  // kAnyError: nothing is promised
@@ -32,4 +32,4 @@ struct Promise {
   std::string Text(const std::string& indent) const;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

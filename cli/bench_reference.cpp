@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
-#include "kpsa/mode_choice.h"
+#include "host/rig_training.h"
+#include "kpsa/training/mode_choice.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMostColors = 10'000;  // of a picture: a reference takes long, and so many tell an RMS
@@ -134,4 +134,4 @@ ReferenceTable BenchReference::Table(std::size_t accelerated, double full_ms, do
   return table;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 #include "cli/bench_side.h"
 #include "cli/common.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // One evaluation.
 struct FromReference {
@@ -60,4 +60,4 @@ class BenchReference {
   std::size_t rival_frames_ = 0;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "cli/table.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using OrderedJson = nlohmann::ordered_json;
@@ -335,4 +335,4 @@ std::string BenchText(const std::vector<BenchResult>& results, const BenchContex
   return text + fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

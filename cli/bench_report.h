@@ -5,7 +5,7 @@
 
 #include "cli/bench_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct BenchContext {
   std::string rig;                // as the user named it
@@ -21,4 +21,4 @@ std::string BenchText(const std::vector<BenchResult>& results, const BenchContex
 // A table of all frames, for every side.
 std::string FramesText(const std::vector<BenchResult>& results);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

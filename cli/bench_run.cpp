@@ -15,11 +15,11 @@
 #include "cli/point_errors.h"
 #include "cli/progress.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/training_record.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Sums over clips; divided by frames at the end.
@@ -521,4 +521,4 @@ Result<std::vector<BenchResult>> RunBench(const Flags& flags, const std::vector<
   return bench.Finish();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -19,7 +19,7 @@
 #include "cli/verdicts.h"
 #include "graph/plan_report.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct BenchOptions {
   int runs = 5;
@@ -102,4 +102,4 @@ struct BenchResult {
 Result<std::vector<BenchResult>> RunBench(const Flags& flags, const std::vector<AccelerationFlags>& sides,
                                           const std::vector<std::string>& clips, const BenchOptions& options);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

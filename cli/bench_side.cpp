@@ -5,7 +5,7 @@
 #include "cli/common.h"
 #include "graph/plan_report.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kMostRepeats = 3;                   // of a frame that is interrupted while it is recorded
@@ -124,4 +124,4 @@ Status Side::RecordTurn(const std::vector<double>& at, std::size_t first, std::s
   return Status();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,10 +7,10 @@
 
 #include "cli/frame_times.h"
 #include "graph/evaluator.h"
-#include "io/rig_builder.h"
 #include "kpsa/kpsa_node.h"
+#include "rig/build/rig_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr std::size_t kTurnFrames =
     128;  // of one side, before another runs them: some seconds of playback
@@ -54,4 +54,4 @@ struct Side {
   }
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

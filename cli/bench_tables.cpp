@@ -8,11 +8,11 @@
 
 #include "cli/common.h"
 #include "cli/table.h"
-#include "io/file.h"
-#include "io/json_depth.h"
+#include "files/file.h"
+#include "files/json_depth.h"
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using BenchJsonValue = nlohmann::json;
@@ -276,4 +276,4 @@ Result<std::vector<LinePlot>> BenchPlots(const std::string& path) {
   return plots;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

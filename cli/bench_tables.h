@@ -7,7 +7,7 @@
 #include "base/status.h"
 #include "cli/line_plot.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct BenchDocument {
   std::string path;
@@ -22,4 +22,4 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents, boo
 // reconstructed; and the error with SoftCache, misses marked. Errors also: no side has them.
 Result<std::vector<LinePlot>> BenchPlots(const std::string& path);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

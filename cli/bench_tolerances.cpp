@@ -7,7 +7,7 @@
 #include "cli/rig_frames.h"
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // As of CalibrationPair::error.
@@ -164,4 +164,4 @@ ToleranceTable BenchTolerances::Table(double full_ms, double hit_ms, double mean
                             [&](double tolerance) { return At(tolerance, full_ms, hit_ms, miss); });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -12,7 +12,7 @@
 #include "cli/tolerance_table.h"
 #include "cli/verdicts.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class BenchTolerances {
  public:
@@ -62,4 +62,4 @@ class BenchTolerances {
   std::vector<std::size_t> node_of_output_;  // or as many as there are nodes: of none, it depends on any
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

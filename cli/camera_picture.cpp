@@ -7,7 +7,7 @@
 #include "cli/frames_range.h"
 #include "nodes/illumination.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kAreaSamples = 16;  // shadow rays a pixel and light that has a size
@@ -256,4 +256,4 @@ Image Develop(const CameraImage& picture, double exposure, CameraLayer layer) {
   return image;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

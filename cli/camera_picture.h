@@ -12,7 +12,7 @@
 #include "cli/verdicts.h"
 #include "nodes/kernels/path_tracer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct CameraView {
   PlugRef world_from_screen;
@@ -57,4 +57,4 @@ Image Develop(const CameraImage& picture, double exposure, CameraLayer layer = C
 // (irradiance).
 Image LightError(const CameraImage& a, const CameraImage& b, double error_max);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kpsa/control_groups.h"
-#include "kpsa/pose_recorder.h"
+#include "kpsa/training/control_groups.h"
+#include "kpsa/training/pose_recorder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kShown = 3;  // controls of a pose
@@ -63,4 +63,4 @@ std::string PoseText(const Rig& rig, const TrainingRig& training, const std::vec
   return text;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

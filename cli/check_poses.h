@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "io/rig_builder.h"
-#include "kpsa/trainer.h"
+#include "kpsa/training/trainer.h"
+#include "rig/build/rig_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // `groups`: mix controls that act together as well, as training on samples does; costs two poses a control.
 Result<std::vector<SampledPose>> DrawNewPoses(const TrainingRig& training, Compiler* compiler,
@@ -20,4 +20,4 @@ double TimeOf(const SampledPose& pose, const std::vector<TrainingClip>& clips);
 std::string PoseText(const Rig& rig, const TrainingRig& training, const std::vector<TrainingClip>& clips,
                      const SampledPose& pose);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

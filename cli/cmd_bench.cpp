@@ -8,7 +8,7 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct BenchFlags : Flags {
@@ -172,4 +172,4 @@ void AddBenchCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,9 +10,9 @@
 #include "cli/options.h"
 #include "cli/table.h"
 #include "cli/vertex_compare.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct CompareFlags : Flags {
@@ -125,4 +125,4 @@ void AddCompareCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

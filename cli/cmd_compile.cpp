@@ -9,11 +9,11 @@
 #include "cli/options.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
 #include "cli/table.h"
 #include "graph/plan_report.h"
+#include "host/rig_training.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct CompileFlags : Flags {
@@ -129,4 +129,4 @@ void AddCompileCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

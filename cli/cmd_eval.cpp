@@ -14,7 +14,7 @@
 #include "cli/verdicts.h"
 #include "cli/vertex_output.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct EvalFlags : Flags {
@@ -148,4 +148,4 @@ void AddEvalCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

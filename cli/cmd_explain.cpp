@@ -16,7 +16,7 @@
 #include "graph/explain.h"
 #include "graph/plan_report.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct ExplainFlags : Flags {
@@ -237,4 +237,4 @@ void AddExplainCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,10 +5,10 @@
 #include "cli/common.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "io/file.h"
-#include "io/rig_format.h"
+#include "files/file.h"
+#include "rig/file/format.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct FmtFlags {
@@ -121,4 +121,4 @@ void AddFmtCommand(CLI::App* program, Command* chosen) {
   AddSwitch(command, "-q,--quiet", &flags->quiet, "no messages but errors");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,9 +11,9 @@
 #include "cli/plug_columns.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // RFC 4180
@@ -160,4 +160,4 @@ void AddGetCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

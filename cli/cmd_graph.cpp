@@ -9,7 +9,7 @@
 #include "cli/rig_frames.h"
 #include "graph/dot.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct GraphFlags : Flags {
@@ -76,4 +76,4 @@ void AddGraphCommand(CLI::App* program, Command* chosen) {
   AddSwitch(command, "--all", &flags->all, "draw the nodes that are left out, too");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

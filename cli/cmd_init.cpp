@@ -6,9 +6,9 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "io/rig_writer.h"
+#include "rig/build/writer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 namespace fs = std::filesystem;
@@ -73,4 +73,4 @@ void AddInitCommand(CLI::App* program, Command* chosen) {
   AddQuietFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "cli/options.h"
 #include "cli/table.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::string CellText(const FactTable::Cell& cell) {
@@ -110,4 +110,4 @@ void AddInspectCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

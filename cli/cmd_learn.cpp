@@ -14,13 +14,13 @@
 #include "cli/output.h"
 #include "cli/progress.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
 #include "cli/verdicts.h"
-#include "kpsa/learner.h"
-#include "kpsa/tile_splice.h"
+#include "host/rig_training.h"
+#include "kpsa/training/learner.h"
+#include "kpsa/training/tile_splice.h"
 #include "kpsa/training_record.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct LearnFlags : Flags {
@@ -250,4 +250,4 @@ void AddLearnCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,9 +10,9 @@
 #include "cli/options.h"
 #include "cli/rig_schema.h"
 #include "cli/table.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct NodesFlags : Flags {
@@ -182,4 +182,4 @@ void AddNodesCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -16,7 +16,7 @@
 #include "cli/table.h"
 #include "graph/plan_report.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct ProfileFlags : Flags {
@@ -169,4 +169,4 @@ void AddProfileCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

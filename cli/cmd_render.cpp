@@ -10,10 +10,10 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/rig_picture.h"
-#include "io/png.h"
+#include "files/png.h"
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMaxPictures = 24;
@@ -281,4 +281,4 @@ void AddRenderCommand(CLI::App* program, Command* chosen) {
   AddQuietFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "cli/options.h"
 #include "cli/output.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct ReportFlags : Flags {
@@ -60,4 +60,4 @@ void AddReportCommand(CLI::App* program, Command* chosen) {
   AddOutputFlags(command, flags.get(), "the tables, .md, instead of stdout");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

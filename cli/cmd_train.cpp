@@ -11,12 +11,12 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
-#include "cli/rig_training.h"
 #include "cli/stack_cost.h"
 #include "cli/train_report.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
+#include "host/rig_training.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kCheckPoses = 60, kLightCheckPoses = 4;  // light takes seconds a pose
@@ -221,4 +221,4 @@ void AddTrainCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

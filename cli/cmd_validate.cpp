@@ -6,9 +6,9 @@
 #include "cli/common.h"
 #include "cli/options.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Loads, compiles and evaluates one frame; what is left to say of a sound rig goes to `notes`.
@@ -83,4 +83,4 @@ void AddValidateCommand(CLI::App* program, Command* chosen) {
   AddJsonFlag(command, flags.get());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

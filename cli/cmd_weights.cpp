@@ -7,10 +7,10 @@
 #include "cli/common.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "io/deformer_weights.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
+#include "rig/build/deformer_weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 namespace fs = std::filesystem;
@@ -326,4 +326,4 @@ void AddWeightsCommand(CLI::App* program, Command* chosen) {
   AddOutputFlags(action, mirrored.get(), "a weight file, .json; stdout if not given");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

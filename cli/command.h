@@ -10,7 +10,7 @@ namespace CLI {
 class App;
 }
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The exit code (0, or 1 where a check failed, things differ or training would not pay), or errors; see
 // ExitCode in cli/common.h.
@@ -37,4 +37,4 @@ void AddGraphCommand(CLI::App* program, Command* chosen);
 void AddNodesCommand(CLI::App* program, Command* chosen);
 void AddWeightsCommand(CLI::App* program, Command* chosen);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

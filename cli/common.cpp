@@ -8,11 +8,11 @@
 
 #include "cli/frames_range.h"
 #include "cli/options.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
 #include "kpsa/kpsa_node.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::atomic<bool> interrupted{false};
@@ -139,6 +139,16 @@ Status AsUsage(Status status) {
   return usage;
 }
 
+std::vector<std::string> SplitNames(const std::string& text) {
+  std::vector<std::string> names;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    if (end > begin) names.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return names;
+}
+
 int ExitCode(const Status& status) {
   if (status.ok()) return 0;
   switch (status.kind()) {
@@ -237,4 +247,4 @@ Status InterruptedStatus() {
   return Status::Make(ErrorKind::kInterrupted, "interrupted; nothing was written");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

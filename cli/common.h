@@ -15,13 +15,13 @@
 #include "base/text.h"
 #include "graph/node_registry.h"
 #include "graph/plugin_loader.h"
-#include "io/rig_builder.h"
+#include "rig/build/rig_builder.h"
 
 namespace CLI {
 class App;
 }
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The flags that several subcommands have, as they were typed; unset where they were not given.
 struct Flags {
@@ -66,6 +66,9 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags);
 // The same errors as errors of usage: their cause stands on the command line.
 Status AsUsage(Status status);
 
+// "a,b" of a flag; empty names are left out.
+std::vector<std::string> SplitNames(const std::string& text);
+
 int ExitCode(const Status& status);
 // At most five lines to stderr; `program` is "kpsa eval", say.
 void PrintErrors(const std::string& program, const Status& status, std::size_t most_lines = 5);
@@ -101,4 +104,4 @@ bool Interrupted();
 const std::atomic<bool>* InterruptFlag();
 Status InterruptedStatus();
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

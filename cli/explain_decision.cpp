@@ -8,7 +8,7 @@
 #include "kpsa/kpsa_node.h"
 #include "kpsa/signals.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMostOutside = 5;  // guards that the text lists
@@ -163,4 +163,4 @@ std::string DecisionStoryJson(const DecisionStory& story) {
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

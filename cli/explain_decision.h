@@ -6,7 +6,7 @@
 
 #include "cli/verdicts.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct DecisionStory {
   // A guard beyond what was trained.
@@ -32,4 +32,4 @@ Result<DecisionStory> TellOfDecisions(Rig* rig, const AccelerationFlags& flags, 
 std::string DecisionText(const DecisionStory& story);
 std::string DecisionStoryJson(const DecisionStory& story);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,9 +9,9 @@
 #include "cli/frames_range.h"
 #include "cli/rig_frames.h"
 #include "cli/table.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Of one point, at one time: what is asked of the graph, in that order.
@@ -248,4 +248,4 @@ std::string VertexJson(const VertexStory& story) {
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

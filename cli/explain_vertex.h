@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/status.h"
-#include "io/rig_builder.h"
+#include "rig/build/rig_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Lengths in metres. "Moved" is against the same rig at rest: no clip, no pose, nothing set.
 struct VertexStory {
@@ -55,4 +55,4 @@ Result<VertexStory> TellOfVertex(const Rig& rig, const Rig& rest, const VertexNa
 std::string VertexText(const VertexStory& story);
 std::string VertexJson(const VertexStory& story);  // a document
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

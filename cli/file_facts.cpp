@@ -9,14 +9,14 @@
 #include "cli/acceleration.h"
 #include "cli/common.h"
 #include "cli/output.h"
-#include "io/npz.h"
-#include "io/point_cache.h"
-#include "io/quantity.h"
-#include "io/weights_json.h"
+#include "files/npz.h"
+#include "files/point_cache.h"
+#include "files/quantity.h"
+#include "files/weights_json.h"
 #include "kpsa/subspace.h"
 #include "kpsa/training_record.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Cell = FactTable::Cell;
@@ -299,4 +299,4 @@ Result<FileFacts> InspectFile(const std::string& path, double fps, const std::ve
       .At({path});
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

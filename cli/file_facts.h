@@ -8,7 +8,7 @@
 
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // One table of facts: a fact a row.
 struct FactTable {
@@ -36,4 +36,4 @@ Result<FileFacts> InspectPointCache(const std::string& path, double fps);
 Result<FileFacts> InspectSubspace(const std::string& path);
 Result<FileFacts> InspectWeights(const std::string& path);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,9 +6,9 @@
 #include "base/matrix.h"
 #include "cli/rig_frames.h"
 #include "kpsa/accelerate.h"
-#include "kpsa/error_split.h"
+#include "kpsa/training/error_split.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr Eigen::Index kFramesAtATime = 64;
@@ -23,7 +23,10 @@ struct SplitBlock {
 SplitBlock MakeBlock(const AppliedSubspace& one) {
   const Subspace& s = *one.subspace;
   SplitBlock block;
-  block.modes = s.kept_modes.cast<double>();
+  block.modes = Eigen::Map<const Eigen::MatrixXf>(s.kept_modes.values.data(),
+                                                  static_cast<Eigen::Index>(s.kept_modes.rows),
+                                                  static_cast<Eigen::Index>(s.kept_modes.columns))
+                    .cast<double>();
   block.poses.resize(block.modes.rows(), kFramesAtATime);
   block.estimates.resize(block.modes.rows(), kFramesAtATime);
   block.mean.resize(block.modes.rows());
@@ -66,7 +69,7 @@ void FrameErrors::Append(const FrameErrors& later) {
 
 bool HaveKeptModes(const std::vector<AppliedSubspace>& applied) {
   return std::all_of(applied.begin(), applied.end(),
-                     [](const AppliedSubspace& one) { return one.subspace->kept_modes.size() > 0; });
+                     [](const AppliedSubspace& one) { return !one.subspace->kept_modes.values.empty(); });
 }
 
 Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acceleration,
@@ -156,4 +159,4 @@ Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acc
   return errors;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,4 +1,4 @@
-// Errors of an accelerated rig frame by frame, split as the paper does (kpsa/error_split.h).
+// Errors of an accelerated rig frame by frame, split as the paper does (kpsa/training/error_split.h).
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 #include "cli/acceleration.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // RMS over the accelerated points, in metres and in the space of the subspace. One entry a frame; all empty
 // where nothing was split.
@@ -29,4 +29,4 @@ bool HaveKeptModes(const std::vector<AppliedSubspace>& applied);
 Result<FrameErrors> SplitFrames(const Flags& flags, const AccelerationFlags& acceleration,
                                 const std::vector<double>& times, const FullWeights& weights);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

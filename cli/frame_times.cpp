@@ -6,7 +6,7 @@
 
 #include "graph/profile.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 double Median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -90,4 +90,4 @@ const std::vector<std::vector<double>>& FrameTimes::Finish() {
   return ns_;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 double Median(std::vector<double> values);  // 0 of none
 
@@ -47,4 +47,4 @@ class FrameTimes {
   double wall_ns_ = 0, cpu_ns_ = 0;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::string_view Trim(std::string_view text) {
@@ -160,4 +160,4 @@ Result<std::vector<double>> SampleTimes(const Flags& flags, const OpenRig& open)
   return times;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

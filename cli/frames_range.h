@@ -11,7 +11,7 @@
 #include "base/status.h"
 #include "cli/common.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr std::size_t kMaxSamples = 1'000'000;  // times of one evaluation
 
@@ -34,4 +34,4 @@ std::int64_t FrameNumber(double seconds, double fps);
 // Whether all refusals of --frames and --times pass, before a rig is loaded.
 Status CheckTimeFlags(const Flags& flags);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

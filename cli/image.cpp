@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr Rgb kInk = {32, 34, 40};
@@ -152,4 +152,4 @@ Image Shrunk(const Image& image, int times) {
   return out;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,4 +1,4 @@
-// Small pictures: pixels, text, colour scale, montage. Plain data; no file format (io/png.h writes them).
+// Small pictures: pixels, text, colour scale, montage. Plain data; no file format (files/png.h writes them).
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 using Rgb = std::array<std::uint8_t, 3>;  // sRGB
 
@@ -51,4 +51,4 @@ Image Shrunk(const Image& image, int times);
 // "0.213 mm": three significant digits.
 std::string Millimetres(double metres);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

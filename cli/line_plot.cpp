@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kWidth = 460, kHeight = 250;                       // of a plot with its margins
@@ -128,4 +128,4 @@ std::string PlotsAsSvg(const std::vector<LinePlot>& plots, std::size_t columns) 
   return svg + "</svg>\n";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct PlotLine {
   std::string name;       // in the legend
@@ -26,4 +26,4 @@ std::string PlotsAsSvg(const std::vector<LinePlot>& plots, std::size_t columns);
 // A distance of ticks so that at most `most` fit into [0, top]: 1, 2 or 5 times a power of ten.
 double RoundStep(double top, int most);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

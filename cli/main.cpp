@@ -9,7 +9,7 @@
 #include "cli/command.h"
 #include "cli/common.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr char kFirstMinutes[] =
@@ -150,6 +150,6 @@ int Main(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
-int main(int argc, char** argv) { return kpsa::Main(argc, argv); }
+int main(int argc, char** argv) { return kpsa::engine::Main(argc, argv); }

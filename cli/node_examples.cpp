@@ -6,7 +6,7 @@
 #include "base/matrix.h"
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using ExampleSetting = NodeExample::Setting;
@@ -252,4 +252,4 @@ std::vector<NodeExample> NodeExamples() {
   return examples;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 
 #include "graph/geometry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A mesh whose quads are drawn as the squares of a chequer board.
 struct ExampleShape {
@@ -37,4 +37,4 @@ struct NodeExample {
 // One for every deformer that the pictures show.
 std::vector<NodeExample> NodeExamples();
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

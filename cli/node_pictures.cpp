@@ -9,13 +9,13 @@
 #include "base/scalar_math.h"
 #include "cli/image.h"
 #include "cli/node_examples.h"
+#include "files/file.h"
+#include "files/png.h"
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
-#include "io/file.h"
-#include "io/graph_editor.h"
-#include "io/png.h"
+#include "rig/graph_editor.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kSide = 160, kSamples = 3;  // of one half: pixels, and samples along a pixel's edge
@@ -236,4 +236,4 @@ Status WriteNodePictures(const NodeRegistry& registry, const std::string& folder
   return {};
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "base/status.h"
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A PNG of 320 x 160 pixels: the shape as it comes to the node, and as it leaves it. The same bytes
 // everywhere.
@@ -23,4 +23,4 @@ Result<std::vector<NodePicture>> DrawNodePictures(const NodeRegistry& registry);
 // Writes <folder>/<type>.png of all of them; errors of the folder or its files, before any is written.
 Status WriteNodePictures(const NodeRegistry& registry, const std::string& folder, bool force);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 CLI::App* AddCommand(CLI::App* program, const std::string& name, const std::string& doc,
                      const std::string& examples, Command* chosen, Command run) {
@@ -46,4 +46,4 @@ void AddSwitch(CLI::App* command, const std::string& name, bool* to, const std::
   command->add_flag(name, *to, doc);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 
 #include "cli/command.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A subcommand; `examples` ends its help. When it is chosen, *chosen becomes `run`.
 CLI::App* AddCommand(CLI::App* program, const std::string& name, const std::string& doc,
@@ -28,4 +28,4 @@ void AddRepeated(CLI::App* command, const std::string& name, const std::string& 
                  std::vector<std::string>* to, const std::string& doc);
 void AddSwitch(CLI::App* command, const std::string& name, bool* to, const std::string& doc);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,9 +11,9 @@
 #include <system_error>
 
 #include "cli/common.h"
-#include "io/file.h"
+#include "files/file.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 namespace fs = std::filesystem;
 
@@ -95,4 +95,4 @@ Status WriteText(const std::string& output, bool force, const std::string& text)
                              {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

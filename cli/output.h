@@ -9,7 +9,7 @@
 
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The lower-case suffix of a path with its dot, "" where there is none.
 std::string Suffix(const std::string& path);
@@ -42,4 +42,4 @@ class OutputPath {
 // Writes text to the output, "-" being stdout.
 Status WriteText(const std::string& output, bool force, const std::string& text);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

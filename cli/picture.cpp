@@ -10,7 +10,7 @@
 #include "base/scalar_math.h"
 #include "nodes/kernels/ray_scene.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kSkyRays = 64;           // ambient occlusion rays a point
@@ -19,7 +19,7 @@ constexpr double kLightRadius = 0.22;  // of the key light's disc at distance 1
 constexpr int kLargestSide = 8192;
 constexpr double kDotRadius = 0.006;  // of a dot, in diagonals of the shape
 
-Double3 Unit(Double3 v) {
+Double3 UnitVector(Double3 v) {
   const double length = Length(v);
   return length > 0 ? v * (1 / length) : Double3{0, 0, 1};
 }
@@ -114,7 +114,7 @@ Result<Surface> Gather(const RenderInput& input) {
     const Double3 n = Cross(PointOf(p, b) - PointOf(p, a), PointOf(p, c) - PointOf(p, a));
     for (Index i : {a, b, c}) out.normals[i] = out.normals[i] + n;
   }
-  for (Double3& n : out.normals) n = Unit(n);
+  for (Double3& n : out.normals) n = UnitVector(n);
   return out;
 }
 
@@ -195,7 +195,7 @@ Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lig
     key += surface.key[i] * w[k];
     matte += surface.matte[i] * w[k];
   }
-  n = Unit(n);
+  n = UnitVector(n);
   // An open surface seen from behind; the smooth normal alone may turn away at a silhouette, too
   const ConstPointsView p = surface.points.view();
   const Double3 a = PointOf(p, corner[0]),
@@ -212,7 +212,7 @@ Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lig
   Double3 out = Times(color, diffuse);
   if (matte < 0.5) {
     const double facing = 1 - std::max(0.0, Dot(n, view)), fresnel = facing * facing * facing * facing;
-    const double h = std::max(0.0, Dot(n, Unit(lights.key + view)));
+    const double h = std::max(0.0, Dot(n, UnitVector(lights.key + view)));
     const double h2 = h * h, h4 = h2 * h2, h8 = h4 * h4, h16 = h8 * h8, h32 = h16 * h16;
     const double rim = std::max(0.0, Dot(n, lights.rim)) * fresnel * 0.35 * sky;
     out = out + Double3{1, 0.98, 0.95} * (0.07 * h32 * key + 0.035 * h8 * key) + Double3{0.8, 0.9, 1} * rim;
@@ -228,7 +228,7 @@ Camera FrameCamera(const RenderInput& input, const RenderOptions& options, doubl
   const double diagonal = std::max(Diagonal(input, &center), 1e-6);
   const Double3 back = {Sin(azimuth) * Cos(elevation), Sin(elevation), Cos(azimuth) * Cos(elevation)};
   Double3 right = Cross(camera.up, back);
-  right = Length(right) > 1e-9 ? Unit(right) : Double3{1, 0, 0};
+  right = Length(right) > 1e-9 ? UnitVector(right) : Double3{1, 0, 0};
   const Double3 up = Cross(back, right);
   // As near as possible with all points inside and below the title: tan(fov / 2) from sine and cosine
   const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.88;
@@ -275,12 +275,12 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
   Double3 center;
   const double diagonal = std::max(Diagonal(input, &center), 1e-6);
 
-  const Double3 back = Unit(camera.eye - camera.target);
-  const Double3 right = Unit(Cross(camera.up, back)), up = Cross(back, right);
+  const Double3 back = UnitVector(camera.eye - camera.target);
+  const Double3 right = UnitVector(Cross(camera.up, back)), up = Cross(back, right);
   // The lights belong to the camera, so that every view is lit well
-  const Lights lights = {Unit(right * -0.62 + up * 0.70 + back * 0.80),
-                         Unit(right * 0.9 + up * 0.05 + back * 0.5),
-                         Unit(right * 0.7 + up * 0.5 + back * -0.6)};
+  const Lights lights = {UnitVector(right * -0.62 + up * 0.70 + back * 0.80),
+                         UnitVector(right * 0.9 + up * 0.05 + back * 0.5),
+                         UnitVector(right * 0.7 + up * 0.5 + back * -0.6)};
   Result<RayScene> shadows = RayScene::Build(std::as_const(surface->points).view(), surface->casting);
   if (!shadows.ok()) return shadows.status();
   LightPoints(*shadows, lights.key, diagonal, &*surface);
@@ -302,7 +302,7 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
           const double x = (column + 0.25 + 0.5 * static_cast<double>(k % 2)) / options.width * 2 - 1;
           const double y =
               1 - (static_cast<double>(row) + 0.25 + 0.5 * static_cast<double>(k / 2)) / options.height * 2;
-          const Double3 d = Unit(right * (x * slope * aspect) + up * (y * slope) - back);
+          const Double3 d = UnitVector(right * (x * slope * aspect) + up * (y * slope) - back);
           directions[k] = d;
           rays[k] = {{static_cast<float>(camera.eye.x), static_cast<float>(camera.eye.y),
                       static_cast<float>(camera.eye.z)},
@@ -359,7 +359,7 @@ RenderPart MakeDots(const RenderDots& dots, double radius) {
     ball.push_back({static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])});
   std::vector<Index> sides;
   const auto middle = [&](Index a, Index b) {
-    const Double3 m = Unit(ball[a] + ball[b]);
+    const Double3 m = UnitVector(ball[a] + ball[b]);
     for (Index i = 6; i < ball.size(); ++i) {
       if (Length(ball[i] - m) < 1e-9) return i;
     }
@@ -433,4 +433,4 @@ Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accel
   return SideBySide(images);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

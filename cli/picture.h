@@ -15,7 +15,7 @@
 #include "base/types.h"
 #include "cli/image.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // One surface. The spans must outlive the calls that are given the part, by `owner` or otherwise.
 struct RenderPart {
@@ -78,4 +78,4 @@ Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accel
                                const RenderOptions& options = {}, const RenderDots* dots = nullptr,
                                const std::string& title = "accelerated");
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,11 +8,11 @@
 #include "cli/bench_side.h"
 #include "cli/frame_times.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kPlaybackBlocks = 5, kPlaybackBlockFrames = 8;
@@ -167,4 +167,4 @@ Result<PlaybackTimes> TimePlayback(const Flags& flags, const Acceleration& entry
   return times;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,9 +9,9 @@
 #include "cli/common.h"
 #include "graph/compiler.h"
 #include "kpsa/subspace.h"
-#include "kpsa/trainer.h"
+#include "kpsa/training/trainer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Consecutive frames [first, end) of a clip. The first leads in: what it changes is not what playback does.
 struct PlaybackBlock {
@@ -42,4 +42,4 @@ Result<PlaybackTimes> TimePlayback(const Flags& flags, const Acceleration& entry
                                    const std::shared_ptr<const Subspace>& subspace,
                                    const std::vector<TrainingClip>& clips);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

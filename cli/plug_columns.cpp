@@ -1,6 +1,6 @@
 #include "cli/plug_columns.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::vector<std::string> Suffixes(const Column& column) {
@@ -131,4 +131,4 @@ void CompleteColumn(const Plan& plan, Column* column) {
   column->suffixes = Suffixes(*column);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

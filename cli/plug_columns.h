@@ -9,7 +9,7 @@
 #include "graph/evaluator.h"
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A plug and the numbers that it gives each frame.
 struct Column {
@@ -37,4 +37,4 @@ Result<std::vector<Column>> FindColumns(const Rig& rig, const std::vector<std::s
 // Fills in what the plan knows: numbers of points, and the suffixes.
 void CompleteColumn(const Plan& plan, Column* column);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

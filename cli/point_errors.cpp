@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kSmallest = 1e-12;  // metres; what is nearer counts as equal
@@ -101,4 +101,4 @@ double PointErrors::diagonal() const {
   return std::sqrt(square);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

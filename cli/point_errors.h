@@ -7,7 +7,7 @@
 #include "base/types.h"
 #include "graph/evaluator.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class PointErrors {
  public:
@@ -40,4 +40,4 @@ class PointErrors {
   double Motion() const;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include "cli/common.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan,
                          const std::vector<double>& times, bool parallel, Profile* profile) {
@@ -36,4 +36,4 @@ Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan
   return measured;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

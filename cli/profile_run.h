@@ -7,7 +7,7 @@
 #include "cli/rig_frames.h"
 #include "cli/trace.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What was measured.
 struct Measured {
@@ -23,4 +23,4 @@ struct Measured {
 Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan,
                          const std::vector<double>& times, bool parallel, Profile* profile);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Progress::Progress(std::string label, std::size_t total, bool quiet)
     : label_(std::move(label)),
@@ -73,4 +73,4 @@ void Progress::Show(const std::string& line) {
   drawn_ = true;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

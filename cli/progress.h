@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <string>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class Progress {
  public:
@@ -31,4 +31,4 @@ class Progress {
   std::chrono::steady_clock::time_point start_, begin_, last_;  // of all, of the label, of the last drawing
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

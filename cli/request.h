@@ -7,24 +7,10 @@
 
 #include "cli/acceleration.h"
 #include "graph/plan.h"
-#include "io/rig_builder.h"
+#include "host/mesh_stage.h"
+#include "rig/build/rig_builder.h"
 
-namespace kpsa {
-
-// A mesh's points: "head_mesh" (the final ones) or "head_mesh@mush" (up to and including a stage). Errors
-// name the nearest mesh or stage.
-struct MeshStage {
-  const CharacterMesh* mesh = nullptr;
-  PlugRef points;
-};
-Result<MeshStage> FindMeshStage(const Rig& rig, std::string_view text);
-
-// A plug ("jaw.worldMatrix", "cage.points[2,0,4].y") or a mesh's points.
-struct WantedPlug {
-  PlugRef plug;                         // as written, with element and component
-  const CharacterMesh* mesh = nullptr;  // of a mesh's points
-};
-Result<WantedPlug> FindWanted(const Rig& rig, std::string_view text);
+namespace kpsa::engine {
 
 // A request for plugs (the final points of the meshes that are shown where there are none), restricted to
 // some vertices of the file: ranges and indices ("0:99,120") into each wanted mesh. Time varies.
@@ -37,4 +23,4 @@ Result<Request> AcceleratedRequest(Rig* rig, Compiler* compiler, const Accelerat
                                    const std::vector<std::string>& wanted,
                                    const std::optional<std::string>& vertices);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

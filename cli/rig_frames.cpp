@@ -5,7 +5,7 @@
 #include "cli/common.h"
 #include "cli/progress.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Request ShownPoints(const Rig& rig) {
   Request request;
@@ -19,8 +19,7 @@ Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compile
   Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
   if (plan.ok()) return plan;
   Status located;
-  for (const Error& error : plan.status().errors())
-    located.Append(Status(error).At(PlaceOfMessage(rig, error.message)));
+  for (const Error& error : plan.status().errors()) located.Append(Status(error).At(PlaceOf(rig, error)));
   return located;
 }
 
@@ -40,8 +39,10 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
       },
       [&](std::size_t frame, const Evaluator& evaluator, const Status& evaluated) -> Status {
         if (!evaluated.ok()) {
-          const std::string& message = evaluated.errors().front().message;
-          return Status::Evaluation("at {} s: {}", times[frame], message).At(PlaceOfMessage(rig, message));
+          const Error& error = evaluated.errors().front();
+          return Status::Evaluation("at {} s: {}", times[frame], error.message)
+              .OfNode(error.node)
+              .At(PlaceOf(rig, error));
         }
         progress.Set(frame + 1);
         return sink(frame, evaluator);
@@ -59,10 +60,10 @@ Status EvaluateTo(const Rig& rig, int frame, Evaluator* evaluator, Profile* prof
     if (time != kNoIndex) evaluator->Set(time, f / rig.fps);
     const Status status = evaluator->Evaluate();
     if (status.ok()) continue;
-    const std::string& message = status.errors().front().message;
-    return Status::Evaluation("at frame {}: {}", f, message).At(PlaceOfMessage(rig, message));
+    const Error& error = status.errors().front();
+    return Status::Evaluation("at frame {}: {}", f, error.message).OfNode(error.node).At(PlaceOf(rig, error));
   }
   return Status();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,9 +10,9 @@
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
 #include "graph/frames.h"
-#include "io/rig_builder.h"
+#include "rig/build/rig_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What the command line asks for where nobody says: the final points of ShownMeshes(rig.scene), in that
 // order; time varies.
@@ -41,4 +41,4 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
 // profile, where one is given, is of the frame alone.
 Status EvaluateTo(const Rig& rig, int frame, Evaluator* evaluator, Profile* profile = nullptr);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "cli/frames_range.h"
 #include "kpsa/subspace.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // COLOR_0 times the materials' colours (glTF 2.0, 3.7.2.1) by point of a mesh; null where the file has no
@@ -147,4 +147,4 @@ Image StackRows(const std::vector<Image>& rows) {
   return all;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "cli/rig_frames.h"
 #include "cli/verdicts.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The points of all meshes at one time, x y z interleaved; none of those that are hidden.
 using Pose = std::vector<std::vector<float>>;
@@ -28,4 +28,4 @@ double WorstDistance(const Pose& a, const Pose& b);  // metres
 // Pictures below each other.
 Image StackRows(const std::vector<Image>& rows);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "io/rig_words.h"
+#include "rig/file/words.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -308,4 +308,4 @@ std::string RigSchema(const NodeRegistry& registry) {
   return schema.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,8 +7,8 @@
 
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::string RigSchema(const NodeRegistry& registry);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,10 +8,10 @@
 
 #include "cli/bench_side.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
 #include "graph/profile.h"
+#include "host/rig_training.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kLittleNs = 20e3, kLittleBound = 1.5;
@@ -166,4 +166,4 @@ std::string NotWorthItJson(const StackCost& cost) {
   return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "cli/common.h"
-#include "kpsa/trainer.h"
+#include "kpsa/training/trainer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Nanoseconds a frame.
 struct FrameCost {
@@ -39,4 +39,4 @@ Result<StackCost> MeasureStack(const OpenRig& open, const Flags& flags, const Ac
 std::string NotWorthItText(const StackCost& cost, const std::string& rig);
 std::string NotWorthItJson(const StackCost& cost);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

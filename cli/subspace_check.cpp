@@ -7,11 +7,11 @@
 #include "cli/check_poses.h"
 #include "cli/frame_times.h"
 #include "cli/rig_frames.h"
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "kpsa/accelerate.h"
-#include "kpsa/space_points.h"
+#include "kpsa/training/space_points.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kWorst = 5;
@@ -235,4 +235,4 @@ Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
   return Checker(rig, entry, subspace, clips, options).Run();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

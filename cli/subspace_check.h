@@ -9,9 +9,9 @@
 
 #include "cli/acceleration.h"
 #include "cli/playback_times.h"
-#include "kpsa/trainer.h"
+#include "kpsa/training/trainer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct SubspaceCheck {
   struct Pose {
@@ -47,4 +47,4 @@ Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
                                     const std::vector<TrainingClip>& clips,
                                     const SubspaceCheckOptions& options);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Characters, not bytes, of UTF-8 text.
@@ -70,4 +70,4 @@ std::string Table::Markdown() const {
   return text;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,10 +5,10 @@
 
 #include "cli/common.h"
 #include "cli/table.h"
-#include "io/quantity.h"
+#include "files/quantity.h"
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kEnoughHits = 0.95, kFewHits = 0.5;
@@ -114,14 +114,6 @@ double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, boo
   return ever_hits ? full_ms / (accelerated_ms + (1 - hits) * miss * full_ms) : 1;
 }
 
-double ExpectedHitRate(const Calibration& calibration) {
-  if (calibration.near_clips > 0)
-    return static_cast<double>(calibration.hits_near_clips) / static_cast<double>(calibration.near_clips);
-  if (calibration.kinds.empty()) return calibration.hit_rate;
-  const Calibration::Kind& sampled = calibration.kinds.front();
-  return static_cast<double>(sampled.hits) / static_cast<double>(std::max<std::size_t>(1, sampled.poses));
-}
-
 double LargestError(std::span<const CalibrationPair> pairs) {
   double largest = 0;
   for (const CalibrationPair& pair : pairs) {
@@ -178,4 +170,4 @@ std::string ToleranceText(const ToleranceTable& table, const ToleranceWords& wor
   return text;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -12,7 +12,7 @@
 #include "base/status.h"
 #include "kpsa/calibration.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What is expected at a tolerance, in scene units (of light a number).
 struct ToleranceRow {
@@ -44,14 +44,6 @@ std::vector<double> TolerancesAround(double tolerance);
 ToleranceTable MakeToleranceTable(double in_force, double largest, double wanted_speedup,
                                   const ToleranceModel& model);
 
-// full / (accelerated + the share of misses * what one adds, of a full evaluation): a miss costs both, or a
-// part where parts miss by themselves; NaN where it is not known. 1 where nothing is ever a hit: then nothing
-// is measured.
-double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits = true,
-                         double miss = 1);
-// Of held-out poses that are made of frames of the training clips, as other clips may be; where there are
-// none, of poses as the sampler draws them; of all where there are no kinds.
-double ExpectedHitRate(const Calibration& calibration);
 // Of pairs that a tolerance can accept; 0 of none.
 double LargestError(std::span<const CalibrationPair> pairs);
 
@@ -93,4 +85,10 @@ Json ToleranceJson(const ToleranceTable& table, const ToleranceWords& words) {
           {"wanted_speedup", std::move(wanted)}};
 }
 
-}  // namespace kpsa
+// full / (accelerated + the share of misses * what one adds, of a full evaluation): a miss costs both, or a
+// part where parts miss by themselves; NaN where it is not known. 1 where nothing is ever a hit: then nothing
+// is measured.
+double SpeedupWithMisses(double full_ms, double accelerated_ms, double hits, bool ever_hits = true,
+                         double miss = 1);
+
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "graph/plan_report.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Microseconds with all digits of the nanoseconds, so that rounding cannot make neighbours overlap.
@@ -51,4 +51,4 @@ std::string TraceJson(const Plan& plan, const Profile& profile, std::span<const 
   return text + "\n]}\n";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

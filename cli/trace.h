@@ -8,7 +8,7 @@
 
 #include "graph/profile.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct FrameSpan {
   std::uint64_t begin_ns = 0, end_ns = 0;
@@ -19,4 +19,4 @@ struct FrameSpan {
 std::string TraceJson(const Plan& plan, const Profile& profile, std::span<const FrameSpan> frames,
                       std::span<const double> times);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,9 +5,9 @@
 
 #include "cli/common.h"
 #include "cli/table.h"
-#include "kpsa/poses.h"
+#include "kpsa/training/poses.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::size_t TrainResult::points() const {
   std::size_t points = 0;
@@ -213,4 +213,4 @@ std::string TrainText(const TrainResult& r) {
   return text;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "kpsa/calibration.h"
 #include "kpsa/training_record.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Misses included, with the share of them that ExpectedHitRate says.
 double ExpectedSpeedup(const SubspaceCheck& check, const Calibration& calibration);
@@ -35,8 +35,8 @@ ToleranceTable TrainedTolerances(const Subspace& subspace, const SubspaceCheck& 
 // Times in milliseconds, lengths in metres.
 std::string TrainJson(const TrainResult& r);
 // For people, with the next command.
-// The accepted calibration pose that is farthest off, as a pose file (io/rig_builder.h).
+// The accepted calibration pose that is farthest off, as a pose file (rig/build/rig_builder.h).
 std::string WorstPoseText(const TrainingRecord& record, const std::string& subspace);
 std::string TrainText(const TrainResult& r);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

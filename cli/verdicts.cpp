@@ -3,16 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kpsa/kpsa_node.h"
-
-namespace kpsa {
-namespace {
-
-constexpr const char* kOutputs[] = {"fullWeight", "score", "missReason", "offender"};
-constexpr Index kOutputCount = 4;
-
-}  // namespace
-
+namespace kpsa::engine {
 const char* VerdictName(FrameVerdict verdict) {
   return verdict == FrameVerdict::kHit ? "hit" : verdict == FrameVerdict::kBlend ? "blend" : "miss";
 }
@@ -46,33 +37,17 @@ std::string Reasons::MostFrequent() const {
 }
 
 void Verdicts::Ask(const Rig& rig, Request* request) {
-  first_output_ = static_cast<Index>(request->outputs.size());
-  for (const AppliedSubspace& one : *applied_) {
-    const NodeDef& def = rig.graph->def(one.node);
-    for (const char* name : kOutputs)
-      request->outputs.push_back({{one.node, def.FindAttribute(name), -1, -1}, {}});
-  }
+  first_output_ = AskForDecisions(*applied_, *rig.graph, request);
 }
 
 void Verdicts::Add(std::int64_t frame, const Evaluator& evaluator) {
   last_.clear();
   FrameRecord record{frame, {}};
   for (Index n = 0; n < applied_->size(); ++n) {
-    const AppliedSubspace& one = (*applied_)[n];
-    const Index output = first_output_ + kOutputCount * n;
-    FrameDecision decision;
-    decision.entry = one.name;
-    decision.full_weight = evaluator.Get<double>(output);
-    decision.score = evaluator.Get<double>(output + 1);
-    const std::int64_t offender = evaluator.Get<std::int64_t>(output + 3);
-    decision.reason = MissText(*one.config, static_cast<MissReason>(evaluator.Get<std::int64_t>(output + 2)),
-                               offender < 0 ? kNoIndex : static_cast<Index>(offender));
+    FrameDecision decision = DecisionOf((*applied_)[n], evaluator, first_output_ + kDecisionOutputs * n);
     if (std::isfinite(decision.score) && !(decision.score <= worst_score_))
       worst_score_ = decision.score, worst_frame_ = frame;
-    const FrameDecision& worst = record.decision;
-    if (n == 0 || decision.full_weight > worst.full_weight ||
-        (decision.full_weight == worst.full_weight && decision.score > worst.score))
-      record.decision = decision;
+    if (n == 0 || IsWorse(decision, record.decision)) record.decision = decision;
     last_.push_back(std::move(decision));
   }
   ++counts_[static_cast<std::size_t>(record.decision.verdict())];
@@ -95,4 +70,4 @@ std::string CountsText(std::size_t hits, std::size_t blends, std::size_t misses)
   return fmt::format("{}, {}, {}", Plural(hits, "hit"), Plural(blends, "blend"), Plural(misses, "miss"));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,25 +8,12 @@
 
 #include "cli/acceleration.h"
 #include "graph/evaluator.h"
+#include "host/decisions.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
-enum class FrameVerdict : std::uint8_t { kHit, kBlend, kMiss };
 const char* VerdictName(FrameVerdict verdict);  // "hit", "blend", "miss"
 
-// Of one node on one frame.
-struct FrameDecision {
-  std::string entry;       // the accelerate entry
-  double full_weight = 0;  // share of the full evaluation in its points: 0 a hit, 1 a miss
-  double score = 0;        // infinite where nothing was measured
-  std::string reason;      // "hit", or why not, with the plug or the point
-  FrameVerdict verdict() const {
-    return full_weight <= 0  ? FrameVerdict::kHit
-           : full_weight < 1 ? FrameVerdict::kBlend
-                             : FrameVerdict::kMiss;
-  }
-  bool hit() const { return verdict() == FrameVerdict::kHit; }
-};
 // "accelerated", "blend: 12 % full", "miss: fully evaluated": what a picture of such a frame shows.
 std::string PictureTitle(const FrameDecision& decision);
 // A JSON object of any type that is made as nlohmann's are; a score that is infinite is dumped as null.
@@ -96,4 +83,4 @@ class Verdicts {
 // "200 hits, 12 blends, 28 misses"
 std::string CountsText(std::size_t hits, std::size_t blends, std::size_t misses);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

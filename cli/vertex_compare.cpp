@@ -5,7 +5,7 @@
 
 #include "cli/common.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Status MatchVertices(const VertexFile& a, const VertexFile& b, VertexPairs* pairs) {
   const auto differ = [&](const std::string& message) {
@@ -73,4 +73,4 @@ FrameError CompareFrame(const VertexPairs& pairs, std::size_t frame, std::vector
   return error;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 
 #include "cli/vertex_file.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Arrays of the two files that stand for each other.
 using VertexPairs = std::vector<std::pair<const VertexArray*, const VertexArray*>>;
@@ -27,4 +27,4 @@ struct FrameError {
 // `distances` is scratch, kept between calls.
 FrameError CompareFrame(const VertexPairs& pairs, std::size_t frame, std::vector<double>* distances);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

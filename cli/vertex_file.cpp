@@ -1,10 +1,10 @@
 #include "cli/vertex_file.h"
 
 #include "cli/output.h"
-#include "io/npz.h"
-#include "io/point_cache.h"
+#include "files/npz.h"
+#include "files/point_cache.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = std::uint64_t{8} << 30;
@@ -59,4 +59,4 @@ Result<VertexFile> ReadVertexFile(const std::string& path, double fps) {
   return file;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct VertexArray {
   std::string name;  // the key of an .npz, "" of .pc2 and .mdd
@@ -25,4 +25,4 @@ struct VertexFile {
 Result<VertexFile> ReadVertexFile(const std::string& path, double fps = 24);
 std::vector<std::string> VertexFileSuffixes();
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

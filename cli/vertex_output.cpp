@@ -5,11 +5,12 @@
 #include "cli/common.h"
 #include "cli/output.h"
 #include "cli/rig_frames.h"
-#include "io/gltf_export.h"
-#include "io/npz.h"
-#include "io/point_cache.h"
+#include "files/npz.h"
+#include "files/point_cache.h"
+#include "gltf/blender_order.h"
+#include "gltf/export.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::uint64_t kMaxCacheBytes = std::uint64_t{4} << 30;
@@ -190,4 +191,4 @@ Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& outp
   return std::unique_ptr<VertexOutput>(std::move(cache));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,9 +10,9 @@
 
 #include "base/points.h"
 #include "base/status.h"
-#include "io/rig_builder.h"
+#include "rig/build/rig_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct VertexOutputOptions {
   bool force = false;
@@ -38,4 +38,4 @@ Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& outp
                                                          std::vector<double> times,
                                                          const VertexOutputOptions& options);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 #include "base/check.h"
 #include "graph/graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Result<Index> Graph::Absorb(Graph other, std::string_view prefix) {
   KPSA_CHECK(other.registry_ == registry_);
@@ -42,4 +42,4 @@ Result<Index> Graph::Absorb(Graph other, std::string_view prefix) {
   return offset;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

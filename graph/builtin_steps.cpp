@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 void Gather(const std::vector<Index>& positions, const float* from, float* to) {
@@ -74,4 +74,4 @@ void ComputeIntToBool(ComputeContext& context) {
   context.out_value<std::int64_t>(0) = context.get<std::int64_t>(0) != 0;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "base/types.h"
 #include "graph/compute_context.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Copies points: input 0 to output 0 through the positions of the kernel (a std::vector<Index>).
 void ComputeGatherPoints(ComputeContext& context);
@@ -26,4 +26,4 @@ void ComputeDoubleToInt(ComputeContext& context);  // toward zero
 void ComputeDoubleToBool(ComputeContext& context);
 void ComputeIntToBool(ComputeContext& context);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "graph/plan_builder.h"
 #include "graph/static_eval.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Content digests of instances in the rest state: what a kernel or a rest value can depend on.
@@ -237,4 +237,4 @@ Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
   return *value;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "graph/graph.h"
 #include "graph/plan.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct CompileStats {
   Index kernels_bound = 0, kernels_reused = 0;  // in the last Compile
@@ -37,4 +37,4 @@ class Compiler {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "base/points.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The elements of an array input, each in a slot of its own.
 template <typename T>
@@ -32,7 +32,7 @@ class ComputeHost {
   // Records an error of the node that computes now; its outputs are then taken as not computed. Not to be
   // called from the body of a For: it would depend on the threads which message is kept.
   virtual void Fail(std::string_view message) = 0;
-  // As kpsa::ParallelFor where the host evaluates in parallel, inline otherwise.
+  // As kpsa::engine::ParallelFor where the host evaluates in parallel, inline otherwise.
   virtual void For(std::size_t count, std::size_t grain, RangeBody body) = 0;
 };
 
@@ -124,4 +124,4 @@ using ComputeBlockFn = void (*)(ComputeContext* contexts, std::size_t count);
 // Several steps of one evaluator at once; gives the bytes that their computes give one by one. Cannot fail.
 using ComputeBatchFn = void (*)(const BatchContext&);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include "graph/node_def.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 bool Fits(const ComputeParameter& parameter, Type type) {
@@ -146,4 +146,4 @@ std::vector<std::string> SignatureProblems(const NodeDef& def, const ComputeGrou
   return problems;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

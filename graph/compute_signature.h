@@ -14,7 +14,7 @@
 #include "graph/compute_context.h"
 #include "graph/value.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class SlotKind : std::uint8_t {
   kBool,     // of Type::kBool
@@ -100,4 +100,4 @@ struct ComputeGroup;
 std::vector<std::string> SignatureProblems(const NodeDef& def, const ComputeGroup& group,
                                            const ComputeSignature& signature);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

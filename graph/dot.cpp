@@ -7,7 +7,7 @@
 
 #include "base/text.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kReddestShare = 1.0 / 3;  // of the time, and above
@@ -133,4 +133,4 @@ std::string DrawDot(const Graph& graph, const Plan& plan, const DotOptions& opti
   return Drawing(graph, plan, options).Draw();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

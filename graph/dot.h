@@ -9,7 +9,7 @@
 #include "graph/plan.h"
 #include "graph/profile.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct DotOptions {
   const Profile* profile = nullptr;  // of the plan: boxes are coloured by time, red is where it goes
@@ -24,4 +24,4 @@ std::string DrawDot(const Graph& graph, const Plan& plan, const DotOptions& opti
 // The text as a quoted string of the DOT language, quotes included; control characters become spaces.
 std::string DotQuoted(std::string_view text);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "base/check.h"
 #include "graph/step_host.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Evaluator::Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options)
     : plan_(std::move(plan)),
@@ -198,7 +198,8 @@ void Evaluator::RecordFailure(Index step, std::string_view message) {
 Status Evaluator::TakeFailure() {
   if (failed_step_ == kNoIndex) return Status();
   Status status = Status::Evaluation("node \"{}\" ({}): {}", plan_->step_name(failed_step_),
-                                     plan_->step_type(failed_step_), failure_);
+                                     plan_->step_type(failed_step_), failure_)
+                      .OfNode(plan_->step_name(failed_step_));
   failed_step_ = kNoIndex;
   return status;
 }
@@ -234,4 +235,4 @@ std::size_t Evaluator::MemoryBytes() const {
          bytes(taking_) + bytes(stack_) + bytes(ready_);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -18,7 +18,7 @@
 #include "graph/profile.h"
 #include "graph/workspace.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct EvaluatorOptions {
   bool parallel = false;           // independent steps and wide kernels on the thread pool; the same bytes
@@ -161,4 +161,4 @@ class Evaluator final {
   Index failed_step_ = kNoIndex;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/check.h"
 #include "graph/step_host.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kComparedBytes = 512;  // small outputs beyond are taken as changed
@@ -405,4 +405,4 @@ void Evaluator::FinishBlockStep(Index step, std::uint64_t begin_ns, std::uint64_
   MarkComputed(step, true);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,22 +5,11 @@
 
 #include "graph/evaluator.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::string NameOf(const Plan::Varying& plug, int component) {
   return component < 0 ? plug.name : fmt::format("{}.{}", plug.name, "xyzw"[component]);
-}
-
-// The numbers of a small value, in its slot's order.
-std::span<const double> NumbersOf(const Value& value, double* whole) {
-  if (const auto* d = value.get_if<double>()) return std::span(d, 1);
-  if (const auto* i = value.get_if<std::int64_t>())
-    return *whole = static_cast<double>(*i), std::span(whole, 1);
-  if (const auto* v = value.get_if<Double3>()) return std::span(&v->x, 3);
-  if (const auto* q = value.get_if<Quaternion>()) return std::span(&q->x, 4);
-  if (const auto* m = value.get_if<Matrix4>()) return m->m;
-  return {};
 }
 
 }  // namespace
@@ -94,4 +83,4 @@ Status Evaluator::SetPoints(const PlugHandle& plug, ConstPointsView points) {
   return Status();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "base/text.h"
 #include "graph/plan_report.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::string PointsText(const Plan::StepInfo& info) {
   if (info.points_total == 0) return "no points";
@@ -72,4 +72,4 @@ std::string MaskText(const Plan& plan, Index step) {
                      PointsText(*largest), Thousands(info.points));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 
 #include "graph/profile.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::string PointsText(const Plan::StepInfo& info);  // "20 of 17,121 points"
 // From a step's last evaluation back to the plug that was set: "time.time > jaw > skin".
@@ -16,4 +16,4 @@ std::string NeedChain(const Plan& plan, Index step);
 // Who needs so many of its points.
 std::string MaskText(const Plan& plan, Index step);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

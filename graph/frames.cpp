@@ -10,7 +10,7 @@
 #include "base/check.h"
 #include "base/parallel.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The frames of one call: hands out blocks, and turns at the sink.
@@ -160,4 +160,4 @@ Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame
   return queue.Result();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

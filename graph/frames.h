@@ -19,7 +19,7 @@
 #include "graph/plan.h"
 #include "graph/profile.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct FrameOptions {
   int threads = 0;  // 0: as many as ParallelFor may use
@@ -45,4 +45,4 @@ using FrameSink =
 Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame_count,
                       const FrameOptions& options, const SetFrame& set, const FrameSink& sink);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

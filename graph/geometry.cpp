@@ -2,7 +2,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 template <typename T>
@@ -90,4 +90,4 @@ WeightMap::WeightMap(std::vector<float> weights) : weights_(std::move(weights)) 
   digest_ = hasher.Finish();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 
 #include "graph/value.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A mesh node's geometry. `points` are welded: glTF vertices that are equal in rest position, influences and
 // morph deltas are one point. Points are ordered spatially; vertex_to_point maps the file's vertices (all
@@ -154,4 +154,4 @@ class WeightMap final : public Asset {
   Digest digest_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Order of plugs within a node.
@@ -187,13 +187,8 @@ Status Graph::CheckPlug(const PlugRef& plug) const {
 // Numbers must be finite, and within the attribute's range.
 Status Graph::CheckNumbers(const PlugRef& plug, const Value& value) const {
   const AttributeDef& a = def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
-  std::span<const double> numbers;
   double number = 0;
-  if (value.get_if<double>() != nullptr || value.get_if<std::int64_t>() != nullptr)
-    number = value.AsDouble(), numbers = {&number, 1};
-  if (const auto* v = value.get_if<Double3>()) numbers = {&v->x, 3};
-  if (const auto* v = value.get_if<Quaternion>()) numbers = {&v->x, 4};
-  if (const auto* v = value.get_if<Matrix4>()) numbers = v->m;
+  std::span<const double> numbers = NumbersOf(value, &number);
   if (const auto* v = value.get_if<std::vector<double>>()) numbers = *v;
   for (double v : numbers) {
     if (!std::isfinite(v))
@@ -214,28 +209,32 @@ Status Graph::CheckNumbers(const PlugRef& plug, const Value& value) const {
   return Status();
 }
 
-Status Graph::Set(const PlugRef& plug, Value value) {
+Status Graph::CheckValue(const PlugRef& plug, Value* value) const {
   KPSA_RETURN_IF_ERROR(CheckPlug(plug));
   const AttributeDef& a = def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
   if (a.output) return Status::Invalid("{} is an output and cannot be set", PlugName(plug));
   const Type type = PlugType(plug);
   if (type == Type::kEnum) {
-    if (const std::string* text = value.get_if<std::string>()) {
+    if (const std::string* text = value->get_if<std::string>()) {
       const auto it = std::find(a.enum_names.begin(), a.enum_names.end(), *text);
       if (it == a.enum_names.end()) {
         return Status::Invalid("{} has no choice \"{}\"; expected one of {}{}", PlugName(plug), *text,
                                fmt::join(a.enum_names, ", "), DidYouMean(*text, a.enum_names));
       }
-      value = Value(static_cast<std::int64_t>(it - a.enum_names.begin()));
-    } else if (value.AsInt() < 0 || value.AsInt() >= static_cast<std::int64_t>(a.enum_names.size())) {
-      return Status::Invalid("{} has no choice {}; expected one of {}", PlugName(plug), value.ToString(),
+      *value = Value(static_cast<std::int64_t>(it - a.enum_names.begin()));
+    } else if (value->AsInt() < 0 || value->AsInt() >= static_cast<std::int64_t>(a.enum_names.size())) {
+      return Status::Invalid("{} has no choice {}; expected one of {}", PlugName(plug), value->ToString(),
                              fmt::join(a.enum_names, ", "));
     }
   }
-  if (!value.FitsType(type)) {
-    return Status::Invalid("{} takes a {}, not {}", PlugName(plug), TypeName(type), value.ToString());
+  if (!value->FitsType(type)) {
+    return Status::Invalid("{} takes a {}, not {}", PlugName(plug), TypeName(type), value->ToString());
   }
-  KPSA_RETURN_IF_ERROR(CheckNumbers(plug, value));
+  return CheckNumbers(plug, *value);
+}
+
+Status Graph::Set(const PlugRef& plug, Value value) {
+  KPSA_RETURN_IF_ERROR(CheckValue(plug, &value));
   auto& values = node(plug.node).values;
   const auto [begin, end] = Range(values, plug, LastChild(plug), kPlug);
   if (begin == end) {
@@ -488,4 +487,4 @@ Status Graph::CheckCycle(const PlugRef& source, const PlugRef& destination) cons
   return Status();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 #include "base/status.h"
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // An index and a version: the id of a removed node is noticed instead of meaning its successor.
 struct NodeId {
@@ -56,6 +56,8 @@ class Graph {
   // numbers are finite. The latest wins: setting a whole plug forgets what was set on its children (or its
   // single points).
   Status Set(const PlugRef& plug, Value value);
+  // What Set would say, which names of choices become numbers for.
+  Status CheckValue(const PlugRef& plug, Value* value) const;
   Status Unset(const PlugRef& plug);
   // The same for a pose: everything sees the value but rest states (node_def.h, Structural::rest), which keep
   // what was set on the attribute before its first pose. Structural attributes have no pose: they are set.
@@ -140,4 +142,4 @@ class Graph {
   std::unordered_map<std::string, std::vector<Index>> by_alias_;  // several: ambiguous
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "base/check.h"
 #include "graph/structural_view.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // First fields of the keys in by_key_: nodes use b = group, others are told apart by b.
@@ -425,4 +425,4 @@ std::vector<Index> InstanceTable::Order() const {
   return order;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "graph/graph.h"
 #include "graph/plan.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Where an input's value comes from.
 struct Source {
@@ -126,4 +126,4 @@ class InstanceTable {
   Status status_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

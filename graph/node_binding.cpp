@@ -2,7 +2,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Positions of attributes in a group, by name.
@@ -146,7 +146,8 @@ Result<Index> PointTotals::OfOutput(Index number, int position, int element) {
         Result<Index> count =
             group.point_count(view, table_.output_def(instance, key.position).name, key.element);
         if (!count.ok())
-          return Status::Invalid("{}: {}", Describe(table_, instance), count.status().ToString());
+          return Status::Invalid("{}: {}", Describe(table_, instance), count.status().ToString())
+              .OfNode(table_.graph().name(instance.node));
         total = *count;
         break;
       }
@@ -217,7 +218,8 @@ Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& stati
     DemandOf demand(table, instance, view, sets);
     group.demand(demand);
     if (!demand.mismatch.empty())
-      return Status::Invalid("{}: {}", Describe(table, instance), demand.mismatch);
+      return Status::Invalid("{}: {}", Describe(table, instance), demand.mismatch)
+          .OfNode(table.graph().name(instance.node));
     return Status();
   }
   // The default: the same points of every points input
@@ -236,7 +238,8 @@ Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& stati
     if (sets->inputs[i].total() != wanted->total()) {
       return Status::Invalid("{}: {} has {} points, its output {}", Describe(table, instance),
                              table.input_def(instance, instance.inputs[i].position).name,
-                             sets->inputs[i].total(), wanted->total());
+                             sets->inputs[i].total(), wanted->total())
+          .OfNode(table.graph().name(instance.node));
     }
     sets->inputs[i] = *wanted;
   }
@@ -249,8 +252,10 @@ Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index numb
   if (instance.kind != Instance::Kind::kNode || !table.group(instance).bind) return BoundKernel();
   const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);
   Result<BoundKernel> kernel = table.group(instance).bind(BindingOf(table, instance, view, sets));
-  if (!kernel.ok()) return Status::Invalid("{}: {}", Describe(table, instance), kernel.status().ToString());
+  if (!kernel.ok())
+    return Status::Invalid("{}: {}", Describe(table, instance), kernel.status().ToString())
+        .OfNode(table.graph().name(instance.node));
   return kernel;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "graph/structural_view.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Point sets by input (Instance::inputs) and by output (position, element), of points plugs only.
 struct InstanceSets {
@@ -41,4 +41,4 @@ Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index inst
 // "node "mush" (deltaMush)"
 std::string Describe(const InstanceTable& table, const Instance& instance);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

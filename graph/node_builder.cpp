@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Whether a default tells a type; assets and buffers do not.
@@ -265,4 +265,4 @@ NodeBuilder& NodeBuilder::strength(std::string_view input) {
   return *this;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -26,7 +26,7 @@
 #include "graph/compute_signature.h"
 #include "graph/node_def.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct AttributeOptions {
   double min = -std::numeric_limits<double>::infinity();
@@ -231,4 +231,4 @@ class NodeBuilder {
   NodeDef* def_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,6 +1,6 @@
 #include "graph/node_def.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 int NodeDef::FindAttribute(std::string_view attribute_name) const {
   for (std::size_t i = 0; i < attributes.size(); ++i) {
@@ -43,4 +43,4 @@ std::vector<std::string> NodeDef::AttributeNames() const {
   return names;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -15,9 +15,7 @@
 #include "graph/point_set.h"
 #include "graph/value.h"
 
-namespace kpsa {
-
-enum class Unit : std::uint8_t { kNone, kLength, kAngle, kTime };
+namespace kpsa::engine {
 
 class Structural;
 
@@ -148,4 +146,4 @@ struct NodeDef {
   std::vector<std::string> AttributeNames() const;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

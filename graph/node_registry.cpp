@@ -1,6 +1,6 @@
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 NodeBuilder NodeRegistry::add(std::string name, std::string doc) {
   auto def = std::make_unique<NodeDef>();
@@ -46,4 +46,4 @@ std::vector<std::string> NodeRegistry::Names() const {
   return names;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

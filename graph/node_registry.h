@@ -11,7 +11,7 @@
 #include "graph/node_builder.h"
 #include "graph/node_def.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class NodeRegistry {
  public:
@@ -34,4 +34,4 @@ class NodeRegistry {
   std::vector<std::unique_ptr<NodeDef>> duplicates_;  // of names that were taken
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

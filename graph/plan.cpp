@@ -1,6 +1,6 @@
 #include "graph/plan.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Index Plan::FindVarying(const PlugRef& plug) const {
   for (Index v = 0; v < varying_.size(); ++v) {
@@ -33,4 +33,4 @@ std::size_t Plan::MemoryBytes() const {
   return total;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

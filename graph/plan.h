@@ -17,7 +17,7 @@
 #include "graph/graph.h"
 #include "graph/point_set.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct RequestedOutput {
   PlugRef plug;
@@ -181,4 +181,4 @@ class Plan {
   std::size_t buffer_floats_ = 0, workspace_floats_ = 0, state_bytes_ = 0;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "graph/builtin_steps.h"
 #include "graph/static_eval.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr Index kLeastBatch = 4;  // steps that are worth a batch
@@ -468,4 +468,4 @@ std::shared_ptr<const Plan> PlanBuilder::Build() {
   return plan_;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "graph/plan.h"
 #include "graph/step_order.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class PlanBuilder {
  public:
@@ -54,4 +54,4 @@ class PlanBuilder {
   std::unordered_map<std::string, std::uint32_t> texts_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

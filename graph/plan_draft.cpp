@@ -8,7 +8,7 @@
 #include "base/check.h"
 #include "graph/static_eval.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kMaxLazyInputs = 64;   // bits of what decide returns
@@ -325,7 +325,8 @@ class Drafter {
           together_position = input.position;
           if (++bits > kMaxLazyInputs) {
             return Status::Invalid("{} has more than {} lazy inputs", Describe(table_, instance),
-                                   kMaxLazyInputs);
+                                   kMaxLazyInputs)
+                .OfNode(table_.graph().name(instance.node));
           }
         }
         Index child = kNoIndex;
@@ -334,7 +335,8 @@ class Drafter {
             together = OpenSegment(lazy_parent, step_number);
             if (draft_.segments[together].owners > kMaxLazyDepth) {
               return Status::Invalid("{}: lazy inputs are nested more than {} deep",
-                                     Describe(table_, instance), kMaxLazyDepth);
+                                     Describe(table_, instance), kMaxLazyDepth)
+                  .OfNode(table_.graph().name(instance.node));
             }
           }
           child = reads_in = together;
@@ -349,7 +351,8 @@ class Drafter {
       draft_.steps[step_number].inputs[i] = std::move(read);
     }
     if (bits > 0 && table_.group(instance).decide == nullptr) {
-      return Status::Invalid("{} has lazy inputs but does not decide about them", Describe(table_, instance));
+      return Status::Invalid("{} has lazy inputs but does not decide about them", Describe(table_, instance))
+          .OfNode(table_.graph().name(instance.node));
     }
     return Status();
   }
@@ -441,4 +444,4 @@ Result<PlanDraft> DraftPlan(InstanceTable& table, StaticEvaluator& statics, cons
   return Drafter(table, statics, request).Run(wanted);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "graph/node_binding.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Where a draft step reads an input.
 struct DraftInput {
@@ -54,4 +54,4 @@ struct PlanDraft {
 Result<PlanDraft> DraftPlan(InstanceTable& table, class StaticEvaluator& statics,
                             const std::vector<Source>& wanted, const Request& request);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::vector<Index> Producers(const Plan& plan, Index step) {
   const Plan::Step& s = plan.steps()[step];
@@ -119,4 +119,4 @@ CriticalPath FindCriticalPath(const Plan& plan, const Profile& profile) {
   return path;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

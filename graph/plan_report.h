@@ -8,7 +8,7 @@
 #include "graph/plan.h"
 #include "graph/profile.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Steps that a step reads, those of its lazy inputs included; ascending, each once.
 std::vector<Index> Producers(const Plan& plan, Index step);
@@ -37,4 +37,4 @@ struct CriticalPath {
 };
 CriticalPath FindCriticalPath(const Plan& plan, const Profile& profile);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

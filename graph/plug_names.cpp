@@ -5,7 +5,7 @@
 #include "base/check.h"
 #include "graph/graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 bool ParseInt(std::string_view text, int* value) {
@@ -198,4 +198,4 @@ Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text)
   return index;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -12,7 +12,7 @@
 
 #include "graph/plugin.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // What the system says, without the path that begins it.
@@ -109,4 +109,4 @@ Status PluginLoader::Load(const std::string& path) {
   return Status();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

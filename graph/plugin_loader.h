@@ -9,7 +9,7 @@
 #include "base/status.h"
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class PluginLoader {
  public:
@@ -27,4 +27,4 @@ class PluginLoader {
   std::map<std::string, std::string> origin_;  // node type -> the library that brought it
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

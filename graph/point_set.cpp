@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 PointSet PointSet::All(Index total) {
   PointSet set;
@@ -91,4 +91,4 @@ bool operator==(const PointSet& a, const PointSet& b) {
   return a.all_ || a.empty() || a.indices_ == b.indices_ || *a.indices_ == *b.indices_;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

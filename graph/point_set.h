@@ -8,7 +8,7 @@
 #include "base/digest.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class PointSet {
  public:
@@ -41,4 +41,4 @@ class PointSet {
   std::shared_ptr<const std::vector<Index>> indices_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

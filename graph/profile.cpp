@@ -4,7 +4,7 @@
 #include <chrono>
 #include <mutex>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 std::mutex add_mutex;  // recording may come from several threads
 }
@@ -35,4 +35,4 @@ std::string CauseName(const Plan& plan, Index cause) {
   return cause < steps ? plan.step_name(cause) : plan.varying()[cause - steps].name;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

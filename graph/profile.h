@@ -8,7 +8,7 @@
 #include "base/types.h"
 #include "graph/plan.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // One evaluation of a step.
 struct ProfileEvent {
@@ -47,4 +47,4 @@ std::uint64_t ProfileClock();  // nanoseconds of a steady clock
 // "skin_1.envelope" or "node "jaw"" for the cause of an event.
 std::string CauseName(const Plan& plan, Index cause);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A host for computations while compiling: serial, errors kept.
@@ -133,7 +133,8 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   for (const Input& input : instance.inputs) {
     values.push_back(Ready(rest ? input.rest : input.source, rest));
     if (values.back() == nullptr)
-      return Status::Invalid("{}: an input has no value", Describe(table_, instance));
+      return Status::Invalid("{}: an input has no value", Describe(table_, instance))
+          .OfNode(table_.graph().name(instance.node));
   }
   auto outputs = std::make_shared<Outputs>();
   if (instance.kind == Instance::Kind::kConvert) {
@@ -232,7 +233,9 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   context.at_rest = rest;
   if (group.decide != nullptr) context.chosen = group.decide(context);
   if (host.error.empty()) group.compute(context);
-  if (!host.error.empty()) return Status::Evaluation("{}: {}", Describe(table_, instance), host.error);
+  if (!host.error.empty())
+    return Status::Evaluation("{}: {}", Describe(table_, instance), host.error)
+        .OfNode(table_.graph().name(instance.node));
   std::size_t next = 0;
   for (std::size_t p = 0; p < group.outputs.size(); ++p) {
     const Type type = table_.OutputType(instance, static_cast<int>(p));
@@ -246,4 +249,4 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   return Status();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 
 #include "graph/node_binding.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class StaticEvaluator final : public StaticValues {
  public:
@@ -45,4 +45,4 @@ PointBuffer GatherPoints(ConstPointsView from, int components, const PointSet& s
 Value AssembleValue(const Value& whole, const std::vector<int>& children,
                     const std::vector<const Value*>& parts);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,7 +3,7 @@
 
 #include "graph/evaluator.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // One on the stack for every run, so that a failure knows its step.
 class Evaluator::StepHost final : public ComputeHost {
@@ -27,4 +27,4 @@ class Evaluator::StepHost final : public ComputeHost {
   Evaluator* evaluator_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

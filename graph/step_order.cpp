@@ -4,7 +4,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMaxUnit = 60000;  // Plan::Step counts the steps of a unit in 16 bits
@@ -216,4 +216,4 @@ StepOrder OrderSteps(const InstanceTable& table, const PlanDraft& draft) {
   return Orderer(table, draft).Run();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

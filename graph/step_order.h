@@ -5,7 +5,7 @@
 
 #include "graph/plan_draft.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct StepOrder {
   struct Unit {
@@ -22,4 +22,4 @@ struct StepOrder {
 // readers (gathers) run between their members, before the buffer is overwritten.
 StepOrder OrderSteps(const InstanceTable& table, const PlanDraft& draft);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

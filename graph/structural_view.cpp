@@ -2,7 +2,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 int StructuralView::Attribute(std::string_view name) const {
   const int attribute = table_.graph().def(node_).FindAttribute(name);
@@ -51,4 +51,4 @@ const Value* StructuralView::rest(std::string_view name, int element) const {
   return table_.HeldValue(node_, attribute, element, true);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "graph/instances.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The static outputs that a view may need from upstream: of a structural source, and rest values of inputs.
 class StaticValues {
@@ -41,4 +41,4 @@ class StructuralView final : public Structural {
   StaticValues* statics_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 const char* TypeName(Type type) {
   constexpr const char* kNames[] = {"bool",    "int",    "enum",   "double",  "double3", "quaternion",
@@ -201,4 +201,14 @@ std::string Value::ToString() const {
       storage_);
 }
 
-}  // namespace kpsa
+std::span<const double> NumbersOf(const Value& value, double* whole) {
+  if (const auto* d = value.get_if<double>()) return std::span(d, 1);
+  if (const auto* i = value.get_if<std::int64_t>())
+    return *whole = static_cast<double>(*i), std::span(whole, 1);
+  if (const auto* v = value.get_if<Double3>()) return std::span(&v->x, 3);
+  if (const auto* q = value.get_if<Quaternion>()) return std::span(&q->x, 4);
+  if (const auto* m = value.get_if<Matrix4>()) return m->m;
+  return {};
+}
+
+}  // namespace kpsa::engine

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <typeindex>
@@ -16,7 +17,7 @@
 #include "base/points.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class Type : std::uint8_t {
   kBool,        // slot: std::int64_t 0 or 1
@@ -131,4 +132,8 @@ class Value {
   Storage storage_;
 };
 
-}  // namespace kpsa
+// The numbers of a small value, in its slot's order; none of other values. Those of a whole number are in
+// *whole.
+std::span<const double> NumbersOf(const Value& value, double* whole);
+
+}  // namespace kpsa::engine

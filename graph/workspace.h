@@ -6,7 +6,7 @@
 #include "base/points.h"
 #include "graph/plan.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class Evaluator;
 
@@ -22,4 +22,4 @@ class Workspace {
   const Evaluator* owner_ = nullptr;  // whose lazy values the buffers hold
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "kpsa/acceleration_draft.h"
 #include "kpsa/near_stack.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // All nodes that points depend on, their own included.
@@ -134,4 +134,4 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
   return std::move(applied->front());
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

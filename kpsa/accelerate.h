@@ -12,7 +12,7 @@
 #include "kpsa/signals.h"
 #include "kpsa/signature.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Points to accelerate: of one mesh, up to and including a stage; and the stages before it, where cues may
 // lie.
@@ -73,4 +73,4 @@ Result<Accelerated> Accelerate(Graph* graph, Compiler* compiler, const Accelerat
                                std::shared_ptr<const Subspace> subspace, const std::string& node_name,
                                const AccelerateOptions& options);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "kpsa/space_frame.h"
 #include "kpsa/training_record.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Position of a signal in a list, added if it is not there.
@@ -357,4 +357,4 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   return draft;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

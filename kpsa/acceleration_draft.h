@@ -4,7 +4,7 @@
 
 #include "kpsa/accelerate.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct AccelerationDraft {
   KpsaConfig::Data data;
@@ -23,4 +23,4 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
                                             const AccelerationTarget& target,
                                             std::shared_ptr<const Subspace> subspace, bool stale_is_miss);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 
 #include "base/points.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // 64-byte aligned storage of halfs or floats.
 template <typename T>
@@ -24,4 +24,4 @@ class AlignedArray {
   std::size_t size_ = 0;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

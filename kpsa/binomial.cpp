@@ -6,7 +6,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kNegligible = 1e-17;  // of a sum: a term that ends it
@@ -68,4 +68,4 @@ double BinomialLowerBound(std::size_t k, std::size_t n, double confidence) {
   return 1 - BinomialUpperBound(n - std::min(k, n), n, confidence);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

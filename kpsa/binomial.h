@@ -5,11 +5,11 @@
 
 #include <cstddef>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The smallest share p in which k or fewer of n have a probability of 1 - confidence at most; 1 where k is n.
 double BinomialUpperBound(std::size_t k, std::size_t n, double confidence);
 // The largest share p in which k or more of n have a probability of 1 - confidence at most; 0 where k is 0.
 double BinomialLowerBound(std::size_t k, std::size_t n, double confidence);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

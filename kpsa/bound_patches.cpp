@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 PointSet Among(const std::vector<Index>& points, const PointSet& wanted) {
@@ -66,4 +66,4 @@ void BoundPatches::Blend(const PatchChoice& choice, Index output, ConstPointsVie
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

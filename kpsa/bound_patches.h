@@ -12,7 +12,7 @@
 #include "graph/point_set.h"
 #include "kpsa/patches.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The points of a region that some of the wanted ones of its output are.
 PointSet WantedOfRegion(const PatchRegion& region, std::span<const PatchPoints> patches,
@@ -48,4 +48,4 @@ class BoundPatches {
   std::vector<Patch> patches_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,9 +11,9 @@
 
 #include "base/scalar_math.h"
 #include "kpsa/binomial.h"
-#include "kpsa/poses.h"
+#include "kpsa/pose_kind.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -269,4 +269,12 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
   return result;
 }
 
-}  // namespace kpsa
+double ExpectedHitRate(const Calibration& calibration) {
+  if (calibration.near_clips > 0)
+    return static_cast<double>(calibration.hits_near_clips) / static_cast<double>(calibration.near_clips);
+  if (calibration.kinds.empty()) return calibration.hit_rate;
+  const Calibration::Kind& sampled = calibration.kinds.front();
+  return static_cast<double>(sampled.hits) / static_cast<double>(std::max<std::size_t>(1, sampled.poses));
+}
+
+}  // namespace kpsa::engine

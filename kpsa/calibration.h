@@ -19,7 +19,7 @@
 
 #include "kpsa/soft_cache.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr double kCalibrationConfidence = 0.9;
 inline constexpr double kSevere = 3;         // tolerances: a violation beyond them is a severe one
@@ -42,7 +42,7 @@ struct CalibrationPair {
   double error = 0;  // largest point error of the pure reconstruction, scene units; of light the RMS over an
                      // output's points, the largest of all outputs
   double guard = 0;  // share of the full evaluation that the guards ask for (GuardWeight)
-  int kind = 0;      // PoseKind (kpsa/poses.h)
+  int kind = 0;      // PoseKind (kpsa/pose_kind.h)
   // Where patches miss by themselves: those that no other one outdoes with a lower score, a lower guard and a
   // larger error, by score; and the score that half of all patches reach, from which on all points are exact
   // (AllWeight).
@@ -90,4 +90,8 @@ Calibration Calibrate(std::span<const CalibrationPair> pairs, double tolerance, 
 double EmittedWeight(const CalibrationPair& pair, const SoftCacheThreshold& threshold);
 double EmittedError(const CalibrationPair& pair, const SoftCacheThreshold& threshold);
 
-}  // namespace kpsa
+// Of held-out poses that are made of frames of the training clips, as other clips may be; where there are
+// none, of poses as the sampler draws them; of all where there are no kinds.
+double ExpectedHitRate(const Calibration& calibration);
+
+}  // namespace kpsa::engine

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "kpsa/poses.h"
+#include "kpsa/pose_kind.h"
 #include "kpsa/subspace_tensors.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr char kNearClips[] = "calibrationNearClips";  // only where there are some
@@ -128,4 +128,4 @@ void HashCalibration(const Subspace& s, Hasher* hasher) {
   if (s.patches.tiles > 0) hasher->Add(std::span<const double>(s.patches.costs));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,10 +3,10 @@
 #pragma once
 
 #include "base/digest.h"
-#include "base/safetensors.h"
+#include "files/safetensors.h"
 #include "kpsa/subspace.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 bool AnyNearClips(const Subspace& s);  // CalibrationPair::near_clips
 // Errors: tensors that are missing, of another size or type, or that cannot be true. Tiles, and how many of
@@ -15,4 +15,4 @@ Status ReadCalibration(const SafetensorsFile& file, Subspace* s);
 void AddCalibration(const Subspace& s, SafetensorsWriter* writer);
 void HashCalibration(const Subspace& s, Hasher* hasher);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "base/matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using RowKind = KpsaConfig::Row::Kind;
@@ -94,4 +94,4 @@ void CueGather::Gather(const Inputs& in, float* scratch, std::span<double> raw) 
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "graph/compute_context.h"
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class CueGather {
  public:
@@ -61,4 +61,4 @@ class CueGather {
   std::vector<Product> products_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

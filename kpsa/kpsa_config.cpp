@@ -1,6 +1,6 @@
 #include "kpsa/kpsa_node.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   Hasher hasher;
@@ -126,4 +126,4 @@ std::string MissText(const KpsaConfig& config, MissReason reason, Index offender
   return "";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -16,7 +16,7 @@
 #include "kpsa/signals.h"
 #include "kpsa/space_frame.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Inputs and outputs by position.
@@ -492,4 +492,4 @@ KpsaTimes TakeKpsaTimes() {
   return {cue_ns.exchange(0), projection_ns.exchange(0), reconstruction_ns.exchange(0)};
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

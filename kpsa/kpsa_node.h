@@ -22,7 +22,7 @@
 #include "graph/node_registry.h"
 #include "kpsa/subspace.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What ties a subspace to the inputs of a node.
 class KpsaConfig final : public Asset {
@@ -91,4 +91,4 @@ struct KpsaTimes {
 void MeasureKpsaTimes(bool on);  // process-wide; not while evaluations run
 KpsaTimes TakeKpsaTimes();
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,4 +1,4 @@
-// A frame that was no hit, as subspaces learn from it (kpsa/learner.h).
+// A frame that was no hit, as subspaces learn from it (kpsa/training/learner.h).
 #pragma once
 
 #include <compare>
@@ -6,13 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/status.h"
-#include "kpsa/poses.h"
-
-namespace kpsa {
-
-struct TrainingClip;
-struct TrainingRig;
+namespace kpsa::engine {
 
 struct Miss {
   std::string clip;  // "": the rest pose
@@ -23,9 +17,4 @@ struct Miss {
   friend auto operator<=>(const Miss&, const Miss&) = default;
 };
 
-// Posed misses as samples of the controls: each, and what lies between it and the pose without its controls,
-// which is as new. Their clips are among `clips`. Errors: a control that the rig lacks.
-Result<std::vector<SampledPose>> SamplesOf(const std::vector<Miss>& misses, const TrainingRig& rig,
-                                           const std::vector<TrainingClip>& clips);
-
-}  // namespace kpsa
+}  // namespace kpsa::engine

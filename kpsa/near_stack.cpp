@@ -5,7 +5,7 @@
 #include "base/matrix.h"
 #include "kpsa/signals.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 Double3 Origin(const Matrix4& m) { return {m(0, 3), m(1, 3), m(2, 3)}; }
@@ -203,4 +203,4 @@ void AddNearNodes(NodeRegistry& registry) {
       });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 
 #include "kpsa/accelerate.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class NearStacks {
  public:
@@ -40,4 +40,4 @@ class NearStacks {
 // Declares spaceOffset and offsetMatrix.
 void AddNearNodes(NodeRegistry& registry);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "kpsa/tiles.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kBorder = 3;              // typical distances of neighbours
@@ -151,4 +151,4 @@ void ChooseRegions(const PatchLayout& layout, double all, PatchChoice* choice) {
   if (choice->full) choice->cost = 1, choice->regions = 0;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -16,7 +16,7 @@
 #include "base/scalar_math.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr std::size_t kMaxPatches = 62, kMaxRegions = 62;  // lazy inputs of a node are 64
 inline constexpr double kWholeFrom = 0.25;      // share of patches, from which all points come in,
@@ -92,4 +92,4 @@ inline double WholeWeight(double mean) {
 // weight, and together cost least.
 void ChooseRegions(const PatchLayout& layout, double all, PatchChoice* choice);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 void TransformAll(const float* m, PointsView p) {
@@ -24,11 +24,11 @@ void TransformAll(const float* m, PointsView p) {
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(TransformAll);
 
@@ -45,5 +45,5 @@ void TransformPoints(const FloatMatrix& matrix, PointsView points) {
   HWY_DYNAMIC_DISPATCH(TransformAll)(matrix.data(), points);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif

@@ -7,7 +7,7 @@
 #include "base/points.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 using FloatMatrix = std::array<float, 12>;  // 3x4 by columns
 FloatMatrix ToFloats(const Matrix4& matrix);
@@ -15,4 +15,4 @@ FloatMatrix ToFloats(const Matrix4& matrix);
 // The same bits on every SIMD target. Arrays as PointsView has them: the padding is written.
 void TransformPoints(const FloatMatrix& matrix, PointsView points);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

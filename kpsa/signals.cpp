@@ -7,7 +7,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 bool IsTransform(const NodeDef& def) {
@@ -169,4 +169,4 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
   return sorted;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

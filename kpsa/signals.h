@@ -13,7 +13,7 @@
 
 #include "graph/compiler.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct Signal {
   std::string name;  // "jaw.matrix", "head_mesh_blendShape.weight[smile]", "cage.points[3].y"
@@ -57,4 +57,4 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
                                         const std::vector<PlugRef>& varying, const std::set<Index>& carried,
                                         std::vector<std::string>* unguarded);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

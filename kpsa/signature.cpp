@@ -10,7 +10,7 @@
 #include "base/digest.h"
 #include "kpsa/signals.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Plugs = std::vector<PlugRef>;
@@ -276,4 +276,4 @@ std::string SignatureDigest(const Signature& signature) {
   return hasher.Finish().ToHex();
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 
 #include "graph/graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct NodeSignature {
   std::string node;                               // digest of its type and connections
@@ -50,4 +50,4 @@ std::vector<SetHere> TakeSetHere(const Graph& graph, const std::vector<PlugRef>&
                                  const std::vector<PlugRef>& space, const std::vector<PlugRef>& controls,
                                  const RigWithin& within, const Signature& trained, Signature* now);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // Sums of sixteen are added in halves, whatever the width of the target.
@@ -98,27 +98,23 @@ double Project(const float* factor, std::size_t rows, std::size_t columns, bool 
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "base/check.h"
-#include "kpsa/quantile.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(Project);
 
 namespace {
 
-constexpr double kQuantile = 0.99;
 constexpr float kHugeMeasurement = 1e15f;  // deviations, or metres: reconstruction would overflow soon
 
 // |block * g|^2 for a block of h x h, column-major.
@@ -158,31 +154,6 @@ void Spoil(Verdict* verdict) {
   verdict->reason = MissReason::kNotFinite;
 }
 
-// Rows that span those of p = (coordinates) y, M <= r.
-Eigen::MatrixXd OrthonormalRows(const Eigen::MatrixXd& coordinates) {
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(coordinates.transpose());
-  const Eigen::MatrixXd q =
-      qr.householderQ() * Eigen::MatrixXd::Identity(coordinates.cols(), coordinates.rows());
-  return q.transpose();
-}
-
-// F in the layout of SoftCacheModel::factor.
-AlignedArray<float> PackFactor(const Eigen::MatrixXd& matrix, bool lower, std::size_t size) {
-  AlignedArray<float> factor(size);
-  const Eigen::Index n = matrix.rows(), columns = matrix.cols(), all = (columns + 15) / 16;
-  float* to = factor.data();
-  for (Eigen::Index row = 0; row < n; row += 4) {
-    const Eigen::Index groups = lower ? row / 16 + 1 : all;
-    for (Eigen::Index group = 0; group < groups; ++group) {
-      for (Eigen::Index i = row; i < row + 4; ++i) {
-        for (Eigen::Index j = 16 * group; j < 16 * group + 16; ++j)
-          *to++ = i < n && j < columns ? static_cast<float>(matrix(i, j)) : 0.0f;
-      }
-    }
-  }
-  return factor;
-}
-
 }  // namespace
 
 std::size_t SoftCacheModel::factor_size() const {
@@ -200,47 +171,6 @@ double FullWeight(double score, const SoftCacheThreshold& threshold) {
   const double lo = threshold.tau_lo();
   if (score <= lo) return 0;
   return Smoothstep((score - lo) / (threshold.tau - lo));
-}
-
-SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
-                                  const Eigen::MatrixXd& training) {
-  KPSA_CHECK_EQ(training.rows(), cues.rows());
-  SoftCacheModel model;
-  model.mode = estimator.mode;
-  model.offsets = cues.offsets;
-  const bool map = model.mode == EstimatorMode::kMap;
-  model.modes = static_cast<std::size_t>(estimator.coordinates.rows());
-  model.factor = PackFactor(map ? estimator.whitening : OrthonormalRows(estimator.coordinates), map,
-                            model.factor_size());
-  for (std::size_t k = 0; k < cues.cues.size() && model.mode == EstimatorMode::kMap; ++k) {
-    const auto begin = static_cast<Eigen::Index>(cues.offsets[k]);
-    const Eigen::Index height = static_cast<Eigen::Index>(cues.offsets[k + 1]) - begin;
-    Eigen::MatrixXd block = estimator.judge.block(begin, begin, height, height);
-    block = block.llt().solve(Eigen::MatrixXd::Identity(height, height)).eval();
-    // The error of a scalar counts by the displacement it stands for, so that all cues speak of lengths
-    if (cues.cues[k].kind == CueKind::kScalar) block *= estimator.reach[begin];
-    for (Eigen::Index i = 0; i < block.size(); ++i)
-      model.leave_one_out.push_back(static_cast<float>(block.data()[i]));
-  }
-
-  // Quantiles over the training poses; the floors keep a score of pure rounding from becoming a large one
-  std::vector<double> scores1, scores2;
-  std::vector<float> y(model.padded_rows()), g(model.padded_rows());
-  for (Eigen::Index t = 0; t < training.cols(); ++t) {
-    for (Eigen::Index j = 0; j < training.rows(); ++j)
-      y[static_cast<std::size_t>(j)] = static_cast<float>(training(j, t));
-    const RawScores raw = ComputeRawScores(model, y, g);
-    scores1.push_back(raw.score1);
-    scores2.push_back(raw.score2);
-  }
-  const double noise = cues.rows() == 0 ? 0 : std::sqrt(cues.noise.minCoeff());
-  const double floor1 =
-      model.mode == EstimatorMode::kPaper ? noise : 1e-6 * static_cast<double>(model.rows());
-  model.quantile1 = std::max(
-      {scores1.empty() ? 0 : Quantile(scores1, kQuantile), floor1, std::numeric_limits<double>::min()});
-  model.quantile2 = std::max(
-      {scores2.empty() ? 0 : Quantile(scores2, kQuantile), noise, std::numeric_limits<double>::min()});
-  return model;
 }
 
 RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y, std::span<float> g) {
@@ -313,5 +243,5 @@ std::string OutsideMessage(const TrainedRange& range, double value) {
                      range.hi);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

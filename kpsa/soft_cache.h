@@ -3,9 +3,8 @@
 // triangular (map), or Q^T, the M orthonormal rows that span what the modes do to the cues (paper: far fewer
 // numbers than the projector I - Q Q^T); g = F^T F y (map), or the residual y - F^T F y = y - C p (paper).
 //
-// map:   score 1 = |F y|^2 (residual and Mahalanobis distance in one); score 2 = the largest leave-one-out
-// error of a
-//        cue, |([G^-1]_ii)^-1 g_i| with the block of the cue; each over its 99 % training quantile; the
+// map:   score 1 = |F y|^2 (residual and Mahalanobis distance in one); score 2 = the largest leave-one-out error
+//        of a cue, |([G^-1]_ii)^-1 g_i| with the block of the cue; each over its 99 % training quantile; the
 //        larger counts.
 // paper: |y - C p| over its 99 % training quantile.
 // F is read once, four rows at a time: w = F y gives the four values that the same rows then add to g.
@@ -15,7 +14,7 @@
 // too; the largest weight counts.
 #pragma once
 
-#include <Eigen/Core>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
@@ -24,9 +23,11 @@
 #include "base/scalar_math.h"
 #include "base/types.h"
 #include "kpsa/aligned_array.h"
-#include "kpsa/estimator.h"
 
-namespace kpsa {
+namespace kpsa::engine {
+
+// How the subspace's numbers follow from the measured ones (kpsa/training/estimator.h).
+enum class EstimatorMode : std::uint8_t { kMap, kPaper };
 
 // Why the full evaluation is needed.
 enum class MissReason : std::uint8_t {
@@ -75,10 +76,6 @@ struct SoftCacheModel {
   std::size_t cues() const { return offsets.empty() ? 0 : offsets.size() - 1; }
 };
 
-// From an estimator; the quantiles from training measurements, one a column [r x T].
-SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
-                                  const Eigen::MatrixXd& training);
-
 struct RawScores {
   double score1 = 0, score2 = 0;  // before division by the quantiles; score2 is 0 in paper mode
   Index worst_cue = kNoIndex;     // of score 2; in paper mode of the largest residual
@@ -115,4 +112,4 @@ inline double GuardWeight(double lo, double hi, double ramp, double value) {
 // "head.rotateX = 1.2 is outside its trained range [-0.5, 0.5]"
 std::string OutsideMessage(const TrainedRange& range, double value);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 
 #include "base/matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kFileRounding = 1e-6;  // rotations of a file are floats
@@ -60,4 +60,4 @@ SpaceFrame SpaceFrameOf(const Matrix4& world, const Matrix4& inverse_rest_stretc
   return frame;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Of the space at rest, A = R U with R a rotation: what is no rotation, inverted (its linear part; mirrored
 // spaces have a negative determinant). The identity for most; also of a flat space.
@@ -20,4 +20,4 @@ struct SpaceFrame {
 };
 SpaceFrame SpaceFrameOf(const Matrix4& world, const Matrix4& inverse_rest_stretch);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

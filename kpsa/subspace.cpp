@@ -6,10 +6,8 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
-
-constexpr Eigen::Index kTileSamples = 400;
 
 template <typename T>
 bool AllFinite(std::span<const T> values) {
@@ -153,14 +151,14 @@ Status ValidateSubspace(const Subspace& s) {
                              s.tiles[i].data().components);
     }
   }
-  if (s.kept_modes.size() > 0) {
+  if (!s.kept_modes.values.empty()) {
+    const ModeMatrix& kept = s.kept_modes;
     std::size_t points = 0;
     for (const SubspaceOutput& output : s.outputs) points += output.points;
-    if (static_cast<std::size_t>(s.kept_modes.rows()) != points * static_cast<std::size_t>(s.components) ||
-        static_cast<std::size_t>(s.kept_modes.cols()) != s.modes || !s.kept_modes.allFinite()) {
-      return Status::Invalid("the kept modes are {} x {}, or not finite; expected {} x {}",
-                             s.kept_modes.rows(), s.kept_modes.cols(),
-                             points * static_cast<std::size_t>(s.components), s.modes);
+    if (kept.rows != points * static_cast<std::size_t>(s.components) || kept.columns != s.modes ||
+        kept.values.size() != kept.rows * kept.columns || !AllFinite(std::span(kept.values))) {
+      return Status::Invalid("the kept modes are {} x {}, or not finite; expected {} x {}", kept.rows,
+                             kept.columns, points * static_cast<std::size_t>(s.components), s.modes);
     }
   }
   for (const TrainedRange& range : s.ranges) {
@@ -186,55 +184,6 @@ Status ValidateSubspace(const Subspace& s) {
                            s.violation_rate, s.blend_start);
   }
   return {};
-}
-
-Eigen::MatrixXd SampledColumns(const Eigen::MatrixXd& training) {
-  const Eigen::Index count = std::min<Eigen::Index>(training.cols(), kTileSamples);
-  Eigen::MatrixXd samples(training.rows(), count);
-  for (Eigen::Index i = 0; i < count; ++i)
-    samples.col(i) = training.col((2 * i + 1) * training.cols() / (2 * count));
-  return samples;
-}
-
-Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
-                      const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
-                      const TileOptions& options, const PoseMatrix* poses, std::size_t clip_poses) {
-  Subspace s;
-  s.mode = estimator.mode;
-  s.components = pca.layout.components;
-  s.modes = static_cast<std::size_t>(pca.mode_count());
-  s.outputs = std::move(outputs);
-  s.cue_mean.assign(cues.mean.data(), cues.mean.data() + cues.mean.size());
-  s.cue_scale.assign(cues.scale.data(), cues.scale.data() + cues.scale.size());
-  s.soft_cache = MakeSoftCacheModel(estimator, cues, training);
-
-  TileInputs inputs;
-  inputs.covariance = estimator.covariance;
-  inputs.samples = SampledColumns(training);
-  const bool latent = estimator.gain.size() == 0;
-  using Map = Eigen::Ref<const Eigen::MatrixXd>;
-  const Map maps = latent ? Map(pca.output_modes()) : Map(estimator.gain);
-  if (latent) {
-    const Eigen::MatrixXd& q = estimator.coordinates;
-    for (Eigen::Index i = 0; i < q.size(); ++i) s.latent.push_back(static_cast<float>(q.data()[i]));
-    inputs.covariance = q * estimator.covariance * q.transpose();
-    inputs.samples = (q * inputs.samples).eval();
-  }
-  Eigen::Index first = 0;
-  for (const SubspaceOutput& output : s.outputs) {
-    const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
-    KPSA_CHECK_LE(first + height, maps.rows());
-    inputs.left_out = pca.row_residual.segment(first, height);
-    if (poses != nullptr && !latent) {
-      inputs.poses = poses, inputs.measured = &training, inputs.clip_poses = clip_poses;
-      inputs.first_column = static_cast<std::size_t>(first);
-    }
-    s.tiles.push_back(BuildTiles(maps.middleRows(first, height), pca.mean.segment(first, height),
-                                 s.components, inputs, options));
-    first += height;
-  }
-  KPSA_CHECK_EQ(first, maps.rows());
-  return s;
 }
 
 SubspaceScratch::SubspaceScratch(const Subspace& subspace)
@@ -353,4 +302,4 @@ void BlendPoints(double full_weight, ConstPointsView full, PointsView points) {
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

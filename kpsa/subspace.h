@@ -5,7 +5,7 @@
 //   Verdict v = Judge(subspace, threshold, &scratch);      // SoftCache
 //   subspace.tiles[output].Reconstruct(scratch.inputs(), points)  // -> points (kpsa/tiles.h)
 //
-// None of these allocates. The file is safetensors (base/safetensors.h) with kind "kpsa-subspace".
+// None of these allocates. The file is safetensors (files/safetensors.h) with kind "kpsa-subspace".
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 #include "kpsa/soft_cache.h"
 #include "kpsa/tiles.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues; 5: without
 // patches; 6: without guards of patches; 7: without calibration poses near clips
@@ -50,7 +50,7 @@ struct CueDescription {
   // The joint in whose space it is measured, by its world matrix, or "": points, and entries of world
   // matrices.
   std::string joint = {};
-  // Products: of one or two scalars (kpsa/cue_products.h), within [lo, hi].
+  // Products: of one or two scalars (kpsa/training/cue_products.h), within [lo, hi].
   struct Factor {
     std::string plug;
     ProductCurve curve;
@@ -78,6 +78,13 @@ struct SubspaceOutput {
   friend bool operator==(const SubspaceOutput&, const SubspaceOutput&) = default;
 };
 
+// [rows x columns], column by column.
+struct ModeMatrix {
+  std::size_t rows = 0, columns = 0;
+  std::vector<float> values;  // rows * columns
+  friend bool operator==(const ModeMatrix&, const ModeMatrix&) = default;
+};
+
 struct Subspace {
   EstimatorMode mode = EstimatorMode::kMap;
   int components = 3;     // of the outputs: 3 or 1
@@ -94,9 +101,9 @@ struct Subspace {
          blend_start = kBlendStart;  // the trained defaults; scene units
   std::vector<TileMap> tiles;        // [outputs]
   // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
-  // split errors with it (kpsa/error_split.h); no frame needs it, so of a file it is copied and checked only
-  // where asked for.
-  Eigen::MatrixXf kept_modes;
+  // split errors with it (kpsa/training/error_split.h); no frame needs it, so of a file it is copied and
+  // checked only where asked for.
+  ModeMatrix kept_modes;
   // Empty, and tiles read y; or, where all points depend on all cues (light), Q [M x r], column by column,
   // and tiles read z = Q y.
   std::vector<float> latent;
@@ -125,18 +132,6 @@ std::string CueName(const Subspace& subspace, const CueDescription& cue);
 
 // Consistency of all sizes and indices; every error says what. ReadSubspace and WriteSubspace call it.
 Status ValidateSubspace(const Subspace& subspace);
-
-// Tiles and SoftCache of a trained estimator (without its gain: by latent coordinates); rows of the PCA's
-// outputs are split over `outputs`. training: y of the training poses [r x T]; where the poses themselves are
-// given, centred, tiles get products, and the score counts what these say. The caller fills cues,
-// calibration, ranges and names.
-Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estimator,
-                      const Eigen::MatrixXd& training, std::vector<SubspaceOutput> outputs,
-                      const TileOptions& options, const PoseMatrix* poses = nullptr,
-                      std::size_t clip_poses = 0);
-
-// Some of the training poses, evenly spread: they watch the largest errors of tiles.
-Eigen::MatrixXd SampledColumns(const Eigen::MatrixXd& training);
 
 Status WriteSubspace(const Subspace& subspace, const std::string& path);
 // Subspace::kept_modes, which may be most of a file: copied and checked, or left out.
@@ -181,4 +176,4 @@ void LargestOfPatches(const Subspace& subspace, std::span<const float> of_tiles,
 // points = (1 - full_weight) * points + full_weight * full, where Verdict::full_weight is in (0, 1).
 void BlendPoints(double full_weight, ConstPointsView full, PointsView points);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,5 +1,5 @@
 // The .kpsa file: lists as JSON in the metadata, numbers as tensors. See kpsa/subspace.h and
-// base/safetensors.h.
+// files/safetensors.h.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -7,13 +7,13 @@
 #include <nlohmann/json.hpp>
 
 #include "base/digest.h"
-#include "base/safetensors.h"
+#include "files/safetensors.h"
 #include "kpsa/calibration_file.h"
-#include "kpsa/poses.h"
+#include "kpsa/pose_kind.h"
 #include "kpsa/subspace.h"
 #include "kpsa/subspace_tensors.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -157,9 +157,7 @@ std::map<std::string, std::string> Header(const Subspace& s) {
           {"training", s.training}};
 }
 
-std::span<const float> ModeValues(const Subspace& s) {
-  return {s.kept_modes.data(), static_cast<std::size_t>(s.kept_modes.size())};
-}
+std::span<const float> ModeValues(const Subspace& s) { return s.kept_modes.values; }
 
 std::string ModesDigest(const Subspace& s) {
   Hasher hasher;
@@ -370,8 +368,7 @@ Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
     rows += output.points * static_cast<std::uint64_t>(s->components);
   const Result<std::vector<float>> values = file.Values<float>(kModes, {s->modes, rows});
   if (!values.ok()) return values.status();
-  s->kept_modes = Eigen::Map<const Eigen::MatrixXf>(values->data(), static_cast<Eigen::Index>(rows),
-                                                    static_cast<Eigen::Index>(s->modes));
+  s->kept_modes = {rows, s->modes, *values};
   const Result<std::string> digest = file.Metadata(kModesDigest);
   if (!digest.ok()) return digest.status();
   if (*digest != ModesDigest(*s))
@@ -418,11 +415,8 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
     Add<std::uint16_t>(&writer, prefix + "w", data.w.span(), true);
     Add<std::uint16_t>(&writer, prefix + "doubt", data.doubt.span(), true);
   }
-  if (s.kept_modes.size() > 0) {
-    writer.Add<float>(
-        kModes,
-        {static_cast<std::uint64_t>(s.kept_modes.cols()), static_cast<std::uint64_t>(s.kept_modes.rows())},
-        ModeValues(s));
+  if (!s.kept_modes.values.empty()) {
+    writer.Add<float>(kModes, {s.kept_modes.columns, s.kept_modes.rows}, ModeValues(s));
     writer.SetMetadata(kModesDigest, ModesDigest(s));
   }
   return writer.Write(path);
@@ -484,4 +478,4 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   return s;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

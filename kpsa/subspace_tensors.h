@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "base/safetensors.h"
+#include "files/safetensors.h"
 #include "kpsa/aligned_array.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 template <typename T>
 Status Assign(Result<std::vector<T>> values, std::vector<T>* target) {
@@ -31,4 +31,4 @@ void Add(SafetensorsWriter* writer, const std::string& key, std::span<const T> v
   writer->Add<T>(key, {values.size()}, values, half);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

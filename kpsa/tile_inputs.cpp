@@ -12,17 +12,17 @@
 
 #ifndef KPSA_TILE_INPUTS_STEP
 #define KPSA_TILE_INPUTS_STEP
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kProductsPadded = (kMaxProducts + kProductLanes - 1) / kProductLanes * kProductLanes;
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // Halfs are converted eight at a time, though there may be wider vectors: Zen 4 takes half as long again for
@@ -167,13 +167,13 @@ void TermsOfTiles(const TileTerms* HWY_RESTRICT tiles, std::size_t count, const 
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(TermsOfTiles);
 
@@ -182,5 +182,5 @@ void ComputeTileInputs(std::span<const TileTerms> tiles, const float* y) {
   HWY_DYNAMIC_DISPATCH(TermsOfTiles)(tiles.data(), tiles.size(), y);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

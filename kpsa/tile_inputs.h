@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <span>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr std::size_t kProductLanes = 16;  // products that are computed at a time
 inline constexpr std::size_t kTilesAtOnce = 8;
@@ -37,4 +37,4 @@ struct TileTerms {
 // work of the others.
 void ComputeTileInputs(std::span<const TileTerms> tiles, const float* y);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

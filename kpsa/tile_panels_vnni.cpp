@@ -7,7 +7,7 @@
 #include <immintrin.h>
 #define KPSA_VNNI __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,avx512vnni,fma")))
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMaxGroups = (2 * kMaxTileRank + 32) / 4;
@@ -139,13 +139,13 @@ void TilePanelsVnni(const std::uint8_t* u, std::size_t panels, std::size_t group
                   : Tile<1>(u, panels, groups, mean, first, frames, frame_count);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #else
-namespace kpsa {
+namespace kpsa::engine {
 bool HasVnni() { return false; }
 void TilePanelsVnni(const std::uint8_t*, std::size_t, std::size_t, int, const float*, std::size_t,
                     const TileFrame*, std::size_t) {
   KPSA_CHECK(false);
 }
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif

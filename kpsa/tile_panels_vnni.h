@@ -9,7 +9,7 @@
 #include "base/points.h"
 #include "kpsa/rigid_points.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What a frame brings to a tile: x = mean + step * (U q), U's bytes being 128 too large each, bias = 128
 // sum(q).
@@ -28,4 +28,4 @@ bool HasVnni();  // false on other machines; the functions below may only be cal
 void TilePanelsVnni(const std::uint8_t* u, std::size_t panels, std::size_t groups, int components,
                     const float* mean, std::size_t first, const TileFrame* frames, std::size_t frame_count);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -16,7 +16,7 @@
 
 #ifndef KPSA_TILES_STEP
 #define KPSA_TILES_STEP
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr float kInputRange = 32639;  // 127 * 256 + 127: both bytes of a wide column's input stay in 16 bits
@@ -28,11 +28,11 @@ struct TileInput {
 };
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // How many vectors of rows are summed in registers at a time.
@@ -184,7 +184,7 @@ void TilePanels1(const std::uint8_t* u, std::size_t panels, std::size_t groups, 
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
@@ -193,7 +193,7 @@ HWY_AFTER_NAMESPACE();
 #include "kpsa/rigid_points.h"
 #include "kpsa/tile_inputs.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(QuantizeInputs);
 HWY_EXPORT(TilePanels3);
@@ -498,5 +498,5 @@ void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::spa
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

@@ -1,6 +1,6 @@
 // Reconstruction at run time: x = mean + U (V y_J), tile by tile, with float32 accumulation. Glossary: y the
-// r normalised measurements (kpsa/cue_selection.h), a tile 128 points in the order given, J the cues that the
-// tile reads, k its rank, P panels of 32 points, c components (3 or 1).
+// r normalised measurements (kpsa/training/cue_selection.h), a tile 128 points in the order given, J the cues
+// that the tile reads, k its rank, P panels of 32 points, c components (3 or 1).
 //
 // The estimator's map B [cN x r] is dense, but the points of a tile hardly depend on most cues. For each tile
 // the few cues J are chosen that predict what B says (greedy, by the fall of the expected squared error under
@@ -18,10 +18,10 @@
 // columns, and the four bytes of a row together, each 128 too large. Everything is read front to back, tile
 // after tile.
 //
-// A tile may have products (kpsa/tile_products.h): z = V y_J, its first latents whitened and clipped, p = 1
-// and products of pairs of these, x = mean + U (z + W p). W is stored as V is. What the products add says how
-// far a pose is from where the linear map was good: for a few points of the tile it is computed apart, the
-// doubt.
+// A tile may have products (kpsa/training/tile_products.h): z = V y_J, its first latents whitened and
+// clipped, p = 1 and products of pairs of these, x = mean + U (z + W p). W is stored as V is. What the
+// products add says how far a pose is from where the linear map was good: for a few points of the tile it is
+// computed apart, the doubt.
 //
 // A tile may lie in the space of a joint: what bends it is then told by few cues, whatever the joints above
 // do, and its points go through the world matrix of the joint, relative to the space of the points, which is
@@ -32,20 +32,17 @@
 // NaN or an infinity in a cue that a tile reads spoils the points of the tile.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
-#include <functional>
-#include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/points.h"
 #include "base/status.h"
 #include "base/types.h"
 #include "kpsa/aligned_array.h"
-#include "kpsa/pose_matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr std::size_t kTilePoints = 128;
 inline constexpr std::size_t kPanelPoints = 32;
@@ -89,7 +86,7 @@ inline constexpr std::size_t kMaxProducts = 1 + kLatents * (kLatents + 1) / 2;
 inline constexpr std::uint8_t kUnitLatent = 15;  // which is 1
 
 // The largest product term of the points that are watched (scene units), as far as it is believed
-// (kpsa/tile_trust.h), and its tile.
+// (kpsa/training/tile_trust.h), and its tile.
 struct Doubt {
   float largest = 0;
   Index tile = kNoIndex;
@@ -157,54 +154,8 @@ class TileMap {
   AlignedArray<std::uint8_t> lanes_;       // pairs as kpsa/tile_inputs.h reads them
 };
 
-struct TileOptions {
-  double rms_budget = 0;  // expected RMS point error that a tile may add, scene units; > 0
-  double max_budget =
-      std::numeric_limits<double>::infinity();  // largest point error that it may add in the samples
-  // Of what is left out of a tile anyway (RMS, TileInputs::left_out): where that is more than rms_budget, it
-  // is the tile's, and max_budget grows with it.
-  double left_out_share = 0;
-};
-// What is known of y.
-struct TileInputs {
-  Eigen::MatrixXd covariance;  // [r x r]; empty: the identity
-  Eigen::MatrixXd samples;     // [r x S] y of some poses, for max_budget; may be empty
-  Eigen::VectorXd left_out;    // [cN] variance of every row that no y tells; empty: 0
-  // Poses that products are fitted to: their rows hold f - mu of the output from `first_column` on. Null:
-  // none.
-  const PoseMatrix* poses = nullptr;
-  const Eigen::MatrixXd* measured = nullptr;  // y of these poses [r x T]
-  std::size_t first_column = 0;
-  std::size_t clip_poses = 0;                     // the first poses, neighbours in time of each other
-  Eigen::VectorXd row_mean = {}, row_scale = {};  // [r] of y = (raw - mean) * scale, where tiles have joints
-};
-// What the tiles cost in accuracy; scene units. Where precision or the number of attempts do not allow the
-// budgets, these exceed them.
-struct TileReport {
-  double rms = 0, worst_tile_rms = 0;  // expected
-  double largest = 0;                  // in the samples
-  std::size_t direct_tiles = 0;
-};
-// gain: B [cN x r]; mean [cN] interleaved. Rows of one output.
-TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int components,
-                   const TileInputs& inputs, const TileOptions& options, TileReport* report = nullptr);
-// The same where each tile has a map of its own, from some of the cues: asked for tile after tile, from
-// several threads; r as TileInputs has it. Of the inputs, covariance and left_out are the models'.
-struct TileModel {
-  std::vector<std::uint32_t> columns;     // of y, ascending
-  Eigen::MatrixXd gain;                   // [3n x |columns|]
-  Eigen::MatrixXd covariance;             // of these columns
-  double left_out = 0;                    // variance of a point that they do not tell
-  std::vector<std::uint32_t> joint_rows;  // where the tile lies in the space of a joint: those of its matrix
-  Eigen::VectorXd mean;                   // [3n], there; empty: as BuildTiles has it
-  Eigen::MatrixXd target;  // [3n x T] less the mean, of the poses that products are fitted to; empty: theirs
-};
-TileMap BuildTiles(const std::function<TileModel(std::size_t tile)>& models, const Eigen::VectorXd& mean,
-                   int components, std::size_t inputs_count, const TileInputs& inputs,
-                   const TileOptions& options, TileReport* report = nullptr);
-
 // IEEE half precision, round to nearest even; overflow gives infinity.
 std::uint16_t HalfFromFloat(float value);
 float FloatFromHalf(std::uint16_t half);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 using nlohmann::json;
 
@@ -179,4 +179,4 @@ TrainingRecord ParseTraining(const std::string& text) {
   return r;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 #include "kpsa/signature.h"
 #include "kpsa/subspace.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What is tried (TrainingRecord::Tried)
 inline constexpr const char *kForAllPoints = "for all points",
@@ -69,4 +69,4 @@ std::string TrainingJson(const TrainingRecord& record);
 // Missing parts come out empty; a text that is no JSON object gives an empty record.
 TrainingRecord ParseTraining(const std::string& json);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kWeight = kFirstOwnInput, kPointWeights = kFirstOwnInput + 1;
@@ -201,4 +201,4 @@ void AddBlendShapeNode(NodeRegistry& registry) {
       .compute([](ArrayView<double> weights, std::int64_t method) { return Combine(weights, method); });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "nodes/kernels/sampler.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Whether a vector channel gives the same value, its first key's, at any time.
@@ -334,4 +334,4 @@ void AddClipNodes(NodeRegistry& registry) {
   AddAnimCurve(registry, "animCurveUL", "A set-driven key: a length over a number.", Unit::kLength);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Result<Keys> MakeKeys(const AnimationSampler& sampler, const char* what) {
   Keys keys;
@@ -19,4 +19,4 @@ Result<Keys> MakeKeys(const AnimationSampler& sampler, const char* what) {
   return keys;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

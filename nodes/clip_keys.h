@@ -7,7 +7,7 @@
 #include "graph/geometry.h"
 #include "nodes/kernels/sampler.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct Keys {
   std::vector<float> times, values;
@@ -18,4 +18,4 @@ struct Keys {
 // No keys where the sampler has none. `what` ("rotation") begins the message about invalid ones.
 Result<Keys> MakeKeys(const AnimationSampler& sampler, const char* what);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double LayerTime(double time, double start, double speed, bool loop, double duration) {
@@ -222,4 +222,4 @@ void AddClipLayerNodes(NodeRegistry& registry) {
       .cost(200, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/kernels/weights.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kMatrix = kFirstOwnInput, kBindPreMatrix = kFirstOwnInput + 1;
@@ -127,4 +127,4 @@ void AddClusterNodes(NodeRegistry& registry) {
       });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

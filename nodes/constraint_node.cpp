@@ -2,7 +2,7 @@
 
 #include "nodes/deformer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 NodeBuilder AddConstraint(NodeRegistry& registry, std::string name, std::string doc) {
   NodeBuilder b = registry.add(std::move(name), std::move(doc));
@@ -54,4 +54,4 @@ double TotalWeight(const ComputeContext& c) {
   return total;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -13,7 +13,7 @@
 #include "base/matrix.h"
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Positions of the shared inputs in the group; a constraint's own follow from kFirstConstraintInput.
 enum ConstraintInput {
@@ -56,4 +56,4 @@ inline double TargetWeight(const ComputeContext& c, std::uint32_t i) {
 double TotalWeight(const ComputeContext& c);
 inline Double3 PlaceOf(const Matrix4& m) { return {m(0, 3), m(1, 3), m(2, 3)}; }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

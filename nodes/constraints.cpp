@@ -7,7 +7,7 @@
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // What is maintained: by target, what takes it (as its constraint sees it) to the constrained at rest.
@@ -333,4 +333,4 @@ void AddConstraintNodes(NodeRegistry& registry) {
       .cost(500, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/kernels/wire.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 Value RestOffsets(const Structural& s) {
@@ -189,4 +189,4 @@ void AddCurveNodes(NodeRegistry& registry) {
   FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 0.8f);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "graph/geometry.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string doc) {
   NodeBuilder builder = registry.add(std::move(name), std::move(doc));
@@ -161,4 +161,4 @@ double CarriedFrame::Growth(const Matrix4& parent_now) const {
   return std::fabs(growth - 1) < 1e-9 ? 1 : growth;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -17,7 +17,7 @@
 #include "graph/node_registry.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Positions of the shared inputs in the group; a deformer's own inputs follow from kFirstOwnInput.
 enum DeformerInput { kInPoints = 0, kEnvelope = 1, kParentMatrix = 2, kFirstOwnInput = 3 };
@@ -81,4 +81,4 @@ inline std::span<float> ScratchSpan(const ComputeContext& context, std::size_t f
   return {context.scratch, floats};
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

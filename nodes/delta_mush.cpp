@@ -5,7 +5,7 @@
 #include "nodes/mesh_topology.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 DeltaMushSettings Settings(const Structural& s) {
@@ -91,4 +91,4 @@ void AddDeltaMushNode(NodeRegistry& registry) {
   FinishDeformer(b, &ComputeMush, BindMush, DemandMush).cost(500, 80);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

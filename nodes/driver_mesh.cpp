@@ -11,7 +11,7 @@
 #include "nodes/kernels/wrap.h"
 #include "nodes/mesh_topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Beside the mesh: its latest rests, the newest one last.
@@ -126,4 +126,4 @@ Result<Driver> BindDriver(const Structural& s, DriverTree tree, const Matrix4& s
   return driver;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

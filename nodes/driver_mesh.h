@@ -12,7 +12,7 @@
 #include "nodes/kernels/moving_surface.h"
 #include "nodes/kernels/topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The place of driverPoints among the inputs of a deformer's group.
 inline constexpr int kDriverPoints = kFirstOwnInput;
@@ -45,4 +45,4 @@ Result<Driver> BindDriver(const Structural& structural, DriverTree tree);
 // The same in any other space.
 Result<Driver> BindDriver(const Structural& structural, DriverTree tree, const Matrix4& stage_from_driver);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

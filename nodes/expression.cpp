@@ -6,7 +6,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct ExpressionKernel {
@@ -49,4 +49,4 @@ void AddExpressionNode(NodeRegistry& registry) {
       .cost(100, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

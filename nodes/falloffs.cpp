@@ -14,7 +14,7 @@
 #include "nodes/driver_mesh.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum FalloffInput : int { kFalloffPoints = 0, kFalloffParent = 1, kOwn = 2 };
@@ -296,4 +296,4 @@ void AddFalloffNodes(NodeRegistry& registry) {
   combine.compute(&ComputeCombine).cost(100, 2);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "nodes/kernels/two_bone_ik.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Inputs of ikHandle in the group.
@@ -199,4 +199,4 @@ void AddIkNodes(NodeRegistry& registry) {
       .cost(100, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 #include "base/matrix.h"
 #include "nodes/kernels/path_tracer.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The ray through the middle of pixel `pixel` (row by row from the top left) of a picture; see
 // camera.worldFromScreen.
@@ -15,4 +15,4 @@ inline void PixelRay(const Matrix4& world_from_screen, Index pixel, Index width,
   *direction = TransformVector(world_from_screen, {x, y, -1});
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

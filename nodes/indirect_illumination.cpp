@@ -11,7 +11,7 @@
 #include "nodes/kernels/path_tracer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum Input { kPoints, kCamera, kLightMatrix, kLightColor };
@@ -272,4 +272,4 @@ void AddIlluminationNodes(NodeRegistry& registry) {
       .cost(1e6f, 2e4f);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum { kTime = kFirstOwnInput, kStiffness, kDamping, kJiggleWeight };
@@ -59,4 +59,4 @@ void AddJiggleNode(NodeRegistry& registry) {
   FinishDeformer(b, &ComputeJiggle, BindJiggle).cost(200, 12);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

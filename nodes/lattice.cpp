@@ -6,7 +6,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct LatticeBound {
@@ -164,4 +164,4 @@ void AddLatticeNode(NodeRegistry& registry) {
   FinishDeformer(b, &ComputeLattice, BindLattice, DemandLattice).cost(500, 3);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

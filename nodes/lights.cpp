@@ -4,7 +4,7 @@
 #include "nodes/illumination.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 NodeBuilder AddLight(NodeRegistry& registry, const char* name, const char* doc, const char* intensity) {
@@ -76,4 +76,4 @@ void AddLightNodes(NodeRegistry& registry) {
       });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,7 +3,7 @@
 #include "nodes/kernels/power.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double Remap(double value, double in_min, double in_max, double out_min, double out_max) {
@@ -69,4 +69,4 @@ void AddMathNodes(NodeRegistry& registry) {
       .compute([](double input, double factor) { return input * factor; });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

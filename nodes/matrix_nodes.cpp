@@ -3,7 +3,7 @@
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 Result<BoundKernel> BindOrder(const Binding& binding) {
@@ -114,4 +114,4 @@ void AddMatrixNodes(NodeRegistry& registry) {
       });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,7 +3,7 @@
 #include "nodes/kernels/weights.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct MeshKernel {
@@ -36,4 +36,4 @@ void AddMeshNode(NodeRegistry& registry) {
       });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,6 +1,6 @@
 #include "nodes/mesh_topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 const Topology* TopologyOf(const Mesh* mesh, Status* error) {
   if (mesh == nullptr) {
@@ -16,4 +16,4 @@ const Topology* TopologyOf(const Mesh* mesh, Status* error) {
   return &*built;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,9 +5,9 @@
 #include "graph/geometry.h"
 #include "nodes/kernels/topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Null (with *error set) where the mesh has none: unset, or triangles out of range.
 const Topology* TopologyOf(const Mesh* mesh, Status* error);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

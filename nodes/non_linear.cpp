@@ -6,7 +6,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kHandle = kFirstOwnInput, kFirstSetting = kFirstOwnInput + 1;
@@ -117,4 +117,4 @@ void AddNonLinearNodes(NodeRegistry& registry) {
   Finish<Wave>(wave);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -13,7 +13,7 @@
 #include "nodes/kernels/transform_math.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct PoseBound {
@@ -95,4 +95,4 @@ void AddPoseInterpolatorNode(NodeRegistry& registry) {
       .cost(400, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

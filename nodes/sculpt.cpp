@@ -7,7 +7,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum { kMatrix = kFirstOwnInput, kRadius, kMaxDisplacement, kDropoffDistance, kStretchOrigin };
@@ -77,4 +77,4 @@ void AddSculptNode(NodeRegistry& registry) {
   FinishDeformer(b, &ComputeSculpt, BindSculpt).cost(300, 30);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

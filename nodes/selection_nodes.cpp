@@ -1,7 +1,7 @@
 // condition and choice: only the chosen side is evaluated.
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 bool Holds(double a, double b, std::int64_t operation) {
@@ -67,4 +67,4 @@ void AddSelectionNodes(NodeRegistry& registry) {
       .decide(&DecideChoice);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "nodes/mesh_topology.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kOffset = kDriverPoints + 1;
@@ -113,4 +113,4 @@ void AddShrinkWrapNode(NodeRegistry& registry) {
   FinishDeformer(b, &ComputeShrinkWrap, BindShrinkWrap, DemandShrinkWrap).cost(2000, 900);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

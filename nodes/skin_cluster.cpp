@@ -8,7 +8,7 @@
 #include "nodes/kernels/weights.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The joints that move none of the points need no world matrix, but for the first one: the kernel computes
@@ -187,4 +187,4 @@ void AddTransformGeometryNode(NodeRegistry& registry) {
       .touches("inPoints", nullptr);  // to another space goes every point
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

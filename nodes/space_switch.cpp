@@ -8,7 +8,7 @@
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum SpaceInput { kSpaceTargets, kSpaceNumber, kSpaceIn, kSpaceParent, kSpaceBlend };
@@ -84,4 +84,4 @@ void AddSpaceSwitchNode(NodeRegistry& registry) {
       .cost(400, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/kernels/spline_chain.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum SplineInput {
@@ -185,4 +185,4 @@ void AddSplineIkNode(NodeRegistry& registry) {
       .cost(5000, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,6 +1,6 @@
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 void AddTimeNode(NodeRegistry& registry) {
   registry.add("time", "The time of the scene. Read `time.time` as a source.")
@@ -49,4 +49,4 @@ void AddStandardNodes(NodeRegistry& registry) {
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

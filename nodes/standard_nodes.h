@@ -3,7 +3,7 @@
 
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 void AddTimeNode(NodeRegistry& registry);               // time
 void AddTransformNodes(NodeRegistry& registry);         // transform, joint
@@ -49,4 +49,4 @@ void AddIlluminationNodes(NodeRegistry& registry);  // indirectIllumination
 // All of them.
 void AddStandardNodes(NodeRegistry& registry);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "nodes/mesh_topology.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kCompressScale = kFirstOwnInput, kStretchScale = kFirstOwnInput + 1;
@@ -141,4 +141,4 @@ void AddTensionNode(NodeRegistry& registry) {
   }).cost(500, 60);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

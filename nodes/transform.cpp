@@ -5,7 +5,7 @@
 #include "nodes/kernels/transform_math.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct TransformKernel {
@@ -111,4 +111,4 @@ void AddTransformNodes(NodeRegistry& registry) {
   AddTransform(registry, "joint", "A transform that moves a skin.");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

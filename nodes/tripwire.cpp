@@ -2,7 +2,7 @@
 #include "nodes/kernels/weights.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 void AddTripwireNode(NodeRegistry& registry) {
   NodeBuilder b =
@@ -21,4 +21,4 @@ void AddTripwireNode(NodeRegistry& registry) {
       .touches("inPoints", nullptr);  // armed, it fails whatever it weighs
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "nodes/kernels/transform_math.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum TwistInput { kTwistStart, kTwistEnd, kTwistJoints, kTwistWeights, kTwistBlend };
@@ -106,4 +106,4 @@ void AddTwistDistributionNode(NodeRegistry& registry) {
       .cost(500, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "nodes/kernels/constraint_math.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The maximum wins where the limits are crossed.
@@ -117,4 +117,4 @@ void AddUtilityNodes(NodeRegistry& registry) {
       });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

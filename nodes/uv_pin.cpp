@@ -7,7 +7,7 @@
 #include "nodes/kernels/surface_pin.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kPinPoints = 0, kRelativeSpaceMatrix = 1;
@@ -204,4 +204,4 @@ void AddPinNodes(NodeRegistry& registry) {
   follicle.compute(&ComputeFollicle).bind(BindPin<MakeFollicle>).demand(DemandPin<MakeFollicle>).cost(200, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

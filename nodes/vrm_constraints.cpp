@@ -6,7 +6,7 @@
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 enum VrmInput { kVrmSource, kVrmIn, kVrmWeight, kVrmParent };
@@ -126,4 +126,4 @@ void AddVrmConstraintNodes(NodeRegistry& registry) {
       .cost(300, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

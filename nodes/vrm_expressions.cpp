@@ -6,7 +6,7 @@
 #include "nodes/deformer.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // What may be held back, by its number in `kind`: 1 blink, 2 lookAt, 3 mouth.
@@ -165,4 +165,4 @@ void AddVrmExpressionNodes(NodeRegistry& registry) {
       .cost(60, 0);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "nodes/driver_mesh.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A search along the surface, or among points (wrap).
@@ -121,4 +121,4 @@ void AddWrapNodes(NodeRegistry& registry) {
   FinishDeformer(proximity, &ComputeWrap, BindWrap<false>, DemandWrapNode<false>).cost(5000, 46);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

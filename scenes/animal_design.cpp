@@ -4,7 +4,7 @@
 #include "scenes/head_shape.h"
 #include "scenes/implicit.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 constexpr Double3 kAnimalEye = {3.5, 16.5, 5.0};
@@ -124,4 +124,4 @@ const HeadDesign& AnimalDesign() {
   return design;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

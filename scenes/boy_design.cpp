@@ -4,7 +4,7 @@
 #include "scenes/head_shape.h"
 #include "scenes/implicit.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 constexpr Double3 kBoyEye = {3.35, 16.9, 6.0};
@@ -121,4 +121,4 @@ const HeadDesign& BoyDesign() {
   return design;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

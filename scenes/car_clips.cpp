@@ -10,7 +10,7 @@
 #include "scenes/car_model.h"
 #include "scenes/keyed_clips.h"
 
-namespace kpsa::scenes::car {
+namespace kpsa::engine::scenes::car {
 namespace {
 
 // Turns about an axis of one joint, or of two that go together: degrees.
@@ -233,4 +233,4 @@ std::vector<GlbClip> CarClips(const std::vector<std::string>& expressions, int b
   return clips;
 }
 
-}  // namespace kpsa::scenes::car
+}  // namespace kpsa::engine::scenes::car

@@ -6,7 +6,7 @@
 #include "base/scalar_math.h"
 #include "scenes/car_model.h"
 
-namespace kpsa::scenes::car {
+namespace kpsa::engine::scenes::car {
 namespace {
 
 constexpr Double3 kCorner = {42, 56, 165}, kMiddle = {0, kMouthHeight, 172};
@@ -223,4 +223,4 @@ std::vector<Expression> MuscleExpressions(const CarCage& cage) {
   return out;
 }
 
-}  // namespace kpsa::scenes::car
+}  // namespace kpsa::engine::scenes::car

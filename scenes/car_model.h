@@ -10,7 +10,7 @@
 
 #include "scenes/face_model.h"
 
-namespace kpsa::scenes::car {
+namespace kpsa::engine::scenes::car {
 
 inline constexpr Double3 kEye = {25, 117, 9};  // centre of the left eyeball
 inline constexpr double kEyeBall = 24;         // its radius
@@ -83,4 +83,4 @@ std::vector<GlbClip> CarClips(const std::vector<std::string>& expressions, int b
 double Share(Double3 p, Double3 center, Double3 radius);  // 1 at the centre of an ellipsoid .. 0 outside
 Double3 Mirrored(Double3 p);
 
-}  // namespace kpsa::scenes::car
+}  // namespace kpsa::engine::scenes::car

@@ -6,7 +6,7 @@
 #include "base/scalar_math.h"
 #include "scenes/car_model.h"
 
-namespace kpsa::scenes::car {
+namespace kpsa::engine::scenes::car {
 namespace {
 
 constexpr double kWidth = 88, kLength = 170, kBottom = 20, kBeltScale = 0.965, kSillScale = 0.95;
@@ -425,4 +425,4 @@ CarCage ClayCage() {
   return Tube(kRings, 12);
 }
 
-}  // namespace kpsa::scenes::car
+}  // namespace kpsa::engine::scenes::car

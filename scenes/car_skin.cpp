@@ -5,7 +5,7 @@
 #include "base/scalar_math.h"
 #include "scenes/car_model.h"
 
-namespace kpsa::scenes::car {
+namespace kpsa::engine::scenes::car {
 namespace {
 
 double HoodField(Double3 p) {
@@ -96,4 +96,4 @@ std::map<std::string, std::vector<double>> CarWeightMaps(const CarShape& shape) 
   return maps;
 }
 
-}  // namespace kpsa::scenes::car
+}  // namespace kpsa::engine::scenes::car

@@ -1,7 +1,7 @@
 #include "base/scalar_math.h"
 #include "scenes/head_shape.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 EyeShape MakeEyeShape(const HeadDesign& design) {
   EyeShape eye;
@@ -42,4 +42,4 @@ EyeShape MakeEyeShape(const HeadDesign& design) {
   return eye;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

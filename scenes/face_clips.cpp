@@ -12,7 +12,7 @@
 #include "scenes/face_model.h"
 #include "scenes/keyed_clips.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 // A turn about one axis of a joint, degrees, as a clip uses it.
@@ -378,4 +378,4 @@ std::vector<GlbClip> FaceClips(const HeadDesign& design, const std::vector<std::
   return clips;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -6,7 +6,7 @@
 
 #include "scenes/face_model.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 constexpr int kCurveVertices = 9;
@@ -170,4 +170,4 @@ std::string CurvesYaml(const HeadDesign& design, const HeadShape& shape) {
   return curves.Take();
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -4,7 +4,7 @@
 #include "scenes/head_shape.h"
 #include "scenes/implicit.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 constexpr Double3 kFaceEye = {3.2, 18.6, 6.62};
@@ -104,4 +104,4 @@ const HeadDesign& FaceDesign() {
   return design;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -6,7 +6,7 @@
 #include "base/scalar_math.h"
 #include "scenes/face_model.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 double Ball(Double3 p, Double3 center, Double3 radius) {
   const Double3 d = p - center;
@@ -355,4 +355,4 @@ std::vector<Expression> FaceExpressions(const HeadDesign& design, const HeadShap
   return maker.Take();
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

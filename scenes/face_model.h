@@ -9,7 +9,7 @@
 #include "scenes/glb_writer.h"
 #include "scenes/head_shape.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 // Shares of the joints at every point, kJointCount each; heads with fewer joints have 0 there.
 std::vector<std::array<double, kJointCount>> FaceWeights(const HeadDesign& design, const HeadShape& shape);
@@ -75,4 +75,4 @@ SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape);
 SceneFiles GenerateHello();
 SceneFiles GenerateRoom();
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -6,7 +6,7 @@
 #include "base/scalar_math.h"
 #include "scenes/face_model.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 constexpr double kUnderSkin = 0.3;  // at least, between the points, too
@@ -151,4 +151,4 @@ SheetShape MakeSheet(const HeadDesign& design, Sheet sheet) {
   return shape;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

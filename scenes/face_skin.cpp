@@ -5,7 +5,7 @@
 #include "base/scalar_math.h"
 #include "scenes/face_model.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 // Share of the jaw in a point of the skin outside the mouth: by its angle about the jaw's axis, from the
@@ -145,4 +145,4 @@ std::map<std::string, std::vector<double>> FaceWeightMaps(const HeadDesign& desi
   return maps;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

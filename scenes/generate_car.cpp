@@ -8,7 +8,7 @@
 #include "scenes/car_model.h"
 #include "scenes/weight_maps.h"
 
-namespace kpsa::scenes::car {
+namespace kpsa::engine::scenes::car {
 namespace {
 
 constexpr double kSmallestDelta = 0.02;  // cm
@@ -172,9 +172,9 @@ std::string CurvesYaml(const CarShape& shape) {
 }
 
 }  // namespace
-}  // namespace kpsa::scenes::car
+}  // namespace kpsa::engine::scenes::car
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 SceneFiles GenerateCar() {
   using namespace car;
@@ -206,4 +206,4 @@ SceneFiles GenerateCar() {
           {"w/car.json", WeightsJson("car_body", CarWeightMaps(shape), shape.points.size())}};
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -7,7 +7,7 @@
 #include "scenes/face_model.h"
 #include "scenes/weight_maps.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 constexpr double kSmallestDelta = 2e-4;  // cm; expressions leave out less
@@ -125,4 +125,4 @@ SceneFiles GenerateHead(const HeadDesign& design, const HeadShape& shape) {
            WeightsJson("face_mesh", FaceWeightMaps(design, shape), shape.points.size())}};
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

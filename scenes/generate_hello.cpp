@@ -5,7 +5,7 @@
 #include "base/scalar_math.h"
 #include "scenes/face_model.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 SceneFiles GenerateHello() {
   constexpr int kAround = 24, kRows = 32;
@@ -58,4 +58,4 @@ SceneFiles GenerateHello() {
   return {{"hello.glb", WriteGlb(scene)}};
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -7,7 +7,7 @@
 #include "scenes/face_model.h"
 #include "scenes/head_shape.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 enum Joint { kHips, kChest, kHead, kShoulderL, kElbowL, kShoulderR, kElbowR, kLampArm, kRoom, kJoints };
@@ -166,4 +166,4 @@ SceneFiles GenerateRoom() {
   return {{"room.glb", WriteGlb(scene)}};
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -10,7 +10,7 @@
 
 namespace {
 
-bool WriteAll(const std::filesystem::path& folder, const kpsa::scenes::SceneFiles& files) {
+bool WriteAll(const std::filesystem::path& folder, const kpsa::engine::scenes::SceneFiles& files) {
   for (const auto& [name, bytes] : files) {
     const std::filesystem::path path = folder / name;
     std::error_code error;
@@ -36,12 +36,12 @@ int main(int argc, char** argv) {
   const std::filesystem::path folder = argv[1];
   bool heads = true;
   for (const auto* design :
-       {&kpsa::scenes::FaceDesign(), &kpsa::scenes::BoyDesign(), &kpsa::scenes::AnimalDesign()})
+       {&kpsa::engine::scenes::FaceDesign(), &kpsa::engine::scenes::BoyDesign(), &kpsa::engine::scenes::AnimalDesign()})
     heads = WriteAll(folder / design->name,
-                     kpsa::scenes::GenerateHead(*design, kpsa::scenes::MakeHeadShape(*design))) &&
+                     kpsa::engine::scenes::GenerateHead(*design, kpsa::engine::scenes::MakeHeadShape(*design))) &&
             heads;
-  const bool written = heads && WriteAll(folder / "hello", kpsa::scenes::GenerateHello()) &&
-                       WriteAll(folder / "gi", kpsa::scenes::GenerateRoom()) &&
-                       WriteAll(folder / "car", kpsa::scenes::GenerateCar());
+  const bool written = heads && WriteAll(folder / "hello", kpsa::engine::scenes::GenerateHello()) &&
+                       WriteAll(folder / "gi", kpsa::engine::scenes::GenerateRoom()) &&
+                       WriteAll(folder / "car", kpsa::engine::scenes::GenerateCar());
   return written ? 0 : 4;
 }

@@ -10,7 +10,7 @@
 #include "base/check.h"
 #include "base/matrix.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 std::string Quoted(std::string_view text) {
@@ -309,4 +309,4 @@ std::array<std::uint8_t, 4> Color(Double3 linear) {
   return {byte(linear.x), byte(linear.y), byte(linear.z), 255};
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

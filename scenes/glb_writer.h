@@ -12,7 +12,7 @@
 
 #include "base/types.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 using Float3 = std::array<float, 3>;
 
@@ -89,4 +89,4 @@ std::array<std::uint8_t, 4> Color(Double3 linear);
 // Weights rounded to multiples of 1/4096 that add up to 1 exactly; the four largest are kept.
 Influences MakeInfluences(std::span<const double> weight_of_joint);
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -8,7 +8,7 @@
 
 #include "scenes/head_shape.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 class HeadBuilder {
  public:
@@ -84,4 +84,4 @@ class HeadBuilder {
   int rows_ = 0;
 };
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

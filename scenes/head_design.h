@@ -9,7 +9,7 @@
 
 #include "base/types.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 // Joints of a head in the order of its skin. Heads without ears that move end before them.
 enum Joint : int { kRoot, kNeck, kHead, kJaw, kEyeL, kEyeR, kEarL, kEarR, kJointCount };
@@ -121,4 +121,4 @@ const HeadDesign& FaceDesign();
 const HeadDesign& BoyDesign();
 const HeadDesign& AnimalDesign();
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

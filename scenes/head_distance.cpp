@@ -4,7 +4,7 @@
 
 #include "scenes/head_shape.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 Double3 HeadNormal(const HeadDesign& design, Double3 p) {
   constexpr double kStep = 1e-3;
@@ -32,4 +32,4 @@ double Smooth(double edge0, double edge1, double x) {
 
 double Bump(double x, double half_width) { return Smooth(half_width, 0, std::fabs(x)); }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

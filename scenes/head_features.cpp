@@ -5,7 +5,7 @@
 #include "base/scalar_math.h"
 #include "scenes/head_builder.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 // Corners and lids of the left eye: k = 0 the inner corner, n / 2 the outer one, first along the upper lid.
 // The point lies on a flattened sphere above the eyeball.
@@ -327,4 +327,4 @@ void HeadBuilder::MakeEars() {
   MarkHole(ear.row0, ear.row1, ear.column0, ear.column1);
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

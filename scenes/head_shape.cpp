@@ -7,7 +7,7 @@
 #include "base/scalar_math.h"
 #include "scenes/head_builder.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 // Angle of column c = 0 .. half_columns: even in x over the face, coarser behind.
 double HeadBuilder::ColumnAngle(int c) const {
@@ -258,4 +258,4 @@ HeadShape HeadBuilder::Build() {
 
 HeadShape MakeHeadShape(const HeadDesign& design) { return HeadBuilder(design).Build(); }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -10,7 +10,7 @@
 #include "base/types.h"
 #include "scenes/head_design.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 struct HeadShape {
   std::vector<Double3> points;
@@ -55,4 +55,4 @@ inline Double3 Mix(Double3 a, Double3 b, double t) { return a * (1 - t) + b * t;
 double Smooth(double edge0, double edge1, double x);  // smoothstep; the edges may fall
 double Bump(double x, double half_width);  // 1 at 0, 0 from |x| = half_width on, twice differentiable
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -7,7 +7,7 @@
 
 #include "base/types.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 inline double SmoothUnion(double a, double b, double k) {
   const double h = std::max(k - std::fabs(a - b), 0.0) / k;
@@ -30,4 +30,4 @@ inline double Cone(Double3 p, Double3 a, Double3 b, double ra, double rb) {
   return Length(pa - ba * h) - (ra + (rb - ra) * h);
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -3,7 +3,7 @@
 #include "base/scalar_math.h"
 #include "scenes/head_shape.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 double ValueAt(const KeyedMotion& motion, int frame) {
@@ -397,4 +397,4 @@ const KeyedClip& CarEmotions() {
   return clip;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 // A control is an expression, "smile" for both sides and "smile.L" for one, or a turn of a joint, "jaw.x".
 struct KeyedMotion {
@@ -38,4 +38,4 @@ const KeyedClip& AnimalSniff();  // follows a scent, snarls, sneezes, shakes its
 const KeyedClip& CarRace();      // off from the lights, two bends, a jump, the flag
 const KeyedClip& CarEmotions();  // as the heads': joy, anger, sadness, surprise, fear, disgust
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

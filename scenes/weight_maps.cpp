@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 constexpr double kSmallestWeight = 1e-3;
@@ -38,4 +38,4 @@ std::string WeightsJson(const std::string& mesh, const std::map<std::string, std
   return out + "\n}}\n";
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 // One map a line, sparse, as rig files read it: name -> one value for each of the mesh's points.
 std::string WeightsJson(const std::string& mesh, const std::map<std::string, std::vector<double>>& maps,
                         std::size_t points);
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -7,7 +7,7 @@
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 void ApplyAffineDeltaLanes(const AffineDelta& delta, const float* weights, float envelope, ConstPointsView in,
@@ -35,11 +35,11 @@ void ApplyAffineDeltaLanes(const AffineDelta& delta, const float* weights, float
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(ApplyAffineDeltaLanes);
 
@@ -65,5 +65,5 @@ void ApplyAffineDelta(const AffineDelta& delta, const float* weights, float enve
   HWY_DYNAMIC_DISPATCH(ApplyAffineDeltaLanes)(delta, weights, envelope, in, out, begin, end);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

@@ -6,7 +6,7 @@
 #include "base/matrix.h"
 #include "base/points.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // d(p) = linear (p - pivot) + offset
 struct AffineDelta {
@@ -24,4 +24,4 @@ AffineDelta MakeAffineDelta(const Matrix4& matrix, Double3 pivot);
 void ApplyAffineDelta(const AffineDelta& delta, const float* weights, float envelope, ConstPointsView in,
                       PointsView out, std::size_t begin, std::size_t end) noexcept;
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

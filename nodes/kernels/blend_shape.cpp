@@ -14,7 +14,7 @@
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // out += weight * deltas, in the lanes that a tile has
@@ -38,11 +38,11 @@ void AddTiles(const BlendShapeKernel::Tile* tiles, const float* deltas, std::siz
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(AddTiles);
 
@@ -144,5 +144,5 @@ void BlendShapeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

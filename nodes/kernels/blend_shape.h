@@ -8,7 +8,7 @@
 #include "base/status.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The points that a target moves. deltas: x y z of each, as many as 3 * points.size(). points: ascending.
 struct BlendTarget {
@@ -58,4 +58,4 @@ class BlendShapeKernel {
   AlignedFloats deltas_;            // per tile: 16 x, 16 y, 16 z
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

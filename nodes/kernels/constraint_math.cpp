@@ -4,7 +4,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kParallel = 1e-12;  // sine of the angle below which two directions are one
@@ -105,4 +105,4 @@ Quaternion RotationMean::Get() const {
   return mode_ == Mode::kAverage && total_ > 0 ? Normalized(mean_) : mean_;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

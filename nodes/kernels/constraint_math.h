@@ -6,7 +6,7 @@
 
 #include "base/matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Double3 Rotate(Quaternion unit, Double3 v);
 Quaternion AxisAngle(Double3 unit_axis, double radians);
@@ -43,4 +43,4 @@ class RotationMean {
   Quaternion mean_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 template <std::size_t kWidth>  // 0: `width` at run time
@@ -44,11 +44,11 @@ void BlendControls(const Index* points, const Index* controls, const float* weig
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(BlendControls);
 
@@ -74,5 +74,5 @@ void ControlBlend::Run(const float* offsets, PointsView points, const Parallel* 
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

@@ -7,7 +7,7 @@
 #include "base/points.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class ControlBlend {
  public:
@@ -28,4 +28,4 @@ class ControlBlend {
   std::vector<float> weights_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

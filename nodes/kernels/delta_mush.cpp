@@ -11,7 +11,7 @@
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // The points minus the pivot, as xyzw by local number.
@@ -196,11 +196,11 @@ void FinishDetail(const MushFinish& run, ConstPointsView rest, std::size_t begin
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(PackLocal);
 HWY_EXPORT(SmoothRows);
@@ -270,5 +270,5 @@ void DeltaMushKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView o
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

@@ -17,7 +17,7 @@
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct DeltaMushSettings {
   int iterations = 10;         // 0 to 1000
@@ -96,4 +96,4 @@ class DeltaMushKernel {
   AlignedFloats masks_;                                 // point weights, padded; empty if all 1
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

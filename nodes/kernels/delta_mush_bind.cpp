@@ -8,7 +8,7 @@
 #include "nodes/kernels/delta_mush_run.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kBlock = 512;  // points that are sorted by their number of neighbours together
@@ -273,4 +273,4 @@ std::size_t DeltaMushKernel::SmoothingSteps() const {
   return steps;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "base/points.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 inline constexpr std::size_t kFinishBlock = 64;
 // Points with equally many neighbours.
 struct MushRows {
@@ -30,4 +30,4 @@ struct MushFinish {
 void ComputeMushDetail(const MushFinish& run, ConstPointsView rest, std::size_t begin,
                        std::size_t end) noexcept;
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

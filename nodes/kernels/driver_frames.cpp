@@ -8,7 +8,7 @@
 #include "nodes/kernels/weights.h"
 #include "nodes/kernels/wrap_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kFrameGrain = 512;
@@ -127,4 +127,4 @@ void DriverFrames::Run(const float* points, float* frames, const Parallel* paral
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

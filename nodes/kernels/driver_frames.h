@@ -16,7 +16,7 @@
 #include "nodes/kernels/topology.h"
 #include "nodes/kernels/wrap_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The driver points that the frames of these points read (each with its ring), sorted.
 std::vector<Index> DriverFramesDemand(const Topology& driver, std::span<const Double3> rest,
@@ -51,4 +51,4 @@ class DriverFrames {
   std::vector<float> normal_duals_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

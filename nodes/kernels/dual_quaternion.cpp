@@ -15,7 +15,7 @@
 
 #ifndef KPSA_NODES_KERNELS_DUAL_QUATERNION_RUN_
 #define KPSA_NODES_KERNELS_DUAL_QUATERNION_RUN_
-namespace kpsa {
+namespace kpsa::engine {
 // What one Run hands to the vector code. Of each joint: rotation xyzw, dual part xyzw, the columns x y z 0
 // of its stretch, and 1 if it stretches.
 struct DualRun : SkinFrame {
@@ -29,11 +29,11 @@ struct DualRun : SkinFrame {
   const float* entry_weights;
 };
 inline constexpr std::size_t kDualPart = 4, kStretch = 8, kStretches = 24;
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // One point: the blended dual quaternion (not unit) and the stretched point, in place.
@@ -142,11 +142,11 @@ void DualBlockLanes(const DualRun& run, std::size_t begin, std::size_t end, Cons
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(DualBlockLanes);
 
@@ -278,5 +278,5 @@ void DualQuaternionKernel::Run(const Inputs& inputs, ConstPointsView in, PointsV
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

@@ -17,7 +17,7 @@
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/skin.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A local kernel.
 class DualQuaternionKernel {
@@ -57,4 +57,4 @@ class DualQuaternionKernel {
   AlignedFloats blend_;  // empty if all 1
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

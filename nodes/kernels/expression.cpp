@@ -13,7 +13,7 @@
 #include "base/scalar_math.h"
 #include "nodes/kernels/power.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double Tangent(double x) { return Sin(x) / Cos(x); }
@@ -262,4 +262,4 @@ double Expression::Run(std::span<const double> inputs, std::span<double> stack) 
   return *top;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -14,7 +14,7 @@
 
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class Expression {
  public:
@@ -39,4 +39,4 @@ class Expression {
   std::size_t stack_size_ = 0;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Status FalloffProfile::Validate() const {
   if (curve != FalloffCurve::kRamp) return {};
@@ -57,4 +57,4 @@ std::vector<float> RadialFalloff(ConstPointsView rest, std::span<const Index> po
   return weights;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

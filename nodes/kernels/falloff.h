@@ -7,7 +7,7 @@
 #include "base/points.h"
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class FalloffCurve : std::uint8_t {
   kNone,    // 1 up to the radius, 0 beyond
@@ -35,4 +35,4 @@ struct FalloffProfile {
 std::vector<float> RadialFalloff(ConstPointsView rest, std::span<const Index> points, Double3 center,
                                  double radius, const FalloffProfile& profile);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

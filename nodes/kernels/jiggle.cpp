@@ -5,7 +5,7 @@
 #include "base/check.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 constexpr std::size_t kJiggleGrain = 1024;
 constexpr double kMostSteps = 1e15;  // of time: beyond, steps are no whole numbers any more
@@ -80,4 +80,4 @@ JiggleKernel::Outcome JiggleKernel::Run(const Inputs& inputs, ConstPointsView in
   return Outcome::kAdvanced;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

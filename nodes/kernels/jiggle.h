@@ -16,7 +16,7 @@
 #include "base/types.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class JiggleKernel {
  public:
@@ -55,4 +55,4 @@ class JiggleKernel {
   std::vector<float> weights_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

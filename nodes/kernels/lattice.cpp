@@ -17,7 +17,7 @@
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // out += weight * sum_u wu sum_t wt sum_s ws offset(s, t, u) for tiles of 16 points.
@@ -70,11 +70,11 @@ void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, s
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(BlendTiles);
 
@@ -271,5 +271,5 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

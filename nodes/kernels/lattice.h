@@ -18,7 +18,7 @@
 #include "nodes/kernels/control_blend.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class LatticeOutside : std::uint8_t {
   kInside,   // points outside of the lattice stay
@@ -72,4 +72,4 @@ class LatticeKernel {
   AlignedFloats axis_weights_;  // of dense: per tile (ds + dt + du) rows of 16
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

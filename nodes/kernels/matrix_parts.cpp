@@ -1,6 +1,6 @@
 #include "nodes/kernels/matrix_parts.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Exactly a at 0 and b at 1.
@@ -46,4 +46,4 @@ Matrix4 BlendMatrices(const Matrix4& a, const Matrix4& b, const PartWeights& wei
                       Mix(from.scale, to.scale, weights.scale), Mix(from.shear, to.shear, weights.shear)});
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 
 #include "base/matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct MatrixParts {
   Double3 translation;
@@ -28,4 +28,4 @@ inline Matrix4 BlendMatrices(const Matrix4& a, const Matrix4& b, double weight) 
   return BlendMatrices(a, b, {weight, weight, weight, weight});
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

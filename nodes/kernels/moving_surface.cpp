@@ -1,6 +1,6 @@
 #include "nodes/kernels/moving_surface.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::unique_ptr<TriangleTree> MovingSurface::Shared::Make() const {
   return std::make_unique<TriangleTree>(rest.view(), triangles);
@@ -21,4 +21,4 @@ MovingSurface::Lease MovingSurface::At(ConstPointsView points) const {
   return {&shared_->spares, std::move(tree)};
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

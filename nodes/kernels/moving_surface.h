@@ -11,7 +11,7 @@
 #include "base/triangle_tree.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Trees over the rest points; an evaluation borrows one and moves it. Copies share them. Thread-safe.
 class MovingSurface {
@@ -52,4 +52,4 @@ class MovingSurface {
   std::shared_ptr<Shared> shared_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/scalar_math.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Of bounds that may be the wrong way round.
@@ -163,4 +163,4 @@ void NonLinearKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView o
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -12,7 +12,7 @@
 #include "base/points.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Onto a circle, towards +X for a positive curvature.
 struct Bend {
@@ -79,4 +79,4 @@ class NonLinearKernel {
   AlignedFloats weights_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

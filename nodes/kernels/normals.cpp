@@ -13,16 +13,16 @@
 
 #ifndef KPSA_NODES_KERNELS_NORMALS_BLOCK_
 #define KPSA_NODES_KERNELS_NORMALS_BLOCK_
-namespace kpsa {
+namespace kpsa::engine {
 // Points between two passes: the gathering stores of a block have left the store buffer before
 // the wider loads read them.
 inline constexpr std::size_t kNormalsBlock = 64;
 inline constexpr std::size_t kNormalsGrain = 512;  // points between two lots of triangles
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 void PackPoints(ConstPointsView in, std::size_t begin, std::size_t end, float* xyzw) {
@@ -65,11 +65,11 @@ void SumNormals(const std::uint8_t* lanes, const Index* offsets, const Index* ar
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(PackPoints);
 HWY_EXPORT(CrossTriangles);
@@ -171,5 +171,5 @@ void NormalsKernel::Run(ConstPointsView in, PointsView normals, std::span<float>
   ForRanges(parallel, count_, 2048, sum);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

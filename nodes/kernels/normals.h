@@ -9,7 +9,7 @@
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The input points that the normals of these points need, sorted.
 std::vector<Index> NormalsDemand(const Topology& topology, std::span<const Index> out_points);
@@ -34,4 +34,4 @@ class NormalsKernel {
   std::vector<Index> ready_;  // triangles that the first 512, 1024, .. outputs need
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

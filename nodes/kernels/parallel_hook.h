@@ -5,7 +5,7 @@
 
 #include "base/parallel.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A loop that somebody else runs: run(self, count, grain, body) calls body over disjoint ranges that cover
 // [0, count), every range but the last a multiple of `grain` long, and returns when all are done.
@@ -24,4 +24,4 @@ inline void ForRanges(const Parallel* parallel, std::size_t count, std::size_t g
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/check.h"
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kNudge = 1e-5;  // of the place's scale: rays start that far above a surface
@@ -328,4 +328,4 @@ Double3 PathTracer::Indirect(const ShadingPlace& place, const PathOptions& optio
   return sum * (1.0 / std::max(options.samples, 1));
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

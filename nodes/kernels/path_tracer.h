@@ -19,7 +19,7 @@
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/ray_scene.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct DiffuseLight {
   enum class Kind : std::uint8_t {
@@ -116,4 +116,4 @@ class PathTracer {
 // for every n.
 double SampleNumber(std::uint32_t seed, std::uint32_t sample, std::uint32_t dimension);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "base/scalar_math.h"
 #include "nodes/kernels/transform_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kSame = 1e-5;      // chords: poses that nobody tells apart
@@ -168,4 +168,4 @@ void PoseWeights::Run(Quaternion rotation, std::span<double> weights) const noex
   for (double& weight : weights) weight /= sum;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -16,7 +16,7 @@
 #include "base/status.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct PoseSpace {
   enum class Part : std::uint8_t { kSwingAndTwist, kSwing, kTwist };
@@ -63,4 +63,4 @@ class PoseWeights {
   std::vector<double> solved_;  // count x count, rows: the pose whose function it is
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 double Power(double x, double y) {
   if (y == std::floor(y) && std::fabs(y) <= 64) {
@@ -16,4 +16,4 @@ double Power(double x, double y) {
   return x > 0 ? Exp(y * Log(x)) : std::nan("");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

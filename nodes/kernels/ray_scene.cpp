@@ -7,7 +7,7 @@
 #include "base/check.h"
 #include "base/embree.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 RTCRay ToEmbree(const Ray& ray) {
@@ -144,4 +144,4 @@ void RayScene::Occluded(std::span<const Ray> rays, std::span<std::uint8_t> occlu
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

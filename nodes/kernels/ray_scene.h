@@ -13,7 +13,7 @@
 #include "base/status.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The part of the line origin + t * direction with near <= t <= far. direction need not be unit length; t
 // counts in its lengths.
@@ -63,4 +63,4 @@ class RayScene {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "base/check.h"
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 KeySpan SpanFrom(std::span<const float> times, std::size_t key, double seconds) {
@@ -178,4 +178,4 @@ void SampleScalars(const SamplerKeys& keys, double seconds, std::span<double> ou
   SampleScalars(keys, Find(keys.times, seconds), out);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "base/matrix.h"
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class Interpolation : std::uint8_t { kStep, kLinear, kCubicSpline };
 
@@ -79,4 +79,4 @@ Quaternion SampleRotation(const SamplerKeys& keys, double seconds);  // componen
 void SampleScalars(const SamplerKeys& keys, double seconds,
                    std::span<double> out);  // out.size() == components
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

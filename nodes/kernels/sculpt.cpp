@@ -6,7 +6,7 @@
 #include "base/check.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kSculptGrain = 2048;
@@ -69,4 +69,4 @@ void SculptKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out,
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,8 +6,8 @@
 //   project: to 1 along its radius, from inside and outside, as far as |r - 1| < d; linear dropoff: times
 //            1 - |r - 1| / d
 //   stretch: along the direction from the stretch origin to the centre, until it leaves the sphere; points
-//            outside within d go as far as the surface point below them, linear dropoff: times 1 - (r - 1) /
-//            d
+//            outside within d go as far as the surface point below them, linear dropoff: times
+//            1 - (r - 1) / d
 // and never farther than the maximum displacement. At the very centre there is no direction: the point stays
 // (flip, project). Double arithmetic.
 #pragma once
@@ -20,7 +20,7 @@
 #include "base/points.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class SculptMode : std::uint8_t { kFlip, kProject, kStretch };
 enum class SculptDropoff : std::uint8_t { kNone, kLinear };
@@ -54,4 +54,4 @@ class SculptKernel {
   std::vector<float> weights_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "base/scalar_math.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kShrinkWrapGrain = 256;
@@ -197,4 +197,4 @@ void ShrinkWrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView 
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

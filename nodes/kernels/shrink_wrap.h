@@ -19,7 +19,7 @@
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct ShrinkWrapSettings {
   enum class Projection : std::uint8_t { kClosest, kNormals, kAxis };
@@ -80,4 +80,4 @@ class ShrinkWrapKernel {
   std::optional<NormalsKernel> normals_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -14,7 +14,7 @@
 
 #ifndef KPSA_NODES_KERNELS_SKIN_RUN_
 #define KPSA_NODES_KERNELS_SKIN_RUN_
-namespace kpsa {
+namespace kpsa::engine {
 // What one Run hands to the vector code.
 struct SkinRun : SkinFrame {
   const float* palette;  // columns x y z 0 of each joint, translations relative to `origin`
@@ -30,11 +30,11 @@ struct SkinBlock {
   const float* weights;
   std::size_t begin, end;  // points
 };
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 // A matrix of four columns x y z 0 in as few vectors as there are
@@ -194,11 +194,11 @@ void SkinBlockLanes(const SkinRun& run, const SkinBlock& block, ConstPointsView 
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(SkinBlockLanes);
 
@@ -340,5 +340,5 @@ void SkinKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

@@ -9,7 +9,7 @@
 #include "base/status.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The influences of a whole mesh, any number a point; zero weights are skipped, joints may repeat.
 // Mesh point p is moved by joints[i] with weights[i], i in [offsets[p], offsets[p + 1]).
@@ -78,4 +78,4 @@ class SkinKernel {
   AlignedFloats masks_;  // point weights, empty if all 1
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 constexpr std::size_t kSoftModGrain = 4096;
 }
@@ -35,4 +35,4 @@ void ClusterKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   copy(end_, count_ - end_);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

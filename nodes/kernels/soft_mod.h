@@ -11,7 +11,7 @@
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A local kernel. A softMod's falloff (falloff.h, RadialFalloff) is multiplied into the point weights.
 class ClusterKernel {
@@ -35,4 +35,4 @@ class ClusterKernel {
   AlignedFloats weights_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

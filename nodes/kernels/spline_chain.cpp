@@ -6,7 +6,7 @@
 #include "nodes/kernels/constraint_math.h"
 #include "nodes/kernels/matrix_parts.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr int kSamplesPerSpan = 16;  // chords leave the curve between two of them
@@ -98,4 +98,4 @@ void SolveSplineChain(const SplineChainPose& pose, std::span<Matrix4> out) {
   }
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

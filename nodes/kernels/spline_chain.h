@@ -8,7 +8,7 @@
 #include "base/matrix.h"
 #include "nodes/kernels/wire.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct SplineChainPose {
   Matrix4 parent;               // world matrix of the first joint's parent
@@ -23,4 +23,4 @@ struct SplineChainPose {
 // Bones or curves without length leave the turn of their joint alone.
 void SolveSplineChain(const SplineChainPose& pose, std::span<Matrix4> out);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

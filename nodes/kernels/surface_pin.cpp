@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kInUvTriangle = 1e-9;  // of a coordinate: nearer ones are in the triangle
@@ -87,4 +87,4 @@ Matrix4 PinMatrix(const SurfaceFrame& frame, const PinAxes& axes) {
   return m;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

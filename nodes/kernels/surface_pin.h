@@ -9,7 +9,7 @@
 #include "base/triangle_tree.h"
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // A place in a triangle: sum of weights[k] * corner k.
 struct TrianglePlace {
@@ -56,4 +56,4 @@ struct PinAxes {
 // The third axis makes it right-handed. The axes must differ.
 Matrix4 PinMatrix(const SurfaceFrame& frame, const PinAxes& axes);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

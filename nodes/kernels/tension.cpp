@@ -6,7 +6,7 @@
 #include "base/check.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double Distance(ConstPointsView points, Index a, Index b) {
@@ -118,4 +118,4 @@ void TensionPushKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView
   });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -12,7 +12,7 @@
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // The input points that these output points need, sorted: one ring; a point of weight 0 needs itself only.
 std::vector<Index> TensionDemand(const Topology& topology, std::span<const Index> out_points,
@@ -59,4 +59,4 @@ class TensionPushKernel {
   std::optional<NormalsKernel> normals_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

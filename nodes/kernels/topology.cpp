@@ -5,7 +5,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMaxIndices = std::size_t{1} << 31;
@@ -149,4 +149,4 @@ std::vector<Index> Topology::Components(Index* count) const {
   return component;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

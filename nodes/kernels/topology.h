@@ -9,7 +9,7 @@
 #include "base/points.h"
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class Topology {
  public:
@@ -45,4 +45,4 @@ class Topology {
   std::vector<std::uint8_t> border_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

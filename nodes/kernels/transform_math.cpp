@@ -5,7 +5,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 Matrix4 ComposeLocal(const Matrix4& offset_parent, const TransformValues& values) {
   Matrix4 m = RotationFromEuler(values.rotate, values.rotate_order);
@@ -74,4 +74,4 @@ Matrix4 NearestRotation(const Matrix4& m) {
   return RotationFromUnit(rotation);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

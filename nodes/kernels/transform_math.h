@@ -3,7 +3,7 @@
 
 #include "base/matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct TransformValues {
   Double3 translate;
@@ -31,4 +31,4 @@ double TwistAngle(Quaternion twist, Double3 axis);
 // reflection. Where m is singular, that of DecomposeTrs.
 Matrix4 NearestRotation(const Matrix4& m);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

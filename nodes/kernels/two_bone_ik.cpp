@@ -6,7 +6,7 @@
 #include "base/scalar_math.h"
 #include "nodes/kernels/constraint_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kNothing = 1e-12;  // of the bones' length: below it there is no length or no way to go
@@ -83,4 +83,4 @@ TwoBoneRest BindTwoBones(const TwoBonePose& rest, std::optional<Double3> pole, b
   return bound;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 
 #include "base/matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct TwoBonePose {  // before the solve: what a clip or the rest pose says
   Double3 start, mid, end;
@@ -40,4 +40,4 @@ TwoBoneTurns SolveTwoBones(const TwoBonePose& pose, const TwoBoneRest& rest, con
 // angle is kept only if `keep_pole_angle`.
 TwoBoneRest BindTwoBones(const TwoBonePose& rest, std::optional<Double3> pole, bool keep_pole_angle);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 
 #include "base/check.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 std::vector<Index> AllPoints(std::size_t count) {
   std::vector<Index> points(count);
@@ -95,4 +95,4 @@ void GatherPoints(ConstPointsView in, std::span<const Index> positions, PointsVi
   for (std::size_t i = 0; i < positions.size(); ++i) out.z[i] = in.z[positions[i]];
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

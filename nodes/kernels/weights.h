@@ -16,7 +16,7 @@
 #include "base/points.h"
 #include "base/status.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // 0, 1, .., count - 1: the list of all points.
 std::vector<Index> AllPoints(std::size_t count);
@@ -39,4 +39,4 @@ AlignedFloats PaddedWeights(std::span<const float> weights, std::size_t count);
 // out[i] = in[positions[i]].
 void GatherPoints(ConstPointsView in, std::span<const Index> positions, PointsView out);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/check.h"
 #include "nodes/kernels/weights.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // One span as a cubic in its own parameter t in [0, 1]: c0 + t (c1 + t (c2 + t c3)).
@@ -271,4 +271,4 @@ void WireKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   if (any) blend_.Run(scratch.data(), out, parallel);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -16,7 +16,7 @@
 #include "nodes/kernels/falloff.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class CurveBasis : std::uint8_t {
   kLinear,      // straight from vertex to vertex
@@ -81,4 +81,4 @@ class WireKernel {
   ControlBlend blend_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

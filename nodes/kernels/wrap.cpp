@@ -7,7 +7,7 @@
 #include "nodes/kernels/weights.h"
 #include "nodes/kernels/wrap_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kWrapGrain = 1024;
@@ -130,4 +130,4 @@ void WrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
             [&](std::size_t begin, std::size_t end) { RunWrap(run, driver, frames, in, out, begin, end); });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

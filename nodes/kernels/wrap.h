@@ -22,7 +22,7 @@
 #include "nodes/kernels/driver_frames.h"
 #include "nodes/kernels/parallel_hook.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 enum class WrapMode : std::uint8_t { kOffset, kSurface, kSnap };
 
@@ -82,4 +82,4 @@ class WrapKernel {
   DriverFrames frames_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 
 #include "nodes/kernels/wrap.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Row = std::vector<std::pair<Index, double>>;  // driver point, weight; ascending
@@ -110,4 +110,4 @@ std::vector<Index> WrapDemand(const Topology& driver, std::span<const Double3> d
   return all;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 constexpr float kFoldedSquare = 1e-10f;  // of the tangents' lengths, squared
@@ -208,11 +208,11 @@ void Wrap(const WrapRun& run, const float* driver, const float* frames, ConstPoi
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace kpsa {
+namespace kpsa::engine {
 
 HWY_EXPORT(NormalsOf);
 HWY_EXPORT(FramesOf);
@@ -236,5 +236,5 @@ void RunWrap(const WrapRun& run, const float* driver, const float* frames, Const
   HWY_DYNAMIC_DISPATCH(Wrap)(run, driver, frames, in, out, begin, end);
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 #endif  // HWY_ONCE

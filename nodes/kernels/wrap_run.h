@@ -6,7 +6,7 @@
 
 #include "base/points.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr std::size_t kWrapBlock = 64;    // ranges of points begin at multiples of this
 inline constexpr std::size_t kFrameFloats = 16;  // three columns and the normal
@@ -44,4 +44,4 @@ void FindWrapPlaces(const WrapRun& run, const float* driver, const float* frames
 void RunWrap(const WrapRun& run, const float* driver, const float* frames, ConstPointsView in, PointsView out,
              std::size_t begin, std::size_t end) noexcept;
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

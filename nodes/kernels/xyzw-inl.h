@@ -9,7 +9,7 @@
 #include "base/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace kpsa {
+namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 #if HWY_TARGET == HWY_SCALAR
@@ -73,7 +73,7 @@ HWY_INLINE void PackXyzw(const float* x, const float* y, const float* z, std::si
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace kpsa
+}  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
 
 #endif  // include guard

@@ -5,7 +5,7 @@
 #include "tests/architecture/source_tree.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::string Lines(const std::vector<std::string>& texts) {
@@ -26,12 +26,37 @@ TEST(IncludeArrows, PointAsTheyMay) {
 TEST(IncludeArrows, CanaryOfEveryArrow) {
   TemporaryFolder tree;
   const std::pair<const char*, const char*> bad[] = {
-      {"base/a.h", "graph/a.h"},  {"graph/a.cpp", "nodes/a.h"},       {"graph/b.h", "kpsa/a.h"},
-      {"graph/c.h", "io/a.h"},    {"nodes/a.h", "kpsa/a.h"},          {"nodes/b.h", "io/a.h"},
-      {"kpsa/a.h", "nodes/a.h"},  {"kpsa/b.cpp", "io/a.h"},           {"io/a.h", "nodes/a.h"},
-      {"io/b.h", "kpsa/a.h"},     {"nodes/kernels/a.h", "graph/a.h"}, {"nodes/kernels/b.h", "nodes/a.h"},
-      {"base/b.cpp", "cli/a.h"},  {"io/c.h", "tests/support/a.h"},    {"kpsa/c.cpp", "nodes/kernels/a.h"},
+      {"base/a.h", "graph/a.h"},
+      {"base/b.cpp", "cli/a.h"},
+      {"base/c.h", "files/a.h"},
+      {"graph/a.cpp", "nodes/a.h"},
+      {"graph/b.h", "kpsa/a.h"},
+      {"graph/c.h", "rig/build/a.h"},
       {"graph/d.h", "bench/a.h"},
+      {"graph/e.h", "files/a.h"},
+      {"nodes/a.h", "kpsa/a.h"},
+      {"nodes/b.h", "gltf/a.h"},
+      {"nodes/kernels/a.h", "graph/a.h"},
+      {"nodes/kernels/b.h", "nodes/a.h"},
+      {"files/a.h", "graph/a.h"},
+      {"files/b.h", "gltf/a.h"},
+      {"gltf/a.h", "graph/a.h"},
+      {"gltf/b.h", "rig/character/a.h"},
+      {"rig/a.h", "rig/build/a.h"},
+      {"rig/file/a.h", "gltf/a.h"},
+      {"rig/file/b.h", "rig/character/a.h"},
+      {"rig/character/a.h", "rig/file/a.h"},
+      {"rig/character/b.h", "rig/build/a.h"},
+      {"rig/build/a.h", "kpsa/a.h"},
+      {"rig/build/b.h", "nodes/a.h"},
+      {"kpsa/a.h", "nodes/a.h"},
+      {"kpsa/b.cpp", "gltf/a.h"},
+      {"kpsa/c.cpp", "nodes/kernels/a.h"},
+      {"kpsa/d.h", "kpsa/training/a.h"},
+      {"kpsa/training/a.h", "rig/build/a.h"},
+      {"kpsa/training/b.cpp", "host/a.h"},
+      {"rig/build/c.h", "tests/support/a.h"},
+      {"include/kpsa/a.h", "base/a.h"},
   };
   for (const auto& [file, include] : bad)
     tree.Write(file, std::string("#pragma once\n  #  include \"") + include + "\"\n");
@@ -49,7 +74,7 @@ TEST(IncludeArrows, CanaryOfEveryDoor) {
   const char* const libraries[] = {"tbb/parallel_for.h", "oneapi/tbb.h",     "yaml-cpp/yaml.h", "tiny_gltf.h",
                                    "nlohmann/json.hpp",  "embree3/rtcore.h", "hwy/highway.h",   "zip.h"};
   for (std::size_t i = 0; i < std::size(libraries); ++i) {
-    for (const char* room : {"base", "graph", "nodes", "nodes/kernels", "kpsa", "io", "cli"}) {
+    for (const char* room : {"base", "graph", "nodes", "nodes/kernels", "kpsa", "rig/build", "cli"}) {
       tree.Write(std::string(room) + "/h" + std::to_string(i) + ".h",
                  std::string("#include <") + libraries[i] + ">\n");
     }
@@ -59,13 +84,13 @@ TEST(IncludeArrows, CanaryOfEveryDoor) {
 
   TemporaryFolder sources;
   sources.Write("graph/a.cpp", "#include <tbb/task_arena.h>\n#include <nlohmann/json.hpp>\n");
-  sources.Write("io/other.cpp", "#include <yaml-cpp/yaml.h>\n");
+  sources.Write("gltf/other.cpp", "#include <yaml-cpp/yaml.h>\n");
   sources.Write("base/parallel.cpp", "#include <tbb/task_arena.h>\n");
   sources.Write("kpsa/a.cpp", "#include \"../base/types.h\"\n#include \"types.h\"\n");
   const std::vector<std::string> found = FindBreaches(ReadSourceTree(sources.path()));
   ASSERT_EQ(found.size(), 4u) << Lines(found);
   EXPECT_EQ(found[0], "graph/a.cpp:1: <tbb/task_arena.h> belongs behind base/parallel.cpp");
-  EXPECT_EQ(found[1], "io/other.cpp:1: <yaml-cpp/yaml.h> belongs behind io/yaml_document.cpp");
+  EXPECT_EQ(found[1], "gltf/other.cpp:1: <yaml-cpp/yaml.h> belongs behind files/yaml_document.cpp");
 
   TemporaryFolder own;  // a door that is a header of ours
   own.Write("base/embree.h", "#include <embree3/rtcore.h>\n");
@@ -81,11 +106,11 @@ TEST(IncludeArrows, CanaryOfEveryDoor) {
 
 TEST(IncludeArrows, AGoodTreeHasNoBreach) {
   TemporaryFolder tree;
-  tree.Write("graph/a.h", "#include \"base/types.h\"\n#include <vector>\n// #include \"io/a.h\"\n");
+  tree.Write("graph/a.h", "#include \"base/types.h\"\n#include <vector>\n// #include \"rig/a.h\"\n");
   tree.Write("nodes/kernels/a.cpp", "#include \"nodes/kernels/a.h\"\n#include \"base/types.h\"\n");
   tree.Write("nodes/a.cpp", "#include \"nodes/kernels/a.h\"\n#include \"graph/a.h\"\n");
-  tree.Write("cli/a.cpp", "#include \"io/a.h\"\n#include \"kpsa/a.h\"\n#include <nlohmann/json.hpp>\n");
-  tree.Write("build-x/a.h", "#include \"io/a.h\"\n");
+  tree.Write("cli/a.cpp", "#include \"rig/build/a.h\"\n#include \"kpsa/a.h\"\n#include <nlohmann/json.hpp>\n");
+  tree.Write("build-x/a.h", "#include \"rig/a.h\"\n");
   EXPECT_EQ(Lines(FindBreaches(ReadSourceTree(tree.path()))), "");
 }
 
@@ -112,4 +137,4 @@ TEST(Headers, CanaryOfOnesThatDoNot) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

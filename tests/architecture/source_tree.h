@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct Include {
   std::string text;  // as written, without quotes or angle brackets
@@ -34,4 +34,4 @@ std::vector<std::string> FindBreaches(const std::vector<SourceFile>& files);
 // own header first.
 std::vector<std::string> FindMissingIncludes(const std::vector<SourceFile>& files);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double MaxDifference(const Matrix4& a, const Matrix4& b) {
@@ -104,4 +104,4 @@ TEST(Matrix, SlerpTakesTheShortWay) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include <set>
 #include <thread>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::set<std::thread::id> ThreadsOfALoop() {
@@ -41,4 +41,4 @@ TEST(WithThreads, TheBodyRunsOnTheCallersThread) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 
 #include "base/parallel.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Counts how many there are, and notices two users at once.
@@ -63,4 +63,4 @@ TEST(Spares, WhatHasNoRoomIsLetGo) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

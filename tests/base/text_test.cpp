@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(Text, TheLongestKnownNameBeforeASeparatorWins) {
@@ -23,4 +23,4 @@ TEST(Text, TheLongestKnownNameBeforeASeparatorWins) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 
 #include "tests/support/instruction_count.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -372,4 +372,4 @@ TEST(TriangleTree, LooksAtFewTriangles) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -18,7 +18,7 @@
 #include "base/parallel.h"
 #include "base/triangle_tree.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
@@ -297,4 +297,4 @@ TEST(TriangleTreeTwin, LeavesTheFloatingPointModeAlone) {
 #endif
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,13 +6,13 @@
 #include <cstring>
 #include <limits>
 
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "graph/evaluator.h"
-#include "io/graph_editor.h"
+#include "rig/graph_editor.h"
 #include "nodes/standard_nodes.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class TrainedRig : public ::testing::Test {
@@ -242,4 +242,4 @@ TEST_F(TrainedRig, AChangedRigIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

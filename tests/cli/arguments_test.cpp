@@ -8,7 +8,7 @@
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct Refusal {
@@ -205,4 +205,4 @@ TEST(Arguments, HelpAndFirstMinutes) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "tests/cli/refusals.h"
 #include "tests/support/gltf_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using nlohmann::json;
@@ -403,4 +403,4 @@ TEST_F(BadArguments, AreRefusedBeforeAnythingIsWritten) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

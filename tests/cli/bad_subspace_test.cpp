@@ -7,7 +7,7 @@
 
 #include "tests/cli/refusals.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using nlohmann::json;
@@ -176,4 +176,4 @@ TEST_F(BadSubspaces, RandomDamage) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -14,7 +14,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -188,4 +188,4 @@ TEST(BenchReport, TheSpeedupHasASpread) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "tests/cli/rig_run.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const std::string kCar = KPSA_SCENES_DIR "/car/car.yaml", kCarHeavy = KPSA_SCENES_DIR "/car/car_heavy.yaml";
@@ -54,4 +54,4 @@ TEST(Car, EveryControlMovesPoints) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,11 +10,11 @@
 #include <sstream>
 
 #include "cli/bench_report.h"
-#include "io/npz.h"
+#include "files/npz.h"
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -495,4 +495,4 @@ TEST(Render, ACameraSeesLightAfterBounces) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

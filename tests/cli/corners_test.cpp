@@ -11,7 +11,7 @@
 #include "tests/support/sheet_character.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 #if defined(KPSA_WITH_ASAN) || defined(KPSA_WITH_TSAN)
@@ -115,4 +115,4 @@ TEST_F(Corners, TwoHundredThousandPointsTrain) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

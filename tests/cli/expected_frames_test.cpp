@@ -5,12 +5,12 @@
 #include <cmath>
 #include <filesystem>
 
-#include "io/npz.h"
+#include "files/npz.h"
 #include "tests/cli/process.h"
 #include "tests/support/expected_files.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The largest distance of two points as a share of the diagonal of all expected positions.
@@ -72,4 +72,4 @@ TEST(ExpectedFrames, EveryCharacterAndClip) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

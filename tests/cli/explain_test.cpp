@@ -8,7 +8,7 @@
 
 #include "tests/cli/refusals.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const std::string kFace = KPSA_SCENES_DIR "/face/face.yaml";
@@ -151,4 +151,4 @@ TEST_F(Explain, Refusals) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class Fmt : public ::testing::Test {
@@ -64,4 +64,4 @@ TEST_F(Fmt, RefusesWhatIsNoRig) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

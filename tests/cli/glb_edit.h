@@ -8,7 +8,7 @@
 
 #include "tests/support/gltf_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct GlbParts {
   nlohmann::json json;
@@ -44,4 +44,4 @@ struct GlbParts {
   }
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kWalkTolerance = 0.5e-3;
@@ -81,4 +81,4 @@ TEST(GuardWalks, NoStepIsMuchLargerThanTheFullEvaluations) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

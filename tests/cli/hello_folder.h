@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <string>
 
-#include "kpsa/trainer.h"
+#include "kpsa/training/trainer.h"
 #include "tests/cli/glb_edit.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // `text` with its only `from` replaced; fails the test where that is not there once.
 inline std::string Replaced(std::string text, const std::string& from, const std::string& to) {
@@ -57,4 +57,4 @@ inline TrainOptions QuickTraining() {
   return options;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // hello.yaml with a cage that nothing moves, and two clusters that move all points by 0.3 mm each where the
@@ -111,4 +111,4 @@ TEST_F(Idle, BenchAndReportTell) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

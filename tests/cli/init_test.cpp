@@ -7,7 +7,7 @@
 #include "tests/support/moving_character.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 bool Has(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
@@ -55,4 +55,4 @@ TEST(Init, SamplesAreThoseAskedFor) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include <regex>
 #include <set>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -139,4 +139,4 @@ std::vector<std::string> SchemaProblems(const nlohmann::json& schema, const nloh
   return checker.problems;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What is wrong with the value, each at its place ("/nodes/mush/iterations: ..."). A keyword that this check
 // does not know is a fault of the schema, and reported too.
 std::vector<std::string> SchemaProblems(const nlohmann::json& schema, const nlohmann::json& value);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class KpsaFrames : public ::testing::Test {
@@ -286,4 +286,4 @@ TEST_F(KpsaFrames, AControlThatIsNoNumberMissesAndLeavesNothingBehind) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

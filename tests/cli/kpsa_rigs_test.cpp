@@ -8,7 +8,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kTolerance = kQuickTolerance;
@@ -404,4 +404,4 @@ TEST_F(Untrained, AnotherAxisOfATrainedJointMisses) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

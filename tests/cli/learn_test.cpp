@@ -5,7 +5,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using nlohmann::json;
@@ -53,7 +53,7 @@ TEST_F(Learning, WhatMissedHitsAfterwardsAndStaysLearnt) {
 
   const Result<Subspace> subspace = ReadSubspace(folder_ / "new.kpsa", KeptModes::kRead);
   ASSERT_TRUE(subspace.ok());
-  EXPECT_GT(subspace->kept_modes.size(), 0) << "as before";
+  EXPECT_GT(subspace->kept_modes.values.size(), 0u) << "as before";
   const TrainingRecord record = ParseTraining(subspace->training);
   ASSERT_EQ(record.learnt.size(), 1u);
   EXPECT_EQ(record.learnt[0].first, "sway");
@@ -101,4 +101,4 @@ TEST_F(Learning, AsksBeforeItReplacesAndSaysWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,5 +1,5 @@
 // Learning in the background: misses are handed in while frames are evaluated, and a new version comes out.
-#include "kpsa/learner.h"
+#include "kpsa/training/learner.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // hello with a clip that sways a joint which never moves in training.
@@ -237,4 +237,4 @@ TEST_F(BackgroundLearning, LearnsPosesOfControls) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

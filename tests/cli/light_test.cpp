@@ -7,7 +7,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -64,4 +64,4 @@ TEST(LearntLight, IsNearerToWhatIsRightThanAsManyPaths) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

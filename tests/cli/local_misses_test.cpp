@@ -10,7 +10,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class LocalMisses : public ::testing::Test {
@@ -425,4 +425,4 @@ TEST_F(LocalMisses, AFileKeepsThemAndDamageIsRefused) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

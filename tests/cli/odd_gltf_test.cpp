@@ -3,11 +3,11 @@
 
 #include <functional>
 
-#include "io/npz.h"
+#include "files/npz.h"
 #include "tests/cli/refusals.h"
 #include "tests/support/gltf_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using nlohmann::json;
@@ -265,4 +265,4 @@ TEST_F(OddGltf, HiddenMeshesAreNoOutputs) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,12 +4,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/npz.h"
+#include "files/npz.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/support/gltf_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using nlohmann::json;
@@ -262,4 +262,4 @@ TEST_F(OddNames, AreFoundInEveryCommand) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(PlaybackBlocks, AreSpreadOverTheFramesOfAllClips) {
@@ -99,4 +99,4 @@ TEST_F(Playback, WhereNoFrameHitsAllAreReconstructed) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

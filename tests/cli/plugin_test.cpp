@@ -10,7 +10,7 @@
 
 #include "tests/cli/refusals.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class Plugins : public RefusalTest {
@@ -114,4 +114,4 @@ TEST_F(Plugins, TwoThatClashAreNamedBoth) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

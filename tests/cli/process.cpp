@@ -15,7 +15,7 @@
 
 extern char** environ;
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -93,4 +93,4 @@ ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, doub
   return Run(Kpsa(arguments), 60, delay_seconds, "", {});
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
 inline const std::string kHelloGlb = KPSA_SCENES_DIR "/hello/hello.glb";
@@ -25,4 +25,4 @@ ProcessResult RunShell(const std::string& line, double limit_seconds, const std:
 // Starts it, sends SIGINT after the delay, and waits.
 ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "tests/cli/rig_run.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class Production : public ::testing::TestWithParam<const char*> {
@@ -139,4 +139,4 @@ INSTANTIATE_TEST_SUITE_P(Rigs, Production,
                                            "animal/animal_heavy.yaml"));
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

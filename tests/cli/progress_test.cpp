@@ -12,7 +12,7 @@
 #include <functional>
 #include <thread>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // What is written to stderr while that is a terminal.
@@ -74,4 +74,4 @@ TEST(Progress, QuietDrawsNothing) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

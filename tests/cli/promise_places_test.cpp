@@ -6,7 +6,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using nlohmann::json;
@@ -238,4 +238,4 @@ TEST_F(Driven, OneEntryMayHoldBoth) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

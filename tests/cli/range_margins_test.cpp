@@ -5,7 +5,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The share of a control's range by which it is beyond its upper end, where the guards begin to ask for the
@@ -51,4 +51,4 @@ TEST(RangeMargins, AreAsWideAsTheToleranceIsKept) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 namespace fs = std::filesystem;
@@ -147,4 +147,4 @@ TEST_F(ReadmeTest, CanaryOfInventedScripts) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,13 +9,13 @@
 #include "cli/common.h"
 #include "cli/node_pictures.h"
 #include "cli/rig_schema.h"
-#include "io/rig_words.h"
-#include "io/yaml_document.h"
+#include "rig/file/words.h"
+#include "files/yaml_document.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/json_schema.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -229,4 +229,4 @@ TEST(NodeReference, PicturesShowWhatEveryDeformerDoes) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -13,7 +13,7 @@
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class RefusalTest : public ::testing::Test {
  protected:
@@ -75,4 +75,4 @@ class RefusalTest : public ::testing::Test {
   TemporaryFolder folder;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -133,7 +133,7 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
     for (std::size_t f = 0; f < frames; ++f) {
       const double projection = e["projection"][f], cueing = e["cueing"][f], storage = e["storage"][f],
                    total = e["total"][f], emitted = e["soft_cache"][f];
-      // The map is stored in tiles: Pythagoras holds up to what these add (kpsa/error_split.h)
+      // The map is stored in tiles: Pythagoras holds up to what these add (kpsa/training/error_split.h)
       EXPECT_NEAR(total * total, projection * projection + cueing * cueing,
                   2 * projection * storage + storage * storage + 1e-6 * total * total);
       const std::string verdict = (*side)["per_frame"][f]["verdict"];
@@ -156,4 +156,4 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,13 +3,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/npz.h"
+#include "files/npz.h"
 #include "kpsa/subspace.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class TwoHellos : public ::testing::Test {
@@ -147,4 +147,4 @@ TEST_F(TwoHellos, AreAcceleratedAsTheRigAlone) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <limits>
 
-#include "kpsa/space_points.h"
+#include "kpsa/training/space_points.h"
 #include "nodes/standard_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 const NodeRegistry& AcceleratedRegistry() {
   static const NodeRegistry* registry = [] {
@@ -178,4 +178,4 @@ std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, 
   return poses;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "graph/evaluator.h"
 #include "kpsa/accelerate.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -91,4 +91,4 @@ class RigRun {
 std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, double reach,
                                              double speed = 0.37);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

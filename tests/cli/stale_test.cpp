@@ -8,7 +8,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using nlohmann::json;
@@ -286,4 +286,4 @@ TEST_F(Stale, TrainingWithMoreThreadsGivesTheSameSubspace) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "tests/cli/rig_run.h"
 #include "tests/support/instruction_count.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class FaceSubset : public ::testing::Test {
@@ -143,4 +143,4 @@ TEST_F(FaceSubset, APatchBehindTheMushCostsItsRings) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,13 +1,13 @@
-// What training turns though no control or hardly one does (kpsa/tilts.h).
-#include "kpsa/tilts.h"
+// What training turns though no control or hardly one does (kpsa/training/tilts.h).
+#include "kpsa/training/tilts.h"
 
 #include <cmath>
 
-#include "cli/rig_training.h"
+#include "host/rig_training.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
@@ -77,4 +77,4 @@ TEST_F(Tilts, AThirdAxisWithoutAControlGetsOne) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TrainOptions WithSeconds(double seconds) {
@@ -82,4 +82,4 @@ TEST(TimeLimits, AreSecondsAndWhatTheyLeftOutIsTold) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -294,4 +294,4 @@ TEST(TrainNothing, AStackThatCostsLittleIsTrainedByForceOnly) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

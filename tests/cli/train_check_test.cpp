@@ -10,7 +10,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class TrainCheck : public ::testing::Test {
@@ -179,4 +179,4 @@ TEST(TrainedStillPoints, AreOfOneModeAndFewCues) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const std::string kArmed = "tripwire: evaluated while armed";
@@ -291,4 +291,4 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

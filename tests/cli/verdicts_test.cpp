@@ -12,7 +12,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
@@ -247,4 +247,4 @@ TEST(FrameDecision, TheShareOfTheFullEvaluationDecides) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

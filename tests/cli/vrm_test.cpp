@@ -7,7 +7,7 @@
 #include "tests/support/gltf_builder.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(Vrm, ExpressionsAreControlsAndFacts) {
@@ -43,4 +43,4 @@ TEST(Vrm, ExpressionsAreControlsAndFacts) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/weights_json.h"
+#include "files/weights_json.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/refusals.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class WeightsCommand : public RefusalTest {
@@ -186,4 +186,4 @@ TEST_F(WeightsCommand, MistakesChangeNothing) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

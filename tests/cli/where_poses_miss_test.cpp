@@ -6,7 +6,7 @@
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Storing costs errors: where poses miss, tiles are stored finely if that pays, and that is told.
@@ -72,4 +72,4 @@ TEST(WherePosesMiss, ALargerToleranceHitsAsOften) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

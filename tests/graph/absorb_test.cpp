@@ -4,7 +4,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class AbsorbTest : public testing::Test {
@@ -161,4 +161,4 @@ TEST_F(AbsorbTest, ARefusalChangesNothing) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -57,7 +57,7 @@ void* mmap(void* address, size_t length, int protection, int flags, int file, of
 }
 #endif
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class Allocations : public testing::Test {
@@ -253,4 +253,4 @@ TEST_F(Allocations, FramesAllocateByThreadAndNotByFrame) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -4,7 +4,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // `count` floors of one number each, in pairs: a0 and a1 drive even and odd ones.
@@ -158,4 +158,4 @@ TEST(Passed, AVaryingInputIsTheOutput) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

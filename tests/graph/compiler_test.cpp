@@ -5,7 +5,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 bool Says(const Status& status, const std::string& part) {
@@ -536,4 +536,4 @@ TEST_F(Untouched, TheBitsAreThoseOfAllPoints) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

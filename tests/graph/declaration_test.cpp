@@ -5,7 +5,7 @@
 #include "graph/graph.h"
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The only problem of what `declare` says of a type "n".
@@ -182,4 +182,4 @@ TEST(Declarations, NamesOfAnotherRegistryAreProblemsToo) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

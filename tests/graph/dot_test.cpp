@@ -10,7 +10,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A reader of the part of the DOT language that drawings use (graphviz.org/doc/info/lang.html). What it
@@ -204,4 +204,4 @@ TEST_F(DotTest, RedIsWhereTheTimeGoes) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

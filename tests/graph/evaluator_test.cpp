@@ -7,7 +7,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(Evaluator, ComputesOnceUntilSomethingChanges) {
@@ -366,4 +366,4 @@ TEST(Evaluator, WhatAnotherTookOfTheWorkspaceStillHearsOfChanges) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "graph/evaluator.cpp"
 #include "graph/evaluator_run.cpp"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct WithoutRecording::Impl {
   explicit Impl(std::shared_ptr<const Plan> plan) : evaluator(std::move(plan)) {}
@@ -24,4 +24,4 @@ void WithoutRecording::Invalidate() { impl_->evaluator.Invalidate(); }
 Status WithoutRecording::Evaluate() { return impl_->evaluator.Evaluate(); }
 double WithoutRecording::Get(Index output) const { return impl_->evaluator.Get<double>(output); }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -6,7 +6,7 @@
 #include "base/status.h"
 #include "graph/plan.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class WithoutRecording {
  public:
@@ -21,4 +21,4 @@ class WithoutRecording {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

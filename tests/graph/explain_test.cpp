@@ -6,7 +6,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class ExplainTest : public ::testing::Test {
@@ -97,4 +97,4 @@ TEST_F(ExplainTest, TimesOfNodesAndTheCriticalPath) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

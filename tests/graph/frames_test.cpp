@@ -10,7 +10,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kFrames = 61;
@@ -278,4 +278,4 @@ TEST(Frames, AStatefulNodeKeepsItsFramesInOrderOnOneEvaluator) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The message of a refusal; "" where there was none.
@@ -348,4 +348,4 @@ TEST_F(GraphTest, ElementsBeyondAnyReasonAreRefused) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

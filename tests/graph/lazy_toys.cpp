@@ -2,7 +2,7 @@
 
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct PatchKernel {
@@ -114,4 +114,4 @@ std::string OutputBytes(const Evaluator& evaluator) {
   return bytes;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

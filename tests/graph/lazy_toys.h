@@ -6,7 +6,7 @@
 #include "graph/evaluator.h"
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline constexpr Index kPatchPoints = 210;
 
@@ -20,4 +20,4 @@ int SharedSegments(const Plan& plan);
 // Of all outputs.
 std::string OutputBytes(const Evaluator& evaluator);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

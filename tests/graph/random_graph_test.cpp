@@ -10,7 +10,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Plug = NaiveTwin::Plug;
@@ -72,21 +72,21 @@ class RandomGraph {
     return *found;
   }
   void Set(const Plug& plug, const NaiveTwin::Held& value) {
-    kpsa::Value engine;
+    kpsa::engine::Value engine;
     if (plug.attribute == "which") {
-      engine = kpsa::Value(std::get<double>(value) != 0);
+      engine = kpsa::engine::Value(std::get<double>(value) != 0);
     } else if (plug.attribute == "count" || plug.attribute == "rings") {
-      engine = kpsa::Value(static_cast<std::int64_t>(std::get<double>(value)));
+      engine = kpsa::engine::Value(static_cast<std::int64_t>(std::get<double>(value)));
     } else if (const auto* number = std::get_if<double>(&value)) {
-      engine = kpsa::Value(*number);
+      engine = kpsa::engine::Value(*number);
     } else if (const auto* vector = std::get_if<Double3>(&value)) {
-      engine = kpsa::Value(*vector);
+      engine = kpsa::engine::Value(*vector);
     } else {
       std::vector<float> xyz;
       for (const Double3& p : std::get<NaiveTwin::Points>(value)) {
         for (int c = 0; c < 3; ++c) xyz.push_back(static_cast<float>(p[c]));
       }
-      engine = kpsa::Value(PointBufferPtr(std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(xyz))));
+      engine = kpsa::engine::Value(PointBufferPtr(std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(xyz))));
     }
     const Status status = graph.Set(Ref(plug), engine);
     EXPECT_TRUE(status.ok()) << status.ToString();
@@ -393,4 +393,4 @@ TEST_P(RandomGraphTest, AgreesWithTheNaiveTwin) {
 INSTANTIATE_TEST_SUITE_P(Threads, RandomGraphTest, testing::Values(1, 2, 4));
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

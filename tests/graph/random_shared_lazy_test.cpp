@@ -6,7 +6,7 @@
 #include "tests/graph/lazy_toys.h"
 #include "tests/support/test_graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Random graphs of owners with several bits, in each other's lazy inputs, beside their eager twins.
@@ -151,4 +151,4 @@ TEST(RandomSharedLazy, AgreesWithItsEagerTwin) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

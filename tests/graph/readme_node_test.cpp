@@ -1,5 +1,5 @@
 // The node of the README, word for word.
-#include "graph/node_registry.h"
+#include "graph/plugin.h"
 #include "tests/support/test_graph.h"
 
 void AddMix(kpsa::NodeRegistry& registry) {

@@ -10,7 +10,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Counting takes microseconds an instruction. What recording costs once an evaluation shows the more the
@@ -80,4 +80,4 @@ TEST(Recording, CostsNothingWhileItIsOff) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

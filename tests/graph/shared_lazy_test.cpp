@@ -12,7 +12,7 @@
 #include "tests/graph/lazy_toys.h"
 #include "tests/support/test_graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Deformers over points, read by 50 patches and whole; `world` and what leads to it are all that they share,
@@ -366,4 +366,4 @@ TEST_F(SharedLazyTest, All64BitsAndDeepNests) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

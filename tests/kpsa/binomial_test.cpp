@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(Binomial, KnownIntervals) {
@@ -77,4 +77,4 @@ TEST(Binomial, CoversAsPromised) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

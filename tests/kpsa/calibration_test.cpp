@@ -7,10 +7,10 @@
 #include <random>
 
 #include "kpsa/binomial.h"
-#include "kpsa/poses.h"
+#include "kpsa/training/poses.h"
 #include "tests/kpsa/synthetic.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using test::kInfinity;
@@ -298,4 +298,4 @@ TEST(Calibration, PosesWithoutANumberCountAsViolations) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,10 +9,10 @@
 #include <limits>
 #include <random>
 
-#include "kpsa/frame_cost.h"
+#include "kpsa/training/frame_cost.h"
 #include "kpsa/tiles.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(Patches, EveryLevelHoldsEveryPatchOnce) {
@@ -384,4 +384,4 @@ TEST(Patches, AreTakenWhereTheySpareTime) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(Signals, WhatDependsOnAStatefulNodeIsRefusedByName) {
@@ -48,4 +48,4 @@ TEST(Signals, EntriesAreReadBackAsTheyAreNamed) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

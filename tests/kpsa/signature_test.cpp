@@ -6,7 +6,7 @@
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const std::vector<std::string> kNames = {"jaw",     "a",   "a.b",      "a.b.c", "upperarm01.L", "x#1",
@@ -156,4 +156,4 @@ TEST_F(SetHereTest, WhatTrainingHadIsNotToldOf) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,10 +8,11 @@
 #include <cmath>
 
 #include "base/simd.h"
-#include "kpsa/eigen_solvers.h"
+#include "kpsa/training/eigen_solvers.h"
+#include "kpsa/training/make_subspace.h"
 #include "tests/kpsa/synthetic.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using test::kInfinity;
@@ -246,4 +247,4 @@ TEST(SoftCache, ScoresAreTheSameOnEveryTargetAndAgreeWithTheNaiveTwin) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 
 #include "base/matrix.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const Matrix4 kTurn = RotationFromEuler({0.4, -0.7, 1.1}, RotateOrder::kXyz);
@@ -68,4 +68,4 @@ TEST(SpaceFrame, AnythingElseIsAStretch) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

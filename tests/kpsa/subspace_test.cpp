@@ -10,11 +10,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "base/safetensors.h"
+#include "files/safetensors.h"
 #include "base/simd.h"
+#include "kpsa/training/make_subspace.h"
 #include "tests/kpsa/synthetic.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using test::Sheet;
@@ -340,17 +341,17 @@ TEST_P(SubspaceTest, CuesAreNamedByMeshAndStage) {
 }
 
 TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
-  subspace_.kept_modes = pca_.output_modes().cast<float>();
+  subspace_.kept_modes = KeptModesOf(pca_);
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
   const Result<Subspace> read = ReadSubspace(path_, KeptModes::kRead), frames = ReadSubspace(path_);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
   EXPECT_EQ(read->kept_modes, subspace_.kept_modes);
   ASSERT_TRUE(frames.ok()) << frames.status().ToString();
-  EXPECT_EQ(frames->kept_modes.size(), 0);  // frames need none
+  EXPECT_EQ(frames->kept_modes.values.size(), 0u);  // frames need none
   // What differs from what was written is refused
   std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(file), {}};
-  const std::string wanted(reinterpret_cast<const char*>(subspace_.kept_modes.data() + 40), 32);
+  const std::string wanted(reinterpret_cast<const char*>(subspace_.kept_modes.values.data() + 40), 32);
   const std::size_t at = bytes.find(wanted);
   ASSERT_NE(at, std::string::npos);
   bytes[at] = static_cast<char>(bytes[at] ^ 1);
@@ -365,7 +366,7 @@ TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   bytes[digest] = 'n';
   std::ofstream(path_, std::ios::binary) << bytes;
   EXPECT_NE(ReadSubspace(path_, KeptModes::kRead).status().ToString().find("modesDigest"), std::string::npos);
-  subspace_.kept_modes.conservativeResize(Eigen::NoChange, 6);
+  subspace_.kept_modes.columns -= 1;
   EXPECT_NE(WriteSubspace(subspace_, path_).ToString().find("kept modes"), std::string::npos);
 }
 
@@ -496,4 +497,4 @@ TEST(Subspace, BlendMixesPoints) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,11 +5,11 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "base/safetensors.h"
+#include "files/safetensors.h"
 #include "kpsa/subspace.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // 130 points that stand still, and one scalar that is measured; exact numbers, whatever rounds them.
@@ -119,4 +119,4 @@ TEST(SubspaceVersions, FlagsOfAnotherTypeOrValueAreRefused) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

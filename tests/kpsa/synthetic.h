@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "base/types.h"
-#include "kpsa/pca.h"
-#include "kpsa/pose_matrix.h"
+#include "kpsa/training/pca.h"
+#include "kpsa/training/pose_matrix.h"
 
-namespace kpsa::test {
+namespace kpsa::engine::test {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -114,4 +114,4 @@ inline PoseMatrix NoisePoses(std::size_t count, const PoseLayout& layout, unsign
   return poses;
 }
 
-}  // namespace kpsa::test
+}  // namespace kpsa::engine::test

@@ -9,8 +9,9 @@
 
 #include "base/simd.h"
 #include "kpsa/tiles.h"
+#include "kpsa/training/tile_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A tile of random numbers, and its terms.
@@ -179,4 +180,4 @@ TEST(TileInputs, TheDoubtIsANumberWhateverTheCuesAre) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,11 +7,12 @@
 #include <random>
 
 #include "base/simd.h"
-#include "kpsa/dense_map.h"
-#include "kpsa/eigen_solvers.h"
+#include "kpsa/training/dense_map.h"
+#include "kpsa/training/eigen_solvers.h"
 #include "kpsa/rigid_points.h"
+#include "kpsa/training/tile_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A map whose tiles have a falling spectrum, as neighbours that move alike give: gain [cN x r].
@@ -368,4 +369,4 @@ TEST(Tiles, ATileStoresNoFinerThanWhatIsLeftOutOfIt) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "nodes/standard_nodes.h"
 #include "tests/support/test_graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const NodeRegistry& Registry() {
@@ -92,4 +92,4 @@ TEST_F(ClipBatchTest, GivesTheSameBytesAsOneByOne) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

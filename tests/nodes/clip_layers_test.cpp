@@ -10,7 +10,7 @@
 #include "nodes/standard_nodes.h"
 #include "tests/support/test_graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const NodeRegistry& Nodes() {
@@ -144,4 +144,4 @@ TEST(LayeredTransform, BadKeysAreRefused) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

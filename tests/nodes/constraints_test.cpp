@@ -3,7 +3,7 @@
 #include "nodes/kernels/matrix_parts.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const std::vector<std::string> kTransformConstraints = {
@@ -350,4 +350,4 @@ TEST(SpaceSwitch, WithoutOffsetsTakesTheLocalMatrixAsInTheSpace) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

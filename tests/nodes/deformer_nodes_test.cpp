@@ -8,7 +8,7 @@
 #include "graph/geometry.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(TensionNode, MeasuresBothWays) {
@@ -184,4 +184,4 @@ TEST_F(DeltaMushNode, BordersStayWhereTheyArePinned) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

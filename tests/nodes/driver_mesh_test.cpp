@@ -7,7 +7,7 @@
 #include "tests/nodes/driver_rig.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A node that follows a mesh, without a graph.
@@ -94,4 +94,4 @@ TEST(DriverMeshes, AreCheckedOnceForAll) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

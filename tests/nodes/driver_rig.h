@@ -14,7 +14,7 @@
 #include "tests/nodes/kernel_support.h"
 #include "tests/support/test_graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline const NodeRegistry& NodesUnderTest() {
   static const NodeRegistry* registry = [] {
@@ -114,4 +114,4 @@ struct DriverRig {
   }
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

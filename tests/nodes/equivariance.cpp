@@ -7,7 +7,7 @@
 #include "nodes/kernels/constraint_math.h"
 #include "tests/nodes/driver_rig.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 Matrix4 MotionOf(Trial trial) {
@@ -255,4 +255,4 @@ std::string TrialName(Trial trial) {
          ((trial & (kAllFar | kNowFar)) != 0 ? ", far" : ", turned");
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

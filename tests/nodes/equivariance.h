@@ -11,7 +11,7 @@
 #include "graph/geometry.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // What a motion of the world does to a value.
 enum class Moves {
@@ -91,4 +91,4 @@ double TrialError(const NodeSetUp& set_up, Trial trial, const std::vector<Value>
 double TrialTolerance(const NodeSetUp& set_up, Trial trial);
 std::string TrialName(Trial trial);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

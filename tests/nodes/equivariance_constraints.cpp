@@ -1,7 +1,7 @@
 // Constraints and IK: what they give is local to a parent, and does not change.
 #include "tests/nodes/equivariance.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::string OnOff(bool maintain) { return maintain ? "maintainOffset" : "no offset"; }
@@ -181,4 +181,4 @@ std::vector<NodeSetUp> ConstraintSetUps() {
   return all;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

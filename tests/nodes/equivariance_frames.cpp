@@ -1,7 +1,7 @@
 // Transforms, matrices, vectors, lights; and nodes that know no world.
 #include "tests/nodes/equivariance.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 void AddTransforms(std::vector<NodeSetUp>* all) {
@@ -234,4 +234,4 @@ const std::map<std::string, std::string>& NodesWithoutWorld() {
   return nodes;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -3,7 +3,7 @@
 
 #include "tests/nodes/equivariance.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // The points come in where the mesh is; where that lies in the world is no matter.
@@ -204,4 +204,4 @@ std::vector<NodeSetUp> HandleSetUps() {
   return all;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

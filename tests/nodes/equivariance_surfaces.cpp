@@ -1,7 +1,7 @@
 // Nodes that read the surface of their own mesh, or follow that of another one.
 #include "tests/nodes/equivariance.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A driver at a stage after its skin.
@@ -177,4 +177,4 @@ std::vector<NodeSetUp> SurfaceSetUps() {
   return all;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <set>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kSeen = 3e-3;  // errors above it are none of rounding
@@ -118,4 +118,4 @@ TEST(RigidMotion, MissesANodeThatNobodyLists) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

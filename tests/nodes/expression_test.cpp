@@ -7,7 +7,7 @@
 
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double Formula(const std::string& text, const std::vector<double>& inputs = {}) {
@@ -118,4 +118,4 @@ TEST(Expressions, TheDefaultIsZero) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "tests/nodes/driver_rig.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 double Smooth(double t) {
@@ -337,4 +337,4 @@ TEST(FalloffNodes, BeforeTheSkinPointsAreWhereTheirParentHasTakenThem) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "tests/nodes/driver_rig.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A sheet that a matrix bends (it shears), then a deformer with a sphere that fades it, or without.
@@ -215,4 +215,4 @@ TEST(FalloffWeights, OfTheDemandedPointsOnly) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "nodes/kernels/two_bone_ik.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // An arm of locals: start, one joint between, mid, one joint below it, end.
@@ -295,4 +295,4 @@ TEST(PoleVectorConstraint, PlacesThePoleByItsTargets) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

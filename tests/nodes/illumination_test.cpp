@@ -11,7 +11,7 @@
 #include "tests/support/memory_in_use.h"
 #include "tests/support/test_graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const NodeRegistry& IlluminationRegistry() {
@@ -319,4 +319,4 @@ TEST(IndirectIllumination, FollowsItsLightAndFailsClearly) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "tests/nodes/driver_rig.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Settings = std::vector<std::pair<std::string, Value>>;
@@ -282,4 +282,4 @@ TEST(ImpossibleValues, ShapesThatAreNoShapes) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

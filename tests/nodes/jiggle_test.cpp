@@ -6,7 +6,7 @@
 #include "graph/frames.h"
 #include "tests/nodes/driver_rig.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A sheet that a matrix moves, and that jiggles.
@@ -149,4 +149,4 @@ TEST(Jiggle, SubsetsHaveTheBitsOfTheWhole) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

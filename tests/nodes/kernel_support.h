@@ -14,7 +14,7 @@
 #include "base/points.h"
 #include "nodes/kernels/topology.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Fixed seeds give fixed numbers with every standard library: only raw mt19937 output is used.
 class Random {
@@ -135,4 +135,4 @@ inline double MaxDistance(const std::vector<Double3>& a, const std::vector<Doubl
   return largest;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

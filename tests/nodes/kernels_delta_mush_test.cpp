@@ -9,7 +9,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Points = std::vector<Double3>;
@@ -284,4 +284,4 @@ TEST_F(DeltaMush, NormalsAgreeWithTheirTwin) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

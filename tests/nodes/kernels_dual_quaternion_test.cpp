@@ -10,7 +10,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 Quaternion Plus(Quaternion a, Quaternion b, double w) {
@@ -319,4 +319,4 @@ TEST(NearestRotation, IsThatOfThePolarDecomposition) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

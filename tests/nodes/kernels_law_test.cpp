@@ -25,7 +25,7 @@
 #include "nodes/kernels/wrap.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const std::vector<std::string> kTargets = {"avx512", "avx2", "scalar"};
@@ -497,4 +497,4 @@ TEST_F(KernelLaw, NoPointsAreFine) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/local_kernels.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // ----------------------------------------------------------------------------------------------------
@@ -408,4 +408,4 @@ TEST_F(LocalKernels, AChainInPlaceIsTheChainApart) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

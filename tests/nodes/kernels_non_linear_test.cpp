@@ -8,7 +8,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 void ExpectNear(Double3 a, Double3 b, double tolerance = 1e-12) {
@@ -254,4 +254,4 @@ TEST_F(NonLinearKernels, NothingToDoIsBitForBit) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/kernels/transform_math.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 TEST(Sampler, StepHoldsAndLinearGoesStraight) {
@@ -227,4 +227,4 @@ TEST(TransformMath, PoseRotationIsMeasuredAgainstTheRest) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

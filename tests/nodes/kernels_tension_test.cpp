@@ -7,7 +7,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class Tension : public testing::Test {
@@ -123,4 +123,4 @@ TEST_F(Tension, ASubsetCostsItsRing) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

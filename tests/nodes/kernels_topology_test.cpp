@@ -8,7 +8,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::vector<Index> Vector(std::span<const Index> span) { return {span.begin(), span.end()}; }
@@ -140,4 +140,4 @@ TEST(Falloff, RadialWeightsFollowTheDistance) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "nodes/kernels/wire.h"
 #include "tests/nodes/local_kernels.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::vector<Double3> Curve(std::size_t n) {
@@ -189,4 +189,4 @@ TEST(Wire, BadSettingsAreNamed) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -9,7 +9,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/kernel_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline bool SameBits(ConstPointsView a, ConstPointsView b, std::size_t i) {
   return std::memcmp(a.x + i, b.x + i, 4) == 0 && std::memcmp(a.y + i, b.y + i, 4) == 0 &&
@@ -41,4 +41,4 @@ class LocalKernels : public testing::Test {
   std::vector<float> mask_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

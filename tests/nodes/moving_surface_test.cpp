@@ -7,7 +7,7 @@
 
 #include "base/parallel.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A strip of squares in the plane of height z.
@@ -66,4 +66,4 @@ TEST(MovingSurface, ManyAtOnceAreWhereTheyShouldBe) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -14,7 +14,7 @@
 #include "nodes/standard_nodes.h"
 #include "tests/support/test_graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline const NodeRegistry& StandardNodes() {
   static const NodeRegistry* registry = [] {
@@ -90,4 +90,4 @@ class PosedNode {
   TestGraph g;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

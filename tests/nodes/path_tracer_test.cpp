@@ -7,7 +7,7 @@
 
 #include "base/scalar_math.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct Triangles {
@@ -294,4 +294,4 @@ TEST(PathTracer, RefusesWhatIsNoScene) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "nodes/kernels/pose_weights.h"
 #include "tests/nodes/driver_rig.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
@@ -174,4 +174,4 @@ TEST(PoseInterpolator, TheNodeIsRelativeToRest) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

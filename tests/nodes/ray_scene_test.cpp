@@ -10,7 +10,7 @@
 
 #include "base/parallel.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct Soup {
@@ -233,4 +233,4 @@ TEST(RayScene, SaysWhatIsWrongWithTheTriangles) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/driver_rig.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 using Mode = SculptMode;
@@ -156,4 +156,4 @@ TEST(Sculpt, EnvelopeWeightsSubsetsAndNoSphere) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 #include "graph/geometry.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Two points; `full` moves the first to x = 1, `half` to y = 1, `most` the second to z = 1.
@@ -192,4 +192,4 @@ TEST_F(SkinNode, BadBlendWeightsAreNamed) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

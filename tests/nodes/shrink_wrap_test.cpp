@@ -8,7 +8,7 @@
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/driver_rig.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // A sphere of radius 1 about the origin, normals outward.
@@ -229,4 +229,4 @@ TEST(ShrinkWrap, TargetsThatAreNoNumbersLeavePointsAlone) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

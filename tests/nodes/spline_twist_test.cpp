@@ -5,7 +5,7 @@
 #include "nodes/kernels/spline_chain.h"
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct Chain {
@@ -295,4 +295,4 @@ TEST(TwistDistribution, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

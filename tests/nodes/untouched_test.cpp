@@ -7,7 +7,7 @@
 
 #include "tests/nodes/equivariance.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // Weights 0, 0.7, 1, 0, 0.7, 1 ...
@@ -76,4 +76,4 @@ TEST(Untouched, AnEnvelopeOfZeroKeepsTheBitsOfAll) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -2,7 +2,7 @@
 
 #include "tests/nodes/node_support.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 class UtilityNodes : public testing::Test {
@@ -202,4 +202,4 @@ TEST_F(UtilityNodes, BlendMatrixBlendsPartByPart) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

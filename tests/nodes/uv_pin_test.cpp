@@ -7,7 +7,7 @@
 #include "tests/nodes/node_support.h"
 #include "tests/support/instruction_count.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
@@ -312,4 +312,4 @@ TEST(Follicle, GivesTheSameFrameInParts) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

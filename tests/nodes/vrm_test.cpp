@@ -3,7 +3,7 @@
 #include "tests/nodes/node_support.h"
 #include "tests/support/memory_in_use.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 // --- VRMC_node_constraint 1.0, "Example of Implementation" of each constraint.
@@ -264,4 +264,4 @@ TEST(VrmExpressions, RefuseListsThatMakeNoSense) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/triangle_tree.h"
 #include "tests/nodes/driver_rig.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::shared_ptr<const Mesh> Cage() {
@@ -314,4 +314,4 @@ TEST(Wrap, ErrorsSayWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

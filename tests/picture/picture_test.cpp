@@ -11,7 +11,7 @@
 #include "scenes/glb_writer.h"
 #include "scenes/head_shape.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct Mesh {
@@ -318,4 +318,4 @@ TEST(Image, LengthsKeepThreeDigits) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -13,9 +13,9 @@
 #if defined(KPSA_BROKEN_silent)
 extern "C" int nothing_that_kpsa_knows() { return 0; }
 #elif defined(KPSA_BROKEN_mute)
-extern "C" int kpsa_plugin_abi() { return kpsa::kPluginAbi; }
+extern "C" int kpsa_plugin_abi() { return kpsa::engine::kPluginAbi; }
 #elif defined(KPSA_BROKEN_old)
-extern "C" int kpsa_plugin_abi() { return kpsa::kPluginAbi - 1; }
+extern "C" int kpsa_plugin_abi() { return kpsa::engine::kPluginAbi - 1; }
 extern "C" void kpsa_register(kpsa::NodeRegistry&) {}
 #elif defined(KPSA_BROKEN_unresolved)
 extern "C" int a_function_that_nobody_has();

@@ -10,13 +10,13 @@
 #include "bench/ablation_parts.h"
 #include "bench/ablation_points.h"
 #include "bench/ablation_q_deim.h"
-#include "cli/rig_training.h"
-#include "io/npz.h"
-#include "kpsa/random.h"
+#include "host/rig_training.h"
+#include "files/npz.h"
+#include "kpsa/training/random.h"
 #include "nodes/standard_nodes.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa::ablation {
+namespace kpsa::engine::ablation {
 namespace {
 
 const std::string kHelloRig = KPSA_SCENES_DIR "/hello/hello.yaml";
@@ -174,4 +174,4 @@ TEST(Ablation, TrainsWithoutEachPart) {
 }
 
 }  // namespace
-}  // namespace kpsa::ablation
+}  // namespace kpsa::engine::ablation

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 std::unique_ptr<PromiseRig> Open(const std::string& name) {
@@ -119,4 +119,4 @@ TEST(PromisePoses, WalksGoFromWithinAnEndToBeyondIt) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

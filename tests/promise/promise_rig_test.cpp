@@ -8,7 +8,7 @@
 #include "bench/promise_poses.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 const std::string kHello = KPSA_SCENES_DIR "/hello/hello.yaml";
@@ -132,4 +132,4 @@ TEST(PromiseRig, RefusesWhatHasNothingToTry) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

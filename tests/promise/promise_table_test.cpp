@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 PromiseCase Case(double promised) { return {"rig", 1, 0.002, 1, promised}; }
@@ -73,4 +73,4 @@ TEST(PromiseTable, PutsSeedsTogetherAndMarksWhatIsBroken) {
 }
 
 }  // namespace
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,10 +11,10 @@
 #include "bench/untouched_run.h"
 #include "cli/common.h"
 #include "cli/rig_frames.h"
-#include "io/rig_writer.h"
+#include "rig/build/writer.h"
 #include "tests/support/temporary_folder.h"
 
-namespace kpsa::untouched {
+namespace kpsa::engine::untouched {
 namespace {
 
 constexpr std::size_t kFewPoints = 1500;
@@ -239,4 +239,4 @@ TEST(UntouchedRun, SaysWhatFailed) {
 }
 
 }  // namespace
-}  // namespace kpsa::untouched
+}  // namespace kpsa::engine::untouched

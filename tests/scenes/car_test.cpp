@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <set>
 
-#include "io/gltf_import.h"
+#include "gltf/import.h"
 #include "scenes/car_model.h"
 #include "tests/scenes/mesh_checks.h"
 
-namespace kpsa::scenes::car {
+namespace kpsa::engine::scenes::car {
 namespace {
 
 const CarShape& Shape() {
@@ -219,4 +219,4 @@ TEST(Car, CurvesHaveNinePointsInARowAndMirrorImages) {
 }
 
 }  // namespace
-}  // namespace kpsa::scenes::car
+}  // namespace kpsa::engine::scenes::car

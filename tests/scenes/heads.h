@@ -5,7 +5,7 @@
 
 #include "scenes/face_model.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 inline const HeadShape& ShapeOf(const HeadDesign& design) {
   static std::map<std::string, HeadShape> shapes;
@@ -14,4 +14,4 @@ inline const HeadShape& ShapeOf(const HeadDesign& design) {
                                : shapes.emplace(design.name, MakeHeadShape(design)).first->second;
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

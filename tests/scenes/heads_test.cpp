@@ -10,7 +10,7 @@
 #include "scenes/face_model.h"
 #include "tests/scenes/mesh_checks.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 struct Made {
@@ -182,4 +182,4 @@ TEST(Heads, WeightMapsAreFromZeroToOneAndUsed) {
 }
 
 }  // namespace
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

@@ -11,7 +11,7 @@
 
 #include "scenes/glb_writer.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 
 // Every edge has two quads that run along it in opposite directions, or it lies on a border; returns the
 // number of borders.
@@ -52,4 +52,4 @@ inline void CheckPointsAndTriangles(const std::vector<Double3>& points,
   }
 }
 
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

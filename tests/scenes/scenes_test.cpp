@@ -8,12 +8,12 @@
 #include <map>
 #include <set>
 
-#include "io/gltf_import.h"
+#include "gltf/import.h"
 #include "scenes/face_model.h"
 #include "tests/scenes/heads.h"
 #include "tests/scenes/mesh_checks.h"
 
-namespace kpsa::scenes {
+namespace kpsa::engine::scenes {
 namespace {
 
 const HeadShape& Shape() { return ShapeOf(FaceDesign()); }
@@ -327,4 +327,4 @@ TEST(Influences, KeepTheFourLargest) {
 }
 
 }  // namespace
-}  // namespace kpsa::scenes
+}  // namespace kpsa::engine::scenes

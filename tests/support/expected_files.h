@@ -8,7 +8,7 @@
 
 #include "tests/support/shared_files.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct ExpectedFile {
   std::string path, stem;
@@ -35,4 +35,4 @@ inline std::vector<ExpectedFile> ExpectedFiles() {
   return files;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

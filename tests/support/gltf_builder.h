@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class GltfBuilder {
  public:
@@ -144,4 +144,4 @@ class GltfBuilder {
   }
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

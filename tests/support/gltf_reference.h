@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "base/matrix.h"
-#include "io/gltf_import.h"
+#include "gltf/import.h"
 
-namespace kpsa::gltf_reference {
+namespace kpsa::engine::gltf_reference {
 
 using Vector = std::vector<double>;
 
@@ -169,4 +169,4 @@ inline std::map<std::string, Vector> AllPoints(const gltf::Character& character,
   return result;
 }
 
-}  // namespace kpsa::gltf_reference
+}  // namespace kpsa::engine::gltf_reference

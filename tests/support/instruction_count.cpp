@@ -3,7 +3,7 @@
 #if defined(__x86_64__) && defined(__linux__) && !defined(KPSA_WITH_TSAN) && !defined(KPSA_WITH_ASAN)
 #include <signal.h>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 constexpr unsigned long kTrapFlag = 0x100;
@@ -45,12 +45,12 @@ std::optional<std::uint64_t> CountInstructions(const std::function<void()>& body
   return counted - empty;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
 #else
 
-namespace kpsa {
+namespace kpsa::engine {
 std::optional<std::uint64_t> CountInstructions(const std::function<void()>&) { return std::nullopt; }
-}  // namespace kpsa
+}  // namespace kpsa::engine
 
 #endif

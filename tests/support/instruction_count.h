@@ -7,10 +7,10 @@
 #include <functional>
 #include <optional>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // Instructions of `body` and of what it calls, on this thread (system calls count as one). None where the
 // machine offers no trap flag, or under a sanitizer.
 std::optional<std::uint64_t> CountInstructions(const std::function<void()>& body);
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

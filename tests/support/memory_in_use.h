@@ -6,11 +6,11 @@
 
 #include <cstddef>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 inline std::size_t MemoryInUse() {
   const struct mallinfo2 now = mallinfo2();
   return now.uordblks + now.hblkhd;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -8,7 +8,7 @@
 
 #include "tests/support/gltf_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct MovingCharacter {
   static constexpr int kPoints = 22;
@@ -73,4 +73,4 @@ struct MovingCharacter {
   }
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

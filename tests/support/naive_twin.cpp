@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 bool Overlap(const NaiveTwin::Plug& a, const NaiveTwin::Plug& b) {
@@ -179,4 +179,4 @@ NaiveTwin::Held NaiveTwin::Output(const Plug& plug) {
   return result;
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -11,7 +11,7 @@
 
 #include "base/types.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class NaiveTwin {
  public:
@@ -55,4 +55,4 @@ class NaiveTwin {
   std::map<Plug, Held> memo_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // <source dir>/../shared/<path>, or one folder above that.
 inline std::string SharedFile(const std::string& path) {
@@ -18,4 +18,4 @@ inline std::string SharedFile(const std::string& path) {
   return "";
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 
 #include "tests/support/gltf_builder.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 struct SheetCharacter {
   GltfBuilder builder;
@@ -94,4 +94,4 @@ struct SheetCharacter {
   }
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class TemporaryFolder {
  public:
@@ -46,4 +46,4 @@ class TemporaryFolder {
   std::string path_;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

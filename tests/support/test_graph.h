@@ -19,7 +19,7 @@
 #include "graph/evaluator.h"
 #include "graph/graph.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 class TestGraph {
  public:
@@ -129,4 +129,8 @@ class TestGraph {
   std::unique_ptr<Profile> profile;
 };
 
-}  // namespace kpsa
+}  // namespace kpsa::engine
+
+namespace kpsa {
+using engine::TestGraph;  // node authors test with it
+}

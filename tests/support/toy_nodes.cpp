@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace kpsa {
+namespace kpsa::engine {
 namespace {
 
 struct SmoothKernel {
@@ -319,4 +319,4 @@ void AddToyNodes(NodeRegistry& registry) {
       });
 }
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

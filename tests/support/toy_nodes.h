@@ -3,7 +3,7 @@
 
 #include "graph/node_registry.h"
 
-namespace kpsa {
+namespace kpsa::engine {
 
 // add (a, b -> out), scale3 (input double3, factor -> out; passes its input at factor 1), pick3 (x of a
 // double3 -> out), sum (input[i] -> out), select (which, a lazy, b lazy -> out), floor (input -> out; in
@@ -29,4 +29,4 @@ BlockComputes TakeBlockComputes();
 // How often several "floor" nodes computed together since the last call.
 int TakeBatchComputes();
 
-}  // namespace kpsa
+}  // namespace kpsa::engine

@@ -1,0 +1,45 @@
+// What the classes of the face (include/kpsa) hold.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "graph/node_registry.h"
+#include "graph/plugin_loader.h"
+#include "host/playing.h"
+#include "kpsa/library.h"
+#include "kpsa/rig.h"
+
+namespace kpsa {
+
+// Loading adds the node types of plugins, and building a graph looks them up: one at a time.
+struct Library::Impl {
+  Impl();
+  std::mutex mutex;
+  engine::NodeRegistry registry;
+  engine::PluginLoader plugins{&registry};
+};
+
+struct Rig::Impl {
+  std::shared_ptr<Library::Impl> library;  // whose registry the graph refers to
+  engine::Rig rest;                        // without a clip; never changed
+  std::optional<engine::AccelerationChoice> acceleration;
+  std::vector<ControlInfo> controls;
+  std::vector<ClipInfo> clips;
+  std::vector<MeshInfo> meshes;
+
+  // Of another rig: the same with what people are told of it.
+  static std::shared_ptr<Impl> Make(std::shared_ptr<Library::Impl> library, engine::Rig rest);
+  // Shared by scenes that play the clip.
+  engine::Result<std::shared_ptr<engine::Playing>> PlayingOf(const std::optional<std::string>& clip) const;
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::map<std::optional<std::string>, std::shared_ptr<engine::Playing>> playing_;
+};
+
+}  // namespace kpsa

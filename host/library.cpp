@@ -1,0 +1,41 @@
+#include "kpsa/library.h"
+
+#include "host/face_impl.h"
+#include "host/problems.h"
+#include "kpsa/kpsa_node.h"
+#include "nodes/standard_nodes.h"
+
+namespace kpsa {
+
+std::string_view Version() { return KPSA_VERSION; }
+
+Library::Impl::Impl() {
+  engine::AddStandardNodes(registry);
+  engine::AddKpsaNode(registry);
+}
+
+Library::Library() : impl_(std::make_shared<Impl>()) {}
+Library::~Library() = default;
+Library::Library(const Library&) = default;
+Library& Library::operator=(const Library&) = default;
+
+kpsa::Result<Done> Library::AddPlugin(const std::string& path) {
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  const engine::Status status = impl_->plugins.Load(path);
+  if (!status.ok()) return engine::ProblemsOf(status);
+  return Done();
+}
+
+kpsa::Result<kpsa::Rig> Library::Load(const std::string& path, const LoadOptions& options) const {
+  engine::RigOptions rig_options;
+  rig_options.rest = true;
+  rig_options.fps = options.fps;
+  rig_options.variant = options.variant;
+  const std::lock_guard<std::mutex> lock(impl_->mutex);
+  if (options.plugins) rig_options.plugins = &impl_->plugins;
+  engine::Result<engine::Rig> rig = engine::LoadRig(impl_->registry, path, rig_options);
+  if (!rig.ok()) return engine::ProblemsOf(rig.status());
+  return kpsa::Rig(kpsa::Rig::Impl::Make(impl_, std::move(*rig)));
+}
+
+}  // namespace kpsa

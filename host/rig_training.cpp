@@ -1,0 +1,164 @@
+#include "host/rig_training.h"
+
+#include <cmath>
+#include <set>
+
+namespace kpsa::engine {
+
+std::vector<PlugRef> VaryingPlugs(const Rig& rig) {
+  std::vector<PlugRef> plugs{rig.scene.time};
+  for (const Control& control : rig.controls) {
+    PlugRef whole = control.plug;
+    whole.component = -1;
+    if (rig.graph->FindConnection(control.plug) != nullptr || rig.graph->FindConnection(whole) != nullptr)
+      continue;
+    plugs.push_back(control.plug);
+  }
+  return plugs;
+}
+
+namespace {
+
+// Where the value of a control can be read that would give what a clip does: a clip drives morph weights
+// themselves, and moves joints underneath their rotate and translate.
+std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
+  if (control.by_clip) return control.plug;
+  const NodeDef& def = graph.def(control.plug.node);
+  const std::string& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)].name;
+  if (attribute != "rotate" && attribute != "translate") return std::nullopt;
+  PlugRef shown = control.plug;
+  shown.attribute = def.FindAttribute(attribute == "rotate" ? "poseRotate" : "poseTranslate");
+  if (shown.attribute < 0) return std::nullopt;
+  return shown;
+}
+
+// Where light is measured by fewer paths than pictures have: keySamples of its node.
+std::optional<PlugRef> KeyLight(const Graph& graph, PlugRef light) {
+  const NodeDef& def = graph.def(light.node);
+  const std::string& name = def.attributes[static_cast<std::size_t>(light.attribute)].name;
+  const int samples = def.FindAttribute("keySamples");
+  light.attribute = def.FindAttribute(name == "irradiance"        ? "keyIrradiance"
+                                      : name == "pointIrradiance" ? "keyPointIrradiance"
+                                                                  : "");
+  if (samples < 0 || light.attribute < 0) return std::nullopt;
+  const Value* set = graph.FindValue({light.node, samples, -1, -1});
+  const Value& value =
+      set != nullptr ? *set : def.attributes[static_cast<std::size_t>(samples)].default_value;
+  return value.AsInt() > 0 ? std::optional(light) : std::nullopt;
+}
+
+}  // namespace
+
+AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) {
+  AccelerationTarget target;
+  if (acceleration.reference >= 0) {
+    const Reference& reference = rig.references[static_cast<std::size_t>(acceleration.reference)];
+    target.within = {reference.name_space, reference.root};
+  }
+  for (const AcceleratedPoints& points : acceleration.points) {
+    AccelerationTarget::MeshPoints out;
+    if (points.colors) {
+      out.name = target.within.Inner(rig.graph->PlugName(points.points));
+      if (const std::optional<PlugRef> key = KeyLight(*rig.graph, points.points))
+        out.stages.push_back({"key", *key, false});
+      out.stages.push_back({"colors", points.points, false});
+      target.meshes.push_back(std::move(out));
+      target.colors = true;
+      continue;
+    }
+    const CharacterMesh& mesh = rig.scene.meshes[points.mesh];
+    for (std::size_t s = 0; s <= points.stage; ++s) {
+      const Stage& stage = mesh.stages[s];
+      out.stages.push_back({stage.name, stage.points, stage.world});
+    }
+    out.name = target.within.Inner(mesh.name + "@" + mesh.stages[points.stage].name);
+    target.meshes.push_back(std::move(out));
+  }
+  for (const CharacterMesh& mesh : rig.scene.meshes) {
+    for (const Stage& stage : mesh.stages)
+      target.all_stages.push_back({stage.name, stage.points, stage.world});
+  }
+  if (acceleration.space) {
+    const NodeDef& def = rig.graph->def(*acceleration.space);
+    target.space.push_back({*acceleration.space, def.FindAttribute("worldMatrix"), -1, -1});
+    target.space_name = target.within.Inner(rig.graph->name(*acceleration.space));
+  } else if (acceleration.reference >= 0) {
+    const NodeId root = target.within.root;
+    target.space.push_back({root, rig.graph->def(root).FindAttribute("worldMatrix"), -1, -1});
+  }
+  target.varying = VaryingPlugs(rig);
+  for (const Control& control : rig.controls) target.controls.push_back(control.plug);
+  return target;
+}
+
+TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
+  TrainingRig training;
+  training.graph = rig->graph.get();
+  training.time = rig->scene.time;
+  training.target = MakeTarget(*rig, acceleration);
+  // The transforms from the space up to the root
+  std::set<Index> carriers;
+  for (NodeId node = acceleration.space.value_or(NodeId());
+       rig->graph->IsAlive(node) && carriers.insert(node.index).second;) {
+    const Connection* parent =
+        rig->graph->FindConnection({node, rig->graph->def(node).FindAttribute("parentMatrix"), -1, -1});
+    if (parent == nullptr) break;
+    node = parent->source.node;
+  }
+  for (const Control& control : rig->controls) {
+    const NodeDef& def = rig->graph->def(control.plug.node);
+    if (def.attributes[static_cast<std::size_t>(control.plug.attribute)].diagnostic) continue;
+    training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip,
+                                 carriers.count(control.plug.node.index) != 0,
+                                 ShownByClip(*rig->graph, control)});
+    // The attribute's own limits; what counts or chooses has no values in between
+    const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)];
+    const Type type = rig->graph->PlugType(control.plug);
+    const bool whole = type == Type::kInt || type == Type::kBool || type == Type::kEnum;
+    training.controls.back().lowest = whole ? control.min : attribute.min;
+    training.controls.back().highest = whole ? control.max : attribute.max;
+  }
+  training.set_clip = [rig](std::optional<std::string_view> clip) { return SetClip(rig, clip); };
+  return training;
+}
+
+Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips) {
+  std::vector<TrainingClip> frames;
+  for (const std::string& name : clips) {
+    const CharacterClip* found = nullptr;
+    for (const CharacterClip& clip : rig.scene.clips) {
+      if (clip.id == name) found = &clip;
+    }
+    if (found == nullptr) return NoSuchClip(rig.scene, name);
+    TrainingClip clip{name, {}};
+    const double first = std::ceil(found->begin * rig.fps - 1e-6);
+    const auto count = static_cast<std::size_t>(std::floor(found->duration * rig.fps + 1e-6) - first) + 1;
+    for (std::size_t i = 0; i < count; ++i) clip.times.push_back((first + static_cast<double>(i)) / rig.fps);
+    frames.push_back(std::move(clip));
+  }
+  return frames;
+}
+
+Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name) {
+  if (rig.accelerate.empty())
+    return Status::Invalid(
+               "has no accelerate section, so nothing to train; kpsa init writes a rig that has one")
+        .At({rig.path});
+  std::vector<std::string> names;
+  for (const Acceleration& entry : rig.accelerate) names.push_back(entry.name);
+  if (!name.has_value() && names.size() > 1)
+    return Status::Usage("the rig accelerates {}: expected the name of one of them", fmt::join(names, ", "));
+  const auto found = name.has_value() ? std::find(names.begin(), names.end(), *name) : names.begin();
+  if (found == names.end())
+    return Status::Usage("\"{}\": the rig accelerates {}{}", *name, fmt::join(names, ", "),
+                         DidYouMean(*name, names));
+  const Acceleration& entry = rig.accelerate[static_cast<std::size_t>(found - names.begin())];
+  if (entry.reference >= 0) {
+    return Status::Usage(
+        "accelerate: \"{}\" is an entry of {}: train that rig; its subspace serves here, too", entry.name,
+        rig.references[static_cast<std::size_t>(entry.reference)].file);
+  }
+  return entry;
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,25 @@
+// Between rig files and the trainer: what an `accelerate:` entry of a rig means in plugs.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kpsa/training/trainer.h"
+#include "rig/build/rig_builder.h"
+
+namespace kpsa::engine {
+
+// The stages of each accelerated mesh up to the accelerated one, the space, and all that may vary.
+AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration);
+// Refers to the rig, which must outlive it.
+TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration);
+// Every frame of the clips at the rig's rate. Errors: a clip that the character lacks.
+Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips);
+// The entry of the rig's accelerate section, by name where there are several. Errors: none, not that one,
+// or one of a reference, which is trained there.
+Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name);
+// What may vary when a clip plays: time, and the controls that the clip does not drive.
+std::vector<PlugRef> VaryingPlugs(const Rig& rig);
+
+}  // namespace kpsa::engine

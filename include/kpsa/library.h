@@ -1,0 +1,45 @@
+// The node types that rigs are made of: the standard ones, KPSA's, and those of plugins.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "kpsa/result.h"
+
+namespace kpsa {
+
+class Rig;
+
+struct LoadOptions {
+  std::optional<std::string> variant = {};  // of the rig's `variants`, or hero:NAME of a reference's
+  std::optional<double> fps = {};           // frames a second, instead of the rig's
+  bool plugins = true;  // false: a rig that names plugins is refused, and no foreign code is loaded
+};
+
+// May be copied (copies share it) and used by several threads at once. What it has loaded keeps it alive.
+class Library {
+ public:
+  Library();
+  ~Library();
+  Library(const Library&);
+  Library& operator=(const Library&);
+
+  // A shared library of node types (graph/plugin.h), for rigs that are loaded from then on. It stays loaded
+  // until the program ends. Errors: no such library, another ABI version, a type whose name is taken or whose
+  // declaration is wrong; nothing of it is added then.
+  Result<Done> AddPlugin(const std::string& path);
+  // A rig (.yaml) or a character (.glb, .gltf, .vrm), which is a rig, too. Errors: all of the file's, each
+  // with its place.
+  Result<Rig> Load(const std::string& path, const LoadOptions& options = {}) const;
+
+ private:
+  struct Impl;
+  friend class Rig;
+  std::shared_ptr<Impl> impl_;
+};
+
+std::string_view Version();  // "0.1.0"
+
+}  // namespace kpsa

@@ -1,0 +1,83 @@
+// One state of a rig (a clip, a time, controls), which evaluates what it is asked for and nothing else.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "kpsa/result.h"
+#include "kpsa/rig.h"
+
+namespace kpsa {
+
+// What SoftCache said of the latest frame of an accelerated rig; of several subspaces, of the one with most
+// of the full evaluation.
+struct Verdict {
+  bool hit = false;       // no deformer of the accelerated stacks ran for all points
+  double full_share = 1;  // of the full evaluation in the points: 0 a hit, 1 a miss, a blend in between
+  double score = 0;       // below 1: like the training; infinite where nothing was measured
+  std::string reason;     // "hit", or why not, in words
+};
+
+// A frame as Scene::Frames hands it over; valid until the call ends.
+struct Frame {
+  std::size_t index = 0;  // in the list of times
+  double seconds = 0;
+  std::span<const std::span<const float>>
+      points;                        // of each mesh of Rig::meshes(), as Scene::Points gives them
+  const Verdict* verdict = nullptr;  // null where nothing is accelerated
+};
+
+struct FrameOptions {
+  int threads = 0;  // 0: all
+  const std::atomic<bool>* cancel =
+      nullptr;  // set it from any thread to end early: a problem of kind kInterrupted
+};
+
+// Used by one thread at a time; any number of scenes may share a rig. What it compiles is shared with other
+// scenes of the rig that ask for the same. A warm Points() allocates nothing and takes no lock.
+class Scene {
+ public:
+  explicit Scene(const Rig& rig);  // at rest
+  ~Scene();
+  Scene(Scene&&) noexcept;
+  Scene& operator=(Scene&&) noexcept;
+  const Rig& rig() const;
+
+  // Lets a clip drive the character, or none: the rest pose. Controls stay where they are set, but for those
+  // that the clip drives.
+  Result<Done> Play(const std::optional<std::string>& clip);
+  void SetTime(double seconds);  // clamped to the keys of clips, as glTF says
+  // A control, or any other plug that is a number and may vary, in the units of the rig's file. Errors: no
+  // such plug (the nearest is named), a value outside of its range, a plug that the clip or the rig drives.
+  Result<Done> Set(std::string_view plug, double value);
+  void Reset();  // all controls at rest; clip and time stay
+
+  // Positions of a mesh's vertices, x y z each, metres: "head_mesh" in world space, or up to a stage of its
+  // stack
+  // ("head_mesh@skin": in the mesh's space before its skin). Valid until the next call on this scene.
+  Result<std::span<const float>> Points(std::string_view mesh);
+  // Any other plug: one number (in the file's units), three, four, or the sixteen of a matrix column by
+  // column (metres, radians).
+  Result<std::vector<double>> Values(std::string_view plug);
+  // Of the latest Points(); hit is false and the reason empty where nothing is accelerated.
+  const Verdict& verdict();
+
+  // Frames of the clip that plays, with the controls as they are set, on many threads; handed over in order,
+  // one call at a time, on any of the threads. `take` returns false to end it. The scene's own time stays.
+  // Bytes do not depend on the threads.
+  Result<Done> Frames(std::span<const double> seconds, const std::function<bool(const Frame&)>& take,
+                      const FrameOptions& options = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace kpsa

@@ -1,0 +1,278 @@
+#include "kpsa/training/calibrate_subspace.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "kpsa/training/carried.h"
+#include "kpsa/training/guard_parts.h"
+#include "kpsa/training/pose_judge.h"
+#include "kpsa/training/range_margins.h"
+#include "kpsa/training/tile_trust.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kPosesAtOnce = 256;                      // are held
+constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say what carries the points
+constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips may go farther
+constexpr double kJudging = 1.5;  // that a pose is judged, in the time that it took to train on
+constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
+constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
+constexpr std::uint64_t kHeldOutSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
+                        kTrialSeed = 0x6a09e667f3bcc908ull;
+
+// Judged poses of every kind.
+struct JudgedSet {
+  std::vector<ScoreJudge> judges;
+  std::vector<std::vector<float>> entries;  // of the signals, by pose
+  std::vector<SampledPose> poses;
+};
+
+// What carries the points rigidly is tried at a few poses.
+Result<Carried> TryCarried(const Calibrator& of, const CalibrationWork& work) {
+  std::vector<SampledPose> sweeps = work.sampler->SweepsWithTilts(), trial;
+  const std::size_t count = std::min(kTrialSweeps, sweeps.size());
+  for (std::size_t i = 0; i < count; ++i) trial.push_back(sweeps[i * sweeps.size() / count]);
+  for (SampledPose& pose : work.sampler->Of(PoseKind::kSampled, kTrialSamples, of.options.seed ^ kTrialSeed))
+    trial.push_back(std::move(pose));
+  return FindCarried(of.rig, work.compiler, of.clips, trial, of.inverse_rest_stretch, of.diagonal,
+                     of.options.tolerance);
+}
+
+// New poses of a kind, a few at a time. All but those beyond the ranges widen these.
+Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, std::uint64_t seed,
+                  std::span<const double> margins, PoseJudge* judge, JudgedSet* judged) {
+  const auto pose_kind = static_cast<PoseKind>(kind);
+  const std::vector<SampledPose> drawn = work.sampler->Of(
+      pose_kind, of.size.poses, (of.options.seed + static_cast<std::uint64_t>(kind)) ^ seed, margins);
+  for (std::size_t first = 0; first < drawn.size(); first += kPosesAtOnce) {
+    // By clip, as the recorder writes them
+    std::vector<SampledPose> some(
+        drawn.begin() + static_cast<std::ptrdiff_t>(first),
+        drawn.begin() + static_cast<std::ptrdiff_t>(std::min(first + kPosesAtOnce, drawn.size())));
+    std::ranges::stable_sort(some, {}, &SampledPose::clip);
+    PoseMatrix recorded(of.layout);
+    KPSA_RETURN_IF_ERROR(work.recorder->AddSamples(some, of.clips, &recorded));
+    for (const JudgedPose& pose : judge->Judge(recorded)) judged->judges.push_back({pose, 0, kind});
+    for (std::size_t t = 0; t < recorded.poses(); ++t) {
+      const std::span<const float> row = std::as_const(recorded).row(t).subspan(of.layout.scalar_begin());
+      if (pose_kind != PoseKind::kBeyond) work.ranges->Widen(row);
+      judged->entries.emplace_back(row.begin(), row.end());
+    }
+    judged->poses.insert(judged->poses.end(), some.begin(), some.end());
+  }
+  return Status();
+}
+
+// By entry: whether it has a guard where the space carries the points.
+std::vector<char> GuardedEntries(const Calibrator& of, const std::vector<std::string>& carried) {
+  std::vector<char> guarded;
+  for (const Signal& signal : of.guards) {
+    const bool free =
+        signal.matrix && std::ranges::find(carried, of.rig.graph->name(signal.plug.node)) != carried.end();
+    guarded.insert(guarded.end(), signal.entries(), !free);
+  }
+  return guarded;
+}
+
+// A range speaks of the patches that need what it watches, where patches miss by themselves.
+Status GuardPatches(const Calibrator& of, const CalibrationWork& work, Subspace* subspace) {
+  if (subspace->patches.tiles == 0) return Status();
+  const Result<std::vector<std::uint64_t>> patches = FindGuardedPatches(
+      of.rig, work.compiler, of.clips, work.recorder->signals(), of.guards.size(), *subspace);
+  if (!patches.ok()) return patches.status();
+  auto range = subspace->ranges.begin();
+  for (std::size_t s = 0; s < of.guards.size(); ++s) {
+    for (std::size_t e = 0; e < of.guards[s].entries(); ++e) (range++)->patches = (*patches)[s];
+  }
+  return Status();
+}
+
+// A subspace with ranges, and with the score that is best for these.
+struct Guarded {
+  Subspace subspace;
+  ChosenMisses chosen;  // nothing where there are no judges
+  double outside = 0;   // CostOutside
+};
+// judged: poses within the ranges; those beyond come from here. outside: of FoundMargins.
+Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const RangeMargins& margins,
+                      const std::vector<char>& guarded, const Subspace& subspace, PoseJudge* judge,
+                      JudgedSet judged, JudgedSet outside) {
+  KPSA_RETURN_IF_ERROR(of.rig.set_clip(std::nullopt));
+  RangeFinder finder = *work.ranges;
+  for (const std::vector<float>& entries : margins.entries) finder.Widen(entries);
+  Result<std::vector<TrainedRange>> ranges =
+      finder.Make(of.rig, work.compiler, of.guards,
+                  {of.options.tolerance, of.options.range_ramp, of.diagonal, of.inverse_rest_stretch});
+  if (!ranges.ok()) return ranges.status();
+  Guarded result{subspace, {}, 0};
+  result.subspace.ranges = std::move(*ranges);
+  KPSA_RETURN_IF_ERROR(GuardPatches(of, work, &result.subspace));
+  if (judged.judges.empty()) return result;
+  KPSA_RETURN_IF_ERROR(JudgePoses(of, work, kBeyond, kScoreSeed, margins.of_controls, judge, &judged));
+  AskGuards(result.subspace.ranges, guarded, judged.entries, result.subspace.patches.patches, &judged.judges);
+  const double tolerance = kCautious * of.options.tolerance;
+  result.chosen =
+      ChooseMisses(&result.subspace, judged.judges, 0, of.full_cost, tolerance, kCalibrationConfidence);
+  AskGuards(result.subspace.ranges, guarded, outside.entries, subspace.patches.patches, &outside.judges);
+  for (JudgedSet* set : {&judged, &outside}) AsChosen(result.chosen, result.subspace, &set->judges);
+  result.outside = CostOutside(result.subspace, judged.judges, outside.judges, of.full_cost, tolerance,
+                               kCalibrationConfidence);
+  return result;
+}
+
+std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
+  std::string name = rule.score.doubt == 0      ? "likeness to the trained poses"
+                     : rule.score.measured == 0 ? "doubts of tiles"
+                                                : "likeness and doubts of tiles";
+  if (rule.weighs && rule.score.doubt > 0) name += " (weighed)";
+  name += rule.tiles > 0 ? fmt::format(", parts of {} tiles", rule.tiles) : ", all points at once";
+  const auto wider = std::ranges::count_if(margins.of_controls, [](double margin) { return margin > 0; });
+  if (wider > 0) name += fmt::format(", {} of {} ranges widened", wider, margins.of_controls.size());
+  return name;
+}
+
+// Of margins that were taken all that was tried, of others the best.
+std::vector<TrainingRecord::Rule> TriedRules(const ChosenMisses& chosen, const RangeMargins& margins,
+                                             double outside, double full, bool all) {
+  std::vector<TrainingRecord::Rule> rules;
+  if (!(full > 0)) return rules;  // the paper's way: nothing was priced
+  for (std::size_t r = 0; r < chosen.tried.size(); ++r) {
+    const MissRule& rule = chosen.tried[r];
+    if (rule.weighs && rule.score.doubt == 0 && r != chosen.taken)
+      continue;  // weighs nothing: the same again
+    if (all || r == chosen.taken)
+      rules.push_back({RuleName(rule, margins), rule.cost.misses, (rule.cost.ns + outside) / full,
+                       all && r == chosen.taken});
+  }
+  return rules;
+}
+
+void RecordWorst(const Calibrator& of, const SampledPose& pose, double error, TrainingRecord* record) {
+  record->worst.error = error;
+  record->worst.kind = PoseKindName(pose.kind);
+  for (std::size_t c = 0; c < of.rig.controls.size(); ++c) {
+    const ControlRange& control = of.rig.controls[c];
+    if (pose.values[c] != control.rest && !(pose.clip >= 0 && control.by_clip))
+      record->worst.controls.emplace_back(of.rig.graph->PlugName(control.plug), pose.values[c]);
+  }
+  if (pose.clip < 0) return;
+  const TrainingClip& clip = of.clips[static_cast<std::size_t>(pose.clip)];
+  record->worst.clip = clip.name;
+  record->worst.time = clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
+}
+
+}  // namespace
+
+CalibrationSize CalibrationWithin(double pose_seconds, const TrainOptions& options, TimeLimit* limit) {
+  if (options.calibration_poses > 0) return {options.calibration_poses, true};
+  const double rate = std::clamp(options.violation_rate, 1e-4, 0.5);
+  const auto wanted = static_cast<std::size_t>(std::clamp(8.0 / rate, 400.0, 1000.0));
+  const auto within = static_cast<std::size_t>(
+      std::clamp(limit->left() / (2 * kPoseKinds * kJudging * pose_seconds), 0.0, 1e9));
+  if (within > 2 * wanted) return {wanted, true};
+  const double fewest = kSpared * std::log(1 - kCalibrationConfidence) / std::log1p(-rate);
+  const std::size_t poses =
+      std::clamp(within, std::min(wanted, static_cast<std::size_t>(std::ceil(fewest))), wanted);
+  if (poses < wanted)
+    limit->LeaveOut(fmt::format("{} of {} poses of a kind to calibrate with", poses, wanted));
+  limit->LeaveOut("no ranges beyond the trained ones");
+  return {poses, false};
+}
+
+Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
+                                    Subspace* subspace) {
+  const Result<Carried> carried = TryCarried(of, work);
+  if (!carried.ok()) return carried.status();
+  subspace->carried = carried->rigid;
+  subspace->space_scales = carried->scales;
+  KPSA_RETURN_IF_ERROR(of.rig.set_clip(std::nullopt));
+
+  GivePatches(of.patches, subspace);
+  const std::size_t patches = subspace->patches.patches;  // that ranges speak of, whether they miss or not
+  // Held-out poses of every kind; as many new ones say how to score them, and how far ranges reach. A picture
+  // has few.
+  const bool of_tiles = !of.options.without.trust;
+  PoseJudge judge(*subspace, of.layout, cues, of_tiles), score_judge(*subspace, of.layout, cues, of_tiles);
+  std::vector<RangeMargins> margins(1);
+  JudgedSet outside;
+  if (!of.rig.target.colors && of.size.margins) {
+    KPSA_RETURN_IF_ERROR(SayStage(of.options, "margins", 0.9));
+    Result<FoundMargins> found = FindMargins(of, work, cues, *subspace);
+    if (!found.ok()) return found.status();
+    margins = std::move(found->sets);
+    outside = {std::move(found->outside), std::move(found->entries), {}};
+  }
+  JudgedSet held_out, scoring;
+  for (int k = 0; k < (of.rig.target.colors ? 1 : kPoseKinds); ++k) {
+    if (k == kBeyond) continue;
+    KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.9 + 0.025 * k));
+    KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kHeldOutSeed, {}, &judge, &held_out));
+    if (!of.rig.target.colors)
+      KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kScoreSeed, {}, &score_judge, &scoring));
+  }
+  KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.98));
+  const std::vector<char> guarded = GuardedEntries(of, carried->rigid);
+  Guarded taken;
+  const RangeMargins* of_taken = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  std::vector<TrainingRecord::Rule>& rules = work.record->rules;
+  rules.clear();
+  const auto tell = [&](const Guarded& of_some, const RangeMargins& some, bool as_taken) {
+    const auto told = TriedRules(of_some.chosen, some, of_some.outside, of.full_cost, as_taken);
+    rules.insert(rules.end(), told.begin(), told.end());
+  };
+  for (const RangeMargins& some : margins) {
+    if (some.told_by_doubts && taken.subspace.score.doubt == 0) continue;
+    Result<Guarded> tried = Guard(of, work, some, guarded, *subspace, &score_judge, scoring, outside);
+    if (!tried.ok()) return tried.status();
+    const double ns = tried->chosen.cost.ns + tried->outside;
+    if (of_taken != nullptr && ns > kAsGood * least) {
+      tell(*tried, some, false);
+      continue;
+    }
+    if (of_taken != nullptr) tell(taken, *of_taken, false);
+    taken = std::move(*tried), of_taken = &some;
+    least = std::min(least, ns);
+  }
+  tell(taken, *of_taken, true);
+  *subspace = std::move(taken.subspace);
+  if (!of.rig.target.colors)
+    KPSA_RETURN_IF_ERROR(
+        JudgePoses(of, work, kBeyond, kHeldOutSeed, of_taken->of_controls, &judge, &held_out));
+  work.record->calibration_poses = held_out.poses.size();
+  work.record->held_out_rms = judge.rms();
+  work.record->held_out_max = judge.max();
+  AskGuards(subspace->ranges, guarded, held_out.entries, patches, &held_out.judges);
+  FrameCost cost = taken.chosen.cost;
+  if (scoring.judges.empty()) {
+    subspace->score = ScoreOf(*subspace, {}, of.full_cost);
+    cost = ExpectedCost(*subspace, held_out.judges, 0, of.full_cost, kCautious * of.options.tolerance,
+                        kCalibrationConfidence);
+  }
+  AsChosen(taken.chosen, *subspace, &held_out.judges);
+  if (!taken.chosen.trust.empty()) WeighTiles(taken.chosen.trust, subspace);
+  if (subspace->patches.tiles == 0) {
+    for (TrainedRange& range : subspace->ranges) range.patches = kAllPatches;
+  }
+  subspace->calibration = PairsOf(*subspace, held_out.judges);
+  for (std::size_t i = 0; i < held_out.poses.size(); ++i) {
+    const SampledPose& pose = held_out.poses[i];
+    subspace->calibration[i].near_clips = pose.near_clips && pose.kind == PoseKind::kSampled;
+  }
+  const Calibration calibration =
+      Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
+  if (calibration.worst != Calibration::kNoPose)
+    RecordWorst(of, held_out.poses[calibration.worst], calibration.worst_error, work.record);
+  return cost;
+}
+
+Status SayStage(const TrainOptions& options, const char* what, double share) {
+  if (options.progress && !options.progress(what, share))
+    return Status::Make(ErrorKind::kInterrupted, "interrupted");
+  return Status();
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,226 @@
+#include "kpsa/training/gemm.h"
+
+#include <algorithm>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kpsa/training/gemm.cpp"
+#include "hwy/foreach_target.h"
+
+#include "base/simd-inl.h"
+
+#ifndef KPSA_GEMM_CONSTANTS
+#define KPSA_GEMM_CONSTANTS
+namespace kpsa::engine {
+namespace {
+constexpr std::size_t kRowStep = 16;     // rows of a micro tile
+constexpr std::size_t kColumnStep = 12;  // columns of a micro tile
+}  // namespace
+}  // namespace kpsa::engine
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace kpsa::engine {
+namespace HWY_NAMESPACE {
+
+// c[kRowStep x kCount] += a-panel [depth][kRowStep] times kCount columns of a b-panel [depth][kColumnStep].
+template <int kCount, int kVectors>
+HWY_INLINE void MicroTile(const double* HWY_RESTRICT a, const double* HWY_RESTRICT b, std::size_t depth,
+                          double* HWY_RESTRICT c, std::size_t c_stride) {
+  const hn::ScalableTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const std::size_t lanes = hn::Lanes(d);
+  V sum[kCount][kVectors];
+#pragma GCC unroll 16
+  for (int j = 0; j < kCount; ++j) {
+#pragma GCC unroll 16
+    for (int v = 0; v < kVectors; ++v) sum[j][v] = hn::Zero(d);
+  }
+  for (std::size_t k = 0; k < depth; ++k) {
+    V column[kVectors];
+#pragma GCC unroll 16
+    for (int v = 0; v < kVectors; ++v)
+      column[v] = hn::LoadU(d, a + k * kRowStep + static_cast<std::size_t>(v) * lanes);
+#pragma GCC unroll 16
+    for (int j = 0; j < kCount; ++j) {
+      const V factor = hn::Set(d, b[k * kColumnStep + static_cast<std::size_t>(j)]);
+#pragma GCC unroll 16
+      for (int v = 0; v < kVectors; ++v) sum[j][v] = hn::MulAdd(column[v], factor, sum[j][v]);
+    }
+  }
+#pragma GCC unroll 16
+  for (int j = 0; j < kCount; ++j) {
+#pragma GCC unroll 16
+    for (int v = 0; v < kVectors; ++v) {
+      double* target = c + static_cast<std::size_t>(j) * c_stride + static_cast<std::size_t>(v) * lanes;
+      hn::StoreU(hn::Add(hn::LoadU(d, target), sum[j][v]), d, target);
+    }
+  }
+}
+
+// c [row panels * 16 x column panels * 12], column-major, += packed a times packed b.
+void PackedProduct(const double* a, const double* b, std::size_t depth, std::size_t row_panels,
+                   std::size_t column_panels, double* c, std::size_t c_stride) {
+  constexpr std::size_t kLanes = HWY_LANES(double);
+  constexpr int kVectors = static_cast<int>(kRowStep / kLanes);
+  constexpr int kCount = kLanes >= 8 ? 12 : kLanes == 4 ? 3 : 1;  // as many sums as the registers hold
+  for (std::size_t j = 0; j < column_panels; ++j) {
+    for (std::size_t i = 0; i < row_panels; ++i) {
+      for (std::size_t part = 0; part < kColumnStep; part += kCount) {
+        MicroTile<kCount, kVectors>(a + i * depth * kRowStep, b + j * depth * kColumnStep + part, depth,
+                                    c + (j * kColumnStep + part) * c_stride + i * kRowStep, c_stride);
+      }
+    }
+  }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace kpsa::engine
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include "base/check.h"
+#include "base/parallel.h"
+
+namespace kpsa::engine {
+
+HWY_EXPORT(PackedProduct);
+
+namespace {
+
+constexpr std::size_t kTile = 384;   // rows and columns of C that one task computes: a multiple of 16 and 12
+constexpr std::size_t kDepth = 192;  // columns of A packed at a time; both packed tiles stay in the L2 cache
+
+// Zeros at a 64-byte boundary: vectors that straddle cache lines cost a third of the speed.
+class AlignedDoubles {
+ public:
+  explicit AlignedDoubles(std::size_t size) : floats_(2 * size) {}
+  double* data() { return reinterpret_cast<double*>(floats_.data()); }
+
+ private:
+  AlignedFloats floats_;
+};
+
+// One tile of C, accumulated over the whole depth in a fixed order.
+void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, std::size_t row, std::size_t column,
+                 Eigen::MatrixXd* c) {
+  const std::size_t height = std::min(kTile, a.rows() - row),
+                    width = std::min(kTile, b_transposed.rows() - column);
+  const std::size_t row_panels = (height + kRowStep - 1) / kRowStep;
+  const std::size_t column_panels = (width + kColumnStep - 1) / kColumnStep;
+  AlignedDoubles packed_a(row_panels * kRowStep * kDepth), packed_b(column_panels * kColumnStep * kDepth);
+  AlignedDoubles tile(row_panels * kRowStep * column_panels * kColumnStep);
+  for (std::size_t k = 0; k < a.columns(); k += kDepth) {
+    const std::size_t depth = std::min(kDepth, a.columns() - k);
+    a.Pack(row, height, k, depth, kRowStep, packed_a.data());
+    b_transposed.Pack(column, width, k, depth, kColumnStep, packed_b.data());
+    HWY_DYNAMIC_DISPATCH(PackedProduct)
+    (packed_a.data(), packed_b.data(), depth, row_panels, column_panels, tile.data(), row_panels * kRowStep);
+  }
+  for (std::size_t j = 0; j < width; ++j) {
+    std::copy_n(tile.data() + j * row_panels * kRowStep, height,
+                c->data() + (column + j) * static_cast<std::size_t>(c->rows()) + row);
+  }
+}
+
+Eigen::MatrixXd Product(const GemmOperand& a, const GemmOperand& b_transposed, bool symmetric) {
+  KPSA_CHECK_EQ(a.columns(), b_transposed.columns());
+  const std::size_t m = a.rows(), n = b_transposed.rows();
+  Eigen::MatrixXd c(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
+  if (m == 0 || n == 0) return c;
+  if (a.columns() == 0) {
+    c.setZero();
+    return c;
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> tiles;
+  for (std::size_t j = 0; j < n; j += kTile) {
+    for (std::size_t i = symmetric ? j : 0; i < m; i += kTile) tiles.emplace_back(i, j);
+  }
+  ParallelFor(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t)
+      ComputeTile(a, b_transposed, tiles[t].first, tiles[t].second, &c);
+  });
+  if (symmetric) {
+    for (Eigen::Index j = 0; j < c.cols(); ++j) {
+      for (Eigen::Index i = 0; i < j; ++i) c(i, j) = c(j, i);
+    }
+  }
+  return c;
+}
+
+}  // namespace
+
+GemmOperand GemmOperand::Dense(const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
+  GemmOperand operand;
+  operand.rows_ = static_cast<std::size_t>(matrix.rows());
+  operand.columns_ = static_cast<std::size_t>(matrix.cols());
+  operand.dense_ = matrix.data();
+  operand.leading_ = static_cast<std::size_t>(matrix.outerStride());
+  return operand;
+}
+
+GemmOperand GemmOperand::Poses(const PoseMatrix& poses, std::size_t first, std::size_t count,
+                               std::size_t begin, std::size_t end, std::span<const double> column_scale) {
+  KPSA_CHECK_LE(first + count, poses.poses());
+  KPSA_CHECK_LE(end, poses.columns());
+  GemmOperand operand;
+  operand.rows_ = count;
+  operand.columns_ = end - begin;
+  operand.pose_rows_.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) operand.pose_rows_.push_back(poses.row(first + i).data() + begin);
+  if (!column_scale.empty()) operand.scale_ = column_scale.subspan(begin, end - begin);
+  return operand;
+}
+
+GemmOperand GemmOperand::Transposed() const {
+  GemmOperand operand = *this;
+  operand.transposed_ = !transposed_;
+  return operand;
+}
+
+void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width,
+                       std::size_t step, double* out) const {
+  for (std::size_t panel = 0; panel * step < height; ++panel) {
+    double* target = out + panel * step * width;  // [width][step]
+    const std::size_t first = row + panel * step, count = std::min(step, height - panel * step);
+    if (count < step) std::fill_n(target, step * width, 0.0);
+    if (dense_ != nullptr && !transposed_) {
+      for (std::size_t k = 0; k < width; ++k)
+        std::copy_n(dense_ + (column + k) * leading_ + first, count, target + k * step);
+    } else if (dense_ != nullptr) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const double* source = dense_ + (first + i) * leading_ + column;
+        for (std::size_t k = 0; k < width; ++k) target[k * step + i] = source[k];
+      }
+    } else if (!transposed_) {
+      const float* sources[kRowStep];
+      for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i] + column;
+      for (std::size_t k = 0; k < width; ++k) {
+        const double scale = scale_.empty() ? 1.0 : scale_[column + k];
+        for (std::size_t i = 0; i < count; ++i)
+          target[k * step + i] = static_cast<double>(sources[i][k]) * scale;
+      }
+    } else {
+      for (std::size_t k = 0; k < width; ++k) {
+        const float* source = pose_rows_[column + k] + first;
+        for (std::size_t i = 0; i < count; ++i) target[k * step + i] = static_cast<double>(source[i]);
+        if (!scale_.empty()) {
+          for (std::size_t i = 0; i < count; ++i) target[k * step + i] *= scale_[first + i];
+        }
+      }
+    }
+  }
+}
+
+Eigen::MatrixXd Multiply(const GemmOperand& a, const GemmOperand& b) {
+  return Product(a, b.Transposed(), false);
+}
+
+Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                         const Eigen::Ref<const Eigen::MatrixXd>& b) {
+  return Multiply(GemmOperand::Dense(a), GemmOperand::Dense(b));
+}
+
+Eigen::MatrixXd Gram(const GemmOperand& a) { return Product(a, a, true); }
+
+}  // namespace kpsa::engine
+#endif  // HWY_ONCE

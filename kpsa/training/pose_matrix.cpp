@@ -1,0 +1,105 @@
+#include "kpsa/training/pose_matrix.h"
+
+#include <algorithm>
+
+#include "base/check.h"
+#include "base/parallel.h"
+
+namespace kpsa::engine {
+
+std::span<float> PoseMatrix::AddPose() {
+  KPSA_CHECK(!centered_);
+  return Grow();
+}
+
+void PoseMatrix::Append(const PoseMatrix& other) {
+  KPSA_CHECK(layout_ == other.layout_ && (centered_ == other.centered_ || other.poses_ == 0));
+  for (std::size_t t = 0; t < other.poses_; ++t) std::ranges::copy(other.row(t), Grow().begin());
+}
+
+PoseMatrix PoseMatrix::TakeEvery(std::size_t count) {
+  PoseMatrix kept(layout_), taken(layout_);
+  kept.centered_ = taken.centered_ = centered_;
+  for (std::size_t t = 0; t < poses_; ++t)
+    std::ranges::copy(std::as_const(*this).row(t), (t % count == count - 1 ? taken : kept).Grow().begin());
+  *this = std::move(kept);
+  return taken;
+}
+
+void PoseMatrix::Truncate(std::size_t poses) {
+  poses_ = std::min(poses_, poses);
+  blocks_.resize((poses_ + kBlockPoses - 1) / kBlockPoses);
+}
+
+std::span<float> PoseMatrix::Grow() {
+  if (poses_ % kBlockPoses == 0) blocks_.push_back(std::make_unique<float[]>(kBlockPoses * columns()));
+  return row(poses_++);
+}
+
+std::span<float> PoseMatrix::row(std::size_t pose) {
+  KPSA_DCHECK(pose / kBlockPoses < blocks_.size());
+  return {blocks_[pose / kBlockPoses].get() + pose % kBlockPoses * columns(), columns()};
+}
+
+std::span<const float> PoseMatrix::row(std::size_t pose) const {
+  return const_cast<PoseMatrix*>(this)->row(pose);
+}
+
+Eigen::VectorXd PoseMatrix::Mean() const {
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(columns()));
+  if (poses_ == 0) return mean;
+  ParallelFor(columns(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pose = 0; pose < poses_; ++pose) {
+      const std::span<const float> values = row(pose);
+      for (std::size_t i = begin; i < end; ++i)
+        mean[static_cast<Eigen::Index>(i)] += static_cast<double>(values[i]);
+    }
+  });
+  return mean / static_cast<double>(poses_);
+}
+
+void PoseMatrix::Subtract(const Eigen::VectorXd& mean) {
+  KPSA_CHECK_EQ(static_cast<std::size_t>(mean.size()), columns());
+  KPSA_CHECK(!centered_);
+  ParallelFor(poses_, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pose = begin; pose < end; ++pose) {
+      const std::span<float> values = row(pose);
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = static_cast<float>(static_cast<double>(values[i]) - mean[static_cast<Eigen::Index>(i)]);
+      }
+    }
+  });
+  centered_ = true;
+}
+
+void StorePoints(ConstPointsView points, int components, std::size_t first_column, std::span<float> row) {
+  KPSA_CHECK(components == 1 || components == 3);
+  KPSA_CHECK_LE(first_column + points.count * static_cast<std::size_t>(components), row.size());
+  float* target = row.data() + first_column;
+  if (components == 1) {
+    std::copy_n(points.x, points.count, target);
+    return;
+  }
+  for (std::size_t i = 0; i < points.count; ++i) {
+    target[3 * i] = points.x[i];
+    target[3 * i + 1] = points.y[i];
+    target[3 * i + 2] = points.z[i];
+  }
+}
+
+MeanShape MeanShapeOf(const PoseLayout& layout, const Eigen::VectorXd& mean) {
+  MeanShape shape;
+  Double3 lo{1e300, 1e300, 1e300}, hi{-1e300, -1e300, -1e300};
+  for (std::size_t i = 0; i < layout.points + layout.stage_points; ++i) {
+    const auto at = static_cast<Eigen::Index>(3 * i);
+    shape.positions.push_back({mean[at], mean[at + 1], mean[at + 2]});
+    for (int a = 0; a < 3 && i < layout.points; ++a) {
+      lo[a] = std::min(lo[a], shape.positions[i][a]);
+      hi[a] = std::max(hi[a], shape.positions[i][a]);
+    }
+  }
+  shape.diagonal = Length(hi - lo);
+  return shape;
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,333 @@
+#include "kpsa/training/pose_recorder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "base/check.h"
+#include "base/matrix.h"
+#include "base/parallel.h"
+#include "kpsa/space_frame.h"
+
+namespace kpsa::engine {
+
+namespace {
+
+double TimeOf(const SampledPose& pose, const TrainingClip& clip) {
+  return clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
+}
+
+}  // namespace
+
+Result<std::shared_ptr<const Plan>> PoseRecorder::CompileFor(const std::vector<PlugRef>& varying) {
+  // Outputs: points of the meshes, candidate points, signals, space
+  Request request;
+  const AccelerationTarget& target = rig_.target;
+  for (const auto& mesh : target.meshes) request.outputs.push_back({mesh.stages.back().points, {}});
+  for (const CandidateStage& candidate : candidates_) {
+    const PlugRef& points = target.meshes[candidate.mesh].stages[candidate.stage].points;
+    Request whole;
+    whole.outputs.push_back({points, {}});
+    Result<std::shared_ptr<const Plan>> sizes = compiler_->Compile(*rig_.graph, whole);
+    if (!sizes.ok()) return sizes.status();
+    request.outputs.push_back(
+        {points, PointSet::Of(candidate.points, (*sizes)->outputs()[0].points.total())});
+  }
+  for (const Signal& signal : signals_) request.outputs.push_back({signal.plug, {}});
+  for (const PlugRef& plug : target.space) request.outputs.push_back({plug, {}});
+  request.varying = varying;
+  return compiler_->Compile(*rig_.graph, request);
+}
+
+std::vector<Index> FirstScalars(std::span<const Signal> signals, const PoseLayout& layout) {
+  std::vector<Index> first;
+  Index next = 0;
+  for (const Signal& signal : signals) {
+    if (signal.relative && next < layout.relative_begin) next = layout.relative_begin;
+    first.push_back(next);
+    next += static_cast<Index>(signal.entries());
+  }
+  return first;
+}
+
+std::vector<std::size_t> PoseRecorder::FreeControls(bool playing) const {
+  std::vector<std::size_t> controls;
+  for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
+    if (!playing || !rig_.controls[c].by_clip) controls.push_back(c);
+  }
+  return controls;
+}
+
+PoseRecorder::PlanResult PoseRecorder::PlanOf(const std::string* clip, bool sampled) {
+  const std::pair key(clip == nullptr ? std::optional<std::string>() : *clip, sampled);
+  if (const auto known = plans_.find(key); known != plans_.end()) return known->second;
+  KPSA_RETURN_IF_ERROR(
+      rig_.set_clip(clip == nullptr ? std::nullopt : std::optional<std::string_view>(*clip)));
+  std::vector<PlugRef> varying{rig_.time};
+  if (sampled) {
+    for (const std::size_t c : FreeControls(clip != nullptr)) varying.push_back(rig_.controls[c].plug);
+  }
+  PlanResult plan = CompileFor(varying);
+  if (plan.ok()) plans_.emplace(key, *plan);
+  return plan;
+}
+
+Result<PoseLayout> PoseRecorder::Layout(std::size_t products) {
+  Result<std::shared_ptr<const Plan>> plan = CompileFor({rig_.time});
+  if (!plan.ok()) return plan.status();
+  layout_ = PoseLayout();
+  std::size_t o = 0;
+  for (; o < rig_.target.meshes.size(); ++o) layout_.points += (*plan)->outputs()[o].points.size();
+  for (const CandidateStage& candidate : candidates_) layout_.stage_points += candidate.points.size();
+  for (const Signal& signal : signals_) {
+    layout_.scalars += signal.entries();
+    if (!signal.relative) layout_.relative_begin = static_cast<Index>(layout_.scalars);  // these come last
+  }
+  layout_.products = products;
+  layout_.relative_begin += static_cast<Index>(products);
+  layout_.scalars += products;
+  return layout_;
+}
+
+Matrix4 PoseRecorder::SpaceFromWorld(const Evaluator& evaluator) const {
+  if (rig_.target.space.empty()) return {};
+  const auto last = static_cast<Index>(evaluator.plan().outputs().size() - 1);
+  return InverseOrIdentity(
+      SpaceFrameOf(evaluator.Get<Matrix4>(last), inverse_rest_stretch_).world_from_space);
+}
+
+void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const {
+  const AccelerationTarget& target = rig_.target;
+  const Matrix4 space_from_world = SpaceFromWorld(evaluator);
+  Index o = 0;
+  std::size_t column = 0;
+  const auto store_points = [&](ConstPointsView points, bool in_space) {
+    for (std::size_t i = 0; i < points.count; ++i) {
+      Double3 p{points.x[i], points.y[i], points.z[i]};
+      if (in_space) p = TransformPoint(space_from_world, p);
+      row[column++] = static_cast<float>(p.x);
+      row[column++] = static_cast<float>(p.y);
+      row[column++] = static_cast<float>(p.z);
+    }
+  };
+  for (const auto& mesh : target.meshes) store_points(evaluator.Points(o++), mesh.stages.back().world);
+  for (const CandidateStage& candidate : candidates_)
+    store_points(evaluator.Points(o++), target.meshes[candidate.mesh].stages[candidate.stage].world);
+  StoreSignals(evaluator, space_from_world, o, row.subspan(column));
+  StoreProducts(products_, layout_, row);
+  KPSA_CHECK_EQ(column + layout_.scalars, row.size());
+}
+
+void PoseRecorder::StoreSignals(const Evaluator& evaluator, const Matrix4& space_from_world, Index o,
+                                std::span<float> entries) const {
+  std::size_t column = 0;
+  for (const Signal& signal : signals_) {
+    if (signal.relative) column = std::max<std::size_t>(column, layout_.relative_begin);
+    if (signal.matrix) {
+      double values[12];
+      const Matrix4& matrix = evaluator.Get<Matrix4>(o++);
+      MatrixEntries(signal.relative ? space_from_world * matrix : matrix, values);
+      for (double value : values) entries[column++] = static_cast<float>(value);
+      continue;
+    }
+    const Type type = evaluator.plan().outputs()[o].type;
+    const double value = type == Type::kDouble ? evaluator.Get<double>(o)
+                                               : static_cast<double>(evaluator.Get<std::int64_t>(o));
+    ++o;
+    entries[column++] = static_cast<float>(value);
+  }
+}
+
+Status PoseRecorder::CheckFinite(std::span<const float> row) const {
+  const auto bad = std::find_if(row.begin(), row.end(), [](float v) { return !std::isfinite(v); });
+  if (bad == row.end()) return Status();
+  auto column = static_cast<std::size_t>(bad - row.begin());
+  if (column < layout_.outputs()) {
+    std::size_t point = column / 3;
+    for (const auto& mesh : rig_.target.meshes) {
+      Request request;
+      request.outputs.push_back({mesh.stages.back().points, {}});
+      const Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
+      const std::size_t total = plan.ok() ? (*plan)->outputs()[0].points.total() : 0;
+      if (point < total) return Status::Evaluation("point {} of {} is not a number", point, mesh.name);
+      point -= total;
+    }
+  }
+  if (column >= layout_.scalar_begin()) {
+    column -= layout_.scalar_begin();
+    const std::vector<Index> first = FirstScalars(signals_, layout_);
+    for (std::size_t s = 0; s < signals_.size(); ++s) {
+      if (column >= first[s] && column < first[s] + signals_[s].entries())
+        return Status::Evaluation("{} is not a number", signals_[s].name);
+    }
+  }
+  return Status::Evaluation("a point of an earlier stage is not a number");
+}
+
+Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
+                            const std::function<void(std::size_t, Evaluator&)>& set,
+                            const std::function<std::string(std::size_t)>& name) {
+  std::vector<std::span<float>> rows;
+  for (std::size_t i = 0; i < count; ++i) rows.push_back(poses->AddPose());
+  std::mutex mutex;
+  std::size_t failed = count;
+  Status failure;
+  const std::size_t grain =
+      std::max<std::size_t>(16, count / static_cast<std::size_t>(4 * HardwareThreads()) + 1);
+  ParallelFor(count, grain, [&](std::size_t begin, std::size_t end) {
+    Evaluator evaluator(plan);
+    for (std::size_t i = begin; i < end; ++i) {
+      set(i, evaluator);
+      Status status = evaluator.Evaluate();
+      if (status.ok()) {
+        Store(evaluator, rows[i]);
+        continue;
+      }
+      std::lock_guard<std::mutex> lock(mutex);
+      if (i < failed) failed = i, failure = std::move(status);
+    }
+  });
+  if (failed < count) return Status::Evaluation("{}: {}", name(failed), failure.ToString());
+  for (std::size_t i = 0; i < count; ++i) {
+    if (Status finite = CheckFinite(rows[i]); !finite.ok())
+      return Status::Evaluation("{}: {}", name(i), finite.errors().front().message);
+  }
+  return Status();
+}
+
+Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
+  const PlanResult plan = PlanOf(&clip.name, false);
+  if (!plan.ok()) return plan.status();
+  const Index time = (*plan)->FindVarying(rig_.time);
+  return Record(
+      *plan, clip.times.size(), poses, [&](std::size_t i, Evaluator& e) { e.Set(time, clip.times[i]); },
+      [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
+}
+
+Status PoseRecorder::WidenRanges(const TrainingClip& clip, std::vector<double>* lo, std::vector<double>* hi) {
+  KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
+  Request request;
+  for (const Signal& signal : signals_) request.outputs.push_back({signal.plug, {}});
+  for (const PlugRef& plug : rig_.target.space) request.outputs.push_back({plug, {}});
+  request.varying = {rig_.time};
+  Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
+  if (!plan.ok()) return plan.status();
+  const Index time = (*plan)->FindVarying(rig_.time);
+  Evaluator evaluator(*plan);
+  std::vector<float> entries(layout_.scalars);
+  for (const double t : clip.times) {
+    evaluator.Set(time, t);
+    KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
+    StoreSignals(evaluator, SpaceFromWorld(evaluator), 0, entries);
+    for (std::size_t e = 0; e < entries.size(); ++e) {
+      (*lo)[e] = std::min<double>((*lo)[e], entries[e]);
+      (*hi)[e] = std::max<double>((*hi)[e], entries[e]);
+    }
+  }
+  return rig_.set_clip(std::nullopt);
+}
+
+// "sampled pose (jaw.rotateX -0.38, smile 0.9 of clip talk at 1.2 s)": the controls farthest from rest.
+std::string PoseRecorder::NameOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) const {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t c = 0; c < pose.values.size(); ++c) {
+    const ControlRange& control = rig_.controls[c];
+    const double extent = std::max(control.max - control.min, 1e-300);
+    if (pose.values[c] != control.rest)
+      order.emplace_back(-std::fabs(pose.values[c] - control.rest) / extent, c);
+  }
+  std::sort(order.begin(), order.end());
+  std::string text = "sampled pose";
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, order.size()); ++i) {
+    text +=
+        fmt::format("{}{} {:.4g}", i == 0 ? " (" : ", ",
+                    rig_.graph->PlugName(rig_.controls[order[i].second].plug), pose.values[order[i].second]);
+  }
+  if (!order.empty()) text += order.size() > 3 ? ", ...)" : ")";
+  if (pose.clip >= 0) {
+    const TrainingClip& clip = clips[static_cast<std::size_t>(pose.clip)];
+    text += fmt::format(" over clip \"{}\" at {:.4g} s", clip.name, TimeOf(pose, clip));
+  }
+  return text;
+}
+
+Result<ClipPoses> PoseRecorder::ControlsOfClips(const std::vector<TrainingClip>& clips) {
+  ClipPoses poses;
+  for (const TrainingClip& clip : clips) {
+    KPSA_RETURN_IF_ERROR(rig_.set_clip(clip.name));
+    Request request;
+    request.varying = {rig_.time};
+    std::vector<std::size_t> shown;
+    for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
+      if (!rig_.controls[c].shown) continue;
+      PlugRef plug = *rig_.controls[c].shown;
+      if (!rig_.graph->def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].output) {
+        const Connection* connection = rig_.graph->FindConnection(plug);
+        if (connection == nullptr) continue;
+        plug = connection->source;
+      }
+      plug.component = -1;
+      request.outputs.push_back({plug, {}});
+      shown.push_back(c);
+    }
+    Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
+    if (!plan.ok()) return plan.status();
+    const Index time = (*plan)->FindVarying(rig_.time);
+    Evaluator evaluator(*plan);
+    for (const double t : clip.times) {
+      if (time != kNoIndex) evaluator.Set(time, t);
+      KPSA_RETURN_IF_ERROR(evaluator.Evaluate());
+      std::vector<double>& pose = poses.emplace_back();
+      for (const ControlRange& control : rig_.controls) pose.push_back(control.rest);
+      for (std::size_t i = 0; i < shown.size(); ++i) {
+        const auto output = static_cast<Index>(i);
+        const int component = rig_.controls[shown[i]].shown->component;
+        if ((*plan)->outputs()[i].type == Type::kDouble3) {
+          pose[shown[i]] = evaluator.Get<Double3>(output)[std::max(0, component)];
+        } else if ((*plan)->outputs()[i].type == Type::kDouble) {
+          pose[shown[i]] = evaluator.Get<double>(output);
+        }
+      }
+    }
+  }
+  KPSA_RETURN_IF_ERROR(rig_.set_clip(std::nullopt));
+  return poses;
+}
+
+Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples,
+                                const std::vector<TrainingClip>& clips, PoseMatrix* poses) {
+  for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
+    std::vector<const SampledPose*> mine;
+    for (const SampledPose& sample : samples) {
+      if (sample.clip == clip) mine.push_back(&sample);
+    }
+    if (mine.empty()) continue;
+    const TrainingClip* playing = clip < 0 ? nullptr : &clips[static_cast<std::size_t>(clip)];
+    const std::vector<std::size_t> used = FreeControls(playing != nullptr);
+    const PlanResult plan = PlanOf(playing == nullptr ? nullptr : &playing->name, true);
+    if (!plan.ok()) return plan.status();
+    std::vector<Index> numbers;
+    for (std::size_t c : used) numbers.push_back((*plan)->FindVarying(rig_.controls[c].plug));
+    const Index time = (*plan)->FindVarying(rig_.time);
+    KPSA_RETURN_IF_ERROR(Record(
+        *plan, mine.size(), poses,
+        [&](std::size_t i, Evaluator& e) {
+          if (playing != nullptr && !playing->times.empty()) {
+            e.Set(time, TimeOf(*mine[i], *playing));
+          }
+          for (std::size_t k = 0; k < used.size(); ++k) {
+            const double value = mine[i]->values[used[k]];
+            const Type type = (*plan)->varying()[numbers[k]].type;
+            if (type == Type::kInt || type == Type::kBool || type == Type::kEnum) {
+              e.SetInt(numbers[k], static_cast<std::int64_t>(value));
+            } else {
+              e.Set(numbers[k], value, rig_.controls[used[k]].plug.component);
+            }
+          }
+        },
+        [&](std::size_t i) { return NameOf(*mine[i], clips); }));
+  }
+  return Status();
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,82 @@
+// Evaluates poses of a rig into rows of a pose matrix: output points, candidate points of earlier stages,
+// and entries of signals, all in the space of the target. A pose with a value that is not finite is an error
+// that names it. Internal to training.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "graph/evaluator.h"
+#include "kpsa/training/cue_products.h"
+#include "kpsa/training/pose_matrix.h"
+#include "kpsa/training/trainer.h"
+
+namespace kpsa::engine {
+
+// Points of an earlier stage of a mesh that may become cues.
+struct CandidateStage {
+  std::size_t mesh = 0, stage = 0;  // in AccelerationTarget::meshes, in its stages
+  std::vector<Index> points;        // of the mesh
+};
+
+// The scalar of each signal's first entry.
+std::vector<Index> FirstScalars(std::span<const Signal> signals, const PoseLayout& layout);
+
+class PoseRecorder {
+ public:
+  PoseRecorder(const TrainingRig& rig, Compiler* compiler, std::vector<CandidateStage> candidates,
+               std::vector<Signal> signals, const Matrix4& inverse_rest_stretch = Matrix4())
+      : rig_(rig),
+        compiler_(compiler),
+        candidates_(std::move(candidates)),
+        signals_(std::move(signals)),
+        inverse_rest_stretch_(inverse_rest_stretch) {}
+  // Scalars of the layout: signals that are not relative, `products` of them, relative matrices.
+  Result<PoseLayout> Layout(std::size_t products = 0);
+  // What is recorded from now on has them.
+  void SetProducts(std::vector<CueProduct> products) { products_ = std::move(products); }
+  const std::vector<CueProduct>& products() const { return products_; }
+  // Appends a row for each time of a clip.
+  Status AddClip(const TrainingClip& clip, PoseMatrix* poses);
+  // Appends a row for each sampled pose.
+  Status AddSamples(const std::vector<SampledPose>& samples, const std::vector<TrainingClip>& clips,
+                    PoseMatrix* poses);
+  // Widens the ranges [lo, hi] of all entries of the signals, in their order, by what they are at times of a
+  // clip; no points are evaluated.
+  Status WidenRanges(const TrainingClip& clip, std::vector<double>* lo, std::vector<double>* hi);
+  // The controls that would give the poses of the clips (ControlRange::shown), at rest where nothing shows
+  // them.
+  Result<ClipPoses> ControlsOfClips(const std::vector<TrainingClip>& clips);
+  const std::vector<Signal>& signals() const { return signals_; }
+  const std::vector<CandidateStage>& candidates() const { return candidates_; }
+  const PoseLayout& layout() const { return layout_; }
+
+ private:
+  using PlanResult = Result<std::shared_ptr<const Plan>>;
+  PlanResult CompileFor(const std::vector<PlugRef>& varying);
+  // The plan of a clip, or with none: sampled, with the controls that the clip leaves free, else with time.
+  PlanResult PlanOf(const std::string* clip, bool sampled);
+  std::vector<std::size_t> FreeControls(bool playing) const;
+  std::string NameOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) const;
+  // Of the space, which is the last output of the plan.
+  Matrix4 SpaceFromWorld(const Evaluator& evaluator) const;
+  void StoreSignals(const Evaluator& evaluator, const Matrix4& space_from_world, Index first_output,
+                    std::span<float> entries) const;
+  Status CheckFinite(std::span<const float> row) const;
+  Status Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
+                const std::function<void(std::size_t, Evaluator&)>& set,
+                const std::function<std::string(std::size_t)>& name);
+  void Store(const Evaluator& evaluator, std::span<float> row) const;
+
+  const TrainingRig& rig_;
+  Compiler* compiler_;
+  std::vector<CandidateStage> candidates_;
+  std::vector<Signal> signals_;
+  std::vector<CueProduct> products_;
+  // By clip (none: the rest pose), and whether controls are sampled; binding wraps takes long
+  std::map<std::pair<std::optional<std::string>, bool>, std::shared_ptr<const Plan>> plans_;
+  Matrix4 inverse_rest_stretch_;
+  PoseLayout layout_;
+};
+
+}  // namespace kpsa::engine

@@ -1,0 +1,210 @@
+#include "kpsa/training/poses.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "kpsa/training/random.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kClipFrames = 80;  // frames of the clips to mix
+
+class Sampler {
+ public:
+  Sampler(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses, std::uint64_t seed)
+      : controls_(controls), clip_poses_(clip_poses), random_(seed) {}
+
+  SampledPose Rest() const {
+    SampledPose pose;
+    for (const ControlRange& control : controls_) pose.values.push_back(control.rest);
+    return pose;
+  }
+  Random& random() { return random_; }
+
+  // Two or three controls of several groups near their ends.
+  void MixGroups(const ControlGroups& groups, SampledPose* pose) {
+    const std::size_t count = 3 + random_.Below(5);
+    for (std::size_t g = 0; g < count; ++g) {
+      const std::vector<std::size_t>& group = groups[random_.Below(groups.size())];
+      const std::size_t active = 2 + random_.Below(2);
+      for (std::size_t k = 0; k < active; ++k)
+        Move(group[random_.Below(group.size())], 0.4 + 0.6 * random_.Unit(), pose);
+    }
+  }
+
+  // Frames of the clips; controls of a node stay together.
+  void MixFrames(SampledPose* pose) {
+    const std::vector<double>& a = clip_poses_[random_.Below(clip_poses_.size())];
+    const std::vector<double>& b = clip_poses_[random_.Below(clip_poses_.size())];
+    const double split = random_.Unit() < 0.3 ? 0 : 0.5 * random_.Unit();  // share of b
+    const double reach_a = 0.3 + random_.Unit(), reach_b = 0.3 + random_.Unit();
+    bool from_b = false;
+    for (std::size_t i = 0; i < controls_.size(); ++i) {
+      const ControlRange& c = controls_[i];
+      // A node's controls are neighbours; a mesh's many weights are each on their own
+      if (i == 0 || controls_[i - 1].plug.node != c.plug.node || c.plug.element >= 0)
+        from_b = random_.Unit() < split;
+      const double value = c.rest + ((from_b ? b[i] : a[i]) - c.rest) * (from_b ? reach_b : reach_a);
+      pose->values[i] = std::clamp(value, c.min, c.max);
+    }
+    MoveSome(4, 0.6, pose);
+  }
+
+  void Mixture(SampledPose* pose) {
+    const std::size_t count = std::min(controls_.size(), 3 + random_.Below(4));
+    for (const std::size_t i : Some(controls_.size(), count))
+      pose->values[i] = controls_[i].min + (controls_[i].max - controls_[i].min) * random_.Unit();
+  }
+
+  void Neighbours(const ControlGroups& groups, SampledPose* pose) {
+    const std::vector<std::size_t>& group = groups[random_.Below(groups.size())];
+    const std::size_t count = std::min(group.size(), 2 + random_.Below(5));
+    for (const std::size_t k : Some(group.size(), count)) Move(group[k], 0.5 + 0.5 * random_.Unit(), pose);
+  }
+
+  // Controls of a clip that plays say nothing; whole numbers have no margin.
+  void Beyond(SampledPose* pose) {
+    const std::size_t count = std::min<std::size_t>(controls_.size(), 1 + random_.Below(3));
+    for (const std::size_t i : Some(controls_.size(), count)) {
+      const ControlRange& c = controls_[i];
+      const double beyond = (kBeyondShare + c.margin) * (c.max - c.min) * random_.Unit();
+      const bool up = random_.Unit() < 0.5 || c.min == c.rest;
+      pose->values[i] = std::clamp(up ? c.max + beyond : c.min - beyond, c.lowest, c.highest);
+    }
+  }
+
+  // Few controls or many: real poses are both. What is laid over a clip stays smaller, the clip's own motion
+  // is there already.
+  void MoveMany(SampledPose* pose) {
+    const std::size_t n = controls_.size();
+    const double share = random_.Unit();
+    const std::size_t most = pose->clip >= 0 ? 4 : std::max<std::size_t>(4, n / 4);
+    const std::size_t active = 1 + static_cast<std::size_t>(share * share * static_cast<double>(most));
+    const double reach = pose->clip >= 0 ? 0.5 : 1.0;
+    for (std::size_t k = 0; k < active; ++k) Move(random_.Below(n), reach * random_.Unit(), pose);
+    if (random_.Unit() < 0.5) return;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (controls_[i].often) Move(i, random_.Unit(), pose);
+    }
+  }
+
+ private:
+  // `count` different numbers below n.
+  std::vector<std::size_t> Some(std::size_t n, std::size_t count) {
+    std::vector<std::size_t> all(n);
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    for (std::size_t k = 0; k < count; ++k) std::swap(all[k], all[k + random_.Below(n - k)]);
+    all.resize(count);
+    return all;
+  }
+  void Move(std::size_t i, double amount, SampledPose* pose) {
+    const ControlRange& c = controls_[i];
+    const double end = random_.Unit() < (c.max - c.rest) / std::max(c.max - c.min, 1e-300) ? c.max : c.min;
+    pose->values[i] = c.rest + (end - c.rest) * amount;
+  }
+  void MoveSome(std::size_t most, double reach, SampledPose* pose) {
+    const std::size_t active = random_.Below(most + 1);
+    for (std::size_t k = 0; k < active; ++k)
+      Move(random_.Below(controls_.size()), reach * random_.Unit(), pose);
+  }
+
+  const std::vector<ControlRange>& controls_;
+  const ClipPoses& clip_poses_;
+  Random random_;
+};
+
+// At most `count` of the poses, each as far as possible from those before it: what is rare in a clip (a
+// blink) is not rare among them. Distances in shares of the controls' ranges.
+ClipPoses Different(const ClipPoses& poses, const std::vector<ControlRange>& controls, std::size_t count) {
+  ClipPoses chosen;
+  std::vector<double> distance(poses.size(), std::numeric_limits<double>::max());
+  const std::vector<double>* last = nullptr;
+  std::vector<double> rest;
+  for (const ControlRange& c : controls) rest.push_back(c.rest);
+  while (chosen.size() < std::min(count, poses.size())) {
+    const std::vector<double>& from = last == nullptr ? rest : *last;
+    std::size_t best = 0;
+    for (std::size_t p = 0; p < poses.size(); ++p) {
+      double squared = 0;
+      for (std::size_t i = 0; i < controls.size(); ++i) {
+        const double d = (poses[p][i] - from[i]) / std::max(controls[i].max - controls[i].min, 1e-300);
+        squared += d * d;
+      }
+      distance[p] = std::min(distance[p], squared);
+      if (distance[p] > distance[best]) best = p;
+    }
+    if (!(distance[best] > 0)) break;
+    last = &poses[best];
+    chosen.push_back(poses[best]);
+  }
+  return chosen;
+}
+
+}  // namespace
+
+std::vector<SampledPose> Sweeps(const std::vector<ControlRange>& controls) {
+  std::vector<SampledPose> poses;
+  for (std::size_t i = 0; i < controls.size(); ++i) {
+    for (const double end : {controls[i].min, controls[i].max}) {
+      SampledPose& pose = poses.emplace_back();
+      for (const ControlRange& control : controls) pose.values.push_back(control.rest);
+      pose.values[i] = end;
+    }
+  }
+  return poses;
+}
+
+std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses,
+                                     const ControlGroups& groups, std::size_t clips, std::size_t count,
+                                     std::uint64_t seed) {
+  const ClipPoses frames = Different(clip_poses, controls, kClipFrames);
+  Sampler sampler(controls, frames, seed);
+  std::vector<SampledPose> poses;
+  for (std::size_t p = 0; p < count; ++p) {
+    SampledPose pose = sampler.Rest();
+    if (!frames.empty() && p % 20 < 9) {
+      sampler.MixFrames(&pose);
+      pose.near_clips = true;
+    } else if (!groups.empty() && p % 20 < 13) {
+      sampler.MixGroups(groups, &pose);
+    } else {
+      if (clips > 0 && (p % 2 == 0 || controls.empty())) {
+        pose.clip = static_cast<int>(sampler.random().Below(clips));
+        pose.phase = sampler.random().Unit();
+        pose.near_clips = true;
+      }
+      if (!controls.empty()) sampler.MoveMany(&pose);
+    }
+    poses.push_back(std::move(pose));
+  }
+  return poses;
+}
+
+std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
+                                     const ClipPoses& clip_poses, const ControlGroups& groups,
+                                     std::size_t clips, std::size_t count, std::uint64_t seed) {
+  if (kind == PoseKind::kSampled) return SamplePoses(controls, clip_poses, groups, clips, count, seed);
+  std::vector<SampledPose> poses;
+  if (controls.empty() || (kind == PoseKind::kNeighbours && groups.empty())) return poses;
+  if (kind == PoseKind::kBeyond) poses = SamplePoses(controls, clip_poses, groups, clips, count, seed);
+  Sampler sampler(controls, clip_poses, ~seed);
+  poses.resize(count, sampler.Rest());
+  for (SampledPose& pose : poses) {
+    pose.kind = kind;
+    switch (kind) {
+      case PoseKind::kMixture:
+        sampler.Mixture(&pose);
+        break;
+      case PoseKind::kNeighbours:
+        sampler.Neighbours(groups, &pose);
+        break;
+      default:
+        sampler.Beyond(&pose);
+    }
+  }
+  return poses;
+}
+
+}  // namespace kpsa::engine

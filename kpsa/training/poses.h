@@ -1,0 +1,65 @@
+// Training poses: which control values to evaluate. Seeded and independent of the machine.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "graph/graph.h"
+#include "kpsa/pose_kind.h"
+
+namespace kpsa::engine {
+
+struct ControlRange {
+  PlugRef plug;
+  double min = 0, max = 0, rest = 0;
+  bool by_clip = false;  // a clip drives it while it plays
+  bool often = false;    // it carries the space of the points: half of the mixtures move it
+  std::optional<PlugRef> shown =
+      {};  // where the value can be read that gives what a clip does (poseRotate.x for rotateX)
+  // What the attribute itself admits, where that is more than [min, max]; whole numbers admit nothing more.
+  double lowest = -std::numeric_limits<double>::infinity();
+  double highest = std::numeric_limits<double>::infinity();
+  double margin = 0;  // of its range: how far beyond its ends guards let it (kpsa/training/range_margins.h)
+  double tilt = 0;    // training turns it so far from rest, though its range is less (kpsa/training/tilts.h)
+};
+
+// Control values of one pose (by control), and where in the training clips it plays: clip < 0 is the rest
+// pose.
+struct SampledPose {
+  std::vector<double> values;
+  int clip = -1;
+  double phase = 0;  // 0..1 of the clip
+  PoseKind kind = PoseKind::kSampled;
+  bool near_clips = false;  // made of frames of the clips: what playback resembles
+};
+
+// What the controls have to be at the frames of the training clips to give the same pose without a clip: one
+// row a frame, by control. Real poses move many controls at once, in ways that no independent sampling finds.
+using ClipPoses = std::vector<std::vector<double>>;
+
+// Controls that move the same points, and therefore act together: groups of indices of controls, one for each
+// of some points. A deformer stack is nearly linear in controls that are far from each other.
+using ControlGroups = std::vector<std::vector<std::size_t>>;
+
+// Every control at its ends alone, the others at rest: 2 poses a control, first min, then max.
+std::vector<SampledPose> Sweeps(const std::vector<ControlRange>& controls);
+
+// `count` poses, in shares (the first two where there are such):
+//   0.45 a frame of the clips, exaggerated or weakened, each node's controls from one or the other of two
+//        frames, and a few controls on top;
+//   0.2  a group of controls that act together, and a few controls on top;
+//   0.35 mixtures of several controls at random values, every second one laid over a random frame of a random
+//        clip.
+// Without controls: random times of the clips.
+std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses,
+                                     const ControlGroups& groups, std::size_t clips, std::size_t count,
+                                     std::uint64_t seed);
+
+// `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours).
+std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
+                                     const ClipPoses& clip_poses, const ControlGroups& groups,
+                                     std::size_t clips, std::size_t count, std::uint64_t seed);
+
+}  // namespace kpsa::engine

@@ -1,0 +1,171 @@
+#include "kpsa/training/tile_subspace.h"
+
+#include <algorithm>
+#include <map>
+
+#include "base/check.h"
+#include "base/parallel.h"
+#include "kpsa/training/cue_values.h"
+#include "kpsa/training/make_subspace.h"
+#include "kpsa/training/tile_builder.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
+constexpr double kTrialBeyond = 0.02;   // share of poses farther off, at most
+
+// The cues of some rows of a set.
+CueSet Subset(const CueSet& set, const std::vector<std::size_t>& kept) {
+  CueSet subset;
+  std::vector<Eigen::Index> rows;
+  subset.offsets.push_back(0);
+  for (const std::size_t k : kept) {
+    subset.cues.push_back(set.cues[k]);
+    for (Index j = set.offsets[k]; j < set.offsets[k + 1]; ++j) rows.push_back(j);
+    subset.offsets.push_back(static_cast<Index>(rows.size()));
+  }
+  subset.mean = set.mean(rows), subset.scale = set.scale(rows);
+  return subset;
+}
+
+// Leaves out what no tile reads.
+void DropUnread(TileSubspace* made) {
+  std::vector<char> read(static_cast<std::size_t>(made->cues.rows()), 0);
+  for (const TileMap& map : made->subspace.tiles) {
+    for (const auto* columns : {&map.data().columns, &map.data().joint_rows}) {
+      for (const std::uint32_t column : *columns) read[column] = 1;
+    }
+  }
+  std::vector<std::size_t> kept;
+  std::vector<std::uint32_t> now(read.size(), 0);
+  std::uint32_t rows = 0;
+  for (std::size_t k = 0; k < made->cues.cues.size(); ++k) {
+    const Index begin = made->cues.offsets[k], end = made->cues.offsets[k + 1];
+    if (std::none_of(read.begin() + begin, read.begin() + end, [](char r) { return r != 0; })) continue;
+    kept.push_back(k);
+    for (Index j = begin; j < end; ++j) now[j] = rows++;
+  }
+  for (TileMap& map : made->subspace.tiles) {
+    TileData data = map.data();
+    data.inputs = rows;
+    for (auto* columns : {&data.columns, &data.joint_rows}) {
+      for (std::uint32_t& column : *columns) column = now[column];
+    }
+    Result<TileMap> fewer = TileMap::Make(std::move(data), "tiles");
+    KPSA_CHECK(fewer.ok());
+    map = std::move(*fewer);
+  }
+  made->cues = Subset(made->cues, kept);
+}
+
+// The rows that a tile reads.
+std::vector<std::uint32_t> ColumnsOf(const TileChoice& choice, std::size_t tile) {
+  const CueSet& cues = choice.cues;
+  std::vector<std::uint32_t> columns;
+  for (const std::uint32_t cue : choice.tiles.of_tile[tile]) {
+    for (Index j = cues.offsets[cue]; j < cues.offsets[cue + 1]; ++j) columns.push_back(j);
+  }
+  return columns;
+}
+
+}  // namespace
+
+TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                       std::vector<TileCandidates> candidates, const TileCueOptions& options) {
+  TileChoice choice;
+  choice.candidates = std::move(candidates);
+  choice.options = options;
+  choice.tiles = ChooseTileCues(poses, choice.candidates, options);
+  choice.cues = MeasureCues(poses, mean, choice.tiles.cues, &choice.measured);
+  return choice;
+}
+
+void FinishTiles(TileSubspace* made) {
+  DropUnread(made);
+  Subspace& s = made->subspace;
+  s.cue_mean.assign(made->cues.mean.data(), made->cues.mean.data() + made->cues.mean.size());
+  s.cue_scale.assign(made->cues.scale.data(), made->cues.scale.data() + made->cues.scale.size());
+  s.soft_cache.offsets = made->cues.offsets;
+}
+
+double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance) {
+  const auto count = static_cast<Eigen::Index>(poses.poses());
+  std::vector<Eigen::VectorXd> largest(choice.candidates.size());  // squared, by tile
+  ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const TileModel fitted = FitTile(poses, choice.measured, choice.cues, choice.options,
+                                       choice.candidates[t], choice.tiles.joint[t], ColumnsOf(choice, t));
+      Eigen::MatrixXd left = fitted.target;
+      if (!fitted.columns.empty()) left -= fitted.gain * choice.measured(fitted.columns, Eigen::all);
+      largest[t].setZero(count);
+      for (Eigen::Index i = 0; i + 2 < left.rows(); i += 3) {
+        largest[t] = largest[t].cwiseMax(left.middleRows<3>(i).colwise().squaredNorm().transpose());
+      }
+    }
+  });
+  Eigen::Index beyond = 0;
+  for (Eigen::Index t = 0; t < count; ++t) {
+    beyond += std::any_of(largest.begin(), largest.end(),
+                          [&](const Eigen::VectorXd& of) { return of[t] > tolerance * tolerance; });
+  }
+  return static_cast<double>(beyond) / static_cast<double>(std::max<Eigen::Index>(count, 1));
+}
+
+std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                                               std::vector<TileCandidates> candidates,
+                                               const TileCueOptions& options) {
+  if (candidates.size() > kTrialTiles * kTrialTiles) {
+    std::vector<TileCandidates> some;
+    for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
+    const TileChoice trial = ChooseTiles(mean, poses, std::move(some), options);
+    if (ShareBeyond(poses, trial, options.tolerance / 2) > kTrialBeyond) return std::nullopt;
+  }
+  return ChooseTiles(mean, poses, std::move(candidates), options);
+}
+
+TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,
+                              const TileChoice& choice, std::vector<SubspaceOutput> outputs,
+                              const TileOptions& options) {
+  TileSubspace made;
+  Subspace& s = made.subspace;
+  s.outputs = std::move(outputs);
+  s.components = poses.layout().components;
+  const TileCues& chosen = choice.tiles;
+  const Eigen::MatrixXd& measured = choice.measured;
+  made.cues = choice.cues;
+  const CueSet& cues = choice.cues;
+
+  TileInputs inputs;
+  inputs.samples = SampledColumns(measured);
+  inputs.poses = &poses, inputs.measured = &measured, inputs.clip_poses = clip_poses;
+  inputs.row_mean = cues.mean, inputs.row_scale = cues.scale;
+  std::map<Index, std::uint32_t> row_of;  // of scalars
+  for (std::size_t k = 0; k < cues.cues.size(); ++k) {
+    if (cues.cues[k].kind == CueKind::kScalar && cues.cues[k].joint == kNoIndex)
+      row_of.emplace(cues.cues[k].index, cues.offsets[k]);
+  }
+  std::size_t tile = 0, first = 0;
+  for (const SubspaceOutput& output : s.outputs) {
+    const auto model = [&](std::size_t t) {
+      const Index joint = chosen.joint[tile + t];
+      TileModel fitted = FitTile(poses, measured, cues, choice.options, choice.candidates[tile + t], joint,
+                                 ColumnsOf(choice, tile + t));
+      for (Index e = 0; e < 12 && joint != kNoIndex; ++e) fitted.joint_rows.push_back(row_of.at(joint + e));
+      return fitted;
+    };
+    const std::size_t height = output.points * static_cast<std::size_t>(s.components);
+    inputs.first_column = first;
+    s.tiles.push_back(
+        BuildTiles(model, mean.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height)),
+                   s.components, static_cast<std::size_t>(cues.rows()), inputs, options));
+    tile += s.tiles.back().tiles();
+    first += height;
+  }
+  KPSA_CHECK_EQ(tile, choice.candidates.size());
+  s.score = {0, 1};
+  FinishTiles(&made);
+  return made;
+}
+
+}  // namespace kpsa::engine

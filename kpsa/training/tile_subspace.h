@@ -1,0 +1,48 @@
+// A subspace whose tiles have cues of their own (kpsa/training/tile_cues.h), judged by what its tiles doubt
+// alone. Internal to training.
+#pragma once
+
+#include <optional>
+
+#include "kpsa/subspace.h"
+#include "kpsa/training/tile_builder.h"
+#include "kpsa/training/tile_cues.h"
+
+namespace kpsa::engine {
+
+struct TileSubspace {
+  Subspace subspace;
+  CueSet cues;  // those that a tile reads, in the order of the subspace's rows
+};
+
+// What tiles measure, and of which poses: chosen once, for tiles of any budget.
+struct TileChoice {
+  std::vector<TileCandidates> candidates;
+  TileCueOptions options;
+  TileCues tiles;
+  CueSet cues;
+  Eigen::MatrixXd measured;  // [rows x poses]
+};
+
+// poses: centred with `mean`. candidates: by tile, of all outputs one after the other.
+TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                       std::vector<TileCandidates> candidates, const TileCueOptions& options);
+
+// The same where an eighth of many tiles says that the others are worth their time: few poses would be
+// farther off than half the tolerance.
+std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                                               std::vector<TileCandidates> candidates,
+                                               const TileCueOptions& options);
+
+// Leaves out the cues that no tile reads, and tells the subspace of the others.
+void FinishTiles(TileSubspace* made);
+
+// Share of the same poses in which a point of those tiles would be farther off, were they stored exactly.
+double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance);
+
+// The first clip_poses of the same poses are of clips. The caller fills what MakeSubspace's does.
+TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,
+                              const TileChoice& choice, std::vector<SubspaceOutput> outputs,
+                              const TileOptions& options);
+
+}  // namespace kpsa::engine

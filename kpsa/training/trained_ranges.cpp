@@ -1,0 +1,103 @@
+#include "kpsa/training/trained_ranges.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kpsa/training/signal_noise.h"
+#include "kpsa/training/signal_reach.h"
+
+namespace kpsa::engine {
+namespace {
+
+// Of the tolerance, as displacements of points: what an entry may do unnoticed; an entry that moved less than
+// `kHardlyMoved` in training has its guard fully there after `kStillRamp`, others after `kLeastRamp` at
+// least.
+constexpr double kSlackShare = 0.05, kHardlyMoved = 2, kStillRamp = 1, kLeastRamp = 0.25;
+constexpr double kStillTurn = 5e-4;     // of light: a turn (radians) of a joint that is none
+constexpr double kTrainedBeyond = 0.5;  // of kBeyondShare: the rest of the way the guards come in
+
+}  // namespace
+
+void RangeFinder::Widen(const PoseMatrix& poses) {
+  for (std::size_t t = 0; t < poses.poses(); ++t) Widen(poses.row(t).subspan(layout_.scalar_begin()));
+}
+
+void RangeFinder::Widen(std::span<const float> scalars) {
+  if (lo_.empty()) {
+    lo_.assign(scalars.begin(), scalars.end());
+    hi_ = lo_;
+  }
+  for (std::size_t e = 0; e < scalars.size(); ++e) {
+    lo_[e] = std::min<double>(lo_[e], scalars[e]);
+    hi_[e] = std::max<double>(hi_[e], scalars[e]);
+  }
+}
+
+Status RangeFinder::Widen(const std::vector<TrainingClip>& clips, PoseRecorder* recorder) {
+  for (const TrainingClip& clip : clips) {
+    TrainingClip fine{clip.name, {}};
+    for (std::size_t i = 0; i < clip.times.size(); ++i) {
+      const double next = clip.times[std::min(i + 1, clip.times.size() - 1)];
+      for (const double part : {0.0, 0.25, 0.5, 0.75})
+        fine.times.push_back(clip.times[i] + part * (next - clip.times[i]));
+    }
+    KPSA_RETURN_IF_ERROR(recorder->WidenRanges(fine, &lo_, &hi_));
+  }
+  return Status();
+}
+
+Result<std::vector<TrainedRange>> RangeFinder::Make(const TrainingRig& rig, Compiler* compiler,
+                                                    const std::vector<Signal>& guards,
+                                                    const Options& options) const {
+  const bool of_light = rig.target.colors;
+  std::vector<double> reach(lo_.size(), 0);
+  if (!of_light) {
+    Result<std::vector<double>> found =
+        FindReach(rig, compiler, guards, options.inverse_rest_stretch, options.diagonal);
+    if (!found.ok()) return found.status();
+    reach = std::move(*found);
+  }
+  std::vector<TrainedRange> ranges;
+  for (const Signal& signal : guards) {
+    for (std::size_t e = 0; e < signal.entries(); ++e) {
+      const std::size_t i = ranges.size();
+      const double extent = hi_[i] - lo_[i], noticed = options.tolerance / reach[i];
+      double slack = kSlackShare * noticed;
+      // What hardly moved comes in slowly enough to be no jump; what did, within what calibration looks at
+      double ramp = std::max(options.range_ramp * extent,
+                             (extent < kHardlyMoved * noticed ? kStillRamp : kLeastRamp) * noticed);
+      if (of_light) {
+        slack = !signal.matrix ? 0 : e < 9 ? kStillTurn : kLightShift;
+        ramp = std::max(options.range_ramp * extent, slack);
+      }
+      ranges.push_back(MakeTrainedRange(EntryName(signal, e), lo_[i], hi_[i], slack, ramp));
+    }
+  }
+  return ranges;
+}
+
+void HalfAsFarBeyond(const std::vector<ControlRange>& controls, std::vector<SampledPose>* poses) {
+  for (SampledPose& pose : *poses) {
+    for (std::size_t c = 0; c < controls.size(); ++c) {
+      double& value = pose.values[c];
+      const double inside = std::clamp(value, controls[c].min, controls[c].max);
+      value = inside + kTrainedBeyond * (value - inside);
+    }
+  }
+}
+
+TrainingClip WithTimesBetween(const TrainingClip& clip, double share) {
+  TrainingClip dense{clip.name, {}};
+  double due = 0, place = 0.5;
+  for (std::size_t i = 0; i < clip.times.size(); ++i) {
+    dense.times.push_back(clip.times[i]);
+    due += share;
+    if (i + 1 == clip.times.size() || due < 1) continue;
+    due -= 1;
+    dense.times.push_back(clip.times[i] + place * (clip.times[i + 1] - clip.times[i]));
+    place = std::fmod(place + 0.6180339887498949, 1.0);
+  }
+  return dense;
+}
+
+}  // namespace kpsa::engine

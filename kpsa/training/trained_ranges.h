@@ -1,0 +1,40 @@
+// The ranges that guards keep: what training and calibration saw of every entry of a signal, and how fast a
+// guard comes in beyond. Internal to training.
+#pragma once
+
+#include "kpsa/training/pose_recorder.h"
+
+namespace kpsa::engine {
+
+class RangeFinder {
+ public:
+  RangeFinder() = default;
+  explicit RangeFinder(const PoseLayout& layout) : layout_(layout) {}
+
+  void Widen(const PoseMatrix& poses);         // not centred
+  void Widen(std::span<const float> scalars);  // of one pose, all of them
+  // By the clips between their times: quaternion keys turn joints about axes there that no frame has.
+  Status Widen(const std::vector<TrainingClip>& clips, PoseRecorder* recorder);
+
+  struct Options {
+    double tolerance = 0, range_ramp = 0;  // as TrainOptions
+    double diagonal = 0;                   // of the model
+    Matrix4 inverse_rest_stretch;
+  };
+  // Of the first signals of the layout, which have guards.
+  Result<std::vector<TrainedRange>> Make(const TrainingRig& rig, Compiler* compiler,
+                                         const std::vector<Signal>& guards, const Options& options) const;
+
+ private:
+  PoseLayout layout_;
+  std::vector<double> lo_, hi_;  // [scalars]; empty before the first pose
+};
+
+// Poses beyond the ranges of their controls, half as far beyond: training ends there, and on the other half
+// guards come in, and calibration looks.
+void HalfAsFarBeyond(const std::vector<ControlRange>& controls, std::vector<SampledPose>* poses);
+
+// A share of the spans between two times gets one more, at all places in between.
+TrainingClip WithTimesBetween(const TrainingClip& clip, double share);
+
+}  // namespace kpsa::engine

@@ -1,0 +1,101 @@
+#include "kpsa/training/training_sampler.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "kpsa/training/tilts.h"
+#include "kpsa/training/trained_ranges.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, and
+constexpr std::size_t kMostJudgeBytes = 400'000'000;   // of those that judge: huge meshes have fewer, but
+constexpr std::size_t kLeastSamples = 200;
+constexpr std::size_t kJudges = 300;  // sampled ones; a third as many of each other kind
+constexpr std::pair<PoseKind, double> kOtherKinds[] = {
+    {PoseKind::kBeyond, 0.08}, {PoseKind::kMixture, 0.06}, {PoseKind::kNeighbours, 0.06}};
+
+}  // namespace
+
+TrainingSampler::TrainingSampler(const TrainingRig& rig, std::vector<ControlRange> drawn,
+                                 const std::vector<TrainingClip>& clips, const TrainOptions& options,
+                                 PoseRecorder* recorder, const PoseLayout& layout)
+    : rig_(rig),
+      drawn_(std::move(drawn)),
+      clips_(clips),
+      options_(options),
+      recorder_(recorder),
+      layout_(layout) {}
+
+Status TrainingSampler::LearnHowControlsMove() {
+  Result<ClipPoses> clip_poses = recorder_->ControlsOfClips(clips_);
+  if (!clip_poses.ok()) return clip_poses.status();
+  clip_poses_ = std::move(*clip_poses);
+  if (rig_.controls.empty() || of_light()) return Status();
+  PoseMatrix sweeps(layout_);
+  KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, &sweeps));
+  groups_ = FindControlGroups(sweeps, 0, drawn_.size());
+  return Status();
+}
+
+std::vector<SampledPose> TrainingSampler::Of(PoseKind kind, std::size_t count, std::uint64_t seed,
+                                             std::span<const double> margins) const {
+  std::vector<ControlRange> controls = drawn_;
+  for (std::size_t c = 0; c < margins.size(); ++c) controls[c].margin = margins[c];
+  std::vector<SampledPose> poses =
+      PosesOfKind(kind, controls, clip_poses_, groups_, clips_.size(), count, seed);
+  AddTilts(rig_.controls, drawn_.size(), seed, &poses);
+  return poses;
+}
+
+std::vector<SampledPose> TrainingSampler::SweepsWithTilts() const {
+  std::vector<SampledPose> sweeps = Sweeps(drawn_);
+  AddTilts(rig_.controls, drawn_.size(), options_.seed ^ 0xbb67ae8584caa73bull, &sweeps);
+  return sweeps;
+}
+
+Status TrainingSampler::AddTraining(PoseMatrix* poses) const {
+  if (options_.samples > 0) KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
+  return AddSampled(std::min(options_.samples, std::max(RoomBeside(*poses), kLeastSamples)), options_.seed,
+                    poses);
+}
+
+Status TrainingSampler::AddMore(const PoseMatrix& beside, PoseMatrix* poses) const {
+  return AddSampled(std::min(options_.samples, RoomBeside(beside)), options_.seed ^ 0xa54ff53a5f1d36f1ull,
+                    poses);
+}
+
+std::size_t TrainingSampler::RoomBeside(const PoseMatrix& poses) const {
+  const std::size_t fit = kMostPoseBytes / PoseBytes();
+  return fit - std::min(fit, poses.poses());
+}
+
+Status TrainingSampler::AddSampled(std::size_t count, std::uint64_t seed, PoseMatrix* poses) const {
+  std::size_t rest = count;
+  if (!of_light()) {
+    for (const auto& [kind, share] : kOtherKinds) {
+      std::vector<SampledPose> some = Of(kind, static_cast<std::size_t>(share * static_cast<double>(count)),
+                                         seed + static_cast<std::uint64_t>(kind));
+      if (kind == PoseKind::kBeyond) HalfAsFarBeyond(rig_.controls, &some);
+      rest -= some.size();
+      KPSA_RETURN_IF_ERROR(recorder_->AddSamples(some, clips_, poses));
+    }
+  }
+  return recorder_->AddSamples(Of(PoseKind::kSampled, rest, seed), clips_, poses);
+}
+
+Status TrainingSampler::AddJudges(PoseMatrix* judges, std::vector<int>* kinds) const {
+  const std::size_t most = std::min(kJudges, kMostJudgeBytes / PoseBytes());
+  for (const auto& [kind, count] :
+       {std::pair{PoseKind::kSampled, most}, std::pair{PoseKind::kMixture, most / 3},
+        std::pair{PoseKind::kNeighbours, most / 3}}) {
+    const std::size_t before = judges->poses();
+    KPSA_RETURN_IF_ERROR(
+        recorder_->AddSamples(Of(kind, count, options_.seed ^ 0x2545f4914f6cdd1dull), clips_, judges));
+    kinds->insert(kinds->end(), judges->poses() - before, static_cast<int>(kind));
+  }
+  return Status();
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,55 @@
+// Draws the poses that are trained on, judged and calibrated with, of every kind (PoseKind), with tilts
+// (kpsa/training/tilts.h), and records them. Internal to training.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "kpsa/training/control_groups.h"
+#include "kpsa/training/pose_recorder.h"
+
+namespace kpsa::engine {
+
+class TrainingSampler {
+ public:
+  // All must outlive it. rig: with tilts, of whose controls the first `drawn` are its own; layout: the
+  // recorder's.
+  TrainingSampler(const TrainingRig& rig, std::vector<ControlRange> drawn,
+                  const std::vector<TrainingClip>& clips, const TrainOptions& options, PoseRecorder* recorder,
+                  const PoseLayout& layout);
+
+  // What the clips do with the controls, and which of these act together: first of all.
+  Status LearnHowControlsMove();
+
+  const std::vector<ControlRange>& drawn() const { return drawn_; }  // the rig's own controls
+  // Without recording them.
+  // margins: by control (ControlRange), or none.
+  std::vector<SampledPose> Of(PoseKind kind, std::size_t count, std::uint64_t seed,
+                              std::span<const double> margins = {}) const;
+  std::vector<SampledPose> SweepsWithTilts() const;  // each control alone
+
+  // Sweeps, and as many samples as the options want and memory holds: the sampler's kind, and some of the
+  // others. Light: no others.
+  Status AddTraining(PoseMatrix* poses) const;
+  // More samples, of another seed, as far as there is room beside the poses.
+  Status AddMore(const PoseMatrix& beside, PoseMatrix* poses) const;
+  // New poses that judge; kinds: the PoseKind of each.
+  Status AddJudges(PoseMatrix* judges, std::vector<int>* kinds) const;
+
+ private:
+  bool of_light() const { return rig_.target.colors; }
+  std::size_t PoseBytes() const { return sizeof(float) * layout_.columns(); }
+  std::size_t RoomBeside(const PoseMatrix& poses) const;
+  Status AddSampled(std::size_t count, std::uint64_t seed, PoseMatrix* poses) const;
+
+  const TrainingRig& rig_;
+  const std::vector<ControlRange> drawn_;
+  const std::vector<TrainingClip>& clips_;
+  const TrainOptions& options_;
+  PoseRecorder* recorder_;
+  const PoseLayout& layout_;
+  ClipPoses clip_poses_;
+  ControlGroups groups_;
+};
+
+}  // namespace kpsa::engine

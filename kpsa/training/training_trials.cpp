@@ -1,0 +1,35 @@
+#include "kpsa/training/training_trials.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace kpsa::engine {
+namespace {
+
+// Of the cost with cues for all points: clips hit more often by these than judges say, by those of tiles they
+// do not. So the latter have to be clearly cheaper.
+constexpr double kOfTiles = 1 / 0.85;
+
+}  // namespace
+
+void TrainingTrials::Add(const char* what, double points, CalibratedSubspace tried) {
+  const double ns = tried.cost.ns + points;
+  tried_.push_back({what, tried.cues.cues.size(), static_cast<std::size_t>(tried.cues.rows()),
+                    tried.cost.misses, ns / full_, false});
+  const double weighed = tried.subspace.by_tile() ? kOfTiles * ns : ns;
+  if (tried_.size() > 1 && weighed >= least_weighed_) return;
+  best_ = std::move(tried), best_ns_ = ns, least_weighed_ = weighed, best_of_ = tried_.size() - 1;
+}
+
+CalibratedSubspace TrainingTrials::Take(std::vector<TrainingRecord::Tried> earlier) {
+  tried_[best_of_].taken = true;
+  std::erase_if(earlier, [&](TrainingRecord::Tried& one) {
+    one.taken = false;
+    return std::ranges::find(tried_, one.what, &TrainingRecord::Tried::what) != tried_.end();
+  });
+  best_.record.tried = std::move(earlier);
+  best_.record.tried.insert(best_.record.tried.end(), tried_.begin(), tried_.end());
+  return std::move(best_);
+}
+
+}  // namespace kpsa::engine

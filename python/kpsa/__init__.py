@@ -1,0 +1,17 @@
+"""Evaluates character rigs: YAML on glTF characters, exactly or by trained subspaces.
+
+    import kpsa
+    rig = kpsa.load("face.yaml")
+    scene = rig.scene()
+    scene.set("jaw.rotateX", -20)
+    xyz = scene.points("head_mesh")  # float32 [V, 3], world space, metres
+"""
+from ._kpsa import (Clip, Control, Error, Library, Mesh, Problem, Rig, Scene, TrainingReport, Verdict,
+                    __version__)
+
+__all__ = ["Clip", "Control", "Error", "Library", "Mesh", "Problem", "Rig", "Scene", "TrainingReport", "Verdict", "load"]
+
+
+def load(path, *, variant=None, fps=None, plugins=True):
+    """A rig (.yaml) or a character (.glb, .gltf, .vrm), with the standard node types."""
+    return Library().load(str(path), variant=variant, fps=fps, plugins=plugins)

@@ -1,0 +1,310 @@
+// The Python module, over the public face alone: the same nouns, NumPy arrays for points, exceptions for problems.
+// Evaluation, training and loading run without the interpreter's lock.
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <atomic>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "kpsa/kpsa.h"
+
+namespace py = pybind11;
+
+namespace {
+
+using Floats = py::array_t<float, py::array::c_style>;
+
+// kpsa.Error, which holds the problems.
+py::object& ErrorType() {
+  static auto* const type = new py::object;
+  return *type;
+}
+
+[[noreturn]] void Raise(const kpsa::Problems& problems) {
+  const py::object error = ErrorType()(kpsa::ToText(problems));
+  error.attr("problems") = problems;
+  const kpsa::Problem& first = problems.front();
+  error.attr("file") = first.file, error.attr("line") = first.line, error.attr("node") = first.node;
+  PyErr_SetObject(ErrorType().ptr(), error.ptr());
+  throw py::error_already_set();
+}
+
+// Runs without the interpreter's lock; raises what went wrong.
+template <typename F>
+auto Checked(F&& f) {
+  auto result = [&] {
+    const py::gil_scoped_release release;
+    return f();
+  }();
+  if (!result) Raise(result.problems());
+  return std::move(*result);
+}
+
+// [rows, 3] of float32 that a caller gave, or a new one.
+Floats Target(const py::object& out, std::vector<py::ssize_t> shape) {
+  if (out.is_none()) return Floats(shape);
+  if (!py::isinstance<Floats>(out)) throw py::type_error("out: expected a C-contiguous array of float32");
+  Floats array = py::reinterpret_borrow<Floats>(out);
+  bool fits = array.ndim() == static_cast<py::ssize_t>(shape.size());
+  for (std::size_t d = 0; fits && d < shape.size(); ++d) fits = array.shape(static_cast<py::ssize_t>(d)) == shape[d];
+  if (!fits || !array.writeable()) {
+    std::string text;
+    for (const py::ssize_t size : shape) text += (text.empty() ? "" : ", ") + std::to_string(size);
+    throw py::value_error("out: expected a writeable array of shape (" + text + ")");
+  }
+  return array;
+}
+
+struct PyVerdict {  // a row of the structured array of verdicts
+  bool hit;
+  float full_share;
+  double score;
+};
+
+Floats Points(kpsa::Scene& scene, const std::string& mesh, const py::object& out) {
+  const auto points = Checked([&] { return scene.Points(mesh); });
+  Floats array = Target(out, {static_cast<py::ssize_t>(points.size() / 3), 3});
+  std::memcpy(array.mutable_data(), points.data(), points.size_bytes());
+  return array;
+}
+
+py::object Values(kpsa::Scene& scene, const std::string& plug) {
+  const std::vector<double> values = Checked([&] { return scene.Values(plug); });
+  if (values.size() == 1) return py::float_(values[0]);
+  py::array_t<double> array(static_cast<py::ssize_t>(values.size()), values.data());
+  if (values.size() != 16) return std::move(array);
+  // Column by column there, rows first here, as NumPy's matrices are
+  return array.reshape({4, 4}).attr("T").attr("copy")();
+}
+
+py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py::object& out, int threads,
+                const py::object& progress) {
+  const auto meshes = scene.rig().meshes();
+  const auto count = static_cast<py::ssize_t>(seconds.size());
+  py::dict arrays;
+  std::vector<float*> to;
+  for (const kpsa::MeshInfo& mesh : meshes) {
+    const py::str name(mesh.name);
+    const py::object given = out.is_none() ? out : py::object(out.attr("get")(name));
+    Floats array = Target(given, {count, static_cast<py::ssize_t>(mesh.vertices), 3});
+    to.push_back(array.mutable_data());
+    arrays[name] = std::move(array);
+  }
+  py::array_t<PyVerdict> verdicts(scene.rig().is_accelerated() ? count : 0);
+  PyVerdict* const verdict = verdicts.mutable_data();
+  std::atomic<bool> cancel = false;
+  bool raised = false;  // by `progress`, or by a signal
+  py::object error_type, error_value, error_trace;
+  Checked([&] {
+    const auto done = scene.Frames(
+        seconds,
+        [&](const kpsa::Frame& frame) {
+          for (std::size_t m = 0; m < frame.points.size(); ++m)
+            std::memcpy(to[m] + frame.index * frame.points[m].size(), frame.points[m].data(), frame.points[m].size_bytes());
+          if (frame.verdict != nullptr)
+            verdict[frame.index] = {frame.verdict->hit, static_cast<float>(frame.verdict->full_share), frame.verdict->score};
+          if (progress.is_none()) return true;
+          const py::gil_scoped_acquire lock;
+          try {
+            const py::object go_on = progress(frame.index + 1);
+            return go_on.is_none() || go_on.cast<bool>();
+          } catch (py::error_already_set& error) {
+            error.restore();
+            PyErr_Fetch(&error_type.ptr(), &error_value.ptr(), &error_trace.ptr());
+            raised = true;
+            return false;
+          }
+        },
+        {.threads = threads, .cancel = &cancel});
+    return done;
+  });
+  if (raised) {
+    PyErr_Restore(error_type.release().ptr(), error_value.release().ptr(), error_trace.release().ptr());
+    throw py::error_already_set();
+  }
+  arrays["verdicts"] = std::move(verdicts);
+  return arrays;
+}
+
+kpsa::TrainingReport Train(const kpsa::Rig& rig, const std::string& subspace, const std::string& entry,
+                           std::optional<std::size_t> samples, std::optional<double> tolerance,
+                           std::optional<double> violation_rate, std::vector<std::string> clips, std::uint64_t seed,
+                           std::optional<double> seconds, int threads, bool paper, const py::object& progress) {
+  kpsa::TrainingOptions options;
+  options.entry = entry;
+  options.samples = samples;
+  options.tolerance = tolerance, options.violation_rate = violation_rate;
+  options.clips = std::move(clips);
+  options.seed = seed;
+  if (seconds.has_value()) options.seconds = *seconds;
+  options.threads = threads;
+  options.paper = paper;
+  bool raised = false;
+  PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
+  options.progress = [&](std::string_view what, double share) {
+    const py::gil_scoped_acquire lock;
+    try {
+      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+      if (progress.is_none()) return true;
+      const py::object go_on = progress(std::string(what), share);
+      return go_on.is_none() || go_on.cast<bool>();
+    } catch (py::error_already_set& error) {
+      error.restore();
+      PyErr_Fetch(&type, &value, &trace);
+      raised = true;
+      return false;
+    }
+  };
+  auto result = [&] {
+    const py::gil_scoped_release release;
+    return rig.Train(options, subspace);
+  }();
+  if (raised) {
+    PyErr_Restore(type, value, trace);
+    throw py::error_already_set();
+  }
+  if (!result) Raise(result.problems());
+  return *result;
+}
+
+template <typename T>
+std::vector<T> ListOf(std::span<const T> items) {
+  return {items.begin(), items.end()};
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_kpsa, m) {
+  m.doc() = "Evaluates character rigs (see the package kpsa).";
+  m.attr("__version__") = std::string(kpsa::Version());
+
+  ErrorType() = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
+      "kpsa.Error", "What was asked for could not be done; `problems` says all that is wrong, `file`, `line` and `node` of the first.",
+      PyExc_RuntimeError, nullptr));
+  m.attr("Error") = ErrorType();
+
+  py::class_<kpsa::Problem>(m, "Problem", "One thing that is wrong.")
+      .def_property_readonly("kind",
+                             [](const kpsa::Problem& p) {
+                               constexpr const char* kNames[] = {"usage", "input", "evaluation", "failed check", "interrupted"};
+                               return kNames[static_cast<int>(p.kind)];
+                             })
+      .def_readonly("file", &kpsa::Problem::file)
+      .def_readonly("line", &kpsa::Problem::line, "counted from 1; 0: unknown")
+      .def_readonly("column", &kpsa::Problem::column)
+      .def_readonly("node", &kpsa::Problem::node)
+      .def_readonly("message", &kpsa::Problem::message)
+      .def("__repr__", [](const kpsa::Problem& p) { return "<Problem " + kpsa::ToText({p}) + ">"; });
+
+  py::class_<kpsa::ControlInfo>(m, "Control", "A plug that animators move, in the units of the rig's file.")
+      .def_readonly("name", &kpsa::ControlInfo::name)
+      .def_readonly("min", &kpsa::ControlInfo::min)
+      .def_readonly("max", &kpsa::ControlInfo::max)
+      .def_readonly("value", &kpsa::ControlInfo::value, "at rest")
+      .def_readonly("si", &kpsa::ControlInfo::si, "metres, radians or seconds for one of the file's units")
+      .def("__repr__", [](const kpsa::ControlInfo& c) {
+        return py::str("<Control {} [{:g}, {:g}]>").format(c.name, c.min, c.max);
+      });
+  py::class_<kpsa::ClipInfo>(m, "Clip")
+      .def_readonly("name", &kpsa::ClipInfo::name)
+      .def_readonly("begin", &kpsa::ClipInfo::begin, "seconds")
+      .def_readonly("end", &kpsa::ClipInfo::end, "seconds")
+      .def("__repr__", [](const kpsa::ClipInfo& c) { return py::str("<Clip {} {:g}..{:g} s>").format(c.name, c.begin, c.end); });
+  py::class_<kpsa::MeshInfo>(m, "Mesh")
+      .def_readonly("name", &kpsa::MeshInfo::name)
+      .def_readonly("vertices", &kpsa::MeshInfo::vertices)
+      .def_readonly("stages", &kpsa::MeshInfo::stages, "of its deformer stack")
+      .def_property_readonly(
+          "triangles",
+          [](const py::object& self) {  // no copy: the array keeps the mesh alive
+            const auto& mesh = self.cast<const kpsa::MeshInfo&>();
+            py::array_t<std::uint32_t> array({static_cast<py::ssize_t>(mesh.triangles.size() / 3), py::ssize_t{3}},
+                                             mesh.triangles.data(), self);
+            array.attr("flags").attr("writeable") = false;
+            return array;
+          },
+          "uint32 [N, 3]: vertices")
+      .def("__repr__", [](const kpsa::MeshInfo& c) { return py::str("<Mesh {} {} vertices>").format(c.name, c.vertices); });
+  py::class_<kpsa::Verdict>(m, "Verdict", "What SoftCache said of a frame.")
+      .def_readonly("hit", &kpsa::Verdict::hit)
+      .def_readonly("full_share", &kpsa::Verdict::full_share, "of the full evaluation: 0 a hit, 1 a miss, a blend in between")
+      .def_readonly("score", &kpsa::Verdict::score, "below 1: like the training")
+      .def_readonly("reason", &kpsa::Verdict::reason)
+      .def("__repr__", [](const kpsa::Verdict& v) { return py::str("<Verdict {} {:g}>").format(v.reason, v.score); });
+  py::class_<kpsa::TrainingReport>(m, "TrainingReport")
+      .def_readonly("subspace", &kpsa::TrainingReport::subspace, "the file that was written")
+      .def_readonly("points", &kpsa::TrainingReport::points)
+      .def_readonly("cues", &kpsa::TrainingReport::cues)
+      .def_readonly("modes", &kpsa::TrainingReport::modes)
+      .def_readonly("held_out_rms", &kpsa::TrainingReport::held_out_rms, "metres")
+      .def_readonly("held_out_max", &kpsa::TrainingReport::held_out_max, "metres")
+      .def_readonly("tolerance", &kpsa::TrainingReport::tolerance, "metres")
+      .def_readonly("hit_rate", &kpsa::TrainingReport::hit_rate, "expected of frames like those of the clips")
+      .def_readonly("warning", &kpsa::TrainingReport::warning);
+
+  PYBIND11_NUMPY_DTYPE(PyVerdict, hit, full_share, score);
+
+  py::class_<kpsa::Rig>(m, "Rig", "A loaded rig. Immutable; threads may share it.")
+      .def_property_readonly("path", [](const kpsa::Rig& r) { return r.path(); })
+      .def_property_readonly("fps", &kpsa::Rig::fps)
+      .def_property_readonly("controls", [](const kpsa::Rig& r) { return ListOf(r.controls()); })
+      .def_property_readonly("clips", [](const kpsa::Rig& r) { return ListOf(r.clips()); })
+      .def_property_readonly("meshes", [](const kpsa::Rig& r) { return ListOf(r.meshes()); }, "those that are shown")
+      .def_property_readonly("notes", [](const kpsa::Rig& r) { return ListOf(r.notes()); }, "what may surprise")
+      .def_property_readonly("is_accelerated", &kpsa::Rig::is_accelerated)
+      .def(
+          "accelerated",
+          [](const kpsa::Rig& r, const std::string& subspace, std::optional<double> tolerance,
+             std::optional<double> violation_rate, bool stale_is_miss) {
+            return Checked([&] { return r.Accelerated({subspace, tolerance, violation_rate, stale_is_miss}); });
+          },
+          py::arg("subspace") = "", py::kw_only(), py::arg("tolerance") = py::none(),
+          py::arg("violation_rate") = py::none(), py::arg("stale_is_miss") = false,
+          "The rig whose accelerated points come from subspaces (\"\": those that it names). tolerance: metres.")
+      .def("train", &Train, py::arg("subspace") = "", py::kw_only(), py::arg("entry") = "",
+           py::arg("samples") = py::none(), py::arg("tolerance") = py::none(), py::arg("violation_rate") = py::none(),
+           py::arg("clips") = std::vector<std::string>(), py::arg("seed") = 1, py::arg("seconds") = py::none(),
+           py::arg("threads") = 0, py::arg("paper") = false, py::arg("progress") = py::none(),
+           "Trains a subspace and writes it to a .kpsa file. progress(what, share) is called on the way; False cancels.")
+      .def("scene", [](const kpsa::Rig& r) { return kpsa::Scene(r); }, "A state of the rig, at rest.");
+
+  py::class_<kpsa::Scene>(m, "Scene", "A state of a rig: a clip, a time, controls. Used by one thread at a time.")
+      .def(py::init<const kpsa::Rig&>(), py::arg("rig"))
+      .def_property_readonly("rig", [](const kpsa::Scene& s) { return s.rig(); })
+      .def("play", [](kpsa::Scene& s, const std::optional<std::string>& clip) { Checked([&] { return s.Play(clip); }); },
+           py::arg("clip"), "Lets a clip drive the character; None: the rest pose.")
+      .def("set_time", &kpsa::Scene::SetTime, py::arg("seconds"))
+      .def("set", [](kpsa::Scene& s, const std::string& plug, double value) { Checked([&] { return s.Set(plug, value); }); },
+           py::arg("plug"), py::arg("value"), "A control, or any other plug that may vary, in the units of the rig's file.")
+      .def(
+          "set",
+          [](kpsa::Scene& s, const std::map<std::string, double>& values) {
+            for (const auto& [plug, value] : values) Checked([&] { return s.Set(plug, value); });
+          },
+          py::arg("values"))
+      .def("reset", &kpsa::Scene::Reset, "All controls at rest.")
+      .def("points", &Points, py::arg("mesh"), py::arg("out") = py::none(),
+           "float32 [V, 3], metres: \"head_mesh\", or up to a stage, \"head_mesh@skin\". Into `out`, if it is given.")
+      .def("values", &Values, py::arg("plug"), "A number, an array of three or four, or a matrix [4, 4].")
+      .def_property_readonly("verdict", [](kpsa::Scene& s) { return s.verdict(); }, "of the latest points()")
+      .def("frames", &Frames, py::arg("seconds"), py::arg("out") = py::none(), py::kw_only(), py::arg("threads") = 0,
+           py::arg("progress") = py::none(),
+           "Frames of the clip that plays, on many threads: a dict of float32 [T, V, 3] by mesh, and \"verdicts\", an array "
+           "of (hit, full_share, score). Into the arrays of `out`, if they are given. progress(frames): False ends it.");
+
+  py::class_<kpsa::Library>(m, "Library", "The node types that rigs are made of.")
+      .def(py::init<>())
+      .def("add_plugin", [](kpsa::Library& l, const std::string& path) { Checked([&] { return l.AddPlugin(path); }); }, py::arg("path"))
+      .def(
+          "load",
+          [](const kpsa::Library& l, const std::string& path, const std::optional<std::string>& variant,
+             std::optional<double> fps, bool plugins) {
+            return Checked([&] { return l.Load(path, {variant, fps, plugins}); });
+          },
+          py::arg("path"), py::kw_only(), py::arg("variant") = py::none(), py::arg("fps") = py::none(),
+          py::arg("plugins") = true, "A rig (.yaml) or a character (.glb, .gltf, .vrm).");
+}

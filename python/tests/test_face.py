@@ -1,0 +1,147 @@
+"""The module as a TD uses it. KPSA_SCENES is the folder of bundled rigs."""
+import os
+import pathlib
+import shutil
+import threading
+
+import numpy as np
+import pytest
+
+import kpsa
+
+SCENES = pathlib.Path(os.environ["KPSA_SCENES"])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("hello")
+    for name in ("hello.yaml", "hello.glb"):
+        shutil.copy(SCENES / "hello" / name, place)
+    return place
+
+
+@pytest.fixture(scope="module")
+def rig(folder):
+    return kpsa.load(folder / "hello.yaml")
+
+
+@pytest.fixture(scope="module")
+def fast(rig):
+    seen = []
+    report = rig.train(samples=200, progress=lambda what, share: seen.append((what, share)))
+    assert report.cues > 0 and report.points > 0 and 0 < report.hit_rate <= 1
+    assert os.path.exists(report.subspace)
+    assert len({what for what, _ in seen}) >= 3
+    return rig.accelerated()
+
+
+def test_what_a_rig_has(rig):
+    assert [c.name for c in rig.controls] == ["upper.rotateX", "upper.rotateZ"]
+    assert rig.controls[1].min == pytest.approx(-75)
+    assert "wave" in [c.name for c in rig.clips]
+    (mesh,) = rig.meshes
+    assert mesh.triangles.dtype == np.uint32 and mesh.triangles.shape[1] == 3
+    assert mesh.triangles.max() < mesh.vertices
+    with pytest.raises(ValueError):
+        mesh.triangles[0, 0] = 1
+    assert kpsa.__version__
+
+
+def test_sets_and_pulls(rig):
+    scene = rig.scene()
+    rest = scene.points("column")
+    assert rest.dtype == np.float32 and rest.shape == (rig.meshes[0].vertices, 3)
+    scene.set("upper.rotateZ", -60)
+    bent = scene.points("column")
+    assert np.abs(bent - rest).max() > 0.001
+    assert scene.values("upper.rotateZ") == pytest.approx(-60)
+    matrix = scene.values("upper.worldMatrix")
+    assert matrix.shape == (4, 4) and matrix[3] == pytest.approx([0, 0, 0, 1])
+    scene.reset()
+    assert (scene.points("column") == rest).all()
+    scene.set({"upper.rotateZ": -60, "upper.rotateX": 0})
+    assert (scene.points("column") == bent).all()
+
+
+def test_points_go_into_the_callers_buffer(rig):
+    scene = rig.scene()
+    out = np.empty((rig.meshes[0].vertices, 3), np.float32)
+    assert scene.points("column", out) is out or np.shares_memory(scene.points("column", out), out)
+    assert (out == scene.points("column")).all()
+    with pytest.raises(ValueError, match="shape"):
+        scene.points("column", np.empty((3, 3), np.float32))
+    with pytest.raises(TypeError):
+        scene.points("column", np.empty(out.shape, np.float64))
+
+
+def test_errors_say_where(rig, tmp_path):
+    (tmp_path / "bad.yaml").write_text("kpsa: 1\ncharacter: none.glb\nnodes:\n  a: {type: latice}\n")
+    with pytest.raises(kpsa.Error) as error:
+        kpsa.load(tmp_path / "bad.yaml")
+    assert error.value.file.endswith("bad.yaml") and error.value.line == 2
+    assert error.value.problems[0].kind == "input"
+    scene = rig.scene()
+    with pytest.raises(kpsa.Error, match="rotateZ"):
+        scene.set("upper.rotatez", 1)
+    with pytest.raises(kpsa.Error, match="did you mean"):
+        scene.points("colum")
+    with pytest.raises(kpsa.Error, match="no such file"):
+        rig.accelerated("none.kpsa")
+
+
+def test_frames_are_the_same_on_any_number_of_threads(fast):
+    scene = fast.scene()
+    scene.play("wave")
+    seconds = np.arange(25) / fast.fps
+    one, three = scene.frames(seconds, threads=1), scene.frames(seconds, threads=3)
+    assert one["column"].shape == (25, fast.meshes[0].vertices, 3)
+    assert (one["column"] == three["column"]).all()
+    assert (one["verdicts"] == three["verdicts"]).all()
+    assert one["verdicts"]["hit"].sum() > 12
+    scene.set_time(seconds[7])
+    assert (scene.points("column") == one["column"][7]).all()
+    assert scene.verdict.hit == one["verdicts"]["hit"][7]
+    out = {"column": np.empty_like(one["column"])}
+    scene.frames(seconds, out)
+    assert (out["column"] == one["column"]).all()
+
+
+def test_progress_may_end_or_raise(rig, fast, tmp_path):
+    scene = fast.scene()
+    scene.play("wave")
+    seconds = np.arange(25) / fast.fps
+    seen = []
+    scene.frames(seconds, threads=1, progress=lambda done: seen.append(done) or len(seen) < 3)
+    assert seen == [1, 2, 3]
+
+    def fail(*_):
+        raise KeyError("mine")
+
+    with pytest.raises(KeyError):
+        scene.frames(seconds, progress=fail)
+    with pytest.raises(KeyError):
+        rig.train(str(tmp_path / "no.kpsa"), samples=50, progress=fail)
+    with pytest.raises(kpsa.Error) as error:
+        rig.train(str(tmp_path / "no.kpsa"), samples=50, progress=lambda *_: False)
+    assert error.value.problems[0].kind == "interrupted"
+    assert not (tmp_path / "no.kpsa").exists()
+
+
+def test_scenes_on_threads_share_a_rig(rig):
+    expected = rig.scene()
+    expected.set("upper.rotateZ", -40)
+    expected = expected.points("column")
+    got = [None] * 4
+
+    def work(k):
+        scene = rig.scene()
+        for angle in range(41):
+            scene.set("upper.rotateZ", -angle)
+            got[k] = scene.points("column")
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all((points == expected).all() for points in got)

@@ -1,0 +1,74 @@
+// Names within templates: what a template's own lines call `hand` is the node `arm_L:hand`
+// (rig/file/templates.h).
+#include "rig/build/rig_build.h"
+#include "rig/file/words.h"
+
+namespace kpsa::engine {
+namespace {
+
+bool TakesPlugs(const AttributeDef& attribute) {
+  return (IsSmallType(attribute.type) && attribute.type != Type::kEnum) || IsPointType(attribute.type);
+}
+
+}  // namespace
+
+// The text with the prefix of the innermost scope that has a node of this name: up to the end, or what
+// follows a node's name in plugs and places.
+std::string RigBuild::InScope(const std::string& text, int source) const {
+  for (int s = source; s >= 0; s = file_->sources[static_cast<std::size_t>(s)].outer) {
+    const std::string& scope = file_->sources[static_cast<std::size_t>(s)].scope;
+    if (scope.empty()) break;
+    const std::string name = scope + text;
+    for (std::size_t end = name.size(); end != std::string::npos && end > scope.size();
+         end = name.find_last_of(".[@", end - 1)) {
+      if (written_.count(name.substr(0, end)) != 0) return name;
+    }
+  }
+  return text;
+}
+
+void RigBuild::InScope(YamlNode* value, int source) const {
+  if (value->is_scalar()) value->scalar = InScope(value->scalar, source);
+  if (value->is_sequence()) {
+    for (YamlNode& item : value->items) InScope(&item, source);
+  }
+}
+
+void RigBuild::ResolveScopes() {
+  const auto scoped = [&](int source) {
+    return !file_->sources[static_cast<std::size_t>(source)].scope.empty();
+  };
+  for (RigNode& node : file_->nodes) {
+    const NodeDef* def = graph().registry().Find(node.type);
+    if (!scoped(node.source) || def == nullptr) continue;
+    for (RigAttribute& attribute : node.attributes) {
+      if (IsRigWord(*def, attribute.name)) {
+        if (attribute.name == "parent" || attribute.name == "at" || attribute.name == "curve" ||
+            attribute.name == "falloffs" || (attribute.name == "falloff" && attribute.value.is_scalar()))
+          InScope(&attribute.value, attribute.source);
+        if (attribute.name != "falloff" || !attribute.value.is_map()) continue;
+        for (std::size_t i = 0; i < attribute.value.keys.size(); ++i) {
+          if (attribute.value.keys[i].scalar == "at") InScope(&attribute.value.items[i], attribute.source);
+        }
+        continue;
+      }
+      const std::string name = attribute.name.substr(0, attribute.name.find_first_of("[."));
+      int number = def->FindAttribute(name);
+      if (number < 0 && name.size() > 1) number = def->FindAttribute(name.substr(0, name.size() - 1));
+      if (number >= 0 && TakesPlugs(def->attributes[static_cast<std::size_t>(number)]))
+        InScope(&attribute.value, attribute.source);
+    }
+  }
+  for (RigConnection& connection : file_->connections) {
+    connection.from = InScope(connection.from, connection.source);
+    connection.to = InScope(connection.to, connection.source);
+  }
+  for (RigDeform& deform : file_->deform) {
+    for (RigString& deformer : deform.stack) deformer.text = InScope(deformer.text, deformer.source);
+    if (deform.points.has_value()) deform.points->text = InScope(deform.points->text, deform.points->source);
+  }
+  for (RigControl& control : file_->controls)
+    control.plug.text = InScope(control.plug.text, control.plug.source);
+}
+
+}  // namespace kpsa::engine
