@@ -106,6 +106,13 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool dele
   }
   if (plug.attribute < 0) {
     std::vector<std::string> names = n.def->AttributeNames();
+    if (!attribute.empty() &&
+        std::string_view("xyzwXYZW").find(attribute.back()) != std::string_view::npos) {  // rotatex: rotateX
+      for (const AttributeDef& a : n.def->attributes) {
+        const int components = a.type == Type::kDouble3 ? 3 : a.type == Type::kQuaternion ? 4 : 0;
+        for (int c = 0; c < components; ++c) names.push_back(a.name + "XYZW"[c]);
+      }
+    }
     for (NodeId delegate : delegates ? n.delegates : std::vector<NodeId>()) {
       if (!IsAlive(delegate)) continue;
       Result<PlugRef> found = FindAttribute(delegate, text, false);

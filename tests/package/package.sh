@@ -29,7 +29,7 @@ cmp readme.cpp program/look.cpp
 
 # Errors reach the program, with their places
 if program-ON/embed hello.yaml upper.rotatez -60 wave 2> error.txt; then exit 1; fi
-grep -q "upper.rotateZ" error.txt
+grep -q "did you mean \"rotateZ\"" error.txt
 
 # The plugin of the tests, against the headers that were installed
 ${CXX:-c++} -std=c++20 -fPIC -shared -I installed/include/kpsa/plugin "$source/tests/plugin/wobble.cpp" -o wobble.so
