@@ -8,6 +8,7 @@
 #include "base/simd.h"
 #include "cli/command.h"
 #include "cli/common.h"
+#include "host/version.h"
 
 namespace kpsa::engine {
 namespace {
@@ -81,7 +82,7 @@ int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vecto
 int Main(int argc, char** argv) {
   InstallInterruptHandler();
   CLI::App program("kpsa: a runtime for character rigs, with Key Point Subspace Acceleration", "kpsa");
-  program.set_version_flag("--version", "kpsa " KPSA_VERSION);
+  program.set_version_flag("--version", [] { return VersionText(); });
   program.set_help_flag("-h,--help", "this help");
   program.require_subcommand(0, 1);
   Command chosen;

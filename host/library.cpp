@@ -1,5 +1,6 @@
 #include "kpsa/library.h"
 
+#include "base/simd.h"
 #include "host/face_impl.h"
 #include "host/problems.h"
 #include "kpsa/kpsa_node.h"
@@ -7,9 +8,8 @@
 
 namespace kpsa {
 
-std::string_view Version() { return KPSA_VERSION; }
-
 Library::Impl::Impl() {
+  static const std::string simd = engine::ApplySimdChoice();  // once, before the first kernel runs
   engine::AddStandardNodes(registry);
   engine::AddKpsaNode(registry);
 }

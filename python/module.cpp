@@ -50,7 +50,8 @@ Floats Target(const py::object& out, std::vector<py::ssize_t> shape) {
   if (!py::isinstance<Floats>(out)) throw py::type_error("out: expected a C-contiguous array of float32");
   Floats array = py::reinterpret_borrow<Floats>(out);
   bool fits = array.ndim() == static_cast<py::ssize_t>(shape.size());
-  for (std::size_t d = 0; fits && d < shape.size(); ++d) fits = array.shape(static_cast<py::ssize_t>(d)) == shape[d];
+  for (std::size_t d = 0; fits && d < shape.size(); ++d)
+    fits = array.shape(static_cast<py::ssize_t>(d)) == shape[d];
   if (!fits || !array.writeable()) {
     std::string text;
     for (const py::ssize_t size : shape) text += (text.empty() ? "" : ", ") + std::to_string(size);
@@ -100,26 +101,28 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
   bool raised = false;  // by `progress`, or by a signal
   py::object error_type, error_value, error_trace;
   Checked([&] {
-    const auto done = scene.Frames(
-        seconds,
-        [&](const kpsa::Frame& frame) {
-          for (std::size_t m = 0; m < frame.points.size(); ++m)
-            std::memcpy(to[m] + frame.index * frame.points[m].size(), frame.points[m].data(), frame.points[m].size_bytes());
-          if (frame.verdict != nullptr)
-            verdict[frame.index] = {frame.verdict->hit, static_cast<float>(frame.verdict->full_share), frame.verdict->score};
-          if (progress.is_none()) return true;
-          const py::gil_scoped_acquire lock;
-          try {
-            const py::object go_on = progress(frame.index + 1);
-            return go_on.is_none() || go_on.cast<bool>();
-          } catch (py::error_already_set& error) {
-            error.restore();
-            PyErr_Fetch(&error_type.ptr(), &error_value.ptr(), &error_trace.ptr());
-            raised = true;
-            return false;
-          }
-        },
-        {.threads = threads, .cancel = &cancel});
+    const auto done = scene.Frames(seconds,
+                                   [&](const kpsa::Frame& frame) {
+                                     for (std::size_t m = 0; m < frame.points.size(); ++m)
+                                       std::memcpy(to[m] + frame.index * frame.points[m].size(),
+                                                   frame.points[m].data(), frame.points[m].size_bytes());
+                                     if (frame.verdict != nullptr)
+                                       verdict[frame.index] = {frame.verdict->hit,
+                                                               static_cast<float>(frame.verdict->full_share),
+                                                               frame.verdict->score};
+                                     if (progress.is_none()) return true;
+                                     const py::gil_scoped_acquire lock;
+                                     try {
+                                       const py::object go_on = progress(frame.index + 1);
+                                       return go_on.is_none() || go_on.cast<bool>();
+                                     } catch (py::error_already_set& error) {
+                                       error.restore();
+                                       PyErr_Fetch(&error_type.ptr(), &error_value.ptr(), &error_trace.ptr());
+                                       raised = true;
+                                       return false;
+                                     }
+                                   },
+                                   {.threads = threads, .cancel = &cancel});
     return done;
   });
   if (raised) {
@@ -132,8 +135,9 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
 
 kpsa::TrainingReport Train(const kpsa::Rig& rig, const std::string& subspace, const std::string& entry,
                            std::optional<std::size_t> samples, std::optional<double> tolerance,
-                           std::optional<double> violation_rate, std::vector<std::string> clips, std::uint64_t seed,
-                           std::optional<double> seconds, int threads, bool paper, const py::object& progress) {
+                           std::optional<double> violation_rate, std::vector<std::string> clips,
+                           std::uint64_t seed, std::optional<double> seconds, int threads, bool paper,
+                           const py::object& progress) {
   kpsa::TrainingOptions options;
   options.entry = entry;
   options.samples = samples;
@@ -182,17 +186,20 @@ PYBIND11_MODULE(_kpsa, m) {
   m.doc() = "Evaluates character rigs (see the package kpsa).";
   m.attr("__version__") = std::string(kpsa::Version());
 
-  ErrorType() = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
-      "kpsa.Error", "What was asked for could not be done; `problems` says all that is wrong, `file`, `line` and `node` of the first.",
-      PyExc_RuntimeError, nullptr));
+  ErrorType() = py::reinterpret_steal<py::object>(
+      PyErr_NewExceptionWithDoc("kpsa.Error",
+                                "What was asked for could not be done; `problems` says all that is wrong, "
+                                "`file`, `line` and `node` of the first.",
+                                PyExc_RuntimeError, nullptr));
   m.attr("Error") = ErrorType();
 
   py::class_<kpsa::Problem>(m, "Problem", "One thing that is wrong.")
-      .def_property_readonly("kind",
-                             [](const kpsa::Problem& p) {
-                               constexpr const char* kNames[] = {"usage", "input", "evaluation", "failed check", "interrupted"};
-                               return kNames[static_cast<int>(p.kind)];
-                             })
+      .def_property_readonly(
+          "kind",
+          [](const kpsa::Problem& p) {
+            constexpr const char* kNames[] = {"usage", "input", "evaluation", "failed check", "interrupted"};
+            return kNames[static_cast<int>(p.kind)];
+          })
       .def_readonly("file", &kpsa::Problem::file)
       .def_readonly("line", &kpsa::Problem::line, "counted from 1; 0: unknown")
       .def_readonly("column", &kpsa::Problem::column)
@@ -213,7 +220,9 @@ PYBIND11_MODULE(_kpsa, m) {
       .def_readonly("name", &kpsa::ClipInfo::name)
       .def_readonly("begin", &kpsa::ClipInfo::begin, "seconds")
       .def_readonly("end", &kpsa::ClipInfo::end, "seconds")
-      .def("__repr__", [](const kpsa::ClipInfo& c) { return py::str("<Clip {} {:g}..{:g} s>").format(c.name, c.begin, c.end); });
+      .def("__repr__", [](const kpsa::ClipInfo& c) {
+        return py::str("<Clip {} {:g}..{:g} s>").format(c.name, c.begin, c.end);
+      });
   py::class_<kpsa::MeshInfo>(m, "Mesh")
       .def_readonly("name", &kpsa::MeshInfo::name)
       .def_readonly("vertices", &kpsa::MeshInfo::vertices)
@@ -222,19 +231,24 @@ PYBIND11_MODULE(_kpsa, m) {
           "triangles",
           [](const py::object& self) {  // no copy: the array keeps the mesh alive
             const auto& mesh = self.cast<const kpsa::MeshInfo&>();
-            py::array_t<std::uint32_t> array({static_cast<py::ssize_t>(mesh.triangles.size() / 3), py::ssize_t{3}},
-                                             mesh.triangles.data(), self);
+            py::array_t<std::uint32_t> array(
+                {static_cast<py::ssize_t>(mesh.triangles.size() / 3), py::ssize_t{3}}, mesh.triangles.data(),
+                self);
             array.attr("flags").attr("writeable") = false;
             return array;
           },
           "uint32 [N, 3]: vertices")
-      .def("__repr__", [](const kpsa::MeshInfo& c) { return py::str("<Mesh {} {} vertices>").format(c.name, c.vertices); });
+      .def("__repr__", [](const kpsa::MeshInfo& c) {
+        return py::str("<Mesh {} {} vertices>").format(c.name, c.vertices);
+      });
   py::class_<kpsa::Verdict>(m, "Verdict", "What SoftCache said of a frame.")
       .def_readonly("hit", &kpsa::Verdict::hit)
-      .def_readonly("full_share", &kpsa::Verdict::full_share, "of the full evaluation: 0 a hit, 1 a miss, a blend in between")
+      .def_readonly("full_share", &kpsa::Verdict::full_share,
+                    "of the full evaluation: 0 a hit, 1 a miss, a blend in between")
       .def_readonly("score", &kpsa::Verdict::score, "below 1: like the training")
       .def_readonly("reason", &kpsa::Verdict::reason)
-      .def("__repr__", [](const kpsa::Verdict& v) { return py::str("<Verdict {} {:g}>").format(v.reason, v.score); });
+      .def("__repr__",
+           [](const kpsa::Verdict& v) { return py::str("<Verdict {} {:g}>").format(v.reason, v.score); });
   py::class_<kpsa::TrainingReport>(m, "TrainingReport")
       .def_readonly("subspace", &kpsa::TrainingReport::subspace, "the file that was written")
       .def_readonly("points", &kpsa::TrainingReport::points)
@@ -253,33 +267,51 @@ PYBIND11_MODULE(_kpsa, m) {
       .def_property_readonly("fps", &kpsa::Rig::fps)
       .def_property_readonly("controls", [](const kpsa::Rig& r) { return ListOf(r.controls()); })
       .def_property_readonly("clips", [](const kpsa::Rig& r) { return ListOf(r.clips()); })
-      .def_property_readonly("meshes", [](const kpsa::Rig& r) { return ListOf(r.meshes()); }, "those that are shown")
-      .def_property_readonly("notes", [](const kpsa::Rig& r) { return ListOf(r.notes()); }, "what may surprise")
+      .def_property_readonly(
+          "meshes", [](const kpsa::Rig& r) { return ListOf(r.meshes()); }, "those that are shown")
+      .def_property_readonly(
+          "notes", [](const kpsa::Rig& r) { return ListOf(r.notes()); }, "what may surprise")
       .def_property_readonly("is_accelerated", &kpsa::Rig::is_accelerated)
       .def(
           "accelerated",
           [](const kpsa::Rig& r, const std::string& subspace, std::optional<double> tolerance,
              std::optional<double> violation_rate, bool stale_is_miss) {
-            return Checked([&] { return r.Accelerated({subspace, tolerance, violation_rate, stale_is_miss}); });
+            return Checked([&] {
+              return r.Accelerated({subspace, tolerance, violation_rate, stale_is_miss});
+            });
           },
           py::arg("subspace") = "", py::kw_only(), py::arg("tolerance") = py::none(),
           py::arg("violation_rate") = py::none(), py::arg("stale_is_miss") = false,
-          "The rig whose accelerated points come from subspaces (\"\": those that it names). tolerance: metres.")
+          "The rig whose accelerated points come from subspaces (\"\": those that it names). tolerance: "
+          "metres.")
       .def("train", &Train, py::arg("subspace") = "", py::kw_only(), py::arg("entry") = "",
-           py::arg("samples") = py::none(), py::arg("tolerance") = py::none(), py::arg("violation_rate") = py::none(),
-           py::arg("clips") = std::vector<std::string>(), py::arg("seed") = 1, py::arg("seconds") = py::none(),
-           py::arg("threads") = 0, py::arg("paper") = false, py::arg("progress") = py::none(),
-           "Trains a subspace and writes it to a .kpsa file. progress(what, share) is called on the way; False cancels.")
-      .def("scene", [](const kpsa::Rig& r) { return kpsa::Scene(r); }, "A state of the rig, at rest.");
+           py::arg("samples") = py::none(), py::arg("tolerance") = py::none(),
+           py::arg("violation_rate") = py::none(), py::arg("clips") = std::vector<std::string>(),
+           py::arg("seed") = 1, py::arg("seconds") = py::none(), py::arg("threads") = 0,
+           py::arg("paper") = false, py::arg("progress") = py::none(),
+           "Trains a subspace and writes it to a .kpsa file. progress(what, share) is called on the way; "
+           "False cancels.")
+      .def(
+          "scene", [](const kpsa::Rig& r) { return kpsa::Scene(r); }, "A state of the rig, at rest.");
 
-  py::class_<kpsa::Scene>(m, "Scene", "A state of a rig: a clip, a time, controls. Used by one thread at a time.")
+  py::class_<kpsa::Scene>(m, "Scene",
+                          "A state of a rig: a clip, a time, controls. Used by one thread at a time.")
       .def(py::init<const kpsa::Rig&>(), py::arg("rig"))
       .def_property_readonly("rig", [](const kpsa::Scene& s) { return s.rig(); })
-      .def("play", [](kpsa::Scene& s, const std::optional<std::string>& clip) { Checked([&] { return s.Play(clip); }); },
-           py::arg("clip"), "Lets a clip drive the character; None: the rest pose.")
+      .def(
+          "play",
+          [](kpsa::Scene& s, const std::optional<std::string>& clip) {
+            Checked([&] { return s.Play(clip); });
+          },
+          py::arg("clip"), "Lets a clip drive the character; None: the rest pose.")
       .def("set_time", &kpsa::Scene::SetTime, py::arg("seconds"))
-      .def("set", [](kpsa::Scene& s, const std::string& plug, double value) { Checked([&] { return s.Set(plug, value); }); },
-           py::arg("plug"), py::arg("value"), "A control, or any other plug that may vary, in the units of the rig's file.")
+      .def(
+          "set",
+          [](kpsa::Scene& s, const std::string& plug, double value) {
+            Checked([&] { return s.Set(plug, value); });
+          },
+          py::arg("plug"), py::arg("value"),
+          "A control, or any other plug that may vary, in the units of the rig's file.")
       .def(
           "set",
           [](kpsa::Scene& s, const std::map<std::string, double>& values) {
@@ -288,17 +320,24 @@ PYBIND11_MODULE(_kpsa, m) {
           py::arg("values"))
       .def("reset", &kpsa::Scene::Reset, "All controls at rest.")
       .def("points", &Points, py::arg("mesh"), py::arg("out") = py::none(),
-           "float32 [V, 3], metres: \"head_mesh\", or up to a stage, \"head_mesh@skin\". Into `out`, if it is given.")
+           "float32 [V, 3], metres: \"head_mesh\", or up to a stage, \"head_mesh@skin\". Into `out`, if it "
+           "is given.")
       .def("values", &Values, py::arg("plug"), "A number, an array of three or four, or a matrix [4, 4].")
-      .def_property_readonly("verdict", [](kpsa::Scene& s) { return s.verdict(); }, "of the latest points()")
-      .def("frames", &Frames, py::arg("seconds"), py::arg("out") = py::none(), py::kw_only(), py::arg("threads") = 0,
-           py::arg("progress") = py::none(),
-           "Frames of the clip that plays, on many threads: a dict of float32 [T, V, 3] by mesh, and \"verdicts\", an array "
-           "of (hit, full_share, score). Into the arrays of `out`, if they are given. progress(frames): False ends it.");
+      .def_property_readonly(
+          "verdict", [](kpsa::Scene& s) { return s.verdict(); }, "of the latest points()")
+      .def("frames", &Frames, py::arg("seconds"), py::arg("out") = py::none(), py::kw_only(),
+           py::arg("threads") = 0, py::arg("progress") = py::none(),
+           "Frames of the clip that plays, on many threads: a dict of float32 [T, V, 3] by mesh, and "
+           "\"verdicts\", an array "
+           "of (hit, full_share, score). Into the arrays of `out`, if they are given. progress(frames): "
+           "False ends it.");
 
   py::class_<kpsa::Library>(m, "Library", "The node types that rigs are made of.")
       .def(py::init<>())
-      .def("add_plugin", [](kpsa::Library& l, const std::string& path) { Checked([&] { return l.AddPlugin(path); }); }, py::arg("path"))
+      .def(
+          "add_plugin",
+          [](kpsa::Library& l, const std::string& path) { Checked([&] { return l.AddPlugin(path); }); },
+          py::arg("path"))
       .def(
           "load",
           [](const kpsa::Library& l, const std::string& path, const std::optional<std::string>& variant,

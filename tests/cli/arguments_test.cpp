@@ -201,7 +201,10 @@ TEST(Arguments, HelpAndFirstMinutes) {
     EXPECT_NE(one.out.find("Examples:"), std::string::npos) << name;
     EXPECT_EQ(one.err, "") << name;
   }
-  EXPECT_EQ(RunKpsa({"--version"}).out.substr(0, 5), "kpsa ");
+  const ProcessResult version = RunKpsa({"--version"});
+  EXPECT_EQ(version.out.substr(0, 5), "kpsa ");
+  for (const char* part : {"compiled by ", "vector unit in use: ", "Eigen 3.", "Embree 3."})
+    EXPECT_NE(version.out.find(part), std::string::npos) << version.out;
 }
 
 }  // namespace
