@@ -1,4 +1,4 @@
-// Weight maps as JSON files (RIG-FORMAT.md, "Weight maps"):
+// Weight maps as JSON files (docs/rig-format.md, "Weight maps"):
 //   {"kpsa": "weights", "version": 1, "mesh": "head_mesh", "points": 17121,
 //    "maps": {"upper": {"default": 0, "indices": [4, 7], "values": [0.5, 1]}}}
 #pragma once

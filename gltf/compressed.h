@@ -1,6 +1,6 @@
 // Compressed geometry of a glTF document: buffer views of EXT_meshopt_compression and primitives of
 // KHR_draco_mesh_compression. What they decode to becomes further buffers, views and accessors of the
-// document, so that its readers see plain ones. Nothing outside io/gltf_*.cpp includes this.
+// document, so that its readers see plain ones. Nothing outside gltf/ includes this.
 //
 // The decoders trust no count: what a few bytes may decode to is limited before anything is allocated.
 #pragma once

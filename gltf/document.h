@@ -1,5 +1,5 @@
 // Inside of the glTF reader: a document whose structure was checked, its buffers, and its accessors.
-// Nothing outside io/gltf_*.cpp includes this.
+// Nothing outside gltf/ includes this.
 #pragma once
 
 #include <cstdint>

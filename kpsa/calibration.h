@@ -1,7 +1,7 @@
 // The SoftCache threshold from a tolerance in scene units. A frame violates if it is accepted although a
 // point of what is emitted, blends included, is farther than the tolerance from the exact result. Calibration
 // poses are of several kinds (PoseKind); among those whose thresholds satisfy all of the following, the
-// largest is taken (KPSA.md 2.11):
+// largest is taken:
 //   of each kind, the rate of violations is at most alpha with 90 % confidence (exact binomial bound),
 //   of all, the same of 2 alpha among hits, and (violations + 1) <= 2 alpha (hits + 1); of each kind that has
 //   any among what is accepted, since violations are counted there: beyond the ranges most of that is blends;

@@ -1,4 +1,4 @@
-// Misses that cost a part (KPSA.md 2.5). The points of a subspace lie in patches, consecutive tiles of an
+// Misses that cost a part. The points of a subspace lie in patches, consecutive tiles of an
 // output. Where the doubts of tiles judge, a patch that is too doubtful is evaluated fully, with a border
 // over which it goes over into what is reconstructed; the rest is reconstructed. Neighbouring patches share
 // what deformers ask for about them, so regions of one, two, four... of them are evaluated as is cheapest.

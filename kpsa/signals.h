@@ -36,7 +36,7 @@ struct SignalEntry {
 SignalEntry SplitEntryName(const std::string& name);
 
 // The world matrices of transforms that enter steps with points under `varying`, sorted by name: cues that a
-// skinCluster is linear in, as it is not in local matrices, which multiply along a chain (KPSA.md 2.12); and
+// skinCluster is linear in, as it is not in local matrices, which multiply along a chain; and
 // the first that stands still, since relative to a space that moves it does not. No guards. Errors as of
 // FindSignals.
 Result<std::vector<Signal>> FindRelativeMatrices(const Graph& graph, Compiler* compiler,

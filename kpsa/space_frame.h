@@ -1,4 +1,4 @@
-// The frame that a subspace lives in (KPSA.md 2.10): the rigid part of a transform's world matrix, times the
+// The frame that a subspace lives in: the rigid part of a transform's world matrix, times the
 // uniform scale that has come above it since the rest pose. Points of the frame are in metres as at rest,
 // whatever stands above: an armature of scale 100 is part of the rest pose, and is divided out.
 #pragma once

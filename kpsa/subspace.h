@@ -112,7 +112,7 @@ struct Subspace {
   // Tiles have cues of their own, and their doubts alone judge: SoftCache's own score speaks of all points,
   // and would say of no part that it misses.
   bool by_tile() const { return doubt_inputs() > 0 && soft_cache.factor.size() == 0; }
-  std::string rig_hash;          // what it was trained on (KPSA.md, section 3)
+  std::string rig_hash;          // what it was trained on
   std::string units = "m";       // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
   std::string space;             // "" world or mesh space, else the joint
   Matrix4 inverse_rest_stretch;  // of the space (kpsa/space_frame.h)

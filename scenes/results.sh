@@ -181,7 +181,7 @@ and took turns with the full evaluation in one run.
 
 The clip is \`talk\`. A key point behind a deltaMush needs all points around it, so key points of the output drag in much of the mesh: paper
 mode has no advantage here. The default measures before it, and where that does not tell enough, a few points behind it, too: the car's and the
-animal's cues cost most of their frames (docs/architecture.md).
+animal's cues cost most of their frames (docs/decisions/15-worst-output-points-as-cues.md).
 
 END
   cat "$work/main.md"

@@ -1,7 +1,7 @@
 // Loads a rig, turns a control and says what moved; then trains a subspace and plays a clip with it.
 //
 //   embed RIG CONTROL VALUE CLIP
-//   embed hello.yaml bend.rotateZ 20 wave
+//   embed hello.yaml upper.rotateZ -60 wave
 #include <kpsa/kpsa.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Which transforms carry the accelerated points rigidly with their space, so that no guard need watch them
-// (KPSA.md 2.10). Being an ancestor of the space is not enough: points that weigh on joints off its chain,
+// Which transforms carry the accelerated points rigidly with their space, so that no guard need watch them.
+// Being an ancestor of the space is not enough: points that weigh on joints off its chain,
 // and deformers that act in the world's axes, see it move. Internal to training.
 #pragma once
 

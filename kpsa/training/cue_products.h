@@ -1,4 +1,4 @@
-// Products of scalars as cues (KPSA.md 2.12). A skinned, sculpted mesh is nearly linear in the entries of the
+// Products of scalars as cues. A skinned, sculpted mesh is nearly linear in the entries of the
 // world matrices relative to the space, in weights and in values; what is left is mostly a product of two of
 // them (a shape that acts before the skin, a combination), or begins where one passes a knot (an in-between,
 // a clamp). Measured as cues of their own, they take the place of points, which cost a part of the stack.

@@ -1,5 +1,5 @@
 // Which score tells poses beyond the tolerance best: SoftCache's own, which knows how unlike the trained
-// poses a measurement is, or the doubt of the tiles, which knows how far the shape bends (KPSA.md 2.13), or
+// poses a measurement is, or the doubt of the tiles, which knows how far the shape bends, or
 // both.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Cues of each tile alone (KPSA.md 2.13, pieces 3 and 4), instead of some for all points: a tile is nearly
+// Cues of each tile alone, instead of some for all points: a tile is nearly
 // linear in the world matrices of the joints that move it, and in a few values; what these leave is told by
 // points before the deformers that spread (a deltaMush), near the tile. All of these, and the tile itself,
 // are taken relative to the space of the points, or to the joint that carries the tile: there little is left

@@ -1,4 +1,4 @@
-// Products of the latents of a tile (KPSA.md 2.13): a deformer stack is nearly linear in what cues measure,
+// Products of the latents of a tile: a deformer stack is nearly linear in what cues measure,
 // and what the linear map leaves is mostly quadratic. z = V y_J are the latents of the tile, its strongest
 // motions; the first of them, whitened and clipped, are multiplied in pairs, and a ridge regression on the
 // products p fits what the tile is off by: x = mean + U (z + W p).

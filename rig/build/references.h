@@ -1,4 +1,4 @@
-// Inside of the rig builder: rigs within rigs, and what their characters play. Nothing outside io/rig_*.cpp
+// Inside of the rig builder: rigs within rigs, and what their characters play. Nothing outside rig/build
 // includes this.
 //
 // A referenced rig is loaded as if it stood alone, at rest, and then taken over as a whole: its graph under a

@@ -1,4 +1,4 @@
-// Inside of the rig builder: the steps from RigFile to Rig. Nothing outside io/rig_*.cpp includes this.
+// Inside of the rig builder: the steps from RigFile to Rig. Nothing outside rig/build includes this.
 #pragma once
 
 #include <deque>
@@ -52,17 +52,17 @@ class RigBuild {
   };
   using Places = std::vector<Double3>;
 
-  // rig_scopes.cpp: names within templates
+  // scopes.cpp: names within templates
   std::string InScope(const std::string& text, int source) const;
   void InScope(YamlNode* value, int source) const;
   void ResolveScopes();
 
-  // rig_clips.cpp: clips of the rig's own
+  // clips.cpp: clips of the rig's own
   void AddClips();
   void AddLayer(const RigClip& clip, const RigClipLayer& from, LayeredClip* to, double* end);
   std::vector<bool> MaskedNodes(const RigClipLayer& layer);
 
-  // rig_nodes.cpp: nodes, their values, overrides
+  // nodes.cpp: nodes, their values, overrides
   void ApplySpecialOverrides();
   void InOwnNames(YamlNode* value, int source) const;
   RigAttribute SpecialOf(const std::string& key, const RigOverride& override_) const;
@@ -75,7 +75,7 @@ class RigBuild {
   void FinishOverrides();
   void CheckVariants();
 
-  // rig_shapes.cpp: targets, combinations and in-betweens of blend shapes, blend weights of skins
+  // shapes.cpp: targets, combinations and in-betweens of blend shapes, blend weights of skins
   bool TakeOwnSpecial(const RigOverride& override_);
   void NameTargets(const Made& made);
   void AddShapeRules(Made* made);
@@ -86,7 +86,7 @@ class RigBuild {
   void SetBlendWeights(Made* made);
   void SetInfluences(Made* made);
 
-  // rig_places.cpp: parents, handles, curves
+  // places.cpp: parents, handles, curves
   void AddCurves();
   void ConnectParents();
   void PlaceHandles();
@@ -99,7 +99,7 @@ class RigBuild {
   bool HangUnderReference(const Made& made, const YamlNode& at);
   Matrix4 LocalAtRest(NodeId transform) const;
 
-  // rig_connect.cpp: connections, names
+  // connect.cpp: connections, names
   void ConnectCurves();
   std::optional<NodeId> FindCurve(const YamlNode& name);
   void MakeConnections();
@@ -112,7 +112,7 @@ class RigBuild {
   std::optional<std::size_t> FindMesh(const std::string& name, const SourceLocation& where);
   std::optional<NodeId> FindTransform(const std::string& name, const SourceLocation& where);
 
-  // rig_constraints.cpp: constraints and IK
+  // constraints.cpp: constraints and IK
   struct NamedTransform {
     NodeId id;
     std::string name;
@@ -144,7 +144,7 @@ class RigBuild {
                  const SourceLocation& where);
   void ConstrainPole(const Made& made, const std::string& name, const SourceLocation& where);
 
-  // rig_deform.cpp: stacks
+  // deform.cpp: stacks
   void BuildStacks();
   void BuildMeshStack(const RigDeform& deform, std::size_t mesh, bool any_morphs);
   void BuildPointsStack(const RigDeform& deform);
@@ -155,7 +155,7 @@ class RigBuild {
   PointBufferPtr PointsToDeform(const PlugRef& plug, const RigString& name, Matrix4* world_from_points);
   PointBufferPtr RegularGrid(const PlugRef& plug, const RigString& name);
 
-  // rig_drivers.cpp: meshes that drive others
+  // drivers.cpp: meshes that drive others
   static const char* SpaceName(bool world) { return world ? "world space" : "mesh space (before the skin)"; }
   void ConnectDrivers();
   void ConnectDriver(const Made& made, const RigAttribute& driver);
@@ -165,7 +165,7 @@ class RigBuild {
   void SplitStage(const std::string& text, std::string* mesh, std::string* stage) const;
   const Stage* FindStage(const CharacterMesh& mesh, const std::string& stage, const SourceLocation& where);
 
-  // rig_spaces.cpp: how stages before a skin lie in the world at rest
+  // spaces.cpp: how stages before a skin lie in the world at rest
   void PlaceStages();
   void PlaceStagesAtHandles();
   std::optional<Places> HandlePlaces(const Made& made);
@@ -173,7 +173,7 @@ class RigBuild {
   void SetWorldFromStage(Made* made, std::size_t geometry, const Matrix4& world_from_stage);
   bool BoxOfMembers(Made* lattice, const SourceLocation& where, Matrix4* world_from_box);
 
-  // rig_members.cpp: members, weights
+  // members.cpp: members, weights
   void SetWeights(Made* made);
   void NoteWeights(const Made& made, const RigAttribute& key, const std::string& geometry,
                    const std::string& path = "", const std::string& map = "");
@@ -195,7 +195,7 @@ class RigBuild {
   Index VertexCount(const Geometry& of) const;
   Index PointOf(const Geometry& of, Index vertex) const;
 
-  // rig_falloffs.cpp: falloffs, evaluated at rest; false after an error
+  // falloffs.cpp: falloffs, evaluated at rest; false after an error
   bool MultiplyByFalloff(const RigAttribute& attribute, const Made& made, const Geometry& of,
                          std::vector<float>* weights);
   using Falloff = std::optional<std::vector<double>>;  // by point, 0 to 1; none: says nothing of this mesh
@@ -216,12 +216,12 @@ class RigBuild {
   void PlaceFalloffs();
   bool FitsDriver(NodeId falloff, const Made& deformer);
 
-  // rig_lights.cpp: what illuminations see
+  // lights.cpp: what illuminations see
   void ConnectLights();
   std::optional<NodeId> FindWithOutputs(const YamlNode& name, std::initializer_list<const char*> outputs,
                                         const char* what);
 
-  // rig_request.cpp: controls and acceleration
+  // request.cpp: controls and acceleration
   void AddControls();
   void AddAccelerations();
 

@@ -1,4 +1,4 @@
-// From a rig file and its character to a graph that can be compiled: everything of RIG-FORMAT.md is looked
+// From a rig file and its character to a graph that can be compiled: everything of docs/rig-format.md is looked
 // up, typed, checked and connected here. A .glb or .gltf alone is a rig, too: what it says is the default
 // graph.
 #pragma once

@@ -1,4 +1,4 @@
-// The channels of a clip, gathered by the node that they move. Inside of io/.
+// The channels of a clip, gathered by the node that they move. Inside of rig/character.
 #pragma once
 
 #include <map>

@@ -1,5 +1,5 @@
 // A rig file in its canonical form: what is written, in one way of writing it. Sections come in the order of
-// RIG-FORMAT.md, one entry a line in braces where it fits, else in blocks of two spaces; strings are quoted
+// docs/rig-format.md, one entry a line in braces where it fits, else in blocks of two spaces; strings are quoted
 // where YAML needs it, numbers of numeric attributes are in their shortest form. Comments are lost.
 #pragma once
 

@@ -1,4 +1,4 @@
-// A rig file (RIG-FORMAT.md, version 1) as plain data, its includes merged in and its templates expanded.
+// A rig file (docs/rig-format.md, version 1) as plain data, its includes merged in and its templates expanded.
 // Names are not looked up and values of attributes are not typed yet: that takes a registry and a character
 // (rig/build/rig_builder.h), which also reads the files of `references`.
 #pragma once

@@ -179,7 +179,7 @@ TEST(Estimator, WhiteningGivesUnitCovariance) {
   EXPECT_TRUE(e.whitening.isLowerTriangular(0.0));
 }
 
-// KPSA.md, 2.1: the choice and the estimator of this project against the rule of the paper, same number of
+// the choice and the estimator of this project against the rule of the paper, same number of
 // points.
 TEST(Estimator, MapOfAnOptimalChoiceBeatsVarimaxAndLeastSquares) {
   const Fixture s(600, 40, 400, {.max_modes = 120});
