@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "graph/frames.h"
+#include "graph/profile.h"
 #include "host/decisions.h"
 #include "host/face_impl.h"
 #include "host/mesh_stage.h"
@@ -278,6 +279,27 @@ const kpsa::Verdict& Scene::verdict() {
       return impl_->verdict;
   }
   return impl_->verdict = VerdictOf(*impl_->playing, *impl_->evaluator);
+}
+
+kpsa::Result<std::vector<StepTime>> Scene::Profile(std::span<const double> seconds) {
+  if (const engine::Status status = impl_->Ensure(); !status.ok()) return engine::ProblemsOf(status);
+  const engine::Plan& plan = *impl_->plan;
+  engine::Evaluator evaluator(impl_->plan);
+  engine::Profile profile(plan);
+  impl_->Apply(evaluator);
+  evaluator.Record(&profile);
+  for (const double time : seconds) {
+    impl_->SetTime(evaluator, time);
+    if (const engine::Status status = evaluator.Evaluate(); !status.ok()) return engine::ProblemsOf(status);
+  }
+  std::vector<StepTime> steps;
+  for (engine::Index s = 0; s < plan.steps().size(); ++s) {
+    const std::size_t ran = profile.counts()[s];
+    steps.push_back({plan.step_name(s), plan.step_type(s), plan.step_label(s), ran, plan.infos()[s].points,
+                     1e-6 * static_cast<double>(profile.self_ns()[s])});
+  }
+  std::ranges::stable_sort(steps, std::ranges::greater(), &StepTime::milliseconds);
+  return steps;
 }
 
 kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,

@@ -34,6 +34,15 @@ struct Frame {
   const Verdict* verdict = nullptr;  // null where nothing is accelerated
 };
 
+// What one step of the plan cost over the frames of a Scene::Profile, dearest first.
+struct StepTime {
+  std::string node, type;  // of the node that it evaluates
+  std::string label;       // "" for the node itself; "gather", "assemble": what brings its inputs together
+  std::size_t evaluations = 0;  // how often it ran
+  std::size_t points = 0;       // that it computes each time
+  double milliseconds = 0;      // all of them together
+};
+
 struct FrameOptions {
   int threads = 0;  // 0: all
   const std::atomic<bool>* cancel =
@@ -68,6 +77,9 @@ class Scene {
   Result<std::vector<double>> Values(std::string_view plug);
   // Of the latest Points(); hit is false and the reason empty where nothing is accelerated.
   const Verdict& verdict();
+
+  // What evaluating the scene's meshes at these times costs, on this thread; the scene's own time stays.
+  Result<std::vector<StepTime>> Profile(std::span<const double> seconds);
 
   // Frames of the clip that plays, with the controls as they are set, on many threads; handed over in order,
   // one call at a time, on any of the threads. `take` returns false to end it. The scene's own time stays.

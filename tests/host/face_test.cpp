@@ -1,6 +1,4 @@
 // The public face: what a program sees that includes nothing but kpsa/kpsa.h.
-#include "kpsa/kpsa.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "kpsa/kpsa.h"
 #include "tests/support/temporary_folder.h"
 
 namespace {
@@ -58,7 +57,8 @@ class Face : public testing::Test {
   static double Apart(const std::vector<float>& a, const std::vector<float>& b) {
     EXPECT_EQ(a.size(), b.size());
     double worst = 0;
-    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i) worst = std::max(worst, std::abs(double{a[i]} - b[i]));
+    for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+      worst = std::max(worst, std::abs(double{a[i]} - b[i]));
     return worst;
   }
   // The only problem of a failed result.
@@ -88,7 +88,8 @@ TEST_F(Face, SaysWhatARigHas) {
   EXPECT_NEAR(bend.min, -75, 1e-9);
   EXPECT_EQ(bend.unit, kpsa::ControlInfo::Unit::kAngle);
   EXPECT_NEAR(bend.si, std::acos(-1) / 180, 1e-15);
-  EXPECT_TRUE(std::ranges::any_of(rig_->clips(), [](const auto& clip) { return clip.name == "wave" && clip.end > 0; }));
+  EXPECT_TRUE(std::ranges::any_of(rig_->clips(),
+                                  [](const auto& clip) { return clip.name == "wave" && clip.end > 0; }));
   EXPECT_NE(rig_->FindMesh("column"), nullptr);
   EXPECT_EQ(rig_->FindMesh("colum"), nullptr);
   EXPECT_FALSE(kpsa::Version().empty());
@@ -141,17 +142,20 @@ TEST_F(Face, ErrorsAreValuesWithPlaces) {
   folder.Write("bad.yaml", "kpsa: 1\ncharacter: none.glb\nnodes:\n  a: {type: latice}\n");
   const auto bad = Library().Load(folder.path() + "/bad.yaml");
   ASSERT_FALSE(bad);
-  EXPECT_NE(kpsa::ToText(bad.problems()).find("bad.yaml:2"), std::string::npos) << kpsa::ToText(bad.problems());
+  EXPECT_NE(kpsa::ToText(bad.problems()).find("bad.yaml:2"), std::string::npos)
+      << kpsa::ToText(bad.problems());
   Scene scene(*rig_);
   EXPECT_NE(Failed(scene.Set("upper.rotatez", 1)).message.find("rotateZ"), std::string::npos);
-  EXPECT_NE(Failed(scene.Set("upper.rotate", 1)).message.find("expected one number of it"), std::string::npos);
+  EXPECT_NE(Failed(scene.Set("upper.rotate", 1)).message.find("expected one number of it"),
+            std::string::npos);
   EXPECT_NE(Failed(scene.Set("mush.iterations", 1)).message.find("structural"), std::string::npos);
   EXPECT_NE(Failed(scene.Set("mush.envelope", 3)).message.find("outside of"), std::string::npos);
   EXPECT_NE(Failed(scene.Set("upper.rotateZ", std::nan(""))).message.find("finite"), std::string::npos);
   EXPECT_NE(Failed(scene.Set("cage.points[0,2,0].x", 0)).message.find("driven by"), std::string::npos);
   EXPECT_NE(Failed(scene.Points("colum")).message.find("did you mean \"column\""), std::string::npos);
   EXPECT_FALSE(scene.Values("column.nothing"));
-  EXPECT_NE(Failed(rig_->Accelerated({.subspace = Path("none.kpsa")})).message.find("no such file"), std::string::npos);
+  EXPECT_NE(Failed(rig_->Accelerated({.subspace = Path("none.kpsa")})).message.find("no such file"),
+            std::string::npos);
   EXPECT_FALSE(rig_->Accelerated({.tolerance = -1}));
   EXPECT_FALSE(rig_->Train({.entry = "colum"}));
   EXPECT_FALSE(rig_->Train({.violation_rate = 2}));
@@ -183,7 +187,56 @@ TEST_F(Face, PlaysAcceleratedAndSaysWhatItDid) {
   ASSERT_TRUE(full.Set("mush.envelope", 0.5));
   EXPECT_EQ(Pull(&accelerated), Pull(&full));
   EXPECT_FALSE(accelerated.verdict().hit);
-  EXPECT_NE(accelerated.verdict().reason.find("mush.envelope"), std::string::npos) << accelerated.verdict().reason;
+  EXPECT_NE(accelerated.verdict().reason.find("mush.envelope"), std::string::npos)
+      << accelerated.verdict().reason;
+}
+
+TEST_F(Face, GraphsAreEditedInACopy) {
+  // A node of the registry, driven by a control, that deforms the mesh after its own stack
+  const auto edited = rig_->Edited([](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {
+    if (auto done = edit.AddNode("cluster", "lift"); !done) return done;
+    if (auto done = edit.AddNode("unitConversion", "half"); !done) return done;
+    if (auto done = edit.Set("half.conversionFactor", 0.5); !done) return done;
+    if (auto done = edit.Connect("upper.poseRotateZ", "half.input"); !done) return done;
+    if (auto done = edit.Set("mush.iterations", 3); !done) return done;
+    return edit.Deform("column", "lift");
+  });
+  ASSERT_TRUE(edited) << kpsa::ToText(edited.problems());
+  EXPECT_EQ(edited->meshes()[0].stages, (std::vector<std::string>{"skin", "cage", "mush", "lift"}));
+  EXPECT_EQ(rig_->meshes()[0].stages.size(), 3u);
+  Scene scene(*edited), plain(*rig_);
+  for (Scene* one : {&scene, &plain}) ASSERT_TRUE(one->Set("upper.rotateZ", -60));
+  EXPECT_GT(Apart(Pull(&scene), Pull(&plain)), 1e-6) << "three iterations are not ten";
+  ASSERT_TRUE(scene.Values("half.output"));
+  EXPECT_NEAR(std::abs((*scene.Values("half.output"))[0]), std::acos(-1) / 6, 1e-6);
+
+  const auto refused = [&](auto edit) { return kpsa::ToText(rig_->Edited(edit).problems()); };
+  EXPECT_NE(refused([](kpsa::GraphEdit& e) { return e.AddNode("clutser", "x"); }).find("cluster"),
+            std::string::npos);
+  EXPECT_NE(refused([](kpsa::GraphEdit& e) { return e.Deform("colum", "mush"); }).find("column"),
+            std::string::npos);
+  EXPECT_NE(refused([](kpsa::GraphEdit& e) { return e.Deform("column", "squeeze"); }).find("no deformer"),
+            std::string::npos);
+  EXPECT_NE(refused([](kpsa::GraphEdit& e) {
+              return e.Connect("squeeze.outValue", "squeeze.input");
+            }).find("cycle"),
+            std::string::npos);
+  EXPECT_NE(refused([](kpsa::GraphEdit& e) { return e.Set("mush.envelope", 7); }).find("outside of"),
+            std::string::npos);
+}
+
+TEST_F(Face, ProfilesSayWhatItCosts) {
+  Scene scene(*rig_);
+  ASSERT_TRUE(scene.Play("wave"));
+  const auto steps = scene.Profile(std::vector<double>{0.1, 0.2, 0.3});
+  ASSERT_TRUE(steps) << kpsa::ToText(steps.problems());
+  const auto mush = std::ranges::find_if(
+      *steps, [](const auto& step) { return step.node == "mush" && step.label.empty(); });
+  ASSERT_NE(mush, steps->end());
+  EXPECT_EQ(mush->type, "deltaMush");
+  EXPECT_EQ(mush->evaluations, 3u);
+  EXPECT_GT(mush->points, 100u);
+  EXPECT_TRUE(std::ranges::is_sorted(*steps, std::ranges::greater(), &kpsa::StepTime::milliseconds));
 }
 
 TEST_F(Face, FramesAreTheSameOnAnyNumberOfThreads) {

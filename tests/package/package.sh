@@ -23,10 +23,6 @@ cmp said-OFF.txt said-ON.txt
 grep -q "upper.rotateZ = -60 moves [1-9][0-9]* of [1-9][0-9]* vertices of column" said-ON.txt
 grep -q "wave: [1-9][0-9]* of 25 frames hit" said-ON.txt
 
-# What the README shows is this program, word for word
-sed -n '/^#include <kpsa\/kpsa.h>/,/^```/p' "$source/README.md" | sed '$d' > readme.cpp
-cmp readme.cpp program/look.cpp
-
 # Errors reach the program, with their places
 if program-ON/embed hello.yaml upper.rotatez -60 wave 2> error.txt; then exit 1; fi
 grep -q "did you mean \"rotateZ\"" error.txt
