@@ -17,9 +17,8 @@ struct Digest {
   std::string ToHex() const;  // 32 digits
 };
 
-// Feeds bytes in and gives their digest. Two different sequences of Add calls over the same bytes give the
-// same digest for raw bytes; strings and spans are fed with their length, so that ("ab","c") and ("a","bc")
-// differ.
+// Feeds bytes in and gives their digest. Every call begins a word of 8 bytes, so the same bytes in other calls
+// give another digest; strings and spans are fed with their length, so that ("ab","c") and ("a","bc") differ.
 class Hasher {
  public:
   void AddBytes(const void* data, std::size_t size);

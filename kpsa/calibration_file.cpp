@@ -1,6 +1,7 @@
 #include "kpsa/calibration_file.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "kpsa/pose_kind.h"
 #include "kpsa/subspace_tensors.h"
@@ -78,7 +79,8 @@ Status ReadCalibration(const SafetensorsFile& file, Subspace* s) {
   if (!calibration.ok()) return calibration.status();
   for (std::size_t i = 0; i + 3 < calibration->size(); i += 4) {
     const std::span<const double> row(calibration->data() + i, 4);
-    const int kind = row[3] >= 0 && row[3] < kPoseKinds ? static_cast<int>(row[3]) : -1;  // refused below
+    const bool known = row[3] >= 0 && row[3] < kPoseKinds && row[3] == std::floor(row[3]);
+    const int kind = known ? static_cast<int>(row[3]) : -1;  // refused below
     s->calibration.push_back({row[0], row[1], row[2], kind});
   }
   if (file.tensors().contains(kNearClips)) {

@@ -68,7 +68,8 @@ struct SoftCacheModel {
   AlignedArray<float>
       factor;  // F: for every 4 rows their groups of 16 columns (map: up to the diagonal), 4 x 16 each
   std::vector<float>
-      leave_one_out;  // blocks ([G^-1]_ii)^-1, h x h each, one after the other (map mode; else empty)
+      leave_one_out;  // blocks ([G^-1]_ii)^-1, h x h each, one after the other (map mode; else empty); those of
+                      // scalars times the displacement that they stand for
   double quantile1 = 1, quantile2 = 1;  // 99 % training quantiles of the raw scores, > 0
   std::size_t rows() const { return offsets.empty() ? 0 : offsets.back(); }
   std::size_t padded_rows() const { return (rows() + 15) / 16 * 16; }

@@ -88,6 +88,8 @@ Status ValidateSubspace(const Subspace& s) {
         return Status::Invalid("cue {} is a scalar, but names no plug or has 3 rows", k);
     } else if (cue.kind == CueDescription::Kind::kProduct) {
       KPSA_RETURN_IF_ERROR(CheckProduct(cue, k, height));
+    } else if (height != 3) {
+      return Status::Invalid("cue {} is a point, but has {} rows, expected 3", k, height);
     } else if (cue.mesh >= s.outputs.size()) {
       return Status::Invalid("cue {} lies on mesh {}, there are {}", k, cue.mesh, s.outputs.size());
     } else if (cue.point >= s.outputs[cue.mesh].points) {

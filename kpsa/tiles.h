@@ -15,7 +15,7 @@
 // sees the rounding (a "wide" column, stored as two: high and low bytes). The inputs z of the bytes are
 // rounded to 16 bits with a step that follows from the largest of them in this frame, and the sums are exact.
 // V is stored in halfs. Layout of U: panels of 32c rows (32 points' x, then y, z), groups of four byte
-// columns, and the four bytes of a row together, each 128 too large. Everything is read front to back, tile
+// columns (those of a group in the places 0, 2, 1, 3), and the four bytes of a row together, each 128 too large. Everything is read front to back, tile
 // after tile.
 //
 // A tile may have products (kpsa/training/tile_products.h): z = V y_J, its first latents whitened and
@@ -72,10 +72,11 @@ struct TileData {
   AlignedArray<float> mean;       // [panels][32c]
   // Products: nothing, or of every tile; the arrays below hold the tiles that have some, one after the other.
   std::vector<std::uint32_t> products;  // [tiles] P, at most kMaxProducts; 0: none
-  std::vector<std::uint8_t> pairs;      // [P][2] latents below min(k, kLatents), or twice kUnitLatent: the 1
-  AlignedArray<float> whitening;        // [32] what the latents are multiplied by; the scale of the doubt
-  AlignedArray<std::uint16_t> w;        // [P][k16] halfs: z = scale (V y_J + W p)
-  AlignedArray<std::uint16_t> doubt;    // [P][16] halfs: x, y, z of kDoubtPoints points
+  std::vector<std::uint8_t>
+      pairs;                      // [P][2] latents below min(k, kLatents), or kUnitLatent, which stands for 1
+  AlignedArray<float> whitening;  // [32] what the latents are multiplied by; the scale of the doubt
+  AlignedArray<std::uint16_t> w;  // [P][k16] halfs: z = scale (V y_J + W p)
+  AlignedArray<std::uint16_t> doubt;  // [P][16] halfs: x, y, z of kDoubtPoints points
   // Joints: nothing, or of every tile 0, or 1 + the joint whose space it lies in. Of each joint the rows of y
   // that are its matrix, column by column (kpsa/signals.h): entry = mean + deviation y.
   std::vector<std::uint32_t> joints;                // [tiles]

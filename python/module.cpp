@@ -245,7 +245,7 @@ PYBIND11_MODULE(_kpsa, m) {
       .def_readonly("hit", &kpsa::Verdict::hit)
       .def_readonly("full_share", &kpsa::Verdict::full_share,
                     "of the full evaluation: 0 a hit, 1 a miss, a blend in between")
-      .def_readonly("score", &kpsa::Verdict::score, "below 1: like the training")
+      .def_readonly("score", &kpsa::Verdict::score, "the smaller, the more like the training")
       .def_readonly("reason", &kpsa::Verdict::reason)
       .def("__repr__",
            [](const kpsa::Verdict& v) { return py::str("<Verdict {} {:g}>").format(v.reason, v.score); });

@@ -21,7 +21,7 @@ namespace kpsa {
 struct Verdict {
   bool hit = false;       // no deformer of the accelerated stacks ran for all points
   double full_share = 1;  // of the full evaluation in the points: 0 a hit, 1 a miss, a blend in between
-  double score = 0;       // below 1: like the training; infinite where nothing was measured
+  double score = 0;       // the smaller, the more like the training; infinite where nothing was measured
   std::string reason;     // "hit", or why not, in words
 };
 

@@ -412,7 +412,7 @@ class Trainer {
     if (options_.keep_modes) subspace.kept_modes = KeptModesOf(pca_);
     if (options_.keep_modes)
       subspace.modes = subspace.soft_cache.modes = static_cast<std::size_t>(pca_.mode_count());
-    subspace.mode = options_.mode;
+    subspace.mode = subspace.soft_cache.mode;  // paper mode may have fallen back
     subspace.space = rig_.target.space_name;
     subspace.inverse_rest_stretch = inverse_rest_stretch_;
     subspace.extent = of_light() ? 0 : diagonal_;

@@ -340,6 +340,12 @@ TEST_P(SubspaceTest, CuesAreNamedByMeshAndStage) {
             "output \"head@1@mush@2.L\" is not at the stage \"skin\"");
 }
 
+// Three numbers are measured of a point, whatever the file says.
+TEST_P(SubspaceTest, APointHasThreeRows) {
+  subspace_.cues[2] = subspace_.cues[0];  // where a scalar was, which has one
+  EXPECT_EQ(ValidateSubspace(subspace_).ToString(), "cue 2 is a point, but has 1 rows, expected 3");
+}
+
 TEST_P(SubspaceTest, KeptModesAreStoredAndChecked) {
   subspace_.kept_modes = KeptModesOf(pca_);
   ASSERT_TRUE(WriteSubspace(subspace_, path_).ok()) << WriteSubspace(subspace_, path_).ToString();
