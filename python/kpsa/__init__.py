@@ -1,10 +1,10 @@
 """Evaluates character rigs: YAML on glTF characters, exactly or by trained subspaces.
 
     import kpsa
-    rig = kpsa.load("face.yaml")
+    rig = kpsa.load("hello.yaml")
     scene = rig.scene()
-    scene.set("jaw.rotateX", -20)
-    xyz = scene.points("head_mesh")  # float32 [V, 3], world space, metres
+    scene.set("upper.rotateZ", -60)
+    xyz = scene.points("column")  # float32 [V, 3], world space, metres
 """
 from ._kpsa import (Clip, Control, Error, Library, Mesh, Problem, Rig, Scene, TrainingReport, Verdict,
                     __version__)

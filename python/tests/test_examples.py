@@ -43,3 +43,9 @@ def test_they_draw(rig, tmp_path, monkeypatch, name, arguments):
     monkeypatch.setattr(sys, "argv", [name, str(rig), *arguments, "-o", str(picture)])
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
     assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_first_lines(rig, monkeypatch, capsys):
+    monkeypatch.chdir(rig.parent)
+    runpy.run_path(str(EXAMPLES / "look.py"), run_name="__main__")
+    assert "794 vertices" in capsys.readouterr().out
