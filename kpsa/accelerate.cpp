@@ -55,72 +55,90 @@ Status Accelerator::Add(const AccelerationTarget& target, std::shared_ptr<const 
   return Status();
 }
 
+namespace {
+
+// Who reads the points, but for what other accelerated points come from.
+std::vector<std::vector<Connection>> ConsumersOf(const Graph& graph, const AccelerationTarget& target,
+                                                 const std::set<Index>& above) {
+  std::vector<std::vector<Connection>> consumers;
+  for (const PlugRef& output : target.outputs()) {
+    consumers.emplace_back();
+    for (const Connection& c : graph.Outputs(output.node)) {
+      if (c.source == output && above.count(c.destination.node.index) == 0) consumers.back().push_back(c);
+    }
+  }
+  return consumers;
+}
+
+}  // namespace
+
+Result<Accelerated> Accelerator::Rewrite(const Entry& entry, const std::set<Index>& above, Graph* graph) {
+  Status status;
+  const auto note = [&](Status s) { status.Append(std::move(s)); };
+  const AccelerationTarget& target = entry.target;
+  const std::vector<std::vector<Connection>> consumers = ConsumersOf(*graph, target, above);
+  Result<NodeId> node = graph->AddNode("kpsa", entry.node_name);
+  if (!node.ok()) return node.status();
+  const NodeDef& def = graph->def(*node);
+  const auto plug = [&](const char* name, int element = -1) {
+    return PlugRef{*node, def.FindAttribute(name), element, -1};
+  };
+  KpsaConfig::Data data = entry.data;
+  std::vector<PlugRef> cues = entry.cues;
+  if (data.has_space && !data.always_miss) {
+    NearStacks near(graph, target, target.space[0], data.rest_origin);
+    for (std::size_t i = 0; i < cues.size(); ++i) {
+      const std::optional<PlugRef> moved = data.cues[i].in_space ? near.Near(cues[i]) : std::nullopt;
+      if (moved.has_value()) cues[i] = *moved, data.cues[i].near = true;
+    }
+  }
+  const auto config = std::make_shared<const KpsaConfig>(std::move(data));
+  const Subspace& subspace = *config->data().subspace;
+  const AccelerateOptions& options = entry.options;
+  note(graph->Set(plug("config"), Value(AssetPtr(config))));
+  note(graph->Set(plug("tolerance"),
+                  std::min(options.tolerance < 0 ? subspace.tolerance : options.tolerance, kAnyError)));
+  note(graph->Set(plug("violationRate"),
+                  options.violation_rate < 0 ? subspace.violation_rate : options.violation_rate));
+  for (std::size_t i = 0; i < cues.size(); ++i)
+    note(graph->Connect(cues[i], plug("cues", static_cast<int>(i))));
+  for (std::size_t j = 0; j < entry.matrices.size(); ++j)
+    note(graph->Connect(entry.matrices[j].plug, plug("matrices", static_cast<int>(j))));
+  for (std::size_t k = 0; k < entry.scalars.size(); ++k)
+    note(graph->Connect(entry.scalars[k].plug, plug("scalars", static_cast<int>(k))));
+  if (!target.space.empty()) note(graph->Connect(target.space[0], plug("spaceMatrix")));
+  std::vector<std::string> names;
+  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
+    names.push_back(target.meshes[m].name);
+    note(graph->Connect(target.meshes[m].stages.back().points, plug("fullPoints", static_cast<int>(m))));
+  }
+  const std::size_t regions = config->data().patches.empty() ? 0 : subspace.patches.regions.size();
+  for (std::size_t r = 0; r < regions; ++r)
+    note(graph->Connect(target.meshes[subspace.patches.regions[r].output].stages.back().points,
+                        plug("regionPoints", static_cast<int>(r))));
+  graph->SetElementNames(*node, def.FindAttribute("outPoints"), names);
+  for (std::size_t m = 0; m < consumers.size(); ++m) {
+    for (const Connection& c : consumers[m])
+      note(graph->Connect(plug("outPoints", static_cast<int>(m)), c.destination, true));
+  }
+  if (!status.ok()) return status;
+  return Accelerated{*node, config, entry.notes};
+}
+
 Result<std::vector<Accelerated>> Accelerator::Apply() {
   std::vector<PlugRef> points;
   for (const auto& entry : entries_) {
     for (const PlugRef& plug : entry->target.outputs()) points.push_back(plug);
   }
   const std::set<Index> above = NodesAbove(*graph_, points);
+  Graph edited = *graph_;
   std::vector<Accelerated> results;
-  Status status;
-  const auto note = [&](Status s) { status.Append(std::move(s)); };
   for (const auto& entry : entries_) {
-    // Who reads the points, but for what other accelerated points come from
-    const AccelerationTarget& target = entry->target;
-    std::vector<std::vector<Connection>> consumers;
-    for (const PlugRef& output : target.outputs()) {
-      consumers.emplace_back();
-      for (const Connection& c : graph_->Outputs(output.node)) {
-        if (c.source == output && above.count(c.destination.node.index) == 0) consumers.back().push_back(c);
-      }
-    }
-    Result<NodeId> node = graph_->AddNode("kpsa", entry->node_name);
-    if (!node.ok()) return node.status();
-    const NodeDef& def = graph_->def(*node);
-    const auto plug = [&](const char* name, int element = -1) {
-      return PlugRef{*node, def.FindAttribute(name), element, -1};
-    };
-    KpsaConfig::Data data = entry->data;
-    std::vector<PlugRef> cues = entry->cues;
-    if (data.has_space && !data.always_miss) {
-      NearStacks near(graph_, target, target.space[0], data.rest_origin);
-      for (std::size_t i = 0; i < cues.size(); ++i) {
-        const std::optional<PlugRef> moved = data.cues[i].in_space ? near.Near(cues[i]) : std::nullopt;
-        if (moved.has_value()) cues[i] = *moved, data.cues[i].near = true;
-      }
-    }
-    const auto config = std::make_shared<const KpsaConfig>(std::move(data));
-    const Subspace& subspace = *config->data().subspace;
-    const AccelerateOptions& options = entry->options;
-    note(graph_->Set(plug("config"), Value(AssetPtr(config))));
-    note(graph_->Set(plug("tolerance"),
-                     std::min(options.tolerance < 0 ? subspace.tolerance : options.tolerance, kAnyError)));
-    note(graph_->Set(plug("violationRate"),
-                     options.violation_rate < 0 ? subspace.violation_rate : options.violation_rate));
-    for (std::size_t i = 0; i < cues.size(); ++i)
-      note(graph_->Connect(cues[i], plug("cues", static_cast<int>(i))));
-    for (std::size_t j = 0; j < entry->matrices.size(); ++j)
-      note(graph_->Connect(entry->matrices[j].plug, plug("matrices", static_cast<int>(j))));
-    for (std::size_t k = 0; k < entry->scalars.size(); ++k)
-      note(graph_->Connect(entry->scalars[k].plug, plug("scalars", static_cast<int>(k))));
-    if (!target.space.empty()) note(graph_->Connect(target.space[0], plug("spaceMatrix")));
-    std::vector<std::string> names;
-    for (std::size_t m = 0; m < target.meshes.size(); ++m) {
-      names.push_back(target.meshes[m].name);
-      note(graph_->Connect(target.meshes[m].stages.back().points, plug("fullPoints", static_cast<int>(m))));
-    }
-    const std::size_t regions = config->data().patches.empty() ? 0 : subspace.patches.regions.size();
-    for (std::size_t r = 0; r < regions; ++r)
-      note(graph_->Connect(target.meshes[subspace.patches.regions[r].output].stages.back().points,
-                           plug("regionPoints", static_cast<int>(r))));
-    graph_->SetElementNames(*node, def.FindAttribute("outPoints"), names);
-    for (std::size_t m = 0; m < consumers.size(); ++m) {
-      for (const Connection& c : consumers[m])
-        note(graph_->Connect(plug("outPoints", static_cast<int>(m)), c.destination, true));
-    }
-    results.push_back({*node, config, entry->notes});
+    Result<Accelerated> one = Rewrite(*entry, above, &edited);
+    if (!one.ok()) return one.status();
+    results.push_back(std::move(*one));
   }
-  if (!status.ok()) return status;
+  *graph_ = std::move(edited);
   return results;
 }
 

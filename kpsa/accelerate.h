@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -58,11 +59,12 @@ class Accelerator {
   // Errors: a subspace of other meshes or stages, or of a rig that differs (named). The graph is not changed.
   Status Add(const AccelerationTarget& target, std::shared_ptr<const Subspace> subspace,
              const std::string& node_name, const AccelerateOptions& options);
-  // Adds the nodes and connects them; in the order of Add.
+  // Adds the nodes and connects them; in the order of Add. On an error the graph is as it was.
   Result<std::vector<Accelerated>> Apply();
 
  private:
   struct Entry;
+  static Result<Accelerated> Rewrite(const Entry& entry, const std::set<Index>& above, Graph* graph);
   Graph* graph_;
   Compiler* compiler_;
   std::vector<std::shared_ptr<const Entry>> entries_;

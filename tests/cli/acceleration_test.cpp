@@ -6,10 +6,10 @@
 #include <cstring>
 #include <limits>
 
-#include "host/rig_training.h"
 #include "graph/evaluator.h"
-#include "rig/graph_editor.h"
+#include "host/rig_training.h"
 #include "nodes/standard_nodes.h"
+#include "rig/graph_editor.h"
 #include "tests/cli/rig_run.h"
 
 namespace kpsa::engine {
@@ -119,6 +119,29 @@ TEST_F(TrainedRig, ToleranceZeroIsTheExactRigBitForBit) {
     EXPECT_EQ(exact.evaluator->Get<std::int64_t>(1), 0);
     ASSERT_EQ(Points(*full.evaluator), Points(*exact.evaluator)) << frame;
   }
+}
+
+TEST_F(TrainedRig, ARewriteThatFailsChangesNothing) {
+  Rig rig = Load();
+  Compiler compiler;
+  Accelerator accelerator(rig.graph.get(), &compiler);
+  const auto facts = [&] {
+    std::string text;
+    for (const NodeId node : rig.graph->Nodes()) {
+      text += rig.graph->name(node) + ":";
+      for (const Connection& c : rig.graph->Inputs(node))
+        text += rig.graph->PlugName(c.source) + ">" + rig.graph->PlugName(c.destination) + " ";
+    }
+    return text;
+  };
+  const std::string before = facts();
+  // The second one's name is taken by the first, when half of the work is done
+  for (int i = 0; i < 2; ++i) {
+    const Status added = accelerator.Add(MakeTarget(rig, rig.accelerate[0]), *subspace_, "kpsa", {});
+    ASSERT_TRUE(added.ok()) << added.ToString();
+  }
+  EXPECT_FALSE(accelerator.Apply().ok());
+  EXPECT_EQ(facts(), before);
 }
 
 TEST_F(TrainedRig, ToleranceInfiniteNeverRunsTheMush) {
