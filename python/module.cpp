@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cstring>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -175,6 +176,58 @@ kpsa::TrainingReport Train(const kpsa::Rig& rig, const std::string& subspace, co
   return *result;
 }
 
+// The graph of Rig.edited while its callback runs; of no use afterwards.
+struct PyEdit {
+  kpsa::GraphEdit* edit = nullptr;
+  kpsa::GraphEdit& get() const {
+    if (edit == nullptr)
+      throw py::value_error("the graph can be edited within the function that edited() calls, and no longer");
+    return *edit;
+  }
+};
+
+void Said(const kpsa::Result<kpsa::Done>& done) {
+  if (!done) Raise(done.problems());
+}
+
+kpsa::Rig Edited(const kpsa::Rig& rig, const py::function& function) {
+  PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
+  auto result = [&] {
+    const py::gil_scoped_release release;
+    return rig.Edited([&](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {
+      const py::gil_scoped_acquire lock;
+      const auto handed = std::make_shared<PyEdit>(PyEdit{&edit});
+      try {
+        function(handed);
+      } catch (py::error_already_set& error) {
+        error.restore();
+        PyErr_Fetch(&type, &value, &trace);
+      }
+      handed->edit = nullptr;
+      if (type == nullptr) return kpsa::Done();
+      return kpsa::Problems(1);  // it goes on below
+    });
+  }();
+  if (type != nullptr) {
+    PyErr_Restore(type, value, trace);
+    throw py::error_already_set();
+  }
+  if (!result) Raise(result.problems());
+  return *result;
+}
+
+py::list Profile(kpsa::Scene& scene, const std::vector<double>& seconds) {
+  py::list steps;
+  for (const kpsa::StepTime& step : Checked([&] { return scene.Profile(seconds); })) {
+    py::dict row;
+    row["node"] = step.node, row["type"] = step.type, row["label"] = step.label;
+    row["evaluations"] = step.evaluations, row["points"] = step.points,
+    row["milliseconds"] = step.milliseconds;
+    steps.append(row);
+  }
+  return steps;
+}
+
 template <typename T>
 std::vector<T> ListOf(std::span<const T> items) {
   return {items.begin(), items.end()};
@@ -262,6 +315,48 @@ PYBIND11_MODULE(_kpsa, m) {
 
   PYBIND11_NUMPY_DTYPE(PyVerdict, hit, full_share, score);
 
+  py::class_<PyEdit, std::shared_ptr<PyEdit>>(m, "GraphEdit",
+                                              "The graph of a copy of a rig, within Rig.edited.")
+      .def(
+          "add_node",
+          [](const PyEdit& e, const std::string& type, const std::string& name) {
+            Said(e.get().AddNode(type, name));
+          },
+          py::arg("type"), py::arg("name"))
+      .def(
+          "set",
+          [](const PyEdit& e, const std::string& plug, double value) { Said(e.get().Set(plug, value)); },
+          py::arg("plug"), py::arg("value"),
+          "A number in the units of the rig's file, a choice, a text, or 3, 4 or 16 numbers.")
+      .def(
+          "set",
+          [](const PyEdit& e, const std::string& plug, const std::string& text) {
+            Said(e.get().Set(plug, text));
+          },
+          py::arg("plug"), py::arg("value"))
+      .def(
+          "set",
+          [](const PyEdit& e, const std::string& plug, const std::vector<double>& values) {
+            Said(e.get().Set(plug, values));
+          },
+          py::arg("plug"), py::arg("value"))
+      .def(
+          "connect",
+          [](const PyEdit& e, const std::string& source, const std::string& destination) {
+            Said(e.get().Connect(source, destination));
+          },
+          py::arg("source"), py::arg("destination"), "A plug that something drives takes the new source.")
+      .def(
+          "disconnect",
+          [](const PyEdit& e, const std::string& destination) { Said(e.get().Disconnect(destination)); },
+          py::arg("destination"))
+      .def(
+          "deform",
+          [](const PyEdit& e, const std::string& mesh, const std::string& node) {
+            Said(e.get().Deform(mesh, node));
+          },
+          py::arg("mesh"), py::arg("node"), "Puts a deformer at the end of a mesh's stack.");
+
   py::class_<kpsa::Rig>(m, "Rig", "A loaded rig. Immutable; threads may share it.")
       .def_property_readonly("path", [](const kpsa::Rig& r) { return r.path(); })
       .def_property_readonly("fps", &kpsa::Rig::fps)
@@ -325,6 +420,10 @@ PYBIND11_MODULE(_kpsa, m) {
       .def("values", &Values, py::arg("plug"), "A number, an array of three or four, or a matrix [4, 4].")
       .def_property_readonly(
           "verdict", [](kpsa::Scene& s) { return s.verdict(); }, "of the latest points()")
+      .def("profile", &Profile, py::arg("seconds"),
+           "What evaluating the meshes at these times costs: a dict a step (node, type, label, evaluations, "
+           "points, milliseconds), "
+           "dearest first.")
       .def("frames", &Frames, py::arg("seconds"), py::arg("out") = py::none(), py::kw_only(),
            py::arg("threads") = 0, py::arg("progress") = py::none(),
            "Frames of the clip that plays, on many threads: a dict of float32 [T, V, 3] by mesh, and "

@@ -60,6 +60,17 @@ class TrainingReport:
     hit_rate: float  # expected of frames like those of the clips
     warning: str
 
+class GraphEdit:
+    """The graph of a copy of a rig, within Rig.edited."""
+    def add_node(self, type: str, name: str) -> None: ...
+    def set(self, plug: str, value: Union[float, str, Sequence[float]]) -> None:
+        """A number in the units of the rig's file, a choice, a text, or 3, 4 or 16 numbers."""
+    def connect(self, source: str, destination: str) -> None:
+        """A plug that something drives takes the new source."""
+    def disconnect(self, destination: str) -> None: ...
+    def deform(self, mesh: str, node: str) -> None:
+        """Puts a deformer at the end of a mesh's stack."""
+
 class Rig:
     """A loaded rig. Immutable; threads may share it."""
     path: str
@@ -77,6 +88,8 @@ class Rig:
               threads: int = 0, paper: bool = False,
               progress: Optional[Callable[[str, float], Optional[bool]]] = None) -> TrainingReport:
         """Trains a subspace and writes it to a .kpsa file. progress(what, share) is called on the way; False cancels."""
+    def edited(self, edit: Callable[[GraphEdit], Any]) -> Rig:
+        """A rig like this one with a graph that edit(graph) has changed."""
     def scene(self) -> Scene:
         """A state of the rig, at rest."""
 
@@ -99,6 +112,8 @@ class Scene:
         """[V, 3], metres: "head_mesh", or up to a stage, "head_mesh@skin". Into `out`, if it is given."""
     def values(self, plug: str) -> Union[float, npt.NDArray[np.float64]]:
         """A number, an array of three or four, or a matrix [4, 4]."""
+    def profile(self, seconds: Sequence[float]) -> list[dict[str, Any]]:
+        """A dict a step (node, type, label, evaluations, points, milliseconds), dearest first."""
     def frames(self, seconds: Sequence[float], out: Optional[Mapping[str, npt.NDArray[np.float32]]] = None, *, threads: int = 0,
                progress: Optional[Callable[[int], Optional[bool]]] = None) -> dict[str, npt.NDArray[Any]]:
         """Frames of the clip that plays: float32 [T, V, 3] by mesh, and "verdicts", an array of (hit, full_share, score)."""

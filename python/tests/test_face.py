@@ -106,6 +106,35 @@ def test_frames_are_the_same_on_any_number_of_threads(fast):
     assert (out["column"] == one["column"]).all()
 
 
+def test_graphs_are_edited_in_a_copy(rig):
+    kept = []
+
+    def edit(graph):
+        kept.append(graph)
+        graph.add_node("cluster", "lift")
+        graph.set("mush.iterations", 3)
+        graph.deform("column", "lift")
+
+    edited = rig.edited(edit)
+    assert edited.meshes[0].stages == ["skin", "cage", "mush", "lift"]
+    assert rig.meshes[0].stages == ["skin", "cage", "mush"]
+    with pytest.raises(ValueError, match="no longer"):
+        kept[0].add_node("cluster", "late")
+    with pytest.raises(kpsa.Error, match="did you mean"):
+        rig.edited(lambda graph: graph.add_node("clutser", "x"))
+    with pytest.raises(KeyError):
+        rig.edited(lambda graph: {}["mine"])
+
+
+def test_profiles_are_dicts(rig):
+    scene = rig.scene()
+    scene.play("wave")
+    steps = scene.profile([0.1, 0.2, 0.3])
+    (mush,) = [step for step in steps if step["node"] == "mush" and not step["label"]]
+    assert mush["type"] == "deltaMush" and mush["evaluations"] == 3 and mush["points"] > 100
+    assert [s["milliseconds"] for s in steps] == sorted((s["milliseconds"] for s in steps), reverse=True)
+
+
 def test_progress_may_end_or_raise(rig, fast, tmp_path):
     scene = fast.scene()
     scene.play("wave")
