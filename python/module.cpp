@@ -78,7 +78,7 @@ py::object Values(kpsa::Scene& scene, const std::string& plug) {
   const std::vector<double> values = Checked([&] { return scene.Values(plug); });
   if (values.size() == 1) return py::float_(values[0]);
   py::array_t<double> array(static_cast<py::ssize_t>(values.size()), values.data());
-  if (values.size() != 16) return std::move(array);
+  if (values.size() != 16) return array;
   // Column by column there, rows first here, as NumPy's matrices are
   return array.reshape({4, 4}).attr("T").attr("copy")();
 }
@@ -386,6 +386,9 @@ PYBIND11_MODULE(_kpsa, m) {
            py::arg("paper") = false, py::arg("progress") = py::none(),
            "Trains a subspace and writes it to a .kpsa file. progress(what, share) is called on the way; "
            "False cancels.")
+      .def("edited", &Edited, py::arg("edit"),
+           "A rig like this one with a graph that edit(graph) has changed: graph.add_node, set, connect, "
+           "disconnect, deform.")
       .def(
           "scene", [](const kpsa::Rig& r) { return kpsa::Scene(r); }, "A state of the rig, at rest.");
 
