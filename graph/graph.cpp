@@ -222,7 +222,8 @@ Status Graph::CheckValue(const PlugRef& plug, Value* value) const {
                                fmt::join(a.enum_names, ", "), DidYouMean(*text, a.enum_names));
       }
       *value = Value(static_cast<std::int64_t>(it - a.enum_names.begin()));
-    } else if (value->AsInt() < 0 || value->AsInt() >= static_cast<std::int64_t>(a.enum_names.size())) {
+    } else if (value->FitsType(type) &&
+               (value->AsInt() < 0 || value->AsInt() >= static_cast<std::int64_t>(a.enum_names.size()))) {
       return Status::Invalid("{} has no choice {}; expected one of {}", PlugName(plug), value->ToString(),
                              fmt::join(a.enum_names, ", "));
     }

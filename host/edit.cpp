@@ -9,6 +9,7 @@ namespace kpsa {
 
 struct GraphEdit::Impl {
   engine::Rig rig;
+  std::mutex* registry;  // which only a new node looks at
 };
 
 namespace {
@@ -42,6 +43,7 @@ engine::Status SetPlug(engine::Rig* rig, std::string_view name, engine::Value va
 }  // namespace
 
 kpsa::Result<Done> GraphEdit::AddNode(std::string_view type, std::string_view name) {
+  const std::lock_guard<std::mutex> lock(*impl_->registry);
   return Said(impl_->rig.graph->AddNode(type, name).status());
 }
 
@@ -101,19 +103,20 @@ kpsa::Result<Done> GraphEdit::Deform(std::string_view mesh, std::string_view nod
   const int geometry = rig.graph->ArraySize(*id, in);
   std::vector<engine::Stage> stages = found->stages;
   stages.push_back({std::string(node), *id, geometry, found->world, {}});
-  return Said(engine::ConnectStages(std::move(stages), &*found, rig.graph.get()));
+  engine::CharacterMesh changed = *found;
+  engine::Graph graph = *rig.graph;
+  const engine::Status status = engine::ConnectStages(std::move(stages), &changed, &graph);
+  if (status.ok()) *found = std::move(changed), *rig.graph = std::move(graph);
+  return Said(status);
 }
 
 kpsa::Result<kpsa::Rig> Rig::Edited(const std::function<Result<Done>(GraphEdit&)>& edit) const {
   if (is_accelerated())
     return Said(engine::Status::Usage("this rig is accelerated: expected the one that it was made of"))
         .problems();
-  GraphEdit::Impl edited{impl_->rest};
+  GraphEdit::Impl edited{impl_->rest, &impl_->library->mutex};
   GraphEdit face(&edited);
-  {
-    const std::lock_guard<std::mutex> lock(impl_->library->mutex);
-    if (const kpsa::Result<Done> done = edit(face); !done) return done.problems();
-  }
+  if (const kpsa::Result<Done> done = edit(face); !done) return done.problems();
   edited.rig.graph->AdoptPoses();
   auto impl = Impl::Make(impl_->library, std::move(edited.rig));
   // Whether it compiles is known now, and not when the first scene asks

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 
 #include "graph/frames.h"
 #include "graph/profile.h"
@@ -31,6 +32,13 @@ kpsa::Verdict VerdictOf(const engine::Playing& playing, const engine::Evaluator&
     if (n == 0 || engine::IsWorse(decision, worst)) worst = std::move(decision);
   }
   return {worst.hit(), worst.full_weight, worst.score, std::move(worst.reason)};
+}
+
+// An edited graph may give a mesh other points than it has vertices for.
+engine::Status CheckCount(const engine::CharacterMesh& mesh, std::size_t count) {
+  if (count == mesh.mesh().point_count()) return engine::Status();
+  return engine::Status::Invalid("\"{}\" has {} points, its stack gives {}", mesh.name,
+                                 mesh.mesh().point_count(), count);
 }
 
 struct Held {  // what somebody set
@@ -72,6 +80,8 @@ struct Scene::Impl {
     if (!made.ok()) return made.status();
     playing = std::move(*made);
     request = playing->request();
+    // What the clip drives is no longer held
+    std::erase_if(held, [&](const Held& one) { return DriverOf(one.plug) != nullptr; });
     for (const Held& one : held) Vary(one.plug);
     plan = nullptr;
     return engine::Status();
@@ -168,9 +178,16 @@ struct Scene::Impl {
 
     const std::vector<engine::PlugRef>& usual = playing->request().varying;
     const bool control = std::ranges::any_of(usual, [&](const engine::PlugRef& other) {
-      return other.node == plug->node && other.attribute == plug->attribute && other.element == plug->element;
+      return other.node == plug->node && other.attribute == plug->attribute &&
+             other.element == plug->element && (other.component == plug->component || other.component < 0);
     });
-    if (!control && shared().acceleration.has_value()) {
+    if (*plug == playing->rig().scene.time) {
+      time = value.AsDouble();
+      if (plan != nullptr) SetTime(*evaluator, time);
+      return engine::Status();
+    }
+    // Points vary as a whole only: a part of them is set in the graph, as poses are
+    if (!control && (shared().acceleration.has_value() || engine::IsPointType(attribute.type))) {
       // Subspaces watch what may vary; whatever else is set has to be there when they come in
       std::erase_if(poses, [&](const engine::Setting& other) { return other.plug == *plug; });
       poses.push_back({*plug, value, full});
@@ -200,11 +217,7 @@ kpsa::Result<Done> Scene::Play(const std::optional<std::string>& clip) {
   const std::optional<std::string> before = std::exchange(impl_->clip, clip);
   impl_->Forget();
   const engine::Status status = impl_->EnsurePlaying();
-  if (status.ok()) {
-    // What the clip drives now is no longer held
-    std::erase_if(impl_->held, [&](const Held& one) { return impl_->DriverOf(one.plug) != nullptr; });
-    return Done();
-  }
+  if (status.ok()) return Done();
   impl_->clip = before;
   impl_->Forget();
   return engine::ProblemsOf(status);
@@ -223,6 +236,8 @@ kpsa::Result<Done> Scene::Set(std::string_view plug, double value) {
 
 void Scene::Reset() {
   impl_->held.clear();
+  if (impl_->playing != nullptr && impl_->request.varying != impl_->playing->request().varying)
+    impl_->request.varying = impl_->playing->request().varying, impl_->plan = nullptr;
   if (!impl_->poses.empty()) impl_->poses.clear(), impl_->Forget();
   if (impl_->plan != nullptr) impl_->Restart();
 }
@@ -234,6 +249,9 @@ kpsa::Result<std::span<const float>> Scene::Points(std::string_view mesh) {
   const engine::Result<engine::Index> output = impl_->OutputOf(found->points);
   if (!output.ok()) return engine::ProblemsOf(output.status());
   if (const engine::Status status = impl_->evaluator->Pull(*output); !status.ok())
+    return engine::ProblemsOf(status);
+  if (const engine::Status status = CheckCount(*found->mesh, impl_->evaluator->Points(*output).count);
+      !status.ok())
     return engine::ProblemsOf(status);
   std::vector<float>& xyz = impl_->points[*output];
   xyz.resize(std::size_t{3} * found->mesh->vertex_count);
@@ -316,6 +334,7 @@ kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,
   frame_options.threads = options.threads;
   frame_options.cancel = options.cancel;
   bool ended = false;
+  std::exception_ptr thrown;
   const engine::Status status = engine::EvaluateFrames(
       impl_->plan, seconds.size(), frame_options,
       [&](std::size_t frame, engine::Evaluator& evaluator) {
@@ -330,14 +349,22 @@ kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,
               .OfNode(error.node)
               .At(engine::PlaceOf(playing.rig(), error));
         }
-        for (std::size_t m = 0; m < shown.size(); ++m)
-          Interleave(playing.rig().scene.meshes[shown[m]].mesh(),
-                     evaluator.Points(static_cast<engine::Index>(m)), points[m]);
+        for (std::size_t m = 0; m < shown.size(); ++m) {
+          const engine::CharacterMesh& mesh = playing.rig().scene.meshes[shown[m]];
+          const engine::ConstPointsView view = evaluator.Points(static_cast<engine::Index>(m));
+          KPSA_RETURN_IF_ERROR(CheckCount(mesh, view.count));
+          Interleave(mesh.mesh(), view, points[m]);
+        }
         kpsa::Verdict verdict;
         if (!playing.applied().empty()) verdict = VerdictOf(playing, evaluator);
-        ended = !take({frame, seconds[frame], spans, playing.applied().empty() ? nullptr : &verdict});
+        try {
+          ended = !take({frame, seconds[frame], spans, playing.applied().empty() ? nullptr : &verdict});
+        } catch (...) {  // of the caller's own; not on a thread that nobody watches
+          thrown = std::current_exception(), ended = true;
+        }
         return ended ? engine::Status::Make(engine::ErrorKind::kInterrupted, "ended") : engine::Status();
       });
+  if (thrown != nullptr) std::rethrow_exception(thrown);
   if (!status.ok() && !ended) return engine::ProblemsOf(status);
   return Done();
 }

@@ -61,6 +61,14 @@ Floats Target(const py::object& out, std::vector<py::ssize_t> shape) {
   return array;
 }
 
+// What a callback returned: nothing means to go on.
+bool Truth(const py::object& answer) {
+  if (answer.is_none()) return true;
+  const int truth = PyObject_IsTrue(answer.ptr());
+  if (truth < 0) throw py::error_already_set();
+  return truth != 0;
+}
+
 struct PyVerdict {  // a row of the structured array of verdicts
   bool hit;
   float full_share;
@@ -115,7 +123,7 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
                                      const py::gil_scoped_acquire lock;
                                      try {
                                        const py::object go_on = progress(frame.index + 1);
-                                       return go_on.is_none() || go_on.cast<bool>();
+                                       return Truth(go_on);
                                      } catch (py::error_already_set& error) {
                                        error.restore();
                                        PyErr_Fetch(&error_type.ptr(), &error_value.ptr(), &error_trace.ptr());
@@ -156,7 +164,7 @@ kpsa::TrainingReport Train(const kpsa::Rig& rig, const std::string& subspace, co
       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
       if (progress.is_none()) return true;
       const py::object go_on = progress(std::string(what), share);
-      return go_on.is_none() || go_on.cast<bool>();
+      return Truth(go_on);
     } catch (py::error_already_set& error) {
       error.restore();
       PyErr_Fetch(&type, &value, &trace);

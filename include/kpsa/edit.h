@@ -18,7 +18,7 @@ class GraphEdit {
   Result<Done> Set(std::string_view plug, double value);
   Result<Done> Set(std::string_view plug, std::span<const double> values);
   Result<Done> Set(std::string_view plug, std::string_view text);
-  // Types have to agree; a cycle is refused with its path. A plug that something drives takes the new source.
+  // Numbers go over as they are inside (metres, radians). Types have to agree; a cycle is refused with its path. A plug that something drives takes the new source.
   Result<Done> Connect(std::string_view source, std::string_view destination);
   Result<Done> Disconnect(std::string_view destination);
   // Puts a deformer at the end of a mesh's stack, where its points are named mesh@node.

@@ -27,7 +27,8 @@ class Library {
   Library& operator=(const Library&);
 
   // A shared library of node types (graph/plugin.h), for rigs that are loaded from then on. It stays loaded
-  // until the program ends. Not while another thread trains a rig of this library. Errors: no such library, another ABI version, a type whose name is taken or whose
+  // until the program ends. Neither it, nor Load of a rig that names a plugin which
+  // is not loaded yet, while another thread trains a rig of this library. Errors: no such library, another ABI version, a type whose name is taken or whose
   // declaration is wrong; nothing of it is added then.
   Result<Done> AddPlugin(const std::string& path);
   // A rig (.yaml) or a character (.glb, .gltf, .vrm), which is a rig, too. Errors: all of the file's, each

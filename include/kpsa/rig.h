@@ -87,7 +87,7 @@ class Rig {
   // no such file, one that is damaged, stale, or of other points.
   Result<Rig> Accelerated(const AccelerationOptions& options = {}) const;
   bool is_accelerated() const;
-  // A rig like this one with a graph that `edit` has changed; nothing but `edit` may use the library meanwhile. Errors:
+  // A rig like this one with a graph that `edit` has changed. What controls rest at stays as it was loaded. Errors:
   // those that `edit` returns, and what does not compile.
   Result<Rig> Edited(const std::function<Result<Done>(GraphEdit&)>& edit) const;
   // Trains a subspace and writes it to a .kpsa file ("": the one that the rig names; an existing one is

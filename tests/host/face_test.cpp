@@ -210,6 +210,24 @@ TEST_F(Face, GraphsAreEditedInACopy) {
   ASSERT_TRUE(scene.Values("half.output"));
   EXPECT_NEAR(std::abs((*scene.Values("half.output"))[0]), std::acos(-1) / 6, 1e-6);
 
+  // A mesh whose stack gives other points than it has vertices for
+  const auto empty = rig_->Edited([](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {
+    if (auto done = edit.AddNode("cluster", "lift"); !done) return done;
+    if (auto done = edit.Deform("column", "lift"); !done) return done;
+    return edit.Disconnect("lift.inPoints");
+  });
+  if (empty) {
+    Scene hollow(*empty);
+    EXPECT_FALSE(hollow.Points("column"));
+    EXPECT_FALSE(hollow.Frames(std::vector<double>{0}, [](const kpsa::Frame&) { return true; }));
+  }
+  // The callback may use the library
+  EXPECT_TRUE(rig_->Edited([&](kpsa::GraphEdit& edit) {
+    Scene within(*edited);
+    EXPECT_TRUE(within.Points("column"));
+    return edit.Set("mush.iterations", 2);
+  }));
+
   const auto refused = [&](auto edit) { return kpsa::ToText(rig_->Edited(edit).problems()); };
   EXPECT_NE(refused([](kpsa::GraphEdit& e) { return e.AddNode("clutser", "x"); }).find("cluster"),
             std::string::npos);
@@ -264,6 +282,7 @@ TEST_F(Face, FramesAreTheSameOnAnyNumberOfThreads) {
   std::size_t taken = 0;
   EXPECT_TRUE(scene.Frames(seconds, [&](const kpsa::Frame&) { return ++taken < 3; }));
   EXPECT_EQ(taken, 3u);
+  EXPECT_THROW((void)scene.Frames(seconds, [](const kpsa::Frame&) -> bool { throw 7; }, {.threads = 2}), int);
   const std::atomic<bool> cancel = true;
   EXPECT_EQ(Failed(scene.Frames(seconds, [](const kpsa::Frame&) { return true; }, {.cancel = &cancel})).kind,
             Problem::Kind::kInterrupted);
