@@ -68,6 +68,11 @@ Status PluginLoader::Load(const std::string& path) {
     return Status::Invalid("plugin \"{}\" cannot be loaded: {}; expected a shared library of nodes", path,
                            complete.errors().front().message);
 
+  // This code may be in a library that was loaded for its loader alone (a Python module): plugins look for its
+  // symbols among those of all
+  static const char here = 0;
+  if (Dl_info own; ::dladdr(&here, &own) != 0 && own.dli_fname != nullptr)
+    (void)::dlopen(own.dli_fname, RTLD_NOW | RTLD_NOLOAD | RTLD_GLOBAL);
   void* const library = ::dlopen(identity.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr)
     return Status::Invalid("plugin \"{}\" cannot be loaded: {}; expected a shared library of nodes", path,

@@ -106,6 +106,17 @@ def test_frames_are_the_same_on_any_number_of_threads(fast):
     assert (out["column"] == one["column"]).all()
 
 
+def test_plugins_add_node_types(folder):
+    library = kpsa.Library()
+    library.add_plugin(os.environ["KPSA_WOBBLE"])
+    edited = library.load(str(folder / "hello.yaml")).edited(lambda graph: graph.add_node("wobble", "sway"))
+    scene = edited.scene()
+    scene.set("sway.input", 0.5)
+    assert scene.values("sway.output") == pytest.approx(1)
+    with pytest.raises(kpsa.Error, match="expected a shared library"):
+        kpsa.Library().add_plugin(str(folder))
+
+
 def test_graphs_are_edited_in_a_copy(rig):
     kept = []
 
