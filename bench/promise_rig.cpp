@@ -8,8 +8,8 @@
 
 #include "base/parallel.h"
 #include "cli/rig_frames.h"
-#include "host/rig_training.h"
 #include "graph/evaluator.h"
+#include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/training/control_groups.h"
 #include "kpsa/training/mode_choice.h"
@@ -20,13 +20,8 @@ namespace {
 
 // What training takes of an accelerate entry (cli/cmd_train.cpp does the same).
 TrainOptions OptionsOf(const Acceleration& entry, double tolerance, std::uint64_t seed) {
-  TrainOptions options;
-  options.samples = static_cast<std::size_t>(entry.train_samples);
-  options.calibration_poses = static_cast<std::size_t>(entry.held_out);
-  if (entry.key_points > 0)
-    options.key_points = options.min_points = static_cast<std::size_t>(entry.key_points);
+  TrainOptions options = TrainOptionsOf(entry);
   options.tolerance = tolerance;
-  options.violation_rate = entry.violation_rate;
   options.seed = seed;
   options.progress = [](const char*, double) { return !Interrupted(); };
   return options;

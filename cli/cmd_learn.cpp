@@ -73,7 +73,7 @@ Result<LearnerRig> OpenForLearner(const LearnFlags& flags) {
   if (!opened.ok()) return opened.status();
   const std::shared_ptr<OpenRig> open = std::move(*opened);
   const Result<Acceleration> entry = ChooseEntry(open->rig, flags.name);
-  if (!entry.ok()) return entry.status();
+  if (!entry.ok()) return Status(entry.status()).At({"--name"});
   LearnerRig rig;
   rig.owner = open;
   rig.training = MakeTrainingRig(&open->rig, *entry);
@@ -160,7 +160,7 @@ CommandResult RunLearn(LearnFlags flags) {
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
   const Result<Acceleration> entry = ChooseEntry(rig, flags.name);
-  if (!entry.ok()) return entry.status();
+  if (!entry.ok()) return Status(entry.status()).At({"--name"});
   const Result<std::vector<TrainingClip>> known = ClipFrames(rig, names);
   if (!known.ok()) return AsUsage(known.status());
   const std::string from = flags.kpsa.value_or(entry->subspace);

@@ -83,19 +83,13 @@ CommandResult RunTrain(const TrainFlags& flags) {
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
   const Result<Acceleration> entry = ChooseEntry(rig, flags.name);
-  if (!entry.ok()) return entry.status();
+  if (!entry.ok()) return Status(entry.status()).At({"--name"});
   const std::string path = flags.output.value_or(entry->subspace);
   if (path.empty())
     return Status::Usage("accelerate: \"{}\" names no subspace file: expected -o FILE.kpsa", entry->name);
   KPSA_RETURN_IF_ERROR(CheckOutput(path, flags.force, {".kpsa"}));
-  if (!flags.samples.has_value()) options.samples = static_cast<std::size_t>(entry->train_samples);
-  if (!flags.calibration.has_value()) options.calibration_poses = static_cast<std::size_t>(entry->held_out);
-  if (entry->key_points > 0) {
-    const auto points = static_cast<std::size_t>(entry->key_points);
-    if (!flags.key_points.has_value()) options.key_points = options.min_points = points;
-  }
-  if (!flags.tolerance.has_value()) options.tolerance = entry->tolerance;
-  if (!flags.violation_rate.has_value()) options.violation_rate = entry->violation_rate;
+  options = TrainOptionsOf(*entry);
+  KPSA_RETURN_IF_ERROR(ReadOptions(flags, &options));  // which were looked at before the rig was loaded
   if (flags.clips.has_value()) {
     for (const std::string& clip : SplitNames(*flags.clips)) {
       if (std::find(entry->test_clips.begin(), entry->test_clips.end(), clip) != entry->test_clips.end())

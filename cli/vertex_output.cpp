@@ -9,21 +9,12 @@
 #include "files/point_cache.h"
 #include "gltf/blender_order.h"
 #include "gltf/export.h"
+#include "host/vertex_points.h"
 
 namespace kpsa::engine {
 namespace {
 
 constexpr std::uint64_t kMaxCacheBytes = std::uint64_t{4} << 30;
-
-// x y z of the vertices [first, first + count) of a mesh.
-void Interleave(const Mesh& mesh, ConstPointsView points, Index first, Index count, float* xyz) {
-  const Index* point = mesh.data().vertex_to_point.data() + first;
-  for (Index v = 0; v < count; ++v) {
-    xyz[3 * v] = points.x[point[v]];
-    xyz[3 * v + 1] = points.y[point[v]];
-    xyz[3 * v + 2] = points.z[point[v]];
-  }
-}
 
 class NpzOutput final : public VertexOutput {
  public:

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "files/file.h"
 #include "host/face_impl.h"
 #include "host/problems.h"
 #include "host/rig_training.h"
@@ -34,15 +35,14 @@ MeshInfo InfoOf(const engine::CharacterMesh& mesh) {
 
 // The options over those of the rig's entry.
 engine::TrainOptions TrainOptionsOf(const TrainingOptions& options, const engine::Acceleration& entry) {
-  engine::TrainOptions train;
+  engine::TrainOptions train = engine::TrainOptionsOf(entry);
   if (options.paper) train.mode = engine::EstimatorMode::kPaper;
-  train.samples = options.samples.value_or(static_cast<std::size_t>(entry.train_samples));
-  train.calibration_poses = options.calibration.value_or(static_cast<std::size_t>(entry.held_out));
-  if (entry.key_points > 0) train.key_points = train.min_points = static_cast<std::size_t>(entry.key_points);
+  if (options.samples.has_value()) train.samples = *options.samples;
+  if (options.calibration.has_value()) train.calibration_poses = *options.calibration;
   if (options.key_points.has_value())
     (options.paper ? train.key_points : train.min_points) = *options.key_points;
-  train.tolerance = options.tolerance.value_or(entry.tolerance);
-  train.violation_rate = options.violation_rate.value_or(entry.violation_rate);
+  if (options.tolerance.has_value()) train.tolerance = *options.tolerance;
+  if (options.violation_rate.has_value()) train.violation_rate = *options.violation_rate;
   train.seed = options.seed;
   train.seconds = options.seconds;
   if (options.progress) {
@@ -150,6 +150,9 @@ kpsa::Result<TrainingReport> Rig::Train(const TrainingOptions& options, const st
   const auto clips = engine::ClipFrames(rig, options.clips.empty() ? entry->train_clips : options.clips);
   if (!clips.ok()) return failed(clips.status());
 
+  // Whether it can be written is known before the minutes of training; what the writer makes is removed at once
+  if (const auto output = engine::OutputFile::Create(path, true); !output.ok())
+    return failed(output.status());
   const engine::ThreadLimit limit(options.threads);
   const engine::TrainOptions train = TrainOptionsOf(options, *entry);
   const engine::Result<engine::Subspace> trained =

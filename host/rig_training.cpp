@@ -122,6 +122,17 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
   return training;
 }
 
+TrainOptions TrainOptionsOf(const Acceleration& entry) {
+  TrainOptions options;
+  options.samples = static_cast<std::size_t>(entry.train_samples);
+  options.calibration_poses = static_cast<std::size_t>(entry.held_out);
+  if (entry.key_points > 0)
+    options.key_points = options.min_points = static_cast<std::size_t>(entry.key_points);
+  options.tolerance = entry.tolerance;
+  options.violation_rate = entry.violation_rate;
+  return options;
+}
+
 Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips) {
   std::vector<TrainingClip> frames;
   for (const std::string& name : clips) {

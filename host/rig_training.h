@@ -14,6 +14,8 @@ namespace kpsa::engine {
 AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration);
 // Refers to the rig, which must outlive it.
 TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration);
+// What the entry asks for; the rest is the trainer's own.
+TrainOptions TrainOptionsOf(const Acceleration& entry);
 // Every frame of the clips at the rig's rate. Errors: a clip that the character lacks.
 Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips);
 // The entry of the rig's accelerate section, by name where there are several. Errors: none, not that one,

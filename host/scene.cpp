@@ -10,19 +10,10 @@
 #include "host/face_impl.h"
 #include "host/mesh_stage.h"
 #include "host/problems.h"
+#include "host/vertex_points.h"
 
 namespace kpsa {
 namespace {
-
-// x y z of all vertices of a mesh, in the file's order.
-void Interleave(const engine::Mesh& mesh, engine::ConstPointsView points, std::span<float> xyz) {
-  const std::vector<engine::Index>& point = mesh.data().vertex_to_point;
-  for (std::size_t v = 0; v < point.size(); ++v) {
-    xyz[3 * v] = points.x[point[v]];
-    xyz[3 * v + 1] = points.y[point[v]];
-    xyz[3 * v + 2] = points.z[point[v]];
-  }
-}
 
 kpsa::Verdict VerdictOf(const engine::Playing& playing, const engine::Evaluator& evaluator) {
   engine::FrameDecision worst;
@@ -255,7 +246,8 @@ kpsa::Result<std::span<const float>> Scene::Points(std::string_view mesh) {
     return engine::ProblemsOf(status);
   std::vector<float>& xyz = impl_->points[*output];
   xyz.resize(std::size_t{3} * found->mesh->vertex_count);
-  Interleave(found->mesh->mesh(), impl_->evaluator->Points(*output), xyz);
+  engine::Interleave(found->mesh->mesh(), impl_->evaluator->Points(*output), 0, found->mesh->vertex_count,
+                     xyz.data());
   return std::span<const float>(xyz);
 }
 
@@ -353,7 +345,7 @@ kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,
           const engine::CharacterMesh& mesh = playing.rig().scene.meshes[shown[m]];
           const engine::ConstPointsView view = evaluator.Points(static_cast<engine::Index>(m));
           KPSA_RETURN_IF_ERROR(CheckCount(mesh, view.count));
-          Interleave(mesh.mesh(), view, points[m]);
+          engine::Interleave(mesh.mesh(), view, 0, mesh.vertex_count, points[m].data());
         }
         kpsa::Verdict verdict;
         if (!playing.applied().empty()) verdict = VerdictOf(playing, evaluator);

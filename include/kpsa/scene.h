@@ -64,7 +64,7 @@ class Scene {
   Result<Done> Play(const std::optional<std::string>& clip);
   void SetTime(double seconds);  // clamped to the keys of clips, as glTF says
   // A control, or any other plug that is a number and may vary, in the units of the rig's file. Errors: no
-  // such plug (the nearest is named), a value outside of its range, a plug that the clip or the rig drives.
+  // such plug (the nearest is named), a value outside of what the attribute admits, a plug that the clip or the rig drives.
   Result<Done> Set(std::string_view plug, double value);
   void Reset();  // all controls at rest; clip and time stay
 
@@ -72,8 +72,8 @@ class Scene {
   // stack
   // ("head_mesh@skin": in the mesh's space before its skin). Valid until the next call on this scene.
   Result<std::span<const float>> Points(std::string_view mesh);
-  // Any other plug: one number (in the file's units), three, four, or the sixteen of a matrix column by
-  // column (metres, radians).
+  // Any other plug, in the file's units: one number, three, four, or the sixteen of a matrix column by column, whose
+  // places are metres.
   Result<std::vector<double>> Values(std::string_view plug);
   // Of the latest Points(); hit is false and the reason empty where nothing is accelerated.
   const Verdict& verdict();

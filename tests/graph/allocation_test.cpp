@@ -1,6 +1,4 @@
-// A warm evaluation allocates nothing, on no thread. Every way into the C library's allocator is interposed
-// here, for the whole test program: operator new ends there, too, and so do TBB's workers.
-#include <dlfcn.h>
+// A warm evaluation allocates nothing, on no thread.
 #include <gtest/gtest.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -12,50 +10,9 @@
 
 #include "base/parallel.h"
 #include "graph/frames.h"
+#include "tests/support/allocations.h"
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
-
-#if defined(KPSA_WITH_ASAN) || defined(KPSA_WITH_TSAN) || !defined(__GLIBC__)
-#define KPSA_COUNTS_ALLOCATIONS 0  // sanitizers bring allocators of their own
-#else
-#define KPSA_COUNTS_ALLOCATIONS 1
-#endif
-
-namespace {
-std::atomic<bool> counting{false};
-std::atomic<int> allocations{0};
-[[maybe_unused]] void Count() {
-  if (counting.load(std::memory_order_relaxed)) allocations.fetch_add(1, std::memory_order_relaxed);
-}
-}  // namespace
-
-#if KPSA_COUNTS_ALLOCATIONS
-extern "C" {
-void* __libc_malloc(size_t);
-void* __libc_calloc(size_t, size_t);
-void* __libc_realloc(void*, size_t);
-void* __libc_memalign(size_t, size_t);
-
-void* malloc(size_t size) noexcept { return Count(), __libc_malloc(size); }
-void* calloc(size_t count, size_t size) noexcept { return Count(), __libc_calloc(count, size); }
-void* realloc(void* old, size_t size) noexcept { return Count(), __libc_realloc(old, size); }
-void* memalign(size_t alignment, size_t size) noexcept { return Count(), __libc_memalign(alignment, size); }
-void* aligned_alloc(size_t alignment, size_t size) noexcept {
-  return Count(), __libc_memalign(alignment, size);
-}
-int posix_memalign(void** result, size_t alignment, size_t size) noexcept {
-  Count();
-  *result = __libc_memalign(alignment, size);
-  return *result == nullptr ? ENOMEM : 0;
-}
-void* mmap(void* address, size_t length, int protection, int flags, int file, off_t offset) noexcept {
-  Count();
-  using Mmap = void* (*)(void*, size_t, int, int, int, off_t);
-  static const auto real = reinterpret_cast<Mmap>(dlsym(RTLD_NEXT, "mmap"));
-  return real(address, length, protection, flags, file, offset);
-}
-}
-#endif
 
 namespace kpsa::engine {
 namespace {
@@ -68,11 +25,9 @@ class Allocations : public testing::Test {
   }
   template <typename F>
   int In(F&& f) {
-    allocations = 0;
-    counting = true;
+    StartCountingAllocations();
     f();
-    counting = false;
-    return allocations;
+    return StopCountingAllocations();
   }
 };
 
