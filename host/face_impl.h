@@ -32,7 +32,7 @@ struct Rig::Impl {
   std::vector<ClipInfo> clips;
   std::vector<MeshInfo> meshes;
 
-  // Of another rig: the same with what people are told of it.
+  // With what people are told of the rig: controls, clips, meshes.
   static std::shared_ptr<Impl> Make(std::shared_ptr<Library::Impl> library, engine::Rig rest);
   // Shared by scenes that play the clip.
   engine::Result<std::shared_ptr<engine::Playing>> PlayingOf(const std::optional<std::string>& clip) const;
