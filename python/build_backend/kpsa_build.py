@@ -46,7 +46,8 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     given = (config_settings or {}).get("build-folder")
     with tempfile.TemporaryDirectory() as temporary:
         package = _build(pathlib.Path(given or os.environ.get("KPSA_BUILD_FOLDER") or temporary).resolve())
-        python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+        module = next(path.name for path in package.iterdir() if path.name.startswith("_kpsa."))
+        python = "cp" + re.search(r"cpython-([0-9]+)", module).group(1)  # of the build, which may not be this one
         tag = f"{python}-{python}-{re.sub('[-.]', '_', sysconfig.get_platform())}"
         info = f"kpsa-{_version()}.dist-info"
         files = {f"kpsa/{path.name}": path.read_bytes() for path in sorted(package.iterdir()) if path.is_file()}

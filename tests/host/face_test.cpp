@@ -117,7 +117,7 @@ TEST_F(Face, AWarmPullAllocatesNothing) {
     GTEST_SKIP() << "allocations are not counted under sanitizers or without glibc";
   const auto fast = rig_->Accelerated();
   ASSERT_TRUE(fast);
-  for (const Rig* rig : {rig_, &*fast}) {
+  for (const Rig* rig : {static_cast<const Rig*>(rig_), &*fast}) {
     Scene scene(*rig);
     ASSERT_TRUE(scene.Play("wave"));
     const auto frame = [&](double seconds) {
