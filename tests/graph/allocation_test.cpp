@@ -66,7 +66,8 @@ TEST_F(Allocations, CanaryTheCounterSeesEveryWay) {
   std::atomic<int> stage{0};
   std::thread other([&] {
     while (stage != 1) std::this_thread::yield();
-    free(malloc(10));
+    void* volatile made = malloc(10);  // volatile: or the compiler leaves both out
+    free(made);
     stage = 2;
   });
   EXPECT_EQ(In([&] {
