@@ -7,7 +7,7 @@
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -172,7 +172,7 @@ double Combine(ArrayView<double> weights, std::int64_t method) {
 
 }  // namespace
 
-void AddBlendShapeNode(NodeRegistry& registry) {
+KPSA_NODES(blend_shape, registry) {
   NodeBuilder b = AddDeformer(registry, "blendShape",
                               "Adds weighted displacements towards target shapes (morph targets). They are "
                               "those of the file, in the axes of mesh space, wherever the stage is; after "

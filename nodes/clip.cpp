@@ -8,7 +8,7 @@
 #include "nodes/clip_keys.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/sampler.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -306,7 +306,7 @@ void AddAnimCurve(NodeRegistry& registry, const char* name, const char* doc, Uni
 
 }  // namespace
 
-void AddClipNodes(NodeRegistry& registry) {
+KPSA_NODES(clip, registry) {
   registry.add("clipTransform", "A transform's part of a clip: its local matrix over time.")
       .category("time")
       .animation()

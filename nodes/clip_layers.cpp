@@ -9,7 +9,7 @@
 #include "base/matrix.h"
 #include "nodes/clip_keys.h"
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -189,7 +189,7 @@ NodeBuilder AddLayered(NodeRegistry& registry, std::string name, std::string doc
 
 }  // namespace
 
-void AddClipLayerNodes(NodeRegistry& registry) {
+KPSA_NODES(clip_layers, registry) {
   registry.add("clipLayer", "Where a layer of clips is in its clip: (time - start) * speed.")
       .category("time")
       .animation()

@@ -7,7 +7,7 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/soft_mod.h"
 #include "nodes/kernels/weights.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -107,7 +107,7 @@ void AddHandle(NodeBuilder& b) {
 
 }  // namespace
 
-void AddClusterNodes(NodeRegistry& registry) {
+KPSA_NODES(cluster, registry) {
   NodeBuilder cluster = AddDeformer(registry, "cluster", "Moves weighted points with a handle.");
   AddHandle(cluster);
   FinishDeformer(cluster, &ComputeCluster, BindCluster).cost(200, 0.3f);

@@ -5,7 +5,7 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/constraint_math.h"
 #include "nodes/kernels/matrix_parts.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -294,7 +294,7 @@ NodeBuilder& AddInterpType(NodeBuilder& b) {
 
 }  // namespace
 
-void AddConstraintNodes(NodeRegistry& registry) {
+KPSA_NODES(constraints, registry) {
   NodeBuilder point = AddConstraint(registry, "pointConstraint", "Moves a transform to its targets' place.");
   point.out("outMatrix", Type::kMatrix, kOutDoc)
       .compute(&ComputeConstraint<PointKernel, ConstrainPoint>)

@@ -7,7 +7,7 @@
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/wire.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -154,7 +154,7 @@ void DemandWire(Demand& demand) {
 
 }  // namespace
 
-void AddCurveNodes(NodeRegistry& registry) {
+KPSA_NODES(curve, registry) {
   registry.add("curve", "A curve for wires, through control vertices.")
       .category("geometry")
       .structural("curve", Type::kCurve, {.doc = "the vertices at rest, world space"})

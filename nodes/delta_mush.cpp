@@ -3,7 +3,7 @@
 #include "base/matrix.h"
 #include "nodes/deformer.h"
 #include "nodes/mesh_topology.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -77,7 +77,7 @@ void ComputeMush(ComputeContext& c) {
 
 }  // namespace
 
-void AddDeltaMushNode(NodeRegistry& registry) {
+KPSA_NODES(delta_mush, registry) {
   NodeBuilder b =
       AddDeformer(registry, "deltaMush", "Smooths the points and gives the rest shape's detail back.");
   b.version(2);  // detail that fades in folds and grows with its parent

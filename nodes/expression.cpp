@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -34,7 +34,7 @@ void ComputeExpression(ComputeContext& c) {
 
 }  // namespace
 
-void AddExpressionNode(NodeRegistry& registry) {
+KPSA_NODES(expression, registry) {
   registry
       .add("expression",
            "A formula. Operators + - * / ^, comparisons, &&, ||, a ? b : c; functions sin cos tan asin acos "

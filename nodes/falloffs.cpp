@@ -12,7 +12,7 @@
 #include "base/matrix.h"
 #include "graph/geometry.h"
 #include "nodes/driver_mesh.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -239,7 +239,7 @@ NodeBuilder& FinishFalloff(NodeBuilder& b, ComputeFn compute, BindFn bind) {
 
 }  // namespace
 
-void AddFalloffNodes(NodeRegistry& registry) {
+KPSA_NODES(falloffs, registry) {
   NodeBuilder sphere =
       AddFalloff(registry, "sphereFalloff", "1 in the middle of a sphere, 0 at its radius and beyond.");
   sphere.in("matrix", Matrix4(), {.doc = "the sphere's handle, whose scale makes it an ellipsoid"})

@@ -5,7 +5,7 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/kernels/two_bone_ik.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -156,7 +156,7 @@ void ComputePole(ComputeContext& c) {
 
 }  // namespace
 
-void AddIkNodes(NodeRegistry& registry) {
+KPSA_NODES(ik_nodes, registry) {
   registry
       .add("ikHandle",
            "Turns a start and a middle joint so that an end joint gets to a target. In rigs: `start`, `mid` "

@@ -9,7 +9,7 @@
 #include "nodes/deformer.h"
 #include "nodes/illumination.h"
 #include "nodes/kernels/path_tracer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -228,7 +228,7 @@ void ComputeIllumination(ComputeContext& c) {
 
 }  // namespace
 
-void AddIlluminationNodes(NodeRegistry& registry) {
+KPSA_NODES(indirect_illumination, registry) {
   NodeBuilder b =
       registry.add("indirectIllumination",
                    "Irradiance that surfaces give each other, at the pixels of a camera: path tracing.");

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -44,7 +44,7 @@ void ComputeJiggle(ComputeContext& c) {
 
 }  // namespace
 
-void AddJiggleNode(NodeRegistry& registry) {
+KPSA_NODES(jiggle, registry) {
   NodeBuilder b =
       AddDeformer(registry, "jiggle",
                   "Points lag behind and swing. It remembers the previous frame: frames are evaluated in "

@@ -4,7 +4,7 @@
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -141,7 +141,7 @@ void DemandLattice(Demand& demand) {
 
 }  // namespace
 
-void AddLatticeNode(NodeRegistry& registry) {
+KPSA_NODES(lattice, registry) {
   NodeBuilder b =
       AddDeformer(registry, "lattice", "Free-form deformation: points follow a grid of control points.");
   b.points_in("points",

@@ -2,7 +2,7 @@
 // and its strength.
 #include "base/scalar_math.h"
 #include "nodes/illumination.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -29,7 +29,7 @@ void PassMatrix(NodeBuilder& b) {
 
 }  // namespace
 
-void AddLightNodes(NodeRegistry& registry) {
+KPSA_NODES(lights, registry) {
   NodeBuilder point = AddLight(registry, "pointLight", "Light from a point, in all directions.",
                                "radiant intensity: irradiance at 1 m");
   FinishLight(point);

@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "nodes/kernels/power.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -32,7 +32,7 @@ double PlusMinusAverage(ArrayView<double> input, std::int64_t operation) {
 
 }  // namespace
 
-void AddMathNodes(NodeRegistry& registry) {
+KPSA_NODES(math_nodes, registry) {
   registry.add("remapValue", "Maps a value from one range to another, clamped to it.")
       .in("inputValue", 0.0)
       .alias("input")

@@ -1,7 +1,7 @@
 #include "base/matrix.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/matrix_parts.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -47,7 +47,7 @@ Matrix4 PickMatrix(const Matrix4& m, bool translate, bool rotate, bool scale, bo
 
 }  // namespace
 
-void AddMatrixNodes(NodeRegistry& registry) {
+KPSA_NODES(matrix_nodes, registry) {
   const std::vector<std::string> orders = {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"};
   registry.add("multMatrix", "The product of matrices, for column vectors: matrixIn[0] is applied last.")
       .category("matrix")

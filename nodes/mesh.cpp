@@ -1,7 +1,7 @@
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/weights.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -21,7 +21,7 @@ Result<BoundKernel> BindMesh(const Binding& binding) {
 
 }  // namespace
 
-void AddMeshNode(NodeRegistry& registry) {
+KPSA_NODES(mesh, registry) {
   registry.add("mesh", "A mesh of the character: its rest points.")
       .category("geometry")
       .structural("mesh", Type::kMesh)

@@ -4,7 +4,7 @@
 #include "nodes/kernels/non_linear.h"
 
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -73,7 +73,7 @@ void AddRipple(NodeBuilder& b, double wavelength) {
 
 }  // namespace
 
-void AddNonLinearNodes(NodeRegistry& registry) {
+KPSA_NODES(non_linear, registry) {
   NodeBuilder bend = Begin(registry, "bend", "Bends points onto a circle, towards the handle's X axis.");
   bend.in("curvature", 0.0, {.unit = Unit::kAngle, .doc = "the turn for each unit of the handle"});
   AddBounds(bend);

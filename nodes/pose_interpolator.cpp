@@ -11,7 +11,7 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/pose_weights.h"
 #include "nodes/kernels/transform_math.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -66,7 +66,7 @@ void ComputePoses(ComputeContext& c) {
 
 }  // namespace
 
-void AddPoseInterpolatorNode(NodeRegistry& registry) {
+KPSA_NODES(pose_interpolator, registry) {
   registry
       .add("poseInterpolator",
            "How near a transform is to each of a few poses: 1 at a pose itself, 0 at the others.")

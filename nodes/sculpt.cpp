@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -59,7 +59,7 @@ void ComputeSculpt(ComputeContext& c) {
 
 }  // namespace
 
-void AddSculptNode(NodeRegistry& registry) {
+KPSA_NODES(sculpt, registry) {
   NodeBuilder b = AddDeformer(registry, "sculpt", "A sphere pushes points out of itself.");
   b.in("matrix", Matrix4(), {.doc = "the handle's world matrix: the sphere's centre, axes and scale"})
       .world_place();

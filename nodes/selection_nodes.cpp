@@ -1,5 +1,5 @@
 // condition and choice: only the chosen side is evaluated.
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -38,7 +38,7 @@ std::uint64_t DecideChoice(ComputeContext& c) {
 
 }  // namespace
 
-void AddSelectionNodes(NodeRegistry& registry) {
+KPSA_NODES(selection_nodes, registry) {
   registry.add("condition", "One of two values, by a comparison. The other side is not evaluated.")
       .category("selection")
       .in("firstTerm", 0.0)

@@ -4,7 +4,7 @@
 #include "graph/geometry.h"
 #include "nodes/driver_mesh.h"
 #include "nodes/mesh_topology.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -91,7 +91,7 @@ void ComputeShrinkWrap(ComputeContext& c) {
 
 }  // namespace
 
-void AddShrinkWrapNode(NodeRegistry& registry) {
+KPSA_NODES(shrink_wrap, registry) {
   NodeBuilder b = AddDeformer(registry, "shrinkWrap", "Points go onto the surface of another mesh.");
   b.version(2);  // an axis that its parent turns
   AddDriver(b);

@@ -6,7 +6,7 @@
 #include "nodes/kernels/dual_quaternion.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/weights.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -144,23 +144,9 @@ void ComputeSkin(ComputeContext& c) {
                   {scratch, bound.dual->ScratchFloats()}, &parallel);
 }
 
-void ComputeTransformGeometry(ComputeContext& c) {
-  const Matrix4& m = c.get<Matrix4>(kFirstOwnInput);
-  const ConstPointsView& in = c.points(kInPoints);
-  const PointsView& out = c.out_points(0);
-  c.host->For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Double3 p = TransformPoint(m, {in.x[i], in.y[i], in.z[i]});
-      out.x[i] = static_cast<float>(p.x);
-      out.y[i] = static_cast<float>(p.y);
-      out.z[i] = static_cast<float>(p.z);
-    }
-  });
-}
-
 }  // namespace
 
-void AddSkinClusterNode(NodeRegistry& registry) {
+KPSA_NODES(skin_cluster, registry) {
   NodeBuilder b =
       AddDeformer(registry, "skinCluster",
                   "Moves points with joints, any number of influences. Takes points in mesh space to "
@@ -176,15 +162,6 @@ void AddSkinClusterNode(NodeRegistry& registry) {
                {.doc = "of weightBlended: 0 takes classicLinear, 1 dualQuaternion; 0 where unset"})
       .per_geometry();
   FinishDeformer(b, &ComputeSkin, BindSkin, DemandSkin).cost(500, 5);
-}
-
-void AddTransformGeometryNode(NodeRegistry& registry) {
-  NodeBuilder b =
-      AddDeformer(registry, "transformGeometry", "Takes the points of a mesh without a skin to world space.");
-  b.in("matrix", Matrix4(), {.doc = "the mesh node's world matrix"});
-  FinishDeformer(b, &ComputeTransformGeometry, nullptr)
-      .cost(20, 2)
-      .touches("inPoints", nullptr);  // to another space goes every point
 }
 
 }  // namespace kpsa::engine

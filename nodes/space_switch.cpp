@@ -6,7 +6,7 @@
 #include "base/matrix.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/matrix_parts.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -62,7 +62,7 @@ void ComputeSpaceSwitch(ComputeContext& c) {
 
 }  // namespace
 
-void AddSpaceSwitchNode(NodeRegistry& registry) {
+KPSA_NODES(space_switch, registry) {
   registry
       .add("spaceSwitch",
            "Carries a transform as if it hung under one of its targets, with its own motion on top.")

@@ -7,7 +7,7 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/kernels/spline_chain.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -157,7 +157,7 @@ void DemandSpline(Demand& demand) {
 
 }  // namespace
 
-void AddSplineIkNode(NodeRegistry& registry) {
+KPSA_NODES(spline_ik, registry) {
   registry
       .add("splineIk",
            "Lays a chain of joints along a curve; bones keep their lengths. In rigs: `start` and `end` name "

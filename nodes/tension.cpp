@@ -5,7 +5,7 @@
 
 #include "nodes/deformer.h"
 #include "nodes/mesh_topology.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -118,7 +118,7 @@ void ComputeStrain(ComputeContext& c) {
 
 }  // namespace
 
-void AddTensionNode(NodeRegistry& registry) {
+KPSA_NODES(tension, registry) {
   NodeBuilder b = AddDeformer(registry, "tension",
                               "Measures how the edges around each point are stretched since the rest pose, "
                               "and pushes points along their normals by it.");

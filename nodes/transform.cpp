@@ -3,7 +3,7 @@
 #include "base/scalar_math.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/transform_math.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -106,7 +106,7 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
 
 }  // namespace
 
-void AddTransformNodes(NodeRegistry& registry) {
+KPSA_NODES(transform, registry) {
   AddTransform(registry, "transform", "A coordinate frame under a parent.");
   AddTransform(registry, "joint", "A transform that moves a skin.");
 }

@@ -1,10 +1,10 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/weights.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 
-void AddTripwireNode(NodeRegistry& registry) {
+KPSA_NODES(tripwire, registry) {
   NodeBuilder b =
       AddDeformer(registry, "tripwire",
                   "Passes points through; fails when it is armed. Shows that a stack was not evaluated.");

@@ -6,7 +6,7 @@
 #include "nodes/kernels/constraint_math.h"
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/kernels/transform_math.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -78,7 +78,7 @@ void ComputeTwist(ComputeContext& c) {
 
 }  // namespace
 
-void AddTwistDistributionNode(NodeRegistry& registry) {
+KPSA_NODES(twist_distribution, registry) {
   registry
       .add("twistDistribution",
            "Twists joints by shares of how far `end` is twisted against `start` about the bone. The end must "

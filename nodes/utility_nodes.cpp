@@ -4,7 +4,7 @@
 #include "base/matrix.h"
 #include "base/scalar_math.h"
 #include "nodes/kernels/constraint_math.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -59,7 +59,7 @@ void ComputeAngleBetween(ComputeContext& c) {
 
 }  // namespace
 
-void AddUtilityNodes(NodeRegistry& registry) {
+KPSA_NODES(utility_nodes, registry) {
   const Double3 ones{1, 1, 1};
   registry.add("clamp", "Keeps each component between a minimum and a maximum.")
       .in("input", Double3())

@@ -5,7 +5,7 @@
 #include "graph/geometry.h"
 #include "nodes/driver_mesh.h"
 #include "nodes/kernels/surface_pin.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -162,7 +162,7 @@ void AddSurface(NodeBuilder& b) {
 
 }  // namespace
 
-void AddPinNodes(NodeRegistry& registry) {
+KPSA_NODES(uv_pin, registry) {
   constexpr double kThird = 1.0 / 3;
   NodeBuilder pin = registry.add(
       "uvPin",

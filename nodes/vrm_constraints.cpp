@@ -4,7 +4,7 @@
 #include "nodes/deformer.h"
 #include "nodes/kernels/constraint_math.h"
 #include "nodes/kernels/matrix_parts.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -95,7 +95,7 @@ const char* const kVrmOutDoc = "local, for the constrained transform's offsetPar
 
 }  // namespace
 
-void AddVrmConstraintNodes(NodeRegistry& registry) {
+KPSA_NODES(vrm_constraints, registry) {
   NodeBuilder roll = AddVrm(registry, "vrmRollConstraint",
                             "Rolls a transform about one of its axes as its source has turned since rest.",
                             "the source's matrix");

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "nodes/deformer.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -128,7 +128,7 @@ void ComputeMorphWeights(ComputeContext& c) {
 
 }  // namespace
 
-void AddVrmExpressionNodes(NodeRegistry& registry) {
+KPSA_NODES(vrm_expressions, registry) {
   const std::vector<std::int64_t> none;
   registry
       .add("vrmExpressions",

@@ -5,7 +5,7 @@
 
 #include "graph/geometry.h"
 #include "nodes/driver_mesh.h"
-#include "nodes/standard_nodes.h"
+#include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
@@ -88,7 +88,7 @@ void ComputeWrap(ComputeContext& c) {
 
 }  // namespace
 
-void AddWrapNodes(NodeRegistry& registry) {
+KPSA_NODES(wrap, registry) {
   NodeBuilder wrap = AddDeformer(registry, "wrap",
                                  "Points follow the nearest points of a driver mesh, each with its frame.");
   wrap.version(2);  // floats
