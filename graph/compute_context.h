@@ -25,6 +25,19 @@ class ArrayView {
   const std::uint32_t* table_;
 };
 
+// The elements of an array output, likewise.
+template <typename T>
+class OutArray {
+ public:
+  OutArray(std::byte* values, const std::uint32_t* table) : values_(values), table_(table) {}
+  std::uint32_t size() const { return table_[0]; }
+  T& operator[](std::uint32_t i) const { return *reinterpret_cast<T*>(values_ + table_[1 + i]); }
+
+ private:
+  std::byte* values_;
+  const std::uint32_t* table_;
+};
+
 // What the host offers to a compute besides data.
 class ComputeHost {
  public:
@@ -51,7 +64,8 @@ class ComputeContext {
   bool at_rest =
       false;  // the rest state is computed while compiling: all lazy inputs are there, whatever decide says
 
-  // Inputs and outputs by their position in the group's lists. T is the slot's type (graph/value.h).
+  // Inputs and outputs by their position in the group's lists; authors of nodes name them
+  // (graph/node_context.h). T is the slot's type (graph/value.h).
   template <typename T>
   const T& get(int i) const {
     return *reinterpret_cast<const T*>(values + in[i]);
@@ -68,6 +82,10 @@ class ComputeContext {
   template <typename T>
   T& out_value(int i, std::uint32_t element) const {
     return *reinterpret_cast<T*>(values + (out + out[i])[1 + element]);
+  }
+  template <typename T>
+  OutArray<T> out_array(int i) const {
+    return OutArray<T>(values, out + out[i]);
   }
   const PointsView& out_points(int i) const { return out_value<PointsView>(i); }
   const PointsView& out_points(int i, std::uint32_t element) const {

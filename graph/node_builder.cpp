@@ -143,6 +143,20 @@ NodeBuilder& NodeBuilder::default_from(std::function<Value(const Structural&)> f
   return *this;
 }
 
+NodeBuilder& NodeBuilder::compute_ports(ComputeFn f, std::span<const Port> ports) {
+  ComputeGroup g = GroupOf(*def_, ports, &def_->problems);
+  g.compute = f;
+  if (std::ranges::none_of(ports, [](const Port& port) { return !port.input; }))
+    problem("", "a compute() that names no output");
+  def_->groups.push_back(std::move(g));
+  return *this;
+}
+
+void NodeBuilder::check_ports(std::span<const Port> ports, std::string_view word) {
+  for (std::string& text : PortProblems(*def_, group(), ports, word))
+    def_->problems.push_back(std::move(text));
+}
+
 NodeBuilder& NodeBuilder::group_compute(CheckedCompute compute) {
   ComputeGroup g;
   g.compute = compute.function;

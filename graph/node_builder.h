@@ -8,15 +8,18 @@
 // compute() of a captureless function takes its inputs in the order of declaration (structural ones left out)
 // and returns the one output: bool, std::int64_t or any integer (int, enum), a scoped enum (enum), double,
 // Double3, Quaternion, const Matrix4&, ConstPointsView, ArrayView<T>. Number and types are held against the
-// declaration.
+// declaration. What is more than that takes a NodeContext (graph/node_context.h), which names its inputs and
+// outputs.
 //
 // Nothing here aborts: what is wrong with a declaration is noted in NodeDef::problems, one sentence each with
 // node, attribute, what was expected and what was given; NodeRegistry::status() tells, and no graph takes
 // such a type.
 #pragma once
 
+#include <initializer_list>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -24,6 +27,7 @@
 #include <vector>
 
 #include "graph/compute_signature.h"
+#include "graph/node_context.h"
 #include "graph/node_def.h"
 
 namespace kpsa::engine {
@@ -34,6 +38,13 @@ struct AttributeOptions {
   Unit unit = Unit::kNone;
   std::string doc = {};
   bool diagnostic = false;
+};
+
+// A value of an enum attribute, and its name in rigs.
+template <typename E>
+struct Choice {
+  const char* name;
+  E value;
 };
 
 class NodeBuilder {
@@ -80,7 +91,25 @@ class NodeBuilder {
     attribute().structural = true;
     return *this;
   }
-  // An enum input; the default is its first name.
+  // An enum input, as a scoped enum whose values are 0, 1, 2, ... in this order; computes and
+  // Structural::choice read it as that.
+  template <typename E>
+  requires std::is_enum_v<E> NodeBuilder& enumeration(std::string name,
+                                                      std::initializer_list<Choice<E>> choices,
+                                                      bool structural, std::string doc = {},
+                                                      E default_choice = E{}) {
+    std::vector<std::string> names;
+    for (const Choice<E>& choice : choices) {
+      if (static_cast<std::size_t>(choice.value) != names.size())
+        problem(name, "its choices are not the values 0, 1, 2, ... of its enum in their order");
+      names.emplace_back(choice.name);
+    }
+    enumeration(std::move(name), std::move(names), structural, std::move(doc),
+                static_cast<int>(default_choice));
+    attribute().choice = &typeid(E);
+    return *this;
+  }
+  // The same by number; the default is the first name.
   NodeBuilder& enumeration(std::string name, std::vector<std::string> names, bool structural,
                            std::string doc = {}, int default_choice = 0);
   // A points, colors or weights input.
@@ -104,6 +133,13 @@ class NodeBuilder {
   NodeBuilder& grid(std::string divisions_attribute);
   NodeBuilder& default_from(std::function<Value(const Structural&)> f);
 
+  // Closes a group: computes the outputs that a function of a NodeContext names from the inputs that it names.
+  template <auto kCompute>
+  NodeBuilder& compute() {
+    using Context = ContextOf<decltype(kCompute)>;
+    return compute_ports([](ComputeContext& context) { kCompute(Context(context)); }, Context::kPorts);
+  }
+  NodeBuilder& compute_ports(ComputeFn f, std::span<const Port> ports);
   // Closes a group: computes all outputs that no group has yet, from all non-structural inputs.
   template <typename F>
   NodeBuilder& compute(F f) {
@@ -121,6 +157,12 @@ class NodeBuilder {
   }
 
   // Change the group that was closed last.
+  template <auto kDecide>  // a function of the compute's NodeContext, or of one that is its beginning
+  NodeBuilder& decide() {
+    using Context = ContextOf<decltype(kDecide)>;
+    check_ports(Context::kPorts, "decide()");
+    return decide([](ComputeContext& context) -> std::uint64_t { return kDecide(Context(context)); });
+  }
   NodeBuilder& decide(DecideFn f) {
     group().decide = f;
     return *this;
@@ -132,6 +174,12 @@ class NodeBuilder {
   // Many steps of the group run as one: `bind` (or null) makes its kernel of theirs, `f` computes all of
   // them.
   NodeBuilder& batch(BindBatchFn bind, ComputeBatchFn f);
+  template <auto kBatch>  // a function of a NodeBatch
+  NodeBuilder& batch(BindBatchFn bind) {
+    using Batch = ContextOf<decltype(kBatch)>;
+    check_ports(Batch::kPorts, "batch()");
+    return batch(std::move(bind), [](const BatchContext& context) { kBatch(Batch(context)); });
+  }
   // The output equals `input`, bit for bit, while the inputs `held` hold their defaults: then plans do
   // without the step.
   NodeBuilder& passes(std::string_view input, const std::vector<std::string>& held);
@@ -169,27 +217,10 @@ class NodeBuilder {
     ComputeFn function = nullptr;
     std::optional<ComputeSignature> signature;
   };
-  template <typename T>
-  struct Argument {  // a value by its slot
-    static decltype(auto) Get(const ComputeContext& context, int i) {
-      if constexpr (std::is_same_v<T, bool>) {
-        return context.get<std::int64_t>(i) != 0;
-      } else if constexpr (std::is_integral_v<T> || std::is_enum_v<T>) {
-        return static_cast<T>(context.get<std::int64_t>(i));
-      } else {
-        return context.get<T>(i);
-      }
-    }
-  };
-  template <typename T>
-  struct Argument<ArrayView<T>> {
-    static ArrayView<T> Get(const ComputeContext& context, int i) { return context.array<T>(i); }
-  };
-
   template <typename F, typename R, typename... Args, std::size_t... I>
   static ComputeFn ThunkOf(std::index_sequence<I...>) {
     return [](ComputeContext& context) {
-      const R result = F{}(Argument<std::decay_t<Args>>::Get(context, static_cast<int>(I))...);
+      const R result = F{}(ArgumentOf<std::decay_t<Args>>::Get(context, static_cast<int>(I))...);
       if constexpr (std::is_integral_v<R> || std::is_enum_v<R>) {
         context.out_value<std::int64_t>(0) = static_cast<std::int64_t>(result);
       } else {
@@ -207,6 +238,7 @@ class NodeBuilder {
   }
   template <typename F>
   static CheckedCompute Checked(F) {
+    static_assert(!std::is_pointer_v<F>, "a function of a NodeContext is named: compute<F>()");
     static_assert(std::is_empty_v<F>, "compute must capture nothing: it may run on any thread");
     if constexpr (std::is_invocable_v<F, ComputeContext&>) {
       return {[](ComputeContext& context) { F{}(context); }, std::nullopt};
@@ -225,6 +257,7 @@ class NodeBuilder {
   NodeBuilder& group_for(std::vector<std::string> outputs, std::vector<std::string> inputs,
                          CheckedCompute compute);
   void finish_group(const CheckedCompute& compute);
+  void check_ports(std::span<const Port> ports, std::string_view word);
   bool one_output(std::string_view word);
   void problem(std::string_view attribute, std::string_view text);
 

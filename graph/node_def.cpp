@@ -1,6 +1,16 @@
 #include "graph/node_def.h"
 
+#include <algorithm>
+
+#include "base/check.h"
+
 namespace kpsa::engine {
+
+std::int64_t Structural::ChoiceOf(std::string_view name, const std::type_info& as) const {
+  const std::type_info* declared = choice_type(name);
+  KPSA_CHECK(declared == nullptr || *declared == as);
+  return value(name).AsInt();
+}
 
 int NodeDef::FindAttribute(std::string_view attribute_name) const {
   for (std::size_t i = 0; i < attributes.size(); ++i) {
@@ -26,6 +36,12 @@ int NodeDef::GroupOfOutput(int attribute) const {
 std::vector<std::string> NodeDef::Problems() const {
   std::vector<std::string> all = problems;
   if (name.empty()) all.push_back("a node type has no name");
+  const bool named =
+      !groups.empty() && std::ranges::all_of(groups, [](const ComputeGroup& g) { return g.named; });
+  const auto is_read = [&](int number) {
+    return std::ranges::any_of(
+        groups, [&](const ComputeGroup& g) { return std::ranges::count(g.inputs, number) > 0; });
+  };
   for (std::size_t i = 0; i < attributes.size(); ++i) {
     const AttributeDef& a = attributes[i];
     if (a.output && GroupOfOutput(static_cast<int>(i)) < 0)
@@ -33,6 +49,11 @@ std::vector<std::string> NodeDef::Problems() const {
           fmt::format("node type \"{}\", attribute \"{}\": nothing computes this output; expected a "
                       "compute() after it is declared",
                       name, a.name));
+    if (named && !a.output && !a.structural && !is_read(static_cast<int>(i)))
+      all.push_back(fmt::format(
+          "node type \"{}\", attribute \"{}\": no compute names this input; expected it in the list "
+          "of one",
+          name, a.name));
   }
   return all;
 }

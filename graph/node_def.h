@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <typeinfo>
 #include <vector>
 
 #include "base/status.h"
@@ -38,7 +39,8 @@ struct AttributeDef {
   bool per_geometry = false;   // array whose element i belongs to the i-th deformed geometry
   bool world_place = false;    // matrix that is the world's where nothing drives it
   std::vector<std::string> enum_names;
-  std::vector<std::string> aliases;  // other names under which plugs may be written
+  const std::type_info* choice = nullptr;  // the scoped enum that enum_names are of, where one was given
+  std::vector<std::string> aliases;        // other names under which plugs may be written
   std::string grid;  // elements may be written [s,t,u]; names the structural attribute with the divisions
   std::function<Value(const Structural&)> default_from;  // for defaults that follow from structural values
 };
@@ -60,10 +62,22 @@ class Structural {
   int get_int(std::string_view name) const { return static_cast<int>(value(name).AsInt()); }
   double get_double(std::string_view name) const { return value(name).AsDouble(); }
   bool get_bool(std::string_view name) const { return value(name).AsInt() != 0; }
+  // Of an enum, as what it was declared with; another one is a programmer's error, too.
+  template <typename E>
+  E choice(std::string_view name) const {
+    return static_cast<E>(ChoiceOf(name, typeid(E)));
+  }
   template <typename T>
   const T* asset(std::string_view name, int element = -1) const {
     return value(name, element).asset<T>();
   }
+
+ protected:
+  // The scoped enum of an enum attribute; null where none was given.
+  virtual const std::type_info* choice_type(std::string_view) const { return nullptr; }
+
+ private:
+  std::int64_t ChoiceOf(std::string_view name, const std::type_info& as) const;
 };
 
 // Which points of the inputs an output needs.
@@ -108,6 +122,7 @@ struct ComputeGroup {
   std::vector<int> inputs;  // attribute numbers, without the structural ones
   std::vector<int> outputs;
   bool per_geometry = false;  // one step for every element of the per-geometry outputs
+  bool named = false;         // the compute says itself what it reads (graph/node_context.h)
   ComputeFn compute = nullptr;
   DecideFn decide = nullptr;  // with lazy inputs
   ComputeBlockFn compute_block = nullptr;
@@ -138,7 +153,8 @@ struct NodeDef {
   std::vector<ComputeGroup> groups;
   std::vector<std::string> problems;  // of the declaration, noted while it was built
 
-  // All that is wrong with it: `problems`, outputs that nothing computes, a name or a group that is missing.
+  // All that is wrong with it: `problems`, outputs that nothing computes, inputs that no compute names, a name
+  // that is missing.
   std::vector<std::string> Problems() const;
 
   int FindAttribute(std::string_view attribute_name) const;  // -1 if there is none

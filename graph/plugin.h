@@ -19,16 +19,16 @@ namespace kpsa::engine {
 
 // Of the declarations that this header includes: raised whenever one of them changes its layout or meaning.
 // Libraries of another version are refused.
-inline constexpr int kPluginAbi = 5;
+inline constexpr int kPluginAbi = 6;
 
 }  // namespace kpsa::engine
 
 // The words of node authors; those of the public face (include/kpsa) are others.
 namespace kpsa {
-using engine::ArrayView, engine::AttributeOptions, engine::Binding, engine::BoundKernel, engine::ComputeContext,
-    engine::ConstPointsView, engine::Demand, engine::Double3, engine::Matrix4, engine::NodeBuilder, engine::NodeRegistry,
-    engine::PointSet, engine::PointsView, engine::Quaternion, engine::Structural, engine::Type, engine::Unit,
-    engine::Value;
+using engine::ArrayView, engine::AttributeOptions, engine::Binding, engine::BoundKernel, engine::Choice,
+    engine::ComputeContext, engine::ConstPointsView, engine::Demand, engine::Double3, engine::In, engine::Matrix4,
+    engine::NodeBuilder, engine::NodeContext, engine::NodeRegistry, engine::Out, engine::OutArray, engine::PointSet,
+    engine::PointsView, engine::Quaternion, engine::Structural, engine::Type, engine::Unit, engine::Value;
 }  // namespace kpsa
 
 // Begins the function that adds the library's node types to `registry`, and exports it with its ABI version.

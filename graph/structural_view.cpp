@@ -10,6 +10,10 @@ int StructuralView::Attribute(std::string_view name) const {
   return attribute;
 }
 
+const std::type_info* StructuralView::choice_type(std::string_view name) const {
+  return table_.graph().def(node_).attributes[static_cast<std::size_t>(Attribute(name))].choice;
+}
+
 int StructuralView::Element(int attribute, int element) const {
   const AttributeDef& a = table_.graph().def(node_).attributes[static_cast<std::size_t>(attribute)];
   return a.array && element < 0 ? geometry() : element;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <typeinfo>
 
 #include "graph/instances.h"
 
@@ -29,6 +30,9 @@ class StructuralView final : public Structural {
   int geometry() const override { return geometry_ < 0 ? 0 : geometry_; }
   const std::string& node_name() const override { return table_.graph().name(node_); }
   const Value* rest(std::string_view name, int element) const override;
+
+ protected:
+  const std::type_info* choice_type(std::string_view name) const override;
 
  private:
   int Attribute(std::string_view name) const;

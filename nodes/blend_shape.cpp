@@ -12,7 +12,6 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr int kWeight = kFirstOwnInput, kPointWeights = kFirstOwnInput + 1;
 constexpr std::size_t kNoShape = static_cast<std::size_t>(-1);
 
 // A target that goes through other shapes on its way: piecewise linear in its weight, its first and last
@@ -33,6 +32,9 @@ struct Path {
     weights[stops[i + 1].shape] += t;
   }
 };
+
+using BlendShapeContext =
+    DeformerContext<In<"weight", ArrayView<double>>, In<"pointWeights", ConstPointsView>>;
 
 struct BlendShapeBound {
   BlendShapeKernel kernel;
@@ -109,10 +111,10 @@ bool IsTurned(const Matrix4& motion) {
   return false;
 }
 
-void ComputeBlendShape(ComputeContext& c) {
+void ComputeBlendShape(BlendShapeContext c) {
   const auto& bound = c.kernel_as<BlendShapeBound>();
-  const ArrayView<double> weight = c.array<double>(kWeight);
-  const std::span<double> weights(reinterpret_cast<double*>(c.scratch), bound.kernel.target_count());
+  const ArrayView<double> weight = c.get<"weight">();
+  const std::span<double> weights(reinterpret_cast<double*>(c.scratch()), bound.kernel.target_count());
   for (std::uint32_t i = 0; i < weights.size(); ++i) weights[i] = i < weight.size() ? weight[i] : 0.0;
   for (const Path& path : bound.paths) weights[path.target] = 0;
   for (const Path& path : bound.paths) {
@@ -120,12 +122,12 @@ void ComputeBlendShape(ComputeContext& c) {
     path.Add(target < weight.size() ? weight[target] : 0.0, weights);
   }
   const Parallel parallel = HostParallel(c);
-  const BlendShapeKernel::Inputs inputs{weights, c.get<double>(kEnvelope)};
-  float* scratch = c.scratch + bound.weight_floats;
+  const BlendShapeKernel::Inputs inputs{weights, c.get<"envelope">()};
+  float* scratch = c.scratch() + bound.weight_floats;
   const std::span<float> kernel_scratch(scratch, bound.kernel.ScratchFloats());
-  const ConstPointsView& in = c.points(kInPoints);
-  const PointsView& out = c.out_points(0);
-  const Matrix4 motion = bound.frame.Motion(c.get<Matrix4>(kParentMatrix));
+  const ConstPointsView& in = c.get<"inPoints">();
+  const PointsView& out = c.out<"outPoints">();
+  const Matrix4 motion = bound.frame.Motion(c.get<"parentMatrix">());
   if (!bound.weighted && !IsTurned(motion)) {
     bound.kernel.Run(inputs, in, out, kernel_scratch, &parallel);
     return;
@@ -136,8 +138,8 @@ void ComputeBlendShape(ComputeContext& c) {
   std::fill_n(scratch, 3 * row, 0.0f);
   const PointsView sums{scratch, scratch + row, scratch + 2 * row, in.count};
   bound.kernel.Run(inputs, sums, sums, kernel_scratch, &parallel);
-  const float* shares = bound.weighted ? c.points(kPointWeights).x : nullptr;
-  c.host->For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
+  const float* shares = bound.weighted ? c.get<"pointWeights">().x : nullptr;
+  c.For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const double share = shares == nullptr ? 1.0 : shares[i];
       const Double3 sum = Double3{sums.x[i], sums.y[i], sums.z[i]} * share;
@@ -170,13 +172,7 @@ double Combine(ArrayView<double> weights, std::int64_t method) {
   return method == 1 ? lowest : weights.size() / inverses;
 }
 
-}  // namespace
-
-KPSA_NODES(blend_shape, registry) {
-  NodeBuilder b = AddDeformer(registry, "blendShape",
-                              "Adds weighted displacements towards target shapes (morph targets). They are "
-                              "those of the file, in the axes of mesh space, wherever the stage is; after "
-                              "a skin they turn as parentMatrix has turned since the rest pose.");
+void DeclareBlendShape(NodeBuilder& b) {
   b.structural("targets", Type::kAsset, {.doc = "the target shapes"}).per_geometry();
   b.in("weight", 0.0, {.doc = "one for each target; weight[name] works, too"}).array();
   b.points_in(
@@ -189,7 +185,20 @@ KPSA_NODES(blend_shape, registry) {
   b.structural("inbetweenShape", std::vector<std::int64_t>{}, {.doc = "the targets that are these shapes"});
   b.structural("inbetweenWeight", std::vector<double>{},
                {.doc = "the weights at which the targets are these shapes; more than 0, less than 1"});
-  FinishDeformer(b, &ComputeBlendShape, BindBlendShape, DemandBlendShape).cost(300, 5);
+}
+
+}  // namespace
+
+KPSA_NODES(blend_shape, registry) {
+  AddDeformer<ComputeBlendShape>(
+      registry, {.name = "blendShape",
+                 .doc = "Adds weighted displacements towards target shapes (morph targets). They are those "
+                        "of the file, in the axes of mesh space, wherever the stage is; after a skin they "
+                        "turn as parentMatrix has turned since the rest pose.",
+                 .own = DeclareBlendShape,
+                 .bind = BindBlendShape,
+                 .demand = DemandBlendShape})
+      .cost(300, 5);
 
   registry.add("combinationShape", "The weight of a shape that acts where others act together.")
       .category("deformer")

@@ -119,9 +119,9 @@ void LocalMatrix(const ClipTransformKernel& k, const Find& find, Matrix4* matrix
   WriteTrs(translation, k.rotation.At(find(k.rotation_times)), scale, matrix);
 }
 
-void ComputeClipTransform(ComputeContext& c) {
+void ComputeClipTransform(NodeContext<In<"time", double>, Out<"matrix", Matrix4>> c) {
   const auto& k = c.kernel_as<ClipTransformKernel>();
-  const double time = c.get<double>(0);
+  const double time = c.get<"time">();
   KeySpan span;
   int found = ClipTransformKernel::kConstant;  // the times that `span` was found in
   LocalMatrix(
@@ -131,7 +131,7 @@ void ComputeClipTransform(ComputeContext& c) {
         found = times;
         return span;
       },
-      &c.out_value<Matrix4>(0));
+      &c.out<"matrix">());
 }
 
 // The transforms of a clip together: those with equal times look their keys up once.
@@ -196,11 +196,11 @@ class FoundKeys {
   Entry entries_[kEntries];
 };
 
-void ComputeClipBatch(const BatchContext& c) {
+void ComputeClipBatch(NodeBatch<In<"time", double>, Out<"matrix", Matrix4>> c) {
   const auto& batch = c.kernel_as<ClipBatchKernel>();
   FoundKeys found(batch);
   const auto span_of = [&](const ClipBatchKernel::Turn& turn) -> const KeySpan& {
-    return found.Find(turn.times, c.get<double>(turn.position, 0));
+    return found.Find(turn.times, c.get<"time">(turn.position));
   };
   // The keys of each are on their way some turns before they are used
   constexpr std::size_t kAhead = 12;
@@ -215,13 +215,13 @@ void ComputeClipBatch(const BatchContext& c) {
     const KeySpan& span = span_of(turn);
     const RotationTrack::Key* key = turn.keys + span.key;
     WriteTrs(turn.translation, span.t == 0 ? key->rotation : RotationTrack::Between(key, span.t), turn.scale,
-             &c.out_value<Matrix4>(turn.position));
+             &c.out<"matrix">(turn.position));
   }
   for (const ClipBatchKernel::Other& other : batch.others) {
-    const double time = c.get<double>(other.position, 0);
+    const double time = c.get<"time">(other.position);
     LocalMatrix(
         *other.kernel, [&](int times) -> const KeySpan& { return found.Find(other.times[times], time); },
-        &c.out_value<Matrix4>(other.position));
+        &c.out<"matrix">(other.position));
   }
 }
 
@@ -242,12 +242,13 @@ Result<BoundKernel> BindClipWeights(const Binding& binding) {
   return MakeBound(std::move(kernel), 2 * components);
 }
 
-void ComputeClipWeights(ComputeContext& c) {
+void ComputeClipWeights(NodeContext<In<"time", double>, Out<"output", OutArray<double>>> c) {
   const auto& [keys, times] = c.kernel_as<ClipWeightsKernel>();
-  const std::span<double> values(reinterpret_cast<double*>(c.scratch), keys.view.components);
-  if (!keys.empty()) SampleScalars(keys.view, times.Find(c.get<double>(0)), values);
-  for (std::uint32_t i = 0; i < c.out_count(0); ++i)
-    c.out_value<double>(0, i) = !keys.empty() && i < values.size() ? values[i] : 0.0;
+  const std::span<double> values(reinterpret_cast<double*>(c.scratch()), keys.view.components);
+  if (!keys.empty()) SampleScalars(keys.view, times.Find(c.get<"time">()), values);
+  const OutArray<double> out = c.out<"output">();
+  for (std::uint32_t i = 0; i < out.size(); ++i)
+    out[i] = !keys.empty() && i < values.size() ? values[i] : 0.0;
 }
 
 struct CurveKernel {
@@ -274,20 +275,20 @@ Result<BoundKernel> BindAnimCurve(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
-void ComputeAnimCurve(ComputeContext& c) {
+void ComputeAnimCurve(NodeContext<In<"input", double>, Out<"output", double>> c) {
   const auto& k = c.kernel_as<CurveKernel>();
-  const double t = std::clamp(c.get<double>(0), k.times.front(), k.times.back());
+  const double t = std::clamp(c.get<"input">(), k.times.front(), k.times.back());
   const auto next =
       static_cast<std::size_t>(std::upper_bound(k.times.begin(), k.times.end(), t) - k.times.begin());
   if (next == k.times.size()) {
-    c.out_value<double>(0) = k.values.back();
+    c.out<"output">() = k.values.back();
     return;
   }
   const double a = k.values[next - 1], b = k.values[next];
   double u = (t - k.times[next - 1]) / (k.times[next] - k.times[next - 1]);
   if (k.interpolation == 1) u = 0;
   if (k.interpolation == 2) u = Smoothstep(u);
-  c.out_value<double>(0) = a + (b - a) * u;
+  c.out<"output">() = a + (b - a) * u;
 }
 
 void AddAnimCurve(NodeRegistry& registry, const char* name, const char* doc, Unit unit) {
@@ -299,7 +300,7 @@ void AddAnimCurve(NodeRegistry& registry, const char* name, const char* doc, Uni
       .enumeration("interpolation", {"linear", "step", "smooth"}, true)
       .out("output", Type::kDouble)
       .unit(unit)
-      .compute(&ComputeAnimCurve)
+      .compute<ComputeAnimCurve>()
       .bind(BindAnimCurve)
       .cost(30, 0);
 }
@@ -313,9 +314,9 @@ KPSA_NODES(clip, registry) {
       .in("time", 0.0, {.unit = Unit::kTime})
       .structural("keys", Type::kAsset)
       .out("matrix", Type::kMatrix)
-      .compute(&ComputeClipTransform)
+      .compute<ComputeClipTransform>()
       .bind(BindClipTransform)
-      .batch(BindClipBatch, &ComputeClipBatch)
+      .batch<ComputeClipBatch>(BindClipBatch)
       .cost(120, 0);
   registry.add("clipWeights", "A mesh's part of a clip: its morph weights over time.")
       .category("time")
@@ -324,7 +325,7 @@ KPSA_NODES(clip, registry) {
       .structural("keys", Type::kAsset)
       .out("output", Type::kDouble)
       .array()
-      .compute(&ComputeClipWeights)
+      .compute<ComputeClipWeights>()
       .bind(BindClipWeights)
       .cost(100, 0);
   AddAnimCurve(registry, "animCurve",

@@ -102,10 +102,10 @@ Result<BoundKernel> BindLayeredTransform(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
-// Inputs: time[], weight[].
-void ComputeLayeredTransform(ComputeContext& c) {
+void ComputeLayeredTransform(
+    NodeContext<In<"time", ArrayView<double>>, In<"weight", ArrayView<double>>, Out<"matrix", Matrix4>> c) {
   const auto& k = c.kernel_as<LayeredTransformKernel>();
-  const ArrayView<double> times = c.array<double>(0), weights = c.array<double>(1);
+  const ArrayView<double> times = c.get<"time">(), weights = c.get<"weight">();
   Double3 translation = k.rest_translation, scale = k.rest_scale;
   Quaternion rotation = k.rest_rotation;
   for (std::uint32_t i = 0; i < k.layers.size() && i < times.size(); ++i) {
@@ -121,7 +121,7 @@ void ComputeLayeredTransform(ComputeContext& c) {
     if (layer.scales)
       scale = mix(scale, SampleVec3(layer.scale.view, layer.scale_times.Find(time)), k.rest_scale);
   }
-  c.out_value<Matrix4>(0) = ComposeTrs(translation, rotation, scale);
+  c.out<"matrix">() = ComposeTrs(translation, rotation, scale);
 }
 
 struct WeightsLayer {
@@ -157,21 +157,23 @@ Result<BoundKernel> BindLayeredWeights(const Binding& binding) {
   return MakeBound(std::move(kernel), 2 * most);
 }
 
-void ComputeLayeredWeights(ComputeContext& c) {
+void ComputeLayeredWeights(NodeContext<In<"time", ArrayView<double>>, In<"weight", ArrayView<double>>,
+                                       Out<"output", OutArray<double>>>
+                               c) {
   const auto& k = c.kernel_as<LayeredWeightsKernel>();
-  const ArrayView<double> times = c.array<double>(0), weights = c.array<double>(1);
-  const std::uint32_t count = c.out_count(0);
+  const ArrayView<double> times = c.get<"time">(), weights = c.get<"weight">();
+  const OutArray<double> out = c.out<"output">();
+  const std::uint32_t count = out.size();
   const auto rest_of = [&](std::size_t n) { return n < k.rest.size() ? k.rest[n] : 0.0; };
-  const auto out = [&](std::uint32_t n) -> double& { return c.out_value<double>(0, n); };
-  for (std::uint32_t n = 0; n < count; ++n) out(n) = rest_of(n);
+  for (std::uint32_t n = 0; n < count; ++n) out[n] = rest_of(n);
   for (std::uint32_t i = 0; i < k.layers.size() && i < times.size(); ++i) {
     const WeightsLayer& layer = k.layers[i];
     const Mix mix{i < weights.size() ? weights[i] : 1, layer.additive};
     if (layer.keys.empty() || mix.weight == 0) continue;
-    const std::span<double> values(reinterpret_cast<double*>(c.scratch), layer.keys.view.components);
+    const std::span<double> values(reinterpret_cast<double*>(c.scratch()), layer.keys.view.components);
     SampleScalars(layer.keys.view, layer.times.Find(times[i]), values);
     for (std::uint32_t n = 0; n < count && n < values.size(); ++n)
-      out(n) = mix(out(n), values[n], rest_of(n));
+      out[n] = mix(out[n], values[n], rest_of(n));
   }
 }
 
@@ -209,7 +211,7 @@ KPSA_NODES(clip_layers, registry) {
   AddLayered(registry, "layeredTransform",
              "A transform's part of several clips over each other: its local matrix over time.")
       .out("matrix", Type::kMatrix)
-      .compute(&ComputeLayeredTransform)
+      .compute<ComputeLayeredTransform>()
       .bind(BindLayeredTransform)
       .cost(250, 0);
   AddLayered(registry, "layeredWeights",
@@ -217,7 +219,7 @@ KPSA_NODES(clip_layers, registry) {
       .structural("rest", std::vector<double>{}, {.doc = "weights where no layer plays"})
       .out("output", Type::kDouble)
       .array()
-      .compute(&ComputeLayeredWeights)
+      .compute<ComputeLayeredWeights>()
       .bind(BindLayeredWeights)
       .cost(200, 0);
 }

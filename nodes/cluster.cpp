@@ -12,7 +12,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr int kMatrix = kFirstOwnInput, kBindPreMatrix = kFirstOwnInput + 1;
+using ClusterContext = DeformerContext<In<"matrix", Matrix4>, In<"bindPreMatrix", Matrix4>>;
 
 struct ClusterBound {
   ClusterKernel kernel;
@@ -79,12 +79,12 @@ Result<BoundKernel> BindSoftMod(const Binding& binding) {
   return MakeBound(std::move(*bound), 0);
 }
 
-void ComputeCluster(ComputeContext& c) {
+void ComputeCluster(ClusterContext c) {
   const auto& bound = c.kernel_as<ClusterBound>();
-  const Matrix4 &parent = c.get<Matrix4>(kParentMatrix), &handle = c.get<Matrix4>(kMatrix);
+  const Matrix4 &parent = c.get<"parentMatrix">(), &handle = c.get<"matrix">();
   Matrix4 delta, motion = bound.frame.Motion(parent);
   if (bound.has_bind_pre) {
-    delta = handle * c.get<Matrix4>(kBindPreMatrix);
+    delta = handle * c.get<"bindPreMatrix">();
   } else if (bound.frame.fixed()) {
     // The handle's motion in its parent's frame, as seen from where the parent rests
     const Matrix4 own = InverseOrIdentity(parent) * handle * bound.parent_from_handle_inverse;
@@ -94,32 +94,38 @@ void ComputeCluster(ComputeContext& c) {
     delta = handle * bound.parent_from_handle_inverse * InverseOrIdentity(parent);
   }
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({delta, TransformPoint(motion, bound.pivot), c.get<double>(kEnvelope)},
-                   c.points(kInPoints), c.out_points(0), {}, &parallel);
+  bound.kernel.Run({delta, TransformPoint(motion, bound.pivot), c.get<"envelope">()}, c.get<"inPoints">(),
+                   c.out<"outPoints">(), {}, &parallel);
 }
 
-void AddHandle(NodeBuilder& b) {
+void DeclareHandle(NodeBuilder& b) {
   b.in("matrix", Matrix4(), {.doc = "the handle's world matrix"});
   b.in("bindPreMatrix", Matrix4(),
        {.doc =
             "inverse of the handle's matrix at bind; default: from the rest state, carried by parentMatrix"});
 }
 
+void DeclareSoftMod(NodeBuilder& b) {
+  DeclareHandle(b);
+  b.structural("falloffCenter", Double3(),
+               {.unit = Unit::kLength, .doc = "world space at rest; default: the handle"});
+  b.structural("falloffRadius", 0.05, {.min = 0, .unit = Unit::kLength});
+  b.enumeration("falloffCurve", {"smooth", "linear", "spline", "none"}, true);
+}
+
 }  // namespace
 
 KPSA_NODES(cluster, registry) {
-  NodeBuilder cluster = AddDeformer(registry, "cluster", "Moves weighted points with a handle.");
-  AddHandle(cluster);
-  FinishDeformer(cluster, &ComputeCluster, BindCluster).cost(200, 0.3f);
-
-  NodeBuilder soft =
-      AddDeformer(registry, "softMod", "Moves points with a handle, fading with the distance from a centre.");
-  AddHandle(soft);
-  soft.structural("falloffCenter", Double3(),
-                  {.unit = Unit::kLength, .doc = "world space at rest; default: the handle"});
-  soft.structural("falloffRadius", 0.05, {.min = 0, .unit = Unit::kLength});
-  soft.enumeration("falloffCurve", {"smooth", "linear", "spline", "none"}, true);
-  FinishDeformer(soft, &ComputeCluster, BindSoftMod)
+  AddDeformer<ComputeCluster>(registry, {.name = "cluster",
+                                         .doc = "Moves weighted points with a handle.",
+                                         .own = DeclareHandle,
+                                         .bind = BindCluster})
+      .cost(200, 0.3f);
+  AddDeformer<ComputeCluster>(registry,
+                              {.name = "softMod",
+                               .doc = "Moves points with a handle, fading with the distance from a centre.",
+                               .own = DeclareSoftMod,
+                               .bind = BindSoftMod})
       .cost(200, 0.3f)
       .touches("inPoints", [](const Structural& structural, const PointSet& points) {
         const Result<std::vector<float>> weights = SoftModWeights(structural, points);

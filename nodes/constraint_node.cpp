@@ -38,19 +38,18 @@ Result<ConstraintRest> ConstraintRest::Bind(const Structural& s) {
   return rest;
 }
 
-bool ConstraintRest::Holds(const ComputeContext& c) const {
-  if (!maintain_ || !(c.get<Matrix4>(kInMatrix) == in_) || !(c.get<Matrix4>(kConstrainedParent) == parent_))
-    return false;
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
+bool ConstraintRest::Holds(ConstraintInputs c) const {
+  if (!maintain_ || !(c.get<"inMatrix">() == in_) || !(c.get<"parentMatrix">() == parent_)) return false;
+  const ArrayView<Matrix4> targets = c.get<"targetMatrix">();
   for (std::uint32_t i = 0; i < targets.size(); ++i) {
     if (!(targets[i] == targets_[i])) return false;
   }
   return true;
 }
 
-double TotalWeight(const ComputeContext& c) {
+double TotalWeight(ConstraintInputs c) {
   double total = 0;
-  for (std::uint32_t i = 0; i < c.array<Matrix4>(kTargetMatrix).size(); ++i) total += TargetWeight(c, i);
+  for (std::uint32_t i = 0; i < c.get<"targetMatrix">().size(); ++i) total += TargetWeight(c, i);
   return total;
 }
 

@@ -15,15 +15,15 @@
 
 namespace kpsa::engine {
 
-// Positions of the shared inputs in the group; a constraint's own follow from kFirstConstraintInput.
-enum ConstraintInput {
-  kTargetMatrix = 0,
-  kTargetWeight = 1,
-  kInMatrix = 2,
-  kConstrainedParent = 3,
-  kBlend = 4,
-  kFirstConstraintInput = 5
-};
+// The shared inputs; and what a constraint's compute sees, with its own.
+using ConstraintInputs =
+    NodeContext<In<"targetMatrix", ArrayView<Matrix4>>, In<"targetWeight", ArrayView<double>>,
+                In<"inMatrix", Matrix4>, In<"parentMatrix", Matrix4>, In<"blend", double>>;
+template <typename... Own>
+using ConstraintContext =
+    NodeContext<In<"targetMatrix", ArrayView<Matrix4>>, In<"targetWeight", ArrayView<double>>,
+                In<"inMatrix", Matrix4>, In<"parentMatrix", Matrix4>, In<"blend", double>, Own...,
+                Out<"outMatrix", Matrix4>>;
 
 // Declares targetMatrix, targetWeight, inMatrix, parentMatrix, blend and maintainOffset. Declare the
 // constraint's own inputs next, then outMatrix.
@@ -39,7 +39,7 @@ class ConstraintRest {
   const Matrix4& parent_inverse() const { return parent_inverse_; }
   std::span<const Matrix4> targets() const { return targets_; }
   // Whether inMatrix must come out as it is. Own inputs of the constraint are its own to compare.
-  bool Holds(const ComputeContext& c) const;
+  bool Holds(ConstraintInputs c) const;
 
  private:
   bool maintain_ = false;
@@ -48,12 +48,12 @@ class ConstraintRest {
 };
 
 // The weight of a target: 1 where unset.
-inline double TargetWeight(const ComputeContext& c, std::uint32_t i) {
-  const ArrayView<double> weights = c.array<double>(kTargetWeight);
+inline double TargetWeight(ConstraintInputs c, std::uint32_t i) {
+  const ArrayView<double> weights = c.get<"targetWeight">();
   return i < weights.size() ? weights[i] : 1.0;
 }
 // Of all targets; at 0 a constraint does nothing.
-double TotalWeight(const ComputeContext& c);
+double TotalWeight(ConstraintInputs c);
 inline Double3 PlaceOf(const Matrix4& m) { return {m(0, 3), m(1, 3), m(2, 3)}; }
 
 }  // namespace kpsa::engine

@@ -50,24 +50,24 @@ RotationMean::Mode InterpType(const Structural& s) {
 // Constrain(kernel, context, parent_inverse, total_weight, local) changes what it owns of the local matrix,
 // which comes in as inMatrix.
 template <typename Kernel,
-          void (*Constrain)(const Kernel&, const ComputeContext&, const Matrix4&, double, Matrix4*)>
-void ComputeConstraint(ComputeContext& c) {
+          void (*Constrain)(const Kernel&, ConstraintInputs, const Matrix4&, double, Matrix4*)>
+void ComputeConstraint(ConstraintContext<> c) {
   const auto& kernel = c.kernel_as<Kernel>();
-  const Matrix4& in = c.get<Matrix4>(kInMatrix);
-  const double blend = c.get<double>(kBlend), total = TotalWeight(c);
+  const Matrix4& in = c.get<"inMatrix">();
+  const double blend = c.get<"blend">(), total = TotalWeight(c);
   if (blend == 0 || !(total > 0) || kernel.rest.Holds(c)) {
-    c.out_value<Matrix4>(0) = in;
+    c.out<"outMatrix">() = in;
     return;
   }
   Matrix4 local = in;
-  Constrain(kernel, c, InverseOrIdentity(c.get<Matrix4>(kConstrainedParent)), total, &local);
-  c.out_value<Matrix4>(0) = BlendMatrices(in, local, blend);
+  Constrain(kernel, c, InverseOrIdentity(c.get<"parentMatrix">()), total, &local);
+  c.out<"outMatrix">() = BlendMatrices(in, local, blend);
 }
 
 // The sum of of(target, i), each by its share of the weights.
 template <typename Of>
-Double3 WeightedMean(const ComputeContext& c, double total, Of of) {
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
+Double3 WeightedMean(ConstraintInputs c, double total, Of of) {
+  const ArrayView<Matrix4> targets = c.get<"targetMatrix">();
   Double3 sum;
   for (std::uint32_t i = 0; i < targets.size(); ++i)
     sum = sum + of(targets[i], i) * (TargetWeight(c, i) / total);
@@ -86,8 +86,8 @@ Result<BoundKernel> BindPoint(const Binding& binding) {
                                  }));
 }
 
-void ConstrainPoint(const PointKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
-                    double total, Matrix4* local) {
+void ConstrainPoint(const PointKernel& k, ConstraintInputs c, const Matrix4& parent_inverse, double total,
+                    Matrix4* local) {
   const Double3 sum = WeightedMean(c, total, [&](const Matrix4& target, std::uint32_t i) {
     return TransformPoint(parent_inverse, PlaceOf(target)) + k.offsets[i];
   });
@@ -109,9 +109,9 @@ Result<BoundKernel> BindOrient(const Binding& binding) {
   return MakeBoundOr(std::move(kernel));
 }
 
-void ConstrainOrient(const OrientKernel& k, const ComputeContext& c, const Matrix4& parent_inverse, double,
+void ConstrainOrient(const OrientKernel& k, ConstraintInputs c, const Matrix4& parent_inverse, double,
                      Matrix4* local) {
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
+  const ArrayView<Matrix4> targets = c.get<"targetMatrix">();
   RotationMean mean(k.mode);
   for (std::uint32_t i = 0; i < targets.size(); ++i)
     mean.Add(TakeApart(parent_inverse * targets[i]).rotation * k.offsets[i], TargetWeight(c, i));
@@ -136,9 +136,9 @@ Result<BoundKernel> BindParent(const Binding& binding) {
   return MakeBoundOr(std::move(kernel));
 }
 
-void ConstrainParent(const ParentKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
-                     double total, Matrix4* local) {
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
+void ConstrainParent(const ParentKernel& k, ConstraintInputs c, const Matrix4& parent_inverse, double total,
+                     Matrix4* local) {
+  const ArrayView<Matrix4> targets = c.get<"targetMatrix">();
   RotationMean mean(k.mode);
   Double3 sum;
   for (std::uint32_t i = 0; i < targets.size(); ++i) {
@@ -167,8 +167,8 @@ Result<BoundKernel> BindScale(const Binding& binding) {
                                  }));
 }
 
-void ConstrainScale(const ScaleKernel& k, const ComputeContext& c, const Matrix4& parent_inverse,
-                    double total, Matrix4* local) {
+void ConstrainScale(const ScaleKernel& k, ConstraintInputs c, const Matrix4& parent_inverse, double total,
+                    Matrix4* local) {
   MatrixParts parts = TakeApart(*local);
   parts.scale = WeightedMean(c, total, [&](const Matrix4& target, std::uint32_t i) {
     const Double3 s = TakeApart(parent_inverse * target).scale, &offset = k.offsets[i];
@@ -178,7 +178,6 @@ void ConstrainScale(const ScaleKernel& k, const ComputeContext& c, const Matrix4
 }
 
 // aim
-enum AimInput { kWorldUpVector = kFirstConstraintInput, kWorldUpMatrix };
 enum WorldUp { kUpScene, kUpObject, kUpObjectRotation, kUpVector, kUpNone };
 
 struct AimKernel {
@@ -261,14 +260,14 @@ Result<BoundKernel> BindAim(const Binding& binding) {
   return MakeBound(std::move(k), 0);
 }
 
-void ComputeAim(ComputeContext& c) {
+void ComputeAim(ConstraintContext<In<"worldUpVector", Double3>, In<"worldUpMatrix", Matrix4>> c) {
   const auto& k = c.kernel_as<AimKernel>();
-  const Matrix4& in = c.get<Matrix4>(kInMatrix);
-  const Double3& up_vector = c.get<Double3>(kWorldUpVector);
-  const Matrix4& up_matrix = c.get<Matrix4>(kWorldUpMatrix);
-  const double blend = c.get<double>(kBlend);
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kTargetMatrix);
-  c.out_value<Matrix4>(0) = in;
+  const Matrix4& in = c.get<"inMatrix">();
+  const Double3& up_vector = c.get<"worldUpVector">();
+  const Matrix4& up_matrix = c.get<"worldUpMatrix">();
+  const double blend = c.get<"blend">();
+  const ArrayView<Matrix4> targets = c.get<"targetMatrix">();
+  c.out<"outMatrix">() = in;
   Double3 target;
   if (blend == 0 ||
       !MeanPlace(
@@ -279,9 +278,8 @@ void ComputeAim(ComputeContext& c) {
       up_matrix == k.up_matrix_rest)
     return;
   MatrixParts parts = TakeApart(in);
-  parts.rotation =
-      AimLocal(k, c.get<Matrix4>(kConstrainedParent), parts, target, up_vector, up_matrix) * k.offset;
-  c.out_value<Matrix4>(0) = BlendMatrices(in, PutTogether(parts), blend);
+  parts.rotation = AimLocal(k, c.get<"parentMatrix">(), parts, target, up_vector, up_matrix) * k.offset;
+  c.out<"outMatrix">() = BlendMatrices(in, PutTogether(parts), blend);
 }
 
 const char* const kOutDoc = "local, for the constrained transform's offsetParentMatrix";
@@ -297,25 +295,25 @@ NodeBuilder& AddInterpType(NodeBuilder& b) {
 KPSA_NODES(constraints, registry) {
   NodeBuilder point = AddConstraint(registry, "pointConstraint", "Moves a transform to its targets' place.");
   point.out("outMatrix", Type::kMatrix, kOutDoc)
-      .compute(&ComputeConstraint<PointKernel, ConstrainPoint>)
+      .compute<ComputeConstraint<PointKernel, ConstrainPoint>>()
       .bind(BindPoint)
       .cost(200, 0);
   NodeBuilder orient = AddConstraint(registry, "orientConstraint", "Turns a transform as its targets.");
   AddInterpType(orient)
       .out("outMatrix", Type::kMatrix, kOutDoc)
-      .compute(&ComputeConstraint<OrientKernel, ConstrainOrient>)
+      .compute<ComputeConstraint<OrientKernel, ConstrainOrient>>()
       .bind(BindOrient)
       .cost(300, 0);
   NodeBuilder parent = AddConstraint(registry, "parentConstraint",
                                      "Moves and turns a transform as if it hung under its targets.");
   AddInterpType(parent)
       .out("outMatrix", Type::kMatrix, kOutDoc)
-      .compute(&ComputeConstraint<ParentKernel, ConstrainParent>)
+      .compute<ComputeConstraint<ParentKernel, ConstrainParent>>()
       .bind(BindParent)
       .cost(300, 0);
   NodeBuilder scale = AddConstraint(registry, "scaleConstraint", "Scales a transform as its targets.");
   scale.out("outMatrix", Type::kMatrix, kOutDoc)
-      .compute(&ComputeConstraint<ScaleKernel, ConstrainScale>)
+      .compute<ComputeConstraint<ScaleKernel, ConstrainScale>>()
       .bind(BindScale)
       .cost(300, 0);
   NodeBuilder aim = AddConstraint(registry, "aimConstraint", "Points an axis of a transform at its targets.");
@@ -328,7 +326,7 @@ KPSA_NODES(constraints, registry) {
                    "smallest turn from inMatrix)",
                    kUpVector)
       .out("outMatrix", Type::kMatrix, kOutDoc)
-      .compute(&ComputeAim)
+      .compute<ComputeAim>()
       .bind(BindAim)
       .cost(500, 0);
 }

@@ -17,10 +17,11 @@ Value RestOffsets(const Structural& s) {
   return Value(PointBufferPtr(std::make_shared<PointBuffer>(curve == nullptr ? 0 : curve->cvs().size())));
 }
 
-void ComputeDisplacements(ComputeContext& c) {
-  const ConstPointsView& cv = c.points(0);
-  const PointsView& out = c.out_points(0);
-  const Matrix4& parent = c.get<Matrix4>(1);
+void ComputeDisplacements(
+    NodeContext<In<"cv", ConstPointsView>, In<"parentMatrix", Matrix4>, Out<"displacements", PointsView>> c) {
+  const ConstPointsView& cv = c.get<"cv">();
+  const PointsView& out = c.out<"displacements">();
+  const Matrix4& parent = c.get<"parentMatrix">();
   for (std::size_t i = 0; i < out.count; ++i) {
     const Double3 d = TransformVector(parent, {cv.x[i], cv.y[i], cv.z[i]});
     out.x[i] = static_cast<float>(d.x);
@@ -29,9 +30,12 @@ void ComputeDisplacements(ComputeContext& c) {
   }
 }
 
-void ComputeWorldMatrix(ComputeContext& c) { c.out_value<Matrix4>(0) = c.get<Matrix4>(0); }
+void ComputeWorldMatrix(NodeContext<In<"parentMatrix", Matrix4>, Out<"worldMatrix", Matrix4>> c) {
+  c.out<"worldMatrix">() = c.get<"parentMatrix">();
+}
 
-constexpr int kDisplacements = kFirstOwnInput, kDeformedWire = kFirstOwnInput + 1;
+using WireContext =
+    DeformerContext<In<"displacements", ConstPointsView>, In<"deformedWire", ArrayView<ConstPointsView>>>;
 
 struct WireBound {
   WireKernel kernel;
@@ -118,12 +122,12 @@ Result<BoundKernel> BindWire(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-void ComputeWire(ComputeContext& c) {
+void ComputeWire(WireContext c) {
   const auto& bound = c.kernel_as<WireBound>();
-  auto* offsets = reinterpret_cast<Double3*>(c.scratch);
+  auto* offsets = reinterpret_cast<Double3*>(c.scratch());
   // In mesh space the skin turns offsets later: take the parent's turn out again
   const Matrix4 turn = bound.frame.fixed() ? bound.stage_from_world * bound.frame.parent_rest() *
-                                                 InverseOrIdentity(c.get<Matrix4>(kParentMatrix))
+                                                 InverseOrIdentity(c.get<"parentMatrix">())
                                            : Matrix4();
   Double3* to = offsets;
   const auto add = [&](const ConstPointsView& displacements) {
@@ -132,14 +136,14 @@ void ComputeWire(ComputeContext& c) {
     }
   };
   if (bound.several) {
-    const ArrayView<ConstPointsView> wires = c.array<ConstPointsView>(kDeformedWire);
+    const ArrayView<ConstPointsView> wires = c.get<"deformedWire">();
     for (std::uint32_t i = 0; i < wires.size(); ++i) add(wires[i]);
   } else {
-    add(c.points(kDisplacements));
+    add(c.get<"displacements">());
   }
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{offsets, bound.vertices}, c.get<double>(kEnvelope)}, c.points(kInPoints),
-                   c.out_points(0), {c.scratch + bound.offset_floats, bound.kernel.ScratchFloats()},
+  bound.kernel.Run({{offsets, bound.vertices}, c.get<"envelope">()}, c.get<"inPoints">(),
+                   c.out<"outPoints">(), {c.scratch() + bound.offset_floats, bound.kernel.ScratchFloats()},
                    &parallel);
 }
 
@@ -150,6 +154,24 @@ void DemandWire(Demand& demand) {
     demand.Require("displacements", -1, PointSet::All(demand.input_total("displacements", -1)));
   for (int i = 0; i < std::min(several, demand.structural().array_size("deformedWire")); ++i)
     demand.Require("deformedWire", i, PointSet::All(demand.input_total("deformedWire", i)));
+}
+
+void DeclareWire(NodeBuilder& b) {
+  b.points_in("displacements", "the curve's displacements");
+  b.points_in("deformedWire", "of several curves, in place of displacements; `curves:` connects them")
+      .array();
+  b.structural("curve", Type::kCurve, {.doc = "the curve at rest"});
+  b.structural(
+      "dropoff", 0.02,
+      {.min = 1e-6, .unit = Unit::kLength, .doc = "distance from the curve where its influence ends"});
+  b.structural("baseWire", Type::kCurve, {.doc = "several curves at rest, in place of curve"}).array();
+  b.structural(
+       "dropoffDistance", 0.02,
+       {.min = 1e-6, .unit = Unit::kLength, .doc = "dropoff of each of several curves; default: dropoff"})
+      .array();
+  b.structural(
+      "crossingEffect", 0.0,
+      {.min = 0, .max = 1, .doc = "of several curves: 0 near ones take over from far ones, 1 they add up"});
 }
 
 }  // namespace
@@ -166,27 +188,16 @@ KPSA_NODES(curve, registry) {
       .out("displacements", Type::kPoints, "the offsets in world axes")
       .unit(Unit::kLength)
       .out("worldMatrix", Type::kMatrix, "parentMatrix, which carries the curve")
-      .compute_for({"displacements"}, {"cv", "parentMatrix"}, &ComputeDisplacements)
+      .compute<ComputeDisplacements>()
       .cost(150, 20)
-      .compute_for({"worldMatrix"}, {"parentMatrix"}, &ComputeWorldMatrix)
+      .compute<ComputeWorldMatrix>()
       .cost(10, 0);
-  NodeBuilder b = AddDeformer(registry, "wire", "Points near a curve, or near several, follow it.");
-  b.points_in("displacements", "the curve's displacements");
-  b.points_in("deformedWire", "of several curves, in place of displacements; `curves:` connects them")
-      .array();
-  b.structural("curve", Type::kCurve, {.doc = "the curve at rest"});
-  b.structural(
-      "dropoff", 0.02,
-      {.min = 1e-6, .unit = Unit::kLength, .doc = "distance from the curve where its influence ends"});
-  b.structural("baseWire", Type::kCurve, {.doc = "several curves at rest, in place of curve"}).array();
-  b.structural(
-       "dropoffDistance", 0.02,
-       {.min = 1e-6, .unit = Unit::kLength, .doc = "dropoff of each of several curves; default: dropoff"})
-      .array();
-  b.structural(
-      "crossingEffect", 0.0,
-      {.min = 0, .max = 1, .doc = "of several curves: 0 near ones take over from far ones, 1 they add up"});
-  FinishDeformer(b, &ComputeWire, BindWire, DemandWire).cost(300, 0.8f);
+  AddDeformer<ComputeWire>(registry, {.name = "wire",
+                                      .doc = "Points near a curve, or near several, follow it.",
+                                      .own = DeclareWire,
+                                      .bind = BindWire,
+                                      .demand = DemandWire})
+      .cost(300, 0.8f);
 }
 
 }  // namespace kpsa::engine

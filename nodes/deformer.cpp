@@ -7,9 +7,9 @@
 #include "nodes/kernels/weights.h"
 
 namespace kpsa::engine {
+namespace {
 
-NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string doc) {
-  NodeBuilder builder = registry.add(std::move(name), std::move(doc));
+void DeclareShared(NodeBuilder& builder) {
   builder.category("deformer");
   builder.points_in("inPoints", "the points to deform").per_geometry();
   builder.in("envelope", 1.0, {.min = 0, .max = 1, .doc = "0 leaves the points alone, 1 deforms them fully"});
@@ -24,17 +24,14 @@ NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string do
       .structural("geometryMatrix", Matrix4(),
                   {.doc = "world from mesh space at rest, for stages in mesh space"})
       .per_geometry();
-  return builder;
 }
-
-namespace {
 
 // A deformer's own kernel, and what it needs where a falloff is connected.
 struct WithFalloff {
   std::shared_ptr<const void> kernel;
   ComputeFn compute = nullptr;
   std::size_t scratch_floats = 0;  // the kernel's own; behind them, the points as they came in
-  int falloff = -1;                // the input; -1: none
+  int points = 0, falloff = -1;    // positions of the inputs; -1: no falloff is connected
   std::vector<Index> positions;    // of the output points among those that come in; empty: the same
 };
 
@@ -46,7 +43,7 @@ void ComputeWithFalloff(ComputeContext& c) {
     bound.compute(own);
     return;
   }
-  const ConstPointsView& in = c.points(kInPoints);
+  const ConstPointsView& in = c.points(bound.points);
   const PointsView& out = c.out_points(0);
   const std::size_t row = PaddedCount(out.count);
   float* copy = c.scratch + bound.scratch_floats;
@@ -71,28 +68,33 @@ void ComputeWithFalloff(ComputeContext& c) {
 
 }  // namespace
 
-NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind, DemandFn demand) {
+NodeBuilder AddDeformer(NodeRegistry& registry, Deformer deformer, ComputeFn compute,
+                        std::span<const Port> ports) {
+  NodeBuilder builder = registry.add(std::move(deformer.name), std::move(deformer.doc));
+  DeclareShared(builder);
+  if (deformer.own) deformer.own(builder);
   builder
       .points_in("falloffWeights",
                  "a factor for what it does to each point, which may vary; `falloff: NAME` connects it",
                  Type::kWeights)
       .per_geometry();
   builder.out("outPoints", Type::kPoints, "the deformed points").per_geometry();
-  builder.compute(&ComputeWithFalloff).in_place("inPoints");
+  builder.compute_ports(&ComputeWithFalloff, ports).in_place("inPoints");
   builder.touches("inPoints", [](const Structural& structural, const PointSet& points) {
     const std::vector<float> weights = WeightsAt(structural, points);
     return weights.empty() || std::ranges::any_of(weights, [](float w) { return w != 0; });
   });
   builder.strength("envelope");
-  const int falloff = builder.input_position("falloffWeights");
-  builder.bind([=](const Binding& binding) -> Result<BoundKernel> {
+  const int points = builder.input_position("inPoints"), falloff = builder.input_position("falloffWeights");
+  builder.bind([compute, points, falloff,
+                bind = std::move(deformer.bind)](const Binding& binding) -> Result<BoundKernel> {
     BoundKernel own;
     if (bind) {
       Result<BoundKernel> made = bind(binding);
       if (!made.ok()) return made.status();
       own = std::move(*made);
     }
-    WithFalloff bound{own.object, compute, (own.scratch_floats + 15) / 16 * 16, -1, {}};
+    WithFalloff bound{own.object, compute, (own.scratch_floats + 15) / 16 * 16, points, -1, {}};
     if (binding.input("falloffWeights").total() == 0) {
       return MakeBound(std::move(bound), own.scratch_floats, own.state_bytes);
     }
@@ -102,7 +104,7 @@ NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind
     const std::size_t scratch = bound.scratch_floats + 3 * PaddedCount(out.size());
     return MakeBound(std::move(bound), scratch, own.state_bytes);
   });
-  builder.demand([=](Demand& asked) {
+  builder.demand([demand = std::move(deformer.demand)](Demand& asked) {
     const PointSet& out = asked.output("outPoints");
     if (demand) {
       demand(asked);

@@ -8,6 +8,8 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -19,17 +21,36 @@
 
 namespace kpsa::engine {
 
-// Positions of the shared inputs in the group; a deformer's own inputs follow from kFirstOwnInput.
-enum DeformerInput { kInPoints = 0, kEnvelope = 1, kParentMatrix = 2, kFirstOwnInput = 3 };
+// What a deformer's compute sees: the shared inputs, its own, and the points that it writes, which may be in
+// the buffer that they come in.
+template <typename... Own>
+using DeformerContext =
+    NodeContext<In<"inPoints", ConstPointsView>, In<"envelope", double>, In<"parentMatrix", Matrix4>, Own...,
+                In<"falloffWeights", ConstPointsView>, Out<"outPoints", PointsView>>;
 
-// Declares inPoints, envelope, parentMatrix, weights, mesh, space, geometryMatrix. Declare the deformer's own
-// inputs next, then close it with FinishDeformer.
-NodeBuilder AddDeformer(NodeRegistry& registry, std::string name, std::string doc);
-// Declares falloffWeights, outPoints and the group; the output may take over the input's buffer. demand may
-// be null (local). Where falloffWeights w are connected, the points are in + w (out - in) of what compute
-// gives: its own kernel knows nothing of them, and nothing is spent where they are not. Every kernel leaves
-// points of weight 0 as they are, bit for bit, so where only such points are wanted, the node does not run.
-NodeBuilder& FinishDeformer(NodeBuilder& builder, ComputeFn compute, BindFn bind, DemandFn demand = nullptr);
+// A deformer in one piece.
+struct Deformer {
+  std::string name, doc;
+  // Declares its own attributes: inputs, and outputs beside the points with their computes.
+  std::function<void(NodeBuilder&)> own = nullptr;
+  BindFn bind = nullptr;      // null: no kernel
+  DemandFn demand = nullptr;  // null: local
+};
+
+NodeBuilder AddDeformer(NodeRegistry& registry, Deformer deformer, ComputeFn compute,
+                        std::span<const Port> ports);
+// Declares inPoints, envelope, parentMatrix, weights, mesh, space and geometryMatrix, the deformer's own, then
+// falloffWeights, outPoints and their group; kCompute is a function of a DeformerContext that names its own
+// inputs. Where falloffWeights w are connected, the points are in + w (out - in) of what it gives: its own
+// kernel knows nothing of them, and nothing is spent where they are not. Every kernel leaves points of weight 0
+// as they are, bit for bit, so where only such points are wanted, the node does not run.
+template <auto kCompute>
+NodeBuilder AddDeformer(NodeRegistry& registry, Deformer deformer) {
+  using Context = ContextOf<decltype(kCompute)>;
+  return AddDeformer(
+      registry, std::move(deformer), [](ComputeContext& context) { kCompute(Context(context)); },
+      Context::kPorts);
+}
 
 // The weight map at these points (empty: 1 everywhere); for bind, at the output points.
 std::vector<float> WeightsAt(const Structural& structural, const PointSet& points);
@@ -64,21 +85,18 @@ class CarriedFrame {
 };
 
 // The host's threads as kernels want them.
-inline Parallel HostParallel(const ComputeContext& context) {
+template <typename... Ports>
+Parallel HostParallel(NodeContext<Ports...> c) {
   return {[](void* self, std::size_t count, std::size_t grain, RangeBody body) {
             static_cast<ComputeHost*>(self)->For(count, grain, body);
           },
-          context.host};
+          c.context().host};
 }
 
 // A kernel and what its adapter keeps beside it, as the engine wants it.
 template <typename T>
 BoundKernel MakeBound(T object, std::size_t scratch_floats, std::size_t state_bytes = 0) {
   return BoundKernel{std::make_shared<const T>(std::move(object)), scratch_floats, state_bytes};
-}
-
-inline std::span<float> ScratchSpan(const ComputeContext& context, std::size_t floats) {
-  return {context.scratch, floats};
 }
 
 }  // namespace kpsa::engine

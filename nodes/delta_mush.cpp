@@ -65,22 +65,17 @@ Result<BoundKernel> BindMush(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-void ComputeMush(ComputeContext& c) {
+void ComputeMush(DeformerContext<In<"displacement", double>> c) {
   const auto& bound = c.kernel_as<MushBound>();
-  const Matrix4& parent = c.get<Matrix4>(kParentMatrix);
+  const Matrix4& parent = c.get<"parentMatrix">();
   const Double3 pivot = TransformPoint(bound.frame.Motion(parent), bound.middle);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run(
-      {c.get<double>(kEnvelope), c.get<double>(kFirstOwnInput) * bound.frame.Growth(parent), pivot},
-      c.points(kInPoints), c.out_points(0), {c.scratch, bound.kernel.ScratchFloats()}, &parallel);
+  bound.kernel.Run({c.get<"envelope">(), c.get<"displacement">() * bound.frame.Growth(parent), pivot},
+                   c.get<"inPoints">(), c.out<"outPoints">(), {c.scratch(), bound.kernel.ScratchFloats()},
+                   &parallel);
 }
 
-}  // namespace
-
-KPSA_NODES(delta_mush, registry) {
-  NodeBuilder b =
-      AddDeformer(registry, "deltaMush", "Smooths the points and gives the rest shape's detail back.");
-  b.version(2);  // detail that fades in folds and grows with its parent
+void DeclareMush(NodeBuilder& b) {
   b.in("displacement", 1.0, {.min = 0, .max = 2, .doc = "how much of the detail comes back"});
   b.structural("iterations", 10, {.min = 0, .max = 200, .doc = "smoothing steps"});
   b.structural("smoothingStep", 0.5,
@@ -88,7 +83,18 @@ KPSA_NODES(delta_mush, registry) {
   b.structural("distanceWeight", 0.0,
                {.min = 0, .max = 1, .doc = "0: all neighbours alike; 1: near ones weigh more"});
   b.structural("pinBorderVertices", true, {.doc = "points on borders keep their place"});
-  FinishDeformer(b, &ComputeMush, BindMush, DemandMush).cost(500, 80);
+}
+
+}  // namespace
+
+KPSA_NODES(delta_mush, registry) {
+  AddDeformer<ComputeMush>(registry, {.name = "deltaMush",
+                                      .doc = "Smooths the points and gives the rest shape's detail back.",
+                                      .own = DeclareMush,
+                                      .bind = BindMush,
+                                      .demand = DemandMush})
+      .version(2)
+      .cost(500, 80);  // detail that fades in folds and grows with its parent
 }
 
 }  // namespace kpsa::engine

@@ -14,10 +14,7 @@
 
 namespace kpsa::engine {
 
-// The place of driverPoints among the inputs of a deformer's group.
-inline constexpr int kDriverPoints = kFirstOwnInput;
-
-// Declares driverPoints, driverMesh and driverMatrix; the first inputs of a deformer's own.
+// Declares driverPoints, driverMesh and driverMatrix.
 void AddDriver(NodeBuilder& builder);
 
 // The mesh of a driver whose points are so many (unset: nobody knows). Errors: driverMesh or driverPoints is

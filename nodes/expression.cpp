@@ -23,12 +23,12 @@ Result<BoundKernel> BindExpression(const Binding& binding) {
   return MakeBound(ExpressionKernel{std::move(*program), inputs}, doubles * sizeof(double) / sizeof(float));
 }
 
-void ComputeExpression(ComputeContext& c) {
+void ComputeExpression(NodeContext<In<"input", ArrayView<double>>, Out<"output", double>> c) {
   const auto& kernel = c.kernel_as<ExpressionKernel>();
-  const ArrayView<double> input = c.array<double>(0);
-  auto* values = reinterpret_cast<double*>(c.scratch);
+  const ArrayView<double> input = c.get<"input">();
+  auto* values = reinterpret_cast<double*>(c.scratch());
   for (std::uint32_t i = 0; i < kernel.inputs; ++i) values[i] = input[i];
-  c.out_value<double>(0) =
+  c.out<"output">() =
       kernel.program.Run({values, kernel.inputs}, {values + kernel.inputs, kernel.program.stack_size()});
 }
 
@@ -44,7 +44,7 @@ KPSA_NODES(expression, registry) {
       .array()
       .structural("expression", "0", {.doc = "as in \"max(in0, 0) * 0.5 + sin(in1)\""})
       .out("output", Type::kDouble)
-      .compute(&ComputeExpression)
+      .compute<ComputeExpression>()
       .bind(BindExpression)
       .cost(100, 0);
 }

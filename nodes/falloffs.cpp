@@ -17,7 +17,16 @@
 namespace kpsa::engine {
 namespace {
 
-enum FalloffInput : int { kFalloffPoints = 0, kFalloffParent = 1, kOwn = 2 };
+template <typename... Own>
+using FalloffContext = NodeContext<In<"inPoints", ConstPointsView>, In<"parentMatrix", Matrix4>, Own...,
+                                   Out<"outputWeights", PointsView>>;
+using SphereContext = FalloffContext<In<"matrix", Matrix4>, In<"radius", double>, In<"fullRadius", double>>;
+using CapsuleContext = FalloffContext<In<"startMatrix", Matrix4>, In<"endMatrix", Matrix4>,
+                                      In<"radius", double>, In<"fullRadius", double>>;
+using PlaneContext = FalloffContext<In<"matrix", Matrix4>, In<"start", double>, In<"end", double>>;
+using ProximityContext =
+    FalloffContext<In<"driverPoints", ConstPointsView>, In<"radius", double>, In<"fullRadius", double>>;
+
 constexpr std::size_t kFalloffGrain = 2048;
 
 // Where the points are: world from their space, which is the world after the skin. Before it, parentMatrix
@@ -55,11 +64,11 @@ Result<BoundKernel> BindShape(const Binding& binding) {
 }
 
 // weights[i] = weight(m * points[i])
-template <typename F>
-void ForPoints(const ComputeContext& c, const Matrix4& m, F weight) {
-  const ConstPointsView& in = c.points(kFalloffPoints);
-  float* out = c.out_points(0).x;
-  c.host->For(in.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
+template <typename... Own, typename F>
+void ForPoints(NodeContext<Own...> c, const Matrix4& m, F weight) {
+  const ConstPointsView& in = c.template get<"inPoints">();
+  float* out = c.template out<"outputWeights">().x;
+  c.For(in.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
       out[i] = static_cast<float>(weight(TransformPoint(m, {in.x[i], in.y[i], in.z[i]})));
   });
@@ -72,30 +81,29 @@ double ByDistance(double distance, double full, double radius, FalloffFade fade)
   return distance > std::max(0.0, radius) ? 0 : 1;
 }
 
-void ComputeSphere(ComputeContext& c) {
+void ComputeSphere(SphereContext c) {
   const auto& place = c.kernel_as<FalloffPlace>();
-  const double radius = c.get<double>(kOwn + 1), full = c.get<double>(kOwn + 2);
+  const double radius = c.get<"radius">(), full = c.get<"fullRadius">();
   Matrix4 from_world;
-  const bool there = Invert(c.get<Matrix4>(kOwn), &from_world);
-  ForPoints(c, from_world * place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
+  const bool there = Invert(c.get<"matrix">(), &from_world);
+  ForPoints(c, from_world * place.WorldFromPoints(c.get<"parentMatrix">()),
             [&](Double3 p) { return there ? ByDistance(Length(p), full, radius, place.fade) : 0; });
 }
 
-void ComputeCapsule(ComputeContext& c) {
+void ComputeCapsule(CapsuleContext c) {
   const auto& place = c.kernel_as<FalloffPlace>();
-  const Double3 a = TransformPoint(c.get<Matrix4>(kOwn), {}),
-                b = TransformPoint(c.get<Matrix4>(kOwn + 1), {});
-  const double radius = c.get<double>(kOwn + 2), full = c.get<double>(kOwn + 3);
-  ForPoints(c, place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)),
+  const Double3 a = TransformPoint(c.get<"startMatrix">(), {}), b = TransformPoint(c.get<"endMatrix">(), {});
+  const double radius = c.get<"radius">(), full = c.get<"fullRadius">();
+  ForPoints(c, place.WorldFromPoints(c.get<"parentMatrix">()),
             [&](Double3 p) { return ByDistance(SegmentDistance(p, a, b), full, radius, place.fade); });
 }
 
-void ComputePlane(ComputeContext& c) {
+void ComputePlane(PlaneContext c) {
   const auto& place = c.kernel_as<FalloffPlace>();
-  const double start = c.get<double>(kOwn + 1), end = c.get<double>(kOwn + 2);
+  const double start = c.get<"start">(), end = c.get<"end">();
   Matrix4 from_world;
-  const bool there = Invert(c.get<Matrix4>(kOwn), &from_world);
-  ForPoints(c, from_world * place.WorldFromPoints(c.get<Matrix4>(kFalloffParent)), [&](Double3 p) {
+  const bool there = Invert(c.get<"matrix">(), &from_world);
+  ForPoints(c, from_world * place.WorldFromPoints(c.get<"parentMatrix">()), [&](Double3 p) {
     if (!there) return 0.0;
     if (start == end) return p.y <= start ? 1.0 : 0.0;  // a step
     return PlaneFalloff(p, {}, {0, 1, 0}, start, end, place.fade);
@@ -128,16 +136,16 @@ Result<BoundKernel> BindProximity(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-void ComputeProximity(ComputeContext& c) {
+void ComputeProximity(ProximityContext c) {
   const auto& bound = c.kernel_as<Proximity>();
-  const Matrix4& parent = c.get<Matrix4>(kFalloffParent);
-  const double radius = c.get<double>(kOwn + 1), full = c.get<double>(kOwn + 2);
-  ConstPointsView surface = c.points(kOwn);
+  const Matrix4& parent = c.get<"parentMatrix">();
+  const double radius = c.get<"radius">(), full = c.get<"fullRadius">();
+  ConstPointsView surface = c.get<"driverPoints">();
   if (bound.carried) {
     const ConstPointsView driver = surface;
     const Matrix4 world_from_driver = bound.place.Carried(bound.world_from_driver, parent);
-    const PointsView carried{c.scratch, c.scratch + bound.row, c.scratch + 2 * bound.row, driver.count};
-    c.host->For(driver.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
+    const PointsView carried{c.scratch(), c.scratch() + bound.row, c.scratch() + 2 * bound.row, driver.count};
+    c.For(driver.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const Double3 p = TransformPoint(world_from_driver, {driver.x[i], driver.y[i], driver.z[i]});
         carried.x[i] = static_cast<float>(p.x);
@@ -174,15 +182,15 @@ Result<BoundKernel> BindWeightMap(const Binding& binding) {
   return MakeBound(std::move(painted), 0);
 }
 
-void ComputeWeightMap(ComputeContext& c) {
-  const double scale = c.get<double>(0);
+void ComputeWeightMap(NodeContext<In<"multiplier", double>, Out<"outputWeights", PointsView>> c) {
+  const double scale = c.get<"multiplier">();
   const std::vector<float>& weights = c.kernel_as<Painted>().weights;
-  float* out = c.out_points(0).x;
+  float* out = c.out<"outputWeights">().x;
   for (std::size_t i = 0; i < weights.size(); ++i)
     out[i] = static_cast<float>(std::clamp(weights[i] * scale, 0.0, 1.0));
 }
 
-enum class FalloffOperation : int { kMultiply, kMax, kMin, kAdd, kSubtract, kAverage };
+enum class FalloffOperation { kMultiply, kMax, kMin, kAdd, kSubtract, kAverage };
 
 double Combined(FalloffOperation how, double a, double b) {
   switch (how) {
@@ -202,11 +210,14 @@ double Combined(FalloffOperation how, double a, double b) {
   return (a + b) / 2;
 }
 
-void ComputeCombine(ComputeContext& c) {
-  const ConstPointsView &a = c.points(0), &b = c.points(1);
-  const auto how = static_cast<FalloffOperation>(c.get<std::int64_t>(2));
-  float* out = c.out_points(0).x;
-  c.host->For(a.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
+using CombineContext = NodeContext<In<"input1", ConstPointsView>, In<"input2", ConstPointsView>,
+                                   In<"operation", FalloffOperation>, Out<"outputWeights", PointsView>>;
+
+void ComputeCombine(CombineContext c) {
+  const ConstPointsView &a = c.get<"input1">(), &b = c.get<"input2">();
+  const FalloffOperation how = c.get<"operation">();
+  float* out = c.out<"outputWeights">().x;
+  c.For(a.count, kFalloffGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) out[i] = static_cast<float>(Combined(how, a.x[i], b.x[i]));
   });
 }
@@ -232,9 +243,10 @@ void AddRadius(NodeBuilder& b, const char* where) {
        {.min = 0, .unit = Unit::kLength, .doc = "up to where it is 1; as large as the radius: a step"});
 }
 
-NodeBuilder& FinishFalloff(NodeBuilder& b, ComputeFn compute, BindFn bind) {
+template <auto kCompute>
+NodeBuilder& FinishFalloff(NodeBuilder& b, BindFn bind) {
   b.out("outputWeights", Type::kWeights, "0 to 1").per_geometry();
-  return b.compute(compute).bind(std::move(bind)).cost(200, 12);
+  return b.compute<kCompute>().bind(std::move(bind)).cost(200, 12);
 }
 
 }  // namespace
@@ -245,14 +257,14 @@ KPSA_NODES(falloffs, registry) {
   sphere.in("matrix", Matrix4(), {.doc = "the sphere's handle, whose scale makes it an ellipsoid"})
       .world_place();
   AddRadius(sphere, "in the handle's units");
-  FinishFalloff(sphere, &ComputeSphere, BindShape);
+  FinishFalloff<ComputeSphere>(sphere, BindShape);
 
   NodeBuilder capsule =
       AddFalloff(registry, "capsuleFalloff", "1 on a line between two places, 0 at the radius and beyond.");
   capsule.in("startMatrix", Matrix4(), {.doc = "world, where the line starts"}).world_place();
   capsule.in("endMatrix", Matrix4(), {.doc = "world, where it ends"}).world_place();
   AddRadius(capsule, "in the world");
-  FinishFalloff(capsule, &ComputeCapsule, BindShape);
+  FinishFalloff<ComputeCapsule>(capsule, BindShape);
 
   NodeBuilder plane = AddFalloff(
       registry, "planeFalloff",
@@ -260,7 +272,7 @@ KPSA_NODES(falloffs, registry) {
   plane.in("matrix", Matrix4(), {.doc = "the plane's handle"}).world_place();
   plane.in("start", 0.0, {.unit = Unit::kLength, .doc = "in the handle's units; the same as `end`: a step"});
   plane.in("end", 1.0, {.unit = Unit::kLength, .doc = "in the handle's units"});
-  FinishFalloff(plane, &ComputePlane, BindShape);
+  FinishFalloff<ComputePlane>(plane, BindShape);
 
   NodeBuilder proximity = AddFalloff(registry, "proximityFalloff",
                                      "1 on the surface of a mesh, which may move; 0 at the radius from it.",
@@ -268,7 +280,7 @@ KPSA_NODES(falloffs, registry) {
   AddDriver(proximity);
   AddRadius(proximity, "in the world");
   proximity.version(2);  // carries its driver
-  FinishFalloff(proximity, &ComputeProximity, BindProximity).demand(DemandProximity).cost(2000, 400);
+  FinishFalloff<ComputeProximity>(proximity, BindProximity).demand(DemandProximity).cost(2000, 400);
 
   registry.add("weightMap", "A painted map as a falloff, with a factor that may vary.")
       .category("falloff")
@@ -277,7 +289,7 @@ KPSA_NODES(falloffs, registry) {
       .in("multiplier", 1.0, {.doc = "of every weight, before they are cut to 0 to 1"})
       .out("outputWeights", Type::kWeights, "0 to 1")
       .per_geometry()
-      .compute(&ComputeWeightMap)
+      .compute<ComputeWeightMap>()
       .bind(BindWeightMap)
       .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
         const auto* map = s.asset<WeightMap>("weights");
@@ -290,10 +302,17 @@ KPSA_NODES(falloffs, registry) {
   combine.category("falloff");
   combine.points_in("input1", "weights; `falloffs:` connects both", Type::kWeights).per_geometry();
   combine.points_in("input2", "weights", Type::kWeights).per_geometry();
-  combine.enumeration("operation", {"multiply", "max", "min", "add", "subtract", "average"}, false,
-                      "add: their sum, up to 1; subtract: the first less the second, down to 0");
+  combine.enumeration<FalloffOperation>(
+      "operation",
+      {{"multiply", FalloffOperation::kMultiply},
+       {"max", FalloffOperation::kMax},
+       {"min", FalloffOperation::kMin},
+       {"add", FalloffOperation::kAdd},
+       {"subtract", FalloffOperation::kSubtract},
+       {"average", FalloffOperation::kAverage}},
+      false, "add: their sum, up to 1; subtract: the first less the second, down to 0");
   combine.out("outputWeights", Type::kWeights, "0 to 1").per_geometry();
-  combine.compute(&ComputeCombine).cost(100, 2);
+  combine.compute<ComputeCombine>().cost(100, 2);
 }
 
 }  // namespace kpsa::engine

@@ -10,8 +10,13 @@
 namespace kpsa::engine {
 namespace {
 
-// Inputs of ikHandle in the group.
-enum IkInput { kIkTarget, kIkPole, kIkTwist, kIkBlend, kIkStart, kIkMid, kIkParent, kIkBetween, kIkBelow };
+using IkContext =
+    NodeContext<In<"target", Matrix4>, In<"poleVector", Matrix4>, In<"twist", double>, In<"blend", double>,
+                In<"inStartMatrix", Matrix4>, In<"inMidMatrix", Matrix4>, In<"parentMatrix", Matrix4>,
+                In<"betweenMatrix", ArrayView<Matrix4>>, In<"belowMatrix", ArrayView<Matrix4>>,
+                Out<"startMatrix", Matrix4>, Out<"midMatrix", Matrix4>>;
+using PoleContext = NodeContext<In<"targetMatrix", ArrayView<Matrix4>>, In<"targetWeight", ArrayView<double>>,
+                                In<"inMatrix", Matrix4>, In<"blend", double>, Out<"outMatrix", Matrix4>>;
 
 struct IkKernel {
   TwoBoneRest rest;
@@ -85,23 +90,23 @@ Matrix4 TurnLocal(const Matrix4& local, const Matrix4& parent, Quaternion turn) 
   return turned;
 }
 
-void ComputeIk(ComputeContext& c) {
+void ComputeIk(IkContext c) {
   const auto& k = c.kernel_as<IkKernel>();
-  const Matrix4 &start = c.get<Matrix4>(kIkStart), &mid = c.get<Matrix4>(kIkMid),
-                &parent = c.get<Matrix4>(kIkParent);
-  const double blend = c.get<double>(kIkBlend);
-  c.out_value<Matrix4>(0) = start;
-  c.out_value<Matrix4>(1) = mid;
+  const Matrix4 &start = c.get<"inStartMatrix">(), &mid = c.get<"inMidMatrix">(),
+                &parent = c.get<"parentMatrix">();
+  const double blend = c.get<"blend">();
+  c.out<"startMatrix">() = start;
+  c.out<"midMatrix">() = mid;
   if (blend == 0) return;
-  const Arm arm = ArmOf(parent, start, ProductOf(c.array<Matrix4>(kIkBetween)), mid,
-                        ProductOf(c.array<Matrix4>(kIkBelow)));
+  const Arm arm =
+      ArmOf(parent, start, ProductOf(c.get<"betweenMatrix">()), mid, ProductOf(c.get<"belowMatrix">()));
   TwoBoneGoal goal;
-  goal.place = TransformPoint(c.get<Matrix4>(kIkTarget), k.end_from_target);
-  if (k.has_pole) goal.pole = PlaceOf(c.get<Matrix4>(kIkPole));
-  goal.twist = c.get<double>(kIkTwist);
+  goal.place = TransformPoint(c.get<"target">(), k.end_from_target);
+  if (k.has_pole) goal.pole = PlaceOf(c.get<"poleVector">());
+  goal.twist = c.get<"twist">();
   const TwoBoneTurns turns = SolveTwoBones(arm.pose, k.rest, goal);
-  c.out_value<Matrix4>(0) = BlendMatrices(start, TurnLocal(start, parent, turns.start), blend);
-  c.out_value<Matrix4>(1) = BlendMatrices(mid, TurnLocal(mid, arm.above_mid, turns.mid), blend);
+  c.out<"startMatrix">() = BlendMatrices(start, TurnLocal(start, parent, turns.start), blend);
+  c.out<"midMatrix">() = BlendMatrices(mid, TurnLocal(mid, arm.above_mid, turns.mid), blend);
 }
 
 // poleVectorConstraint: the offset is a place in the target's axes.
@@ -111,8 +116,6 @@ struct PoleKernel {
   std::vector<Matrix4> targets;
   std::vector<Double3> offsets;
 };
-
-enum PoleInput { kPoleTarget, kPoleWeight, kPoleIn, kPoleBlend };
 
 Result<BoundKernel> BindPole(const Binding& binding) {
   const Structural& s = binding.structural();
@@ -134,13 +137,13 @@ Result<BoundKernel> BindPole(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
-void ComputePole(ComputeContext& c) {
+void ComputePole(PoleContext c) {
   const auto& k = c.kernel_as<PoleKernel>();
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(kPoleTarget);
-  const ArrayView<double> weights = c.array<double>(kPoleWeight);
-  const Matrix4& in = c.get<Matrix4>(kPoleIn);
-  const double blend = c.get<double>(kPoleBlend);
-  c.out_value<Matrix4>(0) = in;
+  const ArrayView<Matrix4> targets = c.get<"targetMatrix">();
+  const ArrayView<double> weights = c.get<"targetWeight">();
+  const Matrix4& in = c.get<"inMatrix">();
+  const double blend = c.get<"blend">();
+  c.out<"outMatrix">() = in;
   Double3 sum;
   double total = 0;
   bool at_rest = k.maintain && in == k.in;
@@ -151,7 +154,7 @@ void ComputePole(ComputeContext& c) {
     at_rest = at_rest && targets[i] == k.targets[i];
   }
   if (blend == 0 || !(total > 0) || at_rest) return;
-  c.out_value<Matrix4>(0) = BlendMatrices(in, Translation(sum * (1 / total)), blend);
+  c.out<"outMatrix">() = BlendMatrices(in, Translation(sum * (1 / total)), blend);
 }
 
 }  // namespace
@@ -179,7 +182,7 @@ KPSA_NODES(ik_nodes, registry) {
                   {.doc = "keeps how the end lies to the target, and the bend to the pole, at rest"})
       .out("startMatrix", Type::kMatrix, "local, for the start's offsetParentMatrix")
       .out("midMatrix", Type::kMatrix, "local, for the middle's offsetParentMatrix")
-      .compute(&ComputeIk)
+      .compute<ComputeIk>()
       .bind(BindIk)
       .cost(1000, 0);
   registry
@@ -194,7 +197,7 @@ KPSA_NODES(ik_nodes, registry) {
       .in("blend", 1.0, {.min = 0, .max = 1, .doc = "0: inMatrix, 1: the constraint"})
       .structural("maintainOffset", false, {.doc = "keeps how inMatrix lies to the targets at rest"})
       .out("outMatrix", Type::kMatrix, "world, for an ikHandle's poleVector")
-      .compute(&ComputePole)
+      .compute<ComputePole>()
       .bind(BindPole)
       .cost(100, 0);
 }

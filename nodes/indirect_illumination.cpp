@@ -14,8 +14,14 @@
 namespace kpsa::engine {
 namespace {
 
-enum Input { kPoints, kCamera, kLightMatrix, kLightColor };
-enum Output { kIrradiance, kPointIrradiance, kKeyIrradiance, kKeyPointIrradiance };
+using IlluminationInputs =
+    NodeContext<In<"points", ArrayView<ConstPointsView>>, In<"worldFromScreen", Matrix4>,
+                In<"lightMatrix", ArrayView<Matrix4>>, In<"lightColor", ArrayView<Double3>>>;
+using IlluminationContext =
+    NodeContext<In<"points", ArrayView<ConstPointsView>>, In<"worldFromScreen", Matrix4>,
+                In<"lightMatrix", ArrayView<Matrix4>>, In<"lightColor", ArrayView<Double3>>,
+                Out<"irradiance", PointsView>, Out<"pointIrradiance", OutArray<PointsView>>,
+                Out<"keyIrradiance", PointsView>, Out<"keyPointIrradiance", OutArray<PointsView>>>;
 constexpr Index kLargestSide = 4096;
 
 bool AtPixels(std::string_view output) { return output == "irradiance" || output == "keyIrradiance"; }
@@ -29,10 +35,9 @@ struct Workplace {
 
 // Shading points whose light is computed with the same number of paths.
 struct ShadingPoints {
-  Output at_pixels = kIrradiance, at_points = kPointIrradiance;
   int samples = 0;
   std::vector<Index> pixels;
-  std::vector<std::vector<Index>> carried;  // by element of at_points: points, of all meshes' points
+  std::vector<std::vector<Index>> carried;  // by element of the output: points, of all meshes' points
 };
 
 struct IlluminationKernel {
@@ -143,7 +148,6 @@ Result<BoundKernel> BindIllumination(const Binding& binding) {
       BindShading(binding, first_points, "keyIrradiance", "keyPointIrradiance", &kernel.keys));
   kernel.shown.samples = samples;
   kernel.keys.samples = key_samples > 0 ? key_samples : samples;
-  kernel.keys.at_pixels = kKeyIrradiance, kernel.keys.at_points = kKeyPointIrradiance;
   const auto& kinds = s.value("lightKinds").get<std::vector<std::int64_t>>();
   for (std::int64_t kind : kinds) {
     if (kind < 0 || kind > 3)
@@ -162,8 +166,8 @@ Result<BoundKernel> BindIllumination(const Binding& binding) {
 }
 
 // Puts the inputs of this evaluation in place.
-Status SetUp(const ComputeContext& c, const IlluminationKernel& kernel, Workplace* place) {
-  const ArrayView<ConstPointsView> meshes = c.array<ConstPointsView>(kPoints);
+Status SetUp(IlluminationInputs c, const IlluminationKernel& kernel, Workplace* place) {
+  const ArrayView<ConstPointsView> meshes = c.get<"points">();
   std::size_t at = 0;
   for (std::uint32_t m = 0; m < meshes.size(); ++m) {
     const ConstPointsView& from = meshes[m];
@@ -172,16 +176,16 @@ Status SetUp(const ComputeContext& c, const IlluminationKernel& kernel, Workplac
     std::copy_n(from.z, from.count, place->points.view().z + at);
     at += from.count;
   }
-  const ArrayView<Matrix4> matrices = c.array<Matrix4>(kLightMatrix);
-  const ArrayView<Double3> colors = c.array<Double3>(kLightColor);
+  const ArrayView<Matrix4> matrices = c.get<"lightMatrix">();
+  const ArrayView<Double3> colors = c.get<"lightColor">();
   for (std::uint32_t l = 0; l < kernel.lights.size(); ++l)
     place->lights[l] = {kernel.lights[l], matrices[l], colors[l]};
   const Parallel parallel = HostParallel(c);
   return place->tracer.Update(std::as_const(place->points).view(), place->lights, &parallel);
 }
 
-void Illuminate(ComputeContext& c, const IlluminationKernel& kernel, const ShadingPoints& shading,
-                const PathTracer& tracer) {
+void Illuminate(IlluminationInputs c, const IlluminationKernel& kernel, const ShadingPoints& shading,
+                const PathTracer& tracer, const PointsView& at_pixels, OutArray<PointsView> at_points) {
   const Parallel parallel = HostParallel(c);
   const auto gather = [&](const ShadingPlace& at, Index own, const PointsView& out, std::size_t i) {
     PathOptions paths = kernel.paths;
@@ -192,36 +196,37 @@ void Illuminate(ComputeContext& c, const IlluminationKernel& kernel, const Shadi
     out.y[i] = static_cast<float>(light.y);
     out.z[i] = static_cast<float>(light.z);
   };
-  const Matrix4& camera = c.get<Matrix4>(kCamera);
+  const Matrix4& camera = c.get<"worldFromScreen">();
   ForRanges(&parallel, shading.pixels.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       Double3 origin, direction;
       PixelRay(camera, shading.pixels[i], kernel.width, kernel.height, &origin, &direction);
-      gather(tracer.See(origin, direction), shading.pixels[i], c.out_points(shading.at_pixels), i);
+      gather(tracer.See(origin, direction), shading.pixels[i], at_pixels, i);
     }
   });
   for (std::uint32_t e = 0; e < shading.carried.size(); ++e) {
     const std::vector<Index>& points = shading.carried[e];
     ForRanges(&parallel, points.size(), 64, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        gather(tracer.OnPoint(points[i]), ~points[i], c.out_points(shading.at_points, e), i);
+        gather(tracer.OnPoint(points[i]), ~points[i], at_points[e], i);
     });
   }
 }
 
-void ComputeIllumination(ComputeContext& c) {
+void ComputeIllumination(IlluminationContext c) {
   const auto& kernel = c.kernel_as<IlluminationKernel>();
   std::unique_ptr<Workplace> place = kernel.workplaces->Take();
   if (place == nullptr) {  // another evaluation is under way
     Result<std::unique_ptr<Workplace>> made = MakeWorkplace(kernel);
-    if (!made.ok()) return c.host->Fail(made.status().errors().front().message);
+    if (!made.ok()) return c.Fail(made.status().errors().front().message);
     place = std::move(*made);
   }
   if (const Status status = SetUp(c, kernel, place.get()); status.ok()) {
-    for (const ShadingPoints* shading : {&kernel.shown, &kernel.keys})
-      Illuminate(c, kernel, *shading, place->tracer);
+    Illuminate(c, kernel, kernel.shown, place->tracer, c.out<"irradiance">(), c.out<"pointIrradiance">());
+    Illuminate(c, kernel, kernel.keys, place->tracer, c.out<"keyIrradiance">(),
+               c.out<"keyPointIrradiance">());
   } else {
-    c.host->Fail(status.errors().front().message);
+    c.Fail(status.errors().front().message);
   }
   kernel.workplaces->Give(std::move(place));
 }
@@ -265,7 +270,7 @@ KPSA_NODES(indirect_illumination, registry) {
   b.out("pointIrradiance", Type::kColors, "at each point of a carried mesh").array();
   b.out("keyIrradiance", Type::kColors, "irradiance by keySamples paths");
   b.out("keyPointIrradiance", Type::kColors, "pointIrradiance by keySamples paths").array();
-  b.compute(&ComputeIllumination)
+  b.compute<ComputeIllumination>()
       .demand(DemandGeometry)
       .bind(BindIllumination)
       .point_count(ShadingPointCount)

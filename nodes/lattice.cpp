@@ -118,18 +118,18 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-void ComputeLattice(ComputeContext& c) {
+void ComputeLattice(DeformerContext<In<"points", ConstPointsView>> c) {
   const auto& bound = c.kernel_as<LatticeBound>();
-  const ConstPointsView& controls = c.points(kFirstOwnInput);
-  auto* offsets = reinterpret_cast<Double3*>(c.scratch);
+  const ConstPointsView& controls = c.get<"points">();
+  auto* offsets = reinterpret_cast<Double3*>(c.scratch());
   for (std::size_t i = 0; i < bound.grid.size(); ++i) {
     const Double3& rest = bound.grid[i];
     offsets[i] = {controls.x[i] - rest.x, controls.y[i] - rest.y, controls.z[i] - rest.z};
   }
-  const Matrix4 now = bound.frame.Motion(c.get<Matrix4>(kParentMatrix)) * bound.stage_from_lattice;
+  const Matrix4 now = bound.frame.Motion(c.get<"parentMatrix">()) * bound.stage_from_lattice;
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{offsets, bound.grid.size()}, now, now, c.get<double>(kEnvelope)}, c.points(kInPoints),
-                   c.out_points(0), {c.scratch + bound.offset_floats, bound.kernel.ScratchFloats()},
+  bound.kernel.Run({{offsets, bound.grid.size()}, now, now, c.get<"envelope">()}, c.get<"inPoints">(),
+                   c.out<"outPoints">(), {c.scratch() + bound.offset_floats, bound.kernel.ScratchFloats()},
                    &parallel);
 }
 
@@ -139,11 +139,7 @@ void DemandLattice(Demand& demand) {
   demand.Require("points", -1, PointSet::All(demand.input_total("points", -1)));
 }
 
-}  // namespace
-
-KPSA_NODES(lattice, registry) {
-  NodeBuilder b =
-      AddDeformer(registry, "lattice", "Free-form deformation: points follow a grid of control points.");
+void DeclareLattice(NodeBuilder& b) {
   b.points_in("points",
               "the control points in lattice coordinates: the rest box is [0, 1]^3; points[s,t,u], s fastest")
       .grid("divisions")
@@ -161,7 +157,18 @@ KPSA_NODES(lattice, registry) {
                {.unit = Unit::kLength,
                 .doc = "corner of the box in the stage's space at rest; default: around the members"});
   b.structural("boxMax", Double3(), {.unit = Unit::kLength});
-  FinishDeformer(b, &ComputeLattice, BindLattice, DemandLattice).cost(500, 3);
+}
+
+}  // namespace
+
+KPSA_NODES(lattice, registry) {
+  AddDeformer<ComputeLattice>(registry,
+                              {.name = "lattice",
+                               .doc = "Free-form deformation: points follow a grid of control points.",
+                               .own = DeclareLattice,
+                               .bind = BindLattice,
+                               .demand = DemandLattice})
+      .cost(500, 3);
 }
 
 }  // namespace kpsa::engine

@@ -10,34 +10,45 @@ Result<BoundKernel> BindOrder(const Binding& binding) {
   return MakeBound(static_cast<RotateOrder>(binding.structural().get_int("rotateOrder")), 0);
 }
 
-void ComputeDecompose(ComputeContext& c) {
+void ComputeDecompose(
+    NodeContext<In<"inputMatrix", Matrix4>, Out<"outputTranslate", Double3>, Out<"outputRotate", Double3>,
+                Out<"outputScale", Double3>, Out<"outputQuat", Quaternion>>
+        c) {
   Double3 translate, scale;
   Quaternion rotation;
-  DecomposeTrs(c.get<Matrix4>(0), &translate, &rotation, &scale);
-  c.out_value<Double3>(0) = translate;
-  c.out_value<Double3>(1) = EulerFromRotation(RotationFromQuaternion(rotation), c.kernel_as<RotateOrder>());
-  c.out_value<Double3>(2) = scale;
-  c.out_value<Quaternion>(3) = rotation;
+  DecomposeTrs(c.get<"inputMatrix">(), &translate, &rotation, &scale);
+  c.out<"outputTranslate">() = translate;
+  c.out<"outputRotate">() = EulerFromRotation(RotationFromQuaternion(rotation), c.kernel_as<RotateOrder>());
+  c.out<"outputScale">() = scale;
+  c.out<"outputQuat">() = rotation;
 }
 
-void ComputeCompose(ComputeContext& c) {
-  c.out_value<Matrix4>(0) =
-      Translation(c.get<Double3>(0)) *
-      (RotationFromEuler(c.get<Double3>(1), c.kernel_as<RotateOrder>()) * Scaling(c.get<Double3>(2)));
+void ComputeCompose(NodeContext<In<"inputTranslate", Double3>, In<"inputRotate", Double3>,
+                                In<"inputScale", Double3>, Out<"outputMatrix", Matrix4>>
+                        c) {
+  c.out<"outputMatrix">() = Translation(c.get<"inputTranslate">()) *
+                            (RotationFromEuler(c.get<"inputRotate">(), c.kernel_as<RotateOrder>()) *
+                             Scaling(c.get<"inputScale">()));
 }
+
+using BlendMatrixContext =
+    NodeContext<In<"inputMatrix", Matrix4>, In<"targetMatrix", ArrayView<Matrix4>>,
+                In<"targetWeight", ArrayView<double>>, In<"envelope", double>, In<"translateWeight", double>,
+                In<"rotateWeight", double>, In<"scaleWeight", double>, In<"shearWeight", double>,
+                Out<"outputMatrix", Matrix4>>;
 
 // Target after target onto the input, as layers.
-void ComputeBlendMatrix(ComputeContext& c) {
-  const ArrayView<Matrix4> targets = c.array<Matrix4>(1);
-  const ArrayView<double> weights = c.array<double>(2);
-  Matrix4 result = c.get<Matrix4>(0);
+void ComputeBlendMatrix(BlendMatrixContext c) {
+  const ArrayView<Matrix4> targets = c.get<"targetMatrix">();
+  const ArrayView<double> weights = c.get<"targetWeight">();
+  Matrix4 result = c.get<"inputMatrix">();
   for (std::uint32_t i = 0; i < targets.size(); ++i) {
-    const double w = (i < weights.size() ? weights[i] : 1.0) * c.get<double>(3);
-    result = BlendMatrices(
-        result, targets[i],
-        {w * c.get<double>(4), w * c.get<double>(5), w * c.get<double>(6), w * c.get<double>(7)});
+    const double w = (i < weights.size() ? weights[i] : 1.0) * c.get<"envelope">();
+    result = BlendMatrices(result, targets[i],
+                           {w * c.get<"translateWeight">(), w * c.get<"rotateWeight">(),
+                            w * c.get<"scaleWeight">(), w * c.get<"shearWeight">()});
   }
-  c.out_value<Matrix4>(0) = result;
+  c.out<"outputMatrix">() = result;
 }
 
 Matrix4 PickMatrix(const Matrix4& m, bool translate, bool rotate, bool scale, bool shear) {
@@ -66,7 +77,7 @@ KPSA_NODES(matrix_nodes, registry) {
       .in("inputScale", Double3{1, 1, 1})
       .enumeration("rotateOrder", orders, true)
       .out("outputMatrix", Type::kMatrix)
-      .compute(&ComputeCompose)
+      .compute<ComputeCompose>()
       .bind(BindOrder);
   registry.add("decomposeMatrix", "Translation, rotation and scale of a matrix; shear is dropped.")
       .category("matrix")
@@ -78,7 +89,7 @@ KPSA_NODES(matrix_nodes, registry) {
       .unit(Unit::kAngle)
       .out("outputScale", Type::kDouble3)
       .out("outputQuat", Type::kQuaternion)
-      .compute(&ComputeDecompose)
+      .compute<ComputeDecompose>()
       .bind(BindOrder);
   registry.add("inverseMatrix", "The inverse; of a matrix that has none, the identity.")
       .category("matrix")
@@ -99,7 +110,7 @@ KPSA_NODES(matrix_nodes, registry) {
       .in("scaleWeight", 1.0, share)
       .in("shearWeight", 1.0, share)
       .out("outputMatrix", Type::kMatrix)
-      .compute(&ComputeBlendMatrix)
+      .compute<ComputeBlendMatrix>()
       .cost(300, 0);
   registry.add("pickMatrix", "The chosen parts of a matrix; the identity in place of the others.")
       .category("matrix")

@@ -19,6 +19,10 @@ Result<BoundKernel> BindMesh(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
+void ComputeMesh(NodeContext<Out<"points", PointsView>> c) {
+  CopyPoints(c.kernel_as<MeshKernel>().points.view(), c.out<"points">());
+}
+
 }  // namespace
 
 KPSA_NODES(mesh, registry) {
@@ -26,8 +30,7 @@ KPSA_NODES(mesh, registry) {
       .category("geometry")
       .structural("mesh", Type::kMesh)
       .out("points", Type::kPoints, "mesh space")
-      .compute(
-          [](ComputeContext& c) { CopyPoints(c.kernel_as<MeshKernel>().points.view(), c.out_points(0)); })
+      .compute<ComputeMesh>()
       .bind(BindMesh)
       .point_count([](const Structural& s, std::string_view, int) -> Result<Index> {
         const auto* mesh = s.asset<Mesh>("mesh");

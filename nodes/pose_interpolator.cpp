@@ -56,12 +56,12 @@ Result<BoundKernel> BindPoses(const Binding& binding) {
   return MakeBound(PoseBound{std::move(*weights), s.value("restMatrix").get<Matrix4>()}, floats);
 }
 
-void ComputePoses(ComputeContext& c) {
+void ComputePoses(NodeContext<In<"matrix", Matrix4>, Out<"outputWeight", OutArray<double>>> c) {
   const auto& bound = c.kernel_as<PoseBound>();
-  const std::span<double> weights(reinterpret_cast<double*>(c.scratch), bound.weights.pose_count());
-  bound.weights.Run(PoseRotation(c.get<Matrix4>(0), bound.rest), weights);
-  for (std::uint32_t i = 0; i < c.out_count(0); ++i)
-    c.out_value<double>(0, i) = i < weights.size() ? weights[i] : 0.0;
+  const std::span<double> weights(reinterpret_cast<double*>(c.scratch()), bound.weights.pose_count());
+  bound.weights.Run(PoseRotation(c.get<"matrix">(), bound.rest), weights);
+  const OutArray<double> out = c.out<"outputWeight">();
+  for (std::uint32_t i = 0; i < out.size(); ++i) out[i] = i < weights.size() ? weights[i] : 0.0;
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ KPSA_NODES(pose_interpolator, registry) {
       .structural("normalize", false, {.doc = "no weight is below 0, and all sum to 1"})
       .out("outputWeight", Type::kDouble, "by pose: outputWeight[0], or outputWeight[name]")
       .array()
-      .compute(&ComputePoses)
+      .compute<ComputePoses>()
       .bind(BindPoses)
       .cost(400, 0);
 }

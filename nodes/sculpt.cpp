@@ -10,7 +10,9 @@
 namespace kpsa::engine {
 namespace {
 
-enum { kMatrix = kFirstOwnInput, kRadius, kMaxDisplacement, kDropoffDistance, kStretchOrigin };
+using SculptContext =
+    DeformerContext<In<"matrix", Matrix4>, In<"radius", double>, In<"maximumDisplacement", double>,
+                    In<"dropoffDistance", double>, In<"stretchOrigin", Double3>>;
 
 struct SculptBound {
   SculptKernel kernel;
@@ -29,38 +31,35 @@ Result<BoundKernel> BindSculpt(const Binding& binding) {
                    0);
 }
 
-void ComputeSculpt(ComputeContext& c) {
+void ComputeSculpt(SculptContext c) {
   const auto& bound = c.kernel_as<SculptBound>();
-  const double radius = c.get<double>(kRadius);
-  const Matrix4& handle = c.get<Matrix4>(kMatrix);
+  const double radius = c.get<"radius">();
+  const Matrix4& handle = c.get<"matrix">();
   // From the world to the stage
   const Matrix4 stage_from_world = bound.frame.fixed()
                                        ? bound.frame.stage_from_world() * bound.frame.parent_rest() *
-                                             InverseOrIdentity(c.get<Matrix4>(kParentMatrix))
+                                             InverseOrIdentity(c.get<"parentMatrix">())
                                        : Matrix4();
   SculptKernel::Inputs inputs{{bound.mode, bound.dropoff, 0, 0, {}},
                               stage_from_world * handle * Scaling({radius, radius, radius}),
-                              c.get<double>(kEnvelope)};
+                              c.get<"envelope">()};
   // Lengths are world ones: the mean radius of the sphere as its handle scales it
   const double size = radius * std::cbrt(std::fabs(Determinant3(handle)));
   if (size > 0) {
-    inputs.shape.dropoff_distance = c.get<double>(kDropoffDistance) / size;
-    inputs.shape.max_displacement = c.get<double>(kMaxDisplacement) / size;
+    inputs.shape.dropoff_distance = c.get<"dropoffDistance">() / size;
+    inputs.shape.max_displacement = c.get<"maximumDisplacement">() / size;
   }
   Matrix4 sphere_from_world;
   if (bound.mode == SculptMode::kStretch && Invert(handle, &sphere_from_world)) {
-    const Double3 away = TransformPoint(sphere_from_world, c.get<Double3>(kStretchOrigin)) * -1.0;
+    const Double3 away = TransformPoint(sphere_from_world, c.get<"stretchOrigin">()) * -1.0;
     const double length = Length(away);
     if (length > 0) inputs.shape.stretch = away * (1 / length);
   }
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run(inputs, c.points(kInPoints), c.out_points(0), &parallel);
+  bound.kernel.Run(inputs, c.get<"inPoints">(), c.out<"outPoints">(), &parallel);
 }
 
-}  // namespace
-
-KPSA_NODES(sculpt, registry) {
-  NodeBuilder b = AddDeformer(registry, "sculpt", "A sphere pushes points out of itself.");
+void DeclareSculpt(NodeBuilder& b) {
   b.in("matrix", Matrix4(), {.doc = "the handle's world matrix: the sphere's centre, axes and scale"})
       .world_place();
   b.in("radius", 0.05, {.min = 0, .unit = Unit::kLength, .doc = "of the sphere, before the handle's scale"});
@@ -74,7 +73,16 @@ KPSA_NODES(sculpt, registry) {
                 "stretch: points go away from stretchOrigin until they are outside");
   b.enumeration("dropoffType", {"none", "linear"}, true,
                 "none: full strength up to the dropoff distance; linear: fading towards it", 1);
-  FinishDeformer(b, &ComputeSculpt, BindSculpt).cost(300, 30);
+}
+
+}  // namespace
+
+KPSA_NODES(sculpt, registry) {
+  AddDeformer<ComputeSculpt>(registry, {.name = "sculpt",
+                                        .doc = "A sphere pushes points out of itself.",
+                                        .own = DeclareSculpt,
+                                        .bind = BindSculpt})
+      .cost(300, 30);
 }
 
 }  // namespace kpsa::engine

@@ -4,33 +4,56 @@
 namespace kpsa::engine {
 namespace {
 
-bool Holds(double a, double b, std::int64_t operation) {
+enum class Comparison { kEqual, kNotEqual, kGreaterThan, kGreaterOrEqual, kLessThan, kLessOrEqual };
+
+bool Holds(double a, double b, Comparison operation) {
   switch (operation) {
-    case 0:
+    case Comparison::kEqual:
       return a == b;
-    case 1:
+    case Comparison::kNotEqual:
       return a != b;
-    case 2:
+    case Comparison::kGreaterThan:
       return a > b;
-    case 3:
+    case Comparison::kGreaterOrEqual:
       return a >= b;
-    case 4:
+    case Comparison::kLessThan:
       return a < b;
-    default:
-      return a <= b;
+    case Comparison::kLessOrEqual:
+      break;
   }
+  return a <= b;
 }
 
-bool Holds(const ComputeContext& c) {
-  return Holds(c.get<double>(0), c.get<double>(1), c.get<std::int64_t>(2));
+using ConditionInputs =
+    NodeContext<In<"firstTerm", double>, In<"secondTerm", double>, In<"operation", Comparison>>;
+using ConditionContext =
+    NodeContext<In<"firstTerm", double>, In<"secondTerm", double>, In<"operation", Comparison>,
+                In<"colorIfTrue", Double3>, In<"colorIfFalse", Double3>, Out<"outColor", Double3>>;
+
+bool Holds(ConditionInputs c) {
+  return Holds(c.get<"firstTerm">(), c.get<"secondTerm">(), c.get<"operation">());
 }
 
-std::uint64_t DecideChoice(ComputeContext& c) {
-  const std::int64_t selector = c.get<std::int64_t>(0);
-  const auto count = static_cast<std::int64_t>(c.array<double>(1).size());
+void ComputeCondition(ConditionContext c) {
+  c.out<"outColor">() = Holds(c) ? c.get<"colorIfTrue">() : c.get<"colorIfFalse">();
+}
+
+std::uint64_t DecideCondition(ConditionInputs c) { return Holds(c) ? 1 : 2; }
+
+using ChoiceContext =
+    NodeContext<In<"selector", std::int64_t>, In<"input", ArrayView<double>>, Out<"output", double>>;
+
+void ComputeChoice(ChoiceContext c) {
+  const ArrayView<double> input = c.get<"input">();
+  c.out<"output">() = input.size() == 0 ? 0.0 : input[static_cast<std::uint32_t>(c.get<"selector">())];
+}
+
+std::uint64_t DecideChoice(ChoiceContext c) {
+  const std::int64_t selector = c.get<"selector">();
+  const auto count = static_cast<std::int64_t>(c.get<"input">().size());
   if (count == 0) return 0;
   if (selector < 0 || selector >= count) {
-    c.host->Fail("selector is not the number of an input");
+    c.Fail("selector is not the number of an input");
     return 0;
   }
   return std::uint64_t{1} << selector;
@@ -43,15 +66,21 @@ KPSA_NODES(selection_nodes, registry) {
       .category("selection")
       .in("firstTerm", 0.0)
       .in("secondTerm", 0.0)
-      .enumeration("operation",
-                   {"equal", "notEqual", "greaterThan", "greaterOrEqual", "lessThan", "lessOrEqual"}, false)
+      .enumeration<Comparison>("operation",
+                               {{"equal", Comparison::kEqual},
+                                {"notEqual", Comparison::kNotEqual},
+                                {"greaterThan", Comparison::kGreaterThan},
+                                {"greaterOrEqual", Comparison::kGreaterOrEqual},
+                                {"lessThan", Comparison::kLessThan},
+                                {"lessOrEqual", Comparison::kLessOrEqual}},
+                               false)
       .in("colorIfTrue", Double3())
       .lazy()
       .in("colorIfFalse", Double3{1, 1, 1})
       .lazy()
       .out("outColor", Type::kDouble3)
-      .compute([](ComputeContext& c) { c.out_value<Double3>(0) = c.get<Double3>(Holds(c) ? 3 : 4); })
-      .decide([](ComputeContext& c) -> std::uint64_t { return Holds(c) ? 1 : 2; });
+      .compute<ComputeCondition>()
+      .decide<DecideCondition>();
   registry.add("choice", "One of many values, by its number. The others are not evaluated.")
       .category("selection")
       .in("selector", 0)
@@ -59,12 +88,8 @@ KPSA_NODES(selection_nodes, registry) {
       .array()
       .lazy()
       .out("output", Type::kDouble)
-      .compute([](ComputeContext& c) {
-        const ArrayView<double> input = c.array<double>(1);
-        c.out_value<double>(0) =
-            input.size() == 0 ? 0.0 : input[static_cast<std::uint32_t>(c.get<std::int64_t>(0))];
-      })
-      .decide(&DecideChoice);
+      .compute<ComputeChoice>()
+      .decide<DecideChoice>();
 }
 
 }  // namespace kpsa::engine

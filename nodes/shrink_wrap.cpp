@@ -9,7 +9,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr int kOffset = kDriverPoints + 1;
+using ShrinkWrapContext = DeformerContext<In<"driverPoints", ConstPointsView>, In<"offset", double>>;
 
 ShrinkWrapSettings Settings(const Structural& s) {
   ShrinkWrapSettings settings;
@@ -78,22 +78,18 @@ Result<BoundKernel> BindShrinkWrap(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-void ComputeShrinkWrap(ComputeContext& c) {
+void ComputeShrinkWrap(ShrinkWrapContext c) {
   const auto& bound = c.kernel_as<ShrinkWrapBound>();
   const Parallel parallel = HostParallel(c);
-  const Matrix4 motion = bound.frame.Motion(c.get<Matrix4>(kParentMatrix));
+  const Matrix4 motion = bound.frame.Motion(c.get<"parentMatrix">());
   // An axis that nothing turns keeps its bits
   const Double3 axis = motion == Matrix4() ? bound.axis : UnitOrZero(TransformVector(motion, bound.axis));
-  bound.kernel.Run(
-      {c.get<double>(kEnvelope), c.get<double>(kOffset) * bound.scale, c.points(kDriverPoints), axis},
-      c.points(kInPoints), c.out_points(0), ScratchSpan(c, bound.kernel.ScratchFloats()), &parallel);
+  bound.kernel.Run({c.get<"envelope">(), c.get<"offset">() * bound.scale, c.get<"driverPoints">(), axis},
+                   c.get<"inPoints">(), c.out<"outPoints">(), {c.scratch(), bound.kernel.ScratchFloats()},
+                   &parallel);
 }
 
-}  // namespace
-
-KPSA_NODES(shrink_wrap, registry) {
-  NodeBuilder b = AddDeformer(registry, "shrinkWrap", "Points go onto the surface of another mesh.");
-  b.version(2);  // an axis that its parent turns
+void DeclareShrinkWrap(NodeBuilder& b) {
   AddDriver(b);
   b.in("offset", 0.0,
        {.unit = Unit::kLength,
@@ -110,7 +106,18 @@ KPSA_NODES(shrink_wrap, registry) {
   b.enumeration("side", {"surface", "outside", "inside"}, true,
                 "surface: all points go onto it; outside: only those inside, so that all end up outside; "
                 "inside: the other way round");
-  FinishDeformer(b, &ComputeShrinkWrap, BindShrinkWrap, DemandShrinkWrap).cost(2000, 900);
+}
+
+}  // namespace
+
+KPSA_NODES(shrink_wrap, registry) {
+  AddDeformer<ComputeShrinkWrap>(registry, {.name = "shrinkWrap",
+                                            .doc = "Points go onto the surface of another mesh.",
+                                            .own = DeclareShrinkWrap,
+                                            .bind = BindShrinkWrap,
+                                            .demand = DemandShrinkWrap})
+      .version(2)
+      .cost(2000, 900);  // an axis that its parent turns
 }
 
 }  // namespace kpsa::engine

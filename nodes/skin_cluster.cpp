@@ -106,13 +106,13 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-constexpr int kJointMatrices = kFirstOwnInput, kSkinOffset = kFirstOwnInput + 1;
+using SkinContext = DeformerContext<In<"matrix", ArrayView<Matrix4>>, In<"offset", Double3>>;
 
-void ComputeSkin(ComputeContext& c) {
+void ComputeSkin(SkinContext c) {
   const auto& bound = c.kernel_as<SkinBound>();
-  const ArrayView<Matrix4> matrix = c.array<Matrix4>(kJointMatrices);
-  auto* palette = reinterpret_cast<Matrix4*>(c.scratch);
-  const Double3& offset = c.get<Double3>(kSkinOffset);
+  const ArrayView<Matrix4> matrix = c.get<"matrix">();
+  auto* palette = reinterpret_cast<Matrix4*>(c.scratch());
+  const Double3& offset = c.get<"offset">();
   const auto follow = [&](Index j) {
     palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j];
     palette[j](0, 3) += offset.x, palette[j](1, 3) += offset.y, palette[j](2, 3) += offset.z;
@@ -121,10 +121,10 @@ void ComputeSkin(ComputeContext& c) {
   for (Index j : bound.linear.has_value() ? bound.linear->joints() : bound.dual->joints()) follow(j);
   const Parallel parallel = HostParallel(c);
   const std::span<const Matrix4> all(palette, bound.joint_from_bind.size());
-  const double envelope = c.get<double>(kEnvelope);
-  const ConstPointsView& in = c.points(kInPoints);
-  const PointsView& out = c.out_points(0);
-  float* scratch = c.scratch + bound.palette_floats;
+  const double envelope = c.get<"envelope">();
+  const ConstPointsView& in = c.get<"inPoints">();
+  const PointsView& out = c.out<"outPoints">();
+  float* scratch = c.scratch() + bound.palette_floats;
   if (!bound.dual.has_value()) {
     bound.linear->Run({all, envelope, Matrix4()}, in, out, {scratch, bound.linear->ScratchFloats()},
                       &parallel);
@@ -144,13 +144,7 @@ void ComputeSkin(ComputeContext& c) {
                   {scratch, bound.dual->ScratchFloats()}, &parallel);
 }
 
-}  // namespace
-
-KPSA_NODES(skin_cluster, registry) {
-  NodeBuilder b =
-      AddDeformer(registry, "skinCluster",
-                  "Moves points with joints, any number of influences. Takes points in mesh space to "
-                  "world space.");
+void DeclareSkin(NodeBuilder& b) {
   b.structural("influences", Type::kAsset, {.doc = "joints and weights of every point"}).per_geometry();
   b.in("matrix", Matrix4(), {.doc = "the joints' world matrices"}).array();
   b.in("offset", Double3(), {.unit = Unit::kLength, .doc = "moves all joints, in double"});
@@ -161,7 +155,20 @@ KPSA_NODES(skin_cluster, registry) {
   b.structural("blendWeights", Type::kAsset,
                {.doc = "of weightBlended: 0 takes classicLinear, 1 dualQuaternion; 0 where unset"})
       .per_geometry();
-  FinishDeformer(b, &ComputeSkin, BindSkin, DemandSkin).cost(500, 5);
+}
+
+}  // namespace
+
+KPSA_NODES(skin_cluster, registry) {
+  AddDeformer<ComputeSkin>(
+      registry,
+      {.name = "skinCluster",
+       .doc =
+           "Moves points with joints, any number of influences. Takes points in mesh space to world space.",
+       .own = DeclareSkin,
+       .bind = BindSkin,
+       .demand = DemandSkin})
+      .cost(500, 5);
 }
 
 }  // namespace kpsa::engine

@@ -11,7 +11,9 @@
 namespace kpsa::engine {
 namespace {
 
-enum SpaceInput { kSpaceTargets, kSpaceNumber, kSpaceIn, kSpaceParent, kSpaceBlend };
+using SpaceContext =
+    NodeContext<In<"targetMatrix", ArrayView<Matrix4>>, In<"space", double>, In<"inMatrix", Matrix4>,
+                In<"parentMatrix", Matrix4>, In<"blend", double>, Out<"outMatrix", Matrix4>>;
 
 struct SpaceKernel {
   bool maintain = false;
@@ -40,13 +42,13 @@ Result<BoundKernel> BindSpaceSwitch(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
-void ComputeSpaceSwitch(ComputeContext& c) {
+void ComputeSpaceSwitch(SpaceContext c) {
   const auto& k = c.kernel_as<SpaceKernel>();
-  const ArrayView<Matrix4> spaces = c.array<Matrix4>(kSpaceTargets);
-  const Matrix4 &in = c.get<Matrix4>(kSpaceIn), &parent = c.get<Matrix4>(kSpaceParent);
-  const double blend = c.get<double>(kSpaceBlend);
-  c.out_value<Matrix4>(0) = in;
-  const double last = static_cast<double>(spaces.size()) - 1, wanted = c.get<double>(kSpaceNumber);
+  const ArrayView<Matrix4> spaces = c.get<"targetMatrix">();
+  const Matrix4 &in = c.get<"inMatrix">(), &parent = c.get<"parentMatrix">();
+  const double blend = c.get<"blend">();
+  c.out<"outMatrix">() = in;
+  const double last = static_cast<double>(spaces.size()) - 1, wanted = c.get<"space">();
   if (blend == 0 || spaces.size() == 0 || !(wanted == wanted)) return;
   const double at = std::min(std::max(wanted, 0.0), last), whole = std::floor(at);
   const auto local = [&](std::uint32_t i) {
@@ -57,7 +59,7 @@ void ComputeSpaceSwitch(ComputeContext& c) {
   const auto first = static_cast<std::uint32_t>(whole);
   Matrix4 result = local(first);
   if (at > whole) result = BlendMatrices(result, local(first + 1), at - whole);
-  c.out_value<Matrix4>(0) = BlendMatrices(in, result, blend);
+  c.out<"outMatrix">() = BlendMatrices(in, result, blend);
 }
 
 }  // namespace
@@ -79,7 +81,7 @@ KPSA_NODES(space_switch, registry) {
                   {.doc = "the spaces take over from the parent as it lies to them at rest; off: inMatrix is "
                           "taken as in the space"})
       .out("outMatrix", Type::kMatrix, "local, for the constrained transform's offsetParentMatrix")
-      .compute(&ComputeSpaceSwitch)
+      .compute<ComputeSpaceSwitch>()
       .bind(BindSpaceSwitch)
       .cost(400, 0);
 }

@@ -12,16 +12,10 @@
 namespace kpsa::engine {
 namespace {
 
-enum SplineInput {
-  kSplineOffsets,
-  kSplineJoints,
-  kSplineTip,
-  kSplineParent,
-  kSplineStartTwist,
-  kSplineEndTwist,
-  kSplineBlend,
-  kSplineCurveMatrix
-};
+using SplineContext = NodeContext<In<"displacements", ConstPointsView>, In<"inMatrix", ArrayView<Matrix4>>,
+                                  In<"tipMatrix", Matrix4>, In<"parentMatrix", Matrix4>,
+                                  In<"startTwist", double>, In<"endTwist", double>, In<"blend", double>,
+                                  In<"curveMatrix", Matrix4>, Out<"outMatrix", OutArray<Matrix4>>>;
 
 struct SplineKernel {
   CurveShape shape;
@@ -108,20 +102,19 @@ Result<BoundKernel> BindSpline(const Binding& binding) {
   return MakeBound(std::move(k), scratch);
 }
 
-void ComputeSpline(ComputeContext& c) {
+void ComputeSpline(SplineContext c) {
   const auto& k = c.kernel_as<SplineKernel>();
-  const ConstPointsView& displacements = c.points(kSplineOffsets);
-  const ArrayView<Matrix4> in = c.array<Matrix4>(kSplineJoints);
-  const Matrix4 &parent = c.get<Matrix4>(kSplineParent), &tip = c.get<Matrix4>(kSplineTip);
-  const Matrix4& curve = c.get<Matrix4>(kSplineCurveMatrix);
-  const double blend = c.get<double>(kSplineBlend);
+  const ConstPointsView& displacements = c.get<"displacements">();
+  const ArrayView<Matrix4> in = c.get<"inMatrix">();
+  const Matrix4 &parent = c.get<"parentMatrix">(), &tip = c.get<"tipMatrix">();
+  const Matrix4& curve = c.get<"curveMatrix">();
+  const double blend = c.get<"blend">();
   const std::size_t joints = k.in_rest.size();
-  auto* solved = reinterpret_cast<Matrix4*>(c.scratch);
+  auto* solved = reinterpret_cast<Matrix4*>(c.scratch());
   Matrix4* below = solved + joints;
   auto* vertices = reinterpret_cast<Double3*>(below + joints);
   bool at_rest = k.maintain && parent == k.parent_rest && tip == k.tip_rest && curve == k.curve_rest &&
-                 c.get<double>(kSplineStartTwist) == k.start_twist_rest &&
-                 c.get<double>(kSplineEndTwist) == k.end_twist_rest &&
+                 c.get<"startTwist">() == k.start_twist_rest && c.get<"endTwist">() == k.end_twist_rest &&
                  SamePoints(displacements, k.displacements_rest->view());
   for (std::uint32_t i = 0; i < joints; ++i) {
     below[i] = in[i];
@@ -135,12 +128,13 @@ void ComputeSpline(ComputeContext& c) {
                       tip,
                       k.shape,
                       {vertices, k.vertices.size()},
-                      c.get<double>(kSplineStartTwist),
-                      c.get<double>(kSplineEndTwist)},
+                      c.get<"startTwist">(),
+                      c.get<"endTwist">()},
                      {solved, joints});
   }
-  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
-    auto& out = c.out_value<Matrix4>(0, i);
+  const OutArray<Matrix4> out_matrices = c.out<"outMatrix">();
+  for (std::uint32_t i = 0; i < out_matrices.size(); ++i) {
+    Matrix4& out = out_matrices[i];
     if (i >= joints) {
       out = Matrix4();
     } else if (!solve) {
@@ -179,7 +173,7 @@ KPSA_NODES(spline_ik, registry) {
       .structural("maintainOffset", false, {.doc = "keeps how the joints lie to the curve at rest"})
       .out("outMatrix", Type::kMatrix, "local, for the joints' offsetParentMatrix")
       .array()
-      .compute(&ComputeSpline)
+      .compute<ComputeSpline>()
       .bind(BindSpline)
       .demand(DemandSpline)
       .cost(5000, 0);

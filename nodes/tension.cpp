@@ -10,7 +10,8 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr int kCompressScale = kFirstOwnInput, kStretchScale = kFirstOwnInput + 1;
+using PushContext = DeformerContext<In<"compressScale", double>, In<"stretchScale", double>>;
+using StrainInputs = NodeContext<In<"inPoints", ConstPointsView>, In<"parentMatrix", Matrix4>>;
 
 struct PushBound {
   TensionPushKernel kernel;
@@ -95,50 +96,63 @@ Result<BoundKernel> BindStrain(const Binding& binding) {
                    scratch);
 }
 
-void ComputePush(ComputeContext& c) {
+void ComputePush(PushContext c) {
   const auto& bound = c.kernel_as<PushBound>();
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({bound.frame.Growth(c.get<Matrix4>(kParentMatrix)), c.get<double>(kCompressScale),
-                    c.get<double>(kStretchScale), c.get<double>(kEnvelope)},
-                   c.points(kInPoints), c.out_points(0), ScratchSpan(c, bound.kernel.ScratchFloats()),
+  bound.kernel.Run({bound.frame.Growth(c.get<"parentMatrix">()), c.get<"compressScale">(),
+                    c.get<"stretchScale">(), c.get<"envelope">()},
+                   c.get<"inPoints">(), c.out<"outPoints">(), {c.scratch(), bound.kernel.ScratchFloats()},
                    &parallel);
 }
 
-template <bool kStretch>
-void ComputeStrain(ComputeContext& c) {
+// The strain with that sign, where it is positive.
+void ComputeStrain(StrainInputs c, float sign, const PointsView& out) {
   const auto& bound = c.kernel_as<StrainBound>();
-  const PointsView& out = c.out_points(0);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run(bound.frame.Growth(c.get<Matrix4>(1)), c.points(0), c.scratch, &parallel);
+  bound.kernel.Run(bound.frame.Growth(c.get<"parentMatrix">()), c.get<"inPoints">(), c.scratch(), &parallel);
   for (std::size_t i = 0; i < out.count; ++i) {
-    const float strain = kStretch ? c.scratch[i] : -c.scratch[i];
+    const float strain = sign * c.scratch()[i];
     out.x[i] = strain > 0 ? strain : 0.0f;
   }
 }
+void ComputeStretch(
+    NodeContext<In<"inPoints", ConstPointsView>, In<"parentMatrix", Matrix4>, Out<"stretch", PointsView>> c) {
+  ComputeStrain(c, 1, c.out<"stretch">());
+}
+void ComputeCompress(
+    NodeContext<In<"inPoints", ConstPointsView>, In<"parentMatrix", Matrix4>, Out<"compress", PointsView>>
+        c) {
+  ComputeStrain(c, -1, c.out<"compress">());
+}
 
-}  // namespace
-
-KPSA_NODES(tension, registry) {
-  NodeBuilder b = AddDeformer(registry, "tension",
-                              "Measures how the edges around each point are stretched since the rest pose, "
-                              "and pushes points along their normals by it.");
+void DeclareTension(NodeBuilder& b) {
   b.in("compressScale", 0.0,
        {.unit = Unit::kLength, .doc = "along the normal, where the edges have lost all of their length"});
   b.in("stretchScale", 0.0,
        {.unit = Unit::kLength, .doc = "along the normal, where the edges are twice as long"});
   b.out("stretch", Type::kWeights, "how much longer the edges are: 1 is twice as long").per_geometry();
-  b.compute_for({"stretch"}, {"inPoints", "parentMatrix"}, &ComputeStrain<true>)
+  b.compute<ComputeStretch>()
       .bind(BindStrain<true>)
       .demand([](Demand& demand) { DemandRing(demand, "stretch", false); })
       .cost(300, 30);
   b.out("compress", Type::kWeights, "how much shorter they are: 1 is no length left").per_geometry();
-  b.compute_for({"compress"}, {"inPoints", "parentMatrix"}, &ComputeStrain<false>)
+  b.compute<ComputeCompress>()
       .bind(BindStrain<false>)
       .demand([](Demand& demand) { DemandRing(demand, "compress", false); })
       .cost(300, 30);
-  FinishDeformer(b, &ComputePush, BindPush, [](Demand& demand) {
-    DemandRing(demand, "outPoints", true);
-  }).cost(500, 60);
+}
+
+}  // namespace
+
+KPSA_NODES(tension, registry) {
+  AddDeformer<ComputePush>(
+      registry, {.name = "tension",
+                 .doc = "Measures how the edges around each point are stretched since the rest pose, "
+                        "and pushes points along their normals by it.",
+                 .own = DeclareTension,
+                 .bind = BindPush,
+                 .demand = [](Demand& demand) { DemandRing(demand, "outPoints", true); }})
+      .cost(500, 60);
 }
 
 }  // namespace kpsa::engine

@@ -22,51 +22,54 @@ Result<BoundKernel> BindTransform(const Binding& binding) {
   return MakeBound(kernel, 0);
 }
 
-// Inputs in the order of the groups below: translate, rotate, scale, offsetParentMatrix.
-bool HasControls(const ComputeContext& c) {
-  return !(c.get<Double3>(0) == Double3() && c.get<Double3>(1) == Double3() &&
-           c.get<Double3>(2) == Double3{1, 1, 1});
+// What all outputs are computed from, the world's from a parent, too.
+using LocalInputs = NodeContext<In<"translate", Double3>, In<"rotate", Double3>, In<"scale", Double3>,
+                                In<"offsetParentMatrix", Matrix4>>;
+template <typename... More>
+using LocalContext = NodeContext<In<"translate", Double3>, In<"rotate", Double3>, In<"scale", Double3>,
+                                 In<"offsetParentMatrix", Matrix4>, More...>;
+
+bool HasControls(LocalInputs c) {
+  return !(c.get<"translate">() == Double3() && c.get<"rotate">() == Double3() &&
+           c.get<"scale">() == Double3{1, 1, 1});
 }
-Matrix4 Local(const ComputeContext& c) {
-  const Matrix4& offset = c.get<Matrix4>(3);
+Matrix4 Local(LocalInputs c) {
+  const Matrix4& offset = c.get<"offsetParentMatrix">();
   if (!HasControls(c)) return offset;
-  return ComposeLocal(offset, {c.get<Double3>(0), c.get<Double3>(1), c.kernel_as<TransformKernel>().order,
-                               c.get<Double3>(2)});
+  return ComposeLocal(offset, {c.get<"translate">(), c.get<"rotate">(), c.kernel_as<TransformKernel>().order,
+                               c.get<"scale">()});
 }
 
-void ComputeMatrix(ComputeContext& c) { c.out_value<Matrix4>(0) = Local(c); }
-void ComputeWorld(ComputeContext& c) {
-  const Matrix4 &parent = c.get<Matrix4>(4), &offset = c.get<Matrix4>(3);
-  c.out_value<Matrix4>(0) = HasControls(c) ? parent * Local(c) : parent * offset;
+void ComputeMatrix(LocalContext<Out<"matrix", Matrix4>> c) { c.out<"matrix">() = Local(c); }
+void ComputeWorld(LocalContext<In<"parentMatrix", Matrix4>, Out<"worldMatrix", Matrix4>> c) {
+  const Matrix4 &parent = c.get<"parentMatrix">(), &offset = c.get<"offsetParentMatrix">();
+  c.out<"worldMatrix">() = HasControls(c) ? parent * Local(c) : parent * offset;
 }
-void ComputeWorldInverse(ComputeContext& c) {
-  c.out_value<Matrix4>(0) = InverseOrIdentity(c.get<Matrix4>(4) * Local(c));
+void ComputeWorldInverse(LocalContext<In<"parentMatrix", Matrix4>, Out<"worldInverseMatrix", Matrix4>> c) {
+  c.out<"worldInverseMatrix">() = InverseOrIdentity(c.get<"parentMatrix">() * Local(c));
 }
 
-void ComputePose(ComputeContext& c) {
+void ComputePose(LocalContext<Out<"poseRotate", Double3>> c) {
   const auto& kernel = c.kernel_as<TransformKernel>();
   const Quaternion q = PoseRotation(Local(c), kernel.rest);
-  c.out_value<Double3>(0) = EulerFromRotation(RotationFromQuaternion(q), kernel.order);
+  c.out<"poseRotate">() = EulerFromRotation(RotationFromQuaternion(q), kernel.order);
 }
-void ComputePoseVector(ComputeContext& c) {
-  c.out_value<Double3>(0) = RotationVector(PoseRotation(Local(c), c.kernel_as<TransformKernel>().rest));
+void ComputePoseVector(LocalContext<Out<"poseRotateVector", Double3>> c) {
+  c.out<"poseRotateVector">() = RotationVector(PoseRotation(Local(c), c.kernel_as<TransformKernel>().rest));
 }
-void ComputePoseTranslate(ComputeContext& c) {
+void ComputePoseTranslate(LocalContext<Out<"poseTranslate", Double3>> c) {
   const Matrix4 local = Local(c);
   const Matrix4& rest = c.kernel_as<TransformKernel>().rest;
-  c.out_value<Double3>(0) = {local(0, 3) - rest(0, 3), local(1, 3) - rest(1, 3), local(2, 3) - rest(2, 3)};
+  c.out<"poseTranslate">() = {local(0, 3) - rest(0, 3), local(1, 3) - rest(1, 3), local(2, 3) - rest(2, 3)};
 }
-void ComputeSwingTwist(ComputeContext& c) {
+void ComputeSwingTwist(LocalContext<Out<"swing", Double3>, Out<"twist", double>> c) {
   const auto& kernel = c.kernel_as<TransformKernel>();
   const SwingTwist parts = DecomposeSwingTwist(PoseRotation(Local(c), kernel.rest), kernel.twist_axis);
-  c.out_value<Double3>(0) = RotationVector(parts.swing);
-  c.out_value<double>(1) = TwistAngle(parts.twist, kernel.twist_axis);
+  c.out<"swing">() = RotationVector(parts.swing);
+  c.out<"twist">() = TwistAngle(parts.twist, kernel.twist_axis);
 }
 
 void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
-  const std::vector<std::string> local = {"translate", "rotate", "scale", "offsetParentMatrix"};
-  std::vector<std::string> world = local;
-  world.push_back("parentMatrix");
   NodeBuilder b = registry.add(name, doc);
   b.category("transform")
       .in("translate", Double3(), {.unit = Unit::kLength, .doc = "control, on top of offsetParentMatrix"})
@@ -92,16 +95,16 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .unit(Unit::kAngle)
       .out("twist", Type::kDouble, "angle about twistAxis")
       .unit(Unit::kAngle);
-  b.compute_for({"matrix"}, local, &ComputeMatrix)
+  b.compute<ComputeMatrix>()
       .passes("offsetParentMatrix", {"translate", "rotate", "scale"})
       .bind(BindTransform)
       .cost(60, 0);
-  b.compute_for({"worldMatrix"}, world, &ComputeWorld).bind(BindTransform).cost(70, 0);
-  b.compute_for({"worldInverseMatrix"}, world, &ComputeWorldInverse).bind(BindTransform).cost(150, 0);
-  b.compute_for({"poseRotate"}, local, &ComputePose).bind(BindTransform).cost(250, 0);
-  b.compute_for({"poseRotateVector"}, local, &ComputePoseVector).bind(BindTransform).cost(200, 0);
-  b.compute_for({"poseTranslate"}, local, &ComputePoseTranslate).bind(BindTransform).cost(60, 0);
-  b.compute_for({"swing", "twist"}, local, &ComputeSwingTwist).bind(BindTransform).cost(300, 0);
+  b.compute<ComputeWorld>().bind(BindTransform).cost(70, 0);
+  b.compute<ComputeWorldInverse>().bind(BindTransform).cost(150, 0);
+  b.compute<ComputePose>().bind(BindTransform).cost(250, 0);
+  b.compute<ComputePoseVector>().bind(BindTransform).cost(200, 0);
+  b.compute<ComputePoseTranslate>().bind(BindTransform).cost(60, 0);
+  b.compute<ComputeSwingTwist>().bind(BindTransform).cost(300, 0);
 }
 
 }  // namespace

@@ -6,11 +6,11 @@
 namespace kpsa::engine {
 namespace {
 
-void ComputeTransformGeometry(ComputeContext& c) {
-  const Matrix4& m = c.get<Matrix4>(kFirstOwnInput);
-  const ConstPointsView& in = c.points(kInPoints);
-  const PointsView& out = c.out_points(0);
-  c.host->For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
+void ComputeTransformGeometry(DeformerContext<In<"matrix", Matrix4>> c) {
+  const Matrix4& m = c.get<"matrix">();
+  const ConstPointsView& in = c.get<"inPoints">();
+  const PointsView& out = c.out<"outPoints">();
+  c.For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const Double3 p = TransformPoint(m, {in.x[i], in.y[i], in.z[i]});
       out.x[i] = static_cast<float>(p.x);
@@ -20,13 +20,15 @@ void ComputeTransformGeometry(ComputeContext& c) {
   });
 }
 
+void DeclareMatrix(NodeBuilder& b) { b.in("matrix", Matrix4(), {.doc = "the mesh node's world matrix"}); }
+
 }  // namespace
 
 KPSA_NODES(transform_geometry, registry) {
-  NodeBuilder b =
-      AddDeformer(registry, "transformGeometry", "Takes the points of a mesh without a skin to world space.");
-  b.in("matrix", Matrix4(), {.doc = "the mesh node's world matrix"});
-  FinishDeformer(b, &ComputeTransformGeometry, nullptr)
+  AddDeformer<ComputeTransformGeometry>(registry,
+                                        {.name = "transformGeometry",
+                                         .doc = "Takes the points of a mesh without a skin to world space.",
+                                         .own = DeclareMatrix})
       .cost(20, 2)
       .touches("inPoints", nullptr);  // to another space goes every point
 }

@@ -11,7 +11,9 @@
 namespace kpsa::engine {
 namespace {
 
-enum TwistInput { kTwistStart, kTwistEnd, kTwistJoints, kTwistWeights, kTwistBlend };
+using TwistContext =
+    NodeContext<In<"startMatrix", Matrix4>, In<"endMatrix", Matrix4>, In<"inMatrix", ArrayView<Matrix4>>,
+                In<"weight", ArrayView<double>>, In<"blend", double>, Out<"outMatrix", OutArray<Matrix4>>>;
 
 struct TwistKernel {
   Quaternion rest;                // of the end against the start
@@ -51,21 +53,21 @@ Result<BoundKernel> BindTwist(const Binding& binding) {
   return MakeBound(std::move(k), 0);
 }
 
-void ComputeTwist(ComputeContext& c) {
+void ComputeTwist(TwistContext c) {
   const auto& k = c.kernel_as<TwistKernel>();
-  const Quaternion now = Conjugate(TakeApart(c.get<Matrix4>(kTwistStart)).rotation) *
-                         TakeApart(c.get<Matrix4>(kTwistEnd)).rotation;
+  const Quaternion now =
+      Conjugate(TakeApart(c.get<"startMatrix">()).rotation) * TakeApart(c.get<"endMatrix">()).rotation;
   // Against rest in the start's axes: now = twisted . rest
   const Quaternion against = Normalized(now * Conjugate(k.rest));
-  const double twist =
-      TwistAngle(DecomposeSwingTwist(against, k.axis).twist, k.axis) * c.get<double>(kTwistBlend);
-  const ArrayView<Matrix4> joints = c.array<Matrix4>(kTwistJoints);
-  const ArrayView<double> weights = c.array<double>(kTwistWeights);
+  const double twist = TwistAngle(DecomposeSwingTwist(against, k.axis).twist, k.axis) * c.get<"blend">();
+  const ArrayView<Matrix4> joints = c.get<"inMatrix">();
+  const ArrayView<double> weights = c.get<"weight">();
   const auto share = [&](std::uint32_t i) {
     return i < weights.size() ? weights[i] : (i + 1.0) / (joints.size() + 1.0);
   };
-  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
-    auto& out = c.out_value<Matrix4>(0, i);
+  const OutArray<Matrix4> out_matrices = c.out<"outMatrix">();
+  for (std::uint32_t i = 0; i < out_matrices.size(); ++i) {
+    Matrix4& out = out_matrices[i];
     out = i < joints.size() ? joints[i] : Matrix4();
     if (i >= joints.size()) continue;
     const int above = k.above[i];
@@ -101,7 +103,7 @@ KPSA_NODES(twist_distribution, registry) {
                   {.doc = "which joint each joint hangs under, -1 for start; default: the one before it"})
       .out("outMatrix", Type::kMatrix, "local, for the joints' offsetParentMatrix")
       .array()
-      .compute(&ComputeTwist)
+      .compute<ComputeTwist>()
       .bind(BindTwist)
       .cost(500, 0);
 }

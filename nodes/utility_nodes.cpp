@@ -45,16 +45,18 @@ Double3 VectorProduct(Double3 a, Double3 b, const Matrix4& matrix, std::int64_t 
 }
 
 // The smallest turn from one vector to the other; none where one of them is zero.
-void ComputeAngleBetween(ComputeContext& c) {
+void ComputeAngleBetween(NodeContext<In<"vector1", Double3>, In<"vector2", Double3>, Out<"angle", double>,
+                                     Out<"axis", Double3>, Out<"euler", Double3>>
+                             c) {
   Double3 a, b;
   Quaternion turn;
-  if (Direction(c.get<Double3>(0), 0, &a) && Direction(c.get<Double3>(1), 0, &b))
+  if (Direction(c.get<"vector1">(), 0, &a) && Direction(c.get<"vector2">(), 0, &b))
     turn = ShortestArc(a, b, Double3());
   const Double3 vector = RotationVector(turn);
   const double angle = Length(vector);
-  c.out_value<double>(0) = angle;
-  c.out_value<Double3>(1) = angle > 0 ? vector * (1 / angle) : Double3{1, 0, 0};
-  c.out_value<Double3>(2) = EulerFromRotation(RotationFromQuaternion(turn), RotateOrder::kXyz);
+  c.out<"angle">() = angle;
+  c.out<"axis">() = angle > 0 ? vector * (1 / angle) : Double3{1, 0, 0};
+  c.out<"euler">() = EulerFromRotation(RotationFromQuaternion(turn), RotateOrder::kXyz);
 }
 
 }  // namespace
@@ -101,7 +103,7 @@ KPSA_NODES(utility_nodes, registry) {
       .out("axis", Type::kDouble3, "of unit length; x where there is no turn")
       .out("euler", Type::kDouble3, "the same turn as angles in the order xyz")
       .unit(Unit::kAngle)
-      .compute(&ComputeAngleBetween);
+      .compute<ComputeAngleBetween>();
   registry.add("vectorProduct", "Products of vectors, and of a vector or a point with a matrix.")
       .in("input1", Double3())
       .in("input2", Double3())

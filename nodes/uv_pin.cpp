@@ -10,7 +10,12 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr int kPinPoints = 0, kRelativeSpaceMatrix = 1;
+using PinPoints = NodeContext<In<"driverPoints", ConstPointsView>>;
+using UvPinContext = NodeContext<In<"driverPoints", ConstPointsView>, In<"relativeSpaceMatrix", Matrix4>,
+                                 Out<"outputMatrix", Matrix4>>;
+using FollicleContext =
+    NodeContext<In<"driverPoints", ConstPointsView>, Out<"outTranslate", Double3>, Out<"outRotate", Double3>,
+                Out<"outMatrix", Matrix4>, Out<"outNormal", Double3>, Out<"outTangent", Double3>>;
 enum RelativeSpace : int { kWorld, kLocal, kCustom };
 
 // The attributes that say where a pin is; element -1 of those that are no arrays.
@@ -124,9 +129,9 @@ Result<BoundKernel> BindPin(const Binding& binding) {
   return MakeBound(std::move(*pin), 0);
 }
 
-SurfaceFrame FrameNow(const ComputeContext& c, bool in_world) {
+SurfaceFrame FrameNow(PinPoints c, bool in_world) {
   const auto& pin = c.kernel_as<PinBound>();
-  const ConstPointsView& points = c.points(kPinPoints);
+  const ConstPointsView& points = c.get<"driverPoints">();
   Double3 corners[3];
   for (int k = 0; k < 3; ++k) {
     const Index i = pin.entries[k];
@@ -136,21 +141,21 @@ SurfaceFrame FrameNow(const ComputeContext& c, bool in_world) {
   return FrameOnTriangle(corners, pin.weights, pin.direction);
 }
 
-void ComputeUvPin(ComputeContext& c) {
+void ComputeUvPin(UvPinContext c) {
   const auto& pin = c.kernel_as<PinBound>();
   const Matrix4 frame = PinMatrix(FrameNow(c, pin.space != kLocal), pin.axes);
-  c.out_value<Matrix4>(0) =
-      pin.space == kCustom ? InverseOrIdentity(c.get<Matrix4>(kRelativeSpaceMatrix)) * frame : frame;
+  c.out<"outputMatrix">() =
+      pin.space == kCustom ? InverseOrIdentity(c.get<"relativeSpaceMatrix">()) * frame : frame;
 }
 
-void ComputeFollicle(ComputeContext& c) {
+void ComputeFollicle(FollicleContext c) {
   const SurfaceFrame frame = FrameNow(c, true);
   const Matrix4 matrix = PinMatrix(frame, c.kernel_as<PinBound>().axes);
-  c.out_value<Double3>(0) = frame.origin;
-  c.out_value<Double3>(1) = EulerFromRotation(matrix, RotateOrder::kXyz);
-  c.out_value<Matrix4>(2) = matrix;
-  c.out_value<Double3>(3) = frame.normal;
-  c.out_value<Double3>(4) = frame.tangent;
+  c.out<"outTranslate">() = frame.origin;
+  c.out<"outRotate">() = EulerFromRotation(matrix, RotateOrder::kXyz);
+  c.out<"outMatrix">() = matrix;
+  c.out<"outNormal">() = frame.normal;
+  c.out<"outTangent">() = frame.tangent;
 }
 
 void AddSurface(NodeBuilder& b) {
@@ -185,7 +190,7 @@ KPSA_NODES(uv_pin, registry) {
   pin.enumeration("relativeSpaceMode", {"world", "local", "custom"}, true,
                   "world; the mesh's own space at the stage; or seen from relativeSpaceMatrix");
   pin.out("outputMatrix", Type::kMatrix, "of each pin: no scale").per_geometry();
-  pin.compute(&ComputeUvPin).bind(BindPin<MakeUvPin>).demand(DemandPin<MakeUvPin>).cost(150, 0);
+  pin.compute<ComputeUvPin>().bind(BindPin<MakeUvPin>).demand(DemandPin<MakeUvPin>).cost(150, 0);
 
   NodeBuilder follicle = registry.add(
       "follicle", "A frame that rides on a mesh at a uv coordinate: x along growing u, z along the normal.");
@@ -201,7 +206,10 @@ KPSA_NODES(uv_pin, registry) {
   follicle.out("outMatrix", Type::kMatrix, "both together");
   follicle.out("outNormal", Type::kDouble3, "world, unit length");
   follicle.out("outTangent", Type::kDouble3, "world, unit length, along growing u");
-  follicle.compute(&ComputeFollicle).bind(BindPin<MakeFollicle>).demand(DemandPin<MakeFollicle>).cost(200, 0);
+  follicle.compute<ComputeFollicle>()
+      .bind(BindPin<MakeFollicle>)
+      .demand(DemandPin<MakeFollicle>)
+      .cost(200, 0);
 }
 
 }  // namespace kpsa::engine

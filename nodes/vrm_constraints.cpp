@@ -9,7 +9,9 @@
 namespace kpsa::engine {
 namespace {
 
-enum VrmInput { kVrmSource, kVrmIn, kVrmWeight, kVrmParent };
+using VrmInputs = NodeContext<In<"sourceMatrix", Matrix4>, In<"inMatrix", Matrix4>, In<"weight", double>>;
+using VrmAimInputs = NodeContext<In<"sourceMatrix", Matrix4>, In<"inMatrix", Matrix4>, In<"weight", double>,
+                                 In<"parentMatrix", Matrix4>>;
 
 struct VrmKernel {
   Quaternion rest, source_rest;
@@ -44,20 +46,20 @@ Quaternion RollOf(Quaternion turn, Double3 axis) {
   return Conjugate(ShortestArc(axis, Rotate(turn, axis), Perpendicular(axis, {0, 1, 0}))) * turn;
 }
 
-Quaternion RollTarget(const VrmKernel& k, const ComputeContext& c) {
+Quaternion RollTarget(const VrmKernel& k, VrmInputs c) {
   // The source's turn in its parent's axes, seen in the constrained's own
-  const Quaternion in_parent = TurnOf(c.get<Matrix4>(kVrmSource)) * Conjugate(k.source_rest);
+  const Quaternion in_parent = TurnOf(c.get<"sourceMatrix">()) * Conjugate(k.source_rest);
   return k.rest * RollOf(Normalized(Conjugate(k.rest) * in_parent * k.rest), k.axis);
 }
 
-Quaternion RotationTarget(const VrmKernel& k, const ComputeContext& c) {
-  return k.rest * (Conjugate(k.source_rest) * TurnOf(c.get<Matrix4>(kVrmSource)));
+Quaternion RotationTarget(const VrmKernel& k, VrmInputs c) {
+  return k.rest * (Conjugate(k.source_rest) * TurnOf(c.get<"sourceMatrix">()));
 }
 
-Quaternion AimTarget(const VrmKernel& k, const ComputeContext& c) {
-  const Matrix4 &parent = c.get<Matrix4>(kVrmParent), &in = c.get<Matrix4>(kVrmIn);
+Quaternion AimTarget(const VrmKernel& k, VrmAimInputs c) {
+  const Matrix4 &parent = c.get<"parentMatrix">(), &in = c.get<"inMatrix">();
   const Double3 place = TransformPoint(parent, {in(0, 3), in(1, 3), in(2, 3)});
-  const Matrix4& source = c.get<Matrix4>(kVrmSource);
+  const Matrix4& source = c.get<"sourceMatrix">();
   const Quaternion turned = TurnOf(parent), world = Normalized(turned * k.rest);
   const Double3 from = Rotate(world, k.axis);
   Double3 to;
@@ -66,19 +68,31 @@ Quaternion AimTarget(const VrmKernel& k, const ComputeContext& c) {
   return Conjugate(turned) * arc * world;
 }
 
-template <Quaternion (*Target)(const VrmKernel&, const ComputeContext&), bool kFromRest>
-void ComputeVrm(ComputeContext& c) {
+// target() is only asked where the constraint has a weight.
+template <typename Target>
+void ComputeVrm(VrmInputs c, bool from_rest, Matrix4* out, Target target) {
   const auto& k = c.kernel_as<VrmKernel>();
-  const Matrix4& in = c.get<Matrix4>(kVrmIn);
-  if (kFromRest && in == k.rest_matrix && c.get<Matrix4>(kVrmSource) == k.source_rest_matrix) {
-    c.out_value<Matrix4>(0) = in;  // bit for bit
+  const Matrix4& in = c.get<"inMatrix">();
+  if (from_rest && in == k.rest_matrix && c.get<"sourceMatrix">() == k.source_rest_matrix) {
+    *out = in;  // bit for bit
     return;
   }
-  const double weight = c.get<double>(kVrmWeight);
+  const double weight = c.get<"weight">();
   MatrixParts parts = TakeApart(in);
-  parts.rotation = weight > 0 ? Normalized(Target(k, c)) : k.rest;
+  parts.rotation = weight > 0 ? Normalized(target(k, c)) : k.rest;
   if (weight > 0 && weight < 1) parts.rotation = Slerp(k.rest, parts.rotation, weight);
-  c.out_value<Matrix4>(0) = PutTogether(parts);
+  *out = PutTogether(parts);
+}
+template <Quaternion (*kTarget)(const VrmKernel&, VrmInputs)>
+void ComputeVrmTurn(NodeContext<In<"sourceMatrix", Matrix4>, In<"inMatrix", Matrix4>, In<"weight", double>,
+                                Out<"outMatrix", Matrix4>>
+                        c) {
+  ComputeVrm(c, true, &c.out<"outMatrix">(), kTarget);
+}
+void ComputeVrmAim(NodeContext<In<"sourceMatrix", Matrix4>, In<"inMatrix", Matrix4>, In<"weight", double>,
+                               In<"parentMatrix", Matrix4>, Out<"outMatrix", Matrix4>>
+                       c) {
+  ComputeVrm(c, false, &c.out<"outMatrix">(), [&](const VrmKernel& k, VrmInputs) { return AimTarget(k, c); });
 }
 
 NodeBuilder AddVrm(NodeRegistry& registry, const char* name, const char* doc, const char* source_doc) {
@@ -102,7 +116,7 @@ KPSA_NODES(vrm_constraints, registry) {
   roll.structural("sourceRestMatrix", Matrix4(), {.doc = kVrmRestDoc})
       .enumeration("rollAxis", {"x", "y", "z"}, true, "own axis")
       .out("outMatrix", Type::kMatrix, kVrmOutDoc)
-      .compute(&ComputeVrm<RollTarget, true>)
+      .compute<ComputeVrmTurn<RollTarget>>()
       .bind(BindVrmRoll)
       .cost(400, 0);
   NodeBuilder aim = AddVrm(registry, "vrmAimConstraint",
@@ -113,7 +127,7 @@ KPSA_NODES(vrm_constraints, registry) {
       .enumeration("aimAxis", {"positiveX", "negativeX", "positiveY", "negativeY", "positiveZ", "negativeZ"},
                    true, "own axis that points at the source")
       .out("outMatrix", Type::kMatrix, kVrmOutDoc)
-      .compute(&ComputeVrm<AimTarget, false>)
+      .compute<ComputeVrmAim>()
       .bind(BindVrmAim)
       .cost(500, 0);
   NodeBuilder rotation =
@@ -121,7 +135,7 @@ KPSA_NODES(vrm_constraints, registry) {
              "Turns a transform from rest as its source has turned from its own.", "the source's matrix");
   rotation.structural("sourceRestMatrix", Matrix4(), {.doc = kVrmRestDoc})
       .out("outMatrix", Type::kMatrix, kVrmOutDoc)
-      .compute(&ComputeVrm<RotationTarget, true>)
+      .compute<ComputeVrmTurn<RotationTarget>>()
       .bind(BindVrmRotation)
       .cost(300, 0);
 }

@@ -56,9 +56,9 @@ Result<BoundKernel> BindExpressions(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
-void ComputeExpressions(ComputeContext& c) {
+void ComputeExpressions(NodeContext<In<"weight", ArrayView<double>>, Out<"output", OutArray<double>>> c) {
   const auto& k = c.kernel_as<ExpressionsKernel>();
-  const ArrayView<double> weights = c.array<double>(0);
+  const ArrayView<double> weights = c.get<"weight">();
   std::array<double, kHeldKinds> held_back = {};
   for (std::uint32_t i = 0; i < k.rules.size(); ++i) {
     const double value = k.Value(weights, i);
@@ -68,13 +68,14 @@ void ComputeExpressions(ComputeContext& c) {
       held_back[held] += k.rules[i].overrides[held] == kHoldsAll ? 1 : value;
     }
   }
-  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
+  const OutArray<double> out = c.out<"output">();
+  for (std::uint32_t i = 0; i < out.size(); ++i) {
     double value = k.Value(weights, i);
     if (i < k.rules.size() && k.rules[i].kind != 0) {
       const double back = held_back[k.rules[i].kind - 1];
       value = back > 0 && k.rules[i].binary ? 0 : value * (1 - std::min(back, 1.0));
     }
-    c.out_value<double>(0, i) = value;
+    out[i] = value;
   }
 }
 
@@ -111,18 +112,21 @@ Result<BoundKernel> BindMorphWeights(const Binding& binding) {
   return MakeBound(std::move(kernel), 0);
 }
 
-void ComputeMorphWeights(ComputeContext& c) {
+void ComputeMorphWeights(NodeContext<In<"weight", ArrayView<double>>, In<"expression", ArrayView<double>>,
+                                     Out<"output", OutArray<double>>>
+                             c) {
   const auto& k = c.kernel_as<MorphWeightsKernel>();
-  const ArrayView<double> weights = c.array<double>(0), expressions = c.array<double>(1);
+  const ArrayView<double> weights = c.get<"weight">(), expressions = c.get<"expression">();
   auto bind = k.binds.begin();
-  for (std::uint32_t i = 0; i < c.out_count(0); ++i) {
+  const OutArray<double> out = c.out<"output">();
+  for (std::uint32_t i = 0; i < out.size(); ++i) {
     double weight = i < weights.size() ? weights[i] : 0.0;
     if (bind != k.binds.end() && bind->target == i) {
       for (; bind != k.binds.end() && bind->target == i; ++bind)
         weight += bind->expression < expressions.size() ? expressions[bind->expression] * bind->share : 0.0;
       weight = std::clamp(weight, 0.0, 1.0);
     }
-    c.out_value<double>(0, i) = weight;
+    out[i] = weight;
   }
 }
 
@@ -146,7 +150,7 @@ KPSA_NODES(vrm_expressions, registry) {
       .structural("overrideMouth", none, {.doc = "likewise to those of kind 3"})
       .out("output", Type::kDouble, "0 to 1")
       .array()
-      .compute(&ComputeExpressions)
+      .compute<ComputeExpressions>()
       .bind(BindExpressions)
       .cost(50, 0);
   registry.add("vrmMorphWeights", "A mesh's morph weights: its own, and what the expressions add.")
@@ -160,7 +164,7 @@ KPSA_NODES(vrm_expressions, registry) {
       .structural("shares", std::vector<double>{}, {.doc = "its weight at all of the expression"})
       .out("output", Type::kDouble, "the sum; 0 to 1 for what expressions add to")
       .array()
-      .compute(&ComputeMorphWeights)
+      .compute<ComputeMorphWeights>()
       .bind(BindMorphWeights)
       .cost(60, 0);
 }

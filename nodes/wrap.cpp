@@ -79,46 +79,57 @@ Result<BoundKernel> BindWrap(const Binding& binding) {
   return MakeBound(std::move(kernel), scratch);
 }
 
-void ComputeWrap(ComputeContext& c) {
+void ComputeWrap(DeformerContext<In<"driverPoints", ConstPointsView>> c) {
   const auto& kernel = c.kernel_as<WrapKernel>();
   const Parallel parallel = HostParallel(c);
-  kernel.Run({c.get<double>(kEnvelope), c.points(kDriverPoints)}, c.points(kInPoints), c.out_points(0),
-             ScratchSpan(c, kernel.ScratchFloats()), &parallel);
+  kernel.Run({c.get<"envelope">(), c.get<"driverPoints">()}, c.get<"inPoints">(), c.out<"outPoints">(),
+             {c.scratch(), kernel.ScratchFloats()}, &parallel);
+}
+
+void DeclareWrap(NodeBuilder& b) {
+  AddDriver(b);
+  b.structural("maxDistance", 0.0,
+               {.min = 0,
+                .unit = Unit::kLength,
+                .doc = "driver points farther away have no influence, and points without one stay; "
+                       "0: no limit"});
+  b.structural("influences", 8,
+               {.min = 1, .max = 64, .doc = "how many driver points, the nearest ones, move a point"});
+  b.enumeration("falloffMode", {"volume"}, true, "how distances are measured: straight through space");
+}
+
+void DeclareProximityWrap(NodeBuilder& b) {
+  AddDriver(b);
+  b.enumeration("wrapMode", {"offset", "surface", "snap"}, true,
+                "offset: the offset from the surface turns with it; surface: it is stretched with it, "
+                "too; snap: points lie on the surface");
+  b.structural("maxDistance", 0.0,
+               {.min = 0,
+                .unit = Unit::kLength,
+                .doc = "points farther from the driver stay where they are; 0: no limit"});
+  b.structural(
+      "smoothInfluences", 0,
+      {.min = 0, .max = 20, .doc = "rings over which the influence of the nearest triangle is spread"});
 }
 
 }  // namespace
 
 KPSA_NODES(wrap, registry) {
-  NodeBuilder wrap = AddDeformer(registry, "wrap",
-                                 "Points follow the nearest points of a driver mesh, each with its frame.");
-  wrap.version(2);  // floats
-  AddDriver(wrap);
-  wrap.structural("maxDistance", 0.0,
-                  {.min = 0,
-                   .unit = Unit::kLength,
-                   .doc = "driver points farther away have no influence, and points without one stay; "
-                          "0: no limit"});
-  wrap.structural("influences", 8,
-                  {.min = 1, .max = 64, .doc = "how many driver points, the nearest ones, move a point"});
-  wrap.enumeration("falloffMode", {"volume"}, true, "how distances are measured: straight through space");
-  FinishDeformer(wrap, &ComputeWrap, BindWrap<true>, DemandWrapNode<true>).cost(3000, 60);
-
-  NodeBuilder proximity =
-      AddDeformer(registry, "proximityWrap", "Points follow the nearest place of a driver's surface.");
-  proximity.version(2);  // floats
-  AddDriver(proximity);
-  proximity.enumeration(
-      "wrapMode", {"offset", "surface", "snap"}, true,
-      "offset: the offset from the surface turns with it; surface: it is stretched with it, "
-      "too; snap: points lie on the surface");
-  proximity.structural("maxDistance", 0.0,
-                       {.min = 0,
-                        .unit = Unit::kLength,
-                        .doc = "points farther from the driver stay where they are; 0: no limit"});
-  proximity.structural(
-      "smoothInfluences", 0,
-      {.min = 0, .max = 20, .doc = "rings over which the influence of the nearest triangle is spread"});
-  FinishDeformer(proximity, &ComputeWrap, BindWrap<false>, DemandWrapNode<false>).cost(5000, 46);
+  AddDeformer<ComputeWrap>(registry,
+                           {.name = "wrap",
+                            .doc = "Points follow the nearest points of a driver mesh, each with its frame.",
+                            .own = DeclareWrap,
+                            .bind = BindWrap<true>,
+                            .demand = DemandWrapNode<true>})
+      .version(2)  // floats
+      .cost(3000, 60);
+  AddDeformer<ComputeWrap>(registry, {.name = "proximityWrap",
+                                      .doc = "Points follow the nearest place of a driver's surface.",
+                                      .own = DeclareProximityWrap,
+                                      .bind = BindWrap<false>,
+                                      .demand = DemandWrapNode<false>})
+      .version(2)  // floats
+      .cost(5000, 46);
 }
 
 }  // namespace kpsa::engine
