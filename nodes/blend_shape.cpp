@@ -157,9 +157,11 @@ void DemandBlendShape(Demand& demand) {
   if (demand.input_total("pointWeights") > 0) demand.Require("pointWeights", 0, demand.output("outPoints"));
 }
 
+enum class CombinationMethod { kMultiply, kLowestWeighting, kSmooth };
+
 // Of weights below 0 all methods but the product make nothing: a shape that is pulled the other way needs no
 // correction.
-double Combine(ArrayView<double> weights, std::int64_t method) {
+double Combine(ArrayView<double> weights, CombinationMethod method) {
   if (weights.size() == 0) return 0;
   double product = weights[0], lowest = weights[0], inverses = 0;
   for (std::uint32_t i = 0; i < weights.size(); ++i) {
@@ -167,9 +169,9 @@ double Combine(ArrayView<double> weights, std::int64_t method) {
     lowest = std::min(lowest, weights[i]);
     inverses += 1 / weights[i];
   }
-  if (method == 0) return product;
+  if (method == CombinationMethod::kMultiply) return product;
   if (!(lowest > 0)) return 0;
-  return method == 1 ? lowest : weights.size() / inverses;
+  return method == CombinationMethod::kLowestWeighting ? lowest : weights.size() / inverses;
 }
 
 void DeclareBlendShape(NodeBuilder& b) {
@@ -204,10 +206,14 @@ KPSA_NODES(blend_shape, registry) {
       .category("deformer")
       .in("inputWeight", 0.0, {.doc = "the weights of the others"})
       .array()
-      .enumeration("combinationMethod", {"multiply", "lowestWeighting", "smooth"}, false,
-                   "their product, the lowest, or their harmonic mean: as the lowest, without its kink")
+      .enumeration<CombinationMethod>(
+          "combinationMethod",
+          {{"multiply", CombinationMethod::kMultiply},
+           {"lowestWeighting", CombinationMethod::kLowestWeighting},
+           {"smooth", CombinationMethod::kSmooth}},
+          false, "their product, the lowest, or their harmonic mean: as the lowest, without its kink")
       .out("outputWeight", Type::kDouble)
-      .compute([](ArrayView<double> weights, std::int64_t method) { return Combine(weights, method); });
+      .compute([](ArrayView<double> weights, CombinationMethod method) { return Combine(weights, method); });
 }
 
 }  // namespace kpsa::engine

@@ -251,9 +251,11 @@ void ComputeClipWeights(NodeContext<In<"time", double>, Out<"output", OutArray<d
     out[i] = !keys.empty() && i < values.size() ? values[i] : 0.0;
 }
 
+enum class CurveInterpolation { kLinear, kStep, kSmooth };
+
 struct CurveKernel {
   std::vector<double> times, values;
-  int interpolation;  // linear, step, smooth
+  CurveInterpolation interpolation;
 };
 
 Result<BoundKernel> BindAnimCurve(const Binding& binding) {
@@ -261,7 +263,7 @@ Result<BoundKernel> BindAnimCurve(const Binding& binding) {
   CurveKernel kernel;
   kernel.times = s.value("keyTimes").get<std::vector<double>>();
   kernel.values = s.value("keyValues").get<std::vector<double>>();
-  kernel.interpolation = s.get_int("interpolation");
+  kernel.interpolation = s.choice<CurveInterpolation>("interpolation");
   if (kernel.times.empty()) return Status::Invalid("keyTimes holds no key");
   if (kernel.times.size() != kernel.values.size()) {
     return Status::Invalid("keyTimes has {} entries, keyValues {}", kernel.times.size(),
@@ -286,8 +288,8 @@ void ComputeAnimCurve(NodeContext<In<"input", double>, Out<"output", double>> c)
   }
   const double a = k.values[next - 1], b = k.values[next];
   double u = (t - k.times[next - 1]) / (k.times[next] - k.times[next - 1]);
-  if (k.interpolation == 1) u = 0;
-  if (k.interpolation == 2) u = Smoothstep(u);
+  if (k.interpolation == CurveInterpolation::kStep) u = 0;
+  if (k.interpolation == CurveInterpolation::kSmooth) u = Smoothstep(u);
   c.out<"output">() = a + (b - a) * u;
 }
 
@@ -297,7 +299,11 @@ void AddAnimCurve(NodeRegistry& registry, const char* name, const char* doc, Uni
       .in("input", 0.0)
       .structural("keyTimes", std::vector<double>{}, {.doc = "ascending"})
       .structural("keyValues", std::vector<double>{}, {.unit = unit})
-      .enumeration("interpolation", {"linear", "step", "smooth"}, true)
+      .enumeration<CurveInterpolation>("interpolation",
+                                       {{"linear", CurveInterpolation::kLinear},
+                                        {"step", CurveInterpolation::kStep},
+                                        {"smooth", CurveInterpolation::kSmooth}},
+                                       true)
       .out("output", Type::kDouble)
       .unit(unit)
       .compute<ComputeAnimCurve>()

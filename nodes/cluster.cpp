@@ -1,7 +1,6 @@
 // cluster and softMod: a handle moves weighted points. Only the handle's own motion acts, relative to its
 // parent: a handle that hangs under the head does not move the face twice when the head turns.
 #include <algorithm>
-#include <cmath>
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
@@ -19,8 +18,7 @@ struct ClusterBound {
   CarriedFrame frame;
   bool has_bind_pre = false;
   Matrix4 parent_from_handle_inverse;  // rest(matrix)^-1 . rest(parentMatrix)
-  Matrix4 parent_rest_inverse;
-  Double3 pivot;  // of the handle at rest, stage space
+  Double3 pivot;                       // of the handle at rest, stage space
 };
 
 Result<ClusterBound> MakeCluster(const Binding& binding, std::vector<float> weights) {
@@ -33,12 +31,10 @@ Result<ClusterBound> MakeCluster(const Binding& binding, std::vector<float> weig
                      *frame,
                      s.is_set("bindPreMatrix"),
                      {},
-                     {},
                      {}};
   Matrix4 handle_inverse;
   if (!Invert(*handle, &handle_inverse)) return Status::Invalid("matrix is singular at rest");
   bound.parent_from_handle_inverse = handle_inverse * frame->parent_rest();
-  bound.parent_rest_inverse = InverseOrIdentity(frame->parent_rest());
   bound.pivot = TransformPoint(frame->stage_from_world(), TransformPoint(*handle, {}));
   return bound;
 }
@@ -47,6 +43,23 @@ Result<BoundKernel> BindCluster(const Binding& binding) {
   Result<ClusterBound> bound = MakeCluster(binding, BoundWeights(binding));
   if (!bound.ok()) return bound.status();
   return MakeBound(std::move(*bound), 0);
+}
+
+// In the order of Maya's, which the kernel does not know.
+enum class SoftModCurve { kSmooth, kLinear, kSpline, kNone };
+
+FalloffCurve CurveOf(SoftModCurve curve) {
+  switch (curve) {
+    case SoftModCurve::kSmooth:
+      return FalloffCurve::kSmooth;
+    case SoftModCurve::kLinear:
+      return FalloffCurve::kLinear;
+    case SoftModCurve::kSpline:
+      return FalloffCurve::kSpline;
+    case SoftModCurve::kNone:
+      break;
+  }
+  return FalloffCurve::kNone;
 }
 
 // Falloff and weight map at some points.
@@ -60,11 +73,9 @@ Result<std::vector<float>> SoftModWeights(const Structural& s, const PointSet& p
   const Double3 world =
       s.is_set("falloffCenter") ? s.value("falloffCenter").get<Double3>() : TransformPoint(*handle, {});
   FalloffProfile profile;
-  constexpr FalloffCurve kCurves[] = {FalloffCurve::kSmooth, FalloffCurve::kLinear, FalloffCurve::kSpline,
-                                      FalloffCurve::kNone};
-  profile.curve = kCurves[s.get_int("falloffCurve")];
+  profile.curve = CurveOf(s.choice<SoftModCurve>("falloffCurve"));
   // Distances are world ones: a stage in mesh space may be scaled
-  const double scale = std::cbrt(std::fabs(Determinant3(frame->world_from_stage())));
+  const double scale = frame->WorldScale();
   const std::vector<float> falloff =
       RadialFalloff(*rest, points.ToVector(), TransformPoint(frame->stage_from_world(), world),
                     s.get_double("falloffRadius") / scale, profile);
@@ -88,8 +99,7 @@ void ComputeCluster(ClusterContext c) {
   } else if (bound.frame.fixed()) {
     // The handle's motion in its parent's frame, as seen from where the parent rests
     const Matrix4 own = InverseOrIdentity(parent) * handle * bound.parent_from_handle_inverse;
-    delta = bound.frame.stage_from_world() * (bound.frame.parent_rest() * own * bound.parent_rest_inverse) *
-            bound.frame.world_from_stage();
+    delta = bound.frame.MotionInStage(own);
   } else {
     delta = handle * bound.parent_from_handle_inverse * InverseOrIdentity(parent);
   }
@@ -110,7 +120,12 @@ void DeclareSoftMod(NodeBuilder& b) {
   b.structural("falloffCenter", Double3(),
                {.unit = Unit::kLength, .doc = "world space at rest; default: the handle"});
   b.structural("falloffRadius", 0.05, {.min = 0, .unit = Unit::kLength});
-  b.enumeration("falloffCurve", {"smooth", "linear", "spline", "none"}, true);
+  b.enumeration<SoftModCurve>("falloffCurve",
+                              {{"smooth", SoftModCurve::kSmooth},
+                               {"linear", SoftModCurve::kLinear},
+                               {"spline", SoftModCurve::kSpline},
+                               {"none", SoftModCurve::kNone}},
+                              true);
 }
 
 }  // namespace

@@ -43,9 +43,7 @@ Result<BoundKernel> MakeBoundOr(Result<Kernel> kernel) {
   return MakeBound(std::move(*kernel), 0);
 }
 
-RotationMean::Mode InterpType(const Structural& s) {
-  return s.get_int("interpType") == 0 ? RotationMean::Mode::kShortest : RotationMean::Mode::kAverage;
-}
+RotationMean::Mode InterpType(const Structural& s) { return s.choice<RotationMean::Mode>("interpType"); }
 
 // Constrain(kernel, context, parent_inverse, total_weight, local) changes what it owns of the local matrix,
 // which comes in as inMatrix.
@@ -178,12 +176,12 @@ void ConstrainScale(const ScaleKernel& k, ConstraintInputs c, const Matrix4& par
 }
 
 // aim
-enum WorldUp { kUpScene, kUpObject, kUpObjectRotation, kUpVector, kUpNone };
+enum class WorldUp { kScene, kObject, kObjectRotation, kVector, kNone };
 
 struct AimKernel {
   ConstraintRest rest;
   Double3 aim, up;
-  int world_up = kUpVector;
+  WorldUp world_up = WorldUp::kVector;
   Double3 target_rest, up_vector_rest;
   Matrix4 up_matrix_rest;
   Quaternion offset;
@@ -211,11 +209,11 @@ Quaternion AimLocal(const AimKernel& k, const Matrix4& parent, const MatrixParts
   Double3 direction, aim;
   if (!Direction(target - place, 0, &direction)) return in.rotation;
   Double3 up = up_vector;
-  if (k.world_up == kUpScene) up = {0, 1, 0};
-  if (k.world_up == kUpObject) up = PlaceOf(up_matrix) - place;
-  if (k.world_up == kUpObjectRotation) up = Rotate(TakeApart(up_matrix).rotation, up_vector);
+  if (k.world_up == WorldUp::kScene) up = {0, 1, 0};
+  if (k.world_up == WorldUp::kObject) up = PlaceOf(up_matrix) - place;
+  if (k.world_up == WorldUp::kObjectRotation) up = Rotate(TakeApart(up_matrix).rotation, up_vector);
   Quaternion turn;
-  if (k.world_up == kUpNone || !AimRotation(k.aim, k.up, direction, up, &turn)) {
+  if (k.world_up == WorldUp::kNone || !AimRotation(k.aim, k.up, direction, up, &turn)) {
     if (!Direction(Rotate(world, k.aim), 0, &aim)) return in.rotation;
     turn = ShortestArc(aim, direction, Rotate(world, k.up)) * world;
   }
@@ -229,14 +227,14 @@ Result<BoundKernel> BindAim(const Binding& binding) {
   AimKernel k{std::move(*rest),
               s.value("aimVector").get<Double3>(),
               s.value("upVector").get<Double3>(),
-              s.get_int("worldUpType"),
+              s.choice<WorldUp>("worldUpType"),
               {},
               {},
               {},
               {}};
   Double3 unit;
   if (!Direction(k.aim, 0, &unit)) return Status::Invalid("aimVector has no direction");
-  if (k.world_up != kUpNone && !Direction(Cross(unit, k.up), 1e-12 * Length(k.up), &unit))
+  if (k.world_up != WorldUp::kNone && !Direction(Cross(unit, k.up), 1e-12 * Length(k.up), &unit))
     return Status::Invalid("upVector is parallel to aimVector, or has no direction");
   Result<Matrix4> up_matrix = RestMatrix(s, "worldUpMatrix");
   if (!up_matrix.ok()) return up_matrix.status();
@@ -285,9 +283,11 @@ void ComputeAim(ConstraintContext<In<"worldUpVector", Double3>, In<"worldUpMatri
 const char* const kOutDoc = "local, for the constrained transform's offsetParentMatrix";
 
 NodeBuilder& AddInterpType(NodeBuilder& b) {
-  return b.enumeration("interpType", {"shortest", "average"}, true,
-                       "how rotations of several targets are mixed: spherically on the shortest way, one "
-                       "after the other, or as the mean of quaternions");
+  return b.enumeration<RotationMean::Mode>(
+      "interpType", {{"shortest", RotationMean::Mode::kShortest}, {"average", RotationMean::Mode::kAverage}},
+      true,
+      "how rotations of several targets are mixed: spherically on the shortest way, one "
+      "after the other, or as the mean of quaternions");
 }
 
 }  // namespace
@@ -321,10 +321,17 @@ KPSA_NODES(constraints, registry) {
       .in("worldUpMatrix", Matrix4(), {.doc = "worldMatrix of the up object"})
       .structural("aimVector", Double3{1, 0, 0}, {.doc = "own axis that points at the target"})
       .structural("upVector", Double3{0, 1, 0}, {.doc = "own axis that is turned towards the world's up"})
-      .enumeration("worldUpType", {"scene", "object", "objectrotation", "vector", "none"}, true,
-                   "what is up: world y, the place of an object, its axes, worldUpVector, or nothing (the "
-                   "smallest turn from inMatrix)",
-                   kUpVector)
+      .enumeration<WorldUp>(
+          "worldUpType",
+          {{"scene", WorldUp::kScene},
+           {"object", WorldUp::kObject},
+           {"objectrotation", WorldUp::kObjectRotation},
+           {"vector", WorldUp::kVector},
+           {"none", WorldUp::kNone}},
+          true,
+          "what is up: world y, the place of an object, its axes, worldUpVector, or nothing (the "
+          "smallest turn from inMatrix)",
+          WorldUp::kVector)
       .out("outMatrix", Type::kMatrix, kOutDoc)
       .compute<ComputeAim>()
       .bind(BindAim)

@@ -1,7 +1,6 @@
 // curve: control vertices that hang under a parent and are offset in its axes. wire: points near a curve
 // follow its offsets.
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "graph/geometry.h"
@@ -39,7 +38,6 @@ using WireContext =
 
 struct WireBound {
   WireKernel kernel;
-  Matrix4 stage_from_world;  // for stages in mesh space: with the parent's motion taken out
   CarriedFrame frame;
   std::size_t vertices, offset_floats;
   bool several = false;
@@ -86,7 +84,7 @@ Result<BoundKernel> BindWire(const Binding& binding) {
   if (!rest.ok()) return rest.status();
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
-  const double scale = std::cbrt(std::fabs(Determinant3(frame->world_from_stage())));
+  const double scale = frame->WorldScale();
   const std::vector<WireSource> sources = Sources(binding);
   std::vector<std::vector<Double3>> vertices;
   std::vector<WireSettings> settings;
@@ -112,11 +110,7 @@ Result<BoundKernel> BindWire(const Binding& binding) {
   WireBound bound{several
                       ? WireKernel(curves, s.get_double("crossingEffect"), *rest, out, BoundWeights(binding))
                       : WireKernel(settings[0], vertices[0], *rest, out, BoundWeights(binding)),
-                  frame->stage_from_world(),
-                  *frame,
-                  all_vertices,
-                  0,
-                  several};
+                  *frame, all_vertices, 0, several};
   bound.offset_floats = (all_vertices * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
   const std::size_t scratch = bound.offset_floats + bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
@@ -126,9 +120,7 @@ void ComputeWire(WireContext c) {
   const auto& bound = c.kernel_as<WireBound>();
   auto* offsets = reinterpret_cast<Double3*>(c.scratch());
   // In mesh space the skin turns offsets later: take the parent's turn out again
-  const Matrix4 turn = bound.frame.fixed() ? bound.stage_from_world * bound.frame.parent_rest() *
-                                                 InverseOrIdentity(c.get<"parentMatrix">())
-                                           : Matrix4();
+  const Matrix4 turn = bound.frame.StageFromWorld(c.get<"parentMatrix">());
   Double3* to = offsets;
   const auto add = [&](const ConstPointsView& displacements) {
     for (std::size_t i = 0; i < displacements.count; ++i) {

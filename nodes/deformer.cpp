@@ -9,6 +9,8 @@
 namespace kpsa::engine {
 namespace {
 
+enum class StageSpace { kWorld, kMesh };
+
 void DeclareShared(NodeBuilder& builder) {
   builder.category("deformer");
   builder.points_in("inPoints", "the points to deform").per_geometry();
@@ -18,8 +20,8 @@ void DeclareShared(NodeBuilder& builder) {
   builder.structural("weights", Type::kAsset, {.doc = "weight map times membership; 1 where unset"})
       .per_geometry();
   builder.structural("mesh", Type::kMesh, {.doc = "the topology of the geometry"}).per_geometry();
-  builder.enumeration("space", {"world", "mesh"}, true,
-                      "the space of the stage: mesh space before the skin, world space after it");
+  builder.enumeration<StageSpace>("space", {{"world", StageSpace::kWorld}, {"mesh", StageSpace::kMesh}}, true,
+                                  "the space of the stage: mesh space before the skin, world space after it");
   builder
       .structural("geometryMatrix", Matrix4(),
                   {.doc = "world from mesh space at rest, for stages in mesh space"})
@@ -146,7 +148,7 @@ Result<CarriedFrame> CarriedFrame::Bind(const Structural& structural) {
   CarriedFrame frame;
   Result<Matrix4> parent = RestMatrix(structural, "parentMatrix");
   if (!parent.ok()) return parent.status();
-  frame.fixed_ = structural.get_int("space") == 1;
+  frame.fixed_ = structural.choice<StageSpace>("space") == StageSpace::kMesh;
   frame.parent_rest_ = *parent;
   if (!Invert(*parent, &frame.parent_rest_inverse_))
     return Status::Invalid("parentMatrix is singular at rest");
@@ -156,6 +158,18 @@ Result<CarriedFrame> CarriedFrame::Bind(const Structural& structural) {
       return Status::Invalid("geometryMatrix is singular");
   }
   return frame;
+}
+
+Matrix4 CarriedFrame::StageFromWorld(const Matrix4& parent_now) const {
+  return fixed_ ? stage_from_world_ * parent_rest_ * InverseOrIdentity(parent_now) : Matrix4();
+}
+
+Matrix4 CarriedFrame::StageFromHandle(const Matrix4& parent_now, const Matrix4& handle) const {
+  return fixed_ ? stage_from_world_ * (parent_rest_ * (InverseOrIdentity(parent_now) * handle)) : handle;
+}
+
+Matrix4 CarriedFrame::MotionInStage(const Matrix4& in_parent) const {
+  return stage_from_world_ * (parent_rest_ * in_parent * parent_rest_inverse_) * world_from_stage_;
 }
 
 double CarriedFrame::Growth(const Matrix4& parent_now) const {

@@ -69,6 +69,14 @@ class CarriedFrame {
   Matrix4 Motion(const Matrix4& parent_now) const {
     return fixed_ ? Matrix4() : parent_now * parent_rest_inverse_;
   }
+  // From the world to the stage: what hangs under the parent is taken to where the parent rests, because in
+  // mesh space the skin carries the points later. The identity for stages in world space.
+  Matrix4 StageFromWorld(const Matrix4& parent_now) const;
+  // The same of a handle, whose matrix is of the world. Against its parent first: where it follows that, it
+  // stays where it is but for the rounding of that.
+  Matrix4 StageFromHandle(const Matrix4& parent_now, const Matrix4& handle) const;
+  // A motion in the parent's axes as one of the points, with the parent where it rests.
+  Matrix4 MotionInStage(const Matrix4& in_parent) const;
   // How much larger the parent has become since rest, along one axis; a rigid motion gives exactly 1.
   double Growth(const Matrix4& parent_now) const;
   bool fixed() const { return fixed_; }

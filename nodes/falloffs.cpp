@@ -39,7 +39,7 @@ struct FalloffPlace {
   // carries: parentMatrix moves something else, too.
   static Result<FalloffPlace> Bind(const Structural& s, bool carries = false) {
     FalloffPlace place;
-    place.fade = static_cast<FalloffFade>(s.get_int("curve"));
+    place.fade = s.choice<FalloffFade>("curve");
     place.moved = s.is_set("geometryMatrix", s.geometry());
     if (!place.moved && !carries) return place;
     if (place.moved) place.world_from_points_at_rest = s.value("geometryMatrix").get<Matrix4>();
@@ -233,7 +233,8 @@ NodeBuilder AddFalloff(NodeRegistry& registry, const char* name, const char* doc
   b.structural("geometryMatrix", Matrix4(),
                {.doc = "world from the points' space at rest, where they are before the skin"})
       .per_geometry();
-  b.enumeration("curve", {"smooth", "linear"}, true, "how the weight gets from 1 to 0");
+  b.enumeration<FalloffFade>("curve", {{"smooth", FalloffFade::kSmooth}, {"linear", FalloffFade::kLinear}},
+                             true, "how the weight gets from 1 to 0");
   return b;
 }
 

@@ -9,6 +9,8 @@
 namespace kpsa::engine {
 namespace {
 
+enum class LatticeInterpolation { kLinear, kBspline, kBernstein };
+
 struct LatticeBound {
   LatticeKernel kernel;
   CarriedFrame frame;
@@ -86,14 +88,15 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
   if (influence.size() != 3)
     return Status::Invalid("localInfluence takes three numbers, not {}", influence.size());
   LatticeSettings settings;
-  const int interpolation = s.get_int("interpolation");
-  settings.local = interpolation != 2;
+  const auto interpolation = s.choice<LatticeInterpolation>("interpolation");
+  settings.local = interpolation != LatticeInterpolation::kBernstein;
   for (std::size_t a = 0; a < 3; ++a) {
     settings.divisions[a] = static_cast<int>(d[a]);
-    settings.influence[a] =
-        interpolation == 0 ? 2 : static_cast<int>(std::clamp<std::int64_t>(influence[a], 0, 1000));
+    settings.influence[a] = interpolation == LatticeInterpolation::kLinear
+                                ? 2
+                                : static_cast<int>(std::clamp<std::int64_t>(influence[a], 0, 1000));
   }
-  settings.outside = static_cast<LatticeOutside>(s.get_int("outside"));
+  settings.outside = s.choice<LatticeOutside>("outside");
   settings.falloff_distance = s.get_double("outsideFalloffDist");
   KPSA_RETURN_IF_ERROR(settings.Validate());
   Result<ConstPointsView> rest = RestPoints(s);
@@ -148,10 +151,19 @@ void DeclareLattice(NodeBuilder& b) {
                {.doc = "control points along s, t, u; 2 to 32 each"});
   b.structural("localInfluence", std::vector<std::int64_t>{2, 2, 2},
                {.doc = "order of the B-spline along s, t, u; 2 is linear"});
-  b.enumeration("interpolation", {"linear", "bspline", "bernstein"}, true,
-                "linear between neighbouring controls, B-splines of localInfluence, or Bernstein polynomials "
-                "over all controls");
-  b.enumeration("outside", {"inside", "all", "falloff"}, true, "what becomes of points outside of the box");
+  b.enumeration<LatticeInterpolation>(
+      "interpolation",
+      {{"linear", LatticeInterpolation::kLinear},
+       {"bspline", LatticeInterpolation::kBspline},
+       {"bernstein", LatticeInterpolation::kBernstein}},
+      true,
+      "linear between neighbouring controls, B-splines of localInfluence, or Bernstein polynomials "
+      "over all controls");
+  b.enumeration<LatticeOutside>("outside",
+                                {{"inside", LatticeOutside::kInside},
+                                 {"all", LatticeOutside::kAll},
+                                 {"falloff", LatticeOutside::kFalloff}},
+                                true, "what becomes of points outside of the box");
   b.structural("outsideFalloffDist", 1.0, {.min = 1e-6, .doc = "of falloff, in widths of the lattice"});
   b.structural("boxMin", Double3(),
                {.unit = Unit::kLength,

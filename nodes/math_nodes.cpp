@@ -12,22 +12,27 @@ double Remap(double value, double in_min, double in_max, double out_min, double 
   return out_min + t * (out_max - out_min);
 }
 
-Double3 MultiplyDivide(Double3 a, Double3 b, std::int64_t operation) {
+enum class Operation { kNone, kMultiply, kDivide, kPower };
+
+Double3 MultiplyDivide(Double3 a, Double3 b, Operation operation) {
   Double3 out = a;
   for (int i = 0; i < 3; ++i) {
-    if (operation == 1) out[i] = a[i] * b[i];
-    if (operation == 2) out[i] = b[i] == 0 ? 0 : a[i] / b[i];
-    if (operation == 3) out[i] = Power(a[i], b[i]);
+    if (operation == Operation::kMultiply) out[i] = a[i] * b[i];
+    if (operation == Operation::kDivide) out[i] = b[i] == 0 ? 0 : a[i] / b[i];
+    if (operation == Operation::kPower) out[i] = Power(a[i], b[i]);
   }
   return out;
 }
 
-double PlusMinusAverage(ArrayView<double> input, std::int64_t operation) {
+enum class SumOperation { kNone, kSum, kSubtract, kAverage };
+
+double PlusMinusAverage(ArrayView<double> input, SumOperation operation) {
   if (input.size() == 0) return 0;
   double sum = input[0];
-  if (operation == 0) return sum;
-  for (std::uint32_t i = 1; i < input.size(); ++i) sum += operation == 2 ? -input[i] : input[i];
-  return operation == 3 ? sum / input.size() : sum;
+  if (operation == SumOperation::kNone) return sum;
+  for (std::uint32_t i = 1; i < input.size(); ++i)
+    sum += operation == SumOperation::kSubtract ? -input[i] : input[i];
+  return operation == SumOperation::kAverage ? sum / input.size() : sum;
 }
 
 }  // namespace
@@ -49,18 +54,28 @@ KPSA_NODES(math_nodes, registry) {
            "Multiplies, divides or raises to a power, component by component. Dividing by 0 gives 0.")
       .in("input1", Double3())
       .in("input2", Double3{1, 1, 1})
-      .enumeration("operation", {"noOperation", "multiply", "divide", "power"}, false, {}, 1)
+      .enumeration<Operation>("operation",
+                              {{"noOperation", Operation::kNone},
+                               {"multiply", Operation::kMultiply},
+                               {"divide", Operation::kDivide},
+                               {"power", Operation::kPower}},
+                              false, {}, Operation::kMultiply)
       .out("output", Type::kDouble3)
-      .compute([](Double3 a, Double3 b, std::int64_t operation) { return MultiplyDivide(a, b, operation); });
+      .compute([](Double3 a, Double3 b, Operation operation) { return MultiplyDivide(a, b, operation); });
   registry.add("plusMinusAverage", "Adds, subtracts from the first, or averages any number of inputs.")
       .in("input", 0.0)
       .array()
       .alias("input1D")
-      .enumeration("operation", {"noOperation", "sum", "subtract", "average"}, false, {}, 1)
+      .enumeration<SumOperation>("operation",
+                                 {{"noOperation", SumOperation::kNone},
+                                  {"sum", SumOperation::kSum},
+                                  {"subtract", SumOperation::kSubtract},
+                                  {"average", SumOperation::kAverage}},
+                                 false, {}, SumOperation::kSum)
       .out("output", Type::kDouble)
       .alias("output1D")
       .compute(
-          [](ArrayView<double> input, std::int64_t operation) { return PlusMinusAverage(input, operation); });
+          [](ArrayView<double> input, SumOperation operation) { return PlusMinusAverage(input, operation); });
   registry
       .add("unitConversion", "Multiplies by a fixed factor: between the runtime's units and a rig file's.")
       .in("input", 0.0)

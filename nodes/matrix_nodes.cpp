@@ -1,4 +1,5 @@
 #include "base/matrix.h"
+#include "nodes/choices.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/matrix_parts.h"
 #include "nodes/node_file.h"
@@ -7,7 +8,7 @@ namespace kpsa::engine {
 namespace {
 
 Result<BoundKernel> BindOrder(const Binding& binding) {
-  return MakeBound(static_cast<RotateOrder>(binding.structural().get_int("rotateOrder")), 0);
+  return MakeBound(binding.structural().choice<RotateOrder>("rotateOrder"), 0);
 }
 
 void ComputeDecompose(
@@ -59,7 +60,6 @@ Matrix4 PickMatrix(const Matrix4& m, bool translate, bool rotate, bool scale, bo
 }  // namespace
 
 KPSA_NODES(matrix_nodes, registry) {
-  const std::vector<std::string> orders = {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"};
   registry.add("multMatrix", "The product of matrices, for column vectors: matrixIn[0] is applied last.")
       .category("matrix")
       .in("matrixIn", Matrix4())
@@ -75,14 +75,14 @@ KPSA_NODES(matrix_nodes, registry) {
       .in("inputTranslate", Double3(), {.unit = Unit::kLength})
       .in("inputRotate", Double3(), {.unit = Unit::kAngle})
       .in("inputScale", Double3{1, 1, 1})
-      .enumeration("rotateOrder", orders, true)
+      .enumeration<RotateOrder>("rotateOrder", kRotateOrders, true)
       .out("outputMatrix", Type::kMatrix)
       .compute<ComputeCompose>()
       .bind(BindOrder);
   registry.add("decomposeMatrix", "Translation, rotation and scale of a matrix; shear is dropped.")
       .category("matrix")
       .in("inputMatrix", Matrix4())
-      .enumeration("rotateOrder", orders, true)
+      .enumeration<RotateOrder>("rotateOrder", kRotateOrders, true)
       .out("outputTranslate", Type::kDouble3)
       .unit(Unit::kLength)
       .out("outputRotate", Type::kDouble3)

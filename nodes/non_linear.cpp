@@ -27,11 +27,8 @@ template <typename Map, FixedName... kSettings>
 void ComputeNonLinear(DeformerContext<In<"matrix", Matrix4>, In<kSettings, double>...> c) {
   static_assert(sizeof(Map) == sizeof...(kSettings) * sizeof(double));
   const auto& bound = c.template kernel_as<NonLinearBound>();
-  const Matrix4 &parent = c.template get<"parentMatrix">(), &handle = c.template get<"matrix">();
-  const CarriedFrame& frame = bound.frame;
   const Matrix4 stage_from_handle =
-      frame.fixed() ? frame.stage_from_world() * (frame.parent_rest() * (InverseOrIdentity(parent) * handle))
-                    : handle;
+      bound.frame.StageFromHandle(c.template get<"parentMatrix">(), c.template get<"matrix">());
   const Parallel parallel = HostParallel(c);
   bound.kernel.Run({Map{c.template get<kSettings>()...}, stage_from_handle, c.template get<"envelope">()},
                    c.template get<"inPoints">(), c.template out<"outPoints">(), {}, &parallel);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/matrix.h"
+#include "nodes/choices.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/pose_weights.h"
 #include "nodes/kernels/transform_math.h"
@@ -28,14 +29,13 @@ Result<BoundKernel> BindPoses(const Binding& binding) {
   if (angles.size() % 3 != 0)
     return Status::Invalid("poseAngles: expected three angles a pose, found {} numbers", angles.size());
   PoseSettings settings;
-  settings.space.part = static_cast<PoseSpace::Part>(s.get_int("poseType"));
-  settings.space.twist_axis = {};
-  settings.space.twist_axis[s.get_int("twistAxis")] = 1;
-  settings.basis = static_cast<PoseBasis>(s.get_int("interpolation"));
+  settings.space.part = s.choice<PoseSpace::Part>("poseType");
+  settings.space.twist_axis = UnitVector(s.choice<Axis>("twistAxis"));
+  settings.basis = s.choice<PoseBasis>("interpolation");
   settings.radius = s.get_double("radius");
   settings.regularization = s.get_double("regularization");
   settings.normalize = s.get_bool("normalize");
-  const auto order = static_cast<RotateOrder>(s.get_int("rotateOrder"));
+  const auto order = s.choice<RotateOrder>("rotateOrder");
   std::vector<Quaternion> poses;
   std::vector<std::string> names;
   for (std::size_t i = 0; i < angles.size(); i += 3) {
@@ -75,12 +75,19 @@ KPSA_NODES(pose_interpolator, registry) {
       .structural("poseAngles", std::vector<double>{},
                   {.unit = Unit::kAngle, .doc = "three angles a pose; in rigs a map, name: [x, y, z]"})
       .structural("poseNames", "", {.doc = "of the poses, one a line; `poses:` sets it"})
-      .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "of the poses' angles")
-      .enumeration("poseType", {"swingAndTwist", "swing", "twist"}, true,
-                   "what of a rotation counts: all of it, where the twist axis points, or the turn about it")
-      .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")
-      .enumeration("interpolation", {"gaussian", "thinPlate", "linear"}, true,
-                   "the radial function: exp(-(d/r)^2), d^2 log d, or d")
+      .enumeration<RotateOrder>("rotateOrder", kRotateOrders, true, "of the poses' angles")
+      .enumeration<PoseSpace::Part>(
+          "poseType",
+          {{"swingAndTwist", PoseSpace::Part::kSwingAndTwist},
+           {"swing", PoseSpace::Part::kSwing},
+           {"twist", PoseSpace::Part::kTwist}},
+          true, "what of a rotation counts: all of it, where the twist axis points, or the turn about it")
+      .enumeration<Axis>("twistAxis", kAxes, true, "the axis of swing and twist")
+      .enumeration<PoseBasis>("interpolation",
+                              {{"gaussian", PoseBasis::kGaussian},
+                               {"thinPlate", PoseBasis::kThinPlate},
+                               {"linear", PoseBasis::kLinear}},
+                              true, "the radial function: exp(-(d/r)^2), d^2 log d, or d")
       .structural("radius", 0.0,
                   {.min = 0,
                    .unit = Unit::kAngle,

@@ -26,8 +26,7 @@ Result<BoundKernel> BindSculpt(const Binding& binding) {
   const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
   return MakeBound(SculptBound{SculptKernel(binding.output("outPoints").ToVector(), BoundWeights(binding)),
-                               *frame, static_cast<SculptMode>(s.get_int("mode")),
-                               static_cast<SculptDropoff>(s.get_int("dropoffType"))},
+                               *frame, s.choice<SculptMode>("mode"), s.choice<SculptDropoff>("dropoffType")},
                    0);
 }
 
@@ -35,11 +34,7 @@ void ComputeSculpt(SculptContext c) {
   const auto& bound = c.kernel_as<SculptBound>();
   const double radius = c.get<"radius">();
   const Matrix4& handle = c.get<"matrix">();
-  // From the world to the stage
-  const Matrix4 stage_from_world = bound.frame.fixed()
-                                       ? bound.frame.stage_from_world() * bound.frame.parent_rest() *
-                                             InverseOrIdentity(c.get<"parentMatrix">())
-                                       : Matrix4();
+  const Matrix4 stage_from_world = bound.frame.StageFromWorld(c.get<"parentMatrix">());
   SculptKernel::Inputs inputs{{bound.mode, bound.dropoff, 0, 0, {}},
                               stage_from_world * handle * Scaling({radius, radius, radius}),
                               c.get<"envelope">()};
@@ -68,11 +63,15 @@ void DeclareSculpt(NodeBuilder& b) {
        {.min = 0, .unit = Unit::kLength, .doc = "how far from the sphere's surface points are moved"});
   b.in("stretchOrigin", Double3(),
        {.unit = Unit::kLength, .doc = "of mode stretch, world space: points move away from it"});
-  b.enumeration("mode", {"flip", "project", "stretch"}, true,
-                "flip: points inside go out along their radius; project: points near the surface go onto it; "
-                "stretch: points go away from stretchOrigin until they are outside");
-  b.enumeration("dropoffType", {"none", "linear"}, true,
-                "none: full strength up to the dropoff distance; linear: fading towards it", 1);
+  b.enumeration<SculptMode>(
+      "mode",
+      {{"flip", SculptMode::kFlip}, {"project", SculptMode::kProject}, {"stretch", SculptMode::kStretch}},
+      true,
+      "flip: points inside go out along their radius; project: points near the surface go onto it; "
+      "stretch: points go away from stretchOrigin until they are outside");
+  b.enumeration<SculptDropoff>(
+      "dropoffType", {{"none", SculptDropoff::kNone}, {"linear", SculptDropoff::kLinear}}, true,
+      "none: full strength up to the dropoff distance; linear: fading towards it", SculptDropoff::kLinear);
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ using ShrinkWrapContext = DeformerContext<In<"driverPoints", ConstPointsView>, I
 
 ShrinkWrapSettings Settings(const Structural& s) {
   ShrinkWrapSettings settings;
-  settings.projection = static_cast<ShrinkWrapSettings::Projection>(s.get_int("projection"));
-  settings.side = static_cast<ShrinkWrapSettings::Side>(s.get_int("side"));
+  settings.projection = s.choice<ShrinkWrapSettings::Projection>("projection");
+  settings.side = s.choice<ShrinkWrapSettings::Side>("side");
   settings.reverse = s.get_bool("reverse");
   settings.bidirectional = s.get_bool("bidirectional");
   settings.closest_if_no_intersection = s.get_bool("closestIfNoIntersection");
@@ -90,22 +90,30 @@ void ComputeShrinkWrap(ShrinkWrapContext c) {
 }
 
 void DeclareShrinkWrap(NodeBuilder& b) {
+  using Projection = ShrinkWrapSettings::Projection;
+  using Side = ShrinkWrapSettings::Side;
   AddDriver(b);
   b.in("offset", 0.0,
        {.unit = Unit::kLength,
         .doc = "distance from the surface, positive outside (where its normals point)"});
-  b.enumeration("projection", {"closest", "vertexNormals", "parallelToAxis"}, true,
-                "to the nearest place of the surface, or where the line along the point's normal or along "
-                "`axis` meets it");
+  b.enumeration<Projection>(
+      "projection",
+      {{"closest", Projection::kClosest},
+       {"vertexNormals", Projection::kNormals},
+       {"parallelToAxis", Projection::kAxis}},
+      true,
+      "to the nearest place of the surface, or where the line along the point's normal or along "
+      "`axis` meets it");
   b.structural("axis", Double3{0, 1, 0},
                {.doc = "direction of parallelToAxis, world axes at rest; it turns with parentMatrix"});
   b.structural("reverse", false, {.doc = "lines go against the normal or axis"});
   b.structural("bidirectional", false, {.doc = "lines go both ways; the nearer hit counts"});
   b.structural("closestIfNoIntersection", false,
                {.doc = "a point whose line meets nothing goes to the nearest place; otherwise it stays"});
-  b.enumeration("side", {"surface", "outside", "inside"}, true,
-                "surface: all points go onto it; outside: only those inside, so that all end up outside; "
-                "inside: the other way round");
+  b.enumeration<Side>(
+      "side", {{"surface", Side::kSurface}, {"outside", Side::kOutside}, {"inside", Side::kInside}}, true,
+      "surface: all points go onto it; outside: only those inside, so that all end up outside; "
+      "inside: the other way round");
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ Result<std::vector<float>> BoundBlendWeights(const Binding& binding) {
   return shares;
 }
 
-enum SkinningMethod { kClassicLinear, kDualQuaternion, kWeightBlended };
+enum class SkinningMethod { kClassicLinear, kDualQuaternion, kWeightBlended };
 
 // The matrices of the palette that no point needs stay as they are: nobody reads them.
 struct SkinBound {
@@ -84,15 +84,15 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
   }
   bound.palette_floats = bound.joint_from_bind.size() * sizeof(Matrix4) / sizeof(float);
   std::size_t scratch = bound.palette_floats;
-  const int method = s.get_int("skinningMethod");
+  const auto method = s.choice<SkinningMethod>("skinningMethod");
   const std::vector<Index> points = out.ToVector();
-  if (method != kDualQuaternion) {
+  if (method != SkinningMethod::kDualQuaternion) {
     bound.linear.emplace(weights, points, BoundWeights(binding));
     scratch += bound.linear->ScratchFloats();
   }
-  if (method != kClassicLinear) {
+  if (method != SkinningMethod::kClassicLinear) {
     std::vector<float> blend;
-    if (method == kWeightBlended) {
+    if (method == SkinningMethod::kWeightBlended) {
       Result<std::vector<float>> shares = BoundBlendWeights(binding);
       if (!shares.ok()) return shares.status();
       blend = std::move(*shares);
@@ -149,9 +149,14 @@ void DeclareSkin(NodeBuilder& b) {
   b.in("matrix", Matrix4(), {.doc = "the joints' world matrices"}).array();
   b.in("offset", Double3(), {.unit = Unit::kLength, .doc = "moves all joints, in double"});
   b.structural("bindPreMatrix", Matrix4(), {.doc = "the joints' inverse bind matrices"}).array();
-  b.enumeration("skinningMethod", {"classicLinear", "dualQuaternion", "weightBlended"}, true,
-                "how influences are blended: as matrices, as rigid motions (dual quaternions), or between "
-                "the two by blendWeights");
+  b.enumeration<SkinningMethod>(
+      "skinningMethod",
+      {{"classicLinear", SkinningMethod::kClassicLinear},
+       {"dualQuaternion", SkinningMethod::kDualQuaternion},
+       {"weightBlended", SkinningMethod::kWeightBlended}},
+      true,
+      "how influences are blended: as matrices, as rigid motions (dual quaternions), or between "
+      "the two by blendWeights");
   b.structural("blendWeights", Type::kAsset,
                {.doc = "of weightBlended: 0 takes classicLinear, 1 dualQuaternion; 0 where unset"})
       .per_geometry();

@@ -1,6 +1,7 @@
 // transform and joint: local = offsetParentMatrix . T . R(rotateOrder) . S, in Maya's sense. The rest pose or
 // the clip feeds offsetParentMatrix; translate, rotate and scale are the controls on top of it.
 #include "base/scalar_math.h"
+#include "nodes/choices.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/transform_math.h"
 #include "nodes/node_file.h"
@@ -16,9 +17,8 @@ struct TransformKernel {
 
 Result<BoundKernel> BindTransform(const Binding& binding) {
   const Structural& s = binding.structural();
-  TransformKernel kernel{
-      static_cast<RotateOrder>(s.get_int("rotateOrder")), s.value("restMatrix").get<Matrix4>(), {}};
-  kernel.twist_axis[s.get_int("twistAxis")] = 1;
+  TransformKernel kernel{s.choice<RotateOrder>("rotateOrder"), s.value("restMatrix").get<Matrix4>(),
+                         UnitVector(s.choice<Axis>("twistAxis"))};
   return MakeBound(kernel, 0);
 }
 
@@ -75,13 +75,13 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .in("translate", Double3(), {.unit = Unit::kLength, .doc = "control, on top of offsetParentMatrix"})
       .in("rotate", Double3(), {.unit = Unit::kAngle, .doc = "control, applied in rotateOrder"})
       .in("scale", Double3{1, 1, 1}, {.doc = "control"})
-      .enumeration("rotateOrder", {"xyz", "yzx", "zxy", "xzy", "yxz", "zyx"}, true, "xyz turns about X first")
+      .enumeration<RotateOrder>("rotateOrder", kRotateOrders, true, "xyz turns about X first")
       .in("offsetParentMatrix", Matrix4(), {.doc = "the rest pose, or what the clip makes of it"})
       .in("parentMatrix", Matrix4(), {.doc = "the parent's worldMatrix"})
       .world_place()
       .structural("restMatrix", Matrix4(),
                   {.doc = "the local matrix at rest, for poseRotate, swing and twist"})
-      .enumeration("twistAxis", {"x", "y", "z"}, true, "the axis of swing and twist")
+      .enumeration<Axis>("twistAxis", kAxes, true, "the axis of swing and twist")
       .out("matrix", Type::kMatrix, "local")
       .out("worldMatrix", Type::kMatrix)
       .out("worldInverseMatrix", Type::kMatrix)

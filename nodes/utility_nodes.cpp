@@ -30,17 +30,18 @@ Double3 UnitLength(Double3 v) {
   return Direction(v, 0, &unit) ? unit : Double3();
 }
 
-enum VectorOperation { kNoProduct, kDotProduct, kCrossProduct, kVectorMatrixProduct, kPointMatrixProduct };
+enum class VectorOperation { kNone, kDot, kCross, kVectorMatrix, kPointMatrix };
 
-Double3 VectorProduct(Double3 a, Double3 b, const Matrix4& matrix, std::int64_t operation, bool normalize) {
+Double3 VectorProduct(Double3 a, Double3 b, const Matrix4& matrix, VectorOperation operation,
+                      bool normalize) {
   Double3 out = a;
-  if (operation == kDotProduct) {
+  if (operation == VectorOperation::kDot) {
     const double dot = normalize ? Dot(UnitLength(a), UnitLength(b)) : Dot(a, b);
     return {dot, dot, dot};
   }
-  if (operation == kCrossProduct) out = Cross(a, b);
-  if (operation == kVectorMatrixProduct) out = TransformVector(matrix, a);
-  if (operation == kPointMatrixProduct) out = TransformPoint(matrix, a);
+  if (operation == VectorOperation::kCross) out = Cross(a, b);
+  if (operation == VectorOperation::kVectorMatrix) out = TransformVector(matrix, a);
+  if (operation == VectorOperation::kPointMatrix) out = TransformPoint(matrix, a);
   return normalize ? UnitLength(out) : out;
 }
 
@@ -108,13 +109,18 @@ KPSA_NODES(utility_nodes, registry) {
       .in("input1", Double3())
       .in("input2", Double3())
       .in("matrix", Matrix4())
-      .enumeration("operation",
-                   {"noOperation", "dotProduct", "crossProduct", "vectorMatrixProduct", "pointMatrixProduct"},
-                   false, "a dot product is in every component; products with the matrix are of input1",
-                   kDotProduct)
+      .enumeration<VectorOperation>(
+          "operation",
+          {{"noOperation", VectorOperation::kNone},
+           {"dotProduct", VectorOperation::kDot},
+           {"crossProduct", VectorOperation::kCross},
+           {"vectorMatrixProduct", VectorOperation::kVectorMatrix},
+           {"pointMatrixProduct", VectorOperation::kPointMatrix}},
+          false, "a dot product is in every component; products with the matrix are of input1",
+          VectorOperation::kDot)
       .in("normalizeOutput", false, {.doc = "unit length; for dot products the cosine of the angle"})
       .out("output", Type::kDouble3)
-      .compute([](Double3 a, Double3 b, const Matrix4& matrix, std::int64_t operation, bool normalize) {
+      .compute([](Double3 a, Double3 b, const Matrix4& matrix, VectorOperation operation, bool normalize) {
         return VectorProduct(a, b, matrix, operation, normalize);
       });
 }

@@ -16,7 +16,7 @@ using UvPinContext = NodeContext<In<"driverPoints", ConstPointsView>, In<"relati
 using FollicleContext =
     NodeContext<In<"driverPoints", ConstPointsView>, Out<"outTranslate", Double3>, Out<"outRotate", Double3>,
                 Out<"outMatrix", Matrix4>, Out<"outNormal", Double3>, Out<"outTangent", Double3>>;
-enum RelativeSpace : int { kWorld, kLocal, kCustom };
+enum class RelativeSpace { kWorld, kLocal, kCustom };
 
 // The attributes that say where a pin is; element -1 of those that are no arrays.
 struct PinPlace {
@@ -30,7 +30,7 @@ struct PinBound {
   double weights[3] = {0, 0, 0};
   UvDirection direction;
   PinAxes axes;
-  int space = kWorld;
+  RelativeSpace space = RelativeSpace::kWorld;
   Matrix4 world_from_driver;
 };
 
@@ -95,8 +95,8 @@ Result<PinBound> MakePin(const Structural& s, const PinPlace& at, Index points) 
 Result<PinBound> MakeUvPin(const Structural& s, Index points) {
   Result<PinBound> pin = MakePin(s, {"coordinateU", "coordinateV", s.geometry()}, points);
   if (!pin.ok()) return pin.status();
-  pin->axes = {s.get_int("normalAxis"), s.get_int("tangentAxis")};
-  pin->space = s.get_int("relativeSpaceMode");
+  pin->axes = {s.choice<PinAxis>("normalAxis"), s.choice<PinAxis>("tangentAxis")};
+  pin->space = s.choice<RelativeSpace>("relativeSpaceMode");
   if (!pin->axes.Differ())
     return Status::Invalid("normalAxis and tangentAxis are the same axis, expected two of x, y and z");
   return pin;
@@ -104,7 +104,7 @@ Result<PinBound> MakeUvPin(const Structural& s, Index points) {
 
 Result<PinBound> MakeFollicle(const Structural& s, Index points) {
   Result<PinBound> pin = MakePin(s, {"parameterU", "parameterV", -1}, points);
-  if (pin.ok()) pin->axes = {2, 0};
+  if (pin.ok()) pin->axes = {PinAxis::kZ, PinAxis::kX};
   return pin;
 }
 
@@ -143,9 +143,9 @@ SurfaceFrame FrameNow(PinPoints c, bool in_world) {
 
 void ComputeUvPin(UvPinContext c) {
   const auto& pin = c.kernel_as<PinBound>();
-  const Matrix4 frame = PinMatrix(FrameNow(c, pin.space != kLocal), pin.axes);
+  const Matrix4 frame = PinMatrix(FrameNow(c, pin.space != RelativeSpace::kLocal), pin.axes);
   c.out<"outputMatrix">() =
-      pin.space == kCustom ? InverseOrIdentity(c.get<"relativeSpaceMatrix">()) * frame : frame;
+      pin.space == RelativeSpace::kCustom ? InverseOrIdentity(c.get<"relativeSpaceMatrix">()) * frame : frame;
 }
 
 void ComputeFollicle(FollicleContext c) {
@@ -184,11 +184,18 @@ KPSA_NODES(uv_pin, registry) {
   pin.structural("barycentric", Double3{kThird, kThird, kThird},
                  {.doc = "where in its `face`: shares of the corners, divided by their sum"})
       .array();
-  const std::vector<std::string> axes = {"x", "y", "z", "-x", "-y", "-z"};
-  pin.enumeration("normalAxis", axes, true, "the axis of the matrix that is the surface's normal", 1);
-  pin.enumeration("tangentAxis", axes, true, "the axis that is the direction of growing u", 0);
-  pin.enumeration("relativeSpaceMode", {"world", "local", "custom"}, true,
-                  "world; the mesh's own space at the stage; or seen from relativeSpaceMatrix");
+  const std::initializer_list<Choice<PinAxis>> axes = {{"x", PinAxis::kX},       {"y", PinAxis::kY},
+                                                       {"z", PinAxis::kZ},       {"-x", PinAxis::kMinusX},
+                                                       {"-y", PinAxis::kMinusY}, {"-z", PinAxis::kMinusZ}};
+  pin.enumeration<PinAxis>("normalAxis", axes, true, "the axis of the matrix that is the surface's normal",
+                           PinAxis::kY);
+  pin.enumeration<PinAxis>("tangentAxis", axes, true, "the axis that is the direction of growing u");
+  pin.enumeration<RelativeSpace>(
+      "relativeSpaceMode",
+      {{"world", RelativeSpace::kWorld},
+       {"local", RelativeSpace::kLocal},
+       {"custom", RelativeSpace::kCustom}},
+      true, "world; the mesh's own space at the stage; or seen from relativeSpaceMatrix");
   pin.out("outputMatrix", Type::kMatrix, "of each pin: no scale").per_geometry();
   pin.compute<ComputeUvPin>().bind(BindPin<MakeUvPin>).demand(DemandPin<MakeUvPin>).cost(150, 0);
 

@@ -1,6 +1,7 @@
 // The node constraints of VRM (VRMC_node_constraint 1.0): roll, aim, rotation. They turn a transform away
 // from its rest rotation, whatever a clip says of its rotation; its place and its size stay those of
 // inMatrix.
+#include "nodes/choices.h"
 #include "nodes/deformer.h"
 #include "nodes/kernels/constraint_math.h"
 #include "nodes/kernels/matrix_parts.h"
@@ -21,24 +22,45 @@ struct VrmKernel {
 
 Quaternion TurnOf(const Matrix4& m) { return TakeApart(m).rotation; }
 
-Result<BoundKernel> BindVrm(const Binding& binding, const char* axis, bool signed_axis) {
+enum class AimAxis { kPositiveX, kNegativeX, kPositiveY, kNegativeY, kPositiveZ, kNegativeZ };
+
+Double3 UnitVector(AimAxis axis) {
+  switch (axis) {
+    case AimAxis::kPositiveX:
+      return {1, 0, 0};
+    case AimAxis::kNegativeX:
+      return {-1, 0, 0};
+    case AimAxis::kPositiveY:
+      return {0, 1, 0};
+    case AimAxis::kNegativeY:
+      return {0, -1, 0};
+    case AimAxis::kPositiveZ:
+      return {0, 0, 1};
+    case AimAxis::kNegativeZ:
+      break;
+  }
+  return {0, 0, -1};
+}
+
+Result<BoundKernel> BindVrm(const Binding& binding, Double3 axis, bool has_source_rest) {
   const Structural& s = binding.structural();
   VrmKernel k;
   k.rest_matrix = s.value("restMatrix").get<Matrix4>();
   k.rest = TurnOf(k.rest_matrix);
-  if (!signed_axis) {
+  if (has_source_rest) {
     k.source_rest_matrix = s.value("sourceRestMatrix").get<Matrix4>();
     k.source_rest = TurnOf(k.source_rest_matrix);
   }
-  if (axis != nullptr) {
-    const int choice = static_cast<int>(s.get_int(axis));
-    k.axis[signed_axis ? choice / 2 : choice] = signed_axis && choice % 2 == 1 ? -1 : 1;
-  }
+  k.axis = axis;
   return MakeBound(k, 0);
 }
-Result<BoundKernel> BindVrmRoll(const Binding& binding) { return BindVrm(binding, "rollAxis", false); }
-Result<BoundKernel> BindVrmAim(const Binding& binding) { return BindVrm(binding, "aimAxis", true); }
-Result<BoundKernel> BindVrmRotation(const Binding& binding) { return BindVrm(binding, nullptr, false); }
+Result<BoundKernel> BindVrmRoll(const Binding& binding) {
+  return BindVrm(binding, UnitVector(binding.structural().choice<Axis>("rollAxis")), true);
+}
+Result<BoundKernel> BindVrmAim(const Binding& binding) {
+  return BindVrm(binding, UnitVector(binding.structural().choice<AimAxis>("aimAxis")), false);
+}
+Result<BoundKernel> BindVrmRotation(const Binding& binding) { return BindVrm(binding, {}, true); }
 
 // The turn that is the roll of `turn` about the axis: what is left after the smallest turn that takes the
 // axis to where `turn` takes it.
@@ -114,7 +136,7 @@ KPSA_NODES(vrm_constraints, registry) {
                             "Rolls a transform about one of its axes as its source has turned since rest.",
                             "the source's matrix");
   roll.structural("sourceRestMatrix", Matrix4(), {.doc = kVrmRestDoc})
-      .enumeration("rollAxis", {"x", "y", "z"}, true, "own axis")
+      .enumeration<Axis>("rollAxis", kAxes, true, "own axis")
       .out("outMatrix", Type::kMatrix, kVrmOutDoc)
       .compute<ComputeVrmTurn<RollTarget>>()
       .bind(BindVrmRoll)
@@ -124,8 +146,14 @@ KPSA_NODES(vrm_constraints, registry) {
                            "the source's worldMatrix");
   aim.in("parentMatrix", Matrix4(), {.doc = "worldMatrix of the constrained transform's parent"})
       .world_place()
-      .enumeration("aimAxis", {"positiveX", "negativeX", "positiveY", "negativeY", "positiveZ", "negativeZ"},
-                   true, "own axis that points at the source")
+      .enumeration<AimAxis>("aimAxis",
+                            {{"positiveX", AimAxis::kPositiveX},
+                             {"negativeX", AimAxis::kNegativeX},
+                             {"positiveY", AimAxis::kPositiveY},
+                             {"negativeY", AimAxis::kNegativeY},
+                             {"positiveZ", AimAxis::kPositiveZ},
+                             {"negativeZ", AimAxis::kNegativeZ}},
+                            true, "own axis that points at the source")
       .out("outMatrix", Type::kMatrix, kVrmOutDoc)
       .compute<ComputeVrmAim>()
       .bind(BindVrmAim)

@@ -11,13 +11,14 @@ namespace {
 
 // What may be held back, by its number in `kind`: 1 blink, 2 lookAt, 3 mouth.
 constexpr std::size_t kHeldKinds = 3;
-enum HoldingBack { kHoldsNone, kHoldsAll, kHoldsSome };
+enum class HoldingBack { kNone, kAll, kSome };
+constexpr auto kMostOverride = static_cast<std::int64_t>(HoldingBack::kSome);
 const char* const kOverrideNames[kHeldKinds] = {"overrideBlink", "overrideLookAt", "overrideMouth"};
 
 struct ExpressionRule {
   bool binary = false;
   std::size_t kind = 0;
-  std::array<int, kHeldKinds> overrides = {};
+  std::array<HoldingBack, kHeldKinds> overrides = {};
 };
 struct ExpressionsKernel {
   std::vector<ExpressionRule> rules;
@@ -49,9 +50,10 @@ Result<BoundKernel> BindExpressions(const Binding& binding) {
     rule->kind = static_cast<std::size_t>(v);
   }));
   for (std::size_t held = 0; held < kHeldKinds; ++held) {
-    KPSA_RETURN_IF_ERROR(read(kOverrideNames[held], kHoldsSome, [held](ExpressionRule* rule, std::int64_t v) {
-      rule->overrides[held] = static_cast<int>(v);
-    }));
+    KPSA_RETURN_IF_ERROR(
+        read(kOverrideNames[held], kMostOverride, [held](ExpressionRule* rule, std::int64_t v) {
+          rule->overrides[held] = static_cast<HoldingBack>(v);
+        }));
   }
   return MakeBound(std::move(kernel), 0);
 }
@@ -64,8 +66,8 @@ void ComputeExpressions(NodeContext<In<"weight", ArrayView<double>>, Out<"output
     const double value = k.Value(weights, i);
     if (!(value > 0)) continue;
     for (std::size_t held = 0; held < kHeldKinds; ++held) {
-      if (k.rules[i].kind == held + 1 || k.rules[i].overrides[held] == kHoldsNone) continue;
-      held_back[held] += k.rules[i].overrides[held] == kHoldsAll ? 1 : value;
+      if (k.rules[i].kind == held + 1 || k.rules[i].overrides[held] == HoldingBack::kNone) continue;
+      held_back[held] += k.rules[i].overrides[held] == HoldingBack::kAll ? 1 : value;
     }
   }
   const OutArray<double> out = c.out<"output">();

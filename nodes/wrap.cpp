@@ -21,7 +21,7 @@ WrapMode ModeOf(const Structural& s) {
   if constexpr (kAmongPoints) {
     return WrapMode::kOffset;
   } else {
-    return static_cast<WrapMode>(s.get_int("wrapMode"));
+    return s.choice<WrapMode>("wrapMode");
   }
 }
 
@@ -100,9 +100,11 @@ void DeclareWrap(NodeBuilder& b) {
 
 void DeclareProximityWrap(NodeBuilder& b) {
   AddDriver(b);
-  b.enumeration("wrapMode", {"offset", "surface", "snap"}, true,
-                "offset: the offset from the surface turns with it; surface: it is stretched with it, "
-                "too; snap: points lie on the surface");
+  b.enumeration<WrapMode>(
+      "wrapMode", {{"offset", WrapMode::kOffset}, {"surface", WrapMode::kSurface}, {"snap", WrapMode::kSnap}},
+      true,
+      "offset: the offset from the surface turns with it; surface: it is stretched with it, "
+      "too; snap: points lie on the surface");
   b.structural("maxDistance", 0.0,
                {.min = 0,
                 .unit = Unit::kLength,

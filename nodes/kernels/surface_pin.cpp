@@ -75,9 +75,9 @@ SurfaceFrame FrameOnTriangle(const Double3 corners[3], const double weights[3],
 
 Matrix4 PinMatrix(const SurfaceFrame& frame, const PinAxes& axes) {
   Double3 columns[3];
-  const int n = axes.normal % 3, t = axes.tangent % 3, third = 3 - n - t;
-  columns[n] = frame.normal * (axes.normal < 3 ? 1 : -1);
-  columns[t] = frame.tangent * (axes.tangent < 3 ? 1 : -1);
+  const int n = PinAxes::Component(axes.normal), t = PinAxes::Component(axes.tangent), third = 3 - n - t;
+  columns[n] = frame.normal * PinAxes::Sign(axes.normal);
+  columns[t] = frame.tangent * PinAxes::Sign(axes.tangent);
   columns[third] = Cross(columns[(third + 1) % 3], columns[(third + 2) % 3]);
   Matrix4 m;
   for (int row = 0; row < 3; ++row) {

@@ -49,9 +49,12 @@ struct SurfaceFrame {
 SurfaceFrame FrameOnTriangle(const Double3 corners[3], const double weights[3], const UvDirection& direction);
 
 // Which axis of a matrix is which direction: 0 to 2 for x, y, z, 3 to 5 for their opposites.
+enum class PinAxis : std::uint8_t { kX, kY, kZ, kMinusX, kMinusY, kMinusZ };
 struct PinAxes {
-  int normal = 1, tangent = 0;
-  bool Differ() const { return normal % 3 != tangent % 3; }
+  PinAxis normal = PinAxis::kY, tangent = PinAxis::kX;
+  static int Component(PinAxis axis) { return static_cast<int>(axis) % 3; }
+  static double Sign(PinAxis axis) { return static_cast<int>(axis) < 3 ? 1 : -1; }
+  bool Differ() const { return Component(normal) != Component(tangent); }
 };
 // The third axis makes it right-handed. The axes must differ.
 Matrix4 PinMatrix(const SurfaceFrame& frame, const PinAxes& axes);
