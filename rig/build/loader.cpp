@@ -7,8 +7,9 @@
 #include <tuple>
 
 #include "graph/plugin_loader.h"
-#include "rig/build/rig_build.h"
+#include "rig/build/build_rig.h"
 #include "rig/build/references.h"
+#include "rig/file/values.h"
 
 namespace kpsa::engine {
 namespace {
@@ -203,7 +204,7 @@ Result<LoadedRig> Loader::Load(const std::string& path, const std::optional<std:
     if (!errors.ok()) return InOrder(errors.Take());  // without them, names are missing
   }
   RestPose rest(*rig.character, rig.scene);
-  RigBuild(&file, &rig, &rest, &errors).Run();
+  BuildRig(&file, &rest, &rig, &errors);
   if (!errors.ok()) return InOrder(errors.Take());
   if (given != nullptr) {
     for (RigOverride& override_ : file.returned) {

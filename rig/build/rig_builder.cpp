@@ -1,90 +1,106 @@
-#include "rig/build/rig_builder.h"
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include "rig/build/rig_build.h"
+// The order of the steps from a rig file to a rig; what each one reads and writes is said in its header.
+#include "rig/build/build_rig.h"
+#include "rig/build/steps/add_accelerations.h"
+#include "rig/build/steps/add_clips.h"
+#include "rig/build/steps/add_constraints.h"
+#include "rig/build/steps/add_controls.h"
+#include "rig/build/steps/add_curves.h"
+#include "rig/build/steps/add_nodes.h"
+#include "rig/build/steps/add_shape_rules.h"
+#include "rig/build/steps/apply_special_overrides.h"
+#include "rig/build/steps/build_mesh_stacks.h"
+#include "rig/build/steps/build_point_stacks.h"
+#include "rig/build/steps/check_variants.h"
+#include "rig/build/steps/connect_curves.h"
+#include "rig/build/steps/connect_drivers.h"
+#include "rig/build/steps/connect_falloffs.h"
+#include "rig/build/steps/connect_lights.h"
+#include "rig/build/steps/connect_parents.h"
+#include "rig/build/steps/connect_pivots.h"
+#include "rig/build/steps/connect_time.h"
+#include "rig/build/steps/finish_overrides.h"
+#include "rig/build/steps/finish_stacks.h"
+#include "rig/build/steps/make_connections.h"
+#include "rig/build/steps/measure_rest.h"
+#include "rig/build/steps/place_falloffs.h"
+#include "rig/build/steps/place_handles.h"
+#include "rig/build/steps/place_stages.h"
+#include "rig/build/steps/place_stages_at_handles.h"
+#include "rig/build/steps/read_attributes.h"
+#include "rig/build/steps/read_overrides.h"
+#include "rig/build/steps/resolve_scopes.h"
+#include "rig/build/steps/set_blend_weights.h"
+#include "rig/build/steps/set_influences.h"
+#include "rig/build/steps/set_targets.h"
+#include "rig/build/steps/set_weights.h"
 
 namespace kpsa::engine {
-namespace {
 
-double RestDiagonal(const CharacterGraph& scene, RestPose* rest) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  Double3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    for (const Double3& p : rest->WorldPoints(m)) {
-      for (int i = 0; i < 3; ++i) {
-        low[i] = std::min(low[i], p[i]);
-        high[i] = std::max(high[i], p[i]);
-      }
-    }
-  }
-  const double diagonal = Length(high - low);
-  return std::isfinite(diagonal) ? diagonal : 0;
-}
+void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
+  Graph* const graph = rig->graph.get();
+  CharacterGraph* const scene = &rig->scene;
+  const RigNames names(*file, *rig, errors);
+  const BuildInput in{*file, *rig, names, errors};
+  WeightMaps maps(in, rig);
 
-}  // namespace
+  // Before anything is made of the file's own nodes
+  AddClips(in, scene);
+  ResolveScopes(names, graph->registry(), file);
+  OwnDeformers own;
+  ApplySpecialOverrides(in, file, &own);
+  SetInfluences(in, own, &maps, scene, graph);
+  rig->rest_diagonal = RestDiagonal(*scene, rest);
 
-RigBuild::RigBuild(RigFile* file, Rig* rig, RestPose* rest, YamlErrors* errors)
-    : file_(file), rig_(rig), rest_(rest), errors_(errors), stack_of_mesh_(rig->scene.meshes.size()) {
-  for (std::size_t n = 0; n < file->nodes.size(); ++n) written_.emplace(file->nodes[n].name, n);
-  for (Index i = 0; i < rig->character->nodes.size(); ++i) {
-    const std::string& name = rig->character->nodes[i].name;
-    gltf_by_name_[name.empty() ? fmt::format("node{}", i) : name].push_back(i);
-    gltf_by_node_[rig->scene.transforms[i].index] = i;
-  }
-}
+  // Nodes and their values
+  MadeNodes nodes;
+  AddNodes(in, &nodes, &rig->node_places, graph);
+  PlugReader reader(in, &file->returned, graph);
+  ReadAttributes(in, &nodes, &reader, graph);
+  ReadOverrides(in, &reader, graph);
+  AddShapeRules(in, nodes, own, graph);
 
-void RigBuild::Run() {
-  AddClips();
-  ResolveScopes();
-  ApplySpecialOverrides();
-  for (Made& made : own_made_) SetInfluences(&made);
-  rig_->rest_diagonal = RestDiagonal(rig_->scene, rest_);
-  AddNodes();
-  for (Made& made : made_) {
-    if (!errors_->full()) ReadAttributes(&made);
-  }
-  ReadOverrides();
-  for (std::vector<Made>* all : {&made_, &own_made_}) {
-    for (Made& made : *all) AddShapeRules(&made);
-  }
-  AddCurves();
-  ConnectParents();
-  if (errors_->ok()) PlaceHandles();
-  ConnectCurves();
-  BuildStacks();
-  ConnectLights();
-  ConnectDrivers();
-  for (Made& made : made_) SetTargets(&made);
-  for (Made& made : own_made_) SetBlendWeights(&made);
-  MakeConnections();
-  AddConstraints();
-  ConnectTime();
-  PlaceStagesAtHandles();
-  PlaceFalloffs();
-  ConnectPivots();
-  FinishOverrides();
-  CheckVariants();
-  AddControls();
-  AddAccelerations();
-}
+  // Where they are at rest
+  RestCurves curves;
+  const RestPlaces places(in, curves, rest, &nodes, graph);
+  AddCurves(in, nodes, places, &curves, graph);
+  ConnectParents(in, nodes, graph);
+  if (errors->ok()) PlaceHandles(in, places, &nodes, graph);
+  ConnectCurves(in, nodes, graph);
 
-bool RigBuild::Fail(const SourceLocation& where, Status status) {
-  if (status.ok()) return true;
-  errors_->Append(std::move(status).At(where));
-  return false;
-}
+  // Stacks, and what weighs them
+  PlugKeys stacked;
+  const RestFalloffs falloffs(in, places, rest, &maps);
+  const WeightSetter weights(in, falloffs, &maps, graph, &rig->notes);
+  BuildMeshStacks(in, &nodes, scene, graph, &rig->notes);
+  SetWeights(weights, &nodes);
+  PlaceStages(in, rest, &nodes, graph);
+  BuildPointStacks(in, curves, rest, &nodes, &stacked, graph);
+  std::vector<FalloffUse> falloff_uses;
+  ConnectFalloffs(in, &nodes, &falloff_uses, graph);
+  FinishStacks(weights, *graph, &nodes, &rig->notes);
 
-RigBuild::Made* RigBuild::FindMade(const std::string& name) {
-  const auto it = made_by_name_.find(name);
-  return it == made_by_name_.end() ? nullptr : &made_[it->second];
-}
+  // What needs the stages
+  ConnectLights(in, nodes, graph);
+  ConnectDrivers(in, nodes, rest, graph);
+  SetTargets(in, nodes, graph);
+  SetBlendWeights(in, own, &maps, graph);
 
-RigBuild::Made* RigBuild::FindMade(NodeId id) {
-  const auto it = made_by_node_.find(id.index);
-  return it == made_by_node_.end() ? nullptr : &made_[it->second];
+  // What drives what
+  MakeConnections(in, reader.pending(), reader.overridden(), graph);
+  ConstrainedPlugs constrained(in, reader.overridden(), {&scene->clip_inputs, &stacked, &rig->pinned, graph});
+  AddConstraints(in, nodes, &constrained, graph);
+  ConnectTime(in, nodes, graph);
+
+  // What depends on who drives whom
+  PlaceStagesAtHandles(in, places, rest, &nodes, graph);
+  PlaceFalloffs(in, falloff_uses, &nodes, graph);
+  ConnectPivots(in, *rest, nodes, graph);
+  FinishOverrides(in, reader.overridden(), stacked, &rig->pinned, graph);
+  CheckVariants(in, nodes);
+
+  // What the rig is for
+  AddControls(in, &rig->controls);
+  AddAccelerations(in, scene, &rig->accelerate);
 }
 
 }  // namespace kpsa::engine

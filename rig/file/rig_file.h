@@ -142,7 +142,7 @@ struct RigFile {
   std::vector<RigVariant> variants;
   std::vector<RigClip> clips;
   std::vector<RigReference> references;
-  std::vector<RigOverride> returned;  // connections of overrides that are not ours to make (rig_references.h)
+  std::vector<RigOverride> returned;  // connections of overrides that are not ours to make (rig/build/loader.cpp)
 };
 
 // Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig

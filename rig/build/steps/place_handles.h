@@ -1,0 +1,11 @@
+// Step 12 of rig_builder.cpp. Handles that are placed `at` something; not where the rig has errors already.
+// Reads: `at`, and where everything is at rest. Writes: offsetParentMatrix and restMatrix in the graph.
+#pragma once
+
+#include "rig/build/rest_places.h"
+
+namespace kpsa::engine {
+
+void PlaceHandles(const BuildInput& in, const RestPlaces& places, MadeNodes* nodes, Graph* graph);
+
+}  // namespace kpsa::engine
