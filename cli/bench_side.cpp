@@ -97,7 +97,6 @@ Status Side::RecordTurn(const std::vector<double>& at, std::size_t first, std::s
       if (Interrupted()) return InterruptedStatus();
       Forget();
       profile.Clear();
-      TakeKpsaTimes();
       const std::uint64_t begin_cpu = ThreadCpuClock();
       evaluator->Record(&profile, static_cast<int>(f));
       const std::uint64_t begin = ProfileClock();
@@ -110,7 +109,7 @@ Status Side::RecordTurn(const std::vector<double>& at, std::size_t first, std::s
       if (!waited || attempt == kMostRepeats || !plan->stateful_node().empty() || (f == 0 && !anew)) break;
       if (!anew) KPSA_RETURN_IF_ERROR(Evaluate(at[f - 1]));
     }
-    const KpsaTimes taken = TakeKpsaTimes();
+    const KpsaTimes taken = KpsaTimesOf(*plan, profile);
     recorded->kpsa.cues += taken.cues, recorded->kpsa.projection += taken.projection;
     recorded->kpsa.reconstruction += taken.reconstruction;
     turn.wall_ns += wall;

@@ -47,6 +47,11 @@ class ComputeHost {
   virtual void Fail(std::string_view message) = 0;
   // As kpsa::engine::ParallelFor where the host evaluates in parallel, inline otherwise.
   virtual void For(std::size_t count, std::size_t grain, RangeBody body) = 0;
+  // For profiles: whether times are wanted, and how long a part of the node's work took. Parts are the node's
+  // own, from 0 to kMaxParts - 1. In decide and compute.
+  static constexpr int kMaxParts = 4;
+  virtual bool recording() const { return false; }
+  virtual void AddPart(int part, std::uint64_t ns) { (void)part, (void)ns; }
 };
 
 class ComputeContext {

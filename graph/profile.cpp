@@ -17,9 +17,15 @@ void Profile::Add(const ProfileEvent& event) {
   if (keep_events && events_.size() < max_events) events_.push_back(event);
 }
 
+void Profile::AddPart(Index step, int part, std::uint64_t ns) {
+  std::lock_guard<std::mutex> lock(add_mutex);
+  part_ns_[step][static_cast<std::size_t>(part)] += ns;
+}
+
 void Profile::Clear() {
   std::fill(counts_.begin(), counts_.end(), 0);
   std::fill(self_ns_.begin(), self_ns_.end(), 0);
+  std::fill(part_ns_.begin(), part_ns_.end(), PartTimes{});
   std::fill(last_cause_.begin(), last_cause_.end(), kNoIndex);
   events_.clear();
 }

@@ -20,6 +20,10 @@ class Evaluator::StepHost final : public ComputeHost {
       body(0, count);
     }
   }
+  bool recording() const override { return evaluator_->profile_ != nullptr; }
+  void AddPart(int part, std::uint64_t ns) override {
+    if (evaluator_->profile_ != nullptr) evaluator_->profile_->AddPart(step, part, ns);
+  }
   bool failed = false;
   Index step;
 

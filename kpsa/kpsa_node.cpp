@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <string_view>
 
 #include "base/check.h"
 #include "base/matrix.h"
@@ -29,26 +28,21 @@ enum Out { kOutPoints, kScore, kHit, kFullWeight, kMissReason, kOffender };
 constexpr double kLeastWeight = 1e-6;  // of the full evaluation, in what is no hit
 constexpr int kGrowthSteps = 16;       // of sqrt(2): a space that is 256 times as large as at rest
 
-std::atomic<bool> measure_times{false};
-std::atomic<std::uint64_t> cue_ns{0}, projection_ns{0}, reconstruction_ns{0};
-
-// Adds the time of a scope to a counter, where somebody asked for it.
+// Adds the time of a scope to a part of the node's work, where somebody records it.
 class Stopwatch {
  public:
-  explicit Stopwatch(std::atomic<std::uint64_t>& counter)
-      : counter_(measure_times.load(std::memory_order_relaxed) ? &counter : nullptr) {
-    if (counter_ != nullptr) begin_ = std::chrono::steady_clock::now();
+  Stopwatch(const ComputeContext& c, KpsaPart part)
+      : host_(c.host != nullptr && c.host->recording() ? c.host : nullptr), part_(part) {
+    if (host_ != nullptr) begin_ = ProfileClock();
   }
   ~Stopwatch() {
-    if (counter_ == nullptr) return;
-    *counter_ += static_cast<std::uint64_t>(
-        std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now() - begin_)
-            .count());
+    if (host_ != nullptr) host_->AddPart(static_cast<int>(part_), ProfileClock() - begin_);
   }
 
  private:
-  std::atomic<std::uint64_t>* counter_;
-  std::chrono::steady_clock::time_point begin_;
+  ComputeHost* host_;
+  KpsaPart part_;
+  std::uint64_t begin_ = 0;
 };
 
 // What a plan's binding adds: the threshold, and which points of the outputs are wanted.
@@ -202,7 +196,7 @@ std::uint64_t Decide(ComputeContext& c) {
   GuardVerdict guard;
   double stretch = 0;
   {
-    const Stopwatch watch(cue_ns);
+    const Stopwatch watch(c, KpsaPart::kCues);
     if (!any) {
       guard = AskGuards(c, data, patches > 0);
       if (guard.all >= 1) return miss(MissReason::kOutOfRange, guard.offender);
@@ -213,7 +207,7 @@ std::uint64_t Decide(ComputeContext& c) {
                           c.array<double>(kScalars), frame.world_from_space},
                          c.scratch + 3 * padded, raw);
   }
-  const Stopwatch watch(projection_ns);
+  const Stopwatch watch(c, KpsaPart::kProjection);
   Normalize(subspace, raw, y);
   for (std::size_t j = r; j < padded; ++j) y[j] = 0;
   Verdict& verdict = state.verdict;
@@ -304,7 +298,7 @@ void Compute(ComputeContext& c) {
       CopyFull(full[m], out);
       continue;
     }
-    const Stopwatch watch(reconstruction_ns);
+    const Stopwatch watch(c, KpsaPart::kReconstruction);
     Reconstruct(c, kernel, m, out);
     if (verdict.hit) continue;
     kernel.patches.Blend(state.patches, m, full[m], regions, out);
@@ -326,7 +320,7 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
       continue;
     }
     // Frames that share a pass over the subspace
-    const Stopwatch watch(reconstruction_ns);
+    const Stopwatch watch(contexts[0], KpsaPart::kReconstruction);
     const std::size_t r = subspace.tile_inputs();
     for (std::size_t first = 0; first < count; first += kBlockFrames) {
       const std::size_t frames = std::min(kBlockFrames, count - first);
@@ -487,9 +481,14 @@ void AddKpsaNode(NodeRegistry& registry) {
       .cost(20000, 5);
 }
 
-void MeasureKpsaTimes(bool on) { measure_times = on; }
-KpsaTimes TakeKpsaTimes() {
-  return {cue_ns.exchange(0), projection_ns.exchange(0), reconstruction_ns.exchange(0)};
+KpsaTimes KpsaTimesOf(const Plan& plan, const Profile& profile) {
+  std::array<std::uint64_t, ComputeHost::kMaxParts> sum{};
+  for (Index s = 0; s < plan.steps().size(); ++s) {
+    if (std::string_view(plan.step_type(s)) != "kpsa") continue;
+    for (std::size_t part = 0; part < sum.size(); ++part) sum[part] += profile.part_ns()[s][part];
+  }
+  const auto of = [&](KpsaPart part) { return sum[static_cast<std::size_t>(part)]; };
+  return {of(KpsaPart::kCues), of(KpsaPart::kProjection), of(KpsaPart::kReconstruction)};
 }
 
 }  // namespace kpsa::engine

@@ -15,11 +15,13 @@
 // The engine has no special case for it: everything here could come from a plugin.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "graph/node_registry.h"
+#include "graph/profile.h"
 #include "kpsa/subspace.h"
 
 namespace kpsa::engine {
@@ -84,11 +86,13 @@ void AddKpsaNode(NodeRegistry& registry);
 // What the node decided, for reports: from its outputs missReason and offender.
 std::string MissText(const KpsaConfig& config, MissReason reason, Index offender);
 
-// Times of the node's parts, in nanoseconds, summed since the last call; only where the process asked for it.
+// The parts of the node's work, as a profile counts them (Profile::part_ns).
+enum class KpsaPart { kCues, kProjection, kReconstruction };
+
+// Of all KPSA nodes of a plan, as recorded; nanoseconds.
 struct KpsaTimes {
   std::uint64_t cues = 0, projection = 0, reconstruction = 0;
 };
-void MeasureKpsaTimes(bool on);  // process-wide; not while evaluations run
-KpsaTimes TakeKpsaTimes();
+KpsaTimes KpsaTimesOf(const Plan& plan, const Profile& profile);
 
 }  // namespace kpsa::engine

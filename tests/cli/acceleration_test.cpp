@@ -8,6 +8,7 @@
 
 #include "graph/evaluator.h"
 #include "host/rig_training.h"
+#include "kpsa/kpsa_node.h"
 #include "nodes/standard_nodes.h"
 #include "rig/graph_editor.h"
 #include "tests/cli/rig_run.h"
@@ -119,6 +120,25 @@ TEST_F(TrainedRig, ToleranceZeroIsTheExactRigBitForBit) {
     EXPECT_EQ(exact.evaluator->Get<std::int64_t>(1), 0);
     ASSERT_EQ(Points(*full.evaluator), Points(*exact.evaluator)) << frame;
   }
+}
+
+TEST_F(TrainedRig, TheNodeSaysHowLongItsPartsTakeWhereThatIsRecorded) {
+  Rig rig = Load();
+  const double metre = 1;
+  Run run = Start(&rig, &metre);
+  Pose(rig, 0, run.evaluator.get());
+  ASSERT_TRUE(run.evaluator->Evaluate().ok());
+  EXPECT_EQ(run.evaluator->Get<std::int64_t>(1), 1);
+  const KpsaTimes times = KpsaTimesOf(*run.plan, *run.profile);
+  EXPECT_GT(times.cues, 0u);
+  EXPECT_GT(times.projection, 0u);
+  EXPECT_GT(times.reconstruction, 0u);
+  run.profile->Clear();
+  run.evaluator->Record(nullptr);
+  Pose(rig, 1, run.evaluator.get());
+  ASSERT_TRUE(run.evaluator->Evaluate().ok());
+  const KpsaTimes none = KpsaTimesOf(*run.plan, *run.profile);
+  EXPECT_EQ(none.cues + none.projection + none.reconstruction, 0u);
 }
 
 TEST_F(TrainedRig, ARewriteThatFailsChangesNothing) {
