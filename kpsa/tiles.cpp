@@ -353,11 +353,6 @@ void TileMap::Reconstruct(std::span<const float> y, PointsView out, const Matrix
   ReconstructBlock(y, {&out, 1}, {}, {space, space == nullptr ? 0u : 1u});
 }
 
-void TileMap::ReconstructTiles(std::span<const float> y, std::span<const Index> tiles, PointsView out,
-                               const Matrix4* space) const {
-  if (!tiles.empty()) ReconstructBlock(y, {&out, 1}, tiles, {space, space == nullptr ? 0u : 1u});
-}
-
 // What the inputs of a tile are computed from, and where they and its doubt (squared, or null) go.
 void TileMap::SetTerms(std::size_t tile, float* z, float* doubt, TileTerms* terms) const {
   terms->rank = data_.ranks[tile], terms->k16 = Padded16(terms->rank);

@@ -116,10 +116,8 @@ class TileMap {
   // y [r] -> all points, in the space of the mean, or through `space`: a tile at a time, as long as it is in
   // the cache.
   void Reconstruct(std::span<const float> y, PointsView out, const Matrix4* space = nullptr) const;
-  // Only the tiles listed (ascending, none twice); other points are not touched.
-  void ReconstructTiles(std::span<const float> y, std::span<const Index> tiles, PointsView out,
-                        const Matrix4* space = nullptr) const;
-  // Frames: y [frames x r] row-major, one output each, and one space each or none. `tiles` empty: all.
+  // Frames: y [frames x r] row-major, one output each, and one space each or none. Only the tiles listed
+  // (ascending, none twice; other points are not touched); empty: all.
   void ReconstructBlock(std::span<const float> y, std::span<const PointsView> outs,
                         std::span<const Index> tiles, std::span<const Matrix4> spaces = {}) const;
   // What U of every tile is multiplied by [input_size()], so that what the doubt needs is computed once; and

@@ -1,6 +1,5 @@
 #include "kpsa/training/pca.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -180,30 +179,6 @@ Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, con
   const Eigen::VectorXd explained = pca.modes.array().square().matrix() * pca.mode_variance();
   pca.row_residual = (pca.row_variance - explained).cwiseMax(0.0);
   return pca;
-}
-
-Eigen::VectorXd ProjectionErrors(const Pca& pca, const PoseMatrix& poses) {
-  KPSA_CHECK(poses.centered() && poses.layout() == pca.layout);
-  const std::size_t outputs = pca.layout.outputs(), kChunk = 384;
-  const Eigen::MatrixXd a = pca.output_modes();
-  Eigen::VectorXd errors(static_cast<Eigen::Index>(poses.poses()));
-  Eigen::LDLT<Eigen::MatrixXd> gram;
-  if (!pca.output_orthonormal) gram.compute(Gram(GemmOperand::Dense(a).Transposed()));
-  for (std::size_t first = 0; first < poses.poses(); first += kChunk) {
-    const std::size_t count = std::min(kChunk, poses.poses() - first);
-    const GemmOperand x = GemmOperand::Poses(poses, first, count, 0, outputs);
-    Eigen::MatrixXd coordinates =
-        Multiply(GemmOperand::Dense(a).Transposed(), x.Transposed());  // [M x count]
-    if (!pca.output_orthonormal) coordinates = gram.solve(coordinates);
-    const Eigen::MatrixXd projected = Multiply(a, coordinates);
-    for (std::size_t t = 0; t < count; ++t) {
-      const std::span<const float> row = poses.row(first + t);
-      const Eigen::Map<const Eigen::VectorXf> f(row.data(), static_cast<Eigen::Index>(outputs));
-      errors[static_cast<Eigen::Index>(first + t)] =
-          (f.cast<double>() - projected.col(static_cast<Eigen::Index>(t))).norm();
-    }
-  }
-  return errors;
 }
 
 Pca TruncatedPca(const Pca& pca, Eigen::Index modes) {

@@ -57,10 +57,6 @@ struct Pca {
 // on how many.
 Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, const PcaOptions& options);
 
-// Errors of the subspace itself, without an estimator: for each pose |f - A A^T f| over the outputs (centred
-// with pca.mean; weighted if the PCA is). [poses]
-Eigen::VectorXd ProjectionErrors(const Pca& pca, const PoseMatrix& poses);
-
 // The same PCA with fewer modes (energies adjusted).
 Pca TruncatedPca(const Pca& pca, Eigen::Index modes);
 

@@ -1,6 +1,7 @@
 #include "kpsa/training/pose_matrix.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -70,21 +71,6 @@ void PoseMatrix::Subtract(const Eigen::VectorXd& mean) {
     }
   });
   centered_ = true;
-}
-
-void StorePoints(ConstPointsView points, int components, std::size_t first_column, std::span<float> row) {
-  KPSA_CHECK(components == 1 || components == 3);
-  KPSA_CHECK_LE(first_column + points.count * static_cast<std::size_t>(components), row.size());
-  float* target = row.data() + first_column;
-  if (components == 1) {
-    std::copy_n(points.x, points.count, target);
-    return;
-  }
-  for (std::size_t i = 0; i < points.count; ++i) {
-    target[3 * i] = points.x[i];
-    target[3 * i + 1] = points.y[i];
-    target[3 * i + 2] = points.z[i];
-  }
 }
 
 MeanShape MeanShapeOf(const PoseLayout& layout, const Eigen::VectorXd& mean) {

@@ -70,9 +70,6 @@ class PoseMatrix {
   std::vector<std::unique_ptr<float[]>> blocks_;
 };
 
-// Writes the points of a mesh into a row from its point `first` on, interleaved.
-void StorePoints(ConstPointsView points, int components, std::size_t first_column, std::span<float> row);
-
 // The places of all points on the average, those at stages behind the outputs', and the diagonal of the box
 // around the outputs'. mean: of all columns.
 struct MeanShape {

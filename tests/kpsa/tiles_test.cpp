@@ -7,10 +7,10 @@
 #include <random>
 
 #include "base/simd.h"
-#include "kpsa/training/dense_map.h"
-#include "kpsa/training/eigen_solvers.h"
 #include "kpsa/rigid_points.h"
+#include "kpsa/training/eigen_solvers.h"
 #include "kpsa/training/tile_builder.h"
+#include "tests/kpsa/dense_map.h"
 
 namespace kpsa::engine {
 namespace {
@@ -301,7 +301,8 @@ TEST(Tiles, ASpaceAppliesToEveryPointOnce) {
   TransformPoints(ToFloats(space), after.view());
   EXPECT_EQ(through.Interleaved(), after.Interleaved());
   const std::vector<Index> last = {2};
-  map.ReconstructTiles(y, last, tile.view(), &space);
+  const PointsView to = tile.view();
+  map.ReconstructBlock(y, {&to, 1}, last, {&space, 1});
   EXPECT_EQ(tile.view().z[299], after.view().z[299]);
   EXPECT_EQ(tile.view().z[255], 0);
 }

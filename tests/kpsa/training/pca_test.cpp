@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
+#include "base/check.h"
 #include "kpsa/training/eigen_solvers.h"
+#include "kpsa/training/gemm.h"
 #include "tests/kpsa/synthetic.h"
 
 namespace kpsa::engine {
@@ -20,6 +23,32 @@ Eigen::MatrixXd Dense(const PoseMatrix& poses) {
       x(static_cast<Eigen::Index>(t), static_cast<Eigen::Index>(j)) = static_cast<double>(poses.row(t)[j]);
   }
   return x;
+}
+
+// Errors of the subspace itself, without an estimator: for each pose |f - A A^T f| over the outputs (centred
+// with pca.mean; weighted if the PCA is). [poses]
+Eigen::VectorXd ProjectionErrors(const Pca& pca, const PoseMatrix& poses) {
+  KPSA_CHECK(poses.centered() && poses.layout() == pca.layout);
+  const std::size_t outputs = pca.layout.outputs(), kChunk = 384;
+  const Eigen::MatrixXd a = pca.output_modes();
+  Eigen::VectorXd errors(static_cast<Eigen::Index>(poses.poses()));
+  Eigen::LDLT<Eigen::MatrixXd> gram;
+  if (!pca.output_orthonormal) gram.compute(Gram(GemmOperand::Dense(a).Transposed()));
+  for (std::size_t first = 0; first < poses.poses(); first += kChunk) {
+    const std::size_t count = std::min(kChunk, poses.poses() - first);
+    const GemmOperand x = GemmOperand::Poses(poses, first, count, 0, outputs);
+    Eigen::MatrixXd coordinates =
+        Multiply(GemmOperand::Dense(a).Transposed(), x.Transposed());  // [M x count]
+    if (!pca.output_orthonormal) coordinates = gram.solve(coordinates);
+    const Eigen::MatrixXd projected = Multiply(a, coordinates);
+    for (std::size_t t = 0; t < count; ++t) {
+      const std::span<const float> row = poses.row(first + t);
+      const Eigen::Map<const Eigen::VectorXf> f(row.data(), static_cast<Eigen::Index>(outputs));
+      errors[static_cast<Eigen::Index>(first + t)] =
+          (f.cast<double>() - projected.col(static_cast<Eigen::Index>(t))).norm();
+    }
+  }
+  return errors;
 }
 
 double DistanceFromIdentity(const Eigen::MatrixXd& a) {
@@ -194,13 +223,6 @@ TEST(PoseMatrix, GrowsWithoutMovingRowsAndCentersOnce) {
   EXPECT_TRUE(poses.centered());
   EXPECT_EQ(poses.row(199)[4], 99.5f);
   EXPECT_NEAR(poses.Mean().cwiseAbs().maxCoeff(), 0, 1e-12);
-}
-
-TEST(PoseMatrix, StoresPointsInterleaved) {
-  const PointBuffer points = PointBuffer::FromInterleaved(std::vector<float>{1, 2, 3, 4, 5, 6});
-  std::vector<float> row(9, 0.0f);
-  StorePoints(points.view(), 3, 3, row);
-  EXPECT_EQ(row, (std::vector<float>{0, 0, 0, 1, 2, 3, 4, 5, 6}));
 }
 
 }  // namespace

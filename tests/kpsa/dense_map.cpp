@@ -1,7 +1,7 @@
-#include "kpsa/training/dense_map.h"
+#include "tests/kpsa/dense_map.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "kpsa/training/dense_map.cpp"
+#define HWY_TARGET_INCLUDE "tests/kpsa/dense_map.cpp"
 #include "hwy/foreach_target.h"
 
 #include "base/simd-inl.h"
