@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/median.h"
 #include "files/npz.h"
 #include "kpsa/training/cue_places.h"
 #include "kpsa/training/mode_choice.h"
@@ -205,8 +206,7 @@ double AblationPoses::Microseconds(const std::vector<CueRef>& cues) {
       if (pass > 0) us.push_back(std::chrono::duration<double, std::micro>(Clock::now() - begin).count());
     }
   }
-  std::nth_element(us.begin(), us.begin() + static_cast<std::ptrdiff_t>(us.size() / 2), us.end());
-  return us[us.size() / 2];
+  return UpperMedian(std::move(us));
 }
 
 Status AblationPoses::Dump(const std::string& path) const {

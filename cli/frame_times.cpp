@@ -8,15 +8,6 @@
 
 namespace kpsa::engine {
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const std::size_t middle = values.size() / 2;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(middle), values.end());
-  const double high = values[middle];
-  if (values.size() % 2 == 1) return high;
-  return (high + *std::max_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(middle))) / 2;
-}
-
 std::uint64_t ThreadCpuClock() {
   timespec now{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-namespace kpsa::engine {
+#include "base/median.h"
 
-double Median(std::vector<double> values);  // 0 of none
+namespace kpsa::engine {
 
 std::uint64_t ThreadCpuClock();  // nanoseconds that this thread has worked
 double ClockCost();              // of a ProfileClock, nanoseconds, measured at the first call

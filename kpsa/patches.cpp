@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "base/median.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa::engine {
@@ -24,9 +26,7 @@ double TypicalDistance(std::span<const Double3> tile) {
     if (std::isfinite(least)) nearest.push_back(std::sqrt(least));
   }
   if (nearest.empty()) return 0;
-  const auto middle = nearest.begin() + static_cast<std::ptrdiff_t>(nearest.size() / 2);
-  std::nth_element(nearest.begin(), middle, nearest.end());
-  return *middle;
+  return UpperMedian(std::move(nearest));
 }
 
 // Points by their x, so that near ones are found without looking at all of them.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/median.h"
 #include "base/types.h"
 #include "kpsa/training/mode_choice.h"
 
@@ -27,8 +28,7 @@ ControlGroups FindControlGroups(const PoseMatrix& poses, std::size_t first, std:
   for (std::size_t i = 0; i < rest.size(); ++i) {
     std::vector<float> values;
     for (std::size_t s = 0; s < 2 * n; ++s) values.push_back(at(first + s, i / 3, i % 3));
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n), values.end());
-    rest[i] = values[n];
+    rest[i] = UpperMedian(std::move(values));
   }
   std::vector<std::vector<std::pair<double, std::size_t>>> movers(
       points.size());  // by point: displacement, control
