@@ -1,0 +1,285 @@
+#include "kpsa/subspace_header.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "kpsa/calibration_file.h"
+
+namespace kpsa::engine {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kMaxCues = 1u << 16, kMaxOutputs = 1u << 12;
+constexpr std::uint64_t kMaxPoints = 1u << 28;
+
+// Reads typed members of a JSON object; the first failure is kept, and everything after it gives defaults.
+class Reader {
+ public:
+  Reader(std::string place, const Json& object, Status* status)
+      : place_(std::move(place)), object_(object), status_(status) {}
+  std::string Text(const char* key) {
+    const Json* value = Find(key);
+    if (value != nullptr && value->is_string()) return value->get<std::string>();
+    return Fail(key, "a string"), std::string();
+  }
+  double Number(const char* key) {
+    const Json* value = Find(key);
+    if (value != nullptr && value->is_number() && std::isfinite(value->get<double>()))
+      return value->get<double>();
+    return Fail(key, "a number"), 0.0;
+  }
+  std::uint64_t Count(const char* key, std::uint64_t limit) {
+    const Json* value = Find(key);
+    if (value != nullptr && value->is_number_unsigned() && value->get<std::uint64_t>() <= limit)
+      return value->get<std::uint64_t>();
+    return Fail(key, "a whole number within bounds"), std::uint64_t{0};
+  }
+
+ private:
+  const Json* Find(const char* key) const {
+    if (!object_.is_object()) return nullptr;
+    const auto found = object_.find(key);
+    return found == object_.end() ? nullptr : &*found;
+  }
+  void Fail(const char* key, const char* expected) {
+    if (status_->ok()) *status_ = Status::Invalid("{}: \"{}\" should be {}", place_, key, expected);
+  }
+  std::string place_;
+  const Json& object_;
+  Status* status_;
+};
+
+// A metadata entry that holds JSON of the wanted kind.
+Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, bool list, std::size_t limit) {
+  const Result<std::string> text = file.Metadata(key);
+  if (!text.ok()) return text.status();
+  int depth_reached = 0;
+  const auto callback = [&](int depth, Json::parse_event_t, Json&) {
+    depth_reached = std::max(depth_reached, depth);
+    return depth <= 8;
+  };
+  Json json = Json::parse(*text, callback, false);
+  if (json.is_discarded() || depth_reached > 8 || json.is_array() != list || (!list && !json.is_object()) ||
+      json.size() > limit) {
+    return Status::Invalid("{}: \"{}\" is not a JSON {} of at most {} entries", file.name(), key,
+                           list ? "list" : "object", limit);
+  }
+  return json;
+}
+
+constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
+
+int VersionOf(const Subspace& s) {
+  const bool products =
+      std::any_of(s.tiles.begin(), s.tiles.end(), [](const TileMap& t) { return t.has_products(); });
+  const bool relative = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
+    return cue.plug.find(".worldMatrix/") != std::string::npos;
+  });
+  const bool multiplied = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
+    return cue.kind == CueDescription::Kind::kProduct;
+  });
+  if (AnyNearClips(s)) return kSubspaceVersion;
+  if (std::ranges::any_of(s.ranges, [](const TrainedRange& r) { return r.patches != kAllPatches; }))
+    return kGuardedPatchesVersion;
+  if (s.patches.tiles > 0) return kPatchesVersion;
+  if (multiplied) return kProductCuesVersion;
+  return products || relative || s.score != ScoreMix() ? kProductTilesVersion : kOldestVersion;
+}
+
+// What the space was at rest, and what moves with it.
+Status ReadFrame(const SafetensorsFile& file, const Json& frame, Subspace* s) {
+  const auto bad = [&](const char* key, const char* expected) {
+    return Status::Invalid("{}: frame: \"{}\" should be {}", file.name(), key, expected);
+  };
+  if (!frame.contains("scales") || !frame["scales"].is_boolean()) return bad("scales", "true or false");
+  s->space_scales = frame["scales"].get<bool>();
+  if (!frame.contains("carried") || !frame["carried"].is_array() || frame["carried"].size() > kMaxCues)
+    return bad("carried", "a list of names");
+  for (const Json& name : frame["carried"]) {
+    if (!name.is_string()) return bad("carried", "a list of names");
+    s->carried.push_back(name.get<std::string>());
+  }
+  const char* const kStretch = "inverseRestStretch";
+  if (!frame.contains(kStretch) || !frame[kStretch].is_array() || frame[kStretch].size() != 9)
+    return bad(kStretch, "nine numbers");
+  for (int i = 0; i < 9; ++i) {
+    const Json& entry = frame[kStretch][static_cast<std::size_t>(i)];
+    if (!entry.is_number()) return bad(kStretch, "nine numbers");
+    s->inverse_rest_stretch(i / 3, i % 3) = entry.get<double>();
+  }
+  return {};
+}
+
+Json CuesJson(const Subspace& s) {
+  Json cues = Json::array();
+  for (const CueDescription& cue : s.cues) {
+    if (cue.kind == CueDescription::Kind::kScalar) {
+      cues.push_back({{"kind", "scalar"}, {"plug", cue.plug}});
+    } else if (cue.kind == CueDescription::Kind::kProduct) {
+      Json factors = Json::array();
+      for (const CueDescription::Factor& factor : cue.factors) {
+        factors.push_back({{"plug", factor.plug},
+                           {"centre", factor.curve.centre},
+                           {"scale", factor.curve.scale},
+                           {"hinge", factor.curve.hinge}});
+      }
+      cues.push_back({{"kind", "product"}, {"factors", factors}, {"lo", cue.lo}, {"hi", cue.hi}});
+    } else {
+      cues.push_back({{"kind", "point"}, {"stage", cue.stage}, {"mesh", cue.mesh}, {"point", cue.point}});
+    }
+    if (!cue.joint.empty()) cues.back()["joint"] = cue.joint;
+  }
+  return cues;
+}
+
+Json RangesJson(const Subspace& s) {
+  Json ranges = Json::array();
+  for (const TrainedRange& range : s.ranges) {
+    ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}, {"ramp", range.ramp}});
+    if (range.patches == kAllPatches) continue;
+    Json& patches = ranges.back()[kRangePatches] = Json::array();
+    for (std::size_t p = 0; p < kMaxPatches; ++p) {
+      if ((range.patches >> p & 1) != 0) patches.push_back(p);
+    }
+  }
+  return ranges;
+}
+
+// *status: the first failure of a Reader; entries after it read as defaults.
+Status ReadCues(const SafetensorsFile& file, const Json& cues, Status* status, Subspace* s) {
+  for (const Json& entry : cues) {
+    Reader reader_of_cue(file.name() + ": a cue", entry, status);
+    CueDescription cue;
+    const std::string kind = reader_of_cue.Text("kind");
+    if (kind == "scalar") {
+      cue.kind = CueDescription::Kind::kScalar;
+      cue.plug = reader_of_cue.Text("plug");
+    } else if (kind == "point") {
+      cue.stage = reader_of_cue.Text("stage");
+      cue.mesh = static_cast<Index>(reader_of_cue.Count("mesh", kMaxOutputs));
+      cue.point = static_cast<Index>(reader_of_cue.Count("point", kMaxPoints));
+    } else if (kind == "product") {
+      cue.kind = CueDescription::Kind::kProduct;
+      cue.lo = reader_of_cue.Number("lo"), cue.hi = reader_of_cue.Number("hi");
+      if (!entry.contains("factors") || !entry["factors"].is_array())
+        return Status::Invalid("{}: a cue: \"factors\" should be an array", file.name());
+      for (const Json& part : entry["factors"]) {
+        Reader factor(file.name() + ": a factor", part, status);
+        cue.factors.push_back({factor.Text("plug"), {factor.Number("centre"), factor.Number("scale")}});
+        cue.factors.back().curve.hinge = part.is_object() && part.value("hinge", Json(false)) == Json(true);
+      }
+    } else if (status->ok()) {
+      return Status::Invalid("{}: a cue is of kind \"{}\", expected point, scalar or product", file.name(),
+                             kind);
+    }
+    if (entry.is_object() && entry.contains("joint")) cue.joint = reader_of_cue.Text("joint");
+    s->cues.push_back(std::move(cue));
+  }
+  return {};
+}
+
+Status ReadRanges(const SafetensorsFile& file, const Json& ranges, Status* status, Subspace* s) {
+  for (const Json& entry : ranges) {
+    Reader range(file.name() + ": a trained range", entry, status);
+    s->ranges.push_back({range.Text("plug"), range.Number("lo"), range.Number("hi"), range.Number("ramp")});
+    if (!entry.is_object() || !entry.contains(kRangePatches)) continue;
+    const Json& patches = entry[kRangePatches];
+    s->ranges.back().patches = 0;
+    bool known = patches.is_array() && !patches.empty();
+    for (std::size_t i = 0; known && i < patches.size(); ++i) {
+      known = patches[i].is_number_unsigned() && patches[i].get<std::uint64_t>() < kMaxPatches;
+      if (known) s->ranges.back().patches |= std::uint64_t{1} << patches[i].get<std::uint64_t>();
+    }
+    if (!known)
+      return Status::Invalid("{}: a trained range: \"{}\" should be numbers of patches", file.name(),
+                             kRangePatches);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
+  Json outputs = Json::array();
+  for (const SubspaceOutput& output : s.outputs)
+    outputs.push_back({{"name", output.name}, {"points", output.points}, {"stage", output.stage}});
+  Json frame = {{"extent", s.extent}, {"scales", s.space_scales}, {"carried", s.carried}};
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) frame["inverseRestStretch"].push_back(s.inverse_rest_stretch(r, c));
+  }
+  Json summary = {{"mode", s.mode == EstimatorMode::kMap ? "map" : "paper"},
+                  {"components", s.components},
+                  {"modes", s.modes},
+                  {"quantile1", s.soft_cache.quantile1},
+                  {"quantile2", s.soft_cache.quantile2},
+                  {"tolerance", s.tolerance},
+                  {"violationRate", s.violation_rate},
+                  {"blendStart", s.blend_start}};
+  if (VersionOf(s) > kOldestVersion) summary["score"] = {s.score.measured, s.score.doubt};
+  if (s.patches.tiles > 0) {
+    summary["tilesOfPatch"] = s.patches.tiles;
+    summary["patchShare"] = s.patches.share;
+  }
+  return {{"kind", kSubspaceKind},      {"version", std::to_string(VersionOf(s))},
+          {"summary", summary.dump()},  {"outputs", outputs.dump()},
+          {"cues", CuesJson(s).dump()}, {"ranges", RangesJson(s).dump()},
+          {"rigHash", s.rig_hash},      {"units", s.units},
+          {"space", s.space},           {"frame", frame.dump()},
+          {"training", s.training}};
+}
+
+Status ReadSubspaceHeader(const SafetensorsFile& file, Subspace* s) {
+  const Result<Json> summary = JsonMetadata(file, "summary", false, 64),
+                     outputs = JsonMetadata(file, "outputs", true, kMaxOutputs),
+                     cues = JsonMetadata(file, "cues", true, kMaxCues),
+                     ranges = JsonMetadata(file, "ranges", true, kMaxCues),
+                     frame = JsonMetadata(file, "frame", false, 64),
+                     training = JsonMetadata(file, "training", false, 1u << 16);
+  for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &frame, &training})
+    KPSA_RETURN_IF_ERROR(part->status());
+  Status status;
+  Reader reader(file.name() + ": summary", *summary, &status);
+  const std::string mode = reader.Text("mode");
+  if (status.ok() && mode != "map" && mode != "paper")
+    return Status::Invalid("{}: the mode is \"{}\", expected map or paper", file.name(), mode);
+  s->mode = s->soft_cache.mode = mode == "paper" ? EstimatorMode::kPaper : EstimatorMode::kMap;
+  s->components = static_cast<int>(reader.Count("components", 3));
+  s->modes = s->soft_cache.modes = reader.Count("modes", 1u << 20);
+  s->soft_cache.quantile1 = reader.Number("quantile1");
+  s->soft_cache.quantile2 = reader.Number("quantile2");
+  s->tolerance = reader.Number("tolerance");
+  s->violation_rate = reader.Number("violationRate");
+  s->blend_start = reader.Number("blendStart");
+  if (summary->contains("score")) {
+    const Json& score = (*summary)["score"];
+    if (!score.is_array() || score.size() != 2 || !score[0].is_number() || !score[1].is_number())
+      return Status::Invalid("{}: summary: \"score\" should be two numbers", file.name());
+    s->score = {score[0].get<double>(), score[1].get<double>()};
+  }
+  if (summary->contains("tilesOfPatch")) {
+    s->patches.tiles = reader.Count("tilesOfPatch", kMaxPoints);
+    s->patches.share = reader.Number("patchShare");
+  }
+  for (const Json& entry : *outputs) {
+    Reader output(file.name() + ": an output", entry, &status);
+    s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints), output.Text("stage")});
+  }
+  KPSA_RETURN_IF_ERROR(ReadCues(file, *cues, &status, s));
+  KPSA_RETURN_IF_ERROR(ReadRanges(file, *ranges, &status, s));
+  s->extent = Reader(file.name() + ": frame", *frame, &status).Number("extent");
+  KPSA_RETURN_IF_ERROR(ReadFrame(file, *frame, s));
+  for (const auto& [key, target] : {std::pair{"rigHash", &s->rig_hash},
+                                    {"units", &s->units},
+                                    {"space", &s->space},
+                                    {"training", &s->training}}) {
+    const Result<std::string> text = file.Metadata(key);
+    KPSA_RETURN_IF_ERROR(text.status());
+    *target = *text;
+  }
+  return status;
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,78 @@
+#include "kpsa/tiles_file.h"
+
+#include <string>
+#include <utility>
+
+#include "kpsa/subspace_tensors.h"
+
+namespace kpsa::engine {
+
+void AddTiles(const Subspace& s, SafetensorsWriter* writer) {
+  for (std::size_t i = 0; i < s.tiles.size(); ++i) {
+    const TileData& data = s.tiles[i].data();
+    const std::string prefix = fmt::format("tiles.{}.", i);
+    Add<std::uint32_t>(writer, prefix + "ranks", data.ranks);
+    Add<std::uint32_t>(writer, prefix + "wide", data.wide);
+    Add<std::uint8_t>(writer, prefix + "direct", data.direct);
+    Add<std::uint32_t>(writer, prefix + "counts", data.counts);
+    Add<std::uint32_t>(writer, prefix + "columns", data.columns);
+    Add<float>(writer, prefix + "scale", data.scale.span());
+    Add<std::uint16_t>(writer, prefix + "v", data.v.span(), true);
+    Add<std::uint8_t>(writer, prefix + "u", data.u.span());
+    Add<float>(writer, prefix + "mean", data.mean.span());
+    if (!data.joints.empty()) {
+      Add<std::uint32_t>(writer, prefix + "joints", data.joints);
+      Add<std::uint32_t>(writer, prefix + "jointRows", data.joint_rows);
+      Add<double>(writer, prefix + "jointMean", data.joint_mean);
+      Add<double>(writer, prefix + "jointDeviation", data.joint_deviation);
+    }
+    if (data.products.empty()) continue;
+    Add<std::uint32_t>(writer, prefix + "products", data.products);
+    Add<std::uint8_t>(writer, prefix + "pairs", data.pairs);
+    Add<float>(writer, prefix + "whitening", data.whitening.span());
+    Add<std::uint16_t>(writer, prefix + "w", data.w.span(), true);
+    Add<std::uint16_t>(writer, prefix + "doubt", data.doubt.span(), true);
+  }
+}
+
+Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
+  constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
+  for (std::size_t i = 0; i < s->outputs.size(); ++i) {
+    const std::string prefix = fmt::format("tiles.{}.", i);
+    TileData data;
+    data.points = s->outputs[i].points;
+    data.components = s->components;
+    data.inputs = s->tile_inputs();
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "ranks", {kAny}), &data.ranks));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "wide", {kAny}), &data.wide));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "direct", {kAny}), &data.direct));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "counts", {kAny}), &data.counts));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "columns", {kAny}), &data.columns));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "scale", {kAny}), &data.scale));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "v", {kAny}, true), &data.v));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "u", {kAny}), &data.u));
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "mean", {kAny}), &data.mean));
+    if (file.tensors().contains(prefix + "products")) {
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "products", {kAny}), &data.products));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "pairs", {kAny}), &data.pairs));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "whitening", {kAny}), &data.whitening));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "w", {kAny}, true), &data.w));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "doubt", {kAny}, true), &data.doubt));
+    }
+    if (file.tensors().contains(prefix + "joints")) {
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "joints", {kAny}), &data.joints));
+      KPSA_RETURN_IF_ERROR(
+          Assign(file.Values<std::uint32_t>(prefix + "jointRows", {kAny}), &data.joint_rows));
+      KPSA_RETURN_IF_ERROR(Assign(file.Values<double>(prefix + "jointMean", {kAny}), &data.joint_mean));
+      KPSA_RETURN_IF_ERROR(
+          Assign(file.Values<double>(prefix + "jointDeviation", {kAny}), &data.joint_deviation));
+    }
+    Result<TileMap> map =
+        TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
+    if (!map.ok()) return map.status();
+    s->tiles.push_back(std::move(*map));
+  }
+  return {};
+}
+
+}  // namespace kpsa::engine
