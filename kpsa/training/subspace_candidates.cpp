@@ -1,0 +1,198 @@
+#include "kpsa/training/subspace_candidates.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "kpsa/training/cue_description.h"
+#include "kpsa/training/make_subspace.h"
+#include "kpsa/training/pose_judge.h"
+#include "kpsa/training/score_choice.h"
+#include "kpsa/training/tile_budgets.h"
+#include "kpsa/training/tile_builder.h"
+#include "kpsa/training/tile_learning.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr double kWorthTrying = 0.35;   // of what a frame costs: what others could save
+constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so many
+constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
+constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
+constexpr double kLess = 0.95;          // likewise, where the others are as fine
+constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of a rotation moves points, about
+
+}  // namespace
+
+bool SubspaceCandidates::HasTimeForTiles() {
+  if (setup->limit.left() > kTilesInModes * modes_seconds) return true;
+  setup->limit.LeaveOut("no cues of each tile");
+  return false;
+}
+
+bool SubspaceCandidates::IsWorthTrying(const FrameCost& of) const {
+  return of.lost() > kFewMisses && of.lost() * setup->full_cost > kWorthTrying * of.ns;
+}
+
+Subspace SubspaceCandidates::ForAllPoints(bool finely) {
+  const bool paper = setup->options.mode == EstimatorMode::kPaper;
+  const Estimator estimator = paper ? LeastSquaresEstimator(modes->pca, cues.set)
+                                    : MapEstimator(modes->pca, cues.set, !setup->of_light());
+  record->warning = estimator.warning;
+  const TileStorage coarse = setup->of_light() ? TileStorage::kLight : TileStorage::kForAllPoints;
+  return MakeSubspace(
+      modes->pca, cues.set, estimator, MeasuredPoses(setup->layout, cues.set, poses->poses), setup->Outputs(),
+      TileBudget(finely ? TileStorage::kFinely : coarse, setup->options.tolerance),
+      setup->of_light() || paper || setup->options.without.tile_products ? nullptr : &poses->poses,
+      poses->clip_poses);
+}
+
+Result<Subspace> SubspaceCandidates::Best() {
+  // Where few of the judges miss, but narrowly, a clip that nobody trained on may miss more
+  const bool misses = setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 &&
+                      !setup->of_light() &&
+                      std::max(cues.choice.misses, cues.choice.misses_of_stricter) > kManyMisses;
+  Subspace subspace;
+  if (misses && HasTimeForTiles()) {
+    KPSA_RETURN_IF_ERROR(CompareWithTiles(&subspace));
+  } else {
+    fine = misses;
+    subspace = ForAllPoints(fine);
+  }
+  Describe(&subspace);
+  return subspace;
+}
+
+void SubspaceCandidates::Describe(Subspace* described) const {
+  Subspace& subspace = *described;
+  if (setup->options.keep_modes) subspace.kept_modes = KeptModesOf(modes->pca);
+  if (setup->options.keep_modes)
+    subspace.modes = subspace.soft_cache.modes = static_cast<std::size_t>(modes->pca.mode_count());
+  subspace.mode = subspace.soft_cache.mode;  // paper mode may have fallen back
+  subspace.space = setup->rig.target.space_name;
+  subspace.inverse_rest_stretch = setup->inverse_rest_stretch;
+  subspace.extent = setup->of_light() ? 0 : modes->diagonal;
+  if (setup->of_light()) subspace.units = kLightUnits;
+  subspace.tolerance = setup->options.tolerance;
+  subspace.violation_rate = setup->options.violation_rate;
+  subspace.cues.clear();
+  for (const CueRef& cue : cues.set.cues)
+    subspace.cues.push_back(DescribeCue(setup->rig, *setup->recorder, setup->totals, cue));
+}
+
+// Of one with cues for all points, and of those with cues of each tile, the cheaper one.
+Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
+  KPSA_RETURN_IF_ERROR(setup->Say("cues of tiles", 0.8));
+  const Result<bool> promising = ChooseTiles();
+  if (!promising.ok()) return promising.status();
+  // Their doubts alone judge them; stored finely where poses miss
+  TileSubspace with_tiles;
+  FrameCost of_tiles{.misses = 1, .ns = std::numeric_limits<double>::infinity()};
+  std::size_t best = 0;
+  for (const bool finely : {false, true}) {
+    if (!*promising) break;
+    TileSubspace made = OfTiles(finely);
+    if (made.subspace.doubt_inputs() == 0) break;
+    const Result<FrameCost> priced = Price(&made.subspace, made.cues);
+    if (!priced.ok()) return priced.status();
+    Tried(finely ? kByTileFinely : kByTile, made.cues, priced->misses, priced->ns);
+    if (priced->ns < of_tiles.ns) {
+      of_tiles = *priced, with_tiles = std::move(made), fine = finely;
+      best = record->tried.size() - 1;
+    }
+    if (!IsWorthTrying(of_tiles) || of_tiles.misses > kHopelessTiles) break;
+  }
+  // As chosen, without products of tiles: others with these would hardly do better, and take their time
+  by_tile = of_tiles.misses < kManyMisses && of_tiles.ns < kClearly * cues.choice.cost;
+  if (by_tile) {
+    Tried(kForAllPoints, cues.set, cues.choice.misses, cues.choice.cost);
+  } else {
+    KPSA_RETURN_IF_ERROR(setup->Say("subspace", 0.87));
+    *subspace = ForAllPoints(true);
+    const Result<FrameCost> of_others = Price(subspace, cues.set);
+    if (!of_others.ok()) return of_others.status();
+    by_tile = of_tiles.ns < kLess * of_others->ns;
+    Tried(kFinelyStored, cues.set, of_others->misses, of_others->ns);
+    if (!by_tile) best = record->tried.size() - 1, fine = true;
+    if (by_tile) others = std::move(*subspace), others_ns = of_others->ns;
+  }
+  record->tried[best].taken = true;
+  if (by_tile) *subspace = std::move(with_tiles.subspace), cues.set = std::move(with_tiles.cues);
+  return Status();
+}
+
+void SubspaceCandidates::Tried(const char* what, const CueSet& of, double misses, double ns) {
+  record->tried.push_back(
+      {what, of.cues.size(), static_cast<std::size_t>(of.rows()), misses, ns / setup->full_cost, false});
+}
+
+Result<bool> SubspaceCandidates::ChooseTiles() {
+  tried_tiles = true;
+  PoseMatrix more(setup->layout);
+  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));
+  record->sampled_poses += more.poses();
+  if (more.poses() > 0) more.Subtract(modes->pca.mean);
+  poses->poses.Append(more);
+  if (poses->spare) {
+    poses->spare->Subtract(modes->pca.mean);
+    poses->poses.Append(*std::exchange(poses->spare, std::nullopt));
+  }
+  TileCandidateOptions of;
+  of.layout = setup->layout, of.totals = setup->totals, of.signals = setup->recorder->signals();
+  of.points = setup->of_tiles, of.positions = modes->positions, of.stages = setup->recorder->candidates();
+  Result<std::vector<TileCandidates>> candidates =
+      FindTileCandidates(setup->rig, &setup->compiler, setup->trained_clips, of);
+  if (!candidates.ok()) return candidates.status();
+  if (!poses->learnt.empty()) {
+    Result<std::vector<TileCandidates>> learning =
+        FindTileCandidates(setup->rig, &setup->compiler, setup->clips, of);
+    if (!learning.ok()) return learning.status();
+    learning_tiles_ = std::move(*learning);
+  }
+  TileCueOptions choice;
+  choice.tolerance = setup->options.tolerance;
+  choice.mean = &modes->pca.mean;
+  choice.turn_reach = kTurnReach * modes->diagonal;
+  const auto add = [&](Index scalar) {
+    const CueRef cue{CueKind::kScalar, scalar};
+    if (modes->pca.row_variance[static_cast<Eigen::Index>(CueColumn(setup->layout, cue))] >
+        modes->noise.scalars[scalar])
+      choice.values.push_back(cue);
+  };
+  const std::vector<Index> first = FirstScalars(setup->recorder->signals(), setup->layout);
+  for (std::size_t s = 0; s < first.size(); ++s) {
+    if (!setup->recorder->signals()[s].matrix) add(first[s]);
+  }
+  std::optional<TileChoice> chosen =
+      ChoosePromisingTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice);
+  if (!chosen) return false;
+  tiles = std::move(*chosen);
+  return true;
+}
+
+TileSubspace SubspaceCandidates::OfTiles(bool finely) const {
+  const TileOptions storage =
+      TileBudget(finely ? TileStorage::kFinely : TileStorage::kOwnCues, setup->options.tolerance);
+  TileSubspace made =
+      MakeTileSubspace(modes->pca.mean, poses->poses, poses->clip_poses, tiles, setup->Outputs(), storage);
+  TeachClips(poses->learnt, learning_tiles_, {&modes->pca.mean, poses->clip_poses, tiles.options, storage},
+             setup->options.tolerance, &poses->poses, &made);
+  return made;
+}
+
+Result<FrameCost> SubspaceCandidates::Price(Subspace* subspace, const CueSet& of) const {
+  const Result<double> points = setup->CostOfPoints(of.cues);
+  if (!points.ok()) return points.status();
+  GivePatches(patches, subspace);
+  std::vector<ScoreJudge> judged;
+  for (const JudgedPose& pose :
+       PoseJudge(*subspace, setup->layout, of, !setup->options.without.trust).Judge(poses->judges))
+    judged.push_back({pose, 0, poses->judge_kinds[judged.size()]});
+  subspace->tolerance = setup->options.tolerance;
+  subspace->violation_rate = setup->options.violation_rate;
+  return ChooseMisses(subspace, judged, *points, setup->full_cost, kCautious * setup->options.tolerance,
+                      kEvenOdds)
+      .cost;
+}
+
+}  // namespace kpsa::engine

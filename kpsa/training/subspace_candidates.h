@@ -1,0 +1,65 @@
+// The subspaces that training chooses from: with cues for all points or of each tile, stored coarsely or finely.
+// Internal to training.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "kpsa/patches.h"
+#include "kpsa/training/frame_cost.h"
+#include "kpsa/training/tile_candidates.h"
+#include "kpsa/training/tile_subspace.h"
+#include "kpsa/training/training_modes.h"
+
+namespace kpsa::engine {
+
+inline constexpr double kManyMisses = 0.05;     // of new poses: cues of each tile are tried
+inline constexpr double kFewMisses = 0.01;      // likewise: finer tiles for these
+inline constexpr double kTooManyMisses = 0.15;  // and cues as for half the tolerance
+
+// Refers to its parts. FindModes has centred the poses.
+struct SubspaceCandidates {
+  SubspaceCandidates(TrainingSetup* of_setup, TrainingPoses* of_poses, TrainingModes* of_modes,
+                     TrainingRecord* of_record, double seconds)
+      : setup(of_setup), poses(of_poses), modes(of_modes), record(of_record), modes_seconds(seconds) {}
+
+  TrainingSetup* setup;
+  TrainingPoses* poses;
+  TrainingModes* modes;
+  TrainingRecord* record;
+  double modes_seconds = 0;  // that finding modes took
+
+  TrainingCues cues = {};
+  PatchLayout patches = {};  // what may miss by itself
+  bool fine = false;         // tiles
+  bool by_tile = false;      // its cues
+  bool tried_tiles = false;
+  FrameCost cost = {};    // by the last calibration, but points
+  TileChoice tiles = {};  // where they were tried
+  // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost
+  Subspace others = {};
+  double others_ns = std::numeric_limits<double>::infinity();
+
+  // The subspace with which a frame is expected to cost least, by the judges.
+  Result<Subspace> Best();
+
+  bool IsWorthTrying(const FrameCost& of) const;
+  // The largest step, and one that can be done without.
+  bool HasTimeForTiles();
+  Subspace ForAllPoints(bool finely);
+  // With more poses, which regressions on few cues are glad of. Whether they may hit often enough.
+  Result<bool> ChooseTiles();
+  TileSubspace OfTiles(bool finely) const;
+  // What does not depend on how its cues were found.
+  void Describe(Subspace* subspace) const;
+
+ private:
+  // The subspace is given its best score by the judges, and is then priced.
+  Result<FrameCost> Price(Subspace* subspace, const CueSet& of) const;
+  Status CompareWithTiles(Subspace* subspace);
+  void Tried(const char* what, const CueSet& of, double misses, double ns);
+
+  std::vector<TileCandidates> learning_tiles_ = {};
+};
+
+}  // namespace kpsa::engine

@@ -1,0 +1,78 @@
+#include "kpsa/training/training_poses.h"
+
+#include <algorithm>
+
+#include "kpsa/training/cue_products.h"
+#include "kpsa/training/miss_samples.h"
+#include "kpsa/training/signal_noise.h"
+#include "kpsa/training/trained_ranges.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kBetween = 400;  // poses between the frames of all clips, at most
+
+}  // namespace
+
+Status RecordPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* record) {
+  const double before = setup->limit.elapsed();
+  std::size_t frames = 0;
+  for (const TrainingClip& clip : setup->trained_clips) frames += clip.times.size();
+  const double between =
+      setup->of_light() ? 0 : std::min(1.0, static_cast<double>(kBetween) / static_cast<double>(frames + 1));
+  for (std::size_t c = 0; c < setup->trained_clips.size(); ++c) {
+    KPSA_RETURN_IF_ERROR(
+        setup->Say("poses", 0.2 * static_cast<double>(c) / static_cast<double>(setup->trained_clips.size())));
+    KPSA_RETURN_IF_ERROR(
+        setup->recorder->AddClip(WithTimesBetween(setup->trained_clips[c], between), &to->poses));
+  }
+  record->clip_poses = to->poses.poses();
+  KPSA_RETURN_IF_ERROR(setup->Say("poses", 0.2));
+  const Result<std::vector<SampledPose>> learnt =
+      SamplesOf(setup->options.learnt_poses, setup->rig, setup->clips);
+  if (!learnt.ok()) return learnt.status();
+  if (setup->options.by_tile_as_before) {
+    for (std::size_t c = setup->trained_clips.size(); c < setup->clips.size(); ++c) {
+      to->learnt.emplace_back(setup->layout);
+      KPSA_RETURN_IF_ERROR(
+          setup->recorder->AddClip(WithTimesBetween(setup->clips[c], 1), &to->learnt.back()));
+    }
+    to->learnt.emplace_back(setup->layout);
+    KPSA_RETURN_IF_ERROR(setup->recorder->AddSamples(*learnt, setup->clips, &to->learnt.back()));
+  } else {
+    KPSA_RETURN_IF_ERROR(setup->recorder->AddSamples(*learnt, setup->clips, &to->poses));
+  }
+  KPSA_RETURN_IF_ERROR(setup->sampler->LearnHowControlsMove());
+  if (setup->options.by_tile_as_before) KPSA_RETURN_IF_ERROR(setup->trained_sampler->LearnHowControlsMove());
+  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddTraining(&to->poses));
+  record->sampled_poses = to->poses.poses() - record->clip_poses;
+  if (to->poses.poses() < 3)
+    return Status::Invalid("{} training poses are too few: name clips or samples to train on",
+                           to->poses.poses());
+  KPSA_RETURN_IF_ERROR(setup->Say("poses", 0.4));
+  const std::size_t sweeps = setup->rig.controls.empty() ? 0 : setup->sampler->SweepsWithTilts().size();
+  to->pose_seconds = (setup->limit.elapsed() - before) / static_cast<double>(to->poses.poses() + sweeps);
+  // Light takes some of these away
+  const bool compares =
+      !setup->of_light() &&
+      (setup->places.size() > 1 || (setup->options.may_have_cues_by_tile && !setup->places.empty()));
+  return compares ? setup->trained_sampler->AddJudges(&to->judges, &to->judge_kinds) : Status();
+}
+
+void FitPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* record) {
+  if (!setup->of_light() && FitIntoTime(&to->poses, &record->clip_poses, &setup->limit))
+    record->sampled_poses = to->poses.poses() - record->clip_poses;
+}
+
+void ChooseProducts(TrainingSetup* setup, TrainingPoses* poses) {
+  CueProductOptions options =
+      ProductOptionsOf(setup->recorder->signals(), setup->layout, setup->options.tolerance);
+  options.hinges = !setup->options.without.hinges;
+  setup->recorder->SetProducts(ChooseCueProducts(poses->poses, options));
+  for (PoseMatrix* matrix : {&poses->poses, &poses->judges}) {
+    for (std::size_t t = 0; t < matrix->poses(); ++t)
+      StoreProducts(setup->recorder->products(), setup->layout, matrix->row(t));
+  }
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,88 @@
+#include "kpsa/training/training_setup.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "kpsa/space_frame.h"
+#include "kpsa/training/calibrate_subspace.h"
+#include "kpsa/training/frame_cost.h"
+#include "kpsa/training/tilts.h"
+#include "kpsa/training/training_signals.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kCueProducts = 160;  // cues that are products of others
+
+}  // namespace
+
+TrainingSetup::TrainingSetup(const TrainingRig& of, const std::vector<TrainingClip>& all_clips,
+                             const TrainOptions& train_options)
+    : rig(WithTilts(of)),
+      drawn(of.controls),
+      clips(all_clips),
+      trained_clips(all_clips.begin(), std::ranges::find_if(all_clips,
+                                                            [&](const TrainingClip& clip) {
+                                                              return train_options.by_tile_as_before &&
+                                                                     clip.learnt;
+                                                            })),
+      options(train_options),
+      limit(train_options.seconds) {}
+
+Status TrainingSetup::Prepare() {
+  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+  Result<std::vector<Index>> points = PointTotals(rig, &compiler);
+  if (!points.ok()) return points.status();
+  totals = std::move(*points);
+  std::vector<CandidateStage> candidates;
+  if (of_map()) {  // the paper's key points are output points
+    Result<CuePlaces> cheapest = FindCuePlaces(rig, &compiler, totals, options.max_light_candidates);
+    if (!cheapest.ok()) return cheapest.status();
+    candidates = std::move(cheapest->stages);
+    places = std::move(cheapest->places);
+    of_tiles = std::move(cheapest->of_tiles);
+    full_cost = cheapest->full_cost;
+  }
+
+  const bool measures = !of_light() && of_map();
+  Result<TrainingSignals> found =
+      FindTrainingSignals(rig, &compiler, clips, measures && !options.without.relative_matrices);
+  if (!found.ok()) return found.status();
+  guards = std::move(found->watched);
+  std::vector<Signal> signals = guards;
+  signals.insert(signals.end(), found->relative.begin(), found->relative.end());
+  for (const PlugRef& space : rig.target.space) {
+    const Result<Value> rest = compiler.Rest(*rig.graph, space);
+    if (!rest.ok()) return rest.status();
+    inverse_rest_stretch = InverseRestStretch(rest->get<Matrix4>());
+  }
+  recorder = std::make_unique<PoseRecorder>(rig, &compiler, std::move(candidates), std::move(signals),
+                                            inverse_rest_stretch);
+  Result<PoseLayout> found_layout =
+      recorder->Layout(measures && !options.without.cue_products ? kCueProducts : 0);
+  if (!found_layout.ok()) return found_layout.status();
+  layout = *found_layout;
+  sampler = std::make_shared<TrainingSampler>(rig, drawn, clips, options, recorder.get(), layout);
+  trained_sampler = sampler;
+  if (options.by_tile_as_before)
+    trained_sampler =
+        std::make_shared<TrainingSampler>(rig, drawn, trained_clips, options, recorder.get(), layout);
+  return Status();
+}
+
+Status TrainingSetup::Say(const char* what, double share) const { return SayStage(options, what, share); }
+
+std::vector<SubspaceOutput> TrainingSetup::Outputs() const {
+  std::vector<SubspaceOutput> outputs;
+  for (std::size_t m = 0; m < rig.target.meshes.size(); ++m) {
+    const AccelerationTarget::MeshPoints& mesh = rig.target.meshes[m];
+    outputs.push_back({mesh.name, totals[m], of_light() ? "" : mesh.stages.back().name});
+  }
+  return outputs;
+}
+
+Result<double> TrainingSetup::CostOfPoints(std::span<const CueRef> cues) {
+  return kpsa::engine::CostOfPoints(rig, &compiler, totals, recorder->candidates(), cues);
+}
+
+}  // namespace kpsa::engine
