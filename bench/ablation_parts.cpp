@@ -63,7 +63,7 @@ class PartsBench {
     };
     TrainOptions options;
     options.samples = given(options_.samples, entry.train_samples);
-    options.calibration_poses = given(options_.calibration_poses, entry.held_out);
+    options.calibration_poses = given(options_.calibration_poses, entry.calibration_poses);
     options.key_points = options_.key_points;
     options.tolerance = entry.tolerance;
     options.violation_rate = entry.violation_rate;

@@ -125,7 +125,7 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
 TrainOptions TrainOptionsOf(const Acceleration& entry) {
   TrainOptions options;
   options.samples = static_cast<std::size_t>(entry.train_samples);
-  options.calibration_poses = static_cast<std::size_t>(entry.held_out);
+  options.calibration_poses = static_cast<std::size_t>(entry.calibration_poses);
   if (entry.key_points > 0)
     options.key_points = options.min_points = static_cast<std::size_t>(entry.key_points);
   options.tolerance = entry.tolerance;

@@ -84,7 +84,7 @@ struct RigAccelerate {
   double violation_rate = 0.01;     // of frames, 0..1
   std::vector<RigString> train_clips, test_clips;
   std::int64_t train_samples = 0;
-  std::int64_t key_points = 0, held_out = 0;  // 0: the trainer's
+  std::int64_t key_points = 0, calibration_poses = 0;  // 0: the trainer's
 };
 
 struct RigOverride {
@@ -142,7 +142,8 @@ struct RigFile {
   std::vector<RigVariant> variants;
   std::vector<RigClip> clips;
   std::vector<RigReference> references;
-  std::vector<RigOverride> returned;  // connections of overrides that are not ours to make (rig/build/loader.cpp)
+  std::vector<RigOverride>
+      returned;  // connections of overrides that are not ours to make (rig/build/loader.cpp)
 };
 
 // Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig

@@ -239,7 +239,7 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
       if (const YamlNode* points = train_map.Find("keyPoints"))
         ReadInteger(*points, "keyPoints", 1, kMaxKeyPoints, &accelerate.key_points, errors);
       if (const YamlNode* poses = train_map.Find("heldOut"))
-        ReadInteger(*poses, "heldOut", 20, kMaxSamples, &accelerate.held_out, errors);
+        ReadInteger(*poses, "heldOut", 20, kMaxSamples, &accelerate.calibration_poses, errors);
       train_map.RejectUnread();
     }
     if (const YamlNode* test = map.Find("test")) {

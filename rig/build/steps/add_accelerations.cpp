@@ -32,7 +32,7 @@ void AddAccelerations(const BuildInput& in, CharacterGraph* scene, std::vector<A
     to.violation_rate = from.violation_rate;
     to.train_samples = from.train_samples;
     to.key_points = from.key_points;
-    to.held_out = from.held_out;
+    to.calibration_poses = from.calibration_poses;
     read_clips(from.train_clips, &to.train_clips);
     read_clips(from.test_clips, &to.test_clips);
     if (from.space.has_value()) to.space = in.names.FindTransform(from.space->text, from.space->where);
