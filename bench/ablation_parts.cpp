@@ -8,9 +8,9 @@
 
 #include "cli/bench_run.h"
 #include "cli/playback_times.h"
-#include "host/rig_training.h"
-#include "cli/table.h"
 #include "cli/tolerance_table.h"
+#include "host/rig_training.h"
+#include "report/table.h"
 
 namespace kpsa::engine::ablation {
 namespace {

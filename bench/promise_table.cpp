@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "cli/common.h"
-#include "cli/table.h"
 #include "kpsa/binomial.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

@@ -15,9 +15,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common.h"
-#include "cli/table.h"
 #include "files/file.h"
 #include "gltf/import.h"
+#include "report/table.h"
 
 namespace kpsa::engine::untouched {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "cli/table.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

@@ -2,7 +2,7 @@
 //
 // For every clip: one pass compares the points (and warms all sides up), some runs are timed, one pass is
 // profiled. The sides take turns by blocks of frames, so that whatever else the machine does hits all of
-// them. A frame's time is the median over the runs (cli/frame_times.h); a clip's is the mean over its frames.
+// them. A frame's time is the median over the runs (host/bench/frame_times.h); a clip's is the mean over its frames.
 #pragma once
 
 #include <limits>

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/frame_times.h"
 #include "graph/evaluator.h"
+#include "host/bench/frame_times.h"
 #include "kpsa/kpsa_node.h"
 #include "rig/build/rig_builder.h"
 

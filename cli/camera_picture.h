@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/image.h"
 #include "cli/rig_frames.h"
 #include "cli/verdicts.h"
 #include "nodes/kernels/path_tracer.h"
+#include "picture/image.h"
 
 namespace kpsa::engine {
 

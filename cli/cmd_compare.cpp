@@ -8,9 +8,9 @@
 #include "cli/common.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
-#include "cli/table.h"
 #include "cli/vertex_compare.h"
 #include "files/quantity.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

@@ -9,9 +9,9 @@
 #include "cli/options.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
-#include "cli/table.h"
 #include "graph/plan_report.h"
 #include "host/rig_training.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

@@ -8,10 +8,10 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "cli/plug_columns.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
 #include "files/quantity.h"
+#include "host/plug_columns.h"
 
 namespace kpsa::engine {
 namespace {

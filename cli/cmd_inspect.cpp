@@ -8,7 +8,7 @@
 #include "cli/file_facts.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
-#include "cli/table.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

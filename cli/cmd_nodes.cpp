@@ -6,11 +6,11 @@
 
 #include "cli/command.h"
 #include "cli/common.h"
-#include "cli/node_pictures.h"
 #include "cli/options.h"
-#include "cli/rig_schema.h"
-#include "cli/table.h"
 #include "files/quantity.h"
+#include "picture/node_pictures.h"
+#include "report/rig_schema.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

@@ -13,8 +13,8 @@
 #include "cli/profile_run.h"
 #include "cli/request.h"
 #include "cli/rig_frames.h"
-#include "cli/table.h"
 #include "graph/plan_report.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

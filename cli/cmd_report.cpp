@@ -1,11 +1,11 @@
 // kpsa report: benches as tables for a document, and as plots over the frames.
 #include <memory>
 
-#include "cli/bench_tables.h"
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "report/bench_tables.h"
 
 namespace kpsa::engine {
 namespace {

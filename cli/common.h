@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "base/quantity_text.h"
 #include "base/status.h"
 #include "base/text.h"
 #include "graph/node_registry.h"
@@ -82,12 +83,6 @@ template <typename Json>
 void PrintJson(const Json& json) {
   Print(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
-
-std::string ByteText(std::uint64_t bytes);                         // 3.1 MB
-std::string LengthText(double metres);                             // 0.213 mm
-std::string RatioText(double ratio, int digits = 1);               // 12.3x; - where it is not finite
-std::string ErrorText(double error, bool light);                   // of points a length, of light a number
-std::string Plural(std::uint64_t count, const std::string& noun);  // "1 mesh", "12 vertices"
 
 // From here to the end of the scope an interrupt (Ctrl-C) only sets the flag that Interrupted() reads, so
 // that what is being written can be removed; outside of such scopes, where nothing is half-written, and at

@@ -8,8 +8,8 @@
 #include "cli/common.h"
 #include "cli/frames_range.h"
 #include "cli/rig_frames.h"
-#include "cli/table.h"
 #include "files/quantity.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "base/parallel.h"
 #include "cli/bench_side.h"
-#include "cli/frame_times.h"
 #include "cli/rig_frames.h"
+#include "host/bench/frame_times.h"
 #include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/kpsa_node.h"

@@ -1,6 +1,6 @@
 // What frames of clips cost, fully and by a subspace, in plans like those of kpsa bench: time alone varies,
 // so that what no clip moves is left out, and everything that is shown is computed. Times are those of the
-// program's work (cli/frame_times.h), but for light.
+// program's work (host/bench/frame_times.h), but for light.
 #pragma once
 
 #include <memory>

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "cli/rig_frames.h"
-#include "cli/trace.h"
+#include "report/trace.h"
 
 namespace kpsa::engine {
 

@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "cli/picture.h"
 #include "cli/rig_frames.h"
 #include "cli/verdicts.h"
+#include "picture/picture.h"
 
 namespace kpsa::engine {
 

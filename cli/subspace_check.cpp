@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "cli/check_poses.h"
-#include "cli/frame_times.h"
 #include "cli/rig_frames.h"
+#include "host/bench/frame_times.h"
+#include "host/checks/check_poses.h"
 #include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/training/space_points.h"

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "cli/common.h"
-#include "cli/table.h"
 #include "files/quantity.h"
 #include "kpsa/kpsa_node.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common.h"
-#include "cli/table.h"
 #include "kpsa/training/poses.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 

@@ -8,8 +8,8 @@
 
 #include "cli/bench_promise.h"
 #include "cli/bench_report.h"
-#include "cli/frame_times.h"
 #include "graph/profile.h"
+#include "host/bench/frame_times.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"

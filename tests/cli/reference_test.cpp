@@ -7,10 +7,10 @@
 #include <set>
 
 #include "cli/common.h"
-#include "cli/node_pictures.h"
-#include "cli/rig_schema.h"
-#include "rig/file/words.h"
 #include "files/yaml_document.h"
+#include "picture/node_pictures.h"
+#include "report/rig_schema.h"
+#include "rig/file/words.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/json_schema.h"
 #include "tests/cli/process.h"

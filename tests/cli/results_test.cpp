@@ -6,8 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "cli/bench_tables.h"
-#include "cli/line_plot.h"
+#include "report/bench_tables.h"
+#include "report/line_plot.h"
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "cli/line_plot.h"
+#include "report/line_plot.h"
 
 #include <fmt/format.h>
 

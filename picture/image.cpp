@@ -1,4 +1,4 @@
-#include "cli/image.h"
+#include "picture/image.h"
 
 #include <fmt/format.h>
 #include <stb/stb_easy_font.h>

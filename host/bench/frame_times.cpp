@@ -1,4 +1,4 @@
-#include "cli/frame_times.h"
+#include "host/bench/frame_times.h"
 
 #include <algorithm>
 #include <ctime>

@@ -1,4 +1,4 @@
-#include "cli/plug_columns.h"
+#include "host/plug_columns.h"
 
 namespace kpsa::engine {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/request.h"
 #include "graph/evaluator.h"
+#include "host/mesh_stage.h"
 #include "kpsa/kpsa_node.h"
 
 namespace kpsa::engine {

@@ -1,4 +1,4 @@
-#include "cli/check_poses.h"
+#include "host/checks/check_poses.h"
 
 #include <algorithm>
 #include <cmath>

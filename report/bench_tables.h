@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/status.h"
-#include "cli/line_plot.h"
+#include "report/line_plot.h"
 
 namespace kpsa::engine {
 

@@ -1,4 +1,4 @@
-#include "cli/node_examples.h"
+#include "picture/node_examples.h"
 
 #include <algorithm>
 #include <cmath>

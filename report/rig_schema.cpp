@@ -1,4 +1,4 @@
-#include "cli/rig_schema.h"
+#include "report/rig_schema.h"
 
 #include <cmath>
 #include <nlohmann/json.hpp>

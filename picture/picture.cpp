@@ -1,4 +1,4 @@
-#include "cli/picture.h"
+#include "picture/picture.h"
 
 #include <algorithm>
 #include <array>

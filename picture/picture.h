@@ -13,7 +13,7 @@
 
 #include "base/status.h"
 #include "base/types.h"
-#include "cli/image.h"
+#include "picture/image.h"
 
 namespace kpsa::engine {
 

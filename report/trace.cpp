@@ -1,4 +1,4 @@
-#include "cli/trace.h"
+#include "report/trace.h"
 
 #include <algorithm>
 #include <map>

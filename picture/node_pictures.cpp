@@ -1,4 +1,4 @@
-#include "cli/node_pictures.h"
+#include "picture/node_pictures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,12 @@
 #include <memory>
 
 #include "base/scalar_math.h"
-#include "cli/image.h"
-#include "cli/node_examples.h"
 #include "files/file.h"
 #include "files/png.h"
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
+#include "picture/image.h"
+#include "picture/node_examples.h"
 #include "rig/graph_editor.h"
 
 namespace kpsa::engine {
@@ -55,7 +55,7 @@ PictureFrame FrameAround(const DrawnHalf& before, const DrawnHalf& after) {
   return {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, kSide * kSamples * (1 - 2 * kMargin) / size};
 }
 
-// A renderer of its own: cli/picture.h's rays (Embree) differ between processors, and a test compares bytes.
+// A renderer of its own: picture/picture.h's rays (Embree) differ between processors, and a test compares bytes.
 class Canvas {
  public:
   Canvas() : depth_(kCells * kCells, -1e30), color_(kCells * kCells, Double3{1, 1, 1}) {}

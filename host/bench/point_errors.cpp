@@ -1,4 +1,4 @@
-#include "cli/point_errors.h"
+#include "host/bench/point_errors.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "cli/bench_tables.h"
+#include "report/bench_tables.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "cli/common.h"
-#include "cli/table.h"
+#include "base/quantity_text.h"
+#include "base/text.h"
 #include "files/file.h"
 #include "files/json_depth.h"
 #include "kpsa/kpsa_node.h"
+#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {
