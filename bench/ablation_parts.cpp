@@ -6,9 +6,11 @@
 #include <chrono>
 #include <cmath>
 
-#include "cli/bench_run.h"
-#include "cli/playback_times.h"
-#include "cli/tolerance_table.h"
+#include "base/quantity_text.h"
+#include "cli/common.h"
+#include "host/bench/bench.h"
+#include "host/bench/tolerance_table.h"
+#include "host/checks/playback_times.h"
 #include "host/rig_training.h"
 #include "report/table.h"
 
@@ -25,17 +27,17 @@ class PartsBench {
     for (const Part& part : parts) KPSA_RETURN_IF_ERROR(TrainWithout(part));
     Say("bench");
     // Every subspace twice: as it is, and with no frame refused
-    std::vector<AccelerationFlags> sides;
+    std::vector<AccelerationChoice> sides;
     for (const bool every : {false, true}) {
       for (const std::string& path : paths_) {
-        sides.emplace_back().kpsa = path;
+        sides.emplace_back().subspace = path;
         sides.back().every_frame = every;
       }
     }
     BenchOptions bench;
     bench.runs = options_.runs;
-    bench.quiet = true;
-    const Result<std::vector<BenchResult>> results = RunBench(flags_, sides, test_clips_, bench);
+    const Result<std::vector<BenchResult>> results =
+        RunBench(OpenerOf(flags_), sides, test_clips_, bench, InterruptWatch());
     if (!results.ok()) return results.status();
     for (std::size_t i = 0; i < rows_.size(); ++i)
       Read((*results)[i], (*results)[rows_.size() + i], &rows_[i]);
@@ -79,7 +81,8 @@ class PartsBench {
     const Calibration calibration = Calibrate(subspace->calibration, subspace->tolerance,
                                               subspace->violation_rate, subspace->blend_start);
     row.held_out_hits = ExpectedHitRate(calibration);
-    const Result<PlaybackTimes> played = TimePlayback(flags_, entry, subspace, *clips);
+    const Result<PlaybackTimes> played =
+        TimePlayback(OpenerOf(flags_), entry, subspace, *clips, InterruptWatch());
     if (!played.ok()) return played.status();
     row.expected_speedup =
         SpeedupWithMisses(played->full_ms, played->hit_ms, row.held_out_hits, calibration.threshold.tau >= 0);

@@ -12,7 +12,7 @@
 #include <cstdlib>
 
 #include "cli/acceleration.h"
-#include "cli/rig_frames.h"
+#include "host/rig_frames.h"
 
 namespace kpsa::engine {
 namespace {

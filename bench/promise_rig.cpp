@@ -7,8 +7,8 @@
 #include <mutex>
 
 #include "base/parallel.h"
-#include "cli/rig_frames.h"
 #include "graph/evaluator.h"
+#include "host/rig_frames.h"
 #include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/training/control_groups.h"

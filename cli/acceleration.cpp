@@ -46,6 +46,13 @@ Result<double> ParseRate(const std::string& text) {
   return value;
 }
 
+Result<double> ParseSpeedup(const std::string& text) {
+  const Result<double> value = ParseQuantity(text, Unit::kNone, FileUnits());
+  if (!value.ok() || !(*value > 0))
+    return Status::Usage("--speedup \"{}\": expected a number above 0, as in 10", text);
+  return value;
+}
+
 Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted) {
   if (flags.accelerate && flags.kpsa.has_value())
     return Status::Usage("--accelerate and --kpsa {}: expected one of them", *flags.kpsa);
@@ -66,6 +73,7 @@ Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted) {
 AccelerationChoice ChoiceOf(const AccelerationFlags& flags) {
   AccelerationChoice choice;
   choice.subspace = flags.kpsa.value_or("");
+  choice.subspace_option = "--kpsa";
   if (flags.tolerance.has_value()) choice.tolerance = *ParseTolerance(*flags.tolerance);
   if (flags.violation_rate.has_value()) choice.violation_rate = *ParseRate(*flags.violation_rate);
   choice.stale_is_miss = flags.stale == "miss";

@@ -28,6 +28,8 @@ Status CheckAccelerationFlags(const AccelerationFlags& flags, bool wanted);
 Result<double> ParseLength(const std::string& what, const std::string& text);
 Result<double> ParseTolerance(const std::string& text);
 Result<double> ParseRate(const std::string& text);
+// "--speedup 10" as a number. Errors: none above 0.
+Result<double> ParseSpeedup(const std::string& text);
 
 // As the flags say, which CheckAccelerationFlags found fit.
 AccelerationChoice ChoiceOf(const AccelerationFlags& flags);

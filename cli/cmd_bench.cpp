@@ -3,10 +3,14 @@
 #include <map>
 #include <memory>
 
-#include "cli/bench_report.h"
+#include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
+#include "cli/progress.h"
+#include "host/bench/bench.h"
+#include "report/bench_report.h"
+#include "report/promise_text.h"
 
 namespace kpsa::engine {
 namespace {
@@ -69,7 +73,7 @@ Status AddIdle(const BenchFlags& flags, const std::vector<std::string>& clips,
     }
     std::map<std::string, double> full_ms;
     for (const BenchNode& node : result.full_nodes) full_ms[node.name] = node.ms_per_frame;
-    Result<IdleDeformers> idle = MeasureIdle(flags, clips, tolerance, full_ms);
+    Result<IdleDeformers> idle = MeasureIdle(OpenerOf(flags), clips, tolerance, full_ms, InterruptWatch());
     if (!idle.ok()) return idle.status();
     result.idle = std::move(*idle);
     if (!result.idle.measured())
@@ -89,7 +93,6 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   BenchOptions options;
   options.runs = *runs;
   options.threads = *threads == 0 ? 1 : *threads;
-  options.quiet = flags.quiet;
   options.reference = flags.reference, options.rival = flags.rival;
   if (flags.rival.has_value() && !flags.reference.has_value())
     return Status::Usage("--rival {}: expected --reference, too, which says what is right", *flags.rival);
@@ -102,7 +105,12 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   const Result<std::vector<std::string>> clips = TestClips(flags, &notes);
   if (!clips.ok()) return clips.status();
   const InterruptScope interruptible;
-  Result<std::vector<BenchResult>> results = RunBench(flags, *sides, *clips, options);
+  std::vector<AccelerationChoice> choices;
+  for (const AccelerationFlags& side : *sides) choices.push_back(ChoiceOf(side));
+  Progress progress("bench, frames", 0, flags.quiet);
+  Result<std::vector<BenchResult>> results =
+      RunBench(OpenerOf(flags), choices, *clips, options, progress.watch());
+  progress.Clear();
   if (!results.ok()) return results.status();
   if (flags.idle) KPSA_RETURN_IF_ERROR(AddIdle(flags, *clips, &*results));
   results->front().notes.insert(results->front().notes.begin(), notes.begin(), notes.end());
@@ -118,7 +126,7 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   int code = 0;
   for (const BenchResult& result : *results) {
     if (result.promise.kept()) continue;
-    const std::string text = result.promise.Text("");
+    const std::string text = PromiseText(result.promise, "");
     Say(fmt::format("kpsa bench --check: {}: {}", result.subspace, text.substr(0, text.find('\n'))));
     code = 1;
   }

@@ -8,8 +8,8 @@
 #include "cli/common.h"
 #include "cli/options.h"
 #include "cli/request.h"
-#include "cli/rig_frames.h"
 #include "graph/plan_report.h"
+#include "host/rig_frames.h"
 #include "host/rig_training.h"
 #include "report/table.h"
 

@@ -10,9 +10,11 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "cli/rig_frames.h"
-#include "cli/verdicts.h"
+#include "cli/progress.h"
 #include "cli/vertex_output.h"
+#include "host/rig_frames.h"
+#include "host/verdicts.h"
+#include "report/verdict_text.h"
 
 namespace kpsa::engine {
 namespace {
@@ -66,14 +68,15 @@ CommandResult Eval(const EvalFlags& flags) {
   std::vector<ConstPointsView> meshes(shown.size());
   RigFrameOptions options;
   options.threads = *threads;
-  options.label = "frames";
-  options.quiet = flags.quiet;
+  Progress progress("frames", times->size(), flags.quiet);
+  options.watch = progress.watch();
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
         if (!applied.empty()) verdicts.Add(FrameNumber((*times)[frame], rig.fps), evaluator);
         for (Index m = 0; m < meshes.size(); ++m) meshes[m] = evaluator.Points(m);
         return (*output)->Frame(meshes);
       }));
+  progress.Clear();
   if (Interrupted()) return InterruptedStatus();
   const Result<std::vector<std::string>> notes = (*output)->Finish();
   if (!notes.ok()) return notes.status();
@@ -112,7 +115,7 @@ CommandResult Eval(const EvalFlags& flags) {
       for (const std::string& note : one.notes) Say("note: " + note);
     }
     for (const std::string& note : *notes) Say("note: " + note);
-    if (!applied.empty()) Say(verdicts.Text());
+    if (!applied.empty()) Say(VerdictsText(verdicts));
     if (const std::string reason = verdicts.MostFrequentReason(); !reason.empty()) Say(reason);
     const std::vector<std::string> paths = (*output)->paths();
     Say(fmt::format("{}{}: {} of {}, {:.2f} s", paths.front(),

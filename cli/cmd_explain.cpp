@@ -6,15 +6,17 @@
 
 #include "base/text.h"
 #include "cli/acceleration.h"
-#include "cli/explain_decision.h"
-#include "cli/explain_vertex.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/request.h"
-#include "cli/rig_frames.h"
 #include "graph/evaluator.h"
 #include "graph/explain.h"
 #include "graph/plan_report.h"
+#include "host/explain/decision_story.h"
+#include "host/explain/vertex_story.h"
+#include "host/rig_frames.h"
+#include "report/decision_text.h"
+#include "report/vertex_text.h"
 
 namespace kpsa::engine {
 namespace {
@@ -72,7 +74,8 @@ Result<Target> FindTarget(const Rig& rig, const std::string& what) {
 }
 
 CommandResult ExplainDecisions(const ExplainFlags& flags, Rig* rig, int frame) {
-  const Result<DecisionStory> story = TellOfDecisions(rig, flags.acceleration, frame);
+  const Result<DecisionStory> story =
+      TellOfDecisions(rig, ChoiceOf(flags.acceleration), frame, InterruptWatch());
   if (!story.ok()) return story.status();
   Print(flags.json ? DecisionStoryJson(*story) : DecisionText(*story));
   return 0;
@@ -146,10 +149,11 @@ CommandResult Explain(ExplainFlags flags) {
   Profile profile(plan);
   if (frame.has_value()) {
     Evaluator evaluator(*compiled);
-    KPSA_RETURN_IF_ERROR(EvaluateTo(rig, *frame, &evaluator, &profile));
+    KPSA_RETURN_IF_ERROR(EvaluateTo(rig, *frame, &evaluator, InterruptWatch(), &profile));
   } else {
     RigFrameOptions options;
     options.threads = 1;
+    options.watch = InterruptWatch();
     options.profile = &profile;
     KPSA_RETURN_IF_ERROR(EvaluateTimes(rig, *compiled, *times, options,
                                        [](std::size_t, const Evaluator&) { return Status(); }));

@@ -9,9 +9,9 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/request.h"
-#include "cli/rig_frames.h"
 #include "files/quantity.h"
 #include "host/plug_columns.h"
+#include "host/rig_frames.h"
 
 namespace kpsa::engine {
 namespace {
@@ -88,6 +88,7 @@ CommandResult Get(const GetFlags& flags) {
   std::vector<double> numbers;
   RigFrameOptions options;
   options.threads = *threads;
+  options.watch = InterruptWatch();
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
         if (!json) text += NumberText((*times)[frame]);

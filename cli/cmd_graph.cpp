@@ -6,8 +6,8 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/request.h"
-#include "cli/rig_frames.h"
 #include "graph/dot.h"
+#include "host/rig_frames.h"
 
 namespace kpsa::engine {
 namespace {
@@ -42,6 +42,7 @@ CommandResult DrawGraph(const GraphFlags& flags) {
     frames = times->size();
     RigFrameOptions options;
     options.threads = 1;
+    options.watch = InterruptWatch();
     options.profile = &profile;
     KPSA_RETURN_IF_ERROR(
         EvaluateTimes(rig, *plan, *times, options, [](std::size_t, const Evaluator&) { return Status(); }));

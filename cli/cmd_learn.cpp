@@ -3,22 +3,18 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
-#include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
-#include "cli/rig_frames.h"
-#include "cli/verdicts.h"
+#include "host/learning.h"
 #include "host/rig_training.h"
-#include "kpsa/training/learner.h"
-#include "kpsa/training/tile_splice.h"
-#include "kpsa/training_record.h"
+#include "kpsa/subspace.h"
+#include "report/learn_text.h"
 
 namespace kpsa::engine {
 namespace {
@@ -26,126 +22,6 @@ namespace {
 struct LearnFlags : Flags {
   std::optional<std::string> name, kpsa, clips;
 };
-
-// What a subspace makes of the frames of a clip.
-struct ClipTrial {
-  std::vector<Miss> missed;
-  std::size_t hits = 0, blends = 0, misses = 0;
-  std::string reason;  // the most frequent one
-};
-
-Result<ClipTrial> TryClip(Flags flags, const std::string& clip, const std::string& subspace) {
-  flags.clip = clip;
-  const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
-  if (!open.ok()) return open.status();
-  Rig& rig = (*open)->rig;
-  const Result<std::vector<double>> times = SampleTimes(flags, **open);
-  if (!times.ok()) return times.status();
-  Compiler compiler;
-  AccelerationFlags acceleration;
-  acceleration.kpsa = subspace;
-  const Result<std::vector<AppliedSubspace>> applied = ApplyAcceleration(&rig, &compiler, acceleration);
-  if (!applied.ok()) return applied.status();
-  Request request;
-  request.varying = VaryingPlugs(rig);
-  Verdicts verdicts(*applied);
-  verdicts.Ask(rig, &request);
-  const auto plan = CompileFor(rig, &compiler, request);
-  if (!plan.ok()) return plan.status();
-  ClipTrial trial;
-  RigFrameOptions options;
-  options.quiet = true;
-  KPSA_RETURN_IF_ERROR(
-      EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
-        verdicts.Add(FrameNumber((*times)[frame], rig.fps), evaluator);
-        if (!verdicts.records().back().decision.hit()) trial.missed.push_back({clip, (*times)[frame]});
-        return Status();
-      }));
-  trial.hits = verdicts.hits();
-  trial.blends = verdicts.count(FrameVerdict::kBlend), trial.misses = verdicts.count(FrameVerdict::kMiss);
-  trial.reason = verdicts.MostFrequentReason();
-  return trial;
-}
-
-// The rig of the flags once more, for the learner alone.
-Result<LearnerRig> OpenForLearner(const LearnFlags& flags) {
-  Result<std::unique_ptr<OpenRig>> opened = LoadRigOf(flags);
-  if (!opened.ok()) return opened.status();
-  const std::shared_ptr<OpenRig> open = std::move(*opened);
-  const Result<Acceleration> entry = ChooseEntry(open->rig, flags.name);
-  if (!entry.ok()) return Status(entry.status()).At({"--name"});
-  LearnerRig rig;
-  rig.owner = open;
-  rig.training = MakeTrainingRig(&open->rig, *entry);
-  rig.frames = [open](const std::string& clip) -> Result<TrainingClip> {
-    Result<std::vector<TrainingClip>> clips = ClipFrames(open->rig, {clip});
-    if (!clips.ok()) return clips.status();
-    return std::move(clips->front());
-  };
-  rig.samples = static_cast<std::size_t>(std::max<std::int64_t>(0, entry->train_samples));
-  return rig;
-}
-
-// Of tiles that learn by themselves: how many there are, and how many learnt nothing.
-struct TileCounts {
-  std::size_t all = 0, kept = 0;
-};
-TileCounts CountTiles(const Subspace& before, const Subspace& after) {
-  TileCounts counts;
-  if (!before.by_tile() || !after.by_tile()) return counts;
-  for (std::size_t m = 0; m < std::min(before.tiles.size(), after.tiles.size()); ++m) {
-    const std::vector<char> same = SameTiles(before.tiles[m], after.tiles[m]);
-    counts.all += same.size();
-    counts.kept += static_cast<std::size_t>(std::ranges::count(same, 1));
-  }
-  return counts;
-}
-
-std::size_t LearntFrames(const Subspace& subspace) {
-  std::size_t frames = 0;
-  for (const auto& [clip, times] : ParseTraining(subspace.training).learnt) frames += times.size();
-  return frames;
-}
-
-struct Learnt {
-  std::string clip;
-  ClipTrial before, after;
-};
-
-std::string LearnJson(const std::string& path, const std::vector<Learnt>& clips, std::size_t poses,
-                      const TileCounts& tiles, double seconds) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  const auto counts = [](const ClipTrial& trial) {
-    return nlohmann::ordered_json{{"hits", trial.hits}, {"blends", trial.blends}, {"misses", trial.misses}};
-  };
-  for (const Learnt& one : clips)
-    list.push_back({{"clip", one.clip}, {"before", counts(one.before)}, {"after", counts(one.after)}});
-  nlohmann::ordered_json document = {{"schema", "kpsa.learn/1"},
-                                     {"subspace", path},
-                                     {"learnt", poses},
-                                     {"clips", list},
-                                     {"seconds", seconds}};
-  if (tiles.all > 0) document["tiles"] = {{"all", tiles.all}, {"kept", tiles.kept}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
-
-std::string LearnText(const std::string& path, const std::vector<Learnt>& clips, std::size_t poses,
-                      const TileCounts& tiles, double seconds) {
-  std::string text = poses == 0 ? fmt::format("{}: there is nothing new to learn\n", path)
-                                : fmt::format("{}: {} learnt, trained again in {:.1f} s\n", path,
-                                              Plural(poses, "frame"), seconds);
-  if (tiles.all > 0)
-    text += fmt::format("{} of {} had nothing to learn, and are as they were\n", tiles.kept,
-                        Plural(tiles.all, "tile"));
-  for (const Learnt& one : clips) {
-    const auto counts = [](const ClipTrial& t) { return CountsText(t.hits, t.blends, t.misses); };
-    text += fmt::format("{}: {}", one.clip, counts(one.before));
-    if (poses > 0) text += "; now " + counts(one.after);
-    text += "\n";
-    if (!one.after.reason.empty()) text += one.after.reason + "\n";
-  }
-  return text;
-}
 
 CommandResult RunLearn(LearnFlags flags) {
   const Result<int> threads = ThreadCount(flags);
@@ -177,50 +53,35 @@ CommandResult RunLearn(LearnFlags flags) {
   const auto begin = std::chrono::steady_clock::now();
   Progress progress("learn", 0, flags.quiet);
   std::string stage;
-  LearnerOptions options;
-  options.threads = 0;  // nothing else is done meanwhile
+  LearnOptions options;
+  options.entry = flags.name;
+  options.clips = names;
+  options.subspace = from;
+  options.watch = InterruptWatch();
   options.progress = [&](const char* what, double) {
     if (stage != what) progress.SetStage(fmt::format("learn: {}", what));
     stage = what;
     return true;
   };
-  Learner learner(
-      old, [&flags] { return OpenForLearner(flags); }, std::move(options));
-  std::size_t poses = 0;
-  TileCounts tiles;
-  std::vector<Learnt> result;
-  for (const std::string& name : names) {
-    Result<ClipTrial> trial = TryClip(flags, name, from);
-    if (!trial.ok()) return trial.status();
-    for (const Miss& miss : trial->missed) learner.Add(miss);
-    result.push_back({name, std::move(*trial), {}});
-  }
-  const auto report = [&] {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    Print(flags.json ? LearnJson(path, result, poses, tiles, seconds)
-                     : LearnText(path, result, poses, tiles, seconds));
-  };
-  if (!learner.Learn()) {  // a file of its own all the same, where one was asked for
-    for (Learnt& one : result) one.after = one.before;
-    if (path != from) KPSA_RETURN_IF_ERROR(WriteSubspace(*old, path));
-    report();
-    return 0;
-  }
-  KPSA_RETURN_IF_ERROR(learner.Wait().At({rig.path}));
-  const std::shared_ptr<const Subspace> learnt = learner.TakeNewest();
-  poses = LearntFrames(*learnt) - LearntFrames(*old);
-  tiles = CountTiles(*old, *learnt);
+  const RigOpener source = OpenerOf(flags);
+  Result<LearnResult> result = LearnMisses(source, old, options);
+  if (!result.ok()) return result.status();
   progress.Clear();
-  {
-    const InterruptScope writing;
-    KPSA_RETURN_IF_ERROR(WriteSubspace(*learnt, path));
+  if (result->subspace != nullptr) {
+    {
+      const InterruptScope writing;
+      KPSA_RETURN_IF_ERROR(WriteSubspace(*result->subspace, path));
+    }
+    for (LearnResult::Clip& clip : result->clips) {
+      Result<ClipTrial> trial = TryClip(source, clip.name, path, options.watch);
+      if (!trial.ok()) return trial.status();
+      clip.after = std::move(*trial);
+    }
+  } else if (path != from) {  // a file of its own all the same, where one was asked for
+    KPSA_RETURN_IF_ERROR(WriteSubspace(*old, path));
   }
-  for (Learnt& one : result) {
-    Result<ClipTrial> trial = TryClip(flags, one.clip, path);
-    if (!trial.ok()) return trial.status();
-    one.after = std::move(*trial);
-  }
-  report();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  Print(flags.json ? LearnJson(*result, path, seconds) : LearnText(*result, path, seconds));
   return 0;
 }
 

@@ -10,11 +10,12 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "cli/profile_run.h"
 #include "cli/request.h"
-#include "cli/rig_frames.h"
 #include "graph/plan_report.h"
+#include "host/profile_run.h"
+#include "host/rig_frames.h"
 #include "report/table.h"
+#include "report/trace.h"
 
 namespace kpsa::engine {
 namespace {
@@ -124,7 +125,7 @@ CommandResult RunProfile(const ProfileFlags& flags) {
   const ThreadLimit limit(*threads);
   Profile profile(**plan);
   profile.keep_events = flags.trace.has_value();
-  const Result<Measured> measured = Measure(rig, *plan, *times, *threads > 1, &profile);
+  const Result<Measured> measured = Measure(rig, *plan, *times, *threads > 1, InterruptWatch(), &profile);
   if (!measured.ok()) return measured.status();
   const std::vector<NodeTime> nodes = NodeTimes(**plan, profile);
   const CriticalPath path = FindCriticalPath(**plan, profile);

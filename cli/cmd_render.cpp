@@ -5,13 +5,13 @@
 
 #include "base/parallel.h"
 #include "cli/acceleration.h"
-#include "cli/camera_picture.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "cli/rig_picture.h"
 #include "files/png.h"
 #include "kpsa/kpsa_node.h"
+#include "picture/camera_picture.h"
+#include "picture/rig_picture.h"
 
 namespace kpsa::engine {
 namespace {
@@ -104,7 +104,7 @@ double ShownTolerance(const AppliedSubspace& applied) {
 Result<std::vector<Image>> CameraRows(Rig& rig, Compiler* compiler, const RenderFlags& flags,
                                       const std::vector<double>& times, const RigFrameOptions& options) {
   const Result<CameraView> view = FindCamera(rig, *flags.camera);
-  if (!view.ok()) return view.status();
+  if (!view.ok()) return Status(view.status()).At({"--camera " + *flags.camera});
   double exposure = 1;
   if (flags.exposure.has_value()) {
     const Result<double> read = ParseNumber("--exposure", *flags.exposure);
@@ -184,7 +184,7 @@ CommandResult Render(const RenderFlags& flags) {
   const InterruptScope interruptible;
   RigFrameOptions frame_options;
   frame_options.threads = *threads;
-  frame_options.quiet = flags.quiet;
+  frame_options.watch = InterruptWatch();
   Compiler compiler;
   if (flags.camera.has_value()) {
     const Result<std::vector<Image>> taken = CameraRows(rig, &compiler, flags, *times, frame_options);

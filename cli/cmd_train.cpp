@@ -11,10 +11,13 @@
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"
-#include "cli/stack_cost.h"
-#include "cli/train_report.h"
 #include "files/quantity.h"
+#include "host/checks/playback_times.h"
+#include "host/checks/stack_cost.h"
+#include "host/checks/subspace_check.h"
 #include "host/rig_training.h"
+#include "report/stack_cost_text.h"
+#include "report/train_report.h"
 
 namespace kpsa::engine {
 namespace {
@@ -104,7 +107,8 @@ CommandResult RunTrain(const TrainFlags& flags) {
 
   if (!flags.force) {
     // What cannot be timed goes to training, which says why
-    if (const auto cost = MeasureStack(**open, flags, *entry, *clips); cost.ok() && !cost->worth_it()) {
+    if (const auto cost = MeasureStack(**open, OpenerOf(flags), *entry, *clips, InterruptWatch());
+        cost.ok() && !cost->worth_it()) {
       Print(flags.json ? NotWorthItJson(*cost) : NotWorthItText(*cost, flags.file));
       return 1;
     }
@@ -132,11 +136,12 @@ CommandResult RunTrain(const TrainFlags& flags) {
   check_options.seed = options.seed ^ 0x9e3779b97f4a7c15ull;
   check_options.groups = options.samples > 0 && !subspace->of_light();
   progress.SetStage("train: timing it");
-  const Result<PlaybackTimes> played = TimePlayback(flags, *entry, subspace, *clips);
+  const Result<PlaybackTimes> played =
+      TimePlayback(OpenerOf(flags), *entry, subspace, *clips, InterruptWatch());
   if (!played.ok()) return Status(played.status()).At({rig.path});
   check_options.played = *played;
   progress.SetLabel("train: trying it, poses", check_options.poses);
-  check_options.progress = [&](std::size_t done, std::size_t) { progress.Set(done); };
+  check_options.watch = progress.watch();
   const Result<SubspaceCheck> check = CheckSubspace(&rig, *entry, subspace, *clips, check_options);
   if (!check.ok()) return Status(check.status()).At({rig.path});
   progress.Clear();

@@ -5,7 +5,7 @@
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/options.h"
-#include "cli/rig_frames.h"
+#include "host/rig_frames.h"
 #include "host/rig_training.h"
 
 namespace kpsa::engine {

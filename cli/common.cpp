@@ -130,6 +130,19 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   return open;
 }
 
+RigOpener OpenerOf(const Flags& flags) {
+  RigOpener source;
+  source.path = flags.file;
+  source.open = [flags](const RigChange& change) {
+    Flags changed = flags;
+    if (change.clip.has_value()) changed.clip = change.clip;
+    if (change.variant.has_value()) changed.variant = change.variant;
+    return LoadRigOf(changed);
+  };
+  source.times = [flags](const OpenRig& open) { return SampleTimes(flags, open); };
+  return source;
+}
+
 Status AsUsage(Status status) {
   Status usage;
   for (Error error : status.errors()) {
@@ -216,8 +229,7 @@ void InstallInterruptHandler() {
 
 bool Interrupted() { return interrupted.load(std::memory_order_relaxed); }
 const std::atomic<bool>* InterruptFlag() { return &interrupted; }
-Status InterruptedStatus() {
-  return Status::Make(ErrorKind::kInterrupted, "interrupted; nothing was written");
-}
+Status InterruptedStatus() { return CancelledStatus(); }
+Watch InterruptWatch() { return {{}, InterruptFlag()}; }
 
 }  // namespace kpsa::engine

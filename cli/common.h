@@ -16,6 +16,8 @@
 #include "base/text.h"
 #include "graph/node_registry.h"
 #include "graph/plugin_loader.h"
+#include "host/open_rig.h"
+#include "host/watch.h"
 #include "rig/build/rig_builder.h"
 
 namespace CLI {
@@ -54,15 +56,11 @@ void AddAllNodes(NodeRegistry& registry);
 // The libraries of --plugin.
 Status LoadPlugins(const Flags& flags, PluginLoader* loader);
 
-// The registry and the rig that refers to it.
-struct OpenRig {
-  NodeRegistry registry;
-  Rig rig;
-  std::optional<double> pose_time;  // seconds, where a pose file says when in its clip it is
-};
 // Loads the rig of the flags, with the clip, the pose file and the settings that they name. Mistakes in flags
 // are usage errors.
 Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags);
+// The same as often as it is wanted; times: those of --frames, --times or the clip.
+RigOpener OpenerOf(const Flags& flags);
 
 // The same errors as errors of usage: their cause stands on the command line.
 Status AsUsage(Status status);
@@ -98,5 +96,7 @@ void InstallInterruptHandler();
 bool Interrupted();
 const std::atomic<bool>* InterruptFlag();
 Status InterruptedStatus();
+// Of calls that an interrupt ends.
+Watch InterruptWatch();
 
 }  // namespace kpsa::engine

@@ -116,10 +116,6 @@ Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view 
   return indices;
 }
 
-std::int64_t FrameNumber(double seconds, double fps) {
-  return std::llround(std::clamp(seconds * fps, -1e15, 1e15));
-}
-
 Status CheckTimeFlags(const Flags& flags) {
   if (flags.frames.has_value() && flags.times.has_value())
     return Status::Usage("--frames and --times: expected one of them");
@@ -136,28 +132,16 @@ Result<std::vector<double>> SampleTimes(const Flags& flags, const OpenRig& open)
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
   if (flags.times.has_value()) return ParseTimes(*flags.times);
   const Rig& rig = open.rig;
-  std::vector<double> times;
   if (flags.frames.has_value()) {
+    std::vector<double> times;
     const Result<std::vector<std::int64_t>> frames = ParseFrames(*flags.frames);
     for (std::int64_t frame : *frames) times.push_back(static_cast<double>(frame) / rig.fps);
     return times;
   }
   if (open.pose_time.has_value()) return std::vector<double>{*open.pose_time};
-  double begin = 0, duration = 0;
-  if (rig.playing.has_value()) begin = rig.playing->begin, duration = rig.playing->duration;
-  for (const CharacterClip& clip : rig.scene.clips) {
-    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip)
-      begin = clip.begin, duration = clip.duration;
-  }
-  // A clip that was made at this rate ends on a frame, but for rounding
-  // (+ 0: from a first frame -0)
-  const double first = std::ceil(begin * rig.fps - 1e-3) + 0.0, last = std::floor(duration * rig.fps + 1e-3);
-  if (!(last - first < static_cast<double>(kMaxSamples))) {
-    return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames: choose some with --frames",
-                         rig.scene.clip.value_or(""), duration, Thousands(kMaxSamples));
-  }
-  for (double frame = first; frame <= last; ++frame) times.push_back(frame / rig.fps);
-  return times;
+  Result<std::vector<double>> all = ClipTimes(rig);
+  if (all.ok()) return all;
+  return Status::Usage("{}: choose some with --frames", all.status().errors().front().message);
 }
 
 }  // namespace kpsa::engine

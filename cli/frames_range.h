@@ -10,10 +10,9 @@
 
 #include "base/status.h"
 #include "cli/common.h"
+#include "host/rig_frames.h"
 
 namespace kpsa::engine {
-
-inline constexpr std::size_t kMaxSamples = 1'000'000;  // times of one evaluation
 
 // A finite decimal number, and nothing else. `what` ("--fps") is for messages.
 Result<double> ParseNumber(std::string_view what, std::string_view text);
@@ -29,8 +28,6 @@ Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view 
 // The times of --frames or --times in seconds. Without them: when the pose file says that it is; else every
 // frame of the clip that plays, from 0 to its end; time 0 alone if none plays.
 Result<std::vector<double>> SampleTimes(const Flags& flags, const OpenRig& open);
-// The frame of the clip that is nearest to a time, for reports; held within +-1e15.
-std::int64_t FrameNumber(double seconds, double fps);
 // Whether all refusals of --frames and --times pass, before a rig is loaded.
 Status CheckTimeFlags(const Flags& flags);
 

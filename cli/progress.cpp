@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "cli/common.h"
+
 namespace kpsa::engine {
 
 Progress::Progress(std::string label, std::size_t total, bool quiet)
@@ -45,6 +47,10 @@ void Progress::Set(std::size_t done) {
   if (now - last_ < std::chrono::milliseconds(100)) return;
   last_ = now;
   Draw(done);
+}
+
+Watch Progress::watch() {
+  return {[this](std::size_t done, std::size_t) { Set(done); }, InterruptFlag()};
 }
 
 void Progress::Draw(std::size_t done) {

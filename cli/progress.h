@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <string>
 
+#include "host/watch.h"
+
 namespace kpsa::engine {
 
 class Progress {
@@ -17,6 +19,8 @@ class Progress {
 
   // Draws at most ten times a second. One thread at a time.
   void Set(std::size_t done);
+  // Of a call of the host: draws what it has done; an interrupt ends it. This must outlive it.
+  Watch watch();
   void SetLabel(std::string label, std::size_t total);
   // A stage whose end nobody can tell: its text and how long everything took so far, drawn at once.
   void SetStage(const std::string& text);

@@ -1,7 +1,7 @@
 #include "cli/request.h"
 
 #include "cli/frames_range.h"
-#include "cli/rig_frames.h"
+#include "host/rig_frames.h"
 
 namespace kpsa::engine {
 Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wanted,
@@ -57,6 +57,24 @@ Result<Request> AcceleratedRequest(Rig* rig, Compiler* compiler, const Accelerat
     }
   }
   return request;
+}
+
+Result<std::optional<VertexName>> FindVertex(const Rig& rig, const std::string& text) {
+  const std::size_t open = text.rfind('[');
+  if (open == std::string::npos || open == 0 || text.back() != ']') return std::optional<VertexName>();
+  const std::string name = text.substr(0, open);
+  std::vector<std::string> names;
+  for (const CharacterMesh& mesh : rig.scene.meshes) {
+    names.push_back(mesh.name);
+    if (mesh.name != name) continue;
+    const Result<std::vector<Index>> vertices =
+        ParseIndices(text, text.substr(open + 1, text.size() - open - 2), mesh.vertex_count);
+    if (!vertices.ok()) return vertices.status();
+    if (vertices->size() != 1) return Status::Usage("{}: expected one vertex", text);
+    return std::optional<VertexName>({&mesh, vertices->front()});
+  }
+  if (name.find('.') != std::string::npos) return std::optional<VertexName>();  // an attribute's element
+  return Status::Usage("\"{}\": no mesh is called \"{}\"{}", text, name, DidYouMean(name, names));
 }
 
 }  // namespace kpsa::engine

@@ -7,6 +7,7 @@
 
 #include "cli/acceleration.h"
 #include "graph/plan.h"
+#include "host/explain/vertex_story.h"
 #include "host/mesh_stage.h"
 #include "rig/build/rig_builder.h"
 
@@ -22,5 +23,9 @@ Result<Request> BuildRequest(const Rig& rig, const std::vector<std::string>& wan
 Result<Request> AcceleratedRequest(Rig* rig, Compiler* compiler, const AccelerationFlags& flags,
                                    const std::vector<std::string>& wanted,
                                    const std::optional<std::string>& vertices);
+
+// "head_mesh[812]": the vertex counts over the file's primitives of the mesh. No value where the text does
+// not look like one; errors (of usage): no such mesh, no such vertex.
+Result<std::optional<VertexName>> FindVertex(const Rig& rig, const std::string& text);
 
 }  // namespace kpsa::engine

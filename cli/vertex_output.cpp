@@ -4,11 +4,11 @@
 
 #include "cli/common.h"
 #include "cli/output.h"
-#include "cli/rig_frames.h"
 #include "files/npz.h"
 #include "files/point_cache.h"
 #include "gltf/blender_order.h"
 #include "gltf/export.h"
+#include "host/rig_frames.h"
 #include "host/vertex_points.h"
 
 namespace kpsa::engine {

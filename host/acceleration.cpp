@@ -57,6 +57,11 @@ Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, con
   return std::make_shared<const Subspace>(std::move(*subspace));
 }
 
+// "; --kpsa names a subspace"
+std::string OtherWay(const AccelerationChoice& choice, const char* what) {
+  return choice.subspace_option.empty() ? "" : fmt::format("; {} names {}", choice.subspace_option, what);
+}
+
 }  // namespace
 
 std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
@@ -88,11 +93,13 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
     applied.push_back(std::move(one));
   } else {
     if (rig->accelerate.empty())
-      return Status::Invalid("has no accelerate section, so nothing to accelerate; --kpsa names a subspace")
+      return Status::Invalid("has no accelerate section, so nothing to accelerate{}",
+                             OtherWay(choice, "a subspace"))
           .At({rig->path});
     for (const Acceleration& entry : rig->accelerate) {
       if (entry.subspace.empty())
-        return Status::Invalid("accelerate: \"{}\" names no subspace file; --kpsa names one", entry.name)
+        return Status::Invalid("accelerate: \"{}\" names no subspace file{}", entry.name,
+                               OtherWay(choice, "one"))
             .At(entry.where);
       const auto subspace = LoadSubspace(
           entry.reference < 0 ? rig->path : rig->references[static_cast<std::size_t>(entry.reference)].file,

@@ -18,7 +18,8 @@ struct Subspace;
 
 // Which subspaces, and what is asked of them.
 struct AccelerationChoice {
-  std::string subspace;  // a file; "": those that the rig names
+  std::string subspace;         // a file; "": those that the rig names
+  std::string subspace_option;  // what people call `subspace` where they choose it, for errors; or ""
   std::optional<double>
       tolerance;  // metres; kAnyError (kpsa/kpsa_node.h): every frame; unset: the subspace's own
   std::optional<double> violation_rate;

@@ -7,12 +7,9 @@
 #include <string>
 
 #include "graph/profile.h"
+#include "host/profile_run.h"
 
 namespace kpsa::engine {
-
-struct FrameSpan {
-  std::uint64_t begin_ns = 0, end_ns = 0;
-};
 
 // One track for frames and one for each thread's computes, so that the events of a track nest. Times are
 // exact to the nanosecond.

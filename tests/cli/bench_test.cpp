@@ -1,15 +1,8 @@
-// What kpsa bench says besides errors: whether the promise was kept, what its clips are worth, and times that
-// a busy machine does not stretch.
-#include <chrono>
+// What kpsa bench says besides errors: whether the promise was kept, what its clips are worth, and how its
+// times spread.
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
-#include <thread>
 
-#include "cli/bench_promise.h"
-#include "cli/bench_report.h"
-#include "graph/profile.h"
-#include "host/bench/frame_times.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
@@ -18,86 +11,6 @@ namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
-
-Promise FivePercent() {
-  Promise promise;
-  promise.tolerance = 1e-3, promise.rate = 0.05;
-  return promise;
-}
-
-TEST(Promise, IsKeptUpToItsRate) {
-  Promise promise = FivePercent();
-  for (int f = 0; f < 19; ++f) promise.Add("talk", f, true, true, 4e-4);
-  EXPECT_TRUE(promise.kept());
-  promise.Add("talk", 19, true, true, 2e-3);
-  EXPECT_TRUE(promise.kept()) << "1 of 20";
-  EXPECT_NE(
-      promise.Text("").find("kept: 1 of 20 frames beyond 1 mm (promised 5 %), 1 of 20 hits (promised 10 %)"),
-      std::string::npos)
-      << promise.Text("");
-  EXPECT_NE(promise.Text("").find("worst accepted: frame 19 of talk, 2.00 tolerances"), std::string::npos);
-  promise.Add("talk", 20, true, true, NAN);
-  EXPECT_FALSE(promise.kept()) << "an error that is no number is beyond every tolerance";
-  EXPECT_TRUE(promise.Text("").starts_with("PROMISE BROKEN: 9.52 % > 5 % of frames beyond 1 mm (2 of 21)"))
-      << promise.Text("");
-  EXPECT_NE(promise.Text("").find("what helps: "), std::string::npos);
-}
-
-TEST(Promise, HitsHaveTwiceTheRate) {
-  Promise promise = FivePercent();
-  for (int f = 0; f < 95; ++f) promise.Add("talk", f, false, false, 0);
-  for (int f = 95; f < 100; ++f) promise.Add("talk", f, true, true, f < 96 ? 2e-3 : 0);
-  EXPECT_FALSE(promise.kept()) << "1 % of the frames, but 20 % of the hits";
-  EXPECT_TRUE(promise.Text("").starts_with("PROMISE BROKEN: 20 % > 10 % of hits beyond 1 mm (1 of 5)"))
-      << promise.Text("");
-}
-
-TEST(Promise, MissesAndFramesThatAreAcceptedAnywayBreakNone) {
-  Promise promise = FivePercent();
-  promise.Add("talk", 1, false, false, 1);  // as of a mesh that nothing accelerates
-  EXPECT_TRUE(promise.kept());
-  EXPECT_NE(promise.Text("").find("no frame was accepted"), std::string::npos);
-  promise.tolerance = 1e30;
-  promise.Add("talk", 2, true, true, 1);
-  EXPECT_FALSE(promise.promised());
-  EXPECT_TRUE(promise.kept());
-  EXPECT_EQ(promise.Text(""), "none: every frame is accepted, whatever its error\n");
-}
-
-TEST(FrameTimes, WhatIsTakenOffComesFromTheInterruptedFrames) {
-  std::vector<double> times = {10, 300, 5010, 12, 2010}, floors = {10, 290, 10, 10, 10};
-  TakeOff(7000, floors, times);
-  EXPECT_EQ(times, (std::vector<double>{10, 300, 10, 12, 10}));
-  TakeOff(5, floors, times);
-  EXPECT_EQ(times, (std::vector<double>{10, 295, 10, 12, 10}));
-  TakeOff(1e9, floors, times);
-  EXPECT_EQ(times, floors) << "none below its floor";
-}
-
-TEST(FrameTimes, WaitingIsNoWork) {
-  constexpr std::uint64_t kWait = 30'000'000;
-  for (const bool cpu : {true, false}) {
-    FrameTimes times(3, cpu);
-    for (int run = 0; run < 3; ++run) {
-      times.BeginTurn(0);
-      for (int f = 0; f < 3; ++f) {
-        const std::uint64_t begin = ProfileClock();
-        if (f == run) std::this_thread::sleep_for(std::chrono::nanoseconds(kWait));
-        times.Add(ProfileClock() - begin);
-      }
-      times.EndTurn();
-    }
-    double most = 0;
-    for (const std::vector<double>& runs : times.Finish()) {
-      ASSERT_EQ(runs.size(), 3u);
-      most = std::max(most, *std::max_element(runs.begin(), runs.end()));
-    }
-    EXPECT_EQ(most < 0.5 * kWait, cpu) << most;
-    if (cpu) {
-      EXPECT_GT(times.wall_ns(), 10 * times.cpu_ns());
-    }
-  }
-}
 
 // In a bench of its own, frames of a known error.
 class Bench : public ::testing::Test {
@@ -175,16 +88,6 @@ TEST_F(Bench, TellsTheSpreadOfItsTimes) {
   const ProcessResult text = Run({"--threads", "2"});
   EXPECT_NE(text.out.find(" over the runs)"), std::string::npos) << text.out;
   EXPECT_NE(text.out.find("wall time"), std::string::npos) << text.out;
-}
-
-TEST(BenchReport, TheSpeedupHasASpread) {
-  BenchResult result;
-  result.full_ms = 1, result.accelerated_ms = 0.02, result.speedup_range = {45, 55};
-  BenchContext context;
-  context.options.runs = 3;
-  EXPECT_NE(BenchText({result}, context).find("speedup    50.00x (45.00 to 55.00 over the runs)"),
-            std::string::npos)
-      << BenchText({result}, context);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "cli/bench_report.h"
 #include "files/npz.h"
 #include "tests/cli/process.h"
 #include "tests/support/temporary_folder.h"
@@ -294,17 +293,6 @@ TEST(Inspect, KnowsWhatItWrites) {
   EXPECT_EQ(OkJson({"inspect", folder / "a.npz", "--json"})["frames"], 5);
   EXPECT_EQ(OkJson({"inspect", folder / "a.mdd", "--json"})["frames"], 5);
   EXPECT_EQ(OkJson({"inspect", KPSA_SCENES_DIR "/face/w/face.json", "--json"})["kind"], "weights");
-}
-
-TEST(BenchReport, WhatIsNotKnownIsNoNumber) {
-  BenchResult result;
-  result.per_frame.emplace_back();
-  const std::string text = BenchText({result}, {}) + FramesText({result});
-  EXPECT_NE(text.find("speedup    -; ceiling -, bound"), std::string::npos) << text;
-  EXPECT_EQ(text.find("0.0x"), std::string::npos) << text;
-  const Json json = Json::parse(BenchJson({result}, {}));
-  EXPECT_TRUE(json["ceiling"]["speedup"].is_null() && json["speedup"].is_null()) << json;
-  EXPECT_TRUE(json["error"]["worst_frame"].is_null()) << json["error"];
 }
 
 // The first five minutes: init, train, bench, and what follows from them.

@@ -1,9 +1,11 @@
 // What of a stack makes less than a tolerance in a clip, and what it costs: kpsa bench --idle.
+#include "host/bench/idle.h"
+
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "cli/bench_idle.h"
+#include "cli/common.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
@@ -29,7 +31,7 @@ class Idle : public ::testing::Test {
     flags.file = folder.rig();
   }
   IdleDeformers Measure(double tolerance) const {
-    const Result<IdleDeformers> idle = MeasureIdle(flags, {"wave"}, tolerance, kFullMs);
+    const Result<IdleDeformers> idle = MeasureIdle(OpenerOf(flags), {"wave"}, tolerance, kFullMs, {});
     EXPECT_TRUE(idle.ok()) << idle.status().ToString();
     return idle.ok() ? *idle : IdleDeformers();
   }

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "cli/subspace_check.h"
 #include "host/checks/check_poses.h"
+#include "host/checks/subspace_check.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"

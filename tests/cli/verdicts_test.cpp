@@ -1,13 +1,12 @@
 // Every frame is a hit, a blend or a miss with its reason, whichever command tells of it. On the bundled
 // hello rig with thresholds that make all three happen in its clip.
-#include "cli/verdicts.h"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "picture/rig_picture.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
@@ -232,18 +231,6 @@ TEST_F(FrameVerdicts, OfSeveralNodesTheWorstCounts) {
                     "outside its trained range",
                     name));
   }
-}
-
-TEST(FrameDecision, TheShareOfTheFullEvaluationDecides) {
-  EXPECT_EQ((FrameDecision{"a", 0, 0.4, "hit"}).verdict(), FrameVerdict::kHit);
-  EXPECT_EQ((FrameDecision{"a", 1e-9, 1.1, "far"}).verdict(), FrameVerdict::kBlend);
-  EXPECT_EQ((FrameDecision{"a", 1, 9, "farther"}).verdict(), FrameVerdict::kMiss);
-  Reasons reasons;
-  EXPECT_EQ(reasons.MostFrequent(), "");
-  reasons.Add("far", "frame 3");
-  reasons.Add("farther", "frame 4");
-  reasons.Add("farther", "frame 5");
-  EXPECT_EQ(reasons.MostFrequent(), "most frequent reason (2 frames, first at frame 4): farther");
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include "bench/untouched_character.h"
 #include "bench/untouched_run.h"
 #include "cli/common.h"
-#include "cli/rig_frames.h"
+#include "host/rig_frames.h"
 #include "rig/build/writer.h"
 #include "tests/support/temporary_folder.h"
 

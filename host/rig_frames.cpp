@@ -1,0 +1,91 @@
+#include "host/rig_frames.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/text.h"
+
+namespace kpsa::engine {
+
+Request ShownPoints(const Rig& rig) {
+  Request request;
+  for (const std::size_t m : ShownMeshes(rig.scene))
+    request.outputs.push_back({rig.scene.meshes[m].points, {}});
+  request.varying.push_back(rig.scene.time);
+  return request;
+}
+
+Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compiler, const Request& request) {
+  Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
+  if (plan.ok()) return plan;
+  Status located;
+  for (const Error& error : plan.status().errors()) located.Append(Status(error).At(PlaceOf(rig, error)));
+  return located;
+}
+
+Result<std::vector<double>> ClipTimes(const Rig& rig) {
+  std::vector<double> times;
+  double begin = 0, duration = 0;
+  if (rig.playing.has_value()) begin = rig.playing->begin, duration = rig.playing->duration;
+  for (const CharacterClip& clip : rig.scene.clips) {
+    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip)
+      begin = clip.begin, duration = clip.duration;
+  }
+  // A clip that was made at this rate ends on a frame, but for rounding
+  // (+ 0: from a first frame -0)
+  const double first = std::ceil(begin * rig.fps - 1e-3) + 0.0, last = std::floor(duration * rig.fps + 1e-3);
+  if (!(last - first < static_cast<double>(kMaxSamples))) {
+    return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames", rig.scene.clip.value_or(""),
+                         duration, Thousands(kMaxSamples));
+  }
+  for (double frame = first; frame <= last; ++frame) times.push_back(frame / rig.fps);
+  return times;
+}
+
+std::int64_t FrameNumber(double seconds, double fps) {
+  return std::llround(std::clamp(seconds * fps, -1e15, 1e15));
+}
+
+Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
+                     const std::vector<double>& times, const RigFrameOptions& options,
+                     const RigFrameSink& sink) {
+  const Index time = plan->FindVarying(rig.scene.time);
+  FrameOptions frame_options;
+  frame_options.threads = options.threads;
+  frame_options.cancel = options.watch.cancel;
+  frame_options.profile = options.profile;
+  const Status status = EvaluateFrames(
+      plan, times.size(), frame_options,
+      [&](std::size_t frame, Evaluator& evaluator) {
+        if (time != kNoIndex) evaluator.Set(time, times[frame]);
+      },
+      [&](std::size_t frame, const Evaluator& evaluator, const Status& evaluated) -> Status {
+        if (!evaluated.ok()) {
+          const Error& error = evaluated.errors().front();
+          return Status::Evaluation("at {} s: {}", times[frame], error.message)
+              .OfNode(error.node)
+              .At(PlaceOf(rig, error));
+        }
+        options.watch.Done(frame + 1, times.size());
+        return sink(frame, evaluator);
+      });
+  if (!status.ok() && status.kind() == ErrorKind::kInterrupted) return CancelledStatus();
+  return status;
+}
+
+Status EvaluateTo(const Rig& rig, int frame, Evaluator* evaluator, const Watch& watch, Profile* profile) {
+  const Plan& plan = evaluator->plan();
+  const Index time = plan.FindVarying(rig.scene.time);
+  for (int f = plan.stateful_node().empty() ? frame - 1 : std::min(frame - 1, 0); f <= frame; ++f) {
+    if (watch.cancelled()) return CancelledStatus();
+    if (f == frame && profile != nullptr) evaluator->Record(profile, f);
+    if (time != kNoIndex) evaluator->Set(time, f / rig.fps);
+    const Status status = evaluator->Evaluate();
+    if (status.ok()) continue;
+    const Error& error = status.errors().front();
+    return Status::Evaluation("at frame {}: {}", f, error.message).OfNode(error.node).At(PlaceOf(rig, error));
+  }
+  return Status();
+}
+
+}  // namespace kpsa::engine

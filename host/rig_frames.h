@@ -1,0 +1,54 @@
+// Evaluation of a rig at several times.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/status.h"
+#include "graph/compiler.h"
+#include "graph/evaluator.h"
+#include "graph/frames.h"
+#include "host/watch.h"
+#include "rig/build/rig_builder.h"
+
+namespace kpsa::engine {
+
+// What is looked at where nobody says: the final points of ShownMeshes(rig.scene), in that
+// order; time varies.
+Request ShownPoints(const Rig& rig);
+
+// Compiles the request; errors are located at the rig's file.
+Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compiler, const Request& request);
+
+inline constexpr std::size_t kMaxSamples = 1'000'000;  // times of one evaluation
+// Every frame of the clip that plays, from its first one to its end, in seconds; time 0 alone if none plays.
+// Errors: more than kMaxSamples.
+Result<std::vector<double>> ClipTimes(const Rig& rig);
+// The frame that is nearest to a time, for reports; held within +-1e15.
+std::int64_t FrameNumber(double seconds, double fps);
+
+struct RigFrameOptions {
+  int threads = 0;  // 0: all
+  Watch watch;      // of frames
+  Profile* profile = nullptr;
+};
+
+// Takes a frame whose outputs are up to date. In ascending order, one call at a time.
+using RigFrameSink = std::function<Status(std::size_t frame, const Evaluator& evaluator)>;
+
+// Evaluates all outputs of the plan at the times. The first frame that fails ends it, with its time in the
+// message; so does whoever cancels it.
+Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
+                     const std::vector<double>& times, const RigFrameOptions& options,
+                     const RigFrameSink& sink);
+
+// Evaluates a frame after those that come before it: one, or all from 0 on where a node needs its past. A
+// profile, where one is given, is of the frame alone.
+Status EvaluateTo(const Rig& rig, int frame, Evaluator* evaluator, const Watch& watch,
+                  Profile* profile = nullptr);
+
+}  // namespace kpsa::engine

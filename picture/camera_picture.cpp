@@ -1,0 +1,257 @@
+#include "picture/camera_picture.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "nodes/illumination.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr int kAreaSamples = 16;  // shadow rays a pixel and light that has a size
+
+bool IsLight(const NodeDef& def) {
+  return def.FindAttribute("outColor") >= 0 && def.FindAttribute("outMatrix") >= 0;
+}
+
+CameraView::Light LightOf(const Graph& graph, NodeId node) {
+  const NodeDef& def = graph.def(node);
+  const DiffuseLight::Kind kind = def.name == "areaLight"     ? DiffuseLight::Kind::kArea
+                                  : def.name == "sunLight"    ? DiffuseLight::Kind::kSun
+                                  : def.name == "sphereLight" ? DiffuseLight::Kind::kBall
+                                                              : DiffuseLight::Kind::kPoint;
+  return {
+      kind, {node, def.FindAttribute("outMatrix"), -1, -1}, {node, def.FindAttribute("outColor"), -1, -1}};
+}
+
+double SrgbCurve(double linear) {
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+}
+
+// Everything up to 0.8 as it is, beyond it a curve that reaches 1 at infinity.
+double Compressed(double x) { return x <= 0.8 ? x : 1 - 0.2 * 0.2 / (x - 0.6); }
+
+const Value& StructuralValue(const Graph& graph, NodeId node, const char* name) {
+  const PlugRef plug{node, graph.def(node).FindAttribute(name), -1, -1};
+  const Value* set = graph.FindValue(plug);
+  return set != nullptr ? *set
+                        : graph.def(node).attributes[static_cast<std::size_t>(plug.attribute)].default_value;
+}
+
+Index SizeOf(const Graph& graph, NodeId node, const char* name) {
+  return static_cast<Index>(StructuralValue(graph, node, name).AsInt());
+}
+
+}  // namespace
+
+Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
+  const Graph& graph = *rig.graph;
+  std::vector<std::string> cameras;
+  std::optional<NodeId> camera;
+  std::vector<NodeId> illuminations, lights;
+  for (Index n = 0; n < graph.node_capacity(); ++n) {
+    const NodeId node = graph.IdAt(n);
+    if (!graph.IsAlive(node)) continue;
+    const NodeDef& def = graph.def(node);
+    if (def.name == "camera") {
+      cameras.push_back(graph.name(node));
+      if (graph.name(node) == name) camera = node;
+    }
+    if (def.name == "indirectIllumination") illuminations.push_back(node);
+    if (IsLight(def)) lights.push_back(node);
+  }
+  if (!camera.has_value()) {
+    if (cameras.empty()) return Status::Usage("{} has no camera", rig.path);
+    return Status::Usage("no such camera{}; there is {}", DidYouMean(name, cameras),
+                         fmt::join(cameras, ", "));
+  }
+  CameraView view;
+  view.world_from_screen = {*camera, graph.def(*camera).FindAttribute("worldFromScreen"), -1, -1};
+  std::optional<NodeId> illumination;
+  for (NodeId node : illuminations) {
+    const Connection* c =
+        graph.FindConnection({node, graph.def(node).FindAttribute("worldFromScreen"), -1, -1});
+    if (c == nullptr || !(c->source == view.world_from_screen)) continue;
+    if (illumination.has_value()) {
+      return Status::Usage("both {} and {} look through it", graph.name(*illumination), graph.name(node));
+    }
+    illumination = node;
+  }
+  if (!illumination.has_value()) {
+    for (NodeId node : lights) view.lights.push_back(LightOf(graph, node));
+    view.meshes = ShownMeshes(rig.scene);
+    return view;
+  }
+  const NodeDef& def = graph.def(*illumination);
+  view.irradiance = PlugRef{*illumination, def.FindAttribute("irradiance"), -1, -1};
+  view.width = SizeOf(graph, *illumination, "width");
+  view.height = SizeOf(graph, *illumination, "height");
+  for (const Connection& c : graph.Inputs(*illumination)) {
+    if (c.destination.attribute == def.FindAttribute("lightMatrix"))
+      view.lights.push_back(LightOf(graph, c.source.node));
+    if (c.destination.attribute != def.FindAttribute("points")) continue;
+    for (std::size_t m = 0; m < rig.scene.meshes.size(); ++m) {
+      if (rig.scene.meshes[m].points == c.source) view.meshes.push_back(m);
+    }
+  }
+  const auto& carried =
+      StructuralValue(graph, *illumination, "carriedMeshes").get<std::vector<std::int64_t>>();
+  for (std::size_t i = 0; i < carried.size(); ++i) {
+    view.carried.push_back({{*illumination, def.FindAttribute("pointIrradiance"), static_cast<int>(i), -1},
+                            static_cast<std::size_t>(carried[i])});
+  }
+  return view;
+}
+
+CameraView AcceleratedView(const CameraView& view, const Rig& rig,
+                           const std::vector<AppliedSubspace>& applied) {
+  CameraView fast = view;
+  for (const AppliedSubspace& one : applied) {
+    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
+      if (view.irradiance.has_value() && one.entry.points[p].points == *view.irradiance)
+        fast.irradiance = one.Output(*rig.graph, p);
+      for (CameraView::Carried& carried : fast.carried) {
+        if (one.entry.points[p].points == carried.irradiance) carried.irradiance = one.Output(*rig.graph, p);
+      }
+    }
+  }
+  return fast;
+}
+
+Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compiler, const CameraView& view,
+                                                const std::vector<double>& times,
+                                                const RigFrameOptions& options, Verdicts* verdicts) {
+  Request request;
+  request.varying.push_back(rig.scene.time);
+  for (std::size_t m : view.meshes) request.outputs.push_back({rig.scene.meshes[m].points, {}});
+  const auto camera = static_cast<Index>(request.outputs.size());
+  request.outputs.push_back({view.world_from_screen, {}});
+  for (const CameraView::Light& light : view.lights) {
+    request.outputs.push_back({light.matrix, {}});
+    request.outputs.push_back({light.color, {}});
+  }
+  const auto irradiance = static_cast<Index>(request.outputs.size());
+  if (view.irradiance.has_value()) request.outputs.push_back({*view.irradiance, {}});
+  for (const CameraView::Carried& carried : view.carried) request.outputs.push_back({carried.irradiance, {}});
+  if (verdicts != nullptr) verdicts->Ask(rig, &request);
+  const auto plan = CompileFor(rig, compiler, request);
+  if (!plan.ok()) return plan.status();
+
+  std::vector<Index> triangles;
+  std::vector<float> albedo;
+  std::vector<Index> carrier;  // of each triangle: in view.carried, or none
+  std::vector<Index> first_point(view.meshes.size());
+  Index count = 0;
+  for (std::size_t i = 0; i < view.meshes.size(); ++i) {
+    const std::size_t m = view.meshes[i];
+    first_point[i] = count;
+    Index owner = kNoIndex;
+    for (std::size_t k = 0; k < view.carried.size(); ++k) {
+      if (view.carried[k].mesh == i) owner = static_cast<Index>(k);
+    }
+    const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
+    for (const Mesh::Primitive& primitive : mesh.primitives) {
+      for (Index t = 3 * primitive.first_triangle;
+           t < 3 * (primitive.first_triangle + primitive.triangle_count); ++t) {
+        if (t % 3 == 0) carrier.push_back(owner);
+        triangles.push_back(count + mesh.triangles[t]);
+        albedo.push_back(std::clamp(primitive.base_color[t % 3], 0.0f, 1.0f));
+      }
+    }
+    count += rig.scene.meshes[m].mesh().point_count();
+  }
+
+  std::vector<CameraImage> images(times.size());
+  KPSA_RETURN_IF_ERROR(
+      EvaluateTimes(rig, *plan, times, options, [&](std::size_t frame, const Evaluator& evaluator) {
+        if (verdicts != nullptr) verdicts->Add(FrameNumber(times[frame], rig.fps), evaluator);
+        PointBuffer points(count);
+        std::size_t at = 0;
+        for (Index m = 0; m < view.meshes.size(); ++m) {
+          const ConstPointsView from = evaluator.Points(m);
+          std::copy_n(from.x, from.count, points.view().x + at);
+          std::copy_n(from.y, from.count, points.view().y + at);
+          std::copy_n(from.z, from.count, points.view().z + at);
+          at += from.count;
+        }
+        std::vector<DiffuseLight> lights;
+        for (Index l = 0; l < view.lights.size(); ++l) {
+          lights.push_back({view.lights[l].kind, evaluator.Get<Matrix4>(camera + 1 + 2 * l),
+                            evaluator.Get<Double3>(camera + 2 + 2 * l)});
+        }
+        const Result<PathTracer> tracer =
+            PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights);
+        if (!tracer.ok()) return tracer.status();
+        const Matrix4 world_from_screen = evaluator.Get<Matrix4>(camera);
+        CameraImage& image = images[frame];
+        const std::size_t pixels = std::size_t{view.width} * view.height;
+        image.width = view.width, image.height = view.height;
+        for (std::vector<float>* layer : {&image.albedo, &image.direct, &image.indirect})
+          layer->assign(3 * pixels, 0);
+        image.hit.assign(pixels, 0);
+        // Light after bounces, at a pixel: its own, or what the points around say of a carried mesh
+        const auto indirect = [&](std::size_t p, const ShadingPlace& place) -> Double3 {
+          const auto at = [](const ConstPointsView& light, std::size_t i) {
+            return Double3{light.x[i], light.y[i], light.z[i]};
+          };
+          if (!place.hit || !view.irradiance.has_value()) return {};
+          const Index owner = carrier[place.triangle];
+          if (owner == kNoIndex) return at(evaluator.Points(irradiance), p);
+          const ConstPointsView light = evaluator.Points(irradiance + 1 + owner);
+          const Index* corner = &triangles[3 * std::size_t{place.triangle}];
+          const Index first = first_point[view.carried[owner].mesh];
+          return at(light, corner[0] - first) * (1 - place.u - place.v) +
+                 at(light, corner[1] - first) * place.u + at(light, corner[2] - first) * place.v;
+        };
+        const auto shade = [&](std::size_t begin, std::size_t end) {
+          for (std::size_t p = begin; p < end; ++p) {
+            Double3 origin, direction;
+            PixelRay(world_from_screen, static_cast<Index>(p), view.width, view.height, &origin, &direction);
+            const ShadingPlace place = tracer->Look(origin, direction);
+            const Double3 light =
+                tracer->Direct(place, static_cast<std::uint32_t>(p) * 0x9e3779b1u, kAreaSamples);
+            image.hit[p] = place.hit;
+            const Double3 bounced = indirect(p, place);
+            for (int k = 0; k < 3; ++k) {
+              image.albedo[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(place.albedo[k]);
+              image.direct[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(light[k]);
+              image.indirect[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(bounced[k]);
+            }
+          }
+        };
+        ParallelFor(pixels, 256, shade);
+        return Status();
+      }));
+  return images;
+}
+
+Image LightError(const CameraImage& a, const CameraImage& b, double error_max) {
+  Image image(static_cast<int>(a.width), static_cast<int>(a.height), {24, 26, 30});
+  for (std::size_t p = 0; p < a.hit.size(); ++p) {
+    double squares = 0;
+    for (std::size_t k = 3 * p; k < 3 * p + 3; ++k) {
+      const double d = double{a.indirect[k]} - b.indirect[k];
+      squares += d * d;
+    }
+    const Rgb color = TurboColor(std::sqrt(squares) / error_max);
+    std::copy(color.begin(), color.end(), image.rgb.begin() + static_cast<std::ptrdiff_t>(3 * p));
+  }
+  return image;
+}
+
+Image Develop(const CameraImage& picture, double exposure, CameraLayer layer) {
+  Image image(static_cast<int>(picture.width), static_cast<int>(picture.height), {24, 26, 30});
+  for (std::size_t p = 0; p < picture.hit.size(); ++p) {
+    if (picture.hit[p] == 0) continue;
+    for (std::size_t k = 3 * p; k < 3 * p + 3; ++k) {
+      double light = layer == CameraLayer::kIndirect ? 0 : picture.direct[k];
+      if (layer != CameraLayer::kDirect) light += std::max(0.0f, picture.indirect[k]);
+      const double radiance = picture.albedo[k] * light * exposure / 3.14159265358979323846;
+      image.rgb[k] = static_cast<std::uint8_t>(std::lround(255 * SrgbCurve(Compressed(radiance))));
+    }
+  }
+  return image;
+}
+
+}  // namespace kpsa::engine

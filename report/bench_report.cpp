@@ -1,0 +1,345 @@
+#include "report/bench_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/quantity_text.h"
+#include "base/text.h"
+#include "report/promise_text.h"
+#include "report/table.h"
+#include "report/tolerance_text.h"
+#include "report/verdict_text.h"
+
+namespace kpsa::engine {
+namespace {
+
+using OrderedJson = nlohmann::ordered_json;
+
+double Finite(double value) { return std::isfinite(value) ? value : -1; }
+
+double Rms(const std::vector<double>& values) {
+  double sum = 0;
+  for (double value : values) sum += value * value;
+  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+// The error of every frame, and what it consists of; null where no modes are kept.
+OrderedJson FrameErrorsJson(const FrameErrors& e) {
+  if (e.empty()) return {};
+  OrderedJson hits = OrderedJson::array(), misses = OrderedJson::array();
+  for (char hit : e.hit) hits.push_back(hit != 0);
+  for (char miss : e.miss) misses.push_back(miss != 0);
+  return {{"rms",
+           {{"projection", Rms(e.projection)},
+            {"cueing", Rms(e.cueing)},
+            {"storage", Rms(e.storage)},
+            {"total", Rms(e.total)},
+            {"soft_cache", Rms(e.soft_cache)}}},
+          {"times", e.times},
+          {"projection", e.projection},
+          {"cueing", e.cueing},
+          {"storage", e.storage},
+          {"total", e.total},
+          {"soft_cache", e.soft_cache},
+          {"hit", hits},
+          {"miss", misses}};
+}
+
+// Null where it was not asked for.
+OrderedJson IdleJson(const IdleDeformers& idle) {
+  if (!idle.measured()) return {};
+  OrderedJson deformers = OrderedJson::array();
+  for (const IdleDeformers::Deformer& each : idle.deformers) {
+    deformers.push_back({{"name", each.name},
+                         {"type", each.type},
+                         {"difference", Finite(each.difference)},
+                         {"off", each.off}});
+  }
+  return {{"share", idle.share},
+          {"ms_per_frame", idle.ms_per_frame},
+          {"difference", idle.difference},
+          {"frames", idle.frames},
+          {"deformers", std::move(deformers)}};
+}
+
+std::string IdleText(const IdleDeformers& idle) {
+  const std::vector<std::string> off = idle.Off();
+  if (off.empty())
+    return fmt::format("idle       none of {} makes less than {} on {}\n",
+                       Plural(idle.deformers.size(), "deformer"), LengthText(idle.tolerance),
+                       Plural(idle.frames, "frame"));
+  return fmt::format(
+      "idle       {:.0f} % of the full cost makes less than {} on {} ({} together):\n           {}\n",
+      100 * idle.share, LengthText(idle.tolerance), Plural(idle.frames, "frame"), LengthText(idle.difference),
+      fmt::join(off, ", "));
+}
+
+OrderedJson RangeJson(const BenchResult::Range& range) { return {range.least, range.most}; }
+
+OrderedJson PromiseJson(const Promise& p) {
+  if (!p.promised()) return {};
+  OrderedJson worst;
+  if (!p.worst_clip.empty()) {
+    worst = {{"clip", p.worst_clip},
+             {"frame", p.worst_frame},
+             {"error", Finite(p.worst_error)},
+             {"tolerances", p.worst_error / p.tolerance}};
+  }
+  const auto share = [](std::size_t part, std::size_t all) {
+    return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
+  };
+  return {{"kept", p.kept()},
+          {"rate", share(p.beyond, p.frames)},
+          {"promised", p.rate},
+          {"rate_of_hits", share(p.hits_beyond, p.hits)},
+          {"promised_of_hits", p.hit_rate()},
+          {"worst_accepted", std::move(worst)}};
+}
+
+ToleranceWords WordsOf(const BenchResult& r) {
+  return {"frames", "train on clips that are like these, or on more samples", r.light};
+}
+
+OrderedJson ReferenceJson(const ReferenceTable& table) {
+  if (table.rows.empty()) return {};
+  OrderedJson rows = OrderedJson::array();
+  for (const FromReference& row : table.rows) {
+    OrderedJson rms = OrderedJson::array();
+    for (const double error : row.rms) rms.push_back(Finite(error));
+    rows.push_back({{"name", row.name}, {"rms", rms}, {"ms_per_frame", row.ms}, {"frames", row.frames}});
+  }
+  return {{"variant", table.variant},
+          {"outputs", table.outputs},
+          {"points", table.points},
+          {"of_points", table.of_points},
+          {"rows", rows}};
+}
+
+OrderedJson SideJson(const BenchResult& r, const BenchContext& context) {
+  nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
+  for (const BenchNode& n : r.full_nodes) {
+    nodes.push_back({{"name", n.name},
+                     {"type", n.type},
+                     {"ms_per_frame", n.ms_per_frame},
+                     {"points", n.points},
+                     {"ns_per_point", n.points == 0 ? 0 : n.ms_per_frame * 1e6 / n.points}});
+  }
+  const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
+  const std::string bound =
+      fmt::format("the graph that the subspace reads ({:.4f} ms){}", r.bound_graph_ms,
+                  r.bound_points_ms > 0
+                      ? fmt::format(" and points that are not accelerated ({:.4f} ms)", r.bound_points_ms)
+                      : "");
+  OrderedJson per_frame = OrderedJson::array();
+  for (const BenchResult::Frame& f : r.per_frame) {
+    OrderedJson row = {{"clip", f.clip}, {"frame", f.number}};
+    row.update(DecisionJson<OrderedJson>(f.decision));
+    row.update({{"rms", Finite(f.rms)},
+                {"max", Finite(f.max)},
+                {"full_ms", f.full_ms},
+                {"accelerated_ms", f.accelerated_ms}});
+    per_frame.push_back(std::move(row));
+  }
+  return {
+      {"schema", "kpsa.bench/1"},
+      {"rig", context.rig},
+      {"subspace", r.subspace},
+      {"mode", r.mode},
+      {"clip", fmt::format("{}", fmt::join(r.clips, ", "))},
+      {"clips", r.clips},
+      {"trained_on", r.trained_on},
+      {"points", r.points},
+      {"output_points", r.output_points},
+      {"cues", r.cues},
+      {"cue_points", r.cue_points},
+      {"cue_stages", r.cue_stages},
+      {"modes", r.modes},
+      {"storage", {{"bytes_per_point", r.bytes_per_point}, {"mean_rank", r.mean_rank}}},
+      {"frames", r.frames},
+      {"threads", context.options.threads},
+      {"runs", context.options.runs},
+      {"units", r.light ? "light" : "m"},
+      {"tolerance", r.promise.tolerance},
+      {"clock", r.cpu_times ? "cpu" : "wall"},
+      {"wall_over_cpu", r.wall_over_cpu},
+      {"full",
+       {{"ms_per_frame", r.full_ms},
+        {"ms_range", RangeJson(r.full_range)},
+        {"ns_per_point", r.output_points == 0 ? 0 : r.full_ms * 1e6 / static_cast<double>(r.output_points)},
+        {"nodes", nodes}}},
+      {"accelerated",
+       {{"ms_per_frame", r.accelerated_ms},
+        {"ms_range", RangeJson(r.accelerated_range)},
+        {"parts_recorded", r.parts_ms},
+        {"graph", r.graph_ms},
+        {"cues", r.cues_ms},
+        {"projection", r.projection_ms},
+        {"reconstruction", r.reconstruction_ms},
+        {"downstream", r.downstream_ms},
+        {"misses", r.misses_ms}}},
+      {"speedup", r.speedup()},
+      {"speedup_range", RangeJson(r.speedup_range)},
+      {"speedup_on_hits",
+       r.hits == 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(r.speedup_on_hits())},
+      {"ceiling", {{"speedup", r.ceiling()}, {"ms_per_frame", r.bound_ms}, {"bound_by", bound}}},
+      {"hit_rate", static_cast<double>(r.hits) / frames},
+      {"blend_rate", static_cast<double>(r.blends) / frames},
+      {"most_frequent_reason", r.most_frequent_reason},
+      {"violation_rate", static_cast<double>(r.promise.beyond) / frames},
+      {"violation_limit", r.promise.rate},
+      {"promise", PromiseJson(r.promise)},
+      {"error",
+       {{"rms", Finite(r.error_rms)},
+        {"max", Finite(r.error_max)},
+        {"p99", Finite(r.error_p99)},
+        {"bbox_diagonal", r.diagonal},
+        {"worst_clip", r.worst_clip},
+        {"worst_frame", r.worst_clip.empty() ? OrderedJson() : OrderedJson(r.worst_frame)}}},
+      {"frame_errors", FrameErrorsJson(r.frame_errors)},
+      {"reference", ReferenceJson(r.reference)},
+      {"idle", IdleJson(r.idle)},
+      {"motion", {{"rms", r.motion_rms}}},
+      {"nodes", {{"total", r.nodes_total}, {"never_evaluated", r.never_evaluated}}},
+      {"points_evaluated_per_frame", {{"full", r.points_full}, {"accelerated", r.points_accelerated}}},
+      {"tolerances", ToleranceJson<OrderedJson>(r.tolerances, WordsOf(r))},
+      {"per_frame", per_frame},
+      {"notes", r.notes}};
+}
+
+std::string ReferenceText(const BenchResult& r) {
+  if (r.reference.rows.empty()) return "";
+  std::vector<std::string> header{"RMS from " + r.reference.variant};
+  for (const std::string& output : r.reference.outputs) header.push_back(">" + output);
+  header.insert(header.end(), {">ms/frame", ">accelerated is"});
+  Table table(header);
+  for (const FromReference& row : r.reference.rows) {
+    std::vector<std::string> cells{row.name};
+    for (const double error : row.rms) cells.push_back(ErrorText(error, r.light));
+    cells.push_back(fmt::format("{:.3f}", row.ms));
+    const bool itself = row.name == r.reference.rows.front().name;
+    cells.push_back(itself ? "" : RatioText(Ratio(row.ms, r.accelerated_ms), 1) + " as fast");
+    table.Row(cells);
+  }
+  return fmt::format("\n{}at {} of {} points\n", table.Text(), r.reference.points, r.reference.of_points);
+}
+
+std::string SideText(const BenchResult& r, const BenchContext& context) {
+  const auto error = [&](double value) { return ErrorText(value, r.light); };
+  std::string text;
+  if (context.kpsa.size() > 1) text += r.subspace + "\n";
+  const double frames = static_cast<double>(std::max<std::size_t>(1, r.frames));
+  text += fmt::format("{}: {} by {} ({}), {} modes\n", context.rig, Plural(r.points, "point"),
+                      Plural(r.cues, "cue"), fmt::join(r.cue_stages, ", "), r.modes);
+  text += fmt::format("trained on {}; tested on {}: {}, {}, medians of {}, {}\n\n",
+                      fmt::join(r.trained_on, ", "), fmt::join(r.clips, ", "), Plural(r.frames, "frame"),
+                      Plural(static_cast<std::uint64_t>(context.options.threads), "thread"),
+                      Plural(static_cast<std::uint64_t>(context.options.runs), "run"),
+                      r.cpu_times ? "the thread's CPU time" : "wall time");
+  std::string heaviest;
+  for (std::size_t i = 0; i < std::min<std::size_t>(4, r.full_nodes.size()); ++i)
+    heaviest +=
+        fmt::format("{}{} {:.3f}", i == 0 ? "" : ", ", r.full_nodes[i].name, r.full_nodes[i].ms_per_frame);
+  std::string parts = fmt::format("graph {:.3f}, cues {:.3f}, projection {:.3f}, reconstruction {:.3f}",
+                                  r.graph_ms, r.cues_ms, r.projection_ms, r.reconstruction_ms);
+  if (r.downstream_ms > 0) parts += fmt::format(", later stages {:.3f}", r.downstream_ms);
+  if (r.misses_ms > 0) parts += fmt::format(", misses {:.3f}", r.misses_ms);
+  Table times({"", ">ms/frame", "over the runs", "of which"});
+  const bool ranges = context.options.runs > 1;
+  const auto range = [&](const BenchResult::Range& of, const char* before, const char* after) {
+    return ranges ? fmt::format("{}{:.3f} to {:.3f}{}", before, of.least, of.most, after) : "";
+  };
+  times.Row({"full", fmt::format("{:.3f}", r.full_ms), range(r.full_range, "", ""), heaviest});
+  times.Row(
+      {"accelerated", fmt::format("{:.3f}", r.accelerated_ms), range(r.accelerated_range, "", ""), parts});
+  text += times.Text();
+  text += fmt::format(
+      "\nspeedup    {}{}{}; ceiling {}, bound by the graph that the subspace reads{}\n",
+      RatioText(r.speedup(), 2),
+      ranges && std::isfinite(r.speedup())
+          ? fmt::format(" ({:.2f} to {:.2f} over the runs)", r.speedup_range.least, r.speedup_range.most)
+          : "",
+      r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
+      RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  text += fmt::format("hits       {:.1f} % of frames: {}\n", 100 * static_cast<double>(r.hits) / frames,
+                      CountsText(r.hits, r.blends, r.frames - r.hits - r.blends));
+  if (!r.most_frequent_reason.empty()) text += "           " + r.most_frequent_reason + "\n";
+  text += "promise    " + PromiseText(r.promise, "           ");
+  text +=
+      fmt::format("error      RMS {}, 99 % {}, max {}{}; motion RMS {}, diagonal {}\n", error(r.error_rms),
+                  error(r.error_p99), error(r.error_max),
+                  r.worst_clip.empty() ? "" : fmt::format(" (frame {} of {})", r.worst_frame, r.worst_clip),
+                  error(r.motion_rms), error(r.diagonal));
+  if (const FrameErrors& e = r.frame_errors; !e.empty()) {
+    text += fmt::format(
+        "split      RMS of all frames reconstructed: projection {}, cueing {}, storage {}, together {}; with "
+        "SoftCache {}\n",
+        error(Rms(e.projection)), error(Rms(e.cueing)), error(Rms(e.storage)), error(Rms(e.total)),
+        error(Rms(e.soft_cache)));
+  }
+  if (r.idle.measured()) text += IdleText(r.idle);
+  text += fmt::format(
+      "evaluated  {} points a frame instead of {}; {} of {} nodes never{}\n",
+      Thousands(static_cast<std::uint64_t>(std::llround(r.points_accelerated))),
+      Thousands(static_cast<std::uint64_t>(std::llround(r.points_full))), r.never_evaluated.size(),
+      r.nodes_total,
+      r.never_evaluated.empty()
+          ? ""
+          : fmt::format(
+                ": {}{}",
+                fmt::join(r.never_evaluated.begin(),
+                          r.never_evaluated.begin() +
+                              static_cast<std::ptrdiff_t>(std::min<std::size_t>(6, r.never_evaluated.size())),
+                          ", "),
+                r.never_evaluated.size() > 6 ? ", ..." : ""));
+  if (!r.tolerances.rows.empty()) text += "\n" + ToleranceText(r.tolerances, WordsOf(r));
+  return text + ReferenceText(r);
+}
+
+}  // namespace
+
+std::string BenchJson(const std::vector<BenchResult>& results, const BenchContext& context) {
+  OrderedJson document = SideJson(results.front(), context), beside = OrderedJson::array();
+  for (std::size_t i = 1; i < results.size(); ++i) beside.push_back(SideJson(results[i], context));
+  document["beside"] = std::move(beside);
+  return document.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+}
+
+std::string FramesText(const std::vector<BenchResult>& results) {
+  std::string text;
+  for (const BenchResult& r : results) {
+    std::vector<std::string> header{"clip", ">frame", "", ">full", ">score", ">RMS", ">max"};
+    header.insert(header.end(), {">full ms", ">accelerated ms", ">speedup"});
+    for (const FromReference& row : r.reference.rows)
+      header.push_back(fmt::format(">{} from {}", row.name, r.reference.variant));
+    header.emplace_back("why");
+    Table table(header);
+    for (std::size_t i = 0; i < r.per_frame.size(); ++i) {
+      const BenchResult::Frame& f = r.per_frame[i];
+      const FrameDecision& d = f.decision;
+      std::vector<std::string> cells{f.clip, fmt::format("{}", f.number), VerdictName(d.verdict())};
+      cells.push_back(fmt::format("{:.0f} %", 100 * d.full_weight));
+      cells.push_back(std::isfinite(d.score) ? fmt::format("{:.3g}", d.score) : "-");
+      for (const double error : {f.rms, f.max}) cells.push_back(ErrorText(error, r.light));
+      for (const double ms : {f.full_ms, f.accelerated_ms}) cells.push_back(fmt::format("{:.3f}", ms));
+      cells.push_back(RatioText(Ratio(f.full_ms, f.accelerated_ms)));
+      for (const FromReference& row : r.reference.rows) cells.push_back(ErrorText(row.frames[i], r.light));
+      cells.push_back(d.hit() ? "" : d.reason);
+      table.Row(cells);
+    }
+    if (results.size() > 1) text += r.subspace + "\n";
+    text += table.Text();
+  }
+  return text;
+}
+
+std::string BenchText(const std::vector<BenchResult>& results, const BenchContext& context) {
+  std::string text;
+  for (const BenchResult& result : results) text += (text.empty() ? "" : "\n\n") + SideText(result, context);
+  const std::string with = context.kpsa.empty() ? "--accelerate" : "--kpsa " + context.kpsa.front();
+  return text + fmt::format("\nnext: kpsa eval {} {} -o fast.npz\n", context.rig, with);
+}
+
+}  // namespace kpsa::engine

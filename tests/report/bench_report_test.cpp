@@ -1,0 +1,38 @@
+// What a bench measured, as text and as JSON.
+#include "report/bench_report.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace kpsa::engine {
+namespace {
+
+using Json = nlohmann::json;
+
+TEST(BenchReport, WhatIsNotKnownIsNoNumber) {
+  BenchResult result;
+  result.per_frame.emplace_back();
+  const std::string text = BenchText({result}, {}) + FramesText({result});
+  EXPECT_NE(text.find("speedup    -; ceiling -, bound"), std::string::npos) << text;
+  EXPECT_EQ(text.find("0.0x"), std::string::npos) << text;
+  const Json json = Json::parse(BenchJson({result}, {}));
+  EXPECT_TRUE(json["ceiling"]["speedup"].is_null() && json["speedup"].is_null()) << json;
+  EXPECT_TRUE(json["error"]["worst_frame"].is_null()) << json["error"];
+}
+
+TEST(BenchReport, TheSpeedupHasASpread) {
+  BenchResult result;
+  result.full_ms = 1, result.accelerated_ms = 0.02, result.speedup_range = {45, 55};
+  BenchContext context;
+  context.options.runs = 3;
+  EXPECT_NE(BenchText({result}, context).find("speedup    50.00x (45.00 to 55.00 over the runs)"),
+            std::string::npos)
+      << BenchText({result}, context);
+}
+
+}  // namespace
+}  // namespace kpsa::engine
