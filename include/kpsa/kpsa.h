@@ -10,6 +10,7 @@
 //   metres
 #pragma once
 
+#include "kpsa/bench.h"    // IWYU pragma: export
 #include "kpsa/edit.h"     // IWYU pragma: export
 #include "kpsa/library.h"  // IWYU pragma: export
 #include "kpsa/result.h"   // IWYU pragma: export

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "kpsa/bench.h"
 #include "kpsa/edit.h"
 #include "kpsa/library.h"
 #include "kpsa/result.h"
@@ -94,6 +95,9 @@ class Rig {
   // replaced). Of a rig that is not accelerated. Takes seconds to minutes; nothing is written unless it
   // succeeds.
   Result<TrainingReport> Train(const TrainingOptions& options, const std::string& subspace = {}) const;
+  // Full against accelerated evaluation of the same frames. Of an accelerated rig; it, and its scenes, stay as they
+  // are. Errors: no such clip, a frame that fails, whatever Accelerated may find by now.
+  Result<BenchReport> Bench(const BenchOptions& options = {}) const;
 
  private:
   struct Impl;

@@ -1,0 +1,101 @@
+// Rig::Bench.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "host/bench/bench.h"
+#include "host/face_impl.h"
+#include "host/open_rig.h"
+#include "host/problems.h"
+#include "host/rig_frames.h"
+#include "kpsa/bench.h"
+#include "kpsa/kpsa_node.h"
+
+namespace kpsa {
+namespace {
+
+engine::Status CheckNumbers(const BenchOptions& options) {
+  if (options.runs < 1 || options.runs > 1000) return engine::Status::Usage("runs: expected 1 to 1,000");
+  if (options.threads < 1 || options.threads > 1024)
+    return engine::Status::Usage("threads: expected 1 to 1,024");
+  return engine::Status();
+}
+
+// Those of all entries, each once; the rig's first clip where they name none, or its rest ("").
+std::vector<std::string> TestClips(const engine::Rig& rig) {
+  std::vector<std::string> clips;
+  for (const engine::Acceleration& entry : rig.accelerate) {
+    for (const std::string& clip : entry.test_clips) {
+      if (std::ranges::find(clips, clip) == clips.end()) clips.push_back(clip);
+    }
+  }
+  if (clips.empty()) clips.push_back(rig.scene.clips.empty() ? "" : rig.scene.clips.front().id);
+  return clips;
+}
+
+// Copies of a rig; a clip that it lacks is refused.
+engine::RigOpener CopiesOf(const engine::Rig& rest) {
+  engine::RigOpener opener;
+  opener.path = rest.path;
+  opener.open = [&rest](const engine::RigChange& change) -> engine::Result<std::unique_ptr<engine::OpenRig>> {
+    auto open = std::make_unique<engine::OpenRig>();
+    open->rig = rest;
+    if (change.clip.has_value()) {
+      if (engine::Status set = engine::SetClip(&open->rig, *change.clip); !set.ok())
+        return std::move(set).At({rest.path});
+    }
+    return open;
+  };
+  opener.times = [](const engine::OpenRig& open) { return engine::ClipTimes(open.rig); };
+  return opener;
+}
+
+BenchReport ReportOf(engine::BenchResult result) {
+  BenchReport report;
+  report.clips = std::move(result.clips);
+  report.frames = result.frames;
+  report.hits = result.hits, report.blends = result.blends;
+  report.most_frequent_reason = std::move(result.most_frequent_reason);
+  report.full_ms = result.full_ms, report.accelerated_ms = result.accelerated_ms;
+  const auto known = [](double ratio) { return std::isfinite(ratio) ? ratio : 0; };
+  report.speedup = known(result.speedup());
+  if (result.hits > 0) report.speedup_on_hits = known(result.speedup_on_hits());
+  report.error_rms = result.error_rms, report.error_max = result.error_max;
+  report.tolerance =
+      result.promise.promised() ? result.promise.tolerance : std::numeric_limits<double>::infinity();
+  report.violation_rate = result.promise.rate;
+  report.beyond = result.promise.promised() ? result.promise.beyond : 0;
+  report.kept = result.promise.kept();
+  report.notes = std::move(result.notes);
+  return report;
+}
+
+}  // namespace
+
+Result<BenchReport> Rig::Bench(const BenchOptions& options) const {
+  if (!is_accelerated())
+    return engine::ProblemsOf(
+        engine::Status::Usage("this rig is not accelerated: expected one that Accelerated gave"));
+  if (const engine::Status numbers = CheckNumbers(options); !numbers.ok()) return engine::ProblemsOf(numbers);
+  engine::BenchOptions bench;
+  bench.runs = options.runs;
+  bench.threads = options.threads;
+  std::atomic<bool> cancel = false;
+  engine::Watch watch;
+  watch.cancel = &cancel;
+  if (options.progress) {
+    watch.progress = [&](std::size_t done, std::size_t) {
+      if (!options.progress(done)) cancel = true;
+    };
+  }
+  engine::Result<std::vector<engine::BenchResult>> results =
+      engine::RunBench(CopiesOf(impl_->rest), {*impl_->acceleration},
+                       options.clips.empty() ? TestClips(impl_->rest) : options.clips, bench, watch);
+  if (!results.ok()) return engine::ProblemsOf(results.status());
+  return ReportOf(std::move(results->front()));
+}
+
+}  // namespace kpsa
