@@ -8,8 +8,8 @@
 #include "cli/common.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
-#include "cli/vertex_compare.h"
 #include "files/quantity.h"
+#include "files/vertex_compare.h"
 #include "report/table.h"
 
 namespace kpsa::engine {

@@ -35,7 +35,7 @@ CommandResult Eval(const EvalFlags& flags) {
   KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, VertexSuffixes()));
   KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, flags.acceleration.wanted()));
   if (*flags.output == "-" && flags.json) return Status::Usage("-o - and --json: stdout takes one of them");
-  if (flags.blender && Suffix(*flags.output) != ".pc2" && Suffix(*flags.output) != ".mdd") {
+  if (flags.blender && FileSuffix(*flags.output) != ".pc2" && FileSuffix(*flags.output) != ".mdd") {
     return Status::Usage("--blender is for .pc2 and .mdd files, found {}", *flags.output);
   }
 

@@ -34,7 +34,7 @@ struct Formatted {
   std::string before, after;
 };
 Result<Formatted> Format(const std::string& file, const FmtFlags& flags) {
-  const std::string suffix = Suffix(file);
+  const std::string suffix = FileSuffix(file);
   if (suffix != ".yaml" && suffix != ".yml")
     return Status::Usage("expected a rig file that ends in .yaml").At({file});
   Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(file, kMaxYamlBytes);

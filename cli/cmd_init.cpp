@@ -27,7 +27,7 @@ CommandResult Init(const InitFlags& flags) {
     if (!samples.ok()) return samples.status();
     options.samples = *samples;
   }
-  const std::string suffix = Suffix(flags.file);
+  const std::string suffix = FileSuffix(flags.file);
   if (suffix != ".glb" && suffix != ".gltf" && suffix != ".vrm")
     return Status::Usage("expected a character, .glb, .gltf or .vrm").At({flags.file});
   const std::string stem = fs::path(flags.file).stem().string();

@@ -1,58 +1,26 @@
 // kpsa inspect: what is in a file.
-#include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "cli/command.h"
 #include "cli/common.h"
-#include "cli/file_facts.h"
 #include "cli/frames_range.h"
 #include "cli/options.h"
-#include "report/table.h"
+#include "files/suffix.h"
+#include "report/file_facts.h"
 
 namespace kpsa::engine {
 namespace {
 
-std::string CellText(const FactTable::Cell& cell) {
-  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
-  if (const auto* count = std::get_if<std::uint64_t>(&cell)) return Thousands(*count);
-  return fmt::format("{:.6g}", std::get<double>(cell));
-}
-
-nlohmann::ordered_json CellJson(const FactTable::Cell& cell) {
-  return std::visit([](const auto& value) { return nlohmann::ordered_json(value); }, cell);
-}
-
-// "mesh node" -> "mesh_node".
-std::string Key(std::string name) {
-  if (name.starts_with('>')) name.erase(0, 1);
-  for (char& c : name) {
-    if (c == ' ') c = '_';
-  }
-  return name;
-}
-
-nlohmann::ordered_json Json(const std::string& path, const FileFacts& facts) {
-  nlohmann::ordered_json json = {{"schema", "kpsa.inspect/1"}, {"file", path}, {"kind", facts.kind}};
-  for (const auto& [name, value] : facts.facts) {
-    json[Key(name)] = CellJson(value);
-    if (name == "training") {
-      // It is JSON in the file already
-      const auto training = nlohmann::ordered_json::parse(std::get<std::string>(value), nullptr, false);
-      if (!training.is_discarded()) json["training"] = training;
-    }
-  }
-  for (const FactTable& table : facts.tables) {
-    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-    for (const auto& row : table.rows) {
-      nlohmann::ordered_json object = nlohmann::ordered_json::object();
-      for (std::size_t c = 0; c < row.size(); ++c) object[Key(table.columns[c])] = CellJson(row[c]);
-      rows.push_back(std::move(object));
-    }
-    json[Key(table.name)] = std::move(rows);
-  }
-  json["notes"] = facts.notes;
-  return json;
+// A rig is loaded, with its plugins; --fps is of point caches.
+Result<FileFacts> FactsOf(const Flags& flags, double fps) {
+  const std::string suffix = FileSuffix(flags.file);
+  if (suffix != ".yaml" && suffix != ".yml") return InspectFile(flags.file, fps);
+  Flags rig;
+  rig.file = flags.file;
+  rig.plugins = flags.plugins;
+  const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(rig);
+  if (!open.ok()) return open.status();
+  return RigFacts((*open)->rig);
 }
 
 CommandResult Inspect(const Flags& flags) {
@@ -63,34 +31,9 @@ CommandResult Inspect(const Flags& flags) {
     if (!(*parsed > 0)) return Status::Usage("--fps {}: expected a number above 0", *flags.fps);
     fps = *parsed;
   }
-  const Result<FileFacts> facts = InspectFile(flags.file, fps, flags.plugins);
+  const Result<FileFacts> facts = FactsOf(flags, fps);
   if (!facts.ok()) return facts.status();
-  if (flags.json) {
-    PrintJson(Json(flags.file, *facts));
-    return 0;
-  }
-  Print(fmt::format("{}: {}\n", flags.file, facts->kind));
-  for (const auto& [name, value] : facts->facts) {
-    if (name == "training") continue;  // JSON, for --json
-    const auto* bytes = std::get_if<std::uint64_t>(&value);
-    const std::string text = bytes != nullptr && name.ends_with("bytes") ? ByteText(*bytes) : CellText(value);
-    Print(fmt::format("  {:<18} {}\n",
-                      name.ends_with(" bytes") ? name.substr(0, name.size() - 6)
-                      : name == "bytes"        ? "size"
-                                               : name,
-                      text));
-  }
-  for (const FactTable& facts_table : facts->tables) {
-    if (facts_table.rows.empty()) continue;
-    Table table(facts_table.columns);
-    for (const auto& row : facts_table.rows) {
-      std::vector<std::string> cells;
-      for (const FactTable::Cell& cell : row) cells.push_back(CellText(cell));
-      table.Row(std::move(cells));
-    }
-    Print(fmt::format("\n{} ({})\n{}", facts_table.name, facts_table.rows.size(), table.Text()));
-  }
-  for (const std::string& note : facts->notes) Print("note: " + note + "\n");
+  Print(flags.json ? FactsJson(flags.file, *facts) : FactsText(flags.file, *facts));
   return 0;
 }
 

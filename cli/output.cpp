@@ -17,18 +17,10 @@ namespace kpsa::engine {
 
 namespace fs = std::filesystem;
 
-std::string Suffix(const std::string& path) {
-  std::string suffix = fs::path(path).extension().string();
-  for (char& c : suffix) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return suffix;
-}
-
 Status CheckOutput(const std::string& path, bool force, const std::vector<std::string>& suffixes) {
   if (path == "-") return Status();
   if (path.empty()) return Status::Usage("-o: the name of the output is empty");
-  if (!suffixes.empty() && std::find(suffixes.begin(), suffixes.end(), Suffix(path)) == suffixes.end()) {
+  if (!suffixes.empty() && std::find(suffixes.begin(), suffixes.end(), FileSuffix(path)) == suffixes.end()) {
     return Status::Usage("expected a name that ends in {}", fmt::join(suffixes, ", ")).At({path});
   }
   if (fs::path(path).lexically_normal().string().starts_with("/dev/std"))

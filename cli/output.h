@@ -8,11 +8,9 @@
 #include <vector>
 
 #include "base/status.h"
+#include "files/suffix.h"
 
 namespace kpsa::engine {
-
-// The lower-case suffix of a path with its dot, "" where there is none.
-std::string Suffix(const std::string& path);
 
 // All refusals for an output at `path` with one of the suffixes (".npz", ...; empty: any). "-" is stdout and
 // passes.

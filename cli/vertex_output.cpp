@@ -68,7 +68,7 @@ class CacheOutput final : public VertexOutput {
  public:
   CacheOutput(std::string path, const Rig& rig, std::vector<double> times, const VertexOutputOptions& options)
       : path_(std::move(path)),
-        suffix_(Suffix(path_)),
+        suffix_(FileSuffix(path_)),
         rig_(rig),
         shown_(ShownMeshes(rig.scene)),
         options_(options) {
@@ -166,7 +166,7 @@ std::vector<std::string> VertexSuffixes() { return {".npz", ".pc2", ".mdd", ".gl
 Result<std::unique_ptr<VertexOutput>> CreateVertexOutput(const std::string& output, const Rig& rig,
                                                          std::vector<double> times,
                                                          const VertexOutputOptions& options) {
-  if (output == "-" || Suffix(output) == ".npz") {
+  if (output == "-" || FileSuffix(output) == ".npz") {
     KPSA_RETURN_IF_ERROR(CheckNotInput(output, rig.files));
     Result<OutputPath> path = OutputPath::Create(output);
     if (!path.ok()) return path.status();

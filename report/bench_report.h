@@ -4,6 +4,7 @@
 #include <string>
 
 #include "host/bench/bench.h"
+#include "report/tolerance_text.h"
 
 namespace kpsa::engine {
 
@@ -18,6 +19,8 @@ struct BenchContext {
 std::string BenchJson(const std::vector<BenchResult>& results, const BenchContext& context);
 // For people, with the next command.
 std::string BenchText(const std::vector<BenchResult>& results, const BenchContext& context);
+// What a bench calls what it tells of tolerances.
+ToleranceWords BenchWords(const BenchResult& r);
 // A table of all frames, for every side.
 std::string FramesText(const std::vector<BenchResult>& results);
 

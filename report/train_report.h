@@ -5,14 +5,12 @@
 #include <string>
 
 #include "host/bench/tolerance_table.h"
+#include "host/checks/expected_speedup.h"
 #include "host/checks/subspace_check.h"
 #include "kpsa/calibration.h"
 #include "kpsa/training_record.h"
 
 namespace kpsa::engine {
-
-// Misses included, with the share of them that ExpectedHitRate says.
-double ExpectedSpeedup(const SubspaceCheck& check, const Calibration& calibration);
 
 struct TrainResult {
   std::string rig, path;  // of the files
@@ -29,14 +27,11 @@ struct TrainResult {
   double speedup() const { return ExpectedSpeedup(check, calibration); }
 };
 
-// ExpectedSpeedup at other tolerances. wanted_speedup 0: none.
-ToleranceTable TrainedTolerances(const Subspace& subspace, const SubspaceCheck& check, double wanted_speedup);
-
 // Times in milliseconds, lengths in metres.
 std::string TrainJson(const TrainResult& r);
-// For people, with the next command.
 // The accepted calibration pose that is farthest off, as a pose file (rig/build/rig_builder.h).
 std::string WorstPoseText(const TrainingRecord& record, const std::string& subspace);
+// For people, with the next command.
 std::string TrainText(const TrainResult& r);
 
 }  // namespace kpsa::engine

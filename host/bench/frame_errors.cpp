@@ -67,6 +67,12 @@ void FrameErrors::Append(const FrameErrors& later) {
   append(&miss, later.miss);
 }
 
+double OverFrames(const std::vector<double>& values) {
+  double sum = 0;
+  for (double value : values) sum += value * value;
+  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
+
 bool HaveKeptModes(const std::vector<AppliedSubspace>& applied) {
   return std::all_of(applied.begin(), applied.end(),
                      [](const AppliedSubspace& one) { return !one.subspace->kept_modes.values.empty(); });

@@ -22,6 +22,8 @@ struct FrameErrors {
   void Append(const FrameErrors& later);
 };
 
+double OverFrames(const std::vector<double>& errors);  // their RMS; 0 of none
+
 // What SoftCache decided: for each frame the share of the full evaluation in the points of each subspace.
 using FullWeights = std::vector<std::vector<double>>;
 

@@ -1,9 +1,11 @@
-#include "cli/vertex_compare.h"
+#include "files/vertex_compare.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "cli/common.h"
+#include "base/quantity_text.h"
 
 namespace kpsa::engine {
 

@@ -1,8 +1,13 @@
-#include "cli/vertex_file.h"
+#include "files/vertex_file.h"
 
-#include "cli/output.h"
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cstdint>
+
 #include "files/npz.h"
 #include "files/point_cache.h"
+#include "files/suffix.h"
 
 namespace kpsa::engine {
 namespace {
@@ -44,7 +49,7 @@ Result<VertexFile> FromNpz(const std::string& path) {
 std::vector<std::string> VertexFileSuffixes() { return {".npz", ".pc2", ".mdd"}; }
 
 Result<VertexFile> ReadVertexFile(const std::string& path, double fps) {
-  const std::string suffix = Suffix(path);
+  const std::string suffix = FileSuffix(path);
   if (suffix == ".npz") return FromNpz(path);
   if (suffix != ".pc2" && suffix != ".mdd")
     return Status::Usage("expected a file that ends in {}", fmt::join(VertexFileSuffixes(), ", ")).At({path});

@@ -1,18 +1,19 @@
-#include "cli/file_facts.h"
+#include "report/file_facts.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <map>
 
-#include "cli/acceleration.h"
-#include "cli/common.h"
-#include "cli/output.h"
+#include "base/quantity_text.h"
 #include "files/npz.h"
 #include "files/point_cache.h"
-#include "files/quantity.h"
+#include "files/suffix.h"
 #include "files/weights_json.h"
+#include "gltf/document.h"
 #include "kpsa/subspace.h"
 #include "kpsa/training_record.h"
 
@@ -122,61 +123,6 @@ Result<FileFacts> InspectCharacter(const std::string& path) {
   return facts;
 }
 
-Result<FileFacts> InspectRig(const std::string& path, const std::vector<std::string>& plugins) {
-  Flags flags;
-  flags.file = path;
-  flags.plugins = plugins;
-  const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
-  if (!open.ok()) return open.status();
-  const Rig& rig = (*open)->rig;
-  FileFacts facts;
-  facts.kind = "rig";
-  facts.facts = {{"character", rig.character->path},
-                 {"fps", rig.fps},
-                 {"length", rig.units.length_name},
-                 {"angle", rig.units.angle_name},
-                 {"nodes", Count(rig.graph->Nodes().size())}};
-  FactTable meshes{"meshes", {"mesh", ">vertices", ">points", "stack"}, {}};
-  for (const CharacterMesh& mesh : rig.scene.meshes) {
-    std::vector<std::string> stages;
-    for (const Stage& stage : mesh.stages) stages.push_back(stage.name);
-    meshes.rows.push_back({mesh.name, Count(mesh.vertex_count), Count(mesh.mesh().point_count()),
-                           fmt::format("{}", fmt::join(stages, " > "))});
-  }
-  FactTable types{"node types", {"type", ">nodes"}, {}};
-  std::map<std::string, std::size_t> counts;
-  for (NodeId node : rig.graph->Nodes()) ++counts[rig.graph->def(node).name];
-  for (const auto& [type, count] : counts) types.rows.push_back({type, Count(count)});
-  FactTable clips{"clips", {"clip", ">seconds"}, {}};
-  for (const CharacterClip& clip : rig.scene.clips) clips.rows.push_back({clip.id, clip.duration});
-  FactTable controls{"controls", {"control", ">min", ">max", ">rest"}, {}};
-  for (const Control& control : rig.controls) {
-    const double factor = 1 / rig.units.FactorOf(control.unit);
-    controls.rows.push_back(
-        {control.name, control.min * factor, control.max * factor, control.value * factor});
-  }
-  FactTable accelerate{
-      "accelerate", {"name", "points", "subspace", ">tolerance", "train clips", "test clips"}, {}};
-  for (const Acceleration& a : rig.accelerate) {
-    const bool colors = !a.points.empty() && a.points[0].colors;
-    std::vector<std::string> points = PointNames(rig, a);
-    if (a.reference >= 0) {
-      for (std::string& name : points)
-        name.insert(0, rig.references[static_cast<std::size_t>(a.reference)].name_space);
-    }
-    accelerate.rows.push_back({a.name, fmt::format("{}", fmt::join(points, ", ")), a.subspace,
-                               colors ? NumberText(a.tolerance) : LengthText(a.tolerance),
-                               fmt::format("{}", fmt::join(a.train_clips, ", ")),
-                               fmt::format("{}", fmt::join(a.test_clips, ", "))});
-  }
-  FactTable files{"files", {"file"}, {}};
-  for (const std::string& file : rig.files) files.rows.push_back({file});
-  facts.tables = {std::move(meshes),   std::move(types),      std::move(clips),
-                  std::move(controls), std::move(accelerate), std::move(files)};
-  facts.notes = rig.notes;
-  return facts;
-}
-
 Result<FileFacts> InspectNpz(const std::string& path) {
   const Result<Npz> npz = ReadNpz(path, std::uint64_t{8} << 30);
   if (!npz.ok()) return npz.status();
@@ -201,7 +147,7 @@ Result<FileFacts> InspectNpz(const std::string& path) {
 }
 
 Result<FileFacts> InspectPointCache(const std::string& path, double fps) {
-  const bool pc2 = Suffix(path) == ".pc2";
+  const bool pc2 = FileSuffix(path) == ".pc2";
   const Result<PointCache> cache = pc2 ? ReadPc2(path, fps) : ReadMdd(path, fps);
   if (!cache.ok()) return cache.status();
   FileFacts facts;
@@ -285,10 +231,9 @@ Result<FileFacts> InspectWeights(const std::string& path) {
   return facts;
 }
 
-Result<FileFacts> InspectFile(const std::string& path, double fps, const std::vector<std::string>& plugins) {
-  const std::string suffix = Suffix(path);
+Result<FileFacts> InspectFile(const std::string& path, double fps) {
+  const std::string suffix = FileSuffix(path);
   if (suffix == ".glb" || suffix == ".gltf" || suffix == ".vrm") return InspectCharacter(path);
-  if (suffix == ".yaml" || suffix == ".yml") return InspectRig(path, plugins);
   if (suffix == ".npz") return InspectNpz(path);
   if (suffix == ".pc2" || suffix == ".mdd") return InspectPointCache(path, fps);
   if (suffix == ".kpsa") return InspectSubspace(path);

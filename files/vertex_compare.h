@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "cli/vertex_file.h"
+#include "files/vertex_file.h"
 
 namespace kpsa::engine {
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/status.h"
+#include "rig/build/rig_builder.h"
 
 namespace kpsa::engine {
 
@@ -24,16 +25,20 @@ struct FileFacts {
   std::vector<std::string> notes;
 };
 
-// Of any file that kpsa reads or writes, by suffix: .glb .gltf .vrm .yaml .yml .npz .pc2 .mdd .kpsa .json
-// (weight maps). `plugins` are libraries of nodes for rigs.
-Result<FileFacts> InspectFile(const std::string& path, double fps, const std::vector<std::string>& plugins);
+// Of any file that kpsa reads or writes but rigs, by suffix: .glb .gltf .vrm .npz .pc2 .mdd .kpsa .json (weight
+// maps). `fps`: of .pc2 files.
+Result<FileFacts> InspectFile(const std::string& path, double fps);
+FileFacts RigFacts(const Rig& rig);
 
 // One kind each; see InspectFile.
 Result<FileFacts> InspectCharacter(const std::string& path);
-Result<FileFacts> InspectRig(const std::string& path, const std::vector<std::string>& plugins);
 Result<FileFacts> InspectNpz(const std::string& path);
 Result<FileFacts> InspectPointCache(const std::string& path, double fps);
 Result<FileFacts> InspectSubspace(const std::string& path);
 Result<FileFacts> InspectWeights(const std::string& path);
+
+// For people, and a JSON document for programs. `path`: as the user named the file.
+std::string FactsText(const std::string& path, const FileFacts& facts);
+std::string FactsJson(const std::string& path, const FileFacts& facts);
 
 }  // namespace kpsa::engine
