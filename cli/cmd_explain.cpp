@@ -2,7 +2,6 @@
 // what SoftCache decided.
 #include <algorithm>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "base/text.h"
 #include "cli/acceleration.h"
@@ -10,12 +9,12 @@
 #include "cli/options.h"
 #include "cli/request.h"
 #include "graph/evaluator.h"
-#include "graph/explain.h"
-#include "graph/plan_report.h"
 #include "host/explain/decision_story.h"
+#include "host/explain/node_story.h"
 #include "host/explain/vertex_story.h"
 #include "host/rig_frames.h"
 #include "report/decision_text.h"
+#include "report/node_text.h"
 #include "report/vertex_text.h"
 
 namespace kpsa::engine {
@@ -31,28 +30,6 @@ struct ExplainFlags : Flags {
 
 constexpr int kMostFrames = 1'000'000;  // of --frame
 
-std::string DriverText(const Rig& rig, const PlugRef& plug) {
-  const Graph& graph = *rig.graph;
-  PlugRef whole = plug;
-  whole.component = -1;
-  for (const PlugRef& p : {plug, whole}) {
-    if (const Connection* driver = graph.FindConnection(p))
-      return fmt::format("driven by {}", graph.PlugName(driver->source));
-  }
-  if (const Value* value = graph.FindValue(plug)) return fmt::format("set to {}", value->ToString());
-  const AttributeDef& attribute = graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
-  return attribute.output ? "an output"
-                          : fmt::format("at its default, {}", attribute.default_value.ToString());
-}
-
-// Why a step that is in the plan did not run; "" where it did.
-std::string NotEvaluated(const Plan& plan, const Profile& profile, Index step) {
-  if (profile.counts()[step] > 0) return "";
-  const Plan::StepInfo& info = plan.infos()[step];
-  if (info.segment != 0) return fmt::format("it runs {}", SegmentName(plan, info.segment));
-  return "nothing that it reads has changed since the frame before";
-}
-
 struct Target {
   NodeId node;
   std::string attribute;  // text about it, "" where only a node was named
@@ -62,7 +39,7 @@ Result<Target> FindTarget(const Rig& rig, const std::string& what) {
   if (const Result<NodeId> node = rig.graph->FindNode(what); node.ok()) return Target{*node, ""};
   const Result<PlugRef> plug = rig.graph->FindPlug(what);
   if (plug.ok())
-    return Target{plug->node, fmt::format("{} is {}", rig.graph->PlugName(*plug), DriverText(rig, *plug))};
+    return Target{plug->node, fmt::format("{} is {}", rig.graph->PlugName(*plug), SourceOfValue(rig, *plug))};
   // Without a dot it was meant as a node, and with one as well where a node is nearly called so
   std::vector<std::string> names;
   for (const NodeId node : rig.graph->Nodes()) names.push_back(rig.graph->name(node));
@@ -159,52 +136,8 @@ CommandResult Explain(ExplainFlags flags) {
                                        [](std::size_t, const Evaluator&) { return Status(); }));
   }
 
-  const std::string name = rig.graph->name(target->node);
-  std::vector<Index> steps;
-  for (Index s = 0; s < plan.steps().size(); ++s) {
-    if (plan.infos()[s].node == target->node) steps.push_back(s);
-  }
-  std::string left_out;
-  for (const Plan::Excluded& e : plan.excluded()) {
-    if (e.node_name == name) left_out = e.reason;
-  }
-  if (steps.empty() && left_out.empty()) left_out = "it only holds what may vary";
-  if (flags.json) {
-    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-    for (Index s : steps) {
-      rows.push_back({{"step", StepName(plan, s)},
-                      {"segment", SegmentName(plan, plan.infos()[s].segment)},
-                      {"count", profile.counts()[s]},
-                      {"points", plan.infos()[s].points},
-                      {"points_total", plan.infos()[s].points_total},
-                      {"dirtied_by", profile.counts()[s] > 0 ? CauseChain(plan, profile, s) : ""},
-                      {"not_evaluated", NotEvaluated(plan, profile, s)},
-                      {"needed_by", NeedChain(plan, s)},
-                      {"mask", MaskText(plan, s)}});
-    }
-    PrintJson(nlohmann::ordered_json{{"schema", "kpsa.explain/1"},
-                                     {"node", name},
-                                     {"type", rig.graph->def(target->node).name},
-                                     {"attribute", target->attribute},
-                                     {"frames", times->size()},
-                                     {"left_out", left_out},
-                                     {"steps", rows}});
-    return 0;
-  }
-  Print(fmt::format("{} ({})\n", name, rig.graph->def(target->node).name));
-  if (!target->attribute.empty()) Print("  " + target->attribute + "\n");
-  if (steps.empty()) Print("  is not evaluated: " + left_out + "\n");
-  for (Index s : steps) {
-    Print(fmt::format("  {}: {}, evaluated in {} of {}, {}\n", StepName(plan, s), PointsText(plan.infos()[s]),
-                      Thousands(profile.counts()[s]), Plural(times->size(), "frame"),
-                      SegmentName(plan, plan.infos()[s].segment)));
-    if (const std::string why = NotEvaluated(plan, profile, s); !why.empty()) {
-      Print(fmt::format("    skipped     {}\n", why));
-    } else {
-      Print(fmt::format("    dirtied by  {}\n", CauseChain(plan, profile, s)));
-    }
-    Print(fmt::format("    needed by   {}\n    points      {}\n", NeedChain(plan, s), MaskText(plan, s)));
-  }
+  const NodeStory story = TellOfNode(rig, plan, profile, target->node, target->attribute, times->size());
+  Print(flags.json ? NodeStoryJson(story) : NodeStoryText(story));
   return 0;
 }
 

@@ -1,16 +1,15 @@
 // kpsa nodes: the node reference, from the registry.
-#include <cmath>
-#include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "cli/command.h"
 #include "cli/common.h"
 #include "cli/options.h"
-#include "files/quantity.h"
 #include "picture/node_pictures.h"
+#include "report/node_reference.h"
 #include "report/rig_schema.h"
-#include "report/table.h"
 
 namespace kpsa::engine {
 namespace {
@@ -20,85 +19,6 @@ struct NodesFlags : Flags {
   std::optional<std::string> pictures;
   bool markdown = false, schema = false;
 };
-
-const char* UnitName(Unit unit) {
-  switch (unit) {
-    case Unit::kLength:
-      return "length";
-    case Unit::kAngle:
-      return "angle";
-    case Unit::kTime:
-      return "time";
-    default:
-      return "";
-  }
-}
-
-std::string Kind(const AttributeDef& a) {
-  if (a.output) return "out";
-  if (a.structural) return "structural";
-  return a.lazy ? "in, lazy" : "in";
-}
-
-std::string TypeText(const AttributeDef& a) {
-  std::string text = TypeName(a.type);
-  if (!a.enum_names.empty()) text += fmt::format(" ({})", fmt::join(a.enum_names, " "));
-  if (a.array) text += "[]";
-  return text;
-}
-
-std::string DefaultText(const AttributeDef& a) {
-  if (a.output) return "";
-  if (a.default_from) return "follows";
-  if (a.default_value.empty()) return "";
-  const auto choice = static_cast<std::size_t>(a.default_value.AsInt());
-  if (a.type == Type::kEnum && choice < a.enum_names.size()) return a.enum_names[choice];
-  if (const Matrix4* matrix = a.default_value.get_if<Matrix4>(); matrix != nullptr && *matrix == Matrix4())
-    return "identity";
-  return a.default_value.ToString();
-}
-
-std::string RangeText(const AttributeDef& a) {
-  if (std::isinf(a.min) && std::isinf(a.max)) return "";
-  if (std::isinf(a.max)) return "from " + NumberText(a.min);
-  if (std::isinf(a.min)) return "to " + NumberText(a.max);
-  return NumberText(a.min) + " to " + NumberText(a.max);
-}
-
-Table Attributes(const NodeDef& def) {
-  Table table({"attribute", "kind", "type", "default", "range", "unit", "what it is"});
-  for (const AttributeDef& a : def.attributes) {
-    table.Row({a.name, Kind(a), TypeText(a), DefaultText(a), RangeText(a), UnitName(a.unit), a.doc});
-  }
-  return table;
-}
-
-std::string PictureLink(const std::string& type) {
-  return HasNodePicture(type) ? fmt::format("![{}: before and after](nodes/{}.png)\n\n", type, type) : "";
-}
-
-nlohmann::ordered_json Json(const NodeDef& def) {
-  nlohmann::ordered_json attributes = nlohmann::ordered_json::array();
-  for (const AttributeDef& a : def.attributes) {
-    nlohmann::ordered_json json = {
-        {"name", a.name},   {"type", TypeName(a.type)},   {"doc", a.doc},   {"output", a.output},
-        {"array", a.array}, {"structural", a.structural}, {"lazy", a.lazy}, {"per_geometry", a.per_geometry}};
-    if (!a.output) json["default"] = DefaultText(a);
-    if (!std::isinf(a.min)) json["min"] = a.min;
-    if (!std::isinf(a.max)) json["max"] = a.max;
-    if (a.unit != Unit::kNone) json["unit"] = UnitName(a.unit);
-    if (!a.enum_names.empty()) json["enum"] = a.enum_names;
-    if (!a.aliases.empty()) json["aliases"] = a.aliases;
-    attributes.push_back(std::move(json));
-  }
-  return {{"name", def.name},
-          {"doc", def.doc},
-          {"category", def.category},
-          {"version", def.version},
-          {"animation", def.animation},
-          {"stateful", def.stateful},
-          {"attributes", std::move(attributes)}};
-}
 
 CommandResult Nodes(const NodesFlags& flags) {
   NodeRegistry registry;
@@ -129,35 +49,12 @@ CommandResult Nodes(const NodesFlags& flags) {
     defs = {def};
   }
   if (flags.json) {
-    nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
-    for (const NodeDef* def : defs) nodes.push_back(Json(*def));
-    PrintJson(nlohmann::ordered_json{{"schema", "kpsa.nodes/1"}, {"nodes", std::move(nodes)}});
-    return 0;
+    Print(NodesJson(defs));
+  } else if (flags.markdown) {
+    Print(NodesMarkdown(defs, HasNodePicture));
+  } else {
+    Print(flags.type.has_value() ? NodeText(*defs[0]) : NodesText(defs));
   }
-  std::map<std::string, std::vector<const NodeDef*>> by_category;
-  for (const NodeDef* def : defs) by_category[def->category].push_back(def);
-  if (flags.markdown) {
-    Print(
-        "# Node reference\n\nWritten by `kpsa nodes --markdown`. Lengths in metres, angles in radians, times "
-        "in seconds unless a rig's `units` say otherwise.\n");
-    for (const auto& [category, members] : by_category) {
-      Print("\n## " + category + "\n");
-      for (const NodeDef* def : members)
-        Print(fmt::format("\n### {}\n\n{}\n\n{}{}", def->name, def->doc, PictureLink(def->name),
-                          Attributes(*def).Markdown()));
-    }
-    return 0;
-  }
-  if (flags.type.has_value()) {
-    Print(fmt::format("{} ({})\n{}\n\n{}", defs[0]->name, defs[0]->category, defs[0]->doc,
-                      Attributes(*defs[0]).Text()));
-    return 0;
-  }
-  Table table({"type", "category", "what it does"});
-  for (const auto& [category, members] : by_category) {
-    for (const NodeDef* def : members) table.Row({def->name, category, def->doc});
-  }
-  Print(table.Text());
   return 0;
 }
 

@@ -1,7 +1,6 @@
 // kpsa profile: where the time of an evaluation goes.
 #include <algorithm>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "base/parallel.h"
 #include "cli/acceleration.h"
@@ -14,7 +13,7 @@
 #include "graph/plan_report.h"
 #include "host/profile_run.h"
 #include "host/rig_frames.h"
-#include "report/table.h"
+#include "report/profile_text.h"
 #include "report/trace.h"
 
 namespace kpsa::engine {
@@ -24,76 +23,6 @@ struct ProfileFlags : Flags {
   AccelerationFlags acceleration;
   std::optional<std::string> trace, top, sort;
 };
-
-void PrintReport(const ProfileFlags& flags, const Plan& plan, const Measured& measured,
-                 std::vector<NodeTime> nodes, const CriticalPath& path, std::size_t top) {
-  const auto frames = static_cast<double>(measured.frames.size());
-  if (flags.sort == "inclusive")
-    std::stable_sort(nodes.begin(), nodes.end(),
-                     [](auto& a, auto& b) { return a.inclusive_ns > b.inclusive_ns; });
-  if (flags.sort == "count")
-    std::stable_sort(nodes.begin(), nodes.end(), [](auto& a, auto& b) { return a.count > b.count; });
-  if (flags.sort == "points")
-    std::stable_sort(nodes.begin(), nodes.end(), [](auto& a, auto& b) { return a.points > b.points; });
-  if (flags.sort == "name")
-    std::stable_sort(nodes.begin(), nodes.end(), [](auto& a, auto& b) { return a.name < b.name; });
-  Table table({"node", "type", ">self us", ">inclusive us", ">count", ">points", ">ns/point", ">share"});
-  for (std::size_t i = 0; i < std::min(top, nodes.size()); ++i) {
-    const NodeTime& n = nodes[i];
-    const double computed_points = static_cast<double>(n.points) * static_cast<double>(n.count);
-    table.Row({n.name, n.type, fmt::format("{:.1f}", n.self_ns / frames / 1e3),
-               fmt::format("{:.1f}", n.inclusive_ns / frames / 1e3), Thousands(n.count),
-               n.points == 0 ? "" : Thousands(n.points),
-               computed_points > 0 ? fmt::format("{:.2f}", n.self_ns / computed_points) : "",
-               fmt::format("{:.1f} %", 100 * n.self_ns / measured.wall_ns)});
-  }
-  Print(table.Text());
-  if (nodes.size() > top)
-    Print(fmt::format("... and {} more (--top {} shows all)\n", Plural(nodes.size() - top, "node"),
-                      nodes.size()));
-  Print(fmt::format("\nFrame: {:.3f} ms (mean of {}); in nodes {:.3f} ms, between them {:.3f} ms\n",
-                    measured.wall_ns / frames / 1e6, Plural(measured.frames.size(), "frame"),
-                    measured.node_ns / frames / 1e6, measured.between_ns() / frames / 1e6));
-  std::vector<std::string> names;
-  for (Index s : path.steps) names.push_back(StepName(plan, s));
-  if (names.size() > 12)
-    names.erase(names.begin() + 4, names.end() - 7), names.insert(names.begin() + 4, "...");
-  Print(fmt::format("Critical path: {:.3f} ms: {}\n", path.ns / frames / 1e6, fmt::join(names, " > ")));
-  Print(
-      fmt::format("Speedup ceiling: {:.1f}x: {:.1f} % of the time is spent above the points, and a subspace "
-                  "skips only what none of its cues reads\n",
-                  measured.ceiling(), 100 * (measured.above_ns + measured.between_ns()) / measured.wall_ns));
-}
-
-void PrintReportJson(const Rig& rig, const Plan& plan, const Measured& measured,
-                     const std::vector<NodeTime>& nodes, const CriticalPath& path, int threads) {
-  const auto frames = static_cast<double>(measured.frames.size());
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array(), chain = rows;
-  for (const NodeTime& n : nodes) {
-    rows.push_back({{"name", n.name},
-                    {"type", n.type},
-                    {"segment", n.segment},
-                    {"self_ms", n.self_ns / frames / 1e6},
-                    {"inclusive_ms", n.inclusive_ns / frames / 1e6},
-                    {"count", n.count},
-                    {"points", n.points},
-                    {"points_total", n.points_total},
-                    {"share", n.self_ns / measured.wall_ns}});
-  }
-  for (Index s : path.steps) chain.push_back(StepName(plan, s));
-  PrintJson(nlohmann::ordered_json{{"schema", "kpsa.profile/1"},
-                                   {"clip", rig.scene.clip.value_or("")},
-                                   {"frames", measured.frames.size()},
-                                   {"threads", threads},
-                                   {"ms_per_frame", measured.wall_ns / frames / 1e6},
-                                   {"between_nodes_ms", measured.between_ns() / frames / 1e6},
-                                   {"nodes", rows},
-                                   {"critical_path", {{"ms", path.ns / frames / 1e6}, {"steps", chain}}},
-                                   {"ceiling",
-                                    {{"speedup", measured.ceiling()},
-                                     {"above_points_ms", measured.above_ns / frames / 1e6},
-                                     {"bound_by", "what is evaluated above the points"}}}});
-}
 
 CommandResult RunProfile(const ProfileFlags& flags) {
   KPSA_RETURN_IF_ERROR(CheckTimeFlags(flags));
@@ -136,9 +65,10 @@ CommandResult RunProfile(const ProfileFlags& flags) {
       Say(fmt::format("note: the trace holds the first {} only", Plural(profile.max_events, "event")));
   }
   if (flags.json) {
-    PrintReportJson(rig, **plan, *measured, nodes, path, *threads);
+    Print(ProfileJson(rig, **plan, *measured, nodes, path, *threads));
   } else if (flags.trace != "-") {
-    PrintReport(flags, **plan, *measured, nodes, path, static_cast<std::size_t>(*top));
+    Print(ProfileText(**plan, *measured, nodes, path, flags.sort.value_or("self"),
+                      static_cast<std::size_t>(*top)));
   }
   return 0;
 }
