@@ -141,14 +141,12 @@ class Bench {
   Status ProfileClip(const std::vector<Side*>& sides, const std::vector<double>& times) {
     std::vector<RecordedSteps> recorded(sides.size());
     for (Side* side : sides) side->StartAgain();
-    MeasureKpsaTimes(true);
     Status status;
     for (std::size_t first = 0; first < times.size() && status.ok(); first += kTurnFrames) {
       const std::size_t end = std::min(first + kTurnFrames, times.size());
       for (std::size_t i = 0; i < sides.size() && status.ok(); ++i)
         status = sides[i]->RecordTurn(times, first, end, &recorded[i]);
     }
-    MeasureKpsaTimes(false);
     KPSA_RETURN_IF_ERROR(std::move(status));
     const auto sum = [](const FrameTimes& frames) {
       double ns = 0;
