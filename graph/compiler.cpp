@@ -180,6 +180,7 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
     impl_->UseRest(statics, *digests, table.instances().size());
   }
   Result<PlanDraft> draft = DraftPlan(table, statics, wanted, request);
+  if (!statics.status().ok()) return statics.status();  // rather than what follows from it
   if (!draft.ok()) return draft.status();
 
   // Bind kernels, or take them from an earlier compilation

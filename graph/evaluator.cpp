@@ -218,7 +218,7 @@ Status Evaluator::Evaluate() {
 
 Status Evaluator::Pull(Index output) {
   const Index producer = plan_->outputs()[output].producer;
-  if (producer >= plan_->steps().size() || !dirty(producer)) return Status();
+  if (IsFresh(output)) return Status();
   set_since_run_ = false;
   MarkWanted(producer);
   wanted_only_ = true;

@@ -63,6 +63,12 @@ class Evaluator final {
   }
   ConstPointsView Points(Index output) const { return Get<ConstPointsView>(output); }
 
+  // Whether an output is up to date without a pull.
+  bool IsFresh(Index output) const {
+    const Index producer = plan_->outputs()[output].producer;
+    return producer >= plan_->steps().size() || !dirty(producer);
+  }
+
   // Records what runs from now on, as of that frame. Null to stop: then evaluation pays nothing for it.
 #ifndef KPSA_WITHOUT_RECORDING  // defined by the test that compares the two
   void Record(Profile* profile, int frame = 0) { profile_ = profile, frame_ = frame; }

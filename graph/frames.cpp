@@ -140,7 +140,7 @@ class BlockEvaluator {
 Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame_count,
                       const FrameOptions& options, const SetFrame& set, const FrameSink& sink) {
   KPSA_CHECK_LE(1, options.block);
-  const bool alone = !plan->stateful_node().empty();
+  const bool alone = !plan->stateful_node().empty() || !plan->prototype_node().empty();
   auto threads = static_cast<std::size_t>(options.threads > 0 ? options.threads : AllowedThreads());
   threads = std::clamp<std::size_t>(frame_count, 1, alone ? 1 : threads);
   const std::size_t share = (frame_count + threads - 1) / threads;

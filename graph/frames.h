@@ -41,7 +41,8 @@ using FrameSink =
 
 // Evaluates all outputs of the plan for frames 0 to frame_count - 1. Errors: the sink's, or kInterrupted
 // after a cancellation; the sink has then seen the first frames without a gap. A plan with a stateful node
-// (Plan::stateful_node) is evaluated on one evaluator, whatever the options say.
+// (Plan::stateful_node) or one of the host program (Plan::prototype_node) is evaluated on one evaluator,
+// whatever the options say.
 Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame_count,
                       const FrameOptions& options, const SetFrame& set, const FrameSink& sink);
 

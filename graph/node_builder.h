@@ -67,6 +67,10 @@ class NodeBuilder {
     def_->stateful = true;
     return *this;
   }
+  NodeBuilder& prototype() {
+    def_->prototype = true;
+    return *this;
+  }
   NodeBuilder& passes_points() {
     def_->passes_points = true;
     return *this;

@@ -148,7 +148,8 @@ struct NodeDef {
   int version = 1;                   // raise it when results change: it invalidates kernels and subspaces
   bool animation = false;            // brings a clip: its connections are ignored in the rest state
   bool stateful = false;             // needs its previous frame
-  bool passes_points = false;        // its points are those that come in, where it succeeds
+  bool prototype = false;      // a function of the host program computes it: slow, on one thread at a time
+  bool passes_points = false;  // its points are those that come in, where it succeeds
   std::vector<AttributeDef> attributes;
   std::vector<ComputeGroup> groups;
   std::vector<std::string> problems;  // of the declaration, noted while it was built

@@ -1,5 +1,7 @@
 #include "graph/node_registry.h"
 
+#include <mutex>
+
 namespace kpsa::engine {
 
 NodeBuilder NodeRegistry::add(std::string name, std::string doc) {
@@ -7,6 +9,7 @@ NodeBuilder NodeRegistry::add(std::string name, std::string doc) {
   def->name = name;
   def->doc = std::move(doc);
   NodeDef* raw = def.get();
+  const std::unique_lock<std::shared_mutex> lock(mutex_);
   if (const auto [at, added] = defs_.try_emplace(std::move(name), nullptr); added) {
     at->second = std::move(def);
   } else {
@@ -17,6 +20,7 @@ NodeBuilder NodeRegistry::add(std::string name, std::string doc) {
 
 Status NodeRegistry::status() const {
   Status status;
+  const std::shared_lock<std::shared_mutex> lock(mutex_);
   for (const auto& [name, def] : defs_) {
     for (const std::string& problem : def->Problems()) status.Append(Status::Invalid("{}", problem));
   }
@@ -27,6 +31,7 @@ Status NodeRegistry::status() const {
 }
 
 void NodeRegistry::Take(NodeRegistry&& other) {
+  const std::unique_lock<std::shared_mutex> lock(mutex_);
   defs_.merge(other.defs_);
   for (auto& [name, def] : other.defs_)
     duplicates_.push_back(std::move(def));  // the names that stayed behind
@@ -36,12 +41,14 @@ void NodeRegistry::Take(NodeRegistry&& other) {
 }
 
 const NodeDef* NodeRegistry::Find(std::string_view name) const {
+  const std::shared_lock<std::shared_mutex> lock(mutex_);
   const auto it = defs_.find(name);
   return it == defs_.end() ? nullptr : it->second.get();
 }
 
 std::vector<std::string> NodeRegistry::Names() const {
   std::vector<std::string> names;
+  const std::shared_lock<std::shared_mutex> lock(mutex_);
   for (const auto& [name, def] : defs_) names.push_back(name);
   return names;
 }

@@ -1,9 +1,11 @@
-// Name -> NodeDef. Passed around, never global. Filled at start by the standard nodes and by plugins;
-// read-only and safe to share between threads afterwards.
+// Name -> NodeDef. Passed around, never global. Filled at start by the standard nodes, and by plugins whenever
+// they come in. Safe to share between threads: types may be added while others look theirs up; a type that is
+// completed by a builder is looked up after that. Plans and evaluators never come here.
 #pragma once
 
 #include <map>
 #include <memory>
+#include <shared_mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +32,7 @@ class NodeRegistry {
   void Take(NodeRegistry&& other);
 
  private:
+  mutable std::shared_mutex mutex_;  // of what follows
   std::map<std::string, std::unique_ptr<NodeDef>, std::less<>> defs_;
   std::vector<std::unique_ptr<NodeDef>> duplicates_;  // of names that were taken
 };

@@ -133,6 +133,8 @@ class Plan {
   // The first node that needs its previous frame (NodeDef::stateful), or "": such a plan is evaluated in
   // ascending order on one evaluator.
   const std::string& stateful_node() const { return stateful_node_; }
+  // The first node that a function of the host program computes (NodeDef::prototype), or "": on one thread.
+  const std::string& prototype_node() const { return prototype_node_; }
   const char* step_name(Index step) const { return text_.data() + infos_[step].name; }  // of its node
   const char* step_type(Index step) const { return text_.data() + infos_[step].type; }  // of its node
   const char* step_label(Index step) const {
@@ -176,7 +178,7 @@ class Plan {
   std::vector<Excluded> excluded_;
   std::vector<std::vector<std::pair<Index, Index>>> closures_;
   std::vector<std::byte> initial_values_;
-  std::string text_, stateful_node_;
+  std::string text_, stateful_node_, prototype_node_;
   std::vector<std::shared_ptr<const void>> owned_;  // kernels, constant points, gather maps
   std::size_t buffer_floats_ = 0, workspace_floats_ = 0, state_bytes_ = 0;
 };

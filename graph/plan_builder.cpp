@@ -306,6 +306,8 @@ void PlanBuilder::FillSteps() {
       const NodeDef& def = table_.graph().def(instance->node);
       if (def.stateful && plan_->stateful_node_.empty())
         plan_->stateful_node_ = table_.graph().name(instance->node);
+      if (def.prototype && plan_->prototype_node_.empty())
+        plan_->prototype_node_ = table_.graph().name(instance->node);
       info.name = AddText(table_.graph().name(instance->node));
       info.type = AddText(def.name);
       info.label = AddText(instance->kind == Instance::Kind::kAssemble  ? "assemble"

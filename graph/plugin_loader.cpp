@@ -61,6 +61,7 @@ Status PluginLoader::Load(const std::string& path) {
   if (!std::filesystem::is_regular_file(canonical, failed))
     return Status::Invalid("plugin \"{}\": expected a shared library, found no regular file", path);
   const std::string identity = canonical.string();
+  const std::lock_guard<std::mutex> lock(mutex_);
   if (std::find(loaded_.begin(), loaded_.end(), identity) != loaded_.end()) return Status();
 
   const std::uint64_t size = std::filesystem::file_size(canonical, failed);
@@ -95,22 +96,35 @@ Status PluginLoader::Load(const std::string& path) {
   } catch (...) {
     return Status::Invalid("plugin \"{}\" failed to register its node types: unknown exception", path);
   }
+  KPSA_RETURN_IF_ERROR(Add(std::move(added), path));
+  loaded_.push_back(identity);
+  return Status();
+}
+
+Status PluginLoader::Add(NodeRegistry&& added) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return Add(std::move(added), "");
+}
+
+Status PluginLoader::Add(NodeRegistry&& added, const std::string& of) {
+  const std::string begin = of.empty() ? "" : fmt::format("plugin \"{}\"", of);
   if (const Status problems = added.status(); !problems.ok()) {
     Status refused;
     for (const Error& error : problems.errors())
-      refused.Append(Status::Invalid("plugin \"{}\": {}", path, error.message));
+      refused.Append(Status::Invalid("{}{}{}", begin, of.empty() ? "" : ": ", error.message));
     return refused;
   }
   for (const std::string& name : added.Names()) {
     if (registry_->Find(name) == nullptr) continue;
     const auto from = origin_.find(name);
-    return Status::Invalid(
-        "plugin \"{}\" registers the node type \"{}\", which {} has already; expected a new name", path, name,
-        from == origin_.end() ? "kpsa itself" : fmt::format("plugin \"{}\"", from->second));
+    return Status::Invalid("{} the node type \"{}\", which {} has already; expected a new name",
+                           of.empty() ? "the program adds" : begin + " registers", name,
+                           from == origin_.end()  ? "kpsa itself"
+                           : from->second.empty() ? "the program"
+                                                  : fmt::format("plugin \"{}\"", from->second));
   }
-  for (const std::string& name : added.Names()) origin_[name] = path;
+  for (const std::string& name : added.Names()) origin_[name] = of;
   registry_->Take(std::move(added));
-  loaded_.push_back(identity);
   return Status();
 }
 

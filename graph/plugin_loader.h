@@ -1,8 +1,9 @@
-// Loads libraries of nodes (graph/plugin.h) into a registry. One loader a registry, before it is shared
-// between threads; libraries stay loaded until the program ends.
+// Loads libraries of nodes (graph/plugin.h) into a registry. One loader a registry, by any thread; libraries stay
+// loaded until the program ends.
 #pragma once
 
 #include <map>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -20,11 +21,18 @@ class PluginLoader {
   // the system cannot load (its words are in the message), one that does not export kpsa_plugin_abi and
   // kpsa_register, another ABI version, a node type without a name or a name that exists, an exception.
   Status Load(const std::string& path);
+  // Adds types that the program itself has made, all or none. Errors: what is wrong with their declarations, a
+  // name that exists.
+  Status Add(NodeRegistry&& added);
 
  private:
+  // `of`: whose the types are, as messages begin with it; "" for the program's own.
+  Status Add(NodeRegistry&& added, const std::string& of);
+
   NodeRegistry* registry_;
+  std::mutex mutex_;                           // of what follows, and of adding
   std::vector<std::string> loaded_;            // canonical paths
-  std::map<std::string, std::string> origin_;  // node type -> the library that brought it
+  std::map<std::string, std::string> origin_;  // node type -> the library that brought it, or ""
 };
 
 }  // namespace kpsa::engine

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "base/check.h"
 
@@ -124,6 +125,16 @@ const Value* StaticEvaluator::Get(const Source& source, bool rest) {
     }
   }
   return Ready(source, rest);
+}
+
+void StaticEvaluator::TellOfFailure(const std::string& plug) {
+  if (std::exchange(told_, true) || status_.ok()) return;
+  Status told;
+  for (Error error : status_.errors()) {
+    error.message += fmt::format("; it drives {}", plug);
+    told.Add(std::move(error));
+  }
+  status_ = std::move(told);
 }
 
 Status StaticEvaluator::Run(Index number, bool rest) {

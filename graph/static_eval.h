@@ -15,6 +15,7 @@ class StaticEvaluator final : public StaticValues {
   explicit StaticEvaluator(InstanceTable& table) : table_(table), totals_(table, *this) {}
   // Evaluates what the source needs. Null on failure, and ever after; status() says why.
   const Value* Get(const Source& source, bool rest) override;
+  void TellOfFailure(const std::string& plug) override;
   PointTotals& totals() { return totals_; }
   const Status& status() const { return status_; }
   Index evaluated() const { return evaluated_; }
@@ -36,6 +37,7 @@ class StaticEvaluator final : public StaticValues {
   std::vector<bool> opened_[2];  // by instance: its inputs were asked for
   std::vector<std::unique_ptr<Value>> taken_;
   Status status_;
+  bool told_ = false;  // which plug it leaves without a value
   Index evaluated_ = 0;
 };
 

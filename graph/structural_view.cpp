@@ -25,9 +25,10 @@ const Value& StructuralView::value(std::string_view name, int element) const {
   if (instance_ != nullptr && statics_ != nullptr) {
     for (const StructuralInput& input : instance_->structural) {
       if (input.attribute != attribute || input.element != element) continue;
-      const Value* driven = statics_->Get(input.source, false);
-      static const Value kNone;
-      return driven != nullptr ? *driven : kNone;
+      if (const Value* driven = statics_->Get(input.source, false)) return *driven;
+      // The failure is told instead of what follows from the value that stands in for it
+      statics_->TellOfFailure(table_.graph().PlugName({node_, attribute, element, -1}));
+      break;
     }
   }
   return *table_.HeldValue(node_, attribute, element);

@@ -15,6 +15,8 @@ class StaticValues {
   virtual ~StaticValues() = default;
   // The value of a source with its component taken; null where an upstream node failed. Stays valid.
   virtual const Value* Get(const Source& source, bool rest) = 0;
+  // What the failure that Get has just met leaves without a value, for whoever reads of it.
+  virtual void TellOfFailure(const std::string& plug) = 0;
 };
 
 class StructuralView final : public Structural {

@@ -86,6 +86,46 @@ TEST_F(CompilerTest, FailuresWhileCompilingNameTheirNode) {
   EXPECT_EQ(g.pull_points("p.outPoints")[3], 2.0f);
 }
 
+TEST(StructuralDrivers, AFailedOneIsToldWithItsNodeAndThePlug) {
+  NodeRegistry registry;
+  AddToyNodes(registry);
+  registry.add("badMatrix", "Fails.")
+      .in("input", 0.0)
+      .out("out", Type::kMatrix)
+      .compute([](ComputeContext& c) { c.host->Fail("no matrix"); });
+  // Reads the matrix while it counts, demands, binds: nowhere may there be none
+  for (const int where : {0, 1, 2}) {
+    const std::string type = fmt::format("framed{}", where);
+    NodeBuilder framed = registry.add(type, "Reads a structural matrix.");
+    framed.points_in("points").structural("frame", Matrix4()).out("outPoints", Type::kPoints);
+    framed.compute([](ComputeContext&) {});
+    const auto read = [](const Structural& s) { return s.value("frame").get<Matrix4>().m[0]; };
+    if (where == 0)
+      framed.point_count([=](const Structural& s, std::string_view, int) -> Result<Index> {
+        return static_cast<Index>(read(s));
+      });
+    if (where == 1)
+      framed.demand([=](Demand& d) {
+        if (read(d.structural()) == 1) d.Require("points", 0, d.output("outPoints"));
+      });
+    if (where == 2)
+      framed.bind([=](const Binding& b) -> Result<BoundKernel> {
+        return BoundKernel{std::make_shared<double>(read(b.structural())), 0, 0};
+      });
+    TestGraph g(registry);
+    g.add("source", "src", {{"count", 3}});
+    g.add("badMatrix", "bad");
+    g.add(type, "p");
+    g.connect("src.outPoints", "p.points");
+    g.connect("bad.out", "p.frame");
+    g.vary("src.step");
+    const Status status = g.try_pull("p.outPoints");
+    ASSERT_FALSE(status.ok()) << where;
+    EXPECT_EQ(status.ToString(), "node \"bad\" (badMatrix): no matrix; it drives p.frame") << where;
+    EXPECT_EQ(status.errors()[0].node, "bad");
+  }
+}
+
 TEST_F(CompilerTest, PointsThatDoNotExist) {
   g.add("grid", "g");
   g.add("add", "a");
