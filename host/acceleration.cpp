@@ -48,11 +48,13 @@ Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std
 
 // `rig`: the path of the one that is trained for it.
 Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, const std::string& path,
-                                                     bool with_modes) {
+                                                     const AccelerationChoice& choice) {
+  const auto known = std::ranges::find(choice.loaded, path, [](const auto& one) { return one.first; });
+  if (known != choice.loaded.end() && !choice.with_modes) return known->second;
   std::error_code error;
   if (!std::filesystem::exists(path, error))
     return Status::Invalid("no such file; kpsa train {} writes it", rig).At({path});
-  Result<Subspace> subspace = ReadSubspace(path, with_modes ? KeptModes::kRead : KeptModes::kSkip);
+  Result<Subspace> subspace = ReadSubspace(path, choice.with_modes ? KeptModes::kRead : KeptModes::kSkip);
   if (!subspace.ok()) return subspace.status();
   return std::make_shared<const Subspace>(std::move(*subspace));
 }
@@ -75,7 +77,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
                                                        const AccelerationChoice& choice) {
   std::vector<AppliedSubspace> applied;
   if (!choice.subspace.empty()) {
-    const auto subspace = LoadSubspace(rig->path, choice.subspace, choice.with_modes);
+    const auto subspace = LoadSubspace(rig->path, choice.subspace, choice);
     if (!subspace.ok()) return subspace.status();
     AppliedSubspace one;
     one.subspace = *subspace;
@@ -103,7 +105,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
             .At(entry.where);
       const auto subspace = LoadSubspace(
           entry.reference < 0 ? rig->path : rig->references[static_cast<std::size_t>(entry.reference)].file,
-          entry.subspace, choice.with_modes);
+          entry.subspace, choice);
       if (!subspace.ok()) return subspace.status();
       AppliedSubspace one;
       one.path = entry.subspace;

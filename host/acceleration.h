@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/status.h"
@@ -26,6 +27,8 @@ struct AccelerationChoice {
   bool stale_is_miss = false;  // else a subspace of another version of the rig is refused
   bool every_frame = false;    // reconstruct every frame, whatever SoftCache and trained ranges say
   bool with_modes = false;     // Subspace::kept_modes as well, which SplitFrames needs
+  // Files that were read before (without modes), by path: they are not read again.
+  std::vector<std::pair<std::string, std::shared_ptr<const Subspace>>> loaded = {};
 };
 
 // What an entry accelerates, as its subspace calls it: "head_mesh@mush" without the namespace of a reference,

@@ -15,15 +15,23 @@ Index AskForDecisions(const std::vector<AppliedSubspace>& applied, const Graph& 
   return first;
 }
 
-FrameDecision DecisionOf(const AppliedSubspace& one, const Evaluator& evaluator, Index first) {
+DecisionNumbers ReadDecision(const Evaluator& evaluator, Index first) {
+  return {evaluator.Get<double>(first), evaluator.Get<double>(first + 1),
+          evaluator.Get<std::int64_t>(first + 2), evaluator.Get<std::int64_t>(first + 3)};
+}
+
+FrameDecision DecisionOf(const AppliedSubspace& one, const DecisionNumbers& numbers) {
   FrameDecision decision;
   decision.entry = one.name;
-  decision.full_weight = evaluator.Get<double>(first);
-  decision.score = evaluator.Get<double>(first + 1);
-  const std::int64_t offender = evaluator.Get<std::int64_t>(first + 3);
-  decision.reason = MissText(*one.config, static_cast<MissReason>(evaluator.Get<std::int64_t>(first + 2)),
-                             offender < 0 ? kNoIndex : static_cast<Index>(offender));
+  decision.full_weight = numbers.full_weight;
+  decision.score = numbers.score;
+  decision.reason = MissText(*one.config, static_cast<MissReason>(numbers.reason),
+                             numbers.offender < 0 ? kNoIndex : static_cast<Index>(numbers.offender));
   return decision;
+}
+
+FrameDecision DecisionOf(const AppliedSubspace& one, const Evaluator& evaluator, Index first) {
+  return DecisionOf(one, ReadDecision(evaluator, first));
 }
 
 bool IsWorse(const FrameDecision& a, const FrameDecision& b) {

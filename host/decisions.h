@@ -30,6 +30,13 @@ inline constexpr Index kDecisionOutputs = 4;  // of a node
 
 // Adds to a request what DecisionOf reads, node after node; the number of the first output.
 Index AskForDecisions(const std::vector<AppliedSubspace>& applied, const Graph& graph, Request* request);
+// What it says in numbers, of outputs that are up to date; first: of this node. Allocates nothing.
+struct DecisionNumbers {
+  double full_weight = 0, score = 0;
+  std::int64_t reason = 0, offender = -1;
+};
+DecisionNumbers ReadDecision(const Evaluator& evaluator, Index first);
+FrameDecision DecisionOf(const AppliedSubspace& one, const DecisionNumbers& numbers);
 // Of outputs that are up to date; first: of this node.
 FrameDecision DecisionOf(const AppliedSubspace& one, const Evaluator& evaluator, Index first);
 // The one with the largest share of the full evaluation, of equal ones with the largest score.

@@ -16,18 +16,16 @@
 
 namespace kpsa {
 
-// Loading adds the node types of plugins, and building a graph looks them up: one at a time.
 struct Library::Impl {
   Impl();
-  std::mutex mutex;
   engine::NodeRegistry registry;
   engine::PluginLoader plugins{&registry};
 };
 
 struct Rig::Impl {
-  std::shared_ptr<Library::Impl> library;  // whose registry the graph refers to
-  engine::Rig rest;                        // without a clip; never changed
-  std::optional<engine::AccelerationChoice> acceleration;
+  std::shared_ptr<Library::Impl> library;                  // whose registry the graph refers to
+  engine::Rig rest;                                        // without a clip; never changed
+  std::optional<engine::AccelerationChoice> acceleration;  // with the subspaces, which are read once
   std::vector<ControlInfo> controls;
   std::vector<ClipInfo> clips;
   std::vector<MeshInfo> meshes;

@@ -39,17 +39,19 @@ Result<std::shared_ptr<Playing>> Playing::Make(const Rig& rest, const std::optio
   return playing;
 }
 
+Status Playing::Located(const Status& status) const {
+  Status located;
+  for (const Error& error : status.errors()) located.Append(Status(error).At(PlaceOf(rig_, error)));
+  return located;
+}
+
 Result<std::shared_ptr<const Plan>> Playing::PlanFor(const Request& request) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& [known, plan] : plans_) {
     if (Same(known, request)) return plan;
   }
   Result<std::shared_ptr<const Plan>> plan = compiler_.Compile(*rig_.graph, request);
-  if (!plan.ok()) {
-    Status located;
-    for (const Error& error : plan.status().errors()) located.Append(Status(error).At(PlaceOf(rig_, error)));
-    return located;
-  }
+  if (!plan.ok()) return Located(plan.status());
   if (plans_.size() == kMostPlans) plans_.erase(plans_.begin());
   plans_.emplace_back(request, *plan);
   return plan;

@@ -33,6 +33,8 @@ class Playing {
   // time and the controls vary that neither the clip nor the rig drives.
   const Request& request() const { return request_; }
   Index first_decision() const { return first_decision_; }
+  // Errors of the compiler and of evaluations, with the places of their nodes in the rig's files.
+  Status Located(const Status& status) const;
   // Thread-safe. Errors have the places of the rig's files.
   Result<std::shared_ptr<const Plan>> PlanFor(const Request& request);
 

@@ -24,12 +24,15 @@ ControlInfo InfoOf(const engine::Control& control, const engine::FileUnits& unit
 }
 static_assert(static_cast<int>(ControlInfo::Unit::kTime) == static_cast<int>(engine::Unit::kTime));
 
-MeshInfo InfoOf(const engine::CharacterMesh& mesh) {
+MeshInfo InfoOf(const engine::CharacterMesh& mesh, const engine::Graph& graph) {
   MeshInfo info;
   info.name = mesh.name;
   info.vertices = mesh.vertex_count;
   info.triangles = mesh.mesh().data().triangle_vertices;
-  for (const engine::Stage& stage : mesh.stages) info.stages.push_back(stage.name);
+  for (const engine::Stage& stage : mesh.stages) {
+    info.stages.push_back(stage.name);
+    info.stage_nodes.push_back(graph.name(stage.node));
+  }
   return info;
 }
 
@@ -71,6 +74,21 @@ engine::Status CheckNumbers(const TrainingOptions& options) {
   return engine::Status();
 }
 
+// Training evaluates poses on all threads, and many of them.
+engine::Status CheckNodes(const engine::Rig& rig) {
+  for (const engine::NodeId node : rig.graph->Nodes()) {
+    if (!rig.graph->def(node).prototype) continue;
+    const std::string& name = rig.graph->name(node);
+    return engine::Status::Usage(
+               "\"{}\" ({}) is computed by a function of this program, one thread at a time: no rig with "
+               "such a node "
+               "is trained; expected node types of the library or of a plugin",
+               name, rig.graph->def(node).name)
+        .OfNode(name);
+  }
+  return engine::Status();
+}
+
 }  // namespace
 
 std::shared_ptr<Rig::Impl> Rig::Impl::Make(std::shared_ptr<Library::Impl> library, engine::Rig rest) {
@@ -80,7 +98,7 @@ std::shared_ptr<Rig::Impl> Rig::Impl::Make(std::shared_ptr<Library::Impl> librar
   for (const engine::CharacterClip& clip : rest.scene.clips)
     impl->clips.push_back({clip.id, clip.begin, clip.duration});
   for (const std::size_t m : engine::ShownMeshes(rest.scene))
-    impl->meshes.push_back(InfoOf(rest.scene.meshes[m]));
+    impl->meshes.push_back(InfoOf(rest.scene.meshes[m], *rest.graph));
   impl->rest = std::move(rest);
   return impl;
 }
@@ -89,7 +107,6 @@ engine::Result<std::shared_ptr<engine::Playing>> Rig::Impl::PlayingOf(
     const std::optional<std::string>& clip) const {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (const auto it = playing_.find(clip); it != playing_.end()) return it->second;
-  const std::lock_guard<std::mutex> building(library->mutex);
   engine::Result<std::shared_ptr<engine::Playing>> made = engine::Playing::Make(rest, clip, {}, acceleration);
   if (made.ok()) playing_[clip] = *made;
   return made;
@@ -115,26 +132,32 @@ kpsa::Result<kpsa::Rig> Rig::Accelerated(const AccelerationOptions& options) con
   choice.violation_rate = options.violation_rate;
   choice.tolerance = options.tolerance;
   if (options.tolerance.has_value() && !(*options.tolerance >= 0))
-    return engine::ProblemsOf(engine::Status::Usage("tolerance: expected a length of 0 or more, metres"));
+    return engine::ProblemsOf(
+        engine::Status::Usage("tolerance: expected a length of 0 or more, metres").At({path()}));
   if (options.tolerance.has_value()) choice.tolerance = std::min(*options.tolerance, engine::kAnyError);
   if (options.violation_rate.has_value() && !(*options.violation_rate >= 0 && *options.violation_rate <= 1))
-    return engine::ProblemsOf(engine::Status::Usage("violation_rate: expected a share from 0 to 1"));
+    return engine::ProblemsOf(
+        engine::Status::Usage("violation_rate: expected a share from 0 to 1").At({path()}));
   auto impl = Impl::Make(impl_->library, impl_->rest);
   impl->acceleration = choice;
   // Whether the subspaces fit is known once they are in place
   const auto playing = impl->PlayingOf(std::nullopt);
-  if (!playing.ok()) return engine::ProblemsOf(playing.status());
+  if (!playing.ok()) return engine::ProblemsOf(engine::Status(playing.status()).At({path()}));
   for (const engine::AppliedSubspace& one : (*playing)->applied()) {
+    impl->acceleration->loaded.emplace_back(one.path, one.subspace);
     for (const std::string& note : one.notes) impl->rest.notes.push_back(one.name + ": " + note);
   }
   return kpsa::Rig(std::move(impl));
 }
 
 kpsa::Result<TrainingReport> Rig::Train(const TrainingOptions& options, const std::string& subspace) const {
-  const auto failed = [](const engine::Status& status) { return engine::ProblemsOf(status); };
+  const auto failed = [&](const engine::Status& status) {
+    return engine::ProblemsOf(engine::Status(status).At({this->path()}));
+  };
   if (is_accelerated())
     return failed(engine::Status::Usage("this rig is accelerated: expected the one that it was made of"));
   if (const engine::Status numbers = CheckNumbers(options); !numbers.ok()) return failed(numbers);
+  if (const engine::Status status = CheckNodes(impl_->rest); !status.ok()) return failed(status);
   engine::Rig rig = impl_->rest;
   const auto entry =
       engine::ChooseEntry(rig, options.entry.empty() ? std::nullopt : std::optional(options.entry));

@@ -18,7 +18,9 @@ class GraphEdit {
   Result<Done> Set(std::string_view plug, double value);
   Result<Done> Set(std::string_view plug, std::span<const double> values);
   Result<Done> Set(std::string_view plug, std::string_view text);
-  // Numbers go over as they are inside (metres, radians). Types have to agree; a cycle is refused with its path. A plug that something drives takes the new source.
+  // As `connections:` of a rig: between numbers of the same unit they go over as they are; between an angle or a
+  // length and a plain number, which counts in the units of the rig's file, a unitConversion comes in. Types have
+  // to agree; a cycle is refused with its path. A plug that something drives takes the new source.
   Result<Done> Connect(std::string_view source, std::string_view destination);
   Result<Done> Disconnect(std::string_view destination);
   // Puts a deformer at the end of a mesh's stack, where its points are named mesh@node.

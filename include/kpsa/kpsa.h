@@ -10,9 +10,11 @@
 //   metres
 #pragma once
 
-#include "kpsa/bench.h"    // IWYU pragma: export
-#include "kpsa/edit.h"     // IWYU pragma: export
-#include "kpsa/library.h"  // IWYU pragma: export
-#include "kpsa/result.h"   // IWYU pragma: export
-#include "kpsa/rig.h"      // IWYU pragma: export
-#include "kpsa/scene.h"    // IWYU pragma: export
+#include "kpsa/bench.h"       // IWYU pragma: export
+#include "kpsa/edit.h"        // IWYU pragma: export
+#include "kpsa/graph_info.h"  // IWYU pragma: export
+#include "kpsa/library.h"     // IWYU pragma: export
+#include "kpsa/node_type.h"   // IWYU pragma: export
+#include "kpsa/result.h"      // IWYU pragma: export
+#include "kpsa/rig.h"         // IWYU pragma: export
+#include "kpsa/scene.h"       // IWYU pragma: export

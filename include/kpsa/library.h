@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "kpsa/node_type.h"
 #include "kpsa/result.h"
 
 namespace kpsa {
@@ -18,7 +19,8 @@ struct LoadOptions {
   bool plugins = true;  // false: a rig that names plugins is refused, and no foreign code is loaded
 };
 
-// May be copied (copies share it) and used by several threads at once. What it has loaded keeps it alive.
+// May be copied (copies share it) and used by several threads at once: types may be added while others load, train
+// and play. What it has loaded keeps it alive.
 class Library {
  public:
   Library();
@@ -27,10 +29,12 @@ class Library {
   Library& operator=(const Library&);
 
   // A shared library of node types (graph/plugin.h), for rigs that are loaded from then on. It stays loaded
-  // until the program ends. Neither it, nor Load of a rig that names a plugin which
-  // is not loaded yet, while another thread trains a rig of this library. Errors: no such library, another ABI version, a type whose name is taken or whose
+  // until the program ends. Errors: no such library, another ABI version, a type whose name is taken or whose
   // declaration is wrong; nothing of it is added then.
   Result<Done> AddPlugin(const std::string& path);
+  // A node type that a function of this program computes (kpsa/node_type.h), for rigs that are loaded from then on.
+  // Errors: a name that is taken, a declaration that is wrong.
+  Result<Done> AddNode(const NodeType& type);
   // A rig (.yaml) or a character (.glb, .gltf, .vrm), which is a rig, too. Errors: all of the file's, each
   // with its place.
   Result<Rig> Load(const std::string& path, const LoadOptions& options = {}) const;

@@ -14,6 +14,7 @@
 
 #include "kpsa/bench.h"
 #include "kpsa/edit.h"
+#include "kpsa/graph_info.h"
 #include "kpsa/library.h"
 #include "kpsa/result.h"
 
@@ -36,6 +37,7 @@ struct MeshInfo {
   std::size_t vertices = 0;              // of all primitives of the glTF mesh, one after the other
   std::vector<std::uint32_t> triangles;  // three vertices each
   std::vector<std::string> stages;       // of its deformer stack: "morph", "skin", "mush"
+  std::vector<std::string> stage_nodes;  // by stage: the node that computes it
 };
 
 // How a rig is accelerated (docs/accelerate.md).
@@ -84,15 +86,23 @@ class Rig {
   std::span<const std::string> notes() const;             // what may surprise, a sentence each
   const MeshInfo* FindMesh(std::string_view name) const;  // null if there is none
 
+  // The graph, to be walked: nodes in the order of their creation, and connections by destination. Without clips, whose
+  // nodes come in when a scene plays them, and of an accelerated rig without its subspaces' nodes. Made at each call.
+  std::vector<NodeInfo> Nodes() const;
+  std::vector<ConnectionInfo> Connections() const;
+  // What a plug ("mush.iterations", "upper.rotateX", "squeeze.value[2]") holds where nothing drives it. Errors: no
+  // such plug, an output.
+  Result<PlugValue> Held(std::string_view plug) const;
+
   // The rig whose accelerated points come from subspaces; this one, and its scenes, stay as they are. Errors:
   // no such file, one that is damaged, stale, or of other points.
   Result<Rig> Accelerated(const AccelerationOptions& options = {}) const;
   bool is_accelerated() const;
-  // A rig like this one with a graph that `edit` has changed. What controls rest at stays as it was loaded. Errors:
-  // those that `edit` returns, and what does not compile.
+  // A rig like this one with a graph that `edit` has changed; its controls rest where the edit has set them.
+  // Errors: those that `edit` returns, and what does not compile.
   Result<Rig> Edited(const std::function<Result<Done>(GraphEdit&)>& edit) const;
   // Trains a subspace and writes it to a .kpsa file ("": the one that the rig names; an existing one is
-  // replaced). Of a rig that is not accelerated. Takes seconds to minutes; nothing is written unless it
+  // replaced). Of a rig that is not accelerated, without nodes that functions of the program compute. Takes seconds to minutes; nothing is written unless it
   // succeeds.
   Result<TrainingReport> Train(const TrainingOptions& options, const std::string& subspace = {}) const;
   // Full against accelerated evaluation of the same frames. Of an accelerated rig; it, and its scenes, stay as they

@@ -51,6 +51,12 @@ struct FrameOptions {
 
 // Used by one thread at a time; any number of scenes may share a rig. What it compiles is shared with other
 // scenes of the rig that ask for the same. A warm Points() allocates nothing and takes no lock.
+//
+// Nodes that remember (jiggle) come to a time through all frames of the rig before it: from frame 0 on, with the
+// controls as they are set, or from the time of the latest pull where that lies before. So times may go back and
+// forth, and without a change of controls on the way a time has the same points whatever was asked for before.
+//
+// Errors have the node that they are about and its place in the rig's file, or else the file.
 class Scene {
  public:
   explicit Scene(const Rig& rig);  // at rest
@@ -63,8 +69,10 @@ class Scene {
   // that the clip drives.
   Result<Done> Play(const std::optional<std::string>& clip);
   void SetTime(double seconds);  // clamped to the keys of clips, as glTF says
-  // A control, or any other plug that is a number and may vary, in the units of the rig's file. Errors: no
-  // such plug (the nearest is named), a value outside of what the attribute admits, a plug that the clip or the rig drives.
+  // A control, or any other plug that is a number and may vary, in the units of the rig's file. Errors, which
+  // change nothing: no such plug (the nearest is named), a value outside of what the attribute admits, a plug that the
+  // clip or the rig drives. What does not compile or evaluate with it is told by whatever is pulled next, until it is
+  // set right.
   Result<Done> Set(std::string_view plug, double value);
   void Reset();  // all controls at rest; clip and time stay
 
@@ -75,15 +83,19 @@ class Scene {
   // Any other plug, in the file's units: one number, three, four, or the sixteen of a matrix column by column, whose
   // places are metres.
   Result<std::vector<double>> Values(std::string_view plug);
-  // Of the latest Points(); hit is false and the reason empty where nothing is accelerated.
+  // Of the latest Points() or Values(), whatever was set since; it evaluates nothing. hit is false and the reason empty
+  // where that failed, or asked no subspace.
   const Verdict& verdict();
 
-  // What evaluating the scene's meshes at these times costs, on this thread; the scene's own time stays.
+  // What evaluating the points of Rig::meshes() at these times costs, on this thread: the meshes alone, whatever
+  // else the scene was asked for. The scene's own time stays.
   Result<std::vector<StepTime>> Profile(std::span<const double> seconds);
 
-  // Frames of the clip that plays, with the controls as they are set, on many threads; handed over in order,
-  // one call at a time, on any of the threads. `take` returns false to end it. The scene's own time stays.
-  // Bytes do not depend on the threads.
+  // Frames of the clip that plays, with the controls as they are when it is called, on many threads; handed over in
+  // order, one call at a time, on any of the threads. `take` returns false to end it; it may use the scene, which
+  // changes nothing of these frames. The points of Rig::meshes() are evaluated, whatever else the scene was asked for.
+  // The scene's own time stays. Bytes do not depend on the threads. Where nodes remember, or functions of the program
+  // compute (kpsa/node_type.h), it runs on one thread; several are refused with the latter.
   Result<Done> Frames(std::span<const double> seconds, const std::function<bool(const Frame&)>& take,
                       const FrameOptions& options = {});
 

@@ -224,6 +224,51 @@ TEST_F(Face, PlaysAcceleratedAndSaysWhatItDid) {
       << accelerated.verdict().reason;
 }
 
+TEST_F(Face, AVerdictIsOfWhatWasPulledLast) {
+  const auto fast = rig_->Accelerated();
+  ASSERT_TRUE(fast);
+  Scene scene(*fast);
+  EXPECT_TRUE(scene.verdict().reason.empty()) << "nothing was pulled";
+  ASSERT_TRUE(scene.Play("wave"));
+  scene.SetTime(0.3);
+  ASSERT_TRUE(scene.Points("column"));
+  const kpsa::Verdict first = scene.verdict();
+  EXPECT_EQ(first.reason, "hit");
+  const auto is_first = [&] {
+    const kpsa::Verdict& now = scene.verdict();
+    return now.hit == first.hit && now.score == first.score && now.reason == first.reason;
+  };
+  scene.SetTime(0.7);
+  EXPECT_TRUE(is_first()) << "of the pose before";
+  ASSERT_TRUE(scene.Set("mush.envelope", 0.5));
+  EXPECT_TRUE(is_first());
+  ASSERT_TRUE(scene.Play(std::nullopt));
+  EXPECT_TRUE(is_first());
+  ASSERT_TRUE(scene.Points("column"));
+  EXPECT_FALSE(scene.verdict().hit);
+  EXPECT_NE(scene.verdict().reason.find("mush.envelope"), std::string::npos) << scene.verdict().reason;
+  ASSERT_TRUE(scene.Points("column@skin"));
+  scene.SetTime(0.9);
+  ASSERT_TRUE(scene.Set("upper.rotateX", 3));
+  ASSERT_TRUE(scene.Values("upper.rotateX"));
+  EXPECT_TRUE(scene.verdict().reason.empty()) << "which needs no subspace";
+  EXPECT_FALSE(scene.Points("colum"));
+  EXPECT_TRUE(scene.verdict().reason.empty());
+}
+
+TEST_F(Face, SubspacesAreReadOnce) {
+  const auto fast = rig_->Accelerated();
+  ASSERT_TRUE(fast);
+  std::filesystem::rename(Path("hello.kpsa"), Path("away.kpsa"));
+  Scene scene(*fast);
+  const auto played = scene.Play("wave");
+  EXPECT_TRUE(played) << kpsa::ToText(played.problems());
+  EXPECT_TRUE(scene.Set("mush.envelope", 0.5));
+  EXPECT_TRUE(scene.Points("column"));
+  EXPECT_FALSE(rig_->Accelerated()) << "which reads it anew";
+  std::filesystem::rename(Path("away.kpsa"), Path("hello.kpsa"));
+}
+
 TEST_F(Face, GraphsAreEditedInACopy) {
   // A node of the registry, driven by a control, that deforms the mesh after its own stack
   const auto edited = rig_->Edited([](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {
@@ -241,7 +286,7 @@ TEST_F(Face, GraphsAreEditedInACopy) {
   for (Scene* one : {&scene, &plain}) ASSERT_TRUE(one->Set("upper.rotateZ", -60));
   EXPECT_GT(Apart(Pull(&scene), Pull(&plain)), 1e-6) << "three iterations are not ten";
   ASSERT_TRUE(scene.Values("half.output"));
-  EXPECT_NEAR(std::abs((*scene.Values("half.output"))[0]), std::acos(-1) / 6, 1e-6);
+  EXPECT_NEAR(std::abs((*scene.Values("half.output"))[0]), 30, 1e-6) << "degrees, as the rig's file counts";
 
   // A mesh whose stack gives other points than it has vertices for
   const auto empty = rig_->Edited([](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {

@@ -1,0 +1,13 @@
+// Node types that functions of the program compute (kpsa/node_type.h), as the engine declares them.
+#pragma once
+
+#include "base/status.h"
+#include "graph/node_registry.h"
+#include "kpsa/node_type.h"
+
+namespace kpsa::engine {
+
+// Adds it to a registry of its own. Errors: no function, no output, a default of another size.
+Status DeclareNode(const NodeType& type, NodeRegistry* registry);
+
+}  // namespace kpsa::engine

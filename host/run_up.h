@@ -1,0 +1,37 @@
+// Nodes that need their previous frame (NodeDef::stateful), brought to any time.
+#pragma once
+
+#include <optional>
+
+#include "graph/evaluator.h"
+#include "rig/build/rig_builder.h"
+
+namespace kpsa::engine {
+
+// The times of one evaluator. A plan without such nodes takes any time as it is; then a RunUp may be used by several
+// threads, on evaluators of their own.
+class RunUp {
+ public:
+  // The evaluator's plan is of that rig, in which the scene's time may vary.
+  RunUp(const Plan& plan, const Rig& rig)
+      : stateful_(!plan.stateful_node().empty()), time_(plan.FindVarying(rig.scene.time)), fps_(rig.fps) {}
+
+  // Sets the time, in seconds, after all outputs were evaluated at every frame of the rig before it: from frame 0
+  // on, or from where the evaluator was; a time before that starts anew. What is set stays as it is. Errors: of
+  // these frames, and kMostFrames.
+  Status To(double seconds, Evaluator* evaluator);
+  bool stateful() const { return stateful_; }
+  static constexpr double kMostFrames = 1e6;  // of one call
+
+ private:
+  void Set(double seconds, Evaluator* evaluator) const {
+    if (time_ != kNoIndex) evaluator->Set(time_, seconds);
+  }
+
+  bool stateful_;
+  Index time_;
+  double fps_;
+  std::optional<double> at_;  // where the evaluator is
+};
+
+}  // namespace kpsa::engine

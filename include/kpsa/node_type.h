@@ -1,0 +1,45 @@
+// A node type that a function of the program computes: for prototypes. It is slow, frames with it are evaluated on
+// one thread, and no rig with it is trained; what stays becomes a node of a plugin (docs/howto/plugin.md).
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace kpsa {
+
+struct NodeAttribute {
+  enum class Type {
+    kNumber,
+    kVector,
+    kQuaternion,
+    kMatrix
+  };  // 1, 3, 4 (x y z w) and 16 numbers (column by column)
+  std::string name;
+  Type type = Type::kNumber;
+  std::vector<double> value =
+      {};  // an input's where nothing is set; empty: zeros, or what turns and moves nothing
+};
+
+// What a function reads and writes while it computes.
+struct NodeCall {
+  std::span<const std::span<const double>> inputs;  // by input, as many numbers as its type has
+  std::span<const std::span<double>> outputs;       // by output; to be written
+  std::span<const float> points;                    // of a deformer: x y z a point, as they come in
+  std::span<float> out_points;                      // as many; they hold the same when the function is called
+};
+
+struct NodeType {
+  std::string name;  // "wobble", as rigs call it
+  std::string doc = {};
+  std::vector<NodeAttribute> inputs = {}, outputs = {};
+  // It has inPoints and outPoints, too, and stands in a mesh's stack (deform: in a rig, GraphEdit::Deform).
+  bool deformer = false;
+  // "", or what is wrong, which becomes an error of the node. It gives the same whenever it is given the same; it is
+  // called by whatever thread uses the scene, by several at once where several scenes are used. What it throws is
+  // an error of the node, too.
+  std::function<std::string(const NodeCall&)> compute;
+};
+
+}  // namespace kpsa
