@@ -6,9 +6,12 @@
 #include <pybind11/stl.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kpsa/kpsa.h"
@@ -25,11 +28,23 @@ py::object& ErrorType() {
   return *type;
 }
 
+// What a node's function raised on this thread since the last call began; owned.
+PyObject*& RaisedByNode() {
+  static thread_local PyObject* raised = nullptr;
+  return raised;
+}
+
 [[noreturn]] void Raise(const kpsa::Problems& problems) {
+  const auto cause = py::reinterpret_steal<py::object>(std::exchange(RaisedByNode(), nullptr));
+  if (cause && PyObject_IsInstance(cause.ptr(), PyExc_Exception) == 0) {  // KeyboardInterrupt, SystemExit
+    PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(cause.ptr())), cause.ptr());
+    throw py::error_already_set();
+  }
   const py::object error = ErrorType()(kpsa::ToText(problems));
   error.attr("problems") = problems;
   const kpsa::Problem& first = problems.front();
   error.attr("file") = first.file, error.attr("line") = first.line, error.attr("node") = first.node;
+  if (cause) PyException_SetCause(error.ptr(), py::object(cause).release().ptr());
   PyErr_SetObject(ErrorType().ptr(), error.ptr());
   throw py::error_already_set();
 }
@@ -37,6 +52,7 @@ py::object& ErrorType() {
 // Runs without the interpreter's lock; raises what went wrong.
 template <typename F>
 auto Checked(F&& f) {
+  Py_CLEAR(RaisedByNode());
   auto result = [&] {
     const py::gil_scoped_release release;
     return f();
@@ -82,13 +98,22 @@ Floats Points(kpsa::Scene& scene, const std::string& mesh, const py::object& out
   return array;
 }
 
-py::object Values(kpsa::Scene& scene, const std::string& plug) {
-  const std::vector<double> values = Checked([&] { return scene.Values(plug); });
+py::object ObjectOf(const std::vector<double>& values) {
   if (values.size() == 1) return py::float_(values[0]);
   py::array_t<double> array(static_cast<py::ssize_t>(values.size()), values.data());
   if (values.size() != 16) return array;
   // Column by column there, rows first here, as NumPy's matrices are
   return array.reshape({4, 4}).attr("T").attr("copy")();
+}
+
+py::object Values(kpsa::Scene& scene, const std::string& plug) {
+  return ObjectOf(Checked([&] { return scene.Values(plug); }));
+}
+
+py::object Held(const kpsa::Rig& rig, const std::string& plug) {
+  const kpsa::PlugValue value = Checked([&] { return rig.Held(plug); });
+  if (value.numbers.empty() && !value.text.empty()) return py::str(value.text);
+  return ObjectOf(value.numbers);
 }
 
 py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py::object& out, int threads,
@@ -106,7 +131,9 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
   }
   py::array_t<PyVerdict> verdicts(scene.rig().is_accelerated() ? count : 0);
   PyVerdict* const verdict = verdicts.mutable_data();
-  std::atomic<bool> cancel = false;
+  using Clock = std::chrono::steady_clock;
+  constexpr auto kSignalInterval = std::chrono::milliseconds(20);  // the lock may be long in coming
+  Clock::time_point looked = Clock::now();
   bool raised = false;  // by `progress`, or by a signal
   py::object error_type, error_value, error_trace;
   Checked([&] {
@@ -119,9 +146,13 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
                                        verdict[frame.index] = {frame.verdict->hit,
                                                                static_cast<float>(frame.verdict->full_share),
                                                                frame.verdict->score};
-                                     if (progress.is_none()) return true;
+                                     const Clock::time_point now = Clock::now();
+                                     if (progress.is_none() && now - looked < kSignalInterval) return true;
+                                     looked = now;
                                      const py::gil_scoped_acquire lock;
                                      try {
+                                       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+                                       if (progress.is_none()) return true;
                                        const py::object go_on = progress(frame.index + 1);
                                        return Truth(go_on);
                                      } catch (py::error_already_set& error) {
@@ -131,7 +162,7 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
                                        return false;
                                      }
                                    },
-                                   {.threads = threads, .cancel = &cancel});
+                                   {.threads = threads});
     return done;
   });
   if (raised) {
@@ -172,6 +203,7 @@ kpsa::TrainingReport Train(const kpsa::Rig& rig, const std::string& subspace, co
       return false;
     }
   };
+  Py_CLEAR(RaisedByNode());
   auto result = [&] {
     const py::gil_scoped_release release;
     return rig.Train(options, subspace);
@@ -200,6 +232,7 @@ void Said(const kpsa::Result<kpsa::Done>& done) {
 
 kpsa::Rig Edited(const kpsa::Rig& rig, const py::function& function) {
   PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
+  Py_CLEAR(RaisedByNode());
   auto result = [&] {
     const py::gil_scoped_release release;
     return rig.Edited([&](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {
@@ -234,6 +267,136 @@ py::list Profile(kpsa::Scene& scene, const std::vector<double>& seconds) {
     steps.append(row);
   }
   return steps;
+}
+
+using NodeType = kpsa::NodeAttribute::Type;
+constexpr const char* kKinds[] = {"number", "vector", "quaternion", "matrix"};
+
+py::array_t<double> NumbersOf(const py::handle& object) {
+  py::array_t<double> array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
+  if (!array) throw py::type_error("expected numbers, got " + std::string(py::repr(object)));
+  return array;
+}
+
+kpsa::NodeAttribute InputOf(const std::string& name, const py::handle& value) {
+  const py::array_t<double> array = NumbersOf(value);
+  kpsa::NodeAttribute input{name, NodeType::kNumber, {array.data(), array.data() + array.size()}};
+  if (array.ndim() == 0) return input;
+  if (array.ndim() == 1 && array.size() == 3) return input.type = NodeType::kVector, input;
+  if (array.ndim() == 1 && array.size() == 4) return input.type = NodeType::kQuaternion, input;
+  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4)
+    throw py::value_error(name + ": expected a number, three, four, or a matrix [4, 4]");
+  input.type = NodeType::kMatrix;
+  for (py::ssize_t row = 0; row < 4; ++row) {
+    for (py::ssize_t column = 0; column < 4; ++column)
+      input.value[static_cast<std::size_t>(4 * column + row)] = array.at(row, column);
+  }
+  return input;
+}
+
+kpsa::NodeAttribute OutputOf(const std::string& name, const std::string& kind) {
+  for (int i = 0; i < 4; ++i) {
+    if (kind == kKinds[i]) return {name, static_cast<NodeType>(i), {}};
+  }
+  throw py::value_error(name + ": expected \"number\", \"vector\", \"quaternion\" or \"matrix\"");
+}
+
+// As many numbers as the output has.
+void Write(const std::string& name, const py::handle& value, std::span<double> to) {
+  const py::array_t<double> array = NumbersOf(value);
+  if (static_cast<std::size_t>(array.size()) != to.size())
+    throw py::value_error(name + ": expected " + std::to_string(to.size()) + " numbers, got " +
+                          std::to_string(array.size()));
+  for (std::size_t i = 0; i < to.size(); ++i)  // a matrix has rows first there
+    to[i] = array.data()[to.size() == 16 ? 4 * (i % 4) + i / 4 : i];
+}
+
+// A node's function in Python, called with the interpreter's lock.
+struct PyNode {
+  std::vector<std::string> inputs, outputs;
+  bool deformer = false;
+  py::object function;
+
+  void Call(const kpsa::NodeCall& call) const {
+    py::dict values;
+    for (std::size_t i = 0; i < inputs.size(); ++i)
+      values[py::str(inputs[i])] = ObjectOf({call.inputs[i].begin(), call.inputs[i].end()});
+    if (deformer) {
+      Floats points({static_cast<py::ssize_t>(call.points.size() / 3), py::ssize_t{3}}, call.points.data());
+      const py::object moved = function(points, **values);
+      if (!moved.is_none()) {
+        points = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(moved);
+        if (!points) throw py::type_error("expected points, got " + std::string(py::repr(moved)));
+      }
+      if (points.ndim() != 2 || points.shape(1) != 3 ||
+          points.size() != static_cast<py::ssize_t>(call.out_points.size()))
+        throw py::value_error("expected points of shape (" + std::to_string(call.out_points.size() / 3) +
+                              ", 3)");
+      std::copy_n(points.data(), call.out_points.size(), call.out_points.begin());
+      return;
+    }
+    const py::object result = function(**values);
+    if (py::isinstance<py::dict>(result)) {
+      for (std::size_t i = 0; i < outputs.size(); ++i)
+        Write(outputs[i], result[py::str(outputs[i])], call.outputs[i]);
+    } else if (outputs.size() == 1) {
+      Write(outputs[0], result, call.outputs[0]);
+    } else {
+      const auto several = result.cast<py::sequence>();
+      if (several.size() != outputs.size())
+        throw py::value_error("expected " + std::to_string(outputs.size()) + " outputs, got " +
+                              std::to_string(several.size()));
+      for (std::size_t i = 0; i < outputs.size(); ++i) Write(outputs[i], several[i], call.outputs[i]);
+    }
+  }
+
+  std::string operator()(const kpsa::NodeCall& call) const {
+    const py::gil_scoped_acquire lock;
+    try {
+      Call(call);
+      return "";
+    } catch (py::error_already_set& error) {
+      const std::string type = py::str(error.type().attr("__name__"));
+      const std::string text = py::str(error.value());
+      Py_XSETREF(RaisedByNode(), py::object(error.value()).release().ptr());
+      if (error.trace()) PyException_SetTraceback(RaisedByNode(), error.trace().ptr());
+      return text.empty() ? type : type + ": " + text;
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+  }
+};
+
+void AddNode(kpsa::Library& library, const std::string& name, const py::object& inputs,
+             const py::object& outputs, const py::object& compute, bool deformer, const std::string& doc) {
+  // Whoever lets go of it last may have no lock
+  const std::shared_ptr<PyNode> node(new PyNode, [](PyNode* of) {
+    if (Py_IsInitialized() == 0) return;
+    const py::gil_scoped_acquire lock;
+    delete of;
+  });
+  kpsa::NodeType type;
+  type.name = name, type.doc = doc, type.deformer = node->deformer = deformer;
+  node->function = compute;
+  if (!inputs.is_none()) {
+    for (const auto& [key, value] : py::dict(inputs)) {
+      node->inputs.push_back(py::str(key));
+      type.inputs.push_back(InputOf(node->inputs.back(), value));
+    }
+  }
+  if (py::isinstance<py::dict>(outputs)) {
+    for (const auto& [key, kind] : py::dict(outputs)) {
+      node->outputs.push_back(py::str(key));
+      type.outputs.push_back(OutputOf(node->outputs.back(), py::str(kind)));
+    }
+  } else if (!outputs.is_none()) {
+    for (const py::handle& key : outputs) {
+      node->outputs.push_back(py::str(key));
+      type.outputs.push_back({node->outputs.back()});
+    }
+  }
+  type.compute = [node](const kpsa::NodeCall& call) { return (*node)(call); };
+  Checked([&] { return library.AddNode(type); });
 }
 
 template <typename T>
@@ -288,6 +451,7 @@ PYBIND11_MODULE(_kpsa, m) {
       .def_readonly("name", &kpsa::MeshInfo::name)
       .def_readonly("vertices", &kpsa::MeshInfo::vertices)
       .def_readonly("stages", &kpsa::MeshInfo::stages, "of its deformer stack")
+      .def_readonly("stage_nodes", &kpsa::MeshInfo::stage_nodes, "by stage: the node that computes it")
       .def_property_readonly(
           "triangles",
           [](const py::object& self) {  // no copy: the array keeps the mesh alive
@@ -301,6 +465,35 @@ PYBIND11_MODULE(_kpsa, m) {
           "uint32 [N, 3]: vertices")
       .def("__repr__", [](const kpsa::MeshInfo& c) {
         return py::str("<Mesh {} {} vertices>").format(c.name, c.vertices);
+      });
+  py::class_<kpsa::PlugInfo>(m, "Plug",
+                             "An attribute of a node: \"node.name\", of an array \"node.name[2]\".")
+      .def_readonly("name", &kpsa::PlugInfo::name)
+      .def_readonly("type", &kpsa::PlugInfo::type, "\"double\", \"enum\", \"matrix\", \"points\", ...")
+      .def_readonly("unit", &kpsa::PlugInfo::unit, "\"\", \"length\", \"angle\" or \"time\"")
+      .def_readonly("doc", &kpsa::PlugInfo::doc)
+      .def_readonly("output", &kpsa::PlugInfo::output, "computed; all others are set or driven")
+      .def_readonly("structural", &kpsa::PlugInfo::structural, "read when a plan is made")
+      .def_readonly("array", &kpsa::PlugInfo::array)
+      .def_readonly("elements", &kpsa::PlugInfo::elements, "of an array that are set or driven")
+      .def_readonly("choices", &kpsa::PlugInfo::choices, "of an enum")
+      .def("__repr__",
+           [](const kpsa::PlugInfo& p) { return py::str("<Plug {} {}>").format(p.name, p.type); });
+  py::class_<kpsa::NodeInfo>(m, "Node", "A node of a rig's graph.")
+      .def_readonly("name", &kpsa::NodeInfo::name)
+      .def_readonly("type", &kpsa::NodeInfo::type)
+      .def_readonly("file", &kpsa::NodeInfo::file,
+                    "where the rig writes it; \"\" for what the character brings")
+      .def_readonly("line", &kpsa::NodeInfo::line)
+      .def_readonly("column", &kpsa::NodeInfo::column)
+      .def_readonly("plugs", &kpsa::NodeInfo::plugs)
+      .def("__repr__",
+           [](const kpsa::NodeInfo& n) { return py::str("<Node {} {}>").format(n.name, n.type); });
+  py::class_<kpsa::ConnectionInfo>(m, "Connection")
+      .def_readonly("source", &kpsa::ConnectionInfo::source)
+      .def_readonly("destination", &kpsa::ConnectionInfo::destination)
+      .def("__repr__", [](const kpsa::ConnectionInfo& c) {
+        return py::str("<Connection {} -> {}>").format(c.source, c.destination);
       });
   py::class_<kpsa::Verdict>(m, "Verdict", "What SoftCache said of a frame.")
       .def_readonly("hit", &kpsa::Verdict::hit)
@@ -353,7 +546,8 @@ PYBIND11_MODULE(_kpsa, m) {
           [](const PyEdit& e, const std::string& source, const std::string& destination) {
             Said(e.get().Connect(source, destination));
           },
-          py::arg("source"), py::arg("destination"), "A plug that something drives takes the new source.")
+          py::arg("source"), py::arg("destination"),
+          "As `connections:` of a rig. A plug that something drives takes the new source.")
       .def(
           "disconnect",
           [](const PyEdit& e, const std::string& destination) { Said(e.get().Disconnect(destination)); },
@@ -375,6 +569,11 @@ PYBIND11_MODULE(_kpsa, m) {
       .def_property_readonly(
           "notes", [](const kpsa::Rig& r) { return ListOf(r.notes()); }, "what may surprise")
       .def_property_readonly("is_accelerated", &kpsa::Rig::is_accelerated)
+      .def_property_readonly("nodes", &kpsa::Rig::Nodes,
+                             "of the graph, in the order of their creation; without clips and subspaces")
+      .def_property_readonly("connections", &kpsa::Rig::Connections)
+      .def("held", &Held, py::arg("plug"),
+           "What a plug holds where nothing drives it: a number, an array, a matrix [4, 4] or a text.")
       .def(
           "accelerated",
           [](const kpsa::Rig& r, const std::string& subspace, std::optional<double> tolerance,
@@ -430,7 +629,7 @@ PYBIND11_MODULE(_kpsa, m) {
            "is given.")
       .def("values", &Values, py::arg("plug"), "A number, an array of three or four, or a matrix [4, 4].")
       .def_property_readonly(
-          "verdict", [](kpsa::Scene& s) { return s.verdict(); }, "of the latest points()")
+          "verdict", [](kpsa::Scene& s) { return s.verdict(); }, "of the latest points() or values()")
       .def("profile", &Profile, py::arg("seconds"),
            "What evaluating the meshes at these times costs: a dict a step (node, type, label, evaluations, "
            "points, milliseconds), "
@@ -448,6 +647,27 @@ PYBIND11_MODULE(_kpsa, m) {
           "add_plugin",
           [](kpsa::Library& l, const std::string& path) { Checked([&] { return l.AddPlugin(path); }); },
           py::arg("path"))
+      .def(
+          "add_node",
+          [](kpsa::Library& l, const std::string& name, const py::object& inputs, const py::object& outputs,
+             const py::object& compute, bool deformer, const std::string& doc) -> py::object {
+            if (!compute.is_none()) return AddNode(l, name, inputs, outputs, compute, deformer, doc), compute;
+            return py::cpp_function(
+                [l, name, inputs, outputs, deformer, doc](const py::object& function) mutable {
+                  AddNode(l, name, inputs, outputs, function, deformer, doc);
+                  return function;
+                });
+          },
+          py::arg("name"), py::arg("inputs") = py::none(), py::arg("outputs") = py::none(),
+          py::arg("compute") = py::none(), py::kw_only(), py::arg("deformer") = false, py::arg("doc") = "",
+          "A node type that a Python function computes: for prototypes, as it is slow, frames with it run on "
+          "one "
+          "thread, and no rig with it is trained. inputs: defaults by name (a number, three, four, a matrix "
+          "[4, 4]); "
+          "outputs: names, or kinds by name (\"number\", \"vector\", \"quaternion\", \"matrix\"). "
+          "compute(**inputs) gives the output, a tuple of them or a dict; of a deformer, compute(points, "
+          "**inputs) "
+          "gives points [P, 3], or changes them and gives None. Without compute: a decorator.")
       .def(
           "load",
           [](const kpsa::Library& l, const std::string& path, const std::optional<std::string>& variant,

@@ -8,7 +8,8 @@ import numpy.typing as npt
 __version__: str
 
 class Error(RuntimeError):
-    """What was asked for could not be done; file, line and node are those of the first problem."""
+    """What was asked for could not be done; file, line and node are those of the first problem. __cause__ is what a node's
+    Python function raised, if that was it."""
     problems: list[Problem]
     file: str
     line: int
@@ -40,7 +41,33 @@ class Mesh:
     name: str
     vertices: int
     stages: list[str]  # of its deformer stack
+    stage_nodes: list[str]  # by stage: the node that computes it
     triangles: npt.NDArray[np.uint32]  # [N, 3]
+
+class Plug:
+    """An attribute of a node: "node.name", of an array "node.name[2]"."""
+    name: str
+    type: str  # "double", "int", "bool", "enum", "double3", "quaternion", "matrix", "points", "string", ...
+    unit: str  # "", "length", "angle" or "time"
+    doc: str
+    output: bool  # computed; all others are set or driven
+    structural: bool  # read when a plan is made
+    array: bool
+    elements: int  # of an array that are set or driven
+    choices: list[str]  # of an enum
+
+class Node:
+    """A node of a rig's graph."""
+    name: str
+    type: str
+    file: str  # where the rig writes it; "" for what the character brings
+    line: int
+    column: int
+    plugs: list[Plug]
+
+class Connection:
+    source: str  # "squeeze.outValue"
+    destination: str
 
 class Verdict:
     """What SoftCache said of a frame."""
@@ -66,7 +93,7 @@ class GraphEdit:
     def set(self, plug: str, value: Union[float, str, Sequence[float]]) -> None:
         """A number in the units of the rig's file, a choice, a text, or 3, 4 or 16 numbers."""
     def connect(self, source: str, destination: str) -> None:
-        """A plug that something drives takes the new source."""
+        """As `connections:` of a rig. A plug that something drives takes the new source."""
     def disconnect(self, destination: str) -> None: ...
     def deform(self, mesh: str, node: str) -> None:
         """Puts a deformer at the end of a mesh's stack."""
@@ -80,6 +107,10 @@ class Rig:
     meshes: list[Mesh]  # those that are shown
     notes: list[str]
     is_accelerated: bool
+    nodes: list[Node]  # of the graph, in the order of their creation; without clips and subspaces
+    connections: list[Connection]
+    def held(self, plug: str) -> Union[float, str, npt.NDArray[np.float64]]:
+        """What a plug holds where nothing drives it: a number, an array, a matrix [4, 4] or a text."""
     def accelerated(self, subspace: str = "", *, tolerance: Optional[float] = None, violation_rate: Optional[float] = None,
                     stale_is_miss: bool = False) -> Rig:
         """The rig whose accelerated points come from subspaces ("": those that it names). tolerance: metres."""
@@ -96,7 +127,7 @@ class Rig:
 class Scene:
     """A state of a rig: a clip, a time, controls. Used by one thread at a time."""
     rig: Rig
-    verdict: Verdict  # of the latest points()
+    verdict: Verdict  # of the latest points() or values()
     def __init__(self, rig: Rig) -> None: ...
     def play(self, clip: Optional[str]) -> None:
         """Lets a clip drive the character; None: the rest pose."""
@@ -122,6 +153,13 @@ class Library:
     """The node types that rigs are made of."""
     def __init__(self) -> None: ...
     def add_plugin(self, path: str) -> None: ...
+    def add_node(self, name: str, inputs: Optional[Mapping[str, Any]] = None,
+                 outputs: Union[Mapping[str, str], Sequence[str], None] = None, compute: Optional[Callable[..., Any]] = None, *,
+                 deformer: bool = False, doc: str = "") -> Callable[..., Any]:
+        """A node type that a Python function computes: for prototypes, as it is slow, frames with it run on one thread, and no
+        rig with it is trained. inputs: defaults by name (a number, three, four, a matrix [4, 4]); outputs: names, or kinds by
+        name ("number", "vector", "quaternion", "matrix"). compute(**inputs) gives the output, a tuple of them or a dict; of a
+        deformer, compute(points, **inputs) gives points [P, 3], or changes them and gives None. Without compute: a decorator."""
     def load(self, path: str, *, variant: Optional[str] = None, fps: Optional[float] = None, plugins: bool = True) -> Rig:
         """A rig (.yaml) or a character (.glb, .gltf, .vrm)."""
 

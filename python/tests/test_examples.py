@@ -49,3 +49,9 @@ def test_the_first_lines(rig, monkeypatch, capsys):
     monkeypatch.chdir(rig.parent)
     runpy.run_path(str(EXAMPLES / "look.py"), run_name="__main__")
     assert "794 vertices" in capsys.readouterr().out
+
+
+def test_a_node_in_python(rig, monkeypatch, capsys):
+    monkeypatch.chdir(rig.parent)
+    runpy.run_path(str(EXAMPLES / "prototype_node.py"), run_name="__main__")
+    assert "794 vertices breathe" in capsys.readouterr().out
