@@ -39,7 +39,7 @@ struct NodeType {
   // "", or what is wrong, which becomes an error of the node. It gives the same whenever it is given the same; it is
   // called by whatever thread uses the scene, by several at once where several scenes are used. What it throws is
   // an error of the node, too.
-  std::function<std::string(const NodeCall&)> compute;
+  std::function<std::string(const NodeCall&)> compute = {};
 };
 
 }  // namespace kpsa
