@@ -273,7 +273,7 @@ using NodeType = kpsa::NodeAttribute::Type;
 constexpr const char* kKinds[] = {"number", "vector", "quaternion", "matrix"};
 
 py::array_t<double> NumbersOf(const py::handle& object) {
-  py::array_t<double> array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
+  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
   if (!array) throw py::type_error("expected numbers, got " + std::string(py::repr(object)));
   return array;
 }
@@ -325,8 +325,9 @@ struct PyNode {
       Floats points({static_cast<py::ssize_t>(call.points.size() / 3), py::ssize_t{3}}, call.points.data());
       const py::object moved = function(points, **values);
       if (!moved.is_none()) {
-        points = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(moved);
-        if (!points) throw py::type_error("expected points, got " + std::string(py::repr(moved)));
+        const auto given = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(moved);
+        if (!given) throw py::type_error("expected points, got " + std::string(py::repr(moved)));
+        points = given;
       }
       if (points.ndim() != 2 || points.shape(1) != 3 ||
           points.size() != static_cast<py::ssize_t>(call.out_points.size()))

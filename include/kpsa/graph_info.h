@@ -27,7 +27,7 @@ struct NodeInfo {
   std::vector<PlugInfo> plugs;
 };
 struct ConnectionInfo {
-  std::string source, destination;  // "squeeze.outValue", "cage.points[0,2,0].x"
+  std::string source, destination;  // "squeeze.outValue", "cage.points[4].x"
 };
 // Numbers in the units of the rig's file (a matrix column by column), or what else is held as a text: a choice, a
 // string, the kind and size of a mesh.
