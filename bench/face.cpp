@@ -3,6 +3,7 @@
 // the same in Python.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -31,10 +32,14 @@ int main(int argc, char** argv) {
   kpsa::Scene scene(*rig);
   if (const auto playing = scene.Play(argv[2]); !playing) return Fail(playing.problems());
   const std::string mesh = rig->meshes().front().name;
+  double begin_time = 0, length = 0;  // of the clip, which plays again and again
+  for (const kpsa::ClipInfo& clip : rig->clips()) {
+    if (clip.name == argv[2]) begin_time = clip.begin, length = clip.end - clip.begin;
+  }
   std::vector<double> us;
   for (int f = -frames / 10; f < frames; ++f) {  // the first ones warm up
     const auto begin = std::chrono::steady_clock::now();
-    scene.SetTime(std::abs(f) / rig->fps());
+    scene.SetTime(begin_time + std::fmod(std::abs(f) / rig->fps(), length));
     const auto points = scene.Points(mesh);
     const auto end = std::chrono::steady_clock::now();
     if (!points) return Fail(points.problems());
