@@ -22,7 +22,7 @@ function(kpsa_library name)
 endfunction()
 
 function(kpsa_compile_together target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 16)
   foreach(source ${ARGN})
     file(STRINGS ${source} targets REGEX "foreach_target|<Eigen/(QR|SVD|Cholesky|Eigenvalues)>" LIMIT_COUNT 1)
     if(targets)  # they compile themselves once a target; and the longest ones had better run beside others

@@ -21,7 +21,7 @@ constexpr bool kSanitized = false;
 #endif
 constexpr char kTakesLong[] = "takes many minutes with sanitizers";
 
-bool Has(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
+bool Holds(const std::string& text, std::string_view part) { return text.find(part) != std::string::npos; }
 
 class Corners : public ::testing::Test {
  protected:
@@ -60,7 +60,7 @@ class Corners : public ::testing::Test {
 
 TEST_F(Corners, WithoutAClipControlsTrainAndTheRestPoseIsMeasured) {
   Init(SheetCharacter(20, 2, 5));
-  EXPECT_TRUE(Has(init_.err, "no clip moves its points: controls alone train it")) << init_.err;
+  EXPECT_TRUE(Holds(init_.err, "no clip moves its points: controls alone train it")) << init_.err;
   TrainAndBench({"--samples", "300", "--calibration", "100"});
   EXPECT_EQ(train_["trained_on"]["clip_poses"], 0);
   EXPECT_EQ(train_["predicted"]["clip_frames"], 0) << "poses are timed";
@@ -81,7 +81,7 @@ TEST_F(Corners, ClipsThatStandStillAreNoMotion) {
       "tolerance: 1mm, train: {clips: [still], samples: 0}, test: {clips: [idle]}}\n");
   const ProcessResult train = Run({"train", "sheet.yaml", "--force"});
   EXPECT_EQ(train.exit_code, 3) << train.out << train.err;
-  EXPECT_TRUE(Has(train.err, "nothing moves")) << train.err;
+  EXPECT_TRUE(Holds(train.err, "nothing moves")) << train.err;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "sheet.kpsa"));
 }
 

@@ -14,10 +14,10 @@
 namespace kpsa::engine {
 namespace {
 
-enum class Side { kLeft, kRight };
+enum class Hand { kLeft, kRight };
 enum class Other { kOne, kTwo };
 
-using EveryKind = NodeContext<In<"flag", bool>, In<"count", std::int64_t>, In<"side", Side>, In<"x", double>,
+using EveryKind = NodeContext<In<"flag", bool>, In<"count", std::int64_t>, In<"side", Hand>, In<"x", double>,
                               In<"v", Double3>, In<"q", Quaternion>, In<"m", Matrix4>,
                               In<"list", ArrayView<double>>, In<"p", ConstPointsView>, Out<"sum", double>,
                               Out<"doubled", OutArray<double>>, Out<"odd", bool>, Out<"points", PointsView>>;
@@ -26,7 +26,7 @@ void ComputeEveryKind(EveryKind c) {
   const ArrayView<double> list = c.get<"list">();
   const ConstPointsView& p = c.get<"p">();
   c.out<"sum">() = (c.get<"flag">() ? 1 : 0) + static_cast<double>(c.get<"count">()) +
-                   (c.get<"side">() == Side::kRight ? 10 : 0) + c.get<"x">() + c.get<"v">().y +
+                   (c.get<"side">() == Hand::kRight ? 10 : 0) + c.get<"x">() + c.get<"v">().y +
                    c.get<"q">().w + c.get<"m">()(0, 3);
   const OutArray<double> doubled = c.out<"doubled">();
   for (std::uint32_t i = 0; i < doubled.size(); ++i) doubled[i] = i < list.size() ? 2 * list[i] : 0;
@@ -38,7 +38,7 @@ void AddEveryKind(NodeRegistry& registry) {
   registry.add("all", "")
       .in("flag", true)
       .in("count", 3)
-      .enumeration<Side>("side", {{"left", Side::kLeft}, {"right", Side::kRight}}, false, "", Side::kRight)
+      .enumeration<Hand>("side", {{"left", Hand::kLeft}, {"right", Hand::kRight}}, false, "", Hand::kRight)
       .in("x", 1.0)
       .in("v", Double3{1, 2, 3})
       .in("q", Quaternion{})
@@ -70,7 +70,7 @@ TEST(NodeContexts, ReadAndWriteEveryKindByName) {
 
 // The only problem of what `declare` says of a type "n".
 template <typename F>
-std::string Problem(F declare) {
+std::string ProblemOf(F declare) {
   NodeRegistry registry;
   declare(registry.add("n", ""));
   const Status status = registry.status();
@@ -86,24 +86,24 @@ std::uint64_t DecideNothing(Context) {
   return 0;
 }
 
-// Of a compute with this list beside inputs a (double), w (double array), k (structural), side (enum Side) and
+// Of a compute with this list beside inputs a (double), w (double array), k (structural), side (enum Hand) and
 // an output x (double).
 template <typename... Ports>
 std::string ProblemOf() {
-  return Problem([](NodeBuilder n) {
+  return ProblemOf([](NodeBuilder n) {
     n.in("a", 0.0)
         .alias("alpha")
         .in("w", 1.0)
         .array()
         .structural("k", 1.0)
-        .enumeration<Side>("side", {{"left", Side::kLeft}, {"right", Side::kRight}}, false)
+        .enumeration<Hand>("side", {{"left", Hand::kLeft}, {"right", Hand::kRight}}, false)
         .out("x", Type::kDouble)
         .compute<Nothing<NodeContext<Ports...>>>();
   });
 }
 using A = In<"a", double>;
 using W = In<"w", ArrayView<double>>;
-using S = In<"side", Side>;
+using S = In<"side", Hand>;
 using X = Out<"x", double>;
 
 TEST(NodeContexts, NamesThatAreNotDeclared) {
@@ -127,7 +127,7 @@ TEST(NodeContexts, NamesThatAreNotDeclared) {
             "kernels are bound");
   EXPECT_EQ((ProblemOf<A, W, S, X, Out<"k", double>>()),
             "node type \"n\", attribute \"k\": compute writes it, but it is an input");
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               n.in("a", 0.0).out("x", Type::kDouble).out("y", Type::kDouble);
               n.compute<Nothing<NodeContext<A, X>>>()
                   .compute<Nothing<NodeContext<In<"x", double>, Out<"y", double>>>>();
@@ -139,12 +139,12 @@ TEST(NodeContexts, NamesThatAreForgotten) {
   EXPECT_EQ((ProblemOf<A, S, X>()),
             "node type \"n\", attribute \"w\": no compute names this input; expected it in the list of one");
   EXPECT_EQ(
-      Problem([](NodeBuilder n) {
+      ProblemOf([](NodeBuilder n) {
         n.in("a", 0.0).out("x", Type::kDouble).out("y", Type::kDouble).compute<Nothing<NodeContext<A, X>>>();
       }),
       "node type \"n\", attribute \"y\": nothing computes this output; expected a compute() after it is "
       "declared");
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               n.in("a", 0.0).out("x", Type::kDouble).compute<Nothing<NodeContext<A, X>>>();
               n.compute<Nothing<NodeContext<A, X>>>();
             }),
@@ -181,8 +181,8 @@ TEST(NodeContexts, TypesAndShapesOfAnotherKind) {
 
 TEST(NodeContexts, EnumsThatDoNotCountUp) {
   EXPECT_EQ(
-      Problem([](NodeBuilder n) {
-        n.enumeration<Side>("side", {{"left", Side::kLeft}, {"right", Side::kLeft}}, false);
+      ProblemOf([](NodeBuilder n) {
+        n.enumeration<Hand>("side", {{"left", Hand::kLeft}, {"right", Hand::kLeft}}, false);
       }),
       "node type \"n\", attribute \"side\": its choices are not the values 0, 1, 2, ... of its enum in their "
       "order");
@@ -190,7 +190,7 @@ TEST(NodeContexts, EnumsThatDoNotCountUp) {
 
 TEST(NodeContexts, DecideAndBatchReadWhatComputeReads) {
   const auto with = [](auto add) {
-    return Problem([&](NodeBuilder n) {
+    return ProblemOf([&](NodeBuilder n) {
       add(n.in("a", 0.0)
               .in("b", 0.0)
               .out("x", Type::kDouble)
