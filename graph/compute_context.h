@@ -96,7 +96,6 @@ class ComputeContext {
   const PointsView& out_points(int i, std::uint32_t element) const {
     return out_value<PointsView>(i, element);
   }
-  std::uint32_t out_count(int i) const { return (out + out[i])[0]; }
 
   template <typename K>
   const K& kernel_as() const {

@@ -7,7 +7,7 @@
 namespace kpsa::engine {
 namespace {
 
-// `strictly`: an enum is read as its scoped enum only.
+// `strictly`: an enum is its scoped enum only, as where a named input reads it.
 bool Fits(const ComputeParameter& parameter, const AttributeDef& attribute, bool strictly = false) {
   const Type type = attribute.type;
   switch (parameter.kind) {
@@ -113,14 +113,15 @@ std::string Expected(const AttributeDef& attribute, bool array, std::string othe
 
 // How a named port of that attribute is written in a list.
 std::string ExpectedPort(const AttributeDef& a, bool array, bool input) {
-  if (input && a.type == Type::kEnum && !array) return Expected(a, array, "a scoped enum");
-  if (input) return ExpectedName(a.type, array);
-  if (array && a.type != Type::kBool && !IsPointType(a.type))
-    return fmt::format("OutArray<{}>", a.type == Type::kInt || a.type == Type::kEnum
-                                           ? "std::int64_t"
-                                           : ExpectedName(a.type, false));
-  if (array) return IsPointType(a.type) ? "OutArray<PointsView>" : "OutArray<std::int64_t>";
-  return IsPointType(a.type) ? "PointsView" : ExpectedName(a.type, false);
+  if (input)
+    return a.type == Type::kEnum && !array ? Expected(a, array, "a scoped enum")
+                                           : ExpectedName(a.type, array);
+  if (!array && a.type == Type::kEnum) return "std::int64_t";
+  const bool integers = a.type == Type::kBool || a.type == Type::kInt || a.type == Type::kEnum;
+  const std::string name = IsPointType(a.type) ? "PointsView"
+                           : array && integers ? "std::int64_t"
+                                               : ExpectedName(a.type, false);
+  return array ? fmt::format("OutArray<{}>", name) : name;
 }
 
 std::string GivenPort(const Port& port) {
@@ -181,7 +182,7 @@ ComputeGroup GroupOf(const NodeDef& def, std::span<const Port> ports, std::vecto
     const AttributeDef& a = def.attributes[static_cast<std::size_t>(number)];
     const bool array = IsArrayIn(group, a);
     if (a.output == port.input || a.structural) continue;
-    if (Fits(port.parameter, a, true) && port.parameter.array == array) continue;
+    if (Fits(port.parameter, a, port.input) && port.parameter.array == array) continue;
     problems->push_back(fmt::format(
         "node type \"{}\", attribute \"{}\" ({}): compute {} it as {}; expected {}", def.name, a.name,
         Described(a), port.input ? "reads" : "writes", GivenPort(port), ExpectedPort(a, array, port.input)));
@@ -199,7 +200,7 @@ std::vector<std::string> PortProblems(const NodeDef& def, const ComputeGroup& gr
     const AttributeDef* a =
         at < numbers.size() ? &def.attributes[static_cast<std::size_t>(numbers[at])] : nullptr;
     if (a != nullptr && a->name == port.name && port.parameter.array == IsArrayIn(group, *a) &&
-        Fits(port.parameter, *a, true))
+        Fits(port.parameter, *a, port.input))
       continue;
     problems.push_back(fmt::format(
         "node type \"{}\", attribute \"{}\": {} names it as {} {}; expected {}, as the compute before it",

@@ -130,6 +130,7 @@ template <typename... Ports>
 class NodeBatch {
  public:
   static constexpr std::array<Port, sizeof...(Ports)> kPorts{Ports::kPort...};
+  static_assert(NamesDiffer(kPorts), "a name is in the context's list twice");
 
   explicit NodeBatch(const BatchContext& context) : context_(&context) {}
   template <FixedName kName>
@@ -138,6 +139,7 @@ class NodeBatch {
     static_assert(kPlace >= 0, "no input of this name is in the context's list");
     constexpr int kPosition = PositionOf(kPorts, kPlace);
     using T = ParameterAt<kPlace, Ports...>;
+    static_assert(!std::is_enum_v<T>, "a batch reads no enums");
     return context_->get<std::conditional_t<std::is_integral_v<T>, std::int64_t, T>>(step, kPosition);
   }
   template <FixedName kName>
@@ -151,7 +153,6 @@ class NodeBatch {
   const K& kernel_as() const {
     return context_->kernel_as<K>();
   }
-  std::size_t size() const { return context_->count; }
 
  private:
   const BatchContext* context_;

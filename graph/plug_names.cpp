@@ -176,6 +176,9 @@ Result<int> Graph::ParseElement(NodeId id, int attribute, std::string_view text)
         set != nullptr ? *set
                        : n.def->attributes[static_cast<std::size_t>(divisions_attribute)].default_value;
     const auto* sizes = divisions.get_if<std::vector<std::int64_t>>();
+    if (sizes != nullptr && sizes->size() != 3)
+      return Status::Invalid("{}.{}[{}]: {} takes three numbers, not {}", n.name, a.name, text, a.grid,
+                             sizes->size());
     std::int64_t index = 0, stride = 1;
     std::size_t axis = 0;
     for (std::string_view left = text;; ++axis) {

@@ -18,6 +18,7 @@ void Profile::Add(const ProfileEvent& event) {
 }
 
 void Profile::AddPart(Index step, int part, std::uint64_t ns) {
+  if (part < 0 || part >= ComputeHost::kMaxParts) return;  // plugins name parts, too
   std::lock_guard<std::mutex> lock(add_mutex);
   part_ns_[step][static_cast<std::size_t>(part)] += ns;
 }

@@ -41,7 +41,7 @@ class Profile {
   std::size_t max_events = 1000000;  // no more are kept beyond
 
   void Add(const ProfileEvent& event);                   // from any thread
-  void AddPart(Index step, int part, std::uint64_t ns);  // likewise
+  void AddPart(Index step, int part, std::uint64_t ns);  // likewise; a part that there is not is ignored
   void Clear();
 
  private:

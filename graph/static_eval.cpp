@@ -94,7 +94,10 @@ const Value* StaticEvaluator::Ready(const Source& source, bool rest) {
 }
 
 const Value* StaticEvaluator::Get(const Source& source, bool rest) {
-  if (!status_.ok()) return nullptr;
+  if (!status_.ok()) {
+    told_ = true;  // whatever is asked for now, it has not failed
+    return nullptr;
+  }
   if (const Value* value = Ready(source, rest)) return value;
   // What is missing, consumers before sources
   std::vector<Index> missing{source.instance};

@@ -91,7 +91,8 @@ Status CheckRig(const Graph& graph, const AccelerationTarget& target, const Subs
   if (const std::string difference = SignatureDifference(record.signature, now); !difference.empty()) {
     if (!stale_is_miss) {
       return Status::Invalid(
-          "the subspace is stale: since it was trained, {} changed; train it again, or use --stale miss",
+          "the subspace is stale: since it was trained, {} changed; train it again, or let all its frames "
+          "miss (--stale miss, stale_is_miss)",
           difference);
     }
     draft->AlwaysMiss(fmt::format("the subspace is stale ({} changed)", difference));

@@ -19,11 +19,11 @@ namespace kpsa::engine {
 namespace {
 
 // Inputs and outputs by position.
-enum In { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints, kRegionPoints };
+enum KpsaInput { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints, kRegionPoints };
 // What decide returns: all points, or regions.
 constexpr std::uint64_t kFullBit = 1;
 constexpr int kFirstRegionBit = 1;
-enum Out { kOutPoints, kScore, kHit, kFullWeight, kMissReason, kOffender };
+enum KpsaOutput { kOutPoints, kScore, kHit, kFullWeight, kMissReason, kOffender };
 
 constexpr double kLeastWeight = 1e-6;  // of the full evaluation, in what is no hit
 constexpr int kGrowthSteps = 16;       // of sqrt(2): a space that is 256 times as large as at rest

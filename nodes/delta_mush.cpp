@@ -93,8 +93,8 @@ KPSA_NODES(delta_mush, registry) {
                                       .own = DeclareMush,
                                       .bind = BindMush,
                                       .demand = DemandMush})
-      .version(2)
-      .cost(500, 80);  // detail that fades in folds and grows with its parent
+      .version(2)  // detail that fades in folds and grows with its parent
+      .cost(500, 80);
 }
 
 }  // namespace kpsa::engine

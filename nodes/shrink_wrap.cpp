@@ -124,8 +124,8 @@ KPSA_NODES(shrink_wrap, registry) {
                                             .own = DeclareShrinkWrap,
                                             .bind = BindShrinkWrap,
                                             .demand = DemandShrinkWrap})
-      .version(2)
-      .cost(2000, 900);  // an axis that its parent turns
+      .version(2)  // an axis that its parent turns
+      .cost(2000, 900);
 }
 
 }  // namespace kpsa::engine

@@ -23,17 +23,15 @@ Result<BoundKernel> BindTransform(const Binding& binding) {
 }
 
 // What all outputs are computed from, the world's from a parent, too.
-using LocalInputs = NodeContext<In<"translate", Double3>, In<"rotate", Double3>, In<"scale", Double3>,
-                                In<"offsetParentMatrix", Matrix4>>;
 template <typename... More>
 using LocalContext = NodeContext<In<"translate", Double3>, In<"rotate", Double3>, In<"scale", Double3>,
                                  In<"offsetParentMatrix", Matrix4>, More...>;
 
-bool HasControls(LocalInputs c) {
+bool HasControls(LocalContext<> c) {
   return !(c.get<"translate">() == Double3() && c.get<"rotate">() == Double3() &&
            c.get<"scale">() == Double3{1, 1, 1});
 }
-Matrix4 Local(LocalInputs c) {
+Matrix4 Local(LocalContext<> c) {
   const Matrix4& offset = c.get<"offsetParentMatrix">();
   if (!HasControls(c)) return offset;
   return ComposeLocal(offset, {c.get<"translate">(), c.get<"rotate">(), c.kernel_as<TransformKernel>().order,

@@ -1,6 +1,5 @@
 #include "kpsa/training/trainer.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "kpsa/training/finer_subspaces.h"

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "kpsa/training/mode_choice.h"
+#include "kpsa/training/signal_noise.h"
 
 namespace kpsa::engine {
 namespace {
@@ -51,7 +52,11 @@ Status ChooseCues(double tolerance, const TrainingPoses& poses, const PoseMatrix
           : kpsa::engine::ChooseCues(modes.pca, modes.positions, modes.noise, poses.poses, choice);
   KPSA_RETURN_IF_ERROR(std::move(priced));
   if (chosen.cues.empty())
-    return Status::Invalid("nothing moves in the training poses: no cue can be chosen");
+    return Status::Invalid(
+        "no cue can be chosen: {} numbers are too few to measure a pose by (a point takes three, and some "
+        "are "
+        "kept to judge by)",
+        choice.rows);
   to->set = MakeCueSet(modes.pca, chosen.cues, modes.noise);
   to->choice = std::move(chosen);
   return Status();

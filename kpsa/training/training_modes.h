@@ -5,7 +5,6 @@
 
 #include "kpsa/training/cue_choice.h"
 #include "kpsa/training/pca.h"
-#include "kpsa/training/signal_noise.h"
 #include "kpsa/training/training_poses.h"
 
 namespace kpsa::engine {

@@ -5,7 +5,6 @@
 
 #include "kpsa/space_frame.h"
 #include "kpsa/training/calibrate_subspace.h"
-#include "kpsa/training/frame_cost.h"
 #include "kpsa/training/tilts.h"
 #include "kpsa/training/training_signals.h"
 

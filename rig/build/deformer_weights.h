@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "rig/build/rig_builder.h"
 #include "files/weights_json.h"
+#include "rig/build/rig_builder.h"
 
 namespace kpsa::engine {
 

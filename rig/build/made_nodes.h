@@ -53,8 +53,6 @@ class MadeNodes {
   MadeNode* Find(const std::string& name);
   const MadeNode* Find(NodeId id) const { return const_cast<MadeNodes*>(this)->Find(id); }
   const MadeNode* Find(const std::string& name) const { return const_cast<MadeNodes*>(this)->Find(name); }
-  std::size_t size() const { return list_.size(); }
-  MadeNode& operator[](std::size_t i) { return list_[i]; }
   auto begin() { return list_.begin(); }
   auto end() { return list_.end(); }
   auto begin() const { return list_.begin(); }

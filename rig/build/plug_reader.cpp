@@ -86,7 +86,7 @@ void PlugReader::ReadPlug(const PlugRef& plug, const YamlNode& value, int source
       return;
     }
     pending_.push_back({value.scalar.substr(prefix.size()), plug, value.where(), source, overrides});
-    if (overrides) overridden_.plugs.emplace_back(plug, false);
+    if (overrides) Override(plug, false);
     return;
   }
   // [a.x, 0, b.y]: components of their own
@@ -106,7 +106,7 @@ void PlugReader::ReadPlug(const PlugRef& plug, const YamlNode& value, int source
   // Characters stand where their files have them at rest
   in_.errors->Add(value, IsReferenceRoot(in_.rig, plug.node) ? graph_->Pose(plug, std::move(read))
                                                              : graph_->Set(plug, std::move(read)));
-  if (overrides) overridden_.plugs.emplace_back(plug, true);
+  if (overrides) Override(plug, true);
 }
 
 }  // namespace kpsa::engine

@@ -22,11 +22,15 @@ class PlugReader {
   void ReadAttribute(const MadeNode& made, const RigAttribute& attribute);
   // Sets the value, or notes the connection, that is written for one plug.
   void ReadPlug(const PlugRef& plug, const YamlNode& value, int source, bool overrides);
+  // Notes that an override says what the plug holds, by a value or by a connection.
+  void Override(const PlugRef& plug, bool by_value) {
+    overridden_.plugs.emplace_back(plug, by_value);
+    overridden_.keys.insert(KeyOf(plug));
+  }
 
   // What was read: connections in the order of the file, and what overrides set or connect.
   const std::vector<PendingConnection>& pending() const { return pending_; }
   const OverriddenPlugs& overridden() const { return overridden_; }
-  OverriddenPlugs* mutable_overridden() { return &overridden_; }
 
  private:
   const BuildInput& in_;

@@ -10,8 +10,8 @@
 
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
-#include "rig/character/clip_motion.h"
 #include "rig/build/rig_builder.h"
+#include "rig/character/clip_motion.h"
 
 namespace kpsa::engine {
 

@@ -109,7 +109,7 @@ bool RestFalloffs::ReadShape(const std::string& kind, const YamlNode& node, int 
   const auto place = [&](const char* key) {
     const YamlNode* value = map.Required(key);
     Double3 at;
-    good = value != nullptr && places_.Read(*value, source, &at) && good;
+    good = value != nullptr && places_->Read(*value, source, &at) && good;
     return at;
   };
   const auto length = [&](const char* key, bool above_zero) {

@@ -15,7 +15,7 @@ namespace kpsa::engine {
 // Refers to its arguments. All return false after an error.
 class RestFalloffs {
  public:
-  RestFalloffs(const BuildInput& in, const RestPlaces& places, RestPose* rest, WeightMaps* maps)
+  RestFalloffs(const BuildInput& in, RestPlaces* places, RestPose* rest, WeightMaps* maps)
       : in_(in), places_(places), rest_(rest), maps_(maps) {}
 
   // Weights are by point of one geometry of the deformer.
@@ -32,7 +32,7 @@ class RestFalloffs {
                  std::function<double(Double3)>* weight_at) const;
 
   const BuildInput& in_;
-  const RestPlaces& places_;
+  RestPlaces* places_;
   RestPose* rest_;
   WeightMaps* maps_;
 };

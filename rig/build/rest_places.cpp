@@ -65,7 +65,7 @@ bool RestPlaces::VertexPlaces(const YamlNode& vertices, const YamlNode* mesh_nod
   return true;
 }
 
-bool RestPlaces::Place(MadeNode* made, int depth) const {
+bool RestPlaces::Place(MadeNode* made, int depth) {
   if (made->placed) return true;
   const auto it = made->special.find("at");
   if (it == made->special.end()) {
@@ -104,7 +104,7 @@ bool RestPlaces::Place(MadeNode* made, int depth) const {
 
 // A handle at a place of a referenced character, of which nothing says what carries it, goes along with that
 // character.
-bool RestPlaces::HangUnderReference(const MadeNode& made, const YamlNode& at) const {
+bool RestPlaces::HangUnderReference(const MadeNode& made, const YamlNode& at) {
   GraphEditor edit(graph_);
   const PlugRef parent = edit.Plug(made.id, "parentMatrix");
   if (graph_->FindConnection(parent) != nullptr || graph_->FindValue(parent) != nullptr) return true;
@@ -121,7 +121,7 @@ bool RestPlaces::HangUnderReference(const MadeNode& made, const YamlNode& at) co
   return in_.Fail(at.where(), edit.Take());
 }
 
-bool RestPlaces::RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world) const {
+bool RestPlaces::RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world) {
   *world = Matrix4();
   for (NodeId node = transform;; ++depth) {
     if (depth > kMaxPlaceDepth) return in_.errors->Add(asked, "places depend on each other too deeply");
@@ -145,7 +145,7 @@ const Places* RestPlaces::CurveOf(const std::string& name) const {
   return it == curves_.end() ? nullptr : &it->second;
 }
 
-bool RestPlaces::ReadPlace(const YamlNode& node, int source, int depth, Double3* place) const {
+bool RestPlaces::ReadPlace(const YamlNode& node, int source, int depth, Double3* place) {
   if (node.is_sequence()) {
     std::vector<double> p;
     if (!ReadNumbers(node, "place", Unit::kLength, in_.units(source), 3, &p, in_.errors)) return false;

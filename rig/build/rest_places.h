@@ -13,31 +13,29 @@ namespace kpsa::engine {
 Matrix4 LocalAtRest(const Rig& rig, NodeId transform);
 
 // Refers to its arguments. All return false after an error. Handles are placed when they are first asked for: what
-// is placed `at` one of them waits for it.
+// is placed `at` one of them waits for it. That sets offsetParentMatrix and may connect parentMatrix.
 class RestPlaces {
  public:
   RestPlaces(const BuildInput& in, const RestCurves& curves, RestPose* rest, MadeNodes* nodes, Graph* graph)
       : in_(in), curves_(curves), rest_(rest), nodes_(nodes), graph_(graph) {}
 
   // A curve (its middle cv), a cv (`lips[2]`), a transform, {vertex: 812, mesh: NAME} or [x, y, z].
-  bool Read(const YamlNode& node, int source, Double3* place) const {
-    return ReadPlace(node, source, 0, place);
-  }
+  bool Read(const YamlNode& node, int source, Double3* place) { return ReadPlace(node, source, 0, place); }
   // Of vertices of a mesh (of the only one, where none is named).
   bool VertexPlaces(const YamlNode& vertices, const YamlNode* mesh, Places* places) const;
   // world_from_local of a transform with everything as set and no connection followed but its parent's. Errors of
   // what it hangs under are at `asked`.
-  bool WorldOf(NodeId transform, const YamlNode& asked, Matrix4* world) const {
+  bool WorldOf(NodeId transform, const YamlNode& asked, Matrix4* world) {
     return RestWorld(transform, asked, 0, world);
   }
   // Follows `at`: sets offsetParentMatrix so that translate 0 is at the place. The axes stay the parent's.
-  bool Place(MadeNode* made) const { return Place(made, 0); }
+  bool Place(MadeNode* made) { return Place(made, 0); }
 
  private:
-  bool ReadPlace(const YamlNode& node, int source, int depth, Double3* place) const;
-  bool RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world) const;
-  bool Place(MadeNode* made, int depth) const;
-  bool HangUnderReference(const MadeNode& made, const YamlNode& at) const;
+  bool ReadPlace(const YamlNode& node, int source, int depth, Double3* place);
+  bool RestWorld(NodeId transform, const YamlNode& asked, int depth, Matrix4* world);
+  bool Place(MadeNode* made, int depth);
+  bool HangUnderReference(const MadeNode& made, const YamlNode& at);
   const Places* CurveOf(const std::string& name) const;
 
   const BuildInput& in_;

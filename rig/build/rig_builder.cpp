@@ -61,23 +61,23 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
 
   // Where they are at rest
   RestCurves curves;
-  const RestPlaces places(in, curves, rest, &nodes, graph);
+  RestPlaces places(in, curves, rest, &nodes, graph);
   AddCurves(in, nodes, places, &curves, graph);
   ConnectParents(in, nodes, graph);
-  if (errors->ok()) PlaceHandles(in, places, &nodes, graph);
+  if (errors->ok()) PlaceHandles(in, &places, &nodes, graph);
   ConnectCurves(in, nodes, graph);
 
   // Stacks, and what weighs them
   PlugKeys stacked;
-  const RestFalloffs falloffs(in, places, rest, &maps);
-  const WeightSetter weights(in, falloffs, &maps, graph, &rig->notes);
+  const RestFalloffs falloffs(in, &places, rest, &maps);
+  WeightSetter weights(in, falloffs, &maps, graph, &rig->notes);
   BuildMeshStacks(in, &nodes, scene, graph, &rig->notes);
-  SetWeights(weights, &nodes);
+  SetWeights(&weights, &nodes);
   PlaceStages(in, rest, &nodes, graph);
   BuildPointStacks(in, curves, rest, &nodes, &stacked, graph);
   std::vector<FalloffUse> falloff_uses;
   ConnectFalloffs(in, &nodes, &falloff_uses, graph);
-  FinishStacks(weights, *graph, &nodes, &rig->notes);
+  FinishStacks(&weights, *graph, &nodes, &rig->notes);
 
   // What needs the stages
   ConnectLights(in, nodes, graph);
@@ -92,8 +92,8 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   ConnectTime(in, nodes, graph);
 
   // What depends on who drives whom
-  PlaceStagesAtHandles(in, places, rest, &nodes, graph);
-  PlaceFalloffs(in, falloff_uses, &nodes, graph);
+  PlaceStagesAtHandles(in, &places, rest, &nodes, graph);
+  PlaceFalloffs(in, falloff_uses, nodes, graph);
   ConnectPivots(in, *rest, nodes, graph);
   FinishOverrides(in, reader.overridden(), stacked, &rig->pinned, graph);
   CheckVariants(in, nodes);

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "base/text.h"
+#include "base/quantity_text.h"
 #include "rig/build/starter_acceleration.h"
 #include "rig/build/starter_stack.h"
 #include "rig/build/starter_text.h"
@@ -15,18 +15,14 @@ constexpr double kLargeMetres = 20;  // more is seldom meant
 std::string TitleOf(const StarterCharacter& in, const std::string& file, bool accelerates) {
   Index points = 0;
   for (const CharacterMesh& mesh : in.rig.scene.meshes) points += mesh.mesh().point_count();
-  const auto several = [](std::size_t count, const char* one, const char* many) {
-    return fmt::format("{} {}", Thousands(count), count == 1 ? one : many);
-  };
   std::string text = fmt::format(
       "# A starter rig for {}: {}, {}, {}, {:.3g} m from corner to corner.\n"
       "# It works as it is: kpsa validate, eval, render{}. Comments say what to do next; take out the # "
       "where no space\n"
       "# follows it to try what is suggested there.\n"
       "# Lengths are in cm and angles in degrees; write 2mm or 0.1rad for anything else.\n",
-      InComment(file), several(in.rig.scene.meshes.size(), "mesh", "meshes"),
-      several(points, "point", "points"), several(in.character.clips.size(), "clip", "clips"),
-      in.rig.rest_diagonal, accelerates ? ", train, bench" : "");
+      InComment(file), Plural(in.rig.scene.meshes.size(), "mesh"), Plural(points, "point"),
+      Plural(in.character.clips.size(), "clip"), in.rig.rest_diagonal, accelerates ? ", train, bench" : "");
   if (in.rig.rest_diagonal > kLargeMetres)
     text += "# So large a character may have been meant in cm: then read cm where metres are written.\n";
   return text;

@@ -70,6 +70,13 @@ TEST_F(Corners, WithoutAClipControlsTrainAndTheRestPoseIsMeasured) {
   EXPECT_EQ(bench_["hit_rate"], 1.0);
 }
 
+TEST_F(Corners, TooFewNumbersAreSaidToBe) {
+  Init(SheetCharacter(20, 2, 5));
+  const ProcessResult train = Run({"train", "sheet.yaml", "--force", "-q", "--samples", "60", "--rows", "3"});
+  EXPECT_EQ(train.exit_code, 3);
+  EXPECT_TRUE(Holds(train.err, "no cue can be chosen: 3 numbers are too few")) << train.err;
+}
+
 TEST_F(Corners, ClipsThatStandStillAreNoMotion) {
   SheetCharacter character(20, 1, 1);
   character.Swing("still", 30, 0);

@@ -1,5 +1,4 @@
 // What kpsa train and kpsa bench say of other tolerances, and of stacks that are too cheap to accelerate.
-#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 

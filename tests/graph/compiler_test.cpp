@@ -126,6 +126,37 @@ TEST(StructuralDrivers, AFailedOneIsToldWithItsNodeAndThePlug) {
   }
 }
 
+TEST(StructuralDrivers, OfAnEarlierFailureIsNotToldAsTheOnesOfAnother) {
+  NodeRegistry registry;
+  AddToyNodes(registry);
+  registry.add("badMatrix", "Fails.")
+      .in("input", 0.0)
+      .out("out", Type::kMatrix)
+      .compute([](ComputeContext& c) { c.host->Fail("no matrix"); });
+  registry.add("goodMatrix", "").in("input", 0.0).out("out", Type::kMatrix).compute([](ComputeContext& c) {
+    c.out_value<Matrix4>(0) = Matrix4();
+  });
+  registry.add("rests", "Looks at what fails at rest, then at a structural matrix.")
+      .in("m", Matrix4())
+      .structural("frame", Matrix4())
+      .out("out", Type::kDouble)
+      .compute([](ComputeContext&) {})
+      .bind([](const Binding& b) -> Result<BoundKernel> {
+        EXPECT_EQ(b.structural().rest("m"), nullptr);
+        return BoundKernel{std::make_shared<Matrix4>(b.structural().value("frame").get<Matrix4>()), 0, 0};
+      });
+  TestGraph g(registry);
+  g.add("badMatrix", "bad");
+  g.add("goodMatrix", "good");
+  g.add("rests", "n");
+  g.connect("bad.out", "n.m");
+  g.connect("good.out", "n.frame");
+  g.vary("bad.input");
+  const Status status = g.try_pull("n.out");
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.ToString(), "node \"bad\" (badMatrix): no matrix");
+}
+
 TEST_F(CompilerTest, PointsThatDoNotExist) {
   g.add("grid", "g");
   g.add("add", "a");

@@ -4,20 +4,10 @@
 
 #include "graph/graph.h"
 #include "graph/node_registry.h"
+#include "tests/graph/declared.h"
 
 namespace kpsa::engine {
 namespace {
-
-// The only problem of what `declare` says of a type "n".
-template <typename F>
-std::string Problem(F declare) {
-  NodeRegistry registry;
-  declare(registry.add("n", ""));
-  const Status status = registry.status();
-  EXPECT_LE(status.errors().size(), 1u) << status.ToString();
-  EXPECT_EQ(Graph(registry).AddNode("n", "one").ok(), status.ok());
-  return status.ok() ? "" : status.errors().front().message;
-}
 
 enum class Side { kLeft, kRight };
 
@@ -36,7 +26,7 @@ NodeBuilder AllKinds(NodeBuilder n) {
 }
 
 TEST(Declarations, EveryKindThatFitsIsTaken) {
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               AllKinds(n).compute([](bool flag, std::int64_t count, Side side, double x, const Double3& v,
                                      Quaternion q, const Matrix4&, const ArrayView<double>& list) noexcept {
                 return flag && side == Side::kLeft ? x + v.x + q.w + static_cast<double>(count) + list.size()
@@ -44,13 +34,13 @@ TEST(Declarations, EveryKindThatFitsIsTaken) {
               });
             }),
             "");
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               n.in("a", 1).out("output", Type::kEnum).compute([](int a) {
                 return a > 0 ? Side::kLeft : Side::kRight;
               });
             }),
             "");
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               n.points_in("w", "", Type::kWeights).out("output", Type::kInt).compute([](ConstPointsView w) {
                 return w.count;
               });
@@ -60,27 +50,27 @@ TEST(Declarations, EveryKindThatFitsIsTaken) {
 
 TEST(Declarations, OneParameterTooManyOrTooFew) {
   EXPECT_EQ(
-      Problem([](NodeBuilder n) {
+      ProblemOf([](NodeBuilder n) {
         n.in("a", 0.0).structural("k", 1.0).out("output", Type::kDouble).compute([](double a, double k) {
           return a * k;
         });
       }),
       "node type \"n\": compute takes 2 parameters; expected 1, one for each input that is not structural "
       "(a)");
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               n.in("a", 0.0).in("b", 0.0).out("output", Type::kDouble).compute([](double a) { return a; });
             }),
             "node type \"n\": compute takes 1 parameter; expected 2, one for each input that is not "
             "structural (a, b)");
   EXPECT_EQ(
-      Problem([](NodeBuilder n) { n.out("output", Type::kDouble).compute([](double a) { return a; }); }),
+      ProblemOf([](NodeBuilder n) { n.out("output", Type::kDouble).compute([](double a) { return a; }); }),
       "node type \"n\": compute takes 1 parameter; expected 0, one for each input that is not structural "
       "(none)");
 }
 
 TEST(Declarations, AParameterOfAnotherType) {
   const auto with = [](auto compute) {
-    return Problem([&](NodeBuilder n) { n.in("a", 0.0).out("output", Type::kDouble).compute(compute); });
+    return ProblemOf([&](NodeBuilder n) { n.in("a", 0.0).out("output", Type::kDouble).compute(compute); });
   };
   EXPECT_EQ(
       with([](Matrix4) { return 0.0; }),
@@ -96,12 +86,12 @@ TEST(Declarations, AParameterOfAnotherType) {
       with([](ConstPointsView) { return 0.0; }),
       "node type \"n\", attribute \"a\" (double): compute takes ConstPointsView as parameter 1; expected "
       "double");
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               n.in("a", 0.0).array().out("output", Type::kDouble).compute([](double a) { return a; });
             }),
             "node type \"n\", attribute \"a\" (double array): compute takes double as parameter 1; expected "
             "ArrayView<double>");
-  EXPECT_EQ(Problem([](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([](NodeBuilder n) {
               n.in("on", true).out("output", Type::kDouble).compute([](Side) { return 0.0; });
             }),
             "node type \"n\", attribute \"on\" (bool): compute takes an enum as parameter 1; expected bool");
@@ -109,7 +99,7 @@ TEST(Declarations, AParameterOfAnotherType) {
 
 TEST(Declarations, AResultOfAnotherType) {
   const auto with = [](Type type, auto compute) {
-    return Problem([&](NodeBuilder n) { n.in("a", 0.0).out("output", type).compute(compute); });
+    return ProblemOf([&](NodeBuilder n) { n.in("a", 0.0).out("output", type).compute(compute); });
   };
   EXPECT_EQ(with(Type::kDouble, [](double) { return 1; }),
             "node type \"n\", attribute \"output\" (double): compute returns an integer; expected double");
@@ -121,7 +111,7 @@ TEST(Declarations, AResultOfAnotherType) {
             "node type \"n\", attribute \"output\" (points): compute returns double; expected a function of "
             "ComputeContext& that writes the output itself");
   EXPECT_EQ(
-      Problem([](NodeBuilder n) {
+      ProblemOf([](NodeBuilder n) {
         n.in("a", 0.0).out("x", Type::kDouble).out("y", Type::kDouble).compute([](double a) { return a; });
       }),
       "node type \"n\": compute returns one value, but is to compute 2 outputs; expected a function of "
@@ -131,21 +121,21 @@ TEST(Declarations, AResultOfAnotherType) {
 TEST(Declarations, OnesThatContradictThemselves) {
   const auto copy = [](double a) { return a; };
   EXPECT_EQ(
-      Problem([&](NodeBuilder n) {
+      ProblemOf([&](NodeBuilder n) {
         n.in("a", 0.0).out("x", Type::kDouble).compute(copy).out("y", Type::kDouble);
       }),
       "node type \"n\", attribute \"y\": nothing computes this output; expected a compute() after it is "
       "declared");
   EXPECT_EQ(
-      Problem([&](NodeBuilder n) {
+      ProblemOf([&](NodeBuilder n) {
         n.in("a", 0.0).in("a", 1.0).out("x", Type::kDouble).compute([](double a, double b) { return a + b; });
       }),
       "node type \"n\", attribute \"a\": declared twice; expected each name once");
-  EXPECT_EQ(Problem([&](NodeBuilder n) {
+  EXPECT_EQ(ProblemOf([&](NodeBuilder n) {
               n.in("a", 0.0).out("x", Type::kDouble).compute_for({"x"}, {"a"}, copy).in_place("b");
             }),
             "node type \"n\", attribute \"b\": the compute before it has no such input");
-  EXPECT_NE(Problem([&](NodeBuilder n) {
+  EXPECT_NE(ProblemOf([&](NodeBuilder n) {
               n.in("a", AssetPtr()).out("x", Type::kDouble).compute(copy);
             }).find("its default tells no type"),
             std::string::npos);

@@ -233,6 +233,8 @@ TEST_F(GraphTest, PlugsByName) {
   EXPECT_TRUE(Says(NameOf("Cage 1.points[1,3,0]"), "expected three indices within the divisions [2, 3, 2]"));
   EXPECT_TRUE(Says(NameOf("Cage 1.points[1,2]"), "expected three indices"));
   EXPECT_TRUE(Says(NameOf("Cage 1.points[-1]"), "expected an index from 0"));
+  g.add("grid", "flat", {{"divisions", Value(std::vector<std::int64_t>{2, 5})}});
+  EXPECT_TRUE(Says(NameOf("flat.points[0,2,0]"), "divisions takes three numbers, not 2"));
   EXPECT_TRUE(Says(NameOf("Cage 1.points[99999999999999999999]"), "expected an index from 0"));
   EXPECT_EQ(NameOf("Cage 1.pivot.z"), "Cage 1.center.z");
   EXPECT_EQ(NameOf("Cage 1.weight"), "Cage 1.weight is an array: name an element, weight[0]");

@@ -56,6 +56,12 @@ TEST_F(Recorded, PartsAreSummedByStep) {
     EXPECT_EQ(Of(node), (Profile::PartTimes{3 * kOfDecide, 0, 3 * (kOfCompute + kAgain), 0})) << node;
 }
 
+TEST_F(Recorded, PartsThatThereAreNotAreIgnored) {
+  Profile::PartTimes before = Of("a");
+  for (const int part : {-1, ComputeHost::kMaxParts, 1 << 30}) g.profile->AddPart(0, part, 1000);
+  EXPECT_EQ(Of("a"), before);
+}
+
 TEST_F(Recorded, NothingIsAddedWhileNobodyRecords) {
   g.profile->Clear();
   EXPECT_EQ(Of("a"), Profile::PartTimes{});

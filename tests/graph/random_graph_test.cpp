@@ -86,7 +86,8 @@ class RandomGraph {
       for (const Double3& p : std::get<NaiveTwin::Points>(value)) {
         for (int c = 0; c < 3; ++c) xyz.push_back(static_cast<float>(p[c]));
       }
-      engine = kpsa::engine::Value(PointBufferPtr(std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(xyz))));
+      engine = kpsa::engine::Value(
+          PointBufferPtr(std::make_shared<PointBuffer>(PointBuffer::FromInterleaved(xyz))));
     }
     const Status status = graph.Set(Ref(plug), engine);
     EXPECT_TRUE(status.ok()) << status.ToString();

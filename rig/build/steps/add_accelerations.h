@@ -1,5 +1,5 @@
-// Step 33 of rig_builder.cpp. What is to be accelerated.
-// Reads: `accelerate`, stages of meshes, controls, clips. Writes: the rig's accelerate entries, after those of
+// A step of rig_builder.cpp. What is to be accelerated.
+// Reads: `accelerate`, stages of meshes, controls, clips, the size of the rig at rest. Writes: the rig's accelerate entries, after those of
 // references; makes their meshes visible.
 #pragma once
 

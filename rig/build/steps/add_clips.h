@@ -1,4 +1,4 @@
-// Step 1 of rig_builder.cpp. Clips of the rig's own.
+// A step of rig_builder.cpp. Clips of the rig's own.
 // Reads: `clips`, and the character's clips and nodes, by name. Writes: scene clips and layered.
 #pragma once
 

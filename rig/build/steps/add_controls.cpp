@@ -2,16 +2,14 @@
 
 #include <algorithm>
 #include <map>
-#include <tuple>
+
+#include "rig/build/plug_keys.h"
 
 namespace kpsa::engine {
 
 void AddControls(const BuildInput& in, std::vector<Control>* controls) {
-  std::map<std::tuple<Index, int, int, int>, std::string> seen;
-  for (const Control& control : *controls)
-    seen.emplace(std::make_tuple(control.plug.node.index, control.plug.attribute, control.plug.element,
-                                 control.plug.component),
-                 control.name);
+  std::map<PlugKey, std::string> seen;
+  for (const Control& control : *controls) seen.emplace(KeyOf(control.plug), control.name);
   for (const RigControl& from : in.file.controls) {
     if (in.errors->full()) return;
     const Result<PlugRef> plug = in.graph().FindPlug(from.plug.text);
@@ -38,8 +36,7 @@ void AddControls(const BuildInput& in, std::vector<Control>* controls) {
           name));
       continue;
     }
-    const auto key = std::make_tuple(plug->node.index, plug->attribute, plug->element, plug->component);
-    if (const auto [it, added] = seen.emplace(key, from.plug.text); !added) {
+    if (const auto [it, added] = seen.emplace(KeyOf(*plug), from.plug.text); !added) {
       refuse(Status::Invalid("\"{}\" and \"{}\" are the same control", from.plug.text, it->second));
       continue;
     }

@@ -1,4 +1,4 @@
-// Step 32 of rig_builder.cpp. What animators and training may move.
+// A step of rig_builder.cpp. What animators and training may move.
 // Reads: `controls`, what drives plugs in the graph. Writes: the rig's controls, after those of references.
 #pragma once
 

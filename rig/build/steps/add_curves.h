@@ -1,4 +1,4 @@
-// Step 10 of rig_builder.cpp. Curves through vertices of meshes, or through places.
+// A step of rig_builder.cpp. Curves through vertices of meshes, or through places.
 // Reads: keys of curve nodes, the points of meshes at rest. Writes: curves in the graph, and their cvs at rest.
 #pragma once
 

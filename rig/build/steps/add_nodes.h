@@ -1,4 +1,4 @@
-// Step 6 of rig_builder.cpp. The nodes of the file.
+// A step of rig_builder.cpp. The nodes of the file.
 // Reads: `nodes`. Writes: the nodes in the graph, without values, and where they are written.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Step 9 of rig_builder.cpp. Combinations and in-betweens of blend shapes, on the rig's own nodes and on the file's.
+// A step of rig_builder.cpp. Combinations and in-betweens of blend shapes, on the rig's own nodes and on the file's.
 // Reads: `combinations` and `inbetweens` of both, and the names of their targets. Writes: nodes and connections in the
 // graph.
 #pragma once

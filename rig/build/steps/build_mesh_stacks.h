@@ -1,7 +1,7 @@
-// Step 14 of rig_builder.cpp. Deformer stacks of meshes: points flow stage by stage. Before those of points attributes,
+// A step of rig_builder.cpp. Deformer stacks of meshes: points flow stage by stage. Before those of points attributes,
 // as the box of a lattice, whose points may be deformed themselves, depends on its members.
-// Reads: `deform` with `meshes`, and the file's own stages. Writes: stages of meshes in the scene, connections in the
-// graph, geometries of the nodes.
+// Reads: `deform` with `meshes`, and the file's own stages. Writes: stages of meshes in the scene, connections and
+// geometryMatrix in the graph, geometries of the nodes, notes.
 #pragma once
 
 #include <string>

@@ -1,5 +1,6 @@
-// Step 17 of rig_builder.cpp. Deformer stacks of points attributes, as those of lattices and curves.
-// Reads: `deform` with `points`, cvs at rest, world_from_stage of lattices. Writes: values and connections in the
+// A step of rig_builder.cpp. Deformer stacks of points attributes, as those of lattices and curves.
+// Reads: `deform` with `points`, cvs at rest, weights of meshes (SetWeights) and their points at rest, for the boxes of
+// lattices, and their world_from_stage. Writes: values and connections in the
 // graph, geometries of the nodes; *stacked: the attributes that a stack drives.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Step 31 of rig_builder.cpp. What no chosen variant sets exists all the same.
+// A step of rig_builder.cpp. What no chosen variant sets exists all the same.
 // Reads: `variants`, the graph. Writes: errors only.
 #pragma once
 

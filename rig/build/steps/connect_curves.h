@@ -1,4 +1,4 @@
-// Step 13 of rig_builder.cpp. A wire's `curve: lips` or `curves: [upper, lower]`: the rest curves as assets, and what
+// A step of rig_builder.cpp. A wire's `curve: lips` or `curves: [upper, lower]`: the rest curves as assets, and what
 // moves them.
 // Reads: those keys, and curves in the graph. Writes: values and connections in the graph.
 #pragma once

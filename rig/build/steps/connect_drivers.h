@@ -1,4 +1,4 @@
-// Step 21 of rig_builder.cpp. `driver` of deformers that follow another mesh at a stage of its stack, and of
+// A step of rig_builder.cpp. `driver` of deformers that follow another mesh at a stage of its stack, and of
 // poseInterpolators.
 // Reads: `driver` and `poses`, stages of meshes, the rest pose. Writes: values and connections in the graph.
 #pragma once

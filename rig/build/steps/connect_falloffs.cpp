@@ -77,8 +77,8 @@ class FalloffNodes {
 
 void ConnectFalloffs(const BuildInput& in, MadeNodes* nodes, std::vector<FalloffUse>* uses, Graph* graph) {
   FalloffNodes falloffs(in, nodes, uses, graph);
-  for (std::size_t m = 0; m < nodes->size() && !in.errors->full(); ++m) {
-    const MadeNode& made = (*nodes)[m];
+  for (const MadeNode& made : *nodes) {
+    if (in.errors->full()) return;
     const RigAttribute* key = made.Find("falloff");
     if (key == nullptr || !key->value.is_scalar()) continue;
     const YamlNode& name = key->value;

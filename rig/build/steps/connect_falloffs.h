@@ -1,6 +1,7 @@
-// Step 18 of rig_builder.cpp. Falloffs that vary: `falloff: NAME` of deformers. A falloff node measures the points as
+// A step of rig_builder.cpp. Falloffs that vary: `falloff: NAME` of deformers. A falloff node measures the points as
 // they come to the deformer, one element for each geometry of each deformer that names it.
-// Reads: `falloff` and `falloffs`. Writes: values and connections in the graph, geometries of falloffs that are maps;
+// Reads: `falloff` and `falloffs`, geometries of deformers and what comes to them, so stacks of meshes and points are
+// there. Writes: values and connections in the graph, geometries of falloffs that are maps;
 // *uses: what is measured where.
 #pragma once
 

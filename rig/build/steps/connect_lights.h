@@ -1,4 +1,4 @@
-// Step 20 of rig_builder.cpp. What an illumination sees: `meshes`, `carried`, `camera` and `lights` of a rig's node, by
+// A step of rig_builder.cpp. What an illumination sees: `meshes`, `carried`, `camera` and `lights` of a rig's node, by
 // their names.
 // Reads: those keys, the last stages of meshes. Writes: values and connections in the graph.
 #pragma once

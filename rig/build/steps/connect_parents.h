@@ -1,4 +1,4 @@
-// Step 11 of rig_builder.cpp. `parent` of the rig's own nodes.
+// A step of rig_builder.cpp. `parent` of the rig's own nodes.
 // Reads: that key. Writes: connections in the graph.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Step 26 of rig_builder.cpp. What remembers its previous frame follows the scene's time, unless the rig gives it
+// A step of rig_builder.cpp. What remembers its previous frame follows the scene's time, unless the rig gives it
 // another one.
 // Reads: values and connections that are set. Writes: connections in the graph.
 #pragma once

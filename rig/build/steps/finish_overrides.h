@@ -1,4 +1,4 @@
-// Step 30 of rig_builder.cpp. An overriding value also ends what drives the plug; a stack or a constraint takes it as
+// A step of rig_builder.cpp. An overriding value also ends what drives the plug; a stack or a constraint takes it as
 // its input.
 // Reads: what is overridden, what stacks and constraints drive. Writes: connections in the graph, plugs that clips
 // leave alone.

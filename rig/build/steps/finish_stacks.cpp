@@ -2,10 +2,10 @@
 
 namespace kpsa::engine {
 
-void FinishStacks(const WeightSetter& setter, const Graph& graph, MadeNodes* nodes,
+void FinishStacks(WeightSetter* setter, const Graph& graph, MadeNodes* nodes,
                   std::vector<std::string>* notes) {
   for (MadeNode& made : *nodes) {
-    setter.Set(&made);
+    setter->Set(&made);
     const bool deforms = graph.def(made.id).FindAttribute("outPoints") >= 0 &&
                          graph.def(made.id).FindAttribute("inPoints") >= 0;
     if (deforms && made.geometries.empty()) {

@@ -1,4 +1,4 @@
-// Step 19 of rig_builder.cpp. Weights of what the stacks of points added, and a note of deformers in no stack.
+// A step of rig_builder.cpp. Weights of what the stacks of points added, and a note of deformers in no stack.
 // Reads: geometries of the nodes. Writes: weights in the graph, notes.
 #pragma once
 
@@ -9,7 +9,7 @@
 
 namespace kpsa::engine {
 
-void FinishStacks(const WeightSetter& setter, const Graph& graph, MadeNodes* nodes,
+void FinishStacks(WeightSetter* setter, const Graph& graph, MadeNodes* nodes,
                   std::vector<std::string>* notes);
 
 }  // namespace kpsa::engine

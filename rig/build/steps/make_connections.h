@@ -1,4 +1,4 @@
-// Step 24 of rig_builder.cpp. Connections, with unit conversions. What a node or a connection asks for gives way to
+// A step of rig_builder.cpp. Connections, with unit conversions. What a node or a connection asks for gives way to
 // overrides; what a clip drives is only taken over where the file says so.
 // Reads: `connections`, what was read of nodes and overrides. Writes: connections and unitConversion nodes in the
 // graph.

@@ -1,4 +1,4 @@
-// Step 5 of rig_builder.cpp. How large the character is.
+// A step of rig_builder.cpp. How large the character is.
 // Reads: the points of all meshes at rest.
 #pragma once
 

@@ -21,12 +21,12 @@ bool FitsDriver(NodeId falloff, const MadeNode& deformer, Graph* graph) {
 
 }  // namespace
 
-void PlaceFalloffs(const BuildInput& in, const std::vector<FalloffUse>& uses, MadeNodes* nodes,
+void PlaceFalloffs(const BuildInput& in, const std::vector<FalloffUse>& uses, const MadeNodes& nodes,
                    Graph* graph) {
   std::set<Index> refused;
   for (const FalloffUse& use : uses) {
-    const MadeNode* deformer = nodes->Find(use.deformer);
-    const MadeNode* falloff = nodes->Find(use.falloff);
+    const MadeNode* deformer = nodes.Find(use.deformer);
+    const MadeNode* falloff = nodes.Find(use.falloff);
     if (deformer == nullptr || falloff == nullptr) continue;
     const DeformedGeometry& of = deformer->geometries[static_cast<std::size_t>(use.geometry)];
     const RigAttribute* driver = falloff->Find("driver");

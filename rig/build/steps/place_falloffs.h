@@ -1,4 +1,4 @@
-// Step 28 of rig_builder.cpp. Where the points of a stage in mesh space are, for falloff nodes, once that is known.
+// A step of rig_builder.cpp. Where the points of a stage in mesh space are, for falloff nodes, once that is known.
 // Reads: what falloffs measure, world_from_stage. Writes: geometryMatrix of falloffs in the graph.
 #pragma once
 
@@ -8,6 +8,7 @@
 
 namespace kpsa::engine {
 
-void PlaceFalloffs(const BuildInput& in, const std::vector<FalloffUse>& uses, MadeNodes* nodes, Graph* graph);
+void PlaceFalloffs(const BuildInput& in, const std::vector<FalloffUse>& uses, const MadeNodes& nodes,
+                   Graph* graph);
 
 }  // namespace kpsa::engine

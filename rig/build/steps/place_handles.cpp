@@ -4,10 +4,10 @@
 
 namespace kpsa::engine {
 
-void PlaceHandles(const BuildInput& in, const RestPlaces& places, MadeNodes* nodes, Graph* graph) {
+void PlaceHandles(const BuildInput& in, RestPlaces* places, MadeNodes* nodes, Graph* graph) {
   for (MadeNode& made : *nodes) {
     if (graph->def(made.id).FindAttribute("offsetParentMatrix") < 0) continue;
-    if (!places.Place(&made)) continue;
+    if (!places->Place(&made)) continue;
     GraphEditor edit(graph);
     if (!edit.Has(made.id, "restMatrix")) continue;
     const Value* offset = graph->FindValue(edit.Plug(made.id, "offsetParentMatrix"));

@@ -1,4 +1,4 @@
-// Step 16 of rig_builder.cpp. How stages before a skin lie in the world at rest. Their points are in mesh space, their
+// A step of rig_builder.cpp. How stages before a skin lie in the world at rest. Their points are in mesh space, their
 // handles, curves and boxes in the world: world_from_stage says what is where, as the skin carries the deformer's
 // members at rest.
 // Reads: the weights that are set, the rest pose. Writes: world_from_stage of the nodes' geometries, geometryMatrix in

@@ -8,7 +8,7 @@ namespace {
 
 // In the world at rest: the vertices of a wire's curve, the centre of a softMod, the transform that moves a
 // cluster. None where the deformer has nothing like it, or where a computation places it.
-std::optional<Places> HandlePlaces(const MadeNode& made, const RestPlaces& places_at_rest, Graph* graph) {
+std::optional<Places> HandlePlaces(const MadeNode& made, RestPlaces* places_at_rest, Graph* graph) {
   if (made.geometries.empty()) return std::nullopt;
   const NodeDef& def = graph->def(made.id);
   GraphEditor edit(graph);
@@ -34,13 +34,13 @@ std::optional<Places> HandlePlaces(const MadeNode& made, const RestPlaces& place
   if (handle == nullptr || graph->def(handle->source.node).FindAttribute("offsetParentMatrix") < 0)
     return std::nullopt;
   Matrix4 world;
-  if (!places_at_rest.WorldOf(handle->source.node, made.from->type_node, &world)) return std::nullopt;
+  if (!places_at_rest->WorldOf(handle->source.node, made.from->type_node, &world)) return std::nullopt;
   return Places{{world(0, 3), world(1, 3), world(2, 3)}};
 }
 
 }  // namespace
 
-void PlaceStagesAtHandles(const BuildInput& in, const RestPlaces& places, RestPose* rest, MadeNodes* nodes,
+void PlaceStagesAtHandles(const BuildInput& in, RestPlaces* places, RestPose* rest, MadeNodes* nodes,
                           Graph* graph) {
   for (MadeNode& made : *nodes) {
     if (made.world || in.errors->full()) continue;

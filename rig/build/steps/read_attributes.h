@@ -1,4 +1,4 @@
-// Step 7 of rig_builder.cpp. What nodes of the file write for their attributes.
+// A step of rig_builder.cpp. What nodes of the file write for their attributes.
 // Reads: their keys. Writes: values in the graph, names of the targets of blend shapes, connections to make (in the
 // reader), and in the nodes the keys that are no attributes.
 #pragma once

@@ -31,7 +31,7 @@ void ReadOverride(const BuildInput& in, const RigOverride& override_, PlugReader
   }
   for (; element.element < before; ++element.element) {
     in.Fail(override_.plug.where, graph->Unset(element));
-    reader->mutable_overridden()->plugs.emplace_back(element, true);
+    reader->Override(element, true);
   }
 }
 
@@ -55,8 +55,6 @@ void ReadOverrides(const BuildInput& in, PlugReader* reader, Graph* graph) {
     if (in.errors->full()) return;
     ReadOverride(in, *override_, reader, graph);
   }
-  OverriddenPlugs* overridden = reader->mutable_overridden();
-  for (const auto& [plug, by_value] : overridden->plugs) overridden->keys.insert(KeyOf(plug));
 }
 
 }  // namespace kpsa::engine

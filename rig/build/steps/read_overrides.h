@@ -1,4 +1,4 @@
-// Step 8 of rig_builder.cpp. What overrides write for single plugs. Values are set at once; connections wait.
+// A step of rig_builder.cpp. What overrides write for single plugs. Values are set at once; connections wait.
 // Reads: what is left of `overrides`. Writes: values in the graph; in the reader connections to make and what is
 // overridden.
 #pragma once

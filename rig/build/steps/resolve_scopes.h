@@ -1,4 +1,4 @@
-// Step 2 of rig_builder.cpp. Names within templates: what a template's own lines call `hand` is the node `arm_L:hand`
+// A step of rig_builder.cpp. Names within templates: what a template's own lines call `hand` is the node `arm_L:hand`
 // (rig/file/templates.h).
 // Reads: the scopes of the file's sources, and which nodes it writes. Writes: the texts of nodes, connections, stacks
 // and controls.

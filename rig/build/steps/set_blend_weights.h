@@ -1,5 +1,6 @@
-// Step 23 of rig_builder.cpp. `head_mesh_skinCluster.blendWeights: "w.json#dq"`.
-// Reads: keys of the character's own deformers, weight files. Writes: blend weights in the graph.
+// A step of rig_builder.cpp. `head_mesh_skinCluster.blendWeights: "w.json#dq"`.
+// Reads: keys of the character's own deformers, weight files. Writes: blend weights in the graph; through `maps`
+// the files and weights that the rig names.
 #pragma once
 
 #include "rig/build/weight_maps.h"

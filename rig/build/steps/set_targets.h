@@ -1,4 +1,4 @@
-// Step 22 of rig_builder.cpp. The targets of each mesh that a blend shape of the rig deforms; one that a mesh lacks
+// A step of rig_builder.cpp. The targets of each mesh that a blend shape of the rig deforms; one that a mesh lacks
 // moves none of its points.
 // Reads: `targets`, geometries of the nodes. Writes: targets in the graph.
 #pragma once

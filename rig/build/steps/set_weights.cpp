@@ -6,7 +6,7 @@
 
 namespace kpsa::engine {
 
-void WeightSetter::Set(MadeNode* made) const {
+void WeightSetter::Set(MadeNode* made) {
   if (made->weighted == made->geometries.size()) return;
   const std::size_t first = made->weighted;
   made->weighted = made->geometries.size();
@@ -44,8 +44,8 @@ void WeightSetter::Set(MadeNode* made) const {
   in_.Fail(made->from->where, edit.Take());
 }
 
-void SetWeights(const WeightSetter& setter, MadeNodes* nodes) {
-  for (MadeNode& made : *nodes) setter.Set(&made);
+void SetWeights(WeightSetter* setter, MadeNodes* nodes) {
+  for (MadeNode& made : *nodes) setter->Set(&made);
 }
 
 }  // namespace kpsa::engine

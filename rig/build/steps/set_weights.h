@@ -1,6 +1,6 @@
-// Steps 15 and 19 of rig_builder.cpp. Members, weight maps and falloffs of deformers: one float a point, their product.
+// A step of rig_builder.cpp. Members, weight maps and falloffs of deformers: one float a point, their product.
 // Reads: `members`, `weights`, `falloff` and weight files. Writes: weights of the nodes' geometries in the graph,
-// notes.
+// notes; through the maps the files and weights that the rig names; through the places handles that falloffs are at.
 #pragma once
 
 #include <string>
@@ -20,7 +20,7 @@ class WeightSetter {
 
   // Sets weights[g] of the geometries that were added since the last call. Nothing is set where the rig says
   // nothing.
-  void Set(MadeNode* made) const;
+  void Set(MadeNode* made);
 
  private:
   const BuildInput& in_;
@@ -31,6 +31,6 @@ class WeightSetter {
   std::vector<std::string>* notes_;
 };
 
-void SetWeights(const WeightSetter& setter, MadeNodes* nodes);
+void SetWeights(WeightSetter* setter, MadeNodes* nodes);
 
 }  // namespace kpsa::engine
