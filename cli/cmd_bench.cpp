@@ -106,7 +106,10 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
   if (!clips.ok()) return clips.status();
   const InterruptScope interruptible;
   std::vector<AccelerationChoice> choices;
-  for (const AccelerationFlags& side : *sides) choices.push_back(ChoiceOf(side));
+  for (const AccelerationFlags& side : *sides) {
+    choices.push_back(ChoiceOf(side));
+    choices.back().with_modes = true;  // for SplitFrames
+  }
   Progress progress("bench, frames", 0, flags.quiet);
   Result<std::vector<BenchResult>> results =
       RunBench(OpenerOf(flags), choices, *clips, options, progress.watch());

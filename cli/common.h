@@ -18,6 +18,7 @@
 #include "graph/plugin_loader.h"
 #include "host/open_rig.h"
 #include "host/watch.h"
+#include "report/json_text.h"
 #include "rig/build/rig_builder.h"
 
 namespace CLI {
@@ -79,7 +80,7 @@ Status FlushOutput();
 // A JSON value of any type that dumps as nlohmann's do.
 template <typename Json>
 void PrintJson(const Json& json) {
-  Print(json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  Print(JsonText(json));
 }
 
 // From here to the end of the scope an interrupt (Ctrl-C) only sets the flag that Interrupted() reads, so

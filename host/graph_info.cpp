@@ -72,7 +72,7 @@ std::vector<ConnectionInfo> Rig::Connections() const {
   return connections;
 }
 
-kpsa::Result<PlugValue> Rig::Held(std::string_view name) const {
+kpsa::Result<PlugValue> Rig::Value(std::string_view name) const {
   const engine::Graph& graph = *impl_->rest.graph;
   const auto failed = [&](engine::Status status) {
     return engine::ProblemsOf(std::move(status).At({impl_->rest.path}));

@@ -97,6 +97,13 @@ void Compute(ComputeContext& c) {
 
 }  // namespace
 
+std::string PrototypeNodeOf(const Graph& graph) {
+  for (const NodeId node : graph.Nodes()) {
+    if (graph.def(node).prototype) return graph.name(node);
+  }
+  return "";
+}
+
 Status DeclareNode(const NodeType& type, NodeRegistry* registry) {
   const auto wrong = [&](std::string_view what) {
     return Status::Usage("node type \"{}\": {}", type.name, what);

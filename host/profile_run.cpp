@@ -1,5 +1,7 @@
 #include "host/profile_run.h"
 
+#include "host/rig_frames.h"
+
 namespace kpsa::engine {
 
 Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan,
@@ -8,11 +10,8 @@ Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan
   Evaluator evaluator(plan, {.parallel = parallel});
   const Index time = plan->FindVarying(rig.scene.time);
   const std::size_t frames = times.size() > 1 ? times.size() : 20;
-  const auto located = [&](const Status& status, double t) {
-    return Status::Evaluation("at {} s: {}", t, status.errors().front().message).At({rig.path});
-  };
   if (time != kNoIndex) evaluator.Set(time, times.back());
-  if (const Status warm = evaluator.Evaluate(); !warm.ok()) return located(warm, times.back());
+  if (const Status warm = evaluator.Evaluate(); !warm.ok()) return FailedAt(rig, times.back(), warm);
   if (!plan->stateful_node().empty()) evaluator.Restart();  // it would not go back from there
   Measured measured;
   for (std::size_t f = 0; f < frames; ++f) {
@@ -24,7 +23,7 @@ Result<Measured> Measure(const Rig& rig, const std::shared_ptr<const Plan>& plan
     if (times.size() == 1) evaluator.Invalidate();
     const Status status = evaluator.Evaluate();
     measured.frames.push_back({begin, ProfileClock()});
-    if (!status.ok()) return located(status, t);
+    if (!status.ok()) return FailedAt(rig, t, status);
     measured.wall_ns += static_cast<double>(measured.frames.back().end_ns - begin);
   }
   for (Index s = 0; s < plan->steps().size(); ++s) {

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "files/file.h"
 #include "host/face_impl.h"
+#include "host/node_type.h"
 #include "host/problems.h"
 #include "host/rig_training.h"
 #include "kpsa/kpsa_node.h"
@@ -76,17 +77,13 @@ engine::Status CheckNumbers(const TrainingOptions& options) {
 
 // Training evaluates poses on all threads, and many of them.
 engine::Status CheckNodes(const engine::Rig& rig) {
-  for (const engine::NodeId node : rig.graph->Nodes()) {
-    if (!rig.graph->def(node).prototype) continue;
-    const std::string& name = rig.graph->name(node);
-    return engine::Status::Usage(
-               "\"{}\" ({}) is computed by a function of this program, one thread at a time: no rig with "
-               "such a node "
-               "is trained; expected node types of the library or of a plugin",
-               name, rig.graph->def(node).name)
-        .OfNode(name);
-  }
-  return engine::Status();
+  const std::string name = engine::PrototypeNodeOf(*rig.graph);
+  if (name.empty()) return engine::Status();
+  return engine::Status::
+      Usage("\"{}\" is computed by a function of this program, one thread at a time: no rig with such a node "
+            "is trained; expected node types of the library or of a plugin",
+            name)
+          .OfNode(name);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "host/bench/bench.h"
 #include "host/face_impl.h"
+#include "host/node_type.h"
 #include "host/open_rig.h"
 #include "host/problems.h"
 #include "host/rig_frames.h"
@@ -22,6 +23,14 @@ engine::Status CheckNumbers(const BenchOptions& options) {
   if (options.threads < 1 || options.threads > 1024)
     return engine::Status::Usage("threads: expected 1 to 1,024");
   return engine::Status();
+}
+
+engine::Status CheckThreads(const BenchOptions& options, const engine::Rig& rig) {
+  const std::string name = engine::PrototypeNodeOf(*rig.graph);
+  if (options.threads == 1 || name.empty()) return engine::Status();
+  return engine::Status::Usage("\"{}\" is computed by a function of this program: expected 1 thread, got {}",
+                               name, options.threads)
+      .OfNode(name);
 }
 
 // Those of all entries, each once; the rig's first clip where they name none, or its rest ("").
@@ -67,8 +76,8 @@ BenchReport ReportOf(engine::BenchResult result) {
   report.tolerance =
       result.promise.promised() ? result.promise.tolerance : std::numeric_limits<double>::infinity();
   report.violation_rate = result.promise.rate;
-  report.beyond = result.promise.promised() ? result.promise.beyond : 0;
-  report.kept = result.promise.kept();
+  report.beyond_tolerance = result.promise.promised() ? result.promise.beyond : 0;
+  report.promise_kept = result.promise.kept();
   report.notes = std::move(result.notes);
   return report;
 }
@@ -76,10 +85,16 @@ BenchReport ReportOf(engine::BenchResult result) {
 }  // namespace
 
 Result<BenchReport> Rig::Bench(const BenchOptions& options) const {
+  const auto failed = [&](const engine::Status& status) {
+    return engine::ProblemsOf(engine::Status(status).At({path()}));
+  };
   if (!is_accelerated())
-    return engine::ProblemsOf(
-        engine::Status::Usage("this rig is not accelerated: expected one that Accelerated gave"));
-  if (const engine::Status numbers = CheckNumbers(options); !numbers.ok()) return engine::ProblemsOf(numbers);
+    return failed(engine::Status::Usage(
+        "this rig is not accelerated: there is nothing to compare; expected what Rig::Accelerated "
+        "(rig.accelerated() in Python) gives"));
+  if (const engine::Status numbers = CheckNumbers(options); !numbers.ok()) return failed(numbers);
+  if (const engine::Status threads = CheckThreads(options, impl_->rest); !threads.ok())
+    return failed(threads);
   engine::BenchOptions bench;
   bench.runs = options.runs;
   bench.threads = options.threads;
@@ -88,13 +103,13 @@ Result<BenchReport> Rig::Bench(const BenchOptions& options) const {
   watch.cancel = &cancel;
   if (options.progress) {
     watch.progress = [&](std::size_t done, std::size_t) {
-      if (!options.progress(done)) cancel = true;
+      if (!cancel && !options.progress(done)) cancel = true;
     };
   }
   engine::Result<std::vector<engine::BenchResult>> results =
       engine::RunBench(CopiesOf(impl_->rest), {*impl_->acceleration},
                        options.clips.empty() ? TestClips(impl_->rest) : options.clips, bench, watch);
-  if (!results.ok()) return engine::ProblemsOf(results.status());
+  if (!results.ok()) return failed(results.status());
   return ReportOf(std::move(results->front()));
 }
 

@@ -46,6 +46,11 @@ std::int64_t FrameNumber(double seconds, double fps) {
   return std::llround(std::clamp(seconds * fps, -1e15, 1e15));
 }
 
+Status FailedAt(const Rig& rig, double seconds, const Status& evaluated) {
+  const Error& error = evaluated.errors().front();
+  return Status::Evaluation("at {} s: {}", seconds, error.message).OfNode(error.node).At(PlaceOf(rig, error));
+}
+
 Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
                      const std::vector<double>& times, const RigFrameOptions& options,
                      const RigFrameSink& sink) {
@@ -60,12 +65,7 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
         if (time != kNoIndex) evaluator.Set(time, times[frame]);
       },
       [&](std::size_t frame, const Evaluator& evaluator, const Status& evaluated) -> Status {
-        if (!evaluated.ok()) {
-          const Error& error = evaluated.errors().front();
-          return Status::Evaluation("at {} s: {}", times[frame], error.message)
-              .OfNode(error.node)
-              .At(PlaceOf(rig, error));
-        }
+        if (!evaluated.ok()) return FailedAt(rig, times[frame], evaluated);
         options.watch.Done(frame + 1, times.size());
         return sink(frame, evaluator);
       });

@@ -31,6 +31,9 @@ Result<std::vector<double>> ClipTimes(const Rig& rig);
 // The frame that is nearest to a time, for reports; held within +-1e15.
 std::int64_t FrameNumber(double seconds, double fps);
 
+// What went wrong at a time: its first error, with the time in the message, its node and the place of that.
+Status FailedAt(const Rig& rig, double seconds, const Status& evaluated);
+
 struct RigFrameOptions {
   int threads = 0;  // 0: all
   Watch watch;      // of frames

@@ -2,32 +2,39 @@
 
 #include <cmath>
 
+#include "host/rig_frames.h"
+
 namespace kpsa::engine {
 namespace {
+
 constexpr double kSameFrame = 1e-6;  // of a frame
+
 }  // namespace
 
-Status RunUp::To(double seconds, Evaluator* evaluator) {
+Status RunUp::To(double seconds, Evaluator* evaluator, std::optional<Index> output) {
   if (!stateful_) {
     Set(seconds, evaluator);
     return Status();
   }
-  if (!at_.has_value() || seconds < *at_) {
+  const double here = at_.value_or(0) * rig_.fps, there = seconds * rig_.fps;
+  const bool at_frame = at_.has_value() && here >= 0 && std::abs(here - std::round(here)) <= kSameFrame;
+  if (!at_.has_value() || seconds < *at_ || (seconds > *at_ && !at_frame)) {
     evaluator->Restart();
     at_.reset();
   }
-  const double first = at_.has_value() ? std::floor(*at_ * fps_ + kSameFrame) + 1 : 0;
-  if (seconds * fps_ - first > kMostFrames)
+  const double first = at_.has_value() ? std::round(here) + 1 : 0;
+  if (there - first > kMostFrames)
     return Status::Usage("\"{}\" needs its previous frame, and {} s lies more than {} frames ahead",
                          evaluator->plan().stateful_node(), seconds, kMostFrames)
         .OfNode(evaluator->plan().stateful_node());
-  for (double frame = first; frame < seconds * fps_ - kSameFrame; ++frame) {
-    Set(frame / fps_, evaluator);
-    if (const Status status = evaluator->Evaluate(); !status.ok()) {
-      at_.reset();
-      const Error& error = status.errors().front();
-      return Status::Evaluation("at {} s: {}", frame / fps_, error.message).OfNode(error.node);
-    }
+  for (double frame = first; frame < there - kSameFrame; ++frame) {
+    Set(frame / rig_.fps, evaluator);
+    Status status = watch_.cancelled() ? CancelledStatus() : evaluator->Evaluate();
+    if (!status.ok() && status.kind() == ErrorKind::kEvaluation && output.has_value())
+      status = evaluator->Pull(*output);
+    if (status.ok()) continue;
+    at_.reset();
+    return status.kind() == ErrorKind::kInterrupted ? status : FailedAt(rig_, frame / rig_.fps, status);
   }
   Set(seconds, evaluator);
   at_ = seconds;

@@ -1,9 +1,11 @@
 // Nodes that need their previous frame (NodeDef::stateful), brought to any time.
 #pragma once
 
+#include <atomic>
 #include <optional>
 
 #include "graph/evaluator.h"
+#include "host/watch.h"
 #include "rig/build/rig_builder.h"
 
 namespace kpsa::engine {
@@ -12,14 +14,17 @@ namespace kpsa::engine {
 // threads, on evaluators of their own.
 class RunUp {
  public:
-  // The evaluator's plan is of that rig, in which the scene's time may vary.
-  RunUp(const Plan& plan, const Rig& rig)
-      : stateful_(!plan.stateful_node().empty()), time_(plan.FindVarying(rig.scene.time)), fps_(rig.fps) {}
+  // The evaluator's plan is of that rig, in which the scene's time may vary. cancel: as Watch's.
+  RunUp(const Plan& plan, const Rig& rig, const std::atomic<bool>* cancel = nullptr)
+      : rig_(rig),
+        stateful_(!plan.stateful_node().empty()),
+        time_(plan.FindVarying(rig.scene.time)),
+        watch_{{}, cancel} {}
 
   // Sets the time, in seconds, after all outputs were evaluated at every frame of the rig before it: from frame 0
-  // on, or from where the evaluator was; a time before that starts anew. What is set stays as it is. Errors: of
-  // these frames, and kMostFrames.
-  Status To(double seconds, Evaluator* evaluator);
+  // on, or from the frame at which the evaluator was; a time before that, or after one between frames, starts anew.
+  // What is set stays as it is. Errors: of that output at these frames, or of any where none is named; kMostFrames.
+  Status To(double seconds, Evaluator* evaluator, std::optional<Index> output = std::nullopt);
   bool stateful() const { return stateful_; }
   static constexpr double kMostFrames = 1e6;  // of one call
 
@@ -28,9 +33,10 @@ class RunUp {
     if (time_ != kNoIndex) evaluator->Set(time_, seconds);
   }
 
+  const Rig& rig_;
   bool stateful_;
   Index time_;
-  double fps_;
+  Watch watch_;
   std::optional<double> at_;  // where the evaluator is
 };
 

@@ -1,10 +1,12 @@
 // Many frames of a scene: Frames and Profile.
 #include <algorithm>
+#include <cmath>
 #include <exception>
 
 #include "graph/frames.h"
 #include "graph/profile.h"
 #include "host/problems.h"
+#include "host/rig_frames.h"
 #include "host/scene_impl.h"
 #include "host/vertex_points.h"
 
@@ -21,11 +23,11 @@ kpsa::Verdict VerdictOf(const engine::Playing& playing, const engine::Evaluator&
   return {worst.hit(), worst.full_weight, worst.score, std::move(worst.reason)};
 }
 
-engine::Status At(const engine::Playing& playing, double seconds, const engine::Status& status) {
-  const engine::Error& error = status.errors().front();
-  return engine::Status::Evaluation("at {} s: {}", seconds, error.message)
-      .OfNode(error.node)
-      .At(engine::PlaceOf(playing.rig(), error));
+engine::Status CheckTimes(std::span<const double> seconds) {
+  for (const double time : seconds) {
+    if (!std::isfinite(time)) return engine::Status::Usage("a time of {} s: expected a number", time);
+  }
+  return engine::Status();
 }
 
 engine::Status CheckThreads(const engine::Plan& plan, int threads) {
@@ -43,6 +45,8 @@ engine::Status CheckThreads(const engine::Plan& plan, int threads) {
 kpsa::Result<std::vector<StepTime>> Scene::Profile(std::span<const double> seconds) {
   const engine::Result<Impl::Snapshot> taken = impl_->Take();
   if (!taken.ok()) return engine::ProblemsOf(taken.status());
+  if (const engine::Status status = CheckTimes(seconds); !status.ok())
+    return engine::ProblemsOf(taken->playing->Located(status));
   const engine::Plan& plan = *taken->plan;
   engine::Evaluator evaluator(taken->plan);
   engine::RunUp run_up(plan, taken->playing->rig());
@@ -54,7 +58,7 @@ kpsa::Result<std::vector<StepTime>> Scene::Profile(std::span<const double> secon
       return engine::ProblemsOf(taken->playing->Located(status));
     evaluator.Record(&profile);
     if (const engine::Status status = evaluator.Evaluate(); !status.ok())
-      return engine::ProblemsOf(At(*taken->playing, time, status));
+      return engine::ProblemsOf(engine::FailedAt(taken->playing->rig(), time, status));
   }
   std::vector<StepTime> steps;
   for (engine::Index s = 0; s < plan.steps().size(); ++s) {
@@ -71,8 +75,9 @@ kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,
   const engine::Result<Impl::Snapshot> taken = impl_->Take();
   if (!taken.ok()) return engine::ProblemsOf(taken.status());
   const engine::Playing& playing = *taken->playing;
-  if (const engine::Status status = CheckThreads(*taken->plan, options.threads); !status.ok())
-    return engine::ProblemsOf(playing.Located(status));
+  for (const engine::Status& status : {CheckTimes(seconds), CheckThreads(*taken->plan, options.threads)}) {
+    if (!status.ok()) return engine::ProblemsOf(playing.Located(status));
+  }
   const std::vector<std::size_t> shown = engine::ShownMeshes(playing.rig().scene);
   std::vector<std::vector<float>> points(shown.size());
   std::vector<std::span<const float>> spans(shown.size());
@@ -82,7 +87,7 @@ kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,
   engine::FrameOptions frame_options;
   frame_options.threads = options.threads;
   frame_options.cancel = options.cancel;
-  engine::RunUp run_up(*taken->plan, playing.rig());
+  engine::RunUp run_up(*taken->plan, playing.rig(), options.cancel);
   engine::Status before;  // of frames that were evaluated on the way; then all run on one thread
   bool ended = false;
   std::exception_ptr thrown;
@@ -96,7 +101,7 @@ kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,
       [&](std::size_t frame, const engine::Evaluator& evaluator,
           const engine::Status& evaluated) -> engine::Status {
         if (!before.ok()) return playing.Located(before);
-        if (!evaluated.ok()) return At(playing, seconds[frame], evaluated);
+        if (!evaluated.ok()) return engine::FailedAt(playing.rig(), seconds[frame], evaluated);
         for (std::size_t m = 0; m < shown.size(); ++m) {
           const engine::CharacterMesh& mesh = playing.rig().scene.meshes[shown[m]];
           const engine::ConstPointsView view = evaluator.Points(static_cast<engine::Index>(m));

@@ -118,7 +118,7 @@ engine::Result<engine::Index> Scene::Impl::OutputOf(const engine::PlugRef& plug)
 engine::Status Scene::Impl::Pull(engine::Index output) {
   decided.assign(playing->applied().size(), std::nullopt);
   decided_by = playing;
-  if (const engine::Status status = run_up->To(time, evaluator.get()); !status.ok())
+  if (const engine::Status status = run_up->To(time, evaluator.get(), output); !status.ok())
     return playing->Located(status);
   // What needs its previous frame sees every frame, whichever output is asked for; failures are those of outputs
   if (run_up->stateful()) (void)evaluator->Evaluate();

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "report/bench_report.h"
+#include "report/json_text.h"
 #include "report/tolerance_text.h"
 #include "report/verdict_text.h"
 
@@ -186,7 +187,7 @@ std::string BenchJson(const std::vector<BenchResult>& results, const BenchContex
   OrderedJson document = SideJson(results.front(), context), beside = OrderedJson::array();
   for (std::size_t i = 1; i < results.size(); ++i) beside.push_back(SideJson(results[i], context));
   document["beside"] = std::move(beside);
-  return document.dump(2, ' ', false, OrderedJson::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 }  // namespace kpsa::engine

@@ -9,6 +9,7 @@
 #include "base/quantity_text.h"
 #include "kpsa/kpsa_node.h"
 #include "kpsa/signals.h"
+#include "report/json_text.h"
 #include "report/verdict_text.h"
 
 namespace kpsa::engine {
@@ -71,7 +72,7 @@ std::string DecisionStoryJson(const DecisionStory& story) {
                                            {"frame", story.frame},
                                            {"clip", story.clip},
                                            {"decisions", std::move(entries)}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 }  // namespace kpsa::engine

@@ -7,6 +7,7 @@
 #include "base/quantity_text.h"
 #include "base/text.h"
 #include "report/file_facts.h"
+#include "report/json_text.h"
 #include "report/table.h"
 
 namespace kpsa::engine {
@@ -53,7 +54,7 @@ std::string FactsJson(const std::string& path, const FileFacts& facts) {
     json[Key(table.name)] = std::move(rows);
   }
   json["notes"] = facts.notes;
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(json);
 }
 
 std::string FactsText(const std::string& path, const FileFacts& facts) {

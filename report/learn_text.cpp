@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/quantity_text.h"
+#include "report/json_text.h"
 #include "report/verdict_text.h"
 
 namespace kpsa::engine {
@@ -22,7 +23,7 @@ std::string LearnJson(const LearnResult& result, const std::string& path, double
                                      {"clips", list},
                                      {"seconds", seconds}};
   if (result.tiles.all > 0) document["tiles"] = {{"all", result.tiles.all}, {"kept", result.tiles.kept}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 std::string LearnText(const LearnResult& result, const std::string& path, double seconds) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "files/quantity.h"
+#include "report/json_text.h"
 #include "report/table.h"
 
 namespace kpsa::engine {
@@ -131,7 +132,7 @@ std::string NodesJson(const NodeDefs& defs) {
   nlohmann::ordered_json nodes = nlohmann::ordered_json::array();
   for (const NodeDef* def : defs) nodes.push_back(DefJson(*def));
   const nlohmann::ordered_json document{{"schema", "kpsa.nodes/1"}, {"nodes", std::move(nodes)}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 }  // namespace kpsa::engine

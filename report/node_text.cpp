@@ -6,6 +6,7 @@
 
 #include "base/quantity_text.h"
 #include "base/text.h"
+#include "report/json_text.h"
 
 namespace kpsa::engine {
 
@@ -43,7 +44,7 @@ std::string NodeStoryJson(const NodeStory& story) {
                                         {"frames", story.frames},
                                         {"left_out", story.left_out},
                                         {"steps", rows}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 }  // namespace kpsa::engine

@@ -12,6 +12,7 @@
 #include "base/quantity_text.h"
 #include "base/text.h"
 #include "graph/plan_report.h"
+#include "report/json_text.h"
 #include "report/table.h"
 
 namespace kpsa::engine {
@@ -75,7 +76,7 @@ std::string PlanJson(const Plan& plan, bool each_step) {
                                         {"varying", varying},
                                         {"nodes", nodes},
                                         {"excluded", excluded}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 std::string PlanText(const Plan& plan, bool each_step) {

@@ -8,6 +8,7 @@
 
 #include "base/quantity_text.h"
 #include "base/text.h"
+#include "report/json_text.h"
 #include "report/table.h"
 
 namespace kpsa::engine {
@@ -81,7 +82,7 @@ std::string ProfileJson(const Rig& rig, const Plan& plan, const Measured& measur
                                          {{"speedup", measured.ceiling()},
                                           {"above_points_ms", measured.above_ns / frames / 1e6},
                                           {"bound_by", "what is evaluated above the points"}}}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 }  // namespace kpsa::engine

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "report/json_text.h"
 #include "rig/file/words.h"
 
 namespace kpsa::engine {
@@ -305,7 +306,7 @@ std::string RigSchema(const NodeRegistry& registry) {
                        {"required", {"kpsa"}},
                        {"additionalProperties", false},
                        {"$defs", Definitions(registry)}};
-  return schema.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return JsonText(schema);
 }
 
 }  // namespace kpsa::engine

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/quantity_text.h"
+#include "report/json_text.h"
 
 namespace kpsa::engine {
 namespace {
@@ -53,7 +54,7 @@ std::string NotWorthItJson(const StackCost& cost) {
                                              {"timed", CostJson(cost.timed)},
                                              {"stated", CostJson(cost.stated)},
                                              {"deformers", std::move(deformers)}}}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 }  // namespace kpsa::engine

@@ -8,6 +8,7 @@
 #include "base/quantity_text.h"
 #include "base/text.h"
 #include "kpsa/training/poses.h"
+#include "report/json_text.h"
 #include "report/table.h"
 #include "report/tolerance_text.h"
 
@@ -91,7 +92,7 @@ std::string TrainJson(const TrainResult& r) {
                                {"accelerated_ms", r.check.accelerated_ms},
                                {"speedup", r.speedup()}}},
                              {"tolerances", ToleranceJson<nlohmann::ordered_json>(r.tolerances, WordsOf(r))}};
-  return document.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 namespace {

@@ -8,6 +8,7 @@
 #include "base/quantity_text.h"
 #include "base/text.h"
 #include "files/quantity.h"
+#include "report/json_text.h"
 #include "report/table.h"
 
 namespace kpsa::engine {
@@ -68,7 +69,7 @@ std::string VertexJson(const VertexStory& story) {
                          {"stages", std::move(stages)},
                          {"joints", std::move(joints)},
                          {"morphs", std::move(morphs)}};
-  return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return JsonText(document);
 }
 
 }  // namespace kpsa::engine

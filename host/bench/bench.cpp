@@ -20,7 +20,6 @@ class Bench {
     contenders_.resize(sides.size());
     for (std::size_t i = 0; i < sides.size(); ++i) {
       contenders_[i].choice = sides[i];
-      contenders_[i].choice.with_modes = true;  // for SplitFrames
     }
   }
 
@@ -87,7 +86,7 @@ class Bench {
           if (Status status = side->Turn(times, first, end); !status.ok())
             return std::move(status).At({rig.path});
         }
-        for (std::size_t f = first; f < end; ++f) watch_.Done(done_++, 0);
+        for (std::size_t f = first; f < end && !watch_.cancelled(); ++f) watch_.Done(done_++, 0);
       }
     }
     for (Side* side : timed) side->times.Finish();

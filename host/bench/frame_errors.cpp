@@ -140,8 +140,7 @@ Result<FrameErrors> SplitFrames(const RigOpener& opener, const RigChange& clip,
   for (std::size_t f = 0; f < times.size(); ++f) {
     if (watch.cancelled()) return CancelledStatus();
     if (time != kNoIndex) evaluator.Set(time, times[f]);
-    if (const Status status = evaluator.Evaluate(); !status.ok())
-      return Status::Evaluation("at {} s: {}", times[f], status.errors().front().message).At({rig.path});
+    if (const Status status = evaluator.Evaluate(); !status.ok()) return FailedAt(rig, times[f], status);
     Index output = 0;
     for (std::size_t n = 0; n < blocks.size(); ++n) {
       const AppliedSubspace& one = (*applied)[n];

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "graph/plan_report.h"
+#include "host/rig_frames.h"
 
 namespace kpsa::engine {
 namespace {
@@ -54,10 +55,11 @@ double PointsComputed(const Plan& plan, const RecordedSteps& recorded) {
   return points;
 }
 
-Side::Side(const Rig& rig, std::shared_ptr<const Plan> made, const SideOptions& options)
-    : plan(std::move(made)),
+Side::Side(const Rig& of, std::shared_ptr<const Plan> made, const SideOptions& options)
+    : rig(of),
+      plan(std::move(made)),
       evaluator(std::make_unique<Evaluator>(plan, EvaluatorOptions{options.parallel, nullptr})),
-      time(plan->FindVarying(rig.scene.time)),
+      time(plan->FindVarying(of.scene.time)),
       times(options.frames, !options.parallel),
       anew(options.still || options.frames == 1),
       one_thread(!options.parallel),
@@ -67,7 +69,7 @@ Status Side::Evaluate(double t) {
   if (time != kNoIndex) evaluator->Set(time, t);
   const Status status = evaluator->Evaluate();
   if (status.ok()) return status;
-  return Status::Evaluation("at {} s: {}", t, status.errors().front().message);
+  return FailedAt(rig, t, status);
 }
 
 Status Side::Turn(const std::vector<double>& at, std::size_t first, std::size_t end) {

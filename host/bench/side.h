@@ -40,6 +40,7 @@ struct SideOptions {
 };
 
 struct Side {
+  const Rig& rig;
   std::shared_ptr<const Plan> plan;
   std::unique_ptr<Evaluator> evaluator;
   Index time = kNoIndex;
@@ -48,8 +49,9 @@ struct Side {
   bool one_thread = true;
   Watch watch;
 
-  Side(const Rig& rig, std::shared_ptr<const Plan> made, const SideOptions& options);
-  Status Evaluate(double t);  // errors name the time
+  // Refers to the rig.
+  Side(const Rig& of, std::shared_ptr<const Plan> made, const SideOptions& options);
+  Status Evaluate(double t);  // errors: FailedAt
   // Before another pass over the frames: nodes that remember the previous one do not go back.
   void StartAgain() {
     if (!plan->stateful_node().empty()) evaluator->Restart();

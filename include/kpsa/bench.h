@@ -12,9 +12,11 @@ struct BenchOptions {
   std::vector<std::string> clips =
       {};        // none: the test clips of the rig; where it names none, its first clip
   int runs = 5;  // timed evaluations of every frame; a frame's time is their median
-  int threads =
-      1;  // of one evaluation. Of one thread times are those of its work, whatever else the machine does
-  // How many frames have been evaluated or timed so far, on the thread that benches; false cancels.
+  // Of one evaluation, and of the whole process while this runs. Of one thread times are those of its work, whatever
+  // else the machine does. 1 where functions of the program compute (kpsa/node_type.h).
+  int threads = 1;
+  // How many frames have been evaluated or timed so far, on the thread that benches; false cancels, and is the last
+  // call.
   std::function<bool(std::size_t frames)> progress = {};
 };
 
@@ -32,8 +34,8 @@ struct BenchReport {
   // Promised: at most this share of frames is a hit or a blend and yet farther off than the tolerance, and at most twice
   // the share of the hits. A tolerance of infinity promises nothing, and nothing is broken then.
   double tolerance = 0, violation_rate = 0;
-  std::size_t beyond = 0;               // accepted frames that are
-  bool kept = true;                     // what was promised
+  std::size_t beyond_tolerance = 0;  // accepted frames that are
+  bool promise_kept = true;
   std::vector<std::string> notes = {};  // what may surprise, a sentence each
 
   double hit_rate() const {

@@ -1,4 +1,4 @@
-// A rig's graph, to be walked: what Rig::Nodes, Connections and Held give. Copies; nothing here refers to the rig.
+// A rig's graph, to be walked: what Rig::Nodes, Connections and Value give. Copies; nothing here refers to the rig.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +30,7 @@ struct ConnectionInfo {
   std::string source, destination;  // "squeeze.outValue", "cage.points[4].x"
 };
 // Numbers in the units of the rig's file (a matrix column by column), or what else is held as a text: a choice, a
-// string, the kind and size of a mesh.
+// string, "<mesh>".
 struct PlugValue {
   std::vector<double> numbers;
   std::string text;

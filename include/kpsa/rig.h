@@ -92,7 +92,7 @@ class Rig {
   std::vector<ConnectionInfo> Connections() const;
   // What a plug ("mush.iterations", "upper.rotateX", "squeeze.value[2]") holds where nothing drives it. Errors: no
   // such plug, an output.
-  Result<PlugValue> Held(std::string_view plug) const;
+  Result<PlugValue> Value(std::string_view plug) const;
 
   // The rig whose accelerated points come from subspaces; this one, and its scenes, stay as they are. Errors:
   // no such file, one that is damaged, stale, or of other points.

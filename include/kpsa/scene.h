@@ -52,9 +52,10 @@ struct FrameOptions {
 // Used by one thread at a time; any number of scenes may share a rig. What it compiles is shared with other
 // scenes of the rig that ask for the same. A warm Points() allocates nothing and takes no lock.
 //
-// Nodes that remember (jiggle) come to a time through all frames of the rig before it: from frame 0 on, with the
-// controls as they are set, or from the time of the latest pull where that lies before. So times may go back and
-// forth, and without a change of controls on the way a time has the same points whatever was asked for before.
+// Nodes that remember (jiggle) come to a time through all frames of the rig before it, with the controls as they are set:
+// from frame 0 on, or from the latest pull where that was at such a frame and lies before. So times may go back and
+// forth, and without a change of controls on the way a time has the same points whatever was asked for before. Times
+// between frames cost the way from frame 0 each.
 //
 // Errors have the node that they are about and its place in the rig's file, or else the file.
 class Scene {
@@ -83,8 +84,9 @@ class Scene {
   // Any other plug, in the file's units: one number, three, four, or the sixteen of a matrix column by column, whose
   // places are metres.
   Result<std::vector<double>> Values(std::string_view plug);
-  // Of the latest Points() or Values(), whatever was set since; it evaluates nothing. hit is false and the reason empty
-  // where that failed, or asked no subspace.
+  // Of the latest Points() or Values(), whatever was set since; it evaluates nothing. Where nothing had changed since a
+  // pull that asked the subspaces, their answer stands. hit is false and the reason empty where it failed, or where
+  // they have not been asked since something changed.
   const Verdict& verdict();
 
   // What evaluating the points of Rig::meshes() at these times costs, on this thread: the meshes alone, whatever

@@ -84,7 +84,7 @@ TEST_F(RigBench, SaysWhatScenesShow) {
   EXPECT_GT(hits, 0u);
   EXPECT_EQ(report.hits, hits);
   EXPECT_EQ(report.blends, blends);
-  EXPECT_EQ(report.beyond, beyond);
+  EXPECT_EQ(report.beyond_tolerance, beyond);
   EXPECT_NEAR(report.error_max, worst, 1e-9);
   EXPECT_GT(report.error_rms, 0);
   EXPECT_LE(report.error_rms, report.error_max);
@@ -98,13 +98,13 @@ TEST_F(RigBench, ToleranceDecidesWhatHits) {
   const BenchReport none = Bench(Fast({.tolerance = 0}));
   EXPECT_EQ(none.hits + none.blends, 0u);
   EXPECT_EQ(none.error_max, 0);
-  EXPECT_TRUE(none.kept);
+  EXPECT_TRUE(none.promise_kept);
   EXPECT_FALSE(none.most_frequent_reason.empty());
   EXPECT_EQ(none.speedup_on_hits, 0);
   const BenchReport any = Bench(Fast({.tolerance = kInfinity}));
   EXPECT_EQ(any.tolerance, kInfinity);
-  EXPECT_TRUE(any.kept) << "nothing is promised";
-  EXPECT_EQ(any.beyond, 0u);
+  EXPECT_TRUE(any.promise_kept) << "nothing is promised";
+  EXPECT_EQ(any.beyond_tolerance, 0u);
   EXPECT_GT(any.hits, none.hits);
 }
 
@@ -117,6 +117,11 @@ TEST_F(RigBench, IsCancelledByItsProgress) {
   };
   EXPECT_EQ(Refused(Fast(), options).kind, Problem::Kind::kInterrupted);
   EXPECT_EQ(calls, 4u);
+  const std::size_t frames = Bench(Fast()).frames;
+  calls = 0;
+  options.progress = [&](std::size_t) { return ++calls < frames + 3; };  // while frames are timed
+  EXPECT_EQ(Refused(Fast(), options).kind, Problem::Kind::kInterrupted);
+  EXPECT_EQ(calls, frames + 3) << "no call after the one that cancels";
   options.progress = [](std::size_t) -> bool { throw 7; };
   EXPECT_THROW((void)Fast().Bench(options), int);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -162,6 +163,55 @@ TEST_F(SceneStates, FramesAreOfWhatTheSceneHeldWhenTheyBegan) {
   EXPECT_EQ(frames, expected);
 }
 
+TEST_F(SceneStates, OnTheWayOnlyWhatIsAskedForMayNotFail) {
+  Library library;
+  ASSERT_TRUE(library.AddNode(Picky()));
+  const Rig rig = Load(library, "  mush: {type: deltaMush, iterations: 10}\n",
+                       "  mush: {type: deltaMush, iterations: 10}\n  lag: {type: jiggle, stiffness: 0.2}\n"
+                       "  choosy: {type: picky}\n");
+  auto with_lag = rig.Edited([](GraphEdit& edit) { return edit.Deform("column", "lag"); });
+  ASSERT_TRUE(with_lag) << kpsa::ToText(with_lag.problems());
+  Scene scene(*with_lag), other(*with_lag);
+  for (Scene* one : {&scene, &other}) {
+    ASSERT_TRUE(one->Play("wave"));
+    one->SetTime(0.5);
+  }
+  ASSERT_TRUE(scene.Values("choosy.output"));
+  ASSERT_TRUE(scene.Set("choosy.input", -1));
+  scene.SetTime(0);
+  (void)Pull(&scene);
+  scene.SetTime(0.5);
+  EXPECT_EQ(Pull(&scene), Pull(&other));
+  EXPECT_FALSE(scene.Values("choosy.output"));
+}
+
+TEST_F(SceneStates, ARunUpIsCancelled) {
+  std::atomic<bool> cancel = false;
+  int calls = 0;
+  NodeType type{.name = "ender", .inputs = {{"input"}}, .outputs = {{"output"}}};
+  type.compute = [&](const NodeCall& call) -> std::string {
+    if (++calls == 5) cancel = true;
+    call.outputs[0][0] = 1;
+    return "";
+  };
+  Library library;
+  ASSERT_TRUE(library.AddNode(type));
+  const Rig rig = Load(library, "  mush: {type: deltaMush, iterations: 10}\nconnections:\n",
+                       "  mush: {type: deltaMush, iterations: 10}\n  lag: {type: jiggle}\n"
+                       "  ender: {type: ender, input: upper.poseRotateZ}\n"
+                       "connections:\n  - ender.output -> mush.envelope\n");
+  auto with_lag = rig.Edited([](GraphEdit& edit) { return edit.Deform("column", "lag"); });
+  ASSERT_TRUE(with_lag) << kpsa::ToText(with_lag.problems());
+  Scene scene(*with_lag);
+  ASSERT_TRUE(scene.Play("wave"));
+  calls = 0;
+  const auto done = scene.Frames(std::vector<double>{20 / rig.fps()}, [](const kpsa::Frame&) { return true; },
+                                 {.cancel = &cancel});
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.problems()[0].kind, Problem::Kind::kInterrupted);
+  EXPECT_EQ(calls, 5) << "it goes no further";
+}
+
 TEST_F(SceneStates, NodesThatRememberComeToATimeThroughAllFramesBeforeIt) {
   const Rig rig = Load(
       Library(), "  mush: {type: deltaMush, iterations: 10}\n",
@@ -188,8 +238,19 @@ TEST_F(SceneStates, NodesThatRememberComeToATimeThroughAllFramesBeforeIt) {
   ASSERT_TRUE(scene.Values("upper.worldMatrix"));
   scene.SetTime(seconds[9]);
   EXPECT_EQ(Pull(&scene), frames[9]);
+  // Nor does a time between frames, or before the first one
+  for (const double other : {12.4 / rig.fps(), -0.7 / rig.fps()}) {
+    scene.SetTime(other);
+    (void)Pull(&scene);
+    scene.SetTime(seconds[13]);
+    EXPECT_EQ(Pull(&scene), frames[13]) << other;
+  }
+  EXPECT_EQ(AllFrames(&scene, {12.4 / rig.fps(), seconds[13]})[1], frames[13]);
   EXPECT_TRUE(scene.Profile(seconds));
   EXPECT_TRUE(scene.Profile(std::vector<double>{seconds[4], seconds[1]}));
+  const double never = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(scene.Profile(std::vector<double>{never}));
+  EXPECT_FALSE(scene.Frames(std::vector<double>{0, never}, [](const kpsa::Frame&) { return true; }));
   // A node of an edit follows the scene's time as one of the file does
   const auto added = Load(Library()).Edited([](GraphEdit& edit) -> kpsa::Result<Done> {
     if (auto done = edit.AddNode("jiggle", "lag"); !done) return done;
@@ -387,14 +448,14 @@ TEST_F(SceneStates, GraphsAreWalked) {
   }
   EXPECT_EQ(rig.meshes()[0].stage_nodes.size(), 3u);
   EXPECT_EQ(rig.meshes()[0].stage_nodes[2], "mush");
-  EXPECT_EQ(rig.Held("mush.iterations")->numbers, std::vector<double>{10});
-  EXPECT_EQ(rig.Held("mush.space")->text, "world");
-  EXPECT_EQ(rig.Held("cage.divisions")->numbers, (std::vector<double>{2, 5, 2}));
-  EXPECT_EQ(rig.Held("upper.worldMatrix").problems().front().node, "upper");
-  EXPECT_EQ(rig.Held("upper.rotate")->numbers.size(), 3u);
-  EXPECT_NEAR(rig.Held("squeeze.inputMax")->numbers[0], -75, 1e-9);
-  EXPECT_EQ(rig.Held("upper.rotateZ")->numbers.size(), 1u);
-  EXPECT_EQ(Failed(rig.Held("mush.nothing")).file, Path("hello.yaml"));
+  EXPECT_EQ(rig.Value("mush.iterations")->numbers, std::vector<double>{10});
+  EXPECT_EQ(rig.Value("mush.space")->text, "world");
+  EXPECT_EQ(rig.Value("cage.divisions")->numbers, (std::vector<double>{2, 5, 2}));
+  EXPECT_EQ(rig.Value("upper.worldMatrix").problems().front().node, "upper");
+  EXPECT_EQ(rig.Value("upper.rotate")->numbers.size(), 3u);
+  EXPECT_NEAR(rig.Value("squeeze.inputMax")->numbers[0], -75, 1e-9);
+  EXPECT_EQ(rig.Value("upper.rotateZ")->numbers.size(), 1u);
+  EXPECT_EQ(Failed(rig.Value("mush.nothing")).file, Path("hello.yaml"));
 }
 
 }  // namespace
