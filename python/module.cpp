@@ -62,8 +62,8 @@ py::object Values(kpsa::Scene& scene, const std::string& plug) {
   return ObjectOf(Checked([&] { return scene.Values(plug); }));
 }
 
-py::object Held(const kpsa::Rig& rig, const std::string& plug) {
-  const kpsa::PlugValue value = Checked([&] { return rig.Held(plug); });
+py::object Value(const kpsa::Rig& rig, const std::string& plug) {
+  const kpsa::PlugValue value = Checked([&] { return rig.Value(plug); });
   if (value.numbers.empty() && !value.text.empty()) return py::str(value.text);
   return ObjectOf(value.numbers);
 }
@@ -86,41 +86,24 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
   using Clock = std::chrono::steady_clock;
   constexpr auto kSignalInterval = std::chrono::milliseconds(20);  // the lock may be long in coming
   Clock::time_point looked = Clock::now();
-  bool raised = false;  // by `progress`, or by a signal
-  py::object error_type, error_value, error_trace;
-  Checked([&] {
-    const auto done = scene.Frames(seconds,
-                                   [&](const kpsa::Frame& frame) {
-                                     for (std::size_t m = 0; m < frame.points.size(); ++m)
-                                       std::memcpy(to[m] + frame.index * frame.points[m].size(),
-                                                   frame.points[m].data(), frame.points[m].size_bytes());
-                                     if (frame.verdict != nullptr)
-                                       verdict[frame.index] = {frame.verdict->hit,
-                                                               static_cast<float>(frame.verdict->full_share),
-                                                               frame.verdict->score};
-                                     const Clock::time_point now = Clock::now();
-                                     if (progress.is_none() && now - looked < kSignalInterval) return true;
-                                     looked = now;
-                                     const py::gil_scoped_acquire lock;
-                                     try {
-                                       if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-                                       if (progress.is_none()) return true;
-                                       const py::object go_on = progress(frame.index + 1);
-                                       return Truth(go_on);
-                                     } catch (py::error_already_set& error) {
-                                       error.restore();
-                                       PyErr_Fetch(&error_type.ptr(), &error_value.ptr(), &error_trace.ptr());
-                                       raised = true;
-                                       return false;
-                                     }
-                                   },
-                                   {.threads = threads});
-    return done;
-  });
-  if (raised) {
-    PyErr_Restore(error_type.release().ptr(), error_value.release().ptr(), error_trace.release().ptr());
-    throw py::error_already_set();
-  }
+  CallbackError raised;  // by `progress`, or by a signal
+  const auto take = [&](const kpsa::Frame& frame) {
+    for (std::size_t m = 0; m < frame.points.size(); ++m)
+      std::memcpy(to[m] + frame.index * frame.points[m].size(), frame.points[m].data(),
+                  frame.points[m].size_bytes());
+    if (frame.verdict != nullptr)
+      verdict[frame.index] = {frame.verdict->hit, static_cast<float>(frame.verdict->full_share),
+                              frame.verdict->score};
+    const Clock::time_point now = Clock::now();
+    if (progress.is_none() && now - looked < kSignalInterval) return true;
+    looked = now;
+    return raised.Call([&] {
+      if (progress.is_none()) return true;
+      const py::object go_on = progress(frame.index + 1);
+      return Truth(go_on);
+    });
+  };
+  Checked([&] { return scene.Frames(seconds, take, {.threads = threads}); }, &raised);
   arrays["verdicts"] = std::move(verdicts);
   return arrays;
 }
@@ -139,33 +122,31 @@ kpsa::TrainingReport Train(const kpsa::Rig& rig, const std::string& subspace, co
   if (seconds.has_value()) options.seconds = *seconds;
   options.threads = threads;
   options.paper = paper;
-  bool raised = false;
-  PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
+  CallbackError raised;
   options.progress = [&](std::string_view what, double share) {
-    const py::gil_scoped_acquire lock;
-    try {
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    return raised.Call([&] {
       if (progress.is_none()) return true;
       const py::object go_on = progress(std::string(what), share);
       return Truth(go_on);
-    } catch (py::error_already_set& error) {
-      error.restore();
-      PyErr_Fetch(&type, &value, &trace);
-      raised = true;
-      return false;
-    }
+    });
   };
-  Py_CLEAR(RaisedByNode());
-  auto result = [&] {
-    const py::gil_scoped_release release;
-    return rig.Train(options, subspace);
-  }();
-  if (raised) {
-    PyErr_Restore(type, value, trace);
-    throw py::error_already_set();
-  }
-  if (!result) Raise(result.problems());
-  return *result;
+  return Checked([&] { return rig.Train(options, subspace); }, &raised);
+}
+
+kpsa::BenchReport Bench(const kpsa::Rig& rig, std::vector<std::string> clips, int runs, int threads,
+                        const py::object& progress) {
+  kpsa::BenchOptions options;
+  options.clips = std::move(clips);
+  options.runs = runs, options.threads = threads;
+  CallbackError raised;
+  options.progress = [&](std::size_t frames) {
+    return raised.Call([&] {
+      if (progress.is_none()) return true;
+      const py::object go_on = progress(frames);
+      return Truth(go_on);
+    });
+  };
+  return Checked([&] { return rig.Bench(options); }, &raised);
 }
 
 // The graph of Rig.edited while its callback runs; of no use afterwards.
@@ -183,30 +164,26 @@ void Said(const kpsa::Result<kpsa::Done>& done) {
 }
 
 kpsa::Rig Edited(const kpsa::Rig& rig, const py::function& function) {
-  PyObject *type = nullptr, *value = nullptr, *trace = nullptr;
-  Py_CLEAR(RaisedByNode());
-  auto result = [&] {
-    const py::gil_scoped_release release;
-    return rig.Edited([&](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {
-      const py::gil_scoped_acquire lock;
-      const auto handed = std::make_shared<PyEdit>(PyEdit{&edit});
-      try {
-        function(handed);
-      } catch (py::error_already_set& error) {
-        error.restore();
-        PyErr_Fetch(&type, &value, &trace);
-      }
-      handed->edit = nullptr;
-      if (type == nullptr) return kpsa::Done();
-      return kpsa::Problems(1);  // it goes on below
-    });
-  }();
-  if (type != nullptr) {
-    PyErr_Restore(type, value, trace);
-    throw py::error_already_set();
-  }
-  if (!result) Raise(result.problems());
-  return *result;
+  CallbackError raised;
+  return Checked(
+      [&] {
+        return rig.Edited([&](kpsa::GraphEdit& edit) -> kpsa::Result<kpsa::Done> {
+          const bool done = raised.Call([&] {
+            const auto handed = std::make_shared<PyEdit>(PyEdit{&edit});
+            try {
+              function(handed);
+            } catch (...) {
+              handed->edit = nullptr;
+              throw;
+            }
+            handed->edit = nullptr;
+            return true;
+          });
+          if (done) return kpsa::Done();
+          return kpsa::Problems(1);  // what was raised takes its place
+        });
+      },
+      &raised);
 }
 
 py::list Profile(kpsa::Scene& scene, const std::vector<double>& seconds) {
@@ -339,6 +316,28 @@ PYBIND11_MODULE(_kpsa, m) {
       .def_readonly("hit_rate", &kpsa::TrainingReport::hit_rate, "expected of frames like those of the clips")
       .def_readonly("warning", &kpsa::TrainingReport::warning);
 
+  py::class_<kpsa::BenchReport>(m, "BenchReport",
+                                "Full against accelerated over the frames of clips; times are milliseconds a "
+                                "frame, errors metres between final points, misses included.")
+      .def_readonly("clips", &kpsa::BenchReport::clips)
+      .def_readonly("frames", &kpsa::BenchReport::frames)
+      .def_readonly("hits", &kpsa::BenchReport::hits)
+      .def_readonly("blends", &kpsa::BenchReport::blends)
+      .def_property_readonly("hit_rate", &kpsa::BenchReport::hit_rate)
+      .def_readonly("most_frequent_reason", &kpsa::BenchReport::most_frequent_reason,
+                    "of frames that are no hits")
+      .def_readonly("full_ms", &kpsa::BenchReport::full_ms)
+      .def_readonly("accelerated_ms", &kpsa::BenchReport::accelerated_ms)
+      .def_readonly("speedup", &kpsa::BenchReport::speedup, "misses included")
+      .def_readonly("speedup_on_hits", &kpsa::BenchReport::speedup_on_hits, "0 where no frame hits")
+      .def_readonly("error_rms", &kpsa::BenchReport::error_rms)
+      .def_readonly("error_max", &kpsa::BenchReport::error_max)
+      .def_readonly("tolerance", &kpsa::BenchReport::tolerance)
+      .def_readonly("violation_rate", &kpsa::BenchReport::violation_rate)
+      .def_readonly("beyond_tolerance", &kpsa::BenchReport::beyond_tolerance, "accepted frames that are")
+      .def_readonly("promise_kept", &kpsa::BenchReport::promise_kept)
+      .def_readonly("notes", &kpsa::BenchReport::notes);
+
   PYBIND11_NUMPY_DTYPE(PyVerdict, hit, full_share, score);
 
   py::class_<PyEdit, std::shared_ptr<PyEdit>>(m, "GraphEdit",
@@ -397,7 +396,7 @@ PYBIND11_MODULE(_kpsa, m) {
       .def_property_readonly("nodes", &kpsa::Rig::Nodes,
                              "of the graph, in the order of their creation; without clips and subspaces")
       .def_property_readonly("connections", &kpsa::Rig::Connections)
-      .def("held", &Held, py::arg("plug"),
+      .def("value", &Value, py::arg("plug"),
            "What a plug holds where nothing drives it: a number, an array, a matrix [4, 4] or a text.")
       .def(
           "accelerated",
@@ -418,6 +417,10 @@ PYBIND11_MODULE(_kpsa, m) {
            py::arg("paper") = false, py::arg("progress") = py::none(),
            "Trains a subspace and writes it to a .kpsa file. progress(what, share) is called on the way; "
            "False cancels.")
+      .def("bench", &Bench, py::kw_only(), py::arg("clips") = std::vector<std::string>(), py::arg("runs") = 5,
+           py::arg("threads") = 1, py::arg("progress") = py::none(),
+           "Full against accelerated, by turns, on clips (none: the rig's test clips). progress(frames) is "
+           "called on the way; False cancels.")
       .def("edited", &Edited, py::arg("edit"),
            "A rig like this one with a graph that edit(graph) has changed: graph.add_node, set, connect, "
            "disconnect, deform.")

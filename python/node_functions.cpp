@@ -82,7 +82,10 @@ struct PyNode {
     } else if (outputs.size() == 1) {
       Write(outputs[0], result, call.outputs[0]);
     } else {
-      const auto several = result.cast<py::sequence>();
+      if (!py::isinstance<py::sequence>(result))
+        throw py::type_error("expected " + std::to_string(outputs.size()) + " outputs, got " +
+                             std::string(py::repr(result)));
+      const auto several = py::reinterpret_borrow<py::sequence>(result);
       if (several.size() != outputs.size())
         throw py::value_error("expected " + std::to_string(outputs.size()) + " outputs, got " +
                               std::to_string(several.size()));
@@ -131,6 +134,8 @@ void AddNode(kpsa::Library& library, const std::string& name, const py::object& 
       node->outputs.push_back(py::str(key));
       type.outputs.push_back(OutputOf(node->outputs.back(), py::str(kind)));
     }
+  } else if (py::isinstance<py::str>(outputs)) {
+    throw py::type_error("outputs: expected names, as [\"output\"], or kinds by name");
   } else if (!outputs.is_none()) {
     for (const py::handle& key : outputs) {
       node->outputs.push_back(py::str(key));

@@ -6,11 +6,11 @@
     scene.set("upper.rotateZ", -60)
     xyz = scene.points("column")  # float32 [V, 3], world space, metres
 """
-from ._kpsa import (Clip, Connection, Control, Error, GraphEdit, Library, Mesh, Node, Plug, Problem, Rig, Scene, TrainingReport,
-                    Verdict, __version__)
+from ._kpsa import (BenchReport, Clip, Connection, Control, Error, GraphEdit, Library, Mesh, Node, Plug, Problem, Rig, Scene,
+                    TrainingReport, Verdict, __version__)
 
-__all__ = ["Clip", "Connection", "Control", "Error", "GraphEdit", "Library", "Mesh", "Node", "Plug", "Problem", "Rig", "Scene",
-           "TrainingReport", "Verdict", "load"]
+__all__ = ["BenchReport", "Clip", "Connection", "Control", "Error", "GraphEdit", "Library", "Mesh", "Node", "Plug", "Problem", "Rig",
+           "Scene", "TrainingReport", "Verdict", "load"]
 
 
 def load(path, *, variant=None, fps=None, plugins=True):

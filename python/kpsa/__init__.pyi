@@ -87,6 +87,27 @@ class TrainingReport:
     hit_rate: float  # expected of frames like those of the clips
     warning: str
 
+class BenchReport:
+    """Full against accelerated over the frames of clips; times are milliseconds a frame, errors metres between final points,
+    misses included."""
+    clips: list[str]
+    frames: int
+    hits: int
+    blends: int  # all others are misses
+    hit_rate: float
+    most_frequent_reason: str  # of frames that are no hits
+    full_ms: float
+    accelerated_ms: float
+    speedup: float  # misses included
+    speedup_on_hits: float  # 0 where no frame hits
+    error_rms: float
+    error_max: float
+    tolerance: float
+    violation_rate: float
+    beyond_tolerance: int  # accepted frames that are
+    promise_kept: bool
+    notes: list[str]
+
 class GraphEdit:
     """The graph of a copy of a rig, within Rig.edited."""
     def add_node(self, type: str, name: str) -> None: ...
@@ -109,7 +130,7 @@ class Rig:
     is_accelerated: bool
     nodes: list[Node]  # of the graph, in the order of their creation; without clips and subspaces
     connections: list[Connection]
-    def held(self, plug: str) -> Union[float, str, npt.NDArray[np.float64]]:
+    def value(self, plug: str) -> Union[float, str, npt.NDArray[np.float64]]:
         """What a plug holds where nothing drives it: a number, an array, a matrix [4, 4] or a text."""
     def accelerated(self, subspace: str = "", *, tolerance: Optional[float] = None, violation_rate: Optional[float] = None,
                     stale_is_miss: bool = False) -> Rig:
@@ -119,6 +140,10 @@ class Rig:
               threads: int = 0, paper: bool = False,
               progress: Optional[Callable[[str, float], Optional[bool]]] = None) -> TrainingReport:
         """Trains a subspace and writes it to a .kpsa file. progress(what, share) is called on the way; False cancels."""
+    def bench(self, *, clips: Sequence[str] = (), runs: int = 5, threads: int = 1,
+              progress: Optional[Callable[[int], Optional[bool]]] = None) -> BenchReport:
+        """Full against accelerated, by turns, on clips (none: the rig's test clips). progress(frames) is called on the way;
+        False cancels."""
     def edited(self, edit: Callable[[GraphEdit], Any]) -> Rig:
         """A rig like this one with a graph that edit(graph) has changed."""
     def scene(self) -> Scene:

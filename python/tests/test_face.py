@@ -35,6 +35,32 @@ def fast(rig):
     return rig.accelerated()
 
 
+def test_bench(rig, fast):
+    seen = []
+    report = fast.bench(clips=["wave"], runs=1, progress=seen.append)
+    scene = fast.scene()
+    scene.play("wave")
+    (clip,) = [c for c in rig.clips if c.name == "wave"]
+    assert report.clips == ["wave"] and report.frames == round((clip.end - clip.begin) * rig.fps) + 1
+    hits = scene.frames(clip.begin + np.arange(report.frames) / rig.fps)["verdicts"]["hit"]
+    assert report.hits == hits.sum() and report.hit_rate == pytest.approx(hits.mean())
+    assert report.full_ms > 0 and report.speedup == pytest.approx(report.full_ms / report.accelerated_ms)
+    assert 0 < report.error_rms <= report.error_max and seen == sorted(seen) and seen
+    assert report.promise_kept and report.beyond_tolerance <= report.violation_rate * report.frames
+    raised = []
+
+    def late(frames):  # while frames are timed
+        if frames > report.frames:
+            raised.append(frames)
+            raise ZeroDivisionError(len(raised))
+
+    with pytest.raises(ZeroDivisionError, match="1"):
+        fast.bench(clips=["wave"], progress=late)
+    assert len(raised) == 1
+    with pytest.raises(kpsa.Error, match="wave"):
+        fast.bench(clips=["wav"])
+
+
 def test_what_a_rig_has(rig):
     assert [c.name for c in rig.controls] == ["upper.rotateX", "upper.rotateZ"]
     assert rig.controls[1].min == pytest.approx(-75)
