@@ -18,12 +18,16 @@
 namespace kpsa::engine {
 namespace {
 
-// Inputs and outputs by position.
-enum KpsaInput { kCues, kMatrices, kScalars, kSpaceMatrix, kFullPoints, kRegionPoints };
+using KpsaContext =
+    NodeContext<In<"cues", ArrayView<ConstPointsView>>, In<"matrices", ArrayView<Matrix4>>,
+                In<"scalars", ArrayView<double>>, In<"spaceMatrix", Matrix4>,
+                In<"fullPoints", ArrayView<ConstPointsView>>, In<"regionPoints", ArrayView<ConstPointsView>>,
+                Out<"outPoints", OutArray<PointsView>>, Out<"score", double>, Out<"hit", bool>,
+                Out<"fullWeight", double>, Out<"missReason", std::int64_t>, Out<"offender", std::int64_t>>;
+
 // What decide returns: all points, or regions.
 constexpr std::uint64_t kFullBit = 1;
 constexpr int kFirstRegionBit = 1;
-enum KpsaOutput { kOutPoints, kScore, kHit, kFullWeight, kMissReason, kOffender };
 
 constexpr double kLeastWeight = 1e-6;  // of the full evaluation, in what is no hit
 constexpr int kGrowthSteps = 16;       // of sqrt(2): a space that is 256 times as large as at rest
@@ -31,8 +35,9 @@ constexpr int kGrowthSteps = 16;       // of sqrt(2): a space that is 256 times 
 // Adds the time of a scope to a part of the node's work, where somebody records it.
 class Stopwatch {
  public:
-  Stopwatch(const ComputeContext& c, KpsaPart part)
-      : host_(c.host != nullptr && c.host->recording() ? c.host : nullptr), part_(part) {
+  Stopwatch(KpsaContext c, KpsaPart part) : part_(part) {
+    ComputeHost* const host = c.context().host;
+    if (host != nullptr && host->recording()) host_ = host;
     if (host_ != nullptr) begin_ = ProfileClock();
   }
   ~Stopwatch() {
@@ -40,7 +45,7 @@ class Stopwatch {
   }
 
  private:
-  ComputeHost* host_;
+  ComputeHost* host_ = nullptr;
   KpsaPart part_;
   std::uint64_t begin_ = 0;
 };
@@ -72,17 +77,17 @@ struct KpsaState {
   Matrix4 world_from_space;
   PatchChoice patches;
 };
-float* Measured(const ComputeContext& c) {
-  return reinterpret_cast<float*>(c.state + (sizeof(KpsaState) + 63) / 64 * 64);
+float* Measured(KpsaContext c) {
+  return reinterpret_cast<float*>(c.state() + (sizeof(KpsaState) + 63) / 64 * 64);
 }
 
-std::span<const float> TileInputsOf(const ComputeContext& c, const Subspace& subspace) {
+std::span<const float> TileInputsOf(KpsaContext c, const Subspace& subspace) {
   const std::size_t y = subspace.latent.empty() ? 0 : subspace.soft_cache.padded_rows();
   return {Measured(c) + y, subspace.tile_inputs()};
 }
 
 // Of output m, where the verdict has left them; else null.
-const float* DoubtInputsOf(const ComputeContext& c, const Subspace& subspace, std::size_t m) {
+const float* DoubtInputsOf(KpsaContext c, const Subspace& subspace, std::size_t m) {
   if (subspace.score.doubt == 0) return nullptr;
   const float* inputs = Measured(c) + subspace.soft_cache.padded_rows();
   for (std::size_t i = 0; i < m; ++i) inputs += subspace.tiles[i].input_size();
@@ -106,9 +111,9 @@ struct GuardVerdict {
 };
 
 // in_parts: patches miss by themselves; else every guard is one of all points.
-GuardVerdict AskGuards(const ComputeContext& c, const KpsaConfig::Data& data, bool in_parts) {
+GuardVerdict AskGuards(KpsaContext c, const KpsaConfig::Data& data, bool in_parts) {
   GuardVerdict verdict;
-  const ArrayView<Matrix4> matrices = c.array<Matrix4>(kMatrices);
+  const ArrayView<Matrix4> matrices = c.get<"matrices">();
   for (std::uint32_t j = 0; j < matrices.size(); ++j) {
     const double* lo = data.matrix_lo.data() + 12 * j;
     const double* hi = data.matrix_hi.data() + 12 * j;
@@ -127,7 +132,7 @@ GuardVerdict AskGuards(const ComputeContext& c, const KpsaConfig::Data& data, bo
                   in_parts ? data.matrix_patches[j] : kAllPatches);
     if (verdict.all >= 1) return verdict;
   }
-  const ArrayView<double> scalars = c.array<double>(kScalars);
+  const ArrayView<double> scalars = c.get<"scalars">();
   for (std::uint32_t k = 0; k < scalars.size(); ++k) {
     if (scalars[k] >= data.scalar_lo[k] && scalars[k] <= data.scalar_hi[k]) continue;
     verdict.Add(GuardWeight(data.scalar_lo[k], data.scalar_hi[k], data.scalar_ramp[k], scalars[k]),
@@ -167,7 +172,7 @@ SoftCacheThreshold ThresholdAt(const KpsaKernel& kernel, double scale) {
   return threshold;
 }
 
-std::uint64_t Decide(ComputeContext& c) {
+std::uint64_t Decide(KpsaContext c) {
   const auto& kernel = c.kernel_as<KpsaKernel>();
   const KpsaConfig::Data& data = kernel.config->data();
   const Subspace& subspace = *data.subspace;
@@ -183,15 +188,16 @@ std::uint64_t Decide(ComputeContext& c) {
     return kFullBit;
   };
   // What comes after it binds to the rest points: to the exact ones
-  if (c.at_rest || data.always_miss || kernel.threshold.tau < 0) return miss(MissReason::kNeverHit, kNoIndex);
+  if (c.context().at_rest || data.always_miss || kernel.threshold.tau < 0)
+    return miss(MissReason::kNeverHit, kNoIndex);
   SpaceFrame frame;
-  if (data.has_space) frame = SpaceFrameOf(c.get<Matrix4>(kSpaceMatrix), subspace.inverse_rest_stretch);
+  if (data.has_space) frame = SpaceFrameOf(c.get<"spaceMatrix">(), subspace.inverse_rest_stretch);
   state.world_from_space = frame.world_from_space;
   const bool any = kernel.threshold.tau == std::numeric_limits<double>::infinity();
   const std::size_t r = subspace.rows();
-  const std::span<double> raw(reinterpret_cast<double*>(c.scratch), r);
+  const std::span<double> raw(reinterpret_cast<double*>(c.scratch()), r);
   const std::size_t padded = subspace.soft_cache.padded_rows();
-  const std::span<float> y(Measured(c), padded), g(c.scratch + 2 * padded, padded);
+  const std::span<float> y(Measured(c), padded), g(c.scratch() + 2 * padded, padded);
   const std::size_t patches = kernel.patches.count();
   GuardVerdict guard;
   double stretch = 0;
@@ -203,9 +209,8 @@ std::uint64_t Decide(ComputeContext& c) {
       stretch = StretchWeight(data, frame);
       if (stretch >= 1) return miss(MissReason::kSpace, kNoIndex);
     }
-    kernel.gather.Gather({c.array<ConstPointsView>(kCues), c.array<Matrix4>(kMatrices),
-                          c.array<double>(kScalars), frame.world_from_space},
-                         c.scratch + 3 * padded, raw);
+    kernel.gather.Gather({c.get<"cues">(), c.get<"matrices">(), c.get<"scalars">(), frame.world_from_space},
+                         c.scratch() + 3 * padded, raw);
   }
   const Stopwatch watch(c, KpsaPart::kProjection);
   Normalize(subspace, raw, y);
@@ -244,17 +249,17 @@ std::uint64_t Decide(ComputeContext& c) {
   return patches == 0 || !finite || state.patches.full ? kFullBit : state.patches.regions << kFirstRegionBit;
 }
 
-void WriteVerdict(const ComputeContext& c) {
+void WriteVerdict(KpsaContext c) {
   const Verdict& v = c.state_as<KpsaState>().verdict;
-  c.out_value<double>(kScore) = v.score;
-  c.out_value<std::int64_t>(kHit) = v.hit;
-  c.out_value<double>(kFullWeight) = v.full_weight;
-  c.out_value<std::int64_t>(kMissReason) = static_cast<std::int64_t>(v.reason);
-  c.out_value<std::int64_t>(kOffender) = v.offender == kNoIndex ? -1 : static_cast<std::int64_t>(v.offender);
+  c.out<"score">() = v.score;
+  c.out<"hit">() = v.hit;
+  c.out<"fullWeight">() = v.full_weight;
+  c.out<"missReason">() = static_cast<std::int64_t>(v.reason);
+  c.out<"offender">() = v.offender == kNoIndex ? -1 : static_cast<std::int64_t>(v.offender);
 }
 
 // Reconstructs output m into `out` (the wanted points only), in the space of its stage.
-void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
+void Reconstruct(KpsaContext c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
   const Subspace& subspace = *kernel.config->data().subspace;
   const KpsaKernel::Output& wanted = kernel.outputs[m];
   const std::span<const float> y = TileInputsOf(c, subspace);
@@ -269,7 +274,8 @@ void Reconstruct(ComputeContext& c, const KpsaKernel& kernel, std::size_t m, Poi
     tiles.ReconstructFrom({&inputs, 1}, {&to, 1}, of, spaces);
   };
   if (wanted.all) return reconstruct({}, out);
-  const PointsView mesh{c.scratch, c.scratch + wanted.padded, c.scratch + 2 * wanted.padded, tiles.points()};
+  const PointsView mesh{c.scratch(), c.scratch() + wanted.padded, c.scratch() + 2 * wanted.padded,
+                        tiles.points()};
   if (!wanted.tiles.empty()) reconstruct(wanted.tiles, mesh);
   for (std::size_t i = 0; i < wanted.points.size(); ++i) {
     out.x[i] = mesh.x[wanted.points[i]];
@@ -284,15 +290,14 @@ void CopyFull(ConstPointsView from, PointsView to) {
   std::memcpy(to.z, from.z, from.count * sizeof(float));
 }
 
-void Compute(ComputeContext& c) {
+void Compute(KpsaContext c) {
   const auto& kernel = c.kernel_as<KpsaKernel>();
   WriteVerdict(c);
   const KpsaState& state = c.state_as<KpsaState>();
   const Verdict& verdict = state.verdict;
-  const ArrayView<ConstPointsView> full = c.array<ConstPointsView>(kFullPoints),
-                                   regions = c.array<ConstPointsView>(kRegionPoints);
+  const ArrayView<ConstPointsView> full = c.get<"fullPoints">(), regions = c.get<"regionPoints">();
   for (std::uint32_t m = 0; m < kernel.outputs.size(); ++m) {
-    const PointsView& out = c.out_points(kOutPoints, m);
+    const PointsView& out = c.out<"outPoints">()[m];
     if (out.count == 0) continue;
     if (verdict.full_weight >= 1) {
       CopyFull(full[m], out);
@@ -310,31 +315,32 @@ void Compute(ComputeContext& c) {
 void ComputeBlock(ComputeContext* contexts, std::size_t count) {
   const auto& kernel = contexts[0].kernel_as<KpsaKernel>();
   const Subspace& subspace = *kernel.config->data().subspace;
-  for (std::size_t i = 0; i < count; ++i) WriteVerdict(contexts[i]);
+  const auto at = [&](std::size_t i) { return KpsaContext(contexts[i]); };
+  for (std::size_t i = 0; i < count; ++i) WriteVerdict(at(i));
   for (std::size_t m = 0; m < kernel.outputs.size(); ++m) {
     if (!kernel.outputs[m].all) {
       for (std::size_t i = 0; i < count; ++i) {
-        const PointsView& out = contexts[i].out_points(kOutPoints, static_cast<std::uint32_t>(m));
-        if (out.count > 0) Reconstruct(contexts[i], kernel, m, out);
+        const PointsView& out = at(i).out<"outPoints">()[static_cast<std::uint32_t>(m)];
+        if (out.count > 0) Reconstruct(at(i), kernel, m, out);
       }
       continue;
     }
     // Frames that share a pass over the subspace
-    const Stopwatch watch(contexts[0], KpsaPart::kReconstruction);
+    const Stopwatch watch(at(0), KpsaPart::kReconstruction);
     const std::size_t r = subspace.tile_inputs();
     for (std::size_t first = 0; first < count; first += kBlockFrames) {
       const std::size_t frames = std::min(kBlockFrames, count - first);
-      float* y = contexts[first].scratch;
+      float* y = at(first).scratch();
       PointsView outs[kBlockFrames];
       Matrix4 spaces[kBlockFrames];
       const float* inputs[kBlockFrames];
       bool moved = false;
       for (std::size_t f = 0; f < frames; ++f) {
-        inputs[f] = DoubtInputsOf(contexts[first + f], subspace, m);
+        inputs[f] = DoubtInputsOf(at(first + f), subspace, m);
         if (inputs[f] == nullptr)
-          std::memcpy(y + f * r, TileInputsOf(contexts[first + f], subspace).data(), r * sizeof(float));
-        outs[f] = contexts[first + f].out_points(kOutPoints, static_cast<std::uint32_t>(m));
-        spaces[f] = contexts[first + f].state_as<KpsaState>().world_from_space;
+          std::memcpy(y + f * r, TileInputsOf(at(first + f), subspace).data(), r * sizeof(float));
+        outs[f] = at(first + f).out<"outPoints">()[static_cast<std::uint32_t>(m)];
+        spaces[f] = at(first + f).state_as<KpsaState>().world_from_space;
         moved = moved || (kernel.config->data().outputs_in_space[m] != 0 && !(spaces[f] == Matrix4()));
       }
       const std::span<const Matrix4> through(spaces, moved ? frames : 0);
@@ -465,8 +471,8 @@ void AddKpsaNode(NodeRegistry& registry) {
            "share of the full evaluation in the points: 0 a hit, between 0 and 1 a blend, 1 a miss")
       .out("missReason", Type::kInt)
       .out("offender", Type::kInt)
-      .compute(&Compute)
-      .decide(&Decide)
+      .compute<Compute>()
+      .decide<Decide>()
       .block(&ComputeBlock)
       .demand(DemandKpsa)
       .bind(BindKpsa)

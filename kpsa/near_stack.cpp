@@ -10,6 +10,21 @@ namespace {
 
 Double3 Origin(const Matrix4& m) { return {m(0, 3), m(1, 3), m(2, 3)}; }
 
+void ComputeSpaceOffset(NodeContext<In<"matrix", Matrix4>, Out<"offset", Double3>> c) {
+  c.out<"offset">() = c.kernel_as<Double3>() - Origin(c.get<"matrix">());
+}
+void ComputeMoved(NodeContext<In<"matrix", Matrix4>, In<"offset", Double3>, Out<"outMatrix", Matrix4>> c) {
+  Matrix4 m = c.get<"matrix">();
+  const Double3& by = c.get<"offset">();
+  m(0, 3) += by.x, m(1, 3) += by.y, m(2, 3) += by.z;
+  c.out<"outMatrix">() = m;
+}
+void ComputeMovedInverse(
+    NodeContext<In<"matrix", Matrix4>, In<"offset", Double3>, Out<"outInverseMatrix", Matrix4>> c) {
+  const Double3& by = c.get<"offset">();
+  c.out<"outInverseMatrix">() = c.get<"matrix">() * Translation({-by.x, -by.y, -by.z});
+}
+
 bool HasPointInputs(const NodeDef& def) {
   for (const AttributeDef& a : def.attributes) {
     if (!a.output && IsPointType(a.type)) return true;
@@ -177,9 +192,7 @@ void AddNearNodes(NodeRegistry& registry) {
       .structural("restOrigin", Double3(), {.unit = Unit::kLength, .doc = "where it is at rest"})
       .out("offset", Type::kDouble3, "restOrigin less the place of the matrix")
       .unit(Unit::kLength)
-      .compute([](ComputeContext& c) {
-        c.out_value<Double3>(0) = c.kernel_as<Double3>() - Origin(c.get<Matrix4>(0));
-      })
+      .compute<ComputeSpaceOffset>()
       .bind([](const Binding& binding) -> Result<BoundKernel> {
         return BoundKernel{
             std::make_shared<const Double3>(binding.structural().value("restOrigin").get<Double3>()), 0, 0};
@@ -190,17 +203,8 @@ void AddNearNodes(NodeRegistry& registry) {
       .in("offset", Double3(), {.unit = Unit::kLength})
       .out("outMatrix", Type::kMatrix, "matrix, then moved by offset")
       .out("outInverseMatrix", Type::kMatrix, "moved back by offset, then matrix")
-      .compute_for({"outMatrix"}, {"matrix", "offset"},
-                   [](ComputeContext& c) {
-                     Matrix4 m = c.get<Matrix4>(0);
-                     const Double3& by = c.get<Double3>(1);
-                     m(0, 3) += by.x, m(1, 3) += by.y, m(2, 3) += by.z;
-                     c.out_value<Matrix4>(0) = m;
-                   })
-      .compute_for({"outInverseMatrix"}, {"matrix", "offset"}, [](ComputeContext& c) {
-        const Double3& by = c.get<Double3>(1);
-        c.out_value<Matrix4>(0) = c.get<Matrix4>(0) * Translation({-by.x, -by.y, -by.z});
-      });
+      .compute<ComputeMoved>()
+      .compute<ComputeMovedInverse>();
 }
 
 }  // namespace kpsa::engine
