@@ -65,10 +65,17 @@ void Scene::Impl::Forget() {
 
 engine::Status Scene::Impl::EnsurePlaying() {
   if (playing != nullptr) return engine::Status();
-  engine::Result<std::shared_ptr<engine::Playing>> made =
-      poses.empty() ? shared().PlayingOf(clip)
-                    : engine::Playing::Make(shared().rest, clip, poses, shared().acceleration);
+  engine::Result<std::shared_ptr<engine::Playing>> made = shared().PlayingOf(clip);
   if (!made.ok()) return engine::Status(made.status()).At({rig.path()});
+  // What the clip drives is no longer held
+  const std::shared_ptr<engine::Playing> plain = *made;
+  const auto is_driven = [&](const auto& one) { return DriverOf(*plain->rig().graph, one.plug) != nullptr; };
+  std::vector<engine::Setting> posed = poses;
+  std::erase_if(posed, is_driven);
+  if (!posed.empty()) made = engine::Playing::Make(shared().rest, clip, posed, shared().acceleration);
+  if (!made.ok()) return engine::Status(made.status()).At({rig.path()});
+  std::erase_if(held, is_driven);
+  poses = std::move(posed);
   playing = std::move(*made);
   request = playing->request();
   // What the clip drives is no longer held
