@@ -77,6 +77,7 @@ AccelerationChoice ChoiceOf(const AccelerationFlags& flags) {
   if (flags.tolerance.has_value()) choice.tolerance = *ParseTolerance(*flags.tolerance);
   if (flags.violation_rate.has_value()) choice.violation_rate = *ParseRate(*flags.violation_rate);
   choice.stale_is_miss = flags.stale == "miss";
+  choice.stale_option = "--stale miss";
   choice.every_frame = flags.every_frame;
   choice.with_modes = flags.with_modes;
   return choice;

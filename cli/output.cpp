@@ -25,6 +25,9 @@ Status CheckOutput(const std::string& path, bool force, const std::vector<std::s
   }
   if (fs::path(path).lexically_normal().string().starts_with("/dev/std"))
     return Status::Usage("write - for stdout").At({path});
+  std::error_code error;
+  if (!force && fs::is_regular_file(path, error))
+    return Status::Usage("exists already; give another name, or --force to replace it").At({path});
   // Asks the writer itself: it knows all reasons. What it made is removed at once.
   const Result<OutputFile> file = OutputFile::Create(path, force);
   return file.ok() ? Status() : AsUsage(file.status());

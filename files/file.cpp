@@ -110,7 +110,7 @@ Result<OutputFile> OutputFile::Create(const std::string& path, bool force) {
     file.device_ = !S_ISREG(info.st_mode);
     if (!file.device_) file.mode_ = info.st_mode & 0777;
     if (!file.device_ && !force) {
-      return Status::Usage("exists already; give another name, or --force to replace it").At({path});
+      return Status::Usage("exists already; give another name, or let it be replaced").At({path});
     }
   } else if (errno != ENOENT) {
     return Status::Usage("cannot be written: {}", Reason(errno)).At({path});
@@ -150,7 +150,7 @@ OutputFile::~OutputFile() {
 Status OutputFile::Commit() {
   if (device_) return CopyTo(temporary_, path_);
   if (!force_ && ::access(path_.c_str(), F_OK) == 0) {
-    return Status::Usage("appeared while it was being written; give another name, or --force to replace it")
+    return Status::Usage("appeared while it was being written; give another name, or let it be replaced")
         .At({path_});
   }
   if ((mode_.has_value() && ::chmod(temporary_.c_str(), *mode_) != 0) ||

@@ -59,7 +59,7 @@ Result<std::shared_ptr<const Subspace>> LoadSubspace(const std::string& rig, con
   return std::make_shared<const Subspace>(std::move(*subspace));
 }
 
-// "; --kpsa names a subspace"
+// "; OPTION names a subspace"
 std::string OtherWay(const AccelerationChoice& choice, const char* what) {
   return choice.subspace_option.empty() ? "" : fmt::format("; {} names {}", choice.subspace_option, what);
 }
@@ -119,6 +119,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
     one.name = one.entry.name;
     AccelerateOptions options;
     options.stale_is_miss = choice.stale_is_miss;
+    options.stale_option = choice.stale_option;
     if (choice.tolerance.has_value()) options.tolerance = *choice.tolerance;
     if (choice.violation_rate.has_value()) options.violation_rate = *choice.violation_rate;
     one.tolerance = options.tolerance < 0 ? one.subspace->tolerance : options.tolerance;

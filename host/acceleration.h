@@ -24,9 +24,10 @@ struct AccelerationChoice {
   std::optional<double>
       tolerance;  // metres; kAnyError (kpsa/kpsa_node.h): every frame; unset: the subspace's own
   std::optional<double> violation_rate;
-  bool stale_is_miss = false;  // else a subspace of another version of the rig is refused
-  bool every_frame = false;    // reconstruct every frame, whatever SoftCache and trained ranges say
-  bool with_modes = false;     // Subspace::kept_modes as well, which SplitFrames needs
+  bool stale_is_miss = false;     // else a subspace of another version of the rig is refused
+  std::string stale_option = {};  // what people call `stale_is_miss` where they choose it, likewise
+  bool every_frame = false;       // reconstruct every frame, whatever SoftCache and trained ranges say
+  bool with_modes = false;        // Subspace::kept_modes as well, which SplitFrames needs
   // Files that were read before (without modes), by path: they are not read again.
   std::vector<std::pair<std::string, std::shared_ptr<const Subspace>>> loaded = {};
 };

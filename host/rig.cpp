@@ -126,6 +126,7 @@ kpsa::Result<kpsa::Rig> Rig::Accelerated(const AccelerationOptions& options) con
   engine::AccelerationChoice choice;
   choice.subspace = options.subspace;
   choice.stale_is_miss = options.stale_is_miss;
+  choice.stale_option = "stale_is_miss";
   choice.violation_rate = options.violation_rate;
   choice.tolerance = options.tolerance;
   if (options.tolerance.has_value() && !(*options.tolerance >= 0))

@@ -47,7 +47,7 @@ struct Accelerator::Entry {
 Status Accelerator::Add(const AccelerationTarget& target, std::shared_ptr<const Subspace> subspace,
                         const std::string& node_name, const AccelerateOptions& options) {
   Result<AccelerationDraft> draft =
-      DraftAcceleration(*graph_, compiler_, target, std::move(subspace), options.stale_is_miss);
+      DraftAcceleration(*graph_, compiler_, target, std::move(subspace), options);
   if (!draft.ok()) return draft.status();
   entries_.push_back(std::make_shared<const Entry>(
       Entry{target, options, node_name, std::move(draft->data), std::move(draft->cues),

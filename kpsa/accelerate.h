@@ -39,9 +39,10 @@ struct AccelerationTarget {
 };
 
 struct AccelerateOptions {
-  double tolerance = -1;       // metres; below 0: the subspace's own; infinity: pure KPSA
-  double violation_rate = -1;  // below 0: the subspace's own
-  bool stale_is_miss = false;  // a stale subspace evaluates everything fully instead of being refused
+  double tolerance = -1;          // metres; below 0: the subspace's own; infinity: pure KPSA
+  double violation_rate = -1;     // below 0: the subspace's own
+  bool stale_is_miss = false;     // a stale subspace evaluates everything fully instead of being refused
+  std::string stale_option = {};  // what people call that where they choose it, for errors; or ""
 };
 
 struct Accelerated {

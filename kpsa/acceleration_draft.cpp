@@ -71,7 +71,7 @@ std::vector<PlugRef> GuardedPlugs(const Graph& graph, const AccelerationTarget& 
 
 // The same rig as in training?
 Status CheckRig(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
-                const TrainingRecord& record, bool stale_is_miss, AccelerationDraft* draft,
+                const TrainingRecord& record, const AccelerateOptions& options, AccelerationDraft* draft,
                 std::vector<SetHere>* set_here) {
   if (subspace.outputs.size() != target.meshes.size()) {
     return Status::Invalid("the subspace is for {} meshes, the rig accelerates {}", subspace.outputs.size(),
@@ -89,20 +89,21 @@ Status CheckRig(const Graph& graph, const AccelerationTarget& target, const Subs
   *set_here = TakeSetHere(graph, target.outputs(), target.space, target.controls, target.within,
                           record.signature, &now);
   if (const std::string difference = SignatureDifference(record.signature, now); !difference.empty()) {
-    if (!stale_is_miss) {
-      return Status::Invalid(
-          "the subspace is stale: since it was trained, {} changed; train it again, or let all its frames "
-          "miss (--stale miss, stale_is_miss)",
-          difference);
+    if (!options.stale_is_miss) {
+      return Status::Invalid("the subspace is stale: since it was trained, {} changed; train it again{}",
+                             difference,
+                             options.stale_option.empty()
+                                 ? ""
+                                 : fmt::format(", or let all its frames miss ({})", options.stale_option));
     }
     draft->AlwaysMiss(fmt::format("the subspace is stale ({} changed)", difference));
   }
   for (const SetHere& set : *set_here) {
     if (!set.structural) continue;
-    if (!stale_is_miss) {
+    if (!options.stale_is_miss) {
       return Status::Invalid(
-          "{} is set to {} here, the subspace was trained on what the rig says; evaluate without "
-          "--accelerate, or train a rig that says so",
+          "{} is set to {} here, the subspace was trained on what the rig says; evaluate without subspaces, "
+          "or train a rig that says so",
           set.name, set.value);
     }
     draft->AlwaysMiss(fmt::format("{} is set to {} here, and the subspace was trained on what the rig says",
@@ -330,12 +331,13 @@ Status PlacePatches(const Graph& graph, Compiler* compiler, const AccelerationTa
 
 Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compiler,
                                             const AccelerationTarget& target,
-                                            std::shared_ptr<const Subspace> subspace, bool stale_is_miss) {
+                                            std::shared_ptr<const Subspace> subspace,
+                                            const AccelerateOptions& options) {
   AccelerationDraft draft;
   draft.data.subspace = subspace;
   const TrainingRecord record = ParseTraining(subspace->training);
   std::vector<SetHere> set_here;
-  KPSA_RETURN_IF_ERROR(CheckRig(graph, target, *subspace, record, stale_is_miss, &draft, &set_here));
+  KPSA_RETURN_IF_ERROR(CheckRig(graph, target, *subspace, record, options, &draft, &set_here));
   KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, record, set_here, &draft));
   KPSA_RETURN_IF_ERROR(AddCues(graph, target, *subspace, &draft));
   for (const AccelerationTarget::MeshPoints& mesh : target.meshes)

@@ -21,6 +21,7 @@ struct AccelerationDraft {
 // Errors as of Accelerator::Add.
 Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compiler,
                                             const AccelerationTarget& target,
-                                            std::shared_ptr<const Subspace> subspace, bool stale_is_miss);
+                                            std::shared_ptr<const Subspace> subspace,
+                                            const AccelerateOptions& options);
 
 }  // namespace kpsa::engine

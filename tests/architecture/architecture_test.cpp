@@ -2,6 +2,12 @@
 // bad tree that it must find fault with.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
+#include <regex>
+#include <string>
+#include <vector>
+
 #include "tests/architecture/source_tree.h"
 #include "tests/support/temporary_folder.h"
 
@@ -142,6 +148,37 @@ TEST(Headers, CanaryOfOnesThatDoNot) {
             (std::vector<std::string>{"base/bad.h:3: uses std::vector, but includes no <vector>",
                                       "kpsa/worse.h:2: uses std::string, but includes no <string>",
                                       "kpsa/worse.h:3: uses nlohmann, but includes no <nlohmann/>"}));
+}
+
+// Texts with a flag of the program ("--set") in rooms that others use, too: "path:line: text".
+std::vector<std::string> FindFlagsInTexts(const std::vector<SourceFile>& files) {
+  const std::regex text(R"re("(?:[^"\\]|\\.)*")re"), flag("--[a-z]");
+  std::vector<std::string> found;
+  for (const SourceFile& file : files) {
+    const std::string room = file.path.substr(0, file.path.find('/'));
+    const char* const rooms[] = {"base", "graph", "nodes", "files", "gltf", "rig", "kpsa", "host"};
+    if (std::find(std::begin(rooms), std::end(rooms), room) == std::end(rooms)) continue;
+    for (std::size_t line = 0; line < file.code.size(); ++line) {
+      if (file.code[line].find("--") == std::string::npos) continue;
+      for (std::sregex_iterator it(file.code[line].begin(), file.code[line].end(), text), end; it != end;
+           ++it)
+        if (std::regex_search(it->str(), flag))
+          found.push_back(file.path + ":" + std::to_string(line + 1) + ": " + it->str());
+    }
+  }
+  return found;
+}
+
+TEST(Messages, NameNoFlagsBelowTheProgram) {
+  EXPECT_EQ(Lines(FindFlagsInTexts(ReadSourceTree(KPSA_SOURCE_DIR))), "");
+}
+
+TEST(Messages, CanaryOfAFlag) {
+  TemporaryFolder tree;
+  tree.Write("host/a.cpp", "// As --set does\nconst char* a = \"try --set\";\n");
+  tree.Write("host/b.cpp", "int b(const char*, int i) { return b(\"a\", --i); }\n");
+  tree.Write("cli/c.cpp", "const char* c = \"try --set\";\n");
+  EXPECT_EQ(Lines(FindFlagsInTexts(ReadSourceTree(tree.path()))), "host/a.cpp:2: \"try --set\"\n");
 }
 
 }  // namespace

@@ -190,7 +190,7 @@ TEST_F(OddNames, StructuralSettingsAreRefusedAsWhatTheyAre) {
   const std::vector<std::string> set = {"--set", "soft/mush@2.L.iterations=150"};
   ExpectRefused(set, {"strips.kpsa",
                       "soft/mush@2.L.iterations is set to 150 here, the subspace was trained on what the rig "
-                      "says; evaluate without --accelerate, or train a rig that says so"});
+                      "says; evaluate without subspaces, or train a rig that says so"});
   EXPECT_NE(Accelerated({set[0], set[1], "--stale", "miss"})["most_frequent_reason"].get<std::string>().find(
                 "soft/mush@2.L.iterations is set to 150 here"),
             std::string::npos);

@@ -20,7 +20,7 @@ TEST(File, WritesWholeFilesOrNothing) {
   EXPECT_EQ(TemporaryFolder::Read(path), "one");
   const Status exists = WriteFileAtomically(path, false, Bytes("two"));
   EXPECT_EQ(exists.kind(), ErrorKind::kUsage);
-  EXPECT_NE(exists.ToString().find("--force"), std::string::npos);
+  EXPECT_NE(exists.ToString().find("let it be replaced"), std::string::npos);
   EXPECT_EQ(TemporaryFolder::Read(path), "one");
   EXPECT_TRUE(WriteFileAtomically(path, true, Bytes("two")).ok());
   EXPECT_EQ(TemporaryFolder::Read(path), "two");
