@@ -65,10 +65,10 @@ Result<Json> ParseHeader(std::string_view text, const std::string& name) {
   };
   const Json header = Json::parse(text, callback, false);
   if (header.is_discarded() || !header.is_object())
-    return Status::Invalid("{}: the header is not a JSON object", name);
+    return Status::Invalid("the header is not a JSON object").At({name});
   if (depth_reached > 4)
-    return Status::Invalid("{}: the header is nested deeper than the format allows", name);
-  if (!duplicate.empty()) return Status::Invalid("{}: the header names \"{}\" twice", name, duplicate);
+    return Status::Invalid("the header is nested deeper than the format allows").At({name});
+  if (!duplicate.empty()) return Status::Invalid("the header names \"{}\" twice", duplicate).At({name});
   return header;
 }
 
@@ -76,7 +76,7 @@ Result<Json> ParseHeader(std::string_view text, const std::string& name) {
 Status ParseTensor(const std::string& name, const std::string& key, const Json& entry,
                    std::uint64_t data_size, Tensor* tensor, std::uint64_t* begin, std::uint64_t* end) {
   const auto bad = [&](const char* what) {
-    return Status::Invalid("{}: tensor \"{}\": {}", name, key, what);
+    return Status::Invalid("tensor \"{}\": {}", key, what).At({name});
   };
   if (!entry.is_object() || !entry.contains("dtype") || !entry.contains("shape") ||
       !entry.contains("data_offsets")) {
@@ -84,12 +84,12 @@ Status ParseTensor(const std::string& name, const std::string& key, const Json& 
   }
   const Json &type = entry["dtype"], &shape = entry["shape"], &offsets = entry["data_offsets"];
   if (!type.is_string()) return bad("dtype is not a string");
-  const auto info = std::find_if(std::begin(kTensorTypes), std::end(kTensorTypes), [&](const TensorTypeInfo& t) {
-    return t.name == type.get_ref<const std::string&>();
-  });
+  const auto info =
+      std::find_if(std::begin(kTensorTypes), std::end(kTensorTypes),
+                   [&](const TensorTypeInfo& t) { return t.name == type.get_ref<const std::string&>(); });
   if (info == std::end(kTensorTypes))
-    return Status::Invalid("{}: tensor \"{}\": unknown dtype \"{}\"", name, key,
-                           type.get_ref<const std::string&>());
+    return Status::Invalid("tensor \"{}\": unknown dtype \"{}\"", key, type.get_ref<const std::string&>())
+        .At({name});
   tensor->type = info->type;
   if (!shape.is_array() || shape.size() > kMaxDimensions)
     return bad("shape is not a list of at most 16 sizes");
@@ -106,12 +106,13 @@ Status ParseTensor(const std::string& name, const std::string& key, const Json& 
   *begin = offsets[0].get<std::uint64_t>();
   *end = offsets[1].get<std::uint64_t>();
   if (*begin > *end || *end > data_size) {
-    return Status::Invalid("{}: tensor \"{}\" lies at bytes {} to {} of {}", name, key, *begin, *end,
-                           data_size);
+    return Status::Invalid("tensor \"{}\" lies at bytes {} to {} of {}", key, *begin, *end, data_size)
+        .At({name});
   }
   if (*end - *begin != size) {
-    return Status::Invalid("{}: tensor \"{}\" of shape {} needs {} bytes, it has {}", name, key,
-                           ShapeText(tensor->shape), size, *end - *begin);
+    return Status::Invalid("tensor \"{}\" of shape {} needs {} bytes, it has {}", key,
+                           ShapeText(tensor->shape), size, *end - *begin)
+        .At({name});
   }
   return {};
 }
@@ -150,13 +151,14 @@ Result<SafetensorsFile> SafetensorsFile::Parse(std::vector<std::byte> bytes, con
   file.name_ = name;
   file.bytes_ = std::move(bytes);
   if (file.bytes_.size() < 8)
-    return Status::Invalid("{}: {} bytes are too few for a header", name, file.bytes_.size());
+    return Status::Invalid("{} bytes are too few for a header", file.bytes_.size()).At({name});
   std::uint64_t header_size;
   std::memcpy(&header_size, file.bytes_.data(), 8);
   if (header_size > file.bytes_.size() - 8 || header_size > kMaxHeader) {
     return Status::Invalid(
-        "{}: the header claims {} bytes, the file has {} (not a safetensors file, or cut short)", name,
-        header_size, file.bytes_.size());
+               "the header claims {} bytes, the file has {} (not a safetensors file, or cut short)",
+               header_size, file.bytes_.size())
+        .At({name});
   }
   const Result<Json> header =
       ParseHeader({reinterpret_cast<const char*>(file.bytes_.data()) + 8, header_size}, name);
@@ -171,9 +173,10 @@ Result<SafetensorsFile> SafetensorsFile::Parse(std::vector<std::byte> bytes, con
   std::vector<Extent> extents;
   for (const auto& [key, entry] : header->items()) {
     if (key == "__metadata__") {
-      if (!entry.is_object()) return Status::Invalid("{}: __metadata__ is not an object of strings", name);
+      if (!entry.is_object()) return Status::Invalid("__metadata__ is not an object of strings").At({name});
       for (const auto& [item, value] : entry.items()) {
-        if (!value.is_string()) return Status::Invalid("{}: __metadata__ \"{}\" is not a string", name, item);
+        if (!value.is_string())
+          return Status::Invalid("__metadata__ \"{}\" is not a string", item).At({name});
         file.metadata_[item] = value.get<std::string>();
       }
       continue;
@@ -192,37 +195,37 @@ Result<SafetensorsFile> SafetensorsFile::Parse(std::vector<std::byte> bytes, con
   std::uint64_t at = 0;
   for (const Extent& extent : extents) {
     if (extent.begin != at) {
-      return Status::Invalid(
-          "{}: tensor \"{}\" begins at byte {}, expected {} (tensors overlap or leave a hole)", name,
-          *extent.key, extent.begin, at);
+      return Status::Invalid("tensor \"{}\" begins at byte {}, expected {} (tensors overlap or leave a hole)",
+                             *extent.key, extent.begin, at)
+          .At({name});
     }
     at = extent.end;
   }
   if (at != data.size())
-    return Status::Invalid("{}: {} bytes of data, the tensors account for {}", name, data.size(), at);
+    return Status::Invalid("{} bytes of data, the tensors account for {}", data.size(), at).At({name});
   return file;
 }
 
 Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return Status::Invalid("{}: no such file", path);
+  if (!std::filesystem::exists(path, error)) return Status::Invalid("no such file").At({path});
   if (!std::filesystem::is_regular_file(path, error))
-    return Status::Invalid("{}: is a folder, a pipe or a device, expected a file", path);
+    return Status::Invalid("is a folder, a pipe or a device, expected a file").At({path});
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   std::ifstream stream(path, std::ios::binary);
-  if (error || !stream) return Status::Invalid("{}: cannot be opened", path);
+  if (error || !stream) return Status::Invalid("cannot be opened").At({path});
   // The header is looked at first: a huge file of another kind is not read into memory
   std::uint64_t header_size = 0;
   stream.read(reinterpret_cast<char*>(&header_size), 8);
   if (!stream || header_size > size - 8 || header_size > kMaxHeader) {
-    return Status::Invalid("{}: not a safetensors file, or cut short", path);
+    return Status::Invalid("not a safetensors file, or cut short").At({path});
   }
   if (size > kMaxFile)
-    return Status::Invalid("{}: is larger than {} bytes, the most that is read", path, kMaxFile);
+    return Status::Invalid("is larger than {} bytes, the most that is read", kMaxFile).At({path});
   std::vector<std::byte> bytes(size);
   stream.seekg(0);
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  if (!stream) return Status::Invalid("{}: could not be read to its end", path);
+  if (!stream) return Status::Invalid("could not be read to its end").At({path});
   return Parse(std::move(bytes), path);
 }
 
@@ -231,7 +234,7 @@ Result<std::string> SafetensorsFile::Metadata(const std::string& key) const {
   if (found != metadata_.end()) return found->second;
   std::vector<std::string> keys;
   for (const auto& [name, value] : metadata_) keys.push_back(name);
-  return Status::Invalid("{}: the header has no \"{}\"{}", name_, key, DidYouMean(key, keys));
+  return Status::Invalid("the header has no \"{}\"{}", key, DidYouMean(key, keys)).At({name_});
 }
 
 Result<const Tensor*> SafetensorsFile::Checked(const std::string& key, TensorType type,
@@ -240,22 +243,22 @@ Result<const Tensor*> SafetensorsFile::Checked(const std::string& key, TensorTyp
   if (found == tensors_.end()) {
     std::vector<std::string> keys;
     for (const auto& [name, tensor] : tensors_) keys.push_back(name);
-    return Status::Invalid("{}: there is no tensor \"{}\"{}", name_, key, DidYouMean(key, keys));
+    return Status::Invalid("there is no tensor \"{}\"{}", key, DidYouMean(key, keys)).At({name_});
   }
   const Tensor& tensor = found->second;
   bool same = tensor.shape.size() == shape.size();
   for (std::size_t i = 0; same && i < shape.size(); ++i)
     same = shape[i] == kAnySize || shape[i] == tensor.shape[i];
   if (tensor.type != type || !same) {
-    return Status::Invalid("{}: tensor \"{}\" is {} {}, expected {} {}", name_, key,
-                           TensorTypeName(tensor.type), ShapeText(tensor.shape), TensorTypeName(type),
-                           ShapeText(shape));
+    return Status::Invalid("tensor \"{}\" is {} {}, expected {} {}", key, TensorTypeName(tensor.type),
+                           ShapeText(tensor.shape), TensorTypeName(type), ShapeText(shape))
+        .At({name_});
   }
   const bool finite = type == TensorType::kF16   ? AllFiniteHalfs(tensor.bytes)
                       : type == TensorType::kF32 ? AllFinite<float>(tensor.bytes)
                       : type == TensorType::kF64 ? AllFinite<double>(tensor.bytes)
                                                  : true;
-  if (!finite) return Status::Invalid("{}: tensor \"{}\" holds a NaN or an infinity", name_, key);
+  if (!finite) return Status::Invalid("tensor \"{}\" holds a NaN or an infinity", key).At({name_});
   return &tensor;
 }
 
@@ -306,19 +309,19 @@ Status SafetensorsWriter::Write(const std::string& path) const {
   const std::string temporary = path + ".part";
   {
     std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
-    if (!stream) return Status::Invalid("{}: cannot be written", path);
+    if (!stream) return Status::Invalid("cannot be written").At({path});
     stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     stream.close();
     if (!stream) {
       std::remove(temporary.c_str());
-      return Status::Invalid("{}: could not be written to its end (is the disk full?)", path);
+      return Status::Invalid("could not be written to its end (is the disk full?)").At({path});
     }
   }
   std::error_code error;
   std::filesystem::rename(temporary, path, error);
   if (error) {
     std::remove(temporary.c_str());
-    return Status::Invalid("{}: cannot be replaced ({})", path, error.message());
+    return Status::Invalid("cannot be replaced ({})", error.message()).At({path});
   }
   return {};
 }

@@ -21,7 +21,7 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
   const double share = s->patches.share;
   s->patches = MakePatchLayout(s->tiles_of_outputs());
   if (s->patches.tiles != tiles)
-    return Status::Invalid("{}: patches of {} tiles, expected {}", file.name(), tiles, s->patches.tiles);
+    return Status::Invalid("patches of {} tiles, expected {}", tiles, s->patches.tiles);
   s->patches.share = share;
   KPSA_RETURN_IF_ERROR(Assign(file.Values<double>(kPatchCosts, {kAny}), &s->patches.costs));
   const Result<std::vector<double>> middles = file.Values<double>(kMiddles, {s->calibration.size()}),
@@ -38,13 +38,12 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
     CalibrationPair& pair = s->calibration[i];
     pair.middle = (*middles)[i];
     if ((*counts)[i] > kMaxPatches || next + (*counts)[i] > pairs->size() / 2)
-      return Status::Invalid("{}: calibration pose {} has {} patches", file.name(), i, (*counts)[i]);
+      return Status::Invalid("calibration pose {} has {} patches", i, (*counts)[i]);
     for (std::size_t p = 0; p < (*counts)[i]; ++p, ++next)
       pair.patches.push_back({(*pairs)[2 * next], (*pairs)[2 * next + 1], guards[next]});
   }
   if (next != pairs->size() / 2)
-    return Status::Invalid("{}: {} patches of calibration poses belong to none", file.name(),
-                           pairs->size() / 2 - next);
+    return Status::Invalid("{} patches of calibration poses belong to none", pairs->size() / 2 - next);
   return {};
 }
 
@@ -90,7 +89,7 @@ Status ReadCalibration(const SafetensorsFile& file, Subspace* s) {
     for (std::size_t i = 0; i < near_clips->size(); ++i) {
       const std::uint8_t flag = (*near_clips)[i];
       if (flag > 1 || (flag == 1 && s->calibration[i].kind != static_cast<int>(PoseKind::kSampled)))
-        return Status::Invalid("{}: calibration pose {} cannot be near clips ({})", file.name(), i, flag);
+        return Status::Invalid("calibration pose {} cannot be near clips ({})", i, flag);
       s->calibration[i].near_clips = flag == 1;
     }
   }

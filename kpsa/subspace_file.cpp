@@ -26,7 +26,7 @@ Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
   const Result<std::string> digest = file.Metadata(kModesDigest);
   if (!digest.ok()) return digest.status();
   if (*digest != ModesDigest(*s))
-    return Status::Invalid("{}: the file is damaged: its modes are not those that were written", file.name());
+    return Status::Invalid("the file is damaged: its modes are not those that were written");
   return {};
 }
 
@@ -53,13 +53,12 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
   return writer.Write(path);
 }
 
-Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
-  const Result<SafetensorsFile> read = SafetensorsFile::Read(path);
-  if (!read.ok()) return read.status();
-  const SafetensorsFile& file = *read;
+namespace {
+
+Result<Subspace> SubspaceIn(const SafetensorsFile& file, KeptModes modes) {
   const auto kind = file.metadata().find("kind");
   if (kind == file.metadata().end() || kind->second != kSubspaceKind) {
-    return Status::Invalid("{}: a file of tensors, but not a subspace (write one with `kpsa train`)", path);
+    return Status::Invalid("a file of tensors, but not a subspace (write one with `kpsa train`)");
   }
   const Result<std::string> version = file.Metadata("version");
   if (!version.ok()) return version.status();
@@ -67,9 +66,9 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   for (int v = kOldestVersion; v <= kSubspaceVersion; ++v) known |= *version == std::to_string(v);
   if (!known) {
     return Status::Invalid(
-        "{}: the subspace has format version {}, this program reads versions {} to {}; train it again or use "
+        "the subspace has format version {}, this program reads versions {} to {}; train it again or use "
         "the program that wrote it",
-        path, *version, kOldestVersion, kSubspaceVersion);
+        *version, kOldestVersion, kSubspaceVersion);
   }
   Subspace s;
   KPSA_RETURN_IF_ERROR(ReadSubspaceHeader(file, &s));
@@ -82,7 +81,7 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   for (std::size_t k = 0; k <= s.cues.size(); ++k) {
     const Index offset = s.soft_cache.offsets[k];
     if (offset > rows || (k == 0 ? offset != 0 : offset < s.soft_cache.offsets[k - 1])) {
-      return Status::Invalid("{}: cue {} begins at row {} of {}", path, k, offset, rows);
+      return Status::Invalid("cue {} begins at row {} of {}", k, offset, rows);
     }
   }
   KPSA_RETURN_IF_ERROR(
@@ -92,21 +91,30 @@ Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   if (file.tensors().contains(kLatent)) {
     KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(kLatent, {kAny}), &s.latent));
     if (rows == 0 || s.latent.empty() || s.latent.size() % rows != 0)
-      return Status::Invalid("{}: {} latent factors of {} rows", path, s.latent.size(), rows);
+      return Status::Invalid("{} latent factors of {} rows", s.latent.size(), rows);
   }
   KPSA_RETURN_IF_ERROR(ReadTiles(file, &s));
   KPSA_RETURN_IF_ERROR(ReadCalibration(file, &s));
   if (modes == KeptModes::kRead &&
       (file.tensors().contains(kModes) || file.metadata().contains(kModesDigest)))
     KPSA_RETURN_IF_ERROR(ReadKeptModes(file, &s));
-  if (Status status = ValidateSubspace(s); !status.ok())
-    return Status::Invalid("{}: {}", path, status.ToString());
+  KPSA_RETURN_IF_ERROR(ValidateSubspace(s));
   const Result<std::string> digest = file.Metadata("digest");
   if (!digest.ok()) return digest.status();
   if (*digest != ContentDigest(s))
     return Status::Invalid(
-        "{}: the file is damaged: its contents are not those that were written; train it again", path);
+        "the file is damaged: its contents are not those that were written; train it again");
   return s;
+}
+
+}  // namespace
+
+Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
+  const Result<SafetensorsFile> file = SafetensorsFile::Read(path);
+  if (!file.ok()) return file.status();
+  Result<Subspace> subspace = SubspaceIn(*file, modes);
+  if (!subspace.ok()) return Status(subspace.status()).At({path});
+  return subspace;
 }
 
 }  // namespace kpsa::engine

@@ -64,8 +64,8 @@ Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, b
   Json json = Json::parse(*text, callback, false);
   if (json.is_discarded() || depth_reached > 8 || json.is_array() != list || (!list && !json.is_object()) ||
       json.size() > limit) {
-    return Status::Invalid("{}: \"{}\" is not a JSON {} of at most {} entries", file.name(), key,
-                           list ? "list" : "object", limit);
+    return Status::Invalid("\"{}\" is not a JSON {} of at most {} entries", key, list ? "list" : "object",
+                           limit);
   }
   return json;
 }
@@ -90,9 +90,9 @@ int VersionOf(const Subspace& s) {
 }
 
 // What the space was at rest, and what moves with it.
-Status ReadFrame(const SafetensorsFile& file, const Json& frame, Subspace* s) {
+Status ReadFrame(const Json& frame, Subspace* s) {
   const auto bad = [&](const char* key, const char* expected) {
-    return Status::Invalid("{}: frame: \"{}\" should be {}", file.name(), key, expected);
+    return Status::Invalid("frame: \"{}\" should be {}", key, expected);
   };
   if (!frame.contains("scales") || !frame["scales"].is_boolean()) return bad("scales", "true or false");
   s->space_scales = frame["scales"].get<bool>();
@@ -149,9 +149,9 @@ Json RangesJson(const Subspace& s) {
 }
 
 // *status: the first failure of a Reader; entries after it read as defaults.
-Status ReadCues(const SafetensorsFile& file, const Json& cues, Status* status, Subspace* s) {
+Status ReadCues(const Json& cues, Status* status, Subspace* s) {
   for (const Json& entry : cues) {
-    Reader reader_of_cue(file.name() + ": a cue", entry, status);
+    Reader reader_of_cue("a cue", entry, status);
     CueDescription cue;
     const std::string kind = reader_of_cue.Text("kind");
     if (kind == "scalar") {
@@ -165,15 +165,14 @@ Status ReadCues(const SafetensorsFile& file, const Json& cues, Status* status, S
       cue.kind = CueDescription::Kind::kProduct;
       cue.lo = reader_of_cue.Number("lo"), cue.hi = reader_of_cue.Number("hi");
       if (!entry.contains("factors") || !entry["factors"].is_array())
-        return Status::Invalid("{}: a cue: \"factors\" should be an array", file.name());
+        return Status::Invalid("a cue: \"factors\" should be an array");
       for (const Json& part : entry["factors"]) {
-        Reader factor(file.name() + ": a factor", part, status);
+        Reader factor("a factor", part, status);
         cue.factors.push_back({factor.Text("plug"), {factor.Number("centre"), factor.Number("scale")}});
         cue.factors.back().curve.hinge = part.is_object() && part.value("hinge", Json(false)) == Json(true);
       }
     } else if (status->ok()) {
-      return Status::Invalid("{}: a cue is of kind \"{}\", expected point, scalar or product", file.name(),
-                             kind);
+      return Status::Invalid("a cue is of kind \"{}\", expected point, scalar or product", kind);
     }
     if (entry.is_object() && entry.contains("joint")) cue.joint = reader_of_cue.Text("joint");
     s->cues.push_back(std::move(cue));
@@ -181,9 +180,9 @@ Status ReadCues(const SafetensorsFile& file, const Json& cues, Status* status, S
   return {};
 }
 
-Status ReadRanges(const SafetensorsFile& file, const Json& ranges, Status* status, Subspace* s) {
+Status ReadRanges(const Json& ranges, Status* status, Subspace* s) {
   for (const Json& entry : ranges) {
-    Reader range(file.name() + ": a trained range", entry, status);
+    Reader range("a trained range", entry, status);
     s->ranges.push_back({range.Text("plug"), range.Number("lo"), range.Number("hi"), range.Number("ramp")});
     if (!entry.is_object() || !entry.contains(kRangePatches)) continue;
     const Json& patches = entry[kRangePatches];
@@ -193,9 +192,7 @@ Status ReadRanges(const SafetensorsFile& file, const Json& ranges, Status* statu
       known = patches[i].is_number_unsigned() && patches[i].get<std::uint64_t>() < kMaxPatches;
       if (known) s->ranges.back().patches |= std::uint64_t{1} << patches[i].get<std::uint64_t>();
     }
-    if (!known)
-      return Status::Invalid("{}: a trained range: \"{}\" should be numbers of patches", file.name(),
-                             kRangePatches);
+    if (!known) return Status::Invalid("a trained range: \"{}\" should be numbers of patches", kRangePatches);
   }
   return {};
 }
@@ -241,10 +238,10 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, Subspace* s) {
   for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &frame, &training})
     KPSA_RETURN_IF_ERROR(part->status());
   Status status;
-  Reader reader(file.name() + ": summary", *summary, &status);
+  Reader reader("summary", *summary, &status);
   const std::string mode = reader.Text("mode");
   if (status.ok() && mode != "map" && mode != "paper")
-    return Status::Invalid("{}: the mode is \"{}\", expected map or paper", file.name(), mode);
+    return Status::Invalid("the mode is \"{}\", expected map or paper", mode);
   s->mode = s->soft_cache.mode = mode == "paper" ? EstimatorMode::kPaper : EstimatorMode::kMap;
   s->components = static_cast<int>(reader.Count("components", 3));
   s->modes = s->soft_cache.modes = reader.Count("modes", 1u << 20);
@@ -256,7 +253,7 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, Subspace* s) {
   if (summary->contains("score")) {
     const Json& score = (*summary)["score"];
     if (!score.is_array() || score.size() != 2 || !score[0].is_number() || !score[1].is_number())
-      return Status::Invalid("{}: summary: \"score\" should be two numbers", file.name());
+      return Status::Invalid("summary: \"score\" should be two numbers");
     s->score = {score[0].get<double>(), score[1].get<double>()};
   }
   if (summary->contains("tilesOfPatch")) {
@@ -264,13 +261,13 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, Subspace* s) {
     s->patches.share = reader.Number("patchShare");
   }
   for (const Json& entry : *outputs) {
-    Reader output(file.name() + ": an output", entry, &status);
+    Reader output("an output", entry, &status);
     s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints), output.Text("stage")});
   }
-  KPSA_RETURN_IF_ERROR(ReadCues(file, *cues, &status, s));
-  KPSA_RETURN_IF_ERROR(ReadRanges(file, *ranges, &status, s));
-  s->extent = Reader(file.name() + ": frame", *frame, &status).Number("extent");
-  KPSA_RETURN_IF_ERROR(ReadFrame(file, *frame, s));
+  KPSA_RETURN_IF_ERROR(ReadCues(*cues, &status, s));
+  KPSA_RETURN_IF_ERROR(ReadRanges(*ranges, &status, s));
+  s->extent = Reader("frame", *frame, &status).Number("extent");
+  KPSA_RETURN_IF_ERROR(ReadFrame(*frame, s));
   for (const auto& [key, target] : {std::pair{"rigHash", &s->rig_hash},
                                     {"units", &s->units},
                                     {"space", &s->space},

@@ -67,8 +67,7 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
       KPSA_RETURN_IF_ERROR(
           Assign(file.Values<double>(prefix + "jointDeviation", {kAny}), &data.joint_deviation));
     }
-    Result<TileMap> map =
-        TileMap::Make(std::move(data), file.name() + ": tiles of \"" + s->outputs[i].name + "\"");
+    Result<TileMap> map = TileMap::Make(std::move(data), "tiles of \"" + s->outputs[i].name + "\"");
     if (!map.ok()) return map.status();
     s->tiles.push_back(std::move(*map));
   }

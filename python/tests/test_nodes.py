@@ -252,7 +252,7 @@ def test_errors_of_every_kind_carry_file_line_and_node(folder):
         (lambda: library.load(path, variant="none"), path, 0, ""),
         (lambda: library.add_plugin(path), path, 0, ""),
         (lambda: rig.accelerated("none.kpsa"), "none.kpsa", 0, ""),
-        (lambda: rig.accelerated(str(folder / "cut.kpsa")), path, 0, ""),  # whose subspace it would be; the message names it
+        (lambda: rig.accelerated(str(folder / "cut.kpsa")), str(folder / "cut.kpsa"), 0, ""),
         (lambda: rig.accelerated(tolerance=-1), path, 0, ""),
         (lambda: rig.bench(), path, 0, ""),
         (lambda: rig.train(entry="none"), path, 0, ""),

@@ -184,6 +184,15 @@ TEST_F(Face, ErrorsAreValuesWithPlaces) {
   EXPECT_FALSE(scene.Values("column.nothing"));
   EXPECT_NE(Failed(rig_->Accelerated({.subspace = Path("none.kpsa")})).message.find("no such file"),
             std::string::npos);
+  // A subspace that cannot be read is named, not the rig
+  folder_->Write("broken.kpsa", "no subspace");
+  const Problem broken = Failed(rig_->Accelerated({.subspace = Path("broken.kpsa")}));
+  EXPECT_EQ(broken.file, Path("broken.kpsa"));
+  EXPECT_EQ(broken.message, "not a safetensors file, or cut short");
+  std::string damaged = folder_->Read(Path("hello.kpsa"));
+  damaged.back() = static_cast<char>(damaged.back() ^ 1);
+  folder_->Write("damaged.kpsa", damaged);
+  EXPECT_EQ(Failed(rig_->Accelerated({.subspace = Path("damaged.kpsa")})).file, Path("damaged.kpsa"));
   EXPECT_FALSE(rig_->Accelerated({.tolerance = -1}));
   EXPECT_FALSE(rig_->Train({.entry = "colum"}));
   EXPECT_FALSE(rig_->Train({.violation_rate = 2}));
