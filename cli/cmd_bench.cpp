@@ -9,6 +9,7 @@
 #include "cli/options.h"
 #include "cli/progress.h"
 #include "host/bench/bench.h"
+#include "host/rig_training.h"
 #include "report/bench_report.h"
 #include "report/promise_text.h"
 
@@ -23,16 +24,11 @@ struct BenchFlags : Flags {
 };
 
 // The rig's test clips; without them, what the flags choose ("").
-Result<std::vector<std::string>> TestClips(const BenchFlags& flags, std::vector<std::string>* notes) {
+Result<std::vector<std::string>> ClipsOf(const BenchFlags& flags, std::vector<std::string>* notes) {
   if (flags.clip.has_value() || flags.rest) return std::vector<std::string>{""};
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
-  std::vector<std::string> clips;
-  for (const Acceleration& entry : (*open)->rig.accelerate) {
-    for (const std::string& clip : entry.test_clips) {
-      if (std::find(clips.begin(), clips.end(), clip) == clips.end()) clips.push_back(clip);
-    }
-  }
+  std::vector<std::string> clips = TestClips((*open)->rig);
   if (clips.empty()) {
     clips.emplace_back();
     notes->push_back(
@@ -102,7 +98,7 @@ CommandResult RunBenchCommand(const BenchFlags& flags) {
     options.speedup = *speedup;
   }
   std::vector<std::string> notes;
-  const Result<std::vector<std::string>> clips = TestClips(flags, &notes);
+  const Result<std::vector<std::string>> clips = ClipsOf(flags, &notes);
   if (!clips.ok()) return clips.status();
   const InterruptScope interruptible;
   std::vector<AccelerationChoice> choices;

@@ -12,6 +12,7 @@
 #include "host/open_rig.h"
 #include "host/problems.h"
 #include "host/rig_frames.h"
+#include "host/rig_training.h"
 #include "kpsa/bench.h"
 #include "kpsa/kpsa_node.h"
 
@@ -33,14 +34,9 @@ engine::Status CheckThreads(const BenchOptions& options, const engine::Rig& rig)
       .OfNode(name);
 }
 
-// Those of all entries, each once; the rig's first clip where they name none, or its rest ("").
-std::vector<std::string> TestClips(const engine::Rig& rig) {
-  std::vector<std::string> clips;
-  for (const engine::Acceleration& entry : rig.accelerate) {
-    for (const std::string& clip : entry.test_clips) {
-      if (std::ranges::find(clips, clip) == clips.end()) clips.push_back(clip);
-    }
-  }
+// The rig's test clips; its first clip where it names none, or its rest ("").
+std::vector<std::string> ClipsOf(const engine::Rig& rig) {
+  std::vector<std::string> clips = engine::TestClips(rig);
   if (clips.empty()) clips.push_back(rig.scene.clips.empty() ? "" : rig.scene.clips.front().id);
   return clips;
 }
@@ -108,7 +104,7 @@ Result<BenchReport> Rig::Bench(const BenchOptions& options) const {
   }
   engine::Result<std::vector<engine::BenchResult>> results =
       engine::RunBench(CopiesOf(impl_->rest), {*impl_->acceleration},
-                       options.clips.empty() ? TestClips(impl_->rest) : options.clips, bench, watch);
+                       options.clips.empty() ? ClipsOf(impl_->rest) : options.clips, bench, watch);
   if (!results.ok()) return failed(results.status());
   return ReportOf(std::move(results->front()));
 }

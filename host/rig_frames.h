@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/status.h"
@@ -25,6 +26,8 @@ Request ShownPoints(const Rig& rig);
 Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compiler, const Request& request);
 
 inline constexpr std::size_t kMaxSamples = 1'000'000;  // times of one evaluation
+// Every frame between two times of a clip, both included, in seconds. Errors: more than kMaxSamples.
+Result<std::vector<double>> FramesBetween(std::string_view clip, double begin, double end, double fps);
 // Every frame of the clip that plays, from its first one to its end, in seconds; time 0 alone if none plays.
 // Errors: more than kMaxSamples.
 Result<std::vector<double>> ClipTimes(const Rig& rig);

@@ -1,7 +1,9 @@
 #include "host/rig_training.h"
 
-#include <cmath>
+#include <algorithm>
 #include <set>
+
+#include "host/rig_frames.h"
 
 namespace kpsa::engine {
 
@@ -141,13 +143,21 @@ Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<s
       if (clip.id == name) found = &clip;
     }
     if (found == nullptr) return NoSuchClip(rig.scene, name);
-    TrainingClip clip{name, {}};
-    const double first = std::ceil(found->begin * rig.fps - 1e-6);
-    const auto count = static_cast<std::size_t>(std::floor(found->duration * rig.fps + 1e-6) - first) + 1;
-    for (std::size_t i = 0; i < count; ++i) clip.times.push_back((first + static_cast<double>(i)) / rig.fps);
-    frames.push_back(std::move(clip));
+    Result<std::vector<double>> times = FramesBetween(name, found->begin, found->duration, rig.fps);
+    if (!times.ok()) return times.status();
+    frames.push_back({name, std::move(*times)});
   }
   return frames;
+}
+
+std::vector<std::string> TestClips(const Rig& rig) {
+  std::vector<std::string> clips;
+  for (const Acceleration& entry : rig.accelerate) {
+    for (const std::string& clip : entry.test_clips) {
+      if (std::ranges::find(clips, clip) == clips.end()) clips.push_back(clip);
+    }
+  }
+  return clips;
 }
 
 Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name) {

@@ -16,8 +16,10 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration);
 TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration);
 // What the entry asks for; the rest is the trainer's own.
 TrainOptions TrainOptionsOf(const Acceleration& entry);
-// Every frame of the clips at the rig's rate. Errors: a clip that the character lacks.
+// Every frame of the clips, as ClipTimes counts them (host/rig_frames.h). Errors: a clip that the character lacks.
 Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips);
+// Of all entries of the rig, each once.
+std::vector<std::string> TestClips(const Rig& rig);
 // The entry of the rig's accelerate section, by name where there are several. Errors: none, not that one,
 // or one of a reference, which is trained there.
 Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name);
