@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <exception>
 #include <memory>
+#include <set>
+#include <vector>
 
 namespace kpsa::engine {
 namespace {
@@ -100,6 +102,21 @@ void Compute(ComputeContext& c) {
 std::string PrototypeNodeOf(const Graph& graph) {
   for (const NodeId node : graph.Nodes()) {
     if (graph.def(node).prototype) return graph.name(node);
+  }
+  return "";
+}
+
+std::string PrototypeNodeAbove(const Graph& graph, std::span<const PlugRef> plugs) {
+  std::set<Index> seen;
+  std::vector<NodeId> nodes;
+  const auto add = [&](NodeId node) {
+    if (seen.insert(node.index).second) nodes.push_back(node);
+  };
+  for (const PlugRef& plug : plugs) add(plug.node);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const NodeId node = nodes[i];
+    if (graph.def(node).prototype) return graph.name(node);
+    for (const Connection& input : graph.Inputs(node)) add(input.source.node);
   }
   return "";
 }

@@ -1,6 +1,7 @@
 // Node types that functions of the program compute (kpsa/node_type.h), as the engine declares them.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "base/status.h"
@@ -12,6 +13,8 @@ namespace kpsa::engine {
 
 // The first node of a graph that is of such a type; "" if none.
 std::string PrototypeNodeOf(const Graph& graph);
+// The same of the nodes that these plugs come from.
+std::string PrototypeNodeAbove(const Graph& graph, std::span<const PlugRef> plugs);
 
 // Adds it to a registry of its own. Errors: no function, no output, a default of another size.
 Status DeclareNode(const NodeType& type, NodeRegistry* registry);

@@ -76,14 +76,20 @@ engine::Status CheckNumbers(const TrainingOptions& options) {
 }
 
 // Training evaluates poses on all threads, and many of them.
-engine::Status CheckNodes(const engine::Rig& rig) {
-  const std::string name = engine::PrototypeNodeOf(*rig.graph);
+engine::Status CheckNodes(const engine::TrainingRig& rig) {
+  std::vector<engine::PlugRef> evaluated = rig.target.outputs();
+  evaluated.insert(evaluated.end(), rig.target.space.begin(), rig.target.space.end());
+  for (const engine::ControlRange& control : rig.controls) {
+    if (control.shown.has_value()) evaluated.push_back(*control.shown);
+  }
+  const std::string name = engine::PrototypeNodeAbove(*rig.graph, evaluated);
   if (name.empty()) return engine::Status();
-  return engine::Status::
-      Usage("\"{}\" is computed by a function of this program, one thread at a time: no rig with such a node "
-            "is trained; expected node types of the library or of a plugin",
-            name)
-          .OfNode(name);
+  return engine::Status::Usage(
+             "\"{}\" is computed by a function of this program, one thread at a time: no points that need "
+             "such a "
+             "node are trained; expected node types of the library or of a plugin",
+             name)
+      .OfNode(name);
 }
 
 }  // namespace
@@ -155,11 +161,12 @@ kpsa::Result<TrainingReport> Rig::Train(const TrainingOptions& options, const st
   if (is_accelerated())
     return failed(engine::Status::Usage("this rig is accelerated: expected the one that it was made of"));
   if (const engine::Status numbers = CheckNumbers(options); !numbers.ok()) return failed(numbers);
-  if (const engine::Status status = CheckNodes(impl_->rest); !status.ok()) return failed(status);
   engine::Rig rig = impl_->rest;
   const auto entry =
       engine::ChooseEntry(rig, options.entry.empty() ? std::nullopt : std::optional(options.entry));
   if (!entry.ok()) return failed(entry.status());
+  const engine::TrainingRig training = engine::MakeTrainingRig(&rig, *entry);
+  if (const engine::Status status = CheckNodes(training); !status.ok()) return failed(status);
   const std::string path = subspace.empty() ? entry->subspace : subspace;
   if (path.empty())
     return failed(engine::Status::Usage("\"{}\" names no subspace file: expected one", entry->name));
@@ -176,8 +183,7 @@ kpsa::Result<TrainingReport> Rig::Train(const TrainingOptions& options, const st
     return failed(output.status());
   const engine::ThreadLimit limit(options.threads);
   const engine::TrainOptions train = TrainOptionsOf(options, *entry);
-  const engine::Result<engine::Subspace> trained =
-      engine::Train(engine::MakeTrainingRig(&rig, *entry), *clips, train);
+  const engine::Result<engine::Subspace> trained = engine::Train(training, *clips, train);
   if (!trained.ok()) return failed(engine::Status(trained.status()).At({rig.path}));
   if (const engine::Status written = engine::WriteSubspace(*trained, path); !written.ok())
     return failed(written);

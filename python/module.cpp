@@ -490,7 +490,7 @@ PYBIND11_MODULE(_kpsa, m) {
           py::arg("compute") = py::none(), py::kw_only(), py::arg("deformer") = false, py::arg("doc") = "",
           "A node type that a Python function computes: for prototypes, as it is slow, frames with it run on "
           "one "
-          "thread, and no rig with it is trained. inputs: defaults by name (a number, three, four, a matrix "
+          "thread, and no points that need it are trained. inputs: defaults by name (a number, three, four, a matrix "
           "[4, 4]); "
           "outputs: names, or kinds by name (\"number\", \"vector\", \"quaternion\", \"matrix\"). "
           "compute(**inputs) gives the output, a tuple of them or a dict; of a deformer, compute(points, "

@@ -1,5 +1,5 @@
 // A node type that a function of the program computes: for prototypes. It is slow, frames with it are evaluated on
-// one thread, and no rig with it is trained; what stays becomes a node of a plugin (docs/howto/plugin.md).
+// one thread, and no points that need it are trained; what stays becomes a node of a plugin (docs/howto/plugin.md).
 #pragma once
 
 #include <functional>

@@ -182,7 +182,7 @@ class Library:
                  outputs: Union[Mapping[str, str], Sequence[str], None] = None, compute: Optional[Callable[..., Any]] = None, *,
                  deformer: bool = False, doc: str = "") -> Callable[..., Any]:
         """A node type that a Python function computes: for prototypes, as it is slow, frames with it run on one thread, and no
-        rig with it is trained. inputs: defaults by name (a number, three, four, a matrix [4, 4]); outputs: names, or kinds by
+        points that need it are trained. inputs: defaults by name (a number, three, four, a matrix [4, 4]); outputs: names, or kinds by
         name ("number", "vector", "quaternion", "matrix"). compute(**inputs) gives the output, a tuple of them or a dict; of a
         deformer, compute(points, **inputs) gives points [P, 3], or changes them and gives None. Without compute: a decorator."""
     def load(self, path: str, *, variant: Optional[str] = None, fps: Optional[float] = None, plugins: bool = True) -> Rig:

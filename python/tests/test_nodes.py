@@ -112,9 +112,13 @@ def test_functions_deform(folder):
     with pytest.raises(kpsa.Error, match="one frame at a time: expected 0 or 1 threads, got 2") as error:
         scene.frames(seconds, threads=2)
     assert error.value.node == "up" and error.value.file.endswith("hello.yaml")
-    with pytest.raises(kpsa.Error, match="no rig with such a node is trained") as error:
-        rig.train(str(folder / "no.kpsa"))
-    assert error.value.node == "up" and not (folder / "no.kpsa").exists()
+    # Points that do not need such a node are trained, others are not
+    rig.train(str(folder / "some.kpsa"), samples=50)
+    library.add_node("half", {"turn": 0}, ["output"], lambda turn: 0.5)
+    driven = load(folder, library, "  half: {type: half}\nconnections:\n  - half.output -> mush.envelope\n")
+    with pytest.raises(kpsa.Error, match="no points that need such a node are trained") as error:
+        driven.train(str(folder / "no.kpsa"))
+    assert error.value.node == "half" and not (folder / "no.kpsa").exists()
 
 
 def test_what_functions_raise_is_told(folder):

@@ -357,7 +357,12 @@ TEST_F(SceneStates, FunctionsOfTheProgramComputeNodes) {
   EXPECT_NE(refused.message.find("1 thread"), std::string::npos) << refused.message;
   EXPECT_TRUE(plain.Frames(seconds, [](const kpsa::Frame&) { return true; }, {.threads = 2}))
       << "the meshes do not need it";
-  EXPECT_EQ(Failed(edited->Train({}, Path("no.kpsa"))).node, "parts");
+  // The accelerated points (up to the mush) need neither "parts" nor "up"
+  const auto trained = edited->Train({.samples = 50}, Path("some.kpsa"));
+  EXPECT_TRUE(trained) << kpsa::ToText(trained.problems());
+  const auto driven = rig.Edited([](GraphEdit& edit) { return edit.Connect("parts.w", "mush.envelope"); });
+  ASSERT_TRUE(driven) << kpsa::ToText(driven.problems());
+  EXPECT_EQ(Failed(driven->Train({}, Path("no.kpsa"))).node, "parts");
   EXPECT_FALSE(std::filesystem::exists(Path("no.kpsa")));
   // Exceptions are errors of the node
   NodeType thrower{.name = "thrower", .outputs = {{"output"}}};
