@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/text.h"
+#include "host/run_up.h"
 
 namespace kpsa::engine {
 namespace {
@@ -63,7 +64,8 @@ Status FailedAt(const Rig& rig, double seconds, const Status& evaluated) {
 Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
                      const std::vector<double>& times, const RigFrameOptions& options,
                      const RigFrameSink& sink) {
-  const Index time = plan->FindVarying(rig.scene.time);
+  RunUp run_up(*plan, rig, options.watch.cancel);
+  Status before;  // of frames on the way; then all run on one thread
   FrameOptions frame_options;
   frame_options.threads = options.threads;
   frame_options.cancel = options.watch.cancel;
@@ -71,9 +73,12 @@ Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
   const Status status = EvaluateFrames(
       plan, times.size(), frame_options,
       [&](std::size_t frame, Evaluator& evaluator) {
-        if (time != kNoIndex) evaluator.Set(time, times[frame]);
+        if (run_up.stateful()) evaluator.Record(nullptr);
+        Status status = run_up.To(times[frame], &evaluator);
+        if (run_up.stateful()) before = std::move(status);
       },
       [&](std::size_t frame, const Evaluator& evaluator, const Status& evaluated) -> Status {
+        if (!before.ok()) return before;
         if (!evaluated.ok()) return FailedAt(rig, times[frame], evaluated);
         options.watch.Done(frame + 1, times.size());
         return sink(frame, evaluator);

@@ -46,7 +46,8 @@ struct RigFrameOptions {
 // Takes a frame whose outputs are up to date. In ascending order, one call at a time.
 using RigFrameSink = std::function<Status(std::size_t frame, const Evaluator& evaluator)>;
 
-// Evaluates all outputs of the plan at the times. The first frame that fails ends it, with its time in the
+// Evaluates all outputs of the plan at the times, to which nodes come that need their previous frame as RunUp says
+// (host/run_up.h). The first frame that fails ends it, with its time in the
 // message; so does whoever cancels it.
 Status EvaluateTimes(const Rig& rig, const std::shared_ptr<const Plan>& plan,
                      const std::vector<double>& times, const RigFrameOptions& options,

@@ -29,7 +29,8 @@ Status RunUp::To(double seconds, Evaluator* evaluator, std::optional<Index> outp
         .OfNode(evaluator->plan().stateful_node());
   for (double frame = first; frame < there - kSameFrame; ++frame) {
     Set(frame / rig_.fps, evaluator);
-    Status status = watch_.cancelled() ? CancelledStatus() : evaluator->Evaluate();
+    const bool ended = watch_.cancelled() || (go_on_ && !go_on_());
+    Status status = ended ? CancelledStatus() : evaluator->Evaluate();
     if (!status.ok() && status.kind() == ErrorKind::kEvaluation && output.has_value())
       status = evaluator->Pull(*output);
     if (status.ok()) continue;

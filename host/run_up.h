@@ -2,7 +2,9 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <optional>
+#include <utility>
 
 #include "graph/evaluator.h"
 #include "host/watch.h"
@@ -14,12 +16,15 @@ namespace kpsa::engine {
 // threads, on evaluators of their own.
 class RunUp {
  public:
-  // The evaluator's plan is of that rig, in which the scene's time may vary. cancel: as Watch's.
-  RunUp(const Plan& plan, const Rig& rig, const std::atomic<bool>* cancel = nullptr)
+  // The evaluator's plan is of that rig, in which the scene's time may vary. cancel: as Watch's; go_on, where there is
+  // one, is asked before every frame on the way, and false ends it as cancel does.
+  RunUp(const Plan& plan, const Rig& rig, const std::atomic<bool>* cancel = nullptr,
+        std::function<bool()> go_on = {})
       : rig_(rig),
         stateful_(!plan.stateful_node().empty()),
         time_(plan.FindVarying(rig.scene.time)),
-        watch_{{}, cancel} {}
+        watch_{{}, cancel},
+        go_on_(std::move(go_on)) {}
 
   // Sets the time, in seconds, after all outputs were evaluated at every frame of the rig before it: from frame 0
   // on, or from the frame at which the evaluator was; a time before that, or after one between frames, starts anew.
@@ -37,6 +42,7 @@ class RunUp {
   bool stateful_;
   Index time_;
   Watch watch_;
+  std::function<bool()> go_on_;
   std::optional<double> at_;  // where the evaluator is
 };
 

@@ -1,6 +1,7 @@
 #include "kpsa/scene.h"
 
 #include <cmath>
+#include <utility>
 
 #include "host/mesh_stage.h"
 #include "host/problems.h"
@@ -26,6 +27,8 @@ kpsa::Result<Done> Scene::Play(const std::optional<std::string>& clip) {
 }
 
 void Scene::SetTime(double seconds) { impl_->time = std::isfinite(seconds) ? seconds : 0; }
+
+void Scene::WatchRunUp(std::function<bool()> go_on) { impl_->on_the_way = std::move(go_on); }
 
 kpsa::Result<Done> Scene::Set(std::string_view plug, double value) {
   const engine::Status status = impl_->Set(plug, value);

@@ -49,7 +49,7 @@ kpsa::Result<std::vector<StepTime>> Scene::Profile(std::span<const double> secon
     return engine::ProblemsOf(taken->playing->Located(status));
   const engine::Plan& plan = *taken->plan;
   engine::Evaluator evaluator(taken->plan);
-  engine::RunUp run_up(plan, taken->playing->rig());
+  engine::RunUp run_up(plan, taken->playing->rig(), nullptr, impl_->on_the_way);
   engine::Profile profile(plan);
   taken->Apply(&evaluator);
   for (const double time : seconds) {
@@ -87,7 +87,7 @@ kpsa::Result<Done> Scene::Frames(std::span<const double> seconds,
   engine::FrameOptions frame_options;
   frame_options.threads = options.threads;
   frame_options.cancel = options.cancel;
-  engine::RunUp run_up(*taken->plan, playing.rig(), options.cancel);
+  engine::RunUp run_up(*taken->plan, playing.rig(), options.cancel, impl_->on_the_way);
   engine::Status before;  // of frames that were evaluated on the way; then all run on one thread
   bool ended = false;
   std::exception_ptr thrown;

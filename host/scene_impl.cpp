@@ -78,8 +78,6 @@ engine::Status Scene::Impl::EnsurePlaying() {
   poses = std::move(posed);
   playing = std::move(*made);
   request = playing->request();
-  // What the clip drives is no longer held
-  std::erase_if(held, [&](const Held& one) { return DriverOf(*playing->rig().graph, one.plug) != nullptr; });
   for (const Held& one : held) Vary(one.plug);
   plan = nullptr;
   return engine::Status();
@@ -102,7 +100,7 @@ engine::Status Scene::Impl::Ensure() {
 
 void Scene::Impl::Restart() {
   evaluator = std::make_unique<engine::Evaluator>(plan);
-  run_up.emplace(*plan, playing->rig());
+  run_up.emplace(*plan, playing->rig(), nullptr, [this] { return !on_the_way || on_the_way(); });
   points.assign(plan->outputs().size(), {});
   ApplyHeld(held, evaluator.get());
 }

@@ -1,6 +1,7 @@
 // What a Scene holds.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,6 +36,7 @@ struct Scene::Impl {
   std::shared_ptr<const engine::Plan> plan;  // null where the request is another by now
   std::unique_ptr<engine::Evaluator> evaluator;
   std::optional<engine::RunUp> run_up;  // of the evaluator
+  std::function<bool()> on_the_way;     // of WatchRunUp
   double time = 0;
   std::vector<Held> held;
   std::vector<engine::Setting> poses;      // plugs that are set in the graph, of an accelerated rig

@@ -51,15 +51,41 @@ struct PyVerdict {  // a row of the structured array of verdicts
   double score;
 };
 
+// Looks at signals while nodes that remember come to a time, and now and then while frames are evaluated.
+class SignalWatch {
+ public:
+  explicit SignalWatch(kpsa::Scene& scene) : scene_(scene) {
+    scene.WatchRunUp([this] { return !Due() || raised.Call([] { return true; }); });
+  }
+  ~SignalWatch() { scene_.WatchRunUp({}); }
+  SignalWatch(const SignalWatch&) = delete;
+  SignalWatch& operator=(const SignalWatch&) = delete;
+  bool Due() {
+    constexpr auto kInterval = std::chrono::milliseconds(20);  // the lock may be long in coming
+    const Clock::time_point now = Clock::now();
+    if (now - looked_ < kInterval) return false;
+    looked_ = now;
+    return true;
+  }
+  CallbackError raised;  // by a signal, or by whatever else is called
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  kpsa::Scene& scene_;
+  Clock::time_point looked_ = Clock::now();
+};
+
 Floats Points(kpsa::Scene& scene, const std::string& mesh, const py::object& out) {
-  const auto points = Checked([&] { return scene.Points(mesh); });
+  SignalWatch watch(scene);
+  const auto points = Checked([&] { return scene.Points(mesh); }, &watch.raised);
   Floats array = Target(out, {static_cast<py::ssize_t>(points.size() / 3), 3});
   std::memcpy(array.mutable_data(), points.data(), points.size_bytes());
   return array;
 }
 
 py::object Values(kpsa::Scene& scene, const std::string& plug) {
-  return ObjectOf(Checked([&] { return scene.Values(plug); }));
+  SignalWatch watch(scene);
+  return ObjectOf(Checked([&] { return scene.Values(plug); }, &watch.raised));
 }
 
 py::object Value(const kpsa::Rig& rig, const std::string& plug) {
@@ -83,10 +109,7 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
   }
   py::array_t<PyVerdict> verdicts(scene.rig().is_accelerated() ? count : 0);
   PyVerdict* const verdict = verdicts.mutable_data();
-  using Clock = std::chrono::steady_clock;
-  constexpr auto kSignalInterval = std::chrono::milliseconds(20);  // the lock may be long in coming
-  Clock::time_point looked = Clock::now();
-  CallbackError raised;  // by `progress`, or by a signal
+  SignalWatch watch(scene);
   const auto take = [&](const kpsa::Frame& frame) {
     for (std::size_t m = 0; m < frame.points.size(); ++m)
       std::memcpy(to[m] + frame.index * frame.points[m].size(), frame.points[m].data(),
@@ -94,16 +117,14 @@ py::dict Frames(kpsa::Scene& scene, const std::vector<double>& seconds, const py
     if (frame.verdict != nullptr)
       verdict[frame.index] = {frame.verdict->hit, static_cast<float>(frame.verdict->full_share),
                               frame.verdict->score};
-    const Clock::time_point now = Clock::now();
-    if (progress.is_none() && now - looked < kSignalInterval) return true;
-    looked = now;
-    return raised.Call([&] {
+    if (!watch.Due() && progress.is_none()) return true;
+    return watch.raised.Call([&] {
       if (progress.is_none()) return true;
       const py::object go_on = progress(frame.index + 1);
       return Truth(go_on);
     });
   };
-  Checked([&] { return scene.Frames(seconds, take, {.threads = threads}); }, &raised);
+  Checked([&] { return scene.Frames(seconds, take, {.threads = threads}); }, &watch.raised);
   arrays["verdicts"] = std::move(verdicts);
   return arrays;
 }
@@ -188,7 +209,8 @@ kpsa::Rig Edited(const kpsa::Rig& rig, const py::function& function) {
 
 py::list Profile(kpsa::Scene& scene, const std::vector<double>& seconds) {
   py::list steps;
-  for (const kpsa::StepTime& step : Checked([&] { return scene.Profile(seconds); })) {
+  SignalWatch watch(scene);
+  for (const kpsa::StepTime& step : Checked([&] { return scene.Profile(seconds); }, &watch.raised)) {
     py::dict row;
     row["node"] = step.node, row["type"] = step.type, row["label"] = step.label;
     row["evaluations"] = step.evaluations, row["points"] = step.points,

@@ -55,7 +55,7 @@ struct FrameOptions {
 // Nodes that remember (jiggle) come to a time through all frames of the rig before it, with the controls as they are set:
 // from frame 0 on, or from the latest pull where that was at such a frame and lies before. So times may go back and
 // forth, and without a change of controls on the way a time has the same points whatever was asked for before. Times
-// between frames cost the way from frame 0 each.
+// between frames cost the way from frame 0 each. WatchRunUp() ends a way that is too long.
 //
 // Errors have the node that they are about and its place in the rig's file, or else the file.
 class Scene {
@@ -76,6 +76,9 @@ class Scene {
   // set right.
   Result<Done> Set(std::string_view plug, double value);
   void Reset();  // all controls at rest; clip and time stay
+  // Asked before every frame on the way to a time (see above), by whatever is pulled, profiled or played, on the
+  // thread that evaluates: false ends it, a problem of kind kInterrupted. Empty: nobody asks.
+  void WatchRunUp(std::function<bool()> go_on);
 
   // Positions of a mesh's vertices, x y z each, metres: "head_mesh" in world space, or up to a stage of its
   // stack

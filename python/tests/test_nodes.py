@@ -6,6 +6,7 @@ import pathlib
 import shutil
 import signal
 import threading
+import time
 import weakref
 
 import numpy as np
@@ -237,6 +238,34 @@ def test_a_signal_ends_frames(folder):
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     assert np.isnan(out["column"][-1]).all(), "it has not waited for the last frame"
+
+
+def test_a_signal_ends_the_way_to_a_late_time(folder):
+    class Rang(Exception):
+        pass
+
+    def ring(*_):
+        raise Rang
+
+    rig = load(folder, more="  lag: {type: jiggle}\nconnections:\n")
+    scene = rig.edited(lambda graph: graph.deform("column", "lag")).scene()
+    scene.play("wave")
+    late = 500000 / rig.fps
+    scene.set_time(late)
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        for ask in (lambda: scene.points("column"), lambda: scene.values("upper.worldMatrix"),
+                    lambda: scene.frames([late]), lambda: scene.profile([late])):
+            signal.setitimer(signal.ITIMER_REAL, 0.1)
+            begin = time.monotonic()
+            with pytest.raises(Rang):
+                ask()
+            assert time.monotonic() - begin < 2, "it has not gone all the way"
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    scene.set_time(0)
+    assert np.isfinite(scene.points("column")).all()
 
 
 def test_errors_of_every_kind_carry_file_line_and_node(folder):

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "kpsa/kpsa.h"
@@ -212,6 +213,31 @@ TEST_F(SceneStates, ARunUpIsCancelled) {
   EXPECT_EQ(calls, 5) << "it goes no further";
 }
 
+TEST_F(SceneStates, ARunUpAsksWhetherToGoOn) {
+  const Rig rig = Load(Library(), "  mush: {type: deltaMush, iterations: 10}\n",
+                       "  mush: {type: deltaMush, iterations: 10}\n  lag: {type: jiggle, stiffness: 0.2}\n");
+  auto with_lag = rig.Edited([](GraphEdit& edit) { return edit.Deform("column", "lag"); });
+  ASSERT_TRUE(with_lag) << kpsa::ToText(with_lag.problems());
+  Scene scene(*with_lag), other(*with_lag);
+  for (Scene* one : {&scene, &other}) {
+    ASSERT_TRUE(one->Play("wave"));
+    one->SetTime(20 / rig.fps());
+  }
+  int asked = 0;
+  const auto is_ended = [&](const Problem& problem) {
+    EXPECT_EQ(problem.kind, Problem::Kind::kInterrupted) << problem.message;
+    EXPECT_EQ(std::exchange(asked, 0), 5) << "it goes no further";
+  };
+  scene.WatchRunUp([&] { return ++asked < 5; });
+  const std::vector<double> seconds{20 / rig.fps()};
+  is_ended(Failed(scene.Points("column")));
+  is_ended(Failed(scene.Values("upper.worldMatrix")));
+  is_ended(Failed(scene.Profile(seconds)));
+  is_ended(Failed(scene.Frames(seconds, [](const kpsa::Frame&) { return true; })));
+  scene.WatchRunUp({});
+  EXPECT_EQ(Pull(&scene), Pull(&other)) << "nothing is left of them";
+}
+
 TEST_F(SceneStates, NodesThatRememberComeToATimeThroughAllFramesBeforeIt) {
   const Rig rig = Load(
       Library(), "  mush: {type: deltaMush, iterations: 10}\n",
@@ -348,7 +374,7 @@ TEST_F(SceneStates, FunctionsOfTheProgramComputeNodes) {
   const std::vector<double> matrix = *plain.Values("upper.worldMatrix");
   EXPECT_EQ(*plain.Values("parts.place"), std::vector<double>(matrix.begin() + 12, matrix.begin() + 15));
   EXPECT_EQ(*plain.Values("parts.w"), std::vector<double>{1});
-  // On one thread, and never to train on
+  // On one thread
   const std::vector<double> seconds{0, 0.1, 0.2};
   EXPECT_EQ(AllFrames(&pushed, seconds), (std::vector{after, after, after}));
   const Problem refused =
