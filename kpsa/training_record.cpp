@@ -49,6 +49,11 @@ std::string TrainingJson(const TrainingRecord& r) {
     rules.push_back({{"rule", one.what}, {"misses", one.misses}, {"cost", one.cost}, {"taken", one.taken}});
   json object = {{"tried", tried},
                  {"rules", rules},
+                 {"separation",
+                  {{"poses", r.separation.poses},
+                   {"beyond", r.separation.beyond},
+                   {"likeness", r.separation.likeness},
+                   {"doubts", r.separation.doubts}}},
                  {"clips", r.clips},
                  {"asked",
                   {{"samples", r.asked.samples},
@@ -120,6 +125,11 @@ TrainingRecord ParseTraining(const std::string& text) {
   if (object.contains("held_out") && object["held_out"].is_object()) {
     r.held_out_rms = number(object["held_out"], "rms");
     r.held_out_max = number(object["held_out"], "max");
+  }
+  if (object.contains("separation") && object["separation"].is_object()) {
+    const json& told = object["separation"];
+    r.separation = {count_in(told, "poses"), count_in(told, "beyond"), number(told, "likeness"),
+                    number(told, "doubts")};
   }
   r.tile_rms = number(object, "tile_rms");
   r.mode = words("mode");

@@ -53,6 +53,12 @@ struct TrainingRecord {
     bool taken = false;
   };
   std::vector<Rule> rules;
+  // How well each part of the score alone ranks the held-out poses: areas under the ROC curve
+  // (kpsa/training/separation).
+  struct Separation {
+    std::size_t poses = 0, beyond = 0;  // the tolerance
+    double likeness = 0, doubts = 0;    // nothing where none or all are beyond
+  } separation;
   // The accepted calibration pose with the largest error of what is emitted, at the trained tolerance.
   struct Worst {
     std::string kind, clip;  // PoseKindName; clip "" is the rest pose, no kind: nothing is accepted

@@ -66,6 +66,7 @@ std::string TrainJson(const TrainResult& r) {
                              {"motion", {{"rms", r.record.motion_rms}}},
                              {"tried", training["tried"]},
                              {"rules", training["rules"]},
+                             {"separation", training["separation"]},
                              {"calibration",
                               {{"tolerance", r.subspace->tolerance},
                                {"violation_rate", r.calibration.alpha},
@@ -139,6 +140,13 @@ std::string TrainText(const TrainResult& r) {
   for (const TrainingRecord::Rule& one : r.record.rules) {
     text += fmt::format("{} to judge by {}: {:.2g} of a full frame, measured points aside, {:.3g} % miss\n",
                         one.taken ? "took" : "tried", one.what, one.cost, 100 * one.misses);
+  }
+  if (const TrainingRecord::Separation& told = r.record.separation;
+      told.beyond > 0 && told.beyond < told.poses) {
+    text += fmt::format(
+        "of {}, {} beyond {}: told apart by likeness {:.2f}, by doubts of tiles {:.2f} (area under ROC)\n",
+        Plural(told.poses, "held-out pose"), told.beyond, error(r.subspace->tolerance), told.likeness,
+        told.doubts);
   }
   // What these poses can promise, where that is less than what was asked for
   std::size_t fewest = r.calibration.poses;

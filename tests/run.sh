@@ -2,8 +2,11 @@
 # Builds everything and runs all tests, and again under the address and undefined-behaviour sanitizers.
 set -e
 cd "$(dirname "$0")/.."
-sh cmake/dependencies.sh
+sh cmake/dependencies.sh clang libclang-rt-14-dev
+sh cmake/dependencies.sh blender &  # for one test of the Python module; it takes as long as a good part of the build
+blender=$!
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
 cmake --build build
+wait $blender
 ctest --test-dir build --output-on-failure -j "$(nproc)"
 sh tests/sanitize.sh

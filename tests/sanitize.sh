@@ -2,7 +2,8 @@
 # Builds the program and its tests under sanitizers and runs all tests there: the address and undefined-behaviour
 # sanitizers, or with `sh tests/sanitize.sh tsan` the thread sanitizer. Tests that measure what sanitizers change
 # (KPSA_NATIVE in CMakeLists.txt) are left out. Clang, since it compiles sanitized code four times faster than GCC,
-# and since a second compiler sees what the first does not.
+# and since a second compiler sees what the first does not. kpsa is a folder of another project's there (examples/embed),
+# so that what add_subdirectory makes of it is built and run, too.
 set -e
 cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh clang libclang-rt-14-dev
@@ -12,7 +13,9 @@ if [ "${1:-asan}" = tsan ]; then
 else
   folder=build-asan sanitizer=KPSA_SANITIZE
 fi
-cmake -S . -B $folder -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g0" \
-  -D$sanitizer=ON -DKPSA_COMPILE_ONCE=ON -DKPSA_PYTHON=OFF > /dev/null
+sh tests/package/whole.sh . $folder/project
+cmake -S $folder/project -B $folder -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g0" \
+  -D$sanitizer=ON -DKPSA_COMPILE_ONCE=ON -DKPSA_PROGRAM=ON > /dev/null
 cmake --build $folder
-ctest --test-dir $folder --output-on-failure -j "$(nproc)"
+ctest --test-dir $folder/kpsa --output-on-failure -j "$(nproc)"
+sh tests/package/embed.sh . $folder $folder/embedded

@@ -9,6 +9,7 @@
 #include "kpsa/training/guard_parts.h"
 #include "kpsa/training/pose_judge.h"
 #include "kpsa/training/range_margins.h"
+#include "kpsa/training/separation.h"
 #include "kpsa/training/tile_trust.h"
 
 namespace kpsa::engine {
@@ -246,6 +247,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   work.record->held_out_rms = judge.rms();
   work.record->held_out_max = judge.max();
   AskGuards(subspace->ranges, guarded, held_out.entries, patches, &held_out.judges);
+  work.record->separation = SeparationOf(held_out.judges, subspace->tolerance);
   FrameCost cost = taken.chosen.cost;
   if (scoring.judges.empty()) {
     subspace->score = ScoreOf(*subspace, {}, of.full_cost);

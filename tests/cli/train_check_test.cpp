@@ -106,6 +106,9 @@ TEST(TrainReport, TellsWhatItTriedToJudgeBy) {
   EXPECT_GT(least, 0);
   EXPECT_LE(cost, 1.15 * least)
       << "parts and belief in tiles have to save 5 % each, wider margins may cost 2 %";
+  const nlohmann::json& told = train["separation"];
+  EXPECT_EQ(told["poses"], train["held_out"]["poses"]);
+  EXPECT_EQ(told["likeness"].is_null(), told["beyond"] == 0) << told;
   const ProcessResult paper = RunKpsa({"train", folder.rig(), "--paper", "--key-points", "20", "--samples",
                                        "100", "--calibration", "100", "--force", "--json", "-q"});
   ASSERT_EQ(paper.exit_code, 0) << paper.err;
