@@ -56,7 +56,7 @@ class PartsBench {
     Rig& rig = (*open)->rig;
     if (rig.accelerate.empty() || rig.accelerate[0].test_clips.empty())
       return Status::Invalid("expected an accelerate entry with a test clip").At({flags_.file});
-    const Acceleration entry = rig.accelerate[0];
+    const AccelerateEntry entry = rig.accelerate[0];
     test_clips_ = entry.test_clips;
     const Result<std::vector<TrainingClip>> clips = ClipFrames(rig, entry.train_clips);
     if (!clips.ok()) return clips.status();

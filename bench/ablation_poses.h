@@ -38,7 +38,7 @@ struct AblationPoses {
 
   NodeRegistry registry;
   Rig rig;
-  Acceleration entry;
+  AccelerateEntry entry;
   std::unique_ptr<PoseMatrix> training, test;  // centred
   Pca pca;
   std::vector<Double3> positions;  // mean, of outputs and stage points

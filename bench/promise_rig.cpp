@@ -19,7 +19,7 @@ namespace kpsa::engine {
 namespace {
 
 // What training takes of an accelerate entry (cli/cmd_train.cpp does the same).
-TrainOptions OptionsOf(const Acceleration& entry, double tolerance, std::uint64_t seed) {
+TrainOptions OptionsOf(const AccelerateEntry& entry, double tolerance, std::uint64_t seed) {
   TrainOptions options = TrainOptionsOf(entry);
   options.tolerance = tolerance;
   options.seed = seed;
@@ -35,7 +35,7 @@ PlugRef WorldPoints(const Rig& rig, const AcceleratedPoints& points, PlugRef at_
 
 // Puts the subspace in the place of the entry's stack. The request gets the points in the world, one output a
 // mesh, and then what VerdictOf reads.
-Status RequestAccelerated(Rig* rig, Compiler* compiler, const Acceleration& entry,
+Status RequestAccelerated(Rig* rig, Compiler* compiler, const AccelerateEntry& entry,
                           std::shared_ptr<const Subspace> subspace, Request* request) {
   const Result<Accelerated> accelerated = Accelerate(rig->graph.get(), compiler, MakeTarget(*rig, entry),
                                                      std::move(subspace), "promise_kpsa", {});
@@ -155,7 +155,7 @@ Result<std::unique_ptr<PromiseRig>> PromiseRig::Open(const std::string& path) {
   self->open_ = std::move(*open);
   Rig& rig = self->open_->rig;
   const auto own = std::find_if(rig.accelerate.begin(), rig.accelerate.end(),
-                                [](const Acceleration& entry) { return entry.reference < 0; });
+                                [](const AccelerateEntry& entry) { return entry.reference < 0; });
   if (own == rig.accelerate.end()) return Status::Invalid("has no accelerate entry of its own").At({path});
   self->entry_ = *own;
   for (const AcceleratedPoints& points : own->points) {

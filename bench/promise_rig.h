@@ -15,8 +15,8 @@
 #include "base/status.h"
 #include "cli/common.h"
 #include "graph/plan.h"
-#include "kpsa/training/poses.h"
 #include "kpsa/subspace.h"
+#include "kpsa/training/poses.h"
 #include "kpsa/training/trainer.h"
 
 namespace kpsa::engine {
@@ -97,7 +97,7 @@ class PromiseRig {
 
   std::string path_;
   std::unique_ptr<OpenRig> open_;
-  Acceleration entry_;
+  AccelerateEntry entry_;
   TrainingRig training_rig_;
   std::vector<std::string> names_;
   std::vector<bool> continuous_;

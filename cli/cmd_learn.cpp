@@ -35,7 +35,7 @@ CommandResult RunLearn(LearnFlags flags) {
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
-  const Result<Acceleration> entry = ChooseEntry(rig, flags.name);
+  const Result<AccelerateEntry> entry = ChooseEntry(rig, flags.name);
   if (!entry.ok()) return Status(entry.status()).At({"--name"});
   const Result<std::vector<TrainingClip>> known = ClipFrames(rig, names);
   if (!known.ok()) return AsUsage(known.status());

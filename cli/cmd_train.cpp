@@ -85,7 +85,7 @@ CommandResult RunTrain(const TrainFlags& flags) {
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
-  const Result<Acceleration> entry = ChooseEntry(rig, flags.name);
+  const Result<AccelerateEntry> entry = ChooseEntry(rig, flags.name);
   if (!entry.ok()) return Status(entry.status()).At({"--name"});
   const std::string path = flags.output.value_or(entry->subspace);
   if (path.empty())

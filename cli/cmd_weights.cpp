@@ -181,6 +181,7 @@ CommandResult Import(const WeightsFlags& flags) {
   }
   Result<WeightFile> merged = map == nullptr ? *file : Merged(rig, *of, to, *file, *map);
   if (!merged.ok()) return merged.status();
+  KPSA_RETURN_IF_ERROR(CheckOutput(to.path, flags.force, {}));
   KPSA_RETURN_IF_ERROR(AsUsage(WriteWeightFile(to.path, *merged, flags.force)));
   if (!flags.quiet)
     Say(fmt::format("{}: {}", to.path, map == nullptr ? facts : Facts(*merged->Find(to.map), *merged)));

@@ -18,8 +18,8 @@ std::vector<std::string> PointNames(const Subspace& subspace) {
 }
 
 // An entry for a rig that has none: what the subspace says of itself.
-Result<Acceleration> EntryOf(const Rig& rig, const Subspace& subspace, const std::string& path) {
-  Acceleration entry;
+Result<AccelerateEntry> EntryOf(const Rig& rig, const Subspace& subspace, const std::string& path) {
+  AccelerateEntry entry;
   entry.name = std::filesystem::path(path).stem().string();
   for (const SubspaceOutput& output : subspace.outputs) {
     if (const Result<PlugRef> plug = rig.graph->FindPlug(output.name);
@@ -66,7 +66,7 @@ std::string OtherWay(const AccelerationChoice& choice, const char* what) {
 
 }  // namespace
 
-std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry) {
+std::vector<std::string> PointNames(const Rig& rig, const AccelerateEntry& entry) {
   std::vector<std::string> names;
   for (const AccelerationTarget::MeshPoints& points : MakeTarget(rig, entry).meshes)
     names.push_back(points.name);
@@ -84,11 +84,11 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
     one.path = choice.subspace;
     const auto found = std::find_if(
         rig->accelerate.begin(), rig->accelerate.end(),
-        [&](const Acceleration& entry) { return PointNames(*rig, entry) == PointNames(**subspace); });
+        [&](const AccelerateEntry& entry) { return PointNames(*rig, entry) == PointNames(**subspace); });
     if (found != rig->accelerate.end()) {
       one.entry = *found;
     } else {
-      Result<Acceleration> entry = EntryOf(*rig, **subspace, choice.subspace);
+      Result<AccelerateEntry> entry = EntryOf(*rig, **subspace, choice.subspace);
       if (!entry.ok()) return entry.status();
       one.entry = std::move(*entry);
     }
@@ -98,7 +98,7 @@ Result<std::vector<AppliedSubspace>> ApplyAcceleration(Rig* rig, Compiler* compi
       return Status::Invalid("has no accelerate section, so nothing to accelerate{}",
                              OtherWay(choice, "a subspace"))
           .At({rig->path});
-    for (const Acceleration& entry : rig->accelerate) {
+    for (const AccelerateEntry& entry : rig->accelerate) {
       if (entry.subspace.empty())
         return Status::Invalid("accelerate: \"{}\" names no subspace file{}", entry.name,
                                OtherWay(choice, "one"))

@@ -34,13 +34,13 @@ struct AccelerationChoice {
 
 // What an entry accelerates, as its subspace calls it: "head_mesh@mush" without the namespace of a reference,
 // or the plug of colours.
-std::vector<std::string> PointNames(const Rig& rig, const Acceleration& entry);
+std::vector<std::string> PointNames(const Rig& rig, const AccelerateEntry& entry);
 
 // One accelerate entry of the rig with its subspace in place.
 struct AppliedSubspace {
   std::string name;  // of the entry
   std::string path;  // of the subspace file
-  Acceleration entry;
+  AccelerateEntry entry;
   std::shared_ptr<const Subspace> subspace;
   NodeId node;                               // the KPSA node
   std::shared_ptr<const KpsaConfig> config;  // of the node

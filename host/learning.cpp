@@ -17,7 +17,7 @@ Result<LearnerRig> OpenForLearner(const RigOpener& opener, const std::optional<s
   Result<std::unique_ptr<OpenRig>> opened = opener.open({});
   if (!opened.ok()) return opened.status();
   const std::shared_ptr<OpenRig> open = std::move(*opened);
-  const Result<Acceleration> entry = ChooseEntry(open->rig, name);
+  const Result<AccelerateEntry> entry = ChooseEntry(open->rig, name);
   if (!entry.ok()) return entry.status();
   LearnerRig rig;
   rig.owner = open;

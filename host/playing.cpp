@@ -19,12 +19,12 @@ bool Same(const Request& a, const Request& b) {
 }  // namespace
 
 Result<std::shared_ptr<Playing>> Playing::Make(const Rig& rest, const std::optional<std::string>& clip,
-                                               std::span<const Setting> poses,
+                                               std::span<const Setting> settings,
                                                const std::optional<AccelerationChoice>& acceleration) {
   std::shared_ptr<Playing> playing(new Playing(rest));
   Rig& rig = playing->rig_;
   if (clip.has_value()) KPSA_RETURN_IF_ERROR(SetClip(&rig, *clip).At({rig.path}));
-  for (const Setting& pose : poses) KPSA_RETURN_IF_ERROR(ApplySetting(&rig, pose));
+  for (const Setting& setting : settings) KPSA_RETURN_IF_ERROR(ApplySetting(&rig, setting));
   if (acceleration.has_value()) {
     Result<std::vector<AppliedSubspace>> applied =
         ApplyAcceleration(&rig, &playing->compiler_, *acceleration);

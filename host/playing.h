@@ -21,10 +21,10 @@ namespace kpsa::engine {
 
 class Playing {
  public:
-  // `poses` are set before the subspaces come in, which therefore know of them: what training did not know
+  // `settings` are set before the subspaces come in, which therefore know of them: what training did not know
   // misses.
   static Result<std::shared_ptr<Playing>> Make(const Rig& rest, const std::optional<std::string>& clip,
-                                               std::span<const Setting> poses,
+                                               std::span<const Setting> settings,
                                                const std::optional<AccelerationChoice>& acceleration);
 
   const Rig& rig() const { return rig_; }

@@ -38,7 +38,7 @@ MeshInfo InfoOf(const engine::CharacterMesh& mesh, const engine::Graph& graph) {
 }
 
 // The options over those of the rig's entry.
-engine::TrainOptions TrainOptionsOf(const TrainingOptions& options, const engine::Acceleration& entry) {
+engine::TrainOptions TrainOptionsOf(const TrainingOptions& options, const engine::AccelerateEntry& entry) {
   engine::TrainOptions train = engine::TrainOptionsOf(entry);
   if (options.paper) train.mode = engine::EstimatorMode::kPaper;
   if (options.samples.has_value()) train.samples = *options.samples;

@@ -51,13 +51,13 @@ std::optional<PlugRef> KeyLight(const Graph& graph, PlugRef light) {
 
 }  // namespace
 
-AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) {
+AccelerationTarget MakeTarget(const Rig& rig, const AccelerateEntry& entry) {
   AccelerationTarget target;
-  if (acceleration.reference >= 0) {
-    const Reference& reference = rig.references[static_cast<std::size_t>(acceleration.reference)];
+  if (entry.reference >= 0) {
+    const Reference& reference = rig.references[static_cast<std::size_t>(entry.reference)];
     target.within = {reference.name_space, reference.root};
   }
-  for (const AcceleratedPoints& points : acceleration.points) {
+  for (const AcceleratedPoints& points : entry.points) {
     AccelerationTarget::MeshPoints out;
     if (points.colors) {
       out.name = target.within.Inner(rig.graph->PlugName(points.points));
@@ -80,11 +80,11 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) 
     for (const Stage& stage : mesh.stages)
       target.all_stages.push_back({stage.name, stage.points, stage.world});
   }
-  if (acceleration.space) {
-    const NodeDef& def = rig.graph->def(*acceleration.space);
-    target.space.push_back({*acceleration.space, def.FindAttribute("worldMatrix"), -1, -1});
-    target.space_name = target.within.Inner(rig.graph->name(*acceleration.space));
-  } else if (acceleration.reference >= 0) {
+  if (entry.space) {
+    const NodeDef& def = rig.graph->def(*entry.space);
+    target.space.push_back({*entry.space, def.FindAttribute("worldMatrix"), -1, -1});
+    target.space_name = target.within.Inner(rig.graph->name(*entry.space));
+  } else if (entry.reference >= 0) {
     const NodeId root = target.within.root;
     target.space.push_back({root, rig.graph->def(root).FindAttribute("worldMatrix"), -1, -1});
   }
@@ -93,14 +93,14 @@ AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration) 
   return target;
 }
 
-TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
+TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry) {
   TrainingRig training;
   training.graph = rig->graph.get();
   training.time = rig->scene.time;
-  training.target = MakeTarget(*rig, acceleration);
+  training.target = MakeTarget(*rig, entry);
   // The transforms from the space up to the root
   std::set<Index> carriers;
-  for (NodeId node = acceleration.space.value_or(NodeId());
+  for (NodeId node = entry.space.value_or(NodeId());
        rig->graph->IsAlive(node) && carriers.insert(node.index).second;) {
     const Connection* parent =
         rig->graph->FindConnection({node, rig->graph->def(node).FindAttribute("parentMatrix"), -1, -1});
@@ -124,7 +124,7 @@ TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration) {
   return training;
 }
 
-TrainOptions TrainOptionsOf(const Acceleration& entry) {
+TrainOptions TrainOptionsOf(const AccelerateEntry& entry) {
   TrainOptions options;
   options.samples = static_cast<std::size_t>(entry.train_samples);
   options.calibration_poses = static_cast<std::size_t>(entry.calibration_poses);
@@ -152,7 +152,7 @@ Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<s
 
 std::vector<std::string> TestClips(const Rig& rig) {
   std::vector<std::string> clips;
-  for (const Acceleration& entry : rig.accelerate) {
+  for (const AccelerateEntry& entry : rig.accelerate) {
     for (const std::string& clip : entry.test_clips) {
       if (std::ranges::find(clips, clip) == clips.end()) clips.push_back(clip);
     }
@@ -160,20 +160,20 @@ std::vector<std::string> TestClips(const Rig& rig) {
   return clips;
 }
 
-Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name) {
+Result<AccelerateEntry> ChooseEntry(const Rig& rig, const std::optional<std::string>& name) {
   if (rig.accelerate.empty())
     return Status::Invalid(
                "has no accelerate section, so nothing to train; kpsa init writes a rig that has one")
         .At({rig.path});
   std::vector<std::string> names;
-  for (const Acceleration& entry : rig.accelerate) names.push_back(entry.name);
+  for (const AccelerateEntry& entry : rig.accelerate) names.push_back(entry.name);
   if (!name.has_value() && names.size() > 1)
     return Status::Usage("the rig accelerates {}: expected the name of one of them", fmt::join(names, ", "));
   const auto found = name.has_value() ? std::find(names.begin(), names.end(), *name) : names.begin();
   if (found == names.end())
     return Status::Usage("\"{}\": the rig accelerates {}{}", *name, fmt::join(names, ", "),
                          DidYouMean(*name, names));
-  const Acceleration& entry = rig.accelerate[static_cast<std::size_t>(found - names.begin())];
+  const AccelerateEntry& entry = rig.accelerate[static_cast<std::size_t>(found - names.begin())];
   if (entry.reference >= 0) {
     return Status::Usage(
         "accelerate: \"{}\" is an entry of {}: train that rig; its subspace serves here, too", entry.name,

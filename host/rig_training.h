@@ -11,18 +11,18 @@
 namespace kpsa::engine {
 
 // The stages of each accelerated mesh up to the accelerated one, the space, and all that may vary.
-AccelerationTarget MakeTarget(const Rig& rig, const Acceleration& acceleration);
+AccelerationTarget MakeTarget(const Rig& rig, const AccelerateEntry& entry);
 // Refers to the rig, which must outlive it.
-TrainingRig MakeTrainingRig(Rig* rig, const Acceleration& acceleration);
+TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry);
 // What the entry asks for; the rest is the trainer's own.
-TrainOptions TrainOptionsOf(const Acceleration& entry);
+TrainOptions TrainOptionsOf(const AccelerateEntry& entry);
 // Every frame of the clips, as ClipTimes counts them (host/rig_frames.h). Errors: a clip that the character lacks.
 Result<std::vector<TrainingClip>> ClipFrames(const Rig& rig, const std::vector<std::string>& clips);
 // Of all entries of the rig, each once.
 std::vector<std::string> TestClips(const Rig& rig);
 // The entry of the rig's accelerate section, by name where there are several. Errors: none, not that one,
 // or one of a reference, which is trained there.
-Result<Acceleration> ChooseEntry(const Rig& rig, const std::optional<std::string>& name);
+Result<AccelerateEntry> ChooseEntry(const Rig& rig, const std::optional<std::string>& name);
 // What may vary when a clip plays: time, and the controls that the clip does not drive.
 std::vector<PlugRef> VaryingPlugs(const Rig& rig);
 

@@ -40,7 +40,7 @@ void Scene::Reset() {
   impl_->held.clear();
   if (impl_->playing != nullptr && impl_->request.varying != impl_->playing->request().varying)
     impl_->request.varying = impl_->playing->request().varying, impl_->plan = nullptr;
-  if (!impl_->poses.empty()) impl_->poses.clear(), impl_->Forget();
+  if (!impl_->settings.empty()) impl_->settings.clear(), impl_->Forget();
   if (impl_->plan != nullptr) impl_->Restart();
 }
 

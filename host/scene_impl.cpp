@@ -70,12 +70,12 @@ engine::Status Scene::Impl::EnsurePlaying() {
   // What the clip drives is no longer held
   const std::shared_ptr<engine::Playing> plain = *made;
   const auto is_driven = [&](const auto& one) { return DriverOf(*plain->rig().graph, one.plug) != nullptr; };
-  std::vector<engine::Setting> posed = poses;
-  std::erase_if(posed, is_driven);
-  if (!posed.empty()) made = engine::Playing::Make(shared().rest, clip, posed, shared().acceleration);
+  std::vector<engine::Setting> kept = settings;
+  std::erase_if(kept, is_driven);
+  if (!kept.empty()) made = engine::Playing::Make(shared().rest, clip, kept, shared().acceleration);
   if (!made.ok()) return engine::Status(made.status()).At({rig.path()});
   std::erase_if(held, is_driven);
-  poses = std::move(posed);
+  settings = std::move(kept);
   playing = std::move(*made);
   request = playing->request();
   for (const Held& one : held) Vary(one.plug);
@@ -158,11 +158,11 @@ engine::Status Scene::Impl::Set(std::string_view name, double number) {
       graph.def(plug->node).attributes[static_cast<std::size_t>(plug->attribute)];
   const bool control = std::ranges::any_of(
       of->request().varying, [&](const engine::PlugRef& varying) { return Covers(varying, *plug); });
-  // Points vary as a whole only: a part of them is set in the graph, as poses are
+  // Points vary as a whole only: a part of them is set in the graph, as settings are
   if (!control && (shared().acceleration.has_value() || engine::IsPointType(attribute.type))) {
     // Subspaces watch what may vary; whatever else is set has to be there when they come in
-    std::erase_if(poses, [&](const engine::Setting& other) { return other.plug == *plug; });
-    poses.push_back({*plug, *value, graph.PlugName(*plug)});
+    std::erase_if(settings, [&](const engine::Setting& other) { return other.plug == *plug; });
+    settings.push_back({*plug, *value, graph.PlugName(*plug)});
     Forget();
     return engine::Status();
   }

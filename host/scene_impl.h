@@ -39,7 +39,7 @@ struct Scene::Impl {
   std::function<bool()> on_the_way;     // of WatchRunUp
   double time = 0;
   std::vector<Held> held;
-  std::vector<engine::Setting> poses;      // plugs that are set in the graph, of an accelerated rig
+  std::vector<engine::Setting> settings;   // plugs that are set in the graph, of an accelerated rig
   std::vector<std::vector<float>> points;  // by output
   // What each subspace said when something was pulled last, where it was asked at all
   std::vector<std::optional<engine::DecisionNumbers>> decided;

@@ -45,7 +45,7 @@ FileFacts RigFacts(const Rig& rig) {
   }
   FactTable accelerate{
       "accelerate", {"name", "points", "subspace", ">tolerance", "train clips", "test clips"}, {}};
-  for (const Acceleration& a : rig.accelerate) {
+  for (const AccelerateEntry& a : rig.accelerate) {
     const bool colors = !a.points.empty() && a.points[0].colors;
     std::vector<std::string> points = PointNames(rig, a);
     if (a.reference >= 0) {

@@ -64,7 +64,7 @@ Status TimeBlock(const Rig& rig, const PlaybackPlans& plans, const std::vector<d
   return Status();
 }
 
-Result<PlaybackSums> TimeAt(double tolerance, const RigOpener& opener, const Acceleration& entry,
+Result<PlaybackSums> TimeAt(double tolerance, const RigOpener& opener, const AccelerateEntry& entry,
                             const std::shared_ptr<const Subspace>& subspace,
                             const std::vector<TrainingClip>& clips, const Watch& watch) {
   PlaybackSums sums;
@@ -118,7 +118,7 @@ std::vector<PlaybackBlock> PlaybackBlocks(const std::vector<TrainingClip>& clips
   return blocks;
 }
 
-Result<PlaybackPlans> MakePlaybackPlans(Rig* rig, const Acceleration& entry,
+Result<PlaybackPlans> MakePlaybackPlans(Rig* rig, const AccelerateEntry& entry,
                                         const std::shared_ptr<const Subspace>& subspace, double tolerance) {
   Request request;
   for (const AcceleratedPoints& points : entry.points) {
@@ -154,7 +154,7 @@ Result<PlaybackPlans> MakePlaybackPlans(Rig* rig, const Acceleration& entry,
   return plans;
 }
 
-Result<PlaybackTimes> TimePlayback(const RigOpener& opener, const Acceleration& entry,
+Result<PlaybackTimes> TimePlayback(const RigOpener& opener, const AccelerateEntry& entry,
                                    const std::shared_ptr<const Subspace>& subspace,
                                    const std::vector<TrainingClip>& clips, const Watch& watch) {
   Result<PlaybackSums> sums = TimeAt(subspace->tolerance, opener, entry, subspace, clips, watch);

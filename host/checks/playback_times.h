@@ -31,7 +31,7 @@ struct PlaybackPlans {
   Index full_weight = 0;  // output of `accelerated`
 };
 // Of the clip that plays. The rig's graph is rewritten.
-Result<PlaybackPlans> MakePlaybackPlans(Rig* rig, const Acceleration& entry,
+Result<PlaybackPlans> MakePlaybackPlans(Rig* rig, const AccelerateEntry& entry,
                                         const std::shared_ptr<const Subspace>& subspace, double tolerance);
 
 struct PlaybackTimes {
@@ -41,7 +41,7 @@ struct PlaybackTimes {
 // The rig is loaded anew for each clip that is timed. Hits are those at the subspace's
 // tolerance; where there is none, frames that are reconstructed at any error. Without clips that move
 // anything, nothing is timed.
-Result<PlaybackTimes> TimePlayback(const RigOpener& opener, const Acceleration& entry,
+Result<PlaybackTimes> TimePlayback(const RigOpener& opener, const AccelerateEntry& entry,
                                    const std::shared_ptr<const Subspace>& subspace,
                                    const std::vector<TrainingClip>& clips, const Watch& watch);
 

@@ -20,7 +20,7 @@ constexpr std::size_t kFrames = 36;
 constexpr int kRuns = 3;
 constexpr double kPatienceNs = 2e8;  // for one run over the frames
 
-Result<std::shared_ptr<const Plan>> FullPlan(const Rig& rig, const Acceleration& entry) {
+Result<std::shared_ptr<const Plan>> FullPlan(const Rig& rig, const AccelerateEntry& entry) {
   Request request;
   request.varying = VaryingPlugs(rig);
   for (const AcceleratedPoints& points : entry.points) request.outputs.push_back({points.points, {}});
@@ -28,7 +28,7 @@ Result<std::shared_ptr<const Plan>> FullPlan(const Rig& rig, const Acceleration&
   return CompileFor(rig, &compiler, request);
 }
 
-std::vector<char> StackSteps(const Plan& plan, const Acceleration& entry) {
+std::vector<char> StackSteps(const Plan& plan, const AccelerateEntry& entry) {
   std::vector<NodeId> nodes;
   for (const AcceleratedPoints& points : entry.points) nodes.push_back(points.points.node);
   return PointStepsAbove(plan, nodes);
@@ -40,7 +40,7 @@ std::size_t PointsOf(const Plan& plan) {
   return points;
 }
 
-FrameCost StatedCost(const Plan& plan, const Acceleration& entry, const NodeRegistry& registry) {
+FrameCost StatedCost(const Plan& plan, const AccelerateEntry& entry, const NodeRegistry& registry) {
   FrameCost cost;
   const std::vector<char> stack = StackSteps(plan, entry);
   for (Index s = 0; s < plan.steps().size(); ++s) {
@@ -55,7 +55,7 @@ FrameCost StatedCost(const Plan& plan, const Acceleration& entry, const NodeRegi
 }
 
 // Everything is evaluated in every frame, as where all controls move.
-Status Time(const RigOpener& opener, const Acceleration& entry, const std::vector<TrainingClip>& clips,
+Status Time(const RigOpener& opener, const AccelerateEntry& entry, const std::vector<TrainingClip>& clips,
             const Watch& watch, StackCost* cost) {
   const Result<std::unique_ptr<OpenRig>> open = opener.open({});
   if (!open.ok()) return open.status();
@@ -110,7 +110,7 @@ double FrameCost::saving() const { return std::max(0.0, stack - least); }
 double FrameCost::bound() const { return frame > saving() ? frame / (frame - saving()) : 1; }
 bool FrameCost::little() const { return saving() < kLittleNs || bound() < kLittleBound; }
 
-Result<StackCost> MeasureStack(const OpenRig& open, const RigOpener& opener, const Acceleration& entry,
+Result<StackCost> MeasureStack(const OpenRig& open, const RigOpener& opener, const AccelerateEntry& entry,
                                const std::vector<TrainingClip>& clips, const Watch& watch) {
   const Result<std::shared_ptr<const Plan>> plan = FullPlan(open.rig, entry);
   if (!plan.ok()) return plan.status();

@@ -34,7 +34,7 @@ struct StackCost {
 
 // `open` came from the opener, and is loaded anew where it has to be timed (on frames of the first clip).
 // Errors: what the entry accelerates does not compile or fails.
-Result<StackCost> MeasureStack(const OpenRig& open, const RigOpener& opener, const Acceleration& entry,
+Result<StackCost> MeasureStack(const OpenRig& open, const RigOpener& opener, const AccelerateEntry& entry,
                                const std::vector<TrainingClip>& clips, const Watch& watch);
 
 }  // namespace kpsa::engine

@@ -55,7 +55,7 @@ void SetPose(const TrainingRig& training, const SampledPose& pose, double time, 
 
 class Checker {
  public:
-  Checker(Rig* rig, const Acceleration& entry, const std::shared_ptr<const Subspace>& subspace,
+  Checker(Rig* rig, const AccelerateEntry& entry, const std::shared_ptr<const Subspace>& subspace,
           const std::vector<TrainingClip>& clips, const SubspaceCheckOptions& options)
       : rig_(*rig),
         entry_(entry),
@@ -212,7 +212,7 @@ class Checker {
   }
 
   Rig& rig_;
-  const Acceleration& entry_;
+  const AccelerateEntry& entry_;
   std::shared_ptr<const Subspace> subspace_;
   const std::vector<TrainingClip>& clips_;
   const SubspaceCheckOptions& options_;
@@ -228,7 +228,7 @@ class Checker {
 
 }  // namespace
 
-Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
+Result<SubspaceCheck> CheckSubspace(Rig* rig, const AccelerateEntry& entry,
                                     const std::shared_ptr<const Subspace>& subspace,
                                     const std::vector<TrainingClip>& clips,
                                     const SubspaceCheckOptions& options) {

@@ -45,7 +45,7 @@ struct SubspaceCheckOptions {
 // Evaluates new poses, drawn as the held-out ones of training are, fully and with every pose reconstructed:
 // guards are lifted. The rig's graph is rewritten. A rig without controls and clips gives no poses. Errors: a
 // full evaluation that fails or is not finite names its pose.
-Result<SubspaceCheck> CheckSubspace(Rig* rig, const Acceleration& entry,
+Result<SubspaceCheck> CheckSubspace(Rig* rig, const AccelerateEntry& entry,
                                     const std::shared_ptr<const Subspace>& subspace,
                                     const std::vector<TrainingClip>& clips,
                                     const SubspaceCheckOptions& options);

@@ -21,7 +21,7 @@ constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since cli
 constexpr double kJudging = 1.5;  // that a pose is judged, in the time that it took to train on
 constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
-constexpr std::uint64_t kHeldOutSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
+constexpr std::uint64_t kCalibrationSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
                         kTrialSeed = 0x6a09e667f3bcc908ull;
 
 // Judged poses of every kind.
@@ -193,7 +193,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
 
   GivePatches(of.patches, subspace);
   const std::size_t patches = subspace->patches.patches;  // that ranges speak of, whether they miss or not
-  // Held-out poses of every kind; as many new ones say how to score them, and how far ranges reach. A picture
+  // Calibration poses of every kind; as many new ones say how to score them, and how far ranges reach. A picture
   // has few.
   const bool of_tiles = !of.options.without.trust;
   PoseJudge judge(*subspace, of.layout, cues, of_tiles), score_judge(*subspace, of.layout, cues, of_tiles);
@@ -206,11 +206,11 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     margins = std::move(found->sets);
     outside = {std::move(found->outside), std::move(found->entries), {}};
   }
-  JudgedSet held_out, scoring;
+  JudgedSet calibrating, scoring;
   for (int k = 0; k < (of.rig.target.colors ? 1 : kPoseKinds); ++k) {
     if (k == kBeyond) continue;
     KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.9 + 0.025 * k));
-    KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kHeldOutSeed, {}, &judge, &held_out));
+    KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kCalibrationSeed, {}, &judge, &calibrating));
     if (!of.rig.target.colors)
       KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kScoreSeed, {}, &score_judge, &scoring));
   }
@@ -242,32 +242,32 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   *subspace = std::move(taken.subspace);
   if (!of.rig.target.colors)
     KPSA_RETURN_IF_ERROR(
-        JudgePoses(of, work, kBeyond, kHeldOutSeed, of_taken->of_controls, &judge, &held_out));
-  work.record->calibration_poses = held_out.poses.size();
+        JudgePoses(of, work, kBeyond, kCalibrationSeed, of_taken->of_controls, &judge, &calibrating));
+  work.record->calibration_poses = calibrating.poses.size();
   work.record->held_out_rms = judge.rms();
   work.record->held_out_max = judge.max();
-  AskGuards(subspace->ranges, guarded, held_out.entries, patches, &held_out.judges);
-  work.record->separation = SeparationOf(held_out.judges, subspace->tolerance);
+AskGuards(subspace->ranges, guarded, calibrating.entries, patches, &calibrating.judges);
+  work.record->separation = SeparationOf(calibrating.judges, subspace->tolerance);
   FrameCost cost = taken.chosen.cost;
   if (scoring.judges.empty()) {
     subspace->score = ScoreOf(*subspace, {}, of.full_cost);
-    cost = ExpectedCost(*subspace, held_out.judges, 0, of.full_cost, kCautious * of.options.tolerance,
+    cost = ExpectedCost(*subspace, calibrating.judges, 0, of.full_cost, kCautious * of.options.tolerance,
                         kCalibrationConfidence);
   }
-  AsChosen(taken.chosen, *subspace, &held_out.judges);
+  AsChosen(taken.chosen, *subspace, &calibrating.judges);
   if (!taken.chosen.trust.empty()) WeighTiles(taken.chosen.trust, subspace);
   if (subspace->patches.tiles == 0) {
     for (TrainedRange& range : subspace->ranges) range.patches = kAllPatches;
   }
-  subspace->calibration = PairsOf(*subspace, held_out.judges);
-  for (std::size_t i = 0; i < held_out.poses.size(); ++i) {
-    const SampledPose& pose = held_out.poses[i];
+  subspace->calibration = PairsOf(*subspace, calibrating.judges);
+  for (std::size_t i = 0; i < calibrating.poses.size(); ++i) {
+    const SampledPose& pose = calibrating.poses[i];
     subspace->calibration[i].near_clips = pose.near_clips && pose.kind == PoseKind::kSampled;
   }
   const Calibration calibration =
       Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
   if (calibration.worst != Calibration::kNoPose)
-    RecordWorst(of, held_out.poses[calibration.worst], calibration.worst_error, work.record);
+    RecordWorst(of, calibrating.poses[calibration.worst], calibration.worst_error, work.record);
   return cost;
 }
 

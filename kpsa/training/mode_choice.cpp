@@ -27,13 +27,13 @@ double HonestResidual(double residual, std::size_t poses, Eigen::Index modes) {
 }
 
 Eigen::Index ChooseModeCount(const Pca& pca, std::span<const CueRef> cues, const CueNoise& noise,
-                             const PoseMatrix& held_out) {
-  KPSA_CHECK(held_out.centered() && held_out.layout() == pca.layout && pca.output_orthonormal);
+                             const PoseMatrix& judges) {
+  KPSA_CHECK(judges.centered() && judges.layout() == pca.layout && pca.output_orthonormal);
   const CueSet set = MakeCueSet(pca, cues, noise);
   const Eigen::MatrixXd best =
       Multiply(GemmOperand::Dense(pca.output_modes()).Transposed(),
-               GemmOperand::Poses(held_out, 0, held_out.poses(), 0, pca.layout.outputs()).Transposed());
-  const Eigen::MatrixXd y = MeasuredPoses(pca.layout, set, held_out);
+               GemmOperand::Poses(judges, 0, judges.poses(), 0, pca.layout.outputs()).Transposed());
+  const Eigen::MatrixXd y = MeasuredPoses(pca.layout, set, judges);
   const Eigen::VectorXd variances = pca.mode_variance();
   std::vector<Eigen::Index> counts;
   std::vector<double> errors;  // less the poses' own energy, which no mode changes
@@ -56,9 +56,9 @@ Eigen::Index ChooseModeCount(const Pca& pca, std::span<const CueRef> cues, const
     errors.push_back(p.squaredNorm() - 2 * p.cwiseProduct(best.topRows(m)).sum());
   }
   double energy = 0;
-  for (std::size_t t = 0; t < held_out.poses(); ++t) {
+  for (std::size_t t = 0; t < judges.poses(); ++t) {
     for (std::size_t i = 0; i < pca.layout.outputs(); ++i)
-      energy += static_cast<double>(held_out.row(t)[i]) * static_cast<double>(held_out.row(t)[i]);
+      energy += static_cast<double>(judges.row(t)[i]) * static_cast<double>(judges.row(t)[i]);
   }
   const double least = energy + *std::min_element(errors.begin(), errors.end());
   std::size_t chosen = 0;

@@ -16,11 +16,11 @@ namespace kpsa::engine {
 bool IsStill(const Pca& pca, double tolerance);
 
 // The smallest number of modes whose MAP estimate from `cues` (any good spread of them) comes within 1 % of
-// the least RMS error on `held_out`: poses centred with pca.mean that the PCA has not seen. The noise of a
+// the least RMS error on `judges`: poses centred with pca.mean that the PCA has not seen. The noise of a
 // cue is what that many modes leave over, as of HonestResidual. The modes must be orthonormal over the
 // outputs.
 Eigen::Index ChooseModeCount(const Pca& pca, std::span<const CueRef> cues, const CueNoise& noise,
-                             const PoseMatrix& held_out);
+                             const PoseMatrix& judges);
 
 // What `modes` of `poses` training poses leave unexplained, for poses that were not trained on: training
 // spends a degree of freedom a mode.

@@ -192,7 +192,7 @@ void Mover::AddRig() {
     control.plug = Moved(control.plug);
     to.controls.push_back(std::move(control));
   }
-  for (Acceleration& entry : from.accelerate) {
+  for (AccelerateEntry& entry : from.accelerate) {
     Name(&entry.name);
     for (AcceleratedPoints& points : entry.points) {
       points.points = Moved(points.points);

@@ -1,6 +1,6 @@
 // The order of the steps from a rig file to a rig; what each one reads and writes is said in its header.
 #include "rig/build/build_rig.h"
-#include "rig/build/steps/add_accelerations.h"
+#include "rig/build/steps/add_accelerate_entries.h"
 #include "rig/build/steps/add_clips.h"
 #include "rig/build/steps/add_constraints.h"
 #include "rig/build/steps/add_controls.h"
@@ -100,7 +100,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
 
   // What the rig is for
   AddControls(in, &rig->controls);
-  AddAccelerations(in, scene, &rig->accelerate);
+  AddAccelerateEntries(in, scene, &rig->accelerate);
 }
 
 }  // namespace kpsa::engine

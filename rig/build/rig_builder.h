@@ -44,7 +44,7 @@ struct AcceleratedPoints {
   PlugRef points;
   bool colors = false;  // points are colours of a node, and of no mesh
 };
-struct Acceleration {
+struct AccelerateEntry {
   std::string name;
   std::vector<AcceleratedPoints> points;
   std::optional<NodeId> space;  // a transform; unset: the world
@@ -95,7 +95,7 @@ struct Rig {
   Cloned<Graph> graph;  // refers to the registry that LoadRig was given; a copy of the rig has its own
   CharacterGraph scene;
   std::vector<Control> controls;
-  std::vector<Acceleration> accelerate;
+  std::vector<AccelerateEntry> accelerate;
   FileUnits units;  // of the file that was opened, fps included
   double fps = 24;
   std::vector<std::string> files;                     // all that were read

@@ -68,7 +68,7 @@ struct RigControl {
   YamlNode min, max;
 };
 
-struct RigAccelerate {
+struct RigAccelerateEntry {
   std::string name;
   SourceLocation where;
   int source = 0;
@@ -137,7 +137,7 @@ struct RigFile {
   std::vector<RigConnection> connections;
   std::vector<RigDeform> deform;
   std::vector<RigControl> controls;
-  std::vector<RigAccelerate> accelerate;
+  std::vector<RigAccelerateEntry> accelerate;
   std::vector<RigOverride> overrides;
   std::vector<RigVariant> variants;
   std::vector<RigClip> clips;

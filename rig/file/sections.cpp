@@ -160,7 +160,7 @@ void SectionReader::ReadControls(const YamlNode& node) {
   }
 }
 
-void SectionReader::ReadAcceleratePoints(const YamlNode& node, RigAccelerate* accelerate) const {
+void SectionReader::ReadAcceleratePoints(const YamlNode& node, RigAccelerateEntry* accelerate) const {
   std::vector<RigString> names;
   ReadNames(node, "points", &names);
   if (names.empty()) errors->Add(node, "points: name at least one mesh@stage");
@@ -173,8 +173,8 @@ void SectionReader::ReadAcceleratePoints(const YamlNode& node, RigAccelerate* ac
                          .At(name.where));
       continue;
     }
-    RigAccelerate::Points points{name.text.substr(0, at), name.text.substr(at + 1), name.where};
-    for (const RigAccelerate::Points& other : accelerate->points) {
+    RigAccelerateEntry::Points points{name.text.substr(0, at), name.text.substr(at + 1), name.where};
+    for (const RigAccelerateEntry::Points& other : accelerate->points) {
       if (other.mesh == points.mesh) {
         errors->Append(Status::Invalid("points of \"{}\" are named twice: first at {}", points.mesh,
                                        other.where.ToString())
@@ -190,7 +190,7 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
   for (std::size_t i = 0; i < node.keys.size(); ++i) {
     const YamlNode& key = node.keys[i];
     if (!define("accelerate", key.scalar, key.where())) continue;
-    auto accelerate = Declared<RigAccelerate>(key);
+    auto accelerate = Declared<RigAccelerateEntry>(key);
     YamlMap map(node.items[i], fmt::format("accelerate \"{}\"", key.scalar), errors);
     const YamlNode* colors = map.Find("colors");
     if (const YamlNode* points = colors == nullptr ? map.Required("points") : map.Find("points")) {

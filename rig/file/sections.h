@@ -38,7 +38,7 @@ struct SectionReader {
   }
   bool ReadNames(const YamlNode& node, const std::string& what, std::vector<RigString>* names) const;
   void ReadLayer(const YamlNode& node, RigClip* clip) const;
-  void ReadAcceleratePoints(const YamlNode& node, RigAccelerate* accelerate) const;
+  void ReadAcceleratePoints(const YamlNode& node, RigAccelerateEntry* accelerate) const;
   const std::string& scope() const { return rig->sources[static_cast<std::size_t>(source)].scope; }
   const FileUnits& units() const { return rig->sources[static_cast<std::size_t>(source)].units; }
 };

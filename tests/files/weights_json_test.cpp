@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "tests/support/instruction_count.h"
 #include "tests/support/temporary_folder.h"
 
 namespace kpsa::engine {
@@ -142,31 +142,36 @@ TEST(Weights, NestedTextIsRefusedBeforeAnybodyRecurses) {
 }
 
 // In the file's order, and in no time that grows by the square of their number.
+// A file of `count` maps of nothing, the last name first.
+std::string MapsOfNothing(int count) {
+  std::string text = R"({"maps": {)";
+  for (int i = 0; i < count; ++i) text += fmt::format("{}\"m{}\":{{}}", i == 0 ? "" : ",", count - i);
+  return text + R"(}, "kpsa": "weights", "version": 1, "mesh": "m", "points": 1})";
+}
+
 TEST(Weights, ManyMaps) {
   const TemporaryFolder folder;
-  // The least of a few times; four times as many maps take some four times as long
-  const auto seconds_for = [&](int maps) {
-    std::string text = R"({"maps": {)";
-    for (int i = 0; i < maps; ++i) text += fmt::format("{}\"m{}\":{{}}", i == 0 ? "" : ",", maps - i);
-    text += R"(}, "kpsa": "weights", "version": 1, "mesh": "m", "points": 1})";
-    const std::string path = folder.Write("w.json", text);
-    double least = std::numeric_limits<double>::infinity();
-    for (int run = 0; run < 5; ++run) {
-      const auto begin = std::chrono::steady_clock::now();
-      const Result<WeightFile> file = ReadWeightFile(path);
-      least =
-          std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-      if (!file.ok() || file->maps.size() != static_cast<std::size_t>(maps)) {
-        ADD_FAILURE() << file.status().ToString();
-        break;
-      }
-      for (int i = 0; i < maps; i += 4999)
-        EXPECT_EQ(file->maps[static_cast<std::size_t>(i)].name, fmt::format("m{}", maps - i));
-    }
-    return least;
+  const int count = 50'000;
+  const Result<WeightFile> file = ReadWeightFile(folder.Write("w.json", MapsOfNothing(count)));
+  ASSERT_TRUE(file.ok()) << file.status().ToString();
+  ASSERT_EQ(file->maps.size(), static_cast<std::size_t>(count));
+  for (int i = 0; i < count; i += 4999)
+    EXPECT_EQ(file->maps[static_cast<std::size_t>(i)].name, fmt::format("m{}", count - i));
+}
+
+// Four times as many maps take some four times as many instructions; were each compared with those before it, they
+// would take more than seven times as many.
+TEST(InstructionCount, OfWeightMapsGrowsAsTheirNumber) {
+  const TemporaryFolder folder;
+  const auto instructions = [&](int maps) {
+    const std::string path = folder.Write("w.json", MapsOfNothing(maps));
+    return CountInstructions([&] { EXPECT_TRUE(ReadWeightFile(path).ok()); });
   };
-  const double few = seconds_for(12500);
-  EXPECT_LT(seconds_for(50000), 8 * few);
+  const std::optional<std::uint64_t> few = instructions(100), many = instructions(400);
+  if (!few.has_value() || !many.has_value()) GTEST_SKIP() << "instructions cannot be counted here";
+  EXPECT_LT(static_cast<double>(*many), 5.0 * static_cast<double>(*few));
+  RecordProperty("few", fmt::format("{}", *few));
+  RecordProperty("many", fmt::format("{}", *many));
 }
 
 TEST(Weights, TheFirstOutOfRange) {

@@ -9,6 +9,6 @@
 
 namespace kpsa::engine {
 
-void AddAccelerations(const BuildInput& in, CharacterGraph* scene, std::vector<Acceleration>* entries);
+void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene, std::vector<AccelerateEntry>* entries);
 
 }  // namespace kpsa::engine

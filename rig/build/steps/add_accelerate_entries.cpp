@@ -1,11 +1,12 @@
-#include "rig/build/steps/add_accelerations.h"
+#include "rig/build/steps/add_accelerate_entries.h"
 
 #include <algorithm>
 #include <map>
 
 namespace kpsa::engine {
 
-void AddAccelerations(const BuildInput& in, CharacterGraph* scene, std::vector<Acceleration>* entries) {
+void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene,
+                          std::vector<AccelerateEntry>* entries) {
   std::vector<std::string> clips;
   for (const CharacterClip& clip : in.rig.scene.clips) clips.push_back(clip.id);
   const auto read_clips = [&](const std::vector<RigString>& names, std::vector<std::string>* to) {
@@ -18,13 +19,13 @@ void AddAccelerations(const BuildInput& in, CharacterGraph* scene, std::vector<A
     }
   };
   std::map<std::size_t, SourceLocation> by_mesh;
-  for (const Acceleration& entry : *entries) {
+  for (const AccelerateEntry& entry : *entries) {
     for (const AcceleratedPoints& points : entry.points) {
       if (!points.colors) by_mesh.emplace(points.mesh, entry.where);
     }
   }
-  for (const RigAccelerate& from : in.file.accelerate) {
-    Acceleration to;
+  for (const RigAccelerateEntry& from : in.file.accelerate) {
+    AccelerateEntry to;
     to.name = from.name;
     to.where = from.where;
     to.subspace = from.subspace;
@@ -36,7 +37,7 @@ void AddAccelerations(const BuildInput& in, CharacterGraph* scene, std::vector<A
     read_clips(from.train_clips, &to.train_clips);
     read_clips(from.test_clips, &to.test_clips);
     if (from.space.has_value()) to.space = in.names.FindTransform(from.space->text, from.space->where);
-    for (RigAccelerate::Points points : from.points) {
+    for (RigAccelerateEntry::Points points : from.points) {
       in.names.SplitStage(points.mesh + "@" + points.stage, &points.mesh, &points.stage);
       const std::optional<std::size_t> mesh_index = in.names.FindMesh(points.mesh, points.where);
       if (!mesh_index.has_value()) continue;
