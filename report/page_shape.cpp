@@ -156,6 +156,12 @@ Result<PageShape> Fit(std::span<const float> rest, const std::vector<std::span<c
     }
     if (shape.modes == before) break;
   }
+  if (shape.modes == 0) {  // nothing moves
+    shape.modes = 1;
+    shape.basis.assign(rest.size(), 0);
+    shape.scale = {0};
+    multiples.emplace_back(rows.size(), 0.0f);
+  }
   for (std::size_t r = 0; r < rows.size(); ++r) {
     for (std::size_t k = 0; k < shape.modes; ++k) shape.rows.push_back(multiples[k][r]);
   }

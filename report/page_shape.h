@@ -21,7 +21,7 @@ namespace kpsa::engine {
 inline constexpr std::size_t kMostPageModes = 256;  // that the page reads
 
 struct PageShape {
-  std::size_t modes = 0;            // K
+  std::size_t modes = 0;            // K; one of zeros where nothing moves
   int largest = 127;                // Q
   std::vector<std::int16_t> basis;  // [K, V, 3] within +-Q
   std::vector<float> scale;         // [K]

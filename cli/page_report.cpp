@@ -1,0 +1,177 @@
+#include "cli/page_report.h"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "base/parallel.h"
+#include "cli/frames_range.h"
+#include "cli/output.h"
+#include "cli/progress.h"
+#include "host/bench/bench.h"
+#include "host/clip_record.h"
+#include "host/rig_frames.h"
+#include "report/page_clips.h"
+#include "report/page_html.h"
+#include "report/page_rig.h"
+#include "report/viewer_page.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kHeavyBytes = 16 << 20;  // of a page that is warned about
+constexpr std::size_t kNamedParts = 4;         // in that warning
+
+// The clips of the flags; without them the test clips, and without these what the rig plays ("").
+std::vector<std::string> ClipsOf(const PageFlags& flags, const Rig& rig) {
+  std::vector<std::string> clips;
+  const auto add = [&](const std::string& clip) {
+    if (std::ranges::find(clips, clip) == clips.end()) clips.push_back(clip);
+  };
+  for (const std::string& clip : flags.clips) add(clip);
+  if (!clips.empty() || flags.rest || flags.pose.has_value())
+    return clips.empty() ? std::vector<std::string>{""} : clips;
+  for (const Acceleration& entry : rig.accelerate) {
+    for (const std::string& clip : entry.test_clips) add(clip);
+  }
+  if (clips.empty()) clips.emplace_back();
+  return clips;
+}
+
+// The subspaces that the flags name, or the rig's own where all of them are there.
+std::optional<AccelerationChoice> ChoiceFor(const PageFlags& flags, const Rig& rig,
+                                            std::vector<std::string>* notes) {
+  if (flags.acceleration.wanted()) return ChoiceOf(flags.acceleration);
+  if (rig.accelerate.empty()) return std::nullopt;
+  for (const Acceleration& entry : rig.accelerate) {
+    std::error_code error;
+    if (!entry.subspace.empty() && std::filesystem::exists(entry.subspace, error)) continue;
+    notes->push_back(
+        fmt::format("\"{}\" is not trained, so the page shows the full evaluation alone (kpsa train {})",
+                    entry.name, flags.file));
+    return std::nullopt;
+  }
+  return ChoiceOf(flags.acceleration);
+}
+
+// [V, 3] where no clip plays.
+Result<std::vector<float>> RestOf(const PageFlags& flags) {
+  Flags rest = flags;
+  rest.rest = true;
+  rest.clip.reset();
+  ClipRecordOptions options;
+  options.threads = 1;
+  options.watch = InterruptWatch();
+  RigOpener opener = OpenerOf(rest);
+  opener.times = [](const OpenRig&) { return std::vector<double>{0.0}; };
+  Result<ClipRecord> record = RecordClip(opener, "", options);
+  if (!record.ok()) return record.status();
+  return std::move(record->full);
+}
+
+std::string Today() {
+  const std::time_t now = std::time(nullptr);
+  char text[32];
+  std::tm local{};
+  localtime_r(&now, &local);
+  return {text, std::strftime(text, sizeof(text), "%Y-%m-%d %H:%M", &local)};
+}
+
+std::string HeavyText(const PageHtml& html) {
+  std::vector<std::string> parts;
+  for (std::size_t i = 0; i < std::min(kNamedParts, html.parts.size()); ++i)
+    parts.push_back(fmt::format("{} {}", html.parts[i].name, ByteText(html.parts[i].bytes)));
+  return fmt::format("warning: the page has {}: {}, ...; fewer clips (--clip) make it smaller",
+                     ByteText(html.text.size()), fmt::join(parts, ", "));
+}
+
+// What was written, to stdout unless that is the page.
+void PrintSizes(const PageFlags& flags, const PageHtml& html, double seconds) {
+  if (flags.json) {
+    nlohmann::ordered_json parts = nlohmann::ordered_json::array();
+    for (const PageHtml::Part& part : html.parts)
+      parts.push_back({{"name", part.name}, {"bytes", part.bytes}});
+    PrintJson(nlohmann::ordered_json{{"schema", "kpsa.page/1"},
+                                     {"file", *flags.output},
+                                     {"bytes", html.text.size()},
+                                     {"seconds", seconds},
+                                     {"parts", parts}});
+  } else if (*flags.output != "-" && !flags.quiet) {
+    Print(fmt::format("{}: {} in {:.1f} s; open it in a browser\n", *flags.output, ByteText(html.text.size()),
+                      seconds));
+  }
+}
+
+}  // namespace
+
+bool MakesPage(const std::string& file) {
+  const std::vector<std::string> suffixes{".yaml", ".yml", ".glb", ".gltf", ".vrm"};
+  return std::ranges::find(suffixes, FileSuffix(file)) != suffixes.end();
+}
+
+CommandResult WritePage(const PageFlags& flags) {
+  if (!flags.output.has_value()) return Status::Usage("{}: expected -o FILE.html", flags.file);
+  KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, {".html"}));
+  if (flags.output == "-" && flags.json) return Status::Usage("-o - and --json: stdout takes one of them");
+  KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, true));
+  const Result<int> threads = ThreadCount(flags),
+                    runs = ParseCount("--runs", flags.runs.value_or("5"), 1, 1000);
+  if (!threads.ok()) return threads.status();
+  if (!runs.ok()) return runs.status();
+  const auto begin = std::chrono::steady_clock::now();
+  const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
+  if (!open.ok()) return open.status();
+  const Rig& rig = (*open)->rig;
+  KPSA_RETURN_IF_ERROR(CheckNotInput(*flags.output, rig.files));
+  std::vector<std::string> notes;
+  const std::optional<AccelerationChoice> choice = ChoiceFor(flags, rig, &notes);
+  if (!choice.has_value()) KPSA_RETURN_IF_ERROR(CheckAccelerationFlags(flags.acceleration, false));
+  const std::vector<std::string> names = ClipsOf(flags, rig);
+
+  const InterruptScope interruptible;
+  const Result<std::vector<float>> rest = RestOf(flags);
+  if (!rest.ok()) return rest.status();
+  PageClips clips;
+  std::vector<BenchResult> results;
+  Progress progress("report: timing, frames", 0, flags.quiet);
+  if (choice.has_value()) {
+    BenchOptions options;
+    options.runs = *runs;
+    options.threads = std::max(1, *threads);
+    Result<std::vector<BenchResult>> bench =
+        RunBench(OpenerOf(flags), {*choice}, names, options, progress.watch());
+    if (!bench.ok()) return bench.status();
+    results = std::move(*bench);
+    clips.bench = &results.front();
+  }
+  progress.SetLabel("report: points, frames", 0);
+  for (const std::string& name : names) {
+    Result<ClipRecord> record = RecordClip(OpenerOf(flags), name, {choice, *threads, progress.watch()});
+    if (!record.ok()) return record.status();
+    clips.records.push_back(std::move(*record));
+  }
+  progress.SetLabel("report: shape, modes", 0);
+  PageData page;
+  PutRigNames(rig, &page);
+  page.Put("made", PageText(Today()));
+  PutMeshes(rig, *rest, &page);
+  KPSA_RETURN_IF_ERROR(PutClips(clips, *rest, progress.watch(), &page));
+  PutControls(rig, &page);
+  const Result<PageHtml> html = MakePageHtml(ViewerPage(), page);
+  if (!html.ok()) return html.status();
+  progress.Clear();
+  if (Interrupted()) return InterruptedStatus();
+  KPSA_RETURN_IF_ERROR(WriteText(*flags.output, flags.force, html->text));
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  PrintSizes(flags, *html, seconds);
+  for (const std::string& note : notes) {
+    if (!flags.quiet) Say("note: " + note);
+  }
+  if (html->text.size() > kHeavyBytes) Say(HeavyText(*html));
+  return 0;
+}
+
+}  // namespace kpsa::engine
