@@ -23,23 +23,28 @@ Result<std::shared_ptr<const Plan>> CompileFor(const Rig& rig, Compiler* compile
   return located;
 }
 
-Result<std::vector<double>> ClipTimes(const Rig& rig) {
+Result<std::vector<double>> ClipTimes(const CharacterClip& clip, double fps) {
   std::vector<double> times;
-  double begin = 0, duration = 0;
-  if (rig.playing.has_value()) begin = rig.playing->begin, duration = rig.playing->duration;
-  for (const CharacterClip& clip : rig.scene.clips) {
-    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip)
-      begin = clip.begin, duration = clip.duration;
-  }
   // A clip that was made at this rate ends on a frame, but for rounding
   // (+ 0: from a first frame -0)
-  const double first = std::ceil(begin * rig.fps - 1e-3) + 0.0, last = std::floor(duration * rig.fps + 1e-3);
+  const double first = std::ceil(clip.begin * fps - 1e-3) + 0.0,
+               last = std::floor(clip.duration * fps + 1e-3);
   if (!(last - first < static_cast<double>(kMaxSamples))) {
-    return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames", rig.scene.clip.value_or(""),
-                         duration, Thousands(kMaxSamples));
+    return Status::Usage("the clip \"{}\" lasts {} s, more than {} frames", clip.id, clip.duration,
+                         Thousands(kMaxSamples));
   }
-  for (double frame = first; frame <= last; ++frame) times.push_back(frame / rig.fps);
+  for (double frame = first; frame <= last; ++frame) times.push_back(frame / fps);
   return times;
+}
+
+Result<std::vector<double>> ClipTimes(const Rig& rig) {
+  CharacterClip playing;
+  if (rig.playing.has_value()) playing = *rig.playing;
+  for (const CharacterClip& clip : rig.scene.clips) {
+    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip) playing = clip;
+  }
+  playing.id = rig.scene.clip.value_or("");
+  return ClipTimes(playing, rig.fps);
 }
 
 std::int64_t FrameNumber(double seconds, double fps) {

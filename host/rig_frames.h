@@ -28,6 +28,8 @@ inline constexpr std::size_t kMaxSamples = 1'000'000;  // times of one evaluatio
 // Every frame of the clip that plays, from its first one to its end, in seconds; time 0 alone if none plays.
 // Errors: more than kMaxSamples.
 Result<std::vector<double>> ClipTimes(const Rig& rig);
+// The same of a clip, whether it plays or not.
+Result<std::vector<double>> ClipTimes(const CharacterClip& clip, double fps);
 // The frame that is nearest to a time, for reports; held within +-1e15.
 std::int64_t FrameNumber(double seconds, double fps);
 

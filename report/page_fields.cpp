@@ -11,8 +11,9 @@ namespace {
 
 constexpr std::string_view kJoint = "joint:", kDeformer = "deformer:";
 
-bool IsDeformer(const CharacterMesh& mesh, const Stage& stage) {
-  return stage.node != mesh.skin_cluster && stage.name != "morph" && stage.name != "transform";
+bool IsDeformer(const Rig& rig, const CharacterMesh& mesh, const Stage& stage) {
+  return stage.node != mesh.skin_cluster && stage.name != "morph" && stage.name != "transform" &&
+         rig.graph->def(stage.node).FindAttribute("weights") >= 0;
 }
 
 // By point of the mesh; false where it has no such joint.
@@ -36,7 +37,7 @@ bool AddDeformer(const Rig& rig, const CharacterMesh& mesh, std::string_view def
                  std::vector<float>* weights) {
   bool found = false;
   for (const Stage& stage : mesh.stages) {
-    if (!IsDeformer(mesh, stage) || rig.graph->name(stage.node) != deformer) continue;
+    if (!IsDeformer(rig, mesh, stage) || rig.graph->name(stage.node) != deformer) continue;
     found = true;
     const std::vector<float> own = PointWeights(rig, {&mesh, &stage});
     for (std::size_t i = 0; i < std::min(own.size(), weights->size()); ++i)
@@ -61,7 +62,8 @@ std::vector<PageField> FieldsOf(const Rig& rig) {
   }
   for (const std::size_t m : shown) {
     for (const Stage& stage : rig.scene.meshes[m].stages) {
-      if (IsDeformer(rig.scene.meshes[m], stage)) add(kDeformer, "deformers", rig.graph->name(stage.node));
+      if (IsDeformer(rig, rig.scene.meshes[m], stage))
+        add(kDeformer, "deformers", rig.graph->name(stage.node));
     }
   }
   return fields;
