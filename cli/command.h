@@ -29,6 +29,7 @@ void AddTrainCommand(CLI::App* program, Command* chosen);
 void AddLearnCommand(CLI::App* program, Command* chosen);
 void AddBenchCommand(CLI::App* program, Command* chosen);
 void AddReportCommand(CLI::App* program, Command* chosen);
+void AddViewCommand(CLI::App* program, Command* chosen);
 void AddCompileCommand(CLI::App* program, Command* chosen);
 void AddProfileCommand(CLI::App* program, Command* chosen);
 void AddExplainCommand(CLI::App* program, Command* chosen);

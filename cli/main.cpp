@@ -97,6 +97,7 @@ int Main(int argc, char** argv) {
   AddLearnCommand(&program, &chosen);
   AddBenchCommand(&program, &chosen);
   AddReportCommand(&program, &chosen);
+  AddViewCommand(&program, &chosen);
   AddCompileCommand(&program, &chosen);
   AddProfileCommand(&program, &chosen);
   AddExplainCommand(&program, &chosen);
