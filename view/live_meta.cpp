@@ -30,7 +30,7 @@ Status PutClipTimes(const Rig& rest, const std::optional<std::string>& first, Pa
     else
       clips.push_back(std::move(told));
   }
-  if (!known) return NoSuchClip(rest.scene, *first);
+  if (!known) return Status::Usage("{}", NoSuchClip(rest.scene, *first).errors().front().message);
   if (!clips.empty()) page->Put("clips", clips.dump(-1, ' ', false, Json::error_handler_t::replace));
   return Status();
 }
