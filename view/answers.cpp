@@ -33,7 +33,7 @@ Answer Events(Session* session, std::string_view after) {
   if (!number.has_value()) return Refusal(400, Status::Usage("after: expected a whole number"));
   const Session::State state = session->WaitForChange(*number, kLongPoll);
   return JsonAnswer(fmt::format("{{\"serial\":{},\"generation\":{},\"problems\":{}}}", state.serial,
-                          state.generation, ProblemList(state.problems, state.warnings)));
+                                state.generation, ProblemList(state.problems, state.warnings)));
 }
 
 Answer Explain(const LiveRig& rig, std::string_view vertex) {

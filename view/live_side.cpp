@@ -125,6 +125,7 @@ Status LiveSide::Evaluate(const LivePose& pose) {
   if (!kept.ok()) return kept.status();
   if ((*kept)->at != pose) {
     (*kept)->at = std::nullopt;
+    Forget(pose, *kept);
     const auto begin = std::chrono::steady_clock::now();
     KPSA_RETURN_IF_ERROR(Move(pose, *kept));
     KPSA_RETURN_IF_ERROR(Pull(pose, *kept));
@@ -134,6 +135,15 @@ Status LiveSide::Evaluate(const LivePose& pose) {
   }
   now_ = *kept;
   return Status();
+}
+
+// What nodes remember is of the controls that they saw: other ones are run up to anew.
+void LiveSide::Forget(const LivePose& pose, Kept* kept) {
+  if (kept->run_up->stateful() && kept->moved != pose.moved) {
+    kept->evaluator->Restart();
+    kept->run_up.emplace(*kept->plan, kept->playing->rig());
+  }
+  kept->moved = pose.moved;
 }
 
 // What no pose moves any more goes back to where the rig has it; equal values cost nothing.

@@ -43,6 +43,7 @@ class LiveSide {
   Result<std::vector<std::pair<std::string, double>>> Values();
   // The rig as it plays, with plugs taken over from the clip, and the subspaces where it is accelerated.
   const Playing& playing() const { return *now_->playing; }
+  const Plan& plan() const { return *now_->plan; }
 
   static constexpr std::size_t kMostKept = 6;
 
@@ -67,7 +68,8 @@ class LiveSide {
     std::optional<RunUp> run_up;
     std::vector<Touched> touched;
     std::vector<Shown> shown;
-    std::optional<LivePose> at;  // what the evaluator's points are of
+    std::vector<MovedPlug> moved;  // by the latest pose, that failed or not
+    std::optional<LivePose> at;    // what the evaluator's points are of
     double microseconds = 0;
     std::uint64_t used = 0;
   };
@@ -76,6 +78,7 @@ class LiveSide {
                                      const std::vector<MovedPlug>& taken);
   void AskForControls(Request* request, Kept* kept) const;
   void AddPosedControls(Kept* kept) const;
+  static void Forget(const LivePose& pose, Kept* kept);
   static Status Move(const LivePose& pose, Kept* kept);
   Status Pull(const LivePose& pose, Kept* kept) const;
 

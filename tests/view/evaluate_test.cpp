@@ -140,6 +140,23 @@ TEST(LiveEvaluate, WhatIsMovedWinsOverTheClip) {
   EXPECT_NE(live.Evaluate(rest.Request("full")).parts, played.parts);
 }
 
+// What a node remembers is of the controls as they are asked for, and not as they were before.
+TEST(LiveEvaluate, NodesRememberNoOtherPose) {
+  const std::string scenes = KPSA_SCENES_DIR "/hello/";
+  std::string yaml = TemporaryFolder::Read(scenes + "hello.yaml");
+  yaml.replace(yaml.find("  mush:"), 0, "  wobble: {type: jiggle, stiffness: 0.3, damping: 0.2}\n");
+  yaml.replace(yaml.find("cage, mush]"), 11, "cage, wobble, mush]");
+  LiveServer live(yaml, "hello.glb", TemporaryFolder::Read(scenes + "hello.glb"));
+  const auto rig = Library().Load(live.rig());
+  ASSERT_TRUE(rig) << ToText(rig.problems());
+  std::vector<Asked> poses = Poses();
+  poses.push_back({{{"upper.rotateX", 20}}, "wave", 0.5});
+  for (const Asked& asked : poses) {
+    kpsa::Verdict verdict;
+    EXPECT_EQ(live.Evaluate(asked.Request("full")).parts.at("full"), PointsOf(*rig, asked, &verdict));
+  }
+}
+
 // Any other plug of a number may be set, too.
 TEST(LiveEvaluate, TakesPlugsThatAreNoControls) {
   const auto live = LiveServer::Hello();
