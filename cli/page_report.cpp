@@ -13,10 +13,13 @@
 #include "cli/progress.h"
 #include "host/bench/bench.h"
 #include "host/clip_record.h"
-#include "host/rig_frames.h"
+#include "host/full_times.h"
+#include "host/rig_survey.h"
 #include "report/page_clips.h"
+#include "report/page_graph.h"
 #include "report/page_html.h"
 #include "report/page_rig.h"
+#include "report/page_tables.h"
 #include "report/viewer_page.h"
 
 namespace kpsa::engine {
@@ -57,19 +60,12 @@ std::optional<AccelerationChoice> ChoiceFor(const PageFlags& flags, const Rig& r
   return ChoiceOf(flags.acceleration);
 }
 
-// [V, 3] where no clip plays.
-Result<std::vector<float>> RestOf(const PageFlags& flags) {
+// Opens the rig with no clip.
+RigOpener RestOpener(const PageFlags& flags) {
   Flags rest = flags;
   rest.rest = true;
   rest.clip.reset();
-  ClipRecordOptions options;
-  options.threads = 1;
-  options.watch = InterruptWatch();
-  RigOpener opener = OpenerOf(rest);
-  opener.times = [](const OpenRig&) { return std::vector<double>{0.0}; };
-  Result<ClipRecord> record = RecordClip(opener, "", options);
-  if (!record.ok()) return record.status();
-  return std::move(record->full);
+  return OpenerOf(rest);
 }
 
 std::string Today() {
@@ -132,24 +128,32 @@ CommandResult WritePage(const PageFlags& flags) {
   const std::vector<std::string> names = ClipsOf(flags, rig);
 
   const InterruptScope interruptible;
-  const Result<std::vector<float>> rest = RestOf(flags);
-  if (!rest.ok()) return rest.status();
+  Progress progress("report: controls", 0, flags.quiet);
+  const Watch watch = progress.watch();
+  const RigOpener opener = OpenerOf(flags);
+  Result<RigSurvey> survey = SurveyRig(opener, RestOpener(flags), names.front(), choice, watch);
+  if (!survey.ok()) return survey.status();
+  progress.SetLabel("report: timing, frames", 0);
+  PageTables tables;
+  tables.runs = *runs, tables.threads = std::max(1, *threads), tables.points = survey->rest.size() / 3;
   PageClips clips;
   std::vector<BenchResult> results;
-  Progress progress("report: timing, frames", 0, flags.quiet);
   if (choice.has_value()) {
     BenchOptions options;
-    options.runs = *runs;
-    options.threads = std::max(1, *threads);
-    Result<std::vector<BenchResult>> bench =
-        RunBench(OpenerOf(flags), {*choice}, names, options, progress.watch());
+    options.runs = tables.runs, options.threads = tables.threads;
+    Result<std::vector<BenchResult>> bench = RunBench(opener, {*choice}, names, options, watch);
     if (!bench.ok()) return bench.status();
     results = std::move(*bench);
-    clips.bench = &results.front();
+    clips.bench = tables.bench = &results.front();
+  } else {
+    Result<FullTimes> full = TimeFull(opener, names, tables.runs, tables.threads, watch);
+    if (!full.ok()) return full.status();
+    clips.full_us = full->frame_us;
+    tables.full = std::move(*full);
   }
   progress.SetLabel("report: points, frames", 0);
   for (const std::string& name : names) {
-    Result<ClipRecord> record = RecordClip(OpenerOf(flags), name, {choice, *threads, progress.watch()});
+    Result<ClipRecord> record = RecordClip(opener, name, {choice, *threads, watch});
     if (!record.ok()) return record.status();
     clips.records.push_back(std::move(*record));
   }
@@ -157,9 +161,23 @@ CommandResult WritePage(const PageFlags& flags) {
   PageData page;
   PutRigNames(rig, &page);
   page.Put("made", PageText(Today()));
-  PutMeshes(rig, *rest, &page);
-  KPSA_RETURN_IF_ERROR(PutClips(clips, *rest, progress.watch(), &page));
-  PutControls(rig, &page);
+  PutMeshes(rig, survey->rest, &page);
+  KPSA_RETURN_IF_ERROR(PutClips(clips, survey->rest, watch, &page));
+  PutControls(rig, &page, survey->reaches);
+  if (survey->reaches.empty() && !rig.controls.empty())
+    notes.push_back(fmt::format("{}: what each moves is measured of at most {}",
+                                Plural(rig.controls.size(), "control"), kMostReaches));
+  PutCues(survey->cues, &page);
+  const std::vector<BenchNode> none;
+  PutNodes(survey->nodes, choice.has_value(),
+           choice.has_value() ? results.front().full_nodes : tables.full.nodes,
+           choice.has_value() ? results.front().accelerated_nodes : none, &page);
+  if (!PutFieldBlobs(rig, &page))
+    notes.push_back(
+        fmt::format("more than {} joints and deformers: their weights are not in the page", kMostFieldBlobs));
+  tables.notes = notes;
+  tables.applied = std::move(survey->applied);
+  PutTables(tables, &page);
   const Result<PageHtml> html = MakePageHtml(ViewerPage(), page);
   if (!html.ok()) return html.status();
   progress.Clear();

@@ -50,6 +50,17 @@ std::pair<std::string, std::string> GroupAndLabel(const Rig& rig, const Control&
   return {name.substr(0, dot), name.substr(dot + 1)};
 }
 
+// In 255ths of the largest.
+void TellReach(const ControlReach& reach, std::size_t number, Json* told, PageData* page) {
+  if (reach.of_vertices.empty()) return;
+  std::vector<std::uint8_t> moves;
+  for (const float metres : reach.of_vertices)
+    moves.push_back(
+        static_cast<std::uint8_t>(std::lround(255 * static_cast<double>(metres) / reach.largest)));
+  (*told)["moves"] = page->AddBlob("moves." + std::to_string(number), moves);
+  (*told)["moves_max"] = reach.largest;
+}
+
 }  // namespace
 
 std::string PageText(const std::string& text) { return Text(Json(text)); }
@@ -86,7 +97,7 @@ void PutMeshes(const Rig& rig, std::span<const float> rest, PageData* page) {
   page->Put("rest", PageText(page->AddBlob("rest", rest)));
 }
 
-void PutControls(const Rig& rig, PageData* page) {
+void PutControls(const Rig& rig, PageData* page, std::span<const ControlReach> reaches) {
   Json controls = Json::array();
   for (const Control& control : rig.controls) {
     const double one = rig.units.FactorOf(control.unit);
@@ -99,6 +110,7 @@ void PutControls(const Rig& rig, PageData* page) {
                  {"value", Number(control.value / one)},
                  {"kind", KindOf(rig.graph->PlugType(control.plug))}};
     if (const Json unit = UnitOf(control.unit, rig.units); !unit.is_null()) told["unit"] = unit;
+    if (!reaches.empty()) TellReach(reaches[controls.size()], controls.size(), &told, page);
     controls.push_back(std::move(told));
   }
   if (!controls.empty()) page->Put("controls", Text(controls));

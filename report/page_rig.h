@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "host/control_reach.h"
 #include "report/page_data.h"
 #include "rig/build/rig_builder.h"
 
@@ -19,7 +20,8 @@ std::size_t StackedVertices(const Rig& rig);
 void PutRigNames(const Rig& rig, PageData* page);
 // points, meshes and rest. `rest` is [V, 3]: x y z, metres, world space, no clip plays.
 void PutMeshes(const Rig& rig, std::span<const float> rest, PageData* page);
-// Its own key: those of the rig in its order, values in the file's units.
-void PutControls(const Rig& rig, PageData* page);
+// Its own key: those of the rig in its order, values in the file's units; and what each moves, where that is known
+// (reaches: one a control, or none).
+void PutControls(const Rig& rig, PageData* page, std::span<const ControlReach> reaches = {});
 
 }  // namespace kpsa::engine
