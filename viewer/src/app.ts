@@ -1,4 +1,5 @@
 // The page: lays out the parts for a model, and again when a rig is replaced by a new version of it.
+import {Vector3} from 'three';
 import type {Context} from './context';
 import type {Model} from './data/model';
 import {noFacts, Series, Signal, type Facts} from './facts';
@@ -67,7 +68,7 @@ export class App {
     before?.session?.end();
     this.help?.element.remove();
     const scope = this.scope = new Scope();
-    const view = this.viewport.setModel(model, before !== null);
+    const view = this.viewport.setModel(model);
     this.store.set(this.firstState(model, before?.model ?? null));
     const facts = new Signal<Facts>(noFacts);
     const series = (model.meta.clips ?? []).map((_, clip) => new Series(model.meta, clip));
@@ -101,6 +102,7 @@ export class App {
     } else {
       showReportFrames(context);
     }
+    if (!before) this.viewport.fit(new Vector3(0.45, 0.16, 1));
   }
 
   private layPanels(context: Context, first: string): void {

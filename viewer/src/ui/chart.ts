@@ -1,6 +1,6 @@
 // uPlot with the colours of the page, that follows the width of its panel and the theme.
 import uPlot from 'uplot';
-import {h, themeColour} from './dom';
+import {h, onceAFrame, themeColour} from './dom';
 import {number} from './format';
 
 export interface Line {
@@ -24,6 +24,8 @@ export interface ChartOptions {
   height?: number;
   /** Marks x with a vertical line. */
   at?: () => number | null;
+  /** Where the x axis has its marks; without, where uPlot puts them. */
+  xMarks?: number[];
   pick?: (x: number) => void;
 }
 
@@ -32,12 +34,16 @@ export class Chart {
   private readonly place: HTMLElement;
   private plot: uPlot | null = null;
   private readonly watch: ResizeObserver;
-  private readonly rebuild = (): void => this.build();
+  private stale = false;  // its colours are of another theme
+  private readonly rebuild = (): void => {
+    this.stale = true;
+    this.build();
+  };
 
   constructor(private readonly options: ChartOptions) {
     this.place = h('div', {class: 'chart-place'});
     this.element = h('figure', {class: 'chart', attributes: {'aria-label': options.title}}, h('figcaption', {}, options.title), this.place);
-    this.watch = new ResizeObserver(() => this.resize());
+    this.watch = new ResizeObserver(onceAFrame(() => this.resize()));
     this.watch.observe(this.place);
     document.addEventListener('kpsa-theme', this.rebuild);
   }
@@ -45,13 +51,14 @@ export class Chart {
   private resize(): void {
     const width = this.place.clientWidth;
     if (!width) return;
-    if (!this.plot) this.build();
+    if (!this.plot || this.stale) this.build();
     else if (this.plot.width !== width) this.plot.setSize({width, height: this.options.height ?? 170});
   }
 
   private build(): void {
     const width = this.place.clientWidth, {options} = this;
     if (!width) return;
+    this.stale = false;
     this.plot?.destroy();
     const ink = themeColour('--muted'), grid = {stroke: themeColour('--grid'), width: 1};
     const font = '11px system-ui, sans-serif';
@@ -67,8 +74,8 @@ export class Chart {
         y: options.logY ? {distr: 3, log: 10} : {range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(1e-12, (high ?? 1) * 1.08)]},
       },
       axes: [
-        {stroke: ink, grid, ticks: grid, font, size: 34, label: options.xLabel, labelSize: 16, labelFont: font, labelGap: 0, values: (_, ticks) => ticks.map((t) => t === null ? '' : xText(t))},
-        {stroke: ink, grid, ticks: grid, font, size: yWidth, values: (_, ticks) => ticks.map((t) => t === null ? '' : yText(t))},
+        {stroke: ink, grid, ticks: grid, font, size: 34, label: options.xLabel, labelSize: 16, labelFont: font, labelGap: 0, values: (_, ticks) => ticks.map((t) => t === null ? '' : xText(t)), ...options.xMarks ? {splits: options.xMarks, filter: (_: uPlot, marks: number[]) => marks} : {}},
+        {stroke: ink, grid, ticks: grid, font, size: yWidth, ...options.logY ? {splits: (_: uPlot, __: number, low: number, high: number) => decades(low, high), filter: (_: uPlot, marks: number[]) => marks} : {}, values: (_, ticks) => ticks.map((t) => t === null ? '' : yText(t))},
       ],
       series: [
         {label: options.xLabel, value: (_, x) => x === null ? '-' : xText(x)},
@@ -91,6 +98,10 @@ export class Chart {
     const x = this.options.at?.() ?? null;
     if (x === null) return;
     const at = Math.round(plot.valToPos(x, 'x', true));
+    if (plot.cursor.left === undefined || plot.cursor.left < 0) {
+      const index = this.options.x.indexOf(x);
+      if (index >= 0) queueMicrotask(() => plot.setLegend({idx: index}, false));
+    }
     plot.ctx.save();
     plot.ctx.fillStyle = themeColour('--accent');
     plot.ctx.fillRect(at - 1, plot.bbox.top, 2, plot.bbox.height);
@@ -119,4 +130,10 @@ export class Chart {
     document.removeEventListener('kpsa-theme', this.rebuild);
     this.plot?.destroy();
   }
+}
+
+function decades(low: number, high: number): number[] {
+  const marks: number[] = [];
+  for (let e = Math.ceil(Math.log10(Math.max(1e-12, low)) - 1e-9); 10 ** e <= high * 1.0001; ++e) marks.push(10 ** e);
+  return marks;
 }

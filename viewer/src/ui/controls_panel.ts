@@ -31,7 +31,7 @@ export function makeControls(context: Context): HTMLElement | null {
       for (const section of sections) section.hidden = !section.querySelector('.control:not([hidden])');
     }},
   });
-  const panel = h('div', {class: 'controls'}, controls.length > 8 ? search : null);
+  const panel = h('div', {class: controls.some((control) => control.moves) ? 'controls' : 'controls still'}, controls.length > 8 ? search : null);
   if (session) {
     panel.prepend(makePoseRow(context));
     const refresh = (): void => {

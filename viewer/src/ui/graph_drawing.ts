@@ -1,6 +1,6 @@
 // The graph as a drawing that is moved by dragging and zoomed by the wheel.
 import type {NodeInfo} from '../data/meta';
-import {svg} from './dom';
+import {onceAFrame, svg} from './dom';
 import {box, layOut} from './graph_layout';
 
 export class GraphDrawing {
@@ -96,10 +96,10 @@ export class GraphDrawing {
       last = {x: event.clientX, y: event.clientY};
       this.apply();
     });
-    new ResizeObserver(() => {
+    new ResizeObserver(onceAFrame(() => {
       this.fit(false);
       this.apply();
-    }).observe(this.element);
+    })).observe(this.element);
   }
 
   get count(): number {

@@ -35,21 +35,33 @@ export function layOut(nodes: readonly NodeInfo[]): Layout {
   // A layer of hundreds becomes several columns next to each other.
   const most = Math.max(12, Math.ceil(Math.sqrt(count) * 1.6));
   const x = new Array<number>(count).fill(0), y = new Array<number>(count).fill(0);
-  let left = 0, height = 0;
+  // Columns go on in a line below when the drawing would be much wider than high.
+  const tallest = Math.min(most, Math.max(...columns.map((column) => column.length)));
+  const widest = Math.max(4 * (box.width + box.across), Math.sqrt(columns.length * (box.width + box.across) * (tallest + 1) * (box.height + box.down) * 1.2));
+  let left = 0, height = 0, top = 0, width = 1, line: number[] = [];
+  const endLine = (): void => {
+    for (const node of line) y[node] += top + height / 2 - box.height / 2;
+    top += height + 2 * box.height;
+    line = [];
+    left = height = 0;
+  };
   for (const column of columns) {
+    if (left > widest) endLine();
     const parts = Math.max(1, Math.ceil(column.length / most)), each = Math.ceil(column.length / parts);
     for (let part = 0; part < parts; ++part) {
       const members = column.slice(part * each, (part + 1) * each), offset = -(members.length - 1) / 2;
       members.forEach((node, i) => {
         x[node] = left;
         y[node] = (offset + i) * (box.height + box.down);
+        line.push(node);
       });
       height = Math.max(height, members.length * (box.height + box.down));
+      width = Math.max(width, left + box.width);
       left += box.width + (part + 1 < parts ? box.down : box.across);
     }
   }
-  for (let i = 0; i < count; ++i) y[i] += height / 2 - box.height / 2;
-  return {x, y, width: Math.max(1, left - box.across), height: Math.max(1, height)};
+  endLine();
+  return {x, y, width, height: Math.max(1, top - 2 * box.height)};
 }
 
 /** The longest way to each node; a node in a cycle is placed as if the edge that closes it were absent. */

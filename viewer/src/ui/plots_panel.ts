@@ -89,6 +89,7 @@ function toleranceChart({model}: Context): Chart {
   const tolerances = model.meta.tolerances!;
   return new Chart({
     title: 'Tolerance against frames that hit', x: tolerances.map((t) => t.tolerance), xLabel: `tolerance (${model.unit.name})`, logX: true,
+    xMarks: tolerances.length <= 12 ? tolerances.map((t) => t.tolerance) : undefined,
     xText: (t) => number(t / model.unit.metres), yText: percent,
     lines: [{label: 'hits', colour: '--plot-a', values: tolerances.map((t) => t.hit_rate), points: true}],
     at: () => model.tolerance,

@@ -65,6 +65,7 @@ export function makeTimeline(context: Context): HTMLElement | null {
     const frames = framesOf(model, clip);
     slider.max = String(Math.max(0, frames - 1));
     slider.value = String(frame);
+    track.hidden = frames < 1;
     slider.disabled = frames < 2;
     playButton.disabled = frames < 2;
     choice.value = String(clip);

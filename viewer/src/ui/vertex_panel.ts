@@ -20,7 +20,7 @@ export function makeVertex(context: Context): HTMLElement {
     }
     const mesh = model.meshes.find((m) => vertex >= m.first && vertex < m.first + m.count);
     const points = viewport.points(view.side), metres = [0, 1, 2].map((c) => points[3 * vertex + c].toFixed(4));
-    const inMesh = mesh && model.meshes.length > 1 ? `, ${vertex - mesh.first} of ${mesh.name}` : mesh ? ` of ${mesh.name}` : '';
+    const inMesh = !mesh ? '' : mesh.first ? `, ${vertex - mesh.first} of ${mesh.name}` : ` of ${mesh.name}`;
     place.textContent = `Vertex ${vertex}${inMesh}, at ${metres.join(', ')} m`;
   });
 

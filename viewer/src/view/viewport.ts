@@ -15,12 +15,12 @@ export class Viewport {
   /** Called after a picture is handed to the GPU. */
   onDrawn: (() => void) | null = null;
   private readonly scene = new Scene();
-  private pending = false;
+  private pending = 0;
   private centre = new Vector3();
   private radius = 1;
 
   constructor(private readonly parent: HTMLElement) {
-    this.renderer = new WebGLRenderer({antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: false});
+    this.renderer = new WebGLRenderer({antialias: !drawnBySoftware(), powerPreference: 'high-performance', preserveDrawingBuffer: false});
     if (!this.renderer.extensions.has('EXT_color_buffer_float')) throw new Error('this browser cannot draw to pictures of floats (EXT_color_buffer_float)');
     this.renderer.debug.checkShaderErrors = true;
     this.canvas = this.renderer.domElement;
@@ -32,21 +32,20 @@ export class Viewport {
     this.controls.enableDamping = false;
     this.controls.zoomToCursor = true;
     this.controls.addEventListener('change', () => this.invalidate());
-    new ResizeObserver(() => this.resize()).observe(parent);
+    new ResizeObserver(() => requestAnimationFrame(() => this.resize())).observe(parent);
   }
 
-  setModel(model: Model, keepCamera: boolean): ModelView {
+  setModel(model: Model): ModelView {
     this.view?.dispose();
     this.scene.clear();
     this.view = new ModelView(model, this.renderer, () => this.invalidate());
     this.scene.add(this.view.group);
     this.resize();
-    if (!keepCamera) this.fit(new Vector3(0.45, 0.16, 1));
     return this.view;
   }
 
   setBackground(colour: string): void {
-    this.renderer.setClearColor(new Color().setStyle(colour, ''), 1);
+    this.renderer.setClearColor(new Color(colour), 1);
     this.scene.background = null;
     this.invalidate();
   }
@@ -71,7 +70,7 @@ export class Viewport {
     if (towards.lengthSq() < 1e-12) towards.set(0, 0, 1);
     const half = Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect);
     this.controls.target.copy(this.centre);
-    this.camera.position.copy(this.centre).addScaledVector(towards.normalize(), this.radius / Math.sin(Math.atan(half)) * 0.92);
+    this.camera.position.copy(this.centre).addScaledVector(towards.normalize(), this.radius / Math.sin(Math.atan(half)) * 0.98);
     this.camera.near = this.radius / 100;
     this.camera.far = this.radius * 100;
     this.camera.updateProjectionMatrix();
@@ -108,17 +107,26 @@ export class Viewport {
   }
 
   invalidate(): void {
-    if (this.pending) return;
-    this.pending = true;
-    requestAnimationFrame(() => this.draw());
+    if (!this.pending) this.pending = requestAnimationFrame(() => this.draw());
   }
 
   draw(): void {
-    this.pending = false;
+    cancelAnimationFrame(this.pending);
+    this.pending = 0;
     this.view?.update();
     this.renderer.render(this.scene, this.camera);
     this.onDrawn?.();
   }
+}
+
+/** Without a GPU, smooth edges cost more than all the rest. */
+function drawnBySoftware(): boolean {
+  const gl = document.createElement('canvas').getContext('webgl2');
+  if (!gl) throw new Error('this browser has no WebGL 2');
+  const info = gl.getExtension('WEBGL_debug_renderer_info');
+  const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+  gl.getExtension('WEBGL_lose_context')?.loseContext();
+  return /SwiftShader|llvmpipe|softpipe|Basic Render/i.test(name);
 }
 
 /** A line of 256 colours. */
