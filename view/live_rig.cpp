@@ -4,12 +4,18 @@
 #include <cmath>
 #include <tuple>
 
+#include "host/control_reach.h"
+#include "host/cue_marks.h"
+#include "host/node_outline.h"
 #include "report/page_fields.h"
+#include "report/page_graph.h"
 #include "report/page_rig.h"
 #include "view/live_meta.h"
 
 namespace kpsa::engine {
 namespace {
+
+constexpr double kReachSeconds = 0.5;
 
 // The largest distance of two points, and the root of the mean square, metres.
 std::pair<double, double> ErrorsOf(const std::vector<float>& a, const std::vector<float>& b) {
@@ -66,9 +72,31 @@ Status LiveRig::PutAll(const LiveOptions& options) {
   page_.Put("accelerated", accelerated() ? "true" : "false");
   if (accelerated()) PutTolerance(accelerated_->playing().applied(), &page_);
   KPSA_RETURN_IF_ERROR(PutClipTimes(rest(), options.clip, &page_));
-  PutControls(rest(), &page_);
+  // What each control moves is worth a moment, and no more
+  std::vector<ControlReach> reaches;
+  if (2e-6 * full_->microseconds() * static_cast<double>(rest().controls.size()) < kReachSeconds) {
+    Result<std::vector<ControlReach>> reached = ReachOfControls(rest(), {});
+    if (reached.ok()) reaches = std::move(*reached);
+  }
+  PutControls(rest(), &page_, reaches);
   PutFields(rest(), &page_);
+  KPSA_RETURN_IF_ERROR(PutGraph());
   meta_ = page_.Meta();
+  return Status();
+}
+
+// The nodes of both sides, and where subspaces measure.
+Status LiveRig::PutGraph() {
+  if (!accelerated()) {
+    PutNodes(OutlineNodes(*full_->playing().rig().graph, full_->plan(), nullptr, {}), false, {}, {}, &page_);
+    return Status();
+  }
+  const Playing& playing = accelerated_->playing();
+  PutNodes(OutlineNodes(*playing.rig().graph, full_->plan(), &accelerated_->plan(), playing.applied()), true,
+           {}, {}, &page_);
+  const Result<std::vector<CueMark>> cues = MarkCues(playing.rig(), playing.applied(), full_points_);
+  if (!cues.ok()) return cues.status();
+  PutCues(*cues, &page_);
   return Status();
 }
 

@@ -78,6 +78,7 @@ class LiveRig {
   LiveRig() = default;
   LiveFrame Evaluate(const LivePose& pose, EvaluateMode mode);
   Status PutAll(const LiveOptions& options);
+  Status PutGraph();
 
   std::unique_ptr<OpenRig> open_;
   std::uint64_t generation_ = 0;

@@ -107,9 +107,9 @@ std::unique_ptr<LiveServer> LiveServer::Hello(bool accelerated) {
                                       accelerated ? HelloSubspace() : "");
 }
 
-WebAnswer LiveServer::Get(const std::string& path, const Headers& headers) {
+WebAnswer LiveServer::Get(const std::string& path, const Headers& headers, int seconds) {
   httplib::Client client("127.0.0.1", server_->port());
-  client.set_read_timeout(60);
+  client.set_read_timeout(seconds);
   return Taken(client.Get(path, HeadersOf(headers)));
 }
 

@@ -50,7 +50,8 @@ class LiveServer {
   using Headers = std::map<std::string, std::string>;
   Headers Token() const { return {{"X-Kpsa-Token", server_->token()}}; }
   WebAnswer Get(const std::string& path) { return Get(path, Token()); }
-  WebAnswer Get(const std::string& path, const Headers& headers);
+  // No answer within these seconds is none.
+  WebAnswer Get(const std::string& path, const Headers& headers, int seconds = 60);
   WebAnswer Post(const std::string& path, const std::string& body) { return Post(path, body, Token()); }
   WebAnswer Post(const std::string& path, const std::string& body, const Headers& headers);
   // Of a request that must be answered.

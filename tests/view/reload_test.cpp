@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <string>
+#include <thread>
 
 #include "tests/view/live_server.h"
 
@@ -81,7 +83,10 @@ TEST(LiveEdits, ASubspaceThatNoLongerFitsIsAWarning) {
 TEST(LiveEdits, WaitingEndsWithTheServer) {
   const auto live = LiveServer::Hello();
   const Json now = live->Get("/events?after=-1").json();
-  std::thread waits([&] { EXPECT_EQ(live->Get("/events?after=" + now["serial"].dump()).json(), now); });
+  std::thread waits([&] {  // it would be answered after 20 s in any case
+    const std::string path = "/events?after=" + now["serial"].dump();
+    EXPECT_EQ(live->Get(path, live->Token(), 15).json(), now);
+  });
   live->session().Stop();
   waits.join();
   for (const char* after : {"", "x", "-2", "1.5", "99999999999999999999"})
