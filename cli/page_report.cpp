@@ -50,6 +50,10 @@ std::optional<AccelerationChoice> ChoiceFor(const PageFlags& flags, const Rig& r
   if (flags.acceleration.wanted()) return ChoiceOf(flags.acceleration);
   if (rig.accelerate.empty()) return std::nullopt;
   for (const Acceleration& entry : rig.accelerate) {
+    if (std::ranges::any_of(entry.points, &AcceleratedPoints::colors)) {
+      notes->push_back(fmt::format("\"{}\" accelerates light, which a page does not show", entry.name));
+      return std::nullopt;
+    }
     std::error_code error;
     if (!entry.subspace.empty() && std::filesystem::exists(entry.subspace, error)) continue;
     notes->push_back(
@@ -133,6 +137,10 @@ CommandResult WritePage(const PageFlags& flags) {
   const RigOpener opener = OpenerOf(flags);
   Result<RigSurvey> survey = SurveyRig(opener, RestOpener(flags), names.front(), choice, watch);
   if (!survey.ok()) return survey.status();
+  for (const AppliedSubspace& one : survey->applied) {
+    if (one.subspace->of_light())
+      return Status::Usage("\"{}\" accelerates light, which a page does not show", one.name).At({one.path});
+  }
   progress.SetLabel("report: timing, frames", 0);
   PageTables tables;
   tables.runs = *runs, tables.threads = std::max(1, *threads), tables.points = survey->rest.size() / 3;
