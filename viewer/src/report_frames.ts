@@ -36,6 +36,8 @@ export function showReportFrames(context: Context): void {
     if (!blob || residuals.has(clip)) return;
     const values = await model.blob(blob);
     if (!(values instanceof Int8Array) && !(values instanceof Int16Array)) throw new Error('a residual is neither i8 nor i16');
+    const {rows} = model.meta.clips![clip].residual!, most = rows ? Math.max(...rows) + 1 : model.meta.clips![clip].frames;
+    if (values.length < most * model.points * 3) throw new Error(`the residual of ${model.meta.clips![clip].name} lacks frames`);
     residuals.set(clip, values);
     show();
   };

@@ -261,10 +261,28 @@ test('a rig without acceleration shows full only, and no empty panel', async () 
   await least.page.close();
 });
 
-test('data of another format is refused with a message', async () => {
-  const report = makeMeta(makeCharacter());
-  report.meta.format = 2;
-  await assert.rejects(browser.open(browser.write('other.html', makeReport(report))), /format 2/);
+test('what does not keep to the contract is refused with a message', async () => {
+  const faults = [
+    [(meta) => { meta.format = 2; }, /format 2/],
+    [(meta) => { meta.clips[1].first_row = 41; }, /clip wave asks for rows beyond the 70/],
+    [(meta) => { meta.blobs.rest.count += 1; }, /blob rest has \d+ bytes, not \d+/],
+    [(meta) => { meta.shape.basis = 'gone'; }, /there is no blob gone/],
+  ];
+  for (const [change, message] of faults) {
+    const report = makeMeta(makeCharacter());
+    change(report.meta);
+    await assert.rejects(browser.open(browser.write('other.html', makeReport(report))), message);
+  }
+});
+
+test('a vertex is chosen by its index, without a mouse', async () => {
+  await fresh();
+  await page.getByRole('tab', {name: 'Vertex'}).click();
+  await page.getByLabel('Vertex', {exact: true}).and(page.locator('input')).fill('1900');
+  await page.keyboard.press('Enter');
+  assert.equal((await state()).vertex, 1900);
+  const [x, y, z] = (await page.evaluate(() => [...window.kpsa.positions()])).slice(5700, 5703).map((c) => c.toFixed(4));
+  await page.getByText(`Vertex 1900, 96 of knob, at ${x}, ${y}, ${z} m`).waitFor({timeout: 3000});
 });
 
 test('no request leaves the page, and nothing is complained of', async () => {

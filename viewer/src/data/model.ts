@@ -58,6 +58,10 @@ export async function loadModel(feed: Feed, given?: Meta): Promise<Model> {
     meta.shape ? loadShape(meta.shape, meta.points, blob) : null,
   ]);
   if (rest.length !== meta.points * 3) throw new Error(`rest has ${rest.length} numbers for ${meta.points} points`);
+  for (const clip of meta.clips ?? []) {
+    const rows = shape ? shape.rows.length / shape.info.modes : 0, first = clip.first_row;
+    if (shape && first !== null && first !== undefined && (first < 0 || first + clip.frames > rows)) throw new Error(`clip ${clip.name} asks for rows beyond the ${rows} there are`);
+  }
   return {
     meta, live: feed.live, points: meta.points, rest, meshes, shape, blob,
     accelerated: meta.accelerated === true,
@@ -70,6 +74,7 @@ async function loadShape(info: ShapeInfo, points: number, blob: (name: string) =
   const [basis, scale, rows] = await Promise.all([blob(info.basis), blob(info.scale).then(floats), blob(info.rows).then(floats)]);
   if (!(basis instanceof Int8Array) && !(basis instanceof Int16Array)) throw new Error('the basis is neither i8 nor i16');
   if (basis.length !== info.modes * points * 3) throw new Error('the basis has another size than its modes and points');
+  if (info.modes < 1 || info.modes > 256) throw new Error(`a shape has 1 to 256 modes, not ${info.modes}`);
   if (scale.length !== info.modes || rows.length % info.modes !== 0) throw new Error('scale or rows do not fit the modes');
   return {info, basis, steps: basis instanceof Int8Array ? 127 : 32767, scale, rows};
 }

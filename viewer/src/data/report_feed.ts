@@ -23,7 +23,9 @@ export class ReportFeed implements Feed {
 }
 
 function fromBase64(text: string): ArrayBuffer {
-  const binary = atob(text);  // skips white space
+  const native = Uint8Array as unknown as {fromBase64?: (text: string) => Uint8Array<ArrayBuffer>};
+  if (native.fromBase64) return native.fromBase64(text).buffer;
+  const binary = atob(text);  // both skip white space
   const bytes = new Uint8Array(binary.length);
   for (let i = 0; i < binary.length; ++i) bytes[i] = binary.charCodeAt(i);
   return bytes.buffer;

@@ -55,6 +55,7 @@ export class Positions {
   private readonly texels: Float32Array<ArrayBuffer>;
   private readonly read: Record<Side, Float32Array>;
   private readonly fresh: Record<Side, boolean> = {accelerated: false, full: false};
+  private readonly one = new Float32Array(4);
   private dirty = true;
   /** Counts changes of the points. */
   version = 0;
@@ -159,6 +160,14 @@ export class Positions {
       out[3 * i + 2] = this.texels[4 * i + 2];
     }
     return out;
+  }
+
+  /** One point, without waiting for all the others. */
+  readOne(side: Side, point: number): [number, number, number] {
+    this.update();
+    const {width} = this.grid;
+    this.renderer.readRenderTargetPixels(this.pass.target, point % width, Math.floor(point / width), 1, 1, this.one, undefined, side === 'accelerated' ? 0 : 1);
+    return [this.one[0], this.one[1], this.one[2]];
   }
 
   dispose(): void {

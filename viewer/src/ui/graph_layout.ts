@@ -36,8 +36,8 @@ export function layOut(nodes: readonly NodeInfo[]): Layout {
   const most = Math.max(12, Math.ceil(Math.sqrt(count) * 1.6));
   const x = new Array<number>(count).fill(0), y = new Array<number>(count).fill(0);
   // Columns go on in a line below when the drawing would be much wider than high.
-  const tallest = Math.min(most, Math.max(...columns.map((column) => column.length)));
-  const widest = Math.max(4 * (box.width + box.across), Math.sqrt(columns.length * (box.width + box.across) * (tallest + 1) * (box.height + box.down) * 1.2));
+  const area = columns.reduce((sum, column) => sum + (box.width + box.across) * (column.length + 2) * (box.height + box.down), 0);
+  const widest = Math.max(4 * (box.width + box.across), Math.sqrt(area * 1.4));
   let left = 0, height = 0, top = 0, width = 1, line: number[] = [];
   const endLine = (): void => {
     for (const node of line) y[node] += top + height / 2 - box.height / 2;

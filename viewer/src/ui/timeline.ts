@@ -71,7 +71,7 @@ export function makeTimeline(context: Context): HTMLElement | null {
     choice.value = String(clip);
     playButton.textContent = playing ? 'Pause' : 'Play';
     setPressed(loopButton, loop);
-    place.textContent = frames ? `${frame} / ${frames - 1}` : 'rest';
+    place.textContent = frames ? `${frame} / ${frames - 1}` : 'no clip';
     slider.setAttribute('aria-valuetext', frames ? `frame ${frame} of ${frames}` : 'no clip');
   }));
   const known = model.accelerated && (model.live || series.some((s) => s.has('verdicts')));

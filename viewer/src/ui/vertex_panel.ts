@@ -6,20 +6,28 @@ import {length, number} from './format';
 import {errorsOfPoint} from './histogram';
 
 export function makeVertex(context: Context): HTMLElement {
-  const {store, model, viewport, view, scope, tell} = context;
+  const {store, model, view, scope, tell} = context;
   const place = h('p', {class: 'details'});
+  const index = h('input', {
+    attributes: {type: 'number', min: 0, max: model.points - 1, step: 1, placeholder: 'index', 'aria-label': 'Vertex'},
+    on: {change: () => {
+      const vertex = Number(index.value);
+      if (index.value !== '' && Number.isInteger(vertex) && vertex >= 0 && vertex < model.points) store.set({vertex});
+    }},
+  });
   const movers = h('div', {class: 'movers'});
   const plot = h('div', {class: 'charts'});
   let chart: Chart | null = null;
 
   const where = onceAFrame(() => {
     const {vertex} = store.now;
+    if (document.activeElement !== index) index.value = vertex < 0 ? '' : String(vertex);
     if (vertex < 0) {
-      place.textContent = 'Click the surface to choose a vertex.';
+      place.textContent = 'Click the surface, or type an index, to choose a vertex.';
       return;
     }
     const mesh = model.meshes.find((m) => vertex >= m.first && vertex < m.first + m.count);
-    const points = viewport.points(view.side), metres = [0, 1, 2].map((c) => points[3 * vertex + c].toFixed(4));
+    const metres = view.positions.readOne(view.side, vertex).map((x) => x.toFixed(4));
     const inMesh = !mesh ? '' : mesh.first ? `, ${vertex - mesh.first} of ${mesh.name}` : ` of ${mesh.name}`;
     place.textContent = `Vertex ${vertex}${inMesh}, at ${metres.join(', ')} m`;
   });
@@ -56,7 +64,7 @@ export function makeVertex(context: Context): HTMLElement {
     plot.replaceChildren(chart.element);
   }
 
-  return h('div', {class: 'vertex'}, place, movers, plot, pickedList(context));
+  return h('div', {class: 'vertex'}, h('label', {class: 'row'}, 'Vertex', index), place, movers, plot, pickedList(context));
 }
 
 async function listMovers({model, session, store}: Context, vertex: number, into: HTMLElement): Promise<void> {
