@@ -15,10 +15,6 @@ namespace {
 
 constexpr std::size_t kMostNodes = 40;  // rows of the profile
 
-double Share(std::size_t part, std::size_t all) {
-  return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
-}
-
 PageTable BenchTable(const BenchResult& r, int runs, int threads) {
   PageTable table("Bench", TimesNote(r.cpu_times, runs, threads),
                   {{"a frame"}, {"full", "ms"}, {"accelerated", "ms"}, {"times as fast"}});
@@ -68,9 +64,9 @@ PageTable ClipTable(const BenchResult& r) {
     }
     const std::size_t n = end - begin;
     const auto frames = static_cast<double>(n);
-    table.Row({r.per_frame[begin].clip, CountCell(n), PercentCell(Share(counts[0], n)),
-               PercentCell(Share(counts[1], n)), PercentCell(Share(counts[2], n)), MillimetreCell(largest),
-               MillimetreCell(std::sqrt(squares / frames)), ShortCell(full / frames),
+    table.Row({r.per_frame[begin].clip, CountCell(n), PercentCell(ShareOf(counts[0], n)),
+               PercentCell(ShareOf(counts[1], n)), PercentCell(ShareOf(counts[2], n)),
+               MillimetreCell(largest), MillimetreCell(std::sqrt(squares / frames)), ShortCell(full / frames),
                ShortCell(fast / frames), ShortCell(Ratio(full, fast))});
     begin = end;
   }

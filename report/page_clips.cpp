@@ -7,7 +7,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "report/page_rig.h"
+#include "report/json_text.h"
 #include "report/page_shape.h"
 
 namespace kpsa::engine {
@@ -16,12 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // Seven digits: more than any of these numbers is worth.
-Json Number(double value) {
-  if (!std::isfinite(value)) return nullptr;
-  return std::stod(fmt::format("{:.7g}", value));
-}
-
-std::string Text(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+Json SevenDigits(double value) { return RoundedJson<Json>(value, 7); }
 
 double Diagonal(const PageClips& clips) {
   double low[3], high[3];
@@ -83,11 +78,11 @@ void TellFrames(std::span<const BenchResult::Frame> frames, bool several, std::v
     verdicts.push_back(static_cast<int>(decision.verdict()));
     why.push_back(
         decision.hit() ? -1 : IndexOf((several ? decision.entry + ": " : "") + decision.reason, reasons));
-    scores.push_back(Number(decision.score));
-    full.push_back(Number(frame.full_ms * 1e3));
-    fast.push_back(Number(frame.accelerated_ms * 1e3));
-    most.push_back(Number(frame.max));
-    rms.push_back(Number(frame.rms));
+    scores.push_back(SevenDigits(decision.score));
+    full.push_back(SevenDigits(frame.full_ms * 1e3));
+    fast.push_back(SevenDigits(frame.accelerated_ms * 1e3));
+    most.push_back(SevenDigits(frame.max));
+    rms.push_back(SevenDigits(frame.rms));
   }
   (*clip)["verdicts"] = std::move(verdicts);
   (*clip)["reasons"] = std::move(why);
@@ -118,7 +113,7 @@ Status PutClips(const PageClips& clips, std::span<const float> rest, const Watch
   const bool accelerated = clips.bench != nullptr;
   page->Put("accelerated", accelerated ? "true" : "false");
   if (accelerated && clips.bench->promise.promised() && clips.bench->promise.tolerance > 0)
-    page->Put("tolerance", Text(clips.bench->promise.tolerance));
+    page->Put("tolerance", CompactJson(Json(clips.bench->promise.tolerance)));
   std::vector<std::span<const float>> rows;
   Json told = Json::array();
   std::vector<std::string> reasons;
@@ -139,7 +134,7 @@ Status PutClips(const PageClips& clips, std::span<const float> rest, const Watch
         clip["residual"] = std::move(residual);
     } else if (n < clips.full_us.size()) {
       Json full = Json::array();
-      for (const double us : clips.full_us[n]) full.push_back(Number(us));
+      for (const double us : clips.full_us[n]) full.push_back(SevenDigits(us));
       clip["full_us"] = std::move(full);
     }
     AddRows(record, &rows);
@@ -153,9 +148,9 @@ Status PutClips(const PageClips& clips, std::span<const float> rest, const Watch
                      {"scale", page->AddBlob("scale", std::span<const float>(shape->scale))},
                      {"rows", page->AddBlob("rows", std::span<const float>(shape->rows))},
                      {"precision", shape->precision}};
-  page->Put("shape", Text(shape_json));
-  page->Put("clips", Text(told));
-  if (!reasons.empty()) page->Put("reasons", Text(Json(reasons)));
+  page->Put("shape", CompactJson(shape_json));
+  page->Put("clips", CompactJson(told));
+  if (!reasons.empty()) page->Put("reasons", CompactJson(Json(reasons)));
   return Status();
 }
 

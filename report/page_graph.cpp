@@ -1,13 +1,12 @@
 #include "report/page_graph.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "report/json_text.h"
 #include "report/page_fields.h"
 
 namespace kpsa::engine {
@@ -15,13 +14,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string Text(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
-
-// A length or a time to six digits.
-Json Short(double value) {
-  if (!std::isfinite(value)) return nullptr;
-  return std::stod(fmt::format("{:.6g}", value));
-}
+// A length or a time.
+Json SixDigits(double value) { return RoundedJson<Json>(value, 6); }
 
 std::map<std::string, double> MicrosecondsOf(const std::vector<BenchNode>& nodes) {
   std::map<std::string, double> times;
@@ -40,14 +34,14 @@ void PutNodes(const std::vector<OutlinedNode>& nodes, bool accelerated,
   for (const OutlinedNode& node : nodes) {
     Json one = {{"name", node.name}, {"type", node.type}};
     if (accelerated) one["state"] = StateName(node.state);
-    if (const auto it = full.find(node.name); it != full.end()) one["full_us"] = Short(it->second);
-    if (const auto it = fast.find(node.name); it != fast.end()) one["accelerated_us"] = Short(it->second);
+    if (const auto it = full.find(node.name); it != full.end()) one["full_us"] = SixDigits(it->second);
+    if (const auto it = fast.find(node.name); it != fast.end()) one["accelerated_us"] = SixDigits(it->second);
     if (node.points > 0) one["points"] = node.points;
     one["inputs"] = node.inputs;
     if (!node.reason.empty()) one["reason"] = node.reason;
     told.push_back(std::move(one));
   }
-  if (!told.empty()) page->Put("nodes", Text(told));
+  if (!told.empty()) page->Put("nodes", CompactJson(told));
 }
 
 void PutCues(const std::vector<CueMark>& cues, PageData* page) {
@@ -58,12 +52,12 @@ void PutCues(const std::vector<CueMark>& cues, PageData* page) {
     if (cue.vertex.has_value()) one["vertex"] = *cue.vertex;
     if (cue.position.has_value()) {
       one["position"] = Json::array();
-      for (const double x : *cue.position) one["position"].push_back(Short(x));
+      for (const double x : *cue.position) one["position"].push_back(SixDigits(x));
     }
     if (!cue.sees.empty()) one["sees"] = cue.sees;
     told.push_back(std::move(one));
   }
-  if (!told.empty()) page->Put("cues", Text(told));
+  if (!told.empty()) page->Put("cues", CompactJson(told));
 }
 
 bool PutFieldBlobs(const Rig& rig, PageData* page) {
@@ -78,7 +72,7 @@ bool PutFieldBlobs(const Rig& rig, PageData* page) {
     const std::string blob = page->AddBlob("field." + std::to_string(told.size()), bytes);
     told.push_back({{"name", field.name}, {"group", field.group}, {"label", field.label}, {"blob", blob}});
   }
-  if (!told.empty()) page->Put("fields", Text(told));
+  if (!told.empty()) page->Put("fields", CompactJson(told));
   return true;
 }
 

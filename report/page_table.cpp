@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "report/json_text.h"
 
 namespace kpsa::engine {
 
@@ -31,7 +34,7 @@ std::string PageTable::Json() const {
   if (!note_.empty()) table["note"] = note_;
   table["columns"] = std::move(columns);
   table["rows"] = std::move(rows);
-  return table.dump(-1, ' ', false, Value::error_handler_t::replace);
+  return CompactJson(table);
 }
 
 PageTable::Cell ShortCell(double value) {
@@ -41,5 +44,9 @@ PageTable::Cell ShortCell(double value) {
 PageTable::Cell MillimetreCell(double metres) { return ShortCell(metres * 1e3); }
 PageTable::Cell PercentCell(double share) { return ShortCell(100 * share); }
 PageTable::Cell CountCell(std::size_t count) { return static_cast<double>(count); }
+
+double ShareOf(std::size_t part, std::size_t all) {
+  return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
+}
 
 }  // namespace kpsa::engine

@@ -8,6 +8,7 @@
 
 #include "base/quantity_text.h"
 #include "base/text.h"
+#include "report/json_text.h"
 #include "report/page_bench.h"
 #include "report/page_table.h"
 #include "report/page_training.h"
@@ -17,12 +18,6 @@ namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string Text(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
-
-double Share(std::size_t part, std::size_t all) {
-  return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
-}
 
 Json Figure(const std::string& label, const std::string& value, const std::string& note = "") {
   Json figure = {{"label", label}, {"value", value}};
@@ -46,7 +41,7 @@ Json SummaryOf(const PageTables& of) {
         "times as fast", fmt::format("{:.1f}", r.speedup()),
         fmt::format("{:.3f} ms a frame instead of {:.3f}, misses included", r.accelerated_ms, r.full_ms)));
   summary.push_back(
-      Figure("hits", fmt::format("{:.1f} %", 100 * Share(r.hits, r.frames)), r.most_frequent_reason));
+      Figure("hits", fmt::format("{:.1f} %", 100 * ShareOf(r.hits, r.frames)), r.most_frequent_reason));
   summary.push_back(
       Figure("largest error", LengthText(r.error_max),
              r.worst_clip.empty() ? "" : fmt::format("frame {} of {}", r.worst_frame, r.worst_clip)));
@@ -71,12 +66,12 @@ Json TolerancesOf(const ToleranceTable& table) {
 }  // namespace
 
 void PutTables(const PageTables& of, PageData* page) {
-  page->Put("summary", Text(SummaryOf(of)));
+  page->Put("summary", CompactJson(SummaryOf(of)));
   std::vector<PageTable> tables;
   std::vector<std::string> notes = of.notes;
   if (of.bench != nullptr) {
     const BenchResult& r = *of.bench;
-    if (!r.tolerances.rows.empty()) page->Put("tolerances", Text(TolerancesOf(r.tolerances)));
+    if (!r.tolerances.rows.empty()) page->Put("tolerances", CompactJson(TolerancesOf(r.tolerances)));
     tables = BenchPageTables(r, of.runs, of.threads);
     tables.push_back(ProfileTable(r.full_nodes, r.accelerated_nodes, r.full_ms));
     for (PageTable& table : TrainingTables(of.applied)) tables.push_back(std::move(table));

@@ -12,10 +12,6 @@
 namespace kpsa::engine {
 namespace {
 
-double Share(std::size_t part, std::size_t all) {
-  return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
-}
-
 std::string Taken(bool taken) { return taken ? "yes" : ""; }
 
 PageTable Tried(const TrainingRecord& record, const std::string& of) {
@@ -52,7 +48,7 @@ PageTable Kinds(const AppliedSubspace& one, const std::string& of) {
   if (one.tolerance >= kAnyError || one.tolerance <= 0) return table;
   for (const Calibration::Kind& kind : calibration.kinds) {
     table.Row({PoseKindName(static_cast<PoseKind>(kind.kind)), CountCell(kind.poses),
-               PercentCell(Share(kind.hits, kind.poses)), PercentCell(Share(kind.accepted, kind.poses)),
+               PercentCell(ShareOf(kind.hits, kind.poses)), PercentCell(ShareOf(kind.accepted, kind.poses)),
                CountCell(kind.violations), PercentCell(kind.upper_bound)});
   }
   return table;
