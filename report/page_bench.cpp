@@ -64,9 +64,9 @@ PageTable ClipTable(const BenchResult& r) {
     }
     const std::size_t n = end - begin;
     const auto frames = static_cast<double>(n);
-    table.Row({r.per_frame[begin].clip, CountCell(n), PercentCell(ShareOf(counts[0], n)),
-               PercentCell(ShareOf(counts[1], n)), PercentCell(ShareOf(counts[2], n)),
-               MillimetreCell(largest), MillimetreCell(std::sqrt(squares / frames)), ShortCell(full / frames),
+    table.Row({r.per_frame[begin].clip, CountCell(n), PercentCell(PartOf(counts[0], n)),
+               PercentCell(PartOf(counts[1], n)), PercentCell(PartOf(counts[2], n)), MillimetreCell(largest),
+               MillimetreCell(std::sqrt(squares / frames)), ShortCell(full / frames),
                ShortCell(fast / frames), ShortCell(Ratio(full, fast))});
     begin = end;
   }

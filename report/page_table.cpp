@@ -45,7 +45,7 @@ PageTable::Cell MillimetreCell(double metres) { return ShortCell(metres * 1e3); 
 PageTable::Cell PercentCell(double share) { return ShortCell(100 * share); }
 PageTable::Cell CountCell(std::size_t count) { return static_cast<double>(count); }
 
-double ShareOf(std::size_t part, std::size_t all) {
+double PartOf(std::size_t part, std::size_t all) {
   return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
 }
 

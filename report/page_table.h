@@ -32,6 +32,6 @@ PageTable::Cell ShortCell(double value);
 PageTable::Cell MillimetreCell(double metres);
 PageTable::Cell PercentCell(double share);
 PageTable::Cell CountCell(std::size_t count);
-double ShareOf(std::size_t part, std::size_t all);  // 0 of none
+double PartOf(std::size_t part, std::size_t all);  // 0 of none
 
 }  // namespace kpsa::engine

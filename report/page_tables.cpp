@@ -41,7 +41,7 @@ Json SummaryOf(const PageTables& of) {
         "times as fast", fmt::format("{:.1f}", r.speedup()),
         fmt::format("{:.3f} ms a frame instead of {:.3f}, misses included", r.accelerated_ms, r.full_ms)));
   summary.push_back(
-      Figure("hits", fmt::format("{:.1f} %", 100 * ShareOf(r.hits, r.frames)), r.most_frequent_reason));
+      Figure("hits", fmt::format("{:.1f} %", 100 * PartOf(r.hits, r.frames)), r.most_frequent_reason));
   summary.push_back(
       Figure("largest error", LengthText(r.error_max),
              r.worst_clip.empty() ? "" : fmt::format("frame {} of {}", r.worst_frame, r.worst_clip)));

@@ -48,7 +48,7 @@ PageTable Kinds(const AppliedSubspace& one, const std::string& of) {
   if (one.tolerance >= kAnyError || one.tolerance <= 0) return table;
   for (const Calibration::Kind& kind : calibration.kinds) {
     table.Row({PoseKindName(static_cast<PoseKind>(kind.kind)), CountCell(kind.poses),
-               PercentCell(ShareOf(kind.hits, kind.poses)), PercentCell(ShareOf(kind.accepted, kind.poses)),
+               PercentCell(PartOf(kind.hits, kind.poses)), PercentCell(PartOf(kind.accepted, kind.poses)),
                CountCell(kind.violations), PercentCell(kind.upper_bound)});
   }
   return table;
