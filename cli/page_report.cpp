@@ -44,10 +44,16 @@ std::vector<std::string> ClipsOf(const PageFlags& flags, const Rig& rig) {
   return clips;
 }
 
+AccelerationChoice WithModes(const PageFlags& flags) {
+  AccelerationChoice choice = ChoiceOf(flags.acceleration);
+  choice.with_modes = true;  // for the table of what errors consist of
+  return choice;
+}
+
 // The subspaces that the flags name, or the rig's own where all of them are there.
 std::optional<AccelerationChoice> ChoiceFor(const PageFlags& flags, const Rig& rig,
                                             std::vector<std::string>* notes) {
-  if (flags.acceleration.wanted()) return ChoiceOf(flags.acceleration);
+  if (flags.acceleration.wanted()) return WithModes(flags);
   if (rig.accelerate.empty()) return std::nullopt;
   for (const Acceleration& entry : rig.accelerate) {
     if (std::ranges::any_of(entry.points, &AcceleratedPoints::colors)) {
@@ -61,7 +67,7 @@ std::optional<AccelerationChoice> ChoiceFor(const PageFlags& flags, const Rig& r
                     entry.name, flags.file));
     return std::nullopt;
   }
-  return ChoiceOf(flags.acceleration);
+  return WithModes(flags);
 }
 
 // Opens the rig with no clip.
@@ -78,6 +84,73 @@ std::string Today() {
   std::tm local{};
   localtime_r(&now, &local);
   return {text, std::strftime(text, sizeof(text), "%Y-%m-%d %H:%M", &local)};
+}
+
+// All that a page shows.
+struct Gathered {
+  RigSurvey survey;
+  std::vector<BenchResult> bench;  // one, or none where nothing is accelerated
+  PageClips clips;
+  PageTables tables;
+};
+
+Status Survey(const RigOpener& opener, const RigOpener& rest, const std::string& clip,
+              const std::optional<AccelerationChoice>& choice, const Watch& watch, Gathered* all) {
+  Result<RigSurvey> survey = SurveyRig(opener, rest, clip, choice, watch);
+  if (!survey.ok()) return survey.status();
+  for (const AppliedSubspace& one : survey->applied) {
+    if (one.subspace->of_light())
+      return Status::Usage("\"{}\" accelerates light, which a page does not show", one.name).At({one.path});
+  }
+  all->survey = std::move(*survey);
+  return Status();
+}
+
+Status Time(const RigOpener& opener, const std::vector<std::string>& clips,
+            const std::optional<AccelerationChoice>& choice, const Watch& watch, Gathered* all) {
+  PageTables& tables = all->tables;
+  if (!choice.has_value()) {
+    Result<FullTimes> full = TimeFull(opener, clips, tables.runs, tables.threads, watch);
+    if (!full.ok()) return full.status();
+    tables.full = std::move(*full);
+    all->clips.full_us = tables.full.frame_us;
+    return Status();
+  }
+  BenchOptions options;
+  options.runs = tables.runs, options.threads = tables.threads;
+  Result<std::vector<BenchResult>> bench = RunBench(opener, {*choice}, clips, options, watch);
+  if (!bench.ok()) return bench.status();
+  all->bench = std::move(*bench);
+  all->clips.bench = tables.bench = &all->bench.front();
+  return Status();
+}
+
+// What is left out is added to the notes.
+Result<PageData> Fill(const Rig& rig, Gathered* all, const Watch& watch, std::vector<std::string>* notes) {
+  const RigSurvey& survey = all->survey;
+  PageTables& tables = all->tables;
+  PageData page;
+  PutRigNames(rig, &page);
+  page.Put("made", PageText(Today()));
+  PutMeshes(rig, survey.rest, &page);
+  KPSA_RETURN_IF_ERROR(PutClips(all->clips, survey.rest, watch, &page));
+  PutControls(rig, &page, survey.reaches);
+  if (survey.reaches.empty() && !rig.controls.empty())
+    notes->push_back(fmt::format("{}: what each moves is measured of at most {}",
+                                 Plural(rig.controls.size(), "control"), kMostReaches));
+  PutCues(survey.cues, &page);
+  const std::vector<BenchNode> none;
+  const bool accelerated = tables.bench != nullptr;
+  PutNodes(survey.nodes, accelerated, accelerated ? tables.bench->full_nodes : tables.full.nodes,
+           accelerated ? tables.bench->accelerated_nodes : none, &page);
+  if (!PutFieldBlobs(rig, &page))
+    notes->push_back(
+        fmt::format("more than {} joints and deformers: their weights are not in the page", kMostFieldBlobs));
+  tables.notes = *notes;
+  tables.applied = survey.applied;
+  tables.points = survey.rest.size() / 3;
+  PutTables(tables, &page);
+  return page;
 }
 
 std::string HeavyText(const PageHtml& html) {
@@ -132,61 +205,25 @@ CommandResult WritePage(const PageFlags& flags) {
   const std::vector<std::string> names = ClipsOf(flags, rig);
 
   const InterruptScope interruptible;
-  Progress progress("report: controls", 0, flags.quiet);
+  Progress progress("report", 0, flags.quiet);
   const Watch watch = progress.watch();
   const RigOpener opener = OpenerOf(flags);
-  Result<RigSurvey> survey = SurveyRig(opener, RestOpener(flags), names.front(), choice, watch);
-  if (!survey.ok()) return survey.status();
-  for (const AppliedSubspace& one : survey->applied) {
-    if (one.subspace->of_light())
-      return Status::Usage("\"{}\" accelerates light, which a page does not show", one.name).At({one.path});
-  }
+  Gathered all;
+  all.tables.runs = *runs, all.tables.threads = std::max(1, *threads);
+  progress.SetLabel("report: controls", 0);
+  KPSA_RETURN_IF_ERROR(Survey(opener, RestOpener(flags), names.front(), choice, watch, &all));
   progress.SetLabel("report: timing, frames", 0);
-  PageTables tables;
-  tables.runs = *runs, tables.threads = std::max(1, *threads), tables.points = survey->rest.size() / 3;
-  PageClips clips;
-  std::vector<BenchResult> results;
-  if (choice.has_value()) {
-    BenchOptions options;
-    options.runs = tables.runs, options.threads = tables.threads;
-    Result<std::vector<BenchResult>> bench = RunBench(opener, {*choice}, names, options, watch);
-    if (!bench.ok()) return bench.status();
-    results = std::move(*bench);
-    clips.bench = tables.bench = &results.front();
-  } else {
-    Result<FullTimes> full = TimeFull(opener, names, tables.runs, tables.threads, watch);
-    if (!full.ok()) return full.status();
-    clips.full_us = full->frame_us;
-    tables.full = std::move(*full);
-  }
+  KPSA_RETURN_IF_ERROR(Time(opener, names, choice, watch, &all));
   progress.SetLabel("report: points, frames", 0);
   for (const std::string& name : names) {
     Result<ClipRecord> record = RecordClip(opener, name, {choice, *threads, watch});
     if (!record.ok()) return record.status();
-    clips.records.push_back(std::move(*record));
+    all.clips.records.push_back(std::move(*record));
   }
   progress.SetLabel("report: shape, modes", 0);
-  PageData page;
-  PutRigNames(rig, &page);
-  page.Put("made", PageText(Today()));
-  PutMeshes(rig, survey->rest, &page);
-  KPSA_RETURN_IF_ERROR(PutClips(clips, survey->rest, watch, &page));
-  PutControls(rig, &page, survey->reaches);
-  if (survey->reaches.empty() && !rig.controls.empty())
-    notes.push_back(fmt::format("{}: what each moves is measured of at most {}",
-                                Plural(rig.controls.size(), "control"), kMostReaches));
-  PutCues(survey->cues, &page);
-  const std::vector<BenchNode> none;
-  PutNodes(survey->nodes, choice.has_value(),
-           choice.has_value() ? results.front().full_nodes : tables.full.nodes,
-           choice.has_value() ? results.front().accelerated_nodes : none, &page);
-  if (!PutFieldBlobs(rig, &page))
-    notes.push_back(
-        fmt::format("more than {} joints and deformers: their weights are not in the page", kMostFieldBlobs));
-  tables.notes = notes;
-  tables.applied = std::move(survey->applied);
-  PutTables(tables, &page);
-  const Result<PageHtml> html = MakePageHtml(ViewerPage(), page);
+  const Result<PageData> page = Fill(rig, &all, watch, &notes);
+  if (!page.ok()) return page.status();
+  const Result<PageHtml> html = MakePageHtml(ViewerPage(), *page);
   if (!html.ok()) return html.status();
   progress.Clear();
   if (Interrupted()) return InterruptedStatus();
