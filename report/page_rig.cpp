@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/version.h"
+#include "report/json_text.h"
 
 namespace kpsa::engine {
 namespace {
@@ -15,8 +16,8 @@ std::string Text(const Json& json) { return json.dump(-1, ' ', false, Json::erro
 
 std::string FileName(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
-// A number as JSON has them: none for one that is not finite.
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+// -30, and not what degrees become on their way through radians.
+Json Number(double value) { return RoundedJson<Json>(value, 12); }
 
 const char* KindOf(Type type) {
   return type == Type::kBool ? "switch" : type == Type::kDouble ? "number" : "integer";

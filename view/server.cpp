@@ -80,14 +80,17 @@ struct Server::Impl {
         std::string body;
         bool large = false;
         // However it is encoded, no more than this is kept
-        read([&](const char* data, std::size_t size) {
+        const bool whole = read([&](const char* data, std::size_t size) {
           large = large || body.size() + size > kMaxBody;
           if (!large) body.append(data, size);
           return !large;
         });
-        Send(large ? Refusal(413, Status::Usage("expected at most {} bytes", kMaxBody))
-                   : AnswerPost(session, request.path, body),
-             &response);
+        if (large || response.status == 413)
+          Send(Refusal(413, Status::Usage("expected at most {} bytes", kMaxBody)), &response);
+        else if (!whole)
+          Send(Refusal(400, Status::Usage("the request has no end")), &response);
+        else
+          Send(AnswerPost(session, request.path, body), &response);
       });
     }
     // What the library refuses itself, and what escapes

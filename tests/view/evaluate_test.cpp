@@ -199,8 +199,8 @@ TEST(LiveEvaluate, RefusesWhatIsNoRequest) {
   has(problem("{\"mode\": \"none\"}"), "mode");
   has(problem(std::string(100'000, '[')), "nested");
   has(problem("{\"set\": " + std::string(400'000, '{')), "nested");
-  const Json nearest = live->Post("/evaluate", "{\"set\": {\"upper.rotatZ\": 3}}").json();
-  EXPECT_EQ(nearest["problems"][0]["suggestion"], "did you mean \"rotateZ\"?") << nearest.dump();
+  const Json nearest = live->Post("/evaluate", "{\"set\": {\"mush.envelop\": 1}}").json();
+  EXPECT_EQ(nearest["problems"][0]["suggestion"], "did you mean \"envelope\"?") << nearest.dump();
   EXPECT_EQ(live->Evaluate(Asked{}.Request("full")).facts["id"], 7);
 }
 

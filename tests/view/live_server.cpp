@@ -137,7 +137,7 @@ nlohmann::json LiveServer::WaitFor(const std::function<bool(const nlohmann::json
   return state;
 }
 
-std::string SendRaw(int port, const std::string& bytes) {
+std::string SendRaw(int port, const std::string& bytes, bool ends) {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address = {};
   address.sin_family = AF_INET;
@@ -150,7 +150,7 @@ std::string SendRaw(int port, const std::string& bytes) {
       if (sent <= 0) break;
       at += static_cast<std::size_t>(sent);
     }
-    ::shutdown(socket, SHUT_WR);
+    if (ends) ::shutdown(socket, SHUT_WR);
     char buffer[4096];
     for (ssize_t got; (got = ::recv(socket, buffer, sizeof(buffer), 0)) > 0;)
       answer.append(buffer, static_cast<std::size_t>(got));

@@ -66,7 +66,8 @@ class LiveServer {
   std::thread thread_;
 };
 
-// Bytes as they are, over a connection of their own; what came back.
-std::string SendRaw(int port, const std::string& bytes);
+// Bytes as they are, over a connection of their own; what came back until the server closed it. `ends`: no more will come,
+// which the server is told.
+std::string SendRaw(int port, const std::string& bytes, bool ends = false);
 
 }  // namespace kpsa::engine

@@ -35,7 +35,7 @@ TEST(LiveEdits, ABrokenOneIsToldAndAMendedOneIsShown) {
   const Json& problem = broken["problems"][0];
   EXPECT_EQ(problem["file"], live->rig());
   EXPECT_EQ(problem["line"], 8);
-  EXPECT_EQ(problem["column"], 26) << problem.dump();
+  EXPECT_EQ(problem["column"], 27) << problem.dump();
   EXPECT_EQ(problem["severity"], "error");
   EXPECT_NE(problem["message"].get<std::string>().find("iteration"), std::string::npos) << problem.dump();
   EXPECT_EQ(problem["suggestion"], "did you mean \"iterations\"?") << problem.dump();
