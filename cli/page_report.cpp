@@ -26,7 +26,6 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kHeavyBytes = 16 << 20;  // of a page that is warned about
-constexpr std::size_t kNamedParts = 4;         // in that warning
 
 // The clips of the flags; without them the test clips, and without these what the rig plays ("").
 std::vector<std::string> ClipsOf(const PageFlags& flags, const Rig& rig) {
@@ -153,14 +152,6 @@ Result<PageData> Fill(const Rig& rig, Gathered* all, const Watch& watch, std::ve
   return page;
 }
 
-std::string HeavyText(const PageHtml& html) {
-  std::vector<std::string> parts;
-  for (std::size_t i = 0; i < std::min(kNamedParts, html.parts.size()); ++i)
-    parts.push_back(fmt::format("{} {}", html.parts[i].name, ByteText(html.parts[i].bytes)));
-  return fmt::format("warning: the page has {}: {}, ...; fewer clips (--clip) make it smaller",
-                     ByteText(html.text.size()), fmt::join(parts, ", "));
-}
-
 // What was written, to stdout unless that is the page.
 void PrintSizes(const PageFlags& flags, const PageHtml& html, double seconds) {
   if (flags.json) {
@@ -212,14 +203,14 @@ CommandResult WritePage(const PageFlags& flags) {
   all.tables.runs = *runs, all.tables.threads = std::max(1, *threads);
   progress.SetLabel("report: controls", 0);
   KPSA_RETURN_IF_ERROR(Survey(opener, RestOpener(flags), names.front(), choice, watch, &all));
-  progress.SetLabel("report: timing, frames", 0);
-  KPSA_RETURN_IF_ERROR(Time(opener, names, choice, watch, &all));
   progress.SetLabel("report: points, frames", 0);
   for (const std::string& name : names) {
     Result<ClipRecord> record = RecordClip(opener, name, {choice, *threads, watch});
     if (!record.ok()) return record.status();
     all.clips.records.push_back(std::move(*record));
   }
+  progress.SetLabel("report: timing, frames", 0);
+  KPSA_RETURN_IF_ERROR(Time(opener, names, choice, watch, &all));
   progress.SetLabel("report: shape, modes", 0);
   const Result<PageData> page = Fill(rig, &all, watch, &notes);
   if (!page.ok()) return page.status();
@@ -233,7 +224,7 @@ CommandResult WritePage(const PageFlags& flags) {
   for (const std::string& note : notes) {
     if (!flags.quiet) Say("note: " + note);
   }
-  if (html->text.size() > kHeavyBytes) Say(HeavyText(*html));
+  if (const std::string note = HeavyNote(*html, kHeavyBytes); !note.empty()) Say("warning: " + note);
   return 0;
 }
 

@@ -1,12 +1,14 @@
 #include "report/page_html.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <cstdint>
 
 #include "base/check.h"
+#include "base/quantity_text.h"
 #include "report/viewer_page.h"
 
 namespace kpsa::engine {
@@ -46,6 +48,16 @@ std::string JsonInHtml(std::string_view json) {
     }
   }
   return text;
+}
+
+std::string HeavyNote(const PageHtml& html, std::size_t most) {
+  constexpr std::size_t kNamed = 4;
+  if (html.text.size() <= most) return "";
+  std::vector<std::string> parts;
+  for (std::size_t i = 0; i < std::min(kNamed, html.parts.size()); ++i)
+    parts.push_back(fmt::format("{} {}", html.parts[i].name, ByteText(html.parts[i].bytes)));
+  return fmt::format("the page has {}: {}, ...; fewer clips (--clip) make it smaller",
+                     ByteText(html.text.size()), fmt::join(parts, ", "));
 }
 
 Result<PageHtml> MakePageHtml(std::string_view viewer, const PageData& data) {

@@ -26,6 +26,8 @@ struct PageHtml {
   std::string text;
   std::vector<Part> parts;  // the largest first; they sum to the text
 };
+// Of a page of more than `most` bytes: its size, and its largest parts; else "".
+std::string HeavyNote(const PageHtml& html, std::size_t most);
 // Errors: `viewer` has not one placeholder alone on its line.
 Result<PageHtml> MakePageHtml(std::string_view viewer, const PageData& data);
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr char kViewer[] = "<html>\n<!--kpsa:data-->\n</html>\n";
 
-std::size_t Count(const std::string& text, const std::string& what) {
+std::size_t Occurrences(const std::string& text, const std::string& what) {
   std::size_t count = 0;
   for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
   return count;
@@ -61,9 +61,9 @@ TEST(PageHtml, NamesCannotLeaveTheirElement) {
   const Result<PageHtml> html = MakePageHtml(kViewer, data);
   ASSERT_TRUE(html.ok()) << html.status().ToString();
   // Two elements, of the meta and of the blob, and nothing that begins or ends another
-  EXPECT_EQ(Count(html->text, "<script"), 2u);
-  EXPECT_EQ(Count(html->text, "</script"), 2u);
-  EXPECT_EQ(Count(html->text, "<!--"), 0u);
+  EXPECT_EQ(Occurrences(html->text, "<script"), 2u);
+  EXPECT_EQ(Occurrences(html->text, "</script"), 2u);
+  EXPECT_EQ(Occurrences(html->text, "<!--"), 0u);
   const ReadPage page = ParsePage(html->text);
   ASSERT_EQ(page.error, "");
   EXPECT_EQ(page.meta["title"], evil);
@@ -91,6 +91,17 @@ TEST(PageHtml, KeepsTheViewerAndSaysWhatIsLarge) {
   const ReadPage page = ParsePage(html->text);
   ASSERT_EQ(page.error, "");
   EXPECT_EQ(page.Wholes("large"), std::vector<int>(noise.begin(), noise.end()));
+}
+
+TEST(PageHtml, NamesTheLargestPartsOfAHeavyPage) {
+  PageHtml html;
+  html.text = std::string(5'000'000, 'x');
+  html.parts = {
+      {"basis", 3'000'000}, {"rows", 1'000'000}, {"viewer", 600'000}, {"meta", 300'000}, {"rest", 100'000}};
+  EXPECT_EQ(HeavyNote(html, 5'000'000), "");
+  const std::string note = HeavyNote(html, 4'999'999);
+  EXPECT_NE(note.find("5 MB: basis 3 MB, rows 1 MB, viewer 600 KB, meta 300 KB, ..."), std::string::npos)
+      << note;
 }
 
 TEST(PageHtml, RefusesAViewerWithoutOnePlace) {
