@@ -1,6 +1,5 @@
 #include "report/page_rig.h"
 
-#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
