@@ -14,8 +14,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// At this one about half the frames of "wave" hit.
-constexpr char kTolerance[] = "0.1mm";
+// At this one some frames of "wave" hit, some miss, and a few are blends.
+constexpr char kTolerance[] = "0.12mm";
 
 class PageReport : public ::testing::Test {
  protected:
@@ -72,8 +72,8 @@ TEST_F(PageReport, HasThePositionsOfEval) {
   ASSERT_EQ(full.size(), accelerated.size());
   ASSERT_TRUE(clip["residual"].contains("rows")) << "no frame is a miss";
   const double precision = page.meta["shape"]["precision"], step = clip["residual"]["step"];
-  EXPECT_LE(precision, 1e-5);
-  EXPECT_LE(step, 1e-4 / 16);
+  EXPECT_LE(precision, 0.12e-3 / 10);
+  EXPECT_LE(step, 0.12e-3 / 16);
   const std::vector<int> residual = page.Wholes(clip["residual"]["blob"]);
   const std::vector<int> rows = clip["residual"]["rows"];
   double farthest = 0, off = 0, moved = 0;
