@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::json;
 
 // At this one some frames of "wave" hit, some miss, and a few are blends.
-constexpr char kTolerance[] = "0.12mm";
+constexpr char kPageTolerance[] = "0.12mm";
 
 class PageReport : public ::testing::Test {
  protected:
@@ -60,13 +60,13 @@ class PageReport : public ::testing::Test {
   static inline HelloFolder* folder_ = nullptr;
 };
 
-double Distance(const double* a, const float* b) {
+double PageDistance(const double* a, const float* b) {
   return std::hypot(a[0] - double{b[0]}, a[1] - double{b[1]}, a[2] - double{b[2]});
 }
 
 TEST_F(PageReport, HasThePositionsOfEval) {
-  const ReadPage page = PageOf(folder_->rig(), {"--tolerance", kTolerance});
-  const auto full = Eval({}), accelerated = Eval({"--accelerate", "--tolerance", kTolerance});
+  const ReadPage page = PageOf(folder_->rig(), {"--tolerance", kPageTolerance});
+  const auto full = Eval({}), accelerated = Eval({"--accelerate", "--tolerance", kPageTolerance});
   const Json& clip = page.meta["clips"][0];
   ASSERT_EQ(clip["frames"], full.size());
   ASSERT_EQ(full.size(), accelerated.size());
@@ -83,7 +83,7 @@ TEST_F(PageReport, HasThePositionsOfEval) {
     EXPECT_EQ(row < 0, full[f] == accelerated[f]) << f;
     double largest = 0;
     for (std::size_t v = 0; v < positions.size(); v += 3) {
-      farthest = std::max(farthest, Distance(&positions[v], &accelerated[f][v]));
+      farthest = std::max(farthest, PageDistance(&positions[v], &accelerated[f][v]));
       double exact[3];
       for (std::size_t c = 0; c < 3; ++c) {
         const double difference = double{full[f][v + c]} - double{accelerated[f][v + c]};
@@ -93,7 +93,7 @@ TEST_F(PageReport, HasThePositionsOfEval) {
         exact[c] = difference;
       }
       largest = std::max(largest, std::hypot(exact[0], exact[1], exact[2]));
-      moved = std::max(moved, Distance(&positions[v], &full[0][v]));
+      moved = std::max(moved, PageDistance(&positions[v], &full[0][v]));
     }
     EXPECT_NEAR(clip["max_error"][f].get<double>(), largest, 1e-6 * largest + 1e-12) << f;
   }
@@ -103,9 +103,9 @@ TEST_F(PageReport, HasThePositionsOfEval) {
 }
 
 TEST_F(PageReport, HasTheVerdictsOfBench) {
-  const ReadPage page = PageOf(folder_->rig(), {"--tolerance", kTolerance});
+  const ReadPage page = PageOf(folder_->rig(), {"--tolerance", kPageTolerance});
   const ProcessResult run =
-      RunKpsa({"bench", folder_->rig(), "--tolerance", kTolerance, "--runs", "1", "--json"});
+      RunKpsa({"bench", folder_->rig(), "--tolerance", kPageTolerance, "--runs", "1", "--json"});
   const Json bench = Json::parse(run.out), &clip = page.meta["clips"][0];
   ASSERT_EQ(bench["per_frame"].size(), clip["frames"]);
   const std::vector<std::string> names = {"hit", "blend", "miss"};
@@ -187,7 +187,8 @@ TEST_F(PageReport, ShowsTheFullEvaluationAloneWithoutASubspace) {
   for (const std::size_t f : {std::size_t{0}, full.size() / 2}) {
     const std::vector<double> positions = page.Positions(f);
     for (std::size_t v = 0; v < positions.size(); v += 3)
-      ASSERT_LE(Distance(&positions[v], &full[f][v]), page.meta["shape"]["precision"].get<double>() + 1e-6);
+      ASSERT_LE(PageDistance(&positions[v], &full[f][v]),
+                page.meta["shape"]["precision"].get<double>() + 1e-6);
   }
   // A character alone is a rig, too
   const ProcessResult character = Report(untrained / "hello.glb", untrained / "glb.html", {"-q"});
