@@ -102,7 +102,16 @@ export class App {
     } else {
       showReportFrames(context);
     }
+    this.insetOf(this.overlay.firstElementChild!, scope);
     if (!before) this.viewport.fit(new Vector3(0.45, 0.16, 1));
+  }
+
+  private insetOf(toolbar: Element, scope: Scope): void {
+    const measure = (): void => this.viewport.setInset(toolbar.clientHeight + 12);
+    const watch = new ResizeObserver(() => requestAnimationFrame(measure));
+    watch.observe(toolbar);
+    scope.add(() => watch.disconnect());
+    measure();
   }
 
   private layPanels(context: Context, first: string): void {

@@ -64,13 +64,15 @@ export class Chart {
     const font = '11px system-ui, sans-serif';
     const xText = options.xText ?? number, yText = options.yText ?? number;
     const yWidth = (_: uPlot, values: string[] | null): number => 16 + 6.5 * Math.max(2, ...(values ?? []).map((v) => v?.length ?? 0));
+    // bars stand about their x: the first and the last need room
+    const bars = options.lines.some((line) => line.bars), room = bars && options.x.length > 1 ? (options.x[1] - options.x[0]) / 2 : 0;
     this.plot = new uPlot({
       width, height: options.height ?? 170,
       padding: [8, 10, 0, 0],
       cursor: {y: false, points: {size: 6}},
       legend: {live: true},
       scales: {
-        x: {time: false, distr: options.logX ? 3 : 1},
+        x: {time: false, distr: options.logX ? 3 : 1, ...bars ? {range: (_: uPlot, low: number, high: number): [number, number] => [low - room, high + room]} : {}},
         y: options.logY ? {distr: 3, log: 10} : {range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(1e-12, (high ?? 1) * 1.08)]},
       },
       axes: [

@@ -1,7 +1,7 @@
 // Controls: sliders (live), or the list of what there is and what each moves (report).
 import type {Context} from '../context';
 import type {ControlInfo} from '../data/meta';
-import {button, h} from './dom';
+import {button, h, setPressed} from './dom';
 import {number} from './format';
 import {makePoseRow} from './pose_files';
 
@@ -53,12 +53,14 @@ const title = (info: ControlInfo): string =>
   [info.name, info.min !== null && info.min !== undefined && info.max !== null && info.max !== undefined && `${number(info.min)} to ${number(info.max)} ${info.unit ?? ''}`]
     .filter(Boolean).join(', ');
 
-function movesButton({store}: Context, info: ControlInfo): HTMLElement | null {
+function movesButton({store, scope}: Context, info: ControlInfo): HTMLElement | null {
   if (!info.moves) return null;
-  return button('Moves', () => {
+  const made = button('Moves', () => {
     const {paint} = store.now, same = paint?.kind === 'moves' && paint.name === info.name;
     store.set(same ? {paint: null} : {paint: {kind: 'moves', name: info.name}, mode: store.now.mode === 'difference' ? 'full' : store.now.mode});
-  }, {title: `Colour what ${info.name} moves`, class: 'quiet'});
+  }, {title: `Colour what ${info.name} moves`, class: 'quiet', pressed: false});
+  scope.add(store.on(['paint'], ({paint}) => setPressed(made, paint?.kind === 'moves' && paint.name === info.name)));
+  return made;
 }
 
 function plainRow(context: Context, info: ControlInfo): Row {

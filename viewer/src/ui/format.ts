@@ -6,7 +6,7 @@ export function number(value: number): string {
   if (!Number.isFinite(value)) return '-';
   const size = Math.abs(value);
   if (size === 0) return '0';
-  if (size >= 1e6 || size < 1e-4) return value.toExponential(1);
+  if (size >= 1e6 || size < 9.9e-5) return value.toExponential(1);
   if (size >= 100) return Math.round(value).toLocaleString('en-US');
   return String(Number(value.toPrecision(3)));
 }

@@ -2,11 +2,11 @@
 import type {Model} from '../data/model';
 
 export interface Histogram {
-  x: number[];       // the upper ends of the bins, metres
+  x: number[];       // the middles of the bins, metres
   share: number[];   // of all points of all frames
 }
 
-const bins = 40;
+const mostBins = 40;
 
 /** Of all points of all frames of a residual, in bins up to its largest error. */
 export function residualHistogram(values: Int8Array | Int16Array, step: number): Histogram {
@@ -15,7 +15,8 @@ export function residualHistogram(values: Int8Array | Int16Array, step: number):
     const square = values[i] * values[i] + values[i + 1] * values[i + 1] + values[i + 2] * values[i + 2];
     if (square > most) most = square;
   }
-  const top = Math.max(1e-9, Math.sqrt(most)), count = new Float64Array(bins);
+  // at least a step wide, or bins between two steps would be empty
+  const top = Math.max(1e-9, Math.sqrt(most)), bins = Math.min(mostBins, Math.max(1, Math.floor(top))), count = new Float64Array(bins);
   for (let i = 0; i < values.length; i += 3) {
     const size = Math.hypot(values[i], values[i + 1], values[i + 2]);
     ++count[Math.min(bins - 1, Math.floor(size / top * bins))];
@@ -26,7 +27,7 @@ export function residualHistogram(values: Int8Array | Int16Array, step: number):
 
 /** Of the largest errors of frames. */
 export function frameHistogram(errors: readonly (number | null)[]): Histogram {
-  const known = errors.filter((e): e is number => e !== null), top = Math.max(1e-9, ...known), count = new Float64Array(bins);
+  const known = errors.filter((e): e is number => e !== null), top = Math.max(1e-9, ...known), bins = mostBins, count = new Float64Array(bins);
   for (const e of known) ++count[Math.min(bins - 1, Math.floor(e / top * bins))];
   return {x: Array.from(count, (_, i) => (i + 0.5) / bins * top), share: Array.from(count, (n) => n / Math.max(1, known.length))};
 }

@@ -16,6 +16,7 @@ export class Viewport {
   onDrawn: (() => void) | null = null;
   private readonly scene = new Scene();
   private pending = 0;
+  private inset = 0;  // pixels at the top that the toolbar covers
   private centre = new Vector3();
   private radius = 1;
 
@@ -50,13 +51,19 @@ export class Viewport {
     this.invalidate();
   }
 
+  /** Keeps the middle of the picture below what covers its top. */
+  setInset(pixels: number): void {
+    this.inset = pixels;
+    this.resize();
+  }
+
   private resize(): void {
     const {clientWidth: width, clientHeight: height} = this.parent;
     if (!width || !height) return;
     this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.camera.setViewOffset(width, height, 0, -this.inset / 2, width, height);
     this.invalidate();
   }
 
@@ -68,7 +75,8 @@ export class Viewport {
     this.radius = Math.max(1e-4, box.getSize(new Vector3()).length() / 2);
     const towards = direction ?? this.camera.position.clone().sub(this.controls.target);
     if (towards.lengthSq() < 1e-12) towards.set(0, 0, 1);
-    const half = Math.tan(this.camera.fov * Math.PI / 360) * Math.min(1, this.camera.aspect);
+    const {clientWidth: width, clientHeight: height} = this.parent;
+    const half = Math.tan(this.camera.fov * Math.PI / 360) * Math.min(Math.max(0.3, 1 - this.inset / Math.max(1, height)), width / Math.max(1, height) || 1);
     this.controls.target.copy(this.centre);
     this.camera.position.copy(this.centre).addScaledVector(towards.normalize(), this.radius / Math.sin(Math.atan(half)) * 0.98);
     this.camera.near = this.radius / 100;
