@@ -37,5 +37,6 @@ void AddCompareCommand(CLI::App* program, Command* chosen);
 void AddGraphCommand(CLI::App* program, Command* chosen);
 void AddNodesCommand(CLI::App* program, Command* chosen);
 void AddWeightsCommand(CLI::App* program, Command* chosen);
+void AddHelpCommand(CLI::App* program, Command* chosen);
 
 }  // namespace kpsa::engine
