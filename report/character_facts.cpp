@@ -10,7 +10,7 @@
 namespace kpsa::engine {
 namespace {
 
-FactTable::Cell Count(std::size_t count) { return static_cast<std::uint64_t>(count); }
+FactTable::Cell Whole(std::size_t count) { return static_cast<std::uint64_t>(count); }
 
 std::string Named(const std::string& name, const char* what, Index index) {
   return name.empty() ? fmt::format("{}{}", what, index) : name;
@@ -40,7 +40,7 @@ FactTable TreeFacts(const gltf::Character& character) {
       open.push_back({*child, depth + 1});
     tree.depths.push_back(depth);
     tree.rows.push_back(
-        {names[n], Count(n),
+        {names[n], Whole(n),
          node.mesh == kNoIndex ? "" : Named(character.meshes[node.mesh].name, "mesh", node.mesh),
          joint_of[n]});
   }
@@ -55,7 +55,7 @@ FactTable MorphFacts(const gltf::Character& character) {
     const gltf::Mesh& mesh = character.meshes[node.mesh];
     const std::vector<double>& weights = node.weights.empty() ? mesh.weights : node.weights;
     for (Index t = 0; t < mesh.targets.size(); ++t) {
-      morphs.rows.push_back({names[n], Count(t), mesh.targets[t].name, Count(mesh.targets[t].vertices.size()),
+      morphs.rows.push_back({names[n], Whole(t), mesh.targets[t].name, Whole(mesh.targets[t].vertices.size()),
                              t < weights.size() ? weights[t] : 0.0});
     }
   }
@@ -73,7 +73,7 @@ FactTable MaterialFacts(const gltf::Character& character) {
       }
     }
     const auto& c = character.materials[m].base_color;
-    materials.rows.push_back({MaterialName(character, m), Count(m), Count(primitives), Count(vertices),
+    materials.rows.push_back({MaterialName(character, m), Whole(m), Whole(primitives), Whole(vertices),
                               fmt::format("{:.3g} {:.3g} {:.3g}", c[0], c[1], c[2])});
   }
   return materials;
@@ -94,7 +94,7 @@ Result<FileFacts> VerticesFacts(const Rig& rig, const std::string& name) {
   FactTable meshes{"meshes", {"mesh", ">count", "vertices"}, {}};
   for (const MeshVertices& one : found->meshes) {
     meshes.rows.push_back(
-        {rig.scene.meshes[one.mesh].name, Count(one.vertices.size()), RangesText(one.vertices)});
+        {rig.scene.meshes[one.mesh].name, Whole(one.vertices.size()), RangesText(one.vertices)});
   }
   facts.tables = {std::move(meshes)};
   return facts;
@@ -106,7 +106,7 @@ Result<FileFacts> NearestFacts(const Rig& rig, Double3 place) {
   FileFacts facts;
   facts.kind = "nearest vertex";
   facts.facts = {{"mesh", rig.scene.meshes[nearest->mesh].name},
-                 {"vertex", Count(nearest->vertex)},
+                 {"vertex", Whole(nearest->vertex)},
                  {"distance metres", nearest->distance}};
   for (int k = 0; k < 3; ++k) facts.facts.emplace_back(std::string(1, "xyz"[k]), nearest->at[k]);
   return facts;

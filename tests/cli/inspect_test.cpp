@@ -14,19 +14,19 @@ namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
-const std::string kFace = KPSA_SCENES_DIR "/face/face.yaml";
-const std::string kFaceGlb = KPSA_SCENES_DIR "/face/face.glb";
+const std::string kFaceYaml = KPSA_SCENES_DIR "/face/face.yaml";
+const std::string kFaceModel = KPSA_SCENES_DIR "/face/face.glb";
 
-std::string Ok(std::vector<std::string> arguments) {
+std::string InspectText(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "inspect");
   const ProcessResult run = RunKpsa(arguments);
   EXPECT_EQ(run.exit_code, 0) << run.err;
   return run.out;
 }
 
-Json OkJson(std::vector<std::string> arguments) {
+Json FactsOf(std::vector<std::string> arguments) {
   arguments.push_back("--json");
-  return Json::parse(Ok(arguments), nullptr, false);
+  return Json::parse(InspectText(arguments), nullptr, false);
 }
 
 Json RowOf(const Json& rows, const std::string& key, const std::string& value) {
@@ -38,14 +38,14 @@ Json RowOf(const Json& rows, const std::string& key, const std::string& value) {
 
 TEST(Inspect, TheTreeOfACharacterWithItsJoints) {
   for (const std::string& file : {kHelloGlb, kHello}) {
-    const Json facts = OkJson({file});
+    const Json facts = FactsOf({file});
     const Json lower = RowOf(facts["tree"], "node", "lower"), upper = RowOf(facts["tree"], "node", "upper");
     ASSERT_FALSE(upper.empty()) << facts.dump(1);
     EXPECT_EQ(upper["depth"].get<int>(), lower["depth"].get<int>() + 1);
     EXPECT_NE(upper["joint_of"], "");
     EXPECT_NE(RowOf(facts["tree"], "node", "column")["mesh"], "");
     // Children stand further to the right than their parents
-    const std::string text = Ok({file});
+    const std::string text = InspectText({file});
     const auto column_of = [&](const std::string& name) {
       const std::size_t at = text.find(name + " ", text.find("tree ("));
       return at - text.rfind('\n', at);
@@ -55,11 +55,11 @@ TEST(Inspect, TheTreeOfACharacterWithItsJoints) {
 }
 
 TEST(Inspect, ClipsInFramesMorphTargetsAndMaterials) {
-  const Json clip = OkJson({kHelloGlb})["clips"][0];
+  const Json clip = FactsOf({kHelloGlb})["clips"][0];
   EXPECT_EQ(clip["frames"], std::lround(clip["seconds"].get<double>() * 24) + 1);
-  const Json twice = OkJson({kHelloGlb, "--fps", "48"})["clips"][0];
+  const Json twice = FactsOf({kHelloGlb, "--fps", "48"})["clips"][0];
   EXPECT_EQ(twice["frames"], std::lround(clip["seconds"].get<double>() * 48) + 1);
-  const Json face = OkJson({kFaceGlb});
+  const Json face = FactsOf({kFaceModel});
   ASSERT_FALSE(face["morph_targets"].empty());
   EXPECT_GT(face["morph_targets"][0]["vertices"], 0);
   EXPECT_EQ(face["morph_targets"][0]["index"], 0);
@@ -78,7 +78,7 @@ TEST(Inspect, TheVertexNearestToAPlace) {
   const std::size_t v = 37;
   const std::string place = fmt::format("{},{},{}", xyz[3 * v] + 0.0001f, xyz[3 * v + 1], xyz[3 * v + 2]);
   for (const std::string& file : {kHelloGlb, kHello}) {
-    const Json near = OkJson({file, "--nearest", place});
+    const Json near = FactsOf({file, "--nearest", place});
     ASSERT_EQ(near["mesh"], "column");
     const auto found = near["vertex"].get<std::size_t>();
     for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(xyz[3 * found + k], xyz[3 * v + k], 1e-6);
@@ -88,7 +88,7 @@ TEST(Inspect, TheVertexNearestToAPlace) {
 }
 
 TEST(Inspect, TheVerticesOfJointsAndMaterialsAreThoseOfRigFiles) {
-  const Json joint = OkJson({kHelloGlb, "--vertices-of", "upper"});
+  const Json joint = FactsOf({kHelloGlb, "--vertices-of", "upper"});
   EXPECT_EQ(joint["kind"], "vertices of a joint");
   const std::string ranges = joint["meshes"][0]["vertices"];
   EXPECT_NE(ranges.find(':'), std::string::npos) << ranges;
@@ -104,8 +104,8 @@ TEST(Inspect, TheVerticesOfJointsAndMaterialsAreThoseOfRigFiles) {
     listed += last - first + 1;
   }
   EXPECT_EQ(joint["meshes"][0]["count"], listed);
-  const Json face = OkJson({kFaceGlb});
-  const Json material = OkJson({kFace, "--vertices-of", face["materials_used"][0]["material"]});
+  const Json face = FactsOf({kFaceModel});
+  const Json material = FactsOf({kFaceYaml, "--vertices-of", face["materials_used"][0]["material"]});
   EXPECT_EQ(material["kind"], "vertices of a material");
   int count = 0;
   for (const Json& mesh : material["meshes"]) count += mesh["count"].get<int>();
