@@ -200,7 +200,7 @@ TEST(LiveEvaluate, RefusesWhatIsNoRequest) {
   has(problem(std::string(100'000, '[')), "nested");
   has(problem("{\"set\": " + std::string(400'000, '{')), "nested");
   const Json nearest = live->Post("/evaluate", "{\"set\": {\"mush.envelop\": 1}}").json();
-  EXPECT_EQ(nearest["problems"][0]["suggestion"], "did you mean \"envelope\"?") << nearest.dump();
+  has(nearest["problems"][0]["suggestion"], "did you mean \"envelope\"");
   EXPECT_EQ(live->Evaluate(Asked{}.Request("full")).facts["id"], 7);
 }
 
