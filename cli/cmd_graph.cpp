@@ -7,6 +7,7 @@
 #include "cli/output.h"
 #include "cli/request.h"
 #include "graph/dot.h"
+#include "host/graph_part.h"
 #include "host/rig_frames.h"
 
 namespace kpsa::engine {
@@ -15,7 +16,7 @@ namespace {
 struct GraphFlags : Flags {
   AccelerationFlags acceleration;
   std::vector<std::string> wanted;
-  std::optional<std::string> vertices;
+  std::optional<std::string> vertices, hide, around;
   bool time = false, all = false;
 };
 
@@ -27,6 +28,8 @@ CommandResult DrawGraph(const GraphFlags& flags) {
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(flags);
   if (!open.ok()) return open.status();
   Rig& rig = (*open)->rig;
+  const GraphPart part{SplitNames(flags.hide.value_or("")), flags.around};
+  KPSA_RETURN_IF_ERROR(AsUsage(HiddenNodes(rig, part).status()));
   Compiler compiler;
   const Result<Request> request =
       AcceleratedRequest(&rig, &compiler, flags.acceleration, flags.wanted, flags.vertices);
@@ -47,7 +50,11 @@ CommandResult DrawGraph(const GraphFlags& flags) {
     KPSA_RETURN_IF_ERROR(
         EvaluateTimes(rig, *plan, *times, options, [](std::size_t, const Evaluator&) { return Status(); }));
   }
-  const DotOptions options{flags.time ? &profile : nullptr, frames, flags.all};
+  // A node may have been put in for a subspace, and one that is left out has neighbours, too
+  const Result<std::vector<bool>> hidden = HiddenNodes(rig, part);
+  if (!hidden.ok()) return AsUsage(hidden.status());
+  const DotOptions options{flags.time ? &profile : nullptr, frames, flags.all || flags.around.has_value(),
+                           *hidden};
   KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, DrawDot(*rig.graph, **plan, options)));
   return 0;
 }
@@ -63,7 +70,8 @@ void AddGraphCommand(CLI::App* program, Command* chosen) {
                  "Examples:\n"
                  "  kpsa graph head.yaml | dot -Tsvg > head.svg\n"
                  "  kpsa graph head.yaml --time --clip face_talk -o head.dot\n"
-                 "  kpsa graph head.yaml --accelerate --all -o head.dot",
+                 "  kpsa graph head.yaml --accelerate --all -o head.dot\n"
+                 "  kpsa graph head.yaml --around jaw:2 --hide clips -o jaw.dot",
                  chosen, [flags] { return DrawGraph(*flags); });
   AddRigFlags(command, flags.get());
   AddTimeFlags(command, flags.get());
@@ -75,6 +83,10 @@ void AddGraphCommand(CLI::App* program, Command* chosen) {
             "only some vertices of the wanted meshes, as in 0:99,120");
   AddSwitch(command, "--time", &flags->time, "evaluate the clip and colour by time");
   AddSwitch(command, "--all", &flags->all, "draw the nodes that are left out, too");
+  AddOption(command, "--hide", "KIND,...", &flags->hide,
+            "leave out joints, transforms, clips, or nodes of a type (unitConversion)");
+  AddOption(command, "--around", "NODE[:N]", &flags->around,
+            "only what is within N connections of a node, 1 if not given; nodes that are left out, too");
 }
 
 }  // namespace kpsa::engine

@@ -29,6 +29,7 @@ void AddTrainCommand(CLI::App* program, Command* chosen);
 void AddLearnCommand(CLI::App* program, Command* chosen);
 void AddBenchCommand(CLI::App* program, Command* chosen);
 void AddReportCommand(CLI::App* program, Command* chosen);
+void AddViewCommand(CLI::App* program, Command* chosen);
 void AddCompileCommand(CLI::App* program, Command* chosen);
 void AddProfileCommand(CLI::App* program, Command* chosen);
 void AddExplainCommand(CLI::App* program, Command* chosen);
@@ -36,5 +37,6 @@ void AddCompareCommand(CLI::App* program, Command* chosen);
 void AddGraphCommand(CLI::App* program, Command* chosen);
 void AddNodesCommand(CLI::App* program, Command* chosen);
 void AddWeightsCommand(CLI::App* program, Command* chosen);
+void AddHelpCommand(CLI::App* program, Command* chosen);
 
 }  // namespace kpsa::engine

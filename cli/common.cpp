@@ -30,11 +30,17 @@ void OnInterrupt(int) {
 
 void AddRigFlags(CLI::App* command, Flags* flags) {
   AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf, .vrm)");
+  AddPoseFlags(command, flags, true);
+}
+
+void AddPoseFlags(CLI::App* command, Flags* flags, bool clip) {
   AddRepeated(command, "--set", "PLUG=VALUE", &flags->sets,
               "plug=value in the rig's units, as in jaw.rotateX=-20; may be repeated");
   AddOption(command, "--pose", "FILE", &flags->pose, "a pose file: plugs and their values");
-  AddOption(command, "--clip", "NAME", &flags->clip,
-            "a clip of the character; its first one if none is named");
+  if (clip) {
+    AddOption(command, "--clip", "NAME", &flags->clip,
+              "a clip of the character; its first one if none is named");
+  }
   AddSwitch(command, "--rest", &flags->rest, "no clip: the file's transforms and default weights");
   AddOption(command, "--fps", "N", &flags->fps, "frames a second; the rig's, else 24");
   AddOption(command, "--variant", "NAME", &flags->variant, "a variant of the rig");

@@ -40,8 +40,10 @@ struct Flags {
   bool force = false, quiet = false, json = false;
 };
 
-void AddRigFlags(CLI::App* command, Flags* flags);    // FILE --set --pose --clip --rest --fps
-                                                      // --variant --plugin
+void AddRigFlags(CLI::App* command, Flags* flags);  // FILE --set --pose --clip --rest --fps
+                                                    // --variant --plugin
+void AddPoseFlags(CLI::App* command, Flags* flags,
+                  bool clip);                         // the same without FILE; with or without --clip
 void AddPluginFlag(CLI::App* command, Flags* flags);  // --plugin
 void AddTimeFlags(CLI::App* command, Flags* flags);   // --frames --times
 void AddOutputFlags(CLI::App* command, Flags* flags, const std::string& doc);  // -o --force

@@ -94,6 +94,20 @@ Result<std::vector<double>> ParseTimes(std::string_view text) {
   return times;
 }
 
+Result<Double3> ParsePlace(std::string_view what, std::string_view text) {
+  const std::vector<std::string_view> parts = Split(text, ',');
+  if (parts.size() != 3)
+    return Status::Usage("{} \"{}\": expected X,Y,Z in metres, found {} parts", what, Quote(text),
+                         parts.size());
+  Double3 place;
+  for (int k = 0; k < 3; ++k) {
+    const Result<double> number = ParseNumber(what, parts[static_cast<std::size_t>(k)]);
+    if (!number.ok()) return number.status();
+    place[k] = *number;
+  }
+  return place;
+}
+
 Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view text, Index total) {
   std::vector<Index> indices;
   for (std::string_view part : Split(text, ',')) {

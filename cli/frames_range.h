@@ -22,6 +22,8 @@ Result<int> ParseCount(std::string_view what, std::string_view text, int low, in
 Result<std::vector<std::int64_t>> ParseFrames(std::string_view text);
 // "T,T,...": finite seconds in any order. At most kMaxSamples.
 Result<std::vector<double>> ParseTimes(std::string_view text);
+// "X,Y,Z": three finite numbers, metres.
+Result<Double3> ParsePlace(std::string_view what, std::string_view text);
 // "0:99,120": indices and ranges with both ends, ascending and each once, below `total`.
 Result<std::vector<Index>> ParseIndices(std::string_view what, std::string_view text, Index total);
 

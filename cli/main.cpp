@@ -19,7 +19,7 @@ constexpr char kFirstMinutes[] =
     "  kpsa init  head.glb                 write a starter rig, head.yaml\n"
     "  kpsa train head.yaml                learn a subspace from its clips and controls\n"
     "  kpsa bench head.yaml                full against accelerated: times, errors, hits\n\n"
-    "  kpsa --help lists all commands, kpsa COMMAND --help explains one.\n";
+    "  kpsa --help lists all commands, kpsa help COMMAND (or kpsa COMMAND --help) explains one.\n";
 
 std::vector<std::string> CommandNames(const CLI::App& program) {
   std::vector<std::string> names;
@@ -97,6 +97,7 @@ int Main(int argc, char** argv) {
   AddLearnCommand(&program, &chosen);
   AddBenchCommand(&program, &chosen);
   AddReportCommand(&program, &chosen);
+  AddViewCommand(&program, &chosen);
   AddCompileCommand(&program, &chosen);
   AddProfileCommand(&program, &chosen);
   AddExplainCommand(&program, &chosen);
@@ -104,22 +105,29 @@ int Main(int argc, char** argv) {
   AddGraphCommand(&program, &chosen);
   AddNodesCommand(&program, &chosen);
   AddWeightsCommand(&program, &chosen);
+  AddHelpCommand(&program, &chosen);
+  // `kpsa help eval` is `kpsa eval --help`
+  std::vector<const char*> words(argv, argv + argc);
+  if (argc > 1 && words[1] == std::string_view("help") && (argc == 2 || *words[2] != '-')) {
+    words.erase(words.begin() + 1);
+    words.push_back("--help");
+  }
   program.footer(
       kFirstMinutes +
       std::string("\nExit codes: 0 fine, 1 a check failed, things differ, or "
                   "training would not pay, 2 usage, 3 invalid input, 4 evaluation error, 130 interrupted."));
 
   try {
-    program.parse(argc, argv);
+    program.parse(static_cast<int>(words.size()), words.data());
   } catch (const CLI::Success& success) {
     // `kpsa nosuch --help`: help is given before the word is refused
-    if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty())
-      return UsageError(program, CLI::ExtrasError({argv[1]}),
-                        std::vector<std::string>(argv + 1, argv + argc));
+    if (words[1][0] != '-' && program.get_subcommands().empty())
+      return UsageError(program, CLI::ExtrasError({words[1]}),
+                        std::vector<std::string>(words.begin() + 1, words.end()));
     program.exit(success);
     return FlushOutput().ok() ? 0 : 3;
   } catch (const CLI::ParseError& error) {
-    return UsageError(program, error, std::vector<std::string>(argv + 1, argv + argc));
+    return UsageError(program, error, std::vector<std::string>(words.begin() + 1, words.end()));
   }
   if (chosen == nullptr) {
     Print(kFirstMinutes);

@@ -1,6 +1,5 @@
 #include "gltf/export.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -8,78 +7,12 @@
 
 #include "base/check.h"
 #include "files/file.h"
+#include "gltf/frame_shapes.h"
 
 namespace kpsa::engine {
 namespace {
 
 using json = nlohmann::ordered_json;
-using Matrix = Eigen::MatrixXd;
-
-// frames ~ mean + shapes * weights^T.
-struct Factors {
-  Eigen::VectorXf mean;     // 3V
-  Eigen::MatrixXf shapes;   // 3V x K
-  Eigen::MatrixXf weights;  // T x K, within [-1, 1]
-  double max_residual = 0, square_sum = 0;
-};
-
-// The left singular vectors of `centered` (3V x T), strongest first, through the Gram matrix of its smaller
-// side.
-Matrix SingularVectors(const Matrix& centered, Eigen::Index most) {
-  const bool tall = centered.rows() >= centered.cols();
-  const Matrix gram =
-      tall ? Matrix(centered.transpose() * centered) : Matrix(centered * centered.transpose());
-  const Eigen::SelfAdjointEigenSolver<Matrix> solver(gram);
-  const Eigen::VectorXd values = solver.eigenvalues().reverse();
-  const double floor = values.size() == 0 ? 0 : 1e-14 * std::max(values[0], 0.0);
-  Eigen::Index rank = 0;
-  while (rank < std::min(most, values.size()) && values[rank] > floor) ++rank;
-  Matrix vectors = solver.eigenvectors().rowwise().reverse().leftCols(rank);
-  if (tall) {
-    vectors = centered * vectors;
-    vectors.colwise().normalize();
-  }
-  return vectors;
-}
-
-// The largest distance and the sum of squares of a residual, per vertex.
-void Measure(const Matrix& residual, double* max, double* square_sum) {
-  double largest = 0;
-  for (Eigen::Index t = 0; t < residual.cols(); ++t) {
-    for (Eigen::Index i = 0; i < residual.rows(); i += 3)
-      largest = std::max(largest, residual.block<3, 1>(i, t).squaredNorm());
-  }
-  *max = std::sqrt(largest);
-  *square_sum = residual.squaredNorm();
-}
-
-Factors Factorize(const PointCacheMesh& mesh, std::size_t frame_count, double tolerance, int max_targets) {
-  const auto rows = static_cast<Eigen::Index>(3 * mesh.vertex_count),
-             cols = static_cast<Eigen::Index>(frame_count);
-  const Matrix frames = Eigen::Map<const Eigen::MatrixXf>(mesh.frames.data(), rows, cols).cast<double>();
-  Factors factors;
-  factors.mean = frames.rowwise().mean().cast<float>();
-  Matrix residual = frames.colwise() - factors.mean.cast<double>();
-  const Matrix vectors = SingularVectors(residual, max_targets);
-  factors.shapes.resize(rows, vectors.cols());
-  factors.weights.resize(cols, vectors.cols());
-  Measure(residual, &factors.max_residual, &factors.square_sum);
-  Eigen::Index count = 0;
-  for (; count < vectors.cols() && factors.max_residual > tolerance; ++count) {
-    Eigen::VectorXd weights = residual.transpose() * vectors.col(count);
-    const double scale = weights.cwiseAbs().maxCoeff();
-    if (scale == 0) break;
-    // Subtract what is written, in float32, so that later shapes mend its rounding
-    factors.shapes.col(count) = (vectors.col(count) * scale).cast<float>();
-    factors.weights.col(count) = (weights / scale).cast<float>();
-    residual -=
-        factors.shapes.col(count).cast<double>() * factors.weights.col(count).cast<double>().transpose();
-    Measure(residual, &factors.max_residual, &factors.square_sum);
-  }
-  factors.shapes.conservativeResize(rows, count);
-  factors.weights.conservativeResize(cols, count);
-  return factors;
-}
 
 // The document and its binary chunk while they grow.
 struct Glb {
@@ -119,31 +52,31 @@ struct Glb {
   }
 };
 
-void AddMesh(const PointCacheMesh& mesh, const Factors& factors, int times_accessor, Glb* glb) {
-  json primitive = {{"attributes", {{"POSITION", glb->AddVectors(factors.mean.data(), mesh.vertex_count)}}}};
+void AddMesh(const PointCacheMesh& mesh, const FrameShapes& shapes, int times_accessor, Glb* glb) {
+  json primitive = {{"attributes", {{"POSITION", glb->AddVectors(shapes.rest.data(), mesh.vertex_count)}}}};
   if (mesh.triangles.empty()) {
     primitive["mode"] = 0;
   } else {
     primitive["indices"] = glb->AddAccessor(mesh.triangles.data(), mesh.triangles.size() * 4, 5125, "SCALAR",
                                             mesh.triangles.size());
   }
-  for (Eigen::Index k = 0; k < factors.shapes.cols(); ++k) {
-    const Eigen::VectorXf shape = factors.shapes.col(k);
+  for (Eigen::Index k = 0; k < shapes.shapes.cols(); ++k) {
+    const Eigen::VectorXf shape = shapes.shapes.col(k);
     primitive["targets"].push_back({{"POSITION", glb->AddVectors(shape.data(), mesh.vertex_count)}});
   }
   const std::size_t node = glb->root["nodes"].size();
   json out = {{"name", mesh.name}, {"primitives", {primitive}}};
-  if (factors.shapes.cols() > 0) {
+  if (shapes.shapes.cols() > 0) {
     // Row by row: all weights of the first key, then of the second
     std::vector<float> values;
-    for (Eigen::Index t = 0; t < factors.weights.rows(); ++t) {
-      for (Eigen::Index k = 0; k < factors.weights.cols(); ++k) values.push_back(factors.weights(t, k));
+    for (Eigen::Index t = 0; t < shapes.weights.rows(); ++t) {
+      for (Eigen::Index k = 0; k < shapes.weights.cols(); ++k) values.push_back(shapes.weights(t, k));
     }
     json& animation = glb->root["animations"][0];
     animation["samplers"].push_back({{"input", times_accessor}, {"output", glb->AddNumbers(values)}});
     animation["channels"].push_back(
         {{"sampler", animation["samplers"].size() - 1}, {"target", {{"node", node}, {"path", "weights"}}}});
-    out["weights"] = std::vector<float>(values.begin(), values.begin() + factors.weights.cols());
+    out["weights"] = std::vector<float>(values.begin(), values.begin() + shapes.weights.cols());
   }
   glb->root["meshes"].push_back(out);
   glb->root["nodes"].push_back({{"name", mesh.name}, {"mesh", glb->root["meshes"].size() - 1}});
@@ -217,13 +150,13 @@ Result<MorphGlbReport> WriteMorphGlb(const std::string& path, const PointCache& 
       if (!std::isfinite(value))
         return Status::Invalid("mesh \"{}\" has points that are not finite", mesh.name).At({path});
     }
-    const Factors factors =
-        Factorize(mesh, times.size(), options.tolerance * report.diagonal, std::max(options.max_targets, 0));
-    report.targets.back() = static_cast<int>(factors.shapes.cols());
-    report.max_residual = std::max(report.max_residual, factors.max_residual);
-    square_sum += factors.square_sum;
+    const FrameShapes shapes = ShapesOfFrames(mesh, times.size(), options.tolerance * report.diagonal,
+                                              std::max(options.max_targets, 0));
+    report.targets.back() = static_cast<int>(shapes.shapes.cols());
+    report.max_residual = std::max(report.max_residual, shapes.max_residual);
+    square_sum += shapes.square_sum;
     count += static_cast<double>(mesh.frames.size() / 3);
-    AddMesh(mesh, factors, times_accessor, &glb);
+    AddMesh(mesh, shapes, times_accessor, &glb);
   }
   if (count > 0) report.rms_residual = std::sqrt(square_sum / count);
   KPSA_RETURN_IF_ERROR(WriteContainer(path, options.force, std::move(glb)));

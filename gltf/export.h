@@ -28,10 +28,10 @@ struct MorphGlbReport {
   double diagonal = 0;  // of the box around all positions
 };
 
-// One node and mesh for each mesh of the cache, POSITION = its mean frame (its only one of a single frame,
-// which gets no animation), targets = left singular vectors of the centred frames, scaled so that the weights
-// stay within [-1, 1], one LINEAR weights channel each. No normals: viewers shade flat. glTF time starts at
-// 0: times are shifted by the first where that is negative. An error for times that do not ascend and for
+// One node and mesh for each mesh of the cache: POSITION and targets as gltf/frame_shapes.h says (a single
+// frame gets no animation), weights within [0, 1], to which many programs clamp them, one LINEAR weights
+// channel each. No normals: viewers shade flat. glTF time starts at 0: times are shifted by the first where
+// that is negative. An error for times that do not ascend and for
 // more than 4 GB.
 Result<MorphGlbReport> WriteMorphGlb(const std::string& path, const PointCache& cache,
                                      const MorphGlbOptions& options);

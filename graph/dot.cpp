@@ -79,7 +79,8 @@ class Drawing {
 
   void DrawNode(NodeId id) {
     NodeLook& look = looks_[id.index];
-    look.drawn = look.kept || options_.all;
+    look.drawn =
+        (look.kept || options_.all) && (id.index >= options_.hidden.size() || !options_.hidden[id.index]);
     if (!look.drawn) return;
     std::string label = Escaped(graph_.name(id)) + "\\n" + Escaped(graph_.def(id).name);
     if (look.points_total > 0)

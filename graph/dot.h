@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "graph/graph.h"
 #include "graph/plan.h"
@@ -14,7 +15,8 @@ namespace kpsa::engine {
 struct DotOptions {
   const Profile* profile = nullptr;  // of the plan: boxes are coloured by time, red is where it goes
   std::size_t frames = 1;            // that the profile recorded
-  bool all = false;  // draw the nodes that the plan leaves out, too: grey, the reason as tooltip
+  bool all = false;               // draw the nodes that the plan leaves out, too: grey, the reason as tooltip
+  std::vector<bool> hidden = {};  // by node index: boxes that are not drawn; empty: none
 };
 
 // The plan must have been made from the graph as it is. Without a profile: green boxes are evaluated always,

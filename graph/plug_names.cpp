@@ -3,6 +3,7 @@
 #include <charconv>
 
 #include "base/check.h"
+#include "base/near_names.h"
 #include "graph/graph.h"
 
 namespace kpsa::engine {
@@ -105,7 +106,7 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool dele
     }
   }
   if (plug.attribute < 0) {
-    std::vector<std::string> names = n.def->AttributeNames();
+    std::vector<std::string> all = n.def->AttributeNames(), names = all;
     if (!attribute.empty() &&
         std::string_view("xyzwXYZW").find(attribute.back()) != std::string_view::npos) {  // rotatex: rotateX
       for (const AttributeDef& a : n.def->attributes) {
@@ -117,10 +118,13 @@ Result<PlugRef> Graph::FindAttribute(NodeId id, std::string_view text, bool dele
       if (!IsAlive(delegate)) continue;
       Result<PlugRef> found = FindAttribute(delegate, text, false);
       if (found.ok() || node(delegate).def->FindAttribute(attribute) >= 0) return found;
-      for (std::string& name : node(delegate).def->AttributeNames()) names.push_back(std::move(name));
+      for (std::string& name : node(delegate).def->AttributeNames()) {
+        names.push_back(name);
+        all.push_back(std::move(name));
+      }
     }
     return Status::Invalid("node \"{}\" ({}) has no attribute \"{}\"{}", n.name, n.def->name, attribute,
-                           DidYouMean(attribute, names));
+                           NearOrAll(attribute, names, all));
   }
   if (text.find('[') != std::string_view::npos) {
     Result<int> index = ParseElement(id, plug.attribute, element);

@@ -42,14 +42,18 @@ Result<std::vector<double>> FramesBetween(std::string_view clip, double begin, d
   return times;
 }
 
+Result<std::vector<double>> ClipTimes(const CharacterClip& clip, double fps) {
+  return FramesBetween(clip.id, clip.begin, clip.duration, fps);
+}
+
 Result<std::vector<double>> ClipTimes(const Rig& rig) {
-  double begin = 0, duration = 0;
-  if (rig.playing.has_value()) begin = rig.playing->begin, duration = rig.playing->duration;
+  CharacterClip playing;
+  if (rig.playing.has_value()) playing = *rig.playing;
   for (const CharacterClip& clip : rig.scene.clips) {
-    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip)
-      begin = clip.begin, duration = clip.duration;
+    if (rig.scene.clip.has_value() && clip.id == *rig.scene.clip) playing = clip;
   }
-  return FramesBetween(rig.scene.clip.value_or(""), begin, duration, rig.fps);
+  playing.id = rig.scene.clip.value_or("");
+  return ClipTimes(playing, rig.fps);
 }
 
 std::int64_t FrameNumber(double seconds, double fps) {

@@ -31,6 +31,8 @@ Result<std::vector<double>> FramesBetween(std::string_view clip, double begin, d
 // Every frame of the clip that plays, from its first one to its end, in seconds; time 0 alone if none plays.
 // Errors: more than kMaxSamples.
 Result<std::vector<double>> ClipTimes(const Rig& rig);
+// The same of a clip, whether it plays or not.
+Result<std::vector<double>> ClipTimes(const CharacterClip& clip, double fps);
 // The frame that is nearest to a time, for reports; held within +-1e15.
 std::int64_t FrameNumber(double seconds, double fps);
 

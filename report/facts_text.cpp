@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <variant>
@@ -12,6 +13,8 @@
 
 namespace kpsa::engine {
 namespace {
+
+constexpr std::uint32_t kDeepestIndent = 20;  // of a tree; deeper nodes stand below each other
 
 std::string CellText(const FactTable::Cell& cell) {
   if (const auto* text = std::get_if<std::string>(&cell)) return *text;
@@ -46,8 +49,10 @@ std::string FactsJson(const std::string& path, const FileFacts& facts) {
   }
   for (const FactTable& table : facts.tables) {
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-    for (const auto& row : table.rows) {
+    for (std::size_t r = 0; r < table.rows.size(); ++r) {
+      const auto& row = table.rows[r];
       nlohmann::ordered_json object = nlohmann::ordered_json::object();
+      if (!table.depths.empty()) object["depth"] = table.depths[r];
       for (std::size_t c = 0; c < row.size(); ++c) object[Key(table.columns[c])] = CellJson(row[c]);
       rows.push_back(std::move(object));
     }
@@ -72,9 +77,11 @@ std::string FactsText(const std::string& path, const FileFacts& facts) {
   for (const FactTable& facts_table : facts.tables) {
     if (facts_table.rows.empty()) continue;
     Table table(facts_table.columns);
-    for (const auto& row : facts_table.rows) {
+    for (std::size_t r = 0; r < facts_table.rows.size(); ++r) {
       std::vector<std::string> cells;
-      for (const FactTable::Cell& cell : row) cells.push_back(CellText(cell));
+      for (const FactTable::Cell& cell : facts_table.rows[r]) cells.push_back(CellText(cell));
+      if (!facts_table.depths.empty())
+        cells.front().insert(0, 2 * std::min(facts_table.depths[r], kDeepestIndent), ' ');
       table.Row(std::move(cells));
     }
     all += fmt::format("\n{} ({})\n{}", facts_table.name, facts_table.rows.size(), table.Text());

@@ -16,6 +16,7 @@
 #include "gltf/document.h"
 #include "kpsa/subspace.h"
 #include "kpsa/training_record.h"
+#include "report/character_facts.h"
 
 namespace kpsa::engine {
 namespace {
@@ -75,7 +76,7 @@ void AddVrmFacts(const gltf::Character& character, const std::vector<std::string
 
 }  // namespace
 
-Result<FileFacts> InspectCharacter(const std::string& path) {
+Result<FileFacts> InspectCharacter(const std::string& path, double fps) {
   const Result<gltf::Character> character = gltf::LoadGltf(path);
   if (!character.ok()) return character.status();
   FileFacts facts;
@@ -107,17 +108,19 @@ Result<FileFacts> InspectCharacter(const std::string& path) {
                            Count(node.skin == kNoIndex ? 0 : character->skins[node.skin].joints.size()),
                            Count(most), Count(mesh.targets.size())});
   }
-  FactTable clips{"clips", {"clip", ">seconds", ">channels", ">keys"}, {}};
+  FactTable clips{"clips", {"clip", ">seconds", ">frames", ">channels", ">keys"}, {}};
   for (const gltf::Clip& clip : character->clips) {
     std::size_t keys = 0;
     for (const gltf::Channel& channel : clip.channels) {
       keys += channel.times.size();
       memory += (channel.times.size() + channel.values.size()) * 8;
     }
-    clips.rows.push_back({clip.id, clip.duration, Count(clip.channels.size()), Count(keys)});
+    clips.rows.push_back(
+        {clip.id, clip.duration, FrameCount(clip.duration, fps), Count(clip.channels.size()), Count(keys)});
   }
   facts.facts.emplace_back("memory bytes", memory);
-  facts.tables = {std::move(meshes), std::move(clips)};
+  facts.tables = {TreeFacts(*character), std::move(meshes), MorphFacts(*character), std::move(clips),
+                  MaterialFacts(*character)};
   AddVrmFacts(*character, names, &facts);
   facts.notes = character->warnings;
   return facts;
@@ -233,7 +236,7 @@ Result<FileFacts> InspectWeights(const std::string& path) {
 
 Result<FileFacts> InspectFile(const std::string& path, double fps) {
   const std::string suffix = FileSuffix(path);
-  if (suffix == ".glb" || suffix == ".gltf" || suffix == ".vrm") return InspectCharacter(path);
+  if (suffix == ".glb" || suffix == ".gltf" || suffix == ".vrm") return InspectCharacter(path, fps);
   if (suffix == ".npz") return InspectNpz(path);
   if (suffix == ".pc2" || suffix == ".mdd") return InspectPointCache(path, fps);
   if (suffix == ".kpsa") return InspectSubspace(path);

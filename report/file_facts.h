@@ -1,6 +1,7 @@
 // What is in a file, as facts for people and programs.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <variant>
@@ -17,6 +18,7 @@ struct FactTable {
   std::vector<std::string> columns;  // '>' first: right-aligned
   using Cell = std::variant<std::string, double, std::uint64_t>;
   std::vector<std::vector<Cell>> rows;
+  std::vector<std::uint32_t> depths = {};  // by row, of a tree's: texts are indented, JSON says "depth"
 };
 struct FileFacts {
   std::string kind;  // "character", "rig", "npz", ...
@@ -26,12 +28,12 @@ struct FileFacts {
 };
 
 // Of any file that kpsa reads or writes but rigs, by suffix: .glb .gltf .vrm .npz .pc2 .mdd .kpsa .json (weight
-// maps). `fps`: of .pc2 files.
+// maps). `fps`: of .pc2 files, and of the frames that a character's clips are counted in.
 Result<FileFacts> InspectFile(const std::string& path, double fps);
 FileFacts RigFacts(const Rig& rig);
 
 // One kind each; see InspectFile.
-Result<FileFacts> InspectCharacter(const std::string& path);
+Result<FileFacts> InspectCharacter(const std::string& path, double fps);
 Result<FileFacts> InspectNpz(const std::string& path);
 Result<FileFacts> InspectPointCache(const std::string& path, double fps);
 Result<FileFacts> InspectSubspace(const std::string& path);

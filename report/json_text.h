@@ -1,6 +1,9 @@
 // JSON as every command prints it.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <cmath>
 #include <string>
 
 namespace kpsa::engine {
@@ -9,6 +12,18 @@ namespace kpsa::engine {
 template <typename Json>
 std::string JsonText(const Json& document) {
   return document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+// In one line, as pages carry it; what is no UTF-8 is replaced.
+template <typename Json>
+std::string CompactJson(const Json& document) {
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+// A number to so many digits; null where it is not finite.
+template <typename Json>
+Json RoundedJson(double value, int digits) {
+  if (!std::isfinite(value)) return nullptr;
+  return std::stod(fmt::format("{:.{}g}", value, digits));
 }
 
 }  // namespace kpsa::engine

@@ -7,7 +7,7 @@
 #include "base/quantity_text.h"
 #include "files/quantity.h"
 #include "host/acceleration.h"
-#include "report/file_facts.h"
+#include "report/character_facts.h"
 
 namespace kpsa::engine {
 namespace {
@@ -35,8 +35,9 @@ FileFacts RigFacts(const Rig& rig) {
   std::map<std::string, std::size_t> counts;
   for (NodeId node : rig.graph->Nodes()) ++counts[rig.graph->def(node).name];
   for (const auto& [type, count] : counts) types.rows.push_back({type, CountOf(count)});
-  FactTable clips{"clips", {"clip", ">seconds"}, {}};
-  for (const CharacterClip& clip : rig.scene.clips) clips.rows.push_back({clip.id, clip.duration});
+  FactTable clips{"clips", {"clip", ">seconds", ">frames"}, {}};
+  for (const CharacterClip& clip : rig.scene.clips)
+    clips.rows.push_back({clip.id, clip.duration, FrameCount(clip.duration, rig.fps)});
   FactTable controls{"controls", {"control", ">min", ">max", ">rest"}, {}};
   for (const Control& control : rig.controls) {
     const double factor = 1 / rig.units.FactorOf(control.unit);
@@ -59,8 +60,9 @@ FileFacts RigFacts(const Rig& rig) {
   }
   FactTable files{"files", {"file"}, {}};
   for (const std::string& file : rig.files) files.rows.push_back({file});
-  facts.tables = {std::move(meshes),   std::move(types),      std::move(clips),
-                  std::move(controls), std::move(accelerate), std::move(files)};
+  facts.tables = {TreeFacts(*rig.character), std::move(meshes),     MorphFacts(*rig.character),
+                  std::move(types),          std::move(clips),      MaterialFacts(*rig.character),
+                  std::move(controls),       std::move(accelerate), std::move(files)};
   facts.notes = rig.notes;
   return facts;
 }

@@ -3,10 +3,10 @@
 set -e
 cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh clang libclang-rt-14-dev
-sh cmake/dependencies.sh blender &  # for one test of the Python module; it takes as long as a good part of the build
-blender=$!
+sh cmake/dependencies.sh blender chromium &  # for tests of the Python module and of the page; it takes as long as a good part of the build
+others=$!
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
 cmake --build build
-wait $blender
+wait $others
 ctest --test-dir build --output-on-failure -j "$(nproc)"
 sh tests/sanitize.sh

@@ -55,7 +55,7 @@ struct BenchResult {
   double wall_over_cpu = 1;  // the larger of both sides'; 1 where it is not known
   double full_ms = 0;        // a frame
   Range full_range, accelerated_range, speedup_range;
-  std::vector<BenchNode> full_nodes;
+  std::vector<BenchNode> full_nodes, accelerated_nodes;  // what takes longest first; misses included
   double accelerated_ms = 0;
   double graph_ms = 0, cues_ms = 0, projection_ms = 0, reconstruction_ms = 0, downstream_ms = 0,
          misses_ms = 0;  // its parts

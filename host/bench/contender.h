@@ -29,7 +29,7 @@ struct BenchSums {
   double parts = 0;                                     // as recorded
   std::vector<double> full_run_ns, accelerated_run_ns;  // by run
   double full_wall = 0, full_cpu = 0, wall = 0, cpu = 0;
-  std::map<std::string, BenchNode> nodes;
+  std::map<std::string, BenchNode> nodes, accelerated_nodes;
   std::set<std::string> computed;
 };
 

@@ -18,6 +18,25 @@ BenchResult::Range RangeOf(const std::vector<double>& runs, double factor, doubl
   return range;
 }
 
+void AddNode(const Plan& plan, Index step, double ns, std::map<std::string, BenchNode>* nodes) {
+  BenchNode& node = (*nodes)[plan.step_name(step)];
+  node.name = plan.step_name(step), node.type = plan.step_type(step);
+  node.ms_per_frame += ns;
+  node.points = std::max(node.points, plan.infos()[step].points);
+}
+
+// Sums in nanoseconds as means in milliseconds.
+std::vector<BenchNode> NodesOf(const std::map<std::string, BenchNode>& sums, double frames) {
+  std::vector<BenchNode> nodes;
+  for (const auto& [name, node] : sums) {
+    nodes.push_back(node);
+    nodes.back().ms_per_frame /= frames * 1e6;
+  }
+  std::stable_sort(nodes.begin(), nodes.end(),
+                   [](const BenchNode& a, const BenchNode& b) { return a.ms_per_frame > b.ms_per_frame; });
+  return nodes;
+}
+
 // What is odd about the times.
 void NoteTimes(BenchResult* result) {
   constexpr double kOdd = 1.1, kExceeds = 1.02;
@@ -82,10 +101,7 @@ void Contender::AddFullProfile(const Plan& plan, const RecordedSteps& recorded, 
   double graph = 0, points = 0, steps_ns = 0, kept_steps = 0;
   for (Index s = 0; s < plan.steps().size(); ++s) {
     const double ns = recorded.self_ns[s] * scale;
-    BenchNode& node = sums.nodes[plan.step_name(s)];
-    node.name = plan.step_name(s), node.type = plan.step_type(s);
-    node.ms_per_frame += ns;
-    node.points = std::max(node.points, plan.infos()[s].points);
+    AddNode(plan, s, ns, &sums.nodes);
     steps_ns += ns;
     if (skippable[s] || !kept.contains(plan.step_name(s))) continue;
     (plan.infos()[s].points_total > 0 ? points : graph) += ns;
@@ -125,6 +141,18 @@ void Contender::AddProfile(const RecordedSteps& recorded, double fast_ns) {
   sums.cues += cues * scale, sums.downstream += downstream * scale, sums.misses += misses * scale;
   sums.projection += projection * scale, sums.reconstruction += reconstruction * scale;
   sums.graph += (all - parts) * scale;
+  for (Index s = 0; s < plan.steps().size(); ++s) {
+    if (std::ranges::find(kpsa_nodes, plan.infos()[s].node) == kpsa_nodes.end() && recorded.counts[s] > 0)
+      AddNode(plan, s, recorded.self_ns[s] * scale, &sums.accelerated_nodes);
+  }
+  // What the parts of KPSA nodes take is known of all of them together
+  const double own = static_cast<double>(recorded.kpsa.cues) + projection + reconstruction;
+  for (const AppliedSubspace& one : applied) {
+    BenchNode& node = sums.accelerated_nodes[open->rig.graph->name(one.node)];
+    node.name = open->rig.graph->name(one.node), node.type = open->rig.graph->def(one.node).name;
+    node.ms_per_frame += own * scale / static_cast<double>(applied.size());
+    node.points = static_cast<Index>(result.points);
+  }
   sums.points_accelerated += PointsComputed(plan, recorded);
 }
 
@@ -148,14 +176,12 @@ void Contender::Finish(double wanted_speedup) {
   result.bound_ms = result.bound_graph_ms + result.bound_points_ms;
   result.points_full = sums.points_full / frames;
   result.points_accelerated = sums.points_accelerated / frames;
-  for (auto& [name, node] : sums.nodes) {
-    node.ms_per_frame = ms(node.ms_per_frame);
-    result.full_nodes.push_back(node);
+  result.full_nodes = NodesOf(sums.nodes, frames);
+  result.accelerated_nodes = NodesOf(sums.accelerated_nodes, frames);
+  for (const auto& [name, node] : sums.nodes) {
     if (!sums.computed.contains(name)) result.never_evaluated.push_back(name);
   }
   result.nodes_total = sums.nodes.size();
-  std::stable_sort(result.full_nodes.begin(), result.full_nodes.end(),
-                   [](const BenchNode& a, const BenchNode& b) { return a.ms_per_frame > b.ms_per_frame; });
   result.parts_ms = ms(sums.parts);
   std::vector<double> ratios;
   for (std::size_t run = 0; run < sums.full_run_ns.size(); ++run)

@@ -135,13 +135,16 @@ struct Setting {
 // "plug=value" with the value in the units of the rig's file: jaw.rotateX=-20, lipUp.translate=[0, 1mm, 0].
 Result<Setting> ParseSetting(const Rig& rig, std::string_view text);
 // A pose file: {kpsa: 1, units: {...}, clip: talk, time: 1.25s, pose: {jaw.rotateX: -20, ...}}; units default
-// to the rig's. The clip, and when in it, are for poses over a clip; "" is the rest pose.
+// to the rig's. The clip, and when in it, are for poses over a clip; "" is the rest pose. Or the plugs alone, without
+// `kpsa` and `pose`: {jaw.rotateX: -20, ...}.
 struct PoseFile {
   std::vector<Setting> settings;
   std::optional<std::string> clip;
   std::optional<double> time;  // seconds
 };
 Result<PoseFile> ReadPoseFile(const Rig& rig, const std::string& path);
+// The same of its text; `name` stands for the path in errors.
+Result<PoseFile> ParsePose(const Rig& rig, std::string_view text, const std::string& name);
 // Sets it in the graph. Takes over from a clip; a plug that the rig itself drives is an error.
 Status ApplySetting(Rig* rig, const Setting& setting);
 

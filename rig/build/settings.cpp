@@ -33,6 +33,52 @@ Result<Setting> ReadSetting(const Rig& rig, const std::string& plug_text, const 
   return setting;
 }
 
+void ReadPlugs(const Rig& rig, const YamlNode& plugs, const FileUnits& units, PoseFile* file,
+               YamlErrors* errors) {
+  for (std::size_t i = 0; i < plugs.keys.size() && !errors->full(); ++i) {
+    Result<Setting> setting = ReadSetting(rig, plugs.keys[i].scalar, plugs.items[i], units);
+    if (setting.ok()) {
+      file->settings.push_back(std::move(*setting));
+    } else {
+      errors->Add(plugs.keys[i], setting.status());
+    }
+  }
+}
+
+Result<PoseFile> ReadPose(const Rig& rig, const YamlNode& root) {
+  YamlErrors errors;
+  PoseFile file;
+  if (root.is_map() && root.Find("kpsa") == nullptr && root.Find("pose") == nullptr) {
+    ReadPlugs(rig, root, rig.units, &file, &errors);
+    if (!errors.ok()) return errors.Take();
+    return file;
+  }
+  YamlMap map(root, "pose file", &errors);
+  ReadVersion(&map, &errors);
+  FileUnits units = rig.units;
+  if (const YamlNode* node = map.Find("units")) ReadUnits(*node, &units, &errors);
+  if (const YamlNode* clip = map.Find("clip")) {
+    if (clip->is_scalar()) {
+      file.clip = clip->scalar;
+    } else {
+      errors.Add(*clip, "clip: expected the name of a clip, or \"\" for the rest pose, found {}",
+                 clip->kind_name());
+    }
+  }
+  if (const YamlNode* time = map.Find("time")) {
+    double seconds = 0;
+    if (ReadNumber(*time, "time", Unit::kTime, units, &seconds, &errors)) file.time = seconds;
+  }
+  if (const YamlNode* pose = map.Required("pose")) {
+    if (!pose->is_map())
+      errors.Add(*pose, "pose: expected a map of plugs and values, found {}", pose->kind_name());
+    ReadPlugs(rig, *pose, units, &file, &errors);
+  }
+  map.RejectUnread();
+  if (!errors.ok()) return errors.Take();
+  return file;
+}
+
 }  // namespace
 
 Result<Setting> ParseSetting(const Rig& rig, std::string_view text) {
@@ -60,41 +106,13 @@ Result<Setting> ParseSetting(const Rig& rig, std::string_view text) {
 }
 
 Result<PoseFile> ReadPoseFile(const Rig& rig, const std::string& path) {
-  Result<YamlNode> root = ReadYamlFile(path);
-  if (!root.ok()) return root.status();
-  YamlErrors errors;
-  YamlMap map(*root, "pose file", &errors);
-  ReadVersion(&map, &errors);
-  FileUnits units = rig.units;
-  if (const YamlNode* node = map.Find("units")) ReadUnits(*node, &units, &errors);
-  PoseFile file;
-  if (const YamlNode* clip = map.Find("clip")) {
-    if (clip->is_scalar()) {
-      file.clip = clip->scalar;
-    } else {
-      errors.Add(*clip, "clip: expected the name of a clip, or \"\" for the rest pose, found {}",
-                 clip->kind_name());
-    }
-  }
-  if (const YamlNode* time = map.Find("time")) {
-    double seconds = 0;
-    if (ReadNumber(*time, "time", Unit::kTime, units, &seconds, &errors)) file.time = seconds;
-  }
-  if (const YamlNode* pose = map.Required("pose")) {
-    if (!pose->is_map())
-      errors.Add(*pose, "pose: expected a map of plugs and values, found {}", pose->kind_name());
-    for (std::size_t i = 0; i < pose->keys.size(); ++i) {
-      Result<Setting> setting = ReadSetting(rig, pose->keys[i].scalar, pose->items[i], units);
-      if (setting.ok()) {
-        file.settings.push_back(std::move(*setting));
-      } else {
-        errors.Add(pose->keys[i], setting.status());
-      }
-    }
-  }
-  map.RejectUnread();
-  if (!errors.ok()) return errors.Take();
-  return file;
+  const Result<YamlNode> root = ReadYamlFile(path);
+  return root.ok() ? ReadPose(rig, *root) : root.status();
+}
+
+Result<PoseFile> ParsePose(const Rig& rig, std::string_view text, const std::string& name) {
+  const Result<YamlNode> root = ParseYaml(text, name);
+  return root.ok() ? ReadPose(rig, *root) : root.status();
 }
 
 Status ApplySetting(Rig* rig, const Setting& setting) {

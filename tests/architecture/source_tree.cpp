@@ -24,13 +24,14 @@ struct RoomRule {
 const std::vector<const char*> kHostKnows = {
     "host", "include", "kpsa/training", "kpsa", "rig/build", "rig/character", "rig/file",
     "rig",  "nodes",   "nodes/kernels", "gltf", "files",     "graph",         "base"};
-std::vector<const char*> Also(const char* room) {
+template <typename... Rooms>
+std::vector<const char*> Also(Rooms... rooms) {
   std::vector<const char*> known = kHostKnows;
-  known.push_back(room);
+  (known.push_back(rooms), ...);
   return known;
 }
 // Rooms that are not listed (cli, bench, tests, ...) stand above all: nobody listed may include them.
-const std::array<RoomRule, 17> kRooms = {{
+const std::array<RoomRule, 18> kRooms = {{
     {"include", {"include"}},
     {"base", {"base"}},
     {"graph", {"graph", "base"}},
@@ -47,6 +48,7 @@ const std::array<RoomRule, 17> kRooms = {{
     {"host", kHostKnows},
     {"report", Also("report")},
     {"picture", Also("picture")},
+    {"view", Also("report", "view")},
     {"scenes", {"scenes", "base"}},
 }};
 const std::set<std::string> kAbove = {"cli", "bench", "tests", "python", "viewer"};
@@ -57,7 +59,7 @@ struct Door {
   std::vector<const char*> files;
   bool any_source = false;  // and every .cpp
 };
-const std::array<Door, 13> kDoors = {{
+const std::array<Door, 14> kDoors = {{
     {"tbb/", {"base/parallel.cpp"}},
     {"oneapi/", {"base/parallel.cpp"}},
     {"yaml-cpp/", {"files/yaml_document.cpp"}},
@@ -70,6 +72,7 @@ const std::array<Door, 13> kDoors = {{
     {"embree", {"base/embree.h"}},
     {"base/embree.h", {"base/embree.cpp", "base/triangle_tree.cpp", "nodes/kernels/ray_scene.cpp"}},
     {"CLI/", {"cli/main.cpp", "cli/options.cpp"}},
+    {"httplib.h", {"view/server.cpp"}},
     {"hwy/", {"base/simd.h", "base/simd-inl.h", "nodes/kernels/xyzw-inl.h"}, true},
     {"zip", {"files/npz.cpp"}},
     // What plays shows none of it to those who include it

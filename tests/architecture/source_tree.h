@@ -24,7 +24,7 @@ std::vector<SourceFile> ReadSourceTree(const std::string& root);
 
 // Breaches of the arrows between rooms and of the doors to libraries: "path:line: what is wrong", by path and
 // line.
-//   base <- graph <- {nodes, kpsa, rig} <- host <- {report, picture} <- {cli, bench, tests, ...}; kernels know
+//   base <- graph <- {nodes, kpsa, rig} <- host <- {report, picture} <- view <- {cli, bench, tests, ...}; kernels know
 //   base only; siblings never each other.
 std::vector<std::string> FindBreaches(const std::vector<SourceFile>& files);
 

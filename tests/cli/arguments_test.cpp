@@ -138,7 +138,7 @@ TEST(Arguments, UsageMistakes) {
       {{"nodes", "bend", "--pictures", "pictures"}, 2, "no TYPE"},
       {{"bench", kHello, "--tolerance", "1mm", "--tolerance", "2mm"}, 2, "one for each"},
       {{"bench", kHello, "--tolerance", "some"}, 2, "--tolerance"},
-      {{"report"}, 2, "BENCH.json"},
+      {{"report"}, 2, "FILE"},
       {{"report", "none.json"}, 3, "none.json"},
       {{"report", "head.json"}, 3, "kpsa bench --json"},
       {{"report", "head.json", "--plot", "a.png"}, 2, ".svg"},

@@ -1,0 +1,18 @@
+# cmake -DINPUT=FILE -DOUTPUT=FILE.cpp -DHEADER=a/b.h -DFUNCTION=Name -P Embed.cmake: a source that gives the bytes of a text file,
+#   std::string_view kpsa::engine::Name()
+# as raw strings, in pieces, since compilers limit how long one may be.
+file(READ ${INPUT} text)
+string(LENGTH "${text}" bytes)
+set(source "// Made of ${INPUT} by cmake/Embed.cmake.\n#include \"${HEADER}\"\n\nnamespace kpsa::engine {\n\nstd::string_view ${FUNCTION}() {\n  static constexpr char kText[] =")
+set(begin 0)
+while(begin LESS bytes)
+  string(SUBSTRING "${text}" ${begin} 15000 piece)
+  string(FIND "${piece}" ")kpsa_page\"" delimiter)
+  if(NOT delimiter EQUAL -1)
+    message(FATAL_ERROR "${INPUT} holds the end of the raw strings that are made of it")
+  endif()
+  string(APPEND source "\n      R\"kpsa_page(${piece})kpsa_page\"")
+  math(EXPR begin "${begin} + 15000")
+endwhile()
+string(APPEND source ";\n  static_assert(sizeof(kText) == ${bytes} + 1, \"not all of the file\");\n  return {kText, sizeof(kText) - 1};\n}\n\n}  // namespace kpsa::engine\n")
+file(WRITE ${OUTPUT} "${source}")

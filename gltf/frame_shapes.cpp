@@ -1,0 +1,77 @@
+#include "gltf/frame_shapes.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace kpsa::engine {
+namespace {
+
+using Matrix = Eigen::MatrixXd;
+
+// The left singular vectors of `centered` (3V x T), strongest first, through the Gram matrix of its smaller
+// side.
+Matrix SingularVectors(const Matrix& centered, Eigen::Index most) {
+  const bool tall = centered.rows() >= centered.cols();
+  const Matrix gram =
+      tall ? Matrix(centered.transpose() * centered) : Matrix(centered * centered.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(gram);
+  const Eigen::VectorXd values = solver.eigenvalues().reverse();
+  const double floor = values.size() == 0 ? 0 : 1e-14 * std::max(values[0], 0.0);
+  Eigen::Index rank = 0;
+  while (rank < std::min(most, values.size()) && values[rank] > floor) ++rank;
+  Matrix vectors = solver.eigenvectors().rowwise().reverse().leftCols(rank);
+  if (tall) {
+    vectors = centered * vectors;
+    vectors.colwise().normalize();
+  }
+  return vectors;
+}
+
+// The largest distance and the sum of squares of a residual, per vertex.
+void Measure(const Matrix& residual, double* max, double* square_sum) {
+  double largest = 0;
+  for (Eigen::Index t = 0; t < residual.cols(); ++t) {
+    for (Eigen::Index i = 0; i < residual.rows(); i += 3)
+      largest = std::max(largest, residual.block<3, 1>(i, t).squaredNorm());
+  }
+  *max = std::sqrt(largest);
+  *square_sum = residual.squaredNorm();
+}
+
+}  // namespace
+
+FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, double tolerance,
+                           int max_shapes) {
+  const auto rows = static_cast<Eigen::Index>(3 * mesh.vertex_count),
+             cols = static_cast<Eigen::Index>(frame_count);
+  const Matrix frames = Eigen::Map<const Eigen::MatrixXf>(mesh.frames.data(), rows, cols).cast<double>();
+  FrameShapes result;
+  result.rest = frames.rowwise().mean().cast<float>();
+  Matrix residual = frames.colwise() - result.rest.cast<double>();
+  const Matrix vectors = SingularVectors(residual, max_shapes);
+  result.shapes.resize(rows, vectors.cols());
+  result.weights.resize(cols, vectors.cols());
+  Measure(residual, &result.max_residual, &result.square_sum);
+  Eigen::Index count = 0;
+  for (; count < vectors.cols() && result.max_residual > tolerance; ++count) {
+    Eigen::VectorXd weights = residual.transpose() * vectors.col(count);
+    double low = weights.minCoeff(), range = weights.maxCoeff() - low;
+    if (range == 0) break;
+    if (weights[0] - low > range / 2) low += range, range = -range;
+    // Subtract what is written, in float32, so that later shapes mend its rounding
+    const Eigen::VectorXf rest = (result.rest.cast<double>() + low * vectors.col(count)).cast<float>();
+    result.shapes.col(count) = (range * vectors.col(count)).cast<float>();
+    result.weights.col(count) = ((weights.array() - low) / range).cwiseMax(0).cwiseMin(1).cast<float>();
+    residual.colwise() -= rest.cast<double>() - result.rest.cast<double>();
+    residual -=
+        result.shapes.col(count).cast<double>() * result.weights.col(count).cast<double>().transpose();
+    result.rest = rest;
+    Measure(residual, &result.max_residual, &result.square_sum);
+  }
+  result.shapes.conservativeResize(rows, count);
+  result.weights.conservativeResize(cols, count);
+  return result;
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,26 @@
+// The few shapes that the frames of a point cache are mixtures of. Nothing outside gltf/ includes this.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "files/point_cache.h"
+
+namespace kpsa::engine {
+
+// frames ~ rest + shapes * weights^T, V vertices (x y z each), T frames, K shapes.
+struct FrameShapes {
+  Eigen::VectorXf rest;     // 3V
+  Eigen::MatrixXf shapes;   // 3V x K, displacements
+  Eigen::MatrixXf weights;  // T x K, within [0, 1]; every column reaches both
+  // Of the float32 numbers above against the frames: the largest distance of a vertex, and the sum of squares
+  double max_residual = 0, square_sum = 0;
+};
+
+// Singular vectors of the frames, strongest first, until no vertex is farther off than `tolerance` (metres)
+// or there are `max_shapes`. Many programs clamp morph weights to [0, 1], so each shape spans all that its
+// weights do, and the rest is where all are least: of the two ends that a shape has, the one that is nearer
+// to the first frame. It need not look like any frame.
+FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, double tolerance,
+                           int max_shapes);
+
+}  // namespace kpsa::engine

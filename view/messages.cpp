@@ -1,0 +1,147 @@
+#include "view/messages.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "files/json_depth.h"
+
+namespace kpsa::engine {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kDeepest = 8;  // a request needs 2
+
+std::string Text(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+
+// Of a key that may be absent or null.
+const Json* Find(const Json& map, const char* key) {
+  const auto at = map.find(key);
+  return at == map.end() || at->is_null() ? nullptr : &*at;
+}
+
+Status ReadSet(const Json& set, PoseRequest* pose) {
+  if (!set.is_object()) return Status::Usage("set: expected plugs and their numbers");
+  for (const auto& [plug, value] : set.items()) {
+    if (value.is_boolean()) {
+      pose->set.emplace_back(plug, value.get<bool>() ? 1 : 0);
+      continue;
+    }
+    const double number = value.is_number() ? value.get<double>() : NAN;
+    if (!std::isfinite(number)) return Status::Usage("set: {}: expected a number", plug);
+    pose->set.emplace_back(plug, number);
+  }
+  return Status();
+}
+
+Status ReadMode(const Json& mode, EvaluateMode* to) {
+  if (mode == "full")
+    *to = EvaluateMode::kFull;
+  else if (mode == "accelerated")
+    *to = EvaluateMode::kAccelerated;
+  else if (mode == "both")
+    *to = EvaluateMode::kBoth;
+  else
+    return Status::Usage("mode: expected full, accelerated or both");
+  return Status();
+}
+
+void Put(Json* facts, const char* key, const std::optional<double>& number) {
+  if (number.has_value() && std::isfinite(*number)) (*facts)[key] = *number;
+}
+
+const char* NameOf(FrameVerdict verdict) {
+  return verdict == FrameVerdict::kHit ? "hit" : verdict == FrameVerdict::kBlend ? "blend" : "miss";
+}
+
+}  // namespace
+
+Result<EvaluateRequest> ParseEvaluate(std::string_view body) {
+  KPSA_RETURN_IF_ERROR(
+      CheckJsonDepth({reinterpret_cast<const std::uint8_t*>(body.data()), body.size()}, kDeepest));
+  const Json json = Json::parse(body, nullptr, false);
+  if (json.is_discarded()) return Status::Usage("the request is no JSON");
+  if (!json.is_object()) return Status::Usage("the request is no object");
+  EvaluateRequest request;
+  if (const Json* id = Find(json, "id"); id != nullptr && id->is_number()) request.id = Text(*id);
+  if (const Json* set = Find(json, "set")) KPSA_RETURN_IF_ERROR(ReadSet(*set, &request.pose));
+  if (const Json* clip = Find(json, "clip")) {
+    if (!clip->is_string()) return Status::Usage("clip: expected a name");
+    request.pose.clip = clip->get<std::string>();
+  }
+  if (const Json* time = Find(json, "time")) {
+    if (!time->is_number()) return Status::Usage("time: expected seconds");
+    request.pose.seconds = time->get<double>();
+  }
+  if (const Json* mode = Find(json, "mode")) KPSA_RETURN_IF_ERROR(ReadMode(*mode, &request.mode));
+  return request;
+}
+
+std::string EvaluateAnswer(const EvaluateRequest& request, const LiveFrame& frame, std::uint64_t generation) {
+  Json facts = {{"generation", generation}, {"parts", Json::array()}, {"verdict", nullptr}};
+  std::size_t bytes = 0;
+  for (const auto& [name, points] : {std::pair{"accelerated", frame.accelerated}, {"full", frame.full}}) {
+    if (points == nullptr) continue;
+    facts["parts"].push_back(name);
+    bytes += points->size() * sizeof(float);
+  }
+  if (frame.decision.has_value()) {
+    facts["verdict"] = NameOf(frame.decision->verdict());
+    facts["reason"] = frame.decision->reason;
+    Put(&facts, "score", frame.decision->score);
+  }
+  Put(&facts, "full_us", frame.full_us);
+  Put(&facts, "accelerated_us", frame.accelerated_us);
+  Put(&facts, "max_error", frame.max_error);
+  Put(&facts, "rms_error", frame.rms_error);
+  for (const auto& [name, value] : frame.values) facts["values"][name] = value;
+  if (!frame.problem.empty()) facts["problem"] = frame.problem;
+  const std::string json = "{\"id\":" + request.id + "," + Text(facts).substr(1);
+
+  const auto length = static_cast<std::uint32_t>(json.size());
+  std::string answer(sizeof(length), '\0');
+  std::memcpy(answer.data(), &length, sizeof(length));
+  answer.reserve(answer.size() + json.size() + 3 + bytes);
+  answer += json;
+  answer.append((4 - answer.size() % 4) % 4, '\0');
+  for (const std::vector<float>* points : {frame.accelerated, frame.full}) {
+    if (points != nullptr)
+      answer.append(reinterpret_cast<const char*>(points->data()), points->size() * sizeof(float));
+  }
+  return answer;
+}
+
+std::string ProblemList(const Status& status, bool warnings) {
+  constexpr std::string_view kBegin = " (did you mean \"", kEnd = "\"?)";
+  Json list = Json::array();
+  for (const Error& error : status.errors()) {
+    Json problem = {{"severity", warnings ? "warning" : "error"}};
+    if (!error.where.file.empty()) problem["file"] = error.where.file;
+    if (error.where.line > 0) problem["line"] = error.where.line;
+    if (error.where.column > 0) problem["column"] = error.where.column;
+    std::string message = error.message;
+    const std::size_t begin = message.find(kBegin);
+    const std::size_t end = begin == std::string::npos ? begin : message.find(kEnd, begin + kBegin.size());
+    if (end != std::string::npos) {
+      problem["suggestion"] = message.substr(begin + 2, end + 2 - (begin + 2));
+      message.erase(begin, end + kEnd.size() - begin);
+    }
+    problem["message"] = message;
+    list.push_back(std::move(problem));
+  }
+  return Text(list);
+}
+
+std::string ProblemsAnswer(const Status& status) { return "{\"problems\":" + ProblemList(status) + "}"; }
+
+std::optional<std::int64_t> ParseWhole(std::string_view text, bool or_minus_one) {
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return std::nullopt;
+  if (number < (or_minus_one ? -1 : 0)) return std::nullopt;
+  return number;
+}
+
+}  // namespace kpsa::engine

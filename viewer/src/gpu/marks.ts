@@ -1,0 +1,75 @@
+// Discs at points: cues, the vertices that were picked, and what is hovered or selected among them.
+import {BufferAttribute, BufferGeometry, GLSL3, Points, RawShaderMaterial, Sphere, type IUniform} from 'three';
+import {lookUp} from './surface';
+
+const vertex = lookUp + `
+in vec3 offset;
+in float vertexIndex;
+in float look;  // 0 plain, 1 hovered or selected
+uniform float size;
+out float strong;
+void main() {
+  strong = look;
+  vec3 at = offset;
+  if (vertexIndex >= 0.0) at += texelFetch(positions, place(int(vertexIndex)), 0).xyz;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(at, 1.0);
+  gl_PointSize = size * (look > 0.5 ? 1.6 : 1.0);
+}`;
+
+const fragment = `
+precision highp float;
+in float strong;
+out vec4 colour;
+uniform vec3 base, selected, rim;
+void main() {
+  float r = length(gl_PointCoord - 0.5) * 2.0;
+  float soft = fwidth(r);
+  float alpha = 1.0 - smoothstep(1.0 - soft, 1.0, r);
+  if (alpha <= 0.0) discard;
+  vec3 inner = strong > 0.5 ? selected : base;
+  colour = vec4(mix(inner, rim, smoothstep(0.62 - soft, 0.62, r)), alpha * 0.95);
+}`;
+
+export interface Mark {
+  vertex: number;  // -1: the offset is its place
+  offset: readonly [number, number, number];
+}
+
+export class Marks {
+  readonly object: Points;
+  private readonly geometry = new BufferGeometry();
+  private readonly material: RawShaderMaterial;
+
+  constructor(shared: Record<string, IUniform>, base: [number, number, number], size: number) {
+    this.material = new RawShaderMaterial({
+      glslVersion: GLSL3, vertexShader: vertex, fragmentShader: fragment, transparent: true, depthTest: false, depthWrite: false,
+      uniforms: {...shared, base: {value: base}, selected: {value: [1, 1, 1]}, rim: {value: [0.05, 0.06, 0.08]}, size: {value: size}},
+    });
+    this.object = new Points(this.geometry, this.material);
+    this.object.frustumCulled = false;
+    this.object.renderOrder = 3;
+    this.set([]);
+  }
+
+  set(marks: readonly Mark[]): void {
+    this.geometry.setAttribute('vertexIndex', new BufferAttribute(Float32Array.from(marks, (m) => m.vertex), 1));
+    this.geometry.setAttribute('offset', new BufferAttribute(Float32Array.from(marks.flatMap((m) => [...m.offset])), 3));
+    this.geometry.setAttribute('look', new BufferAttribute(new Float32Array(marks.length), 1));
+    this.geometry.boundingSphere = new Sphere();
+    this.geometry.setDrawRange(0, marks.length);
+    this.object.visible = marks.length > 0;
+  }
+
+  /** Which of them is shown as hovered or selected; -1 for none. */
+  emphasize(index: number): void {
+    const look = this.geometry.getAttribute('look') as BufferAttribute;
+    (look.array as Float32Array).fill(0);
+    if (index >= 0) look.setX(index, 1);
+    look.needsUpdate = true;
+  }
+
+  dispose(): void {
+    this.geometry.dispose();
+    this.material.dispose();
+  }
+}

@@ -1,0 +1,125 @@
+// Evaluation on the server: one request in flight, the newest state wins, and how long the whole loop takes.
+import type {Model} from '../data/model';
+import {noFacts, Signal, type Facts, type Series} from '../facts';
+import type {Store} from '../state';
+import type {Viewport} from '../view/viewport';
+import type {Client, EvaluateAnswer, EvaluateMode, Values} from './client';
+
+export class Session {
+  /** What the user has moved; everything else is as in the clip or as the rig sets it. */
+  moved: Values = {};
+  /** Controls as the server evaluated them last. */
+  readonly values = new Signal<Values>({});
+  /** Something was moved or released. */
+  readonly touched = new Signal<number>(0);
+  readonly loopMs = new Signal<number | null>(null);
+  /** Whether both sides are asked for, so that the error is known. */
+  compare = true;
+  answered = 0;
+  private id = 0;
+  private busy = false;
+  private again = false;
+  private asked = 0;      // when the oldest change was made that is not drawn yet
+  private waiting = 0;
+  private ended = false;
+
+  constructor(
+    readonly client: Client, private readonly model: Model, private readonly store: Store, private readonly viewport: Viewport,
+    private readonly facts: Signal<Facts>, private readonly series: readonly Series[], private readonly tell: (text: string) => void,
+  ) {}
+
+  set(values: Values, at = performance.now()): void {
+    this.moved = {...this.moved, ...values};
+    this.touched.set(this.touched.value + 1);
+    this.changed(at);
+  }
+
+  release(names: readonly string[], at = performance.now()): void {
+    const rest = {...this.moved};
+    for (const name of names) delete rest[name];
+    this.moved = rest;
+    this.touched.set(this.touched.value + 1);
+    this.changed(at);
+  }
+
+  /** Something that is evaluated has changed. */
+  changed(at = performance.now()): void {
+    if (this.ended) return;
+    if (!this.waiting) this.waiting = at;
+    if (this.busy) this.again = true;
+    else void this.run();
+  }
+
+  end(): void {
+    this.ended = true;
+  }
+
+  get idle(): boolean {
+    return !this.busy && !this.again;
+  }
+
+  private mode(): EvaluateMode {
+    if (!this.model.accelerated) return 'full';
+    const mode = this.store.now.mode;
+    return this.compare || mode === 'difference' || mode === 'overlay' ? 'both' : mode;
+  }
+
+  private async run(): Promise<void> {
+    this.busy = true;
+    do {
+      this.again = false;
+      this.asked = this.waiting;
+      this.waiting = 0;
+      const {clip, frame} = this.store.now;
+      const info = clip >= 0 ? this.model.meta.clips![clip] : null;
+      try {
+        const answer = await this.client.evaluate({
+          id: ++this.id, set: this.moved, clip: info?.name ?? null, time: info ? info.begin + frame / info.fps : 0, mode: this.mode(),
+        }, this.model.points);
+        if (this.ended) break;
+        await this.show(answer, clip, frame);
+      } catch (error) {
+        if (this.ended) break;
+        this.facts.set({...this.facts.value, problem: (error as Error).message});
+        if (error instanceof TypeError) {
+          this.tell('no answer from the server');
+          await new Promise((resolve) => setTimeout(resolve, 500));
+        }
+      }
+    } while (this.again && !this.ended);
+    this.busy = false;
+  }
+
+  private async show({facts, accelerated, full}: EvaluateAnswer, clip: number, frame: number): Promise<void> {
+    if (facts.generation !== undefined && facts.generation !== (this.model.meta.generation ?? facts.generation)) return;
+    if (accelerated || full) this.viewport.view?.positions.setSent(accelerated, full);
+    const known: Facts = {
+      ...noFacts, verdict: facts.verdict ?? null, reason: facts.reason || null, score: facts.score ?? null, full_us: facts.full_us ?? null,
+      accelerated_us: facts.accelerated_us ?? null, max_error: facts.max_error ?? null, rms_error: facts.rms_error ?? null, problem: facts.problem ?? null,
+    };
+    if (clip >= 0 && !Object.keys(this.moved).length) this.series[clip]?.record(frame, known);
+    this.facts.set(known);
+    if (facts.values) this.values.set(facts.values);
+    this.viewport.draw();
+    await finished(this.viewport.renderer.getContext() as WebGL2RenderingContext);
+    ++this.answered;
+    if (this.asked) this.loopMs.set(performance.now() - this.asked);
+  }
+}
+
+/** Resolves when the GPU has drawn what it was given. */
+async function finished(gl: WebGL2RenderingContext): Promise<void> {
+  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  gl.flush();
+  if (!fence) return;
+  const began = performance.now();
+  while (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED && performance.now() < began + 1000) {
+    await new Promise<void>((resolve) => {
+      if (performance.now() > began + 8) return setTimeout(resolve, 4);  // slow anyway: leave it the processor
+      const channel = new MessageChannel();
+      channel.port1.onmessage = () => resolve();
+      channel.port2.postMessage(0);
+    });
+  }
+  gl.deleteSync(fence);
+}

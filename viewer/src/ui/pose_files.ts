@@ -1,0 +1,37 @@
+// Reset, and poses as files.
+import type {Context} from '../context';
+import {button, h} from './dom';
+
+export function makePoseRow({session, model, tell}: Context): HTMLElement {
+  const live = session!;
+  const open = h('input', {
+    attributes: {type: 'file', accept: '.json,.yaml,.yml,.txt', hidden: true, 'aria-label': 'Pose file'},
+    on: {change: () => {
+      const file = open.files?.[0];
+      open.value = '';
+      if (!file) return;
+      file.text().then((text) => live.client.poseFile(text)).then((values) => {
+        live.set(values);
+        tell(`${file.name}: ${Object.keys(values).length} values`);
+      }).catch((error: Error) => tell(error.message));
+    }},
+  });
+  const compare = h('input', {attributes: {type: 'checkbox', checked: live.compare}, on: {change: () => {
+    live.compare = compare.checked;
+    live.changed();
+  }}});
+  return h('div', {class: 'row pose'},
+    button('Reset', (() => live.release(Object.keys(live.moved))), {title: 'All controls as the rig or the clip has them'}),
+    button('Save pose', () => {
+      const values: Record<string, number> = {};
+      for (const {name, value} of model.meta.controls ?? []) {
+        const now = live.moved[name] ?? live.values.value[name] ?? value;
+        if (now !== null && now !== undefined) values[name] = now;
+      }
+      const link = h('a', {attributes: {href: URL.createObjectURL(new Blob([JSON.stringify(values, null, 2) + '\n'], {type: 'application/json'})), download: 'pose.json'}});
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    }),
+    button('Load pose', () => open.click()), open,
+    model.accelerated ? h('label', {class: 'check', attributes: {title: 'Evaluates fully as well, so that the error is known'}}, compare, ' Compare') : null);
+}

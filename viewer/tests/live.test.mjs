@@ -1,0 +1,196 @@
+// The page as a live view, of a server that evaluates the made-up character.
+import assert from 'node:assert/strict';
+import {readFileSync, writeFileSync} from 'node:fs';
+import {after, before, test} from 'node:test';
+import {startBrowser} from './support/browser.mjs';
+import {difference} from './support/png.mjs';
+import {coefficientsOf, startServer, token} from './support/server.mjs';
+
+let browser, server, page, requests, complaints;
+
+before(async () => {
+  server = await startServer();
+  browser = await startBrowser();
+  ({page, requests, complaints} = await browser.open(server.url));
+});
+after(async () => {
+  await browser?.stop();
+  await server?.stop();
+});
+
+const picture = () => page.locator('.stage canvas').screenshot();
+const idle = () => page.waitForTimeout(150);
+
+/** Waits for something that the server has seen. */
+async function until(what) {
+  const end = Date.now() + 5000;
+  while (!what() && Date.now() < end) await new Promise((resolve) => setTimeout(resolve, 10));
+  assert.ok(what(), what.toString());
+}
+
+/** The largest difference in metres of the full points to what the server means by a pose. */
+async function off(set, clip = null, time = 0) {
+  const got = await page.evaluate(() => [...window.kpsa.positions('full')]);
+  const expected = server.character.place(coefficientsOf(server.character, set, clip, time));
+  return Math.max(...got.map((x, i) => Math.abs(x - expected[i])));
+}
+
+test('a slider moves points, in state and picture, and the loop is timed', async () => {
+  const before = await picture();
+  assert.ok(await off({}) < 1e-6);
+  const slider = page.getByRole('slider', {name: 'bend'});
+  await slider.evaluate((element) => {
+    element.value = '30';
+    element.dispatchEvent(new Event('input', {bubbles: true}));
+  });
+  await page.waitForFunction(() => window.kpsa.loopMs !== null && window.kpsa.facts.max_error !== null);
+  await idle();
+  assert.ok(await off({'bend.rotateX': 30}) < 1e-6);
+  assert.ok(difference(before, await picture()) > 0.01);
+  const loop = await page.evaluate(() => window.kpsa.loopMs);
+  assert.ok(loop > 0.5 && loop < 5000, `${loop} ms`);
+  assert.match(await page.locator('.status').innerText(), /hit[\s\S]*max 0\.9 mm[\s\S]*accelerated 55 µs[\s\S]*loop \d/);
+  assert.deepEqual(server.last.set, {'bend.rotateX': 30});
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 55));
+  assert.match(await page.locator('.status').innerText(), /miss[\s\S]*outside its trained range/);
+});
+
+test('sides are what the server sent', async () => {
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 20));
+  const [near, full] = await page.evaluate(() => [[...window.kpsa.positions('accelerated')], [...window.kpsa.positions('full')]]);
+  const most = Math.max(...near.map((x, i) => Math.abs(x - full[i])));
+  assert.ok(Math.abs(most - 0.0009) < 1e-6, `${most}`);
+});
+
+test('one request is in flight, and the newest state wins', async () => {
+  server.delay = 60;
+  server.mostInFlight = 0;
+  const asked = server.log.filter((entry) => entry.path === '/evaluate').length;
+  await page.evaluate(async () => {
+    const slider = document.querySelector('#panel-controls input[type=range]');
+    for (let i = 0; i <= 40; ++i) {
+      slider.value = String(i);
+      slider.dispatchEvent(new Event('input', {bubbles: true}));
+      await new Promise((resolve) => setTimeout(resolve, 5));
+    }
+  });
+  await page.waitForTimeout(400);
+  server.delay = 0;
+  assert.equal(server.mostInFlight, 1);
+  const count = server.log.filter((entry) => entry.path === '/evaluate').length - asked;
+  assert.ok(count >= 2 && count < 15, `${count} requests for 41 states`);
+  assert.equal(server.last.set['bend.rotateX'], 40);
+  assert.ok(await off({'bend.rotateX': 40}) < 1e-6);
+});
+
+test('a double click goes to the default, reset to all of them', async () => {
+  await page.getByRole('slider', {name: 'bend'}).dblclick();
+  await until(() => !('bend.rotateX' in server.last.set));
+  await page.evaluate(() => window.kpsa.setControl('twist.rotateY', 12));
+  assert.equal(server.last.set['twist.rotateY'], 12);
+  await page.getByRole('button', {name: 'Reset'}).click();
+  await until(() => !Object.keys(server.last.set).length);
+  await idle();
+  assert.ok(await off({}) < 1e-6);
+});
+
+test('clips play, and the strip and plots remember what was seen', async () => {
+  await page.getByLabel('Clip', {exact: true}).selectOption('bend (test)');
+  await page.evaluate(() => window.kpsa.setFrame(12));
+  assert.equal(server.last.clip, 'bend');
+  assert.ok(Math.abs(server.last.time - 12 / 24) < 1e-9);
+  assert.ok(await off({}, 'bend', 0.5) < 1e-6);
+  await page.getByRole('button', {name: 'Play'}).click();
+  await page.waitForFunction(() => window.kpsa.state.frame > 20);
+  await page.getByRole('button', {name: 'Pause'}).click();
+  await idle();
+  const strip = page.locator('.strip'), box = await strip.boundingBox();
+  await strip.hover({position: {x: (12.5 / 40) * box.width, y: 4}});
+  assert.match(await page.locator('.track .hint').innerText(), /frame 12 - hit - max error 0\.9 mm/);
+  await page.getByLabel('Clip', {exact: true}).selectOption('No clip');
+  await until(() => server.last.clip === null);
+});
+
+test('problems are shown with their place, the last rig goes on, and they are cleared', async () => {
+  server.setProblems([{file: 'sheet.yaml', line: 12, column: 5, message: 'there is no node spime', suggestion: 'did you mean spine?'}]);
+  const panel = page.locator('.problems');
+  await panel.waitFor();
+  assert.match(await panel.innerText(), /sheet\.yaml:12:5[\s\S]*no node spime[\s\S]*did you mean spine/);
+  assert.match(await panel.innerText(), /last good rig goes on/);
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 10));
+  assert.ok(await off({'bend.rotateX': 10}) < 1e-6);
+  server.setProblems([]);
+  await panel.waitFor({state: 'hidden'});
+});
+
+test('a new version of the rig is loaded, what was moved is kept', async () => {
+  server.reload({title: 'Sheet, second version'});
+  await page.waitForFunction(() => window.kpsa.state.generation === 2);
+  await page.waitForFunction(() => document.querySelector('h1').textContent === 'Sheet, second version');
+  await idle();
+  assert.deepEqual(server.last.set, {'bend.rotateX': 10});
+  assert.ok(await off({'bend.rotateX': 10}) < 1e-6);
+  const before = await picture();
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', -30));
+  assert.ok(difference(before, await picture()) > 0.01);
+});
+
+test('poses are saved and loaded', async () => {
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 25));
+  const waiting = page.waitForEvent('download');
+  await page.getByRole('button', {name: 'Save pose'}).click();
+  const download = await waiting;
+  assert.equal(download.suggestedFilename(), 'pose.json');
+  const saved = JSON.parse(readFileSync(await download.path(), 'utf8'));
+  assert.equal(saved['bend.rotateX'], 25);
+  assert.equal(Object.keys(saved).length, server.meta.controls.length);
+  const file = browser.folder + '/in.json';
+  writeFileSync(file, JSON.stringify({'bend.rotateX': -15, 'twist.rotateY': 3}));
+  await page.locator('input[type=file]').setInputFiles(file);
+  await until(() => server.last.set['bend.rotateX'] === -15 && server.last.set['twist.rotateY'] === 3);
+  writeFileSync(file, 'not a pose');
+  await page.locator('input[type=file]').setInputFiles(file);
+  await page.getByText('pose.json:1:1 is not JSON').waitFor();
+  complaints.splice(0, complaints.length, ...complaints.filter((text) => !/status of 400/.test(text)));
+});
+
+test('fields are asked for, vertices explained', async () => {
+  const before = await picture();
+  await page.getByLabel('Colours', {exact: true}).selectOption({label: 'spine'});
+  await idle();
+  assert.ok(difference(before, await picture()) > 0.05);
+  const at = await page.evaluate(() => window.kpsa.project(44 * 30 + 20));
+  await page.mouse.click(at.x, at.y);
+  await page.locator('#panel-vertex .lines').waitFor();
+  assert.match(await page.locator('#panel-vertex').innerText(), /bend[\s\S]*200 mm[\s\S]*twist[\s\S]*40 mm[\s\S]*vertex 1340 is a hit/);
+});
+
+test('a server that goes away is noticed', async () => {
+  const other = await startServer({accelerated: false}), shown = await browser.open(other.url);
+  assert.equal(await shown.page.getByRole('button', {name: 'Difference'}).count(), 0);
+  assert.equal(other.last.mode, 'full');
+  await other.stop();
+  await shown.page.locator('html.lost').waitFor({state: 'attached', timeout: 10000});
+  await shown.page.close();
+});
+
+test('a wrong token is refused, and said', async () => {
+  const [first] = server.url.split('?');
+  const other = await page.context().newPage();
+  await other.route('**/page*', (route) => route.fulfill({path: new URL('../dist/viewer.html', import.meta.url).pathname, contentType: 'text/html'}));
+  await other.goto(first + 'page?token=wrong');
+  await other.locator('.failure').waitFor();
+  assert.match(await other.locator('.failure').innerText(), /wrong token/);
+  assert.ok(server.refused >= 1);
+  await other.close();
+});
+
+test('all requests go to the server with the token, and nothing is complained of', async () => {
+  const origin = new URL(server.url).origin;
+  assert.ok(requests.every((url) => url.startsWith(origin) || url.startsWith('data:') || url.startsWith('blob:')), requests.join('\n'));
+  const asked = server.log.filter((entry) => entry.token !== 'wrong');
+  assert.ok(asked.length > 20);
+  assert.deepEqual(asked.filter((entry) => entry.token !== token), []);
+  assert.deepEqual(complaints, []);
+  assert.deepEqual(await page.evaluate(() => window.kpsa.errors), []);
+});

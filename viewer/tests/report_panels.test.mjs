@@ -1,0 +1,118 @@
+// The panels of a report, and what they have to do with the picture.
+import assert from 'node:assert/strict';
+import {after, before, test} from 'node:test';
+import {startBrowser} from './support/browser.mjs';
+import {makeCharacter} from './support/character.mjs';
+import {makeMeta} from './support/meta.mjs';
+import {difference} from './support/png.mjs';
+import {makeReport} from './support/report.mjs';
+
+const made = makeMeta(makeCharacter());
+let browser, page, complaints;
+
+before(async () => {
+  browser = await startBrowser();
+  ({page, complaints} = await browser.open(browser.write('report.html', makeReport(made))));
+});
+after(async () => browser?.stop());
+
+const picture = () => page.locator('.stage canvas').screenshot();
+const state = () => page.evaluate(() => ({...window.kpsa.state}));
+const fresh = async () => {
+  await page.keyboard.press('Escape');
+  await page.evaluate(async () => {
+    await window.kpsa.setMode('accelerated');
+    await window.kpsa.setFrame(0, 'bend');
+    document.activeElement?.blur();
+  });
+};
+
+test('a click on a vertex lists what moves it, largest first, and its error', async () => {
+  await fresh();
+  const vertex = 44 * 34 + 22, at = await page.evaluate((v) => window.kpsa.project(v), vertex);
+  await page.mouse.click(at.x, at.y);
+  assert.equal((await state()).vertex, vertex);
+  const panel = page.locator('#panel-vertex');
+  await panel.getByText(`Vertex ${vertex} of sheet, at`).waitFor({timeout: 3000});
+  await panel.locator('.bars li').first().waitFor();
+  const names = await panel.locator('.bars .name').allInnerTexts();
+  assert.deepEqual(names.slice(0, 1), ['bend']);
+  assert.ok(names.includes('squash.weight') && !names.some((name) => name.includes('finger')));
+  await panel.locator('canvas').first().waitFor();
+  assert.match(await panel.locator('.chart').innerText(), /Error of vertex/);
+});
+
+test('picked vertices are a YAML list', async () => {
+  await fresh();
+  await page.keyboard.press('p');
+  const vertices = [44 * 20 + 10, 44 * 25 + 30];
+  for (const vertex of vertices) {
+    const at = await page.evaluate((v) => window.kpsa.project(v), vertex);
+    await page.mouse.click(at.x, at.y);
+  }
+  assert.equal(await page.getByLabel('Picked vertices as YAML').inputValue(), `vertices: [${vertices.join(', ')}]`);
+  await page.getByRole('button', {name: 'Clear'}).click();
+  assert.equal(await page.getByLabel('Picked vertices as YAML').inputValue(), 'vertices: []');
+  await page.getByRole('button', {name: 'Pick vertices'}).click();
+});
+
+test('the graph is searched by name', async () => {
+  await page.getByRole('tab', {name: 'Graph'}).click();
+  const panel = page.locator('#panel-graph');
+  assert.equal(await panel.locator('tbody tr:visible').count(), 260);
+  await panel.getByRole('searchbox').fill('mush');
+  assert.equal(await panel.locator('tbody tr:visible').count(), 1);
+  assert.equal(await panel.locator('.graph .node:not(.faint)').count(), 1);
+  await panel.getByRole('searchbox').press('Enter');
+  assert.match(await panel.locator('.details').innerText(), /delta_mush_final \(deltaMush\).*only a miss needs it/);
+  await panel.getByRole('searchbox').fill('');
+});
+
+test('tables sort, cues are marked', async () => {
+  await page.getByRole('tab', {name: 'Tables'}).click();
+  const table = page.locator('#panel-tables table').first();
+  await table.getByRole('button', {name: 'speedup'}).click();
+  assert.deepEqual(await table.locator('tbody tr td:first-child').allInnerTexts(), ['wave', 'all', 'bend']);
+  await table.getByRole('button', {name: 'speedup'}).click();
+  assert.deepEqual(await table.locator('tbody tr td:first-child').allInnerTexts(), ['bend', 'all', 'wave']);
+  await fresh();
+  await page.keyboard.press('z');
+  await page.waitForTimeout(100);
+  const before = await picture();
+  await page.getByRole('tab', {name: 'Cues'}).click();
+  await page.locator('#panel-cues tbody tr').nth(4).click();
+  await page.waitForTimeout(100);
+  assert.ok(difference(before, await picture()) > 1e-4);
+  assert.match(await page.locator('#panel-cues .details').innerText(), /point, at sheet@skin, 0\.6 µs, the bend of the spine/);
+  const vertex = made.meta.cues[6].vertex, at = await page.evaluate((v) => window.kpsa.project(v), vertex);
+  await page.mouse.move(at.x, at.y);
+  await page.locator('.cue-hint:visible').waitFor();
+  assert.match(await page.locator('.cue-hint').innerText(), new RegExp(`points\\[${vertex}\\]`));
+});
+
+test('fields and moves are colours', async () => {
+  await fresh();
+  const before = await picture();
+  await page.getByLabel('Colours', {exact: true}).selectOption({label: 'spine'});
+  await page.waitForTimeout(100);
+  const field = await picture();
+  assert.ok(difference(before, field) > 0.05);
+  await page.getByLabel('Colours', {exact: true}).selectOption({label: 'twist'});
+  await page.waitForTimeout(100);
+  assert.ok(difference(field, await picture()) > 0.05);
+});
+
+test('a vertex is chosen by its index, without a mouse', async () => {
+  await fresh();
+  await page.getByRole('tab', {name: 'Vertex'}).click();
+  await page.getByLabel('Vertex', {exact: true}).and(page.locator('input')).fill('1900');
+  await page.keyboard.press('Enter');
+  assert.equal((await state()).vertex, 1900);
+  const [x, y, z] = (await page.evaluate(() => [...window.kpsa.positions()])).slice(5700, 5703).map((c) => c.toFixed(4));
+  await page.getByText(`Vertex 1900, 96 of knob, at ${x}, ${y}, ${z} m`).waitFor({timeout: 3000});
+});
+
+test('nothing is complained of', async () => {
+  assert.deepEqual(complaints, []);
+  assert.deepEqual(await page.evaluate(() => window.kpsa.errors), []);
+});

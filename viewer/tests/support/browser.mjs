@@ -1,0 +1,34 @@
+// One chromium without a screen, and pages of it that note whatever goes wrong.
+import {chromium} from 'playwright-core';
+import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+
+export async function startBrowser({width = 1440, height = 900, dark = true} = {}) {
+  const folder = mkdtempSync(join(tmpdir(), 'kpsa-viewer-'));
+  const context = await chromium.launchPersistentContext(join(folder, 'profile'), {
+    executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', headless: true, viewport: {width, height}, colorScheme: dark ? 'dark' : 'light',
+    args: ['--headless', '--no-sandbox', '--disable-gpu-sandbox', '--use-angle=swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync', '--no-first-run'],
+  });
+  /** A page, its requests and its complaints. */
+  const open = async (url) => {
+    const page = await context.newPage(), requests = [], complaints = [];
+    page.on('request', (request) => requests.push(request.url()));
+    page.on('console', (message) => { if (['error', 'warning'].includes(message.type()) && !/GPU stall|GL Driver/.test(message.text())) complaints.push(message.text()); });
+    page.on('pageerror', (error) => complaints.push(String(error)));
+    await page.goto(url);
+    await page.waitForFunction(() => window.kpsa);
+    await page.evaluate(() => window.kpsa.ready);
+    return {page, requests, complaints};
+  };
+  const write = (name, text) => {
+    const path = join(folder, name);
+    writeFileSync(path, text);
+    return 'file://' + path;
+  };
+  const stop = async () => {
+    await context.close();
+    rmSync(folder, {recursive: true, force: true});
+  };
+  return {open, write, stop, folder};
+}
