@@ -98,13 +98,13 @@ test('a live view moves points by sliders, and follows edits of the rig file', {
 
   // A mistake in the file is told with its place, and the last good rig goes on
   const path = join(folder, 'hello.yaml'), good = readFileSync(path, 'utf8');
-  writeFileSync(path, good.replace('deltaMush', 'deltaMash'));
+  writeFileSync(path, good.replace('type: deltaMush', 'type: deltaMash'));
   const problem = page.getByText(/hello\.yaml:\d+/).first();
-  await problem.waitFor({timeout: 60000});
+  await problem.waitFor({timeout: 120000});
   assert.match(await page.locator('body').innerText(), /deltaMush/, 'with a suggestion');
   assert.ok(apart(await set('upper.rotateZ', -40), expected) < 1e-5, 'the last good rig goes on');
   writeFileSync(path, good);
-  await problem.waitFor({state: 'hidden', timeout: 60000});
+  await problem.waitFor({state: 'hidden', timeout: 120000});
   assert.ok(requests.every((url) => url.startsWith('http://127.0.0.1:')), requests.join());
   assert.deepEqual(complaints, []);
 });
