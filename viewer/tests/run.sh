@@ -10,7 +10,7 @@ skip() {
   exit 77
 }
 command -v npm > /dev/null || skip "there is no npm here"
-node -e 'process.exit(parseInt(process.versions.node) < 20)' || skip "node $(node --version) is older than 20"
+node -e 'process.exit(parseInt(process.versions.node) < 20 ? 1 : 0)' || skip "node $(node --version) is older than 20"
 command -v "${CHROMIUM:-chromium}" > /dev/null || skip "there is no chromium here"
 mkdir -p "$work"
 rm -rf "$work/src" "$work/tests" "$work/dist"
