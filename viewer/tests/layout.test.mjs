@@ -1,7 +1,7 @@
 // Sizes, themes and the way through by Tab.
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
-import {startBrowser} from './support/browser.mjs';
+import {settled, startBrowser} from './support/browser.mjs';
 import {makeCharacter} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
 import {makeReport} from './support/report.mjs';
@@ -33,7 +33,7 @@ for (const [width, height] of [[1440, 900], [1024, 700], [420, 800]]) {
     await page.evaluate(() => window.kpsa.setMode('difference'));
     for (const tab of await page.getByRole('tab').all()) {
       await tab.click();
-      await page.waitForTimeout(60);
+      await settled(page);
       assert.deepEqual(await faults(), [], await tab.innerText());
     }
     const stage = await page.locator('.stage canvas').boundingBox(), side = await page.locator('.side').boundingBox();
@@ -70,7 +70,7 @@ test('dark and light follow the system, and are readable', async () => {
   });
   for (const scheme of ['light', 'dark']) {
     await page.emulateMedia({colorScheme: scheme});
-    await page.waitForFunction((wanted) => document.documentElement.dataset.theme === wanted, scheme, {timeout: 3000});
+    await page.waitForFunction((wanted) => document.documentElement.dataset.theme === wanted, scheme);
     for (const [pair, ratio] of await contrast()) assert.ok(ratio >= 4.5, `${scheme}: ${pair} ${ratio.toFixed(2)}`);
   }
 });

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import {readFileSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
-import {startBrowser} from './support/browser.mjs';
+import {settled, startBrowser} from './support/browser.mjs';
 import {difference} from './support/png.mjs';
 import {coefficientsOf, startServer, token} from './support/server.mjs';
 
@@ -19,11 +19,11 @@ after(async () => {
 });
 
 const picture = () => page.locator('.stage canvas').screenshot();
-const idle = () => page.waitForTimeout(150);
+const idle = () => settled(page);
 
 /** Waits for something that the server has seen. */
 async function until(what) {
-  const end = Date.now() + 5000;
+  const end = Date.now() + 120000;
   while (!what() && Date.now() < end) await new Promise((resolve) => setTimeout(resolve, 10));
   assert.ok(what(), what.toString());
 }
@@ -48,7 +48,7 @@ test('a slider moves points, in state and picture, and the loop is timed', async
   assert.ok(await off({'bend.rotateX': 30}) < 1e-6);
   assert.ok(difference(before, await picture()) > 0.01);
   const loop = await page.evaluate(() => window.kpsa.loopMs);
-  assert.ok(loop > 0.5 && loop < 5000, `${loop} ms`);
+  assert.ok(loop > 0, `${loop} ms`);
   assert.match(await page.locator('.status').innerText(), /hit[\s\S]*max 0\.9 mm[\s\S]*accelerated 55 µs[\s\S]*loop \d/);
   assert.deepEqual(server.last.set, {'bend.rotateX': 30});
   await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 55));
@@ -63,22 +63,24 @@ test('sides are what the server sent', async () => {
 });
 
 test('one request is in flight, and the newest state wins', async () => {
-  server.delay = 60;
+  let release;
+  server.held = new Promise((resolve) => { release = resolve; });
   server.mostInFlight = 0;
-  const asked = server.log.filter((entry) => entry.path === '/evaluate').length;
+  const count = () => server.log.filter((entry) => entry.path === '/evaluate').length, asked = count();
   await page.evaluate(async () => {
     const slider = document.querySelector('#panel-controls input[type=range]');
     for (let i = 0; i <= 40; ++i) {
       slider.value = String(i);
       slider.dispatchEvent(new Event('input', {bubbles: true}));
-      await new Promise((resolve) => setTimeout(resolve, 5));
+      await new Promise((resolve) => setTimeout(resolve, 1));
     }
   });
-  await page.waitForTimeout(400);
-  server.delay = 0;
+  await until(() => count() > asked);
+  server.held = null;
+  release();
+  await settled(page);
   assert.equal(server.mostInFlight, 1);
-  const count = server.log.filter((entry) => entry.path === '/evaluate').length - asked;
-  assert.ok(count >= 2 && count < 15, `${count} requests for 41 states`);
+  assert.equal(count() - asked, 2, 'the first of 41 states, which was held, and the newest');
   assert.equal(server.last.set['bend.rotateX'], 40);
   assert.ok(await off({'bend.rotateX': 40}) < 1e-6);
 });
@@ -170,7 +172,7 @@ test('a server that goes away is noticed', async () => {
   assert.equal(await shown.page.getByRole('button', {name: 'Difference'}).count(), 0);
   assert.equal(other.last.mode, 'full');
   await other.stop();
-  await shown.page.locator('html.lost').waitFor({state: 'attached', timeout: 10000});
+  await shown.page.locator('html.lost').waitFor({state: 'attached'});
   await shown.page.close();
 });
 

@@ -1,7 +1,7 @@
 // The page as a report: one file from disk.
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
-import {startBrowser} from './support/browser.mjs';
+import {settled, startBrowser} from './support/browser.mjs';
 import {makeCharacter, makeErrors, residualStep} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
 import {difference, share} from './support/png.mjs';
@@ -85,7 +85,7 @@ test('the slider moves points, in state and picture', async () => {
   assert.ok(difference(before, await picture()) < 1e-4, 'nothing changes by itself');
   await page.getByRole('slider', {name: 'Frame'}).fill('13');
   assert.equal((await state()).frame, 13);
-  await page.waitForTimeout(100);
+  await settled(page);
   assert.ok(difference(before, await picture()) > 0.01);
   assert.ok(apart(await page.evaluate(() => [...window.kpsa.positions()]), points) > 1e-3);
 });
@@ -97,7 +97,7 @@ test('modes are different pictures; the heat map shows what is over the toleranc
   for (const mode of ['full', 'accelerated', 'difference', 'overlay']) {
     await page.getByRole('button', {name: mode, exact: false}).first().click();
     await page.mouse.move(5, 5);
-    await page.waitForTimeout(100);
+    await settled(page);
     pictures[mode] = await picture();
     assert.equal((await state()).mode, mode);
   }
@@ -140,7 +140,7 @@ test('keys', async () => {
   await page.keyboard.press('1');
   const before = await picture();
   await page.keyboard.press('Shift+ArrowLeft');
-  await page.waitForTimeout(100);
+  await settled(page);
   assert.ok(difference(before, await picture()) > 0.01, 'turned');
   const was = await page.evaluate(() => document.documentElement.dataset.theme);
   await page.keyboard.press('t');

@@ -1,7 +1,7 @@
 // The panels of a report, and what they have to do with the picture.
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
-import {startBrowser} from './support/browser.mjs';
+import {settled, startBrowser} from './support/browser.mjs';
 import {makeCharacter} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
 import {difference} from './support/png.mjs';
@@ -33,7 +33,7 @@ test('a click on a vertex lists what moves it, largest first, and its error', as
   await page.mouse.click(at.x, at.y);
   assert.equal((await state()).vertex, vertex);
   const panel = page.locator('#panel-vertex');
-  await panel.getByText(`Vertex ${vertex} of sheet, at`).waitFor({timeout: 3000});
+  await panel.getByText(`Vertex ${vertex} of sheet, at`).waitFor();
   await panel.locator('.bars li').first().waitFor();
   const names = await panel.locator('.bars .name').allInnerTexts();
   assert.deepEqual(names.slice(0, 1), ['bend']);
@@ -77,11 +77,11 @@ test('tables sort, cues are marked', async () => {
   assert.deepEqual(await table.locator('tbody tr td:first-child').allInnerTexts(), ['bend', 'all', 'wave']);
   await fresh();
   await page.keyboard.press('z');
-  await page.waitForTimeout(100);
+  await settled(page);
   const before = await picture();
   await page.getByRole('tab', {name: 'Cues'}).click();
   await page.locator('#panel-cues tbody tr').nth(4).click();
-  await page.waitForTimeout(100);
+  await settled(page);
   assert.ok(difference(before, await picture()) > 1e-4);
   assert.match(await page.locator('#panel-cues .details').innerText(), /point, at sheet@skin, 0\.6 µs, the bend of the spine/);
   const vertex = made.meta.cues[6].vertex, at = await page.evaluate((v) => window.kpsa.project(v), vertex);
@@ -94,11 +94,11 @@ test('fields and moves are colours', async () => {
   await fresh();
   const before = await picture();
   await page.getByLabel('Colours', {exact: true}).selectOption({label: 'spine'});
-  await page.waitForTimeout(100);
+  await settled(page);
   const field = await picture();
   assert.ok(difference(before, field) > 0.05);
   await page.getByLabel('Colours', {exact: true}).selectOption({label: 'twist'});
-  await page.waitForTimeout(100);
+  await settled(page);
   assert.ok(difference(field, await picture()) > 0.05);
 });
 
@@ -109,7 +109,7 @@ test('a vertex is chosen by its index, without a mouse', async () => {
   await page.keyboard.press('Enter');
   assert.equal((await state()).vertex, 1900);
   const [x, y, z] = (await page.evaluate(() => [...window.kpsa.positions()])).slice(5700, 5703).map((c) => c.toFixed(4));
-  await page.getByText(`Vertex 1900, 96 of knob, at ${x}, ${y}, ${z} m`).waitFor({timeout: 3000});
+  await page.getByText(`Vertex 1900, 96 of knob, at ${x}, ${y}, ${z} m`).waitFor();
 });
 
 test('nothing is complained of', async () => {

@@ -4,6 +4,9 @@ import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 
+/** Waits until nothing is asked for and all that has been done is drawn. */
+export const settled = (page) => page.evaluate(() => window.kpsa.setMode(window.kpsa.state.mode));
+
 export async function startBrowser({width = 1440, height = 900, dark = true} = {}) {
   const folder = mkdtempSync(join(tmpdir(), 'kpsa-viewer-'));
   const context = await chromium.launchPersistentContext(join(folder, 'profile'), {
@@ -16,6 +19,7 @@ export async function startBrowser({width = 1440, height = 900, dark = true} = {
     page.on('request', (request) => requests.push(request.url()));
     page.on('console', (message) => { if (['error', 'warning'].includes(message.type()) && !/GPU stall|GL Driver/.test(message.text())) complaints.push(message.text()); });
     page.on('pageerror', (error) => complaints.push(String(error)));
+    page.setDefaultTimeout(120000);
     await page.goto(url);
     await page.waitForFunction(() => window.kpsa);
     await page.evaluate(() => window.kpsa.ready);
