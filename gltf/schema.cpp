@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "gltf/animation_pointer.h"
 #include "gltf/document.h"
 
 namespace kpsa::engine::gltf {
@@ -238,11 +239,11 @@ Status CheckVersion(const json& asset) {
 }
 
 constexpr const char *kMeshopt = "EXT_meshopt_compression", *kDraco = "KHR_draco_mesh_compression",
-                     *kVisibility = "KHR_node_visibility";
+                     *kVisibility = "KHR_node_visibility", *kPointer = "KHR_animation_pointer";
 
 bool IsRead(std::string_view extension) {
   return extension == "KHR_mesh_quantization" || extension == kMeshopt || extension == kDraco ||
-         extension == kVisibility || extension == "VRM" || extension == "VRMC_vrm" ||
+         extension == kVisibility || extension == kPointer || extension == "VRM" || extension == "VRMC_vrm" ||
          extension == "VRMC_node_constraint";
 }
 
@@ -423,6 +424,7 @@ Result<ReducedJson> ReduceJson(std::span<const std::uint8_t> text) {
       for (const json& mesh : root["meshes"]) result.target_names.push_back(TargetNames(mesh));
     }
 
+    KPSA_RETURN_IF_ERROR(ResolvePointers(root, &reduced, &result.warnings));
     // tinygltf drops a channel without a target node with an error; the specification has it ignored
     if (reduced.contains("animations")) {
       for (json& animation : reduced["animations"]) {
