@@ -1,8 +1,11 @@
 #include "gltf/frame_shapes.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "files/cache_normals.h"
 
 namespace kpsa::engine {
 namespace {
@@ -71,6 +74,33 @@ FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, 
   }
   result.shapes.conservativeResize(rows, count);
   result.weights.conservativeResize(cols, count);
+  return result;
+}
+
+FrameNormals NormalsOfFrames(const PointCacheMesh& mesh, const FrameShapes& shapes) {
+  FrameNormals result;
+  if (mesh.triangles.empty()) return result;
+  const Eigen::Index frames = shapes.weights.rows(), count = shapes.weights.cols();
+  const Eigen::Index rows = shapes.rest.size();
+  Matrix normals(frames, rows);
+  for (Eigen::Index t = 0; t < frames; ++t) {
+    const std::vector<float> normal = CacheNormals(mesh, static_cast<std::size_t>(t));
+    normals.row(t) = Eigen::Map<const Eigen::RowVectorXf>(normal.data(), rows).cast<double>();
+  }
+  Matrix weights(frames, count + 1);
+  weights << Eigen::VectorXd::Ones(frames), shapes.weights.cast<double>();
+  Matrix fit = Eigen::CompleteOrthogonalDecomposition<Matrix>(weights).solve(normals);
+  for (Eigen::Index i = 0; i < rows; i += 3) {
+    const double length = fit.block<1, 3>(0, i).norm();
+    constexpr double kShortest = 1e-3;
+    if (length > kShortest) {
+      fit.middleCols(i, 3) /= length;
+    } else {  // what points nowhere where all weights are 0 starts from the first frame's
+      fit.block<1, 3>(0, i) = normals.block<1, 3>(0, i);
+    }
+  }
+  result.rest = fit.row(0).transpose().cast<float>();
+  result.shapes = fit.bottomRows(count).transpose().cast<float>();
   return result;
 }
 

@@ -23,4 +23,14 @@ struct FrameShapes {
 FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, double tolerance,
                            int max_shapes);
 
+// normals ~ normalized(rest + shapes * weights^T): those of the frames, fitted to their weights.
+struct FrameNormals {
+  Eigen::VectorXf rest;    // 3V, unit
+  Eigen::MatrixXf shapes;  // 3V x K
+};
+
+// Least squares for each vertex. Only directions count, so each is scaled to what makes its rest normal a
+// unit vector, as glTF wants it. Empty for a mesh without triangles.
+FrameNormals NormalsOfFrames(const PointCacheMesh& mesh, const FrameShapes& shapes);
+
 }  // namespace kpsa::engine
