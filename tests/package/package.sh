@@ -27,6 +27,11 @@ grep -q "wave: [1-9][0-9]* of 25 frames hit" said-ON.txt
 if program-ON/embed hello.yaml upper.rotatez -60 wave 2> error.txt; then exit 1; fi
 grep -q "did you mean \"rotateZ\"" error.txt
 
+# What man and shells read
+for file in man/man1/kpsa.1 bash-completion/completions/kpsa zsh/site-functions/_kpsa fish/vendor_completions.d/kpsa.fish; do
+  grep -q accelerate "installed/share/$file"
+done
+
 # The plugin of the tests, against the headers that were installed
 ${CXX:-c++} -std=c++20 -fPIC -shared -I installed/include/kpsa/plugin "$source/tests/plugin/wobble.cpp" -o wobble.so
 installed/bin/kpsa nodes wobble --plugin ./wobble.so | grep -q "A triangle wave."
