@@ -38,9 +38,9 @@ json Primitive(const PointCacheMesh& mesh, const CachePart& part, const FrameSha
   if (!mesh.colors.empty()) attributes["COLOR_0"] = glb->AddVectors(Rows(mesh.colors.data(), part, 3));
   primitive["attributes"] = std::move(attributes);
   if (part.material != kNoIndex) primitive["material"] = part.material;
-  for (Eigen::Index k = 0; k < shapes.shapes.cols(); ++k) {
-    json target = {{"POSITION", glb->AddPositions(Rows(shapes.shapes.col(k).data(), part, 3))}};
-    if (!triangles.empty()) target["NORMAL"] = glb->AddVectors(Rows(normals.shapes.col(k).data(), part, 3));
+  for (std::size_t k = 0; k < shapes.shapes.size(); ++k) {
+    json target = {{"POSITION", glb->AddPositions(Rows(shapes.shapes[k].data(), part, 3))}};
+    if (!triangles.empty()) target["NORMAL"] = glb->AddVectors(Rows(normals.shapes[k].data(), part, 3));
     primitive["targets"].push_back(target);
   }
   return primitive;
@@ -53,31 +53,29 @@ void AddMesh(const PointCacheMesh& mesh, const FrameShapes& shapes, const std::s
   for (const CachePart& part : CacheParts(mesh)) {
     if (part.vertex_count > 0) out["primitives"].push_back(Primitive(mesh, part, shapes, normals, glb));
   }
-  const std::size_t node = glb->root["nodes"].size();
-  if (shapes.shapes.cols() > 0) {
-    // Row by row: all weights of the first key, then of the second
-    std::vector<float> values;
-    for (Eigen::Index t = 0; t < shapes.weights.rows(); ++t) {
-      for (Eigen::Index k = 0; k < shapes.weights.cols(); ++k) values.push_back(shapes.weights(t, k));
-    }
+  const std::size_t node = glb->root()["nodes"].size();
+  if (!shapes.shapes.empty()) {
+    // All weights of the first key, then of the second
+    const std::vector<float>& values = shapes.weights;
     const int output = glb->AddNumbers(values);
-    json& animation = glb->root["animations"][0];
+    json& animation = glb->root()["animations"][0];
     animation["name"] = clip.empty() ? "cache" : clip;
     animation["samplers"].push_back({{"input", times_accessor}, {"output", output}});
     animation["channels"].push_back(
         {{"sampler", animation["samplers"].size() - 1}, {"target", {{"node", node}, {"path", "weights"}}}});
-    out["weights"] = std::vector<float>(values.begin(), values.begin() + shapes.weights.cols());
-    for (Eigen::Index k = 0; k < shapes.weights.cols(); ++k)
+    out["weights"] = std::vector<float>(values.begin(),
+                                        values.begin() + static_cast<std::ptrdiff_t>(shapes.shapes.size()));
+    for (std::size_t k = 0; k < shapes.shapes.size(); ++k)
       out["extras"]["targetNames"].push_back(fmt::format("shape{}", k + 1));
   }
-  glb->root["meshes"].push_back(out);
-  glb->root["nodes"].push_back({{"name", mesh.name}, {"mesh", glb->root["meshes"].size() - 1}});
-  glb->root["scene"] = 0;
-  glb->root["scenes"][0]["nodes"].push_back(node);
+  glb->root()["meshes"].push_back(out);
+  glb->root()["nodes"].push_back({{"name", mesh.name}, {"mesh", glb->root()["meshes"].size() - 1}});
+  glb->root()["scene"] = 0;
+  glb->root()["scenes"][0]["nodes"].push_back(node);
 }
 
 void AddMaterial(const CacheMaterial& material, GlbFile* glb) {
-  json& root = glb->root;
+  json& root = glb->root();
   json shading = {{"baseColorFactor", material.base_color},
                   {"metallicFactor", material.metallic},
                   {"roughnessFactor", material.roughness}};
@@ -124,13 +122,13 @@ Result<MorphGlbReport> WriteMorphGlb(const std::string& path, const PointCache& 
   GlbFile glb;
   const int times_accessor = times.size() > 1 ? glb.AddNumbers(times) : -1;
   if (times.size() > 1) {
-    glb.root["accessors"].back()["min"] = {times.front()};
-    glb.root["accessors"].back()["max"] = {times.back()};
+    glb.root()["accessors"].back()["min"] = {times.front()};
+    glb.root()["accessors"].back()["max"] = {times.back()};
   }
   for (const CacheImage& image : cache.images) {
     const int view = glb.AddBytes(image.bytes);
-    glb.root["images"].push_back({{"bufferView", view}, {"mimeType", image.type}});
-    glb.root["textures"].push_back({{"source", glb.root["images"].size() - 1}});
+    glb.root()["images"].push_back({{"bufferView", view}, {"mimeType", image.type}});
+    glb.root()["textures"].push_back({{"source", glb.root()["images"].size() - 1}});
   }
   for (const CacheMaterial& material : cache.materials) AddMaterial(material, &glb);
   double square_sum = 0, count = 0;
@@ -144,7 +142,7 @@ Result<MorphGlbReport> WriteMorphGlb(const std::string& path, const PointCache& 
     }
     const FrameShapes shapes = ShapesOfFrames(mesh, times.size(), options.tolerance * report.diagonal,
                                               std::max(options.max_targets, 0));
-    report.targets.back() = static_cast<int>(shapes.shapes.cols());
+    report.targets.back() = static_cast<int>(shapes.shapes.size());
     report.max_residual = std::max(report.max_residual, shapes.max_residual);
     square_sum += shapes.square_sum;
     count += static_cast<double>(mesh.frames.size() / 3);

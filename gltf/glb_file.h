@@ -2,7 +2,8 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,7 +15,9 @@ namespace kpsa::engine {
 
 class GlbFile {
  public:
-  nlohmann::ordered_json root = {{"asset", {{"version", "2.0"}, {"generator", "kpsa"}}}};
+  GlbFile();
+  ~GlbFile();
+  nlohmann::ordered_json& root() { return *root_; }
 
   // Indices of accessors, and of the view that holds these bytes.
   int AddPositions(std::span<const float> xyz);  // with the bounds that POSITION needs
@@ -34,6 +37,7 @@ class GlbFile {
   int AddAccessor(std::span<const T> values, int component_type, const char* type, std::size_t width,
                   Use use);
 
+  std::unique_ptr<nlohmann::ordered_json> root_;
   std::vector<std::uint8_t> bytes_;
 };
 
