@@ -1,19 +1,20 @@
-// KHR_animation_pointer: channels that name what they animate by a JSON pointer. Nothing outside gltf/
-// includes this.
+// KHR_animation_pointer: JSON pointers to what a channel animates. Nothing outside gltf/ includes this.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <cstdint>
 #include <string>
-#include <vector>
 
 #include "base/status.h"
 
 namespace kpsa::engine::gltf {
 
-// Makes plain channels of those of `reduced` (the checked copy of `root`) that point at translation,
-// rotation, scale or weights of a node; channels that point elsewhere are left out, with a warning for each
-// animation. Errors: a pointer that is none, that names no node, and a node beside it.
-Status ResolvePointers(const nlohmann::json& root, nlohmann::json* reduced,
-                       std::vector<std::string>* warnings);
+struct PointedAt {
+  std::uint64_t node = 0;
+  std::string path;  // translation, rotation, scale or weights
+};
+
+// Whether the pointer is one of those that are read, which *at is set to. Errors: no JSON pointer; one that
+// names no node of `node_count`.
+Result<bool> ResolvePointer(const std::string& pointer, std::size_t node_count, PointedAt* at);
 
 }  // namespace kpsa::engine::gltf
