@@ -32,6 +32,7 @@ Status CheckRig(const std::string& file, const YamlNode& root, const FmtFlags& f
 // The file's text and its canonical form.
 struct Formatted {
   std::string before, after;
+  bool loses_comments = false;  // they could not be told from what the file says
 };
 Result<Formatted> Format(const std::string& file, const FmtFlags& flags) {
   const std::string suffix = FileSuffix(file);
@@ -50,7 +51,13 @@ Result<Formatted> Format(const std::string& file, const FmtFlags& flags) {
   Flags with_plugins;
   with_plugins.plugins = flags.plugins;
   KPSA_RETURN_IF_ERROR(LoadPlugins(with_plugins, &plugins));
-  Result<std::string> after = FormatRig(*root, registry);
+  CommentMap kept;
+  if (!flags.drop_comments) {
+    const std::optional<std::vector<Comment>> comments = FindComments(text.before);
+    text.loses_comments = !comments.has_value() && HasComments(text.before);
+    if (comments.has_value()) kept = AttachComments(*root, text.before, *comments);
+  }
+  Result<std::string> after = FormatRig(*root, registry, kept);
   if (!after.ok()) return after.status();
   text.after = std::move(*after);
   return text;
@@ -76,7 +83,7 @@ CommandResult Fmt(const FmtFlags& flags) {
       continue;
     }
     const bool same = text->before == text->after;
-    const bool loses = !flags.check && !flags.drop_comments && !same && HasComments(text->before);
+    const bool loses = !flags.check && !same && text->loses_comments;
     if (flags.check) {
       if (!same) Print(file + "\n");
       differs = differs || !same;
@@ -102,12 +109,12 @@ void AddFmtCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<FmtFlags>();
   CLI::App* command = AddCommand(
       program, "fmt", "A rig file in canonical form",
-      "Sections in one order, an entry a line where it fits, quotes where they are needed. Comments are "
-      "lost. Invalid rigs are refused.\n"
+      "Sections in one order, an entry a line where it fits, quotes where they are needed. Comments "
+      "stay with their entries. Invalid rigs are refused.\n"
       "Examples:\n"
       "  kpsa fmt head.yaml -o tidy.yaml\n"
       "  kpsa fmt head.yaml lips.yaml --check\n"
-      "  kpsa fmt head.yaml --in-place --drop-comments",
+      "  kpsa fmt head.yaml --in-place",
       chosen, [flags] { return Fmt(*flags); });
   AddRepeated(command, "FILE", "FILE", &flags->files, "rig files (.yaml)");
   AddOption(command, "-o,--output", "FILE", &flags->output, "a .yaml file instead of stdout");
@@ -115,7 +122,7 @@ void AddFmtCommand(CLI::App* program, Command* chosen) {
   AddSwitch(command, "--check", &flags->check,
             "write nothing: print the files that are not so; exit 1 if any");
   AddSwitch(command, "--in-place", &flags->in_place, "replace the files themselves");
-  AddSwitch(command, "--drop-comments", &flags->drop_comments, "even where comments are lost");
+  AddSwitch(command, "--drop-comments", &flags->drop_comments, "leave comments out");
   AddRepeated(command, "--plugin", "FILE", &flags->plugins,
               "a shared library that adds node types; may be repeated");
   AddSwitch(command, "-q,--quiet", &flags->quiet, "no messages but errors");

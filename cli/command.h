@@ -24,6 +24,7 @@ void AddInspectCommand(CLI::App* program, Command* chosen);
 void AddFmtCommand(CLI::App* program, Command* chosen);
 void AddEvalCommand(CLI::App* program, Command* chosen);
 void AddGetCommand(CLI::App* program, Command* chosen);
+void AddPoseCommand(CLI::App* program, Command* chosen);
 void AddRenderCommand(CLI::App* program, Command* chosen);
 void AddTrainCommand(CLI::App* program, Command* chosen);
 void AddLearnCommand(CLI::App* program, Command* chosen);
@@ -37,6 +38,8 @@ void AddCompareCommand(CLI::App* program, Command* chosen);
 void AddGraphCommand(CLI::App* program, Command* chosen);
 void AddNodesCommand(CLI::App* program, Command* chosen);
 void AddWeightsCommand(CLI::App* program, Command* chosen);
+void AddCompletionsCommand(CLI::App* program, Command* chosen);
+void AddManCommand(CLI::App* program, Command* chosen);
 void AddHelpCommand(CLI::App* program, Command* chosen);
 
 }  // namespace kpsa::engine

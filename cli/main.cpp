@@ -92,6 +92,7 @@ int Main(int argc, char** argv) {
   AddFmtCommand(&program, &chosen);
   AddEvalCommand(&program, &chosen);
   AddGetCommand(&program, &chosen);
+  AddPoseCommand(&program, &chosen);
   AddRenderCommand(&program, &chosen);
   AddTrainCommand(&program, &chosen);
   AddLearnCommand(&program, &chosen);
@@ -105,6 +106,8 @@ int Main(int argc, char** argv) {
   AddGraphCommand(&program, &chosen);
   AddNodesCommand(&program, &chosen);
   AddWeightsCommand(&program, &chosen);
+  AddCompletionsCommand(&program, &chosen);
+  AddManCommand(&program, &chosen);
   AddHelpCommand(&program, &chosen);
   // `kpsa help eval` is `kpsa eval --help`
   std::vector<const char*> words(argv, argv + argc);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "cli/cache_look.h"
 #include "cli/common.h"
 #include "cli/output.h"
 #include "files/npz.h"
@@ -78,6 +79,7 @@ class CacheOutput final : public VertexOutput {
       const CharacterMesh& mesh = rig.scene.meshes[m];
       cache_.meshes.push_back({mesh.name, mesh.vertex_count, {}, mesh.mesh().data().triangle_vertices});
     }
+    if (!one_file_a_mesh()) AddLook(rig, shown_, &cache_, &notes_);
   }
   bool one_file_a_mesh() const { return suffix_ == ".pc2" || suffix_ == ".mdd"; }
 
@@ -113,7 +115,7 @@ class CacheOutput final : public VertexOutput {
   }
 
   Result<std::vector<std::string>> Finish() override {
-    std::vector<std::string> notes;
+    std::vector<std::string> notes = notes_;
     if (suffix_ == ".usda") {
       KPSA_RETURN_IF_ERROR(WriteUsda(path_, cache_, options_.force, &notes));
     } else if (suffix_ == ".glb") {
@@ -157,6 +159,7 @@ class CacheOutput final : public VertexOutput {
   std::vector<std::size_t> shown_;
   VertexOutputOptions options_;
   PointCache cache_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace

@@ -49,5 +49,17 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/kpsaConfigVersion.cmake C
 install(FILES ${PROJECT_BINARY_DIR}/kpsaConfig.cmake ${PROJECT_BINARY_DIR}/kpsaConfigVersion.cmake DESTINATION ${package})
 if(KPSA_PROGRAM)
   install(TARGETS kpsa)
+  # What the program says of itself to man and to shells
+  set(said ${PROJECT_BINARY_DIR}/said)
+  install(CODE "
+    file(MAKE_DIRECTORY \"${said}\")
+    foreach(words man \"completions;bash\" \"completions;zsh\" \"completions;fish\")
+      list(GET words -1 name)
+      execute_process(COMMAND \"$<TARGET_FILE:kpsa>\" \${words} OUTPUT_FILE \"${said}/\${name}\" COMMAND_ERROR_IS_FATAL ANY)
+    endforeach()")
+  install(FILES ${said}/man DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 RENAME kpsa.1)
+  install(FILES ${said}/bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME kpsa)
+  install(FILES ${said}/zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions RENAME _kpsa)
+  install(FILES ${said}/fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d RENAME kpsa.fish)
 endif()
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

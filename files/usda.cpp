@@ -1,85 +1,176 @@
-#include <fmt/format.h>
-
+#include <algorithm>
+#include <cmath>
 #include <set>
+#include <span>
 
 #include "base/check.h"
-#include "files/file.h"
+#include "files/cache_normals.h"
 #include "files/point_cache.h"
+#include "files/usda_text.h"
 
 namespace kpsa::engine {
 namespace {
 
 constexpr std::uint64_t kWarnAbove = 100'000'000;
 
-// Text in blocks, with its length.
-class TextWriter {
- public:
-  explicit TextWriter(const ByteSink& sink) : sink_(sink) {}
-  template <typename... Args>
-  Status Put(fmt::format_string<Args...> format, Args&&... args) {
-    fmt::format_to(std::back_inserter(block_), format, std::forward<Args>(args)...);
-    return block_.size() < (1 << 16) ? Status() : Flush();
+// "[a, b, ...]" of `count` items, each as `item` puts it.
+template <typename Item>
+Status PutList(std::size_t count, TextWriter* out, const Item& item) {
+  KPSA_RETURN_IF_ERROR(out->Put("["));
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0) KPSA_RETURN_IF_ERROR(out->Put(", "));
+    KPSA_RETURN_IF_ERROR(item(i));
   }
-  Status Flush() {
-    written_ += block_.size();
-    Status status = sink_({reinterpret_cast<const std::uint8_t*>(block_.data()), block_.size()});
-    block_.clear();
-    return status;
-  }
-  std::uint64_t written() const { return written_; }
-
- private:
-  const ByteSink& sink_;
-  std::string block_;
-  std::uint64_t written_ = 0;
-};
-
-// A prim name: letters, digits and underscores, not starting with a digit, not yet in `taken`.
-std::string PrimName(const std::string& name, std::set<std::string>* taken) {
-  std::string prim;
-  for (const char c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    prim += plain ? c : '_';
-  }
-  if (prim.empty() || (prim[0] >= '0' && prim[0] <= '9')) prim = "_" + prim;
-  std::string unique = prim;
-  for (int i = 1; !taken->insert(unique).second; ++i) unique = fmt::format("{}_{}", prim, i);
-  return unique;
+  return out->Put("]");
+}
+Status PutVectors(std::span<const float> xyz, TextWriter* out) {
+  return PutList(xyz.size() / 3, out, [&](std::size_t i) {
+    return out->Put("({}, {}, {})", xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]);
+  });
 }
 
-std::string Quoted(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    quoted += static_cast<unsigned char>(c) < 32 ? ' ' : c;
+// "<type> <name>.timeSamples": of each frame what `value` puts; one sample a time.
+template <typename Value>
+Status PutSamples(const PointCache& cache, const char* attribute, TextWriter* out, const Value& value) {
+  KPSA_RETURN_IF_ERROR(out->Put("        {}.timeSamples = {{\n", attribute));
+  for (std::size_t t = 0; t < cache.times.size(); ++t) {
+    if (t > 0 && cache.times[t] == cache.times[t - 1]) continue;
+    KPSA_RETURN_IF_ERROR(out->Put("            {}: ", cache.times[t] * cache.fps));
+    KPSA_RETURN_IF_ERROR(value(t));
+    KPSA_RETURN_IF_ERROR(out->Put(",\n"));
   }
-  return quoted + "\"";
+  return out->Put("        }}\n");
+}
+
+// The least and the largest corner of a frame's box.
+std::vector<float> Extent(std::span<const float> xyz) {
+  if (xyz.empty()) return {0, 0, 0, 0, 0, 0};
+  std::vector<float> box = {xyz[0], xyz[1], xyz[2], xyz[0], xyz[1], xyz[2]};
+  for (std::size_t i = 0; i < xyz.size(); ++i) {
+    box[i % 3] = std::min(box[i % 3], xyz[i]);
+    box[3 + i % 3] = std::max(box[3 + i % 3], xyz[i]);
+  }
+  return box;
+}
+
+Status PutGeometry(const PointCache& cache, const PointCacheMesh& mesh, TextWriter* out) {
+  const auto frame = [&](std::size_t t) {
+    return std::span(mesh.frames).subspan(3 * t * mesh.vertex_count, 3 * mesh.vertex_count);
+  };
+  KPSA_RETURN_IF_ERROR(out->Put("        int[] faceVertexCounts = "));
+  KPSA_RETURN_IF_ERROR(PutList(mesh.triangles.size() / 3, out, [&](std::size_t) { return out->Put("3"); }));
+  KPSA_RETURN_IF_ERROR(out->Put("\n        int[] faceVertexIndices = "));
+  KPSA_RETURN_IF_ERROR(
+      PutList(mesh.triangles.size(), out, [&](std::size_t i) { return out->Put("{}", mesh.triangles[i]); }));
+  KPSA_RETURN_IF_ERROR(out->Put("\n"));
+  KPSA_RETURN_IF_ERROR(PutSamples(cache, "float3[] extent", out,
+                                  [&](std::size_t t) { return PutVectors(Extent(frame(t)), out); }));
+  KPSA_RETURN_IF_ERROR(
+      PutSamples(cache, "point3f[] points", out, [&](std::size_t t) { return PutVectors(frame(t), out); }));
+  if (mesh.triangles.empty()) return {};
+  KPSA_RETURN_IF_ERROR(
+      out->Put("        normal3f[] normals (\n            interpolation = \"vertex\"\n        )\n"));
+  return PutSamples(cache, "normal3f[] normals", out,
+                    [&](std::size_t t) { return PutVectors(CacheNormals(mesh, t), out); });
+}
+
+const CacheMaterial* MaterialOf(const PointCache& cache, const CachePart& part) {
+  return part.material < cache.materials.size() ? &cache.materials[part.material] : nullptr;
+}
+
+// Texture coordinates and colours.
+Status PutPrimvars(const PointCache& cache, const PointCacheMesh& mesh, TextWriter* out) {
+  constexpr const char* kVertex = " (\n            interpolation = \"vertex\"\n        )\n";
+  if (!mesh.uvs.empty()) {
+    KPSA_RETURN_IF_ERROR(out->Put("        texCoord2f[] primvars:st = "));
+    KPSA_RETURN_IF_ERROR(PutList(mesh.vertex_count, out, [&](std::size_t v) {
+      const float s = mesh.uvs[2 * v], t = 1 - mesh.uvs[2 * v + 1];
+      return std::isfinite(s) && std::isfinite(t) ? out->Put("({}, {})", s, t) : out->Put("(0, 0)");
+    }));
+    KPSA_RETURN_IF_ERROR(out->Put("{}", kVertex));
+  }
+  std::vector<float> colors;
+  for (const CachePart& part : CacheParts(mesh)) {
+    const CacheMaterial* material = MaterialOf(cache, part);
+    for (std::size_t i = 0; i < std::size_t{3} * part.vertex_count; ++i) {
+      const std::size_t at = std::size_t{3} * part.first_vertex + i;
+      colors.push_back((material == nullptr ? 1 : static_cast<float>(material->base_color[i % 3])) *
+                       (mesh.colors.empty() ? 1 : mesh.colors[at]));
+    }
+  }
+  const bool constant = mesh.colors.empty() && mesh.parts.size() <= 1;
+  if (constant) colors.resize(std::min<std::size_t>(colors.size(), 3));
+  KPSA_RETURN_IF_ERROR(out->Put("        color3f[] primvars:displayColor = "));
+  KPSA_RETURN_IF_ERROR(PutVectors(colors, out));
+  return out->Put("{}", constant ? "\n" : kVertex);
+}
+
+// Which triangles are of which material. A material cannot show vertex colours, so those go without.
+Status PutBindings(const PointCache& cache, const PointCacheMesh& mesh,
+                   const std::vector<std::string>& materials, TextWriter* out) {
+  if (!mesh.colors.empty()) return {};
+  const std::vector<CachePart> parts = CacheParts(mesh);
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    const CachePart& part = parts[p];
+    if (MaterialOf(cache, part) == nullptr) continue;
+    const std::string rel =
+        fmt::format("rel material:binding = </cache/Looks/{}>\n", materials[part.material]);
+    if (parts.size() == 1) return out->Put("        {}", rel);
+    KPSA_RETURN_IF_ERROR(out->Put(
+        "        def GeomSubset \"part{}\" (\n            prepend apiSchemas = [\"MaterialBindingAPI\"]\n"
+        "        )\n        {{\n            uniform token elementType = \"face\"\n"
+        "            uniform token familyName = \"materialBind\"\n            int[] indices = ",
+        p));
+    std::vector<std::size_t> faces;
+    for (std::size_t i = 0; i < mesh.triangles.size(); i += 3) {
+      if (mesh.triangles[i] >= part.first_vertex && mesh.triangles[i] - part.first_vertex < part.vertex_count)
+        faces.push_back(i / 3);
+    }
+    KPSA_RETURN_IF_ERROR(PutList(faces.size(), out, [&](std::size_t i) { return out->Put("{}", faces[i]); }));
+    KPSA_RETURN_IF_ERROR(out->Put("\n            {}        }}\n", rel));
+  }
+  return {};
 }
 
 Status PutMesh(const PointCache& cache, const PointCacheMesh& mesh, const std::string& prim,
-               TextWriter* out) {
+               const std::vector<std::string>& materials, TextWriter* out) {
   KPSA_CHECK_EQ(mesh.frames.size(), cache.times.size() * mesh.vertex_count * 3);
-  KPSA_RETURN_IF_ERROR(out->Put("    def Mesh \"{}\"\n    {{\n        custom string sourceName = {}\n", prim,
-                                Quoted(mesh.name)));
+  const std::vector<CachePart> parts = CacheParts(mesh);
+  const bool double_sided = std::any_of(parts.begin(), parts.end(), [&](const CachePart& part) {
+    return MaterialOf(cache, part) != nullptr && MaterialOf(cache, part)->double_sided;
+  });
   KPSA_RETURN_IF_ERROR(
-      out->Put("        uniform token subdivisionScheme = \"none\"\n        int[] faceVertexCounts = ["));
-  for (std::size_t i = 0; i < mesh.triangles.size() / 3; ++i)
-    KPSA_RETURN_IF_ERROR(out->Put("{}3", i == 0 ? "" : ", "));
-  KPSA_RETURN_IF_ERROR(out->Put("]\n        int[] faceVertexIndices = ["));
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    KPSA_RETURN_IF_ERROR(out->Put("{}{}", i == 0 ? "" : ", ", mesh.triangles[i]));
+      out->Put("    def Mesh \"{}\" (\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )\n    {{\n"
+               "        custom string sourceName = {}\n        uniform token subdivisionScheme = \"none\"\n"
+               "        uniform token orientation = \"rightHanded\"\n        uniform bool doubleSided = {}\n",
+               prim, Quoted(mesh.name), double_sided ? 1 : 0));
+  KPSA_RETURN_IF_ERROR(PutGeometry(cache, mesh, out));
+  KPSA_RETURN_IF_ERROR(PutPrimvars(cache, mesh, out));
+  KPSA_RETURN_IF_ERROR(PutBindings(cache, mesh, materials, out));
+  return out->Put("    }}\n");
+}
+
+// The materials below "Looks"; *names by material.
+Status PutMaterials(const PointCache& cache, std::vector<std::string>* names, TextWriter* out) {
+  if (cache.materials.empty()) return {};
+  std::set<std::string> taken;
+  KPSA_RETURN_IF_ERROR(out->Put("    def Scope \"Looks\"\n    {{\n"));
+  for (const CacheMaterial& material : cache.materials) {
+    const std::string& name = names->emplace_back(PrimName(material.name, &taken));
+    const std::array<double, 4>& color = material.base_color;
+    KPSA_RETURN_IF_ERROR(
+        out->Put("        def Material \"{0}\"\n        {{\n"
+                 "            token outputs:surface.connect = </cache/Looks/{0}/surface.outputs:surface>\n"
+                 "            def Shader \"surface\"\n            {{\n"
+                 "                uniform token info:id = \"UsdPreviewSurface\"\n"
+                 "                color3f inputs:diffuseColor = ({1}, {2}, {3})\n"
+                 "                float inputs:opacity = {4}\n                float inputs:metallic = {5}\n"
+                 "                float inputs:roughness = {6}\n                token outputs:surface\n"
+                 "            }}\n        }}\n",
+                 name, color[0], color[1], color[2], material.alpha_mode == "BLEND" ? color[3] : 1,
+                 material.metallic, material.roughness));
   }
-  KPSA_RETURN_IF_ERROR(out->Put("]\n        point3f[] points.timeSamples = {{\n"));
-  for (std::size_t t = 0; t < cache.times.size(); ++t) {
-    if (t > 0 && cache.times[t] == cache.times[t - 1]) continue;  // one sample a time
-    KPSA_RETURN_IF_ERROR(out->Put("            {}: [", cache.times[t] * cache.fps));
-    for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
-      const float* p = &mesh.frames[(t * mesh.vertex_count + v) * 3];
-      KPSA_RETURN_IF_ERROR(out->Put("{}({}, {}, {})", v == 0 ? "" : ", ", p[0], p[1], p[2]));
-    }
-    KPSA_RETURN_IF_ERROR(out->Put("],\n"));
-  }
-  return out->Put("        }}\n    }}\n");
+  return out->Put("    }}\n");
 }
 
 }  // namespace
@@ -96,9 +187,13 @@ Status WriteUsda(const std::string& path, const PointCache& cache, bool force,
                 "    timeCodesPerSecond = {}\n    framesPerSecond = {}\n    metersPerUnit = 1\n"
                 "    upAxis = \"Y\"\n)\n\ndef Xform \"cache\"\n{{\n",
                 first, last, cache.fps, cache.fps));
-    std::set<std::string> taken;
+    if (!cache.rig.empty())
+      KPSA_RETURN_IF_ERROR(out.Put("    custom string kpsa:rig = {}\n", Quoted(cache.rig)));
+    std::vector<std::string> materials;
+    KPSA_RETURN_IF_ERROR(PutMaterials(cache, &materials, &out));
+    std::set<std::string> taken = {"Looks"};
     for (const PointCacheMesh& mesh : cache.meshes) {
-      KPSA_RETURN_IF_ERROR(PutMesh(cache, mesh, PrimName(mesh.name, &taken), &out));
+      KPSA_RETURN_IF_ERROR(PutMesh(cache, mesh, PrimName(mesh.name, &taken), materials, &out));
     }
     KPSA_RETURN_IF_ERROR(out.Put("}}\n"));
     KPSA_RETURN_IF_ERROR(out.Flush());

@@ -30,7 +30,8 @@ struct MorphGlbReport {
 
 // One node and mesh for each mesh of the cache: POSITION and targets as gltf/frame_shapes.h says (a single
 // frame gets no animation), weights within [0, 1], to which many programs clamp them, one LINEAR weights
-// channel each. No normals: viewers shade flat. glTF time starts at 0: times are shifted by the first where
+// channel each. A primitive for each part, with what the cache knows of its material and texture coordinates,
+// and normals that are fitted to the same weights. glTF time starts at 0: times are shifted by the first where
 // that is negative. An error for times that do not ascend and for
 // more than 4 GB.
 Result<MorphGlbReport> WriteMorphGlb(const std::string& path, const PointCache& cache,

@@ -1,8 +1,11 @@
 #include "gltf/frame_shapes.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "files/cache_normals.h"
 
 namespace kpsa::engine {
 namespace {
@@ -39,6 +42,8 @@ void Measure(const Matrix& residual, double* max, double* square_sum) {
   *square_sum = residual.squaredNorm();
 }
 
+std::vector<float> Floats(const Eigen::VectorXf& values) { return {values.begin(), values.end()}; }
+
 }  // namespace
 
 FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, double tolerance,
@@ -47,11 +52,10 @@ FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, 
              cols = static_cast<Eigen::Index>(frame_count);
   const Matrix frames = Eigen::Map<const Eigen::MatrixXf>(mesh.frames.data(), rows, cols).cast<double>();
   FrameShapes result;
-  result.rest = frames.rowwise().mean().cast<float>();
-  Matrix residual = frames.colwise() - result.rest.cast<double>();
+  Eigen::VectorXf rest = frames.rowwise().mean().cast<float>();
+  Matrix residual = frames.colwise() - rest.cast<double>();
   const Matrix vectors = SingularVectors(residual, max_shapes);
-  result.shapes.resize(rows, vectors.cols());
-  result.weights.resize(cols, vectors.cols());
+  std::vector<Eigen::VectorXf> all_weights;
   Measure(residual, &result.max_residual, &result.square_sum);
   Eigen::Index count = 0;
   for (; count < vectors.cols() && result.max_residual > tolerance; ++count) {
@@ -60,17 +64,51 @@ FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, 
     if (range == 0) break;
     if (weights[0] - low > range / 2) low += range, range = -range;
     // Subtract what is written, in float32, so that later shapes mend its rounding
-    const Eigen::VectorXf rest = (result.rest.cast<double>() + low * vectors.col(count)).cast<float>();
-    result.shapes.col(count) = (range * vectors.col(count)).cast<float>();
-    result.weights.col(count) = ((weights.array() - low) / range).cwiseMax(0).cwiseMin(1).cast<float>();
-    residual.colwise() -= rest.cast<double>() - result.rest.cast<double>();
-    residual -=
-        result.shapes.col(count).cast<double>() * result.weights.col(count).cast<double>().transpose();
-    result.rest = rest;
+    const Eigen::VectorXf moved = (rest.cast<double>() + low * vectors.col(count)).cast<float>();
+    const Eigen::VectorXf shape = (range * vectors.col(count)).cast<float>();
+    all_weights.push_back(((weights.array() - low) / range).cwiseMax(0).cwiseMin(1).cast<float>());
+    residual.colwise() -= moved.cast<double>() - rest.cast<double>();
+    residual -= shape.cast<double>() * all_weights.back().cast<double>().transpose();
+    result.shapes.push_back(Floats(shape));
+    rest = moved;
     Measure(residual, &result.max_residual, &result.square_sum);
   }
-  result.shapes.conservativeResize(rows, count);
-  result.weights.conservativeResize(cols, count);
+  result.rest = Floats(rest);
+  for (Eigen::Index t = 0; t < cols; ++t) {
+    for (const Eigen::VectorXf& weights : all_weights) result.weights.push_back(weights[t]);
+  }
+  return result;
+}
+
+FrameNormals NormalsOfFrames(const PointCacheMesh& mesh, const FrameShapes& shapes) {
+  FrameNormals result;
+  if (mesh.triangles.empty()) return result;
+  const auto rows = static_cast<Eigen::Index>(shapes.rest.size()),
+             frames = static_cast<Eigen::Index>(mesh.frames.size()) / rows,
+             count = static_cast<Eigen::Index>(shapes.shapes.size());
+  Matrix normals(frames, rows);
+  for (Eigen::Index t = 0; t < frames; ++t) {
+    const std::vector<float> normal = CacheNormals(mesh, static_cast<std::size_t>(t));
+    normals.row(t) = Eigen::Map<const Eigen::RowVectorXf>(normal.data(), rows).cast<double>();
+  }
+  Matrix weights(frames, count + 1);
+  weights << Eigen::VectorXd::Ones(frames),
+      Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+          shapes.weights.data(), frames, count)
+          .cast<double>();
+  Matrix fit = Eigen::CompleteOrthogonalDecomposition<Matrix>(weights).solve(normals);
+  for (Eigen::Index i = 0; i < rows; i += 3) {
+    const double length = fit.block<1, 3>(0, i).norm();
+    constexpr double kShortest = 1e-3;
+    if (length > kShortest) {
+      fit.middleCols(i, 3) /= length;
+    } else {  // what points nowhere where all weights are 0 starts from the first frame's
+      fit.block<1, 3>(0, i) = normals.block<1, 3>(0, i);
+    }
+  }
+  result.rest = Floats(fit.row(0).transpose().cast<float>());
+  for (Eigen::Index k = 0; k < count; ++k)
+    result.shapes.push_back(Floats(fit.row(k + 1).transpose().cast<float>()));
   return result;
 }
 

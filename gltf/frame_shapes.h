@@ -1,7 +1,7 @@
 // The few shapes that the frames of a point cache are mixtures of. Nothing outside gltf/ includes this.
 #pragma once
 
-#include <Eigen/Core>
+#include <vector>
 
 #include "files/point_cache.h"
 
@@ -9,9 +9,9 @@ namespace kpsa::engine {
 
 // frames ~ rest + shapes * weights^T, V vertices (x y z each), T frames, K shapes.
 struct FrameShapes {
-  Eigen::VectorXf rest;     // 3V
-  Eigen::MatrixXf shapes;   // 3V x K, displacements
-  Eigen::MatrixXf weights;  // T x K, within [0, 1]; every column reaches both
+  std::vector<float> rest;                 // 3V
+  std::vector<std::vector<float>> shapes;  // K times 3V, displacements
+  std::vector<float> weights;              // T x K, frame after frame, within [0, 1]; each shape's reach both
   // Of the float32 numbers above against the frames: the largest distance of a vertex, and the sum of squares
   double max_residual = 0, square_sum = 0;
 };
@@ -22,5 +22,15 @@ struct FrameShapes {
 // to the first frame. It need not look like any frame.
 FrameShapes ShapesOfFrames(const PointCacheMesh& mesh, std::size_t frame_count, double tolerance,
                            int max_shapes);
+
+// normals ~ normalized(rest + shapes * weights^T): those of the frames, fitted to their weights.
+struct FrameNormals {
+  std::vector<float> rest;                 // 3V, unit
+  std::vector<std::vector<float>> shapes;  // K times 3V
+};
+
+// Least squares for each vertex. Only directions count, so each is scaled to what makes its rest normal a
+// unit vector, as glTF wants it. Empty for a mesh without triangles.
+FrameNormals NormalsOfFrames(const PointCacheMesh& mesh, const FrameShapes& shapes);
 
 }  // namespace kpsa::engine

@@ -5,7 +5,7 @@
 // Units and spaces are glTF's, which are ours: metres, seconds, Y up, right-handed, column-major matrices.
 //
 // Extensions: KHR_mesh_quantization, EXT_meshopt_compression, KHR_draco_mesh_compression (vertices in the
-// order in which Draco decodes them) and what gltf/vrm.h lists are read. Extensions that cannot move a
+// order in which Draco decodes them), KHR_animation_pointer (to nodes) and what gltf/vrm.h lists are read. Extensions that cannot move a
 // point (KHR_texture_*, KHR_materials_*, KHR_lights_punctual, EXT_texture_*, ...) are ignored even where the
 // file requires them. Any other required one is an error that names it. Images are never read.
 //

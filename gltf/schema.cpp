@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "gltf/animation_pointer.h"
 #include "gltf/document.h"
 
 namespace kpsa::engine::gltf {
@@ -238,11 +239,11 @@ Status CheckVersion(const json& asset) {
 }
 
 constexpr const char *kMeshopt = "EXT_meshopt_compression", *kDraco = "KHR_draco_mesh_compression",
-                     *kVisibility = "KHR_node_visibility";
+                     *kVisibility = "KHR_node_visibility", *kPointer = "KHR_animation_pointer";
 
 bool IsRead(std::string_view extension) {
   return extension == "KHR_mesh_quantization" || extension == kMeshopt || extension == kDraco ||
-         extension == kVisibility || extension == "VRM" || extension == "VRMC_vrm" ||
+         extension == kVisibility || extension == kPointer || extension == "VRM" || extension == "VRMC_vrm" ||
          extension == "VRMC_node_constraint";
 }
 
@@ -404,6 +405,58 @@ Status CopyBuffers(const json& root, std::vector<BufferSource>* buffers) {
   return {};
 }
 
+// In quotes, in one line, not too long.
+std::string ShownPointer(const std::string& text) {
+  constexpr std::size_t kMost = 80;
+  const std::string quoted = json(text.substr(0, kMost)).dump(-1, ' ', true, json::error_handler_t::replace);
+  return text.size() <= kMost ? quoted : quoted + "...";
+}
+
+// Makes plain channels of those that point at translation, rotation, scale or weights of a node; those that
+// point elsewhere are left out, with a warning for each animation.
+Status ResolvePointers(const json& root, json* reduced, std::vector<std::string>* warnings) {
+  if (!reduced->contains("animations")) return {};
+  const std::size_t node_count = reduced->contains("nodes") ? (*reduced)["nodes"].size() : 0;
+  for (std::size_t a = 0; a < (*reduced)["animations"].size(); ++a) {
+    json kept = json::array();
+    std::size_t left_out = 0;
+    std::string first;
+    json& channels = (*reduced)["animations"][a]["channels"];
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      json& target = channels[c]["target"];
+      const json* extension = FindExtension(root["animations"][a]["channels"][c]["target"], kPointer);
+      if (target["path"] != "pointer" || extension == nullptr) {
+        kept.push_back(std::move(channels[c]));
+        continue;
+      }
+      const std::string where = fmt::format("animations[{}].channels[{}].target", a, c);
+      if (!extension->is_object() || !extension->contains("pointer") || !(*extension)["pointer"].is_string())
+        return Status::Invalid("{}.extensions.{}.pointer must be text", where, kPointer);
+      if (target.contains("node"))
+        return Status::Invalid("{} has a node beside the pointer of {}", where, kPointer);
+      const std::string& pointer = (*extension)["pointer"].get_ref<const std::string&>();
+      PointedAt at;
+      const Result<bool> read = ResolvePointer(pointer, node_count, &at);
+      if (!read.ok())
+        return Status::Invalid("{}: the pointer {} {}", where, ShownPointer(pointer),
+                               read.status().errors()[0].message);
+      if (*read) {
+        target = {{"node", at.node}, {"path", at.path}};
+        kept.push_back(std::move(channels[c]));
+      } else if (left_out++ == 0) {
+        first = pointer;
+      }
+    }
+    channels = std::move(kept);
+    if (left_out > 0) {
+      warnings->push_back(
+          fmt::format("animations[{}] animates {}{}, which is not supported; ignored", a, ShownPointer(first),
+                      left_out == 1 ? std::string() : fmt::format(" and {} more by pointers", left_out - 1)));
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<ReducedJson> ReduceJson(std::span<const std::uint8_t> text) {
@@ -423,6 +476,7 @@ Result<ReducedJson> ReduceJson(std::span<const std::uint8_t> text) {
       for (const json& mesh : root["meshes"]) result.target_names.push_back(TargetNames(mesh));
     }
 
+    KPSA_RETURN_IF_ERROR(ResolvePointers(root, &reduced, &result.warnings));
     // tinygltf drops a channel without a target node with an error; the specification has it ignored
     if (reduced.contains("animations")) {
       for (json& animation : reduced["animations"]) {

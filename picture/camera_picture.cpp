@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "nodes/illumination.h"
+#include "picture/head_light.h"
 
 namespace kpsa::engine {
 namespace {
@@ -24,13 +25,6 @@ CameraView::Light LightOf(const Graph& graph, NodeId node) {
   return {
       kind, {node, def.FindAttribute("outMatrix"), -1, -1}, {node, def.FindAttribute("outColor"), -1, -1}};
 }
-
-double SrgbCurve(double linear) {
-  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-}
-
-// Everything up to 0.8 as it is, beyond it a curve that reaches 1 at infinity.
-double Compressed(double x) { return x <= 0.8 ? x : 1 - 0.2 * 0.2 / (x - 0.6); }
 
 const Value& StructuralValue(const Graph& graph, NodeId node, const char* name) {
   const PlugRef plug{node, graph.def(node).FindAttribute(name), -1, -1};
@@ -180,10 +174,16 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
           lights.push_back({view.lights[l].kind, evaluator.Get<Matrix4>(camera + 1 + 2 * l),
                             evaluator.Get<Double3>(camera + 2 + 2 * l)});
         }
-        const Result<PathTracer> tracer =
+        const Matrix4 world_from_screen = evaluator.Get<Matrix4>(camera);
+        const bool head_light = lights.empty() && !view.irradiance.has_value();
+        if (head_light) lights.push_back({DiffuseLight::Kind::kPoint, world_from_screen, {1, 1, 1}});
+        Result<PathTracer> tracer =
             PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights);
         if (!tracer.ok()) return tracer.status();
-        const Matrix4 world_from_screen = evaluator.Get<Matrix4>(camera);
+        if (head_light) {
+          lights.front().color = HeadLightColor(*tracer, world_from_screen);
+          KPSA_RETURN_IF_ERROR(tracer->Update(std::as_const(points).view(), lights));
+        }
         CameraImage& image = images[frame];
         const std::size_t pixels = std::size_t{view.width} * view.height;
         image.width = view.width, image.height = view.height;
@@ -224,34 +224,6 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
         return Status();
       }));
   return images;
-}
-
-Image LightError(const CameraImage& a, const CameraImage& b, double error_max) {
-  Image image(static_cast<int>(a.width), static_cast<int>(a.height), {24, 26, 30});
-  for (std::size_t p = 0; p < a.hit.size(); ++p) {
-    double squares = 0;
-    for (std::size_t k = 3 * p; k < 3 * p + 3; ++k) {
-      const double d = double{a.indirect[k]} - b.indirect[k];
-      squares += d * d;
-    }
-    const Rgb color = TurboColor(std::sqrt(squares) / error_max);
-    std::copy(color.begin(), color.end(), image.rgb.begin() + static_cast<std::ptrdiff_t>(3 * p));
-  }
-  return image;
-}
-
-Image Develop(const CameraImage& picture, double exposure, CameraLayer layer) {
-  Image image(static_cast<int>(picture.width), static_cast<int>(picture.height), {24, 26, 30});
-  for (std::size_t p = 0; p < picture.hit.size(); ++p) {
-    if (picture.hit[p] == 0) continue;
-    for (std::size_t k = 3 * p; k < 3 * p + 3; ++k) {
-      double light = layer == CameraLayer::kIndirect ? 0 : picture.direct[k];
-      if (layer != CameraLayer::kDirect) light += std::max(0.0f, picture.indirect[k]);
-      const double radiance = picture.albedo[k] * light * exposure / 3.14159265358979323846;
-      image.rgb[k] = static_cast<std::uint8_t>(std::lround(255 * SrgbCurve(Compressed(radiance))));
-    }
-  }
-  return image;
 }
 
 }  // namespace kpsa::engine

@@ -38,7 +38,7 @@ Result<CameraView> FindCamera(const Rig& rig, const std::string& name);
 CameraView AcceleratedView(const CameraView& view, const Rig& rig,
                            const std::vector<AppliedSubspace>& applied);
 
-// One picture: linear light, 3 numbers a pixel, row by row from the top left.
+// One picture, by a light at the camera where there is none: linear light, 3 numbers a pixel, row by row from the top left.
 struct CameraImage {
   Index width = 0, height = 0;
   std::vector<float> albedo, direct, indirect;  // reflectance; irradiances

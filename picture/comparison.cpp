@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "picture/caption.h"
 #include "picture/picture.h"
 #include "picture/surface.h"
 
@@ -107,7 +108,7 @@ Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accel
     images.push_back(std::move(*image));
     DrawTitle(images.back(), caption);
   }
-  DrawLegend(images.back(), full.scalar_max);
+  images.push_back(LegendPanel(options.height, {full.scalar_max, full.tolerance}));
   return SideBySide(images);
 }
 

@@ -1,6 +1,5 @@
 #include "picture/image.h"
 
-#include <fmt/format.h>
 #include <stb/stb_easy_font.h>
 
 #include <algorithm>
@@ -10,7 +9,6 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr Rgb kInk = {32, 34, 40};
 constexpr Rgb kGround = {236, 237, 240};
 constexpr int kLongestText = 200;
 
@@ -86,37 +84,6 @@ Rgb TurboColor(double t) {
   return {byte(r), byte(g), byte(b)};
 }
 
-std::string Millimetres(double metres) {
-  const double mm = metres * 1e3;
-  const int digits = mm >= 100 ? 0 : mm >= 10 ? 1 : mm >= 1 ? 2 : mm >= 1e-3 || mm == 0 ? 3 : 6;
-  return fmt::format("{:.{}f} mm", mm, digits);
-}
-
-void DrawLegend(Image& image, double max_metres) {
-  const int scale = std::max(1, image.height / 400);
-  const int bar_height = image.height * 6 / 10, bar_width = 10 * scale;
-  const int right = image.width - 8 * scale - TextWidth("00.00", scale);
-  const int left = right - bar_width - 4 * scale, top = (image.height - bar_height) / 2;
-  for (int y = 0; y < bar_height; ++y) {
-    image.Fill(left, top + y, bar_width, 1, TurboColor(1.0 - (y + 0.5) / bar_height));
-  }
-  for (int tick = 0; tick <= 4; ++tick) {
-    const int y = top + bar_height - tick * bar_height / 4;
-    image.Fill(left + bar_width, y, 3 * scale, scale, kInk);
-    std::string number = Millimetres(max_metres * tick / 4);
-    number.resize(number.size() - 3);  // the unit stands above the bar once
-    DrawText(image, right + 2 * scale, y - 4 * scale, scale, kInk, number);
-  }
-  constexpr std::string_view kLabel = "error, mm";
-  DrawText(image, std::min(left, image.width - 4 * scale - TextWidth(kLabel, scale)), top - 14 * scale, scale,
-           kInk, kLabel);
-}
-
-void DrawTitle(Image& image, std::string_view title) {
-  const int scale = std::max(1, image.height / 300);
-  DrawText(image, (image.width - TextWidth(title, scale)) / 2, 6 * scale, scale, kInk, title);
-}
-
 Image SideBySide(std::span<const Image> images, int gap) {
   int width = 0, height = 0;
   for (const Image& image : images) {
@@ -132,6 +99,31 @@ Image SideBySide(std::span<const Image> images, int gap) {
     x += image.width + gap;
   }
   return out;
+}
+
+Image StackRows(const std::vector<Image>& rows) {
+  if (rows.size() == 1) return rows.front();
+  constexpr int kGap = 4;
+  int width = 0, height = -kGap;
+  for (const Image& row : rows) width = std::max(width, row.width), height += row.height + kGap;
+  Image all(width, height, {255, 255, 255});
+  int y = 0;
+  for (const Image& row : rows) {
+    for (int i = 0; i < row.height; ++i)
+      std::copy_n(row.rgb.begin() + std::ptrdiff_t{3} * i * row.width,
+                  std::size_t{3} * static_cast<std::size_t>(row.width),
+                  all.rgb.begin() + std::ptrdiff_t{3} * (y + i) * width);
+    y += row.height + kGap;
+  }
+  return all;
+}
+
+std::vector<Image> InRows(const std::vector<Image>& images) {
+  std::vector<Image> rows;
+  constexpr std::size_t kMost = 6;
+  for (std::size_t i = 0; i < images.size(); i += kMost)
+    rows.push_back(SideBySide(std::span(images).subspan(i, std::min(kMost, images.size() - i))));
+  return rows;
 }
 
 Image Shrunk(const Image& image, int times) {

@@ -35,12 +35,6 @@ int TextWidth(std::string_view text, int scale);  // pixels
 // the caller.
 Rgb TurboColor(double t);
 
-// The scale of a heat map along the right side: a bar with ticks 0 .. max_metres, numbers in mm.
-void DrawLegend(Image& image, double max_metres);
-
-// A title at the top of the picture.
-void DrawTitle(Image& image, std::string_view title);
-
 // The pictures in one row on a common ground, `gap` pixels apart, tops aligned.
 Image SideBySide(std::span<const Image> images, int gap = 4);
 
@@ -48,7 +42,8 @@ Image SideBySide(std::span<const Image> images, int gap = 4);
 // the bottom is cut off.
 Image Shrunk(const Image& image, int times);
 
-// "0.213 mm": three significant digits.
-std::string Millimetres(double metres);
+// Pictures below each other, and the same in rows of six.
+Image StackRows(const std::vector<Image>& rows);
+std::vector<Image> InRows(const std::vector<Image>& images);
 
 }  // namespace kpsa::engine

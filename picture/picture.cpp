@@ -16,46 +16,80 @@ namespace {
 
 constexpr int kLargestSide = 8192;
 
+struct Axes {
+  Double3 right, up, back;
+};
+
+Axes AxesOf(const Camera& camera, double azimuth, double elevation) {
+  Axes axes;
+  axes.back = {Sin(azimuth) * Cos(elevation), Sin(elevation), Cos(azimuth) * Cos(elevation)};
+  axes.right = Cross(camera.up, axes.back);
+  axes.right = Length(axes.right) > 1e-9 ? UnitVector(axes.right) : Double3{1, 0, 0};
+  axes.up = Cross(axes.back, axes.right);
+  return axes;
+}
+
+template <typename F>
+void EachPoint(const RenderInput& input, F&& f) {
+  for (const RenderPart& part : input.parts) {
+    for (std::size_t i = 0; i + 2 < part.points.size(); i += 3)
+      f(Double3{part.points[i], part.points[i + 1], part.points[i + 2]});
+  }
+}
+
+// From the camera's target, as near as possible with all points inside and below the title.
+double DistanceTo(const RenderInput& input, const Camera& camera, const RenderOptions& options,
+                  const Axes& axes) {
+  // tan(fov / 2) from sine and cosine
+  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.88;
+  const double aspect = static_cast<double>(options.width) / options.height;
+  double distance = 0;
+  EachPoint(input, [&](Double3 point) {
+    const Double3 d = point - camera.target;
+    const double forward = Dot(d, axes.back);
+    distance = std::max(distance, forward + std::fabs(Dot(d, axes.up)) / slope);
+    distance = std::max(distance, forward + std::fabs(Dot(d, axes.right)) / (slope * aspect));
+  });
+  return distance;
+}
+
 }  // namespace
 
 Camera FrameCamera(const RenderInput& input, const RenderOptions& options, double azimuth, double elevation) {
   Camera camera;
   Double3 center;
   const double diagonal = std::max(Diagonal(input, &center), 1e-6);
-  const Double3 back = {Sin(azimuth) * Cos(elevation), Sin(elevation), Cos(azimuth) * Cos(elevation)};
-  Double3 right = Cross(camera.up, back);
-  right = Length(right) > 1e-9 ? UnitVector(right) : Double3{1, 0, 0};
-  const Double3 up = Cross(back, right);
-  // As near as possible with all points inside and below the title: tan(fov / 2) from sine and cosine
-  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.88;
-  const double aspect = static_cast<double>(options.width) / options.height;
+  const Axes axes = AxesOf(camera, azimuth, elevation);
   // Centre the projection of the box of the points, too: a head's middle is not its picture's middle
   double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
-  const auto each_point = [&](auto&& f) {
-    for (const RenderPart& part : input.parts) {
-      for (std::size_t i = 0; i + 2 < part.points.size(); i += 3) {
-        f(Double3{part.points[i], part.points[i + 1], part.points[i + 2]} - center);
-      }
-    }
-  };
-  each_point([&](Double3 d) {
-    const double at[2] = {Dot(d, right), Dot(d, up)};
+  EachPoint(input, [&](Double3 point) {
+    const double at[2] = {Dot(point - center, axes.right), Dot(point - center, axes.up)};
     for (int k = 0; k < 2; ++k) {
       low[k] = std::min(low[k], at[k]);
       high[k] = std::max(high[k], at[k]);
     }
   });
-  if (low[0] <= high[0]) center = center + right * ((low[0] + high[0]) / 2) + up * ((low[1] + high[1]) / 2);
-  double distance = diagonal * 0.5;
-  each_point([&](Double3 unshifted) {
-    const Double3 d = unshifted - right * ((low[0] + high[0]) / 2) - up * ((low[1] + high[1]) / 2);
-    const double forward = Dot(d, back);
-    distance = std::max(distance, forward + std::fabs(Dot(d, up)) / slope);
-    distance = std::max(distance, forward + std::fabs(Dot(d, right)) / (slope * aspect));
-  });
+  if (low[0] <= high[0])
+    center = center + axes.right * ((low[0] + high[0]) / 2) + axes.up * ((low[1] + high[1]) / 2);
   camera.target = center;
-  camera.eye = center + back * distance;
+  camera.eye = center + axes.back * std::max(diagonal * 0.5, DistanceTo(input, camera, options, axes));
   return camera;
+}
+
+std::vector<Camera> FrameAround(const RenderInput& input, const RenderOptions& options, int count,
+                                double elevation) {
+  std::vector<Camera> cameras(static_cast<std::size_t>(count));
+  Double3 center;
+  double distance = std::max(Diagonal(input, &center), 1e-6) * 0.5;
+  const auto azimuth = [&](std::size_t i) { return 2 * kPi * static_cast<double>(i) / count; };
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    cameras[i].target = center;
+    distance =
+        std::max(distance, DistanceTo(input, cameras[i], options, AxesOf(cameras[i], azimuth(i), elevation)));
+  }
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    cameras[i].eye = center + AxesOf(cameras[i], azimuth(i), elevation).back * distance;
+  return cameras;
 }
 
 Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const RenderOptions& options) {
@@ -123,9 +157,8 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
 Result<std::vector<Image>> RenderTurntable(const RenderInput& input, int count, double elevation,
                                            const RenderOptions& options) {
   std::vector<Image> frames;
-  for (int i = 0; i < count; ++i) {
-    Result<Image> frame =
-        RenderMesh(input, FrameCamera(input, options, 2 * kPi * i / count, elevation), options);
+  for (const Camera& camera : FrameAround(input, options, count, elevation)) {
+    Result<Image> frame = RenderMesh(input, camera, options);
     if (!frame.ok()) return frame.status();
     frames.push_back(std::move(*frame));
   }

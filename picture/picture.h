@@ -31,6 +31,7 @@ struct RenderPart {
 struct RenderInput {
   std::vector<RenderPart> parts;
   double scalar_max = 1e-3;  // metres: the scalar drawn as the top of the colour scale
+  double tolerance = 0;      // metres: marked on the legend of that scale; 0: none
 };
 
 // A perspective camera. The field of view is the vertical one.
@@ -56,7 +57,10 @@ Camera FrameCamera(const RenderInput& input, const RenderOptions& options, doubl
 // length.
 Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const RenderOptions& options = {});
 
-// `count` pictures from all around, the camera of FrameCamera at the azimuths 2 pi i / count.
+// Cameras from all around, at the azimuths 2 pi i / count, that turn about the middle of the input's box at one distance.
+std::vector<Camera> FrameAround(const RenderInput& input, const RenderOptions& options, int count,
+                                double elevation);
+// What they see.
 Result<std::vector<Image>> RenderTurntable(const RenderInput& input, int count, double elevation,
                                            const RenderOptions& options = {});
 
@@ -72,7 +76,7 @@ struct RenderDots {
 RenderPart MakeDots(const RenderDots& dots, double radius);
 
 // Three pictures side by side from one camera: "full", the accelerated one with its title, and the heat map
-// of their distance, titled with its maximum; with dots a fourth, of the full shape with them, after the
+// of their distance, titled with its maximum, with its legend beside it; with dots a fourth, of the full shape with them, after the
 // first. `full` and `accelerated` hold the same parts with different points.
 Result<Image> RenderComparison(const RenderInput& full, const RenderInput& accelerated, const Camera& camera,
                                const RenderOptions& options = {}, const RenderDots* dots = nullptr,

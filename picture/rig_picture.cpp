@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 
 #include "base/quantity_text.h"
@@ -38,12 +39,14 @@ std::shared_ptr<const std::vector<float>> PointColors(const Rig& rig, std::size_
 }  // namespace
 
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
-                                        const RigFrameOptions& options, Verdicts* verdicts) {
-  Request request = ShownPoints(rig);
+                                        const RigFrameOptions& options, const std::vector<std::size_t>& shown,
+                                        Verdicts* verdicts) {
+  Request request;
+  for (const std::size_t m : shown) request.outputs.push_back({rig.scene.meshes[m].points, {}});
+  request.varying.push_back(rig.scene.time);
   if (verdicts != nullptr) verdicts->Ask(rig, &request);
   const auto plan = CompileFor(rig, compiler, request);
   if (!plan.ok()) return plan.status();
-  const std::vector<std::size_t> shown = ShownMeshes(rig.scene);
   std::vector<Pose> poses(times.size(), Pose(rig.scene.meshes.size()));
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, times, options, [&](std::size_t frame, const Evaluator& evaluator) {
@@ -95,16 +98,6 @@ RenderInput MakeInput(const Rig& rig, const Pose& pose) {
   return input;
 }
 
-Camera FramePoses(const Rig& rig, const std::vector<Pose>& poses, const RenderOptions& options,
-                  double azimuth, double elevation) {
-  RenderInput all;
-  for (const Pose& pose : poses) {
-    const RenderInput one = MakeInput(rig, pose);
-    all.parts.insert(all.parts.end(), one.parts.begin(), one.parts.end());
-  }
-  return FrameCamera(all, options, azimuth, elevation);
-}
-
 RenderDots KeyPoints(const std::vector<AppliedSubspace>& applied, const Pose& pose) {
   RenderDots dots;
   std::size_t scalars = 0;
@@ -134,6 +127,28 @@ double WorstDistance(const Pose& a, const Pose& b) {
   return worst;
 }
 
+std::vector<std::string> Captions(const Rig& rig, double time, const std::string& more) {
+  std::string stem = rig.character->path.empty() ? rig.path : rig.character->path;
+  stem = std::filesystem::path(stem).stem().string();
+  std::string clip = rig.scene.clip.value_or("no clip");
+  if (!rig.scene.clip.has_value() && rig.playing.has_value()) {
+    clip.clear();
+    for (const PlayedClip& played : rig.played) clip += (clip.empty() ? "" : " + ") + played.id;
+  }
+  const double frame = time * rig.fps;
+  const std::string when = std::abs(frame - std::round(frame)) < 1e-3
+                               ? fmt::format("frame {}", FrameNumber(time, rig.fps))
+                               : fmt::format("{:.4g} s", time);
+  const std::string end = more.empty() ? when : when + ", " + more;
+  return {stem + ", " + clip + ", " + end, clip + ", " + end, end, more.empty() ? when : more};
+}
+
+std::string VerdictWord(const FrameDecision& decision) {
+  return decision.verdict() == FrameVerdict::kHit     ? "hit"
+         : decision.verdict() == FrameVerdict::kBlend ? "blend"
+                                                      : "miss";
+}
+
 std::string PictureTitle(const FrameDecision& decision) {
   switch (decision.verdict()) {
     case FrameVerdict::kHit:
@@ -145,23 +160,6 @@ std::string PictureTitle(const FrameDecision& decision) {
       break;
   }
   return "miss: fully evaluated";
-}
-
-Image StackRows(const std::vector<Image>& rows) {
-  if (rows.size() == 1) return rows.front();
-  constexpr int kGap = 4;
-  int width = 0, height = -kGap;
-  for (const Image& row : rows) width = std::max(width, row.width), height += row.height + kGap;
-  Image all(width, height, {255, 255, 255});
-  int y = 0;
-  for (const Image& row : rows) {
-    for (int i = 0; i < row.height; ++i)
-      std::copy_n(row.rgb.begin() + std::ptrdiff_t{3} * i * row.width,
-                  std::size_t{3} * static_cast<std::size_t>(row.width),
-                  all.rgb.begin() + std::ptrdiff_t{3} * (y + i) * width);
-    y += row.height + kGap;
-  }
-  return all;
 }
 
 }  // namespace kpsa::engine

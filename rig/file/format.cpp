@@ -86,7 +86,8 @@ std::string InQuotes(std::string_view text) {
 
 class Formatter {
  public:
-  explicit Formatter(const NodeRegistry& registry) : registry_(registry) {}
+  Formatter(const NodeRegistry& registry, const CommentMap& comments)
+      : registry_(registry), comments_(comments) {}
 
   std::string Root(const YamlNode& root) {
     std::vector<std::size_t> order;
@@ -94,6 +95,8 @@ class Formatter {
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
       return PlaceOf(kSections, root.keys[a].scalar) < PlaceOf(kSections, root.keys[b].scalar);
     });
+    for (const std::string& line : comments_.head) out_ += line + "\n";
+    if (!comments_.head.empty()) out_ += "\n";
     bool entries_before = false;
     for (std::size_t i : order) {
       const std::string& key = root.keys[i].scalar;
@@ -102,13 +105,14 @@ class Formatter {
       entries_before = entries;
       section_ = key;
       path_.clear();
-      out_ += Scalar(root.keys[i], false, false) + ":";
-      if (entries) {
+      Commented(root.items[i], "", false, [&] {
+        out_ += Scalar(root.keys[i], false, false) + ":";
+        if (!entries) return Value(root.items[i], key.size() + 1, 0);
         Block(root.items[i], kStep, false);
-      } else {
-        Value(root.items[i], key.size() + 1, 0);
-      }
+        return true;
+      });
     }
+    for (const std::string& line : comments_.foot) out_ += line + "\n";
     return std::move(out_);
   }
 
@@ -160,12 +164,49 @@ class Formatter {
     return text + (node.is_map() ? "}" : "]");
   }
 
-  // What follows "key:" or "-", which end at a column, up to the end of the line or of the block.
-  void Value(const YamlNode& node, std::size_t column, int indent, bool in_list = false) {
+  // Writes an entry with its comments; `write` says whether the entries within it wrote their own. On the line of a
+  // "-" (`here`) nothing comes before it any more.
+  template <typename Write>
+  void Commented(const YamlNode& value, const std::string& indent, bool here, Write&& write) {
+    const std::size_t begin = out_.size();
+    const bool within = write();
+    std::string before, after;
+    const auto add = [&](const std::vector<std::string>& lines, std::string* to) {
+      for (const std::string& line : lines) *to += indent + line + "\n";
+    };
+    const auto found = comments_.entries.find(&value);
+    const EntryComments own = found == comments_.entries.end() ? EntryComments() : found->second;
+    add(own.before, here ? &after : &before);
+    if (!within) {
+      std::vector<std::string> inner;
+      CollectComments(value, &inner);
+      add(inner, here ? &after : &before);
+    }
+    add(own.after, &after);
+    if (!own.beside.empty()) out_.insert(std::min(out_.find('\n', begin), out_.size()), " " + own.beside);
+    out_.insert(begin, before);
+    out_ += after;
+  }
+
+  void CollectComments(const YamlNode& node, std::vector<std::string>* lines) const {
+    for (const YamlNode& item : node.items) {
+      if (const auto found = comments_.entries.find(&item); found != comments_.entries.end()) {
+        const EntryComments& of = found->second;
+        lines->insert(lines->end(), of.before.begin(), of.before.end());
+        if (!of.beside.empty()) lines->push_back(of.beside);
+        lines->insert(lines->end(), of.after.begin(), of.after.end());
+      }
+      CollectComments(item, lines);
+    }
+  }
+
+  // What follows "key:" or "-", which end at a column, up to the end of the line or of the block. Whether it is a block,
+  // whose entries have lines of their own.
+  bool Value(const YamlNode& node, std::size_t column, int indent, bool in_list = false) {
     if (node.items.empty() && !node.is_map() && !node.is_sequence()) {
       const std::string text = Scalar(node, false, true);
       out_ += (text.empty() ? "" : " ") + text + "\n";
-      return;
+      return false;
     }
     const std::string flow = Flow(node);
     if (node.items.empty() || column + 1 + flow.size() <= kWidth) {
@@ -176,7 +217,9 @@ class Formatter {
       Wrapped(node, column, indent + kStep);
     } else {
       Block(node, indent + kStep, in_list && node.is_map());
+      return true;
     }
+    return false;
   }
 
   // A long list of scalars, in lines.
@@ -207,8 +250,11 @@ class Formatter {
         Enter(node, i);
         head = Scalar(node.keys[i], false, false) + ":";
       }
-      out_ += (here && i == 0 ? "" : before) + head;
-      Value(node.items[i], before.size() + head.size(), indent, !node.is_map());
+      const bool first = here && i == 0;
+      Commented(node.items[i], before, first, [&] {
+        out_ += (first ? "" : before) + head;
+        return Value(node.items[i], before.size() + head.size(), indent, !node.is_map());
+      });
       if (node.is_map()) path_.pop_back();
     }
   }
@@ -221,6 +267,7 @@ class Formatter {
   }
 
   const NodeRegistry& registry_;
+  const CommentMap& comments_;
   std::string out_;
   std::string_view section_;
   std::vector<std::string_view> path_;  // keys below the section
@@ -269,12 +316,13 @@ bool SameUncommented(const YamlNode& said, const YamlNode& says) {
 
 }  // namespace
 
-Result<std::string> FormatRig(const YamlNode& root, const NodeRegistry& registry) {
+Result<std::string> FormatRig(const YamlNode& root, const NodeRegistry& registry,
+                              const CommentMap& comments) {
   const SourceLocation where{root.where().file, 0, 0};
   if (!root.is_map())
     return Status::Invalid("expected a map of sections, found {}", root.kind_name()).At(where);
   if (IsTagged(root)) return Status::Invalid("has YAML tags (!name), which have no canonical form").At(where);
-  std::string text = Formatter(registry).Root(root);
+  std::string text = Formatter(registry, comments).Root(root);
   const Result<YamlNode> back = ParseYaml(text, where.file);
   if (!back.ok() || !Same(root, *back, false))
     return Status::Invalid("has a value that no canonical form is known of").At(where);

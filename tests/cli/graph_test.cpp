@@ -34,7 +34,7 @@ TEST(GraphParts, KindsOfNodesAreHidden) {
   EXPECT_TRUE(Shows(bare, "squeeze"));
   // Nor are arrows from or to them drawn
   EXPECT_EQ(bare.find("worldMatrix > "), std::string::npos) << bare;
-  const ProcessResult wrong = RunKpsa({"graph", kHello, "--hide", "joint"});
+  const ProcessResult wrong = RunKpsa({"graph", kHello, "--hide", "joinst"});
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_NE(wrong.err.find("did you mean \"joints\""), std::string::npos) << wrong.err;
 }

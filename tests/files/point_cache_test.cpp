@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "gltf/blender_order.h"
 #include "gltf/export.h"
@@ -11,6 +14,8 @@
 
 namespace kpsa::engine {
 namespace {
+
+using nlohmann::json;
 
 // Two meshes: a moving triangle and a still point.
 PointCache Small() {
@@ -126,9 +131,47 @@ TEST(PointCache, BlenderOrderKeepsUsedVerticesOfEachPrimitive) {
   EXPECT_EQ(BlenderVertexOrder(mesh), (std::vector<Index>{1, 2, 4, 5, 6, 8}));
 }
 
+// The same with what it is shown with: the triangle has a material and texture coordinates.
+PointCache Looking() {
+  PointCache cache = Small();
+  cache.rig = "hello.yaml";
+  cache.clip = "wave";
+  cache.materials.push_back(
+      {.name = "red clay", .base_color = {0.5, 0.25, 0, 1}, .roughness = 0.75, .image = 0});
+  cache.images.push_back({"image/png", {1, 2, 3, 4, 5}});
+  cache.meshes[0].uvs = {0, 0, 1, 0, 0, 0.75f};
+  cache.meshes[0].parts = {{0, 3, 0}};
+  return cache;
+}
+
+// Faces and colours by part, and the same numbers for both.
+TEST(PointCache, UsdaPartsAndColors) {
+  const TemporaryFolder folder;
+  PointCache cache;
+  cache.times = {0};
+  cache.materials = {{.name = "a", .base_color = {1, 0, 0, 1}}, {.name = "a", .base_color = {0, 1, 0, 1}}};
+  cache.meshes.push_back(
+      {"two", 6, {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1}, {0, 1, 2, 5, 4, 3}});
+  cache.meshes[0].parts = {{0, 3, 0}, {3, 3, 1}};
+  std::vector<std::string> warnings;
+  ASSERT_TRUE(WriteUsda(folder / "a.usda", cache, false, &warnings).ok());
+  std::string text = TemporaryFolder::Read(folder / "a.usda");
+  for (const char* part :
+       {"int[] indices = [0]\n            rel material:binding = </cache/Looks/a>",
+        "int[] indices = [1]\n            rel material:binding = </cache/Looks/a_1>",
+        "displayColor = [(1, 0, 0), (1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 1, 0), (0, 1, 0)] (\n",
+        "0: [(0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, -1), (0, 0, -1), (0, 0, -1)],\n"})
+    EXPECT_NE(text.find(part), std::string::npos) << part;
+  cache.meshes[0].colors.assign(18, 0.5f);
+  ASSERT_TRUE(WriteUsda(folder / "b.usda", cache, false, &warnings).ok());
+  text = TemporaryFolder::Read(folder / "b.usda");
+  EXPECT_NE(text.find("(0.5, 0, 0), (0, 0.5, 0)"), std::string::npos);
+  EXPECT_EQ(text.find("material:binding"), std::string::npos);
+}
+
 TEST(PointCache, UsdaText) {
   const TemporaryFolder folder;
-  PointCache cache = Small();
+  PointCache cache = Looking();
   cache.meshes[0].frames[0] = 0.1f;
   cache.meshes[1].name = "9 \"dots\"\n";
   std::vector<std::string> warnings;
@@ -136,11 +179,29 @@ TEST(PointCache, UsdaText) {
   EXPECT_TRUE(warnings.empty());
   const std::string text = TemporaryFolder::Read(folder / "a.usda");
   EXPECT_TRUE(text.starts_with("#usda 1.0\n"));
-  for (const char* part :
-       {"startTimeCode = 2\n", "endTimeCode = 4\n", "timeCodesPerSecond = 4\n", "upAxis = \"Y\"",
-        "def Mesh \"tri\"", "int[] faceVertexCounts = [3]", "int[] faceVertexIndices = [0, 1, 2]",
-        "2: [(0.1, 1, 2), (3, 4, 5), (6, 7, 8)],\n", "4: [(20, 21, 22)", "def Mesh \"_9__dots__\"",
-        "sourceName = \"9 \\\"dots\\\" \"", "int[] faceVertexCounts = []"}) {
+  for (const char* part : {"startTimeCode = 2\n",
+                           "endTimeCode = 4\n",
+                           "timeCodesPerSecond = 4\n",
+                           "upAxis = \"Y\"",
+                           "def Mesh \"tri\"",
+                           "int[] faceVertexCounts = [3]",
+                           "int[] faceVertexIndices = [0, 1, 2]",
+                           "2: [(0.1, 1, 2), (3, 4, 5), (6, 7, 8)],\n",
+                           "4: [(20, 21, 22)",
+                           "def Mesh \"_9__dots__\"",
+                           "sourceName = \"9 \\\"dots\\\" \"",
+                           "int[] faceVertexCounts = []",
+                           "kpsa:rig = \"hello.yaml\"",
+                           "2: [(0.1, 1, 2), (6, 7, 8)],\n",
+                           "4: [(20, 21, 22), (26, 27, 28)],\n",
+                           "texCoord2f[] primvars:st = [(0, 1), (1, 1), (0, 0.25)]",
+                           "normal3f[] normals.timeSamples = {",
+                           "primvars:displayColor = [(0.5, 0.25, 0)]",
+                           "subdivisionScheme = \"none\"",
+                           "def Material \"red_clay\"",
+                           "diffuseColor = (0.5, 0.25, 0)",
+                           "roughness = 0.75",
+                           "rel material:binding = </cache/Looks/red_clay>"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part;
   }
 }
@@ -203,6 +264,102 @@ TEST(MorphGlb, FewShapesForManyFrames) {
   EXPECT_GT(coarse->max_residual, 1e-2 * coarse->diagonal);
   ExpectSameAsCache(folder / "b.glb", cache, *coarse);
   EXPECT_FALSE(WriteMorphGlb(folder / "b.glb", cache, {}).ok());
+}
+
+json GlbJson(const std::string& path) {
+  const std::string bytes = TemporaryFolder::Read(path);
+  std::uint32_t size = 0;
+  std::memcpy(&size, &bytes[12], 4);
+  return json::parse(bytes.substr(20, size));
+}
+
+// The floats of an accessor.
+std::vector<float> GlbFloats(const std::string& path, const json& root, const json& accessor,
+                             std::size_t width) {
+  const std::string bytes = TemporaryFolder::Read(path);
+  std::uint32_t size = 0;
+  std::memcpy(&size, &bytes[12], 4);
+  const json& view =
+      root["bufferViews"][root["accessors"][accessor.get<std::size_t>()]["bufferView"].get<std::size_t>()];
+  std::vector<float> values(root["accessors"][accessor.get<std::size_t>()]["count"].get<std::size_t>() *
+                            width);
+  std::memcpy(values.data(), &bytes[28 + size + view["byteOffset"].get<std::size_t>()], 4 * values.size());
+  return values;
+}
+
+TEST(MorphGlb, NamesMaterialsAndTextureCoordinates) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "a.glb";
+  ASSERT_TRUE(WriteMorphGlb(path, Looking(), {}).ok());
+  const json root = GlbJson(path);
+  EXPECT_EQ(root["animations"][0]["name"], "wave");
+  EXPECT_EQ(root["meshes"][0]["extras"]["targetNames"], (json{"shape1"}));
+  const json& material = root["materials"][0];
+  EXPECT_EQ(material["name"], "red clay");
+  EXPECT_EQ(material["pbrMetallicRoughness"]["baseColorFactor"], (json{0.5, 0.25, 0, 1}));
+  EXPECT_EQ(material["pbrMetallicRoughness"]["roughnessFactor"], 0.75);
+  EXPECT_EQ(material["pbrMetallicRoughness"]["baseColorTexture"]["index"], 0);
+  EXPECT_EQ(root["textures"][0]["source"], 0);
+  EXPECT_EQ(root["images"][0]["mimeType"], "image/png");
+  const json& view = root["bufferViews"][root["images"][0]["bufferView"].get<std::size_t>()];
+  EXPECT_EQ(view["byteLength"], 5);
+  const json& primitive = root["meshes"][0]["primitives"][0];
+  EXPECT_EQ(primitive["material"], 0);
+  EXPECT_EQ(GlbFloats(path, root, primitive["attributes"]["TEXCOORD_0"], 2), Looking().meshes[0].uvs);
+  EXPECT_FALSE(root["meshes"][1]["primitives"][0].contains("material"));
+  EXPECT_TRUE(gltf::LoadGltf(path).ok());
+}
+
+// Two triangles that share an edge of doubled vertices and fold: normals of every frame are what the shapes
+// come to, the doubled vertices share theirs, and each part has its own vertices.
+TEST(MorphGlb, NormalsOfEveryFrame) {
+  PointCache cache;
+  cache.materials.resize(2);
+  cache.meshes.push_back({"fold", 6, {}, {0, 2, 1, 3, 4, 5}});
+  PointCacheMesh& mesh = cache.meshes[0];
+  mesh.smooth = {0, 1, 2, 1, 2, 3};
+  mesh.parts = {{0, 3, 0}, {3, 3, 1}};
+  mesh.colors.assign(18, 0.5f);
+  constexpr int kFrames = 24;
+  for (int t = 0; t < kFrames; ++t) {
+    cache.times.push_back(t);
+    const float a = 0.02f * static_cast<float>(t);
+    mesh.frames.insert(mesh.frames.end(), {-std::cos(a), std::sin(a), 0, 0, 0, -1, 0, 0, 1,  //
+                                           0, 0, -1, 0, 0, 1, std::cos(a), std::sin(a), 0});
+  }
+  const TemporaryFolder folder;
+  const std::string path = folder / "a.glb";
+  ASSERT_TRUE(WriteMorphGlb(path, cache, {.tolerance = 1e-7}).ok());
+  const json root = GlbJson(path);
+  const json& sampler = root["animations"][0]["samplers"][0];
+  const std::size_t targets = root["meshes"][0]["primitives"][0]["targets"].size();
+  const std::vector<float> weights = GlbFloats(path, root, sampler["output"], 1);
+  ASSERT_EQ(weights.size(), targets * kFrames);
+  for (std::size_t p = 0; p < 2; ++p) {
+    const json& primitive = root["meshes"][0]["primitives"][p];
+    EXPECT_EQ(primitive["material"], p);
+    EXPECT_TRUE(primitive["attributes"].contains("COLOR_0"));
+    const std::vector<float> rest = GlbFloats(path, root, primitive["attributes"]["NORMAL"], 3);
+    ASSERT_EQ(rest.size(), 9u);
+    for (std::size_t t = 0; t < kFrames; ++t) {
+      std::vector<float> now = rest;
+      for (std::size_t k = 0; k < targets; ++k) {
+        const std::vector<float> delta = GlbFloats(path, root, primitive["targets"][k]["NORMAL"], 3);
+        for (std::size_t i = 0; i < 9; ++i) now[i] += weights[t * targets + k] * delta[i];
+      }
+      const double a = 0.02 * static_cast<double>(t), side = p == 0 ? -1 : 1;
+      for (std::size_t v = 0; v < 3; ++v) {
+        const bool on_edge = p == 0 ? v > 0 : v < 2;
+        const Double3 expected = on_edge ? Double3{0, 1, 0} : Double3{-side * std::sin(a), std::cos(a), 0};
+        const Double3 n = {now[3 * v], now[3 * v + 1], now[3 * v + 2]};
+        EXPECT_NEAR(Length(Double3{rest[3 * v], rest[3 * v + 1], rest[3 * v + 2]}), 1, 1e-6);
+        EXPECT_GT(Dot(n, expected) / Length(n), 0.9999) << p << " " << t << " " << v;
+      }
+    }
+  }
+  const Result<gltf::Character> character = gltf::LoadGltf(path);
+  ASSERT_TRUE(character.ok());
+  EXPECT_EQ(character->meshes[0].primitives[1].triangles, (std::vector<Index>{3, 4, 5}));
 }
 
 TEST(MorphGlb, MoreFramesThanNumbersAndOtherEdges) {

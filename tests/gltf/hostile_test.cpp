@@ -146,6 +146,35 @@ TEST(GltfHostile, DamagedStructure) {
   }
 }
 
+TEST(GltfHostile, AnimationPointers) {
+  const auto error = [](const json& target, const std::string& part) {
+    GltfBuilder b = GltfBuilder::Character();
+    b.root["animations"][0]["channels"][0]["target"] = target;
+    ExpectError(b.Text(), part);
+  };
+  const auto to = [](const json& pointer) {
+    return json{{"path", "pointer"}, {"extensions", {{"KHR_animation_pointer", {{"pointer", pointer}}}}}};
+  };
+  const std::string none = "names no node: there are 4";
+  for (const char* pointer :
+       {"/nodes/4/translation", "/nodes/-1/translation", "/nodes/00/translation", "/nodes//translation",
+        "/nodes/1 /translation", "/nodes/+1/translation", "/nodes/99999999999999999999/translation",
+        "/nodes/0x1/scale", "/nodes/a\n/scale"})
+    error(to(pointer), none);
+  error(to("/nodes/" + std::string(1 << 20, '9') + "/scale"), none);
+  error(to(""), "must start with /");
+  error(to("nodes/0/translation"), "must start with /");
+  error(to("/nodes/0/~2"), "a ~ that is neither");
+  error(to("/nodes/0/scale~"), "a ~ that is neither");
+  const std::string missing = "extensions.KHR_animation_pointer.pointer must be text";
+  for (const json& pointer : {json(), json(3), json::array({"/nodes/0/scale"})}) error(to(pointer), missing);
+  error({{"path", "pointer"}, {"extensions", {{"KHR_animation_pointer", "/nodes/0/scale"}}}}, missing);
+  json both = to("/nodes/1/translation");
+  both["node"] = 1;
+  error(both, "has a node beside the pointer");
+  error(to("/nodes/3/translation"), "which has a matrix");
+}
+
 TEST(GltfHostile, DamagedAccessors) {
   const auto accessor = [](GltfBuilder& b, int i) -> json& {
     return b.root["accessors"][static_cast<std::size_t>(i)];

@@ -1,5 +1,6 @@
 #include "gltf/import.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -351,6 +352,51 @@ TEST(GltfImport, AnimationsOfAllKinds) {
   close(gltf_reference::Sample(clip.channels[1], 1), {0, 0, std::sqrt(0.5), std::sqrt(0.5)});
   // Hermite at t = 0.5: half of both values and an eighth of the out-tangent 2
   close(gltf_reference::Sample(clip.channels[2], 1), {0.5 + 1.5 + 2 / 8.0, 1, 1});
+}
+
+json PointerTarget(const std::string& pointer) {
+  return {{"path", "pointer"}, {"extensions", {{"KHR_animation_pointer", {{"pointer", pointer}}}}}};
+}
+
+TEST(GltfImport, AnimationPointersToNodes) {
+  GltfBuilder plain = GltfBuilder::Character(), pointed = plain;
+  std::size_t channels = 0;
+  for (json& animation : pointed.root["animations"]) {
+    for (json& channel : animation["channels"]) {
+      json& target = channel["target"];
+      target = PointerTarget(
+          fmt::format("/nodes/{}/{}", target["node"].get<int>(), target["path"].get<std::string>()));
+      ++channels;
+    }
+  }
+  ASSERT_GE(channels, 2u);
+  pointed.root["extensionsUsed"] = pointed.root["extensionsRequired"] = {"KHR_animation_pointer"};
+  const Character a = MustLoad(plain.Text()), b = MustLoad(pointed.Text());
+  EXPECT_EQ(b.warnings, a.warnings);
+  ASSERT_EQ(a.clips.size(), b.clips.size());
+  for (std::size_t c = 0; c < a.clips.size(); ++c) {
+    ASSERT_EQ(a.clips[c].channels.size(), b.clips[c].channels.size());
+    for (std::size_t i = 0; i < a.clips[c].channels.size(); ++i) {
+      const Channel &one = a.clips[c].channels[i], &other = b.clips[c].channels[i];
+      EXPECT_EQ(one.node, other.node);
+      EXPECT_EQ(one.path, other.path);
+      EXPECT_EQ(one.values, other.values);
+    }
+  }
+  // What cannot be read moves nothing, and is said
+  json& all = pointed.root["animations"][0]["channels"];
+  const std::size_t before = b.clips[0].channels.size();
+  for (const char* other :
+       {"/materials/0/pbrMetallicRoughness/baseColorFactor", "/nodes/0/weights/0", "/nodes/0", "/"}) {
+    all.push_back({{"sampler", 0}, {"target", PointerTarget(other)}});
+  }
+  const Character c = MustLoad(pointed.Text());
+  EXPECT_EQ(c.clips[0].channels.size(), before);
+  ASSERT_EQ(c.warnings.size(), a.warnings.size() + 1);
+  EXPECT_EQ(
+      c.warnings[0],
+      "animations[0] animates \"/materials/0/pbrMetallicRoughness/baseColorFactor\" and 3 more by pointers, "
+      "which is not supported; ignored");
 }
 
 TEST(GltfImport, BuffersBesideTheDocument) {

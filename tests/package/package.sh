@@ -17,6 +17,11 @@ for shared in OFF ON; do
 done
 cmp said-OFF/said.txt said-ON/said.txt
 
+# What man and shells read
+for file in man/man1/kpsa.1 bash-completion/completions/kpsa zsh/site-functions/_kpsa fish/vendor_completions.d/kpsa.fish; do
+  grep -q accelerate "installed/share/$file"
+done
+
 # The plugin of the tests, against the headers that were installed
 ${CXX:-c++} -std=c++20 -fPIC -shared -I installed/include/kpsa/plugin "$source/tests/plugin/wobble.cpp" -o wobble.so
 installed/bin/kpsa nodes wobble --plugin ./wobble.so | grep -q "A triangle wave."

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "base/parallel.h"
+#include "picture/caption.h"
 #include "scenes/glb_writer.h"
 #include "scenes/head_shape.h"
 
@@ -157,7 +158,7 @@ TEST(Picture, AComparisonShowsThreePicturesAndTheLargestError) {
   const RenderOptions options = Plain(120, 150);
   const auto image = RenderComparison(full, accelerated, FrameCamera(full, options, 0, 0), options);
   ASSERT_TRUE(image.ok());
-  EXPECT_EQ(image->width, 3 * 120 + 2 * 4);
+  EXPECT_EQ(image->width, 3 * 120 + 3 * 4 + LegendPanel(150, {}).width);
   EXPECT_EQ(image->height, 150);
   const std::vector<float> distances = PointDistances(head.points, moved);
   EXPECT_NEAR(*std::max_element(distances.begin(), distances.end()), 0.8e-3, 1e-7);
@@ -177,7 +178,7 @@ TEST(Picture, AComparisonShowsKeyPointsOnRequest) {
                   {0.5f, 0.5f, 0, -0.5f, -0.5f, -0.5f}};  // the second one is behind the square
   const auto image = RenderComparison(full, full, camera, options, &dots);
   ASSERT_TRUE(image.ok());
-  ASSERT_EQ(image->width, 4 * 480 + 3 * 4);
+  ASSERT_EQ(image->width, 4 * 480 + 4 * 4 + LegendPanel(480, {}).width);
   const auto reds = [&](int left) {
     int count = 0;
     double x = 0, y = 0;
@@ -251,7 +252,13 @@ TEST(Picture, ATurntableStartsInFrontAndTurns) {
   const auto frames = RenderTurntable(input, 4, 0.1, options);
   ASSERT_TRUE(frames.ok());
   ASSERT_EQ(frames->size(), 4u);
-  EXPECT_EQ((*frames)[0].rgb, RenderMesh(input, FrameCamera(input, options, 0, 0.1), options)->rgb);
+  const std::vector<Camera> cameras = FrameAround(input, options, 4, 0.1);
+  EXPECT_EQ((*frames)[0].rgb, RenderMesh(input, cameras[0], options)->rgb);
+  // All at one scale: what turns is as large from every side
+  for (const Camera& camera : cameras) {
+    EXPECT_NEAR(Length(camera.eye - camera.target), Length(cameras[0].eye - cameras[0].target), 1e-9);
+    EXPECT_EQ(Length(camera.target - cameras[0].target), 0);
+  }
   EXPECT_NE((*frames)[0].rgb, (*frames)[2].rgb);
 }
 

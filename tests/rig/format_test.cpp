@@ -208,6 +208,74 @@ TEST(RigFormat, FindsCommentsBesideLongTexts) {
     EXPECT_FALSE(HasComments(text)) << text;
 }
 
+std::string WithComments(const std::string& text) {
+  const Result<YamlNode> root = ParseYaml(text, "t.yaml");
+  const std::optional<std::vector<Comment>> comments = FindComments(text);
+  EXPECT_TRUE(root.ok() && comments.has_value()) << text;
+  if (!root.ok() || !comments.has_value()) return "";
+  const Result<std::string> formatted =
+      FormatRig(*root, StandardRegistry(), AttachComments(*root, text, *comments));
+  return formatted.ok() ? *formatted : formatted.status().ToString();
+}
+
+std::vector<std::string> CommentTexts(const std::string& text) {
+  std::vector<std::string> texts;
+  const std::optional<std::vector<Comment>> comments = FindComments(text);
+  EXPECT_TRUE(comments.has_value());
+  for (const Comment& c : comments.value_or(std::vector<Comment>())) texts.push_back(c.text);
+  std::sort(texts.begin(), texts.end());
+  return texts;
+}
+
+TEST(RigFormat, CommentsStayWithTheirEntries) {
+  const std::string text = R"(# The head of the file,
+# in two lines
+
+# what is set
+overrides: {mush.iterations: 12}  # smoother
+nodes:
+    # about mush
+    mush:
+        type: deltaMush   # a type
+        # half a step
+        smoothingStep: 0.50
+        # the end of mush
+    # about w
+    "w": {type: wire, curve: "a # b"} # beside w
+connections:
+  - a.x -> b.y
+    # of the list
+fps: 24   # film
+kpsa: 1
+# the foot
+)";
+  const std::string formatted = WithComments(text);
+  EXPECT_EQ(formatted, R"(# The head of the file,
+# in two lines
+
+kpsa: 1
+fps: 24 # film
+nodes:
+  # about mush
+  # a type
+  # half a step
+  # the end of mush
+  mush: {type: deltaMush, smoothingStep: 0.5}
+  # about w
+  w: {type: wire, curve: "a # b"} # beside w
+
+connections:
+  - a.x -> b.y
+  # of the list
+
+# what is set
+overrides: # smoother
+  mush.iterations: 12
+# the foot
+)");
+  EXPECT_EQ(WithComments(formatted), formatted);
+}
+
 // What a file says, whatever the order of its keys and the spelling of its numbers.
 std::string Meaning(const YamlNode& node) {
   std::vector<std::string> parts;
@@ -237,6 +305,9 @@ TEST(RigFormat, KeepsTheRepositorysRigs) {
       EXPECT_EQ(Meaning(*said), Meaning(*says)) << entry.path();
       EXPECT_EQ(Formatted(formatted), formatted) << entry.path();
       EXPECT_TRUE(HasComments(text) && !HasComments(formatted)) << entry.path();
+      const std::string commented = WithComments(text);
+      EXPECT_EQ(CommentTexts(text), CommentTexts(commented)) << entry.path();
+      EXPECT_EQ(WithComments(commented), commented) << entry.path();
       ++files;
       const std::string name = entry.path().filename().string();
       const bool of_nodes = entry.path().parent_path().filename() == "nodes";
