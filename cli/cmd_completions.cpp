@@ -1,5 +1,4 @@
 // kpsa completions, kpsa man: what the program says of itself, for shells and for man.
-#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "cli/common.h"

@@ -60,11 +60,11 @@ Status Hide(const Rig& rig, const std::string& kind, std::vector<bool>* hidden) 
 Result<std::vector<bool>> HiddenNodes(const Rig& rig, const GraphPart& part) {
   const Graph& graph = *rig.graph;
   std::vector<bool> hidden(graph.node_capacity());
-  for (const std::string& kind : part.hide) KPSA_RETURN_IF_ERROR(Hide(rig, kind, &hidden).At({"--hide"}));
+  for (const std::string& kind : part.hide) KPSA_RETURN_IF_ERROR(Hide(rig, kind, &hidden).At({"hide"}));
   if (!part.around.has_value()) return hidden;
   NodeId middle;
   int steps = 1;
-  KPSA_RETURN_IF_ERROR(ReadAround(graph, *part.around, &middle, &steps).At({"--around"}));
+  KPSA_RETURN_IF_ERROR(ReadAround(graph, *part.around, &middle, &steps).At({"around"}));
   std::vector<bool> reached(hidden.size());
   reached[middle.index] = true;
   hidden[middle.index] = false;

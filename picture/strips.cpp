@@ -16,7 +16,7 @@ double ShownTolerance(const AppliedSubspace& applied) {
 }
 
 Status PlayTestClip(Rig* rig) {
-  for (const Acceleration& entry : rig->accelerate) {
+  for (const AccelerateEntry& entry : rig->accelerate) {
     if (!entry.test_clips.empty()) return SetClip(rig, entry.test_clips.front()).At({rig->path});
   }
   return Status();

@@ -71,7 +71,7 @@ const std::array<Door, 14> kDoors = {{
     {"nlohmann/", {}, true},
     {"embree", {"base/embree.h"}},
     {"base/embree.h", {"base/embree.cpp", "base/triangle_tree.cpp", "nodes/kernels/ray_scene.cpp"}},
-    {"CLI/", {"cli/main.cpp", "cli/options.cpp"}},
+    {"CLI/", {"cli/main.cpp", "cli/options.cpp", "cli/describe.cpp"}},
     {"httplib.h", {"view/server.cpp"}},
     {"hwy/", {"base/simd.h", "base/simd-inl.h", "nodes/kernels/xyzw-inl.h"}, true},
     {"zip", {"files/npz.cpp"}},
