@@ -7,6 +7,6 @@ sh cmake/dependencies.sh blender chromium &  # for tests of the Python module an
 others=$!
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
 cmake --build build
-wait $others
+wait $others || echo "Blender or Chromium could not be installed: their tests are skipped"
 ctest --test-dir build --output-on-failure -j "$(nproc)"
 sh tests/sanitize.sh
