@@ -1,7 +1,7 @@
 // The page as a report: one file from disk.
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
-import {settled, startBrowser} from './support/browser.mjs';
+import {pictureOf, settled, startAfresh, startBrowser, stateOf} from './support/browser.mjs';
 import {makeCharacter, makeErrors, residualStep} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
 import {difference, share} from './support/png.mjs';
@@ -16,16 +16,7 @@ before(async () => {
 });
 after(async () => browser?.stop());
 
-const picture = () => page.locator('.stage canvas').screenshot();
-const state = () => page.evaluate(() => ({...window.kpsa.state}));
-const fresh = async () => {
-  await page.keyboard.press('Escape');
-  await page.evaluate(async () => {
-    await window.kpsa.setMode('accelerated');
-    await window.kpsa.setFrame(0, 'bend');
-    document.activeElement?.blur();
-  });
-};
+const picture = () => pictureOf(page), state = () => stateOf(page), fresh = () => startAfresh(page);
 
 /** The largest difference of two lists of places, relative to their size. */
 function apart(got, expected) {

@@ -1,7 +1,7 @@
 // The panels of a report, and what they have to do with the picture.
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
-import {settled, startBrowser} from './support/browser.mjs';
+import {pictureOf, settled, startAfresh, startBrowser, stateOf} from './support/browser.mjs';
 import {makeCharacter} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
 import {difference} from './support/png.mjs';
@@ -16,16 +16,7 @@ before(async () => {
 });
 after(async () => browser?.stop());
 
-const picture = () => page.locator('.stage canvas').screenshot();
-const state = () => page.evaluate(() => ({...window.kpsa.state}));
-const fresh = async () => {
-  await page.keyboard.press('Escape');
-  await page.evaluate(async () => {
-    await window.kpsa.setMode('accelerated');
-    await window.kpsa.setFrame(0, 'bend');
-    document.activeElement?.blur();
-  });
-};
+const picture = () => pictureOf(page), state = () => stateOf(page), fresh = () => startAfresh(page);
 
 test('a click on a vertex lists what moves it, largest first, and its error', async () => {
   await fresh();

@@ -7,6 +7,18 @@ import {join} from 'node:path';
 /** Waits until nothing is asked for and all that has been done is drawn. */
 export const settled = (page) => page.evaluate(() => window.kpsa.setMode(window.kpsa.state.mode));
 
+export const pictureOf = (page) => page.locator('.stage canvas').screenshot();
+export const stateOf = (page) => page.evaluate(() => ({...window.kpsa.state}));
+/** A report of the made-up character as it is at first. */
+export async function startAfresh(page) {
+  await page.keyboard.press('Escape');
+  await page.evaluate(async () => {
+    await window.kpsa.setMode('accelerated');
+    await window.kpsa.setFrame(0, 'bend');
+    document.activeElement?.blur();
+  });
+}
+
 export async function startBrowser({width = 1440, height = 900, dark = true} = {}) {
   const folder = mkdtempSync(join(tmpdir(), 'kpsa-viewer-'));
   const context = await chromium.launchPersistentContext(join(folder, 'profile'), {
