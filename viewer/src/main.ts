@@ -29,7 +29,6 @@ async function begin(): Promise<void> {
   app = new App(root);
   app.load(model, client);
   if (client) {
-    app.problems.set(model.meta.problems ?? []);
     void followRig(app, client, model.meta.generation ?? 0);
   }
   await new Promise((resolve) => requestAnimationFrame(resolve));

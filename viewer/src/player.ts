@@ -8,32 +8,34 @@ export function framesOf(model: Model, clip: number): number {
 }
 
 export function play(store: Store, model: Model, scope: Scope): void {
-  let began = 0, from = 0, running = false, ended = false;
+  let began = 0, from = 0, waiting = 0;
   const tick = (now: number): void => {
-    if (ended || !store.now.playing) {
-      running = false;
-      return;
-    }
+    waiting = 0;
+    if (!store.now.playing) return;
     const {clip, loop} = store.now, frames = framesOf(model, clip);
     if (frames < 2) return store.set({playing: false});
-    const fps = model.meta.clips![clip].fps || 24;
-    let frame = from + Math.floor((now - began) / 1000 * fps);
+    // the time of a picture may be before the moment when playing began
+    let frame = from + Math.floor(Math.max(0, now - began) / 1000 * model.meta.clips![clip].fps);
     if (frame >= frames && !loop) return store.set({frame: frames - 1, playing: false});
-    frame %= frames;
+    // rounds are taken off, or the end of looping would be far beyond the clip
+    const rounds = Math.floor(frame / frames) * frames;
+    from -= rounds;
+    frame -= rounds;
     store.set({frame});
-    requestAnimationFrame(tick);
+    if (store.now.playing && !waiting) waiting = requestAnimationFrame(tick);
+  };
+  const stop = (): void => {
+    cancelAnimationFrame(waiting);
+    waiting = 0;
   };
   scope.add(store.on(['playing', 'clip'], ({playing, frame, clip}) => {
-    if (!playing) {
-      running = false;
-      return;
-    }
+    stop();
+    if (!playing) return;
     from = frame >= framesOf(model, clip) - 1 ? 0 : frame;
     began = performance.now();
-    if (!running) requestAnimationFrame(tick);
-    running = true;
+    waiting = requestAnimationFrame(tick);
   }));
-  scope.add(() => { ended = true; });
+  scope.add(stop);
 }
 
 /** Goes some frames on or back, round the ends. */

@@ -1,5 +1,6 @@
 // Frames of a report: hands the row of a frame and its residual to the GPU, and says what is known of it.
 import type {Context} from './context';
+import {isSame, rowOf} from './data/residual';
 import {noFacts} from './facts';
 
 export function showReportFrames(context: Context): void {
@@ -17,16 +18,13 @@ export function showReportFrames(context: Context): void {
       return;
     }
     view.positions.setRow(info.first_row === null || info.first_row === undefined ? -1 : info.first_row + frame);
-    let unknown = false;
-    const residual = info.residual, values = residuals.get(clip);
+    const {residual} = info, values = residuals.get(clip), row = rowOf(info, frame);
     if (residual && values) {
-      const row = residual.rows ? residual.rows[frame] : frame;
       view.positions.setResidual(row < 0 ? null : values.subarray(row * model.points * 3, (row + 1) * model.points * 3), residual.step);
-      unknown = row < 0 && series[clip].verdicts[frame] !== 'miss';
     } else {
       view.positions.setResidual(null, 0);
-      unknown = model.accelerated && series[clip].verdicts[frame] !== 'miss';
     }
+    const unknown = model.accelerated && (row < 0 || !values) && !isSame(info, frame);
     facts.set({...series[clip].at(frame), unknown});
     viewport.invalidate();
   };
@@ -36,8 +34,6 @@ export function showReportFrames(context: Context): void {
     if (!blob || residuals.has(clip)) return;
     const values = await model.blob(blob);
     if (!(values instanceof Int8Array) && !(values instanceof Int16Array)) throw new Error('a residual is neither i8 nor i16');
-    const {rows} = model.meta.clips![clip].residual!, most = rows ? Math.max(...rows) + 1 : model.meta.clips![clip].frames;
-    if (values.length < most * model.points * 3) throw new Error(`the residual of ${model.meta.clips![clip].name} lacks frames`);
     residuals.set(clip, values);
     show();
   };

@@ -57,6 +57,7 @@ test('a basis of 16 bits, and rows of the residual that are absent', async () =>
   const wide = makeCharacter({wide: true, modes: 11}), report = makeMeta(wide);
   const clip = report.meta.clips[0], n = wide.points * 3;
   clip.residual.rows = clip.verdicts.map((v, f) => f === 5 ? 0 : -1);
+  clip.max_error[7] = 0;
   report.arrays['residual-0'] = Int16Array.from(report.arrays['residual-0'].subarray(5 * n, 6 * n));
   report.meta.blobs['residual-0'] = {type: 'i16', count: n, deflate: true};
   const other = await browser.open(browser.write('wide.html', makeReport(report)));
@@ -67,7 +68,65 @@ test('a basis of 16 bits, and rows of the residual that are absent', async () =>
   assert.equal(await other.page.evaluate(() => window.kpsa.facts.unknown), false);
   await positionsAt(other.page, 6, 'bend', 'full');
   assert.equal(await other.page.evaluate(() => window.kpsa.facts.unknown), true);
+  await positionsAt(other.page, 7, 'bend', 'full');
+  assert.equal(await other.page.evaluate(() => window.kpsa.facts.unknown), false, 'its error is 0');
   await other.page.close();
+});
+
+test('a residual of 8 bits, one of 16, and the first again', async () => {
+  const report = makeMeta(character), n = character.points * 3;
+  const wide = Int16Array.from({length: 30 * n}, (_, i) => 200 + i % 1000);
+  report.arrays['residual-1'] = wide;
+  report.meta.blobs['residual-1'].type = 'i16';
+  const other = await browser.open(browser.write('both.html', makeReport(report)));
+  const narrow = report.arrays['residual-0'];
+  for (const [clip, row, values] of [['bend', 0, narrow], ['wave', 40, wide], ['bend', 0, narrow]]) {
+    await other.page.waitForFunction(async (name) => {
+      await window.kpsa.setFrame(5, name);
+      return !window.kpsa.facts.unknown;
+    }, clip);
+    const expected = character.place(character.rowOf(row + 5)).map((x, i) => x + values[5 * n + i] * residualStep);
+    const off = apart(await positionsAt(other.page, 5, clip, 'full'), expected);
+    assert.ok(off < 1e-6, `${clip}: ${off}`);
+  }
+  assert.deepEqual(other.complaints, []);
+  await other.page.close();
+});
+
+test('the clock of playing', async () => {
+  await fresh();
+  const seen = await page.evaluate(() => {
+    const {requestAnimationFrame: ask, cancelAnimationFrame: cancel} = window, waiting = new Map();
+    let last = 0;
+    window.requestAnimationFrame = (call) => waiting.set(++last, call) && last;
+    window.cancelAnimationFrame = (id) => waiting.delete(id);
+    const picture = (now) => {
+      const due = [...waiting.values()];
+      waiting.clear();
+      for (const call of due) call(now);
+      return window.kpsa.state.frame;
+    };
+    const press = (key) => document.dispatchEvent(new KeyboardEvent('keydown', {key, bubbles: true}));
+    const began = performance.now(), found = {};
+    press(' ');
+    found.early = picture(began - 100);
+    found.third = picture(began + 1000 * 40 / 24 * 2.5);
+    press('l');
+    found.unlooped = picture(began + 1000 * 40 / 24 * 2.5 + 1);
+    found.playing = window.kpsa.state.playing;
+    press('l');
+    press(' ');
+    press(' ');
+    for (let i = 0; i < 3; ++i) picture(began);
+    found.ticks = waiting.size;
+    press(' ');
+    while (waiting.size) picture(began);
+    Object.assign(window, {requestAnimationFrame: ask, cancelAnimationFrame: cancel});
+    return found;
+  });
+  assert.ok(seen.early === 0 && seen.third >= 17 && seen.third <= 20, JSON.stringify(seen));
+  assert.ok(seen.playing && seen.unlooped >= 17 && seen.unlooped <= 20, `looping ends at the end of a round: ${JSON.stringify(seen)}`);
+  assert.equal(seen.ticks, 1);
 });
 
 test('the slider moves points, in state and picture', async () => {
@@ -182,7 +241,18 @@ test('what does not keep to the contract is refused with a message', async () =>
     [(meta) => { meta.format = 2; }, /format 2/],
     [(meta) => { meta.clips[1].first_row = 41; }, /clip wave asks for rows beyond the 70/],
     [(meta) => { meta.blobs.rest.count += 1; }, /blob rest has \d+ bytes, not \d+/],
+    [(meta) => { meta.blobs.rest.count -= 1; }, /blob rest has more than \d+ bytes/],
+    [(meta) => { meta.blobs.rest.count = 1e12; }, /blob rest cannot have \d+ bytes/],
+    [(meta) => { meta.blobs.rest.count = -1; }, /blob rest has no type or count/],
     [(meta) => { meta.shape.basis = 'gone'; }, /there is no blob gone/],
+    [(meta) => { meta.clips[0].frames = 1e9; }, /clip bend has 1000000000 frames/],
+    [(meta) => { meta.clips[0].frames = 2.5; }, /clip bend has 2.5 frames/],
+    [(meta) => { meta.clips[0].fps = 0; }, /clip bend has 0 frames a second/],
+    [(meta) => { meta.clips[0].first_row = -1; }, /clip bend has first_row -1/],
+    [(meta) => { meta.clips[0].residual.rows = [0]; }, /clip bend has 1 rows of a residual for 40 frames/],
+    [(meta) => { meta.clips[0].residual.rows = meta.clips[0].verdicts.map(() => 40); }, /clip bend has row 40 of a residual that has 40/],
+    [(meta) => { meta.clips[0].residual.rows = meta.clips[0].verdicts.map(() => -2); }, /clip bend has row -2/],
+    [(meta) => { meta.clips[0].residual.blob = 'residual-1'; }, /clip bend has 40 frames, and its residual has 30/],
   ];
   for (const [change, message] of faults) {
     const report = makeMeta(makeCharacter());

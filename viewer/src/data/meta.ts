@@ -144,7 +144,6 @@ export interface Meta {
   tolerances?: Maybe<ToleranceInfo[]>;
   fields?: Maybe<FieldInfo[]>;
   generation?: Maybe<number>;
-  problems?: Maybe<Problem[]>;
 }
 
 /** The meta of a JSON value, or an Error that says what is wrong with it. */
@@ -154,5 +153,23 @@ export function checkMeta(value: unknown): Meta {
   if (meta.format !== 1) throw new Error(`the data of this page has format ${String(meta.format)}, and this viewer reads format 1`);
   if (!Number.isInteger(meta.points) || meta.points < 1) throw new Error('the data of this page has no points');
   if (!meta.blobs || !Array.isArray(meta.meshes) || !meta.rest) throw new Error('the data of this page lacks blobs, meshes or rest');
+  for (const clip of meta.clips ?? []) checkClip(clip, meta);
   return meta;
+}
+
+const mostFrames = 1_000_000;
+
+function checkClip(clip: ClipInfo, {blobs, points}: Meta): void {
+  const refuse = (what: string): never => { throw new Error(`clip ${clip.name} has ${what}`); };
+  const {frames, fps, first_row: first, residual} = clip;
+  if (!Number.isInteger(frames) || frames < 0 || frames > mostFrames) refuse(`${String(frames)} frames; 0 to ${mostFrames} are possible`);
+  if (!Number.isFinite(fps) || fps <= 0) refuse(`${String(fps)} frames a second`);
+  if (first !== null && first !== undefined && (!Number.isInteger(first) || first < 0)) refuse(`first_row ${String(first)}`);
+  if (!residual) return;
+  const {rows} = residual;
+  if (rows && rows.length !== frames) refuse(`${rows.length} rows of a residual for ${frames} frames`);
+  if (!blobs[residual.blob]) refuse(`a residual in ${residual.blob}, and there is no such blob`);
+  const stored = Math.floor(blobs[residual.blob].count / (3 * points));
+  if (!rows && frames > stored) refuse(`${frames} frames, and its residual has ${stored}`);
+  for (const row of rows ?? []) if (!Number.isInteger(row) || row < -1 || row >= stored) refuse(`row ${String(row)} of a residual that has ${stored}`);
 }

@@ -33,8 +33,8 @@ export interface Model {
   blob(name: string): Promise<BlobArray>;
 }
 
-export async function loadModel(feed: Feed, given?: Meta): Promise<Model> {
-  const meta = given ?? await feed.meta();
+export async function loadModel(feed: Feed): Promise<Model> {
+  const meta = await feed.meta();
   const kept = new Map<string, Promise<BlobArray>>();
   const blob = (name: string): Promise<BlobArray> => {
     let found = kept.get(name);
@@ -60,7 +60,7 @@ export async function loadModel(feed: Feed, given?: Meta): Promise<Model> {
   if (rest.length !== meta.points * 3) throw new Error(`rest has ${rest.length} numbers for ${meta.points} points`);
   for (const clip of meta.clips ?? []) {
     const rows = shape ? shape.rows.length / shape.info.modes : 0, first = clip.first_row;
-    if (shape && first !== null && first !== undefined && (first < 0 || first + clip.frames > rows)) throw new Error(`clip ${clip.name} asks for rows beyond the ${rows} there are`);
+    if (shape && first !== null && first !== undefined && first + clip.frames > rows) throw new Error(`clip ${clip.name} asks for rows beyond the ${rows} there are`);
   }
   return {
     meta, live: feed.live, points: meta.points, rest, meshes, shape, blob,

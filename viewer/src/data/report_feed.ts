@@ -1,5 +1,5 @@
 // The data of a report: script elements of the page itself.
-import {typed, type Feed} from './feed';
+import {sizeOf, typed, type Feed} from './feed';
 import {checkMeta, type BlobArray, type BlobInfo, type Meta} from './meta';
 
 export function hasReport(): boolean {
@@ -18,7 +18,7 @@ export class ReportFeed implements Feed {
     if (!element) throw new Error(`blob ${name} is not in this page`);
     const bytes = fromBase64(element.textContent ?? '');
     element.remove();  // the model keeps the array; the text is as large again
-    return typed(info.deflate ? await inflate(bytes) : bytes, name, info);
+    return typed(info.deflate ? await inflate(bytes, name, sizeOf(name, info)) : bytes, name, info);
   }
 }
 
@@ -31,6 +31,23 @@ function fromBase64(text: string): ArrayBuffer {
   return bytes.buffer;
 }
 
-async function inflate(bytes: ArrayBuffer): Promise<ArrayBuffer> {
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();
+const mostInflated = 1032;  // times as large is what deflate can make of its input
+
+/** Never takes more memory than the blob says that it has. */
+async function inflate(bytes: ArrayBuffer, name: string, expected: number): Promise<ArrayBuffer> {
+  if (expected > mostInflated * bytes.byteLength + 64) throw new Error(`blob ${name} cannot have ${expected} bytes: it is ${bytes.byteLength} packed`);
+  const out = new Uint8Array(expected), reader = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate')).getReader();
+  let at = 0;
+  for (;;) {
+    const {done, value} = await reader.read();
+    if (done) break;
+    if (at + value.length > expected) {
+      void reader.cancel().catch(() => undefined);
+      throw new Error(`blob ${name} has more than ${expected} bytes`);
+    }
+    out.set(value, at);
+    at += value.length;
+  }
+  if (at !== expected) throw new Error(`blob ${name} has ${at} bytes, not ${expected}`);
+  return out.buffer;
 }

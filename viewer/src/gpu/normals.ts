@@ -5,8 +5,7 @@ import type {Model} from '../data/model';
 import {pairTexture, texture} from './layout';
 import {Pass} from './pass';
 import type {Positions, Side} from './positions';
-
-const across = 512;  // triangles a line of the list
+import {across, trianglesAbout} from './triangles_about';
 
 const fragment = `
 precision highp float;
@@ -45,7 +44,7 @@ export class Normals {
 
   constructor(model: Model, positions: Positions, private readonly renderer: WebGLRenderer) {
     const {width, height} = positions.grid;
-    const {spans, corners, rows} = trianglesAbout(model, width * height);
+    const {spans, corners, rows} = trianglesAbout(model.rest, model.meshes, width * height);
     const spanTexture = pairTexture(spans, width, height);
     const cornerTexture = texture(corners, across * 3, rows);
     this.pass = new Pass(positions.grid, 2, fragment, {
@@ -71,40 +70,4 @@ export class Normals {
   dispose(): void {
     for (const thing of this.owned) thing.dispose();
   }
-}
-
-/** For each point the place and the number of its triangles in a list of their corners. */
-function trianglesAbout(model: Model, size: number): {spans: Uint32Array<ArrayBuffer>; corners: Uint32Array<ArrayBuffer>; rows: number} {
-  const leader = leaders(model.rest, model.points);
-  const count = new Uint32Array(model.points);
-  for (const mesh of model.meshes) for (const v of mesh.triangles) ++count[leader[v]];
-  const first = new Uint32Array(model.points + 1);
-  for (let i = 0; i < model.points; ++i) first[i + 1] = first[i] + count[i];
-  const rows = Math.max(1, Math.ceil(first[model.points] / across));
-  const corners = new Uint32Array(rows * across * 3);
-  const next = first.slice(0, model.points);
-  for (const {triangles} of model.meshes) {
-    for (let t = 0; t < triangles.length; t += 3) {
-      for (let corner = 0; corner < 3; ++corner) corners.set(triangles.subarray(t, t + 3), 3 * next[leader[triangles[t + corner]]]++);
-    }
-  }
-  const spans = new Uint32Array(size * 2);
-  for (let i = 0; i < model.points; ++i) {
-    spans[2 * i] = first[leader[i]];
-    spans[2 * i + 1] = count[leader[i]];
-  }
-  return {spans, corners, rows};
-}
-
-/** For each point the first one at the same place. */
-function leaders(rest: Float32Array, points: number): Uint32Array {
-  const leader = new Uint32Array(points);
-  const seen = new Map<string, number>();
-  for (let i = 0; i < points; ++i) {
-    const key = `${rest[3 * i]},${rest[3 * i + 1]},${rest[3 * i + 2]}`;
-    const found = seen.get(key);
-    if (found === undefined) seen.set(key, i);
-    leader[i] = found ?? i;
-  }
-  return leader;
 }

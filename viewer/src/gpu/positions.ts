@@ -62,6 +62,7 @@ export class Positions {
   private row: Float32Array<ArrayBuffer> | null = null;
   private sent: Record<Side, PointTexture<Float32Array<ArrayBuffer>>> | null = null;
   private residual: PointTexture<Int8Array<ArrayBuffer>> | PointTexture<Int16Array<ArrayBuffer>> | null = null;
+  private wide = false;  // the residual is of 16 bits, and takes those of 8
   private readonly uniforms: Uniforms;
 
   constructor(private readonly model: Model, private readonly renderer: WebGLRenderer) {
@@ -75,7 +76,7 @@ export class Positions {
         rest: {value: this.own(floatPoints(model.points, grid, model.rest).texture)},
         row: {value: this.own(texture(this.row, modes, 1))},
         basis: {value: this.own(layers(model.shape.basis, modes, model.points, grid))},
-        residual: {value: this.own(texture(new Int8Array(grid.width * grid.height * 3), grid.width * 3, grid.height))},
+        residual: {value: texture(new Int8Array(grid.width * grid.height * 3), grid.width * 3, grid.height)},
         modes: {value: modes}, stepSize: {value: 0},
       };
     } else {
@@ -108,16 +109,20 @@ export class Positions {
     if (!this.model.shape) return;
     this.uniforms.stepSize.value = values ? step : 0;
     if (values) {
-      if (!this.residual || this.uniforms.residual.value !== this.residual.texture) this.makeResidual(values);
-      this.residual?.write(values);
+      const wide = values instanceof Int16Array;
+      if (!this.residual || (wide && !this.wide)) this.residual = this.makeResidual(wide);
+      this.residual.write(values);
     }
     this.changed();
   }
 
-  private makeResidual(like: Int8Array | Int16Array): void {
+  private makeResidual(wide: boolean): NonNullable<Positions['residual']> {
     const size = this.grid.width * this.grid.height * 3;
-    this.residual = like instanceof Int8Array ? new PointTexture(new Int8Array(size), this.grid) : new PointTexture(new Int16Array(size), this.grid);
-    this.uniforms.residual.value = this.own(this.residual.texture);
+    const made = wide ? new PointTexture(new Int16Array(size), this.grid) : new PointTexture(new Int8Array(size), this.grid);
+    (this.uniforms.residual.value as Texture).dispose();
+    this.uniforms.residual.value = made.texture;
+    this.wide = wide;
+    return made;
   }
 
   /** Points as a server sent them; where it sent one side only, both are that. */
@@ -172,5 +177,6 @@ export class Positions {
 
   dispose(): void {
     for (const thing of this.owned) thing.dispose();
+    (this.uniforms.residual?.value as Texture | undefined)?.dispose();
   }
 }

@@ -67,11 +67,11 @@ function clipCharts({model, store}: Context, series: Series): Chart[] {
 
 async function addHistogram({model, series, store, tell}: Context, clip: number, into: HTMLElement, charts: Chart[]): Promise<void> {
   if (model.live || !model.accelerated) return;
-  const residual = model.meta.clips![clip].residual;
+  const info = model.meta.clips![clip], {residual} = info;
   try {
     const values = residual ? await model.blob(residual.blob) as Int8Array | Int16Array : null;
     if (store.now.clip !== clip || (!values && !series[clip].has('max_error'))) return;
-    const {x, share} = residual && values ? residualHistogram(values, residual.step) : frameHistogram(series[clip].max_error);
+    const {x, share} = residual && values ? residualHistogram(info, model.points, values, residual.step) : frameHistogram(series[clip].max_error);
     const chart = new Chart({
       title: `Share of ${residual ? 'points, all frames' : 'frames'}, by error (${model.unit.name}); logarithmic`, x, xLabel: `error (${model.unit.name})`,
       xText: (e) => number(e / model.unit.metres), yText: percent, logY: true,

@@ -1,0 +1,28 @@
+// Parts of the page that need no browser.
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+import {load} from './support/units.mjs';
+
+test('points at one place share their triangles, unless there are very many', async () => {
+  const {trianglesAbout} = await load('gpu/triangles_about.ts');
+  // `count` triangles that all have their first corner at one place, as a point of its own each
+  const fan = (count) => {
+    const rest = Float32Array.from({length: 9 * count}, (_, i) => i % 9 < 3 ? 0 : i);
+    return trianglesAbout(rest, [{triangles: Uint32Array.from({length: 3 * count}, (_, i) => i)}], 3 * count).spans;
+  };
+  assert.equal(fan(64)[1], 64);
+  assert.equal(fan(65)[1], 1);
+  // and one point of many triangles adds up 256 of them
+  const rest = Float32Array.from({length: 903}, (_, i) => i), triangles = Uint32Array.from({length: 900}, (_, i) => [0, i % 300 + 1, (i + 1) % 300 + 1][i % 3]);
+  assert.equal(trianglesAbout(rest, [{triangles}], 301).spans[1], 256);
+});
+
+test('frames without a stored difference that are misses, or whose error is 0, count as zeros', async () => {
+  const {residualHistogram, errorsOfPoint, frameHistogram} = await load('ui/histogram.ts');
+  const values = Int8Array.from([3, 0, 0, 9, 0, 0]);  // one row of two points
+  const clip = {frames: 4, verdicts: [0, 2, 0, 0], max_error: [4.5, null, 0, 0.001], residual: {step: 0.5, rows: [0, -1, -1, -1]}};
+  const {share} = residualHistogram(clip, 2, values, 0.5);
+  assert.deepEqual([share[0], share[3], share[8]], [4 / 6, 1 / 6, 1 / 6]);
+  assert.deepEqual(errorsOfPoint({points: 2, meta: {clips: [clip]}}, 0, 1, values), [4.5, 0, 0, null]);
+  assert.equal(frameHistogram(new Array(400_000).fill(0.001)).share.at(-1), 1);
+});
