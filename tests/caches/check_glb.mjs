@@ -3,17 +3,17 @@ import { readFileSync } from 'node:fs';
 import validator from 'gltf-validator';
 import { AnimationMixer, LoopOnce, Vector3 } from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
-import { readNpz } from './read_npz.mjs';
+import { readNpz } from './npz.mjs';
 
 const [glbPath, npzPath] = process.argv.slice(2);
-const glb = readFileSync(glbPath), [times, ...arrays] = readNpz(readFileSync(npzPath));
+const glb = readFileSync(glbPath), { times, ...meshArrays } = readNpz(readFileSync(npzPath)), arrays = Object.values(meshArrays);
 const fail = (text) => { console.error(`${glbPath}: ${text}`); process.exit(1); };
 
 // Texture coordinates without a texture are no fault
 const stated = ['UNUSED_OBJECT'];
 const { issues } = await validator.validateBytes(new Uint8Array(glb), { maxIssues: 100 });
 const told = issues.messages.filter((issue) => issue.severity < 2 || !stated.includes(issue.code));
-if (told.length > 0) fail(`the validator says ${JSON.stringify(told.slice(0, 5), null, 1)}`);
+if (told.length > 0 || issues.numErrors > 0 || issues.truncated) fail(`the validator says, of ${issues.numErrors} errors, ${JSON.stringify(told.slice(0, 5), null, 1)}`);
 
 globalThis.self ??= globalThis;
 const file = await new GLTFLoader().parseAsync(glb.buffer.slice(glb.byteOffset, glb.byteOffset + glb.byteLength), '');
@@ -27,8 +27,8 @@ file.scene.traverse((object) => { if (object.isMesh) meshes.push(object); });
 if (meshes.length !== arrays.length) fail(`${meshes.length} meshes, the .npz has ${arrays.length}`);
 
 const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-for (const { values } of arrays) {
-  values.forEach((value, i) => {
+for (const { data } of arrays) {
+  data.forEach((value, i) => {
     low[i % 3] = Math.min(low[i % 3], value);
     high[i % 3] = Math.max(high[i % 3], value);
   });
@@ -37,10 +37,10 @@ const diagonal = Math.hypot(...high.map((value, i) => value - low[i]));
 let worst = 0, largest = 0;
 const frames = times.shape[0], point = new Vector3();
 for (const frame of [0, Math.floor(frames / 3), Math.floor(frames / 2), frames - 1]) {
-  mixer.setTime(times.values[frame]);
+  mixer.setTime(times.data[frame]);
   file.scene.updateMatrixWorld(true);
   meshes.forEach((mesh, m) => {
-    const { shape, values } = arrays[m], { attributes, morphAttributes } = mesh.geometry;
+    const { shape, data } = arrays[m], { attributes, morphAttributes } = mesh.geometry;
     if (attributes.position.count !== shape[1]) fail(`mesh ${m} has ${attributes.position.count} vertices`);
     const weights = mesh.morphTargetInfluences ?? [];  // a still mesh has none
     if (!attributes.normal || (weights.length > 0 && !morphAttributes.normal)) fail(`mesh ${m} has no normals`);
@@ -49,8 +49,8 @@ for (const frame of [0, Math.floor(frames / 3), Math.floor(frames / 2), frames -
     for (let v = 0; v < shape[1]; ++v) {
       mesh.getVertexPosition(v, point).applyMatrix4(mesh.matrixWorld);
       const at = 3 * (frame * shape[1] + v);
-      worst = Math.max(worst, Math.hypot(point.x - values[at], point.y - values[at + 1], point.z - values[at + 2]));
-      largest = Math.max(largest, Math.abs(values[at] - values[3 * v]));
+      worst = Math.max(worst, Math.hypot(point.x - data[at], point.y - data[at + 1], point.z - data[at + 2]));
+      largest = Math.max(largest, Math.abs(data[at] - data[3 * v]));
     }
   });
 }

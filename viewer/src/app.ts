@@ -74,6 +74,7 @@ export class App {
     const series = (model.meta.clips ?? []).map((_, clip) => new Series(model.meta, clip));
     const tell = (text: string): void => this.tell(text);
     const session = client ? new Session(client, model, this.store, this.viewport, facts, series, tell) : null;
+    if (session && before?.session) session.compare = before.session.compare;
     const context: Context = {
       store: this.store, model, viewport: this.viewport, view, series, facts, session, scope, tell, open: (panel) => this.tabs?.open(panel),
     };

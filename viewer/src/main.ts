@@ -32,8 +32,12 @@ async function begin(): Promise<void> {
     void followRig(app, client, model.meta.generation ?? 0);
   }
   await new Promise((resolve) => requestAnimationFrame(resolve));
-  const session = app.context?.session;
-  while (session && !session.answered && !app.context?.facts.value.problem) await new Promise((resolve) => setTimeout(resolve, 5));
+  // the rig may be replaced, and its session with it, before there is an answer
+  const unanswered = (): boolean => {
+    const context = app?.context;
+    return !!context?.session && !context.session.answered && !context.facts.value.problem;
+  };
+  while (unanswered()) await new Promise((resolve) => setTimeout(resolve, 5));
 }
 
 async function followRig(shown: App, client: Client, first: number): Promise<void> {

@@ -7,6 +7,12 @@ export function framesOf(model: Model, clip: number): number {
   return clip >= 0 ? model.meta.clips?.[clip]?.frames ?? 0 : 0;
 }
 
+/** The frame of a clip that is nearest to a time in seconds. */
+export function nearestFrame(model: Model, clip: number, time: number): number {
+  const {begin, fps, frames} = model.meta.clips![clip];
+  return Math.max(0, Math.min(frames - 1, Math.round((time - begin) * fps)));
+}
+
 export function play(store: Store, model: Model, scope: Scope): void {
   let began = 0, from = 0, waiting = 0;
   const tick = (now: number): void => {

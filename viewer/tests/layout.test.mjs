@@ -4,13 +4,12 @@ import {after, before, test} from 'node:test';
 import {settled, startBrowser} from './support/browser.mjs';
 import {makeCharacter} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
-import {makeReport} from './support/report.mjs';
 
 let browser, page;
 
 before(async () => {
   browser = await startBrowser();
-  ({page} = await browser.open(browser.write('report.html', makeReport(makeMeta(makeCharacter())))));
+  ({page} = await browser.openReport(makeMeta(makeCharacter())));
 });
 after(async () => browser?.stop());
 

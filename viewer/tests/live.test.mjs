@@ -96,6 +96,16 @@ test('a double click goes to the default, reset to all of them', async () => {
   assert.ok(await off({}) < 1e-6);
 });
 
+test('Delete and Backspace on a slider release it', async () => {
+  for (const key of ['Delete', 'Backspace']) {
+    await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 12));
+    await page.getByRole('slider', {name: 'bend'}).focus();
+    await page.keyboard.press(key);
+    await until(() => !('bend.rotateX' in server.last.set));
+    await idle();
+  }
+});
+
 test('clips play, and the strip and plots remember what was seen', async () => {
   await page.getByLabel('Clip', {exact: true}).selectOption('bend (test)');
   await page.evaluate(() => window.kpsa.setFrame(12));
@@ -125,12 +135,45 @@ test('problems are shown with their place, the last rig goes on, and they are cl
   await panel.waitFor({state: 'hidden'});
 });
 
+test('an answer belongs to what was set when it was asked for', async () => {
+  const hint = async (frame) => {
+    const strip = page.locator('.strip'), box = await strip.boundingBox();
+    await strip.hover({position: {x: (frame + 0.5) / 40 * box.width, y: 4}});
+    return page.locator('.track .hint').innerText();
+  };
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 0));
+  await page.evaluate(() => window.kpsa.setFrame(30, 'bend'));
+  let release;
+  server.held = new Promise((resolve) => { release = resolve; });
+  await page.evaluate(() => void window.kpsa.setControl('bend.rotateX', 55));
+  await until(() => server.last.set['bend.rotateX'] === 55);
+  await page.getByRole('button', {name: 'Reset'}).click();
+  await page.evaluate(() => void window.kpsa.setFrame(31));
+  server.held = null;
+  release();
+  await until(() => server.last.time > 30.5 / 24);
+  await idle();
+  assert.match(await hint(31), /frame 31 - hit/);
+  assert.doesNotMatch(await hint(30), /miss/);
+  await page.evaluate(() => window.kpsa.setFrame(0, null));
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 10));
+});
+
 test('a new version of the rig is loaded, what was moved is kept', async () => {
+  await page.getByLabel('Compare').uncheck();
+  await until(() => server.last.mode !== 'both');
+  await idle();
+  server.last = null;
   server.reload({title: 'Sheet, second version'});
   await page.waitForFunction(() => window.kpsa.state.generation === 2);
   await page.waitForFunction(() => document.querySelector('h1').textContent === 'Sheet, second version');
+  await until(() => server.last);
   await idle();
   assert.deepEqual(server.last.set, {'bend.rotateX': 10});
+  assert.notEqual(server.last.mode, 'both', 'Compare stays unticked');
+  await page.getByLabel('Compare').check();
+  await until(() => server.last.mode === 'both');
+  await idle();
   assert.ok(await off({'bend.rotateX': 10}) < 1e-6);
   const before = await picture();
   await page.evaluate(() => window.kpsa.setControl('bend.rotateX', -30));
@@ -150,6 +193,11 @@ test('poses are saved and loaded', async () => {
   writeFileSync(file, JSON.stringify({'bend.rotateX': -15, 'twist.rotateY': 3}));
   await page.locator('input[type=file]').setInputFiles(file);
   await until(() => server.last.set['bend.rotateX'] === -15 && server.last.set['twist.rotateY'] === 3);
+  writeFileSync(file, JSON.stringify({'bend.rotateX': 5, clip: 'wave', time: 0.5 + 7.4 / 30}));
+  await page.locator('input[type=file]').setInputFiles(file);
+  await until(() => server.last.set['bend.rotateX'] === 5 && server.last.clip === 'wave');
+  assert.equal(await page.evaluate(() => window.kpsa.state.frame), 7);
+  await page.evaluate(() => window.kpsa.setFrame(0, null));
   writeFileSync(file, 'not a pose');
   await page.locator('input[type=file]').setInputFiles(file);
   await page.getByText('pose.json:1:1 is not JSON').waitFor();
@@ -165,6 +213,30 @@ test('fields are asked for, vertices explained', async () => {
   await page.mouse.click(at.x, at.y);
   await page.locator('#panel-vertex .lines').waitFor();
   assert.match(await page.locator('#panel-vertex').innerText(), /bend[\s\S]*200 mm[\s\S]*twist[\s\S]*40 mm[\s\S]*vertex 1340 is a hit/);
+});
+
+test('a vertex is explained again when the pose has changed', async () => {
+  const panel = page.locator('#panel-vertex');
+  await page.evaluate(() => window.kpsa.setControl('bend.rotateX', 17));
+  await panel.getByText('bent by 17').waitFor({timeout: 20000});
+  assert.equal(await panel.locator('.lines').count(), 1);
+  assert.deepEqual(await panel.locator('.bars button').evaluateAll((all) => all.map((b) => b.disabled)), [false, false, true], 'detail has no moves to show');
+});
+
+test('the page is ready when its rig was replaced before the first answer', async () => {
+  let release;
+  const other = await startServer();
+  other.held = new Promise((resolve) => { release = resolve; });
+  const asked = () => other.log.filter((entry) => entry.path === '/evaluate').length, shown = browser.open(other.url);
+  await until(() => asked() === 1);
+  other.reload({title: 'Replaced'});
+  await until(() => asked() === 2);
+  other.held = null;
+  release();
+  const opened = await Promise.race([shown, new Promise((resolve) => setTimeout(resolve, 20000, null))]);
+  assert.ok(opened, 'ready resolves');
+  await opened.page.close();
+  await other.stop();
 });
 
 test('a server that goes away is noticed', async () => {

@@ -5,14 +5,13 @@ import {pictureOf, settled, startAfresh, startBrowser, stateOf} from './support/
 import {makeCharacter, makeErrors, residualStep} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
 import {difference, share} from './support/png.mjs';
-import {makeReport} from './support/report.mjs';
 
 const character = makeCharacter(), made = makeMeta(character);
 let browser, page, requests, complaints;
 
 before(async () => {
   browser = await startBrowser();
-  ({page, requests, complaints} = await browser.open(browser.write('report.html', makeReport(made))));
+  ({page, requests, complaints} = await browser.openReport(made));
 });
 after(async () => browser?.stop());
 
@@ -60,7 +59,7 @@ test('a basis of 16 bits, and rows of the residual that are absent', async () =>
   clip.max_error[7] = 0;
   report.arrays['residual-0'] = Int16Array.from(report.arrays['residual-0'].subarray(5 * n, 6 * n));
   report.meta.blobs['residual-0'] = {type: 'i16', count: n, deflate: true};
-  const other = await browser.open(browser.write('wide.html', makeReport(report)));
+  const other = await browser.openReport(report, 'wide.html');
   const expected = wide.place(wide.rowOf(5));
   assert.ok(apart(await positionsAt(other.page, 5, 'bend', 'accelerated'), expected) < 1e-6);
   const full = expected.map((x, i) => x + report.arrays['residual-0'][i] * residualStep);
@@ -78,7 +77,7 @@ test('a residual of 8 bits, one of 16, and the first again', async () => {
   const wide = Int16Array.from({length: 30 * n}, (_, i) => 200 + i % 1000);
   report.arrays['residual-1'] = wide;
   report.meta.blobs['residual-1'].type = 'i16';
-  const other = await browser.open(browser.write('both.html', makeReport(report)));
+  const other = await browser.openReport(report, 'both.html');
   const narrow = report.arrays['residual-0'];
   for (const [clip, row, values] of [['bend', 0, narrow], ['wave', 40, wide], ['bend', 0, narrow]]) {
     await other.page.waitForFunction(async (name) => {
@@ -202,6 +201,29 @@ test('keys', async () => {
   assert.ok(await page.locator('dialog').isHidden());
   await page.keyboard.press('z');
   await page.keyboard.press('f');
+  const {loop} = await state();
+  await page.keyboard.press('L');  // as Caps Lock makes it
+  assert.equal((await state()).loop, !loop);
+  await page.keyboard.press('L');
+});
+
+test('a lost picture comes back', async () => {
+  await fresh();
+  await page.evaluate(() => window.kpsa.setFrame(9));
+  const before = await picture(), points = await page.evaluate(() => [...window.kpsa.positions()]);
+  await page.evaluate(async () => {
+    const canvas = document.querySelector('.stage canvas'), lose = canvas.getContext('webgl2').getExtension('WEBGL_lose_context');
+    const heard = (name) => new Promise((resolve) => canvas.addEventListener(name, () => setTimeout(resolve, 50), {once: true}));
+    const lost = heard('webglcontextlost');
+    lose.loseContext();
+    await lost;
+    const restored = heard('webglcontextrestored');
+    lose.restoreContext();
+    await restored;
+  });
+  await settled(page);
+  assert.ok(difference(before, await picture()) < 1e-4);
+  assert.deepEqual(await page.evaluate(() => [...window.kpsa.positions()]), points);
 });
 
 test('the strip says hit, blend or miss, and why', async () => {
@@ -223,12 +245,12 @@ test('the title is text, not markup', async () => {
 
 test('a rig without acceleration shows full only, and no empty panel', async () => {
   const report = makeMeta(makeCharacter(), {accelerated: false});
-  const other = await browser.open(browser.write('full.html', makeReport(report)));
+  const other = await browser.openReport(report, 'full.html');
   assert.deepEqual(await other.page.getByRole('tab').allInnerTexts(), ['Controls', 'Graph', 'Tables', 'Vertex']);
   assert.equal(await other.page.getByRole('button', {name: 'Difference'}).count(), 0);
   assert.ok(await other.page.locator('.strip').isHidden());
   const bare = {format: 1, points: report.meta.points, blobs: report.meta.blobs, meshes: report.meta.meshes, rest: 'rest'};
-  const least = await browser.open(browser.write('bare.html', makeReport({meta: bare, arrays: report.arrays})));
+  const least = await browser.openReport({meta: bare, arrays: report.arrays}, 'bare.html');
   assert.deepEqual(await least.page.getByRole('tab').allInnerTexts(), ['Vertex']);
   assert.equal(await least.page.getByRole('slider').count(), 0);
   assert.deepEqual([...other.complaints, ...least.complaints], []);
@@ -257,7 +279,7 @@ test('what does not keep to the contract is refused with a message', async () =>
   for (const [change, message] of faults) {
     const report = makeMeta(makeCharacter());
     change(report.meta);
-    await assert.rejects(browser.open(browser.write('other.html', makeReport(report))), message);
+    await assert.rejects(browser.openReport(report, 'other.html'), message);
   }
 });
 

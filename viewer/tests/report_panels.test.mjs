@@ -5,14 +5,13 @@ import {pictureOf, settled, startAfresh, startBrowser, stateOf} from './support/
 import {makeCharacter} from './support/character.mjs';
 import {makeMeta} from './support/meta.mjs';
 import {difference} from './support/png.mjs';
-import {makeReport} from './support/report.mjs';
 
 const made = makeMeta(makeCharacter());
 let browser, page, complaints;
 
 before(async () => {
   browser = await startBrowser();
-  ({page, complaints} = await browser.open(browser.write('report.html', makeReport(made))));
+  ({page, complaints} = await browser.openReport(made));
 });
 after(async () => browser?.stop());
 
@@ -42,6 +41,10 @@ test('picked vertices are a YAML list', async () => {
     await page.mouse.click(at.x, at.y);
   }
   assert.equal(await page.getByLabel('Picked vertices as YAML').inputValue(), `vertices: [${vertices.join(', ')}]`);
+  const field = page.getByLabel('Vertex', {exact: true}).and(page.locator('input'));
+  await field.fill('1900');
+  await field.press('Enter');
+  assert.equal(await page.getByLabel('Picked vertices as YAML').inputValue(), `vertices: [${[...vertices, 1900].join(', ')}]`);
   await page.getByRole('button', {name: 'Clear'}).click();
   assert.equal(await page.getByLabel('Picked vertices as YAML').inputValue(), 'vertices: []');
   await page.getByRole('button', {name: 'Pick vertices'}).click();
@@ -57,6 +60,38 @@ test('the graph is searched by name', async () => {
   await panel.getByRole('searchbox').press('Enter');
   assert.match(await panel.locator('.details').innerText(), /delta_mush_final \(deltaMush\).*only a miss needs it/);
   await panel.getByRole('searchbox').fill('');
+});
+
+test('a drag of the graph that begins at a node chooses nothing', async () => {
+  await page.evaluate(() => document.activeElement.blur());  // fields keep Escape
+  await fresh();
+  await page.locator('#panel-graph').getByRole('button', {name: 'Fit'}).click();
+  const node = page.locator('#panel-graph .graph .node').nth(200), box = await node.boundingBox(), at = [box.x + box.width / 2, box.y + box.height / 2];
+  const drag = async (by) => {
+    await page.mouse.move(...at);
+    await page.mouse.down();
+    // back to where it began, over the same node
+    for (const x of [by, 0]) await page.mouse.move(at[0] + x, at[1]);
+    await page.mouse.up();
+  };
+  await drag(40);
+  assert.equal((await state()).node, -1);
+  await drag(2);
+  assert.equal((await state()).node, 200);
+  await page.keyboard.press('Escape');
+});
+
+test('where a vertex is follows the side that is shown', async () => {
+  await fresh();
+  await page.evaluate(() => window.kpsa.setFrame(26));
+  await page.getByRole('tab', {name: 'Vertex'}).click();
+  await page.getByLabel('Vertex', {exact: true}).and(page.locator('input')).fill('1650');
+  await page.keyboard.press('Enter');
+  for (const side of ['accelerated', 'full']) {
+    await page.evaluate((mode) => window.kpsa.setMode(mode), side);
+    const [x, y, z] = (await page.evaluate((s) => [...window.kpsa.positions(s)], side)).slice(4950, 4953).map((c) => c.toFixed(4));
+    await page.getByText(`at ${x}, ${y}, ${z} m`).waitFor({timeout: 10000});
+  }
 });
 
 test('tables sort, cues are marked', async () => {

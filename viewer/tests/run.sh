@@ -16,6 +16,11 @@ mkdir -p "$work"
 rm -rf "$work/src" "$work/tests" "$work/dist"
 cp -r "$viewer"/* "$viewer/.npmrc" "$work"
 cd "$work"
-npm ci --silent || skip "npm cannot install what package-lock.json names"
+# A registry that cannot be reached, or lacks a package, is no fault of the page; anything else is
+npm ci --loglevel=error > npm.log 2>&1 || {
+  cat npm.log
+  grep -qE 'ENOTFOUND|ECONNREFUSED|ETIMEDOUT|ECONNRESET|EAI_AGAIN|E403|E404|403 Forbidden|404 Not Found' npm.log || exit 1
+  skip "npm cannot reach what package-lock.json names"
+}
 npm run --silent check
 npm test

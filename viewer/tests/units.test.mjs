@@ -26,3 +26,10 @@ test('frames without a stored difference that are misses, or whose error is 0, c
   assert.deepEqual(errorsOfPoint({points: 2, meta: {clips: [clip]}}, 0, 1, values), [4.5, 0, 0, null]);
   assert.equal(frameHistogram(new Array(400_000).fill(0.001)).share.at(-1), 1);
 });
+
+test('a node of very many inputs is laid out', async () => {
+  const {layOut} = await load('ui/graph_layout.ts'), many = 200_000;
+  const nodes = [{name: 'sum', inputs: Array.from({length: many}, (_, i) => i + 1)}, ...Array.from({length: many}, () => ({name: 'part', inputs: []}))];
+  const {x, y} = layOut(nodes);
+  assert.ok([...x, ...y].every(Number.isFinite) && (x[0] !== x[1] || y[0] !== y[1]));
+});

@@ -40,10 +40,10 @@ export class Marks {
   private readonly geometry = new BufferGeometry();
   private readonly material: RawShaderMaterial;
 
-  constructor(shared: Record<string, IUniform>, base: [number, number, number], size: number) {
+  constructor(shared: Record<string, IUniform>, base: [number, number, number]) {
     this.material = new RawShaderMaterial({
       glslVersion: GLSL3, vertexShader: vertex, fragmentShader: fragment, transparent: true, depthTest: false, depthWrite: false,
-      uniforms: {...shared, base: {value: base}, selected: {value: [1, 1, 1]}, rim: {value: [0.05, 0.06, 0.08]}, size: {value: size}},
+      uniforms: {...shared, base: {value: base}, selected: {value: [1, 1, 1]}, rim: {value: [0.05, 0.06, 0.08]}, size: {value: 9}},
     });
     this.object = new Points(this.geometry, this.material);
     this.object.frustumCulled = false;
@@ -58,6 +58,11 @@ export class Marks {
     this.geometry.boundingSphere = new Sphere();
     this.geometry.setDrawRange(0, marks.length);
     this.object.visible = marks.length > 0;
+  }
+
+  /** How wide a mark is, in pixels of the picture. */
+  setSize(size: number): void {
+    this.material.uniforms.size.value = size;
   }
 
   /** Which of them is shown as hovered or selected; -1 for none. */

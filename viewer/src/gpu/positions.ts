@@ -140,6 +140,11 @@ export class Positions {
     this.fresh.accelerated = this.fresh.full = false;
   }
 
+  /** What the GPU had is gone. */
+  again(): void {
+    this.changed();
+  }
+
   /** Computes what has changed. */
   update(): void {
     if (!this.dirty) return;

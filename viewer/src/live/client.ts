@@ -40,6 +40,13 @@ export interface Events {
   problems: Problem[];
 }
 
+/** What a pose file says. */
+export interface Pose {
+  set: Values;
+  clip?: string | null;
+  time?: number | null;
+}
+
 export interface Explanation {
   lines: string[];
   moved_by?: {name: string; metres: number}[];
@@ -85,8 +92,8 @@ export class Client implements Feed {
     return await (await this.request('/events?after=' + after)).json() as Events;
   }
 
-  async poseFile(text: string): Promise<Values> {
-    return (await (await this.request('/pose-file', text)).json() as {set: Values}).set;
+  async poseFile(text: string): Promise<Pose> {
+    return await (await this.request('/pose-file', text)).json() as Pose;
   }
 
   async explain(vertex: number): Promise<Explanation> {

@@ -71,13 +71,13 @@ export class Session {
       this.asked = this.waiting;
       this.waiting = 0;
       const {clip, frame} = this.store.now;
-      const info = clip >= 0 ? this.model.meta.clips![clip] : null;
+      const set = this.moved, info = clip >= 0 ? this.model.meta.clips![clip] : null;
       try {
         const answer = await this.client.evaluate({
-          id: ++this.id, set: this.moved, clip: info?.name ?? null, time: info ? info.begin + frame / info.fps : 0, mode: this.mode(),
+          id: ++this.id, set, clip: info?.name ?? null, time: info ? info.begin + frame / info.fps : 0, mode: this.mode(),
         }, this.model.points);
         if (this.ended) break;
-        await this.show(answer, clip, frame);
+        await this.show(answer, clip, frame, !Object.keys(set).length);
       } catch (error) {
         if (this.ended) break;
         this.facts.set({...this.facts.value, problem: (error as Error).message});
@@ -90,14 +90,14 @@ export class Session {
     this.busy = false;
   }
 
-  private async show({facts, accelerated, full}: EvaluateAnswer, clip: number, frame: number): Promise<void> {
+  private async show({facts, accelerated, full}: EvaluateAnswer, clip: number, frame: number, ofClip: boolean): Promise<void> {
     if (facts.generation !== undefined && facts.generation !== (this.model.meta.generation ?? facts.generation)) return;
     if (accelerated || full) this.viewport.view?.positions.setSent(accelerated, full);
     const known: Facts = {
       ...noFacts, verdict: facts.verdict ?? null, reason: facts.reason || null, score: facts.score ?? null, full_us: facts.full_us ?? null,
       accelerated_us: facts.accelerated_us ?? null, max_error: facts.max_error ?? null, rms_error: facts.rms_error ?? null, problem: facts.problem ?? null,
     };
-    if (clip >= 0 && !Object.keys(this.moved).length) this.series[clip]?.record(frame, known);
+    if (clip >= 0 && ofClip) this.series[clip]?.record(frame, known);
     this.facts.set(known);
     if (facts.values) this.values.set(facts.values);
     this.viewport.draw();

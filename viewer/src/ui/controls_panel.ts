@@ -80,11 +80,15 @@ function sliderRow(context: Context, info: ControlInfo): Row {
   };
   const reset = (event: Event): void => session.release([info.name], event.timeStamp);
   const slider = h('input', {
-    attributes: {type: 'range', min, max, step: whole ? 1 : 'any', 'aria-label': info.label ?? info.name, title: `${title(info)}; double click for the default`},
+    attributes: {type: 'range', min, max, step: whole ? 1 : 'any', 'aria-label': info.label ?? info.name, title: `${title(info)}; double click or Delete for the default`},
     on: {input: (event) => set(Number(slider.value), event), dblclick: reset},
   });
   // step "any" makes arrow keys useless in some browsers: a hundredth of the range instead
   slider.addEventListener('keydown', (event) => {
+    if (event.key === 'Delete' || event.key === 'Backspace') {
+      event.preventDefault();
+      return reset(event);
+    }
     const by = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1}[event.key];
     if (by === undefined || whole) return;
     event.preventDefault();

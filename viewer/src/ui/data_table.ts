@@ -24,7 +24,6 @@ export class DataTable {
   private readonly heads: HTMLTableCellElement[];
   private sorted = -1;
   private down = false;
-  private readonly shown: boolean[];
 
   constructor(private readonly options: TableOptions) {
     const {columns, rows} = options;
@@ -44,7 +43,6 @@ export class DataTable {
       const cell = row[c];
       return h('td', {class: numeric[c] ? 'number' : undefined}, typeof cell === 'number' ? number(cell) : cell ?? '');
     })));
-    this.shown = rows.map(() => true);
     this.body.append(...this.lines);
     this.element = h('div', {class: 'table-place', attributes: {tabindex: 0, role: 'region', 'aria-label': options.label}},
       h('table', {class: options.choose ? 'choosable' : undefined}, h('thead', {}, h('tr', {}, ...this.heads)), this.body));
@@ -69,9 +67,8 @@ export class DataTable {
   filter(keep: (row: number) => boolean): number {
     let count = 0;
     this.lines.forEach((line, i) => {
-      this.shown[i] = keep(i);
-      line.hidden = !this.shown[i];
-      if (this.shown[i]) ++count;
+      line.hidden = !keep(i);
+      if (!line.hidden) ++count;
     });
     return count;
   }

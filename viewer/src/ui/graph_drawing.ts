@@ -10,8 +10,9 @@ export class GraphDrawing {
   private readonly layout;
   private view = {x: 0, y: 0, scale: 1};
   private fitted = false;
+  private dragged = false;  // since the button went down
 
-  constructor(private readonly nodes: readonly NodeInfo[], choose: (node: number) => void, hover: (node: number) => void) {
+  constructor(nodes: readonly NodeInfo[], choose: (node: number) => void, hover: (node: number) => void) {
     const layout = this.layout = layOut(nodes);
     const paths: SVGPathElement[] = [];
     nodes.forEach((node, to) => {
@@ -21,7 +22,7 @@ export class GraphDrawing {
         const bend = Math.max(16, Math.abs(x1 - x0) / 2);
         const path = svg('path', {d: `M${x0} ${y0}C${x0 + bend} ${y0} ${x1 - bend} ${y1} ${x1} ${y1}`});
         paths.push(path);
-        for (const end of [from, to]) this.wires.set(end, [...this.wires.get(end) ?? [], path]);
+        for (const end of [from, to]) this.wiresOf(end).push(path);
       }
     });
     this.groups = nodes.map((node, i) => {
@@ -30,12 +31,18 @@ export class GraphDrawing {
         svg('text', {x: 7, y: 15}, node.name.length > 22 ? node.name.slice(0, 21) + '…' : node.name));
       group.addEventListener('pointerenter', () => hover(i));
       group.addEventListener('pointerleave', () => hover(-1));
-      group.addEventListener('click', () => choose(i));
+      group.addEventListener('click', () => { if (!this.dragged) choose(i); });
       return group;
     });
     this.element = svg('svg', {class: 'graph', role: 'img', 'aria-label': 'The graph of nodes; the list below has the same nodes'},
       svg('g', {class: 'wires'}, ...paths), ...this.groups);
     this.listen();
+  }
+
+  private wiresOf(node: number): SVGPathElement[] {
+    let found = this.wires.get(node);
+    if (!found) this.wires.set(node, found = []);
+    return found;
   }
 
   /** A colour and whether it is faint, for each node. */
@@ -82,15 +89,19 @@ export class GraphDrawing {
   }
 
   private listen(): void {
-    let last: {x: number; y: number} | null = null;
+    let last: {x: number; y: number} | null = null, down = {x: 0, y: 0};
     this.element.addEventListener('wheel', (event) => {
       event.preventDefault();
       const at = this.element.getBoundingClientRect();
       this.zoom(Math.exp(-event.deltaY / 400), event.clientX - at.left, event.clientY - at.top);
     }, {passive: false});
-    this.element.addEventListener('pointerdown', (event) => { last = {x: event.clientX, y: event.clientY}; });
+    this.element.addEventListener('pointerdown', (event) => {
+      last = down = {x: event.clientX, y: event.clientY};
+      this.dragged = false;
+    });
     this.element.addEventListener('pointermove', (event) => {
       if (!last || !event.buttons) return;
+      if (Math.hypot(event.clientX - down.x, event.clientY - down.y) > 4) this.dragged = true;
       this.view.x -= (event.clientX - last.x) / this.view.scale;
       this.view.y -= (event.clientY - last.y) / this.view.scale;
       last = {x: event.clientX, y: event.clientY};
@@ -100,9 +111,5 @@ export class GraphDrawing {
       this.fit(false);
       this.apply();
     })).observe(this.element);
-  }
-
-  get count(): number {
-    return this.nodes.length;
   }
 }

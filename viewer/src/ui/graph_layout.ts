@@ -77,9 +77,9 @@ function layersOf(inputs: readonly number[][]): number[] {
       }
       const missing = open[node] ? [] : inputs[node].filter((i) => layer[i] < 0 && !open[i]);
       open[node] = true;
-      if (missing.length) stack.push(...missing);
+      if (missing.length) for (const i of missing) stack.push(i);
       else {
-        layer[node] = Math.max(-1, ...inputs[node].map((i) => layer[i])) + 1;
+        layer[node] = inputs[node].reduce((most, i) => Math.max(most, layer[i]), -1) + 1;
         stack.pop();
       }
     }

@@ -41,8 +41,9 @@ export function makeGraph({model, store, scope}: Context): HTMLElement | null {
       node.points && `${node.points} points`, node.reason].filter(Boolean).join(', ');
   }
 
+  const longest = (by: ColourBy, least: number): number => nodes.reduce((most, node) => Math.max(most, by === 'state' ? 0 : node[by] ?? 0), least);
   const paint = (): void => {
-    const most = colourBy === 'state' ? 1 : Math.max(1e-9, ...nodes.map((node) => node[colourBy as 'full_us'] ?? 0));
+    const most = colourBy === 'state' ? 1 : longest(colourBy, 1e-9);
     drawing.paint((i) => colourOf(nodes[i], colourBy, most), (i) => !matches(i));
     const left = table.filter(matches);
     found.textContent = words ? `${left} of ${nodes.length}` : '';
@@ -70,7 +71,7 @@ export function makeGraph({model, store, scope}: Context): HTMLElement | null {
   const legend = (): void => {
     const states = [...new Set(nodes.map((node) => node.state).filter((s) => s !== null && s !== undefined))];
     key.replaceChildren(...colourBy === 'state' ? states.map((state) => h('span', {}, h('i', {attributes: {style: `background:var(${stateColours[state]})`}}), state))
-      : [h('span', {}, h('i', {class: 'ramp'}), `0 to ${duration(Math.max(...nodes.map((node) => node[colourBy as 'full_us'] ?? 0)))}`)]);
+      : [h('span', {}, h('i', {class: 'ramp'}), `0 to ${duration(longest(colourBy, 0))}`)]);
   };
 
   document.addEventListener('kpsa-theme', paint);

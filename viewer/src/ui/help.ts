@@ -15,7 +15,7 @@ export class Help {
       h('h2', {}, 'Keys'),
       h('dl', {}, ...keys.filter(([key]) => accelerated || key !== '1 2 3 4').flatMap(([key, what]) => [h('dt', {}, ...key.split(' ').flatMap((k, i) => [i ? ' ' : '', /^[+,]$/.test(k) && key !== '+ −' ? k : h('kbd', {}, k.replace(',', ''))])), h('dd', {}, what)])),
       h('p', {class: 'note'}, 'Drag turns, right drag or Shift and drag moves, the wheel zooms. A click chooses a vertex. ',
-        live ? 'A double click on a slider goes to its default.' : 'This page has all its data inside and never asks a network.'),
+        live ? 'A double click on a slider goes to its default, and so does Delete.' : 'This page has all its data inside and never asks a network.'),
       button('Close', () => this.element.close()));
     this.element.addEventListener('click', (event) => { if (event.target === this.element) this.element.close(); });
   }

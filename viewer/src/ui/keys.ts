@@ -18,7 +18,7 @@ function typing(target: EventTarget | null, key: string): boolean {
 export function listenToKeys({store, model, viewport, view, scope}: Context, help: Help): void {
   const clips = model.meta.clips?.length ?? 0, turn = Math.PI / 24;
   const press = (event: KeyboardEvent): void => {
-    const {key} = event;
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;  // Caps Lock
     if (typing(event.target, key) || event.altKey || event.metaKey || (help.element.open && key !== '?')) return;
     const {clip} = store.now;
     if (event.shiftKey && key.startsWith('Arrow')) {

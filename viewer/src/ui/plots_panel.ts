@@ -40,9 +40,11 @@ export function makePlots(context: Context): HTMLElement | null {
   }
   scope.add(close);
   if (tolerances.length) {
-    const chart = toleranceChart(context);
-    scope.add(() => chart.end());
-    panel.append(chart.element);
+    const ofTolerances = [toleranceChart(context, 'hits'), ...tolerances.some((t) => typeof t.speedup === 'number') ? [toleranceChart(context, 'speedup')] : []];
+    for (const chart of ofTolerances) {
+      scope.add(() => chart.end());
+      panel.append(chart.element);
+    }
   }
   return panel;
 }
@@ -85,13 +87,14 @@ async function addHistogram({model, series, store, tell}: Context, clip: number,
   }
 }
 
-function toleranceChart({model}: Context): Chart {
+function toleranceChart({model}: Context, what: 'hits' | 'speedup'): Chart {
   const tolerances = model.meta.tolerances!;
   return new Chart({
-    title: 'Tolerance against frames that hit', x: tolerances.map((t) => t.tolerance), xLabel: `tolerance (${model.unit.name})`, logX: true,
-    xMarks: tolerances.length <= 12 ? tolerances.map((t) => t.tolerance) : undefined,
-    xText: (t) => number(t / model.unit.metres), yText: percent,
-    lines: [{label: 'hits', colour: '--plot-a', values: tolerances.map((t) => t.hit_rate), points: true}],
+    title: what === 'hits' ? 'Tolerance against frames that hit' : 'Tolerance against times as fast', x: tolerances.map((t) => t.tolerance),
+    xLabel: `tolerance (${model.unit.name})`, logX: true, xMarks: tolerances.length <= 12 ? tolerances.map((t) => t.tolerance) : undefined,
+    xText: (t) => number(t / model.unit.metres), yText: what === 'hits' ? percent : number,
+    lines: [what === 'hits' ? {label: 'hits', colour: '--plot-a', values: tolerances.map((t) => t.hit_rate), points: true}
+      : {label: 'times as fast', colour: '--plot-c', values: tolerances.map((t) => t.speedup ?? null), points: true}],
     at: () => model.tolerance,
   });
 }

@@ -1,8 +1,9 @@
 // Reset, and poses as files.
 import type {Context} from '../context';
+import {nearestFrame} from '../player';
 import {button, h} from './dom';
 
-export function makePoseRow({session, model, tell}: Context): HTMLElement {
+export function makePoseRow({session, store, model, tell}: Context): HTMLElement {
   const live = session!;
   const open = h('input', {
     attributes: {type: 'file', accept: '.json,.yaml,.yml,.txt', hidden: true, 'aria-label': 'Pose file'},
@@ -10,9 +11,11 @@ export function makePoseRow({session, model, tell}: Context): HTMLElement {
       const file = open.files?.[0];
       open.value = '';
       if (!file) return;
-      file.text().then((text) => live.client.poseFile(text)).then((values) => {
-        live.set(values);
-        tell(`${file.name}: ${Object.keys(values).length} values`);
+      file.text().then((text) => live.client.poseFile(text)).then(({set, clip: name, time}) => {
+        const clip = (model.meta.clips ?? []).findIndex((c) => c.name === name);
+        if (clip >= 0) store.set({playing: false, clip, frame: nearestFrame(model, clip, time ?? model.meta.clips![clip].begin)});
+        live.set(set);
+        tell(`${file.name}: ${Object.keys(set).length} values${clip >= 0 ? `, ${name} at frame ${store.now.frame}` : ''}`);
       }).catch((error: Error) => tell(error.message));
     }},
   });

@@ -6,18 +6,27 @@ import {length, number} from './format';
 import {errorsOfPoint} from './histogram';
 
 export function makeVertex(context: Context): HTMLElement {
-  const {store, model, view, scope, tell} = context;
+  const {store, model, view, scope, session, tell} = context;
   const place = h('p', {class: 'details'});
   const index = h('input', {
     attributes: {type: 'number', min: 0, max: model.points - 1, step: 1, placeholder: 'index', 'aria-label': 'Vertex'},
     on: {change: () => {
       const vertex = Number(index.value);
-      if (index.value !== '' && Number.isInteger(vertex) && vertex >= 0 && vertex < model.points) store.set({vertex});
+      if (index.value !== '' && Number.isInteger(vertex) && vertex >= 0 && vertex < model.points) {
+        const {picking, picked} = store.now;
+        store.set({vertex, ...picking && !picked.includes(vertex) ? {picked: [...picked, vertex]} : {}});
+      }
     }},
   });
   const movers = h('div', {class: 'movers'});
   const plot = h('div', {class: 'charts'});
   let chart: Chart | null = null;
+  let lists = 0, plots = 0;  // an answer to an older question is dropped
+
+  const list = (vertex: number): void => {
+    const mine = ++lists;
+    if (vertex >= 0) listMovers(context, vertex, movers, () => mine === lists).catch((error: Error) => { if (mine === lists) tell(error.message); });
+  };
 
   const where = onceAFrame(() => {
     const {vertex} = store.now;
@@ -32,17 +41,27 @@ export function makeVertex(context: Context): HTMLElement {
     place.textContent = `Vertex ${vertex}${inMesh}, at ${metres.join(', ')} m`;
   });
 
-  scope.add(store.on(['vertex', 'frame', 'clip'], where));
+  scope.add(store.on(['vertex', 'frame', 'clip', 'mode'], where));
   scope.add(context.facts.on(where));
   scope.add(store.on(['vertex'], ({vertex}) => {
     movers.replaceChildren();
-    if (vertex >= 0) listMovers(context, vertex, movers).catch((error: Error) => tell(error.message));
+    list(vertex);
   }));
+  if (session) {
+    // what moves a vertex is told of the pose that was evaluated last
+    let timer = 0;
+    scope.add(context.facts.on(() => {
+      clearTimeout(timer);
+      timer = window.setTimeout(() => list(store.now.vertex), 300);
+    }));
+    scope.add(() => clearTimeout(timer));
+  }
   scope.add(store.on(['vertex', 'clip'], ({vertex, clip}) => {
     chart?.end();
     chart = null;
     plot.replaceChildren();
-    if (vertex >= 0 && clip >= 0) void showErrors(vertex, clip);
+    ++plots;
+    if (vertex >= 0 && clip >= 0) showErrors(vertex, clip).catch((error: Error) => tell(error.message));
   }));
   scope.add(store.on(['frame'], () => chart?.refresh(false)));
   scope.add(() => chart?.end());
@@ -50,8 +69,8 @@ export function makeVertex(context: Context): HTMLElement {
   async function showErrors(vertex: number, clip: number): Promise<void> {
     const residual = model.meta.clips![clip].residual;
     if (!residual) return;
-    const values = await model.blob(residual.blob) as Int8Array | Int16Array;
-    if (store.now.vertex !== vertex || store.now.clip !== clip) return;
+    const mine = plots, values = await model.blob(residual.blob) as Int8Array | Int16Array;
+    if (mine !== plots) return;
     const errors = errorsOfPoint(model, clip, vertex, values), x = errors.map((_, i) => i);
     chart = new Chart({
       title: `Error of vertex ${vertex} (${model.unit.name})`, x, xLabel: 'frame', yText: (y) => number(y / model.unit.metres),
@@ -67,7 +86,7 @@ export function makeVertex(context: Context): HTMLElement {
   return h('div', {class: 'vertex'}, h('label', {class: 'row'}, 'Vertex', index), place, movers, plot, pickedList(context));
 }
 
-async function listMovers({model, session, store}: Context, vertex: number, into: HTMLElement): Promise<void> {
+async function listMovers({model, session, store}: Context, vertex: number, into: HTMLElement, wanted: () => boolean): Promise<void> {
   const controls = (model.meta.controls ?? []).filter((control) => control.moves && control.moves_max);
   let found: {name: string; metres: number}[] = [];
   let lines: string[] = [];
@@ -80,17 +99,19 @@ async function listMovers({model, session, store}: Context, vertex: number, into
     lines = told.lines;
     if (told.moved_by) found = told.moved_by;
   }
-  if (store.now.vertex !== vertex) return;
+  if (!wanted()) return;
   found.sort((a, b) => b.metres - a.metres);
   const most = found[0]?.metres ?? 1;
   const name = (plug: string): string => model.meta.controls?.find((c) => c.name === plug)?.label ?? plug;
-  if (controls.length || session) into.append(h('h3', {}, found.length ? 'Moved by' : 'No control moves it'));
-  into.append(h('ul', {class: 'bars'}, ...found.slice(0, 30).map(({name: plug, metres}) => h('li', {},
-    h('button', {attributes: {type: 'button', title: `Show what ${plug} moves`}, on: {click: () => {
-      if (controls.some((c) => c.name === plug)) store.set({paint: {kind: 'moves', name: plug}, mode: 'full'});
-    }}}, h('span', {class: 'bar', attributes: {style: `width:${(metres / most * 100).toFixed(1)}%`}}), h('span', {class: 'name'}, name(plug)),
+  const parts: HTMLElement[] = [];
+  if (controls.length || session) parts.push(h('h3', {}, found.length ? 'Moved by' : 'No control moves it'));
+  parts.push(h('ul', {class: 'bars'}, ...found.slice(0, 30).map(({name: plug, metres}) => h('li', {},
+    h('button', {attributes: {type: 'button', title: `Show what ${plug} moves`, disabled: !controls.some((c) => c.name === plug)},
+      on: {click: () => store.set({paint: {kind: 'moves', name: plug}, mode: 'full'})}}, h('span', {class: 'bar', attributes: {style: `width:${(metres / most * 100).toFixed(1)}%`}}), h('span', {class: 'name'}, name(plug)),
       h('span', {class: 'value'}, length(metres, model)))))));
-  if (lines.length) into.append(h('pre', {class: 'lines'}, lines.join('\n')));
+  if (lines.length) parts.push(h('pre', {class: 'lines'}, lines.join('\n')));
+  // the same again would take the focus from its buttons
+  if (parts.map((part) => part.outerHTML).join('') !== into.innerHTML) into.replaceChildren(...parts);
 }
 
 /** Clicks collect vertices; shown as the YAML list that rigs are written with. */

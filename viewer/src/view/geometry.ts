@@ -16,7 +16,7 @@ export function boundsOf(points: Float32Array): Box3 {
 export function vertexUnder(model: Model, points: Float32Array, camera: Camera, x: number, y: number): number {
   const from = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const ray = new Vector3(x, y, 0.5).unproject(camera).sub(from).normalize();
-  const a = new Vector3(), b = new Vector3(), c = new Vector3(), normal = new Vector3(), to = new Vector3(), hit = new Vector3();
+  const a = new Vector3(), b = new Vector3(), c = new Vector3(), normal = new Vector3(), to = new Vector3();
   let nearest = Infinity, found = -1;
   for (const {triangles} of model.meshes) {
     for (let t = 0; t < triangles.length; t += 3) {
@@ -37,7 +37,6 @@ export function vertexUnder(model: Model, points: Float32Array, camera: Camera, 
       nearest = distance;
       const weights = [1 - u - v, u, v];
       found = triangles[t + weights.indexOf(Math.max(...weights))];
-      hit.copy(a);
     }
   }
   return found;

@@ -54,8 +54,8 @@ export class ModelView {
       this.ghost.add(this.made(surface(triangles, mesh, this.other, true)));
       if (mesh.edges) this.edges.add(this.made(edgeLines(this.own(indexed(mesh.edges)), this.shown)));
     }
-    this.cues = this.own(new Marks(this.shown, [1, 0.78, 0.2], 9 * renderer.getPixelRatio()));
-    this.picked = this.own(new Marks(this.shown, [0.3, 0.85, 1], 9 * renderer.getPixelRatio()));
+    this.cues = this.own(new Marks(this.shown, [1, 0.78, 0.2]));
+    this.picked = this.own(new Marks(this.shown, [0.3, 0.85, 1]));
     this.group.add(this.solid, this.ghost, this.edges, this.cues.object, this.picked.object);
   }
 
@@ -97,6 +97,10 @@ export class ModelView {
     errorTable(inTolerances, this.errorTexels);
     this.errorColours.needsUpdate = true;
     this.invalidate();
+  }
+
+  setPixelRatio(ratio: number): void {
+    for (const marks of [this.cues, this.picked]) marks.setSize(9 * ratio);
   }
 
   /** Values of 0 to 1 as colours; null for the meshes' own. */

@@ -12,10 +12,9 @@ export class Viewport {
   readonly controls: OrbitControls;
   readonly renderer: WebGLRenderer;
   view: ModelView | null = null;
-  /** Called after a picture is handed to the GPU. */
-  onDrawn: (() => void) | null = null;
   private readonly scene = new Scene();
   private pending = 0;
+  private background = '#000';
   private inset = 0;  // pixels at the top that the toolbar covers
   private centre = new Vector3();
   private radius = 1;
@@ -25,6 +24,11 @@ export class Viewport {
     if (!this.renderer.extensions.has('EXT_color_buffer_float')) throw new Error('this browser cannot draw to pictures of floats (EXT_color_buffer_float)');
     this.renderer.debug.checkShaderErrors = true;
     this.canvas = this.renderer.domElement;
+    // three.js listens before, and uploads everything again; what was computed, and the background, are left
+    this.canvas.addEventListener('webglcontextrestored', () => {
+      this.view?.positions.again();
+      this.setBackground(this.background);
+    });
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', 'The character. Drag to turn, Shift and arrow keys turn, plus and minus zoom, F fits.');
@@ -46,6 +50,7 @@ export class Viewport {
   }
 
   setBackground(colour: string): void {
+    this.background = colour;
     this.renderer.setClearColor(new Color(colour), 1);
     this.scene.background = null;
     this.invalidate();
@@ -58,9 +63,10 @@ export class Viewport {
   }
 
   private resize(): void {
-    const {clientWidth: width, clientHeight: height} = this.parent;
+    const {clientWidth: width, clientHeight: height} = this.parent, ratio = Math.min(2, devicePixelRatio);
+    this.view?.setPixelRatio(ratio);
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio));
+    this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     this.camera.setViewOffset(width, height, 0, -this.inset / 2, width, height);
@@ -123,7 +129,6 @@ export class Viewport {
     this.pending = 0;
     this.view?.update();
     this.renderer.render(this.scene, this.camera);
-    this.onDrawn?.();
   }
 }
 

@@ -3,6 +3,7 @@ import {chromium} from 'playwright-core';
 import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
+import {makeReport} from './report.mjs';
 
 /** Waits until nothing is asked for and all that has been done is drawn. */
 export const settled = (page) => page.evaluate(() => window.kpsa.setMode(window.kpsa.state.mode));
@@ -42,9 +43,11 @@ export async function startBrowser({width = 1440, height = 900, dark = true} = {
     writeFileSync(path, text);
     return 'file://' + path;
   };
+  /** A page of a report of {meta, arrays}. */
+  const openReport = (made, name = 'report.html') => open(write(name, makeReport(made)));
   const stop = async () => {
     await context.close();
     rmSync(folder, {recursive: true, force: true});
   };
-  return {open, write, stop, folder};
+  return {open, openReport, write, stop, folder};
 }

@@ -79,14 +79,15 @@ export async function startServer({accelerated = true, port = 0} = {}) {
     }
     if (what === 'pose-file') {
       try {
-        return json(JSON.stringify({set: JSON.parse(body)}));
+        const {clip, time, ...set} = JSON.parse(body);
+        return json(JSON.stringify({set, clip, time}));
       } catch {
         return refuse(400, 'pose.json:1:1 is not JSON');
       }
     }
     if (what === 'explain') {
       const at = Number(url.searchParams.get('vertex'));
-      return json(JSON.stringify({lines: [`vertex ${at} is a hit`, 'sheet@skin: spine_2 0.8, spine_1 0.2'], moved_by: [{name: 'bend.rotateX', metres: 0.2}, {name: 'twist.rotateY', metres: 0.04}]}));
+      return json(JSON.stringify({lines: [`vertex ${at} is a hit`, `bent by ${state.last.set['bend.rotateX'] ?? 0}`, 'sheet@skin: spine_2 0.8, spine_1 0.2'], moved_by: [{name: 'bend.rotateX', metres: 0.2}, {name: 'twist.rotateY', metres: 0.04}, {name: 'detail.level', metres: 0.01}]}));
     }
     refuse(404, 'there is no ' + url.pathname);
   });
