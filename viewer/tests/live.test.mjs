@@ -223,6 +223,27 @@ test('a vertex is explained again when the pose has changed', async () => {
   assert.deepEqual(await panel.locator('.bars button').evaluateAll((all) => all.map((b) => b.disabled)), [false, false, true], 'detail has no moves to show');
 });
 
+test('an answer about a vertex that was left and chosen again is taken once', async () => {
+  const field = page.getByLabel('Vertex', {exact: true}).and(page.locator('input')), lines = page.locator('#panel-vertex .lines');
+  let asked = 0, release;
+  const held = new Promise((resolve) => { release = resolve; });
+  await page.route('**/explain*', async (route) => {
+    if (!asked++) await held;
+    await route.continue();
+  });
+  for (const vertex of ['100', '200', '100']) {
+    await field.fill(vertex);
+    await field.press('Enter');
+  }
+  await lines.getByText('vertex 100 is a hit').waitFor();
+  const answered = page.waitForResponse(/explain/);
+  release();
+  await answered;
+  await idle();
+  assert.equal(await lines.count(), 1);
+  await page.unroute('**/explain*');
+});
+
 test('the page is ready when its rig was replaced before the first answer', async () => {
   let release;
   const other = await startServer();
