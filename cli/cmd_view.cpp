@@ -27,6 +27,7 @@ CommandResult View(const ViewFlags& flags) {
   LiveOptions options;
   options.opener = OpenerOf(rest);
   options.clip = flags.clip;
+  options.clips = !flags.rest;
   if (flags.acceleration.wanted()) options.acceleration = ChoiceOf(flags.acceleration);
   const Result<std::unique_ptr<Session>> session = Session::Open(std::move(options));
   if (!session.ok()) return session.status();

@@ -13,8 +13,9 @@ std::vector<std::string> ChoicesOf(const std::string& value) {
   for (std::size_t begin = 0; begin <= value.size();) {
     const std::size_t end = std::min(value.find('|', begin), value.size());
     const std::string word = value.substr(begin, end - begin);
-    if (std::all_of(word.begin(), word.end(), [](char c) { return (c >= 'a' && c <= 'z') || c == '-'; }))
-      words.push_back(word);
+    if (!std::all_of(word.begin(), word.end(), [](char c) { return (c >= 'a' && c <= 'z') || c == '-'; }))
+      return {};
+    words.push_back(word);
     begin = end + 1;
   }
   return words;

@@ -57,7 +57,7 @@ int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vecto
     const std::string& word = arguments.front();
     message = word.starts_with('-')
                   ? fmt::format("unknown option \"{}\"{}", word, DidYouMean(word, OptionNames(program)))
-                  : fmt::format("unknown command \"{}\"{}; kpsa --help lists all", word,
+                  : fmt::format("unknown command \"{}\"{}", word,
                                 DidYouMean(word, CommandNames(program)));
   } else if (const std::vector<std::string> actions = CommandNames(*command);
              command != &program && !actions.empty()) {

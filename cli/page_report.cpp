@@ -15,6 +15,7 @@
 #include "host/clip_record.h"
 #include "host/full_times.h"
 #include "host/rig_survey.h"
+#include "host/rig_training.h"
 #include "report/page_clips.h"
 #include "report/page_graph.h"
 #include "report/page_html.h"
@@ -36,9 +37,7 @@ std::vector<std::string> ClipsOf(const PageFlags& flags, const Rig& rig) {
   for (const std::string& clip : flags.clips) add(clip);
   if (!clips.empty() || flags.rest || flags.pose.has_value())
     return clips.empty() ? std::vector<std::string>{""} : clips;
-  for (const AccelerateEntry& entry : rig.accelerate) {
-    for (const std::string& clip : entry.test_clips) add(clip);
-  }
+  clips = TestClips(rig);
   if (clips.empty()) clips.emplace_back();
   return clips;
 }
@@ -204,9 +203,17 @@ CommandResult WritePage(const PageFlags& flags) {
   progress.SetLabel("report: controls", 0);
   KPSA_RETURN_IF_ERROR(Survey(opener, RestOpener(flags), names.front(), choice, watch, &all));
   progress.SetLabel("report: points, frames", 0);
+  double bytes = 0;
   for (const std::string& name : names) {
     Result<ClipRecord> record = RecordClip(opener, name, {choice, *threads, watch});
     if (!record.ok()) return record.status();
+    bytes += sizeof(float) * static_cast<double>(record->full.size() + record->accelerated.size());
+    if (bytes > kMostRecordBytes)
+      return Status::Usage(
+                 "the clips up to \"{}\" have {} of positions, of at most {}; choose fewer with --clip",
+                 record->name, ByteText(static_cast<std::uint64_t>(bytes)),
+                 ByteText(static_cast<std::uint64_t>(kMostRecordBytes)))
+          .At({flags.file});
     all.clips.records.push_back(std::move(*record));
   }
   progress.SetLabel("report: timing, frames", 0);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
 
@@ -23,9 +22,7 @@ constexpr int kUnsignedInt = 5125, kFloat = 5126;
 // The document and its binary chunk while they grow.
 class GlbFile {
  public:
-  GlbFile();
-  ~GlbFile();
-  json& root() { return *root_; }
+  json& root() { return root_; }
 
   // Indices of accessors, and of the view that holds these bytes.
   int AddPositions(std::span<const float> xyz);  // with the bounds that POSITION needs
@@ -45,31 +42,28 @@ class GlbFile {
   int AddAccessor(std::span<const T> values, int component_type, const char* type, std::size_t width,
                   Use use);
 
-  std::unique_ptr<json> root_;
+  json root_ = {{"asset", {{"version", "2.0"}, {"generator", "kpsa"}}}};
   std::vector<std::uint8_t> bytes_;
 };
-
-GlbFile::GlbFile() : root_(new json({{"asset", {{"version", "2.0"}, {"generator", "kpsa"}}}})) {}
-GlbFile::~GlbFile() = default;
 
 int GlbFile::AddView(std::span<const std::uint8_t> bytes, Use use) {
   bytes_.resize((bytes_.size() + 3) / 4 * 4);
   json view = {{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bytes.size()}};
   if (use != kNone) view["target"] = static_cast<int>(use);
   bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
-  (*root_)["bufferViews"].push_back(std::move(view));
-  return static_cast<int>((*root_)["bufferViews"].size()) - 1;
+  root_["bufferViews"].push_back(std::move(view));
+  return static_cast<int>(root_["bufferViews"].size()) - 1;
 }
 
 template <typename T>
 int GlbFile::AddAccessor(std::span<const T> values, int component_type, const char* type, std::size_t width,
                          Use use) {
   const int view = AddView({reinterpret_cast<const std::uint8_t*>(values.data()), values.size_bytes()}, use);
-  (*root_)["accessors"].push_back({{"bufferView", view},
-                                   {"componentType", component_type},
-                                   {"type", type},
-                                   {"count", values.size() / width}});
-  return static_cast<int>((*root_)["accessors"].size()) - 1;
+  root_["accessors"].push_back({{"bufferView", view},
+                                {"componentType", component_type},
+                                {"type", type},
+                                {"count", values.size() / width}});
+  return static_cast<int>(root_["accessors"].size()) - 1;
 }
 
 int GlbFile::AddPositions(std::span<const float> xyz) {
@@ -83,8 +77,8 @@ int GlbFile::AddPositions(std::span<const float> xyz) {
     }
     low.push_back(least), high.push_back(most);
   }
-  (*root_)["accessors"].back()["min"] = low;
-  (*root_)["accessors"].back()["max"] = high;
+  root_["accessors"].back()["min"] = low;
+  root_["accessors"].back()["max"] = high;
   return accessor;
 }
 
@@ -100,8 +94,8 @@ int GlbFile::AddBytes(std::span<const std::uint8_t> bytes) { return AddView(byte
 
 Status GlbFile::Write(const std::string& path, bool force) {
   bytes_.resize((bytes_.size() + 3) / 4 * 4);
-  if (!bytes_.empty()) (*root_)["buffers"].push_back({{"byteLength", bytes_.size()}});
-  std::string text = (*root_).dump(-1, ' ', false, json::error_handler_t::replace);
+  if (!bytes_.empty()) root_["buffers"].push_back({{"byteLength", bytes_.size()}});
+  std::string text = root_.dump(-1, ' ', false, json::error_handler_t::replace);
   text.resize((text.size() + 3) / 4 * 4, ' ');
   const std::uint64_t total = 12 + 8 + text.size() + (bytes_.empty() ? 0 : 8 + bytes_.size());
   if (total > 0xffffffffu)

@@ -60,6 +60,11 @@ std::string ReadImage(const json& texture, Source* source, Index* index) {
   return "";
 }
 
+bool RepeatsAsUsual(const json& sampler) {
+  constexpr int kRepeat = 10497;  // glTF 2.0, 5.26
+  return sampler.value("wrapS", kRepeat) == kRepeat && sampler.value("wrapT", kRepeat) == kRepeat;
+}
+
 void ReadMaterial(const json& in, Source* source, CacheMaterial* material, std::vector<std::string>* notes) {
   const auto share = [](const json& object, const char* key, double usual) {
     const double value = object.value(key, usual);
@@ -75,7 +80,14 @@ void ReadMaterial(const json& in, Source* source, CacheMaterial* material, std::
   material->roughness = share(shading, "roughnessFactor", 1);
   if (!shading.contains("baseColorTexture")) return;
   const std::string why = ReadImage(shading["baseColorTexture"], source, &material->image);
-  if (why.empty()) return;
+  if (why.empty()) {
+    const json& texture = Element(source->root, "textures", shading["baseColorTexture"].at("index"));
+    if (texture.contains("sampler") && !RepeatsAsUsual(Element(source->root, "samplers", texture["sampler"])))
+      notes->push_back(fmt::format(
+          "the image of material \"{}\" repeats beyond its borders, where the character's ends otherwise",
+          material->name));
+    return;
+  }
   notes->push_back(fmt::format("material \"{}\" goes without its image, which {}", material->name, why));
 }
 

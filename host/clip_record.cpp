@@ -6,7 +6,6 @@
 #include "base/quantity_text.h"
 #include "base/text.h"
 #include "host/rig_frames.h"
-#include "host/verdicts.h"
 #include "host/vertex_points.h"
 
 namespace kpsa::engine {
@@ -19,8 +18,7 @@ bool IsTest(const Rig& rig, const std::string& clip) {
 }
 
 Result<std::vector<float>> Record(const Rig& rig, Compiler* compiler, const Request& request,
-                                  const std::vector<double>& times, const RigFrameOptions& options,
-                                  Verdicts* verdicts) {
+                                  const std::vector<double>& times, const RigFrameOptions& options) {
   const auto plan = CompileFor(rig, compiler, request);
   if (!plan.ok()) return plan.status();
   const std::size_t width = 3 * ShownVertices(rig);
@@ -31,7 +29,6 @@ Result<std::vector<float>> Record(const Rig& rig, Compiler* compiler, const Requ
         ReadVertices(rig, evaluator, to);
         if (!std::ranges::all_of(to, [](float x) { return std::isfinite(x); }))
           return Status::Evaluation("at {} s: a point is not finite", times[frame]).At({rig.path});
-        if (verdicts != nullptr) verdicts->Add(FrameNumber(times[frame], rig.fps), evaluator);
         return Status();
       }));
   return points;
@@ -70,7 +67,8 @@ Result<ClipRecord> RecordClip(const RigOpener& opener, const std::string& clip,
   record.fps = rig.fps;
   record.times = *times;
   record.width = 3 * ShownVertices(rig);
-  const double bytes = 2.0 * sizeof(float) * static_cast<double>(record.width * times->size());
+  const double bytes = (options.acceleration.has_value() ? 2.0 : 1.0) * sizeof(float) *
+                       static_cast<double>(record.width * times->size());
   if (bytes > kMostRecordBytes) {
     return Status::Usage("the clip \"{}\" has {} of {}, which are {} of positions: expected at most {}",
                          record.name, Plural(times->size(), "frame"), Plural(record.width / 3, "vertex"),
@@ -82,21 +80,16 @@ Result<ClipRecord> RecordClip(const RigOpener& opener, const std::string& clip,
   frames.threads = options.threads;
   frames.watch = options.watch;
   Compiler compiler;
-  Result<std::vector<float>> full = Record(rig, &compiler, ShownPoints(rig), *times, frames, nullptr);
+  Result<std::vector<float>> full = Record(rig, &compiler, ShownPoints(rig), *times, frames);
   if (!full.ok()) return full.status();
   record.full = std::move(*full);
   if (!options.acceleration.has_value()) return record;
   const Result<std::vector<AppliedSubspace>> applied =
       ApplyAcceleration(&rig, &compiler, *options.acceleration);
   if (!applied.ok()) return applied.status();
-  Request request = ShownPoints(rig);
-  Verdicts verdicts(*applied);
-  verdicts.Ask(rig, &request);
-  Result<std::vector<float>> accelerated = Record(rig, &compiler, request, *times, frames, &verdicts);
+  Result<std::vector<float>> accelerated = Record(rig, &compiler, ShownPoints(rig), *times, frames);
   if (!accelerated.ok()) return accelerated.status();
   record.accelerated = std::move(*accelerated);
-  for (const FrameRecord& frame : verdicts.records())
-    record.full_weights.push_back(frame.decision.full_weight);
   return record;
 }
 

@@ -23,7 +23,6 @@ struct ClipRecord {
   std::vector<double> times;             // [frames] seconds, 1 / fps apart
   std::size_t width = 0;                 // 3V
   std::vector<float> full, accelerated;  // [frames, V, 3] metres, world space; empty: nothing is accelerated
-  std::vector<double> full_weights;  // [frames] the largest share of the full evaluation: 0 a hit, 1 a miss
   std::span<const float> FullAt(std::size_t frame) const {
     return std::span(full).subspan(frame * width, width);
   }

@@ -1,21 +1,11 @@
 #include "host/scene_impl.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "host/settable_plug.h"
 
 namespace kpsa {
 namespace {
-
-// What drives a plug, a part of it, or what it is a part of; null if nothing does.
-const engine::Connection* DriverOf(const engine::Graph& graph, const engine::PlugRef& plug) {
-  const auto overlap = [](int a, int b) { return a == b || a < 0 || b < 0; };
-  for (const engine::Connection& driver : graph.Inputs(plug.node, plug.attribute)) {
-    if (overlap(driver.destination.element, plug.element) &&
-        overlap(driver.destination.component, plug.component))
-      return &driver;
-  }
-  return nullptr;
-}
 
 // Whether a varying plug is the other one, or all of it.
 bool Covers(const engine::PlugRef& varying, const engine::PlugRef& plug) {
@@ -26,26 +16,10 @@ bool Covers(const engine::PlugRef& varying, const engine::PlugRef& plug) {
 // The value in the runtime's units, of a plug that a scene may set.
 engine::Result<engine::Value> ValueFor(const engine::Rig& rig, const engine::PlugRef& plug, double number) {
   const engine::Graph& graph = *rig.graph;
+  KPSA_RETURN_IF_ERROR(engine::CheckSettable(graph, plug));
   const engine::AttributeDef& attribute =
       graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
-  const engine::Type type = graph.PlugType(plug);
-  const std::string full = graph.PlugName(plug);
-  if (attribute.output) return engine::Status::Usage("{} is an output and cannot be set", full);
-  if (attribute.structural)
-    return engine::Status::Usage("{} is structural: it is read when a rig is loaded, and no scene sets it",
-                                 full);
-  if (type > engine::Type::kDouble)
-    return engine::Status::Usage("{} is a {}: expected one number of it, as in {}.x", full,
-                                 engine::TypeName(type), full);
-  if (const engine::Connection* driver = DriverOf(graph, plug))
-    return engine::Status::Usage("{} is driven by {} and cannot be set", full,
-                                 graph.PlugName(driver->source));
-  engine::Value value(number * rig.units.FactorOf(attribute.unit));
-  const bool whole = type != engine::Type::kDouble;
-  if (whole && number == std::floor(number) && std::abs(number) <= 0x1p53)
-    value = engine::Value(static_cast<std::int64_t>(number));
-  KPSA_RETURN_IF_ERROR(graph.CheckValue(plug, &value));
-  return value;
+  return engine::ValueOf(graph, plug, number * rig.units.FactorOf(attribute.unit));
 }
 
 }  // namespace
@@ -69,7 +43,9 @@ engine::Status Scene::Impl::EnsurePlaying() {
   if (!made.ok()) return engine::Status(made.status()).At({rig.path()});
   // What the clip drives is no longer held
   const std::shared_ptr<engine::Playing> plain = *made;
-  const auto is_driven = [&](const auto& one) { return DriverOf(*plain->rig().graph, one.plug) != nullptr; };
+  const auto is_driven = [&](const auto& one) {
+    return engine::DriverOf(*plain->rig().graph, one.plug) != nullptr;
+  };
   std::vector<engine::Setting> kept = settings;
   std::erase_if(kept, is_driven);
   if (!kept.empty()) made = engine::Playing::Make(shared().rest, clip, kept, shared().acceleration);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <string>
 
 namespace kpsa::engine {
@@ -23,7 +24,8 @@ std::string CompactJson(const Json& document) {
 template <typename Json>
 Json RoundedJson(double value, int digits) {
   if (!std::isfinite(value)) return nullptr;
-  return std::stod(fmt::format("{:.{}g}", value, digits));
+  return std::strtod(fmt::format("{:.{}g}", value, digits).c_str(),
+                     nullptr);  // stod throws at the smallest numbers
 }
 
 }  // namespace kpsa::engine

@@ -39,7 +39,7 @@ std::string PageTable::Json() const {
 
 PageTable::Cell ShortCell(double value) {
   if (!std::isfinite(value)) return std::monostate();
-  return std::stod(fmt::format("{:.4g}", value));
+  return std::strtod(fmt::format("{:.4g}", value).c_str(), nullptr);  // stod throws at the smallest numbers
 }
 PageTable::Cell MillimetreCell(double metres) { return ShortCell(metres * 1e3); }
 PageTable::Cell PercentCell(double share) { return ShortCell(100 * share); }

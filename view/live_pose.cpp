@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/settable_plug.h"
+
 namespace kpsa::engine {
 namespace {
 
@@ -12,17 +14,9 @@ Result<MovedPlug> FindPlug(const Rig& rest, const std::string& name, double numb
   if (!found.ok()) return found.status();
   const PlugRef& plug = *found;
   const AttributeDef& attribute = graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)];
-  const std::string full = graph.PlugName(plug);
-  if (attribute.output) return Status::Usage("{} is an output and cannot be set", full);
-  if (plug == rest.scene.time) return Status::Usage("{} is the time, which is asked for apart", full);
-  if (attribute.structural)
-    return Status::Usage("{} is structural: it is read when a rig is loaded; change it in the rig's file",
-                         full);
-  const Type type = graph.PlugType(plug);
-  if (type > Type::kDouble)
-    return Status::Usage("{} is a {}: expected one number of it, as in {}.x", full, TypeName(type), full);
-  if (const Connection* driver = DriverOf(graph, plug))
-    return Status::Usage("{} is driven by {} and cannot be set", full, graph.PlugName(driver->source));
+  if (plug == rest.scene.time)
+    return Status::Usage("{} is the time, which is asked for apart", graph.PlugName(plug));
+  KPSA_RETURN_IF_ERROR(CheckSettable(graph, plug));
   MovedPlug moved{plug, number * rest.units.FactorOf(attribute.unit)};
   if (const Result<Value> value = ValueOf(graph, plug, moved.number); !value.ok()) return value.status();
   moved.control =
@@ -35,24 +29,6 @@ Result<MovedPlug> FindPlug(const Rig& rest, const std::string& name, double numb
 }
 
 }  // namespace
-
-const Connection* DriverOf(const Graph& graph, const PlugRef& plug) {
-  const auto overlap = [](int a, int b) { return a == b || a < 0 || b < 0; };
-  for (const Connection& driver : graph.Inputs(plug.node, plug.attribute)) {
-    if (overlap(driver.destination.element, plug.element) &&
-        overlap(driver.destination.component, plug.component))
-      return &driver;
-  }
-  return nullptr;
-}
-
-Result<Value> ValueOf(const Graph& graph, const PlugRef& plug, double number) {
-  Value value(number);
-  if (graph.PlugType(plug) != Type::kDouble && number == std::floor(number) && std::abs(number) <= 0x1p53)
-    value = Value(static_cast<std::int64_t>(number));
-  KPSA_RETURN_IF_ERROR(graph.CheckValue(plug, &value));
-  return value;
-}
 
 Result<LivePose> FindPose(const Rig& rest, const PoseRequest& request) {
   LivePose pose;

@@ -39,9 +39,4 @@ struct LivePose {
 Result<LivePose> FindPose(const Rig& rest, const PoseRequest& request);
 inline constexpr double kBeyondClips = 60;  // seconds
 
-// What drives the plug, a part of it, or what it is a part of; null if nothing does.
-const Connection* DriverOf(const Graph& graph, const PlugRef& plug);
-// A whole number where the plug takes no other. Errors: a number that it does not take.
-Result<Value> ValueOf(const Graph& graph, const PlugRef& plug, double number);
-
 }  // namespace kpsa::engine

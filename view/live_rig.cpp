@@ -15,7 +15,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kReachSeconds = 0.5;
+constexpr std::size_t kReachPoints = 2'000'000;  // some half second
 
 // The largest distance of two points, and the root of the mean square, metres.
 std::pair<double, double> ErrorsOf(const std::vector<float>& a, const std::vector<float>& b) {
@@ -71,10 +71,10 @@ Status LiveRig::PutAll(const LiveOptions& options) {
   PutMeshes(rest(), full_points_, &page_);
   page_.Put("accelerated", accelerated() ? "true" : "false");
   if (accelerated()) PutTolerance(accelerated_->playing().applied(), &page_);
-  KPSA_RETURN_IF_ERROR(PutClipTimes(rest(), options.clip, &page_));
-  // What each control moves is worth a moment, and no more
+  if (options.clips) KPSA_RETURN_IF_ERROR(PutClipTimes(rest(), options.clip, &page_));
+  // What each control moves is worth a moment, and no more: two evaluations each
   std::vector<ControlReach> reaches;
-  if (2e-6 * full_->microseconds() * static_cast<double>(rest().controls.size()) < kReachSeconds) {
+  if (2 * vertices() * rest().controls.size() <= kReachPoints) {
     Result<std::vector<ControlReach>> reached = ReachOfControls(rest(), {});
     if (reached.ok()) reaches = std::move(*reached);
   }
@@ -108,8 +108,8 @@ LiveFrame LiveRig::Evaluate(const LivePose& pose, EvaluateMode mode) {
     if (status.ok()) status = side.CopyPoints(*points);
     if (status.ok()) {
       *us = side.microseconds();
-      const auto values = side.Values();
-      if (values.ok()) frame.values = *values;
+      if (!frame.values.empty()) return true;  // the same on both sides
+      if (auto values = side.Values(); values.ok()) frame.values = std::move(*values);
       return true;
     }
     if (failed.ok()) failed = status;

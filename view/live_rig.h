@@ -21,6 +21,7 @@ namespace kpsa::engine {
 struct LiveOptions {
   RigOpener opener;                                // of the rig at rest
   std::optional<AccelerationChoice> acceleration;  // none: the full evaluation alone
+  bool clips = true;                               // are offered
   std::optional<std::string> clip;                 // that is offered first
 };
 

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "host/scene_impl.h"
+#include "host/settable_plug.h"
 #include "host/vertex_points.h"
 
 namespace kpsa::engine {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/json_depth.h"
+#include "report/verdict_text.h"
 
 namespace kpsa::engine {
 namespace {
@@ -52,10 +53,6 @@ void Put(Json* facts, const char* key, const std::optional<double>& number) {
   if (number.has_value() && std::isfinite(*number)) (*facts)[key] = *number;
 }
 
-const char* NameOf(FrameVerdict verdict) {
-  return verdict == FrameVerdict::kHit ? "hit" : verdict == FrameVerdict::kBlend ? "blend" : "miss";
-}
-
 }  // namespace
 
 Result<EvaluateRequest> ParseEvaluate(std::string_view body) {
@@ -88,7 +85,7 @@ std::string EvaluateAnswer(const EvaluateRequest& request, const LiveFrame& fram
     bytes += points->size() * sizeof(float);
   }
   if (frame.decision.has_value()) {
-    facts["verdict"] = NameOf(frame.decision->verdict());
+    facts["verdict"] = VerdictName(frame.decision->verdict());
     facts["reason"] = frame.decision->reason;
     Put(&facts, "score", frame.decision->score);
   }
@@ -96,7 +93,11 @@ std::string EvaluateAnswer(const EvaluateRequest& request, const LiveFrame& fram
   Put(&facts, "accelerated_us", frame.accelerated_us);
   Put(&facts, "max_error", frame.max_error);
   Put(&facts, "rms_error", frame.rms_error);
-  for (const auto& [name, value] : frame.values) facts["values"][name] = value;
+  if (!frame.values.empty()) {
+    Json::object_t values;  // each name once: not looked for among the others
+    for (const auto& [name, value] : frame.values) values.push_back({name, value});
+    facts["values"] = std::move(values);
+  }
   if (!frame.problem.empty()) facts["problem"] = frame.problem;
   const std::string json = "{\"id\":" + request.id + "," + Text(facts).substr(1);
 

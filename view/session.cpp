@@ -55,10 +55,15 @@ Session::State Session::WaitForChange(std::int64_t after, double seconds) {
 }
 
 void Session::Follow() {
+  bool changing = false;
   std::unique_lock<std::mutex> lock(mutex_);
   while (!changed_.wait_for(lock, kLookEvery, [&] { return stop_; })) {
     lock.unlock();
-    if (watch_.Look()) Reload();
+    // What changes from look to look is still being written
+    if (watch_.Look())
+      changing = true;
+    else if (std::exchange(changing, false))
+      Reload();
     lock.lock();
   }
 }

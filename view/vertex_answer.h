@@ -23,6 +23,4 @@ Result<VertexAnswer> TellOfVertex(const Rig& rest, const LatestPose& at, std::si
 // JSON as the page reads it.
 std::string VertexAnswerText(const VertexAnswer& answer);
 
-inline constexpr double kControlSeconds = 0.2;  // that controls may be tried for
-
 }  // namespace kpsa::engine

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "files/npz.h"
@@ -103,6 +104,24 @@ TEST(Caches, ImagesOfTheCharacter) {
             std::string::npos)
       << run.err;
   EXPECT_FALSE(GlbJson(folder / "out2.glb").contains("images"));
+  b.root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 0;
+  b.root["samplers"] = {{{"wrapS", 33071}}};
+  b.root["textures"][0]["sampler"] = 0;
+  folder.Write("c.glb", b.Glb());
+  EXPECT_NE(RunKpsa({"eval", folder / "c.glb", "-o", folder / "out3.glb"})
+                .err.find("where the character's ends otherwise"),
+            std::string::npos);
+}
+
+TEST(Caches, OfPointsThatAreNotFiniteAreRefused) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.glb", "a.usda", "a.pc2", "a.mdd"}) {
+    const ProcessResult run =
+        RunKpsa({"eval", kHello, "--set", "upper.translateX=1e36", "--frames", "0:1", "-o", folder / name});
+    EXPECT_EQ(run.exit_code, 4) << name << run.err;
+    EXPECT_NE(run.err.find("of mesh \"column\" is not finite"), std::string::npos) << name << run.err;
+    EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
+  }
 }
 
 }  // namespace

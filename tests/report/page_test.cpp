@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <nlohmann/json.hpp>
 #include <numeric>
+#include <variant>
 
+#include "report/json_text.h"
 #include "report/page_html.h"
 #include "report/page_rig.h"
 #include "report/page_table.h"
@@ -125,6 +128,11 @@ TEST(PageTable, WritesNumbersTextsAndGaps) {
   EXPECT_EQ(std::get<double>(MillimetreCell(0.000123456)), 0.1235);
   EXPECT_EQ(std::get<double>(PercentCell(0.5)), 50);
   EXPECT_TRUE(std::holds_alternative<std::monostate>(ShortCell(INFINITY)));
+}
+
+TEST(PageNumbers, TheSmallestAreNoErrors) {
+  EXPECT_EQ((RoundedJson<nlohmann::json>(1e-310, 6)), nlohmann::json(1e-310));
+  EXPECT_EQ(std::get<double>(ShortCell(-1e-310)), -1e-310);
 }
 
 }  // namespace

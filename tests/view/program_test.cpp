@@ -51,7 +51,9 @@ const std::string kRig = KPSA_SCENES_DIR "/hello/hello.yaml";
 
 TEST(ViewProgram, PrintsItsAddressAndServesUntilItIsInterrupted) {
   for (const int signal : {SIGINT, SIGTERM}) {
-    Viewing viewing({KPSA_PROGRAM, "view", kRig});
+    // Clips to play, and none
+    Viewing viewing(signal == SIGINT ? std::vector<std::string>{KPSA_PROGRAM, "view", kRig}
+                                     : std::vector<std::string>{KPSA_PROGRAM, "view", kRig, "--rest"});
     const std::string begin = "http://127.0.0.1:", middle = "/?token=";
     ASSERT_TRUE(viewing.line.starts_with(begin)) << viewing.line;
     const std::size_t at = viewing.line.find(middle);
@@ -62,6 +64,7 @@ TEST(ViewProgram, PrintsItsAddressAndServesUntilItIsInterrupted) {
     const auto meta = client.Get("/meta.json", {{"X-Kpsa-Token", token}});
     ASSERT_TRUE(meta);
     EXPECT_EQ(meta->status, 200);
+    EXPECT_EQ(meta->body.find("\"clips\":") != std::string::npos, signal == SIGINT);
     // Somebody waits for changes, as pages do
     std::thread waits([&] {
       httplib::Client other("127.0.0.1", port);

@@ -30,7 +30,10 @@ TEST(LiveEdits, ABrokenOneIsToldAndAMendedOneIsShown) {
 
   live->folder().Write("rig.yaml",
                        Replaced(good, "type: deltaMush, iterations", "type: deltaMush, iteration"));
-  const Json broken = live->WaitFor([](const Json& state) { return !state["problems"].empty(); });
+  // A look may fall between the two steps of writing a file
+  const Json broken = live->WaitFor([](const Json& state) {
+    return !state["problems"].empty() && state["problems"][0]["line"] == 8;
+  });
   ASSERT_FALSE(broken["problems"].empty());
   const Json& problem = broken["problems"][0];
   EXPECT_EQ(problem["file"], live->rig());
