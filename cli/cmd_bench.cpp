@@ -6,6 +6,7 @@
 #include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/frames_range.h"
+#include "cli/interrupt.h"
 #include "cli/options.h"
 #include "cli/progress.h"
 #include "host/bench/bench.h"

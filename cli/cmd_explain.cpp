@@ -6,6 +6,7 @@
 #include "base/text.h"
 #include "cli/acceleration.h"
 #include "cli/frames_range.h"
+#include "cli/interrupt.h"
 #include "cli/options.h"
 #include "cli/request.h"
 #include "graph/evaluator.h"

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "cli/acceleration.h"
 #include "cli/frames_range.h"
+#include "cli/interrupt.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "files/png.h"

@@ -8,6 +8,7 @@
 #include "cli/acceleration.h"
 #include "cli/command.h"
 #include "cli/frames_range.h"
+#include "cli/interrupt.h"
 #include "cli/options.h"
 #include "cli/output.h"
 #include "cli/progress.h"

@@ -1,9 +1,6 @@
 #include "cli/common.h"
 
-#include <unistd.h>
-
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 
 #include "cli/frames_range.h"
@@ -13,21 +10,6 @@
 #include "nodes/standard_nodes.h"
 
 namespace kpsa::engine {
-namespace {
-
-std::atomic<bool> interrupted{false};
-std::atomic<int> scopes{0};
-
-void OnInterrupt(int) {
-  if (scopes.load() == 0 || interrupted.exchange(true)) {
-    constexpr char kText[] = "\ninterrupted\n";
-    [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kText, sizeof(kText) - 1);
-    ::_exit(130);
-  }
-}
-
-}  // namespace
-
 void AddRigFlags(CLI::App* command, Flags* flags) {
   AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf, .vrm)");
   AddPoseFlags(command, flags, true);
@@ -221,21 +203,5 @@ Status FlushOutput() {
     return Status::Invalid("stdout cannot be written");
   return Status();
 }
-
-InterruptScope::InterruptScope() { ++scopes; }
-InterruptScope::~InterruptScope() { --scopes; }
-
-void InstallInterruptHandler() {
-  struct sigaction action = {};
-  action.sa_handler = OnInterrupt;
-  action.sa_flags = SA_RESTART;
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
-}
-
-bool Interrupted() { return interrupted.load(std::memory_order_relaxed); }
-const std::atomic<bool>* InterruptFlag() { return &interrupted; }
-Status InterruptedStatus() { return CancelledStatus(); }
-Watch InterruptWatch() { return {{}, InterruptFlag()}; }
 
 }  // namespace kpsa::engine

@@ -4,7 +4,6 @@
 // differ or training would not pay, 2 usage, 3 invalid input, 4 evaluation error, 130 interrupted.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -17,7 +16,6 @@
 #include "graph/node_registry.h"
 #include "graph/plugin_loader.h"
 #include "host/open_rig.h"
-#include "host/watch.h"
 #include "report/json_text.h"
 #include "rig/build/rig_builder.h"
 
@@ -84,22 +82,5 @@ template <typename Json>
 void PrintJson(const Json& json) {
   Print(JsonText(json));
 }
-
-// From here to the end of the scope an interrupt (Ctrl-C) only sets the flag that Interrupted() reads, so
-// that what is being written can be removed; outside of such scopes, where nothing is half-written, and at
-// the second interrupt, it ends the program.
-class InterruptScope {
- public:
-  InterruptScope();
-  ~InterruptScope();
-  InterruptScope(const InterruptScope&) = delete;
-  InterruptScope& operator=(const InterruptScope&) = delete;
-};
-void InstallInterruptHandler();
-bool Interrupted();
-const std::atomic<bool>* InterruptFlag();
-Status InterruptedStatus();
-// Of calls that an interrupt ends.
-Watch InterruptWatch();
 
 }  // namespace kpsa::engine

@@ -8,6 +8,7 @@
 #include "base/simd.h"
 #include "cli/command.h"
 #include "cli/common.h"
+#include "cli/interrupt.h"
 #include "host/version.h"
 
 namespace kpsa::engine {
@@ -57,8 +58,7 @@ int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vecto
     const std::string& word = arguments.front();
     message = word.starts_with('-')
                   ? fmt::format("unknown option \"{}\"{}", word, DidYouMean(word, OptionNames(program)))
-                  : fmt::format("unknown command \"{}\"{}", word,
-                                DidYouMean(word, CommandNames(program)));
+                  : fmt::format("unknown command \"{}\"{}", word, DidYouMean(word, CommandNames(program)));
   } else if (const std::vector<std::string> actions = CommandNames(*command);
              command != &program && !actions.empty()) {
     const std::string word = arguments.size() > 1 ? arguments[1] : "";
@@ -80,7 +80,7 @@ int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vecto
 }
 
 int Main(int argc, char** argv) {
-  InstallInterruptHandler();
+  InstallSignalHandlers();
   CLI::App program("kpsa: a runtime for character rigs, with Key Point Subspace Acceleration", "kpsa");
   program.set_version_flag("--version", [] { return VersionText(); });
   program.set_help_flag("-h,--help", "this help");

@@ -12,6 +12,7 @@
 
 #include "cli/common.h"
 #include "files/file.h"
+#include "files/temporaries.h"
 
 namespace kpsa::engine {
 
@@ -57,6 +58,7 @@ Result<OutputPath> OutputPath::Create(const std::string& output) {
     return Status::Usage("no temporary file for stdout: {}", std::generic_category().message(errno))
         .At({name});
   }
+  AddTemporary(place.path_);
   ::close(descriptor);
   return place;
 }
@@ -65,7 +67,9 @@ OutputPath::OutputPath(OutputPath&& other) noexcept
     : path_(std::exchange(other.path_, "")), stdout_(std::exchange(other.stdout_, false)) {}
 
 OutputPath::~OutputPath() {
-  if (stdout_ && !path_.empty()) ::unlink(path_.c_str());
+  if (!stdout_ || path_.empty()) return;
+  ::unlink(path_.c_str());
+  DropTemporary(path_);
 }
 
 Status OutputPath::Finish() {

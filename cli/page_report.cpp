@@ -9,6 +9,7 @@
 
 #include "base/parallel.h"
 #include "cli/frames_range.h"
+#include "cli/interrupt.h"
 #include "cli/output.h"
 #include "cli/progress.h"
 #include "host/bench/bench.h"

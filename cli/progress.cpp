@@ -8,6 +8,7 @@
 #include <cstdlib>
 
 #include "cli/common.h"
+#include "cli/interrupt.h"
 
 namespace kpsa::engine {
 

@@ -12,6 +12,8 @@
 #include <memory>
 #include <system_error>
 
+#include "files/temporaries.h"
+
 namespace kpsa::engine {
 namespace {
 
@@ -41,12 +43,16 @@ std::string WithoutLinks(const std::string& path) {
 std::string CreateTemporary(const std::string& prefix, unsigned mode = 0666) {
   for (int attempt = 0; attempt < 100; ++attempt) {
     std::string name = fmt::format("{}.tmp{}-{}", prefix, ::getpid(), temporary_counter++);
+    AddTemporary(name);
     const int descriptor = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, mode);
     if (descriptor >= 0) {
       ::close(descriptor);
       return name;
     }
-    if (errno != EEXIST) return "";
+    const int reason = errno;
+    DropTemporary(name);
+    errno = reason;
+    if (reason != EEXIST) return "";
   }
   return "";
 }
@@ -144,7 +150,9 @@ OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
 }
 
 OutputFile::~OutputFile() {
-  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+  if (temporary_.empty()) return;
+  ::unlink(temporary_.c_str());
+  DropTemporary(temporary_);
 }
 
 Status OutputFile::Commit() {
@@ -157,6 +165,7 @@ Status OutputFile::Commit() {
       ::rename(temporary_.c_str(), target_.c_str()) != 0) {
     return Status::Invalid("cannot be written: {}", Reason(errno)).At({path_});
   }
+  DropTemporary(temporary_);
   temporary_.clear();
   return {};
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -11,6 +10,7 @@
 #include <set>
 
 #include "base/check.h"
+#include "files/file.h"
 
 static_assert(std::endian::native == std::endian::little, "tensors are copied as they lie in memory");
 
@@ -306,24 +306,7 @@ std::vector<std::byte> SafetensorsWriter::Serialize() const {
 
 Status SafetensorsWriter::Write(const std::string& path) const {
   const std::vector<std::byte> bytes = Serialize();
-  const std::string temporary = path + ".part";
-  {
-    std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
-    if (!stream) return Status::Invalid("cannot be written").At({path});
-    stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    stream.close();
-    if (!stream) {
-      std::remove(temporary.c_str());
-      return Status::Invalid("could not be written to its end (is the disk full?)").At({path});
-    }
-  }
-  std::error_code error;
-  std::filesystem::rename(temporary, path, error);
-  if (error) {
-    std::remove(temporary.c_str());
-    return Status::Invalid("cannot be replaced ({})", error.message()).At({path});
-  }
-  return {};
+  return WriteFileAtomically(path, true, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace kpsa::engine

@@ -91,9 +91,9 @@ inline bool Evaluator::Compute(Index number, Index cause, bool stale) {
   if constexpr (kRecord) begin = ProfileClock();
   bool changed = stale;
   if (step.value_size > 0 && step.value_size <= kComparedBytes) {
-    changed = ComputeAndCompare(step, context) || computed_[number] == 0;
+    host.Guard([&] { changed = ComputeAndCompare(step, context) || computed_[number] == 0; });
   } else {
-    step.compute(context);
+    host.Guard([&] { step.compute(context); });
   }
   if constexpr (kRecord) AddEvent(number, cause, begin, ProfileClock());
   if (host.failed) [[unlikely]] {
@@ -137,7 +137,7 @@ bool Evaluator::Decide(Index number, Index* cause) {
   StepHost host(this, number);
   ComputeContext context = ContextOf(plan_->steps()[number]);
   context.host = &host;
-  chosen_[plan_->steps()[number].branch] = branch.decide(context);
+  host.Guard([&] { chosen_[plan_->steps()[number].branch] = branch.decide(context); });
   return !host.failed;
 }
 

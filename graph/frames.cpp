@@ -2,16 +2,24 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
+#include <optional>
 #include <system_error>
 #include <thread>
 #include <vector>
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/thrown.h"
 
 namespace kpsa::engine {
 namespace {
+
+// Where a thread is, for what is thrown there.
+struct Place {
+  std::optional<std::size_t> frame;  // none before the first
+};
 
 // The frames of one call: hands out blocks, and turns at the sink.
 class FrameQueue {
@@ -35,13 +43,14 @@ class FrameQueue {
 
   // Waits until all frames before `begin` are handed on, then hands on these.
   void Sink(std::size_t begin, std::size_t end, const std::vector<std::unique_ptr<Evaluator>>& evaluators,
-            const std::vector<Status>& evaluated) {
+            const std::vector<Status>& evaluated, Place* at) {
     {
       std::unique_lock<std::mutex> lock(mutex_);
       turn_.wait(lock, [&] { return done_ == begin || stop_.load(std::memory_order_relaxed); });
     }
     for (std::size_t frame = begin; frame < end; ++frame) {
       if (stopped()) return;
+      at->frame = frame;
       Status status = sink_(frame, *evaluators[frame - begin], evaluated[frame - begin]);
       if (!status.ok()) return Stop(std::move(status));
       std::lock_guard<std::mutex> lock(mutex_);
@@ -50,14 +59,36 @@ class FrameQueue {
     turn_.notify_all();
   }
 
+  // An exception, while it is handled: all others are cancelled. It becomes an error once the threads are through and
+  // have given back what they took: it may say that there is no memory.
+  void Thrown(const Place& at) noexcept {
+    {
+      std::lock_guard<std::mutex> lock(mutex_);
+      if (thrown_ == nullptr) thrown_ = std::current_exception(), thrown_at_ = at;
+      stop_.store(true, std::memory_order_relaxed);
+    }
+    turn_.notify_all();
+  }
+
   // Once all threads are through.
   Status Result() const {
+    if (error_.ok() && thrown_ != nullptr) return ThrownStatus();
     if (!error_.ok() || done_ == frame_count_) return error_;
     return Status::Make(ErrorKind::kInterrupted,
                         fmt::format("interrupted after {} of {} frames", done_, frame_count_));
   }
 
  private:
+  Status ThrownStatus() const {
+    try {
+      std::rethrow_exception(thrown_);
+    } catch (...) {
+      const std::string text = ThrownText();
+      if (!thrown_at_.frame.has_value()) return Status::Evaluation("{}", text);
+      return Status::Evaluation("frame {} of {}: {}", *thrown_at_.frame, frame_count_, text);
+    }
+  }
+
   void Stop(Status error) {
     std::lock_guard<std::mutex> lock(mutex_);
     if (error_.ok()) error_ = std::move(error);
@@ -74,6 +105,8 @@ class FrameQueue {
   std::condition_variable turn_;
   std::size_t done_ = 0;
   Status error_;
+  std::exception_ptr thrown_;
+  Place thrown_at_;
 };
 
 // The evaluators of one thread.
@@ -93,9 +126,10 @@ class BlockEvaluator {
     }
   }
 
-  void Run(std::size_t begin, std::size_t end, const SetFrame& set, FrameQueue& queue) {
+  void Run(std::size_t begin, std::size_t end, const SetFrame& set, FrameQueue& queue, Place* at) {
     const std::size_t count = end - begin;
     for (std::size_t i = 0; i < count; ++i) {
+      at->frame = begin + i;
       set(begin + i, *evaluators_[i]);
       evaluators_[i]->Record(profile_, static_cast<int>(begin + i));
       evaluators_[i]->BeginRun();
@@ -109,18 +143,25 @@ class BlockEvaluator {
       }
       if (ready == 0) continue;
       const std::uint64_t start = profile_ != nullptr ? ProfileClock() : 0;
-      plan_.branches()[plan_.steps()[step].branch].compute_block(contexts_.data(), ready);
+      try {
+        plan_.branches()[plan_.steps()[step].branch].compute_block(contexts_.data(), ready);
+      } catch (...) {
+        for (std::size_t i = 0; i < ready; ++i) contexts_[i].host->Fail(ThrownText());
+      }
       const std::uint64_t share = profile_ != nullptr ? (ProfileClock() - start) / ready : 0;
       for (std::size_t i = 0; i < ready; ++i)
         prepared_[i]->FinishBlockStep(step, start + i * share, start + (i + 1) * share);
     }
-    for (std::size_t i = 0; i < count && !queue.stopped(); ++i) evaluated_[i] = evaluators_[i]->EndRun();
+    for (std::size_t i = 0; i < count && !queue.stopped(); ++i) {
+      at->frame = begin + i;
+      evaluated_[i] = evaluators_[i]->EndRun();
+    }
   }
 
-  void Work(const SetFrame& set, FrameQueue& queue) {
+  void Work(const SetFrame& set, FrameQueue& queue, Place* at) {
     for (std::size_t begin, end; queue.Take(&begin, &end);) {
-      Run(begin, end, set, queue);
-      queue.Sink(begin, end, evaluators_, evaluated_);
+      Run(begin, end, set, queue, at);
+      queue.Sink(begin, end, evaluators_, evaluated_, at);
     }
   }
 
@@ -147,15 +188,32 @@ Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame
   const std::size_t block =
       std::clamp<std::size_t>(share, 1, alone ? 1 : static_cast<std::size_t>(options.block));
   FrameQueue queue(frame_count, block, sink, options.cancel);
-  const auto work = [&] { BlockEvaluator(plan, block, options.profile).Work(set, queue); };
+  // Nothing leaves a thread but through the queue
+  const auto work = [&](bool first) {
+    Place at;
+    try {
+      std::optional<BlockEvaluator> evaluator;
+      try {
+        evaluator.emplace(plan, block, options.profile);
+      } catch (const std::bad_alloc&) {  // no memory for another thread: those that are there do all
+        if (first) throw;
+        return;
+      }
+      evaluator->Work(set, queue, &at);
+    } catch (...) {
+      queue.Thrown(at);
+    }
+  };
   // Threads of its own rather than the pool's: they wait for each other, and a waiting pool thread may not
   // take a block
   std::vector<std::thread> workers;
+  workers.reserve(threads);
   try {
-    for (std::size_t i = 1; i < threads; ++i) workers.emplace_back(work);
+    for (std::size_t i = 1; i < threads; ++i) workers.emplace_back(work, false);
   } catch (const std::system_error&) {  // no more threads to be had: those that are there do all
+  } catch (const std::bad_alloc&) {
   }
-  work();
+  work(true);
   for (std::thread& worker : workers) worker.join();
   return queue.Result();
 }

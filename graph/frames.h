@@ -40,8 +40,10 @@ using FrameSink =
     std::function<Status(std::size_t frame, const Evaluator& evaluator, const Status& evaluated)>;
 
 // Evaluates all outputs of the plan for frames 0 to frame_count - 1. Errors: the sink's, or kInterrupted
-// after a cancellation; the sink has then seen the first frames without a gap. A plan with a stateful node
-// (Plan::stateful_node) or one of the host program (Plan::prototype_node) is evaluated on one evaluator,
+// after a cancellation; the sink has then seen the first frames without a gap. What `set`, `sink` or an allocation
+// throws ends everything, too, and is a kEvaluation error with the number of its frame; what a node throws is an error
+// of that node at that frame. Where there is no memory for another thread, those that are there do all. A plan with a
+// stateful node (Plan::stateful_node) or one of the host program (Plan::prototype_node) is evaluated on one evaluator,
 // whatever the options say.
 Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame_count,
                       const FrameOptions& options, const SetFrame& set, const FrameSink& sink);

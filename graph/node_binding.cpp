@@ -1,6 +1,7 @@
 #include "graph/node_binding.h"
 
 #include "base/check.h"
+#include "base/thrown.h"
 
 namespace kpsa::engine {
 namespace {
@@ -251,7 +252,15 @@ Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index numb
   const Instance& instance = table.instances()[number];
   if (instance.kind != Instance::Kind::kNode || !table.group(instance).bind) return BoundKernel();
   const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);
-  Result<BoundKernel> kernel = table.group(instance).bind(BindingOf(table, instance, view, sets));
+  const BindingOf binding(table, instance, view, sets);
+  const auto bind = [&]() -> Result<BoundKernel> {
+    try {
+      return table.group(instance).bind(binding);
+    } catch (...) {
+      return Status::Invalid("{}", ThrownText());
+    }
+  };
+  Result<BoundKernel> kernel = bind();
   if (!kernel.ok())
     return Status::Invalid("{}: {}", Describe(table, instance), kernel.status().ToString())
         .OfNode(table.graph().name(instance.node));

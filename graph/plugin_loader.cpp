@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 
+#include "base/thrown.h"
 #include "graph/plugin.h"
 
 namespace kpsa::engine {
@@ -91,10 +91,8 @@ Status PluginLoader::Load(const std::string& path) {
   NodeRegistry added;
   try {
     add(added);
-  } catch (const std::exception& error) {
-    return Status::Invalid("plugin \"{}\" failed to register its node types: {}", path, error.what());
   } catch (...) {
-    return Status::Invalid("plugin \"{}\" failed to register its node types: unknown exception", path);
+    return Status::Invalid("plugin \"{}\" failed to register its node types: {}", path, ThrownText());
   }
   KPSA_RETURN_IF_ERROR(Add(std::move(added), path));
   loaded_.push_back(identity);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/thrown.h"
 
 namespace kpsa::engine {
 namespace {
@@ -245,8 +246,12 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   context.state = reinterpret_cast<std::byte*>(state.data());
   context.host = &host;
   context.at_rest = rest;
-  if (group.decide != nullptr) context.chosen = group.decide(context);
-  if (host.error.empty()) group.compute(context);
+  try {
+    if (group.decide != nullptr) context.chosen = group.decide(context);
+    if (host.error.empty()) group.compute(context);
+  } catch (...) {
+    host.Fail(ThrownText());
+  }
   if (!host.error.empty())
     return Status::Evaluation("{}: {}", Describe(table_, instance), host.error)
         .OfNode(table_.graph().name(instance.node));

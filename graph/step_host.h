@@ -1,6 +1,7 @@
 // What a compute may ask the evaluator for. Internal to graph/.
 #pragma once
 
+#include "base/thrown.h"
 #include "graph/evaluator.h"
 
 namespace kpsa::engine {
@@ -23,6 +24,16 @@ class Evaluator::StepHost final : public ComputeHost {
   bool recording() const override { return evaluator_->profile_ != nullptr; }
   void AddPart(int part, std::uint64_t ns) override {
     if (evaluator_->profile_ != nullptr) evaluator_->profile_->AddPart(step, part, ns);
+  }
+  // Calls what a node's author wrote. An exception of it is a failure of the step: it may run on a thread that nobody
+  // watches, and ends in none of the evaluator's own code.
+  template <typename F>
+  void Guard(const F& function) {
+    try {
+      function();
+    } catch (...) {
+      Fail(ThrownText());
+    }
   }
   bool failed = false;
   Index step;

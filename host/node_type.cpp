@@ -1,10 +1,11 @@
 #include "host/node_type.h"
 
 #include <algorithm>
-#include <exception>
 #include <memory>
 #include <set>
 #include <vector>
+
+#include "base/thrown.h"
 
 namespace kpsa::engine {
 namespace {
@@ -59,11 +60,8 @@ struct Kernel {
 std::string Call(const Function& function, const NodeCall& call) {
   try {
     return function.compute(call);
-  } catch (const std::exception& error) {
-    const std::string what = error.what();
-    return what.empty() ? "its function threw an exception" : what;
   } catch (...) {
-    return "its function threw an exception";
+    return ThrownText();
   }
 }
 

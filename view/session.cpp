@@ -1,7 +1,9 @@
 #include "view/session.h"
 
 #include <chrono>
-#include <exception>
+#include <utility>
+
+#include "base/thrown.h"
 
 namespace kpsa::engine {
 namespace {
@@ -12,8 +14,8 @@ constexpr std::chrono::milliseconds kLookEvery{250};
 Result<std::shared_ptr<LiveRig>> LoadOrTell(const LiveOptions& options, std::uint64_t generation) {
   try {
     return LiveRig::Load(options, generation, true);
-  } catch (const std::exception& error) {
-    return Status::Invalid("{}", error.what()).At({options.opener.path});
+  } catch (...) {
+    return Status::Invalid("{}", ThrownText()).At({options.opener.path});
   }
 }
 

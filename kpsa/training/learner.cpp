@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/parallel.h"
+#include "base/thrown.h"
 #include "kpsa/training_record.h"
 
 namespace kpsa::engine {
@@ -140,12 +141,17 @@ void Learner::Run(const std::stop_token& stop) {
     const Misses misses = learning_;
     lock.unlock();
     Result<Subspace> trained = Status();
-    WithThreads(options_.threads, [&] { trained = TrainWith(*before, misses, stop); });
     std::shared_ptr<const Subspace> made;
     Misses learnt;
-    if (trained.ok()) {
-      made = std::make_shared<const Subspace>(std::move(*trained));
-      learnt = LearntBy(ParseTraining(made->training));
+    try {
+      WithThreads(options_.threads, [&] { trained = TrainWith(*before, misses, stop); });
+      if (trained.ok()) {
+        made = std::make_shared<const Subspace>(std::move(*trained));
+        learnt = LearntBy(ParseTraining(made->training));
+      }
+    } catch (...) {  // this is a thread of its own
+      trained = Status::Invalid("{}", ThrownText());
+      made = nullptr;
     }
     lock.lock();
     state_.last = trained.status();
