@@ -20,7 +20,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-ProcessResult Run(std::vector<std::string> words, double limit_seconds, double interrupt_after,
+// Sent once, after so many seconds; never where they are negative.
+struct Interrupt {
+  double seconds = -1;
+  int signal = SIGINT;
+};
+
+ProcessResult Run(std::vector<std::string> words, double limit_seconds, const Interrupt& interrupt,
                   const std::string& folder, const std::vector<std::string>& more_environment) {
   ProcessResult result;
   const TemporaryFolder streams;
@@ -51,8 +57,8 @@ ProcessResult Run(std::vector<std::string> words, double limit_seconds, double i
   struct rusage usage = {};
   while (::wait4(process, &status, WNOHANG, &usage) == 0) {
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-    if (interrupt_after >= 0 && !interrupted && seconds > interrupt_after) {
-      ::kill(process, SIGINT);
+    if (interrupt.seconds >= 0 && !interrupted && seconds > interrupt.seconds) {
+      ::kill(process, interrupt.signal);
       interrupted = true;
     }
     if (seconds > limit_seconds && !ended) {
@@ -82,15 +88,16 @@ std::size_t ProcessResult::error_lines() const {
 
 ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_seconds,
                       const std::string& folder, const std::vector<std::string>& environment) {
-  return Run(Kpsa(arguments), limit_seconds, -1, folder, environment);
+  return Run(Kpsa(arguments), limit_seconds, {}, folder, environment);
 }
 
 ProcessResult RunShell(const std::string& line, double limit_seconds, const std::string& folder) {
-  return Run({"/bin/sh", "-c", line}, limit_seconds, -1, folder, {});
+  return Run({"/bin/sh", "-c", line}, limit_seconds, {}, folder, {});
 }
 
-ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds) {
-  return Run(Kpsa(arguments), 60, delay_seconds, "", {});
+ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds, int signal,
+                                 const std::vector<std::string>& environment) {
+  return Run(Kpsa(arguments), 60, {delay_seconds, signal}, "", environment);
 }
 
 }  // namespace kpsa::engine

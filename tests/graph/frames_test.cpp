@@ -5,6 +5,8 @@
 #include <cstring>
 #include <map>
 #include <mutex>
+#include <new>
+#include <stdexcept>
 #include <thread>
 
 #include "tests/support/test_graph.h"
@@ -123,6 +125,58 @@ TEST_F(FramesTest, AFrameThatFailsIsNamedAndTheOthersGoOn) {
   EXPECT_TRUE(status.ok());
   EXPECT_EQ(failed, 10);  // 4 14 24 34 44 54, 5 18 31 57
   EXPECT_EQ(failed + fine, static_cast<int>(kFrames));
+}
+
+// What callers throw, on whatever thread, is an error with its frame, and everything else ends.
+TEST_F(FramesTest, WhatCallersThrowIsAnErrorOfItsFrame) {
+  for (const int threads : {1, 3}) {
+    for (const bool by_sink : {false, true}) {
+      FrameOptions options;
+      options.threads = threads;
+      std::size_t sunk = 0;
+      const Status status = EvaluateFrames(
+          g_.plan, kFrames, options,
+          [&](std::size_t frame, Evaluator& e) {
+            Set(frame, e);
+            if (!by_sink && frame == 20) throw std::runtime_error("the disk has gone");
+          },
+          [&](std::size_t frame, const Evaluator&, const Status&) {
+            ++sunk;
+            if (by_sink && frame == 20) throw std::bad_alloc();
+            return Status();
+          });
+      EXPECT_EQ(status.kind(), ErrorKind::kEvaluation);
+      EXPECT_EQ(status.ToString(),
+                by_sink ? "frame 20 of 61: not enough memory" : "frame 20 of 61: the disk has gone");
+      EXPECT_LE(sunk, by_sink ? 21u : 20u);
+    }
+  }
+}
+
+// What a node throws fails that node at that frame, in computes, in decisions and in blocks.
+TEST_F(FramesTest, WhatANodeThrowsIsAnErrorOfThatNode) {
+  for (const int threads : {1, 3}) {
+    FrameOptions options;
+    options.threads = threads;
+    std::size_t failed = 0;
+    const Status status = EvaluateFrames(
+        g_.plan, kFrames, options,
+        [](std::size_t frame, Evaluator& e) {
+          Set(frame, e);
+          e.Set(2, frame % 10 == 4 ? kThrows : 1.0);  // the node "gate"
+          e.Set(3, -1e30);
+        },
+        [&](std::size_t frame, const Evaluator&, const Status& evaluated) {
+          EXPECT_EQ(evaluated.ok(), frame % 10 != 4) << frame << evaluated.ToString();
+          if (evaluated.ok()) return Status();
+          ++failed;
+          EXPECT_EQ(evaluated.errors().front().node, "gate");
+          EXPECT_EQ(evaluated.ToString(), "node \"gate\" (fail): was told to throw");
+          return Status();
+        });
+    EXPECT_TRUE(status.ok()) << status.ToString();
+    EXPECT_EQ(failed, 6u);
+  }
 }
 
 TEST_F(FramesTest, BlocksComputeHitsTogetherAndMissesAlone) {

@@ -39,6 +39,14 @@ KPSA_PLUGIN(registry) {
       .in("b", 0.0)
       .out("output", kpsa::Type::kDouble)
       .compute([](double a, double b, double c) { return static_cast<int>(a + b + c); });
+#elif defined(KPSA_BROKEN_explosive)  // nothing that can be seen before it runs
+  registry.add("fuse", "Passes what is at most 1.")
+      .in("input", 0.0, {.unit = kpsa::Unit::kTime})
+      .out("output", kpsa::Type::kDouble)
+      .compute([](double x) {
+        if (x > 1) throw std::runtime_error("the fuse has blown");
+        return x;
+      });
 #elif defined(KPSA_BROKEN_throwing)
   throw std::runtime_error("no licence found");
 #endif

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <stdexcept>
 
 namespace kpsa::engine {
 namespace {
@@ -112,6 +113,7 @@ void AddToyNodes(NodeRegistry& registry) {
       .in("input", 0.0)
       .out("out", Type::kDouble)
       .compute([](ComputeContext& c) {
+        if (c.get<double>(0) == kThrows) throw std::runtime_error("was told to throw");
         if (c.get<double>(0) < 0) return c.host->Fail("input is below zero");
         c.out_value<double>(0) = c.get<double>(0);
       });

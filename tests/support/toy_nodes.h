@@ -7,7 +7,7 @@ namespace kpsa::engine {
 
 // add (a, b -> out), scale3 (input double3, factor -> out; passes its input at factor 1), pick3 (x of a
 // double3 -> out), sum (input[i] -> out), select (which, a lazy, b lazy -> out), floor (input -> out; in
-// batches), fail (input -> out; fails where input < 0), source (count S -> points i * step), move (points,
+// batches), fail (input -> out; fails where input < 0, throws at kThrows), source (count S -> points i * step), move (points,
 // offset -> points + offset, in place), raise (points, by, S first -> y + by from point `first` on; touches
 // no others), smooth (points on a ring, rings S -> mean of neighbours within `rings`), measure (points -> sum
 // of x), cached (cue points [S: cue list], full points lazy, threshold, floor -> points: where the cues' sum
@@ -18,6 +18,7 @@ namespace kpsa::engine {
 // compute; S factor), grid (S divisions, S mode enum, points on the grid
 // -> outPoints; weight[i] with element names; size 0..10). Some claim to cost more than they do, so that
 // small graphs are evaluated on several threads.
+inline constexpr double kThrows = -1e6;
 void AddToyNodes(NodeRegistry& registry);
 const NodeRegistry& ToyRegistry();  // one with nothing else
 
