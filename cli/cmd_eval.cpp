@@ -13,6 +13,7 @@
 #include "cli/output.h"
 #include "cli/progress.h"
 #include "cli/vertex_output.h"
+#include "host/finite_points.h"
 #include "host/rig_frames.h"
 #include "host/verdicts.h"
 #include "report/verdict_text.h"
@@ -74,7 +75,10 @@ CommandResult Eval(const EvalFlags& flags) {
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
         if (!applied.empty()) verdicts.Add(FrameNumber((*times)[frame], rig.fps), evaluator);
-        for (Index m = 0; m < meshes.size(); ++m) meshes[m] = evaluator.Points(m);
+        for (Index m = 0; m < meshes.size(); ++m) {
+          meshes[m] = evaluator.Points(m);
+          KPSA_RETURN_IF_ERROR(CheckFinite(rig, rig.scene.meshes[shown[m]], meshes[m], (*times)[frame]));
+        }
         return (*output)->Frame(meshes);
       }));
   progress.Clear();

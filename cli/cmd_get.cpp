@@ -1,4 +1,6 @@
 // kpsa get: values of plugs over time.
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -87,6 +89,7 @@ CommandResult Get(const GetFlags& flags) {
     text += "\n";
   }
   std::vector<double> numbers;
+  std::string not_finite;  // the first that is told
   RigFrameOptions options;
   options.threads = *threads;
   options.watch = InterruptWatch();
@@ -106,6 +109,8 @@ CommandResult Get(const GetFlags& flags) {
           }
           numbers.clear();
           if (column.output != kNoIndex) column.Read(evaluator, &numbers);
+          if (not_finite.empty() && !std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); }))
+            not_finite = fmt::format("{} is not finite at {} s", column.name, (*times)[frame]);
           if (!json) {
             for (double number : numbers) text += "," + NumberText(number);
             if (column.output == kNoIndex) text += ",\"" + column.text + "\"";
@@ -134,6 +139,7 @@ CommandResult Get(const GetFlags& flags) {
     text = document.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   }
   KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, text));
+  if (!not_finite.empty()) Say("note: " + not_finite + (json ? "; it is null in JSON" : ""));
   return 0;
 }
 

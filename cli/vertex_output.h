@@ -22,7 +22,7 @@ struct VertexOutputOptions {
 class VertexOutput {
  public:
   virtual ~VertexOutput() = default;
-  // The next frame: for each mesh that is shown, all its points in their order.
+  // The next frame: for each mesh that is shown, all its points in their order, all finite.
   virtual Status Frame(std::span<const ConstPointsView> meshes) = 0;
   // Completes the file; without it nothing appears. Returns what a user should know, one line each.
   virtual Result<std::vector<std::string>> Finish() = 0;
