@@ -48,7 +48,7 @@ void AddCompileCommand(CLI::App* program, Command* chosen) {
                  "  kpsa compile head.yaml --want head_mesh@mush --vertices 0:9\n"
                  "  kpsa compile head.glb --want jaw.worldMatrix",
                  chosen, [flags] { return Compile(*flags); });
-  AddRigFlags(command, flags.get());
+  AddRigFlags(command, flags.get(), NativeCode::kWhereToldTo);
   AddRepeated(command, "--want", "PLUG", &flags->wanted,
               "a plug or a mesh's points (head_mesh@mush) instead of all visible meshes; may be repeated");
   AddOption(command, "--vertices", "LIST", &flags->vertices,

@@ -11,10 +11,9 @@
 namespace kpsa::engine {
 namespace {
 
-struct FmtFlags {
-  std::vector<std::string> files, plugins;
-  std::optional<std::string> output;
-  bool check = false, in_place = false, drop_comments = false, force = false, quiet = false;
+struct FmtFlags : Flags {
+  std::vector<std::string> files;
+  bool check = false, in_place = false, drop_comments = false;
 };
 
 // All that kpsa validate says of a rig; of a part that others include, what can be said of it alone.
@@ -23,9 +22,9 @@ Status CheckRig(const std::string& file, const YamlNode& root, const FmtFlags& f
     RigFile part;
     return ReadRigFile(file, std::nullopt, &part, true);
   }
-  Flags rig;
+  Flags rig = flags;
   rig.file = file;
-  rig.plugins = flags.plugins;
+  rig.output.reset();
   return LoadRigOf(rig).status();
 }
 
@@ -48,9 +47,7 @@ Result<Formatted> Format(const std::string& file, const FmtFlags& flags) {
   NodeRegistry registry;
   AddAllNodes(registry);
   PluginLoader plugins(&registry);
-  Flags with_plugins;
-  with_plugins.plugins = flags.plugins;
-  KPSA_RETURN_IF_ERROR(LoadPlugins(with_plugins, &plugins));
+  KPSA_RETURN_IF_ERROR(LoadPlugins(flags, &plugins));
   CommentMap kept;
   if (!flags.drop_comments) {
     const std::optional<std::vector<Comment>> comments = FindComments(text.before);
@@ -123,8 +120,7 @@ void AddFmtCommand(CLI::App* program, Command* chosen) {
             "write nothing: print the files that are not so; exit 1 if any");
   AddSwitch(command, "--in-place", &flags->in_place, "replace the files themselves");
   AddSwitch(command, "--drop-comments", &flags->drop_comments, "leave comments out");
-  AddRepeated(command, "--plugin", "FILE", &flags->plugins,
-              "a shared library that adds node types; may be repeated");
+  AddPluginFlags(command, flags.get(), NativeCode::kWhereToldTo);
   AddSwitch(command, "-q,--quiet", &flags->quiet, "no messages but errors");
 }
 

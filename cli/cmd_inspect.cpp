@@ -35,6 +35,7 @@ Result<FileFacts> FactsOf(const InspectFlags& flags, double fps) {
   Flags rig;
   rig.file = flags.file;
   rig.plugins = flags.plugins;
+  rig.reads_only = flags.reads_only, rig.rig_plugins = flags.rig_plugins;
   rig.rest = character;
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(rig);
   if (!open.ok()) return open.status();
@@ -79,7 +80,7 @@ void AddInspectCommand(CLI::App* program, Command* chosen) {
   AddOption(
       command, "--vertices-of", "NAME", &flags->vertices_of,
       "the vertices that a joint moves or a material covers (or all of a mesh), as rig files list them");
-  AddPluginFlag(command, flags.get());
+  AddPluginFlags(command, flags.get(), NativeCode::kWhereToldTo);
   AddJsonFlag(command, flags.get());
 }
 

@@ -75,7 +75,7 @@ void AddNodesCommand(CLI::App* program, Command* chosen) {
             "write a picture of what each deformer does, FOLDER/TYPE.png");
   AddSwitch(command, "--force", &flags->force, "replace existing pictures");
   AddSwitch(command, "--schema", &flags->schema, "print a JSON Schema of rig files, for editors");
-  AddPluginFlag(command, flags.get());
+  AddPluginFlags(command, flags.get());
   AddJsonFlag(command, flags.get());
 }
 

@@ -78,7 +78,7 @@ void AddValidateCommand(CLI::App* program, Command* chosen) {
                  "  kpsa validate head.yaml\n"
                  "  kpsa validate head.glb --json",
                  chosen, [flags] { return Validate(*flags); });
-  AddRigFlags(command, flags.get());
+  AddRigFlags(command, flags.get(), NativeCode::kWhereToldTo);
   AddQuietFlag(command, flags.get());
   AddJsonFlag(command, flags.get());
 }

@@ -267,7 +267,7 @@ CLI::App* AddAction(CLI::App* group, const std::string& name, const std::string&
   AddRequired(action, "DEFORMER", &flags->deformer,
               "a deformer, NODE or MESH@STAGE; a skin is MESH_skinCluster or MESH@skin");
   AddOption(action, "--variant", "NAME", &flags->variant, "a variant of the rig");
-  AddPluginFlag(action, flags.get());
+  AddPluginFlags(action, flags.get());
   AddQuietFlag(action, flags.get());
   return action;
 }

@@ -10,12 +10,12 @@
 #include "nodes/standard_nodes.h"
 
 namespace kpsa::engine {
-void AddRigFlags(CLI::App* command, Flags* flags) {
+void AddRigFlags(CLI::App* command, Flags* flags, NativeCode code) {
   AddRequired(command, "FILE", &flags->file, "a rig (.yaml) or a character (.glb, .gltf, .vrm)");
-  AddPoseFlags(command, flags, true);
+  AddPoseFlags(command, flags, true, code);
 }
 
-void AddPoseFlags(CLI::App* command, Flags* flags, bool clip) {
+void AddPoseFlags(CLI::App* command, Flags* flags, bool clip, NativeCode code) {
   AddRepeated(command, "--set", "PLUG=VALUE", &flags->sets,
               "plug=value in the rig's units, as in jaw.rotateX=-20; may be repeated");
   AddOption(command, "--pose", "FILE", &flags->pose, "a pose file: plugs and their values");
@@ -26,12 +26,18 @@ void AddPoseFlags(CLI::App* command, Flags* flags, bool clip) {
   AddSwitch(command, "--rest", &flags->rest, "no clip: the file's transforms and default weights");
   AddOption(command, "--fps", "N", &flags->fps, "frames a second; the rig's, else 24");
   AddOption(command, "--variant", "NAME", &flags->variant, "a variant of the rig");
-  AddPluginFlag(command, flags);
+  AddPluginFlags(command, flags, code);
 }
 
-void AddPluginFlag(CLI::App* command, Flags* flags) {
+void AddPluginFlags(CLI::App* command, Flags* flags, NativeCode code) {
   AddRepeated(command, "--plugin", "FILE", &flags->plugins,
               "a shared library that adds node types; may be repeated");
+  flags->reads_only = code == NativeCode::kWhereToldTo;
+  if (flags->reads_only) {
+    AddSwitch(command, "--plugins", &flags->rig_plugins, "load the plugins that the rig names: native code");
+  } else {
+    AddSwitch(command, "--no-plugins", &flags->no_plugins, "load no plugin but those of --plugin");
+  }
 }
 
 void AddTimeFlags(CLI::App* command, Flags* flags) {
@@ -70,6 +76,11 @@ void AddAllNodes(NodeRegistry& registry) {
 
 Status LoadPlugins(const Flags& flags, PluginLoader* loader) {
   for (const std::string& file : flags.plugins) KPSA_RETURN_IF_ERROR(loader->Load(file).At({"--plugin"}));
+  if (flags.no_plugins)
+    loader->RefuseOthers("--no-plugins");
+  else if (flags.reads_only && !flags.rig_plugins)
+    loader->RefuseOthers(
+        "this command runs no native code unless told to; expected --plugins, or --plugin with its name");
   return Status();
 }
 

@@ -30,6 +30,7 @@ struct Flags {
   std::string file;               // the rig or character
   std::vector<std::string> sets;  // --set plug=value
   std::vector<std::string> plugins;
+  bool reads_only = false, rig_plugins = false, no_plugins = false;  // NativeCode, --plugins, --no-plugins
   std::optional<std::string> pose, clip, fps, variant;
   bool rest = false;
   std::optional<std::string> frames, times;
@@ -38,12 +39,16 @@ struct Flags {
   bool force = false, quiet = false, json = false;
 };
 
-void AddRigFlags(CLI::App* command, Flags* flags);  // FILE --set --pose --clip --rest --fps
-                                                    // --variant --plugin
-void AddPoseFlags(CLI::App* command, Flags* flags,
-                  bool clip);                         // the same without FILE; with or without --clip
-void AddPluginFlag(CLI::App* command, Flags* flags);  // --plugin
-void AddTimeFlags(CLI::App* command, Flags* flags);   // --frames --times
+// Which libraries of nodes a command loads besides those of --plugin: commands that only read load none unless told to.
+enum class NativeCode : std::uint8_t { kWhatRigsName, kWhereToldTo };
+
+// FILE --set --pose --clip --rest --fps --variant, and those of plugins
+void AddRigFlags(CLI::App* command, Flags* flags, NativeCode code = NativeCode::kWhatRigsName);
+// The same without FILE; with or without --clip
+void AddPoseFlags(CLI::App* command, Flags* flags, bool clip, NativeCode code = NativeCode::kWhatRigsName);
+// --plugin, and --no-plugins or --plugins
+void AddPluginFlags(CLI::App* command, Flags* flags, NativeCode code = NativeCode::kWhatRigsName);
+void AddTimeFlags(CLI::App* command, Flags* flags);                            // --frames --times
 void AddOutputFlags(CLI::App* command, Flags* flags, const std::string& doc);  // -o --force
 void AddThreadsFlag(CLI::App* command, Flags* flags);
 void AddQuietFlag(CLI::App* command, Flags* flags);
@@ -54,7 +59,7 @@ Result<int> ThreadCount(const Flags& flags);
 
 // Every node type of the program: the standard ones and KPSA's.
 void AddAllNodes(NodeRegistry& registry);
-// The libraries of --plugin.
+// The libraries of --plugin; whether the loader loads others is as the flags say.
 Status LoadPlugins(const Flags& flags, PluginLoader* loader);
 
 // Loads the rig of the flags, with the clip, the pose file and the settings that they name. Mistakes in flags

@@ -54,6 +54,11 @@ Function* FindFunction(void* library, const char* name) {
 
 }  // namespace
 
+void PluginLoader::RefuseOthers(std::string reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  refusal_ = std::move(reason);
+}
+
 Status PluginLoader::Load(const std::string& path) {
   std::error_code failed;
   const std::filesystem::path canonical = std::filesystem::canonical(path, failed);
@@ -63,6 +68,7 @@ Status PluginLoader::Load(const std::string& path) {
   const std::string identity = canonical.string();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (std::find(loaded_.begin(), loaded_.end(), identity) != loaded_.end()) return Status();
+  if (!refusal_.empty()) return Status::Invalid("plugin \"{}\" is not loaded: {}", path, refusal_);
 
   const std::uint64_t size = std::filesystem::file_size(canonical, failed);
   if (const Status complete = failed ? Status() : CheckComplete(identity, size); !complete.ok())

@@ -21,6 +21,8 @@ class PluginLoader {
   // the system cannot load (its words are in the message), one that does not export kpsa_plugin_abi and
   // kpsa_register, another ABI version, a node type without a name or a name that exists, an exception.
   Status Load(const std::string& path);
+  // From here on libraries that were not loaded before are refused, with that reason.
+  void RefuseOthers(std::string reason);
   // Adds types that the program itself has made, all or none. Errors: what is wrong with their declarations, a
   // name that exists.
   Status Add(NodeRegistry&& added);
@@ -32,6 +34,7 @@ class PluginLoader {
   NodeRegistry* registry_;
   std::mutex mutex_;                           // of what follows, and of adding
   std::vector<std::string> loaded_;            // canonical paths
+  std::string refusal_;                        // of all others; "" where they are loaded
   std::map<std::string, std::string> origin_;  // node type -> the library that brought it, or ""
 };
 

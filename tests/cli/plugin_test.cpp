@@ -50,7 +50,7 @@ TEST_F(Plugins, ARigLoadsItsLibraryFromItsFolder) {
   EXPECT_EQ(RunKpsa({"compare", folder / "a.npz", folder / "b.npz"}).exit_code, 1)
       << "the node moves nothing";
   // From another folder, and from an included file
-  EXPECT_EQ(RunKpsa({"validate", folder / "rig.yaml"}).exit_code, 0);
+  EXPECT_EQ(RunKpsa({"validate", folder / "rig.yaml", "--plugins"}).exit_code, 0);
   std::filesystem::create_directory(folder / "parts");
   folder.Write("parts/part.yaml", "kpsa: 1\nplugins: ../lib/wobble.so\n");
   folder.Write("whole.yaml", Rig("include: parts/part.yaml\nplugins: [./lib/wobble.so]\n"));
@@ -62,10 +62,32 @@ TEST_F(Plugins, TheCommandLineLoadsThemToo) {
   EXPECT_EQ(Get({"bare.yaml", "--plugin", "lib/wobble.so"}, "sway.output"),
             (std::vector<double>{-30, 0, 30, 0}));
   ExpectGood({"inspect", "bare.yaml", "--plugin", "lib/wobble.so"});
-  ExpectGood({"inspect", "rig.yaml"});
+  ExpectGood({"inspect", "rig.yaml", "--plugins"});
+  ExpectGood({"inspect", "rig.yaml", "--plugin", "lib/wobble.so"});
   // Both name it: it is loaded once
   EXPECT_EQ(Get({"rig.yaml", "--plugin", "lib/wobble.so", "--plugin", "lib/../lib/wobble.so"}, "sway.output"),
             (std::vector<double>{-30, 0, 30, 0}));
+}
+
+// What a rig names is native code that somebody else wrote.
+TEST_F(Plugins, AreNotLoadedByCommandsThatOnlyReadNorWhereTheyAreRefused) {
+  const std::vector<std::string> reading[] = {
+      {"inspect", "rig.yaml"}, {"validate", "rig.yaml"}, {"compile", "rig.yaml"}, {"fmt", "rig.yaml"}};
+  for (std::vector<std::string> command : reading) {
+    ExpectRefused(command, 3, {"rig.yaml:3:", "wobble.so\" is not loaded", "expected --plugins"});
+    command.push_back("--plugins");
+    ExpectGood(command);
+  }
+  ExpectRefused({"eval", "rig.yaml", "--no-plugins", "-o", "a.npz"}, 3,
+                {"wobble.so\" is not loaded: --no-plugins"});
+  ExpectGood(
+      {"eval", "rig.yaml", "--no-plugins", "--plugin", "lib/wobble.so", "--times", "0", "-o", "a.npz"});
+  // Not even its first instruction runs: a library that ends the program where it is loaded
+  const std::string deadly = fmt::format("{}/libplugin_deadly.so", KPSA_BROKEN_PLUGINS);
+  folder.Write("deadly.yaml", fmt::format("kpsa: 1\ncharacter: hello.glb\nplugins: [\"{}\"]\n", deadly));
+  for (const char* command : {"inspect", "validate", "compile", "fmt"})
+    EXPECT_EQ(RunKpsa({command, folder / "deadly.yaml"}).exit_code, 3) << command;
+  EXPECT_EQ(RunKpsa({"inspect", folder / "deadly.yaml", "--plugins"}).exit_code, 77);
 }
 
 TEST_F(Plugins, TheReferenceTellsOfTheirNodes) {

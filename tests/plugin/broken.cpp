@@ -1,4 +1,5 @@
 // Libraries that must be refused, one a KPSA_BROKEN_...
+#include <cstdlib>
 #include <stdexcept>
 
 #include "graph/plugin.h"
@@ -14,6 +15,8 @@
 extern "C" int nothing_that_kpsa_knows() { return 0; }
 #elif defined(KPSA_BROKEN_mute)
 extern "C" int kpsa_plugin_abi() { return kpsa::engine::kPluginAbi; }
+#elif defined(KPSA_BROKEN_deadly)
+[[maybe_unused]] static const bool loaded = (std::_Exit(77), true);
 #elif defined(KPSA_BROKEN_old)
 extern "C" int kpsa_plugin_abi() { return kpsa::engine::kPluginAbi - 1; }
 extern "C" void kpsa_register(kpsa::NodeRegistry&) {}
