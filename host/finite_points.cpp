@@ -52,11 +52,11 @@ Status CheckFinite(const Rig& rig, const CharacterMesh& mesh, ConstPointsView po
     if (IsFinite(points, i)) continue;
     std::string node;
     const std::string after = FirstNode(rig, mesh, seconds, &node);
-    const Error error{ErrorKind::kEvaluation, {}, "", node};
-    return Status::Evaluation("at {} s: vertex {} of mesh \"{}\" is ({}, {}, {}), not finite{}", seconds, v,
-                              mesh.name, points.x[i], points.y[i], points.z[i], after)
-        .OfNode(node)
-        .At(PlaceOf(rig, error));
+    Status status = Status::Evaluation("at {} s: vertex {} of mesh \"{}\" is ({}, {}, {}), not finite{}",
+                                       seconds, v, mesh.name, points.x[i], points.y[i], points.z[i], after)
+                        .OfNode(node);
+    const SourceLocation place = PlaceOf(rig, status.errors().front());
+    return std::move(status).At(place);
   }
   return Status();
 }

@@ -88,7 +88,7 @@ TEST(Faults, SignalsLeaveNothing) {
 TEST(Faults, InterruptsEndWhatIsDeepInItsWork) {
   const TemporaryFolder folder;
   const std::vector<std::string> commands[] = {
-      {"render", KPSA_SCENES_DIR "/gi/gi.yaml", "--camera", "front", "--samples", "65536", "-o",
+      {"render", KPSA_SCENES_DIR "/gi/gi.yaml", "--camera", "front", "--set", "bounced.samples=65536", "-o",
        folder / "out.png"},
       {"eval", KPSA_SCENES_DIR "/face/face.yaml", "--frames", "0:2400", "-o", folder / "out.glb"},
   };
