@@ -55,21 +55,22 @@ std::vector<std::string> NearNames(std::string_view word, const std::vector<std:
   return near;
 }
 
-std::string NearOrAll(std::string_view word, const std::vector<std::string>& candidates,
-                      const std::vector<std::string>& all) {
+Suggestion NearOrAll(std::string_view word, const std::vector<std::string>& candidates,
+                     const std::vector<std::string>& all) {
   std::vector<std::string> near = NearNames(word, candidates);
   if (near.empty()) {
-    if (all.empty()) return "";
+    if (all.empty()) return {};
     const auto shown = all.begin() + static_cast<std::ptrdiff_t>(std::min(all.size(), kMostListed));
     const std::string list = fmt::format("; there is {}", fmt::join(all.begin(), shown, ", "));
-    return all.size() <= kMostListed ? list : fmt::format("{} and {} more", list, all.size() - kMostListed);
+    return {"",
+            all.size() <= kMostListed ? list : fmt::format("{} and {} more", list, all.size() - kMostListed)};
   }
   near.resize(std::min(near.size(), kMostNear));
   for (std::string& name : near) name = "\"" + name + "\"";
   const std::string last = near.back();
   near.pop_back();
-  if (near.empty()) return fmt::format(" (did you mean {}?)", last);
-  return fmt::format(" (did you mean {} or {}?)", fmt::join(near, ", "), last);
+  if (near.empty()) return {fmt::format("did you mean {}?", last), ""};
+  return {fmt::format("did you mean {} or {}?", fmt::join(near, ", "), last), ""};
 }
 
 }  // namespace kpsa::engine

@@ -15,11 +15,12 @@ std::string Error::ToString() const {
   return place.empty() ? message : place + ": " + message;
 }
 
-Status Status::Make(ErrorKind kind, std::string message) {
+Status Status::Make(ErrorKind kind, std::string message, std::string suggestion) {
   Status status;
   status.errors_.emplace_back();
   status.errors_.back().kind = kind;
   status.errors_.back().message = std::move(message);
+  status.errors_.back().suggestion = std::move(suggestion);
   return status;
 }
 
@@ -50,9 +51,10 @@ std::string Status::ToString() const {
   return text;
 }
 
-std::string DidYouMean(std::string_view word, const std::vector<std::string>& candidates) {
+Suggestion DidYouMean(std::string_view word, const std::vector<std::string>& candidates) {
   const std::vector<std::string> near = NearNames(word, candidates);
-  return near.empty() ? "" : fmt::format(" (did you mean \"{}\"?)", near.front());
+  if (near.empty()) return {};
+  return {fmt::format("did you mean \"{}\"?", near.front()), ""};
 }
 
 }  // namespace kpsa::engine

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -30,11 +31,21 @@ struct SourceLocation {
   std::string ToString() const;  // "rig.yaml:41:7", "rig.yaml" or ""
 };
 
+// What somebody may have meant who wrote a wrong name: a part of a message that keeps its meaning (Error::suggestion).
+struct Suggestion {
+  std::string words;      // "did you mean "rotateX"?"; "" where nothing is near
+  std::string otherwise;  // said then
+  bool empty() const { return words.empty(); }
+  std::string ToString() const { return words.empty() ? otherwise : " (" + words + ")"; }
+};
+
 struct Error {
   ErrorKind kind = ErrorKind::kInvalidInput;
   SourceLocation where;
-  std::string message;  // one sentence: what is wrong, what was expected, what to do; at most five lines
+  std::string message;    // one sentence: what is wrong, what was expected, what to do; at most five lines
   std::string node = {};  // that it is about, by its name in the graph; "" if none
+  std::string suggestion =
+      {};  // Suggestion::words, where the message ends or goes on with " (" + suggestion + ")"
   std::string ToString() const;  // "rig.yaml:41:7: message"
 };
 
@@ -46,18 +57,20 @@ class [[nodiscard]] Status {
 
   template <typename... Args>
   static Status Invalid(fmt::format_string<Args...> format, Args&&... args) {
-    return Make(ErrorKind::kInvalidInput, fmt::format(format, std::forward<Args>(args)...));
+    return Make(ErrorKind::kInvalidInput, fmt::vformat(format, fmt::make_format_args(args...)),
+                WordsAmong(args...));
   }
   template <typename... Args>
   static Status Usage(fmt::format_string<Args...> format, Args&&... args) {
-    return Make(ErrorKind::kUsage, fmt::format(format, std::forward<Args>(args)...));
+    return Make(ErrorKind::kUsage, fmt::vformat(format, fmt::make_format_args(args...)), WordsAmong(args...));
   }
   template <typename... Args>
   static Status Evaluation(fmt::format_string<Args...> format, Args&&... args) {
-    return Make(ErrorKind::kEvaluation, fmt::format(format, std::forward<Args>(args)...));
+    return Make(ErrorKind::kEvaluation, fmt::vformat(format, fmt::make_format_args(args...)),
+                WordsAmong(args...));
   }
 
-  static Status Make(ErrorKind kind, std::string message);
+  static Status Make(ErrorKind kind, std::string message, std::string suggestion = {});
 
   bool ok() const { return errors_.empty(); }
   const std::vector<Error>& errors() const { return errors_; }
@@ -71,6 +84,17 @@ class [[nodiscard]] Status {
   std::string ToString() const;  // one error a line
 
  private:
+  // Of the suggestion among the parts of a message; "" if there is none.
+  template <typename... Args>
+  static std::string WordsAmong(const Args&... args) {
+    std::string words;
+    const auto look = [&](const auto& arg) {
+      if constexpr (std::is_same_v<std::decay_t<decltype(arg)>, Suggestion>) words = arg.words;
+    };
+    (look(args), ...);
+    return words;
+  }
+
   std::vector<Error> errors_;
 };
 
@@ -94,12 +118,21 @@ class [[nodiscard]] Result {
   Status status_;
 };
 
-// " (did you mean "envelope"?)" for the nearest of the candidates, or "" if none is near.
-std::string DidYouMean(std::string_view word, const std::vector<std::string>& candidates);
+// "did you mean "envelope"?" for the nearest of the candidates, if one is near.
+Suggestion DidYouMean(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace kpsa::engine
 
-#define KPSA_RETURN_IF_ERROR(expression)                                                  \
-  do {                                                                                    \
+// In a message: " (did you mean "envelope"?)".
+template <>
+struct fmt::formatter<kpsa::engine::Suggestion> : fmt::formatter<std::string_view> {
+  template <typename Context>
+  auto format(const kpsa::engine::Suggestion& suggestion, Context& context) const {
+    return fmt::formatter<std::string_view>::format(suggestion.ToString(), context);
+  }
+};
+
+#define KPSA_RETURN_IF_ERROR(expression)                                                          \
+  do {                                                                                            \
     if (::kpsa::engine::Status kpsa_status = (expression); !kpsa_status.ok()) return kpsa_status; \
   } while (false)

@@ -40,7 +40,7 @@ Result<MeshStage> FindMeshStage(const Rig& rig, std::string_view text) {
   if (stage == nullptr) {
     std::vector<std::string> stages;
     for (const Stage& s : mesh->stages) stages.push_back(s.name);
-    const std::string nearest = DidYouMean(stage_name, stages);
+    const Suggestion nearest = DidYouMean(stage_name, stages);
     const std::size_t count = stages.size();
     if (count > kMostStages) stages.resize(kMostStages - 2);
     return Status::Usage("\"{}\": the mesh has no stage \"{}\"{}; it has {}{}", text, stage_name, nearest,

@@ -115,7 +115,6 @@ std::string EvaluateAnswer(const EvaluateRequest& request, const LiveFrame& fram
 }
 
 std::string ProblemList(const Status& status, bool warnings) {
-  constexpr std::string_view kBegin = " (did you mean \"", kEnd = "\"?)";
   Json list = Json::array();
   for (const Error& error : status.errors()) {
     Json problem = {{"severity", warnings ? "warning" : "error"}};
@@ -123,11 +122,11 @@ std::string ProblemList(const Status& status, bool warnings) {
     if (error.where.line > 0) problem["line"] = error.where.line;
     if (error.where.column > 0) problem["column"] = error.where.column;
     std::string message = error.message;
-    const std::size_t begin = message.find(kBegin);
-    const std::size_t end = begin == std::string::npos ? begin : message.find(kEnd, begin + kBegin.size());
-    if (end != std::string::npos) {
-      problem["suggestion"] = message.substr(begin + 2, end + 2 - (begin + 2));
-      message.erase(begin, end + kEnd.size() - begin);
+    if (!error.suggestion.empty()) {
+      problem["suggestion"] = error.suggestion;
+      const std::string within = " (" + error.suggestion + ")";
+      if (const std::size_t at = message.find(within); at != std::string::npos)
+        message.erase(at, within.size());
     }
     problem["message"] = message;
     list.push_back(std::move(problem));
