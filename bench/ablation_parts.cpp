@@ -8,6 +8,7 @@
 
 #include "base/quantity_text.h"
 #include "cli/common.h"
+#include "cli/interrupt.h"
 #include "host/bench/bench.h"
 #include "host/bench/tolerance_table.h"
 #include "host/checks/playback_times.h"

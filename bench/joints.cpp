@@ -10,8 +10,8 @@
 
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
-#include "rig/build/rig_builder.h"
 #include "nodes/standard_nodes.h"
+#include "rig/build/rig_builder.h"
 
 namespace kpsa::engine {
 namespace {

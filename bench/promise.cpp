@@ -17,6 +17,7 @@
 
 #include "bench/promise_table.h"
 #include "cli/frames_range.h"
+#include "cli/interrupt.h"
 #include "rig/build/writer.h"
 
 namespace kpsa::engine {
@@ -235,7 +236,7 @@ class Bench {
 };
 
 int Main(int argc, char** argv) {
-  InstallInterruptHandler();
+  InstallSignalHandlers();
   const Result<Options> options = ReadOptions(argc, argv);
   if (!options.ok()) {
     PrintErrors("bench_promise", options.status());

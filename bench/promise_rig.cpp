@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "base/parallel.h"
+#include "cli/interrupt.h"
 #include "graph/evaluator.h"
 #include "host/rig_frames.h"
 #include "host/rig_training.h"

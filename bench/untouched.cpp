@@ -16,6 +16,7 @@
 #include "bench/untouched_run.h"
 #include "cli/common.h"
 #include "cli/frames_range.h"
+#include "cli/interrupt.h"
 
 namespace kpsa::engine::untouched {
 namespace {
@@ -147,7 +148,7 @@ class Bench {
 };
 
 int Main(int argc, char** argv) {
-  InstallInterruptHandler();
+  InstallSignalHandlers();
   const Result<Options> options = ReadOptions(argc, argv);
   if (!options.ok()) {
     PrintErrors("bench_untouched", options.status());

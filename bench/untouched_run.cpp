@@ -15,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/common.h"
+#include "cli/interrupt.h"
 #include "files/file.h"
 #include "gltf/import.h"
 #include "report/table.h"
