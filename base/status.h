@@ -88,7 +88,7 @@ class [[nodiscard]] Status {
   template <typename... Args>
   static std::string WordsAmong(const Args&... args) {
     std::string words;
-    const auto look = [&](const auto& arg) {
+    [[maybe_unused]] const auto look = [&](const auto& arg) {
       if constexpr (std::is_same_v<std::decay_t<decltype(arg)>, Suggestion>) words = arg.words;
     };
     (look(args), ...);

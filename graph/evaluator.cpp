@@ -39,6 +39,8 @@ Evaluator::Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options)
   dirty_.assign(steps / 64 + 1, 0);
   wanted_.assign(steps / 64 + 1, 0);
   taking_.assign(plan_->segments().size(), 0);
+  asked_.assign(plan_->segments().size(), 0);
+  shared_.reserve(plan_->segments().size());
   stack_.reserve(steps);
   block_host_ = std::make_unique<StepHost>(this, kNoIndex);
   if (options_.parallel) ready_.reserve(steps);
@@ -221,6 +223,7 @@ Status Evaluator::Pull(Index output) {
   if (IsFresh(output)) return Status();
   set_since_run_ = false;
   MarkWanted(producer);
+  NextRun();
   wanted_only_ = true;
   Run(plan_->segments()[0], plan_->segments()[0].begin, plan_->segments()[0].end);
   wanted_only_ = false;
@@ -232,7 +235,7 @@ std::size_t Evaluator::MemoryBytes() const {
   const auto bytes = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof(*this) + plan_->initial_values().size() + buffers_.size() * 4 + state_.size() * 4 +
          bytes(changed_) + bytes(computed_) + bytes(chosen_) + bytes(dirty_) + bytes(wanted_) +
-         bytes(taking_) + bytes(stack_) + bytes(ready_);
+         bytes(taking_) + bytes(asked_) + bytes(shared_) + bytes(stack_) + bytes(ready_);
 }
 
 }  // namespace kpsa::engine

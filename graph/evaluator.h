@@ -124,6 +124,9 @@ class Evaluator final {
   bool Decide(Index step, Index* cause);
   bool RunChosen(Index step);
   bool RunAll(Index segment);
+  bool RunShared(Index segment);
+  bool RunSegment(Index segment);
+  void NextRun();
   void OwnWorkspace(Index segment);
   void AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns);
   void RecordFailure(Index step, std::string_view message);
@@ -148,9 +151,12 @@ class Evaluator final {
   bool wanted_only_ = false;
   std::vector<std::uint64_t> taking_;  // by segment: the taking of the workspace in which it ran
   std::uint64_t takings_ = 0;
-  std::vector<Index> stack_;  // steps to visit
-  std::vector<Index> ready_;  // first steps of units of a level, for the parallel evaluation
-  Index cursor_ = 0;          // of RunUntil
+  std::vector<Index> stack_;          // steps to visit
+  std::vector<Index> ready_;          // first steps of units of a level, for the parallel evaluation
+  Index cursor_ = 0;                  // of RunUntil
+  std::uint32_t run_ = 0;             // counts BeginRun and Pull
+  std::vector<std::uint32_t> asked_;  // by segment: the run in which it was needed by another one
+  std::vector<Index> shared_;         // of RunShared, and of those around it
   std::uint32_t epoch_ = 1;
   bool set_since_run_ = false;
   bool clean_ = false;  // nothing is dirty that Evaluate would run

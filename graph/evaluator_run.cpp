@@ -1,8 +1,11 @@
 // How an Evaluator runs: one step, a unit, a segment; serially, by levels on threads, or cut at the steps of
 // blocks.
+#include <algorithm>
 #include <bit>
 #include <cstring>
+#include <functional>
 #include <thread>
+#include <utility>
 
 #include "base/check.h"
 #include "graph/step_host.h"
@@ -142,7 +145,27 @@ bool Evaluator::Decide(Index number, Index* cause) {
 }
 
 // A segment of lazy inputs: all of what is chosen is needed.
-bool Evaluator::RunAll(Index g) {
+bool Evaluator::RunAll(Index g) { return RunShared(g) && RunSegment(g); }
+
+// What it shares with others and has not run yet in this run: sources come later in the plan than what needs them.
+bool Evaluator::RunShared(Index g) {
+  if (plan_->segments()[g].needs.empty()) return true;
+  const std::size_t begin = shared_.size();  // others before it, where it is within one that is shared
+  const auto ask = [&](Index segment) {
+    for (const Index needed : plan_->segments()[segment].needs) {
+      if (std::exchange(asked_[needed], run_) != run_) shared_.push_back(needed);
+    }
+  };
+  ask(g);
+  for (std::size_t at = begin; at < shared_.size(); ++at) ask(shared_[at]);
+  std::sort(shared_.begin() + static_cast<std::ptrdiff_t>(begin), shared_.end(), std::greater<>());
+  bool fine = true;
+  for (std::size_t at = begin; at < shared_.size() && fine; ++at) fine = RunSegment(shared_[at]);
+  shared_.resize(begin);
+  return fine;
+}
+
+bool Evaluator::RunSegment(Index g) {
   const Plan::Segment& segment = plan_->segments()[g];
   if (segment.uses_workspace) OwnWorkspace(g);
   const bool wanted_only = wanted_only_;
@@ -159,8 +182,6 @@ bool Evaluator::RunChosen(Index number) {
   for (std::size_t i = 0; i < branch.segment_of_lazy.size(); ++i) {
     const Index g = branch.segment_of_lazy[i];
     if ((chosen_[b] >> branch.bit_of_lazy[i] & 1) == 0 || g == kNoIndex || g == before) continue;
-    if (before == kNoIndex && branch.shared_segment != kNoIndex && !RunAll(branch.shared_segment))
-      return false;
     before = g;
     if (!RunAll(g)) return false;
   }
@@ -359,7 +380,14 @@ bool Evaluator::Run(const Plan::Segment& segment, Index begin, Index end) {
   return profile_ != nullptr ? RunRange<true>(begin, end) : RunRange<false>(begin, end);
 }
 
+void Evaluator::NextRun() {
+  if (++run_ != 0) return;
+  std::fill(asked_.begin(), asked_.end(), 0);
+  run_ = 1;
+}
+
 void Evaluator::BeginRun() {
+  NextRun();
   set_since_run_ = false;
   cursor_ = 0;
 }

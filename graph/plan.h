@@ -75,12 +75,16 @@ class Plan {
     std::vector<std::uint8_t> bit_of_lazy;  // its bit in what decide returns
     std::vector<Index> segment_of_lazy;     // kNoIndex where it needs no step
     std::vector<Index> lazy_deps;           // its producer; kNoIndex for none
-    Index shared_segment = kNoIndex;        // the parent of segments of lazy inputs that share steps
   };
+  // Segment 0 runs in every frame, another one if a lazy input is chosen that needs it: it is its own, or shared by
+  // several (`users`), runs when the first of them does, and comes after those that need it.
   struct Segment {
-    Index parent = kNoIndex, owner = kNoIndex;  // owner: the step whose lazy inputs it serves
-    Index begin = 0, end = 0;                   // steps
-    std::vector<Index> levels;                  // begin of every level, and end
+    Index parent = kNoIndex;    // which has run before
+    Index owner = kNoIndex;     // the step whose lazy inputs it serves; kNoIndex where it serves several
+    Index begin = 0, end = 0;   // steps
+    std::vector<Index> levels;  // begin of every level, and end
+    std::vector<Index> users,
+        needs;  // of what is shared: segments that read it; shared segments that it reads
     bool uses_workspace = false;
   };
   struct Buffer {  // of points: where its slot and its floats are

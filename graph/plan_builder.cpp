@@ -92,8 +92,12 @@ void PlanBuilder::NumberSteps() {
     segment.end = static_cast<Index>(placed_.size());
     segment.levels.push_back(segment.end);
   }
-  for (Index g = 1; g < draft_.segments.size(); ++g)
-    plan_->segments_[g].owner = number_[draft_.segments[g].owner];
+  for (Index g = 1; g < draft_.segments.size(); ++g) {
+    if (const Index owner = draft_.segments[g].owner; owner != kNoIndex)
+      plan_->segments_[g].owner = number_[owner];
+    plan_->segments_[g].users = draft_.segments[g].users;
+    plan_->segments_[g].needs = draft_.segments[g].needs;
+  }
   plan_->steps_.resize(placed_.size());
   plan_->infos_.resize(placed_.size());
   for (const auto& units : order_.segments) {
@@ -281,7 +285,6 @@ void PlanBuilder::FillSteps() {
       branch.compute_block = group->compute_block;
       branch.bit_of_lazy = draft.lazy_bits;
       branch.segment_of_lazy = draft.lazy_segments;
-      branch.shared_segment = draft.shared_segment;
       for (const DraftInput& input : draft.inputs) {
         if (input.lazy) branch.lazy_deps.push_back(ProducerOf(input));
       }

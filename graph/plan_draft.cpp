@@ -50,7 +50,6 @@ class Drafter {
       uses_[*it] = {};
     }
     InsertGathers();
-    DropEmptyShared();
     return std::move(draft_);
   }
 
@@ -222,11 +221,8 @@ class Drafter {
     for (std::size_t p = 0; p < instance.output_sizes.size(); ++p) {
       has_points = has_points || IsPointType(table_.OutputType(instance, static_cast<int>(p)));
     }
-    if (!has_points) {  // one step, where all its users can see it
-      Index segment = uses[0].segment;
-      for (const Use& use : uses) segment = CommonAncestor(segment, use.segment);
-      return MakeStep(number, segment, uses);
-    }
+    if (!has_points)
+      return MakeStep(number, SegmentOf(uses), uses);  // one step, where all its users can see it
     // Demands are unioned within a segment, never across; a segment that holds what a descendant wants serves
     // it
     std::map<std::pair<int, Index>, std::vector<Use>> by_segment;
@@ -254,21 +250,41 @@ class Drafter {
     return Status();
   }
 
-  // How many segments the lazy inputs of a step open: one a bit with something to evaluate.
-  int LazySegments(const Instance& instance) const {
-    int count = 0, together = -1;
-    for (const Input& input : instance.inputs) {
-      if (!input.lazy || !Varies(input.source) || together == input.position) continue;
-      if (table_.input_def(instance, input.position).lazy_together) together = input.position;
-      ++count;
+  // Where a step runs that has all these readers: in the segment of one that is around all others; else, where all are
+  // lazy in what is around them, in a segment that they share.
+  Index SegmentOf(const std::vector<Use>& uses) {
+    std::vector<Index> readers;
+    for (const Use& use : uses) readers.push_back(use.segment);
+    std::sort(readers.begin(), readers.end());
+    readers.erase(std::unique(readers.begin(), readers.end()), readers.end());
+    Index around = readers[0];
+    for (const Index reader : readers) around = CommonAncestor(around, reader);
+    if (std::binary_search(readers.begin(), readers.end(), around)) return around;
+    const auto [at, added] = shared_.emplace(readers, static_cast<Index>(draft_.segments.size()));
+    if (!added) return at->second;
+    DraftSegment shared{around, draft_.segments[readers[0]].owner, Depth(around) + 1, 0, readers, {}};
+    for (const Index reader : readers) {
+      DraftSegment& user = draft_.segments[reader];
+      user.needs.push_back(at->second);
+      shared.owners = std::max(shared.owners, user.owners);
+      if (user.owner != shared.owner) shared.owner = kNoIndex;
     }
-    return count;
+    draft_.segments.push_back(std::move(shared));
+    return at->second;
+  }
+
+  // How many owners are nested, for the limit of that.
+  Status CheckDepth(const Instance& instance, Index segment) const {
+    if (draft_.segments[segment].owners <= kMaxLazyDepth) return Status();
+    return Status::Invalid("{}: lazy inputs are nested more than {} deep", Describe(table_, instance),
+                           kMaxLazyDepth)
+        .OfNode(table_.graph().name(instance.node));
   }
 
   // Opens a segment for what a step evaluates on demand.
   Index OpenSegment(Index parent, Index owner) {
     const int owners = draft_.segments[draft_.steps[owner].segment].owners + 1;
-    draft_.segments.push_back({parent, owner, Depth(parent) + 1, owners});
+    draft_.segments.push_back({parent, owner, Depth(parent) + 1, owners, {}, {}});
     return static_cast<Index>(draft_.segments.size() - 1);
   }
 
@@ -300,10 +316,6 @@ class Drafter {
     draft_.steps.push_back(std::move(step));
     for (const Use& use : uses) Answer(use, step_number);
 
-    // What only its lazy inputs share runs before those that are chosen, and not at all where none is
-    Index lazy_parent = segment;
-    if (LazySegments(instance) > 1)
-      draft_.steps[step_number].shared_segment = lazy_parent = OpenSegment(segment, step_number);
     Index together = kNoIndex;
     int together_position = -1, bits = 0;
     for (std::size_t i = 0; i < instance.inputs.size(); ++i) {
@@ -332,12 +344,8 @@ class Drafter {
         Index child = kNoIndex;
         if (Varies(input.source)) {
           if (together == kNoIndex) {
-            together = OpenSegment(lazy_parent, step_number);
-            if (draft_.segments[together].owners > kMaxLazyDepth) {
-              return Status::Invalid("{}: lazy inputs are nested more than {} deep",
-                                     Describe(table_, instance), kMaxLazyDepth)
-                  .OfNode(table_.graph().name(instance.node));
-            }
+            together = OpenSegment(segment, step_number);
+            KPSA_RETURN_IF_ERROR(CheckDepth(instance, together));
           }
           child = reads_in = together;
         }
@@ -403,38 +411,12 @@ class Drafter {
     for (DraftInput& output : draft_.outputs) serve(output, 0);
   }
 
-  // Most owners have lazy inputs that share nothing.
-  void DropEmptyShared() {
-    std::vector<bool> used(draft_.segments.size(), false), dropped = used;
-    for (const DraftStep& step : draft_.steps) used[step.segment] = true;
-    for (DraftStep& step : draft_.steps) {
-      if (step.shared_segment == kNoIndex || used[step.shared_segment]) continue;
-      dropped[step.shared_segment] = true;
-      step.shared_segment = kNoIndex;
-    }
-    std::vector<Index> number;  // parents come before their children
-    std::vector<DraftSegment> kept;
-    for (Index g = 0; g < draft_.segments.size(); ++g) {
-      DraftSegment segment = draft_.segments[g];
-      if (segment.parent != kNoIndex) segment.parent = number[segment.parent];
-      number.push_back(dropped[g] ? segment.parent : static_cast<Index>(kept.size()));
-      if (!dropped[g]) kept.push_back(segment);
-    }
-    draft_.segments = std::move(kept);
-    for (DraftStep& step : draft_.steps) {
-      step.segment = number[step.segment];
-      if (step.shared_segment != kNoIndex) step.shared_segment = number[step.shared_segment];
-      for (Index& child : step.lazy_segments) {
-        if (child != kNoIndex) child = number[child];
-      }
-    }
-  }
-
   InstanceTable& table_;
   StaticEvaluator& statics_;
   const Request& request_;
   PlanDraft draft_;
   std::vector<std::vector<Use>> uses_;
+  std::map<std::vector<Index>, Index> shared_;  // segments, by those that read them
 };
 
 }  // namespace

@@ -29,14 +29,19 @@ struct DraftStep {
   std::vector<DraftInput> inputs;
   std::vector<Index> lazy_segments;     // by lazy input, in order; kNoIndex where nothing has to be evaluated
   std::vector<std::uint8_t> lazy_bits;  // by lazy input: its bit in what decide returns
-  Index shared_segment = kNoIndex;      // parent of its lazy segments, where these share steps
   Type gather_type = Type::kPoints;
 };
 
+// What a lazy input needs alone; or what several of them share and nobody else reads (`users`), which runs when the
+// first of them is chosen. Those that are needed come after those that need them.
 struct DraftSegment {
-  Index parent = kNoIndex, owner = kNoIndex;  // owner: a draft step of the parent, or of the one above
-  int depth = 0;                              // below segment 0
-  int owners = 0;                             // that have to decide before it runs
+  Index parent = kNoIndex;  // which has run before
+  Index owner =
+      kNoIndex;    // the draft step of the lazy input, in the parent; where shared: if it is one of all users
+  int depth = 0;   // below segment 0
+  int owners = 0;  // that have to decide before it runs
+  std::vector<Index> users;  // of what is shared: the segments that read it, shared ones among them
+  std::vector<Index> needs;  // the shared segments that it reads
 };
 
 struct PlanDraft {

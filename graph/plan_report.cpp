@@ -22,7 +22,26 @@ std::vector<Index> Producers(const Plan& plan, Index step) {
 
 std::string SegmentName(const Plan& plan, Index segment) {
   if (segment == 0) return "always";
-  return fmt::format("only if {} asks for it", plan.step_name(plan.segments()[segment].owner));
+  // The owners of all that share it
+  std::vector<std::string> names;
+  std::vector<Index> open{segment};
+  std::vector<bool> seen(plan.segments().size(), false);
+  while (!open.empty()) {
+    const Plan::Segment& g = plan.segments()[open.back()];
+    open.pop_back();
+    if (g.owner != kNoIndex) {
+      const std::string name = plan.step_name(g.owner);
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+      continue;
+    }
+    for (const Index user : g.users) {
+      if (!seen[user]) open.push_back(user), seen[user] = true;
+    }
+  }
+  std::sort(names.begin(), names.end());
+  if (names.size() == 1) return fmt::format("only if {} asks for it", names[0]);
+  if (names.size() == 2) return fmt::format("only if {} or {} asks for it", names[0], names[1]);
+  return fmt::format("only if {}, {} or {} more ask for it", names[0], names[1], names.size() - 2);
 }
 
 std::string NeededBy(const Plan& plan, Index step) {

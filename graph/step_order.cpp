@@ -151,45 +151,63 @@ class Orderer {
       }
     }
     const std::vector<Index> kinds = BatchKinds();
-    std::vector<std::vector<std::vector<Index>>> consumers(order_.segments.size());
-    std::vector<std::vector<Index>> waiting(order_.segments.size());
-    for (Index g = 0; g < order_.segments.size(); ++g) {
-      consumers[g].resize(order_.segments[g].size());
-      waiting[g].assign(order_.segments[g].size(), 0);
+    // What is to be ordered in a segment: its units, and behind them a place for each shared segment that lies in it,
+    // after all that it reads there and before all that have it run
+    std::vector<Index> size(order_.segments.size()), place(order_.segments.size(), kNoIndex);
+    for (Index g = 0; g < size.size(); ++g) size[g] = static_cast<Index>(order_.segments[g].size());
+    for (Index g = 1; g < size.size(); ++g) {
+      if (!draft_.segments[g].users.empty()) place[g] = size[draft_.segments[g].parent]++;
     }
-    const auto depends = [&](Index reader, Index producer) {
-      const auto [g, u] = unit_of[reader];
-      const auto [pg, pu] = unit_of[producer];
-      KPSA_CHECK_EQ(g, pg);
-      if (u == pu) return;
-      consumers[g][pu].push_back(u);
-      ++waiting[g][u];
+    std::vector<std::vector<std::vector<Index>>> consumers(order_.segments.size());
+    std::vector<std::vector<Index>> waiting(order_.segments.size()), level(order_.segments.size());
+    for (Index g = 0; g < order_.segments.size(); ++g) {
+      consumers[g].resize(size[g]);
+      waiting[g].assign(size[g], 0);
+      level[g].assign(size[g], 0);
+    }
+    const auto depends = [&](Index g, Index reader, Index producer) {
+      if (reader == producer) return;
+      consumers[g][producer].push_back(reader);
+      ++waiting[g][reader];
+    };
+    // What in `home` has that segment run, which lies in it: the unit of an owner, or a shared segment; kNoIndex where
+    // it lies elsewhere
+    const auto runs_it = [&](Index segment, Index home) {
+      Index child = segment;
+      while (child != 0 && draft_.segments[child].parent != home) child = draft_.segments[child].parent;
+      if (child == 0) return kNoIndex;
+      return place[child] != kNoIndex ? place[child] : unit_of[draft_.segments[child].owner].second;
     };
     for (Index s = 0; s < draft_.steps.size(); ++s) {
       for (const DraftInput& input : draft_.steps[s].inputs) {
         if (input.kind != DraftInput::Kind::kStep) continue;
-        // What a lazy segment reads from outside must run before the segment's owner does
-        const Index home = draft_.steps[input.step].segment;
-        Index reader = s;
-        for (Index g = draft_.steps[s].segment; g != home && g != 0; g = draft_.segments[g].parent)
-          reader = draft_.segments[g].owner;
-        if (draft_.steps[reader].segment == home) depends(reader, input.step);
+        const auto [home, producer] = unit_of[input.step];
+        const Index own = draft_.steps[s].segment;
+        // What a lazy segment reads from outside must run before the segment's owner does. What it reads of a shared
+        // one runs when it does
+        const Index reader = own == home ? unit_of[s].second : runs_it(own, home);
+        if (reader != kNoIndex) depends(home, reader, producer);
       }
+    }
+    for (Index g = 1; g < draft_.segments.size(); ++g) {
+      const Index home = draft_.segments[g].parent;
+      for (const Index user : draft_.segments[g].users) depends(home, runs_it(user, home), place[g]);
     }
     for (Index g = 0; g < order_.segments.size(); ++g) {
       auto& units = order_.segments[g];
       std::vector<Index> ready;
-      for (Index u = 0; u < units.size(); ++u) {
+      for (Index u = 0; u < size[g]; ++u) {
         if (waiting[g][u] == 0) ready.push_back(u);
       }
       std::size_t done = 0;
       for (std::size_t at = 0; at < ready.size(); ++at, ++done) {
         for (Index c : consumers[g][ready[at]]) {
-          units[c].level = std::max(units[c].level, units[ready[at]].level + 1);
+          level[g][c] = std::max(level[g][c], level[g][ready[at]] + 1);
           if (--waiting[g][c] == 0) ready.push_back(c);
         }
       }
-      if (done != units.size()) return false;
+      if (done != size[g]) return false;
+      for (Index u = 0; u < units.size(); ++u) units[u].level = level[g][u];
       // Branches come last in their level: the parallel evaluator runs them after the others. Steps of a
       // batch lie side by side. Draft steps were made consumers first, so descending numbers keep sources
       // near their users.

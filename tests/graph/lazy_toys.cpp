@@ -93,7 +93,7 @@ const NodeRegistry& LazyToys(bool lazy) {
 
 int SharedSegments(const Plan& plan) {
   int count = 0;
-  for (const Plan::Branch& branch : plan.branches()) count += branch.shared_segment != kNoIndex;
+  for (const Plan::Segment& segment : plan.segments()) count += !segment.users.empty();
   return count;
 }
 

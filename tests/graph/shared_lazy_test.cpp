@@ -92,8 +92,7 @@ class SharedLazyTest : public testing::Test {
 
 TEST_F(SharedLazyTest, WhatLazyInputsShareHasASegmentBetween) {
   const Plan& plan = *g.plan;
-  const Index shared = BranchOf("p").shared_segment;
-  ASSERT_NE(shared, kNoIndex);
+  const Index shared = SegmentOf("world");
   EXPECT_EQ(plan.segments()[shared].parent, 0u);
   EXPECT_EQ(plan.segments()[shared].owner, Step("p"));
   EXPECT_TRUE(plan.segments()[shared].uses_workspace);  // what probe measures
@@ -103,14 +102,16 @@ TEST_F(SharedLazyTest, WhatLazyInputsShareHasASegmentBetween) {
   std::set<Index> lazy;
   for (const Index g_of : BranchOf("p").segment_of_lazy) {
     lazy.insert(g_of);
-    EXPECT_EQ(plan.segments()[g_of].parent, shared);
+    EXPECT_EQ(plan.segments()[g_of].parent, 0u);
+    EXPECT_EQ(plan.segments()[g_of].needs, std::vector<Index>{shared});
   }
+  EXPECT_EQ(std::set<Index>(plan.segments()[shared].users.begin(), plan.segments()[shared].users.end()),
+            lazy);
   EXPECT_EQ(lazy.size(), kPatches + 1u);
   // An owner that is itself shared, and what its lazy inputs share
-  const Index inner = BranchOf("side").shared_segment;
-  ASSERT_NE(inner, kNoIndex);
+  const Index inner = SegmentOf("root");
+  EXPECT_EQ(plan.segments()[inner].users.size(), 2u);
   EXPECT_EQ(plan.segments()[inner].parent, shared);
-  EXPECT_EQ(SegmentOf("root"), inner);
   EXPECT_EQ(SegmentName(plan, inner), "only if side asks for it");
   // Points are the segments' own, a step each
   int after = 0;
@@ -312,6 +313,83 @@ TEST_F(SharedLazyTest, AFailureInWhatIsSharedIsTheOwners) {
     EXPECT_DOUBLE_EQ(f.pull<double>("pick.out"), 4);
     EXPECT_EQ(f.computes("left") + f.computes("right"), 2u);
   }
+}
+
+// A value that lazy inputs of several owners read, or some of one owner's: it runs once, when the first of them is
+// chosen, and where none is its failure is nobody's.
+TEST_F(SharedLazyTest, WhatSeveralOwnersShareRunsWhenTheFirstIsChosen) {
+  for (const bool parallel : {false, true}) {
+    TestGraph f(LazyToys(true));
+    f.options.parallel = parallel;
+    f.add("fail", "gate");
+    f.add("add", "after");
+    f.add("add", "time");
+    f.connect("gate.out", "after.a");
+    for (const char* name : {"one", "two", "three"}) {
+      f.add("pick", name);
+      f.connect("after.out", name + std::string(".input[0]"));
+      f.connect("time.out", name + std::string(".input[1]"));
+      f.vary(name + std::string(".chosen"));
+    }
+    f.connect("after.out", "three.input[2]");
+    f.add("add", "sum");
+    f.connect("one.out", "sum.a");
+    f.connect("two.out", "sum.b");
+    f.vary("gate.input");
+    f.vary("time.a");
+    f.want("sum.out");
+    f.want("three.out");
+    f.set("gate.input", -1.0);
+    f.set("time.a", 3.0);
+    const auto choose = [&](std::int64_t one, std::int64_t two, std::int64_t three) {
+      f.set("one.chosen", one);
+      f.set("two.chosen", two);
+      f.set("three.chosen", three);
+    };
+    choose(2, 2, 2);
+    EXPECT_DOUBLE_EQ(f.pull<double>("sum.out"), 6);
+    EXPECT_DOUBLE_EQ(f.pull<double>("three.out"), 3);
+    EXPECT_EQ(f.computes("gate") + f.computes("after"), 0u);
+    for (const int who : {0, 1, 2}) {
+      choose(who == 0 ? 1 : 2, who == 1 ? 1 : 2, who == 2 ? 4 : 2);
+      EXPECT_EQ(f.try_pull(who == 2 ? "three.out" : "sum.out").ToString(),
+                "node \"gate\" (fail): input is below zero")
+          << who;
+      choose(0, 0, 0);
+      EXPECT_DOUBLE_EQ(f.pull<double>("sum.out"), 0) << "it heals";
+      EXPECT_DOUBLE_EQ(f.pull<double>("three.out"), 0);
+    }
+    const std::uint64_t before = f.computes("after");
+    f.set("gate.input", 5.0);
+    choose(1, 2, 0);
+    EXPECT_DOUBLE_EQ(f.pull<double>("sum.out"), 8);
+    choose(1, 1, 5);
+    EXPECT_DOUBLE_EQ(f.pull<double>("sum.out"), 10);
+    EXPECT_DOUBLE_EQ(f.pull<double>("three.out"), 10);
+    EXPECT_EQ(f.computes("after"), before + 1);
+    EXPECT_EQ(f.plan->segments().size(), 1u + 7 + 1);
+    EXPECT_EQ(SharedSegments(*f.plan), 1);
+  }
+}
+
+// Two sides of one owner share what fails; the third is chosen.
+TEST_F(SharedLazyTest, WhatTheOtherSidesShareDoesNotRun) {
+  TestGraph f(LazyToys(true));
+  f.add("fail", "gate");
+  f.add("pick", "pick");
+  for (const char* name : {"left", "right", "mine"}) f.add("add", name);
+  f.connect("gate.out", "left.a");
+  f.connect("gate.out", "right.a");
+  for (int e = 0; const char* name : {"left", "right", "mine"})
+    f.connect(name + std::string(".out"), "pick.input[" + std::to_string(e++) + "]");
+  for (const char* plug : {"gate.input", "mine.a", "pick.chosen"}) f.vary(plug);
+  f.want("pick.out");
+  f.set("gate.input", -1.0);
+  f.set("mine.a", 7.0);
+  f.set("pick.chosen", 4);
+  EXPECT_DOUBLE_EQ(f.pull<double>("pick.out"), 7);
+  EXPECT_EQ(f.computes("gate"), 0u);
+  EXPECT_EQ(SegmentName(*f.plan, 4), "only if pick asks for it");
 }
 
 TEST_F(SharedLazyTest, All64BitsAndDeepNests) {
