@@ -367,8 +367,8 @@ TEST_F(SharedLazyTest, WhatSeveralOwnersShareRunsWhenTheFirstIsChosen) {
     EXPECT_DOUBLE_EQ(f.pull<double>("sum.out"), 10);
     EXPECT_DOUBLE_EQ(f.pull<double>("three.out"), 10);
     EXPECT_EQ(f.computes("after"), before + 1);
-    EXPECT_EQ(f.plan->segments().size(), 1u + 7 + 1);
-    EXPECT_EQ(SharedSegments(*f.plan), 1);
+    EXPECT_EQ(f.plan->segments().size(), 1u + 7 + 2);
+    EXPECT_EQ(SharedSegments(*f.plan), 2);  // after with gate, and time
   }
 }
 
