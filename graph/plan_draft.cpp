@@ -4,6 +4,7 @@
 #include <cstring>
 #include <map>
 #include <tuple>
+#include <utility>
 
 #include "base/check.h"
 #include "graph/static_eval.h"
@@ -281,6 +282,22 @@ class Drafter {
         .OfNode(table_.graph().name(instance.node));
   }
 
+  // The bit of each input in what decide returns, of an eager one the last bit before it. A lazy_together array has one
+  // for all of its elements, also where it has none; what a demand skips keeps its own.
+  std::vector<int> LazyBits(const Instance& instance) const {
+    std::vector<int> bits;
+    int bit = -1, position = -1;
+    for (const Input& input : instance.inputs) {
+      for (; position < input.position; ++position) {
+        const AttributeDef& a = table_.input_def(instance, position + 1);
+        bit += a.lazy && a.lazy_together ? 1 : 0;
+      }
+      if (input.lazy && !table_.input_def(instance, input.position).lazy_together) ++bit;
+      bits.push_back(bit);
+    }
+    return bits;
+  }
+
   // Opens a segment for what a step evaluates on demand.
   Index OpenSegment(Index parent, Index owner) {
     const int owners = draft_.segments[draft_.steps[owner].segment].owners + 1;
@@ -316,8 +333,14 @@ class Drafter {
     draft_.steps.push_back(std::move(step));
     for (const Use& use : uses) Answer(use, step_number);
 
-    Index together = kNoIndex;
-    int together_position = -1, bits = 0;
+    Index together = kNoIndex;  // the segment of the lazy inputs that have the last bit
+    const std::vector<int> bit_of = LazyBits(instance);
+    const int bits = bit_of.empty() ? 0 : bit_of.back() + 1;
+    if (bits > kMaxLazyInputs) {
+      return Status::Invalid("{} has more than {} lazy inputs", Describe(table_, instance), kMaxLazyInputs)
+          .OfNode(table_.graph().name(instance.node));
+    }
+    int last_bit = -1;
     for (std::size_t i = 0; i < instance.inputs.size(); ++i) {
       const Input& input = instance.inputs[i];
       const std::vector<bool>& skipped = draft_.steps[step_number].sets.skipped;
@@ -329,18 +352,7 @@ class Drafter {
       }
       Index reads_in = segment;
       if (input.lazy) {
-        // The elements of a lazy_together array share a segment and a bit
-        const bool shares =
-            together_position == input.position && table_.input_def(instance, input.position).lazy_together;
-        if (!shares) {
-          together = kNoIndex;
-          together_position = input.position;
-          if (++bits > kMaxLazyInputs) {
-            return Status::Invalid("{} has more than {} lazy inputs", Describe(table_, instance),
-                                   kMaxLazyInputs)
-                .OfNode(table_.graph().name(instance.node));
-          }
-        }
+        if (std::exchange(last_bit, bit_of[i]) != bit_of[i]) together = kNoIndex;
         Index child = kNoIndex;
         if (Varies(input.source)) {
           if (together == kNoIndex) {
@@ -350,7 +362,7 @@ class Drafter {
           child = reads_in = together;
         }
         draft_.steps[step_number].lazy_segments.push_back(child);
-        draft_.steps[step_number].lazy_bits.push_back(static_cast<std::uint8_t>(bits - 1));
+        draft_.steps[step_number].lazy_bits.push_back(static_cast<std::uint8_t>(bit_of[i]));
       }
       DraftInput read;
       const PointSet points = draft_.steps[step_number].sets.inputs[i];

@@ -12,6 +12,7 @@
 #include "graph/plan_report.h"
 #include "tests/graph/lazy_toys.h"
 #include "tests/support/test_graph.h"
+#include "tests/support/toy_nodes.h"
 
 namespace kpsa::engine {
 namespace {
@@ -390,6 +391,51 @@ TEST_F(SharedLazyTest, WhatTheOtherSidesShareDoesNotRun) {
   EXPECT_DOUBLE_EQ(f.pull<double>("pick.out"), 7);
   EXPECT_EQ(f.computes("gate"), 0u);
   EXPECT_EQ(SegmentName(*f.plan, 4), "only if pick asks for it");
+}
+
+// An array without elements, and one that a demand skips, keep the bits of what comes after them.
+TEST_F(SharedLazyTest, ArraysWithoutElementsKeepTheirBit) {
+  NodeRegistry registry;
+  AddToyNodes(registry);
+  registry.add("both", "One or the other.")
+      .in("chosen", 0)
+      .in("none", 0.0)
+      .array()
+      .lazy(true)
+      .in("all", 0.0)
+      .array()
+      .lazy(true)
+      .in("one", 0.0)
+      .lazy()
+      .out("out", Type::kDouble)
+      .compute([](std::int64_t chosen, ArrayView<double> none, ArrayView<double> all, double one) {
+        double sum = (chosen & 4) != 0 ? one : 0;
+        for (std::uint32_t i = 0; i < none.size(); ++i) sum += (chosen & 1) != 0 ? none[i] : 0;
+        for (std::uint32_t i = 0; i < all.size(); ++i) sum += (chosen & 2) != 0 ? all[i] : 0;
+        return sum;
+      })
+      .decide([](ComputeContext& c) -> std::uint64_t {
+        return static_cast<std::uint64_t>(c.get<std::int64_t>(0));
+      });
+  for (const int elements : {0, 1, 3}) {
+    TestGraph f(registry);
+    for (const char* name : {"time", "sum"}) f.add("add", name);
+    f.add("both", "both");
+    f.connect("time.out", "sum.a");
+    for (int e = 0; e < elements; ++e) f.connect("time.out", "both.all[" + std::to_string(e) + "]");
+    f.connect("sum.out", "both.one");
+    f.vary("time.a");
+    f.vary("both.chosen");
+    for (const double time : {1.0, 2.0}) {
+      f.set("time.a", time);
+      f.set("both.chosen", 4);
+      EXPECT_DOUBLE_EQ(f.pull<double>("both.out"), time) << elements;
+      f.set("both.chosen", 2);
+      EXPECT_DOUBLE_EQ(f.pull<double>("both.out"), elements * time);
+      f.set("both.chosen", 7);
+      EXPECT_DOUBLE_EQ(f.pull<double>("both.out"), (elements + 1) * time);
+    }
+  }
 }
 
 TEST_F(SharedLazyTest, All64BitsAndDeepNests) {
