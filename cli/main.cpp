@@ -79,6 +79,14 @@ int UsageError(CLI::App& program, const CLI::ParseError& error, const std::vecto
   return 2;
 }
 
+// 0 where all that was printed went out, else an error and `code`.
+int FlushOr(int code) {
+  const Status flushed = FlushOutput();
+  if (flushed.ok()) return 0;
+  PrintErrors("kpsa", flushed);
+  return code;
+}
+
 int Main(int argc, char** argv) {
   InstallSignalHandlers();
   CLI::App program("kpsa: a runtime for character rigs, with Key Point Subspace Acceleration", "kpsa");
@@ -128,13 +136,13 @@ int Main(int argc, char** argv) {
       return UsageError(program, CLI::ExtrasError({words[1]}),
                         std::vector<std::string>(words.begin() + 1, words.end()));
     program.exit(success);
-    return FlushOutput().ok() ? 0 : 3;
+    return FlushOr(3);
   } catch (const CLI::ParseError& error) {
     return UsageError(program, error, std::vector<std::string>(words.begin() + 1, words.end()));
   }
   if (chosen == nullptr) {
     Print(kFirstMinutes);
-    return FlushOutput().ok() ? 0 : 3;
+    return FlushOr(3);
   }
   const std::string name = Innermost(program).second;
   if (const std::string problem = ApplySimdChoice(); !problem.empty()) {

@@ -1,6 +1,9 @@
 #include "cli/options.h"
 
 #include <CLI/CLI.hpp>
+#include <memory>
+
+#include "cli/memory_limit.h"
 
 namespace kpsa::engine {
 
@@ -8,7 +11,15 @@ CLI::App* AddCommand(CLI::App* program, const std::string& name, const std::stri
                      const std::string& examples, Command* chosen, Command run) {
   CLI::App* command = program->add_subcommand(name, doc);
   command->footer(examples);
-  command->callback([chosen, run = std::move(run)] { *chosen = run; });
+  const auto memory = std::make_shared<std::optional<std::string>>();
+  AddOption(command, "--max-memory", "SIZE", memory.get(),
+            "of address space, as 500MB or 2GB: what needs more is an error, not a machine without memory");
+  command->callback([chosen, memory, run = std::move(run)] {
+    *chosen = [memory, run]() -> CommandResult {
+      if (memory->has_value()) KPSA_RETURN_IF_ERROR(LimitMemory(**memory));
+      return run();
+    };
+  });
   return command;
 }
 
@@ -28,7 +39,9 @@ void AddOption(CLI::App* command, const std::string& name, const std::string& va
 }
 
 void AddRequired(CLI::App* command, const std::string& name, std::string* to, const std::string& doc) {
-  command->add_option(name, *to, doc)->required();
+  command->add_option(name, *to, doc)->required()->check([](const std::string& text) {
+    return text.empty() ? std::string("expected the name of a file, found an empty text") : std::string();
+  });
 }
 
 void AddRepeated(CLI::App* command, const std::string& name, const std::string& value,

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <climits>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -39,8 +40,13 @@ std::string WithoutLinks(const std::string& path) {
   return target.string();
 }
 
-// Creates an empty file of a new name; the name, or "" with errno set.
-std::string CreateTemporary(const std::string& prefix, unsigned mode = 0666) {
+// Creates an empty file of a new name; the name, or "" with errno set. It is of the prefix, cut short where file systems
+// would have no room for what is added.
+std::string CreateTemporary(std::string prefix, unsigned mode = 0666) {
+  constexpr std::size_t kMostOfName = 200;                 // of 255
+  const std::size_t begin = prefix.find_last_of('/') + 1;  // 0 where there is none
+  if (prefix.size() - begin > kMostOfName && prefix.size() - begin <= NAME_MAX)
+    prefix.resize(begin + kMostOfName);
   for (int attempt = 0; attempt < 100; ++attempt) {
     std::string name = fmt::format("{}.tmp{}-{}", prefix, ::getpid(), temporary_counter++);
     AddTemporary(name);
@@ -57,9 +63,23 @@ std::string CreateTemporary(const std::string& prefix, unsigned mode = 0666) {
   return "";
 }
 
+// Into a device or a pipe. One that nobody reads would be waited for without end.
+FilePointer OpenDevice(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return nullptr;
+  ::fcntl(descriptor, F_SETFL, 0);
+  FilePointer file(::fdopen(descriptor, "wb"));
+  if (file == nullptr) ::close(descriptor);
+  return file;
+}
+
 Status CopyTo(const std::string& from, const std::string& to) {
-  FilePointer in(std::fopen(from.c_str(), "rb")), out(std::fopen(to.c_str(), "wb"));
-  if (in == nullptr || out == nullptr) return Status::Invalid("cannot write: {}", Reason(errno)).At({to});
+  FilePointer in(std::fopen(from.c_str(), "rb"));
+  if (in == nullptr) return Status::Invalid("cannot write: {}", Reason(errno)).At({to});
+  FilePointer out = OpenDevice(to);
+  if (out == nullptr && errno == ENXIO)
+    return Status::Invalid("is a pipe that nobody reads; expected a reader, or the name of a file").At({to});
+  if (out == nullptr) return Status::Invalid("cannot write: {}", Reason(errno)).At({to});
   std::vector<std::uint8_t> block(1 << 16);
   while (const std::size_t size = std::fread(block.data(), 1, block.size(), in.get())) {
     if (std::fwrite(block.data(), 1, size, out.get()) != size) {

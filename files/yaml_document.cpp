@@ -34,6 +34,8 @@ class TreeBuilder final : public YAML::EventHandler {
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
+    if (value.find('\0') != std::string::npos)  // by an escape; what is named so would end there elsewhere
+      throw Refusal{Status::Invalid("a text may hold no zero byte").At(Where(mark))};
     YamlNode node = Make(YamlNode::Kind::kScalar, mark);
     node.quoted = tag == "!";
     if (tag != "!" && tag != "?") node.tag = tag;

@@ -127,7 +127,16 @@ Result<FileFacts> InspectCharacter(const std::string& path, double fps) {
 }
 
 Result<FileFacts> InspectNpz(const std::string& path) {
-  const Result<Npz> npz = ReadNpz(path, std::uint64_t{8} << 30);
+  // What is worth looking at: a deflated archive may claim a thousand times its size
+  constexpr std::uint64_t kLeastBudget = std::uint64_t{256} << 20, kBudgetOfSize = 16,
+                          kMostBudget = std::uint64_t{8} << 30;
+  std::error_code unknown;
+  const std::uintmax_t size = std::filesystem::file_size(path, unknown);
+  const std::uint64_t budget =
+      unknown
+          ? kLeastBudget
+          : std::clamp(kBudgetOfSize * std::min<std::uint64_t>(size, kMostBudget), kLeastBudget, kMostBudget);
+  const Result<Npz> npz = ReadNpz(path, budget);
   if (!npz.ok()) return npz.status();
   FileFacts facts;
   facts.kind = "npz";

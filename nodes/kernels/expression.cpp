@@ -153,6 +153,8 @@ class ExpressionReader {
     if (text.size() > Expression::kMaxLength)
       return Status::Invalid("expression: {} characters, at most {} are allowed", text.size(),
                              Expression::kMaxLength);
+    if (const std::size_t zero = text.find('\0'); zero != std::string::npos)
+      return Status::Invalid("expression, character {}: a zero byte", zero + 1);
     try {
       FormulaParser parser(&inputs_);
       parser.SetExpr(text);

@@ -111,6 +111,73 @@ TEST(Faults, AFileThatMayNotGrowIsAnError) {
   }
 }
 
+// Names, outputs and texts at the edge of what systems take.
+TEST(Faults, OddOutputsAndTextsAreClearErrors) {
+  const TemporaryFolder folder;
+  const auto shell = [&](const std::string& words) {
+    return RunShell("exec " KPSA_PROGRAM " " + words, 60, folder.path());
+  };
+  ProcessResult run = shell("--help > /dev/full");
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("stdout cannot be written"), std::string::npos) << run.err;
+  run = shell("eval '' -o a.npz");
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_NE(run.err.find("expected the name of a file, found an empty text"), std::string::npos) << run.err;
+  // As long as a name may be, and longer
+  const std::string longest = std::string(251, 'a') + ".npz";
+  run = shell("eval " + kHello + " --frames 0:3 -o " + longest);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(std::filesystem::exists(folder / longest));
+  EXPECT_EQ(folder.FileCount(), 1u);
+  run = shell("eval " + kHello + " --frames 0:3 -o a" + longest);
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_NE(run.err.find("File name too long"), std::string::npos) << run.err;
+  // A pipe: without a reader, and with one
+  run =
+      RunShell("mkfifo pipe.npz; exec " KPSA_PROGRAM " eval " + kHello + " --frames 0:3 --force -o pipe.npz",
+               60, folder.path());
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("is a pipe that nobody reads"), std::string::npos) << run.err;
+  run = RunShell(
+      "cat pipe.npz > got.npz & exec " KPSA_PROGRAM " eval " + kHello + " --frames 0:3 --force -o pipe.npz",
+      60, folder.path());
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  // Zero bytes, which end a text elsewhere
+  folder.Write("rig.yaml", std::string("kpsa: 1\ncharacter: ") + kHelloGlb +
+                               "\nnodes: {e: {type: expression, expression: \"1\\0+2\"}}\n");
+  run = shell("get rig.yaml e.output --times 0");
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("rig.yaml:3:"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("a text may hold no zero byte"), std::string::npos) << run.err;
+}
+
+#if !defined(KPSA_WITH_ASAN) && !defined(KPSA_WITH_TSAN)
+TEST(Faults, MemoryIsLimitedWhereItIsAskedFor) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(
+      RunKpsa({"eval", kHello, "--frames", "0:10", "--max-memory", "2GB", "-o", folder / "a.npz"}).exit_code,
+      0);
+  // A small archive that claims gigabytes: two arrays of zeros, deflated
+  const ProcessResult made = RunShell(
+      "python3 -c \"import numpy; numpy.savez_compressed('bomb.npz', a=numpy.zeros((1000, 100000, 3), "
+      "numpy.float32))\"",
+      120, folder.path());
+  if (made.exit_code != 0) GTEST_SKIP() << "no NumPy: " << made.err;
+  ProcessResult run = RunKpsa({"inspect", folder / "bomb.npz"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("claims 1200000128 bytes"), std::string::npos) << run.err;
+  EXPECT_LT(run.peak_bytes, 300e6);
+  run = RunKpsa({"compare", folder / "bomb.npz", folder / "bomb.npz", "--max-memory", "500MB"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_NE(run.err.find("not enough memory"), std::string::npos) << run.err;
+  for (const char* wrong : {"2G", "", "-1GB", "10MB", "1e400GB", "GB"}) {
+    run = RunKpsa({"inspect", folder / "bomb.npz", "--max-memory", wrong});
+    EXPECT_EQ(run.exit_code, 2) << wrong;
+    EXPECT_NE(run.err.find("expected a size from 64MB on"), std::string::npos) << wrong << run.err;
+  }
+}
+#endif
+
 TEST(Temporaries, AreRemovedWhereAProgramEndsAtOnce) {
   const TemporaryFolder folder;
   Result<OutputFile> kept = OutputFile::Create(folder / "kept", false),

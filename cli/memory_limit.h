@@ -1,0 +1,14 @@
+// How much memory the program may take.
+#pragma once
+
+#include <string_view>
+
+#include "base/status.h"
+
+namespace kpsa::engine {
+
+// From here on the process gets no more address space than that: "500MB", "2GB" (of 1024's), "1073741824". What needs
+// more fails as an error (exit 3 or 4). Errors, of usage: another text, less than 64 MB, a system that refuses.
+Status LimitMemory(std::string_view text);
+
+}  // namespace kpsa::engine
