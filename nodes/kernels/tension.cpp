@@ -54,9 +54,10 @@ StrainKernel::StrainKernel(const Topology& topology, ConstPointsView rest, std::
     for (Index q : ring) length += Distance(rest, p, q);
     const bool measured = length > 0 && std::isfinite(length);
     rest_.push_back(measured ? length : 0);
-    if (measured) {
-      const std::vector<Index> places = PositionsIn(in_points, ring);
-      neighbors_.insert(neighbors_.end(), places.begin(), places.end());
+    for (std::size_t k = 0; measured && k < ring.size(); ++k) {
+      const auto place = std::lower_bound(in_points.begin(), in_points.end(), ring[k]);
+      KPSA_CHECK(place != in_points.end() && *place == ring[k]);
+      neighbors_.push_back(static_cast<Index>(place - in_points.begin()));
     }
     offsets_.push_back(static_cast<Index>(neighbors_.size()));
   }
