@@ -11,23 +11,47 @@ namespace {
 
 constexpr std::size_t kMostNear = 4, kMostListed = 12;
 
-// Edit distance with transpositions, over bytes; gives up beyond `limit`.
-std::size_t EditDistance(std::string_view a, std::string_view b, std::size_t limit) {
-  if (a.size() > b.size() + limit || b.size() > a.size() + limit) return limit + 1;
-  std::vector<std::size_t> before(b.size() + 1), last(b.size() + 1), row(b.size() + 1);
-  std::iota(last.begin(), last.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-        row[j] = std::min(row[j], before[j - 2] + 1);
+constexpr std::size_t kMostEdits = 8;  // of long words
+
+// Edit distance with transpositions, over bytes. It gives up beyond a limit, so that a word costs no more than its length
+// times that limit: files may name as many wrong ones as they like.
+class EditDistance {
+ public:
+  // limit + 1 where it is larger than `limit`.
+  std::size_t operator()(std::string_view a, std::string_view b, std::size_t limit) {
+    if (a.size() > b.size() + limit || b.size() > a.size() + limit) return limit + 1;
+    const std::size_t beyond = limit + 1;
+    for (auto* row : {&before_, &last_, &row_}) row->assign(b.size() + 1, beyond);
+    for (std::size_t j = 0; j <= std::min(b.size(), limit); ++j) last_[j] = j;
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+      const std::size_t begin = i > limit ? i - limit : 0, end = std::min(b.size(), i + limit);
+      std::size_t least = beyond;
+      if (begin == 0)
+        least = row_[0] = std::min(i, beyond);
+      else
+        row_[begin - 1] = beyond;
+      for (std::size_t j = std::max<std::size_t>(begin, 1); j <= end; ++j) {
+        std::size_t edits =
+            std::min({last_[j] + 1, row_[j - 1] + 1, last_[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
+        if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+          edits = std::min(edits, before_[j - 2] + 1);
+        row_[j] = std::min(edits, beyond);
+        least = std::min(least, row_[j]);
+      }
+      if (end < b.size()) row_[end + 1] = beyond;
+      if (least == beyond && i > 1 && least_before_ == beyond)
+        return beyond;  // a transposition reaches over one row
+      least_before_ = least;
+      std::swap(before_, last_);
+      std::swap(last_, row_);
     }
-    std::swap(before, last);
-    std::swap(last, row);
+    return last_[b.size()];
   }
-  return last[b.size()];
-}
+
+ private:
+  std::vector<std::size_t> before_, last_, row_;
+  std::size_t least_before_ = 0;
+};
 
 std::string Lower(std::string_view text) {
   std::string lower(text);
@@ -42,11 +66,11 @@ std::string Lower(std::string_view text) {
 std::vector<std::string> NearNames(std::string_view word, const std::vector<std::string>& candidates) {
   std::vector<std::string> near;
   if (word.size() > 256) return near;
-  const std::size_t limit = std::max<std::size_t>(1, word.size() / 3);
-  std::size_t best = limit;
+  std::size_t best = std::clamp<std::size_t>(word.size() / 3, 1, kMostEdits);
   const std::string lower = Lower(word);
+  EditDistance edits;
   for (const std::string& candidate : candidates) {
-    const std::size_t distance = EditDistance(lower, Lower(candidate), limit);
+    const std::size_t distance = edits(lower, Lower(candidate), best);
     if (distance > best) continue;
     if (distance < best) near.clear();
     best = distance;
