@@ -66,13 +66,13 @@ TEST(Faults, ANodeThatThrowsIsNamedWithItsTime) {
 TEST(Faults, SignalsLeaveNothing) {
   const TemporaryFolder folder, scratch;
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-    const ProcessResult run = RunKpsaInterrupted(LongEval(folder / "out.npz"), 0.5, signal);
+    const ProcessResult run = RunKpsaInterrupted(LongEval(folder / "out.npz"), 0, signal, folder.path());
     EXPECT_EQ(run.exit_code, 130) << signal << run.err;
     EXPECT_NE(run.err.find("interrupted"), std::string::npos) << signal;
     EXPECT_EQ(folder.FileCount(), 0u) << signal;
   }
   for (const int signal : {SIGQUIT, SIGABRT}) {
-    const ProcessResult run = RunKpsaInterrupted(LongEval(folder / "out.npz"), 0.5, signal);
+    const ProcessResult run = RunKpsaInterrupted(LongEval(folder / "out.npz"), 0, signal, folder.path());
     EXPECT_EQ(run.exit_code, 128 + signal) << run.err;
     EXPECT_EQ(folder.FileCount(), 0u) << signal;
   }

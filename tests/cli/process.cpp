@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <thread>
 
 #include "tests/support/temporary_folder.h"
@@ -20,10 +21,17 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Sent once, after so many seconds; never where they are negative.
+// Sent once, after so many seconds (never where they are negative), and not before there is a file in `where`.
 struct Interrupt {
   double seconds = -1;
   int signal = SIGINT;
+  std::string where = {};
+
+  bool IsDue(double now) const {
+    if (seconds < 0 || now <= seconds) return false;
+    return where.empty() ||
+           std::filesystem::directory_iterator(where) != std::filesystem::directory_iterator();
+  }
 };
 
 ProcessResult Run(std::vector<std::string> words, double limit_seconds, const Interrupt& interrupt,
@@ -57,7 +65,7 @@ ProcessResult Run(std::vector<std::string> words, double limit_seconds, const In
   struct rusage usage = {};
   while (::wait4(process, &status, WNOHANG, &usage) == 0) {
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-    if (interrupt.seconds >= 0 && !interrupted && seconds > interrupt.seconds) {
+    if (!interrupted && interrupt.IsDue(seconds)) {
       ::kill(process, interrupt.signal);
       interrupted = true;
     }
@@ -96,8 +104,8 @@ ProcessResult RunShell(const std::string& line, double limit_seconds, const std:
 }
 
 ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds, int signal,
-                                 const std::vector<std::string>& environment) {
-  return Run(Kpsa(arguments), 60, {delay_seconds, signal}, "", environment);
+                                 const std::string& where) {
+  return Run(Kpsa(arguments), 60, {delay_seconds, signal, where}, "", {});
 }
 
 }  // namespace kpsa::engine

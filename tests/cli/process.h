@@ -22,8 +22,8 @@ ProcessResult RunKpsa(const std::vector<std::string>& arguments, double limit_se
                       const std::string& folder = "", const std::vector<std::string>& environment = {});
 // A line of shell, as /bin/sh runs it in the folder.
 ProcessResult RunShell(const std::string& line, double limit_seconds, const std::string& folder);
-// Starts it, sends the signal (SIGINT) after the delay, and waits.
+// Starts it, sends the signal (SIGINT) after the delay and once there is a file in the folder `where`, and waits.
 ProcessResult RunKpsaInterrupted(const std::vector<std::string>& arguments, double delay_seconds,
-                                 int signal = 2, const std::vector<std::string>& environment = {});
+                                 int signal = 2, const std::string& where = "");
 
 }  // namespace kpsa::engine
