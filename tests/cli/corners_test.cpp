@@ -113,13 +113,13 @@ TEST_F(Corners, ThousandsOfControlsTrain) {
 
 TEST_F(Corners, HundredsOfThousandsOfPointsTrain) {
   if (kSanitized) GTEST_SKIP() << kTakesLong;
-  SheetCharacter character(kLong ? 448 : 224, 2, 3);
+  SheetCharacter character(kLong ? 448 : 142, 2, 3);
   character.Swing("a", 20, 0.4f);
   character.Swing("b", 10, 0.3f);
   Init(character);
   TrainAndBench(
       {"--samples", "40", "--calibration", "40", "--violation-rate", "10%", "--rows", "60", "--modes", "40"});
-  EXPECT_GT(train_["points"], kLong ? 200'000 : 50'000);
+  EXPECT_GT(train_["points"], kLong ? 200'000 : 20'000);
   EXPECT_EQ(train_["calibration"]["hit_rate_of"], "clips");
   EXPECT_GT(bench_["hit_rate"], 0.5);
 }
