@@ -285,6 +285,7 @@ class Drafter {
   // The bit of each input in what decide returns, of an eager one the last bit before it. A lazy_together array has one
   // for all of its elements, also where it has none; what a demand skips keeps its own.
   std::vector<int> LazyBits(const Instance& instance) const {
+    if (instance.kind != Instance::Kind::kNode) return std::vector<int>(instance.inputs.size(), -1);
     std::vector<int> bits;
     int bit = -1, position = -1;
     for (const Input& input : instance.inputs) {

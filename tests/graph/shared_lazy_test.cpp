@@ -426,6 +426,7 @@ TEST_F(SharedLazyTest, ArraysWithoutElementsKeepTheirBit) {
     f.connect("sum.out", "both.one");
     f.vary("time.a");
     f.vary("both.chosen");
+    f.want("both.out");
     for (const double time : {1.0, 2.0}) {
       f.set("time.a", time);
       f.set("both.chosen", 4);
