@@ -16,6 +16,8 @@ export interface Api {
   positions(side?: Side): Float32Array;
   /** Where a vertex is in the page, in CSS pixels. */
   project(vertex: number): {x: number; y: number};
+  /** Where a handle is in the page, in CSS pixels. */
+  projectHandle(handle: number): {x: number; y: number};
   readonly loopMs: number | null;
   readonly errors: string[];
 }
@@ -65,6 +67,11 @@ export function makeApi(app: () => App | null, ready: Promise<void>, errors: str
     project(vertex) {
       const {viewport, view} = now(), box = viewport.canvas.getBoundingClientRect();
       const at = viewport.pixelsOf(view.shownPoints(), vertex);
+      return {x: box.left + at.x, y: box.top + at.y};
+    },
+    projectHandle(handle) {
+      const {viewport, view} = now(), box = viewport.canvas.getBoundingClientRect();
+      const at = viewport.pixelsOf(Float32Array.from(view.handles.offsetOf(handle)), 0);
       return {x: box.left + at.x, y: box.top + at.y};
     },
     get loopMs() {

@@ -12,6 +12,7 @@ import {makeControls} from './ui/controls_panel';
 import {cueMarks, makeCues} from './ui/cues_panel';
 import {button, h, themeColour} from './ui/dom';
 import {makeGraph} from './ui/graph_panel';
+import {listenToHandles} from './ui/handles';
 import {makeHeader} from './ui/header';
 import {Help} from './ui/help';
 import {listenToKeys} from './ui/keys';
@@ -90,6 +91,7 @@ export class App {
     this.under.replaceChildren(...[makeTimeline(context), makeStatus(context)].filter((part) => part !== null));
     this.layPanels(context, open ?? (session ? 'controls' : 'plots'));
     listenToKeys(context, help);
+    listenToHandles(context, this.stage);
     listenToPointer(context, this.stage);
     play(this.store, model, scope);
 
@@ -131,7 +133,7 @@ export class App {
     const tested = Math.max(0, clips.findIndex((clip) => clip.test));
     const clip = before ? named : model.live || !clips.length ? -1 : tested;
     return {
-      clip, frame: Math.max(0, Math.min(now.frame, framesOf(model, clip) - 1)), playing: false, cue: -1, node: -1, paint: null,
+      clip, frame: Math.max(0, Math.min(now.frame, framesOf(model, clip) - 1)), playing: false, cue: -1, node: -1, paint: null, handle: -1,
       vertex: now.vertex < model.points ? now.vertex : -1, picked: now.picked.filter((v) => v < model.points),
       mode: !model.accelerated ? 'full' : before?.accelerated ? now.mode : 'accelerated',
       errorTop: (model.tolerance ?? model.unit.metres) * 2,

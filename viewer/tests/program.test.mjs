@@ -6,7 +6,7 @@ import {copyFileSync, mkdtempSync, readFileSync, rmSync, writeFileSync} from 'no
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {after, before, test} from 'node:test';
-import {startBrowser} from './support/browser.mjs';
+import {settled, startBrowser} from './support/browser.mjs';
 import {readNpz} from './support/npz.mjs';
 import {difference} from './support/png.mjs';
 
@@ -95,6 +95,23 @@ test('a live view moves points by sliders, and follows edits of the rig file', {
   assert.ok(apart(moved, expected) < 1e-5, `${apart(moved, expected)} m from kpsa eval`);
   assert.ok(apart(moved, before) > 1e-2, 'the slider moves points');
   assert.ok(difference(pictureBefore, pictureAfter) > 0, 'and the picture');
+
+  // Dragged in the picture, the column goes with the pointer, and its pose is that of the sliders
+  await page.evaluate(() => window.kpsa.setControl('upper.rotateZ', 0));
+  const from = await page.evaluate(() => window.kpsa.projectHandle(0)), to = {x: from.x + 70, y: from.y + 25};
+  await page.mouse.move(from.x, from.y);
+  await page.mouse.down();
+  await page.mouse.move(to.x, to.y, {steps: 12});
+  await page.mouse.up();
+  await settled(page);
+  const at = await page.evaluate(() => window.kpsa.projectHandle(0));
+  assert.ok(Math.hypot(at.x - to.x, at.y - to.y) < 2, `the handle is at ${at.x}, ${at.y}, the pointer at ${to.x}, ${to.y}`);
+  const sliders = await page.evaluate(() => Object.fromEntries([...document.querySelectorAll('.control')].map((row) =>
+    ['upper.' + row.querySelector('.name').textContent, Number(row.querySelector('input[type=range]').value)])));
+  assert.ok(Math.abs(sliders['upper.rotateZ']) > 5);
+  const posed = evaluated('dragged.npz', '--rest', ...Object.entries(sliders).flatMap(([plug, value]) => ['--set', `${plug}=${value}`])).frame(0);
+  assert.ok(apart(await page.evaluate(() => [...window.kpsa.positions('full')]), posed) < 1e-5);
+  await page.getByRole('button', {name: 'Reset'}).click();
 
   // A mistake in the file is told with its place, and the last good rig goes on
   const path = join(folder, 'hello.yaml'), good = readFileSync(path, 'utf8');

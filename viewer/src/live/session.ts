@@ -3,7 +3,7 @@ import type {Model} from '../data/model';
 import {noFacts, Signal, type Facts, type Series} from '../facts';
 import type {Store} from '../state';
 import type {Viewport} from '../view/viewport';
-import type {Client, EvaluateAnswer, EvaluateMode, Values} from './client';
+import type {Client, DragRequest, EvaluateAnswer, EvaluateMode, Values} from './client';
 
 export class Session {
   /** What the user has moved; everything else is as in the clip or as the rig sets it. */
@@ -13,6 +13,8 @@ export class Session {
   /** Something was moved or released. */
   readonly touched = new Signal<number>(0);
   readonly loopMs = new Signal<number | null>(null);
+  /** x y z of each handle, as they were evaluated last. */
+  readonly places = new Signal<readonly (number | null)[]>([]);
   /** Whether both sides are asked for, so that the error is known. */
   compare = true;
   answered = 0;
@@ -22,24 +24,37 @@ export class Session {
   private asked = 0;      // when the oldest change was made that is not drawn yet
   private waiting = 0;
   private ended = false;
+  private drag: DragRequest | null = null;
+  private drags = 0;  // a later set, release or cancel wins over the answer to a drag
 
   constructor(
     readonly client: Client, private readonly model: Model, private readonly store: Store, private readonly viewport: Viewport,
     private readonly facts: Signal<Facts>, private readonly series: readonly Series[], private readonly tell: (text: string) => void,
   ) {}
 
-  set(values: Values, at = performance.now()): void {
-    this.moved = {...this.moved, ...values};
+  /** Brings a handle to the pointer. */
+  dragTo(drag: DragRequest, at = performance.now()): void {
+    this.drag = drag;
+    this.changed(at);
+  }
+
+  /** All that was moved before. */
+  restore(moved: Values, at = performance.now()): void {
+    this.drag = null;
+    ++this.drags;
+    this.moved = moved;
     this.touched.set(this.touched.value + 1);
     this.changed(at);
+  }
+
+  set(values: Values, at = performance.now()): void {
+    this.restore({...this.moved, ...values}, at);
   }
 
   release(names: readonly string[], at = performance.now()): void {
     const rest = {...this.moved};
     for (const name of names) delete rest[name];
-    this.moved = rest;
-    this.touched.set(this.touched.value + 1);
-    this.changed(at);
+    this.restore(rest, at);
   }
 
   /** Something that is evaluated has changed. */
@@ -70,14 +85,23 @@ export class Session {
       this.again = false;
       this.asked = this.waiting;
       this.waiting = 0;
-      const {clip, frame} = this.store.now;
+      const {clip, frame, showHandles} = this.store.now;
+      // a place of the pointer is gone to once
+      const {drag, drags} = this;
+      this.drag = null;
       const set = this.moved, info = clip >= 0 ? this.model.meta.clips![clip] : null;
       try {
         const answer = await this.client.evaluate({
           id: ++this.id, set, clip: info?.name ?? null, time: info ? info.begin + frame / info.fps : 0, mode: this.mode(),
+          ...this.model.meta.handles?.length && showHandles ? {handles: true} : {}, ...drag ? {drag} : {},
         }, this.model.points);
         if (this.ended) break;
-        await this.show(answer, clip, frame, !Object.keys(set).length);
+        const {dragged} = answer.facts;
+        if (dragged && drags === this.drags) {
+          this.moved = {...this.moved, ...dragged};
+          this.touched.set(this.touched.value + 1);
+        }
+        await this.show(answer, clip, frame, !drag && !Object.keys(set).length);
       } catch (error) {
         if (this.ended) break;
         this.facts.set({...this.facts.value, problem: (error as Error).message});
@@ -100,6 +124,7 @@ export class Session {
     if (clip >= 0 && ofClip) this.series[clip]?.record(frame, known);
     this.facts.set(known);
     if (facts.values) this.values.set(facts.values);
+    if (facts.handles) this.places.set(facts.handles);
     this.viewport.draw();
     await finished(this.viewport.renderer.getContext() as WebGL2RenderingContext);
     ++this.answered;

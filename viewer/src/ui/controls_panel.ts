@@ -12,7 +12,7 @@ interface Row {
 }
 
 export function makeControls(context: Context): HTMLElement | null {
-  const {model, session, scope} = context, controls = model.meta.controls ?? [];
+  const {model, session, scope, store} = context, controls = model.meta.controls ?? [];
   if (!controls.length) return null;
   const rows = controls.map((info) => session && info.min !== null && info.min !== undefined ? sliderRow(context, info) : plainRow(context, info));
   const groups = new Map<string, Row[]>();
@@ -40,6 +40,17 @@ export function makeControls(context: Context): HTMLElement | null {
         show(moved ? session.moved[info.name] : session.values.value[info.name] ?? info.value ?? 0, moved);
       }
     };
+    // the handle that is held and the sliders that are its own show each other
+    const handles = model.meta.handles ?? [];
+    for (const {info, element} of rows) {
+      const own = handles.findIndex((handle) => handle.controls.includes(info.name));
+      if (own >= 0) element.addEventListener('focusin', () => store.set({handle: own}));
+    }
+    scope.add(store.on(['handle'], ({handle}) => {
+      const names = handles[handle]?.controls ?? [];
+      const own = rows.filter(({info, element}) => element.classList.toggle('held', names.includes(info.name)));
+      if (own.length && !own.some(({element}) => element.contains(document.activeElement))) own[0].element.scrollIntoView({block: 'nearest'});
+    }));
     scope.add(session.values.on(refresh));
     scope.add(session.touched.on(refresh));
   } else {

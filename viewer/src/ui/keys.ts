@@ -46,9 +46,10 @@ export function listenToKeys({store, model, viewport, view, scope}: Context, hel
       case '-': viewport.zoom(1 / 0.85); break;
       case 'c': if (view.cueCount) store.set({showCues: !store.now.showCues}); break;
       case 'e': store.set({showEdges: !store.now.showEdges}); break;
+      case 'h': if (model.meta.handles?.length) store.set({showHandles: !store.now.showHandles}); break;
       case 'p': store.set({picking: !store.now.picking}); break;
       case 't': applyTheme(theme() === 'dark' ? 'light' : 'dark'); break;
-      case 'Escape': store.set({vertex: -1, cue: -1, node: -1, paint: null, picking: false}); break;
+      case 'Escape': store.set({vertex: -1, cue: -1, node: -1, paint: null, handle: -1, picking: false}); break;
       case '?': help.toggle(); break;
       default: return;
     }

@@ -15,6 +15,7 @@ export class ModelView {
   readonly positions: Positions;
   readonly cues: Marks;
   readonly picked: Marks;
+  readonly handles: Marks;
   private readonly normals: Normals;
   private readonly solid = new Group();
   private readonly ghost = new Group();
@@ -56,7 +57,9 @@ export class ModelView {
     }
     this.cues = this.own(new Marks(this.shown, [1, 0.78, 0.2]));
     this.picked = this.own(new Marks(this.shown, [0.3, 0.85, 1]));
-    this.group.add(this.solid, this.ghost, this.edges, this.cues.object, this.picked.object);
+    this.handles = this.own(new Marks(this.shown, [0.76, 0.6, 1]));
+    this.handles.set((model.meta.handles ?? []).map(({position, kind}) => ({vertex: -1, offset: position, diamond: kind === 'move'})));
+    this.group.add(this.solid, this.ghost, this.edges, this.cues.object, this.picked.object, this.handles.object);
   }
 
   private own<T extends {dispose(): void}>(thing: T): T {
@@ -101,6 +104,7 @@ export class ModelView {
 
   setPixelRatio(ratio: number): void {
     for (const marks of [this.cues, this.picked]) marks.setSize(9 * ratio);
+    this.handles.setSize(13 * ratio);
   }
 
   /** Values of 0 to 1 as colours; null for the meshes' own. */
@@ -126,6 +130,12 @@ export class ModelView {
   showCues(visible: boolean, selected: number): void {
     this.cues.object.visible = visible && this.cueMarks.length > 0;
     this.cues.emphasize(this.cueOf.indexOf(selected));
+    this.invalidate();
+  }
+
+  showHandles(visible: boolean, held: number): void {
+    this.handles.object.visible = visible && (this.model.meta.handles?.length ?? 0) > 0;
+    this.handles.emphasize(held);
     this.invalidate();
   }
 
