@@ -82,7 +82,6 @@ export class App {
     this.context = context;
     const {marks, cueOf} = cueMarks(context);
     view.setCueMarks(marks, cueOf);
-    view.setEdges(false);
 
     const help = this.help = new Help(model.live, model.accelerated);
     document.body.append(help.element);

@@ -161,7 +161,7 @@ function describe({model, session}: Context, {name, kind, controls}: HandleInfo)
   const told = controls.map((control) => {
     const info = model.meta.controls?.find((one) => one.name === control);
     const value = session!.moved[control] ?? session!.values.value[control] ?? info?.value;
-    return `${info?.label ?? control} ${value === null || value === undefined ? '-' : number(value)}${info?.unit ? ` ${info.unit}` : ''}`;
+    return `${info?.label ?? control} ${value === null || value === undefined ? '-' : number(value)}${info?.unit ? (info.unit === '°' ? '°' : ` ${info.unit}`) : ''}`;
   });
   return `${kind === 'turn' ? 'Turn' : 'Move'} ${name}: ${told.join(', ')}`;
 }

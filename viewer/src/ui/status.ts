@@ -15,7 +15,8 @@ export function makeStatus(context: Context): HTMLElement | null {
     verdict.hidden = !known.verdict;
     verdict.textContent = known.verdict ?? '';
     verdict.dataset.verdict = known.verdict ?? '';
-    reason.textContent = known.problem ?? known.reason ?? '';
+    // of a hit the reason is that word again
+    reason.textContent = known.problem ?? (known.reason === known.verdict ? '' : known.reason) ?? '';
     reason.classList.toggle('bad', known.problem !== null);
     const parts: string[] = [];
     most.hidden = known.max_error === null;

@@ -44,14 +44,13 @@ export function makeToolbar(context: Context): HTMLElement {
     }));
     group.append(handles);
   }
-  if (view.hasEdges) {
-    const edges = button('Edges', () => store.set({showEdges: !store.now.showEdges}), {title: 'Edges (E)', pressed: false});
-    scope.add(store.on(['showEdges'], ({showEdges}) => {
-      setPressed(edges, showEdges);
-      view.setEdges(showEdges);
-    }));
-    group.append(edges);
-  }
+  const edges = button('Edges', () => store.set({showEdges: !store.now.showEdges}),
+    {title: view.edgesAreModelled ? 'Edges (E)' : 'Edges of the triangles that the file has (E)', pressed: false});
+  scope.add(store.on(['showEdges'], ({showEdges}) => {
+    setPressed(edges, showEdges);
+    view.setEdges(showEdges);
+  }));
+  group.append(edges);
   group.append(button('Fit', () => viewport.fit(), {title: 'All of it (F)'}));
   bar.append(group);
   return bar;

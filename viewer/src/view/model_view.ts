@@ -2,6 +2,7 @@
 import {Group, Vector3, type DataTexture, type WebGLRenderer} from 'three';
 import type {Model} from '../data/model';
 import {gridOf, texture} from '../gpu/layout';
+import {edgesOf} from '../gpu/edges';
 import {Marks, type Mark} from '../gpu/marks';
 import {Normals} from '../gpu/normals';
 import {Positions, type Side} from '../gpu/positions';
@@ -53,7 +54,6 @@ export class ModelView {
       const triangles = this.own(indexed(mesh.triangles));
       this.solid.add(this.made(surface(triangles, mesh, this.shown, false)));
       this.ghost.add(this.made(surface(triangles, mesh, this.other, true)));
-      if (mesh.edges) this.edges.add(this.made(edgeLines(this.own(indexed(mesh.edges)), this.shown)));
     }
     this.cues = this.own(new Marks(this.shown, [1, 0.78, 0.2]));
     this.picked = this.own(new Marks(this.shown, [0.3, 0.85, 1]));
@@ -72,8 +72,9 @@ export class ModelView {
     return object;
   }
 
-  get hasEdges(): boolean {
-    return this.edges.children.length > 0;
+  /** Whether edges are those that were modelled; else they are those of triangles. */
+  get edgesAreModelled(): boolean {
+    return this.model.meshes.every((mesh) => mesh.edges);
   }
 
   /** The side whose surface is solid. */
@@ -116,6 +117,12 @@ export class ModelView {
   }
 
   setEdges(visible: boolean): void {
+    if (visible && !this.edges.children.length) {  // not before somebody wants to see them
+      for (const mesh of this.model.meshes) {
+        const lines = this.own(indexed(mesh.edges ?? edgesOf(mesh.triangles, this.model.points)));
+        this.edges.add(this.made(edgeLines(lines, mesh, this.shown)));
+      }
+    }
     this.edges.visible = visible;
     this.invalidate();
   }
