@@ -101,7 +101,7 @@ Status LiveRig::PutGraph() {
            {}, {}, &page_);
   const Result<std::vector<CueMark>> cues = MarkCues(playing.rig(), playing.applied(), full_points_);
   if (!cues.ok()) return cues.status();
-  PutCues(*cues, &page_);
+  PutCues(*cues, {}, &page_);
   return Status();
 }
 

@@ -14,6 +14,18 @@ namespace {
 
 using Json = nlohmann::json;
 
+// "of it: cues" of the bench's table, milliseconds.
+double CuesOfBench(const Json& tables) {
+  for (const Json& table : tables) {
+    if (table["title"] != "Bench") continue;
+    for (const Json& row : table["rows"]) {
+      if (row[0] == "of it: cues") return row[2].get<double>();
+    }
+  }
+  ADD_FAILURE() << "no table tells of cues";
+  return 0;
+}
+
 // At this one some frames of "wave" hit, some miss, and a few are blends.
 constexpr char kPageTolerance[] = "0.12mm";
 
@@ -154,11 +166,16 @@ TEST_F(PageReport, TellsOfTheRig) {
   EXPECT_FALSE(nodes["mush"]["inputs"].empty());
   ASSERT_FALSE(meta["cues"].empty());
   const std::vector<float> rest = page.Floats(meta["rest"]);
+  double cost = 0;
   for (const Json& cue : meta["cues"]) {
+    EXPECT_GT(cue["cost_us"].get<double>(), 0) << cue.dump();
+    cost += cue["cost_us"].get<double>();
     if (cue["kind"] != "point") continue;
     const std::size_t vertex = cue["vertex"];
     EXPECT_NEAR(cue["position"][1].get<double>(), rest[3 * vertex + 1], 1e-5);
   }
+  const double measured = CuesOfBench(meta["tables"]);
+  EXPECT_NEAR(cost / 1e3, measured, 2e-3 * measured);
   std::set<std::string> titles;
   for (const Json& table : meta["tables"]) {
     titles.insert(table["title"]);

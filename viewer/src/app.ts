@@ -22,6 +22,7 @@ import {listenToPointer} from './ui/pointer';
 import {ProblemList} from './ui/problems';
 import {makeSplitter} from './ui/splitter';
 import {makeStatus} from './ui/status';
+import {makeSummary} from './ui/summary_panel';
 import {makeTables} from './ui/tables_panel';
 import {Tabs, type Panel} from './ui/tabs';
 import {makeTimeline} from './ui/timeline';
@@ -88,7 +89,7 @@ export class App {
     makeHeader(this.header, context, help);
     this.overlay.replaceChildren(makeToolbar(context), makeLegend(context));
     this.under.replaceChildren(...[makeTimeline(context), makeStatus(context)].filter((part) => part !== null));
-    this.layPanels(context, open ?? (session ? 'controls' : 'plots'));
+    this.layPanels(context, open ?? (session ? 'controls' : model.accelerated ? 'summary' : 'plots'));
     listenToKeys(context, help);
     listenToHandles(context, this.stage);
     listenToPointer(context, this.stage);
@@ -118,7 +119,7 @@ export class App {
 
   private layPanels(context: Context, first: string): void {
     const found: [string, string, HTMLElement | null][] = [
-      ['controls', 'Controls', makeControls(context)], ['plots', 'Plots', makePlots(context)], ['graph', 'Graph', makeGraph(context)],
+      ['summary', 'Summary', makeSummary(context)], ['controls', 'Controls', makeControls(context)], ['plots', 'Plots', makePlots(context)], ['graph', 'Graph', makeGraph(context)],
       ['cues', 'Cues', makeCues(context)], ['tables', 'Tables', makeTables(context)], ['vertex', 'Vertex', makeVertex(context)],
     ];
     const panels = found.flatMap(([id, label, element]): Panel[] => element ? [{id, label, element}] : []);

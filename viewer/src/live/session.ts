@@ -13,6 +13,8 @@ export class Session {
   /** Something was moved or released. */
   readonly touched = new Signal<number>(0);
   readonly loopMs = new Signal<number | null>(null);
+  /** Of the latest answer: until it was here, what the page's own work took, and until the picture was drawn; milliseconds. */
+  readonly parts = {answer: 0, page: 0, picture: 0};
   /** x y z of each handle, as they were evaluated last. */
   readonly places = new Signal<readonly (number | null)[]>([]);
   /** Whether both sides are asked for, so that the error is known. */
@@ -90,12 +92,14 @@ export class Session {
       const {drag, drags} = this;
       this.drag = null;
       const set = this.moved, info = clip >= 0 ? this.model.meta.clips![clip] : null;
+      const sent = performance.now();
       try {
         const answer = await this.client.evaluate({
           id: ++this.id, set, clip: info?.name ?? null, time: info ? info.begin + frame / info.fps : 0, mode: this.mode(),
           ...this.model.meta.handles?.length && showHandles ? {handles: true} : {}, ...drag ? {drag} : {},
         }, this.model.points);
         if (this.ended) break;
+        this.parts.answer = performance.now() - sent;
         const {dragged} = answer.facts;
         if (dragged && drags === this.drags) {
           this.moved = {...this.moved, ...dragged};
@@ -116,6 +120,7 @@ export class Session {
 
   private async show({facts, accelerated, full}: EvaluateAnswer, clip: number, frame: number, ofClip: boolean): Promise<void> {
     if (facts.generation !== undefined && facts.generation !== (this.model.meta.generation ?? facts.generation)) return;
+    const begin = performance.now();
     if (accelerated || full) this.viewport.view?.positions.setSent(accelerated, full);
     const known: Facts = {
       ...noFacts, verdict: facts.verdict ?? null, reason: facts.reason || null, score: facts.score ?? null, full_us: facts.full_us ?? null,
@@ -126,7 +131,10 @@ export class Session {
     if (facts.values) this.values.set(facts.values);
     if (facts.handles) this.places.set(facts.handles);
     this.viewport.draw();
+    const drawn = performance.now();
+    this.parts.page = drawn - begin;
     await finished(this.viewport.renderer.getContext() as WebGL2RenderingContext);
+    this.parts.picture = performance.now() - drawn;
     ++this.answered;
     if (this.asked) this.loopMs.set(performance.now() - this.asked);
   }
