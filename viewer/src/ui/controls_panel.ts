@@ -91,7 +91,7 @@ function sliderRow(context: Context, info: ControlInfo): Row {
   };
   const reset = (event: Event): void => session.release([info.name], event.timeStamp);
   const slider = h('input', {
-    attributes: {type: 'range', min, max, step: whole ? 1 : 'any', 'aria-label': info.label ?? info.name, title: `${title(info)}; double click or Delete for the default`},
+    attributes: {type: 'range', min, max, step: whole ? 1 : 'any', 'aria-label': info.name, title: `${title(info)}; double click or Delete for the default`},
     on: {input: (event) => set(Number(slider.value), event), dblclick: reset},
   });
   // step "any" makes arrow keys useless in some browsers: a hundredth of the range instead
@@ -107,7 +107,7 @@ function sliderRow(context: Context, info: ControlInfo): Row {
     set(Math.min(max, Math.max(min, Number(slider.value) + by * (max - min) / (event.shiftKey ? 10 : 100))), event);
   });
   const field = h('input', {
-    class: 'value', attributes: {type: 'number', step: whole ? 1 : 'any', 'aria-label': `${info.label ?? info.name}, value`},
+    class: 'value', attributes: {type: 'number', step: whole ? 1 : 'any', 'aria-label': `${info.name}, value`},
     on: {change: (event) => set(Number(field.value), event)},
   });
   const element = h('div', {class: 'control'},

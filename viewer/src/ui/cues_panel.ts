@@ -24,6 +24,8 @@ export function describeCue({model}: Context, index: number): string {
     .filter(Boolean).join(', ');
 }
 
+const plurals: Record<string, string> = {point: 'points', matrix: 'matrices', scalar: 'scalars', product: 'products'};
+
 export function makeCues(context: Context): HTMLElement | null {
   const {model, store, scope} = context, cues = model.meta.cues ?? [];
   if (!cues.length) return null;
@@ -43,6 +45,6 @@ export function makeCues(context: Context): HTMLElement | null {
   const costs = cues.flatMap((cue) => cue.cost_us === null || cue.cost_us === undefined ? [] : [cue.cost_us]);
   const cost = costs.length ? ` That takes ${duration(costs.reduce((sum, us) => sum + us, 0))} of a frame. What cues share of it is split between them; the joints and drivers that move them run in any case.` : '';
   return h('div', {class: 'cues'},
-    h('p', {class: 'note'}, `${cues.length} values are measured on every frame: ${[...count].map(([kind, n]) => `${n} ${kind}`).join(', ')}.${cost}`),
+    h('p', {class: 'note'}, `${cues.length === 1 ? 'One cue is' : `${cues.length} cues are`} measured in every frame: ${[...count].map(([kind, n]) => `${n} ${n === 1 ? kind : plurals[kind] ?? kind}`).join(', ')}.${cost}`),
     details, table.element);
 }

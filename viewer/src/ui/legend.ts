@@ -26,7 +26,7 @@ export function makeLegend(context: Context): HTMLElement {
     factor.value = String(errorTop);
     if (errors) {
       const tolerance = model.tolerance;
-      title.textContent = 'Full against accelerated';
+      title.textContent = 'Difference of both';
       bar.style.background = gradient(errorColour, errorTop / base);
       low.textContent = '0';
       high.textContent = length(errorTop, model);

@@ -21,7 +21,7 @@ function howFast({model}: Context): HTMLElement | null {
   const figures = model.meta.summary ?? [];
   if (!figures.length) return null;
   return section('In short', h('dl', {class: 'figures'}, ...figures.flatMap(({label, value, note}) =>
-    [h('dt', {}, label), h('dd', {}, h('b', {}, value), note ? ` ${note}` : '')])));
+    [h('dt', {}, label), h('dd', {}, h('b', {}, value), note ? `: ${note.startsWith(`${value}: `) ? note.slice(value.length + 2) : note}` : '')])));
 }
 
 function howFarOff(context: Context): HTMLElement | null {
