@@ -101,43 +101,69 @@ class SomePoints {
   std::size_t meshes_ = 0;
 };
 
-// A point that each of the handle's controls moves at least half as far as it moves any that all of them move, near the
-// middle of what they move; of those as near, one farther out. None where nothing moves.
-std::optional<Double3> PointToHold(const std::vector<Double3>& points,
-                                   const std::vector<std::vector<double>>& by_control) {
-  std::vector<double> together(points.size(), 0);  // metres
-  std::vector<double> least(points.size(), 1);     // of what each control moves at most
-  bool any = false;
+// What the controls of a handle that turns do to the points.
+struct Reach {
+  std::vector<double> together;  // how far all of them move each point, metres
+  std::vector<double> least;  // of what each of them moves at most, the share of the one that moves it least
+  double sum = 0;             // of `together`
+  Double3 middle;             // of what they move
+};
+
+Reach ReachOf(const std::vector<Double3>& points, const std::vector<std::vector<double>>& by_control) {
+  Reach reach{std::vector<double>(points.size(), 0), std::vector<double>(points.size(), 1), 0, {}};
   for (const std::vector<double>& moved : by_control) {
     const double most = moved.empty() ? 0 : *std::ranges::max_element(moved);
     if (most <= 0) continue;
-    any = true;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      together[i] += moved[i];
-      least[i] = std::min(least[i], moved[i] / most);
+      reach.together[i] += moved[i];
+      reach.least[i] = std::min(reach.least[i], moved[i] / most);
+      reach.middle = reach.middle + moved[i] * points[i];
+      reach.sum += moved[i];
     }
   }
-  if (!any) return std::nullopt;
-  Double3 middle, middle_of_all;
-  double sum = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    middle = middle + together[i] * points[i];
-    middle_of_all = middle_of_all + points[i];
-    sum += together[i];
-  }
-  middle = middle * (1 / sum);
-  middle_of_all = middle_of_all * (1 / static_cast<double>(points.size()));
-  constexpr double kEnough = 0.5, kOutwards = 0.3;
-  const double enough = kEnough * *std::ranges::max_element(least);
-  std::optional<Double3> best;
-  double best_score = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (least[i] < enough || together[i] <= 0) continue;
-    const double score = Length(points[i] - middle) - kOutwards * Length(points[i] - middle_of_all);
-    if (score < best_score) best_score = score, best = points[i];
-  }
-  return best;
+  if (reach.sum > 0) reach.middle = reach.middle * (1 / reach.sum);
+  return reach;
 }
+
+// Chooses points to hold, apart from each other.
+class Chooser {
+ public:
+  explicit Chooser(const std::vector<Double3>& points) : points_(points) {
+    Double3 low = points.empty() ? Double3() : points.front(), high = low;
+    for (const Double3& p : points) {
+      middle_ = middle_ + p * (1 / static_cast<double>(points.size()));
+      for (int axis = 0; axis < 3; ++axis)
+        low[axis] = std::min(low[axis], p[axis]), high[axis] = std::max(high[axis], p[axis]);
+    }
+    apart_ = Length(high - low) / 16;
+  }
+  void Take(Double3 place) { taken_.push_back(place); }
+
+  // Each control moves it at least half as far as it moves what all of them move most. Of these the nearest to the middle
+  // of what they move, and a little to the outside and to the node itself. None where nothing moves.
+  std::optional<Double3> Choose(const Reach& reach, Double3 node) {
+    constexpr double kEnough = 0.5, kOutwards = 0.3, kToNode = 0.25, kCrowd = 8;
+    if (!(reach.sum > 0)) return std::nullopt;
+    const double enough = kEnough * *std::ranges::max_element(reach.least);
+    std::optional<Double3> best;
+    double best_score = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (reach.least[i] < enough || reach.together[i] <= 0) continue;
+      const Double3 p = points_[i];
+      double score = Length(p - reach.middle) - kOutwards * Length(p - middle_) + kToNode * Length(p - node);
+      for (const Double3& other : taken_) score += kCrowd * std::max(0.0, apart_ - Length(p - other));
+      if (score < best_score) best_score = score, best = p;
+    }
+    if (best.has_value()) Take(*best);
+    return best;
+  }
+
+ private:
+  const std::vector<Double3>& points_;
+  Double3 middle_;
+  double apart_ = 0;
+  std::vector<Double3> taken_;
+};
 
 }  // namespace
 
@@ -152,24 +178,38 @@ Result<std::vector<Handle>> FindHandles(const Rig& rest) {
   const std::vector<Double3> still = some.Read();
   std::vector<Matrix4> matrices;
   for (std::size_t h = 0; h < handles.size(); ++h) matrices.push_back(some.MatrixOf(h));
-  std::vector<Handle> placed;
+  std::vector<Reach> reaches(handles.size());
+  std::vector<std::size_t> order;  // of those that turn
+  Chooser chooser(still);
   for (std::size_t h = 0; h < handles.size(); ++h) {
-    Handle& handle = handles[h];
-    if (handle.turns) {
-      std::vector<std::vector<double>> by_control;
-      for (const std::size_t c : handle.controls) {
-        Result<std::vector<double>> moved = some.Moved(rest.controls[c], still);
-        if (!moved.ok()) return moved.status();
-        by_control.push_back(std::move(*moved));
-      }
-      const std::optional<Double3> held = PointToHold(still, by_control);
-      Matrix4 inverse;
-      if (!held.has_value() || !Invert(matrices[h], &inverse)) continue;
-      handle.anchor = TransformPoint(inverse, *held);
+    if (!handles[h].turns) {
+      chooser.Take(TransformPoint(matrices[h], {}));
+      continue;
     }
-    placed.push_back(std::move(handle));
+    std::vector<std::vector<double>> by_control;
+    for (const std::size_t c : handles[h].controls) {
+      Result<std::vector<double>> moved = some.Moved(rest.controls[c], still);
+      if (!moved.ok()) return moved.status();
+      by_control.push_back(std::move(*moved));
+    }
+    reaches[h] = ReachOf(still, by_control);
+    order.push_back(h);
   }
-  return placed;
+  // What moves little has the fewest places
+  std::ranges::stable_sort(order, {}, [&](std::size_t h) { return reaches[h].sum; });
+  std::vector<char> placed(handles.size(), 0);
+  for (const std::size_t h : order) {
+    const std::optional<Double3> held = chooser.Choose(reaches[h], TransformPoint(matrices[h], {}));
+    Matrix4 inverse;
+    if (!held.has_value() || !Invert(matrices[h], &inverse)) continue;
+    handles[h].anchor = TransformPoint(inverse, *held);
+    placed[h] = 1;
+  }
+  std::vector<Handle> shown;
+  for (std::size_t h = 0; h < handles.size(); ++h) {
+    if (!handles[h].turns || placed[h]) shown.push_back(std::move(handles[h]));
+  }
+  return shown;
 }
 
 }  // namespace kpsa::engine

@@ -85,6 +85,17 @@ TEST(LiveHandles, AreWhatARigLetsOneTurnAndMove) {
   EXPECT_LT(nearest, 1e-6);
 }
 
+// Two nodes that move nearly the same have handles that can be told apart.
+TEST(LiveHandles, StandApart) {
+  const auto live = HelloWith("controls:\n",
+                              "controls:\n  lower.rotateX: {min: -3, max: 3}\n"
+                              "  lower.rotateZ: {min: -3, max: 3}\n");
+  const Json handles = live->Get("/meta.json").json()["handles"];
+  ASSERT_EQ(handles.size(), 2u);
+  EXPECT_EQ(handles[0]["name"], "lower");
+  EXPECT_GT(Length(Vector(handles[0]["position"]) - Vector(handles[1]["position"])), 0.02);
+}
+
 TEST(LiveHandles, AreNotThereWithoutControlsThatHaveAPlace) {
   const auto live =
       HelloWith("controls:\n  upper.rotateX: {min: -30, max: 30}\n  upper.rotateZ: {min: -75, max: 30}\n",

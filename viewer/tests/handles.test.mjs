@@ -152,4 +152,20 @@ test('H hides handles: nothing is held then, and nothing is asked of them', asyn
   await page.keyboard.press('f');
 });
 
+test('a finger drags, and need not be as exact', async () => {
+  const phone = await startBrowser({width: 390, height: 844, touch: true});
+  try {
+    const {page: small} = await phone.open(server.url), cdp = await small.context().newCDPSession(small);
+    const at = await small.evaluate(() => window.kpsa.projectHandle(0)), touch = (type, x, y) => cdp.send('Input.dispatchTouchEvent', {type, touchPoints: type === 'touchEnd' ? [] : [{x, y}]});
+    await touch('touchStart', at.x + 14, at.y);
+    for (let i = 1; i <= 5; ++i) await touch('touchMove', at.x + 14, at.y - 8 * i);
+    await touch('touchEnd');
+    await settled(small);
+    const now = await small.evaluate(() => window.kpsa.projectHandle(0));
+    assert.ok(Math.abs(now.y - (at.y - 40)) < 1.5, `${now.y} of ${at.y - 40}`);
+  } finally {
+    await phone.stop();
+  }
+});
+
 test('nothing was complained of', () => assert.deepEqual(complaints, []));
