@@ -135,7 +135,7 @@ class Chooser {
       for (int axis = 0; axis < 3; ++axis)
         low[axis] = std::min(low[axis], p[axis]), high[axis] = std::max(high[axis], p[axis]);
     }
-    apart_ = Length(high - low) / 16;
+    apart_ = Length(high - low) / 30;
   }
   void Take(Double3 place) { taken_.push_back(place); }
 

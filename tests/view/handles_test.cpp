@@ -93,7 +93,7 @@ TEST(LiveHandles, StandApart) {
   const Json handles = live->Get("/meta.json").json()["handles"];
   ASSERT_EQ(handles.size(), 2u);
   EXPECT_EQ(handles[0]["name"], "lower");
-  EXPECT_GT(Length(Vector(handles[0]["position"]) - Vector(handles[1]["position"])), 0.02);
+  EXPECT_GT(Length(Vector(handles[0]["position"]) - Vector(handles[1]["position"])), 0.01);
 }
 
 TEST(LiveHandles, AreNotThereWithoutControlsThatHaveAPlace) {

@@ -40,27 +40,29 @@ uniform sampler2D errorColours, fieldColours;
 uniform vec3 base;
 uniform float errorTop, alpha;
 uniform int paint;  // 0 its own colour, 1 errors, 2 a field
-vec3 shaded() {
+vec3 painted() {
+  if (paint == 1) return texture(errorColours, vec2(clamp(error / errorTop, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
+  if (paint == 2) return texture(fieldColours, vec2(clamp(weight, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
+  return base;
+}
+vec3 shaded(vec3 c) {
   vec3 n = normalize(gl_FrontFacing ? normal : -normal);
   float key = max(dot(n, vec3(0.32, 0.48, 0.816)), 0.0);
   float fill = max(dot(n, vec3(-0.6, 0.1, 0.79)), 0.0);
   float light = 0.26 + 0.66 * key + 0.16 * fill + 0.08 * n.y;
-  vec3 c = base;
-  if (paint == 1) c = texture(errorColours, vec2(clamp(error / errorTop, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
-  if (paint == 2) c = texture(fieldColours, vec2(clamp(weight, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
   if (paint != 0) light = 0.45 + 0.6 * light;
   return min(c * light, 1.0);
 }
 `;
 
 const fragment = lit + `
-void main() { colour = vec4(shaded(), alpha); }`;
+void main() { colour = vec4(shaded(painted()), alpha); }`;
 
-// Darker than the surface where that is light, lighter where it is dark; and no darker where two lines lie on each other (seams).
+// Darker than what is light, lighter than what is dark, whatever light falls on it; no darker where two lines lie on each other (seams).
 const lineFragment = lit + `
 void main() {
-  vec3 c = shaded();
-  colour = vec4(dot(c, vec3(0.2126, 0.7152, 0.0722)) > 0.3 ? c * 0.45 : mix(c, vec3(1.0), 0.4), 1.0);
+  vec3 own = painted(), c = shaded(own);
+  colour = vec4(dot(own, vec3(0.2126, 0.7152, 0.0722)) > 0.3 ? c * 0.45 : mix(c, vec3(1.0), 0.35), 1.0);
 }`;
 
 export interface SurfaceUniforms {
