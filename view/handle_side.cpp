@@ -38,10 +38,17 @@ Result<std::vector<Double3>> HandleSide::Places(const LivePose& pose) {
   return places;
 }
 
+LiveSide& HandleSide::SideOf(std::size_t handle) {
+  if (dragged_ == nullptr || dragged_handle_ != handle)
+    dragged_ = std::make_unique<LiveSide>(rest_, std::vector<PlugRef>{handles_[handle].matrix});
+  dragged_handle_ = handle;
+  return *dragged_;
+}
+
 // Where the handle's controls are, in runtime units and within their ranges.
 Result<std::vector<double>> HandleSide::NumbersOf(const Handle& handle, const LivePose& pose) {
-  KPSA_RETURN_IF_ERROR(side_->Evaluate(pose));
-  const auto values = side_->Values();  // of the clip
+  KPSA_RETURN_IF_ERROR(dragged_->Evaluate(pose));
+  const auto values = dragged_->Values();  // of the clip
   if (!values.ok()) return values.status();
   std::vector<double> numbers;
   for (const std::size_t c : handle.controls) {
@@ -64,10 +71,11 @@ Result<std::vector<std::pair<std::string, double>>> HandleSide::DragTo(const Dra
   if (!std::isfinite(Length(drag.line.from)) || !std::isfinite(length) || !(length > 0))
     return Status::Usage("drag: expected a place and a direction that is not 0");
   const Handle& handle = handles_[drag.handle];
+  LiveSide& side = SideOf(drag.handle);
   const Result<std::vector<double>> start = NumbersOf(handle, *pose);
   if (!start.ok()) return start.status();
   // It would be run up to anew for every number that is tried
-  if (const std::string& node = side_->plan().stateful_node(); !node.empty())
+  if (const std::string& node = side.plan().stateful_node(); !node.empty())
     return Status::Usage("drag: where {} is depends on {}, which remembers the frames before", handle.name,
                          node);
   std::vector<Range> ranges;
@@ -80,8 +88,8 @@ Result<std::vector<std::pair<std::string, double>>> HandleSide::DragTo(const Dra
   const std::vector<double> numbers = BringToLine(
       [&](const std::vector<double>& tried) -> std::optional<Double3> {
         put(tried);
-        if (!side_->Evaluate(*pose).ok()) return std::nullopt;
-        const Double3 place = TransformPoint(side_->MatrixOf(drag.handle), handle.anchor);
+        if (!side.Evaluate(*pose).ok()) return std::nullopt;
+        const Double3 place = TransformPoint(side.MatrixOf(0), handle.anchor);
         return std::isfinite(Length(place)) ? std::optional(place) : std::nullopt;
       },
       ranges, *start, drag.line);

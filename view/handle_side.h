@@ -37,10 +37,13 @@ class HandleSide {
  private:
   explicit HandleSide(const Rig& rest) : rest_(rest) {}
   Result<std::vector<double>> NumbersOf(const Handle& handle, const LivePose& pose);
+  LiveSide& SideOf(std::size_t handle);
 
   const Rig& rest_;
   std::vector<Handle> handles_;
-  std::unique_ptr<LiveSide> side_;  // none without handles
+  std::unique_ptr<LiveSide> side_;     // of all of them; none without handles
+  std::unique_ptr<LiveSide> dragged_;  // of the one that was dragged last, alone
+  std::size_t dragged_handle_ = 0;
 };
 
 }  // namespace kpsa::engine

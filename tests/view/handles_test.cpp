@@ -176,6 +176,32 @@ TEST(LiveHandles, AreDraggedOverAClip) {
   EXPECT_NE(dragged.parts, played.parts);
 }
 
+// A pin on a surface that wobbles: what it would take to drag it is all frames before, for every value that is tried.
+TEST(LiveHandles, AreNotDraggedWhereTheyRememberOtherFrames) {
+  const std::string scenes = KPSA_SCENES_DIR "/hello/";
+  std::string yaml = TemporaryFolder::Read(scenes + "hello.yaml");
+  yaml.replace(yaml.find("  mush:"), 0,
+               "  wobble: {type: jiggle, stiffness: 0.3, damping: 0.2}\n"
+               "  pins: {type: uvPin, driver: column, face: [900]}\n"
+               "  ball: {type: transform, offsetParentMatrix: \"pins.outputMatrix[0]\"}\n");
+  yaml.replace(yaml.find("cage, mush]"), 11, "cage, wobble, mush]");
+  yaml.replace(yaml.find("controls:\n") + 10, 0, "  ball.translateX: {min: -5, max: 5}\n");
+  LiveServer live(yaml, "hello.glb", TemporaryFolder::Read(scenes + "hello.glb"));
+  const Json handles = live.Get("/meta.json").json()["handles"];
+  ASSERT_EQ(handles.size(), 2u) << handles.dump();
+  EXPECT_EQ(handles[0]["name"], "ball");
+  const auto drag = [&](std::size_t handle) {
+    Json request = Asking(Json::object());
+    request["drag"] = {{"handle", handle}, {"from", {0.1, 0.2, 1}}, {"along", {0, 0, -1}}};
+    return live.Post("/evaluate", request.dump());
+  };
+  const WebAnswer refused = drag(0);
+  EXPECT_EQ(refused.status, 400);
+  EXPECT_NE(refused.body.find("where ball is depends on wobble"), std::string::npos) << refused.body;
+  EXPECT_EQ(drag(1).status, 200) << "the joint does not depend on it";
+  EXPECT_EQ(drag(0).status, 400);
+}
+
 TEST(LiveHandles, RefuseWhatIsNoDrag) {
   const auto live = LiveServer::Hello();
   const auto problem = [&](const Json& drag) {
