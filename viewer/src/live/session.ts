@@ -4,6 +4,7 @@ import {noFacts, Signal, type Facts, type Series} from '../facts';
 import type {Store} from '../state';
 import type {Viewport} from '../view/viewport';
 import type {Client, DragRequest, EvaluateAnswer, EvaluateMode, Values} from './client';
+import {History} from './history';
 
 export class Session {
   /** What the user has moved; everything else is as in the clip or as the rig sets it. */
@@ -26,7 +27,8 @@ export class Session {
   private asked = 0;      // when the oldest change was made that is not drawn yet
   private waiting = 0;
   private ended = false;
-  private drag: DragRequest | null = null;
+  readonly history = new History();
+  private drag: {to: DragRequest; gesture: string} | null = null;
   private drags = 0;  // a later set, release or cancel wins over the answer to a drag
 
   constructor(
@@ -34,14 +36,32 @@ export class Session {
     private readonly facts: Signal<Facts>, private readonly series: readonly Series[], private readonly tell: (text: string) => void,
   ) {}
 
-  /** Brings a handle to the pointer. */
-  dragTo(drag: DragRequest, at = performance.now()): void {
-    this.drag = drag;
+  /** Brings a handle to the pointer; all of one gesture are one step to undo. */
+  dragTo(to: DragRequest, gesture: string, at = performance.now()): void {
+    this.drag = {to, gesture};
     this.changed(at);
   }
 
-  /** All that was moved before. */
-  restore(moved: Values, at = performance.now()): void {
+  /** As if the gesture had not been. */
+  takeBack(gesture: string, before: Values): void {
+    this.history.drop(gesture);
+    this.restore(before);
+  }
+
+  undo(): boolean {
+    return this.goTo(this.history.undo(this.moved));
+  }
+
+  redo(): boolean {
+    return this.goTo(this.history.redo(this.moved));
+  }
+
+  private goTo(moved: Values | null): boolean {
+    if (moved) this.restore(moved);
+    return moved !== null;
+  }
+
+  private restore(moved: Values, at = performance.now()): void {
     this.drag = null;
     ++this.drags;
     this.moved = moved;
@@ -50,12 +70,15 @@ export class Session {
   }
 
   set(values: Values, at = performance.now()): void {
+    this.history.note(this.moved, Object.keys(values).join(), at, false);
     this.restore({...this.moved, ...values}, at);
   }
 
   release(names: readonly string[], at = performance.now()): void {
     const rest = {...this.moved};
     for (const name of names) delete rest[name];
+    if (Object.keys(rest).length === Object.keys(this.moved).length) return;
+    this.history.note(this.moved, 'release ' + names.join(), at, false);
     this.restore(rest, at);
   }
 
@@ -96,12 +119,13 @@ export class Session {
       try {
         const answer = await this.client.evaluate({
           id: ++this.id, set, clip: info?.name ?? null, time: info ? info.begin + frame / info.fps : 0, mode: this.mode(),
-          ...this.model.meta.handles?.length && showHandles ? {handles: true} : {}, ...drag ? {drag} : {},
+          ...this.model.meta.handles?.length && showHandles ? {handles: true} : {}, ...drag ? {drag: drag.to} : {},
         }, this.model.points);
         if (this.ended) break;
         this.parts.answer = performance.now() - sent;
         const {dragged} = answer.facts;
-        if (dragged && drags === this.drags) {
+        if (dragged && drag && drags === this.drags) {
+          this.history.note(this.moved, drag.gesture, performance.now(), true);
           this.moved = {...this.moved, ...dragged};
           this.touched.set(this.touched.value + 1);
         }

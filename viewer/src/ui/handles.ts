@@ -15,6 +15,7 @@ interface Held {
   aside: {x: number; y: number};
   began: {x: number; y: number};
   before: Values;
+  gesture: string;
   dragged: boolean;
 }
 
@@ -25,7 +26,7 @@ export function listenToHandles(context: Context, stage: HTMLElement): void {
   if (!session || !handles.length) return;
   const hint = h('div', {class: 'hint', attributes: {hidden: true}});
   stage.append(hint);
-  let held: Held | null = null, hovered = -1, pointerAt = {x: 0, y: 0};
+  let held: Held | null = null, hovered = -1, gestures = 0, pointerAt = {x: 0, y: 0};
 
   const pixelsOf = (handle: number): {x: number; y: number} | null =>
     toPixels(new Vector3(...view.handles.offsetOf(handle)), camera, canvas.clientWidth, canvas.clientHeight);
@@ -76,7 +77,7 @@ export function listenToHandles(context: Context, stage: HTMLElement): void {
     event.preventDefault();
     canvas.focus({preventScroll: true});
     canvas.setPointerCapture(event.pointerId);
-    held = {handle, pointer: event.pointerId, aside: {x: place.x - at.x, y: place.y - at.y}, began: at, before: session.moved, dragged: false};
+    held = {handle, pointer: event.pointerId, aside: {x: place.x - at.x, y: place.y - at.y}, began: at, before: session.moved, gesture: `drag ${++gestures}`, dragged: false};
     pointerAt = at;
     store.set({handle});
     show();
@@ -100,7 +101,7 @@ export function listenToHandles(context: Context, stage: HTMLElement): void {
     const from = new Vector3().setFromMatrixPosition(camera.matrixWorld);
     const x = (at.x + held.aside.x) / canvas.clientWidth * 2 - 1, y = 1 - (at.y + held.aside.y) / canvas.clientHeight * 2;
     const along = new Vector3(x, y, 0.5).unproject(camera).sub(from).normalize();
-    session.dragTo({handle: held.handle, from: from.toArray(), along: along.toArray()}, event.timeStamp);
+    session.dragTo({handle: held.handle, from: from.toArray(), along: along.toArray()}, held.gesture, event.timeStamp);
     show();
   };
 
@@ -124,7 +125,7 @@ export function listenToHandles(context: Context, stage: HTMLElement): void {
     if (!held || event.key !== 'Escape') return;
     event.stopPropagation();
     event.preventDefault();
-    session.restore(held.before, event.timeStamp);
+    session.takeBack(held.gesture, held.before);
     letGo();
   };
 

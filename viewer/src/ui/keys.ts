@@ -15,12 +15,18 @@ function typing(target: EventTarget | null, key: string): boolean {
   return key === ' ' && target.closest('button, a') !== null;
 }
 
-export function listenToKeys({store, model, viewport, view, scope}: Context, help: Help): void {
+export function listenToKeys({store, model, viewport, view, scope, session, tell}: Context, help: Help): void {
   const clips = model.meta.clips?.length ?? 0, turn = Math.PI / 24;
   const press = (event: KeyboardEvent): void => {
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;  // Caps Lock
     if (typing(event.target, key) || event.altKey || event.metaKey || (help.element.open && key !== '?')) return;
     const {clip} = store.now;
+    if (event.ctrlKey && session && (key === 'z' || key === 'y')) {
+      event.preventDefault();
+      const back = key === 'z' && !event.shiftKey;
+      if (!(back ? session.undo() : session.redo())) tell(back ? 'nothing to undo' : 'nothing to redo');
+      return;
+    }
     if (event.shiftKey && key.startsWith('Arrow')) {
       if (key === 'ArrowLeft' || key === 'ArrowRight') viewport.turn(key === 'ArrowLeft' ? -turn : turn, 0);
       else viewport.turn(0, key === 'ArrowUp' ? turn : -turn);
