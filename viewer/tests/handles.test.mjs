@@ -200,6 +200,7 @@ test('a finger drags, and need not be as exact', async () => {
     await touch('touchEnd');
     // what a finger did may come to the page a picture later
     await small.waitForFunction((y) => Math.abs(window.kpsa.projectHandle(0).y - y) < 1.5, at.y - 40);
+    assert.equal(await small.evaluate(() => scrollY), 0, 'the page stays');
   } finally {
     await phone.stop();
   }

@@ -49,7 +49,9 @@ export function makeControls(context: Context): HTMLElement | null {
     scope.add(store.on(['handle'], ({handle}) => {
       const names = handles[handle]?.controls ?? [];
       const own = rows.filter(({info, element}) => element.classList.toggle('held', names.includes(info.name)));
-      if (own.length && !own.some(({element}) => element.contains(document.activeElement))) own[0].element.scrollIntoView({block: 'nearest'});
+      // where the panel is a part of the page (narrow screens), that would take the picture from under the pointer
+      const scrolls = getComputedStyle(panel).overflowY !== 'visible';
+      if (scrolls && own.length && !own.some(({element}) => element.contains(document.activeElement))) own[0].element.scrollIntoView({block: 'nearest'});
     }));
     scope.add(session.values.on(refresh));
     scope.add(session.touched.on(refresh));
