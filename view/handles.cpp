@@ -16,7 +16,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kMostWork = 400'000;                      // points evaluated to place handles
-constexpr std::size_t kFewestPoints = 64, kMostPoints = 2'000;  // that are looked at
+constexpr std::size_t kFewestPoints = 64, kMostPoints = 800;  // that are looked at
 
 // What is there to drag, without anchors.
 std::vector<Handle> HandlesWithoutPlaces(const Rig& rest) {
