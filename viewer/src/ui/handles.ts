@@ -24,6 +24,8 @@ const near = {mouse: 10, touch: 20}, clickSlack = 3;  // pixels
 export function listenToHandles(context: Context, stage: HTMLElement): void {
   const {store, model, viewport, view, session, scope} = context, {canvas, camera} = viewport, handles = model.meta.handles ?? [];
   if (!session || !handles.length) return;
+  const label = canvas.getAttribute('aria-label') ?? '';
+  canvas.setAttribute('aria-label', `${label} Handles are dragged; the sliders of the panel Controls do the same.`);
   const hint = h('div', {class: 'hint', attributes: {hidden: true}});
   stage.append(hint);
   let held: Held | null = null, hovered = -1, gestures = 0, pointerAt = {x: 0, y: 0};
@@ -147,6 +149,7 @@ export function listenToHandles(context: Context, stage: HTMLElement): void {
     canvas.removeEventListener('pointerleave', leave);
     stage.removeEventListener('dblclick', twice, true);
     document.removeEventListener('keydown', press, true);
+    canvas.setAttribute('aria-label', label);
     stage.classList.remove('over-handle');
     canvas.style.cursor = '';
     hint.remove();
