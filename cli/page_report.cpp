@@ -137,9 +137,9 @@ Result<PageData> Fill(const Rig& rig, Gathered* all, const Watch& watch, std::ve
   if (survey.reaches.empty() && !rig.controls.empty())
     notes->push_back(fmt::format("{}: what each moves is measured of at most {}",
                                  Plural(rig.controls.size(), "control"), kMostReaches));
-  PutCues(survey.cues, &page);
   const std::vector<BenchNode> none;
   const bool accelerated = tables.bench != nullptr;
+  PutCues(survey.cues, accelerated ? tables.bench->cue_us : std::vector<std::vector<double>>(), &page);
   PutNodes(survey.nodes, accelerated, accelerated ? tables.bench->full_nodes : tables.full.nodes,
            accelerated ? tables.bench->accelerated_nodes : none, &page);
   if (!PutFieldBlobs(rig, &page))

@@ -42,17 +42,20 @@ class Marker {
 
   void Add(const AppliedSubspace& one) {
     const RigWithin within = MakeTarget(rig_, one.entry).within;
-    for (const CueDescription& cue : one.subspace->cues) {
+    for (now_.cue = 0; now_.cue < one.subspace->cues.size(); ++now_.cue) {
+      const CueDescription& cue = one.subspace->cues[now_.cue];
       if (cue.kind == CueDescription::Kind::kPoint) {
         AddPoint(one, cue, within);
       } else if (cue.kind == CueDescription::Kind::kProduct) {
-        others_.push_back({CueName(*one.subspace, cue), Kind::kProduct, {}, {}, {}, ProductText(cue)});
+        others_.push_back(
+            {CueName(*one.subspace, cue), Kind::kProduct, {}, {}, {}, ProductText(cue), {now_}});
       } else if (const SignalEntry entry = SplitEntryName(cue.plug); entry.entry.has_value()) {
         AddEntry(within.prefix + entry.signal, *entry.entry);
       } else {
-        others_.push_back({within.prefix + cue.plug, Kind::kScalar, {}, {}, {}, "its value"});
+        others_.push_back({within.prefix + cue.plug, Kind::kScalar, {}, {}, {}, "its value", {now_}});
       }
     }
+    ++now_.subspace;
   }
 
   // After all were added. Matrices are evaluated at rest.
@@ -61,7 +64,7 @@ class Marker {
     Request request;
     std::vector<std::size_t> asked;  // marks, one an output
     for (const std::string& name : order_) {
-      marks.push_back({name, Kind::kMatrix, {}, {}, {}, EntriesText(matrices_[name])});
+      marks.push_back({name, Kind::kMatrix, {}, {}, {}, EntriesText(matrices_[name]), cues_of_[name]});
       const Result<PlugRef> plug = rig_.graph->FindPlug(name);
       if (!plug.ok()) continue;
       const int world = rig_.graph->def(plug->node).FindAttribute("worldMatrix");
@@ -89,7 +92,7 @@ class Marker {
 
  private:
   void AddPoint(const AppliedSubspace& one, const CueDescription& cue, const RigWithin& within) {
-    CueMark mark{CueName(*one.subspace, cue), Kind::kPoint, cue.stage, {}, {}, "its position, x y z"};
+    CueMark mark{CueName(*one.subspace, cue), Kind::kPoint, cue.stage, {}, {}, "its position, x y z", {now_}};
     if (!cue.joint.empty()) mark.sees += " in the space of " + within.prefix + cue.joint;
     const AcceleratedPoints& points = one.entry.points[cue.mesh];
     if (points.colors) {
@@ -110,6 +113,7 @@ class Marker {
   void AddEntry(const std::string& matrix, std::size_t entry) {
     if (!matrices_.contains(matrix)) order_.push_back(matrix);
     matrices_[matrix].push_back(entry);
+    cues_of_[matrix].push_back(now_);
   }
 
   static std::string ProductText(const CueDescription& cue) {
@@ -141,7 +145,9 @@ class Marker {
   std::map<std::size_t, std::size_t> first_;  // of shown meshes, the first of their vertices
   std::vector<CueMark> points_, others_;
   std::map<std::string, std::vector<std::size_t>> matrices_;  // entries that are measured
+  std::map<std::string, std::vector<CueMark::Cue>> cues_of_;  // likewise
   std::vector<std::string> order_;                            // of the matrices
+  CueMark::Cue now_;                                          // the one that is marked
 };
 
 }  // namespace

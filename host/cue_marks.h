@@ -22,6 +22,10 @@ struct CueMark {
                                       // matrix the nearest at rest
   std::optional<std::array<double, 3>> position;  // metres, world space, at rest
   std::string sees;                               // in words: what is measured of it
+  struct Cue {
+    std::size_t subspace = 0, cue = 0;  // of those that were applied; of its Subspace::cues
+  };
+  std::vector<Cue> cues;  // that it stands for
 };
 const char* KindName(CueMark::Kind kind);  // "point", "matrix", "scalar", "product"
 

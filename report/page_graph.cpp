@@ -44,7 +44,8 @@ void PutNodes(const std::vector<OutlinedNode>& nodes, bool accelerated,
   if (!told.empty()) page->Put("nodes", CompactJson(told));
 }
 
-void PutCues(const std::vector<CueMark>& cues, PageData* page) {
+void PutCues(const std::vector<CueMark>& cues, const std::vector<std::vector<double>>& cue_us,
+             PageData* page) {
   Json told = Json::array();
   for (const CueMark& cue : cues) {
     Json one = {{"name", cue.name}, {"kind", KindName(cue.kind)}};
@@ -53,6 +54,11 @@ void PutCues(const std::vector<CueMark>& cues, PageData* page) {
     if (cue.position.has_value()) {
       one["position"] = Json::array();
       for (const double x : *cue.position) one["position"].push_back(SixDigits(x));
+    }
+    if (!cue_us.empty()) {
+      double cost = 0;
+      for (const CueMark::Cue& part : cue.cues) cost += cue_us[part.subspace][part.cue];
+      one["cost_us"] = RoundedJson<Json>(cost, 4);
     }
     if (!cue.sees.empty()) one["sees"] = cue.sees;
     told.push_back(std::move(one));

@@ -16,8 +16,9 @@ namespace kpsa::engine {
 void PutNodes(const std::vector<OutlinedNode>& nodes, bool accelerated,
               const std::vector<BenchNode>& full_times, const std::vector<BenchNode>& accelerated_times,
               PageData* page);
-// Its own key; none without cues.
-void PutCues(const std::vector<CueMark>& cues, PageData* page);
+// Its own key; none without cues. cue_us: BenchResult's, or none where nothing was measured.
+void PutCues(const std::vector<CueMark>& cues, const std::vector<std::vector<double>>& cue_us,
+             PageData* page);
 
 inline constexpr std::size_t kMostFieldBlobs = 64;
 // `fields` with their weights as blobs (FieldsOf); false and nothing where there are more than kMostFieldBlobs.

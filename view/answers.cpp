@@ -55,7 +55,7 @@ Answer Evaluate(LiveRig* rig, std::string_view body) {
   const Result<EvaluateRequest> request = ParseEvaluate(body);
   if (!request.ok()) return Refusal(400, request.status());
   Answer answer;
-  const Status status = rig->Evaluate(request->pose, request->mode, [&](const LiveFrame& frame) {
+  const Status status = rig->Evaluate(request->frame, [&](const LiveFrame& frame) {
     answer = BytesAnswer(EvaluateAnswer(*request, frame, rig->generation()));
   });
   return status.ok() ? answer : Refusal(400, status);

@@ -61,6 +61,9 @@ Result<std::shared_ptr<LiveRig>> LiveRig::Load(const LiveOptions& options, std::
         live->files_.push_back(entry.subspace);
     }
   }
+  Result<std::unique_ptr<HandleSide>> handles = HandleSide::Make(rig);
+  if (!handles.ok()) return handles.status();
+  live->handles_ = std::move(*handles);
   KPSA_RETURN_IF_ERROR(live->PutAll(options));
   return live;
 }
@@ -79,6 +82,8 @@ Status LiveRig::PutAll(const LiveOptions& options) {
     if (reached.ok()) reaches = std::move(*reached);
   }
   PutControls(rest(), &page_, reaches);
+  if (const Result<std::vector<Double3>> places = handles_->Places({}); places.ok())
+    PutHandles(rest(), handles(), *places, &page_);
   PutFields(rest(), &page_);
   KPSA_RETURN_IF_ERROR(PutGraph());
   meta_ = page_.Meta();
@@ -96,11 +101,12 @@ Status LiveRig::PutGraph() {
            {}, {}, &page_);
   const Result<std::vector<CueMark>> cues = MarkCues(playing.rig(), playing.applied(), full_points_);
   if (!cues.ok()) return cues.status();
-  PutCues(*cues, &page_);
+  PutCues(*cues, {}, &page_);
   return Status();
 }
 
-LiveFrame LiveRig::Evaluate(const LivePose& pose, EvaluateMode mode) {
+LiveFrame LiveRig::Evaluate(const LivePose& pose, const FrameRequest& request) {
+  const EvaluateMode mode = request.mode;
   LiveFrame frame;
   Status failed;
   const auto told = [&](LiveSide& side, std::vector<float>* points, std::optional<double>* us) {
@@ -126,6 +132,10 @@ LiveFrame LiveRig::Evaluate(const LivePose& pose, EvaluateMode mode) {
   if (!failed.ok()) {
     frame.accelerated = frame.full = nullptr;
     frame.problem = failed.ToString();
+  }
+  if (request.handles) {
+    if (Result<std::vector<Double3>> places = handles_->Places(pose); places.ok())
+      frame.handles = std::move(*places);
   }
   if (frame.accelerated != nullptr && frame.full != nullptr)
     std::tie(frame.max_error, frame.rms_error) = ErrorsOf(full_points_, accelerated_points_);

@@ -19,14 +19,13 @@ Value InitialOf(const Plan& plan, const PlugHandle& handle) {
   return NumbersOf(whole, &number)[static_cast<std::size_t>(handle.component)];
 }
 
-Index CountMeshes(const Playing& playing) {
-  return static_cast<Index>(ShownMeshes(playing.rig().scene).size());
-}
-
 }  // namespace
 
 LiveSide::LiveSide(const Rig& rest, std::optional<AccelerationChoice> acceleration)
     : rest_(rest), acceleration_(std::move(acceleration)) {}
+
+LiveSide::LiveSide(const Rig& rest, std::vector<PlugRef> matrices)
+    : rest_(rest), matrices_(std::move(matrices)) {}
 
 Result<LiveSide::Kept*> LiveSide::Find(const std::optional<std::string>& clip,
                                        const std::vector<MovedPlug>& taken) {
@@ -66,6 +65,12 @@ Result<std::unique_ptr<LiveSide::Kept>> LiveSide::Make(const std::optional<std::
     }
   }
   Request request = kept->playing->request();
+  kept->wanted = static_cast<Index>(request.outputs.size());
+  if (!matrices_.empty()) {
+    request.outputs.clear();
+    for (const PlugRef& matrix : matrices_) request.outputs.push_back({matrix, {}});
+    kept->wanted = static_cast<Index>(matrices_.size());
+  }
   AskForControls(&request, kept.get());
   Result<std::shared_ptr<const Plan>> plan = kept->playing->PlanFor(request);
   if (!plan.ok()) return plan.status();
@@ -174,12 +179,8 @@ Status LiveSide::Pull(const LivePose& pose, Kept* kept) const {
     return playing.Located(status);
   // What needs its previous frame sees every frame; failures are those of outputs
   if (kept->run_up->stateful()) (void)evaluator.Evaluate();
-  for (Index output = 0; output < CountMeshes(playing); ++output) {
+  for (Index output = 0; output < kept->wanted; ++output) {
     if (const Status status = evaluator.Pull(output); !status.ok()) return playing.Located(status);
-  }
-  for (Index n = 0; n < kDecisionOutputs * playing.applied().size(); ++n) {
-    if (const Status status = evaluator.Pull(playing.first_decision() + n); !status.ok())
-      return playing.Located(status);
   }
   return Status();
 }

@@ -26,6 +26,8 @@ class LiveSide {
  public:
   // `rest`: no clip plays; it outlives this. No acceleration: the full evaluation.
   LiveSide(const Rig& rest, std::optional<AccelerationChoice> acceleration);
+  // Matrices alone are evaluated, and no points: plugs of the rig's graph.
+  LiveSide(const Rig& rest, std::vector<PlugRef> matrices);
 
   // Brings the points of the shown meshes up to date. Errors, with places in the rig's files: what does not compile or
   // evaluate; nothing below is of any use then.
@@ -34,6 +36,9 @@ class LiveSide {
   // Of the latest pose. x y z of each vertex of all shown meshes, metres, world space; [V, 3] of
   // StackedVertices (report/page_rig.h).
   Status CopyPoints(std::span<float> xyz) const;
+  const Matrix4& MatrixOf(std::size_t n) const {
+    return now_->evaluator->Get<Matrix4>(static_cast<Index>(n));
+  }
   // What it took to bring the points here from those of the pose before.
   double microseconds() const { return now_->microseconds; }
   // Of an accelerated side: of the entry with the largest share of the full evaluation.
@@ -64,6 +69,7 @@ class LiveSide {
         taken;  // that the graph has: driven by the clip elsewhere (number 0), or no controls
     std::shared_ptr<Playing> playing;
     std::shared_ptr<const Plan> plan;
+    Index wanted = 0;  // outputs that every pose evaluates
     std::unique_ptr<Evaluator> evaluator;
     std::optional<RunUp> run_up;
     std::vector<Touched> touched;
@@ -84,6 +90,7 @@ class LiveSide {
 
   const Rig& rest_;
   std::optional<AccelerationChoice> acceleration_;
+  std::vector<PlugRef> matrices_;  // instead of points
   std::vector<std::unique_ptr<Kept>> kept_;
   Kept* now_ = nullptr;
   std::uint64_t uses_ = 0;

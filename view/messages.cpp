@@ -1,11 +1,13 @@
 #include "view/messages.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "files/json_depth.h"
+#include "report/json_text.h"
 #include "report/verdict_text.h"
 
 namespace kpsa::engine {
@@ -49,8 +51,37 @@ Status ReadMode(const Json& mode, EvaluateMode* to) {
   return Status();
 }
 
+Status ReadVector(const Json& drag, const char* key, Double3* to) {
+  const Json* numbers = Find(drag, key);
+  if (numbers == nullptr || !numbers->is_array() || numbers->size() != 3 ||
+      !std::ranges::all_of(*numbers, [](const Json& number) { return number.is_number(); }))
+    return Status::Usage("drag: {}: expected three numbers", key);
+  for (std::size_t axis = 0; axis < 3; ++axis) (*to)[static_cast<int>(axis)] = (*numbers)[axis].get<double>();
+  return Status();
+}
+
+Status ReadDrag(const Json& json, std::optional<Drag>* to) {
+  if (!json.is_object()) return Status::Usage("drag: expected a handle, from and along");
+  Drag drag;
+  const Json* handle = Find(json, "handle");
+  if (handle == nullptr || !handle->is_number_unsigned())
+    return Status::Usage("drag: handle: expected its number");
+  drag.handle = handle->get<std::size_t>();
+  KPSA_RETURN_IF_ERROR(ReadVector(json, "from", &drag.line.from));
+  KPSA_RETURN_IF_ERROR(ReadVector(json, "along", &drag.line.along));
+  *to = drag;
+  return Status();
+}
+
 void Put(Json* facts, const char* key, const std::optional<double>& number) {
   if (number.has_value() && std::isfinite(*number)) (*facts)[key] = *number;
+}
+
+// Each name once: not looked for among the others.
+Json ByName(const std::vector<std::pair<std::string, double>>& values) {
+  Json::object_t map;
+  for (const auto& [name, value] : values) map.push_back({name, value});
+  return map;
 }
 
 }  // namespace
@@ -63,16 +94,21 @@ Result<EvaluateRequest> ParseEvaluate(std::string_view body) {
   if (!json.is_object()) return Status::Usage("the request is no object");
   EvaluateRequest request;
   if (const Json* id = Find(json, "id"); id != nullptr && id->is_number()) request.id = Text(*id);
-  if (const Json* set = Find(json, "set")) KPSA_RETURN_IF_ERROR(ReadSet(*set, &request.pose));
+  if (const Json* set = Find(json, "set")) KPSA_RETURN_IF_ERROR(ReadSet(*set, &request.frame.pose));
   if (const Json* clip = Find(json, "clip")) {
     if (!clip->is_string()) return Status::Usage("clip: expected a name");
-    request.pose.clip = clip->get<std::string>();
+    request.frame.pose.clip = clip->get<std::string>();
   }
   if (const Json* time = Find(json, "time")) {
     if (!time->is_number()) return Status::Usage("time: expected seconds");
-    request.pose.seconds = time->get<double>();
+    request.frame.pose.seconds = time->get<double>();
   }
-  if (const Json* mode = Find(json, "mode")) KPSA_RETURN_IF_ERROR(ReadMode(*mode, &request.mode));
+  if (const Json* mode = Find(json, "mode")) KPSA_RETURN_IF_ERROR(ReadMode(*mode, &request.frame.mode));
+  if (const Json* handles = Find(json, "handles")) {
+    if (!handles->is_boolean()) return Status::Usage("handles: expected true or false");
+    request.frame.handles = handles->get<bool>();
+  }
+  if (const Json* drag = Find(json, "drag")) KPSA_RETURN_IF_ERROR(ReadDrag(*drag, &request.frame.drag));
   return request;
 }
 
@@ -93,10 +129,13 @@ std::string EvaluateAnswer(const EvaluateRequest& request, const LiveFrame& fram
   Put(&facts, "accelerated_us", frame.accelerated_us);
   Put(&facts, "max_error", frame.max_error);
   Put(&facts, "rms_error", frame.rms_error);
-  if (!frame.values.empty()) {
-    Json::object_t values;  // each name once: not looked for among the others
-    for (const auto& [name, value] : frame.values) values.push_back({name, value});
-    facts["values"] = std::move(values);
+  if (!frame.values.empty()) facts["values"] = ByName(frame.values);
+  if (!frame.dragged.empty()) facts["dragged"] = ByName(frame.dragged);
+  if (!frame.handles.empty()) {
+    Json& places = facts["handles"] = Json::array();
+    for (const Double3& place : frame.handles) {
+      for (int axis = 0; axis < 3; ++axis) places.push_back(RoundedJson<Json>(place[axis], 6));
+    }
   }
   if (!frame.problem.empty()) facts["problem"] = frame.problem;
   const std::string json = "{\"id\":" + request.id + "," + Text(facts).substr(1);

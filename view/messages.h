@@ -13,8 +13,7 @@ namespace kpsa::engine {
 
 struct EvaluateRequest {
   std::string id = "null";  // a JSON number or null, given back
-  PoseRequest pose;
-  EvaluateMode mode = EvaluateMode::kFull;
+  FrameRequest frame;
 };
 
 // Any bytes. Errors: what is no request, or is nested too deeply.

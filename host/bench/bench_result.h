@@ -58,8 +58,9 @@ struct BenchResult {
   std::vector<BenchNode> full_nodes, accelerated_nodes;  // what takes longest first; misses included
   double accelerated_ms = 0;
   double graph_ms = 0, cues_ms = 0, projection_ms = 0, reconstruction_ms = 0, downstream_ms = 0,
-         misses_ms = 0;  // its parts
-  double parts_ms = 0;   // as recorded: where they take longer than accelerated_ms, they are shown as shares
+         misses_ms = 0;                     // its parts
+  std::vector<std::vector<double>> cue_us;  // [subspaces][cues] parts of cues_ms (host/bench/cue_costs.h)
+  double parts_ms = 0;  // as recorded: where they take longer than accelerated_ms, they are shown as shares
   double full_ms_on_hits = 0, accelerated_ms_on_hits = 0;
   double speedup() const { return Ratio(full_ms, accelerated_ms); }
   double speedup_on_hits() const { return Ratio(full_ms_on_hits, accelerated_ms_on_hits); }

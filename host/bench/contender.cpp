@@ -49,6 +49,7 @@ Status Contender::Load(const RigOpener& opener, const RigChange& clip, const Sid
   verdicts->Ask(rig, &request);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
+  cue_costs.Load(rig, **plan, applied, &compiler);
   side = std::make_unique<Side>(rig, *plan, options);
   clip_errors = PointErrors(compared);
   weights.clear();

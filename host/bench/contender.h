@@ -12,6 +12,7 @@
 #include "graph/evaluator.h"
 #include "host/acceleration.h"
 #include "host/bench/bench_result.h"
+#include "host/bench/cue_costs.h"
 #include "host/bench/point_errors.h"
 #include "host/bench/side.h"
 #include "host/bench/tolerances.h"
@@ -49,6 +50,7 @@ struct Contender {
   std::unique_ptr<Side> side;
   PointErrors clip_errors;
   FullWeights weights;
+  CueCosts cue_costs;
   BenchTolerances tolerances;
 
   // The rig with the subspaces in place. `outputs` becomes what the full side has to compute.

@@ -141,6 +141,7 @@ void Contender::AddProfile(const RecordedSteps& recorded, double fast_ns) {
   sums.cues += cues * scale, sums.downstream += downstream * scale, sums.misses += misses * scale;
   sums.projection += projection * scale, sums.reconstruction += reconstruction * scale;
   sums.graph += (all - parts) * scale;
+  cue_costs.Add(recorded, scale);
   for (Index s = 0; s < plan.steps().size(); ++s) {
     if (std::ranges::find(kpsa_nodes, plan.infos()[s].node) == kpsa_nodes.end() && recorded.counts[s] > 0)
       AddNode(plan, s, recorded.self_ns[s] * scale, &sums.accelerated_nodes);
@@ -168,6 +169,7 @@ void Contender::Finish(double wanted_speedup) {
   result.projection_ms = ms(sums.projection);
   result.reconstruction_ms = ms(sums.reconstruction), result.downstream_ms = ms(sums.downstream),
   result.misses_ms = ms(sums.misses);
+  result.cue_us = cue_costs.Finish(frames);
   // What is left without cues and reconstruction: as measured, where no miss is among it; else as in the full
   // evaluation, whose points leave colder caches behind
   const bool all_hit = result.hits == result.frames;

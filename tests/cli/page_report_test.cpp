@@ -14,6 +14,18 @@ namespace {
 
 using Json = nlohmann::json;
 
+// "of it: cues" of the bench's table, milliseconds.
+double CuesOfBench(const Json& tables) {
+  for (const Json& table : tables) {
+    if (table["title"] != "Bench") continue;
+    for (const Json& row : table["rows"]) {
+      if (row[0] == "of it: cues") return row[2].get<double>();
+    }
+  }
+  ADD_FAILURE() << "no table tells of cues";
+  return 0;
+}
+
 // At this one some frames of "wave" hit, some miss, and a few are blends.
 constexpr char kPageTolerance[] = "0.12mm";
 
@@ -154,11 +166,23 @@ TEST_F(PageReport, TellsOfTheRig) {
   EXPECT_FALSE(nodes["mush"]["inputs"].empty());
   ASSERT_FALSE(meta["cues"].empty());
   const std::vector<float> rest = page.Floats(meta["rest"]);
+  double cost = 0, least_point = INFINITY, most_number = 0;
+  std::map<std::string, double> of_stage;  // in equal parts
   for (const Json& cue : meta["cues"]) {
+    EXPECT_GT(cue["cost_us"].get<double>(), 0) << cue.dump();
+    const double us = cue["cost_us"].get<double>();
+    cost += us;
+    if (cue["kind"] == "scalar") most_number = std::max(most_number, us);
     if (cue["kind"] != "point") continue;
+    least_point = std::min(least_point, us);
+    EXPECT_EQ(of_stage.try_emplace(cue["stage"].get<std::string>(), us).first->second, us);
     const std::size_t vertex = cue["vertex"];
     EXPECT_NEAR(cue["position"][1].get<double>(), rest[3 * vertex + 1], 1e-5);
   }
+  const double measured = CuesOfBench(meta["tables"]);
+  EXPECT_NEAR(cost / 1e3, measured, 2e-3 * measured);
+  ASSERT_FALSE(of_stage.empty());
+  EXPECT_GT(least_point, most_number) << "a point is three numbers, and what deforms it";
   std::set<std::string> titles;
   for (const Json& table : meta["tables"]) {
     titles.insert(table["title"]);

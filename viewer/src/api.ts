@@ -16,7 +16,13 @@ export interface Api {
   positions(side?: Side): Float32Array;
   /** Where a vertex is in the page, in CSS pixels. */
   project(vertex: number): {x: number; y: number};
+  /** Where a handle is in the page, in CSS pixels. */
+  projectHandle(handle: number): {x: number; y: number};
   readonly loopMs: number | null;
+  /** Live, of the latest loop: until the answer was here, the page's own work, until the picture was drawn; milliseconds. */
+  readonly loopParts: Readonly<{answer: number; page: number; picture: number}> | null;
+  /** Shows frames one after the other: the page's own work of each, and until the picture was drawn; milliseconds. */
+  timeFrames(frames: readonly number[]): {page: number[]; picture: number[]};
   readonly errors: string[];
 }
 
@@ -67,8 +73,32 @@ export function makeApi(app: () => App | null, ready: Promise<void>, errors: str
       const at = viewport.pixelsOf(view.shownPoints(), vertex);
       return {x: box.left + at.x, y: box.top + at.y};
     },
+    projectHandle(handle) {
+      const {viewport, view} = now(), box = viewport.canvas.getBoundingClientRect();
+      const at = viewport.pixelsOf(Float32Array.from(view.handles.offsetOf(handle)), 0);
+      return {x: box.left + at.x, y: box.top + at.y};
+    },
     get loopMs() {
       return app()?.context?.session?.loopMs.value ?? null;
+    },
+    get loopParts() {
+      return app()?.context?.session?.parts ?? null;
+    },
+    timeFrames(frames) {
+      const {store, viewport} = now(), gl = viewport.renderer.getContext(), texel = new Uint8Array(4), page: number[] = [], picture: number[] = [];
+      const wait = (): void => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, texel);  // returns when all is drawn
+      wait();
+      for (const frame of frames) {
+        const begin = performance.now();
+        store.set({playing: false, frame});
+        viewport.draw();
+        document.body.getBoundingClientRect();  // styles and layout of what has changed
+        const asked = performance.now();
+        wait();
+        page.push(asked - begin);
+        picture.push(performance.now() - asked);
+      }
+      return {page, picture};
     },
   };
 }

@@ -12,6 +12,7 @@ import {makeControls} from './ui/controls_panel';
 import {cueMarks, makeCues} from './ui/cues_panel';
 import {button, h, themeColour} from './ui/dom';
 import {makeGraph} from './ui/graph_panel';
+import {listenToHandles} from './ui/handles';
 import {makeHeader} from './ui/header';
 import {Help} from './ui/help';
 import {listenToKeys} from './ui/keys';
@@ -21,6 +22,7 @@ import {listenToPointer} from './ui/pointer';
 import {ProblemList} from './ui/problems';
 import {makeSplitter} from './ui/splitter';
 import {makeStatus} from './ui/status';
+import {makeSummary} from './ui/summary_panel';
 import {makeTables} from './ui/tables_panel';
 import {Tabs, type Panel} from './ui/tabs';
 import {makeTimeline} from './ui/timeline';
@@ -81,15 +83,15 @@ export class App {
     this.context = context;
     const {marks, cueOf} = cueMarks(context);
     view.setCueMarks(marks, cueOf);
-    view.setEdges(false);
 
     const help = this.help = new Help(model.live, model.accelerated);
     document.body.append(help.element);
     makeHeader(this.header, context, help);
     this.overlay.replaceChildren(makeToolbar(context), makeLegend(context));
     this.under.replaceChildren(...[makeTimeline(context), makeStatus(context)].filter((part) => part !== null));
-    this.layPanels(context, open ?? (session ? 'controls' : 'plots'));
+    this.layPanels(context, open ?? (session ? 'controls' : model.accelerated ? 'summary' : 'plots'));
     listenToKeys(context, help);
+    listenToHandles(context, this.stage);
     listenToPointer(context, this.stage);
     play(this.store, model, scope);
 
@@ -117,7 +119,7 @@ export class App {
 
   private layPanels(context: Context, first: string): void {
     const found: [string, string, HTMLElement | null][] = [
-      ['controls', 'Controls', makeControls(context)], ['plots', 'Plots', makePlots(context)], ['graph', 'Graph', makeGraph(context)],
+      ['summary', 'Summary', makeSummary(context)], ['controls', 'Controls', makeControls(context)], ['plots', 'Plots', makePlots(context)], ['graph', 'Graph', makeGraph(context)],
       ['cues', 'Cues', makeCues(context)], ['tables', 'Tables', makeTables(context)], ['vertex', 'Vertex', makeVertex(context)],
     ];
     const panels = found.flatMap(([id, label, element]): Panel[] => element ? [{id, label, element}] : []);
@@ -131,7 +133,7 @@ export class App {
     const tested = Math.max(0, clips.findIndex((clip) => clip.test));
     const clip = before ? named : model.live || !clips.length ? -1 : tested;
     return {
-      clip, frame: Math.max(0, Math.min(now.frame, framesOf(model, clip) - 1)), playing: false, cue: -1, node: -1, paint: null,
+      clip, frame: Math.max(0, Math.min(now.frame, framesOf(model, clip) - 1)), playing: false, cue: -1, node: -1, paint: null, handle: -1,
       vertex: now.vertex < model.points ? now.vertex : -1, picked: now.picked.filter((v) => v < model.points),
       mode: !model.accelerated ? 'full' : before?.accelerated ? now.mode : 'accelerated',
       errorTop: (model.tolerance ?? model.unit.metres) * 2,

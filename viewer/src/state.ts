@@ -21,11 +21,14 @@ export interface State {
   errorTop: number;  // of the heat map, metres
   showCues: boolean;
   showEdges: boolean;
+  showHandles: boolean;
+  handle: number;  // the one that is held or hovered, or whose sliders are; -1 for none
 }
 
 export const initialState: State = {
   clip: -1, frame: 0, mode: 'full', playing: false, loop: true, paint: null, vertex: -1, cue: -1, node: -1, picking: false, picked: [],
   errorTop: 0.001, showCues: false, showEdges: false,
+  showHandles: true, handle: -1,
 };
 
 type Listener = (state: State) => void;

@@ -92,3 +92,26 @@ test('every control has a name', async () => {
     .filter((e) => !(e.getAttribute('aria-label') || e.textContent.trim() || e.closest('label'))).map((e) => e.outerHTML.slice(0, 80)));
   assert.deepEqual(nameless, []);
 });
+
+test('on a telephone nothing sticks out, and a finger finds what it presses', async () => {
+  const phone = await startBrowser({width: 390, height: 844, touch: true});
+  try {
+    const {page: small} = await phone.openReport(makeMeta(makeCharacter()), 'phone.html');
+    await small.evaluate(() => window.kpsa.setMode('difference'));
+    for (const tab of await small.getByRole('tab').all()) {
+      await tab.tap();
+      await settled(small);
+      const found = await small.evaluate(() => {
+        const faults = document.documentElement.scrollWidth > innerWidth ? [`the page is ${document.documentElement.scrollWidth} wide`] : [];
+        for (const element of document.querySelectorAll('button, select, input[type=range], input[type=search], input[type=number]')) {
+          const {width, height} = element.getBoundingClientRect();
+          if (element.checkVisibility() && width && height < (element.matches('.link, th button, .bars button') ? 30 : 34)) faults.push(`${element.outerHTML.slice(0, 80)} is ${height} high`);
+        }
+        return faults;
+      });
+      assert.deepEqual(found, [], await tab.innerText());
+    }
+  } finally {
+    await phone.stop();
+  }
+});

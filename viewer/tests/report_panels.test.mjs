@@ -109,7 +109,7 @@ test('tables sort, cues are marked', async () => {
   await page.locator('#panel-cues tbody tr').nth(4).click();
   await settled(page);
   assert.ok(difference(before, await picture()) > 1e-4);
-  assert.match(await page.locator('#panel-cues .details').innerText(), /point, at sheet@skin, 0\.6 µs, the bend of the spine/);
+  assert.match(await page.locator('#panel-cues .details').innerText(), /point, at sheet@skin, 0\.6 µs of a frame, the bend of the spine/);
   const vertex = made.meta.cues[6].vertex, at = await page.evaluate((v) => window.kpsa.project(v), vertex);
   await page.mouse.move(at.x, at.y);
   await page.locator('.cue-hint:visible').waitFor();

@@ -33,3 +33,13 @@ test('a node of very many inputs is laid out', async () => {
   const {x, y} = layOut(nodes);
   assert.ok([...x, ...y].every(Number.isFinite) && (x[0] !== x[1] || y[0] !== y[1]));
 });
+
+test('edges of triangles are there once, whichever way round they are', async () => {
+  const {edgesOf} = await load('gpu/edges.ts');
+  const pairs = (triangles, points) => [...edgesOf(Uint32Array.from(triangles), points)].reduce((all, v, i) => (i % 2 ? all[all.length - 1].push(v) : all.push([v]), all), []);
+  assert.deepEqual(pairs([0, 1, 2, 2, 1, 3], 4), [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]);
+  assert.deepEqual(pairs([], 4), []);
+  assert.deepEqual(pairs([1, 1, 1, 5, 5, 2], 6), [[2, 5]], 'a triangle that has collapsed');
+  const many = 40_000_000;  // beyond what 32 bits multiply
+  assert.deepEqual(pairs([many - 1, many - 2, 0, many - 3, many - 1, many - 2], many), [[0, many - 2], [0, many - 1], [many - 3, many - 2], [many - 3, many - 1], [many - 2, many - 1]]);
+});

@@ -75,6 +75,14 @@ export interface CueInfo {
   sees?: Maybe<string>;
 }
 
+/** A point in the picture that is dragged, live. */
+export interface HandleInfo {
+  name: string;
+  kind: 'move' | 'turn';
+  controls: string[];
+  position: [number, number, number];
+}
+
 export type NodeState = 'kept' | 'cues only' | 'never run' | 'switched off';
 
 export interface NodeInfo {
@@ -139,6 +147,7 @@ export interface Meta {
   reasons?: Maybe<string[]>;
   controls?: Maybe<ControlInfo[]>;
   cues?: Maybe<CueInfo[]>;
+  handles?: Maybe<HandleInfo[]>;
   nodes?: Maybe<NodeInfo[]>;
   tables?: Maybe<TableInfo[]>;
   tolerances?: Maybe<ToleranceInfo[]>;

@@ -1,4 +1,4 @@
-// Discs at points: cues, the vertices that were picked, and what is hovered or selected among them.
+// Discs and diamonds at points: cues, the vertices that were picked, handles, and what is hovered or selected among them.
 import {BufferAttribute, BufferGeometry, GLSL3, Points, RawShaderMaterial, Sphere, type IUniform} from 'three';
 import {lookUp} from './surface';
 
@@ -6,10 +6,12 @@ const vertex = lookUp + `
 in vec3 offset;
 in float vertexIndex;
 in float look;  // 0 plain, 1 hovered or selected
+in float corners;  // 0 a disc, 1 a diamond
 uniform float size;
-out float strong;
+out float strong, pointed;
 void main() {
   strong = look;
+  pointed = corners;
   vec3 at = offset;
   if (vertexIndex >= 0.0) at += texelFetch(positions, place(int(vertexIndex)), 0).xyz;
   gl_Position = projectionMatrix * modelViewMatrix * vec4(at, 1.0);
@@ -18,11 +20,12 @@ void main() {
 
 const fragment = `
 precision highp float;
-in float strong;
+in float strong, pointed;
 out vec4 colour;
 uniform vec3 base, selected, rim;
 void main() {
-  float r = length(gl_PointCoord - 0.5) * 2.0;
+  vec2 at = abs(gl_PointCoord - 0.5) * 2.0;
+  float r = pointed > 0.5 ? at.x + at.y : length(at);
   float soft = fwidth(r);
   float alpha = 1.0 - smoothstep(1.0 - soft, 1.0, r);
   if (alpha <= 0.0) discard;
@@ -33,6 +36,7 @@ void main() {
 export interface Mark {
   vertex: number;  // -1: the offset is its place
   offset: readonly [number, number, number];
+  diamond?: boolean;
 }
 
 export class Marks {
@@ -54,10 +58,24 @@ export class Marks {
   set(marks: readonly Mark[]): void {
     this.geometry.setAttribute('vertexIndex', new BufferAttribute(Float32Array.from(marks, (m) => m.vertex), 1));
     this.geometry.setAttribute('offset', new BufferAttribute(Float32Array.from(marks.flatMap((m) => [...m.offset])), 3));
+    this.geometry.setAttribute('corners', new BufferAttribute(Float32Array.from(marks, (m) => m.diamond ? 1 : 0), 1));
     this.geometry.setAttribute('look', new BufferAttribute(new Float32Array(marks.length), 1));
     this.geometry.boundingSphere = new Sphere();
     this.geometry.setDrawRange(0, marks.length);
     this.object.visible = marks.length > 0;
+  }
+
+  /** Takes them elsewhere; where a number is not known they stay. */
+  move(offsets: readonly (number | null)[]): void {
+    const attribute = this.geometry.getAttribute('offset') as BufferAttribute, {array} = attribute;
+    for (let i = 0; i < Math.min(array.length, offsets.length); ++i) array[i] = offsets[i] ?? array[i];
+    attribute.needsUpdate = true;
+  }
+
+  /** Where a mark without a vertex is. */
+  offsetOf(index: number): [number, number, number] {
+    const {array} = this.geometry.getAttribute('offset');
+    return [array[3 * index], array[3 * index + 1], array[3 * index + 2]];
   }
 
   /** How wide a mark is, in pixels of the picture. */

@@ -129,8 +129,12 @@ export class Positions {
   setSent(accelerated: Float32Array | null, full: Float32Array | null): void {
     const a = accelerated ?? full, f = full ?? accelerated;
     if (!this.sent || !a || !f) return;
+    // what was sent once is uploaded once
+    const {sentAccelerated, sentFull} = this.uniforms;
     this.sent.accelerated.write(a);
-    this.sent.full.write(f);
+    if (a !== f) this.sent.full.write(f);
+    sentAccelerated.value = this.sent.accelerated.texture;
+    sentFull.value = (a === f ? this.sent.accelerated : this.sent.full).texture;
     this.changed();
   }
 

@@ -30,7 +30,7 @@ void main() {
   gl_Position.z -= lift * gl_Position.w;
 }`;
 
-const fragment = `
+const lit = `
 precision highp float;
 precision highp sampler2D;
 in vec3 normal;
@@ -40,24 +40,30 @@ uniform sampler2D errorColours, fieldColours;
 uniform vec3 base;
 uniform float errorTop, alpha;
 uniform int paint;  // 0 its own colour, 1 errors, 2 a field
-void main() {
+vec3 painted() {
+  if (paint == 1) return texture(errorColours, vec2(clamp(error / errorTop, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
+  if (paint == 2) return texture(fieldColours, vec2(clamp(weight, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
+  return base;
+}
+vec3 shaded(vec3 c) {
   vec3 n = normalize(gl_FrontFacing ? normal : -normal);
   float key = max(dot(n, vec3(0.32, 0.48, 0.816)), 0.0);
   float fill = max(dot(n, vec3(-0.6, 0.1, 0.79)), 0.0);
   float light = 0.26 + 0.66 * key + 0.16 * fill + 0.08 * n.y;
-  vec3 c = base;
-  if (paint == 1) c = texture(errorColours, vec2(clamp(error / errorTop, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
-  if (paint == 2) c = texture(fieldColours, vec2(clamp(weight, 0.0, 1.0) * 0.99609 + 0.00195, 0.5)).rgb;
   if (paint != 0) light = 0.45 + 0.6 * light;
-  colour = vec4(min(c * light, 1.0), alpha);
-}`;
+  return min(c * light, 1.0);
+}
+`;
 
-const lineFragment = `
-precision highp float;
-out vec4 colour;
-uniform vec3 base;
-uniform float alpha;
-void main() { colour = vec4(base, alpha); }`;
+const fragment = lit + `
+void main() { colour = vec4(shaded(painted()), alpha); }`;
+
+// Darker than what is light, lighter than what is dark, whatever light falls on it; no darker where two lines lie on each other (seams).
+const lineFragment = lit + `
+void main() {
+  vec3 own = painted(), c = shaded(own);
+  colour = vec4(dot(own, vec3(0.2126, 0.7152, 0.0722)) > 0.3 ? c * 0.45 : mix(c, vec3(1.0), 0.35), 1.0);
+}`;
 
 export interface SurfaceUniforms {
   [name: string]: IUniform;
@@ -91,10 +97,10 @@ export function surface(geometry: Indexed, mesh: MeshData, shared: SurfaceUnifor
   return placed(new Mesh(geometry, material), ghost ? 1 : 0);
 }
 
-export function edgeLines(geometry: Indexed, shared: SurfaceUniforms): LineSegments {
+export function edgeLines(geometry: Indexed, mesh: MeshData, shared: SurfaceUniforms): LineSegments {
   const material = new RawShaderMaterial({
-    glslVersion: GLSL3, vertexShader: vertex, fragmentShader: lineFragment, transparent: true, depthWrite: false,
-    uniforms: {...shared, base: {value: [0.08, 0.09, 0.11]}, alpha: {value: 0.35}, lift: {value: 0.0004}},
+    glslVersion: GLSL3, vertexShader: vertex, fragmentShader: lineFragment,
+    uniforms: {...shared, base: {value: rgb(mesh.colour)}, alpha: {value: 1}, lift: {value: 0.0004}},
   });
   return placed(new LineSegments(geometry, material), 2);
 }

@@ -11,6 +11,15 @@ export interface EvaluateRequest {
   clip: string | null;
   time: number;
   mode: EvaluateMode;
+  handles?: boolean;
+  drag?: DragRequest | null;
+}
+
+/** A handle, and the line on which the pointer holds it. */
+export interface DragRequest {
+  handle: number;
+  from: readonly [number, number, number];
+  along: readonly [number, number, number];
 }
 
 export interface EvaluateFacts {
@@ -25,6 +34,10 @@ export interface EvaluateFacts {
   max_error?: number | null;
   rms_error?: number | null;
   values?: Values | null;
+  /** What a drag made of its handle's controls. */
+  dragged?: Values | null;
+  /** x y z of each handle. */
+  handles?: (number | null)[] | null;
   problem?: string | null;
 }
 

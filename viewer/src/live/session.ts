@@ -3,7 +3,8 @@ import type {Model} from '../data/model';
 import {noFacts, Signal, type Facts, type Series} from '../facts';
 import type {Store} from '../state';
 import type {Viewport} from '../view/viewport';
-import type {Client, EvaluateAnswer, EvaluateMode, Values} from './client';
+import type {Client, DragRequest, EvaluateAnswer, EvaluateMode, Values} from './client';
+import {History} from './history';
 
 export class Session {
   /** What the user has moved; everything else is as in the clip or as the rig sets it. */
@@ -13,6 +14,10 @@ export class Session {
   /** Something was moved or released. */
   readonly touched = new Signal<number>(0);
   readonly loopMs = new Signal<number | null>(null);
+  /** Of the latest answer: until it was here, what the page's own work took, and until the picture was drawn; milliseconds. */
+  readonly parts = {answer: 0, page: 0, picture: 0};
+  /** x y z of each handle, as they were evaluated last. */
+  readonly places = new Signal<readonly (number | null)[]>([]);
   /** Whether both sides are asked for, so that the error is known. */
   compare = true;
   answered = 0;
@@ -22,24 +27,59 @@ export class Session {
   private asked = 0;      // when the oldest change was made that is not drawn yet
   private waiting = 0;
   private ended = false;
+  readonly history = new History();
+  private drag: {to: DragRequest; gesture: string} | null = null;
+  private drags = 0;  // a later set, release or cancel wins over the answer to a drag
 
   constructor(
     readonly client: Client, private readonly model: Model, private readonly store: Store, private readonly viewport: Viewport,
     private readonly facts: Signal<Facts>, private readonly series: readonly Series[], private readonly tell: (text: string) => void,
   ) {}
 
-  set(values: Values, at = performance.now()): void {
-    this.moved = {...this.moved, ...values};
+  /** Brings a handle to the pointer; all of one gesture are one step to undo. */
+  dragTo(to: DragRequest, gesture: string, at = performance.now()): void {
+    this.drag = {to, gesture};
+    this.changed(at);
+  }
+
+  /** As if the gesture had not been. */
+  takeBack(gesture: string, before: Values): void {
+    this.history.drop(gesture);
+    this.restore(before);
+  }
+
+  undo(): boolean {
+    return this.goTo(this.history.undo(this.moved));
+  }
+
+  redo(): boolean {
+    return this.goTo(this.history.redo(this.moved));
+  }
+
+  private goTo(moved: Values | null): boolean {
+    if (moved) this.restore(moved);
+    return moved !== null;
+  }
+
+  private restore(moved: Values, at = performance.now()): void {
+    this.drag = null;
+    ++this.drags;
+    this.moved = moved;
     this.touched.set(this.touched.value + 1);
     this.changed(at);
+  }
+
+  set(values: Values, at = performance.now()): void {
+    this.history.note(this.moved, Object.keys(values).join(), at, false);
+    this.restore({...this.moved, ...values}, at);
   }
 
   release(names: readonly string[], at = performance.now()): void {
     const rest = {...this.moved};
     for (const name of names) delete rest[name];
-    this.moved = rest;
-    this.touched.set(this.touched.value + 1);
-    this.changed(at);
+    if (Object.keys(rest).length === Object.keys(this.moved).length) return;
+    this.history.note(this.moved, 'release ' + names.join(), at, false);
+    this.restore(rest, at);
   }
 
   /** Something that is evaluated has changed. */
@@ -70,14 +110,26 @@ export class Session {
       this.again = false;
       this.asked = this.waiting;
       this.waiting = 0;
-      const {clip, frame} = this.store.now;
+      const {clip, frame, showHandles} = this.store.now;
+      // a place of the pointer is gone to once
+      const {drag, drags} = this;
+      this.drag = null;
       const set = this.moved, info = clip >= 0 ? this.model.meta.clips![clip] : null;
+      const sent = performance.now();
       try {
         const answer = await this.client.evaluate({
           id: ++this.id, set, clip: info?.name ?? null, time: info ? info.begin + frame / info.fps : 0, mode: this.mode(),
+          ...this.model.meta.handles?.length && showHandles ? {handles: true} : {}, ...drag ? {drag: drag.to} : {},
         }, this.model.points);
         if (this.ended) break;
-        await this.show(answer, clip, frame, !Object.keys(set).length);
+        this.parts.answer = performance.now() - sent;
+        const {dragged} = answer.facts;
+        if (dragged && drag && drags === this.drags) {
+          this.history.note(this.moved, drag.gesture, performance.now(), true);
+          this.moved = {...this.moved, ...dragged};
+          this.touched.set(this.touched.value + 1);
+        }
+        await this.show(answer, clip, frame, !drag && !Object.keys(set).length);
       } catch (error) {
         if (this.ended) break;
         this.facts.set({...this.facts.value, problem: (error as Error).message});
@@ -92,6 +144,7 @@ export class Session {
 
   private async show({facts, accelerated, full}: EvaluateAnswer, clip: number, frame: number, ofClip: boolean): Promise<void> {
     if (facts.generation !== undefined && facts.generation !== (this.model.meta.generation ?? facts.generation)) return;
+    const begin = performance.now();
     if (accelerated || full) this.viewport.view?.positions.setSent(accelerated, full);
     const known: Facts = {
       ...noFacts, verdict: facts.verdict ?? null, reason: facts.reason || null, score: facts.score ?? null, full_us: facts.full_us ?? null,
@@ -100,8 +153,12 @@ export class Session {
     if (clip >= 0 && ofClip) this.series[clip]?.record(frame, known);
     this.facts.set(known);
     if (facts.values) this.values.set(facts.values);
+    if (facts.handles) this.places.set(facts.handles);
     this.viewport.draw();
+    const drawn = performance.now();
+    this.parts.page = drawn - begin;
     await finished(this.viewport.renderer.getContext() as WebGL2RenderingContext);
+    this.parts.picture = performance.now() - drawn;
     ++this.answered;
     if (this.asked) this.loopMs.set(performance.now() - this.asked);
   }

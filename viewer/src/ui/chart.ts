@@ -33,7 +33,10 @@ export class Chart {
   readonly element: HTMLElement;
   private readonly place: HTMLElement;
   private plot: uPlot | null = null;
+  private readonly line = h('div', {class: 'chart-line', attributes: {hidden: true}});
   private readonly watch: ResizeObserver;
+  private shown = false;
+  private old = false;    // its values are
   private stale = false;  // its colours are of another theme
   private readonly rebuild = (): void => {
     this.stale = true;
@@ -50,9 +53,11 @@ export class Chart {
 
   private resize(): void {
     const width = this.place.clientWidth;
+    this.shown = width > 0;
     if (!width) return;
     if (!this.plot || this.stale) this.build();
     else if (this.plot.width !== width) this.plot.setSize({width, height: this.options.height ?? 170});
+    else this.refresh(this.old);
   }
 
   private build(): void {
@@ -88,29 +93,44 @@ export class Chart {
           ...line.bars ? {paths: uPlot.paths.bars!({size: [0.9, 60]}), fill: themeColour(line.colour) + '99', points: {show: false}} : {},
         })),
       ],
-      hooks: {draw: [(plot) => this.mark(plot)], ready: [(plot) => this.listen(plot)]},
+      hooks: {
+        ready: [(plot) => this.listen(plot)],
+        setSize: [(plot) => this.mark(plot)], setScale: [(plot) => this.mark(plot)],
+        setSeries: [(plot, index) => {
+          const name = index === null ? null : plot.root.querySelectorAll('.u-legend .u-series > th')[index];
+          name?.setAttribute('aria-pressed', String(plot.series[index!].show !== false));
+        }],
+      },
     }, this.data(), this.place);
+    this.plot.over.append(this.line);
+    this.mark(this.plot);
   }
 
   private data(): uPlot.AlignedData {
     return [this.options.x, ...this.options.lines.map((line) => line.values)] as uPlot.AlignedData;
   }
 
+  /** The line at x, which goes over the plot: the plot is not drawn again for it. */
   private mark(plot: uPlot): void {
-    const x = this.options.at?.() ?? null;
-    if (x === null) return;
-    const at = Math.round(plot.valToPos(x, 'x', true));
+    const x = this.options.at?.() ?? null, left = x === null ? NaN : plot.valToPos(x, 'x');
+    const inside = left >= 0 && left <= plot.bbox.width / uPlot.pxRatio;
+    this.line.hidden = !inside;
+    if (x === null || !inside) return;
+    this.line.style.transform = `translateX(${Math.round(left) - 1}px)`;
+    // while the pointer is away, the legend has the values of the line
     if (plot.cursor.left === undefined || plot.cursor.left < 0) {
-      const index = this.options.x.indexOf(x);
-      if (index >= 0) queueMicrotask(() => plot.setLegend({idx: index}, false));
+      const index = this.indexOf(x);
+      if (index >= 0) plot.setLegend({idx: index}, false);
     }
-    plot.ctx.save();
-    plot.ctx.fillStyle = themeColour('--accent');
-    plot.ctx.fillRect(at - 1, plot.bbox.top, 2, plot.bbox.height);
-    plot.ctx.restore();
+  }
+
+  private indexOf(x: number): number {
+    const {x: all} = this.options;
+    return all[x] === x ? x : all.indexOf(x);  // frames are their own places
   }
 
   private listen(plot: uPlot): void {
+    this.reachLegend(plot);
     const {pick} = this.options;
     if (!pick) return;
     plot.over.style.cursor = 'pointer';
@@ -120,11 +140,33 @@ export class Chart {
     });
   }
 
-  /** Draws again; `fresh`: the values have changed. */
+  /** Lines are shown and hidden by a click on their names; by keys as well. */
+  private reachLegend(plot: uPlot): void {
+    const names = [...plot.root.querySelectorAll<HTMLElement>('.u-legend .u-series > th')];
+    names.forEach((name, series) => {
+      if (!series) return;  // the axis
+      name.tabIndex = 0;
+      name.setAttribute('role', 'button');
+      name.setAttribute('aria-label', `${this.options.lines[series - 1].label}, shown`);
+      name.setAttribute('aria-pressed', String(plot.series[series].show !== false));
+      name.addEventListener('keydown', (event) => {
+        if (event.key !== 'Enter' && event.key !== ' ') return;
+        event.preventDefault();
+        event.stopPropagation();
+        name.click();
+      });
+    });
+  }
+
+  /** Draws again; `fresh`: the values have changed. What is not seen waits until it is. */
   refresh(fresh: boolean): void {
-    if (!this.plot || !this.element.isConnected) return;
-    if (fresh) this.plot.setData(this.data());
-    else this.plot.redraw(false);
+    if (fresh && !this.shown) this.old = true;
+    if (!this.plot || !this.shown) return;
+    if (fresh) {
+      this.old = false;
+      this.plot.setData(this.data());
+    }
+    this.mark(this.plot);
   }
 
   end(): void {

@@ -12,7 +12,7 @@ interface Row {
 }
 
 export function makeControls(context: Context): HTMLElement | null {
-  const {model, session, scope} = context, controls = model.meta.controls ?? [];
+  const {model, session, scope, store} = context, controls = model.meta.controls ?? [];
   if (!controls.length) return null;
   const rows = controls.map((info) => session && info.min !== null && info.min !== undefined ? sliderRow(context, info) : plainRow(context, info));
   const groups = new Map<string, Row[]>();
@@ -40,6 +40,19 @@ export function makeControls(context: Context): HTMLElement | null {
         show(moved ? session.moved[info.name] : session.values.value[info.name] ?? info.value ?? 0, moved);
       }
     };
+    // the handle that is held and the sliders that are its own show each other
+    const handles = model.meta.handles ?? [];
+    for (const {info, element} of rows) {
+      const own = handles.findIndex((handle) => handle.controls.includes(info.name));
+      if (own >= 0) element.addEventListener('focusin', () => store.set({handle: own}));
+    }
+    scope.add(store.on(['handle'], ({handle}) => {
+      const names = handles[handle]?.controls ?? [];
+      const own = rows.filter(({info, element}) => element.classList.toggle('held', names.includes(info.name)));
+      // where the panel is a part of the page (narrow screens), that would take the picture from under the pointer
+      const scrolls = getComputedStyle(panel).overflowY !== 'visible';
+      if (scrolls && own.length && !own.some(({element}) => element.contains(document.activeElement))) own[0].element.scrollIntoView({block: 'nearest'});
+    }));
     scope.add(session.values.on(refresh));
     scope.add(session.touched.on(refresh));
   } else {
@@ -80,7 +93,7 @@ function sliderRow(context: Context, info: ControlInfo): Row {
   };
   const reset = (event: Event): void => session.release([info.name], event.timeStamp);
   const slider = h('input', {
-    attributes: {type: 'range', min, max, step: whole ? 1 : 'any', 'aria-label': info.label ?? info.name, title: `${title(info)}; double click or Delete for the default`},
+    attributes: {type: 'range', min, max, step: whole ? 1 : 'any', 'aria-label': info.name, title: `${title(info)}; double click or Delete for the default`},
     on: {input: (event) => set(Number(slider.value), event), dblclick: reset},
   });
   // step "any" makes arrow keys useless in some browsers: a hundredth of the range instead
@@ -96,7 +109,7 @@ function sliderRow(context: Context, info: ControlInfo): Row {
     set(Math.min(max, Math.max(min, Number(slider.value) + by * (max - min) / (event.shiftKey ? 10 : 100))), event);
   });
   const field = h('input', {
-    class: 'value', attributes: {type: 'number', step: whole ? 1 : 'any', 'aria-label': `${info.label ?? info.name}, value`},
+    class: 'value', attributes: {type: 'number', step: whole ? 1 : 'any', 'aria-label': `${info.name}, value`},
     on: {change: (event) => set(Number(field.value), event)},
   });
   const element = h('div', {class: 'control'},

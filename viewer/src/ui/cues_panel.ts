@@ -20,9 +20,11 @@ export function cueMarks({model}: Context): {marks: Mark[]; cueOf: number[]} {
 
 export function describeCue({model}: Context, index: number): string {
   const cue = model.meta.cues![index];
-  return [cue.kind, cue.stage && `at ${cue.stage}`, cue.cost_us !== null && cue.cost_us !== undefined && duration(cue.cost_us), cue.sees]
+  return [cue.kind, cue.stage && `at ${cue.stage}`, cue.cost_us !== null && cue.cost_us !== undefined && `${duration(cue.cost_us)} of a frame`, cue.sees]
     .filter(Boolean).join(', ');
 }
+
+const plurals: Record<string, string> = {point: 'points', matrix: 'matrices', scalar: 'scalars', product: 'products'};
 
 export function makeCues(context: Context): HTMLElement | null {
   const {model, store, scope} = context, cues = model.meta.cues ?? [];
@@ -30,7 +32,7 @@ export function makeCues(context: Context): HTMLElement | null {
   const details = h('p', {class: 'details', attributes: {'aria-live': 'polite'}});
   const table = new DataTable({
     label: 'Cues',
-    columns: [{name: 'cue'}, {name: 'kind'}, {name: 'stage'}, {name: 'cost', unit: 'µs', note: 'time to measure it'}],
+    columns: [{name: 'cue'}, {name: 'kind'}, {name: 'stage'}, {name: 'cost', unit: 'µs', note: 'a frame: its part of the time that measuring all of them takes'}],
     rows: cues.map((cue) => [cue.name, cue.kind, cue.stage ?? null, cue.cost_us ?? null]),
     choose: (row) => store.set({cue: store.now.cue === row ? -1 : row, showCues: true}),
   });
@@ -40,7 +42,9 @@ export function makeCues(context: Context): HTMLElement | null {
   }));
   const count = new Map<string, number>();
   for (const cue of cues) count.set(cue.kind, (count.get(cue.kind) ?? 0) + 1);
+  const costs = cues.flatMap((cue) => cue.cost_us === null || cue.cost_us === undefined ? [] : [cue.cost_us]);
+  const cost = costs.length ? ` That takes ${duration(costs.reduce((sum, us) => sum + us, 0))} of a frame. What cues share of it is split between them; the joints and drivers that move them run in any case.` : '';
   return h('div', {class: 'cues'},
-    h('p', {class: 'note'}, `${cues.length} values are measured on every frame: ${[...count].map(([kind, n]) => `${n} ${kind}`).join(', ')}.`),
+    h('p', {class: 'note'}, `${cues.length === 1 ? 'One cue is' : `${cues.length} cues are`} measured in every frame: ${[...count].map(([kind, n]) => `${n} ${n === 1 ? kind : plurals[kind] ?? kind}`).join(', ')}.${cost}`),
     details, table.element);
 }

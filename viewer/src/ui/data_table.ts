@@ -41,7 +41,7 @@ export class DataTable {
       },
     }, ...columns.map((_, c) => {
       const cell = row[c];
-      return h('td', {class: numeric[c] ? 'number' : undefined}, typeof cell === 'number' ? number(cell) : cell ?? '');
+      return h('td', {class: numeric[c] ? 'number' : undefined, attributes: {title: typeof cell === 'string' && cell.length > 24 ? cell : null}}, typeof cell === 'number' ? number(cell) : cell ?? '');
     })));
     this.body.append(...this.lines);
     this.element = h('div', {class: 'table-place', attributes: {tabindex: 0, role: 'region', 'aria-label': options.label}},

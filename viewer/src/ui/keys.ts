@@ -15,12 +15,18 @@ function typing(target: EventTarget | null, key: string): boolean {
   return key === ' ' && target.closest('button, a') !== null;
 }
 
-export function listenToKeys({store, model, viewport, view, scope}: Context, help: Help): void {
+export function listenToKeys({store, model, viewport, view, scope, session, tell}: Context, help: Help): void {
   const clips = model.meta.clips?.length ?? 0, turn = Math.PI / 24;
   const press = (event: KeyboardEvent): void => {
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;  // Caps Lock
     if (typing(event.target, key) || event.altKey || event.metaKey || (help.element.open && key !== '?')) return;
     const {clip} = store.now;
+    if (event.ctrlKey && session && (key === 'z' || key === 'y')) {
+      event.preventDefault();
+      const back = key === 'z' && !event.shiftKey;
+      if (!(back ? session.undo() : session.redo())) tell(back ? 'nothing to undo' : 'nothing to redo');
+      return;
+    }
     if (event.shiftKey && key.startsWith('Arrow')) {
       if (key === 'ArrowLeft' || key === 'ArrowRight') viewport.turn(key === 'ArrowLeft' ? -turn : turn, 0);
       else viewport.turn(0, key === 'ArrowUp' ? turn : -turn);
@@ -46,9 +52,10 @@ export function listenToKeys({store, model, viewport, view, scope}: Context, hel
       case '-': viewport.zoom(1 / 0.85); break;
       case 'c': if (view.cueCount) store.set({showCues: !store.now.showCues}); break;
       case 'e': store.set({showEdges: !store.now.showEdges}); break;
+      case 'h': if (model.meta.handles?.length) store.set({showHandles: !store.now.showHandles}); break;
       case 'p': store.set({picking: !store.now.picking}); break;
       case 't': applyTheme(theme() === 'dark' ? 'light' : 'dark'); break;
-      case 'Escape': store.set({vertex: -1, cue: -1, node: -1, paint: null, picking: false}); break;
+      case 'Escape': store.set({vertex: -1, cue: -1, node: -1, paint: null, handle: -1, picking: false}); break;
       case '?': help.toggle(); break;
       default: return;
     }

@@ -16,7 +16,7 @@ export function makeLegend(context: Context): HTMLElement {
   });
   const base = model.tolerance ?? model.unit.metres;
   for (const times of [0.25, 0.5, 1, 2, 4]) factor.append(h('option', {attributes: {value: base * times}}, `0 to ${length(base * times, model)}`));
-  const legend = h('div', {class: 'legend'}, title, h('div', {class: 'legend-track'}, bar, line), scale, factor);
+  const legend = h('div', {class: 'legend'}, h('div', {class: 'legend-head'}, title, factor), h('div', {class: 'legend-track'}, bar, line), scale);
 
   scope.add(store.on(['errorTop'], ({errorTop}) => view.setErrorTop(errorTop, errorTop / base)));
   scope.add(store.on(['mode', 'paint', 'errorTop'], ({mode, paint, errorTop}) => {
@@ -26,7 +26,7 @@ export function makeLegend(context: Context): HTMLElement {
     factor.value = String(errorTop);
     if (errors) {
       const tolerance = model.tolerance;
-      title.textContent = 'Full against accelerated';
+      title.textContent = 'Difference of both';
       bar.style.background = gradient(errorColour, errorTop / base);
       low.textContent = '0';
       high.textContent = length(errorTop, model);

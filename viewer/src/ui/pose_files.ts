@@ -3,7 +3,7 @@ import type {Context} from '../context';
 import {nearestFrame} from '../player';
 import {button, h} from './dom';
 
-export function makePoseRow({session, store, model, tell}: Context): HTMLElement {
+export function makePoseRow({session, store, model, tell, scope}: Context): HTMLElement {
   const live = session!;
   const open = h('input', {
     attributes: {type: 'file', accept: '.json,.yaml,.yml,.txt', hidden: true, 'aria-label': 'Pose file'},
@@ -23,7 +23,14 @@ export function makePoseRow({session, store, model, tell}: Context): HTMLElement
     live.compare = compare.checked;
     live.changed();
   }}});
+  const undo = button('Undo', () => live.undo(), {title: 'What was moved last (Ctrl+Z)'});
+  const redo = button('Redo', () => live.redo(), {title: 'What was undone last (Ctrl+Shift+Z)'});
+  scope.add(live.touched.on(() => {
+    undo.disabled = !live.history.canUndo;
+    redo.disabled = !live.history.canRedo;
+  }));
   return h('div', {class: 'row pose'},
+    undo, redo,
     button('Reset', (() => live.release(Object.keys(live.moved))), {title: 'All controls as the rig or the clip has them'}),
     button('Save pose', () => {
       const values: Record<string, number> = {};

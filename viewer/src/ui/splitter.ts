@@ -2,7 +2,7 @@
 import {h} from './dom';
 
 export function makeSplitter(main: HTMLElement): HTMLElement {
-  let width = 460;
+  let width = 480;
   const set = (wanted: number): void => {
     width = Math.round(Math.min(Math.max(300, wanted), Math.max(320, main.clientWidth - 360)));
     main.style.setProperty('--side', `${width}px`);

@@ -3,19 +3,23 @@ import type {Context} from '../context';
 import {h} from './dom';
 import {duration, length, number} from './format';
 
+const meaning = {hit: 'computed without the full stack', blend: 'in part from the full evaluation', miss: 'evaluated fully'};
+
 export function makeStatus(context: Context): HTMLElement | null {
   const {model, facts, session, scope} = context;
   if (!model.accelerated && !model.live && !model.meta.clips?.some((clip) => clip.full_us)) return null;
   const verdict = h('span', {class: 'verdict'});
   const reason = h('span', {class: 'reason'});
   const most = h('span');
-  const figures = h('span');
+  const figures = h('span', {attributes: {title: 'score: how unlike what was trained; 1 is where a frame misses'}});
   const loop = h('span', {class: 'loop'});
   scope.add(facts.on((known) => {
     verdict.hidden = !known.verdict;
     verdict.textContent = known.verdict ?? '';
     verdict.dataset.verdict = known.verdict ?? '';
-    reason.textContent = known.problem ?? known.reason ?? '';
+    verdict.title = known.verdict ? meaning[known.verdict] : '';
+    // of a hit the reason is that word again
+    reason.textContent = known.problem ?? (known.reason === known.verdict ? '' : known.reason) ?? '';
     reason.classList.toggle('bad', known.problem !== null);
     const parts: string[] = [];
     most.hidden = known.max_error === null;

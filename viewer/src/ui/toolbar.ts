@@ -6,7 +6,7 @@ import {button, h, setPressed} from './dom';
 const names: Record<ViewMode, string> = {full: 'Full', accelerated: 'Accelerated', difference: 'Difference', overlay: 'Overlay'};
 
 export function makeToolbar(context: Context): HTMLElement {
-  const {store, model, view, viewport, scope} = context;
+  const {store, model, view, viewport, scope, session} = context;
   const bar = h('div', {class: 'toolbar', attributes: {role: 'toolbar', 'aria-label': 'Picture'}});
 
   if (model.accelerated) {
@@ -36,14 +36,21 @@ export function makeToolbar(context: Context): HTMLElement {
     }));
     group.append(cues);
   }
-  if (view.hasEdges) {
-    const edges = button('Edges', () => store.set({showEdges: !store.now.showEdges}), {title: 'Edges (E)', pressed: false});
-    scope.add(store.on(['showEdges'], ({showEdges}) => {
-      setPressed(edges, showEdges);
-      view.setEdges(showEdges);
+  if (model.meta.handles?.length) {
+    const handles = button('Handles', () => store.set({showHandles: !store.now.showHandles}), {title: 'What is dragged (H)', pressed: true});
+    scope.add(store.on(['showHandles'], ({showHandles}) => {
+      setPressed(handles, showHandles);
+      if (showHandles) session?.changed();
     }));
-    group.append(edges);
+    group.append(handles);
   }
+  const edges = button('Edges', () => store.set({showEdges: !store.now.showEdges}),
+    {title: view.edgesAreModelled ? 'Edges (E)' : 'Edges of the triangles that the file has (E)', pressed: false});
+  scope.add(store.on(['showEdges'], ({showEdges}) => {
+    setPressed(edges, showEdges);
+    view.setEdges(showEdges);
+  }));
+  group.append(edges);
   group.append(button('Fit', () => viewport.fit(), {title: 'All of it (F)'}));
   bar.append(group);
   return bar;

@@ -2,6 +2,7 @@
 import {Group, Vector3, type DataTexture, type WebGLRenderer} from 'three';
 import type {Model} from '../data/model';
 import {gridOf, texture} from '../gpu/layout';
+import {edgesOf} from '../gpu/edges';
 import {Marks, type Mark} from '../gpu/marks';
 import {Normals} from '../gpu/normals';
 import {Positions, type Side} from '../gpu/positions';
@@ -15,6 +16,7 @@ export class ModelView {
   readonly positions: Positions;
   readonly cues: Marks;
   readonly picked: Marks;
+  readonly handles: Marks;
   private readonly normals: Normals;
   private readonly solid = new Group();
   private readonly ghost = new Group();
@@ -52,11 +54,12 @@ export class ModelView {
       const triangles = this.own(indexed(mesh.triangles));
       this.solid.add(this.made(surface(triangles, mesh, this.shown, false)));
       this.ghost.add(this.made(surface(triangles, mesh, this.other, true)));
-      if (mesh.edges) this.edges.add(this.made(edgeLines(this.own(indexed(mesh.edges)), this.shown)));
     }
     this.cues = this.own(new Marks(this.shown, [1, 0.78, 0.2]));
     this.picked = this.own(new Marks(this.shown, [0.3, 0.85, 1]));
-    this.group.add(this.solid, this.ghost, this.edges, this.cues.object, this.picked.object);
+    this.handles = this.own(new Marks(this.shown, [0.76, 0.6, 1]));
+    this.handles.set((model.meta.handles ?? []).map(({position, kind}) => ({vertex: -1, offset: position, diamond: kind === 'move'})));
+    this.group.add(this.solid, this.ghost, this.edges, this.cues.object, this.picked.object, this.handles.object);
   }
 
   private own<T extends {dispose(): void}>(thing: T): T {
@@ -69,8 +72,9 @@ export class ModelView {
     return object;
   }
 
-  get hasEdges(): boolean {
-    return this.edges.children.length > 0;
+  /** Whether edges are those that were modelled; else they are those of triangles. */
+  get edgesAreModelled(): boolean {
+    return this.model.meshes.every((mesh) => mesh.edges);
   }
 
   /** The side whose surface is solid. */
@@ -101,6 +105,7 @@ export class ModelView {
 
   setPixelRatio(ratio: number): void {
     for (const marks of [this.cues, this.picked]) marks.setSize(9 * ratio);
+    this.handles.setSize(13 * ratio);
   }
 
   /** Values of 0 to 1 as colours; null for the meshes' own. */
@@ -112,6 +117,12 @@ export class ModelView {
   }
 
   setEdges(visible: boolean): void {
+    if (visible && !this.edges.children.length) {  // not before somebody wants to see them
+      for (const mesh of this.model.meshes) {
+        const lines = this.own(indexed(mesh.edges ?? edgesOf(mesh.triangles, this.model.points)));
+        this.edges.add(this.made(edgeLines(lines, mesh, this.shown)));
+      }
+    }
     this.edges.visible = visible;
     this.invalidate();
   }
@@ -126,6 +137,12 @@ export class ModelView {
   showCues(visible: boolean, selected: number): void {
     this.cues.object.visible = visible && this.cueMarks.length > 0;
     this.cues.emphasize(this.cueOf.indexOf(selected));
+    this.invalidate();
+  }
+
+  showHandles(visible: boolean, held: number): void {
+    this.handles.object.visible = visible && (this.model.meta.handles?.length ?? 0) > 0;
+    this.handles.emphasize(held);
     this.invalidate();
   }
 

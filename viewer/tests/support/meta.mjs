@@ -31,7 +31,7 @@ export function makeMeta(character, {accelerated = true, live = false} = {}) {
     nodes: makeNodes(accelerated), tables: makeTables(),
   };
   meta.clips = character.clips.map((clip) => ({...clip}));
-  if (live) meta.generation = 1;
+  if (live) Object.assign(meta, {generation: 1, handles: [{name: 'bend', kind: 'turn', controls: ['bend.rotateX'], position: [-0.2, 0.8, 0.1]}]});
   if (accelerated) {
     Object.assign(meta, {
       tolerance, reasons: ['bend.rotateX is outside its trained range', 'bent farther than the trained poses (most at sheet, points from 896 on)'], cues: makeCues(character),

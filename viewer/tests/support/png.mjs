@@ -39,3 +39,13 @@ export function share(png, is) {
   for (let i = 0; i < data.length; i += channels) if (is(data[i], data[i + 1], data[i + 2])) ++count;
   return count / (width * height);
 }
+
+/** By how much lightness differs, 0 to 1, where it does by more than a little: the middle one of these pixels. */
+export function contrast(a, b) {
+  const x = decode(a), y = decode(b), found = [], light = (p, i) => (0.2126 * p[i] + 0.7152 * p[i + 1] + 0.0722 * p[i + 2]) / 255;
+  for (let i = 0; i < x.data.length; i += x.channels) {
+    const off = Math.abs(light(x.data, i) - light(y.data, i));
+    if (off > 0.02) found.push(off);
+  }
+  return found.sort((p, q) => p - q)[found.length >> 1] ?? 0;
+}

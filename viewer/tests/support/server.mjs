@@ -28,7 +28,17 @@ export async function startServer({accelerated = true, port = 0} = {}) {
   let serial = 0, problems = [], inFlight = 0;
   const state = {character, meta, log, mostInFlight: 0, refused: 0, held: null};
 
+  const [handle] = meta.handles, perDegree = 0.004;  // metres that the handle goes up
+  const heldAt = (set) => [handle.position[0], handle.position[1] + perDegree * (set['bend.rotateX'] ?? 0), handle.position[2]];
+  /** The value at which the handle, which goes up and down, is as near to a line as it can be. */
+  const drag = ({from, along}) => {
+    const gap = from.map((x, i) => x - handle.position[i]), dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
+    const aa = dot(along, along), up = (gap[1] * aa - along[1] * dot(along, gap)) / (aa - along[1] ** 2) / perDegree;
+    return {'bend.rotateX': Math.min(60, Math.max(-60, up))};
+  };
   const evaluate = (request) => {
+    const dragged = request.drag ? drag(request.drag) : null;
+    Object.assign(request.set, dragged);
     const bent = request.set['bend.rotateX'] ?? 0, miss = Math.abs(bent) > 50;
     const full = Float32Array.from(character.place(coefficientsOf(character, request.set, request.clip, request.time)));
     const near = Float32Array.from(full, (x, i) => miss || i % 3 !== 2 ? x : x + 0.0009 * Math.sin(i / 300));
@@ -36,6 +46,8 @@ export async function startServer({accelerated = true, port = 0} = {}) {
     const facts = {id: request.id, generation: meta.generation, parts, full_us: request.mode === 'accelerated' ? null : 640, values: {...Object.fromEntries(meta.controls.map((c) => [c.name, c.value])), ...request.set}};
     if (accelerated && request.mode !== 'full') Object.assign(facts, {verdict: miss ? 'miss' : 'hit', reason: miss ? 'bend.rotateX is outside its trained range' : '', score: miss ? 1.7 : 0.4, accelerated_us: miss ? 700 : 55});
     if (request.mode === 'both') Object.assign(facts, {max_error: miss ? 0 : 0.0009, rms_error: miss ? 0 : 0.0004});
+    if (dragged) facts.dragged = dragged;
+    if (request.handles) facts.handles = heldAt(request.set);
     let text = Buffer.from(JSON.stringify(facts));
     const head = Buffer.alloc(4);
     head.writeUInt32LE(text.length);
