@@ -12,6 +12,7 @@ namespace kpsa::engine::gltf {
 namespace {
 
 constexpr unsigned kPositionTypes = kFloat | kAnyInteger16;  // integers: KHR_mesh_quantization
+constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
 constexpr float kNegativeNoise = -1e-4f;  // exporters' rounding; such weights count as zero
 
 int FindAttribute(const std::map<std::string, int>& attributes, const std::string& name) {
@@ -198,21 +199,40 @@ Status ReadColors(const Document& document, const tinygltf::Primitive& in, const
 }
 
 // Appends the texture coordinates of this primitive where it has them; nothing while no primitive had any.
-Status ReadUvs(const Document& document, const tinygltf::Primitive& in, const std::string& where,
-               const Primitive& primitive, Mesh* mesh) {
-  const int accessor = FindAttribute(in.attributes, "TEXCOORD_0");
-  if (accessor < 0 && mesh->uvs.empty()) return {};
-  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(8 * (mesh->vertex_count() - mesh->uvs.size() / 2), where));
+Status ReadUvs(const Document& document, const tinygltf::Primitive& in, const std::string& where, int set,
+               const Primitive& primitive, const Mesh& mesh, std::vector<float>* all) {
+  const std::string name = fmt::format("TEXCOORD_{}", set);
+  const int accessor = FindAttribute(in.attributes, name);
+  if (accessor < 0 && all->empty()) return {};
+  KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(8 * (mesh.vertex_count() - all->size() / 2), where));
   if (accessor >= 0 && primitive.vertex_count > 0) {
-    const std::string place = where + ".TEXCOORD_0";
+    const std::string place = where + "." + name;
     KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
     std::vector<float> uvs;
     KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, 2, kPositionTypes, place, &uvs));
-    mesh->uvs.resize(2 * static_cast<std::size_t>(primitive.first_vertex), kNone);
-    mesh->uvs.insert(mesh->uvs.end(), uvs.begin(), uvs.end());
+    all->resize(2 * static_cast<std::size_t>(primitive.first_vertex), kNoNumber);
+    all->insert(all->end(), uvs.begin(), uvs.end());
   }
-  mesh->uvs.resize(2 * mesh->vertex_count(), kNone);
+  all->resize(2 * mesh.vertex_count(), kNoNumber);
+  return {};
+}
+
+// Likewise the normals.
+Status ReadNormals(const Document& document, const tinygltf::Primitive& in, const std::string& where,
+                   const Primitive& primitive, Mesh* mesh) {
+  const int accessor = FindAttribute(in.attributes, "NORMAL");
+  if (accessor < 0 && mesh->normals.empty()) return {};
+  KPSA_RETURN_IF_ERROR(
+      document.budget.TakeMemory(12 * (mesh->vertex_count() - mesh->normals.size() / 3), where));
+  if (accessor >= 0 && primitive.vertex_count > 0) {
+    const std::string place = where + ".NORMAL";
+    KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
+    std::vector<float> normals;
+    KPSA_RETURN_IF_ERROR(ReadDirections(document, accessor, kFloat | kByte | kShort, place, &normals));
+    mesh->normals.resize(3 * static_cast<std::size_t>(primitive.first_vertex), kNoNumber);
+    mesh->normals.insert(mesh->normals.end(), normals.begin(), normals.end());
+  }
+  mesh->normals.resize(mesh->positions.size(), kNoNumber);
   return {};
 }
 
@@ -234,7 +254,12 @@ Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, co
   KPSA_RETURN_IF_ERROR(ReadInfluences(document, in, where, &primitive, mesh));
   KPSA_RETURN_IF_ERROR(ReadTargets(document, in, where, primitive, mesh));
   KPSA_RETURN_IF_ERROR(ReadColors(document, in, where, primitive, mesh));
-  KPSA_RETURN_IF_ERROR(ReadUvs(document, in, where, primitive, mesh));
+  KPSA_RETURN_IF_ERROR(ReadUvs(document, in, where, 0, primitive, *mesh, &mesh->uvs));
+  for (int set = 1; set <= static_cast<int>(mesh->more_uvs.size()); ++set) {
+    KPSA_RETURN_IF_ERROR(ReadUvs(document, in, where, set, primitive, *mesh,
+                                 &mesh->more_uvs[static_cast<std::size_t>(set) - 1]));
+  }
+  KPSA_RETURN_IF_ERROR(ReadNormals(document, in, where, primitive, mesh));
   mesh->primitives.push_back(std::move(primitive));
   return {};
 }
@@ -265,6 +290,11 @@ Status ReadMesh(const Document& document, std::size_t index, Mesh* mesh) {
 }
 
 }  // namespace
+
+const std::vector<float>& Mesh::UvSet(std::size_t n) const {
+  static const std::vector<float> none;
+  return n == 0 ? uvs : n <= more_uvs.size() ? more_uvs[n - 1] : none;
+}
 
 Status ReadMeshes(const Document& document, Character* character) {
   const tinygltf::Model& model = *document.model;

@@ -33,6 +33,25 @@ const Value& StructuralValue(const Graph& graph, NodeId node, const char* name) 
                         : graph.def(node).attributes[static_cast<std::size_t>(plug.attribute)].default_value;
 }
 
+// What the textures of the mesh say where a ray hits its triangle `t`; `spread`: of a pixel's rays, at 1 m.
+Double3 TextureColor(const MeshLook& look, Index t, const ShadingPlace& place, ConstPointsView points,
+                     const Index* corner, double spread, Double3 origin) {
+  const Index* const at = &look.triangles[3 * std::size_t{t}];
+  if (look.texture.empty() || look.texture[*at] == kNoIndex) return {1, 1, 1};
+  const SurfaceTexture& texture = look.textures[look.texture[*at]];
+  const double w[3] = {1 - place.u - place.v, place.u, place.v};
+  Double3 corners[3];
+  double uvs[3][2], uv[2] = {0, 0};
+  for (std::size_t k = 0; k < 3; ++k) {
+    corners[k] = {points.x[corner[k]], points.y[corner[k]], points.z[corner[k]]};
+    for (std::size_t i = 0; i < 2; ++i) {
+      uvs[k][i] = double{look.uvs[2 * std::size_t{at[k]} + i]};
+      uv[i] += uvs[k][i] * w[k];
+    }
+  }
+  return texture.At(uv[0], uv[1], TexelsOf(texture, corners, uvs, spread * Length(place.position - origin)));
+}
+
 Index SizeOf(const Graph& graph, NodeId node, const char* name) {
   return static_cast<Index>(StructuralValue(graph, node, name).AsInt());
 }
@@ -135,7 +154,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
   std::vector<Index> triangles;
   std::vector<float> albedo;
   std::vector<Index> carrier;  // of each triangle: in view.carried, or none
-  std::vector<Index> first_point(view.meshes.size());
+  std::vector<Index> first_point(view.meshes.size()), mesh_of, first_triangle;
   Index count = 0;
   for (std::size_t i = 0; i < view.meshes.size(); ++i) {
     const std::size_t m = view.meshes[i];
@@ -145,6 +164,8 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
       if (view.carried[k].mesh == i) owner = static_cast<Index>(k);
     }
     const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
+    first_triangle.push_back(static_cast<Index>(triangles.size() / 3));
+    mesh_of.insert(mesh_of.end(), mesh.triangles.size() / 3, static_cast<Index>(i));
     for (const Mesh::Primitive& primitive : mesh.primitives) {
       for (Index t = 3 * primitive.first_triangle;
            t < 3 * (primitive.first_triangle + primitive.triangle_count); ++t) {
@@ -204,6 +225,12 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
           return at(light, corner[0] - first) * (1 - place.u - place.v) +
                  at(light, corner[1] - first) * place.u + at(light, corner[2] - first) * place.v;
         };
+        const auto spread = [&](std::size_t p, Double3 direction) {  // from the pixel beside it, in its row
+          Double3 origin, other;
+          const std::size_t beside = (p + 1) % image.width == 0 && image.width > 1 ? p - 1 : p + 1;
+          PixelRay(world_from_screen, static_cast<Index>(beside), view.width, view.height, &origin, &other);
+          return Length(UnitOrZero(other) - UnitOrZero(direction));
+        };
         const auto shade = [&](std::size_t begin, std::size_t end) {
           for (std::size_t p = begin; p < end; ++p) {
             Double3 origin, direction;
@@ -213,8 +240,16 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
                 tracer->Direct(place, static_cast<std::uint32_t>(p) * 0x9e3779b1u, kAreaSamples);
             image.hit[p] = place.hit;
             const Double3 bounced = indirect(p, place);
+            Double3 texel = {1, 1, 1};
+            if (place.hit && view.look != nullptr) {
+              const Index i = mesh_of[place.triangle];
+              texel = TextureColor((*view.look)[view.meshes[i]], place.triangle - first_triangle[i], place,
+                                   std::as_const(points).view(), &triangles[3 * std::size_t{place.triangle}],
+                                   spread(p, direction), origin);
+            }
             for (int k = 0; k < 3; ++k) {
-              image.albedo[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(place.albedo[k]);
+              image.albedo[3 * p + static_cast<std::size_t>(k)] =
+                  static_cast<float>(place.albedo[k] * texel[k]);
               image.direct[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(light[k]);
               image.indirect[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(bounced[k]);
             }

@@ -3,6 +3,7 @@
 // camera.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "host/verdicts.h"
 #include "nodes/kernels/path_tracer.h"
 #include "picture/image.h"
+#include "picture/look.h"
 
 namespace kpsa::engine {
 
@@ -26,9 +28,10 @@ struct CameraView {
     DiffuseLight::Kind kind;
     PlugRef matrix, color;
   };
-  std::vector<Light> lights;        // of the illumination; all of the rig where there is none
-  std::vector<std::size_t> meshes;  // that are lit, in rig.scene.meshes
-  Index width = 400, height = 400;  // of the illumination
+  std::vector<Light> lights;            // of the illumination; all of the rig where there is none
+  std::vector<std::size_t> meshes;      // that are lit, in rig.scene.meshes
+  Index width = 400, height = 400;      // of the illumination
+  std::shared_ptr<const RigLook> look;  // whose textures are multiplied with base colours; null: none are
 };
 
 // The view of a camera node. Errors: no such camera (the nearest one is named), several illuminations that

@@ -143,8 +143,10 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
         scene->ClosestHits(rays, hits);
         Double3 sum = {};
         for (std::size_t k = 0; k < 4; ++k) {
-          sum = sum + (hits[k].triangle == kNoIndex ? ground
-                                                    : Shade(*surface, hits[k], directions[k] * -1.0, lights));
+          const double size = hits[k].t * slope / options.height;  // of one of 2 x 2 samples of a pixel
+          sum = sum + (hits[k].triangle == kNoIndex
+                           ? ground
+                           : Shade(*surface, hits[k], directions[k] * -1.0, lights, size));
         }
         image.Set(column, static_cast<int>(row),
                   {SrgbByte(sum.x / 4), SrgbByte(sum.y / 4), SrgbByte(sum.z / 4)});

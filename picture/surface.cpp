@@ -41,6 +41,59 @@ double LinearFromSrgb(std::uint8_t byte) {
 
 Double3 PointOf(ConstPointsView p, std::size_t i) { return {p.x[i], p.y[i], p.z[i]}; }
 
+Status CheckPart(const RenderPart& part) {
+  const std::size_t n = part.points.size() / 3;
+  const auto fits = [](std::size_t size, std::size_t expected) { return size == 0 || size == expected; };
+  if (part.points.size() % 3 != 0 || !fits(part.colors.size(), 3 * n) || !fits(part.scalars.size(), n)) {
+    return Status::Invalid("a picture's part has {} coordinates, {} colour values and {} scalars",
+                           part.points.size(), part.colors.size(), part.scalars.size());
+  }
+  if (!fits(part.smooth.size(), n) || !fits(part.texture.size(), n) ||
+      part.uvs.size() != 2 * part.texture.size())
+    return Status::Invalid(
+        "a picture's part of {} points shares {} normals and has {} textures and {} coordinates", n,
+        part.smooth.size(), part.texture.size(), part.uvs.size());
+  for (const Index first : part.smooth) {
+    if (first >= n) return Status::Invalid("a normal is shared with point {}, there are {} points", first, n);
+  }
+  for (const Index texture : part.texture) {
+    if (texture != kNoIndex && texture >= part.textures.size())
+      return Status::Invalid("a point is covered by texture {} of {}", texture, part.textures.size());
+  }
+  return {};
+}
+
+// What covers the part's triangles, from `first` on in the surface; nothing while no part had any.
+void GatherTextures(const RenderPart& part, std::size_t base, std::size_t first, Surface* out) {
+  const bool covered = !part.texture.empty() && part.scalars.empty();
+  if (!covered && out->textures.empty()) return;
+  out->textures.resize(first / 3, nullptr);
+  out->uvs.resize(base, {0, 0});
+  for (std::size_t t = first; t < out->triangles.size(); t += 3) {
+    const Index texture = covered ? part.texture[out->triangles[t] - base] : kNoIndex;
+    out->textures.push_back(texture == kNoIndex ? nullptr : &part.textures[texture]);
+  }
+  for (std::size_t i = 0; i < part.points.size() / 3; ++i)
+    out->uvs.push_back(covered ? std::array{part.uvs[2 * i], part.uvs[2 * i + 1]} : std::array{0.0f, 0.0f});
+}
+
+// What the texture there says, of a sample of that size.
+Double3 TexelColor(const Surface& surface, const RayHit& hit, const Index* corner,
+                   const std::array<double, 3>& w, double size) {
+  const SurfaceTexture& texture = *surface.textures[hit.triangle];
+  const ConstPointsView p = surface.points.view();
+  Double3 corners[3];
+  double uvs[3][2], at[2] = {0, 0};
+  for (std::size_t k = 0; k < 3; ++k) {
+    corners[k] = PointOf(p, corner[k]);
+    for (std::size_t i = 0; i < 2; ++i) {
+      uvs[k][i] = double{surface.uvs[corner[k]][i]};
+      at[i] += uvs[k][i] * w[k];
+    }
+  }
+  return texture.At(at[0], at[1], TexelsOf(texture, corners, uvs, size));
+}
+
 }  // namespace
 
 Double3 UnitVector(Double3 v) {
@@ -62,13 +115,8 @@ Result<Surface> GatherSurface(const RenderInput& input) {
   Surface out;
   std::size_t count = 0;
   for (const RenderPart& part : input.parts) {
-    const std::size_t n = part.points.size() / 3;
-    if (part.points.size() % 3 != 0 || (!part.colors.empty() && part.colors.size() != 3 * n) ||
-        (!part.scalars.empty() && part.scalars.size() != n)) {
-      return Status::Invalid("a picture's part has {} coordinates, {} colour values and {} scalars",
-                             part.points.size(), part.colors.size(), part.scalars.size());
-    }
-    count += n;
+    KPSA_RETURN_IF_ERROR(CheckPart(part));
+    count += part.points.size() / 3;
   }
   out.points = PointBuffer(count);
   const PointsView p = out.points.view();
@@ -84,14 +132,16 @@ Result<Surface> GatherSurface(const RenderInput& input) {
       if (!part.scalars.empty()) color = LinearFromRgb(TurboColor(part.scalars[i] / input.scalar_max));
       out.colors.push_back(color);
       out.matte.push_back(part.scalars.empty() ? 0 : 1);
+      out.shares.push_back(static_cast<Index>(base + (part.smooth.empty() ? i : part.smooth[i])));
     }
     const auto first = static_cast<std::ptrdiff_t>(out.triangles.size());
     for (Index index : part.triangles) {
       if (index >= n) return Status::Invalid("a triangle names point {}, there are {} points", index, n);
       out.triangles.push_back(static_cast<Index>(base) + index);
     }
-    base += n;
     out.triangles.resize(out.triangles.size() / 3 * 3);
+    GatherTextures(part, base, static_cast<std::size_t>(first), &out);
+    base += n;
     if (part.casts_shadows)
       out.casting.insert(out.casting.end(), out.triangles.begin() + first, out.triangles.end());
   }
@@ -99,9 +149,10 @@ Result<Surface> GatherSurface(const RenderInput& input) {
   for (std::size_t t = 0; t < out.triangles.size(); t += 3) {
     const Index a = out.triangles[t], b = out.triangles[t + 1], c = out.triangles[t + 2];
     const Double3 n = Cross(PointOf(p, b) - PointOf(p, a), PointOf(p, c) - PointOf(p, a));
-    for (Index i : {a, b, c}) out.normals[i] = out.normals[i] + n;
+    for (Index i : {a, b, c}) out.normals[out.shares[i]] = out.normals[out.shares[i]] + n;
   }
   for (Double3& n : out.normals) n = UnitVector(n);
+  for (std::size_t i = 0; i < count; ++i) out.normals[i] = out.normals[out.shares[i]];
   return out;
 }
 
@@ -130,6 +181,7 @@ void LightPoints(const RayScene& scene, Double3 to_key, double diagonal, Surface
     std::array<Ray, kSkyRays> rays;
     std::array<std::uint8_t, kSkyRays> blocked;
     for (std::size_t i = begin; i < end; ++i) {
+      if (surface->shares[i] != i) continue;
       const Double3 n = surface->normals[i];
       const Double3 origin = PointOf(p, i) + n * (diagonal * 1e-3);
       Double3 s, t;
@@ -162,9 +214,13 @@ void LightPoints(const RayScene& scene, Double3 to_key, double diagonal, Surface
       surface->key[i] = static_cast<float>(seen) / kLightRays;
     }
   });
+  for (std::size_t i = 0; i < count; ++i) {
+    surface->sky[i] = surface->sky[surface->shares[i]];
+    surface->key[i] = surface->key[surface->shares[i]];
+  }
 }
 
-Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lights& lights) {
+Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lights& lights, double size) {
   const Index* corner = &surface.triangles[3 * static_cast<std::size_t>(hit.triangle)];
   const std::array<double, 3> w = {1.0 - hit.u - hit.v, hit.u, hit.v};
   Double3 n = {}, color = {};
@@ -183,6 +239,11 @@ Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lig
   const Double3 a = PointOf(p, corner[0]),
                 facet = Cross(PointOf(p, corner[1]) - a, PointOf(p, corner[2]) - a);
   if (Dot(facet, view) < 0) n = n * -1.0;
+  if (!surface.textures.empty() && surface.textures[hit.triangle] != nullptr) {
+    // What is seen at a slant is larger than it looks; a texture knows no direction, so half of that
+    const double facing = std::fabs(Dot(UnitVector(facet), view));
+    color = Times(color, TexelColor(surface, hit, corner, w, size / std::sqrt(std::max(facing, 0.05))));
+  }
   // Sky from above, ground bounce from below, key with a soft terminator, weak fill
   const double up = 0.5 + 0.5 * n.y;
   const Double3 ambient =
