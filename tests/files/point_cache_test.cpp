@@ -317,7 +317,7 @@ TEST(MorphGlb, NormalsOfEveryFrame) {
   cache.materials.resize(2);
   cache.meshes.push_back({"fold", 6, {}, {0, 2, 1, 3, 4, 5}});
   PointCacheMesh& mesh = cache.meshes[0];
-  mesh.smooth = {0, 1, 2, 1, 2, 3};
+  mesh.smooth = {0, 1, 2, 1, 2, 5};
   mesh.parts = {{0, 3, 0}, {3, 3, 1}};
   mesh.colors.assign(18, 0.5f);
   constexpr int kFrames = 24;
