@@ -37,11 +37,11 @@ void EachPoint(const RenderInput& input, F&& f) {
   }
 }
 
-// From the camera's target, as near as possible with all points inside and below the title.
+// From the camera's target, as near as possible with all points between title and caption.
 double DistanceTo(const RenderInput& input, const Camera& camera, const RenderOptions& options,
                   const Axes& axes) {
   // tan(fov / 2) from sine and cosine
-  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.88;
+  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.84;
   const double aspect = static_cast<double>(options.width) / options.height;
   double distance = 0;
   EachPoint(input, [&](Double3 point) {

@@ -15,7 +15,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr const char* kEnd = "1";  // seconds: sheared by 45 degrees
+constexpr const char* kEnd = "1";  // seconds: sheared by 1 in 2
 
 class HardEdges : public ::testing::Test {
  protected:
@@ -70,7 +70,7 @@ TEST_F(HardEdges, InGlbOfAPose) {
   int slanted = 0;
   for (std::size_t t = 0; t < 12; ++t) {
     const Double3 face = NormalOf(hard, primitive, t);
-    slanted += std::abs(std::abs(face.x) - std::sqrt(0.5)) < 1e-5;
+    slanted += std::abs(std::abs(face.x) - 2 / std::sqrt(5.0)) < 1e-5;
     for (std::size_t k = 3 * t; k < 3 * t + 3; ++k) {
       const float* n = &hard.normals[3 * std::size_t{primitive.triangles[k]}];
       EXPECT_NEAR(Length(Double3{n[0], n[1], n[2]} - face), 0, 1e-5);

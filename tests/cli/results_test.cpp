@@ -49,7 +49,7 @@ TEST(Results, TheScriptWritesTheTablesAndPictures) {
   const std::string plots = TemporaryFolder::Read(folder / "results/hello.svg");
   if (!no_plots) {
     EXPECT_EQ(Count(plots, ">with SoftCache: "), 2u);
-    EXPECT_EQ(Count(plots, ">hello, bend: paper mode, 10 key points<"), 1u);
+    EXPECT_EQ(Count(plots, ">hello, wave: paper mode, 10 key points<"), 1u);
   }
   // The same frames as numbers
   ASSERT_EQ(RunKpsa({"report", folder / "out/hello.json", "--csv", folder / "frames.csv"}).exit_code, 0);

@@ -1,7 +1,9 @@
 // A cube from -1 to 1 that a morph target shears along x: node and mesh "cube", a clip of a second to all of it.
 #pragma once
 
+#include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/gltf_builder.h"
