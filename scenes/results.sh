@@ -220,7 +220,13 @@ END
   cat "$work/heavy.md"
   printf '\nOn the other clips:\n\n'
   cat "$work/heavy-clips.md"
-  printf '\n## Pictures\n'
+  cat << END
+
+## Pictures
+
+A frame of the test clip; errors are coloured up to twice the tolerance, where the arrow is. Plots, by \`bench/plot_frames.py\`: on the left all frames reconstructed, hit or not, and what their error
+is made of; on the right what SoftCache shows.
+END
   for rig in $characters; do pictures "$rig" "$(basename "$rig")"; done
   if [ "$heavy" != "$characters" ]; then
     printf '\n### Errors with heavy stacks\n\n'
