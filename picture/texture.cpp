@@ -57,13 +57,17 @@ Double3 Texture::At(double u, double v, double texels, gltf::Wrap wrap_u, gltf::
          (at(left, top + 1) * (1 - a) + at(left + 1, top + 1) * a) * b;
 }
 
-double TexelsOf(const SurfaceTexture& texture, const Double3 (&corners)[3], const double (&uvs)[3][2],
-                double size) {
+Double3 TexelAt(const SurfaceTexture& texture, const CoveredPlace& place, double size) {
+  const auto& [corners, uvs, w] = place;
+  const Texture& picture = *texture.texture;
   const double area = Length(Cross(corners[1] - corners[0], corners[2] - corners[0]));
   const double covered = std::fabs((uvs[1][0] - uvs[0][0]) * (uvs[2][1] - uvs[0][1]) -
                                    (uvs[2][0] - uvs[0][0]) * (uvs[1][1] - uvs[0][1])) *
-                         texture.texture->width() * texture.texture->height();
-  return area > 0 && std::isfinite(covered) ? size * std::sqrt(covered / area) : 0;
+                         picture.width() * picture.height();
+  const double texels = area > 0 && std::isfinite(covered) ? size * std::sqrt(covered / area) : 0;
+  return picture.At(uvs[0][0] * w[0] + uvs[1][0] * w[1] + uvs[2][0] * w[2],
+                    uvs[0][1] * w[0] + uvs[1][1] * w[1] + uvs[2][1] * w[2], texels, texture.wrap_u,
+                    texture.wrap_v, texture.nearest);
 }
 
 }  // namespace kpsa::engine

@@ -1,6 +1,7 @@
 // Pictures that cover surfaces.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -30,13 +31,15 @@ struct SurfaceTexture {
   std::shared_ptr<const Texture> texture;
   gltf::Wrap wrap_u = gltf::Wrap::kRepeat, wrap_v = gltf::Wrap::kRepeat;
   bool nearest = false;
-  Double3 At(double u, double v, double texels) const {
-    return texture->At(u, v, texels, wrap_u, wrap_v, nearest);
-  }
 };
 
-// Texels along a side of a sample of `size` metres on a triangle of these corners; uvs: u v of each.
-double TexelsOf(const SurfaceTexture& texture, const Double3 (&corners)[3], const double (&uvs)[3][2],
-                double size);
+// A place on a covered triangle, of which everything is interpolated.
+struct CoveredPlace {
+  std::array<Double3, 3> corners;            // in the world
+  std::array<std::array<double, 2>, 3> uvs;  // of them
+  std::array<double, 3> weights;             // of them, of sum 1
+};
+// The colour there, of a sample of `size` metres.
+Double3 TexelAt(const SurfaceTexture& texture, const CoveredPlace& place, double size);
 
 }  // namespace kpsa::engine
