@@ -193,9 +193,11 @@ CommandResult Render(const RenderFlags& flags) {
   if (Interrupted()) return InterruptedStatus();
   const Image picture = StackRows(*rows);
   KPSA_RETURN_IF_ERROR(WritePng(*flags.output, flags.force, picture.width, picture.height, picture.rgb));
-  for (const std::string& note : notes) {
-    if (!flags.quiet) Say("warning: " + note);
-  }
+  constexpr std::size_t kMostNotes = 20;
+  for (std::size_t i = 0; i < std::min(notes.size(), kMostNotes) && !flags.quiet; ++i)
+    Say("warning: " + notes[i]);
+  if (notes.size() > kMostNotes && !flags.quiet)
+    Say(fmt::format("warning: ... and {} more", notes.size() - kMostNotes));
   if (!flags.quiet) Say(fmt::format("{}: {} x {}", *flags.output, picture.width, picture.height));
   return 0;
 }

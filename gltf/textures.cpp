@@ -149,25 +149,29 @@ class TextureReader {
     return {};
   }
 
-  // Each image once; a broken one is told once, by the first who wants it, and again by others.
+  // Each image is read once, a broken one, too; everybody who wants it is told.
   Status FindImage(const json& source, const std::string& where, std::size_t* index) {
     const Result<const json*> image = ElementAt(root_, "images", source, where);
     if (!image.ok()) return image.status();
     const auto number = source.get<std::size_t>();
-    const std::string place = fmt::format("images[{}]", number);
-    if (const auto known = known_.find(number); known != known_.end()) {
-      *index = known->second;
-      return {};
-    }
-    Result<Bytes> bytes = ImageBytes(**image, place);
+    auto known = known_.find(number);
+    if (known == known_.end())
+      known = known_.emplace(number, AddImage(**image, fmt::format("images[{}]", number))).first;
+    if (!known->second.ok()) return known->second.status();
+    *index = *known->second;
+    return {};
+  }
+
+  // Its place in the result.
+  Result<std::size_t> AddImage(const json& image, const std::string& place) {
+    Result<Bytes> bytes = ImageBytes(image, place);
     if (!bytes.ok()) return Status::Invalid("{}: {}", place, bytes.status().errors().front().message);
     if (bytes->size() > budget_)
       return Status::Invalid("{} has {} bytes, of all that a picture's textures may have {} are left", place,
                              bytes->size(), budget_);
     budget_ -= bytes->size();
-    *index = known_[number] = to_.images.size();
     to_.images.push_back({path_ + ": " + place, std::move(*bytes)});
-    return {};
+    return to_.images.size() - 1;
   }
 
   Result<Bytes> ImageBytes(const json& image, const std::string& place) {
@@ -218,8 +222,8 @@ class TextureReader {
   const std::string path_;
   std::uint64_t& budget_;
   BaseTextures& to_;
-  std::map<std::size_t, std::size_t> known_;
-  std::map<std::size_t, Bytes> buffers_;  // that are not in the container, by number
+  std::map<std::size_t, Result<std::size_t>> known_;  // by image of the file
+  std::map<std::size_t, Bytes> buffers_;              // that are not in the container, by number
 };
 
 }  // namespace

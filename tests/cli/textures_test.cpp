@@ -138,6 +138,23 @@ TEST_F(TexturesTest, BrokenPicturesAreToldAndLeftOut) {
   told(b, "baseColorTexture.index is no index");
 }
 
+TEST_F(TexturesTest, ManyWarningsAreCounted) {
+  GltfBuilder b = Sheet({{"uri", "none.png"}});
+  const json material = b.root["materials"][0], primitive = b.root["meshes"][0]["primitives"][0];
+  for (int m = 1; m < 30; ++m) {
+    b.root["materials"].push_back(material);
+    b.root["meshes"][0]["primitives"].push_back(primitive);
+    b.root["meshes"][0]["primitives"].back()["material"] = m;
+  }
+  DrawSheet(b);
+  std::size_t count = 0;
+  for (std::size_t at = said_.find("warning: "); at != std::string::npos;
+       at = said_.find("warning: ", at + 1))
+    ++count;
+  EXPECT_EQ(count, 21u) << said_;
+  EXPECT_NE(said_.find("... and 10 more"), std::string::npos) << said_;
+}
+
 // Two characters, each with the pictures of its own file.
 TEST_F(TexturesTest, OfReferences) {
   folder_.Write("one.glb", Sheet().Glb());
