@@ -115,8 +115,7 @@ Result<CameraTake> ReadTake(const Rig& rig, const RenderFlags& flags, std::vecto
   Result<CameraView> view = FindCamera(rig, *flags.camera);
   if (!view.ok()) return Status(view.status()).At({"--camera " + *flags.camera});
   take.view = std::move(*view);
-  if (!flags.no_textures)
-    take.view.look = std::make_shared<const RigLook>(LookOf(rig, take.view.meshes, true, notes));
+  take.view.look = std::make_shared<const RigLook>(LookOf(rig, take.view.meshes, !flags.no_textures, notes));
   if (flags.exposure.has_value()) {
     const Result<double> read = ParseFactor("--exposure", *flags.exposure, 0, 1e30);
     if (!read.ok()) return read.status();

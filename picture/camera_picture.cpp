@@ -51,6 +51,8 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
   std::vector<Index> triangles;
   std::vector<float> albedo;
   std::vector<Index> carrier;  // of each triangle: in view.carried, or none
+  std::vector<Index> shares;   // of each corner: the number of its normal, if there is a look
+  Index normals = 0;
   std::vector<Index> first_point(view.meshes.size()), mesh_of, first_triangle;
   Index count = 0;
   for (std::size_t i = 0; i < view.meshes.size(); ++i) {
@@ -70,6 +72,11 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
         triangles.push_back(count + mesh.triangles[t]);
         albedo.push_back(std::clamp(primitive.base_color[t % 3], 0.0f, 1.0f));
       }
+    }
+    if (view.look != nullptr) {
+      const MeshLook& look = (*view.look)[m];
+      for (const Index corner : look.triangles) shares.push_back(normals + look.smooth[corner]);
+      normals += static_cast<Index>(look.points.size());
     }
     count += rig.scene.meshes[m].mesh().point_count();
   }
@@ -96,7 +103,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
         const bool head_light = lights.empty() && !view.irradiance.has_value();
         if (head_light) lights.push_back({DiffuseLight::Kind::kPoint, world_from_screen, {1, 1, 1}});
         Result<PathTracer> tracer =
-            PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights);
+            PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights, {}, shares);
         if (!tracer.ok()) return tracer.status();
         if (head_light) {
           lights.front().color = HeadLightColor(*tracer, world_from_screen);

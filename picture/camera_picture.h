@@ -28,10 +28,12 @@ struct CameraView {
     DiffuseLight::Kind kind;
     PlugRef matrix, color;
   };
-  std::vector<Light> lights;            // of the illumination; all of the rig where there is none
-  std::vector<std::size_t> meshes;      // that are lit, in rig.scene.meshes
-  Index width = 400, height = 400;      // of the illumination
-  std::shared_ptr<const RigLook> look;  // whose textures are multiplied with base colours; null: none are
+  std::vector<Light> lights;        // of the illumination; all of the rig where there is none
+  std::vector<std::size_t> meshes;  // that are lit, in rig.scene.meshes
+  Index width = 400, height = 400;  // of the illumination
+  // Whose textures are multiplied with base colours, and whose edges are hard; null: no textures, edges of more than 50
+  // degrees.
+  std::shared_ptr<const RigLook> look;
 };
 
 // The view of a camera node. Errors: no such camera (the nearest one is named), several illuminations that

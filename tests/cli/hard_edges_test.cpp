@@ -38,7 +38,10 @@ class HardEdges : public ::testing::Test {
         RunKpsa({"render", Write(edges), "--times", kEnd, "--size", "160x160", "--azimuth", "0",
                  "--elevation", "45", "--force", "-o", folder_ / "a.png"});
     EXPECT_EQ(run.exit_code, 0) << run.err;
-    const std::string bytes = TemporaryFolder::Read(folder_ / "a.png");
+    return Read(folder_ / "a.png");
+  }
+  static Image Read(const std::string& path) {
+    const std::string bytes = TemporaryFolder::Read(path);
     const Result<Image> image =
         DecodePicture({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, 1 << 20);
     EXPECT_TRUE(image.ok());
@@ -99,6 +102,33 @@ TEST_F(HardEdges, InUsda) {
   EXPECT_NE(hard.find("(0, 1, 0), (0, 1, 0), (0, 1, 0), (0, 1, 0)"), std::string::npos);
   EXPECT_EQ(smooth.find("(0, 1, 0)"), std::string::npos);
   EXPECT_EQ(Usda(CubeEdges::kNone).find("normal3f"), std::string::npos);
+}
+
+// As a camera of the rig sees it: the same edges, whatever their angle.
+TEST_F(HardEdges, ThroughACamera) {
+  const auto step = [&](CubeEdges edges) {
+    Write(edges);
+    const std::string rig =
+        folder_.Write("cube.yaml",
+                      "kpsa: 1\ncharacter: cube.glb\nnodes:\n"
+                      "  eye: {type: transform, translate: [0.5, 5, 5], rotate: [-45, 0, 0]}\n"
+                      "  front: {type: camera, matrix: eye.worldMatrix}\n"
+                      "  above: {type: transform, rotate: [-80, 0, 0]}\n"
+                      "  sun: {type: sunLight, matrix: above.worldMatrix, color: [1, 1, 1], intensity: 2}\n");
+    const ProcessResult run =
+        RunKpsa({"render", rig, "--times", kEnd, "--camera", "front", "--force", "-o", folder_ / "a.png"});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    const Image image = Read(folder_ / "a.png");
+    int largest = 0;
+    for (int y = image.height / 4; y < image.height * 3 / 4; ++y) {
+      const int now = image.At(image.width / 2, y)[1], next = image.At(image.width / 2, y + 1)[1];
+      if (now > 40 && next > 40) largest = std::max(largest, std::abs(now - next));
+    }
+    return largest;
+  };
+  EXPECT_GT(step(CubeEdges::kHard), 25);
+  EXPECT_GT(step(CubeEdges::kNone), 25);
+  EXPECT_LT(step(CubeEdges::kSmooth), 12);
 }
 
 TEST_F(HardEdges, InPictures) {
