@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "gltf/shading.h"
+#include "rig/character/smoothing.h"
 
 namespace kpsa::engine {
 
@@ -24,7 +25,7 @@ void AddLook(const Rig& rig, const std::vector<std::size_t>& meshes, PointCache*
     PointCacheMesh& to = cache->meshes[i];
     to.uvs = mesh.uvs;
     to.colors = mesh.colors;
-    to.smooth = from.mesh().data().vertex_to_point;
+    to.smooth = SmoothVertices(mesh, from.mesh().data().vertex_to_point);
     for (const gltf::Primitive& primitive : mesh.primitives)
       to.parts.push_back({primitive.first_vertex, primitive.vertex_count, primitive.material});
   }

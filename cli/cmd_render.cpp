@@ -22,6 +22,7 @@ struct RenderFlags : Flags {
   AccelerationFlags acceleration;
   std::optional<std::string> size, azimuth, elevation, turntable, error_scale, camera, exposure, layer,
       shrink, look_at, zoom, fit;
+  bool no_textures = false;
   std::vector<std::string> meshes;
 };
 
@@ -37,6 +38,7 @@ Result<double> ParseFactor(const char* what, const std::string& text, double lea
 Result<StripView> ReadView(const RenderFlags& flags) {
   StripView view;
   view.meshes = flags.meshes;
+  view.textures = !flags.no_textures;
   view.framing.fit = flags.fit;
   if (flags.size.has_value()) {
     const std::size_t x = flags.size->find('x');
@@ -109,11 +111,12 @@ Status CheckCameraFlags(const RenderFlags& flags) {
 }
 
 // How a picture is taken through a camera of the rig.
-Result<CameraTake> ReadTake(const Rig& rig, const RenderFlags& flags) {
+Result<CameraTake> ReadTake(const Rig& rig, const RenderFlags& flags, std::vector<std::string>* notes) {
   CameraTake take;
   Result<CameraView> view = FindCamera(rig, *flags.camera);
   if (!view.ok()) return Status(view.status()).At({"--camera " + *flags.camera});
   take.view = std::move(*view);
+  take.view.look = std::make_shared<const RigLook>(LookOf(rig, take.view.meshes, !flags.no_textures, notes));
   if (flags.exposure.has_value()) {
     const Result<double> read = ParseFactor("--exposure", *flags.exposure, 0, 1e30);
     if (!read.ok()) return read.status();
@@ -169,25 +172,32 @@ CommandResult Render(const RenderFlags& flags) {
   Compiler compiler;
   std::optional<AccelerationChoice> choice;
   if (accelerated) choice = ChoiceOf(flags.acceleration);
+  std::vector<std::string> notes;
   Result<std::vector<Image>> rows = std::vector<Image>();
   if (flags.camera.has_value()) {
-    const Result<CameraTake> take = ReadTake(rig, flags);
+    const Result<CameraTake> take = ReadTake(rig, flags, &notes);
     if (!take.ok()) return take.status();
     rows = DrawCameraStrip(&rig, &compiler, *take, choice, *times, options);
   } else if (accelerated) {
-    Result<ComparedFrames> compared = CompareFrames(&rig, &compiler, *choice, *times, !worst, *view, options);
+    Result<ComparedFrames> compared =
+        CompareFrames(&rig, &compiler, *choice, *times, !worst, *view, options, &notes);
     if (!compared.ok()) return compared.status();
     if (worst && !flags.quiet)
       Say(fmt::format("the frame with the largest error, at {:.4g} s: {}", (*times)[compared->worst],
                       LengthText(compared->error)));
     rows = std::move(compared->rows);
   } else {
-    rows = DrawStrip(rig, &compiler, *times, *view, options);
+    rows = DrawStrip(rig, &compiler, *times, *view, options, &notes);
   }
   if (!rows.ok()) return rows.status();
   if (Interrupted()) return InterruptedStatus();
   const Image picture = StackRows(*rows);
   KPSA_RETURN_IF_ERROR(WritePng(*flags.output, flags.force, picture.width, picture.height, picture.rgb));
+  constexpr std::size_t kMostNotes = 20;
+  for (std::size_t i = 0; i < std::min(notes.size(), kMostNotes) && !flags.quiet; ++i)
+    Say("warning: " + notes[i]);
+  if (notes.size() > kMostNotes && !flags.quiet)
+    Say(fmt::format("warning: ... and {} more", notes.size() - kMostNotes));
   if (!flags.quiet) Say(fmt::format("{}: {} x {}", *flags.output, picture.width, picture.height));
   return 0;
 }
@@ -221,6 +231,7 @@ void AddRenderCommand(CLI::App* program, Command* chosen) {
             "fill the picture with the face, or with what a joint moves, a material covers or a mesh is");
   AddOption(command, "--look-at", "X,Y,Z", &flags->look_at, "the middle of the picture, metres");
   AddOption(command, "--zoom", "FACTOR", &flags->zoom, "larger (2) or smaller (0.5); 1 if not given");
+  AddSwitch(command, "--no-textures", &flags->no_textures, "base colours alone, without their textures");
   AddOption(command, "--turntable", "N", &flags->turntable, "N pictures from all around");
   AddOption(command, "--error-scale", "LENGTH", &flags->error_scale,
             "error at the top of the heat map; the tolerance if not given");

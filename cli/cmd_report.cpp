@@ -1,4 +1,4 @@
-// kpsa report: a rig as a page; benches as tables for a document, and as plots over the frames.
+// kpsa report: a rig as a page; benches as tables for a document, or their frames as numbers.
 #include <memory>
 
 #include "cli/command.h"
@@ -13,7 +13,7 @@ namespace {
 
 struct ReportFlags : PageFlags {
   std::vector<std::string> files, references;
-  std::optional<std::string> plot;
+  std::optional<std::string> frames;
   bool without_any = false;
 };
 
@@ -21,7 +21,7 @@ struct ReportFlags : PageFlags {
 Status RefuseOthers(const ReportFlags& flags, bool page) {
   const AccelerationFlags& acceleration = flags.acceleration;
   const std::vector<std::pair<bool, const char*>> of_benches{{!flags.references.empty(), "--reference"},
-                                                             {flags.plot.has_value(), "--plot"},
+                                                             {flags.frames.has_value(), "--csv"},
                                                              {flags.without_any, "--without-any"}};
   const std::vector<std::pair<bool, const char*>> of_rigs{
       {!flags.clips.empty(), "--clip"},
@@ -58,21 +58,17 @@ CommandResult Report(ReportFlags flags) {
   if (flags.references.size() > flags.files.size())
     return Status::Usage("{} --reference for {}", flags.references.size(),
                          Plural(flags.files.size(), "file"));
-  if (flags.plot.has_value()) {
-    if (flags.files.size() != 1)
-      return Status::Usage("--plot: expected one bench, not {}", flags.files.size());
-    KPSA_RETURN_IF_ERROR(CheckOutput(*flags.plot, flags.force, {".svg"}));
-  }
+  if (flags.frames.has_value()) KPSA_RETURN_IF_ERROR(CheckOutput(*flags.frames, flags.force, {".csv"}));
   if (flags.output.has_value()) KPSA_RETURN_IF_ERROR(CheckOutput(*flags.output, flags.force, {".md"}));
   std::vector<BenchDocument> documents;
   for (std::size_t i = 0; i < flags.files.size(); ++i)
     documents.push_back({flags.files[i], i < flags.references.size() ? flags.references[i] : ""});
   const Result<std::string> tables = BenchTables(documents, !flags.without_any);
   if (!tables.ok()) return tables.status();
-  if (flags.plot.has_value()) {
-    const Result<std::vector<LinePlot>> plots = BenchPlots(flags.files.front());
-    if (!plots.ok()) return plots.status();
-    KPSA_RETURN_IF_ERROR(WriteText(*flags.plot, flags.force, PlotsAsSvg(*plots, 2)));
+  if (flags.frames.has_value()) {
+    const Result<std::string> frames = BenchFrames(flags.files);
+    if (!frames.ok()) return frames.status();
+    KPSA_RETURN_IF_ERROR(WriteText(*flags.frames, flags.force, *frames));
     if (!flags.output.has_value()) return 0;
   }
   KPSA_RETURN_IF_ERROR(WriteText(flags.output.value_or("-"), flags.force, *tables));
@@ -84,15 +80,17 @@ CommandResult Report(ReportFlags flags) {
 void AddReportCommand(CLI::App* program, Command* chosen) {
   auto flags = std::make_shared<ReportFlags>();
   CLI::App* command = AddCommand(
-      program, "report", "A rig as a page to look at (HTML); benches as tables (Markdown) and plots (SVG)",
+      program, "report", "A rig as a page to look at (HTML); benches as tables (Markdown) or frames (CSV)",
       "Of a rig or a character: one file with its test clips, full and accelerated, that opens in a browser "
       "from disk.\nWithout a subspace it shows the full evaluation. docs/report.md says what is in it.\n"
-      "Of benches, which are what kpsa bench --json printed: tables, and errors over the frames.\n"
+      "Of benches, which are what kpsa bench --json printed: tables, or the numbers of every frame. Figures "
+      "are "
+      "drawn of them by bench/plot_frames.py (matplotlib), and a page of the rig has them, too.\n"
       "Examples:\n"
       "  kpsa report head.yaml -o head.html\n"
       "  kpsa report head.yaml --kpsa other.kpsa --clip face_talk --tolerance 0.5mm -o head.html\n"
       "  kpsa report head.json body.json -o tables.md\n"
-      "  kpsa report head.json --plot errors.svg",
+      "  kpsa report head.json --csv frames.csv",
       chosen, [flags] { return Report(*flags); });
   AddRepeated(command, "FILE", "", &flags->files,
               "a rig (.yaml) or a character (.glb, .gltf, .vrm); or outputs of kpsa bench --json (.json)");
@@ -109,9 +107,9 @@ void AddReportCommand(CLI::App* program, Command* chosen) {
               "of benches: a figure to stand beside a bench's paper mode, in the order of the files");
   AddSwitch(command, "--without-any", &flags->without_any,
             "of benches: leave out sides that accept every frame");
-  AddOption(command, "--plot", "FILE.svg", &flags->plot,
-            "of benches: errors over the frames, of subspaces trained with --keep-modes; then no tables "
-            "without -o");
+  AddOption(command, "--csv", "FILE.csv", &flags->frames,
+            "of benches: every frame's verdict, errors and times, with the parts of the errors of subspaces "
+            "trained with --keep-modes; then no tables without -o");
   AddQuietFlag(command, flags.get());
   AddSwitch(command, "--json", &flags->json,
             "of a rig: print the sizes of the page's parts to stdout as JSON");

@@ -2,7 +2,7 @@
 # Installs what the build needs (Debian 12), and the packages that are given as arguments, where they are missing. Needs root or sudo only if something is missing.
 set -e
 packages="g++ cmake ninja-build pkg-config libeigen3-dev libtbb-dev libyaml-cpp-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev libfmt-dev \
-libhwy-dev libmuparser-dev libzip-dev zlib1g-dev libembree-dev libcli11-dev libcpp-httplib-dev nlohmann-json3-dev libstb-dev libgtest-dev \
+libhwy-dev libmuparser-dev libzip-dev zlib1g-dev libpng-dev libjpeg-dev libembree-dev libcli11-dev libcpp-httplib-dev nlohmann-json3-dev libstb-dev libgtest-dev \
 pybind11-dev python3-dev python3-numpy python3-pytest python3-pip $*"
 if ! command -v apt-get > /dev/null || ! command -v dpkg-query > /dev/null; then
   echo "there is no apt-get here, so nothing is installed; what the build needs is called, on Debian 12: $packages" >&2

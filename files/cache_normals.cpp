@@ -14,11 +14,10 @@ std::vector<float> CacheNormals(const PointCacheMesh& mesh, std::size_t frame) {
     const float* p = points + std::size_t{3} * vertex;
     return Double3{p[0], p[1], p[2]};
   };
-  const auto group = [&](Index vertex) { return mesh.smooth.empty() ? vertex : mesh.smooth[vertex]; };
-  const std::size_t groups = mesh.smooth.empty()
-                                 ? mesh.vertex_count
-                                 : std::size_t{1} + *std::max_element(mesh.smooth.begin(), mesh.smooth.end());
-  std::vector<Double3> sums(groups);
+  const auto group = [&](Index vertex) {
+    return mesh.smooth.empty() || mesh.smooth[vertex] == kNoIndex ? vertex : mesh.smooth[vertex];
+  };
+  std::vector<Double3> sums(mesh.vertex_count);
   for (std::size_t i = 0; i < mesh.triangles.size(); i += 3) {
     const Index a = mesh.triangles[i], b = mesh.triangles[i + 1], c = mesh.triangles[i + 2];
     const Double3 normal = Cross(point(b) - point(a), point(c) - point(a));
@@ -49,6 +48,12 @@ std::vector<Index> PartTriangles(const PointCacheMesh& mesh, const CachePart& pa
     triangles.insert(triangles.end(), {first, mesh.triangles[i + 1], mesh.triangles[i + 2]});
   }
   return triangles;
+}
+
+bool PartIsFlat(const PointCacheMesh& mesh, const CachePart& part) {
+  if (mesh.smooth.empty()) return false;
+  const auto begin = mesh.smooth.begin() + part.first_vertex;
+  return std::all_of(begin, begin + part.vertex_count, [](Index first) { return first == kNoIndex; });
 }
 
 bool PartHasUvs(const PointCacheMesh& mesh, const CachePart& part) {

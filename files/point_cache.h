@@ -24,9 +24,10 @@ struct PointCacheMesh {
   std::vector<float> frames;     // T * V * 3: x y z of each vertex, frame after frame
   std::vector<Index> triangles;  // three vertex indices each; empty for points only
   // What usda and GLB show it with. All may be empty.
-  std::vector<float> uvs = {};        // 2V, as glTF has them, v downwards; not a number: the vertex has none
-  std::vector<float> colors = {};     // 3V, linear, multiplied with the base colour
-  std::vector<Index> smooth = {};     // V: vertices of one number share a normal; empty: none do
+  std::vector<float> uvs = {};     // 2V, as glTF has them, v downwards; not a number: the vertex has none
+  std::vector<float> colors = {};  // 3V, linear, multiplied with the base colour
+  // V: the first of the vertices that share its normal; kNoIndex: its triangles are flat. Empty: none share any
+  std::vector<Index> smooth = {};
   std::vector<CachePart> parts = {};  // all vertices, in their order; empty: one part without a material
 };
 struct CacheImage {

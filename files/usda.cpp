@@ -67,7 +67,10 @@ Status PutGeometry(const PointCache& cache, const PointCacheMesh& mesh, TextWrit
                                   [&](std::size_t t) { return PutVectors(Extent(frame(t)), out); }));
   KPSA_RETURN_IF_ERROR(
       PutSamples(cache, "point3f[] points", out, [&](std::size_t t) { return PutVectors(frame(t), out); }));
-  if (mesh.triangles.empty()) return {};
+  const std::vector<CachePart> parts = CacheParts(mesh);
+  const bool flat =
+      std::all_of(parts.begin(), parts.end(), [&](const CachePart& p) { return PartIsFlat(mesh, p); });
+  if (mesh.triangles.empty() || flat) return {};
   KPSA_RETURN_IF_ERROR(
       out->Put("        normal3f[] normals (\n            interpolation = \"vertex\"\n        )\n"));
   return PutSamples(cache, "normal3f[] normals", out,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "gltf/document.h"
 
@@ -181,14 +182,15 @@ Status Open(const Document& document, int index, int components, unsigned types,
   return {};
 }
 
-// Calls each(element, component, number) for the elements first the base, then the replacements.
+// Calls each(element, component, number) for the elements first the base, then the replacements; all numbers
+// are finite, unless `any`.
 template <typename Each>
-Status ForEachNumber(const Access& access, const std::string& what, const Each& each) {
+Status ForEachNumber(const Access& access, const std::string& what, const Each& each, bool any = false) {
   const auto visit = [&](std::size_t element, const std::uint8_t* data) -> Status {
     for (int c = 0; c < access.components; ++c) {
       const double number = LoadNumber(data + static_cast<std::size_t>(c) * access.component_size,
                                        access.accessor->componentType, access.accessor->normalized);
-      if (!std::isfinite(number)) {
+      if (!any && !std::isfinite(number)) {
         return Status::Invalid("{}: component {} of element {} is not finite", what, c, element);
       }
       each(element, c, number);
@@ -209,7 +211,7 @@ Status ForEachNumber(const Access& access, const std::string& what, const Each& 
 
 template <typename T>
 Status ReadAll(const Document& document, int accessor, int components, unsigned types,
-               const std::string& what, std::vector<T>* values) {
+               const std::string& what, std::vector<T>* values, bool any = false) {
   Access access;
   KPSA_RETURN_IF_ERROR(Open(document, accessor, components, types, what, &access));
   const std::size_t total = access.count * static_cast<std::size_t>(components);
@@ -217,9 +219,10 @@ Status ReadAll(const Document& document, int accessor, int components, unsigned 
   KPSA_RETURN_IF_ERROR(document.budget.TakeWork(total * sizeof(T), what));
   values->assign(total, T(0));
   const auto width = static_cast<std::size_t>(components);
-  return ForEachNumber(access, what, [&](std::size_t element, int component, double number) {
+  const auto keep = [&](std::size_t element, int component, double number) {
     (*values)[element * width + static_cast<std::size_t>(component)] = static_cast<T>(number);
-  });
+  };
+  return ForEachNumber(access, what, keep, any);
 }
 
 }  // namespace
@@ -237,6 +240,17 @@ template Status ReadNumbers<float>(const Document&, int, int, unsigned, const st
                                    std::vector<float>*);
 template Status ReadNumbers<double>(const Document&, int, int, unsigned, const std::string&,
                                     std::vector<double>*);
+
+Status ReadDirections(const Document& document, int accessor, unsigned types, const std::string& what,
+                      std::vector<float>* values) {
+  KPSA_RETURN_IF_ERROR(ReadAll(document, accessor, 3, types, what, values, true));
+  for (std::size_t i = 0; i < values->size(); i += 3) {
+    float* const v = &(*values)[i];
+    if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2]))
+      std::fill_n(v, 3, std::numeric_limits<float>::quiet_NaN());
+  }
+  return {};
+}
 
 Status ReadIndices(const Document& document, int accessor, int components, unsigned types,
                    const std::string& what, std::vector<Index>* values) {

@@ -143,8 +143,8 @@ class Decompressor {
   }
   // Others are not decoded: nobody asks for them.
   static bool IsRead(const std::string& name) {
-    return name == "POSITION" || name == "COLOR_0" || name == "TEXCOORD_0" || name.starts_with("JOINTS_") ||
-           name.starts_with("WEIGHTS_");
+    return name == "POSITION" || name == "NORMAL" || name == "COLOR_0" || name.starts_with("TEXCOORD_") ||
+           name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_");
   }
   const tinygltf::Accessor& AccessorOf(int index) const {
     return model_.accessors[static_cast<std::size_t>(index)];

@@ -15,7 +15,6 @@
 namespace kpsa::engine::gltf {
 namespace {
 
-constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30;  // as the lengths in a GLB
 constexpr std::uint64_t kLargestJson = std::uint64_t{512} << 20;
 
 std::uint32_t ReadUint32(std::span<const std::uint8_t> bytes, std::size_t offset) {
@@ -75,24 +74,9 @@ Result<std::vector<std::uint8_t>> LoadBuffer(const BufferSource& source, bool is
   std::vector<std::uint8_t> bytes;
   if (source.is_fallback) return bytes;
   if (source.has_uri) {
-    if (HasPrefixIgnoringCase(source.uri, "data:")) {
-      Result<std::vector<std::uint8_t>> decoded = DecodeDataUri(source.uri);
-      if (!decoded.ok()) return decoded.status();
-      bytes = std::move(*decoded);
-    } else {
-      const Result<std::string> relative = RelativePathOfUri(source.uri);
-      if (!relative.ok()) return relative.status();
-      const std::string path = (std::filesystem::path(folder) / *relative).string();
-      std::error_code error;
-      if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
-        return Status::Invalid("\"{}\" is not a file", Shortened(source.uri));
-      }
-      Result<std::vector<std::uint8_t>> read = ReadFileBytes(path, kLargestFile);
-      if (!read.ok()) {
-        return Status::Invalid("\"{}\" {}", Shortened(source.uri), read.status().errors().front().message);
-      }
-      bytes = std::move(*read);
-    }
+    Result<std::vector<std::uint8_t>> read = ReadUri(source.uri, folder, kLargestFile);
+    if (!read.ok()) return read.status();
+    bytes = std::move(*read);
   } else if (is_first && container.is_binary) {
     bytes.assign(container.binary.begin(), container.binary.end());
   } else {
@@ -257,6 +241,20 @@ Result<std::string> RelativePathOfUri(const std::string& uri) {
   return normal.string();
 }
 
+Result<std::vector<std::uint8_t>> ReadUri(const std::string& uri, const std::string& folder,
+                                          std::uint64_t most) {
+  if (HasPrefixIgnoringCase(uri, "data:")) return DecodeDataUri(uri);
+  const Result<std::string> relative = RelativePathOfUri(uri);
+  if (!relative.ok()) return relative.status();
+  const std::string path = (std::filesystem::path(folder) / *relative).string();
+  std::error_code error;
+  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error))
+    return Status::Invalid("\"{}\" is not a file", Shortened(uri));
+  Result<std::vector<std::uint8_t>> read = ReadFileBytes(path, most);
+  if (!read.ok()) return Status::Invalid("\"{}\" {}", Shortened(uri), read.status().errors().front().message);
+  return read;
+}
+
 Result<Document> LoadDocument(std::span<const std::uint8_t> bytes, const std::string& folder) {
   Result<Container> container = SplitContainer(bytes);
   if (!container.ok()) return container.status();
@@ -303,6 +301,8 @@ Result<Character> LoadGltfFromMemory(std::span<const std::uint8_t> bytes, const 
     for (const auto read : {&ReadMeshes, &ReadScene, &ReadSkins, &ReadClips, &ReadVrm}) {
       if (Status status = read(*document, &character); !status.ok()) return located(std::move(status));
     }
+    for (Index m = 0; m < character.materials.size(); ++m)
+      character.materials[m].file = name, character.materials[m].index = m;
     return character;
   } catch (const std::bad_alloc&) {
     return located(Status::Invalid("does not fit into memory"));

@@ -16,6 +16,8 @@ class Model;
 
 namespace kpsa::engine::gltf {
 
+constexpr std::uint64_t kLargestFile = std::uint64_t{4} << 30;  // bytes, as the lengths in a GLB
+
 // What a document may still allocate and compute: a few bytes that name one accessor a million times must not
 // become gigabytes.
 struct Budget {
@@ -73,6 +75,10 @@ Result<std::vector<std::uint8_t>> DecodeDataUri(const std::string& uri);
 // "..".
 Result<std::string> RelativePathOfUri(const std::string& uri);
 
+// What a URI stands for: of a data URI its bytes, else the file in `folder`, of at most `most` bytes.
+Result<std::vector<std::uint8_t>> ReadUri(const std::string& uri, const std::string& folder,
+                                          std::uint64_t most);
+
 Result<Document> LoadDocument(std::span<const std::uint8_t> bytes, const std::string& folder);
 
 // --- Accessors. `what` names the user in messages: "meshes[0].primitives[1].POSITION".
@@ -92,6 +98,9 @@ std::size_t AccessorCount(const Document& document, int accessor);
 template <typename T>
 Status ReadNumbers(const Document& document, int accessor, int components, unsigned types,
                    const std::string& what, std::vector<T>* values);
+// The same of directions: an element that is not finite becomes three that are not a number.
+Status ReadDirections(const Document& document, int accessor, unsigned types, const std::string& what,
+                      std::vector<float>* values);
 // Reads elements of unsigned integers.
 Status ReadIndices(const Document& document, int accessor, int components, unsigned types,
                    const std::string& what, std::vector<Index>* values);

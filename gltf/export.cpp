@@ -123,11 +123,12 @@ json Primitive(const PointCacheMesh& mesh, const CachePart& part, const FrameSha
   json primitive, attributes;
   attributes["POSITION"] = glb->AddPositions(Rows(shapes.rest.data(), part, 3));
   std::vector<Index> triangles = PartTriangles(mesh, part);
+  const bool with_normals = !triangles.empty() && !PartIsFlat(mesh, part);
   if (triangles.empty()) {
     primitive["mode"] = 0;
   } else {
     for (Index& vertex : triangles) vertex -= part.first_vertex;
-    attributes["NORMAL"] = glb->AddVectors(Rows(normals.rest.data(), part, 3));
+    if (with_normals) attributes["NORMAL"] = glb->AddVectors(Rows(normals.rest.data(), part, 3));
     primitive["indices"] = glb->AddIndices(triangles);
   }
   if (PartHasUvs(mesh, part)) attributes["TEXCOORD_0"] = glb->AddUvs(Rows(mesh.uvs.data(), part, 2));
@@ -136,7 +137,7 @@ json Primitive(const PointCacheMesh& mesh, const CachePart& part, const FrameSha
   if (part.material != kNoIndex) primitive["material"] = part.material;
   for (std::size_t k = 0; k < shapes.shapes.size(); ++k) {
     json target = {{"POSITION", glb->AddPositions(Rows(shapes.shapes[k].data(), part, 3))}};
-    if (!triangles.empty()) target["NORMAL"] = glb->AddVectors(Rows(normals.shapes[k].data(), part, 3));
+    if (with_normals) target["NORMAL"] = glb->AddVectors(Rows(normals.shapes[k].data(), part, 3));
     primitive["targets"].push_back(target);
   }
   return primitive;

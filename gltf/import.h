@@ -7,12 +7,14 @@
 // Extensions: KHR_mesh_quantization, EXT_meshopt_compression, KHR_draco_mesh_compression (vertices in the
 // order in which Draco decodes them), KHR_animation_pointer (to nodes) and what gltf/vrm.h lists are read. Extensions that cannot move a
 // point (KHR_texture_*, KHR_materials_*, KHR_lights_punctual, EXT_texture_*, ...) are ignored even where the
-// file requires them. Any other required one is an error that names it. Images are never read.
+// file requires them. Any other required one is an error that names it. Images are never read here
+// (gltf/textures.h).
 //
 // The file is hostile: JSON depth and size, container lengths, every index, count, stride and offset, every
 // float and every allocation are checked first, and a buffer may not lie outside the document's folder.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -72,6 +74,10 @@ struct Mesh {
   std::vector<float> positions;  // 3V, x y z interleaved, mesh-local
   std::vector<float> colors;     // COLOR_0, 3V linear 0 .. 1, for pictures; empty where no primitive has it
   std::vector<float> uvs;  // TEXCOORD_0, 2V; not a number where a primitive lacks it, empty where all do
+  std::array<std::vector<float>, 3> more_uvs;  // TEXCOORD_1 to TEXCOORD_3, likewise
+  // NORMAL, 3V, mesh-local, of the length that the file gives; not a number where a vertex has none that is
+  // finite, empty where no primitive has it
+  std::vector<float> normals;
   std::vector<Primitive> primitives;
   // Row v: the influences of vertex v from all JOINTS_n/WEIGHTS_n in slot order, without zeros; a joint
   // listed twice is summed. Weights are divided by their sum, as the specification wants them to be
@@ -81,6 +87,8 @@ struct Mesh {
   std::vector<MorphTarget> targets;
   std::vector<double> weights;  // default weights, one a target
   std::size_t vertex_count() const { return positions.size() / 3; }
+  // TEXCOORD_n; empty where there are none.
+  const std::vector<float>& UvSet(std::size_t n) const;
   bool skinned() const { return !influence_offsets.empty(); }
   CsrView<Influence> influence_rows() const { return {influence_offsets, influences}; }
 };
@@ -96,6 +104,8 @@ struct Skin {
 struct Material {
   std::string name;
   std::array<double, 4> base_color = {1, 1, 1, 1};  // linear RGBA
+  std::string file;                                 // where it stands
+  Index index = 0;                                  // in the materials of that file
 };
 
 enum class Path : std::uint8_t { kTranslation, kRotation, kScale, kWeights };

@@ -3,28 +3,15 @@
 
 #include <algorithm>
 #include <charconv>
-#include <limits>
 #include <map>
 
 #include "gltf/document.h"
+#include "gltf/vertex_look.h"
 
 namespace kpsa::engine::gltf {
 namespace {
 
-constexpr unsigned kPositionTypes = kFloat | kAnyInteger16;  // integers: KHR_mesh_quantization
 constexpr float kNegativeNoise = -1e-4f;  // exporters' rounding; such weights count as zero
-
-int FindAttribute(const std::map<std::string, int>& attributes, const std::string& name) {
-  const auto found = attributes.find(name);
-  return found == attributes.end() ? -1 : found->second;
-}
-
-Status CheckCount(const Document& document, int accessor, std::size_t expected, const std::string& what) {
-  const std::size_t count = AccessorCount(document, accessor);
-  if (count == expected) return {};
-  return Status::Invalid("{} (accessors[{}]) has {} elements, POSITION has {}", what, accessor, count,
-                         expected);
-}
 
 // The list of vertices, as drawn, to triangles (glTF 2.0, 3.7.2.1); an incomplete last triangle is not drawn.
 // `at(i)` is the vertex of place i of `count`.
@@ -172,50 +159,6 @@ Status ReadTargets(const Document& document, const tinygltf::Primitive& in, cons
   return {};
 }
 
-// Appends the colours of this primitive where it has them, white else; nothing while no primitive had any.
-Status ReadColors(const Document& document, const tinygltf::Primitive& in, const std::string& where,
-                  const Primitive& primitive, Mesh* mesh) {
-  const int accessor = FindAttribute(in.attributes, "COLOR_0");
-  if (accessor < 0 && mesh->colors.empty()) return {};
-  KPSA_RETURN_IF_ERROR(
-      document.budget.TakeMemory(12 * (mesh->vertex_count() - mesh->colors.size() / 3), where));
-  if (accessor >= 0) {
-    const std::string place = where + ".COLOR_0";
-    KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
-    const bool with_alpha =
-        document.model->accessors[static_cast<std::size_t>(accessor)].type == TINYGLTF_TYPE_VEC4;
-    const std::size_t components = with_alpha ? 4 : 3;
-    std::vector<float> colors;
-    KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, static_cast<int>(components),
-                                     kFloat | kUnsignedByte | kUnsignedShort, place, &colors));
-    mesh->colors.resize(3 * static_cast<std::size_t>(primitive.first_vertex), 1.0f);
-    for (std::size_t i = 0; i < colors.size(); ++i) {
-      if (i % components < 3) mesh->colors.push_back(std::clamp(colors[i], 0.0f, 1.0f));
-    }
-  }
-  mesh->colors.resize(mesh->positions.size(), 1.0f);
-  return {};
-}
-
-// Appends the texture coordinates of this primitive where it has them; nothing while no primitive had any.
-Status ReadUvs(const Document& document, const tinygltf::Primitive& in, const std::string& where,
-               const Primitive& primitive, Mesh* mesh) {
-  const int accessor = FindAttribute(in.attributes, "TEXCOORD_0");
-  if (accessor < 0 && mesh->uvs.empty()) return {};
-  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-  KPSA_RETURN_IF_ERROR(document.budget.TakeMemory(8 * (mesh->vertex_count() - mesh->uvs.size() / 2), where));
-  if (accessor >= 0 && primitive.vertex_count > 0) {
-    const std::string place = where + ".TEXCOORD_0";
-    KPSA_RETURN_IF_ERROR(CheckCount(document, accessor, primitive.vertex_count, place));
-    std::vector<float> uvs;
-    KPSA_RETURN_IF_ERROR(ReadNumbers(document, accessor, 2, kPositionTypes, place, &uvs));
-    mesh->uvs.resize(2 * static_cast<std::size_t>(primitive.first_vertex), kNone);
-    mesh->uvs.insert(mesh->uvs.end(), uvs.begin(), uvs.end());
-  }
-  mesh->uvs.resize(2 * mesh->vertex_count(), kNone);
-  return {};
-}
-
 Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, const std::string& where,
                      Mesh* mesh) {
   Primitive primitive;
@@ -233,8 +176,7 @@ Status ReadPrimitive(const Document& document, const tinygltf::Primitive& in, co
   KPSA_RETURN_IF_ERROR(ReadTriangles(document, in, where, &primitive));
   KPSA_RETURN_IF_ERROR(ReadInfluences(document, in, where, &primitive, mesh));
   KPSA_RETURN_IF_ERROR(ReadTargets(document, in, where, primitive, mesh));
-  KPSA_RETURN_IF_ERROR(ReadColors(document, in, where, primitive, mesh));
-  KPSA_RETURN_IF_ERROR(ReadUvs(document, in, where, primitive, mesh));
+  KPSA_RETURN_IF_ERROR(ReadVertexLook(document, in, where, primitive, mesh));
   mesh->primitives.push_back(std::move(primitive));
   return {};
 }

@@ -12,106 +12,22 @@ namespace {
 
 constexpr int kAreaSamples = 16;  // shadow rays a pixel and light that has a size
 
-bool IsLight(const NodeDef& def) {
-  return def.FindAttribute("outColor") >= 0 && def.FindAttribute("outMatrix") >= 0;
-}
-
-CameraView::Light LightOf(const Graph& graph, NodeId node) {
-  const NodeDef& def = graph.def(node);
-  const DiffuseLight::Kind kind = def.name == "areaLight"     ? DiffuseLight::Kind::kArea
-                                  : def.name == "sunLight"    ? DiffuseLight::Kind::kSun
-                                  : def.name == "sphereLight" ? DiffuseLight::Kind::kBall
-                                                              : DiffuseLight::Kind::kPoint;
-  return {
-      kind, {node, def.FindAttribute("outMatrix"), -1, -1}, {node, def.FindAttribute("outColor"), -1, -1}};
-}
-
-const Value& StructuralValue(const Graph& graph, NodeId node, const char* name) {
-  const PlugRef plug{node, graph.def(node).FindAttribute(name), -1, -1};
-  const Value* set = graph.FindValue(plug);
-  return set != nullptr ? *set
-                        : graph.def(node).attributes[static_cast<std::size_t>(plug.attribute)].default_value;
-}
-
-Index SizeOf(const Graph& graph, NodeId node, const char* name) {
-  return static_cast<Index>(StructuralValue(graph, node, name).AsInt());
+// What the textures of the mesh say where a ray hits its triangle `t`, of a sample of `size` metres.
+Double3 TextureColor(const MeshLook& look, Index t, const ShadingPlace& hit, ConstPointsView points,
+                     const Index* corner, double size) {
+  const Index* const at = &look.triangles[3 * std::size_t{t}];
+  if (look.texture.empty() || look.texture[*at] == kNoIndex) return {1, 1, 1};
+  CoveredPlace place;
+  place.weights = {1 - hit.u - hit.v, hit.u, hit.v};
+  for (std::size_t k = 0; k < 3; ++k) {
+    place.corners[k] = {points.x[corner[k]], points.y[corner[k]], points.z[corner[k]]};
+    const float* const uv = &look.uvs[2 * std::size_t{at[k]}];
+    place.uvs[k] = {double{uv[0]}, double{uv[1]}};
+  }
+  return TexelAt(look.textures[look.texture[*at]], place, size);
 }
 
 }  // namespace
-
-Result<CameraView> FindCamera(const Rig& rig, const std::string& name) {
-  const Graph& graph = *rig.graph;
-  std::vector<std::string> cameras;
-  std::optional<NodeId> camera;
-  std::vector<NodeId> illuminations, lights;
-  for (Index n = 0; n < graph.node_capacity(); ++n) {
-    const NodeId node = graph.IdAt(n);
-    if (!graph.IsAlive(node)) continue;
-    const NodeDef& def = graph.def(node);
-    if (def.name == "camera") {
-      cameras.push_back(graph.name(node));
-      if (graph.name(node) == name) camera = node;
-    }
-    if (def.name == "indirectIllumination") illuminations.push_back(node);
-    if (IsLight(def)) lights.push_back(node);
-  }
-  if (!camera.has_value()) {
-    if (cameras.empty()) return Status::Usage("{} has no camera", rig.path);
-    return Status::Usage("no such camera{}; there is {}", DidYouMean(name, cameras),
-                         fmt::join(cameras, ", "));
-  }
-  CameraView view;
-  view.world_from_screen = {*camera, graph.def(*camera).FindAttribute("worldFromScreen"), -1, -1};
-  std::optional<NodeId> illumination;
-  for (NodeId node : illuminations) {
-    const Connection* c =
-        graph.FindConnection({node, graph.def(node).FindAttribute("worldFromScreen"), -1, -1});
-    if (c == nullptr || !(c->source == view.world_from_screen)) continue;
-    if (illumination.has_value()) {
-      return Status::Usage("both {} and {} look through it", graph.name(*illumination), graph.name(node));
-    }
-    illumination = node;
-  }
-  if (!illumination.has_value()) {
-    for (NodeId node : lights) view.lights.push_back(LightOf(graph, node));
-    view.meshes = ShownMeshes(rig.scene);
-    return view;
-  }
-  const NodeDef& def = graph.def(*illumination);
-  view.irradiance = PlugRef{*illumination, def.FindAttribute("irradiance"), -1, -1};
-  view.width = SizeOf(graph, *illumination, "width");
-  view.height = SizeOf(graph, *illumination, "height");
-  for (const Connection& c : graph.Inputs(*illumination)) {
-    if (c.destination.attribute == def.FindAttribute("lightMatrix"))
-      view.lights.push_back(LightOf(graph, c.source.node));
-    if (c.destination.attribute != def.FindAttribute("points")) continue;
-    for (std::size_t m = 0; m < rig.scene.meshes.size(); ++m) {
-      if (rig.scene.meshes[m].points == c.source) view.meshes.push_back(m);
-    }
-  }
-  const auto& carried =
-      StructuralValue(graph, *illumination, "carriedMeshes").get<std::vector<std::int64_t>>();
-  for (std::size_t i = 0; i < carried.size(); ++i) {
-    view.carried.push_back({{*illumination, def.FindAttribute("pointIrradiance"), static_cast<int>(i), -1},
-                            static_cast<std::size_t>(carried[i])});
-  }
-  return view;
-}
-
-CameraView AcceleratedView(const CameraView& view, const Rig& rig,
-                           const std::vector<AppliedSubspace>& applied) {
-  CameraView fast = view;
-  for (const AppliedSubspace& one : applied) {
-    for (std::size_t p = 0; p < one.entry.points.size(); ++p) {
-      if (view.irradiance.has_value() && one.entry.points[p].points == *view.irradiance)
-        fast.irradiance = one.Output(*rig.graph, p);
-      for (CameraView::Carried& carried : fast.carried) {
-        if (one.entry.points[p].points == carried.irradiance) carried.irradiance = one.Output(*rig.graph, p);
-      }
-    }
-  }
-  return fast;
-}
 
 Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compiler, const CameraView& view,
                                                 const std::vector<double>& times,
@@ -135,7 +51,9 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
   std::vector<Index> triangles;
   std::vector<float> albedo;
   std::vector<Index> carrier;  // of each triangle: in view.carried, or none
-  std::vector<Index> first_point(view.meshes.size());
+  std::vector<Index> shares;   // of each corner: the number of its normal, if there is a look
+  Index normals = 0;
+  std::vector<Index> first_point(view.meshes.size()), mesh_of, first_triangle;
   Index count = 0;
   for (std::size_t i = 0; i < view.meshes.size(); ++i) {
     const std::size_t m = view.meshes[i];
@@ -145,6 +63,8 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
       if (view.carried[k].mesh == i) owner = static_cast<Index>(k);
     }
     const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
+    first_triangle.push_back(static_cast<Index>(triangles.size() / 3));
+    mesh_of.insert(mesh_of.end(), mesh.triangles.size() / 3, static_cast<Index>(i));
     for (const Mesh::Primitive& primitive : mesh.primitives) {
       for (Index t = 3 * primitive.first_triangle;
            t < 3 * (primitive.first_triangle + primitive.triangle_count); ++t) {
@@ -152,6 +72,11 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
         triangles.push_back(count + mesh.triangles[t]);
         albedo.push_back(std::clamp(primitive.base_color[t % 3], 0.0f, 1.0f));
       }
+    }
+    if (view.look != nullptr) {
+      const MeshLook& look = (*view.look)[m];
+      for (const Index corner : look.triangles) shares.push_back(normals + look.smooth[corner]);
+      normals += static_cast<Index>(look.points.size());
     }
     count += rig.scene.meshes[m].mesh().point_count();
   }
@@ -178,7 +103,7 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
         const bool head_light = lights.empty() && !view.irradiance.has_value();
         if (head_light) lights.push_back({DiffuseLight::Kind::kPoint, world_from_screen, {1, 1, 1}});
         Result<PathTracer> tracer =
-            PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights);
+            PathTracer::Build(std::as_const(points).view(), triangles, albedo, lights, {}, shares);
         if (!tracer.ok()) return tracer.status();
         if (head_light) {
           lights.front().color = HeadLightColor(*tracer, world_from_screen);
@@ -204,6 +129,12 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
           return at(light, corner[0] - first) * (1 - place.u - place.v) +
                  at(light, corner[1] - first) * place.u + at(light, corner[2] - first) * place.v;
         };
+        const auto spread = [&](std::size_t p, Double3 direction) {  // from the pixel beside it, in its row
+          Double3 origin, other;
+          const std::size_t beside = (p + 1) % image.width == 0 && image.width > 1 ? p - 1 : p + 1;
+          PixelRay(world_from_screen, static_cast<Index>(beside), view.width, view.height, &origin, &other);
+          return Length(UnitOrZero(other) - UnitOrZero(direction));
+        };
         const auto shade = [&](std::size_t begin, std::size_t end) {
           for (std::size_t p = begin; p < end; ++p) {
             Double3 origin, direction;
@@ -213,8 +144,16 @@ Result<std::vector<CameraImage>> EvaluateCamera(const Rig& rig, Compiler* compil
                 tracer->Direct(place, static_cast<std::uint32_t>(p) * 0x9e3779b1u, kAreaSamples);
             image.hit[p] = place.hit;
             const Double3 bounced = indirect(p, place);
+            Double3 texel = {1, 1, 1};
+            if (place.hit && view.look != nullptr) {
+              const Index i = mesh_of[place.triangle];
+              texel = TextureColor((*view.look)[view.meshes[i]], place.triangle - first_triangle[i], place,
+                                   std::as_const(points).view(), &triangles[3 * std::size_t{place.triangle}],
+                                   spread(p, direction) * Length(place.position - origin));
+            }
             for (int k = 0; k < 3; ++k) {
-              image.albedo[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(place.albedo[k]);
+              image.albedo[3 * p + static_cast<std::size_t>(k)] =
+                  static_cast<float>(place.albedo[k] * texel[k]);
               image.direct[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(light[k]);
               image.indirect[3 * p + static_cast<std::size_t>(k)] = static_cast<float>(bounced[k]);
             }

@@ -3,6 +3,7 @@
 // camera.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "host/verdicts.h"
 #include "nodes/kernels/path_tracer.h"
 #include "picture/image.h"
+#include "picture/look.h"
 
 namespace kpsa::engine {
 
@@ -29,6 +31,9 @@ struct CameraView {
   std::vector<Light> lights;        // of the illumination; all of the rig where there is none
   std::vector<std::size_t> meshes;  // that are lit, in rig.scene.meshes
   Index width = 400, height = 400;  // of the illumination
+  // Whose textures are multiplied with base colours, and whose edges are hard; null: no textures, edges of more than 50
+  // degrees.
+  std::shared_ptr<const RigLook> look;
 };
 
 // The view of a camera node. Errors: no such camera (the nearest one is named), several illuminations that

@@ -30,6 +30,9 @@ void DrawReadable(Image& image, int x, int y, int scale, std::string_view text) 
   DrawText(image, x, y, scale, on_light ? kDark : kLight, text);
 }
 
+// Of letters that are read where pictures in a row are shrunk to a page.
+int LetterScale(const Image& image) { return std::max(1, image.height / 200); }
+
 std::string NumberOf(double value, bool metres) {
   if (!metres) return fmt::format("{:.3g}", value);
   std::string number = Millimetres(value);
@@ -46,13 +49,14 @@ std::string Millimetres(double metres) {
 }
 
 void DrawTitle(Image& image, std::string_view title) {
-  const int scale = std::max(1, image.height / 300);
+  int scale = LetterScale(image);
+  while (scale > 1 && TextWidth(title, scale) + 8 * scale > image.width) --scale;
   DrawReadable(image, (image.width - TextWidth(title, scale)) / 2, 6 * scale, scale, title);
 }
 
 void DrawCaption(Image& image, std::span<const std::string> texts) {
   for (const std::string& text : texts) {
-    for (int scale = std::max(1, image.height / 300); scale > 0; --scale) {
+    for (int scale = LetterScale(image); scale > 0; --scale) {
       if (TextWidth(text, scale) + 8 * scale > image.width) continue;
       DrawReadable(image, 4 * scale, image.height - (kLetterHeight + 5) * scale, scale, text);
       return;
@@ -61,7 +65,7 @@ void DrawCaption(Image& image, std::span<const std::string> texts) {
 }
 
 Image LegendPanel(int height, const Legend& legend) {
-  const int scale = std::max(1, height / 400);
+  const int scale = std::max(1, height / 300);
   const std::string unit = legend.metres ? "error, mm" : "error";
   const std::array<std::string, 2> foot = {
       "> tolerance", "  " + (legend.metres ? Millimetres(legend.mark) : NumberOf(legend.mark, false))};

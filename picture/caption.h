@@ -9,7 +9,7 @@
 
 namespace kpsa::engine {
 
-// A title at the top of the picture.
+// A title at the top of the picture, in letters that fit.
 void DrawTitle(Image& image, std::string_view title);
 // A line at its lower left: the first of the texts that fits, from the longest to the shortest; in smaller letters
 // rather than a shorter one.

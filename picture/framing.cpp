@@ -67,8 +67,7 @@ Result<std::vector<Camera>> FrameRig(const Rig& rig, const std::vector<Pose>& po
     seen = std::move(*points);
   } else {
     for (const Pose& pose : poses) {
-      const RenderInput one = MakeInput(rig, pose);
-      seen.parts.insert(seen.parts.end(), one.parts.begin(), one.parts.end());
+      for (const std::vector<float>& points : pose) seen.parts.emplace_back().points = points;
     }
   }
   std::vector<Camera> cameras =

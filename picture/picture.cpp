@@ -37,11 +37,11 @@ void EachPoint(const RenderInput& input, F&& f) {
   }
 }
 
-// From the camera's target, as near as possible with all points inside and below the title.
+// From the camera's target, as near as possible with all points between title and caption.
 double DistanceTo(const RenderInput& input, const Camera& camera, const RenderOptions& options,
                   const Axes& axes) {
   // tan(fov / 2) from sine and cosine
-  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.88;
+  const double slope = Sin(camera.field_of_view / 2) / Cos(camera.field_of_view / 2) * 0.84;
   const double aspect = static_cast<double>(options.width) / options.height;
   double distance = 0;
   EachPoint(input, [&](Double3 point) {
@@ -143,8 +143,10 @@ Result<Image> RenderMesh(const RenderInput& input, const Camera& camera, const R
         scene->ClosestHits(rays, hits);
         Double3 sum = {};
         for (std::size_t k = 0; k < 4; ++k) {
-          sum = sum + (hits[k].triangle == kNoIndex ? ground
-                                                    : Shade(*surface, hits[k], directions[k] * -1.0, lights));
+          const double size = hits[k].t * slope / options.height;  // of one of 2 x 2 samples of a pixel
+          sum = sum + (hits[k].triangle == kNoIndex
+                           ? ground
+                           : Shade(*surface, hits[k], directions[k] * -1.0, lights, size));
         }
         image.Set(column, static_cast<int>(row),
                   {SrgbByte(sum.x / 4), SrgbByte(sum.y / 4), SrgbByte(sum.z / 4)});

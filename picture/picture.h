@@ -2,8 +2,8 @@
 // draws.
 //
 // Light is computed at the points (ambient occlusion and the shadow of the key light, by rays) and
-// interpolated, so that pictures are free of noise; pixels are shaded with smooth normals, 2 x 2 samples
-// each. The same input gives the same picture at any number of threads.
+// interpolated, so that pictures are free of noise; pixels are shaded with interpolated normals, 2 x 2 samples
+// each. Points that share a normal are one place with one light; an edge between others is hard. The same input gives the same picture at any number of threads.
 #pragma once
 
 #include <memory>
@@ -14,15 +14,22 @@
 #include "base/status.h"
 #include "base/types.h"
 #include "picture/image.h"
+#include "picture/texture.h"
 
 namespace kpsa::engine {
 
 // One surface. The spans must outlive the calls that are given the part, by `owner` or otherwise.
 struct RenderPart {
-  std::span<const float> points;       // 3 a point (x y z), metres, world space
-  std::span<const Index> triangles;    // 3 indices each, counter-clockwise from outside
-  std::span<const float> colors;       // 3 a point, linear light 0 .. 1; or empty: `color` everywhere
-  std::span<const float> scalars;      // 1 a point, metres; or empty: the part is drawn as clay
+  std::span<const float> points;     // 3 a point (x y z), metres, world space
+  std::span<const Index> triangles;  // 3 indices each, counter-clockwise from outside
+  std::span<const float> colors;     // 3 a point, linear light 0 .. 1; or empty: `color` everywhere
+  std::span<const float> scalars;    // 1 a point, metres; or empty: the part is drawn as clay
+  std::span<const Index> smooth;     // 1 a point: the first of those that share its normal; or empty: its own
+  // What the colours are multiplied with: textures, 1 a point (that of a triangle's first counts; kNoIndex: none)
+  // and 2 texture coordinates a point; or all empty. Scalars hide them.
+  std::span<const SurfaceTexture> textures;
+  std::span<const Index> texture;
+  std::span<const float> uvs;
   Double3 color = {0.62, 0.43, 0.35};  // linear light
   bool casts_shadows = true;
   std::shared_ptr<const void> owner;  // keeps alive what the spans refer to, where nobody else does

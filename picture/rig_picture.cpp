@@ -13,30 +13,6 @@
 #include "kpsa/subspace.h"
 
 namespace kpsa::engine {
-namespace {
-
-// COLOR_0 times the materials' colours (glTF 2.0, 3.7.2.1) by point of a mesh; null where the file has no
-// COLOR_0.
-std::shared_ptr<const std::vector<float>> PointColors(const Rig& rig, std::size_t m) {
-  const CharacterMesh& mesh = rig.scene.meshes[m];
-  const gltf::Mesh& file = rig.character->meshes[rig.character->nodes[mesh.gltf_node].mesh];
-  if (file.colors.empty()) return nullptr;
-  const auto& point_of = mesh.mesh().data().vertex_to_point;
-  auto colors = std::make_shared<std::vector<float>>(3 * std::size_t{mesh.mesh().point_count()}, 1.0f);
-  for (const gltf::Primitive& primitive : file.primitives) {
-    std::array<double, 4> base = {1, 1, 1, 1};
-    if (primitive.material != kNoIndex) base = rig.character->materials[primitive.material].base_color;
-    for (std::size_t v = primitive.first_vertex;
-         v < std::size_t{primitive.first_vertex} + primitive.vertex_count; ++v) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        (*colors)[3 * std::size_t{point_of[v]} + k] = static_cast<float>(file.colors[3 * v + k] * base[k]);
-      }
-    }
-  }
-  return colors;
-}
-
-}  // namespace
 
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
                                         const RigFrameOptions& options, const std::vector<std::size_t>& shown,
@@ -63,37 +39,21 @@ Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, cons
   return poses;
 }
 
-RenderInput MakeInput(const Rig& rig, const Pose& pose) {
+RenderInput MakeInput(const RigLook& look, const Pose& pose) {
   RenderInput input;
   for (std::size_t m = 0; m < pose.size(); ++m) {
     if (pose[m].empty()) continue;  // hidden
-    const Mesh::Data& mesh = rig.scene.meshes[m].mesh().data();
-    const std::span<const Index> triangles(mesh.triangles);
-    if (const auto colors = PointColors(rig, m); colors != nullptr) {
-      RenderPart part;
-      part.points = pose[m], part.triangles = triangles;
-      part.colors = *colors, part.owner = colors;
-      input.parts.push_back(part);
-      continue;
+    const MeshLook& mesh = look[m];
+    auto points = std::make_shared<std::vector<float>>();
+    points->reserve(3 * mesh.points.size());
+    for (const Index point : mesh.points) {
+      const auto from = pose[m].begin() + std::ptrdiff_t{3} * point;
+      points->insert(points->end(), from, from + 3);
     }
-    const bool colored =
-        std::any_of(mesh.primitives.begin(), mesh.primitives.end(), [](const Mesh::Primitive& p) {
-          return p.base_color[0] != p.base_color[1] || p.base_color[1] != p.base_color[2];
-        });
-    if (!colored) {
-      RenderPart part;
-      part.points = pose[m], part.triangles = triangles;
-      input.parts.push_back(part);
-      continue;
-    }
-    for (const Mesh::Primitive& primitive : mesh.primitives) {
-      RenderPart part;
-      part.points = pose[m], part.triangles = triangles.subspan(std::size_t{3} * primitive.first_triangle,
-                                                                std::size_t{3} * primitive.triangle_count);
-      part.color = {double{primitive.base_color[0]}, double{primitive.base_color[1]},
-                    double{primitive.base_color[2]}};
-      if (!part.triangles.empty()) input.parts.push_back(part);
-    }
+    RenderPart& part = input.parts.emplace_back();
+    part.points = *points, part.owner = points;
+    part.triangles = mesh.triangles, part.smooth = mesh.smooth, part.colors = mesh.colors;
+    part.textures = mesh.textures, part.texture = mesh.texture, part.uvs = mesh.uvs;
   }
   return input;
 }

@@ -6,6 +6,7 @@
 
 #include "host/rig_frames.h"
 #include "host/verdicts.h"
+#include "picture/look.h"
 #include "picture/picture.h"
 
 namespace kpsa::engine {
@@ -17,9 +18,8 @@ using Pose = std::vector<std::vector<float>>;
 Result<std::vector<Pose>> EvaluatePoses(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
                                         const RigFrameOptions& options, const std::vector<std::size_t>& shown,
                                         Verdicts* verdicts = nullptr);
-// One part a mesh, with the file's vertex colours if it has them; or one a primitive where materials have
-// colours. Refers to both arguments.
-RenderInput MakeInput(const Rig& rig, const Pose& pose);
+// One part a mesh that has points in the pose. Refers to the look.
+RenderInput MakeInput(const RigLook& look, const Pose& pose);
 // The points that the subspaces measure, on the pose.
 RenderDots KeyPoints(const std::vector<AppliedSubspace>& applied, const Pose& pose);
 double WorstDistance(const Pose& a, const Pose& b);  // metres

@@ -23,9 +23,11 @@ Status PlayTestClip(Rig* rig) {
 }
 
 Result<std::vector<Image>> DrawStrip(const Rig& rig, Compiler* compiler, const std::vector<double>& times,
-                                     const StripView& view, const RigFrameOptions& options) {
+                                     const StripView& view, const RigFrameOptions& options,
+                                     std::vector<std::string>* notes) {
   const Result<std::vector<std::size_t>> meshes = ChooseMeshes(rig, view.meshes);
   if (!meshes.ok()) return meshes.status();
+  const RigLook look = LookOf(rig, *meshes, view.textures, notes);
   const Result<std::vector<Pose>> poses = EvaluatePoses(rig, compiler, times, options, *meshes);
   if (!poses.ok()) return poses.status();
   const Result<std::vector<Camera>> cameras =
@@ -34,7 +36,7 @@ Result<std::vector<Image>> DrawStrip(const Rig& rig, Compiler* compiler, const s
   std::vector<Image> images;
   for (std::size_t i = 0; i < (view.turntable > 0 ? cameras->size() : times.size()); ++i) {
     const std::size_t frame = view.turntable > 0 ? 0 : i, camera = view.turntable > 0 ? i : 0;
-    Result<Image> image = RenderMesh(MakeInput(rig, (*poses)[frame]), (*cameras)[camera], view.options);
+    Result<Image> image = RenderMesh(MakeInput(look, (*poses)[frame]), (*cameras)[camera], view.options);
     if (!image.ok()) return image.status();
     const std::string turned =
         view.turntable > 0 ? fmt::format("{:.0f} deg", 360.0 * static_cast<double>(i) / view.turntable) : "";
@@ -47,9 +49,10 @@ Result<std::vector<Image>> DrawStrip(const Rig& rig, Compiler* compiler, const s
 
 Result<ComparedFrames> CompareFrames(Rig* rig, Compiler* compiler, const AccelerationChoice& choice,
                                      const std::vector<double>& times, bool all, const StripView& view,
-                                     const RigFrameOptions& options) {
+                                     const RigFrameOptions& options, std::vector<std::string>* notes) {
   const Result<std::vector<std::size_t>> meshes = ChooseMeshes(*rig, view.meshes);
   if (!meshes.ok()) return meshes.status();
+  const RigLook look = LookOf(*rig, *meshes, view.textures, notes);
   const Result<std::vector<Pose>> full = EvaluatePoses(*rig, compiler, times, options, *meshes);
   if (!full.ok()) return full.status();
   const Result<std::vector<AppliedSubspace>> applied = ApplyAcceleration(rig, compiler, choice);
@@ -69,7 +72,7 @@ Result<ComparedFrames> CompareFrames(Rig* rig, Compiler* compiler, const Acceler
       FrameRig(*rig, all ? *full : std::vector<Pose>{(*full)[compared.worst]}, view.options, view.framing);
   if (!camera.ok()) return camera.status();
   for (std::size_t f : frames) {
-    RenderInput exact = MakeInput(*rig, (*full)[f]), emitted = MakeInput(*rig, (*fast)[f]);
+    RenderInput exact = MakeInput(look, (*full)[f]), emitted = MakeInput(look, (*fast)[f]);
     exact.tolerance = ShownTolerance(applied->front());
     exact.scalar_max = emitted.scalar_max = view.error_scale.value_or(exact.tolerance);
     const RenderDots dots = KeyPoints(*applied, (*full)[f]);

@@ -41,6 +41,18 @@ double LinearFromSrgb(std::uint8_t byte) {
 
 Double3 PointOf(ConstPointsView p, std::size_t i) { return {p.x[i], p.y[i], p.z[i]}; }
 
+// What the texture there says, of a sample of that size.
+Double3 TexelColor(const Surface& surface, const RayHit& hit, const Index* corner,
+                   const std::array<double, 3>& w, double size) {
+  CoveredPlace place;
+  place.weights = w;
+  for (std::size_t k = 0; k < 3; ++k) {
+    place.corners[k] = PointOf(surface.points.view(), corner[k]);
+    place.uvs[k] = {double{surface.uvs[corner[k]][0]}, double{surface.uvs[corner[k]][1]}};
+  }
+  return TexelAt(*surface.textures[hit.triangle], place, size);
+}
+
 }  // namespace
 
 Double3 UnitVector(Double3 v) {
@@ -58,67 +70,6 @@ std::uint8_t SrgbByte(double linear) {
 
 Double3 LinearFromRgb(Rgb c) { return {LinearFromSrgb(c[0]), LinearFromSrgb(c[1]), LinearFromSrgb(c[2])}; }
 
-Result<Surface> GatherSurface(const RenderInput& input) {
-  Surface out;
-  std::size_t count = 0;
-  for (const RenderPart& part : input.parts) {
-    const std::size_t n = part.points.size() / 3;
-    if (part.points.size() % 3 != 0 || (!part.colors.empty() && part.colors.size() != 3 * n) ||
-        (!part.scalars.empty() && part.scalars.size() != n)) {
-      return Status::Invalid("a picture's part has {} coordinates, {} colour values and {} scalars",
-                             part.points.size(), part.colors.size(), part.scalars.size());
-    }
-    count += n;
-  }
-  out.points = PointBuffer(count);
-  const PointsView p = out.points.view();
-  std::size_t base = 0;
-  for (const RenderPart& part : input.parts) {
-    const std::size_t n = part.points.size() / 3;
-    for (std::size_t i = 0; i < n; ++i) {
-      p.x[base + i] = part.points[3 * i];
-      p.y[base + i] = part.points[3 * i + 1];
-      p.z[base + i] = part.points[3 * i + 2];
-      Double3 color = part.color;
-      if (!part.colors.empty()) color = {part.colors[3 * i], part.colors[3 * i + 1], part.colors[3 * i + 2]};
-      if (!part.scalars.empty()) color = LinearFromRgb(TurboColor(part.scalars[i] / input.scalar_max));
-      out.colors.push_back(color);
-      out.matte.push_back(part.scalars.empty() ? 0 : 1);
-    }
-    const auto first = static_cast<std::ptrdiff_t>(out.triangles.size());
-    for (Index index : part.triangles) {
-      if (index >= n) return Status::Invalid("a triangle names point {}, there are {} points", index, n);
-      out.triangles.push_back(static_cast<Index>(base) + index);
-    }
-    base += n;
-    out.triangles.resize(out.triangles.size() / 3 * 3);
-    if (part.casts_shadows)
-      out.casting.insert(out.casting.end(), out.triangles.begin() + first, out.triangles.end());
-  }
-  out.normals.resize(count);
-  for (std::size_t t = 0; t < out.triangles.size(); t += 3) {
-    const Index a = out.triangles[t], b = out.triangles[t + 1], c = out.triangles[t + 2];
-    const Double3 n = Cross(PointOf(p, b) - PointOf(p, a), PointOf(p, c) - PointOf(p, a));
-    for (Index i : {a, b, c}) out.normals[i] = out.normals[i] + n;
-  }
-  for (Double3& n : out.normals) n = UnitVector(n);
-  return out;
-}
-
-double Diagonal(const RenderInput& input, Double3* center) {
-  Double3 low = {1e30, 1e30, 1e30}, high = {-1e30, -1e30, -1e30};
-  for (const RenderPart& part : input.parts) {
-    for (std::size_t i = 0; i < part.points.size(); ++i) {
-      const int axis = static_cast<int>(i % 3);
-      low[axis] = std::min(low[axis], static_cast<double>(part.points[i]));
-      high[axis] = std::max(high[axis], static_cast<double>(part.points[i]));
-    }
-  }
-  if (low.x > high.x) low = high = {0, 0, 0};
-  *center = (low + high) * 0.5;
-  return Length(high - low);
-}
-
 void LightPoints(const RayScene& scene, Double3 to_key, double diagonal, Surface* surface) {
   const std::size_t count = surface->points.count();
   surface->sky.resize(count);
@@ -130,6 +81,7 @@ void LightPoints(const RayScene& scene, Double3 to_key, double diagonal, Surface
     std::array<Ray, kSkyRays> rays;
     std::array<std::uint8_t, kSkyRays> blocked;
     for (std::size_t i = begin; i < end; ++i) {
+      if (surface->shares[i] != i) continue;
       const Double3 n = surface->normals[i];
       const Double3 origin = PointOf(p, i) + n * (diagonal * 1e-3);
       Double3 s, t;
@@ -162,9 +114,13 @@ void LightPoints(const RayScene& scene, Double3 to_key, double diagonal, Surface
       surface->key[i] = static_cast<float>(seen) / kLightRays;
     }
   });
+  for (std::size_t i = 0; i < count; ++i) {
+    surface->sky[i] = surface->sky[surface->shares[i]];
+    surface->key[i] = surface->key[surface->shares[i]];
+  }
 }
 
-Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lights& lights) {
+Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lights& lights, double size) {
   const Index* corner = &surface.triangles[3 * static_cast<std::size_t>(hit.triangle)];
   const std::array<double, 3> w = {1.0 - hit.u - hit.v, hit.u, hit.v};
   Double3 n = {}, color = {};
@@ -183,6 +139,11 @@ Double3 Shade(const Surface& surface, const RayHit& hit, Double3 view, const Lig
   const Double3 a = PointOf(p, corner[0]),
                 facet = Cross(PointOf(p, corner[1]) - a, PointOf(p, corner[2]) - a);
   if (Dot(facet, view) < 0) n = n * -1.0;
+  if (!surface.textures.empty() && surface.textures[hit.triangle] != nullptr) {
+    // What is seen at a slant is larger than it looks; a texture knows no direction, so half of that
+    const double facing = std::fabs(Dot(UnitVector(facet), view));
+    color = Times(color, TexelColor(surface, hit, corner, w, size / std::sqrt(std::max(facing, 0.05))));
+  }
   // Sky from above, ground bounce from below, key with a soft terminator, weak fill
   const double up = 0.5 + 0.5 * n.y;
   const Double3 ambient =

@@ -74,6 +74,15 @@ bool IsRepeated(const BenchJsonValue& side, const std::vector<BenchJsonValue>& s
   });
 }
 
+// A cell of a table of commas (RFC 4180).
+std::string CsvText(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
+}
+std::string CsvNumber(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+
 // The sides of a document, the first included.
 Result<std::vector<BenchJsonValue>> ReadSides(const std::string& path) {
   const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kMostBytes);
@@ -237,44 +246,38 @@ Result<std::string> BenchTables(const std::vector<BenchDocument>& documents, boo
   return text;
 }
 
-Result<std::vector<LinePlot>> BenchPlots(const std::string& path) {
-  const Result<std::vector<BenchJsonValue>> sides = ReadSides(path);
-  if (!sides.ok()) return sides.status();
-  std::vector<LinePlot> plots;
-  try {
-    for (const BenchJsonValue& side : *sides) {
-      const BenchJsonValue& errors = side.at("frame_errors");
-      if (errors.is_null() || IsRepeated(side, *sides)) continue;
-      const double percent = 100 / NumberAt(side, "/error/bbox_diagonal");
-      const auto line = [&](const char* name, const char* key, const char* color) {
-        PlotLine one{name, color, {}};
-        for (const BenchJsonValue& value : errors.at(key))
-          one.y.push_back(value.is_number() ? percent * value.get<double>() : NAN);
-        return one;
-      };
-      const std::string title =
-          fmt::format("{}, {}, {}", NameOf(side), side.at("mode") == "paper" ? "paper mode" : "default",
-                      MeasuredOf(side));
-      LinePlot parts{title + ": KPSA", "frame", "RMS error, % of the diagonal", {}, "", {}};
-      parts.lines = {line("projection", "projection", "#2f7fd0"), line("cueing", "cueing", "#e09020"),
-                     line("total", "total", "#303030")};
-      LinePlot cached{title + ": SoftCache", "frame", "RMS error, % of the diagonal", {}, "", {}};
-      cached.lines = {line("error with SoftCache", "soft_cache", "#208050")};
-      cached.marks_name = "misses";
-      for (std::size_t f = 0; f < errors.at("miss").size(); ++f) {
-        if (errors.at("miss")[f].get<bool>()) cached.marks.push_back(f);
+Result<std::string> BenchFrames(const std::vector<std::string>& paths) {
+  std::string text =
+      "rig,mode,measured,tolerance,clip,frame,verdict,full_weight,score,rms,max,full_ms,accelerated_ms,"
+      "projection,cueing,storage,total\n";
+  for (const std::string& path : paths) {
+    const Result<std::vector<BenchJsonValue>> sides = ReadSides(path);
+    if (!sides.ok()) return sides.status();
+    try {
+      for (const BenchJsonValue& side : *sides) {
+        const double tolerance = ToleranceOf(side);
+        const std::string start =
+            fmt::format("{},{},{},{},", CsvText(NameOf(side)), CsvText(ModeOf(side)),
+                        CsvText(MeasuredOf(side)), tolerance >= kAnyError ? "any" : CsvNumber(tolerance));
+        const BenchJsonValue &frames = side.at("per_frame"), &errors = side.at("frame_errors");
+        for (std::size_t f = 0; f < frames.size(); ++f) {
+          text += start + CsvText(frames[f].at("clip").get<std::string>());
+          text += fmt::format(",{},{}", CountAt(frames[f], "/frame"),
+                              CsvText(frames[f].at("verdict").get<std::string>()));
+          for (const char* key : {"full_weight", "score", "rms", "max", "full_ms", "accelerated_ms"})
+            text += "," + CsvNumber(NumberOrNan(frames[f].at(key)));
+          for (const char* key : {"projection", "cueing", "storage", "total"})
+            text += "," + (errors.is_null() ? "" : CsvNumber(NumberOrNan(errors.at(key).at(f))));
+          text += '\n';
+        }
       }
-      plots.push_back(std::move(parts));
-      plots.push_back(std::move(cached));
+    } catch (const Refusal& refusal) {
+      return Status(refusal.status).At({path});
+    } catch (const BenchJsonValue::exception& error) {
+      return Status::Invalid("is no bench of this version: {}", error.what()).At({path});
     }
-  } catch (const Refusal& refusal) {
-    return Status(refusal.status).At({path});
-  } catch (const BenchJsonValue::exception& error) {
-    return Status::Invalid("is no bench of this version: {}", error.what()).At({path});
   }
-  if (plots.empty())
-    return Status::Invalid("has no errors by frame: kpsa train --keep-modes keeps what they need").At({path});
-  return plots;
+  return text;
 }
 
 }  // namespace kpsa::engine

@@ -1,11 +1,10 @@
-// Tables and plots from what `kpsa bench --json` printed: one document a rig, each with one side or several.
+// Tables from what `kpsa bench --json` printed: one document a rig, each with one side or several.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "base/status.h"
-#include "report/line_plot.h"
 
 namespace kpsa::engine {
 
@@ -18,8 +17,9 @@ struct BenchDocument {
 // every frame, too. Errors: a file that is no bench of this program.
 Result<std::string> BenchTables(const std::vector<BenchDocument>& documents, bool with_any = true);
 
-// Two plots for each side that has errors by frame: projection, cueing and total of every frame
-// reconstructed; and the error with SoftCache, misses marked. Errors also: no side has them.
-Result<std::vector<LinePlot>> BenchPlots(const std::string& path);
+// The frames of all sides, a line each, as comma-separated values; lengths in metres, times in milliseconds, what is
+// not known empty. The parts of an error are those of every frame reconstructed, of subspaces trained with
+// --keep-modes. Errors: those of BenchTables.
+Result<std::string> BenchFrames(const std::vector<std::string>& paths);
 
 }  // namespace kpsa::engine

@@ -47,15 +47,24 @@ void AddWall(const char* name, Float3 color, Double3 corner, Double3 u, Double3 
   Finish(std::move(quads), &mesh, scene);
 }
 
+// Corners of each side of its own, so that its edges are hard.
 void AddBox(const char* name, Float3 color, Double3 low, Double3 high, GlbScene* scene) {
   GlbMesh mesh;
   mesh.name = name;
   mesh.base_color = color;
-  for (int i = 0; i < 8; ++i) {
-    mesh.positions.push_back(Float({i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z}));
-    mesh.influences.push_back(Rigid(kRoom));
+  constexpr int kSides[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  std::vector<std::array<int, 4>> quads;
+  for (const auto& side : kSides) {
+    const int first = static_cast<int>(mesh.positions.size());
+    for (const int i : side) {
+      mesh.positions.push_back(
+          Float({i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z}));
+      mesh.influences.push_back(Rigid(kRoom));
+    }
+    quads.push_back({first, first + 1, first + 2, first + 3});
   }
-  Finish({{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}, &mesh, scene);
+  Finish(std::move(quads), &mesh, scene);
 }
 
 // A limb with rounded ends from a to b; weights(t) gives those of the joints at t of the way.

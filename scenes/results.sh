@@ -1,7 +1,7 @@
 #!/bin/sh
 # Results: characters that nobody tuned for, and those of the reference's sizes in paper mode and as the program chooses, with
 # a rigger's stack and with a heavy one, on three clips each. Builds
-# kpsa, trains, benches the sides of a character in one run, draws, and writes docs/results.md and docs/results/. What it makes on
+# kpsa, trains, benches the sides of a character in one run, draws (plots with matplotlib), and writes docs/results.md and docs/results/. What it makes on
 # the way goes to out/results/.
 #
 #   sh scenes/results.sh [--assets FOLDER]   everything, some 20 to 30 minutes; with human.glb, head.glb, Fox.glb and
@@ -9,20 +9,22 @@
 #   sh scenes/results.sh --try KPSA FOLDER   the same steps with that program on the smallest rig, all files to FOLDER
 set -e
 cd "$(dirname "$0")/.."
-train_options='' bench_options='--runs 9 --idle' render_options='--size 330x420'
+train_options='' bench_options='--runs 9 --idle'
 default_options='' assets=''
 if [ "$1" = --try ]; then
   kpsa=$2 docs=$3 work=$3/out
-  train_options='--samples 100 --calibration 60' bench_options='--runs 1 --idle' render_options='--size 40x50'
+  train_options='--samples 100 --calibration 60' bench_options='--runs 1 --idle'
   default_options='--rows 24'
 else
   if [ "$1" = --assets ]; then assets="--assets $2"; fi
   kpsa=build/kpsa docs=docs work=out/results
-  sh cmake/dependencies.sh
+  sh cmake/dependencies.sh python3-matplotlib
   echo '== building kpsa (minutes, the first time)'
   cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
   cmake --build build --target kpsa bench_untouched
 fi
+python=/usr/bin/python3 # Debian's, which has its packages
+[ -x "$python" ] || python=python3
 mkdir -p "$docs/results" "$work"
 
 # train RIG NAME OPTIONS...: a subspace of scenes/RIG.yaml to NAME.kpsa.
@@ -50,6 +52,15 @@ sides() {
     --kpsa "$work/$name.kpsa" --tolerance own "$@"
 }
 
+# plot NAME: errors over the frames of NAME.json.
+plot() {
+  if "$python" -c 'import matplotlib' 2> /dev/null; then
+    "$python" bench/plot_frames.py "$work/$1.json" -o "$docs/results/$1.svg"
+  else
+    echo "skipped: no plots, as $python has no matplotlib (Debian: python3-matplotlib)"
+  fi
+}
+
 # measure RIG KEY_POINTS [CLIP...]: trains both modes, and benches them on the test clip and on these, which nobody looked at
 # before their rows are printed.
 measure() {
@@ -61,19 +72,16 @@ measure() {
   train "$of" "$name" $default_options
   printf '\n== %s: full, paper mode and default mode taking turns\n' "$name"
   sides "$of" "$name" "$name"
-  "$kpsa" report "$work/$name.json" --plot "$docs/results/$name.svg" --force
+  plot "$name"
   for clip in "$@"; do sides "$of" "$name" "$name-$clip" --clip "$clip"; done
 }
 
-# draw RIG CLIP FRAMES SCALE: full, key points, accelerated, error; paper mode with every frame accepted, and default mode.
+# draw RIG CLIP FRAMES SCALE SIZE: full, key points, accelerated, error; paper mode with every frame accepted, and default mode.
 draw() {
   name=$(basename "$1") rig=scenes/$1.yaml
-  # shellcheck disable=SC2086
-  "$kpsa" render "$rig" --clip "$2" --frames "$3" --kpsa "$work/$name-paper.kpsa" --tolerance any --error-scale "$4" -q \
-    --force -o "$docs/results/$name-paper.png" $render_options
-  # shellcheck disable=SC2086
-  "$kpsa" render "$rig" --clip "$2" --frames "$3" --kpsa "$work/$name.kpsa" --error-scale "$4" -q --force \
-    -o "$docs/results/$name.png" $render_options
+  set -- --clip "$2" --frames "$3" --error-scale "$4" --size "$5" -q --force
+  "$kpsa" render "$rig" --kpsa "$work/$name-paper.kpsa" --tolerance any "$@" -o "$docs/results/$name-paper.png"
+  "$kpsa" render "$rig" --kpsa "$work/$name.kpsa" "$@" -o "$docs/results/$name.png"
 }
 
 # pictures RIG TITLE: their part of the document.
@@ -100,7 +108,7 @@ clips() {
 if [ "$1" = --try ]; then
   characters=hello/hello heavy=hello/hello
   measure hello/hello 10 wave
-  draw hello/hello wave 0:24:24 1mm
+  draw hello/hello wave 0:24:24 1mm 40x50
   "$kpsa" report "$work/hello.json" --without-any > "$work/main.md"
   "$kpsa" report "$work/hello-wave.json" --without-any | sed '/^$/,$d' > "$work/clips.md"
   "$kpsa" report "$work/hello.json" --reference 1x > "$work/heavy.md"
@@ -116,9 +124,10 @@ else
     measure "car/car$stack" 70 emotions race
     measure "animal/animal$stack" 80 emotions sniff
   done
-  draw boy/boy talk 40 1mm
-  draw car/car talk 40 10mm
-  draw animal/animal talk 40 1mm
+  # The tolerance in the middle of the scale
+  draw boy/boy talk 40 0.8mm 480x600
+  draw car/car talk 40 4mm 560x600
+  draw animal/animal talk 40 0.8mm 480x600
   "$kpsa" report "$work/boy.json" "$work/car.json" "$work/animal.json" --without-any > "$work/main.md"
   "$kpsa" report "$work/boy_heavy.json" "$work/car_heavy.json" "$work/animal_heavy.json" \
     --reference 8.7x --reference 15x --reference 20.75x > "$work/heavy.md"
@@ -211,7 +220,13 @@ END
   cat "$work/heavy.md"
   printf '\nOn the other clips:\n\n'
   cat "$work/heavy-clips.md"
-  printf '\n## Pictures\n'
+  cat << END
+
+## Pictures
+
+A frame of the test clip; errors are coloured up to twice the tolerance, where the arrow is. Plots, by \`bench/plot_frames.py\`: on the left all frames reconstructed, hit or not, and what their error
+is made of; on the right what SoftCache shows.
+END
   for rig in $characters; do pictures "$rig" "$(basename "$rig")"; done
   if [ "$heavy" != "$characters" ]; then
     printf '\n### Errors with heavy stacks\n\n'

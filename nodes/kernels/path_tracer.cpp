@@ -101,12 +101,19 @@ double SampleNumber(std::uint32_t seed, std::uint32_t sample, std::uint32_t dime
 
 Result<PathTracer> PathTracer::Build(ConstPointsView points, std::span<const Index> triangles,
                                      std::span<const float> albedo, std::span<const DiffuseLight> lights,
-                                     std::span<const std::uint8_t> unseen) {
+                                     std::span<const std::uint8_t> unseen, std::span<const Index> shares) {
   Result<RayScene> scene = RayScene::Build(points, triangles);
   if (!scene.ok()) return scene.status();
   if (albedo.size() != triangles.size())
     return Status::Invalid("{} albedo numbers for {} triangles", albedo.size(), triangles.size() / 3);
+  if (!shares.empty() && shares.size() != triangles.size())
+    return Status::Invalid("{} corners share normals, there are {}", shares.size(), triangles.size());
+  for (const Index share : shares) {
+    if (share >= triangles.size())
+      return Status::Invalid("a corner has normal {}, expected a number below {}", share, triangles.size());
+  }
   PathTracer tracer(std::move(*scene));
+  tracer.shares_.assign(shares.begin(), shares.end());
   tracer.lights_.resize(lights.size());
   tracer.SetLights(lights);
   tracer.corners_.assign(triangles.begin(), triangles.end());
@@ -148,9 +155,9 @@ Status PathTracer::Update(ConstPointsView points, std::span<const DiffuseLight> 
   return Status();
 }
 
-// Those of corners are of all triangles about the point that are turned away from this one by no more than a
-// crease, by their areas; of all of them where there are so many that comparing each with each would take
-// long.
+// Those of corners are of the triangles that share them, by their areas; where nobody said which, of all about the
+// point that are turned away from this one by no more than a crease, or of all of them where there are so many that
+// comparing each with each would take long.
 void PathTracer::ComputeNormals(ConstPointsView points, const Parallel* parallel) {
   constexpr double kCrease = 0.6427876096865394;  // cosine of 50 degrees
   constexpr std::size_t kMany = 128, kGrain = 1024;
@@ -162,6 +169,12 @@ void PathTracer::ComputeNormals(ConstPointsView points, const Parallel* parallel
       normals_[t] = UnitOrZero(faces_[t]);
     }
   });
+  if (!shares_.empty()) {
+    std::vector<Double3> sums(shares_.size());
+    for (std::size_t c = 0; c < shares_.size(); ++c) sums[shares_[c]] = sums[shares_[c]] + faces_[c / 3];
+    for (std::size_t c = 0; c < shares_.size(); ++c) corner_normals_[c] = UnitOrZero(sums[shares_[c]]);
+    return;
+  }
   ForRanges(parallel, points.count, kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       const std::span<const Index> around(around_.data() + offsets_[p], offsets_[p + 1] - offsets_[p]);

@@ -38,8 +38,8 @@ struct DiffuseLight {
 struct ShadingPlace {
   bool hit = false;
   Double3 position;  // world, metres
-  // Unit, towards the viewer: smooth over edges of less than 50 degrees, and about points of very many
-  // triangles.
+  // Unit, towards the viewer: of what shares it, where that was said; else smooth over edges of less than 50
+  // degrees, and about points of very many triangles.
   Double3 normal;
   Double3 face;   // unit, towards the viewer: of the triangle itself
   Double3 along;  // across which samples turn with the surface (OnPoint), or zero
@@ -59,11 +59,14 @@ struct PathOptions {
 class PathTracer {
  public:
   // points: world positions; triangles: three indices each; albedo: three numbers a triangle. Builds the
-  // search structure, which allocates. unseen: 1 for triangles that See looks through; empty: none.
-  // Errors: those of RayScene::Build; albedo of another length.
+  // search structure, which allocates. unseen: 1 for triangles that See looks through; empty: none. shares: three
+  // numbers a triangle, below the number of indices; corners of one number share a normal. Empty: those of a point
+  // do, over edges of less than 50 degrees.
+  // Errors: those of RayScene::Build; albedo or shares of another length, a number that is too large.
   static Result<PathTracer> Build(ConstPointsView points, std::span<const Index> triangles,
                                   std::span<const float> albedo, std::span<const DiffuseLight> lights,
-                                  std::span<const std::uint8_t> unseen = {});
+                                  std::span<const std::uint8_t> unseen = {},
+                                  std::span<const Index> shares = {});
   // Moves points and lights, as many as there were; see RayScene::Update.
   Status Update(ConstPointsView points, std::span<const DiffuseLight> lights,
                 const Parallel* parallel = nullptr);
@@ -106,6 +109,7 @@ class PathTracer {
   std::vector<Double3> positions_;       // [points]
   std::vector<Double3> faces_;           // [triangles] normals of the length of twice the area
   std::vector<Double3> normals_;         // [triangles] unit; zero where a triangle has no area
+  std::vector<Index> shares_;            // [3 * triangles] numbers of normals, or empty
   std::vector<Double3> corner_normals_;  // [3 * triangles]
   std::vector<Double3> albedo_;          // [triangles]
   std::vector<Lamp> lights_;

@@ -259,7 +259,7 @@ TEST_F(PageReport, RefusesBadInput) {
   refused({"report", rig}, 2, "expected -o FILE.html");
   refused({"report", rig, "-o", *folder_ / "x.md"}, 2, ".html");
   refused({"report", rig, kHelloGlb, "-o", out}, 2, "expected one rig");
-  refused({"report", rig, "-o", out, "--plot", "x.svg"}, 2, "--plot is of no use for a rig");
+  refused({"report", rig, "-o", out, "--csv", "x.csv"}, 2, "--csv is of no use for a rig");
   refused({"report", rig, "-o", out, "--clip", "nod"}, 2, "nod");
   refused({"report", rig, "-o", out, "--kpsa", *folder_ / "none.kpsa"}, 3, "none.kpsa");
   refused({"report", rig, "-o", out, "--tolerance", "far"}, 2, "--tolerance");

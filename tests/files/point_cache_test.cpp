@@ -310,6 +310,35 @@ TEST(MorphGlb, NamesMaterialsAndTextureCoordinates) {
   EXPECT_TRUE(gltf::LoadGltf(path).ok());
 }
 
+// What is flat has no normals, so that readers give it those of its faces; a usda mesh has them for all of its vertices
+// or for none.
+TEST(MorphGlb, FlatPartsHaveNoNormals) {
+  PointCache cache;
+  cache.times = {0, 1};
+  cache.meshes.push_back({"roof", 6, {}, {0, 1, 2, 3, 4, 5}});
+  PointCacheMesh& mesh = cache.meshes[0];
+  mesh.parts = {{0, 3}, {3, 3}};
+  mesh.smooth = {0, 1, 2, kNoIndex, kNoIndex, kNoIndex};
+  for (const float lift : {0.0f, 1.0f})
+    mesh.frames.insert(mesh.frames.end(), {0, lift, 0, 0, 0, 1, 1, 0, 0, 2, lift, 0, 2, 0, 1, 3, 0, 0});
+  const TemporaryFolder folder;
+  const std::string path = folder / "a.glb";
+  ASSERT_TRUE(WriteMorphGlb(path, cache, {}).ok());
+  const json root = GlbJson(path);
+  for (const int part : {0, 1}) {
+    const json& primitive = root["meshes"][0]["primitives"][static_cast<std::size_t>(part)];
+    EXPECT_EQ(primitive["attributes"].contains("NORMAL"), part == 0);
+    EXPECT_EQ(primitive["targets"][0].contains("NORMAL"), part == 0);
+  }
+  EXPECT_TRUE(gltf::LoadGltf(path).ok());
+  std::vector<std::string> warnings;
+  ASSERT_TRUE(WriteUsda(folder / "some.usda", cache, false, &warnings).ok());
+  EXPECT_NE(TemporaryFolder::Read(folder / "some.usda").find("normals.timeSamples"), std::string::npos);
+  mesh.smooth.assign(6, kNoIndex);
+  ASSERT_TRUE(WriteUsda(folder / "none.usda", cache, false, &warnings).ok());
+  EXPECT_EQ(TemporaryFolder::Read(folder / "none.usda").find("normal3f"), std::string::npos);
+}
+
 // Two triangles that share an edge of doubled vertices and fold: normals of every frame are what the shapes
 // come to, the doubled vertices share theirs, and each part has its own vertices.
 TEST(MorphGlb, NormalsOfEveryFrame) {
@@ -317,7 +346,7 @@ TEST(MorphGlb, NormalsOfEveryFrame) {
   cache.materials.resize(2);
   cache.meshes.push_back({"fold", 6, {}, {0, 2, 1, 3, 4, 5}});
   PointCacheMesh& mesh = cache.meshes[0];
-  mesh.smooth = {0, 1, 2, 1, 2, 3};
+  mesh.smooth = {0, 1, 2, 1, 2, 5};
   mesh.parts = {{0, 3, 0}, {3, 3, 1}};
   mesh.colors.assign(18, 0.5f);
   constexpr int kFrames = 24;

@@ -22,6 +22,7 @@ class DracoCharacter {
     position = Add(draco::GeometryAttribute::POSITION, draco::DT_FLOAT32, 3, grid.positions.data(), 12);
     color = Add(draco::GeometryAttribute::COLOR, draco::DT_UINT8, 4, grid.colors.data(), 4);
     uvs = Add(draco::GeometryAttribute::TEX_COORD, draco::DT_FLOAT32, 2, grid.uvs.data(), 8);
+    normals = Add(draco::GeometryAttribute::NORMAL, draco::DT_FLOAT32, 3, grid.normals.data(), 12);
     joints = Add(draco::GeometryAttribute::GENERIC, draco::DT_UINT8, 4, grid.joints.data(), 4);
     weights = Add(draco::GeometryAttribute::GENERIC, draco::DT_FLOAT32, 4, grid.weights.data(), 16);
     for (std::size_t i = 0; i < grid.indices.size(); i += 3) {
@@ -42,20 +43,18 @@ class DracoCharacter {
     data.assign(encoded.data(), encoded.data() + encoded.size());
   }
 
-  // Unique ids: those of POSITION, COLOR_0, TEXCOORD_0, JOINTS_0 and WEIGHTS_0.
+  // Unique ids: those of POSITION, COLOR_0, TEXCOORD_0, NORMAL, JOINTS_0 and WEIGHTS_0.
   json Ids() const {
     const auto id = [&](int attribute) { return mesh_.attribute(attribute)->unique_id(); };
-    return {{"POSITION", id(position)},
-            {"COLOR_0", id(color)},
-            {"TEXCOORD_0", id(uvs)},
-            {"JOINTS_0", id(joints)},
-            {"WEIGHTS_0", id(weights)}};
+    return {{"POSITION", id(position)}, {"COLOR_0", id(color)},   {"TEXCOORD_0", id(uvs)},
+            {"NORMAL", id(normals)},    {"JOINTS_0", id(joints)}, {"WEIGHTS_0", id(weights)}};
   }
   // The document; what Draco holds has no view of its own.
   GltfBuilder Document() {
     GltfBuilder b = grid.builder;
     const int view = b.View(data);
-    for (const int accessor : {grid.position, grid.color, grid.uv, grid.joint, grid.weight, grid.index})
+    for (const int accessor :
+         {grid.position, grid.color, grid.uv, grid.normal, grid.joint, grid.weight, grid.index})
       b.root["accessors"][static_cast<std::size_t>(accessor)].erase("bufferView");
     b.root["meshes"][0]["primitives"][0]["extensions"] = {
         {"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", Ids()}}}};
@@ -65,7 +64,7 @@ class DracoCharacter {
 
   GridCharacter grid;
   std::vector<std::uint8_t> data;
-  int position = 0, color = 0, uvs = 0, joints = 0, weights = 0;
+  int position = 0, color = 0, uvs = 0, normals = 0, joints = 0, weights = 0;
 
  private:
   int Add(draco::GeometryAttribute::Type type, draco::DataType data_type, int components, const void* values,
@@ -133,6 +132,7 @@ TEST(GltfDraco, EdgebreakerInDracosOrder) {
       if (c < 2) {
         EXPECT_EQ(got.uvs.at(2 * i + c), plain.uvs.at(2 * before[i] + c));
       }
+      EXPECT_EQ(got.normals.at(3 * i + c), plain.normals.at(3 * before[i] + c));
       EXPECT_EQ(got.colors[3 * i + c], plain.colors[3 * before[i] + c]);
       EXPECT_EQ(got.targets[0].deltas[3 * i + c], plain.targets.at(0).deltas[3 * before[i] + c]);
     }
@@ -190,7 +190,7 @@ TEST(GltfDraco, WhatDoesNotFit) {
                          .get<std::size_t>()];
   };
   const auto count_all = [&](GltfBuilder& b, std::uint64_t vertices, std::uint64_t indices) {
-    for (const int i : {grid.position, grid.color, grid.uv, grid.joint, grid.weight})
+    for (const int i : {grid.position, grid.color, grid.uv, grid.normal, grid.joint, grid.weight})
       accessor(b, i)["count"] = vertices;
     accessor(b, grid.index)["count"] = indices;
   };

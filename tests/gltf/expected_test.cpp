@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "gltf/import.h"
 #include "files/npz.h"
+#include "gltf/import.h"
 #include "tests/support/expected_files.h"
 #include "tests/support/gltf_reference.h"
 

@@ -99,6 +99,7 @@ Compressed CompressAll(const GridCharacter& grid, bool triangles) {
                                                                                  {grid.weight, 16},
                                                                                  {grid.color, 4},
                                                                                  {grid.uv, 8},
+                                                                                 {grid.normal, 12},
                                                                                  {grid.delta, 12},
                                                                                  {grid.matrix, 64},
                                                                                  {grid.time, 4},

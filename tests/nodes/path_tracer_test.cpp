@@ -285,6 +285,32 @@ TEST(PathTracer, ManyTrianglesAboutAPointShareItsNormal) {
   EXPECT_LT(flat.y, 0.9);
 }
 
+// Two quads that meet at right angles, with corners of their own: hard, unless they share a normal.
+TEST(PathTracer, NormalsAreSharedAsItIsSaid) {
+  Triangles fold;
+  fold.AddQuad({-1, 0, 0}, {0, 0, 1}, {1, 0, 0}, 0.5f);  // a floor, from x = -1 to 0
+  fold.AddQuad({0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 0.5f);   // a wall, at x = 0
+  const auto points = PointBuffer::FromInterleaved(fold.xyz);
+  const auto normal = [&](const std::vector<Index>& shares) {
+    const Result<PathTracer> tracer =
+        PathTracer::Build(points.view(), fold.corners, fold.albedo, {}, {}, shares);
+    EXPECT_TRUE(tracer.ok()) << tracer.status().ToString();
+    return tracer->Look({-1e-4, 0.5, 0.5}, {0, -1, 0}).normal;  // on the floor, at the edge
+  };
+  std::vector<Index> own(12), shared(12);
+  for (Index c = 0; c < 12; ++c) {
+    own[c] = c;
+    shared[c] = fold.xyz[3 * c] == 0 && fold.xyz[3 * c + 1] == 0 ? 0 : 1 + c / 6;  // one along the edge
+  }
+  EXPECT_NEAR(normal({}).y, 1, 1e-9);
+  EXPECT_NEAR(normal(own).y, 1, 1e-9);
+  EXPECT_NEAR(normal(shared).y, std::sqrt(0.5), 1e-3);
+  own[3] = 12;
+  EXPECT_FALSE(PathTracer::Build(points.view(), fold.corners, fold.albedo, {}, {}, own).ok());
+  EXPECT_FALSE(
+      PathTracer::Build(points.view(), fold.corners, fold.albedo, {}, {}, std::vector<Index>(3)).ok());
+}
+
 TEST(PathTracer, RefusesWhatIsNoScene) {
   Triangles t = Floor();
   t.albedo.pop_back();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 
 namespace kpsa::engine {
 namespace {
@@ -42,6 +43,29 @@ TEST(Captions, TheLongestThatFits) {
   EXPECT_EQ(draw(24, all), draw(24, all.subspan(2, 1)));
   EXPECT_EQ(draw(10, all), Image(10, 30, {255, 255, 255}).rgb);
   EXPECT_EQ(draw(10, {}), Image(10, 30, {255, 255, 255}).rgb);
+}
+
+TEST(Captions, TitlesShrinkUntilTheyFit) {
+  const auto margins = [](const std::string& title) {
+    const Rgb white = {255, 255, 255};
+    Image image(300, 400, white);
+    DrawTitle(image, title);
+    int left = 300, right = 0, bottom = 0;
+    for (int y = 0; y < 400; ++y) {
+      for (int x = 0; x < 300; ++x) {
+        if (image.At(x, y) == white) continue;
+        left = std::min(left, x), right = std::max(right, x), bottom = std::max(bottom, y);
+      }
+    }
+    return std::array{left, 299 - right, bottom};
+  };
+  const auto [left, right, bottom] = margins("full");
+  const auto small = margins("170 key points and 1,234 scalars");
+  EXPECT_GT(bottom, 20);
+  EXPECT_LT(small[2], bottom);
+  EXPECT_GT(small[0], 0);
+  EXPECT_GT(small[1], 0);
+  EXPECT_NEAR(left, right, 6);
 }
 
 TEST(Legends, MarkTheTolerance) {

@@ -19,7 +19,7 @@ TEST(BenchTables, NestedBenchesAreRefusedBeforeTheyAreCompared) {
   const Result<std::string> tables = BenchTables({{path, ""}});
   ASSERT_FALSE(tables.ok());
   EXPECT_NE(tables.status().ToString().find("nested more than"), std::string::npos);
-  EXPECT_FALSE(BenchPlots(path).ok());
+  EXPECT_FALSE(BenchFrames({path}).ok());
 }
 
 }  // namespace

@@ -16,14 +16,14 @@
 namespace kpsa::engine {
 
 struct GridCharacter {
-  std::vector<float> positions, weights, uvs, deltas, times, turns;
+  std::vector<float> positions, normals, weights, uvs, deltas, times, turns;
   std::vector<std::uint8_t> joints, colors;  // VEC4; colours normalised
   std::vector<std::uint16_t> indices;
   std::size_t vertex_count = 0;
   GltfBuilder builder;
   // Accessors of `builder`
-  int position = 0, joint = 0, weight = 0, color = 0, uv = 0, index = 0, delta = 0, matrix = 0, time = 0,
-      turn = 0;
+  int position = 0, joint = 0, weight = 0, color = 0, uv = 0, normal = 0, index = 0, delta = 0, matrix = 0,
+      time = 0, turn = 0;
 
   explicit GridCharacter(std::size_t n) : vertex_count(n * n) {
     std::mt19937 random(7);
@@ -38,6 +38,7 @@ struct GridCharacter {
       joints.insert(joints.end(),
                     {static_cast<std::uint8_t>(i % 2), static_cast<std::uint8_t>(1 - i % 2), 0, 0});
       uvs.insert(uvs.end(), {positions[3 * i] / 7, positions[3 * i + 1] / 7});
+      normals.insert(normals.end(), {positions[3 * i] / 9, positions[3 * i + 1] / 9, 1});
       for (int c = 0; c < 4; ++c) colors.push_back(static_cast<std::uint8_t>(random() % 256));
       if (i % n + 1 == n || i / n + 1 == n) continue;
       const auto corner = [&](std::size_t k) { indices.push_back(static_cast<std::uint16_t>(i + k)); };
@@ -54,6 +55,7 @@ struct GridCharacter {
     weight = b.Accessor(weights, "VEC4");
     color = b.Accessor(colors, "VEC4", true);
     uv = b.Accessor(uvs, "VEC2");
+    normal = b.Accessor(normals, "VEC3");
     index = b.Accessor(indices, "SCALAR");
     delta = b.Accessor(deltas, "VEC3");
     std::vector<float> matrices(32, 0.f);
@@ -68,7 +70,8 @@ struct GridCharacter {
                            {"JOINTS_0", joint},
                            {"WEIGHTS_0", weight},
                            {"COLOR_0", color},
-                           {"TEXCOORD_0", uv}}},
+                           {"TEXCOORD_0", uv},
+                           {"NORMAL", normal}}},
                          {"indices", index},
                          {"targets", {{{"POSITION", delta}}}}}}}});
     b.Push("skins", {{"joints", {1, 2}}, {"inverseBindMatrices", matrix}});
@@ -111,6 +114,7 @@ inline void ExpectSame(const gltf::Character& got, const gltf::Character& expect
     EXPECT_EQ(a.positions, b.positions);
     EXPECT_EQ(a.colors, b.colors);
     EXPECT_EQ(a.uvs, b.uvs);
+    EXPECT_EQ(a.normals, b.normals);
     EXPECT_EQ(a.influence_offsets, b.influence_offsets);
     ASSERT_EQ(a.influences.size(), b.influences.size());
     for (std::size_t i = 0; i < a.influences.size(); ++i) {
