@@ -28,6 +28,7 @@
 #include "rig/build/steps/place_stages_at_handles.h"
 #include "rig/build/steps/read_attributes.h"
 #include "rig/build/steps/read_overrides.h"
+#include "rig/build/steps/read_targets.h"
 #include "rig/build/steps/resolve_scopes.h"
 #include "rig/build/steps/set_blend_weights.h"
 #include "rig/build/steps/set_influences.h"
@@ -54,6 +55,8 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   // Nodes and their values
   MadeNodes nodes;
   AddNodes(in, &nodes, &rig->node_places, graph);
+  TargetShapes shapes(in, rig);
+  ReadTargets(in, nodes, &shapes, graph);
   PlugReader reader(in, &file->returned, graph);
   ReadAttributes(in, &nodes, &reader, graph);
   ReadOverrides(in, &reader, graph);
@@ -82,7 +85,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   // What needs the stages
   ConnectLights(in, nodes, graph);
   ConnectDrivers(in, nodes, rest, graph);
-  SetTargets(in, nodes, graph);
+  SetTargets(in, nodes, shapes, graph, &rig->notes);
   SetBlendWeights(in, own, &maps, graph);
 
   // What drives what
