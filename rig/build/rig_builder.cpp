@@ -22,6 +22,7 @@
 #include "rig/build/steps/finish_stacks.h"
 #include "rig/build/steps/make_connections.h"
 #include "rig/build/steps/measure_rest.h"
+#include "rig/build/steps/note_double_moves.h"
 #include "rig/build/steps/place_falloffs.h"
 #include "rig/build/steps/place_handles.h"
 #include "rig/build/steps/place_stages.h"
@@ -74,7 +75,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   PlugKeys stacked;
   const RestFalloffs falloffs(in, &places, rest, &maps);
   WeightSetter weights(in, falloffs, &maps, graph, &rig->notes);
-  BuildMeshStacks(in, &nodes, scene, graph, &rig->notes);
+  BuildMeshStacks(in, *rest, &nodes, scene, graph, &rig->notes);
   SetWeights(&weights, &nodes);
   PlaceStages(in, rest, &nodes, graph);
   BuildPointStacks(in, curves, rest, &nodes, &stacked, graph);
@@ -100,6 +101,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   ConnectPivots(in, *rest, nodes, graph);
   FinishOverrides(in, reader.overridden(), stacked, &rig->pinned, graph);
   CheckVariants(in, nodes);
+  NoteDoubleMoves(in, nodes, &rig->notes);
 
   // What the rig is for
   AddControls(in, &rig->controls);
