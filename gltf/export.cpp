@@ -10,6 +10,7 @@
 #include "gltf/frame_shapes.h"
 #include "gltf/glb_file.h"
 #include "gltf/skin_export.h"
+#include "gltf/skin_residual.h"
 
 namespace kpsa::engine {
 namespace {

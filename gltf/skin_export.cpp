@@ -4,7 +4,6 @@
 #include <cmath>
 #include <span>
 
-#include "base/matrix.h"
 #include "files/cache_normals.h"
 
 namespace kpsa::engine {
@@ -12,11 +11,6 @@ namespace {
 
 constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 constexpr float kSameNormal = 1e-6f;
-
-Matrix4 AsFloats(Matrix4 m) {
-  for (double& number : m.m) number = static_cast<double>(static_cast<float>(number));
-  return m;
-}
 
 // The entries of the part's vertices, counted within it.
 CacheTarget PartOf(const CacheTarget& target, const CachePart& part) {
@@ -90,50 +84,6 @@ GlbPrimitive PrimitiveOfPart(const PointCacheMesh& mesh, const CachePart& part,
     primitive.attributes.emplace_back("COLOR_0", glb->AddVectors(PartRows(mesh.colors, part, 3)));
   primitive.material = part.material;
   return primitive;
-}
-
-SkinResidual ResidualOf(const PointCacheMesh& mesh, const CacheSkin& skin,
-                        const std::vector<NodeTrack>& tracks) {
-  SkinResidual residual;
-  const std::size_t frames = mesh.frames.size() / (3 * std::max<std::size_t>(mesh.vertex_count, 1));
-  std::vector<double> points(skin.rest.size());
-  for (std::size_t t = 0; t < frames; ++t) {
-    const std::vector<Matrix4> worlds = WorldsOf(tracks, t);
-    std::copy(skin.rest.begin(), skin.rest.end(), points.begin());
-    for (std::size_t k = 0; k < skin.targets.size(); ++k) {
-      const CacheTarget& target = skin.targets[k];
-      const auto weight = static_cast<double>(static_cast<float>(skin.weights[t * skin.targets.size() + k]));
-      for (std::size_t i = 0; i < target.deltas.size() && weight != 0; ++i)
-        points[3 * std::size_t{target.vertices[i / 3]} + i % 3] += weight * target.deltas[i];
-    }
-    std::vector<Matrix4> palette;
-    for (std::size_t j = 0; j < skin.joints.size(); ++j)
-      palette.push_back(worlds[skin.joints[j]] * AsFloats(skin.inverse_binds[j]));
-    for (std::size_t v = 0; v < mesh.vertex_count; ++v) {
-      const Double3 point{points[3 * v], points[3 * v + 1], points[3 * v + 2]};
-      Double3 moved;
-      if (skin.node != kNoIndex) {
-        moved = TransformPoint(worlds[skin.node], point);
-      } else {
-        for (Index i = skin.offsets[v]; i < skin.offsets[v + 1]; ++i)
-          moved = moved + TransformPoint(palette[skin.influences[i]], point) * skin.shares[i];
-      }
-      const float* frame = &mesh.frames[3 * (t * mesh.vertex_count + v)];
-      const double off = Length(moved - Double3{frame[0], frame[1], frame[2]});
-      residual.max = off <= residual.max ? residual.max : off;  // also where it is not a number
-      residual.square_sum += off * off;
-    }
-  }
-  return residual;
-}
-
-const CacheNode* ShearedNode(const SkinnedScene& scene, const CacheSkin& skin,
-                             const std::vector<NodeTrack>& tracks) {
-  if (skin.node != kNoIndex && tracks[skin.node].sheared) return &scene.nodes[skin.node];
-  for (const Index joint : skin.joints) {
-    if (tracks[joint].sheared) return &scene.nodes[joint];
-  }
-  return nullptr;
 }
 
 void SkinExport::AddNodes(const std::vector<const CacheSkin*>& skins) {

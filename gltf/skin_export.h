@@ -12,17 +12,6 @@
 
 namespace kpsa::engine {
 
-// Of the float32 numbers that are written against the frames: the largest distance of a vertex, the sum of squares.
-struct SkinResidual {
-  double max = 0, square_sum = 0;
-};
-SkinResidual ResidualOf(const PointCacheMesh& mesh, const CacheSkin& skin,
-                        const std::vector<NodeTrack>& tracks);
-
-// The node that moves the mesh and has no track; null where all have one.
-const CacheNode* ShearedNode(const SkinnedScene& scene, const CacheSkin& skin,
-                             const std::vector<NodeTrack>& tracks);
-
 // The part's rows of what has `width` numbers a vertex.
 std::span<const float> PartRows(const std::vector<float>& values, const CachePart& part, std::size_t width);
 // What all primitives have: positions, normals where there are triangles, and how the part looks.

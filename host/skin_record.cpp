@@ -24,14 +24,16 @@ SkinRecord::SkinRecord(const Rig& rig, const std::vector<std::size_t>& meshes, s
     : rig_(rig), nodes_(rig.character->nodes.size(), kNoIndex) {
   for (const std::size_t m : meshes) {
     CacheSkin skin;
-    std::vector<Weight> weights;
+    std::vector<StageWeights> weights;
     const Status status = Describe(rig.scene.meshes[m], &skin, &weights);
     scene_.reasons.push_back(status.ok() ? "" : status.errors().front().message);
     scene_.meshes.push_back(status.ok() ? std::optional(std::move(skin)) : std::nullopt);
+    if (!status.ok()) weights.clear();
     weights_.push_back(std::move(weights));
   }
   std::uint64_t numbers = 16 * scene_.nodes.size();
-  for (const std::vector<Weight>& weights : weights_) numbers += weights.size();
+  for (const std::optional<CacheSkin>& skin : scene_.meshes)
+    numbers += skin.has_value() ? skin->targets.size() : 0;
   if (numbers * sizeof(double) * frames <= kMaxBytes) return;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     if (scene_.reasons[m].empty()) scene_.reasons[m] = "has too many joints for so many frames";
@@ -42,7 +44,7 @@ SkinRecord::SkinRecord(const Rig& rig, const std::vector<std::size_t>& meshes, s
   worlds_.clear();
 }
 
-Status SkinRecord::Describe(const CharacterMesh& mesh, CacheSkin* skin, std::vector<Weight>* weights) {
+Status SkinRecord::Describe(const CharacterMesh& mesh, CacheSkin* skin, std::vector<StageWeights>* weights) {
   if (mesh.stages.empty() || !(mesh.stages.back().points == mesh.points))
     return Status::Invalid("is accelerated");
   const Stage& last = mesh.stages.back();
@@ -59,7 +61,7 @@ Status SkinRecord::Describe(const CharacterMesh& mesh, CacheSkin* skin, std::vec
   for (const Index p : data.vertex_to_point)
     skin->rest.insert(skin->rest.end(), {rest.x[p], rest.y[p], rest.z[p]});
   for (const Stage& stage : mesh.stages) {
-    if (&stage != &last) AddTargets(mesh, stage, skin, weights);
+    if (&stage != &last) KPSA_RETURN_IF_ERROR(AddTargets(mesh, stage, skin, weights));
   }
   if (last.node == mesh.skin_cluster) {
     AddJoints(mesh, skin);
@@ -70,11 +72,21 @@ Status SkinRecord::Describe(const CharacterMesh& mesh, CacheSkin* skin, std::vec
 }
 
 // With the share of the stage's weight map; points of no share do not move.
-void SkinRecord::AddTargets(const CharacterMesh& mesh, const Stage& stage, CacheSkin* skin,
-                            std::vector<Weight>* weights) const {
+Status SkinRecord::AddTargets(const CharacterMesh& mesh, const Stage& stage, CacheSkin* skin,
+                              std::vector<StageWeights>* weights) const {
   const auto* targets = AssetOf<MorphTargets>(rig_, stage, "targets");
   const auto* map = AssetOf<WeightMap>(rig_, stage, "weights");
-  if (targets == nullptr) return;
+  if (targets == nullptr) return Status();
+  const auto list = [&]<typename T>(const char* attribute, const T& none) {
+    const Value* value = rig_.graph->FindValue(PlugOf(rig_, stage.node, attribute));
+    return value == nullptr ? none : value->get<T>();
+  };
+  const std::vector<std::int64_t> no_numbers;
+  Result<ShapePaths> paths =
+      ShapePaths::Make(list("inbetweenTarget", no_numbers), list("inbetweenShape", no_numbers),
+                       list("inbetweenWeight", std::vector<double>()), targets->targets().size());
+  if (!paths.ok()) return Status::Invalid("has in-betweens that are none");
+  StageWeights of_stage{{}, PlugOf(rig_, stage.node, "envelope"), std::move(*paths)};
   std::vector<std::size_t> entry_of(targets->point_count());
   for (std::size_t k = 0; k < targets->targets().size(); ++k) {
     const MorphTargets::Target& from = targets->targets()[k];
@@ -90,9 +102,10 @@ void SkinRecord::AddTargets(const CharacterMesh& mesh, const Stage& stage, Cache
       for (std::size_t c = 0; c < 3; ++c) to.deltas.push_back(share * from.deltas[3 * entry_of[p] + c]);
     }
     skin->targets.push_back(std::move(to));
-    weights->push_back(
-        {PlugOf(rig_, stage.node, "weight", static_cast<int>(k)), PlugOf(rig_, stage.node, "envelope")});
+    of_stage.weights.push_back(PlugOf(rig_, stage.node, "weight", static_cast<int>(k)));
   }
+  weights->push_back(std::move(of_stage));
+  return Status();
 }
 
 void SkinRecord::AddJoints(const CharacterMesh& mesh, CacheSkin* skin) {
@@ -130,10 +143,10 @@ Index SkinRecord::NodeOf(Index gltf_node) {
 void SkinRecord::Ask(Request* request) {
   first_ = static_cast<Index>(request->outputs.size());
   for (const PlugRef& world : worlds_) request->outputs.push_back({world, {}});
-  for (const std::vector<Weight>& weights : weights_) {
-    for (const Weight& weight : weights) {
-      request->outputs.push_back({weight.plug, {}});
-      request->outputs.push_back({weight.envelope, {}});
+  for (const std::vector<StageWeights>& of_mesh : weights_) {
+    for (const StageWeights& stage : of_mesh) {
+      request->outputs.push_back({stage.envelope, {}});
+      for (const PlugRef& weight : stage.weights) request->outputs.push_back({weight, {}});
     }
   }
 }
@@ -141,9 +154,16 @@ void SkinRecord::Ask(Request* request) {
 void SkinRecord::Add(const Evaluator& evaluator) {
   Index at = first_;
   for (CacheNode& node : scene_.nodes) node.worlds.push_back(evaluator.Get<Matrix4>(at++));
+  std::vector<double> given, weights;
   for (std::size_t m = 0; m < weights_.size(); ++m) {
-    for (std::size_t k = 0; k < weights_[m].size(); ++k, at += 2)
-      scene_.meshes[m]->weights.push_back(evaluator.Get<double>(at) * evaluator.Get<double>(at + 1));
+    for (const StageWeights& stage : weights_[m]) {
+      const double envelope = evaluator.Get<double>(at++);
+      given.clear();
+      for (std::size_t k = 0; k < stage.weights.size(); ++k) given.push_back(evaluator.Get<double>(at++));
+      weights = given;
+      stage.paths.Apply([&](std::size_t target) { return given[target]; }, weights);
+      for (const double weight : weights) scene_.meshes[m]->weights.push_back(weight * envelope);
+    }
   }
 }
 

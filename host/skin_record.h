@@ -9,6 +9,7 @@
 
 #include "gltf/skinned_scene.h"
 #include "graph/evaluator.h"
+#include "nodes/kernels/shape_paths.h"
 #include "rig/build/rig_builder.h"
 
 namespace kpsa::engine {
@@ -30,21 +31,24 @@ class SkinRecord {
   const SkinnedScene& scene() const { return scene_; }
 
  private:
-  struct Weight {
-    PlugRef plug, envelope;
+  // Of one blend shape, whose targets follow each other.
+  struct StageWeights {
+    std::vector<PlugRef> weights;
+    PlugRef envelope;
+    ShapePaths paths;
   };
   Index NodeOf(Index gltf_node);
-  Status Describe(const CharacterMesh& mesh, CacheSkin* skin, std::vector<Weight>* weights);
-  void AddTargets(const CharacterMesh& mesh, const Stage& stage, CacheSkin* skin,
-                  std::vector<Weight>* weights) const;
+  Status Describe(const CharacterMesh& mesh, CacheSkin* skin, std::vector<StageWeights>* weights);
+  Status AddTargets(const CharacterMesh& mesh, const Stage& stage, CacheSkin* skin,
+                    std::vector<StageWeights>* weights) const;
   void AddJoints(const CharacterMesh& mesh, CacheSkin* skin);
 
   const Rig& rig_;
   SkinnedScene scene_;
-  std::vector<PlugRef> worlds_;               // by node
-  std::vector<Index> nodes_;                  // by glTF node; kNoIndex: not recorded
-  std::vector<std::vector<Weight>> weights_;  // by mesh and target
-  Index first_ = 0;                           // of the request's outputs
+  std::vector<PlugRef> worlds_;                     // by node
+  std::vector<Index> nodes_;                        // by glTF node; kNoIndex: not recorded
+  std::vector<std::vector<StageWeights>> weights_;  // by mesh and blend shape
+  Index first_ = 0;                                 // of the request's outputs
 };
 
 }  // namespace kpsa::engine

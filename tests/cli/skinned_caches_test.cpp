@@ -279,6 +279,16 @@ overrides: {"fix.weight[many]": 0.75}
   EXPECT_TRUE(Says(err, "weights of morph targets go from -")) << err;
 }
 
+// glTF has no in-betweens: the weights of the shapes are what comes of them.
+TEST_F(SkinnedCaches, InBetweensAreWeightsOfTheirShapes) {
+  const std::string rig = Rig(R"(nodes:
+  fix: {type: blendShape, targets: [few, many], inbetweens: {many: {0.25: few}}, 'weight[many]': 0.6, envelope: 0.7}
+overrides: {limb_blendShape.inbetweens: {many: {0.5: few}}}
+deform: [{meshes: [limb], stack: [morph, fix, skin]}]
+)");
+  ExpectSame({rig});
+}
+
 TEST_F(SkinnedCaches, ReferencesComeAlong) {
   Rig("");
   folder.Write("two.yaml",
@@ -336,7 +346,6 @@ TEST_F(SkinnedCaches, WhatJointsDoNotDoAloneIsMorphTargets) {
          "has \"restSkin\" (skinCluster) in its stack");
   expect("overrides: {limb_skinCluster.skinningMethod: dualQuaternion}\n", "is ");
   expect("overrides: {limb_skinCluster.envelope: 0.5}\n", "is ");
-  expect("overrides: {limb_blendShape.inbetweens: {many: {0.5: few}}}\n", "is ");
 }
 
 TEST_F(SkinnedCaches, FlagsThatDoNotFitAreRefused) {
