@@ -48,7 +48,8 @@ void NoteDoubleMoves(const BuildInput& in, const MadeNodes& nodes, std::vector<s
         notes->push_back(fmt::format(
             "{}: the joints of \"{}\" move it twice: by its {}, and by \"{}\" ({}), whose driver they "
             "move, too. Write restSkin instead, or put \"{}\" before the skin and let it follow a stage "
-            "of its driver before that one's skin (driver: \"MESH@STAGE\")",
+            "of its driver before that one's skin (driver: \"MESH@STAGE\"), or name what carries both as its "
+            "parent",
             skin->where.ToString(), mesh.name, skin->text, made->from->name, made->from->where.ToString(),
             made->from->name));
       }
