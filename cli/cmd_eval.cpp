@@ -15,6 +15,7 @@
 #include "cli/vertex_output.h"
 #include "host/finite_points.h"
 #include "host/rig_frames.h"
+#include "host/skin_record.h"
 #include "host/verdicts.h"
 #include "report/verdict_text.h"
 
@@ -23,8 +24,22 @@ namespace {
 
 struct EvalFlags : Flags {
   AccelerationFlags acceleration;
-  bool blender = false;
+  bool blender = false, skinned = false, no_skinned = false;
 };
+
+// Of a .glb: what joints and morph targets alone do. None for other files, and where nobody wants it.
+Status MakeSkinRecord(const EvalFlags& flags, const Rig& rig, const std::vector<std::size_t>& shown,
+                      std::size_t frames, std::optional<SkinRecord>* skins) {
+  if (flags.no_skinned || FileSuffix(*flags.output) != ".glb") return Status();
+  skins->emplace(rig, shown, frames);
+  for (std::size_t m = 0; m < shown.size() && flags.skinned; ++m) {
+    const std::string& reason = (*skins)->reasons()[m];
+    if (!reason.empty())
+      return Status::Usage("--skinned: mesh \"{}\" {}; without it, such meshes are written as morph targets",
+                           rig.scene.meshes[shown[m]].name, reason);
+  }
+  return Status();
+}
 
 CommandResult Eval(const EvalFlags& flags) {
   // Whatever can be refused without the rig
@@ -39,6 +54,12 @@ CommandResult Eval(const EvalFlags& flags) {
   if (*flags.output == "-" && flags.json) return Status::Usage("-o - and --json: stdout takes one of them");
   if (flags.blender && FileSuffix(*flags.output) != ".pc2" && FileSuffix(*flags.output) != ".mdd") {
     return Status::Usage("--blender is for .pc2 and .mdd files, found {}", *flags.output);
+  }
+  if (flags.skinned && flags.no_skinned)
+    return Status::Usage("--skinned and --no-skinned: expected one of them");
+  if ((flags.skinned || flags.no_skinned) && FileSuffix(*flags.output) != ".glb") {
+    return Status::Usage("{} is for .glb files, found {}", flags.skinned ? "--skinned" : "--no-skinned",
+                         *flags.output);
   }
 
   const ThreadLimit limit(*threads);
@@ -60,12 +81,16 @@ CommandResult Eval(const EvalFlags& flags) {
   Request request = ShownPoints(rig);
   Verdicts verdicts(applied);
   verdicts.Ask(rig, &request);
+  std::optional<SkinRecord> skins;
+  KPSA_RETURN_IF_ERROR(MakeSkinRecord(flags, rig, shown, times->size(), &skins));
+  if (skins.has_value()) skins->Ask(&request);
   const auto plan = CompileFor(rig, &compiler, request);
   if (!plan.ok()) return plan.status();
 
   const InterruptScope interruptible;
   Result<std::unique_ptr<VertexOutput>> output =
-      CreateVertexOutput(*flags.output, rig, *times, {flags.force, flags.blender});
+      CreateVertexOutput(*flags.output, rig, *times,
+                         {flags.force, flags.blender, skins.has_value() ? &*skins : nullptr, flags.skinned});
   if (!output.ok()) return output.status();
   std::vector<ConstPointsView> meshes(shown.size());
   RigFrameOptions options;
@@ -75,6 +100,7 @@ CommandResult Eval(const EvalFlags& flags) {
   KPSA_RETURN_IF_ERROR(
       EvaluateTimes(rig, *plan, *times, options, [&](std::size_t frame, const Evaluator& evaluator) {
         if (!applied.empty()) verdicts.Add(FrameNumber((*times)[frame], rig.fps), evaluator);
+        if (skins.has_value()) skins->Add(evaluator);
         for (Index m = 0; m < meshes.size(); ++m) {
           meshes[m] = evaluator.Points(m);
           KPSA_RETURN_IF_ERROR(CheckFinite(rig, rig.scene.meshes[shown[m]], meshes[m], (*times)[frame]));
@@ -142,6 +168,7 @@ void AddEvalCommand(CLI::App* program, Command* chosen) {
                  "  kpsa eval head.glb --clip face_talk -o talk.npz\n"
                  "  kpsa eval head.yaml --frames 0:48:2 --set jaw.rotateX=-20 -o open.pc2 --blender\n"
                  "  kpsa eval head.yaml --accelerate -o fast.npz\n"
+                 "  kpsa eval body.yaml --clip walk -o walk.glb --skinned\n"
                  "  kpsa eval head.glb --times 0.5,1.25 -o - | python3 read.py",
                  chosen, [flags] { return Eval(*flags); });
   AddRigFlags(command, flags.get());
@@ -150,6 +177,10 @@ void AddEvalCommand(CLI::App* program, Command* chosen) {
                  "the vertex cache: .npz .pc2 .mdd .glb .usda, or - for .npz to stdout");
   AddSwitch(command, "--blender", &flags->blender,
             ".pc2 and .mdd for Blender's Mesh Cache: its axes and vertex order");
+  AddSwitch(command, "--skinned", &flags->skinned,
+            ".glb: refuse a mesh that joints and the rig's own morph targets do not move alone");
+  AddSwitch(command, "--no-skinned", &flags->no_skinned,
+            ".glb: write all meshes as morph targets, none with joints");
   AddAccelerationFlags(command, &flags->acceleration);
   AddThreadsFlag(command, flags.get());
   AddQuietFlag(command, flags.get());

@@ -72,7 +72,7 @@ void AddInspectCommand(CLI::App* program, Command* chosen) {
                                  "  kpsa inspect head.kpsa --json",
                                  chosen, [flags] { return Inspect(*flags); });
   AddRequired(command, "FILE", &flags->file,
-              ".glb .gltf .vrm .yaml .npz .pc2 .mdd .kpsa, or .json (weight maps)");
+              ".glb .gltf .vrm .yaml .npz .obj .pc2 .mdd .kpsa, or .json (weight maps)");
   AddOption(command, "--fps", "N", &flags->fps,
             "frames a second of .pc2 files and of a character's clips; 24 if not given");
   AddOption(command, "--nearest", "X,Y,Z", &flags->nearest,

@@ -16,6 +16,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::uint64_t kMaxCacheBytes = std::uint64_t{4} << 30;
+constexpr std::size_t kMostReasons = 4;  // why meshes have no joints, in notes
 
 class NpzOutput final : public VertexOutput {
  public:
@@ -119,15 +120,7 @@ class CacheOutput final : public VertexOutput {
     if (suffix_ == ".usda") {
       KPSA_RETURN_IF_ERROR(WriteUsda(path_, cache_, options_.force, &notes));
     } else if (suffix_ == ".glb") {
-      MorphGlbOptions options;
-      options.force = options_.force;
-      const Result<MorphGlbReport> report = WriteMorphGlb(path_, cache_, options);
-      if (!report.ok()) return report.status();
-      int most = 0;
-      for (int targets : report->targets) most = std::max(most, targets);
-      notes.push_back(fmt::format(
-          "at most {} morph targets a mesh; against the frames: max {}, RMS {} (diagonal {})", most,
-          LengthText(report->max_residual), LengthText(report->rms_residual), LengthText(report->diagonal)));
+      KPSA_RETURN_IF_ERROR(FinishGlb(&notes));
     } else {
       for (std::size_t m = 0; m < cache_.meshes.size(); ++m) {
         CacheOptions options;
@@ -143,6 +136,40 @@ class CacheOutput final : public VertexOutput {
       }
     }
     return notes;
+  }
+
+  Status FinishGlb(std::vector<std::string>* notes) const {
+    GlbOptions options;
+    options.force = options_.force;
+    options.only_scene = options_.skinned;
+    if (options_.skins != nullptr) options.scene = &options_.skins->scene();
+    const Result<GlbReport> report = WriteGlb(path_, cache_, options);
+    if (!report.ok()) return report.status();
+    std::size_t morphed = 0;
+    for (std::size_t m = 0; m < report->reasons.size(); ++m) {
+      if (report->reasons[m].empty() || ++morphed > kMostReasons) continue;
+      notes->push_back(
+          fmt::format("mesh \"{}\" goes without joints: it {}", cache_.meshes[m].name, report->reasons[m]));
+    }
+    if (morphed > kMostReasons) notes->push_back(fmt::format("so do {} more", morphed - kMostReasons));
+    const auto skinned = static_cast<std::size_t>(report->skinned);
+    std::vector<std::string> parts;
+    if (skinned > 0)
+      parts.push_back(fmt::format("{} by joints and the rig's own morph targets", Plural(skinned, "mesh")));
+    if (skinned < cache_.meshes.size())
+      parts.push_back(fmt::format("at most {} morph targets a mesh{}", report->morphed_targets,
+                                  skinned > 0 ? " of the others" : ""));
+    notes->push_back(fmt::format("{}; against the frames: max {}, RMS {} (diagonal {})",
+                                 fmt::join(parts, ", "), LengthText(report->max_residual),
+                                 LengthText(report->rms_residual), LengthText(report->diagonal)));
+    if (report->most_joints > 4)
+      notes->push_back(fmt::format(
+          "up to {} joints move a vertex: programs that read four show something else", report->most_joints));
+    if (report->least_weight < 0 || report->most_weight > 1)
+      notes->push_back(fmt::format(
+          "weights of morph targets go from {:.3g} to {:.3g}: some programs keep them within 0 to 1",
+          report->least_weight, report->most_weight));
+    return Status();
   }
 
   std::vector<std::string> paths() const override {

@@ -10,6 +10,7 @@
 
 #include "base/points.h"
 #include "base/status.h"
+#include "host/skin_record.h"
 #include "rig/build/rig_builder.h"
 
 namespace kpsa::engine {
@@ -17,6 +18,9 @@ namespace kpsa::engine {
 struct VertexOutputOptions {
   bool force = false;
   bool blender = false;  // .pc2 and .mdd in Blender's axes and vertex order
+  // Of a .glb: what its joints and morph targets alone do, which has all frames by Finish; null: nothing is known.
+  const SkinRecord* skins = nullptr;
+  bool skinned = false;  // a mesh that they do not move alone is an error
 };
 
 class VertexOutput {

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <map>
 #include <optional>
@@ -384,6 +385,9 @@ const NpzArray* Npz::Find(std::string_view name) const {
 }
 
 Result<Npz> ReadNpz(const std::string& path, std::uint64_t max_bytes) {
+  std::error_code unknown;
+  if (std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown))
+    return Status::Invalid("is a folder, a pipe or a device, expected a file").At({path});
   int code = 0;
   std::unique_ptr<zip_t, void (*)(zip_t*)> archive(zip_open(path.c_str(), ZIP_RDONLY, &code), &zip_discard);
   if (archive == nullptr) {

@@ -35,7 +35,10 @@ Result<AccelerateEntry> EntryOf(const Rig& rig, const Subspace& subspace, const 
     AcceleratedPoints points;
     points.mesh = static_cast<std::size_t>(found->mesh - rig.scene.meshes.data());
     points.points = found->points;
-    while (!(found->mesh->stages[points.stage].points == found->points)) ++points.stage;
+    const std::vector<Stage>& stages = found->mesh->stages;
+    while (points.stage < stages.size() && !(stages[points.stage].points == found->points)) ++points.stage;
+    if (points.stage == stages.size())
+      return Status::Invalid("the subspace is for {}, which is no stage of this rig", output.name).At({path});
     entry.points.push_back(points);
   }
   if (!subspace.space.empty()) {

@@ -7,31 +7,11 @@
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
+#include "nodes/kernels/shape_paths.h"
 #include "nodes/node_file.h"
 
 namespace kpsa::engine {
 namespace {
-
-constexpr std::size_t kNoShape = static_cast<std::size_t>(-1);
-
-// A target that goes through other shapes on its way: piecewise linear in its weight, its first and last
-// piece going on outside of 0 to 1.
-struct Path {
-  struct Stop {
-    double at;
-    std::size_t shape;
-  };
-  std::size_t target;
-  std::vector<Stop> stops;  // ascending; the first is nothing at 0, the last the target itself at 1
-
-  void Add(double weight, std::span<double> weights) const {
-    std::size_t i = 0;
-    while (i + 2 < stops.size() && weight > stops[i + 1].at) ++i;
-    const double t = (weight - stops[i].at) / (stops[i + 1].at - stops[i].at);
-    if (stops[i].shape != kNoShape) weights[stops[i].shape] += 1 - t;
-    weights[stops[i + 1].shape] += t;
-  }
-};
 
 using BlendShapeContext =
     DeformerContext<In<"weight", ArrayView<double>>, In<"pointWeights", ConstPointsView>>;
@@ -39,42 +19,10 @@ using BlendShapeContext =
 struct BlendShapeBound {
   BlendShapeKernel kernel;
   CarriedFrame frame;
-  std::vector<Path> paths;  // by target
+  ShapePaths paths;
   std::size_t weight_floats;
   bool weighted;  // by pointWeights
 };
-
-Result<std::vector<Path>> ReadPaths(const Structural& s, std::size_t target_count) {
-  const auto& targets = s.value("inbetweenTarget").get<std::vector<std::int64_t>>();
-  const auto& shapes = s.value("inbetweenShape").get<std::vector<std::int64_t>>();
-  const auto& places = s.value("inbetweenWeight").get<std::vector<double>>();
-  if (targets.size() != shapes.size() || targets.size() != places.size()) {
-    return Status::Invalid(
-        "inbetweenTarget, inbetweenShape and inbetweenWeight have {}, {} and {} entries, "
-        "expected as many",
-        targets.size(), shapes.size(), places.size());
-  }
-  std::vector<Path> paths;
-  for (std::size_t i = 0; i < targets.size(); ++i) {
-    const auto count = static_cast<std::int64_t>(target_count);
-    if (targets[i] < 0 || targets[i] >= count || shapes[i] < 0 || shapes[i] >= count) {
-      return Status::Invalid("in-between {}: expected numbers of targets from 0 to {}", i, count - 1);
-    }
-    if (targets[i] == shapes[i]) return Status::Invalid("in-between {}: target {} is its own", i, targets[i]);
-    if (!(places[i] > 0 && places[i] < 1))
-      return Status::Invalid("in-between {}: a weight of {}, expected more than 0 and less than 1", i,
-                             places[i]);
-    const auto target = static_cast<std::size_t>(targets[i]);
-    auto path = std::find_if(paths.begin(), paths.end(), [&](const Path& p) { return p.target == target; });
-    if (path == paths.end()) path = paths.insert(path, {target, {{0, kNoShape}, {1, target}}});
-    const auto after = std::find_if(path->stops.begin(), path->stops.end(),
-                                    [&](const Path::Stop& stop) { return stop.at >= places[i]; });
-    if (after->at == places[i])
-      return Status::Invalid("in-between {}: target {} has two at {}", i, target, places[i]);
-    path->stops.insert(after, {places[i], static_cast<std::size_t>(shapes[i])});
-  }
-  return paths;
-}
 
 Result<BoundKernel> BindBlendShape(const Binding& binding) {
   const Structural& s = binding.structural();
@@ -90,7 +38,10 @@ Result<BoundKernel> BindBlendShape(const Binding& binding) {
     targets.push_back({target.points, target.deltas});
   const BlendShapeTargets all{out.total(), targets};
   KPSA_RETURN_IF_ERROR(all.Validate());
-  Result<std::vector<Path>> paths = ReadPaths(s, targets.size());
+  Result<ShapePaths> paths =
+      ShapePaths::Make(s.value("inbetweenTarget").get<std::vector<std::int64_t>>(),
+                       s.value("inbetweenShape").get<std::vector<std::int64_t>>(),
+                       s.value("inbetweenWeight").get<std::vector<double>>(), targets.size());
   if (!paths.ok()) return paths.status();
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
@@ -115,12 +66,12 @@ void ComputeBlendShape(BlendShapeContext c) {
   const auto& bound = c.kernel_as<BlendShapeBound>();
   const ArrayView<double> weight = c.get<"weight">();
   const std::span<double> weights(reinterpret_cast<double*>(c.scratch()), bound.kernel.target_count());
-  for (std::uint32_t i = 0; i < weights.size(); ++i) weights[i] = i < weight.size() ? weight[i] : 0.0;
-  for (const Path& path : bound.paths) weights[path.target] = 0;
-  for (const Path& path : bound.paths) {
-    const auto target = static_cast<std::uint32_t>(path.target);
-    path.Add(target < weight.size() ? weight[target] : 0.0, weights);
-  }
+  const auto weight_of = [&](std::size_t target) {
+    const auto i = static_cast<std::uint32_t>(target);
+    return i < weight.size() ? weight[i] : 0.0;
+  };
+  for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = weight_of(i);
+  bound.paths.Apply(weight_of, weights);
   const Parallel parallel = HostParallel(c);
   const BlendShapeKernel::Inputs inputs{weights, c.get<"envelope">()};
   float* scratch = c.scratch() + bound.weight_floats;

@@ -62,6 +62,12 @@ void DemandWrapNode(Demand& demand) {
                    total));
 }
 
+struct WrapBound {
+  WrapKernel kernel;
+  CarriedFrame frame;
+  std::size_t KernelFloats() const { return (kernel.ScratchFloats() + 15) / 16 * 16; }
+};
+
 template <bool kAmongPoints>
 Result<BoundKernel> BindWrap(const Binding& binding) {
   const Structural& s = binding.structural();
@@ -72,18 +78,66 @@ Result<BoundKernel> BindWrap(const Binding& binding) {
   if (!rest.ok()) return rest.status();
   const std::vector<float> weights = BoundWeights(binding);
   const WrapInfluences influences = FindInfluences<kAmongPoints>(s, *driver, out, *rest, weights);
-  WrapKernel kernel(ModeOf<kAmongPoints>(s), *driver->topology, driver->rest->points,
-                    driver->stage_from_driver, influences, *rest, out.ToVector(),
-                    binding.input("driverPoints", -1).ToVector(), weights);
-  const std::size_t scratch = kernel.ScratchFloats();
-  return MakeBound(std::move(kernel), scratch);
+  const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
+  if (!frame.ok()) return frame.status();
+  const PointSet& driver_points = binding.input("driverPoints", -1);
+  WrapBound bound{
+      WrapKernel(ModeOf<kAmongPoints>(s), *driver->topology, driver->rest->points, driver->stage_from_driver,
+                 influences, *rest, out.ToVector(), driver_points.ToVector(), weights),
+      *frame};
+  std::size_t scratch = bound.KernelFloats();
+  if (!frame->fixed()) scratch += 3 * PaddedCount(driver_points.size()) + 6 * PaddedCount(out.size());
+  return MakeBound(std::move(bound), scratch);
+}
+
+// x y z rows of `count` points from there on; what follows them.
+PointsView TakeRows(std::size_t count, float** scratch) {
+  const std::size_t row = PaddedCount(count);
+  const PointsView view{*scratch, *scratch + row, *scratch + 2 * row, count};
+  *scratch += 3 * row;
+  return view;
 }
 
 void ComputeWrap(DeformerContext<In<"driverPoints", ConstPointsView>> c) {
-  const auto& kernel = c.kernel_as<WrapKernel>();
+  const auto& bound = c.kernel_as<WrapBound>();
   const Parallel parallel = HostParallel(c);
-  kernel.Run({c.get<"envelope">(), c.get<"driverPoints">()}, c.get<"inPoints">(), c.out<"outPoints">(),
-             {c.scratch(), kernel.ScratchFloats()}, &parallel);
+  const std::span<float> kernel_scratch(c.scratch(), bound.kernel.ScratchFloats());
+  const double envelope = c.get<"envelope">();
+  const ConstPointsView &driver = c.get<"driverPoints">(), &in = c.get<"inPoints">();
+  const PointsView& out = c.out<"outPoints">();
+  const Matrix4 motion = bound.frame.Motion(c.get<"parentMatrix">());
+  Matrix4 back;
+  if (motion == Matrix4() || !Invert(motion, &back)) {
+    bound.kernel.Run({envelope, driver}, in, out, kernel_scratch, &parallel);
+    return;
+  }
+  // What the driver does to the points where the parent rests, then carried with it
+  float* scratch = c.scratch() + bound.KernelFloats();
+  const PointsView resting_driver = TakeRows(driver.count, &scratch), resting = TakeRows(in.count, &scratch),
+                   wrapped = TakeRows(in.count, &scratch);
+  const auto to_rest = [&](const ConstPointsView& from, const PointsView& to) {
+    c.For(from.count, 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const Double3 p = TransformPoint(back, {from.x[i], from.y[i], from.z[i]});
+        to.x[i] = static_cast<float>(p.x);
+        to.y[i] = static_cast<float>(p.y);
+        to.z[i] = static_cast<float>(p.z);
+      }
+    });
+  };
+  to_rest(driver, resting_driver);
+  to_rest(in, resting);
+  bound.kernel.Run({envelope, resting_driver}, resting, wrapped, kernel_scratch, &parallel);
+  c.For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Double3 move = TransformVector(motion, {static_cast<double>(wrapped.x[i]) - resting.x[i],
+                                                    static_cast<double>(wrapped.y[i]) - resting.y[i],
+                                                    static_cast<double>(wrapped.z[i]) - resting.z[i]});
+      out.x[i] = static_cast<float>(in.x[i] + move.x);
+      out.y[i] = static_cast<float>(in.y[i] + move.y);
+      out.z[i] = static_cast<float>(in.z[i] + move.z);
+    }
+  });
 }
 
 void DeclareWrap(NodeBuilder& b) {
@@ -117,20 +171,24 @@ void DeclareProximityWrap(NodeBuilder& b) {
 }  // namespace
 
 KPSA_NODES(wrap, registry) {
-  AddDeformer<ComputeWrap>(registry,
-                           {.name = "wrap",
-                            .doc = "Points follow the nearest points of a driver mesh, each with its frame.",
-                            .own = DeclareWrap,
-                            .bind = BindWrap<true>,
-                            .demand = DemandWrapNode<true>})
-      .version(2)  // floats
+  AddDeformer<ComputeWrap>(
+      registry, {.name = "wrap",
+                 .doc = "Points follow the nearest points of a driver mesh, each with its frame. How "
+                        "parentMatrix has moved "
+                        "since the rest pose is no move of the driver: it carries the points already.",
+                 .own = DeclareWrap,
+                 .bind = BindWrap<true>,
+                 .demand = DemandWrapNode<true>})
+      .version(3)  // carried by its parent
       .cost(3000, 60);
-  AddDeformer<ComputeWrap>(registry, {.name = "proximityWrap",
-                                      .doc = "Points follow the nearest place of a driver's surface.",
-                                      .own = DeclareProximityWrap,
-                                      .bind = BindWrap<false>,
-                                      .demand = DemandWrapNode<false>})
-      .version(2)  // floats
+  AddDeformer<ComputeWrap>(
+      registry, {.name = "proximityWrap",
+                 .doc = "Points follow the nearest place of a driver's surface. How parentMatrix has "
+                        "moved since the rest pose is no move of the driver: it carries the points already.",
+                 .own = DeclareProximityWrap,
+                 .bind = BindWrap<false>,
+                 .demand = DemandWrapNode<false>})
+      .version(3)  // carried by its parent
       .cost(5000, 46);
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/quantity_text.h"
 #include "files/npz.h"
+#include "files/obj.h"
 #include "files/point_cache.h"
 #include "files/suffix.h"
 #include "files/weights_json.h"
@@ -32,7 +33,7 @@ std::uint64_t FileSize(const std::string& path) {
 }
 
 // The box around x y z values: "0.1 x 0.3 x 0.2 m", or that some are not finite.
-std::string BoxText(const std::vector<float>& xyz) {
+std::string BoxText(const std::vector<float>& xyz, const char* unit = " m") {
   double low[3], high[3];
   for (int c = 0; c < 3; ++c) low[c] = std::numeric_limits<double>::infinity(), high[c] = -low[c];
   for (std::size_t i = 0; i + 2 < xyz.size(); i += 3) {
@@ -43,8 +44,8 @@ std::string BoxText(const std::vector<float>& xyz) {
     }
   }
   return xyz.empty() ? "empty"
-                     : fmt::format("{:.4g} x {:.4g} x {:.4g} m", high[0] - low[0], high[1] - low[1],
-                                   high[2] - low[2]);
+                     : fmt::format("{:.4g} x {:.4g} x {:.4g}{}", high[0] - low[0], high[1] - low[1],
+                                   high[2] - low[2], unit);
 }
 
 const char* NpzTypeName(NpzType type) {
@@ -143,7 +144,7 @@ Result<FileFacts> InspectNpz(const std::string& path) {
   facts.facts = {{"bytes", FileSize(path)}};
   FactTable arrays{"arrays", {"array", "type", "shape", "box of all frames"}, {}};
   for (const NpzArray& array : npz->arrays) {
-    const bool vertices = array.shape.size() == 3 && array.shape[2] == 3;
+    const bool vertices = (array.shape.size() == 2 || array.shape.size() == 3) && array.shape.back() == 3;
     arrays.rows.push_back({array.name, std::string(NpzTypeName(array.type)),
                            fmt::format("({})", fmt::join(array.shape, ", ")),
                            vertices ? BoxText(array.Floats()) : ""});
@@ -155,6 +156,19 @@ Result<FileFacts> InspectNpz(const std::string& path) {
     }
   }
   facts.tables = {std::move(arrays)};
+  return facts;
+}
+
+Result<FileFacts> InspectObj(const std::string& path) {
+  const Result<std::vector<ObjShape>> shapes = ReadObj(path);
+  if (!shapes.ok()) return shapes.status();
+  FileFacts facts;
+  facts.kind = "obj";
+  facts.facts = {{"bytes", FileSize(path)}};
+  FactTable table{"shapes", {"shape", ">vertices", "box"}, {}};
+  for (const ObjShape& shape : *shapes)
+    table.rows.push_back({shape.name, Count(shape.positions.size() / 3), BoxText(shape.positions, "")});
+  facts.tables = {std::move(table)};
   return facts;
 }
 
@@ -247,11 +261,12 @@ Result<FileFacts> InspectFile(const std::string& path, double fps) {
   const std::string suffix = FileSuffix(path);
   if (suffix == ".glb" || suffix == ".gltf" || suffix == ".vrm") return InspectCharacter(path, fps);
   if (suffix == ".npz") return InspectNpz(path);
+  if (suffix == ".obj") return InspectObj(path);
   if (suffix == ".pc2" || suffix == ".mdd") return InspectPointCache(path, fps);
   if (suffix == ".kpsa") return InspectSubspace(path);
   if (suffix == ".json") return InspectWeights(path);
   return Status::Usage(
-             "expected a file that ends in .glb, .gltf, .vrm, .yaml, .npz, .pc2, .mdd, .kpsa or .json "
+             "expected a file that ends in .glb, .gltf, .vrm, .yaml, .npz, .obj, .pc2, .mdd, .kpsa or .json "
              "(weight maps)")
       .At({path});
 }

@@ -27,7 +27,7 @@ struct FileFacts {
   std::vector<std::string> notes;
 };
 
-// Of any file that kpsa reads or writes but rigs, by suffix: .glb .gltf .vrm .npz .pc2 .mdd .kpsa .json (weight
+// Of any file that kpsa reads or writes but rigs, by suffix: .glb .gltf .vrm .npz .obj .pc2 .mdd .kpsa .json (weight
 // maps). `fps`: of .pc2 files, and of the frames that a character's clips are counted in.
 Result<FileFacts> InspectFile(const std::string& path, double fps);
 FileFacts RigFacts(const Rig& rig);
@@ -35,6 +35,7 @@ FileFacts RigFacts(const Rig& rig);
 // One kind each; see InspectFile.
 Result<FileFacts> InspectCharacter(const std::string& path, double fps);
 Result<FileFacts> InspectNpz(const std::string& path);
+Result<FileFacts> InspectObj(const std::string& path);
 Result<FileFacts> InspectPointCache(const std::string& path, double fps);
 Result<FileFacts> InspectSubspace(const std::string& path);
 Result<FileFacts> InspectWeights(const std::string& path);

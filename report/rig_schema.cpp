@@ -116,11 +116,25 @@ void AddAttribute(const AttributeDef& a, Json* properties, Json* patterns) {
   }
 }
 
-Json WordSchema(std::string_view word) {
+// An entry of a blend shape's targets: a name, or shapes of a file.
+Json TargetSchema() {
+  const Json shapes = Closed({{"file", {{"type", "string"}}},
+                              {"shapes", OneOrList(Ref("name"))},
+                              {"name", Ref("name")},
+                              {"mesh", Ref("name")},
+                              {"from", Ref("name")},
+                              {"as", {{"enum", {"positions", "displacements"}}}},
+                              {"unit", {{"enum", {"mm", "cm", "m"}}}}},
+                             {"file"});
+  return {{"anyOf", {Ref("name"), shapes}}};
+}
+
+Json WordSchema(const NodeDef& def, std::string_view word) {
   if (word == "at") return Ref("place");
   if (word == "members") return Ref("members");
   if (word == "weights") return OneOrList({{"type", "string"}});
   if (word == "falloff") return Ref("falloff");
+  if (word == "targets" && def.name == "blendShape") return OneOrList(TargetSchema());
   if (word == "curves" || word == "targets" || word == "meshes" || word == "lights" || word == "carried" ||
       word == "falloffs")
     return ListOf(Ref("name"));
@@ -145,7 +159,7 @@ Json NodeSchema(const NodeDef& def) {
     if (!a.output) AddAttribute(a, &properties, &patterns);
   }
   for (const RigWord& word : RigWordsOf(def)) {
-    properties[word.name] = Described(WordSchema(word.name), word.doc);
+    properties[word.name] = Described(WordSchema(def, word.name), word.doc);
   }
   Json schema = {{"description", def.doc}, {"properties", std::move(properties)}};
   if (!patterns.empty()) schema["patternProperties"] = std::move(patterns);

@@ -143,10 +143,12 @@ void Mover::AddScene() {
                          &mesh.skin_cluster, &mesh.transform_geometry})
       *node = Moved(*node);
     for (NodeId& node : mesh.influence_nodes) node = Moved(node);
-    for (Stage& stage : mesh.stages) {
-      stage.node = Moved(stage.node);
-      stage.points = Moved(stage.points);
-    }
+    const auto move = [&](Stage* stage) {
+      stage->node = Moved(stage->node);
+      stage->points = Moved(stage->points);
+    };
+    move(&mesh.at_rest);
+    for (Stage& stage : mesh.stages) move(&stage);
     mesh.points = Moved(mesh.points);
     for (OutputPrimitive& primitive : mesh.primitives) Name(&primitive.key);
     to.meshes.push_back(std::move(mesh));

@@ -22,12 +22,14 @@
 #include "rig/build/steps/finish_stacks.h"
 #include "rig/build/steps/make_connections.h"
 #include "rig/build/steps/measure_rest.h"
+#include "rig/build/steps/note_double_moves.h"
 #include "rig/build/steps/place_falloffs.h"
 #include "rig/build/steps/place_handles.h"
 #include "rig/build/steps/place_stages.h"
 #include "rig/build/steps/place_stages_at_handles.h"
 #include "rig/build/steps/read_attributes.h"
 #include "rig/build/steps/read_overrides.h"
+#include "rig/build/steps/read_targets.h"
 #include "rig/build/steps/resolve_scopes.h"
 #include "rig/build/steps/set_blend_weights.h"
 #include "rig/build/steps/set_influences.h"
@@ -54,6 +56,8 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   // Nodes and their values
   MadeNodes nodes;
   AddNodes(in, &nodes, &rig->node_places, graph);
+  TargetShapes shapes(in, rig);
+  ReadTargets(in, nodes, &shapes, graph);
   PlugReader reader(in, &file->returned, graph);
   ReadAttributes(in, &nodes, &reader, graph);
   ReadOverrides(in, &reader, graph);
@@ -71,7 +75,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   PlugKeys stacked;
   const RestFalloffs falloffs(in, &places, rest, &maps);
   WeightSetter weights(in, falloffs, &maps, graph, &rig->notes);
-  BuildMeshStacks(in, &nodes, scene, graph, &rig->notes);
+  BuildMeshStacks(in, *rest, &nodes, scene, graph, &rig->notes);
   SetWeights(&weights, &nodes);
   PlaceStages(in, rest, &nodes, graph);
   BuildPointStacks(in, curves, rest, &nodes, &stacked, graph);
@@ -82,7 +86,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   // What needs the stages
   ConnectLights(in, nodes, graph);
   ConnectDrivers(in, nodes, rest, graph);
-  SetTargets(in, nodes, graph);
+  SetTargets(in, nodes, shapes, graph, &rig->notes);
   SetBlendWeights(in, own, &maps, graph);
 
   // What drives what
@@ -97,6 +101,7 @@ void BuildRig(RigFile* file, RestPose* rest, Rig* rig, YamlErrors* errors) {
   ConnectPivots(in, *rest, nodes, graph);
   FinishOverrides(in, reader.overridden(), stacked, &rig->pinned, graph);
   CheckVariants(in, nodes);
+  NoteDoubleMoves(in, nodes, &rig->notes);
 
   // What the rig is for
   AddControls(in, &rig->controls);

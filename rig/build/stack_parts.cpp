@@ -34,7 +34,7 @@ MadeNode* FindDeformer(const BuildInput& in, const RigString& name, MadeNodes* n
       return nullptr;
     }
   }
-  std::vector<std::string> names{"gltf", "morph", "skin"};
+  std::vector<std::string> names{"gltf", "morph", "skin", "restSkin"};
   for (const MadeNode& made : *nodes) {
     if (deforms(made)) names.push_back(made.from->name);
   }

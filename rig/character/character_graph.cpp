@@ -180,6 +180,7 @@ class Builder {
     mesh.rest = AddOwn("mesh", mesh, "mesh");
     if (!edit_.ok()) return;
     edit_.Set(mesh.rest, "mesh", mesh.geometry.mesh);
+    mesh.at_rest = {"rest", mesh.rest, 0, false, edit_.Plug(mesh.rest, "points")};
     if (mesh.geometry.targets != nullptr) AddBlendShape(from, gltf_mesh, &mesh);
     if (from.skin != kNoIndex && gltf_mesh.skinned()) {
       AddSkinCluster(from.skin, gltf_mesh, &mesh);
@@ -260,7 +261,7 @@ const Stage* CharacterMesh::FindStage(std::string_view stage) const {
     const bool own = s.node == blend_shape || s.node == skin_cluster || s.node == transform_geometry;
     if (own && (stage == "gltf" || (stage == "skin" && s.node == transform_geometry))) found = &s;
   }
-  return found;
+  return found == nullptr && stage == at_rest.name ? &at_rest : found;
 }
 
 std::vector<Stage> OwnStages(const CharacterMesh& mesh) {

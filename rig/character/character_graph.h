@@ -17,9 +17,9 @@
 #include <unordered_set>
 #include <vector>
 
+#include "gltf/import.h"
 #include "graph/geometry.h"
 #include "graph/graph.h"
-#include "gltf/import.h"
 #include "rig/character/weld.h"
 
 namespace kpsa::engine {
@@ -58,6 +58,7 @@ struct CharacterMesh {
   NodeId transform;                                            // of the mesh node
   NodeId rest, blend_shape, skin_cluster, transform_geometry;  // invalid where absent
   NodeId morph_weights;       // likewise: before the blendShape, where expressions move the mesh
+  Stage at_rest;              // "rest": before all stages, in mesh space
   std::vector<Stage> stages;  // in order; the last one's points are `points`
   PlugRef points;
   bool world = false;  // whether `points` are in world space
@@ -65,8 +66,8 @@ struct CharacterMesh {
   const Mesh& mesh() const { return *geometry.mesh; }
   // Whose `weight` clips and rigs set.
   NodeId weights_node() const { return morph_weights.version != 0 ? morph_weights : blend_shape; }
-  // By name; `gltf` is the last of the file's own stages, `skin` also an unskinned mesh's transform. Null if
-  // none.
+  // By name; `gltf` is the last of the file's own stages, `skin` also an unskinned mesh's transform, `rest` what comes
+  // before all of them. Null if none.
   const Stage* FindStage(std::string_view stage) const;
 };
 

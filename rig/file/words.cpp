@@ -49,7 +49,8 @@ const Rule kRules[] = {
      [](const NodeDef& d) { return Has(d, "driverPoints") || d.name == "poseInterpolator"; }},
     {{"poses", "poses of the driver by name, angles from rest"},
      [](const NodeDef& d) { return d.name == "poseInterpolator"; }},
-    {{"targets", "transforms of a constraint, or morph targets of a blend shape"},
+    {{"targets",
+      "transforms of a constraint; of a blend shape morph targets, or {file: FILE}, shapes of a file"},
      [](const NodeDef& d) {
        return (Has(d, "targetMatrix") && Has(d, "outMatrix")) || d.name == "blendShape";
      }},

@@ -21,9 +21,16 @@ for name in hello face; do
   done
   node check_glb.mjs $name.glb $name.npz
 done
+# What joints and morph targets alone move
+for name in hello/hello face/face gi/room; do
+  of=skinned_$(basename $name)
+  "$kpsa" eval "$1/scenes/$name.glb" --frames 0:24 -o $of.glb --skinned -q
+  "$kpsa" eval "$1/scenes/$name.glb" --frames 0:24 -o $of.npz -q
+  node check_glb.mjs $of.glb $of.npz --skinned
+done
 "$kpsa" eval "$1/scenes/hello/hello.yaml" --frames 0:24 -o hello.usda -q
 command -v blender > /dev/null || { echo "without Blender, which is not here"; exit 0; }
-blender --background --python-exit-code 1 --python "$here/check_blender.py" -- hello.glb hello.usda hello.npz > blender.log 2>&1 ||
+blender --background --python-exit-code 1 --python "$here/check_blender.py" -- hello.glb hello.usda hello.npz skinned_face.glb skinned_face.npz > blender.log 2>&1 ||
   { cat blender.log; exit 1; }
 grep -E "^(Blender [0-9].*:|skipped)" blender.log
 grep -q "Blender has read all caches" blender.log

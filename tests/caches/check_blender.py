@@ -1,6 +1,6 @@
-"""Run by Blender: blender --background --python-exit-code 1 --python check_blender.py -- GLB USDA NPZ
+"""Run by Blender: blender --background --python-exit-code 1 --python check_blender.py -- GLB USDA NPZ SKINNED_GLB SKINNED_NPZ
 
-Blender imports both, and its evaluated meshes have the points of the .npz, in its own axes and at three frames.
+Blender imports all, and its evaluated meshes have the points of the .npz, in its own axes and at three frames.
 """
 import sys
 
@@ -10,15 +10,18 @@ import numpy as np
 if not hasattr(np, "bool"):
     np.bool = bool  # which the importer of Blender 3.4 asks of NumPy before 1.24
 
-glb, usda, npz = sys.argv[sys.argv.index("--") + 1 :]
-arrays = np.load(npz)
-times = arrays["times"]
-frames = [arrays[key] for key in arrays.files if key != "times"]
-diagonal = np.linalg.norm(np.ptp(np.concatenate([f.reshape(-1, 3) for f in frames]), axis=0))
+glb, usda, npz, skinned_glb, skinned_npz = sys.argv[sys.argv.index("--") + 1 :]
 
 
-def check(kind, first_frame, tolerance):
-    objects = [o for o in bpy.context.scene.objects if o.type == "MESH"]
+def check(kind, npz, first_frame, tolerance):
+    arrays = np.load(npz)
+    times = arrays["times"]
+    frames = [arrays[key] for key in arrays.files if key != "times"]
+    diagonal = np.linalg.norm(np.ptp(np.concatenate([f.reshape(-1, 3) for f in frames]), axis=0))
+    # The importer draws bones with a mesh of its own, in a collection that is not shown
+    objects = [o for o in bpy.context.scene.objects if o.type == "MESH" and not o.name.startswith("Icosphere")]
+    if len(objects) > 1:
+        objects = [next(o for o in objects if o.name.split(".")[0] == key[:-2]) for key in arrays.files if key != "times"]
     assert len(objects) == len(frames), f"{kind}: {len(objects)} meshes"
     worst = 0
     for t in (0, len(times) // 2, len(times) - 1):
@@ -50,11 +53,14 @@ def empty():
 
 empty()
 bpy.ops.import_scene.gltf(filepath=glb)
-check("glb", 0, 1.01e-4)
+check("glb", npz, 0, 1.01e-4)
+empty()
+bpy.ops.import_scene.gltf(filepath=skinned_glb)
+check("glb with joints", skinned_npz, 0, 1.1e-5)
 if bpy.app.build_options.usd:
     empty()
     bpy.ops.wm.usd_import(filepath=usda)
-    check("usda", 0, 1e-6)
+    check("usda", npz, 0, 1e-6)
 else:
     print("skipped: usda, this Blender is built without USD")
 print("Blender has read all caches")

@@ -1,12 +1,13 @@
-// node check_glb.mjs GLB NPZ: the validator has nothing to say, and three.js shows what the .npz holds.
+// node check_glb.mjs GLB NPZ [--skinned]: the validator has nothing to say, and three.js shows what the .npz holds.
 import { readFileSync } from 'node:fs';
 import validator from 'gltf-validator';
-import { AnimationMixer, LoopOnce, Vector3 } from 'three';
+import { AnimationMixer, LoopOnce, PropertyBinding, Vector3 } from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { readNpz } from './npz.mjs';
 
-const [glbPath, npzPath] = process.argv.slice(2);
-const glb = readFileSync(glbPath), { times, ...meshArrays } = readNpz(readFileSync(npzPath)), arrays = Object.values(meshArrays);
+const [glbPath, npzPath, ...flags] = process.argv.slice(2), skinned = flags.includes('--skinned');
+const glb = readFileSync(glbPath), { times, ...meshArrays } = readNpz(readFileSync(npzPath)), names = Object.keys(meshArrays);
+const arrays = Object.values(meshArrays);
 const fail = (text) => { console.error(`${glbPath}: ${text}`); process.exit(1); };
 
 // Texture coordinates without a texture are no fault
@@ -22,8 +23,12 @@ const mixer = new AnimationMixer(file.scene), action = mixer.clipAction(file.ani
 action.setLoop(LoopOnce);
 action.clampWhenFinished = true;
 action.play();
-const meshes = [];
+let meshes = [];
 file.scene.traverse((object) => { if (object.isMesh) meshes.push(object); });
+// With joints, meshes come in the order of the nodes; here each has one primitive
+if (skinned) meshes = names.map((key) => meshes.find((mesh) => mesh.name === PropertyBinding.sanitizeNodeName(key.replace(/\/0$/, ''))));
+if (meshes.includes(undefined)) fail(`a mesh of ${names} is missing`);
+if (skinned && !meshes.some((mesh) => mesh.isSkinnedMesh)) fail('no mesh has joints');
 if (meshes.length !== arrays.length) fail(`${meshes.length} meshes, the .npz has ${arrays.length}`);
 
 const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
@@ -44,8 +49,9 @@ for (const frame of [0, Math.floor(frames / 3), Math.floor(frames / 2), frames -
     if (attributes.position.count !== shape[1]) fail(`mesh ${m} has ${attributes.position.count} vertices`);
     const weights = mesh.morphTargetInfluences ?? [];  // a still mesh has none
     if (!attributes.normal || (weights.length > 0 && !morphAttributes.normal)) fail(`mesh ${m} has no normals`);
-    if (weights.length > 0 && mesh.morphTargetDictionary.shape1 !== 0) fail(`mesh ${m} has no target "shape1"`);
-    if (weights.some((weight) => weight < 0 || weight > 1)) fail('a weight is outside of 0 to 1');
+    if (!skinned && weights.length > 0 && mesh.morphTargetDictionary.shape1 !== 0) fail(`mesh ${m} has no target "shape1"`);
+    if (skinned && weights.length > 0 && mesh.morphTargetDictionary.shape1 !== undefined) fail(`mesh ${m} has not its own targets`);
+    if (!skinned && weights.some((weight) => weight < 0 || weight > 1)) fail('a weight is outside of 0 to 1');
     for (let v = 0; v < shape[1]; ++v) {
       mesh.getVertexPosition(v, point).applyMatrix4(mesh.matrixWorld);
       const at = 3 * (frame * shape[1] + v);
@@ -55,7 +61,8 @@ for (const frame of [0, Math.floor(frames / 3), Math.floor(frames / 2), frames -
   });
 }
 if (largest === 0) fail('nothing moves');
-if (!(worst <= 1.01e-4 * diagonal)) fail(`three.js shows points ${worst} m off, at most ${1e-4 * diagonal} m are stated`);
+const allowed = skinned ? 1.1e-5 : 1.01e-4;
+if (!(worst <= allowed * diagonal)) fail(`three.js shows points ${worst} m off, at most ${allowed * diagonal} m are stated`);
 console.log(`${glbPath}: ${meshes.length} meshes, ${meshes.map((mesh) => (mesh.morphTargetInfluences ?? []).length)} targets, ` +
             `three.js within ${(worst / diagonal).toExponential(1)} of the diagonal; the validator: ` +
             `${issues.numErrors} errors, ${issues.numWarnings} warnings, ${issues.numInfos} infos, ${issues.numHints} hints`);

@@ -62,5 +62,23 @@ TEST_F(Fmt, RefusesWhatIsNoRig) {
   EXPECT_EQ(Run({part, "-o", "a.yaml", "--in-place"}).exit_code, 2);
 }
 
+// Files that a rig names belong to it: one that is wrong is told, and the rest stays as it is written.
+TEST_F(Fmt, ShapesOfFiles) {
+  folder.Edit("nodes:\n",
+              "nodes:\n  fix: {type: blendShape, targets: [{file: a b.obj, unit: cm, name: \"1\"}]}\n");
+  folder.Edit("[skin, cage, mush]", "[skin, cage, mush, fix]");
+  const ProcessResult missing = Run({folder.rig()});
+  EXPECT_EQ(missing.exit_code, 3);
+  EXPECT_NE(missing.err.find("a b.obj"), std::string::npos) << missing.err;
+  std::string obj;
+  for (int v = 0; v < 794; ++v) obj += "v 0 0 0\n";
+  folder.Write("a b.obj", obj);
+  const ProcessResult run = Run({folder.rig()});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("  fix: {type: blendShape, targets: [{file: a b.obj, unit: cm, name: \"1\"}]}\n"),
+            std::string::npos)
+      << run.out;
+}
+
 }  // namespace
 }  // namespace kpsa::engine

@@ -112,6 +112,26 @@ TEST(Inspect, TheVerticesOfJointsAndMaterialsAreThoseOfRigFiles) {
   EXPECT_EQ(count, face["materials_used"][0]["vertices"]);
 }
 
+TEST(Inspect, FilesOfShapes) {
+  const TemporaryFolder folder;
+  Result<NpzWriter> writer = NpzWriter::Create(folder / "fix.npz", false);
+  ASSERT_TRUE(writer.ok() && writer->Add("elbow", {2, 3}, std::vector<float>{0, 0, 0, 1, 2, 3}).ok() &&
+              writer->Finish().ok());
+  const Json elbow = FactsOf({folder / "fix.npz"})["arrays"][0];
+  EXPECT_EQ(elbow["array"], "elbow");
+  EXPECT_EQ(elbow["shape"], "(2, 3)");
+  EXPECT_EQ(elbow["box_of_all_frames"], "1 x 2 x 3 m");
+  folder.Write("two.obj", "o a\nv 0 0 0\nv 1 2 3\no b\nv 0 0 0\n");
+  const Json facts = FactsOf({folder / "two.obj"});
+  EXPECT_EQ(facts["kind"], "obj");
+  ASSERT_EQ(facts["shapes"].size(), 2u) << facts.dump(1);
+  EXPECT_EQ(facts["shapes"][0]["shape"], "a");
+  EXPECT_EQ(facts["shapes"][0]["vertices"], 2);
+  EXPECT_EQ(facts["shapes"][0]["box"], "1 x 2 x 3");
+  folder.Write("bad.obj", "v 0 0\n");
+  EXPECT_EQ(RunKpsa({"inspect", folder / "bad.obj"}).exit_code, 3);
+}
+
 TEST(Inspect, RefusesWhatHasNoVertices) {
   const auto refused = [](std::vector<std::string> arguments, const std::string& message) {
     arguments.insert(arguments.begin(), "inspect");

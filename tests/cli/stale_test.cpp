@@ -5,6 +5,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "files/npz.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
 
@@ -283,6 +284,33 @@ TEST_F(Stale, TrainingWithMoreThreadsGivesTheSameSubspace) {
                  results[0]);  // accelerated is not exact: the comparison sees that
   }
   for (const std::string& result : results) EXPECT_TRUE(result == results[0]);
+}
+
+// Shapes of a file count by what they hold, and only those that a blend shape takes.
+TEST(StaleShapes, AChangedShapeIsRefusedByName) {
+  const HelloFolder folder;
+  const auto write = [&](float lift, float unused) {
+    std::vector<float> shape(3 * std::size_t{794}, 0.f), other(shape.size(), unused);
+    shape[1] = lift;
+    Result<NpzWriter> writer = NpzWriter::Create(folder / "fix.npz", true);
+    ASSERT_TRUE(writer.ok() && writer->Add("elbow", {794, 3}, shape).ok() &&
+                writer->Add("other", {794, 3}, other).ok() && writer->Finish().ok());
+  };
+  write(0.01f, 0);
+  folder.Edit("nodes:\n",
+              "nodes:\n  fix: {type: blendShape, targets: [{file: fix.npz, shapes: elbow, as: "
+              "displacements}], 'weight[elbow]': 1}\n");
+  folder.Edit("[skin, cage, mush]", "[skin, fix, cage, mush]");
+  const auto run = [&](std::vector<std::string> arguments) { return RunKpsa(arguments, 60, folder.path()); };
+  ASSERT_EQ(run({"train", "hello.yaml", "--samples", "100", "--rows", "20", "-q"}).exit_code, 0);
+  const auto eval = [&] { return run({"eval", "hello.yaml", "--accelerate", "--frames", "0:1", "-o", "-"}); };
+  EXPECT_EQ(eval().exit_code, 0) << eval().err;
+  write(0.01f, 0.5f);
+  EXPECT_EQ(eval().exit_code, 0) << eval().err;
+  write(0.02f, 0);
+  const ProcessResult stale = eval();
+  EXPECT_EQ(stale.exit_code, 3);
+  EXPECT_NE(stale.err.find("fix.targets"), std::string::npos) << stale.err;
 }
 
 }  // namespace

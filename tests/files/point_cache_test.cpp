@@ -207,7 +207,7 @@ TEST(PointCache, UsdaText) {
 }
 
 // The file's own animation, evaluated by the reference, against the cache.
-void ExpectSameAsCache(const std::string& path, const PointCache& cache, const MorphGlbReport& report) {
+void ExpectSameAsCache(const std::string& path, const PointCache& cache, const GlbReport& report) {
   const Result<gltf::Character> character = gltf::LoadGltf(path);
   ASSERT_TRUE(character.ok()) << character.status().ToString();
   const gltf::Clip* clip = character->clips.empty() ? nullptr : &character->clips[0];
@@ -245,7 +245,7 @@ TEST(MorphGlb, FewShapesForManyFrames) {
     cache.meshes[1].frames.insert(cache.meshes[1].frames.end(), {1, 2, 3});
   }
   const TemporaryFolder folder;
-  const Result<MorphGlbReport> report = WriteMorphGlb(folder / "a.glb", cache, {});
+  const Result<GlbReport> report = WriteGlb(folder / "a.glb", cache, {});
   ASSERT_TRUE(report.ok()) << report.status().ToString();
   EXPECT_EQ(report->targets, (std::vector<int>{3, 0}));
   EXPECT_LT(report->max_residual, 1e-4 * report->diagonal);
@@ -258,12 +258,12 @@ TEST(MorphGlb, FewShapesForManyFrames) {
   EXPECT_EQ(*std::min_element(weights.begin(), weights.end()), 0);
   EXPECT_EQ(*std::max_element(weights.begin(), weights.end()), 1);
   // Fewer targets than it takes: an honest residual
-  const Result<MorphGlbReport> coarse = WriteMorphGlb(folder / "b.glb", cache, {.max_targets = 1});
+  const Result<GlbReport> coarse = WriteGlb(folder / "b.glb", cache, {.max_targets = 1});
   ASSERT_TRUE(coarse.ok());
   EXPECT_EQ(coarse->targets[0], 1);
   EXPECT_GT(coarse->max_residual, 1e-2 * coarse->diagonal);
   ExpectSameAsCache(folder / "b.glb", cache, *coarse);
-  EXPECT_FALSE(WriteMorphGlb(folder / "b.glb", cache, {}).ok());
+  EXPECT_FALSE(WriteGlb(folder / "b.glb", cache, {}).ok());
 }
 
 json GlbJson(const std::string& path) {
@@ -290,7 +290,7 @@ std::vector<float> GlbFloats(const std::string& path, const json& root, const js
 TEST(MorphGlb, NamesMaterialsAndTextureCoordinates) {
   const TemporaryFolder folder;
   const std::string path = folder / "a.glb";
-  ASSERT_TRUE(WriteMorphGlb(path, Looking(), {}).ok());
+  ASSERT_TRUE(WriteGlb(path, Looking(), {}).ok());
   const json root = GlbJson(path);
   EXPECT_EQ(root["animations"][0]["name"], "wave");
   EXPECT_EQ(root["meshes"][0]["extras"]["targetNames"], (json{"shape1"}));
@@ -358,7 +358,7 @@ TEST(MorphGlb, NormalsOfEveryFrame) {
   }
   const TemporaryFolder folder;
   const std::string path = folder / "a.glb";
-  ASSERT_TRUE(WriteMorphGlb(path, cache, {.tolerance = 1e-7}).ok());
+  ASSERT_TRUE(WriteGlb(path, cache, {.tolerance = 1e-7}).ok());
   const json root = GlbJson(path);
   const json& sampler = root["animations"][0]["samplers"][0];
   const std::size_t targets = root["meshes"][0]["primitives"][0]["targets"].size();
@@ -400,25 +400,25 @@ TEST(MorphGlb, MoreFramesThanNumbersAndOtherEdges) {
     cache.meshes[0].frames.insert(cache.meshes[0].frames.end(),
                                   {std::sin(0.7f * static_cast<float>(t)), static_cast<float>(t % 3), 1});
   }
-  Result<MorphGlbReport> report = WriteMorphGlb(folder / "a.glb", cache, {.tolerance = 0});
+  Result<GlbReport> report = WriteGlb(folder / "a.glb", cache, {.tolerance = 0});
   ASSERT_TRUE(report.ok());
   EXPECT_EQ(report->targets[0], 2);
   ExpectSameAsCache(folder / "a.glb", cache, *report);
   PointCache single = Small();
   single.times.resize(1);
   for (PointCacheMesh& mesh : single.meshes) mesh.frames.resize(mesh.vertex_count * 3);
-  report = WriteMorphGlb(folder / "b.glb", single, {});
+  report = WriteGlb(folder / "b.glb", single, {});
   ASSERT_TRUE(report.ok());
   EXPECT_TRUE(gltf::LoadGltf(folder / "b.glb")->clips.empty());
   ExpectSameAsCache(folder / "b.glb", single, *report);
   PointCache still = Small();
   still.meshes.erase(still.meshes.begin());
-  ASSERT_TRUE(WriteMorphGlb(folder / "c.glb", still, {}).ok());
+  ASSERT_TRUE(WriteGlb(folder / "c.glb", still, {}).ok());
   EXPECT_TRUE(gltf::LoadGltf(folder / "c.glb").ok());
-  ASSERT_TRUE(WriteMorphGlb(folder / "d.glb", PointCache(), {}).ok());
+  ASSERT_TRUE(WriteGlb(folder / "d.glb", PointCache(), {}).ok());
   EXPECT_TRUE(gltf::LoadGltf(folder / "d.glb").ok());
   cache.times[3] = cache.times[2];
-  EXPECT_NE(WriteMorphGlb(folder / "e.glb", cache, {}).status().ToString().find("ascend"), std::string::npos);
+  EXPECT_NE(WriteGlb(folder / "e.glb", cache, {}).status().ToString().find("ascend"), std::string::npos);
 }
 
 }  // namespace

@@ -49,12 +49,8 @@ void AddWrapSetUps(std::vector<NodeSetUp>* all) {
       {"proximityWrap", Setting("smoothInfluences", 2)}};
   for (const auto& [type, way] : ways) {
     const std::string what = way.input + " " + way.rest.ToString();
-    all->push_back(AfterSkin(type, what, DriverAfterSkin({way})));
-    all->back().given[0].bound = true;  // the driver carries the points
-    if (way.input == "maxDistance") {
-      all->back().unless = kFrameAlone;
-      all->back().why = "points without a driver near them stay";
-    }
+    const bool snaps = what == "wrapMode snap";  // onto the driver, whoever carries the points
+    all->push_back(AfterSkin(type, what, DriverAfterSkin({way}), snaps));
     all->push_back(BeforeSkin(type, what, DriverBeforeSkin({way}), false));
     for (GivenInput& input : all->back().given) input.idle |= input.input == "parentMatrix";
   }

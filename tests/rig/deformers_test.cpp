@@ -308,7 +308,7 @@ overrides:
   EXPECT_TRUE(Has(text, "t.yaml:4:3: blendShape \"a\": the key \"targets\" is missing")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:5:35: targets: \"smlie\" is no target of tube (did you mean \"smile\"?)"))
       << text;
-  EXPECT_TRUE(Has(text, "t.yaml:6:34: targets: \"smile\" is named twice")) << text;
+  EXPECT_TRUE(Has(text, "t.yaml:6:42: targets: \"smile\" is named twice: here and at t.yaml:6:35")) << text;
   EXPECT_TRUE(Has(text, "t.yaml:11:15: an in-between of \"smile\" at 0: expected a weight of more than 0"))
       << text;
   EXPECT_TRUE(Has(text, "t.yaml:11:24: an in-between of \"smile\" at 1.5")) << text;

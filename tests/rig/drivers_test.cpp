@@ -79,6 +79,122 @@ TEST_F(RigDrivers, InMeshSpaceBothAreBeforeTheSkin) {
   EXPECT_LT(MaxDistance(player.Points(kShirt), expected), 1e-6);
 }
 
+// A mesh that the file skins follows a driver in the world, with its skin at rest.
+TEST_F(RigDrivers, AtRestASkinLeavesAllMovesToTheWrap) {
+  for (const char* type : {"proximityWrap", "wrap"}) {
+    RigPlayer player =
+        Play(fmt::format("nodes:\n  w: {{type: {}, driver: cage}}\n"
+                         "deform:\n  - {{meshes: [shirt], stack: [restSkin, w]}}\n{}",
+                         type, kControls));
+    ASSERT_TRUE(player.ok());
+    EXPECT_TRUE(player.rig.notes.empty()) << player.rig.notes.front();
+    const std::vector<Double3> rest = player.Points(kShirt);
+    player.Set("root.translateX", 0.5);
+    player.Set("root.rotateZ", 1.5707963267948966);
+    EXPECT_LT(MaxDistance(player.Points("restSkin", kShirt), rest), 1e-9);
+    std::vector<Double3> expected = rest;  // once, not twice
+    for (Double3& p : expected) p = {0.5 - p.y, p.x, p.z};
+    EXPECT_LT(MaxDistance(player.Points(kShirt), expected), 1e-6) << type;
+    // The driver bends where its joints do, and the shirt, which is near it, with it
+    player.Set("tip.rotateY", 0.3);
+    EXPECT_GT(MaxDistance(player.Points(kShirt), expected), 0.1);
+    EXPECT_LT(MaxDistance(player.Points("restSkin", kShirt), rest), 1e-9);
+  }
+}
+
+// What `parent` does to a mesh, its skin does already: the wrap adds what the driver does besides.
+TEST_F(RigDrivers, AParentCarriesWhatFollows) {
+  RigPlayer player = Play(std::string("nodes:\n  w: {type: proximityWrap, driver: cage, parent: root}\n"
+                                      "deform:\n  - {meshes: [shirt], stack: [skin, w]}\n") +
+                          kControls);
+  ASSERT_TRUE(player.ok());
+  const std::vector<Double3> rest = player.Points(kShirt);
+  player.Set("root.translateX", 0.5);
+  player.Set("root.rotateZ", 1.5707963267948966);
+  std::vector<Double3> expected = rest;
+  for (Double3& p : expected) p = {0.5 - p.y, p.x, p.z};
+  EXPECT_LT(MaxDistance(player.Points(kShirt), expected), 1e-6);
+}
+
+// Where the rest pose is not the bind pose, restSkin is the skin at rest and not the mesh as it is.
+TEST_F(RigDrivers, ARestSkinIsWhereTheJointsRest) {
+  GltfBuilder b = SheetsCharacter();
+  b.root["nodes"][1]["translation"] = {0, 0, 3};
+  b.root["nodes"][2]["rotation"] = {0, 0.6, 0, 0.8};
+  folder.Write("c.gltf", b.Text());
+  RigPlayer skinned = Play(kControls);
+  const std::vector<Double3> rest = skinned.Points(kShirt);
+  RigPlayer held = Play("deform:\n  - {meshes: [shirt], stack: [restSkin]}\n" + std::string(kControls));
+  ASSERT_TRUE(skinned.ok() && held.ok());
+  EXPECT_LT(MaxDistance(held.Points(kShirt), rest), 1e-6);
+  EXPECT_GT(MaxDistance(held.Points("rest", kShirt), rest), 1);
+  held.Set("root.translateX", 1);
+  EXPECT_LT(MaxDistance(held.Points(kShirt), rest), 1e-6);
+}
+
+TEST_F(RigDrivers, RestIsAStageOfEveryMesh) {
+  // Before its skin the shirt is pulled onto the cage as that rests, and then both are skinned
+  RigPlayer player = Play(std::string("units: {length: cm}\nnodes:\n"
+                                      "  s: {type: shrinkWrap, driver: \"cage@rest\", offset: 5, projection: "
+                                      "parallelToAxis, axis: [0, 0, 1], bidirectional: on}\n"
+                                      "deform:\n  - {meshes: [shirt], stack: [s, skin]}\n") +
+                          kControls);
+  ASSERT_TRUE(player.ok());
+  EXPECT_TRUE(player.rig.notes.empty());
+  player.Set("root.rotateZ", 0.5);
+  for (const Double3& p : player.Points("s", kShirt)) EXPECT_NEAR(p.z, 0.05, 1e-6);
+  for (const Double3& p : player.Points(kShirt)) EXPECT_NEAR(p.z, 0.05, 1e-6);
+  EXPECT_TRUE(Has(Errors("accelerate:\n  a: {points: [\"cage@rest\"]}\n"),
+                  "\"cage\" rests there: there is nothing to accelerate"))
+      << Errors("accelerate:\n  a: {points: [\"cage@rest\"]}\n");
+}
+
+TEST_F(RigDrivers, MovingTwiceIsNoted) {
+  const auto notes = [&](const std::string& node, const std::string& deform) {
+    const Rig rig = Loaded("nodes:\n  w: {type: " + node + "}\ndeform:\n" + deform);
+    std::string all;
+    for (const std::string& note : rig.notes) all += note + "\n";
+    return Short(all);
+  };
+  const std::string twice =
+      "the joints of \"shirt\" move it twice: by its skin, and by \"w\" (t.yaml:4:3), whose driver they "
+      "move, too. "
+      "Write restSkin instead, or put \"w\" before the skin";
+  const std::string shirt = "  - {meshes: [shirt], stack: [skin, w]}\n";
+  for (const char* type : {"proximityWrap", "wrap"}) {
+    const std::string said = notes(std::string(type) + ", driver: cage", shirt);
+    EXPECT_TRUE(Has(said, "t.yaml:6:31: " + twice)) << said;
+  }
+  // By a chain of wraps, too
+  const Rig chain = Loaded(
+      "nodes:\n  v: {type: wrap, driver: cage}\n  w: {type: wrap, driver: cloth}\n"
+      "deform:\n  - {meshes: [shirt], stack: [skin, w]}\n  - {meshes: [cloth], stack: [v]}\n");
+  ASSERT_EQ(chain.notes.size(), 1u);
+  EXPECT_TRUE(Has(chain.notes[0], "the joints of \"shirt\" move it twice")) << chain.notes[0];
+  // Not where the driver moves by itself, the wrap comes first, the skin rests, or what lies on the driver is put there
+  EXPECT_EQ(notes("wrap, driver: cloth", shirt), "");
+  EXPECT_EQ(notes("wrap, driver: \"cage@rest\"", "  - {meshes: [shirt], stack: [w, skin]}\n"), "");
+  EXPECT_EQ(notes("wrap, driver: cage", "  - {meshes: [shirt], stack: [restSkin, w]}\n"), "");
+  EXPECT_EQ(notes("shrinkWrap, driver: cage", shirt), "");
+  EXPECT_EQ(notes("wrap, driver: cage, parent: root", shirt), "");
+}
+
+TEST_F(RigDrivers, RestSkinsAreForSkins) {
+  EXPECT_EQ(Errors("deform:\n  - {meshes: [cloth], stack: [restSkin]}\n"),
+            "t.yaml:4:31: mesh \"cloth\" has no skin: leave \"restSkin\" out");
+  for (const char* word : {"skin", "gltf"}) {
+    EXPECT_EQ(
+        Errors(fmt::format("deform:\n  - {{meshes: [shirt], stack: [restSkin, {}]}}\n", word)),
+        fmt::format(
+            "t.yaml:4:41: \"{}\" lets the joints of \"shirt\" move it, and \"restSkin\" does not: leave "
+            "one of them out",
+            word));
+  }
+  EXPECT_TRUE(Has(Errors("deform:\n  - {meshes: [shirt], stack: [restSkin, restSkin]}\n"),
+                  "\"restSkin\" is in this stack twice"));
+  EXPECT_TRUE(Has(Errors("nodes:\n  restSkin: {type: deltaMush}\n"), "is a word of stacks"));
+}
+
 TEST_F(RigDrivers, AShrunkClothLiesOnTheCage) {
   RigPlayer player = Play(std::string("units: {length: cm}\nnodes:\n"
                                       "  s: {type: shrinkWrap, driver: cage, offset: 5, projection: "
@@ -141,7 +257,8 @@ TEST_F(RigDrivers, ErrorsAtTheirLine) {
   EXPECT_EQ(
       errors(", driver: cage", "{meshes: [shirt], stack: [w, skin]}\n"),
       "t.yaml:4:36: \"w\" deforms shirt in mesh space (before the skin), and the driver \"cage\" is in world "
-      "space: name a stage of the driver in the same space");
+      "space: name a stage of the driver in the same space, or write restSkin before it in its stack, "
+      "instead of skin");
   EXPECT_TRUE(Has(errors(", driver: [cage]", cloth), "t.yaml:4:36: driver: expected"));
   EXPECT_TRUE(Has(errors(", drivr: cage", cloth), "has no attribute \"drivr\" (did you mean \"driver\"?)"));
   EXPECT_TRUE(

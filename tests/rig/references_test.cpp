@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "tests/rig/rig_player.h"
+#include "tests/rig/sheets_character.h"
 
 namespace kpsa::engine {
 namespace {
@@ -137,6 +138,32 @@ TEST_F(References, WhatStandsInTheWorldWithoutAHandleGoesAlong) {
                                "flare, endFlareX: 2", "sine, amplitude: 0.2, wavelength: 3",
                                "wave, amplitude: 0.2, wavelength: 3, maxRadius: 5", "sculpt, radius: 9"})
     compare(fmt::format("d: {{type: {}}}", deformer), "d");
+}
+
+// What follows a driver is moved by the reference once, whatever takes it to the world and however far it follows.
+TEST_F(References, FollowersGoAlongOnce) {
+  folder.Write("sheets.gltf", SheetsCharacter().Text());
+  for (const char* stack : {"meshes: [cloth], stack: [w]", "meshes: [shirt], stack: [restSkin, w]",
+                            "meshes: [shirt], stack: [restSkin]", "meshes: [shirt], stack: [skin, w]"}) {
+    for (const char* type :
+         {"wrap", "proximityWrap", "proximityWrap, envelope: 0.4", "proximityWrap, wrapMode: surface"}) {
+      SCOPED_TRACE(fmt::format("{} {}", stack, type));
+      Write(fmt::format("character: sheets.gltf\nnodes: {{w: {{type: {}, driver: cage}}}}\ndeform: [{{{}}}]\n"
+                        "controls: {{tip.rotateY: {{min: -90, max: 90}}}}\n",
+                        type, stack),
+            "placed.yaml");
+      RigPlayer alone(folder / "placed.yaml");
+      RigPlayer moved(Write(
+          "references: {a: {file: placed.yaml, translate: [1, 10, 0.5]}}\noverrides: {a.rotateZ: 90}\n"));
+      ASSERT_TRUE(alone.ok() && moved.ok());
+      alone.Set("tip.rotateY", 0.5), moved.Set("a:tip.rotateY", 0.5);
+      for (std::size_t mesh = 0; mesh < 3; ++mesh) {
+        std::vector<Double3> expected = alone.Points(mesh);
+        for (Double3& p : expected) p = {1 - p.y, 10 + p.x, 0.5 + p.z};
+        EXPECT_LT(MaxDistance(moved.Points(mesh), expected), 1e-5) << mesh;
+      }
+    }
+  }
 }
 
 TEST_F(References, StandBesideACharacterAndAGltfFileIsARig) {

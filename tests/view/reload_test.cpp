@@ -31,9 +31,8 @@ TEST(LiveEdits, ABrokenOneIsToldAndAMendedOneIsShown) {
   live->folder().Write("rig.yaml",
                        Replaced(good, "type: deltaMush, iterations", "type: deltaMush, iteration"));
   // A look may fall between the two steps of writing a file
-  const Json broken = live->WaitFor([](const Json& state) {
-    return !state["problems"].empty() && state["problems"][0]["line"] == 8;
-  });
+  const Json broken = live->WaitFor(
+      [](const Json& state) { return !state["problems"].empty() && state["problems"][0]["line"] == 8; });
   ASSERT_FALSE(broken["problems"].empty());
   const Json& problem = broken["problems"][0];
   EXPECT_EQ(problem["file"], live->rig());
@@ -66,6 +65,26 @@ TEST(LiveEdits, TheCharacterIsLookedAtAsWell) {
   live->folder().Write("hello.glb", glb);
   const Json back = live->WaitFor([](const Json& state) { return state["problems"].empty(); });
   EXPECT_EQ(back["generation"], 2);
+}
+
+TEST(LiveEdits, FilesOfShapesAreLookedAtAsWell) {
+  const auto live = LiveServer::Hello();
+  const auto shape = [&](double lift) {
+    std::string text = "v 0 " + std::to_string(lift) + " 0\n";
+    for (int v = 1; v < 794; ++v) text += "v 0 0 0\n";
+    return live->folder().Write("lift.obj", text);
+  };
+  shape(0.25);
+  std::string rig = TemporaryFolder::Read(live->rig());
+  rig = Replaced(
+      rig, "nodes:\n",
+      "nodes:\n  fix: {type: blendShape, targets: {file: lift.obj, as: positions}, 'weight[lift]': 1}\n");
+  live->folder().Write("rig.yaml", Replaced(rig, "[skin, cage, mush]", "[skin, cage, mush, fix]"));
+  const Json first = live->WaitFor([](const Json& state) { return state["generation"] != 1; });
+  const Evaluated before = live->Evaluate(Bent());
+  shape(0.5);
+  live->WaitFor([&](const Json& state) { return state["generation"] != first["generation"]; });
+  EXPECT_NE(live->Evaluate(Bent()).parts, before.parts);
 }
 
 TEST(LiveEdits, ASubspaceThatNoLongerFitsIsAWarning) {

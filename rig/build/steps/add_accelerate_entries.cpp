@@ -44,6 +44,11 @@ void AddAccelerateEntries(const BuildInput& in, CharacterGraph* scene,
       const CharacterMesh& mesh = in.rig.scene.meshes[*mesh_index];
       const Stage* stage = in.names.FindStage(mesh, points.stage, points.where);
       if (stage == nullptr) continue;
+      if (stage == &mesh.at_rest) {
+        in.Fail(points.where,
+                Status::Invalid("\"{}\" rests there: there is nothing to accelerate", mesh.name));
+        continue;
+      }
       if (const auto [it, added] = by_mesh.emplace(*mesh_index, points.where); !added) {
         in.Fail(points.where, Status::Invalid("points of \"{}\" are accelerated already, at {}", mesh.name,
                                               it->second.ToString()));

@@ -6,7 +6,7 @@ namespace kpsa::engine {
 namespace {
 
 // Words of stacks: no node may be called so.
-constexpr const char* kStackWords[] = {"gltf", "morph", "skin", "transform"};
+constexpr const char* kStackWords[] = {"gltf", "morph", "skin", "restSkin", "transform"};
 
 }  // namespace
 

@@ -2,20 +2,62 @@
 
 #include <algorithm>
 
+#include "base/matrix.h"
 #include "rig/build/stack_parts.h"
 #include "rig/graph_editor.h"
 
 namespace kpsa::engine {
 namespace {
 
-bool ResolveStack(const BuildInput& in, const RigDeform& deform, std::size_t mesh_index, bool any_morphs,
-                  MadeNodes* nodes, std::vector<Stage>* stages, Graph* graph) {
+// The file's skin with its joints at rest, for a mesh that something else moves.
+NodeId AddRestSkin(const BuildInput& in, const RestPose& rest, const CharacterMesh& mesh,
+                   const RigString& item, Graph* graph) {
+  GraphEditor edit(graph);
+  const NodeId node = edit.AddFresh("skinCluster", mesh.name + "_restSkin");
+  edit.Set(node, "influences", 0, mesh.influences);
+  // It stands in the world, and goes along with a reference as all that does
+  const NodeId place = edit.AddFresh("transform", mesh.name + "_restPlace");
+  for (std::size_t j = 0; j < mesh.influence_nodes.size(); ++j) {
+    const int element = static_cast<int>(j);
+    const Matrix4& joint = rest.NodeWorld(in.names.GltfNode(mesh.influence_nodes[j]));
+    edit.Set(node, "bindPreMatrix", element, joint * mesh.inverse_binds[j]);
+    edit.Connect(edit.Plug(place, "worldMatrix"), edit.Plug(node, "matrix", element));
+  }
+  in.Fail(item.where, edit.Take());
+  return node;
+}
+
+// The stage that takes a mesh of the file to the world is its own, or `restSkin` where the stack has that.
+bool ChooseSkin(const BuildInput& in, const RigDeform& deform, const CharacterMesh& mesh,
+                const RestPose& rest, Stage* into_world, Graph* graph) {
+  const auto item = std::find_if(deform.stack.begin(), deform.stack.end(),
+                                 [](const RigString& each) { return each.text == "restSkin"; });
+  if (item == deform.stack.end()) return true;
+  if (into_world->name != "skin") {
+    return in.Fail(item->where,
+                   Status::Invalid("mesh \"{}\" has no skin: leave \"restSkin\" out", mesh.name));
+  }
+  for (const RigString& other : deform.stack) {
+    if (other.text == "skin" || other.text == "gltf") {
+      return in.Fail(other.where,
+                     Status::Invalid("\"{}\" lets the joints of \"{}\" move it, and \"restSkin\" does "
+                                     "not: leave one of them out",
+                                     other.text, mesh.name));
+    }
+  }
+  *into_world = {item->text, AddRestSkin(in, rest, mesh, *item, graph), 0, true, {}};
+  return true;
+}
+
+bool ResolveStack(const BuildInput& in, const RestPose& rest, const RigDeform& deform, std::size_t mesh_index,
+                  bool any_morphs, MadeNodes* nodes, std::vector<Stage>* stages, Graph* graph) {
   const CharacterMesh& mesh = in.rig.scene.meshes[mesh_index];
   std::vector<Stage> own = OwnStages(mesh);
+  if (!ChooseSkin(in, deform, mesh, rest, &own.back(), graph)) return false;
   const Stage* morph = own.front().name == "morph" ? &own.front() : nullptr;
   const Stage& into_world = own.back();  // skin or transform
   const bool placed = std::any_of(deform.stack.begin(), deform.stack.end(), [](const RigString& item) {
-    return item.text == "gltf" || item.text == "skin" || item.text == "transform";
+    return item.text == "gltf" || item.text == "skin" || item.text == "restSkin" || item.text == "transform";
   });
   bool world = false, good = true;
   const auto add_own = [&](const Stage& stage, const RigString& item) {
@@ -51,8 +93,8 @@ bool ResolveStack(const BuildInput& in, const RigDeform& deform, std::size_t mes
                        Status::Invalid("mesh \"{}\" has no morph targets: leave \"morph\" out", mesh.name));
       }
     }
-    if (item.text == "gltf" || item.text == "skin" || item.text == "transform") {
-      if (item.text == "transform" && into_world.name == "skin") {
+    if (item.text == "gltf" || item.text == "skin" || item.text == "restSkin" || item.text == "transform") {
+      if (item.text == "transform" && into_world.name != "transform") {
         good = in.Fail(item.where,
                        Status::Invalid("mesh \"{}\" has a skin, which ignores its transform: write \"skin\"",
                                        mesh.name));
@@ -60,7 +102,8 @@ bool ResolveStack(const BuildInput& in, const RigDeform& deform, std::size_t mes
         add_own(into_world, item);
       }
     }
-    if (item.text == "gltf" || item.text == "morph" || item.text == "skin" || item.text == "transform")
+    if (item.text == "gltf" || item.text == "morph" || item.text == "skin" || item.text == "restSkin" ||
+        item.text == "transform")
       continue;
     MadeNode* made = FindDeformer(in, item, nodes);
     if (made == nullptr) {
@@ -80,23 +123,25 @@ bool ResolveStack(const BuildInput& in, const RigDeform& deform, std::size_t mes
   return good;
 }
 
-void BuildMeshStack(const BuildInput& in, const RigDeform& deform, std::size_t mesh_index, bool any_morphs,
-                    MadeNodes* nodes, CharacterGraph* scene, Graph* graph, std::vector<std::string>* notes) {
+void BuildMeshStack(const BuildInput& in, const RestPose& rest, const RigDeform& deform,
+                    std::size_t mesh_index, bool any_morphs, MadeNodes* nodes, CharacterGraph* scene,
+                    Graph* graph, std::vector<std::string>* notes) {
   std::vector<Stage> stages;
-  if (!ResolveStack(in, deform, mesh_index, any_morphs, nodes, &stages, graph)) return;
+  if (!ResolveStack(in, rest, deform, mesh_index, any_morphs, nodes, &stages, graph)) return;
   CharacterMesh& mesh = scene->meshes[mesh_index];
   in.Fail(deform.where, ConnectStages(std::move(stages), &mesh, graph));
   if (!mesh.world) {
     notes->push_back(
-        fmt::format("{}: the stack of \"{}\" leaves out its skin, so that its points stay in mesh space",
+        fmt::format("{}: the stack of \"{}\" leaves out its skin, so that its points stay in mesh space; "
+                    "restSkin takes them to the world without moving them",
                     deform.where.ToString(), mesh.name));
   }
 }
 
 }  // namespace
 
-void BuildMeshStacks(const BuildInput& in, MadeNodes* nodes, CharacterGraph* scene, Graph* graph,
-                     std::vector<std::string>* notes) {
+void BuildMeshStacks(const BuildInput& in, const RestPose& rest, MadeNodes* nodes, CharacterGraph* scene,
+                     Graph* graph, std::vector<std::string>* notes) {
   std::vector<std::optional<SourceLocation>> stack_of_mesh(scene->meshes.size());
   for (const RigDeform& deform : in.file.deform) {
     std::vector<std::pair<std::size_t, SourceLocation>> meshes;
@@ -115,7 +160,7 @@ void BuildMeshStacks(const BuildInput& in, MadeNodes* nodes, CharacterGraph* sce
       meshes.emplace_back(*mesh, name.where);
     }
     for (const auto& [mesh, where] : meshes)
-      BuildMeshStack(in, deform, mesh, any_morphs, nodes, scene, graph, notes);
+      BuildMeshStack(in, rest, deform, mesh, any_morphs, nodes, scene, graph, notes);
   }
 }
 

@@ -71,7 +71,7 @@ void BuildPointStack(const BuildInput& in, const RigDeform& deform, const RestCu
   if (points == nullptr) return;
   std::optional<PlugRef> last;
   for (const RigString& item : deform.stack) {
-    for (const char* word : {"gltf", "morph", "skin", "transform"}) {
+    for (const char* word : {"gltf", "morph", "skin", "restSkin", "transform"}) {
       if (item.text == word)
         in.Fail(item.where, Status::Invalid("\"{}\" belongs to meshes, not to {}", word, name.text));
     }

@@ -71,9 +71,10 @@ void ConnectDriver(const BuildInput& in, const MadeNode& made, const RigAttribut
   if (!made.geometries.empty() && world != made.world) {
     in.Fail(where,
             Status::Invalid("\"{}\" deforms {} in {}, and the driver \"{}\" is in {}: name a stage of the "
-                            "driver in the same space",
+                            "driver in the same space{}",
                             made.from->name, made.geometries.front().name, SpaceName(made.world), text,
-                            SpaceName(world)));
+                            SpaceName(world),
+                            made.world ? "" : ", or write restSkin before it in its stack, instead of skin"));
     return;
   }
   GraphEditor edit(graph);
