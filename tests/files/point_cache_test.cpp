@@ -323,7 +323,7 @@ TEST(MorphGlb, FlatPartsHaveNoNormals) {
     mesh.frames.insert(mesh.frames.end(), {0, lift, 0, 0, 0, 1, 1, 0, 0, 2, lift, 0, 2, 0, 1, 3, 0, 0});
   const TemporaryFolder folder;
   const std::string path = folder / "a.glb";
-  ASSERT_TRUE(WriteMorphGlb(path, cache, {}).ok());
+  ASSERT_TRUE(WriteGlb(path, cache, {}).ok());
   const json root = GlbJson(path);
   for (const int part : {0, 1}) {
     const json& primitive = root["meshes"][0]["primitives"][static_cast<std::size_t>(part)];
