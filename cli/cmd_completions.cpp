@@ -21,7 +21,7 @@ void AddCompletionsCommand(CLI::App* program, Command* chosen) {
                                    Print(*text);
                                    return 0;
                                  });
-  AddRequired(command, "SHELL", shell.get(), "bash, zsh or fish");
+  AddRequired(command, "SHELL", shell.get(), "whose completions", "bash|zsh|fish");
 }
 
 void AddManCommand(CLI::App* program, Command* chosen) {

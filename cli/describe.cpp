@@ -34,7 +34,7 @@ OptionDoc DescribeOption(const CLI::Option& option) {
   doc.doc = option.get_description();
   doc.required = option.get_required();
   doc.repeated = option.get_items_expected_max() > 1;
-  doc.choices = ChoicesOf(doc.value);
+  doc.choices = ChoicesOf(option.get_type_name());
   const std::string& what = doc.positional ? doc.names.front() : doc.value;
   doc.takes_file =
       what.starts_with("FILE") || what == "RIG" || what == "MAP" || what == "FOLDER" || what == "CHARACTER";

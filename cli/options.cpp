@@ -38,10 +38,12 @@ void AddOption(CLI::App* command, const std::string& name, const std::string& va
   if (!value.empty()) option->type_name(value);
 }
 
-void AddRequired(CLI::App* command, const std::string& name, std::string* to, const std::string& doc) {
-  command->add_option(name, *to, doc)->required()->check([](const std::string& text) {
+void AddRequired(CLI::App* command, const std::string& name, std::string* to, const std::string& doc,
+                 const std::string& value) {
+  CLI::Option* option = command->add_option(name, *to, doc)->required()->check([](const std::string& text) {
     return text.empty() ? std::string("expected the name of a file, found an empty text") : std::string();
   });
+  if (!value.empty()) option->type_name(value);
 }
 
 void AddRepeated(CLI::App* command, const std::string& name, const std::string& value,

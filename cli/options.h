@@ -22,7 +22,8 @@ CLI::App* AddCommandGroup(CLI::App* program, const std::string& name, const std:
 // Positional arguments where the name has no dash. `value` names what is expected ("FILE", "A:B[:S]").
 void AddOption(CLI::App* command, const std::string& name, const std::string& value,
                std::optional<std::string>* to, const std::string& doc);
-void AddRequired(CLI::App* command, const std::string& name, std::string* to, const std::string& doc);
+void AddRequired(CLI::App* command, const std::string& name, std::string* to, const std::string& doc,
+                 const std::string& value = "");
 // An option that may be repeated (one value each time), or all remaining positional arguments (at least one).
 void AddRepeated(CLI::App* command, const std::string& name, const std::string& value,
                  std::vector<std::string>* to, const std::string& doc);

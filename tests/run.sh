@@ -3,10 +3,10 @@
 set -e
 cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh clang libclang-rt-14-dev
-sh cmake/dependencies.sh blender chromium &  # for tests of the Python module and of the page; it takes as long as a good part of the build
+sh cmake/dependencies.sh blender chromium zsh fish &  # for tests of the Python module, of the page and of completions; it takes as long as a good part of the build
 others=$!
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
 cmake --build build
-wait $others || echo "Blender or Chromium could not be installed: their tests are skipped"
+wait $others || echo "Blender, Chromium or shells could not be installed: their tests are skipped"
 ctest --test-dir build --output-on-failure -j "$(nproc)"
 sh tests/sanitize.sh

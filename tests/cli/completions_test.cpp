@@ -109,7 +109,59 @@ TEST(Completions, BashCompletesAllThatHelpSays) {
   EXPECT_EQ(answer(), std::set<std::string>());
 }
 
-// zsh and fish may not be here: what they are given names everything.
+// The lines that a user has begun, as zsh and fish complete them.
+const char* const kBegun[] = {"kpsa ev",          "kpsa eval --thr",
+                              "kpsa weights exp", "kpsa eval a --stale re",
+                              "kpsa help we",     "kpsa completions z"};
+const char* const kCompleted[] = {"kpsa eval ",           "kpsa eval --threads ",
+                                  "kpsa weights export ", "kpsa eval a --stale refuse ",
+                                  "kpsa help weights ",   "kpsa completions zsh "};
+
+TEST(Completions, ZshCompletesWhatIsBegun) {
+  if (RunShell("command -v zsh", 60, "/").exit_code != 0) GTEST_SKIP() << "there is no zsh here";
+  const TemporaryFolder folder;
+  folder.Write("_kpsa", Printed({"completions", "zsh"}));
+  // In a terminal of its own; the words of what it waits for are never echoed as such
+  std::string script =
+      "zmodload zsh/zpty\nzpty z zsh -f -i\n"
+      "zpty -w z \"fpath=($PWD \\$fpath); autoload -Uz compinit; compinit -u -D; tell() { zle complete-word; "
+      "print -r -- "
+      "\\\"\\$BUFFER\\\" >> answers; BUFFER=; zle -M to'ld'; }; zle -N tell; bindkey '^I' tell; "
+      "PS1='rea''dy> '\"\n"
+      "zpty -r z out '*ready> *'\n";
+  for (const char* line : kBegun)
+    script += std::string("zpty -w -n z '") + line + "'$'\\t'\nzpty -r z out '*told*'\n";
+  folder.Write("ask.zsh", script + "zpty -d z\n");
+  const ProcessResult run = RunShell("zsh -f ask.zsh", 120, folder.path());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  std::istringstream answers(TemporaryFolder::Read(folder / "answers"));
+  for (const char* completed : kCompleted) {
+    std::string answer;
+    std::getline(answers, answer);
+    EXPECT_EQ(answer, completed);
+  }
+}
+
+TEST(Completions, FishCompletesWhatIsBegun) {
+  if (RunShell("command -v fish", 60, "/").exit_code != 0) GTEST_SKIP() << "there is no fish here";
+  const TemporaryFolder folder;
+  folder.Write("kpsa.fish", Printed({"completions", "fish"}));
+  for (std::size_t i = 0; i < std::size(kBegun); ++i) {
+    const ProcessResult run =
+        RunShell("HOME=$PWD XDG_CONFIG_HOME=$PWD fish --no-config -c 'source kpsa.fish; complete -C \"" +
+                     std::string(kBegun[i]) + "\"'",
+                 120, folder.path());
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const std::string begun = kBegun[i], completed = kCompleted[i];
+    const std::string word = completed.substr(begun.rfind(' ') + 1, completed.size() - begun.rfind(' ') - 2);
+    std::istringstream lines(run.out);
+    std::set<std::string> words;
+    for (std::string line; std::getline(lines, line);) words.insert(line.substr(0, line.find('\t')));
+    EXPECT_EQ(words, std::set<std::string>{word}) << begun;
+  }
+}
+
+// What they are given names everything.
 TEST(Completions, ZshAndFishAreGivenAllThatHelpSays) {
   const std::string zsh = Printed({"completions", "zsh"}), fish = Printed({"completions", "fish"});
   for (const CommandHelp& told : AllCommands()) {
