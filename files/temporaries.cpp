@@ -37,7 +37,11 @@ void DropTemporary(const std::string& path) {
 
 void RemoveTemporaries() {
   for (std::atomic<char*>& slot : names) {
-    if (const char* name = slot.exchange(nullptr)) ::unlink(name);
+    // Taken meanwhile: whoever drops it now does not free it
+    char* const name = slot.exchange(nullptr);
+    if (name == nullptr) continue;
+    ::unlink(name);
+    slot.store(name);
   }
 }
 
