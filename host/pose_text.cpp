@@ -4,6 +4,7 @@
 #include <charconv>
 #include <map>
 
+#include "files/quantity.h"
 #include "host/plug_columns.h"
 #include "host/rig_frames.h"
 
@@ -16,7 +17,7 @@ std::string ShortestText(double value, double factor) {
     const std::string text = fmt::format("{:.{}g}", value / factor, digits);
     double read = 0;
     std::from_chars(text.data(), text.data() + text.size(), read);
-    if (read * factor == value) return text;
+    if (read * factor == value) return NumberText(read);
   }
   return fmt::format("{:.17g}", value / factor);
 }

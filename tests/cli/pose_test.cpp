@@ -31,6 +31,7 @@ class PoseFiles : public ::testing::Test {
 
 TEST_F(PoseFiles, HoldWhatDiffersFromRestInTheRigsUnits) {
   EXPECT_EQ(Write({"--set", "upper.rotateZ=-20.1"}), "kpsa: 1\npose:\n  upper.rotateZ: -20.1\n");
+  EXPECT_EQ(Write({"--set", "upper.rotateZ=10"}), "kpsa: 1\npose:\n  upper.rotateZ: 10\n");
   EXPECT_EQ(Write({"--set", "upper.rotateZ=0"}), "kpsa: 1\npose: {}\n");
   EXPECT_EQ(Write({}), "kpsa: 1\npose: {}\n");
   EXPECT_EQ(Write({"--rest"}), "kpsa: 1\nclip: \"\"\npose: {}\n");
