@@ -85,7 +85,7 @@ inline bool ComputeAndCompare(const Plan::Step& step, ComputeContext& context) {
 }
 
 template <bool kRecord>
-inline bool Evaluator::Compute(Index number, Index cause, bool stale) {
+[[gnu::always_inline]] inline bool Evaluator::Compute(Index number, Index cause, bool stale) {
   const Plan::Step& step = plan_->steps()[number];
   StepHost host(this, number);
   ComputeContext context = ContextOf(step);
@@ -93,10 +93,14 @@ inline bool Evaluator::Compute(Index number, Index cause, bool stale) {
   std::uint64_t begin = 0;
   if constexpr (kRecord) begin = ProfileClock();
   bool changed = stale;
-  if (step.value_size > 0 && step.value_size <= kComparedBytes) {
-    host.Guard([&] { changed = ComputeAndCompare(step, context) || computed_[number] == 0; });
-  } else {
-    host.Guard([&] { step.compute(context); });
+  try {
+    if (step.value_size > 0 && step.value_size <= kComparedBytes) {
+      changed = ComputeAndCompare(step, context) || computed_[number] == 0;
+    } else {
+      step.compute(context);
+    }
+  } catch (...) {  // not on to a thread that nobody watches
+    host.Fail(ThrownText());
   }
   if constexpr (kRecord) AddEvent(number, cause, begin, ProfileClock());
   if (host.failed) [[unlikely]] {
