@@ -16,9 +16,9 @@ double RecordingNs(const Plan& plan, const RecordedSteps& recorded) {
   constexpr int kEvents = 4000;
   if (plan.steps().empty()) return 0;
   Profile profile(plan);
-  const std::uint64_t begin = ProfileClock();
+  const std::uint64_t begin = ThreadCpuClock();  // others may run meanwhile
   for (int i = 0; i < kEvents; ++i) profile.Add({0, kNoIndex, ProfileClock(), ProfileClock(), 0, 0});
-  const double each = static_cast<double>(ProfileClock() - begin) / kEvents;
+  const double each = static_cast<double>(ThreadCpuClock() - begin) / kEvents;
   double events = 0;
   for (std::uint64_t count : recorded.counts) events += static_cast<double>(count);
   return each * events;
@@ -93,6 +93,7 @@ Status Side::RecordTurn(const std::vector<double>& at, std::size_t first, std::s
   Profile profile(*plan);
   RecordedSteps turn;
   turn.counts.resize(plan->steps().size());
+  double steps_ns = 0;
   for (std::size_t f = first; f < end; ++f) {
     double wall = 0;
     for (int attempt = 0;; ++attempt) {
@@ -117,11 +118,12 @@ Status Side::RecordTurn(const std::vector<double>& at, std::size_t first, std::s
     turn.wall_ns += wall;
     for (std::size_t s = 0; s < turn.counts.size(); ++s) {
       recorded->self_ns[s] += static_cast<double>(profile.self_ns()[s]);
+      steps_ns += static_cast<double>(profile.self_ns()[s]);
       recorded->counts[s] += profile.counts()[s];
       turn.counts[s] += profile.counts()[s];
     }
   }
-  recorded->wall_ns += turn.wall_ns - RecordingNs(*plan, turn);
+  recorded->wall_ns += std::max(steps_ns, turn.wall_ns - RecordingNs(*plan, turn));
   return Status();
 }
 

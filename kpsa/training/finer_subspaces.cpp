@@ -9,6 +9,7 @@ namespace kpsa::engine {
 Status CandidateCalibrator::Calibrate(Subspace* subspace) const {
   TrainingSetup& setup = *candidates->setup;
   RangeFinder own = ranges;
+  if (candidates->by_tile) own.Widen(candidates->ranges_of_tiles);
   const Calibrator calibrator{setup.rig,
                               setup.clips,
                               setup.options,

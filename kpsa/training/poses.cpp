@@ -10,6 +10,8 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kClipFrames = 80;  // frames of the clips to mix
+// Of a mesh's weights, in the share of other controls that move together: shapes add up where they overlap
+constexpr double kWeightsTogether = 0.25;
 
 class Sampler {
  public:
@@ -62,6 +64,24 @@ class Sampler {
     const std::vector<std::size_t>& group = groups[random_.Below(groups.size())];
     const std::size_t count = std::min(group.size(), 2 + random_.Below(5));
     for (const std::size_t k : Some(group.size(), count)) Move(group[k], 0.5 + 0.5 * random_.Unit(), pose);
+  }
+
+  // Most nodes at once, each about all of its axes, as a clip does that nobody trained on.
+  void MoveTogether(SampledPose* pose) {
+    const double share = 0.3 + 0.7 * random_.Unit(), reach = 0.2 + 0.8 * random_.Unit();
+    bool moves = false;
+    for (std::size_t i = 0; i < controls_.size(); ++i) {
+      const ControlRange& c = controls_[i];
+      if (i == 0 || controls_[i - 1].plug.node != c.plug.node || c.plug.element >= 0)
+        moves = random_.Unit() < (c.plug.element >= 0 ? kWeightsTogether * share : share);
+      if (moves) pose->values[i] = c.rest + (c.min + (c.max - c.min) * random_.Unit() - c.rest) * reach;
+    }
+  }
+
+  // Every control at an end.
+  void MoveToEnds(SampledPose* pose) {
+    for (std::size_t i = 0; i < controls_.size(); ++i)
+      pose->values[i] = random_.Unit() < 0.5 ? controls_[i].min : controls_[i].max;
   }
 
   // Controls of a clip that plays say nothing; whole numbers have no margin.
@@ -179,6 +199,22 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
     }
     poses.push_back(std::move(pose));
   }
+  return poses;
+}
+
+std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls, std::size_t count,
+                                       std::uint64_t seed) {
+  Sampler sampler(controls, {}, seed);
+  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
+  for (SampledPose& pose : poses) sampler.MoveTogether(&pose);
+  return poses;
+}
+
+std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
+                                     std::uint64_t seed) {
+  Sampler sampler(controls, {}, seed);
+  std::vector<SampledPose> poses(controls.empty() ? 0 : count, sampler.Rest());
+  for (SampledPose& pose : poses) sampler.MoveToEnds(&pose);
   return poses;
 }
 

@@ -57,6 +57,16 @@ std::vector<SampledPose> SamplePoses(const std::vector<ControlRange>& controls, 
                                      const ControlGroups& groups, std::size_t clips, std::size_t count,
                                      std::uint64_t seed);
 
+// `count` poses in which most controls move at once, each node's together. What has no other inputs than the
+// joints near it learns them all from each of these.
+std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls, std::size_t count,
+                                       std::uint64_t seed);
+
+// `count` poses with every control at its least or its most: among them is about each corner of what three
+// controls of a transform reach, where the entries of its matrix end.
+std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
+                                     std::uint64_t seed);
+
 // `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours).
 std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
                                      const ClipPoses& clip_poses, const ControlGroups& groups,

@@ -131,6 +131,11 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   PoseMatrix more(setup->layout);
   KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));
   record->sampled_poses += more.poses();
+  ranges_of_tiles = RangeFinder(setup->layout);
+  ranges_of_tiles.Widen(more);
+  PoseMatrix ends(setup->layout);
+  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddEnds(&ends));
+  ranges_of_tiles.Widen(ends);
   if (more.poses() > 0) more.Subtract(modes->pca.mean);
   poses->poses.Append(more);
   if (poses->spare) {

@@ -9,6 +9,7 @@
 #include "kpsa/training/frame_cost.h"
 #include "kpsa/training/tile_candidates.h"
 #include "kpsa/training/tile_subspace.h"
+#include "kpsa/training/trained_ranges.h"
 #include "kpsa/training/training_modes.h"
 
 namespace kpsa::engine {
@@ -34,8 +35,9 @@ struct SubspaceCandidates {
   bool fine = false;         // tiles
   bool by_tile = false;      // its cues
   bool tried_tiles = false;
-  FrameCost cost = {};    // by the last calibration, but points
-  TileChoice tiles = {};  // where they were tried
+  FrameCost cost = {};               // by the last calibration, but points
+  TileChoice tiles = {};             // where they were tried
+  RangeFinder ranges_of_tiles = {};  // of the poses that these alone were trained on
   // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost
   Subspace others = {};
   double others_ns = std::numeric_limits<double>::infinity();

@@ -33,6 +33,14 @@ void RangeFinder::Widen(std::span<const float> scalars) {
   }
 }
 
+void RangeFinder::Widen(const RangeFinder& others) {
+  if (others.lo_.empty()) return;
+  for (const std::vector<double>* end : {&others.lo_, &others.hi_}) {
+    const std::vector<float> scalars(end->begin(), end->end());
+    Widen(scalars);
+  }
+}
+
 Status RangeFinder::Widen(const std::vector<TrainingClip>& clips, PoseRecorder* recorder) {
   for (const TrainingClip& clip : clips) {
     TrainingClip fine{clip.name, {}};

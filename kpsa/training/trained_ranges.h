@@ -13,6 +13,7 @@ class RangeFinder {
 
   void Widen(const PoseMatrix& poses);         // not centred
   void Widen(std::span<const float> scalars);  // of one pose, all of them
+  void Widen(const RangeFinder& others);
   // By the clips between their times: quaternion keys turn joints about axes there that no frame has.
   Status Widen(const std::vector<TrainingClip>& clips, PoseRecorder* recorder);
 

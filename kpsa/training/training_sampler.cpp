@@ -13,6 +13,8 @@ constexpr std::size_t kMostPoseBytes = 1'500'000'000;  // of training poses, and
 constexpr std::size_t kMostJudgeBytes = 400'000'000;   // of those that judge: huge meshes have fewer, but
 constexpr std::size_t kLeastSamples = 200;
 constexpr std::size_t kJudges = 300;  // sampled ones; a third as many of each other kind
+constexpr std::size_t kAtEnds = 40;   // poses: each of eight corners is missed by one transform in 200
+constexpr double kTogether = 0.3;     // of the samples, besides: poses that move most controls at once
 constexpr std::pair<PoseKind, double> kOtherKinds[] = {
     {PoseKind::kBeyond, 0.08}, {PoseKind::kMixture, 0.06}, {PoseKind::kNeighbours, 0.06}};
 
@@ -62,8 +64,19 @@ Status TrainingSampler::AddTraining(PoseMatrix* poses) const {
 }
 
 Status TrainingSampler::AddMore(const PoseMatrix& beside, PoseMatrix* poses) const {
-  return AddSampled(std::min(options_.samples, RoomBeside(beside)), options_.seed ^ 0xa54ff53a5f1d36f1ull,
-                    poses);
+  const std::uint64_t seed = options_.seed ^ 0xa54ff53a5f1d36f1ull;
+  const std::size_t room = RoomBeside(beside), count = std::min(options_.samples, room);
+  KPSA_RETURN_IF_ERROR(AddSampled(count, seed, poses));
+  const auto together = static_cast<std::size_t>(kTogether * static_cast<double>(options_.samples));
+  std::vector<SampledPose> at_once = PosesTogether(drawn_, std::min(together, room - count), ~seed);
+  AddTilts(rig_.controls, drawn_.size(), ~seed, &at_once);
+  return recorder_->AddSamples(at_once, clips_, poses);
+}
+
+Status TrainingSampler::AddEnds(PoseMatrix* poses) const {
+  std::vector<SampledPose> at_ends = PosesAtEnds(drawn_, kAtEnds, options_.seed);
+  AddTilts(rig_.controls, drawn_.size(), options_.seed, &at_ends);
+  return recorder_->AddSamples(at_ends, clips_, poses);
 }
 
 std::size_t TrainingSampler::RoomBeside(const PoseMatrix& poses) const {

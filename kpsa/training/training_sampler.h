@@ -31,8 +31,11 @@ class TrainingSampler {
   // Sweeps, and as many samples as the options want and memory holds: the sampler's kind, and some of the
   // others. Light: no others.
   Status AddTraining(PoseMatrix* poses) const;
-  // More samples, of another seed, as far as there is room beside the poses.
+  // More samples, of another seed, as far as there is room beside the poses; and PosesTogether, for tiles with
+  // cues of their own.
   Status AddMore(const PoseMatrix& beside, PoseMatrix* poses) const;
+  // Of which only the values of transforms are of use, not the points.
+  Status AddEnds(PoseMatrix* poses) const;
   // New poses that judge; kinds: the PoseKind of each.
   Status AddJudges(PoseMatrix* judges, std::vector<int>* kinds) const;
 
