@@ -327,6 +327,7 @@ void PlanBuilder::FillSteps() {
     info.cost_ns = group == nullptr
                        ? 10.0f + 0.5f * static_cast<float>(info.points)
                        : group->cost_ns + group->cost_ns_per_point * static_cast<float>(info.points);
+    if (const float of_bound = kernels_[placed_[n]].cost_ns; of_bound > 0) info.cost_ns = of_bound;
   }
 }
 

@@ -16,6 +16,7 @@ namespace kpsa::engine {
 // What is tried (TrainingRecord::Tried)
 inline constexpr const char *kForAllPoints = "for all points",
                             *kFinelyStored = "for all points, tiles stored finely",
+                            *kFewerCues = "fewer for all points, tiles stored finely",
                             *kForHalf = "for all points, as for half the tolerance",
                             *kByTile = "of each tile", *kByTileFinely = "of each tile, tiles stored finely";
 

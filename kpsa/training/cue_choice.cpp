@@ -28,6 +28,13 @@ constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many ti
 constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
+// Of the rows: what is tried, fewer until more judges miss, or more where many do
+constexpr double kFewer[] = {0.7, 0.5, 0.35}, kMore = 1.5;
+constexpr double kMissedMore = 0.004;  // of the judges: fewer rows may add so much
+constexpr double kManyMissed = 0.05;   // likewise: more rows are tried
+constexpr double kHalf = 0.5;          // of the cost, for others
+constexpr std::size_t kOthers = 2;
+
 constexpr double kStricter = 0.5;  // of the tolerance: clips that nobody trained on err up to so much more
 
 // Values that move more than they are trusted.
@@ -67,35 +74,80 @@ class Chooser {
     const bool compares = options_.judges != nullptr;
     for (const CuePlace& place : places) {
       place_ = static_cast<std::size_t>(&place - places.data());
-      chosen_.clear();
-      SelectInRounds(place, 3);
+      const bool better = TryPlace(place, true);
       if (chosen_.empty()) continue;
-      AddPoints(place);
-      bool better = compares && KeepIfCheaper();
-      if (better && !options_.by_rms && options_.points_cost(chosen_) > kDear * best_.cost) {
-        const std::vector<CueRef> many = std::exchange(chosen_, {});
-        SelectInRounds(place, kPointPrice);
-        AddPoints(place);
-        if (!KeepIfCheaper()) chosen_ = many;
-      }
-      const bool early = std::any_of(chosen_.begin(), chosen_.end(),
-                                     [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
-      const double hopeless = compares && best_.misses > kMissed ? kFewBeyond : kHopeless;
-      if (early && !options_.by_rms && AddWorstPoints(hopeless)) better |= compares && KeepIfCheaper();
       if (!compares) return {std::move(chosen_), place_};
       if (!better) break;  // earlier ones see even less
     }
+    if (options_.may_choose_rows && !best_.cues.empty()) ChooseRows(places);
+    FindCheaper();
     return std::move(best_);
   }
 
  private:
+  // Whether it is cheaper than those before.
+  bool TryPlace(const CuePlace& place, bool with_worst) {
+    const bool compares = options_.judges != nullptr;
+    chosen_.clear();
+    SelectInRounds(place, 3);
+    if (chosen_.empty()) return false;
+    AddPoints(place);
+    bool better = compares && KeepIfCheaper();
+    if (better && !options_.by_rms && options_.points_cost(chosen_) > kDear * best_.cost) {
+      const std::vector<CueRef> many = std::exchange(chosen_, {});
+      SelectInRounds(place, kPointPrice);
+      AddPoints(place);
+      if (!KeepIfCheaper()) chosen_ = many;
+    }
+    const bool early = std::any_of(chosen_.begin(), chosen_.end(),
+                                   [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
+    const double hopeless = compares && best_.misses > kMissed ? kFewBeyond : kHopeless;
+    if (with_worst && early && !options_.by_rms && AddWorstPoints(hopeless))
+      better |= compares && KeepIfCheaper();
+    return better;
+  }
+
+  // As few rows as the judges do not miss more often with, with half the tolerance, too, since clips err more
+  // than judges do. Or more rows where many miss, if that costs less.
+  void ChooseRows(const std::vector<CuePlace>& places) {
+    const CueChoice all = best_;
+    const bool has_worst = std::ranges::any_of(all.cues, [&](const CueRef& cue) {
+      return std::ranges::find(places[all.place], cue) == places[all.place].end() &&
+             cue.kind != CueKind::kScalar;
+    });
+    const auto with = [&](double share) {
+      rows_ = static_cast<std::size_t>(share * static_cast<double>(options_.rows));
+      return TryPlace(places[place_], has_worst);
+    };
+    place_ = all.place;
+    for (const double share : kFewer) {
+      const CueChoice before = best_;
+      if (with(share) && best_.misses <= all.misses + kMissedMore &&
+          best_.misses_of_stricter <= all.misses_of_stricter + kMissedMore)
+        continue;
+      best_ = before;
+      break;
+    }
+    if (best_.cues == all.cues && std::max(all.misses, all.misses_of_stricter) > kManyMissed) with(kMore);
+  }
+
+  void FindCheaper() {
+    for (CueChoice::Other& other : tried_) {
+      if (other.cost_of_hits < kHalf * best_.cost && other.cues != best_.cues)
+        best_.cheaper.push_back(std::move(other));
+    }
+    std::ranges::stable_sort(best_.cheaper, {}, &CueChoice::Other::cost);
+    if (best_.cheaper.size() > kOthers) best_.cheaper.resize(kOthers);
+  }
+
   // Whether what is chosen is expected to cost less than the best so far, which it then is.
   bool KeepIfCheaper() {
     double rows = 0;
     for (const CueRef& cue : chosen_) rows += cue.kind == CueKind::kScalar ? 1 : 3;
     const Missed missed = Misses(chosen_);
-    const double cost =
-        options_.points_cost(chosen_) + kScoreCost * rows * rows + missed.share * options_.miss_cost;
+    const double of_hits = options_.points_cost(chosen_) + kScoreCost * rows * rows,
+                 cost = of_hits + missed.share * options_.miss_cost;
+    tried_.push_back({chosen_, cost, of_hits});
     if (!best_.cues.empty() && cost >= best_.cost) return false;
     best_ = {chosen_, place_, cost, missed.share, missed.of_stricter};
     return true;
@@ -160,10 +212,10 @@ class Chooser {
     for (std::size_t round = 1; round <= rounds; ++round) {
       CueSelectionOptions selection;
       selection.fixed = chosen_;
-      selection.count = options_.rows;
+      selection.count = rows_;
       // At other prices as many points fit in as have to be there
       const double budget =
-          static_cast<double>(options_.rows) + (point_price - 3) * static_cast<double>(options_.min_points);
+          static_cast<double>(rows_) + (point_price - 3) * static_cast<double>(options_.min_points);
       selection.max_cost = budget * static_cast<double>(round) / static_cast<double>(rounds);
       selection.marginal_cost = [point_price](CueRef cue, std::span<const CueRef>) {
         return cue.kind == CueKind::kScalar ? 1.0 : point_price;
@@ -227,7 +279,8 @@ class Chooser {
   const CueNoise& noise_;
   const PoseMatrix& poses_;
   const CueChoiceOptions& options_;
-  std::size_t place_ = 0;
+  std::size_t place_ = 0, rows_ = options_.rows;
+  std::vector<CueChoice::Other> tried_;
   std::vector<CueRef> chosen_;
   CueChoice best_;
 };

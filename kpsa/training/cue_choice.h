@@ -13,9 +13,10 @@ namespace kpsa::engine {
 using CuePlace = std::vector<CueRef>;  // points that may be measured together
 
 struct CueChoiceOptions {
-  std::size_t rows = 300;       // of measurements: a point takes 3, a scalar 1
-  std::size_t min_points = 16;  // points see what no scalar does: some of them are kept to judge by
-  double tolerance = 1e-4;      // scene units
+  std::size_t rows = 300;        // of measurements: a point takes 3, a scalar 1
+  bool may_choose_rows = false;  // fewer or more of them, where judges say that a frame then costs less
+  std::size_t min_points = 16;   // points see what no scalar does: some of them are kept to judge by
+  double tolerance = 1e-4;       // scene units
   // Where errors count by their RMS alone (light, with its noise): one round, no worst points.
   bool by_rms = false;
   std::size_t max_outputs = 0;  // output points that may become cues, spread; 0: all
@@ -44,6 +45,14 @@ struct CueChoice {
   // (points, score, misses), and the share of misses; likewise with half the tolerance.
   std::size_t place = 0;
   double cost = 0, misses = 0, misses_of_stricter = 0;
+  // Others that would cost less than half of it if none missed, at most two, those first that are expected to
+  // cost least: the score that compared them here is not the one that a subspace gets
+  // (kpsa/training/score_choice.h).
+  struct Other {
+    std::vector<CueRef> cues;
+    double cost = 0, cost_of_hits = 0;
+  };
+  std::vector<Other> cheaper = {};
 };
 
 // A-optimal cues (kpsa/training/cue_selection.h): points of one place and scalars, in rounds: after each

@@ -60,7 +60,7 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   const auto for_all_points = [&] {
     of.cues.set = MakeCueSet(of.modes->pca, of.cues.choice.cues, of.modes->noise);
   };
-  const char* const fine = of.by_tile ? kByTileFinely : kFinelyStored;
+  const char* const fine = of.by_tile ? kByTileFinely : of.fewer ? kFewerCues : kFinelyStored;
   KPSA_RETURN_IF_ERROR(add(of.fine ? fine : of.by_tile ? kByTile : kForAllPoints, std::move(*subspace)));
   bool may_be_for_all = of.by_tile;
   if (of.by_tile &&

@@ -20,6 +20,7 @@ constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so ma
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
 constexpr double kLess = 0.95;          // likewise, where the others are as fine
+constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
 constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of a rotation moves points, about
 
 }  // namespace
@@ -59,6 +60,7 @@ Result<Subspace> SubspaceCandidates::Best() {
     fine = misses;
     subspace = ForAllPoints(fine);
   }
+  KPSA_RETURN_IF_ERROR(CompareWithCheaper(&subspace));
   Describe(&subspace);
   return subspace;
 }
@@ -117,7 +119,38 @@ Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     if (by_tile) others = std::move(*subspace), others_ns = of_others->ns;
   }
   record->tried[best].taken = true;
+  best_ns_ = record->tried[best].cost * setup->full_cost;
   if (by_tile) *subspace = std::move(with_tiles.subspace), cues.set = std::move(with_tiles.cues);
+  return Status();
+}
+
+Status SubspaceCandidates::CompareWithCheaper(Subspace* subspace) {
+  const std::vector<CueChoice::Other> others = std::exchange(cues.choice.cheaper, {});
+  if (others.empty() || poses->judges.poses() == 0 || setup->of_light()) return Status();
+  if (best_ns_ == 0) {
+    const Result<FrameCost> priced = Price(subspace, cues.set);
+    if (!priced.ok()) return priced.status();
+    best_ns_ = priced->ns;
+    Tried(fine ? kFinelyStored : kForAllPoints, cues.set, priced->misses, priced->ns);
+    record->tried.back().taken = true;
+  }
+  for (const CueChoice::Other& other : others) {
+    if (other.cost_of_hits > kCheaper * best_ns_ || setup->limit.left() < modes_seconds) continue;
+    const CueSet before = std::exchange(cues.set, MakeCueSet(modes->pca, other.cues, modes->noise));
+    Subspace made = ForAllPoints(true);
+    const Result<FrameCost> priced = Price(&made, cues.set);
+    if (!priced.ok()) return priced.status();
+    Tried(kFewerCues, cues.set, priced->misses, priced->ns);
+    if (priced->ns > kCheaper * best_ns_) {
+      cues.set = before;
+      continue;
+    }
+    for (TrainingRecord::Tried& one : record->tried) one.taken = false;
+    record->tried.back().taken = true;
+    *subspace = std::move(made), best_ns_ = priced->ns;
+    by_tile = false, fine = fewer = true;
+    cues.choice.cues = other.cues;
+  }
   return Status();
 }
 

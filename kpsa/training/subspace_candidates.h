@@ -34,6 +34,7 @@ struct SubspaceCandidates {
   PatchLayout patches = {};  // what may miss by itself
   bool fine = false;         // tiles
   bool by_tile = false;      // its cues
+  bool fewer = false;        // not those that were expected to cost least, but cheaper ones
   bool tried_tiles = false;
   FrameCost cost = {};               // by the last calibration, but points
   TileChoice tiles = {};             // where they were tried
@@ -59,9 +60,12 @@ struct SubspaceCandidates {
   // The subspace is given its best score by the judges, and is then priced.
   Result<FrameCost> Price(Subspace* subspace, const CueSet& of) const;
   Status CompareWithTiles(Subspace* subspace);
+  // With what was cheaper but for its misses, by the judges that compare subspaces.
+  Status CompareWithCheaper(Subspace* subspace);
   void Tried(const char* what, const CueSet& of, double misses, double ns);
 
   std::vector<TileCandidates> learning_tiles_ = {};
+  double best_ns_ = 0;  // of what Best has taken so far; 0: not priced
 };
 
 }  // namespace kpsa::engine

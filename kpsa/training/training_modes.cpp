@@ -30,6 +30,7 @@ Status ChooseCues(double tolerance, const TrainingPoses& poses, const PoseMatrix
                   TrainingSetup* setup, const TrainingModes& modes, TrainingCues* to) {
   CueChoiceOptions choice;
   choice.rows = modes.still ? std::min<std::size_t>(kStillRows, setup->options.rows) : setup->options.rows;
+  choice.may_choose_rows = setup->options.may_have_cues_by_tile && !modes.still && !setup->of_light();
   choice.min_points = modes.still ? 1 : setup->options.min_points;
   choice.tolerance = tolerance;
   choice.by_rms = setup->of_light();
