@@ -5,7 +5,9 @@
 
 #include "base/matrix.h"
 #include "base/scalar_math.h"
+#include "graph/compiler.h"
 #include "graph/geometry.h"
+#include "tests/nodes/driver_rig.h"
 #include "tests/nodes/node_support.h"
 
 namespace kpsa::engine {
@@ -155,6 +157,37 @@ class DeltaMushNode : public testing::Test {
   }
   TestGraph g;
 };
+
+// What the compiler says that `count` points in the middle of a grid cost.
+double PriceOfMush(int iterations, Index count) {
+  TestGraph g(StandardNodes());
+  const auto mesh = GridMesh(30, 30, [](double, double) { return 0.0; });
+  g.add("mesh", "m", {{"mesh", mesh}});
+  g.add("cluster", "c");
+  g.add("deltaMush", "d", {{"mesh[0]", mesh}, {"iterations", iterations}});
+  g.connect("m.points", "c.inPoints[0]");
+  g.connect("c.outPoints[0]", "d.inPoints[0]");
+  g.vary("c.matrix");
+  const Index total = 30 * 30;
+  std::vector<Index> points;
+  for (Index i = 0; i < count; ++i) points.push_back((total - count) / 2 + i);
+  g.want("d.outPoints[0]", PointSet::Of(points, total));
+  const auto plan = Compiler().Compile(g.graph, g.request);
+  EXPECT_TRUE(plan.ok()) << plan.status().ToString();
+  for (Index s = 0; s < (*plan)->steps().size(); ++s) {
+    if (std::string_view((*plan)->step_name(s)) == "d")
+      return static_cast<double>((*plan)->infos()[s].cost_ns);
+  }
+  return 0;
+}
+
+TEST(DeltaMushPrice, OfAFewPointsIsThatOfAllThatSmoothAroundThem) {
+  const double one = PriceOfMush(10, 1), none = PriceOfMush(0, 1), all = PriceOfMush(10, 900);
+  EXPECT_GT(one, 2 * none);  // ten rings
+  EXPECT_GT(10 * one, all);  // not a thousandth of it
+  EXPECT_LT(2 * one, all);
+  EXPECT_LT(PriceOfMush(10, 20), 4 * one);  // they share rings
+}
 
 TEST_F(DeltaMushNode, DisplacementTurnsWithTheSurface) {
   ExpectPoints(Turned(), {0, 0, 0, 3, 0, 0});  // the whole detail: a turned rest shape

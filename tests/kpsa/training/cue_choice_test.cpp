@@ -116,7 +116,7 @@ bool AllOf(std::span<const CueRef> cues, CueKind kind) {
 }
 
 // Two places: the outputs, which see the folds, and the stage, which does not.
-std::vector<CueRef> ChooseAmongPlaces(const Fold& fold, double output_cost, double miss_cost) {
+CueChoice ChoiceAmongPlaces(const Fold& fold, double output_cost, double miss_cost, bool may_choose_rows) {
   CueChoiceOptions options{.rows = 20,
                            .min_points = 4,
                            .tolerance = kTolerance,
@@ -134,10 +134,22 @@ std::vector<CueRef> ChooseAmongPlaces(const Fold& fold, double output_cost, doub
     outputs.push_back({CueKind::kOutput, i});
   }
   options.places = {outputs, stage};
-  std::vector<CueRef> chosen = ChooseCues(fold.pca, fold.positions, fold.noise, fold.poses, options).cues;
+  options.may_choose_rows = may_choose_rows;
+  return ChooseCues(fold.pca, fold.positions, fold.noise, fold.poses, options);
+}
+
+std::vector<CueRef> ChooseAmongPlaces(const Fold& fold, double output_cost, double miss_cost) {
+  std::vector<CueRef> chosen = ChoiceAmongPlaces(fold, output_cost, miss_cost, false).cues;
   std::erase_if(chosen, [](const CueRef& cue) { return cue.kind == CueKind::kScalar; });
   return chosen;
 }
+
+std::size_t RowsOf(const std::vector<CueRef>& cues) {
+  std::size_t rows = 0;
+  for (const CueRef& cue : cues) rows += cue.kind == CueKind::kScalar ? 1 : 3;
+  return rows;
+}
+
 TEST(CueChoice, AnEarlierPlaceIsTakenWhereItSeesEnough) {
   const std::vector<CueRef> chosen = ChooseAmongPlaces(Fold(0), 100, 1000);
   ASSERT_FALSE(chosen.empty());
@@ -150,6 +162,26 @@ TEST(CueChoice, ALaterPlaceIsTakenWhereMissesWouldCostMore) {
   EXPECT_TRUE(AllOf(chosen, CueKind::kOutput));
   // Four in ten poses fold: misses that cost little are the better bargain
   EXPECT_FALSE(AllOf(ChooseAmongPlaces(Fold(3), 100, 20), CueKind::kOutput));
+}
+
+TEST(CueChoice, NoMoreNumbersAreMeasuredThanJudgesNeed) {
+  const Fold fold(0);  // two scalars tell all
+  const std::size_t all = RowsOf(ChoiceAmongPlaces(fold, 100, 1000, false).cues),
+                    chosen = RowsOf(ChoiceAmongPlaces(fold, 100, 1000, true).cues);
+  EXPECT_LT(chosen, all);
+  EXPECT_GE(chosen, 2u);
+}
+
+TEST(CueChoice, WhatWouldCostLessButForItsMissesIsToldOf) {
+  const Fold fold(3);
+  const CueChoice choice = ChoiceAmongPlaces(fold, 100, 1000, false);
+  ASSERT_FALSE(choice.cheaper.empty());
+  for (const CueChoice::Other& other : choice.cheaper) {
+    EXPECT_TRUE(AllOf(other.cues, CueKind::kStage));
+    EXPECT_LT(other.cost_of_hits, choice.cost / 2);
+    EXPECT_GE(other.cost, choice.cost);
+  }
+  EXPECT_TRUE(ChoiceAmongPlaces(fold, 0, 1000, false).cheaper.empty());
 }
 
 TEST(CueChoice, PaperModeTakesTwoPointsAMode) {
