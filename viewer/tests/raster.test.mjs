@@ -3,11 +3,17 @@ import assert from 'node:assert/strict';
 import {before, test} from 'node:test';
 import {load} from './support/units.mjs';
 
-const width = 64, height = 48, background = 7;
-let drawTriangles, drawLines, stride;
-before(async () => { ({drawTriangles, drawLines, stride} = await load('draw/raster.ts')); });
+const width = 61, height = 45, background = 7, everywhere = {left: 0, top: 0, right: width, bottom: height};  // no whole tiles
+let drawTriangles, drawLines, farthest, stride, makeTarget;
+before(async () => { ({drawTriangles, drawLines, farthest, stride, target: makeTarget} = await load('draw/raster.ts')); });
 
-const blank = () => ({width, height, colours: new Int32Array(width * height).fill(background), depth: new Float32Array(width * height)});
+const blank = () => makeTarget(width, height, new Int32Array(width * height).fill(background));
+/** As a picture is drawn: fronts first, and of the rest what they do not hide. */
+const draw = (target, v, triangles, table, row) => {
+  drawTriangles(target, v, triangles, table, row, 'front');
+  farthest(target, everywhere);
+  drawTriangles(target, v, triangles, table, row, 'back');
+};
 /** Each [x, y, 1 / distance, light of the front, of the back, row]. */
 const vertices = (...all) => Float32Array.from(all.flatMap(([x, y, near = 1, front = 10, back = 20, row = 3]) => [x, y, near, front, back, row]));
 const shades = Int32Array.from({length: 65536}, (_, i) => i);  // the colour is where it was looked up
@@ -29,10 +35,10 @@ test('triangles that share edges leave no pixel out and take none twice', () => 
     }
   }
   const v = vertices(...all), whole = blank(), count = new Int32Array(width * height);
-  drawTriangles(whole, v, Uint32Array.from(triangles), shades, -1, false);
+  draw(whole, v, Uint32Array.from(triangles), shades, -1);
   for (let t = 0; t < triangles.length; t += 3) {
     const target = blank();
-    drawTriangles(target, v, Uint32Array.from(triangles.slice(t, t + 3)), shades, -1, false);
+    draw(target, v, Uint32Array.from(triangles.slice(t, t + 3)), shades, -1);
     target.colours.forEach((colour, p) => { count[p] += colour !== background; });
   }
   for (let y = 0; y < height; ++y) {
@@ -45,18 +51,48 @@ test('what is nearer hides what is behind, in either order, and each side has it
   const v = vertices([4, 4, 1], [40, 4, 1], [4, 40, 1], [4, 4, 2], [4, 40, 2], [40, 4, 2]), at = 10 * width + 10;
   for (const corners of [[0, 1, 2, 3, 4, 5], [3, 4, 5, 0, 1, 2]]) {
     const target = blank();
-    drawTriangles(target, v, order(...corners), shades, 5, false);
+    draw(target, v, order(...corners), shades, 5);
     assert.equal(target.depth[at], 2);
     assert.equal(target.colours[at], 5 << 8 | 10, 'counter-clockwise as one sees it, y upwards: the front');
   }
   const target = blank();
-  drawTriangles(target, v, order(0, 1, 2), shades, 5, false);
+  draw(target, v, order(0, 1, 2), shades, 5);
   assert.equal(target.colours[at], 5 << 8 | 20, 'the back');
+});
+
+test('backs are left out where fronts hide them, and only there', () => {
+  let seed = 5;
+  const random = (size) => (seed = seed * 16807 % 2147483647) / 2147483647 * size;
+  for (let round = 0; round < 40; ++round) {
+    // a front that covers a part of the picture, and small triangles about it, some of them in front of it
+    const all = [[random(20), 0, 1.5], [random(20), 48, 1.5], [37 + random(24), 24, 1.5]], corners = [0, 1, 2];
+    for (let i = 0; i < 60; ++i) {
+      const x = random(60), y = random(44), near = 1 + random(1);
+      corners.push(all.length, all.length + 1, all.length + 2);
+      all.push([x, y, near], [x + random(9), y + random(9), near], [x + random(9), y + random(9), near]);
+    }
+    const v = vertices(...all), target = blank(), plain = blank();
+    draw(target, v, order(...corners), shades, 1);
+    plain.tiles.fill(0);  // nothing is known of what is drawn
+    drawTriangles(plain, v, order(...corners), shades, 1, 'front');
+    const fronts = plain.colours.slice();
+    drawTriangles(plain, v, order(...corners), shades, 1, 'back');
+    assert.deepEqual(target.colours, plain.colours);
+    assert.notDeepEqual(fronts, plain.colours, 'backs are seen');
+  }
+  // and where all is covered, a back is not drawn even if its depth would let it
+  const covered = blank();
+  drawTriangles(covered, vertices([0, 0, 1], [0, 200, 1], [200, 0, 1]), order(0, 1, 2), shades, 1, 'front');
+  farthest(covered, everywhere);
+  covered.depth.fill(0);
+  const before = covered.colours.slice();
+  drawTriangles(covered, vertices([9, 9, 0.9], [30, 9, 0.9], [9, 30, 0.9]), order(0, 1, 2), shades, 2, 'back');
+  assert.deepEqual(covered.colours, before);
 });
 
 test('light, colour and depth change evenly', () => {
   const target = blank();
-  drawTriangles(target, vertices([0, 0, 1, 0, 0, 0], [64, 0, 3, 128, 128, 64], [0, 48, 1, 0, 0, 0]), order(0, 1, 2), shades, -1, false);
+  draw(target, vertices([0, 0, 1, 0, 0, 0], [64, 0, 3, 128, 128, 64], [0, 48, 1, 0, 0, 0]), order(0, 1, 2), shades, -1);
   const p = 8 * width + 20;
   assert.equal(target.colours[p], 20 << 8 | 41);
   assert.ok(Math.abs(target.depth[p] - (1 + 20.5 / 32)) < 1e-6);
@@ -64,9 +100,9 @@ test('light, colour and depth change evenly', () => {
 
 test('a ghost lets half of what is behind through, and is over the surface that it is as near as', () => {
   const v = vertices([0, 0], [64, 0], [0, 48]), target = blank(), half = Int32Array.from({length: 65536}, () => 0xff204060 | 0);
-  drawTriangles(target, v, order(0, 1, 2), Int32Array.from({length: 65536}, () => 0xff402000 | 0), 0, false);
+  draw(target, v, order(0, 1, 2), Int32Array.from({length: 65536}, () => 0xff402000 | 0), 0);
   const depth = target.depth.slice();
-  drawTriangles(target, v, order(0, 1, 2), half, 0, true);
+  drawTriangles(target, v, order(0, 1, 2), half, 0, 'ghost');
   assert.equal(target.colours[0] >>> 0, 0xff303030);
   assert.deepEqual(target.depth, depth);
 });
@@ -74,26 +110,26 @@ test('a ghost lets half of what is behind through, and is over the surface that 
 test('what is behind the eye, beside the picture or no number is not drawn, and nothing is written elsewhere', () => {
   for (const bad of [[10, 10, 0], [NaN, 10], [10, 10, NaN]]) {
     const target = blank();
-    drawTriangles(target, vertices([1, 1], [40, 1], bad), order(0, 1, 2), shades, -1, false);
+    draw(target, vertices([1, 1], [40, 1], bad), order(0, 1, 2), shades, -1);
     drawLines(target, vertices([1, 1], bad), order(0, 1), shades, -1);
     assert.equal(drawn(target), 0, String(bad));
   }
   const target = blank(), huge = vertices([-1e7, -1e7], [1e7, -1e7], [0, 1e7], [-9, 5], [-3, 40], [-5, 9], [70, 5], [99, 5], [80, 40]);
-  drawTriangles(target, huge, order(3, 4, 5, 6, 7, 8), shades, -1, false);
+  draw(target, huge, order(3, 4, 5, 6, 7, 8), shades, -1);
   drawLines(target, huge, order(3, 4, 6, 8), shades, -1);
   assert.equal(drawn(target), 0);
-  drawTriangles(target, huge, order(0, 1, 2), shades, -1, false);
+  draw(target, huge, order(0, 1, 2), shades, -1);
   assert.equal(drawn(target), width * height, 'one that covers all');
 });
 
 test('lines are whole, as long as they should be, and hidden by what is clearly nearer', () => {
   const v = vertices([5.5, 10.5], [25.5, 10.5], [-1000, 20.5], [1000, 20.5], [30.5, 2.5], [30.5, 30.5]), target = blank();
   drawLines(target, v, order(0, 1, 2, 3, 4, 5), shades, 2);
-  assert.equal(drawn(target), 20 + 64 + 28 - 1);
+  assert.equal(drawn(target), 20 + width + 28 - 1);
   assert.equal(target.colours[10 * width + 15], 2 << 8 | 10);
   for (const [near, seen] of [[1, true], [1.001, true], [1.1, false]]) {
     const covered = blank();
-    drawTriangles(covered, vertices([0, 0, near], [64, 0, near], [0, 96, near]), order(0, 1, 2), shades, 9, false);
+    draw(covered, vertices([0, 0, near], [64, 0, near], [0, 96, near]), order(0, 1, 2), shades, 9);
     drawLines(covered, v, order(0, 1), shades, 2);
     assert.equal(covered.colours[10 * width + 15] === (2 << 8 | 10), seen, `behind ${near}`);
   }

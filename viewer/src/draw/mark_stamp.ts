@@ -1,7 +1,7 @@
 // Marks into arrays of pixels: what the shader of gpu_materials.ts does.
 import {cover, rimBegins, rimColour, selectedColour, selectedScale, type Marks} from './marks';
-import {around, nothing, toTarget, type Box} from './projection';
-import type {Target} from './raster';
+import {around, nothing, toTarget} from './projection';
+import type {Box, Target} from './raster';
 import type {Camera} from 'three';
 
 /** How many pixels the widest of them reaches from its middle. */

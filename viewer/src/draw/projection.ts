@@ -1,16 +1,8 @@
 // Points of a surface as a rasteriser needs them: where they are in the picture, and how light they are.
 import {Matrix4, Vector3, type Camera, type PerspectiveCamera} from 'three';
-import {stride, type Target} from './raster';
+import {stride, type Box, type Target} from './raster';
 import type {Paint, Surface} from './scene';
 import {fillLight, keyLight, lightOf} from './shades';
-
-/** Pixels, the last ones not among them. */
-export interface Box {
-  left: number;
-  top: number;
-  right: number;
-  bottom: number;
-}
 
 export const nothing: Box = {left: Infinity, top: Infinity, right: -Infinity, bottom: -Infinity};
 

@@ -2,8 +2,8 @@
 import type {Camera} from 'three';
 import {rgb} from '../view/colours';
 import {placesOf, stamp} from './mark_stamp';
-import {around, everything, inside, nothing, project, type Box} from './projection';
-import {drawLines, drawTriangles, stride, type Target} from './raster';
+import {around, everything, inside, nothing, project} from './projection';
+import {drawLines, drawTriangles, farthest, stride, target, type Box, type Target} from './raster';
 import {ghostColour, type Picture, type Scene} from './scene';
 import {pixel, Shades, tableOf} from './shades';
 
@@ -80,16 +80,18 @@ export class SoftwarePicture implements Picture {
     if (left >= right || top >= bottom) return;
     target.colours.fill(this.background, top * target.width, bottom * target.width);
     target.depth.fill(0, top * target.width, bottom * target.width);
-    if (scene) this.drawMeshes(scene);
+    if (scene) this.drawMeshes(scene, box);
     for (const {one, places} of marks) stamp(target, one, places, ratio);
     this.context.putImageData(target.image, 0, 0, left, top, right - left, bottom - top);
   }
 
-  private drawMeshes({meshes, paint, ghost, edges}: Scene): void {
+  private drawMeshes({meshes, paint, ghost, edges}: Scene, box: Box): void {
     const {target, rows} = this, shades = paint ? this.painted : this.own;
     shades.set(paint?.table ?? this.colours, paint !== null, edges !== null);
-    meshes.forEach(({triangles}, i) => drawTriangles(target, this.solid, triangles, shades.surface, paint ? -1 : rows[i], false));
-    if (ghost) for (const {triangles} of meshes) drawTriangles(target, this.ghost, triangles, this.ghosts.surface, 0, true);
+    meshes.forEach(({triangles}, i) => drawTriangles(target, this.solid, triangles, shades.surface, paint ? -1 : rows[i], 'front'));
+    farthest(target, box);
+    meshes.forEach(({triangles}, i) => drawTriangles(target, this.solid, triangles, shades.surface, paint ? -1 : rows[i], 'back'));
+    if (ghost) for (const {triangles} of meshes) drawTriangles(target, this.ghost, triangles, this.ghosts.surface, 0, 'ghost');
     edges?.forEach((lines, i) => drawLines(target, this.solid, lines, shades.lines, paint ? -1 : rows[i]));
   }
 
@@ -100,5 +102,5 @@ export class SoftwarePicture implements Picture {
 
 function pixels(width: number, height: number): Pixels {
   const image = new ImageData(width, height);
-  return {image, width, height, colours: new Int32Array(image.data.buffer), depth: new Float32Array(width * height)};
+  return {image, ...target(width, height, new Int32Array(image.data.buffer))};
 }
