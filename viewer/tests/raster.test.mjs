@@ -134,3 +134,19 @@ test('lines are whole, as long as they should be, and hidden by what is clearly 
     assert.equal(covered.colours[10 * width + 15] === (2 << 8 | 10), seen, `behind ${near}`);
   }
 });
+
+test('a triangle that reaches behind the eye is drawn as far as it is before it', async () => {
+  const {Projected} = await load('draw/projected.ts'), projected = new Projected(), near = 0.5;
+  // A camera at the origin that looks along -z, over a floor a unit below it, half the picture high
+  const elements = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, -1, 0, 0, -2 * near, 0], identity = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
+  const camera = {near, updateMatrixWorld() {}, projectionMatrix: {elements}, matrixWorld: {elements: identity}, matrixWorldInverse: {elements: identity}};
+  const points = Float32Array.from([-900, -1, -300, 900, -1, -300, 0, -1, 300]), normals = Float32Array.from([0, 1, 0, 0, 1, 0, 0, 1, 0]), target = blank();
+  projected.take({meshes: [{triangles: order(0, 1, 2)}]}, {points, normals, version: 0}, null, camera, target);
+  assert.deepEqual(projected.box, everywhere);
+  for (const {vertices: v, triangles} of projected.parts) draw(target, v, triangles, shades, 4);
+  for (let y = 0; y < height; ++y) {
+    for (let x = 0; x < width; ++x) assert.equal(target.colours[y * width + x] !== background, y >= height / 2, `${x} ${y}`);
+  }
+  const depth = target.depth[(height - 1) * width + 30];
+  assert.ok(Math.abs(depth - (height - 0.5 - height / 2) / (height / 2)) < 1e-4, `a floor is as far as it is below: ${depth}`);
+});

@@ -40,12 +40,13 @@ test('the processor draws what a GPU draws', async () => {
   await take('turned', async (page) => {
     for (let i = 0; i < 12; ++i) await page.keyboard.press('Shift+ArrowLeft');  // its back
   });
+  await take('near', async (page) => { for (let i = 0; i < 10; ++i) await page.keyboard.press('+'); });
   // edges of triangles are smoothed by one of them and not by the other, so lines are not compared
   // nor, in the overlay, which of two surfaces is nearer where they hardly differ
   for (const [name, [software, webgl]] of Object.entries(pictures)) {
     assert.ok(difference(software, webgl) < (name === 'overlay' ? 0.05 : 0.008), `${name}: ${difference(software, webgl)}`);
   }
-  for (const name of ['accelerated', 'difference', 'field', 'turned']) assert.ok(difference(pictures[name][0], pictures.overlay[1]) > 0.03, `${name} is another picture`);
+  for (const name of ['accelerated', 'difference', 'field', 'turned', 'near']) assert.ok(difference(pictures[name][0], pictures.overlay[1]) > 0.03, `${name} is another picture`);
   assert.ok(difference(pictures.field[0], pictures.cues[1]) > 0.001, 'cues are another picture');
   const [one, other] = await Promise.all(pages.map(({page}) => page.evaluate(() => [...window.kpsa.positions('full')])));
   assert.deepEqual(one, other);

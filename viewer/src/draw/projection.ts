@@ -26,8 +26,8 @@ export function toTarget(camera: Camera, {width, height}: Target): Float64Array 
   return Float64Array.from(pixels.multiply(seen).elements);
 }
 
-/** Fills `out`, `stride` numbers a point, and says where it all is. What is nearer than the camera sees is behind. */
-export function project(surface: Surface, paint: Paint | null, camera: Camera, target: Target, out: Float32Array): Box {
+/** Fills `out`, `stride` numbers a point, and says where it all is, and whether some of it is nearer than the camera sees: behind. */
+export function project(surface: Surface, paint: Paint | null, camera: Camera, target: Target, out: Float32Array): {box: Box; behind: boolean} {
   const {points, normals} = surface, count = points.length / 3, near = (camera as PerspectiveCamera).near, m = toTarget(camera, target);
   const [key, fill, up] = [keyLight, fillLight, [0, 1, 0] as const].map((light) => new Vector3(...light).transformDirection(camera.matrixWorld));
   const kx = key.x, ky = key.y, kz = key.z, fx = fill.x, fy = fill.y, fz = fill.z, ux = up.x, uy = up.y, uz = up.z;
@@ -35,6 +35,10 @@ export function project(surface: Surface, paint: Paint | null, camera: Camera, t
   let left = Infinity, top = Infinity, right = -Infinity, bottom = -Infinity, behind = false;
   for (let i = 0, at = 0, o = 0; i < count; ++i, at += 3, o += stride) {
     const x = points[at], y = points[at + 1], z = points[at + 2], w = m[3] * x + m[7] * y + m[11] * z + m[15];
+    const nx = normals[at], ny = normals[at + 1], nz = normals[at + 2];
+    const k = keySize * (nx * kx + ny * ky + nz * kz), f = fillSize * (nx * fx + ny * fy + nz * fz), n = nx * ux + ny * uy + nz * uz;
+    out[o + 3] = lightOf(k, f, n);
+    out[o + 4] = lightOf(-k, -f, -n);
     if (!(w > near)) {
       out[o + 2] = 0;
       behind = true;
@@ -45,17 +49,13 @@ export function project(surface: Surface, paint: Paint | null, camera: Camera, t
     if (px > right) right = px;
     if (py < top) top = py;
     if (py > bottom) bottom = py;
-    const nx = normals[at], ny = normals[at + 1], nz = normals[at + 2];
-    const k = keySize * (nx * kx + ny * ky + nz * kz), f = fillSize * (nx * fx + ny * fy + nz * fz), n = nx * ux + ny * uy + nz * uz;
     out[o] = px;
     out[o + 1] = py;
     out[o + 2] = by;
-    out[o + 3] = lightOf(k, f, n);
-    out[o + 4] = lightOf(-k, -f, -n);
   }
   if (paint) {
     const {values, top: most} = paint, by = 255.9 / most;
     for (let i = 0, o = 5; i < count; ++i, o += stride) out[o] = Math.min(255.9, Math.max(0, values[i] * by));
   }
-  return behind ? everything(target) : {left, top, right: right + 1, bottom: bottom + 1};
+  return {box: behind ? everything(target) : {left, top, right: right + 1, bottom: bottom + 1}, behind};
 }

@@ -2,8 +2,9 @@
 import type {Camera} from 'three';
 import {rgb} from '../view/colours';
 import {placesOf, stamp} from './mark_stamp';
-import {around, everything, inside, nothing, project} from './projection';
-import {drawLines, drawTriangles, farthest, stride, target, type Box, type Target} from './raster';
+import {Projected} from './projected';
+import {around, everything, inside, nothing} from './projection';
+import {drawLines, drawTriangles, farthest, target, type Box, type Faces, type Target} from './raster';
 import {ghostColour, type Picture, type Scene} from './scene';
 import {pixel, Shades, tableOf} from './shades';
 
@@ -18,8 +19,8 @@ export class SoftwarePicture implements Picture {
   private ratio = 1;
   private background = pixel(0, 0, 0);
   private before: Box = nothing;  // what the picture shows beside its background
-  private solid = new Float32Array();
-  private ghost = new Float32Array();
+  private readonly solid = new Projected();
+  private readonly ghost = new Projected();
   private readonly own = new Shades();
   private readonly painted = new Shades();
   private readonly ghosts = new Shades();
@@ -37,8 +38,6 @@ export class SoftwarePicture implements Picture {
 
   show(scene: Scene): void {
     this.scene = scene;
-    this.solid = new Float32Array(stride * scene.points);
-    this.ghost = new Float32Array();
     const known = [...new Set(scene.meshes.map(({colour}) => colour))];
     this.colours = tableOf(known.map(rgb));
     this.rows = scene.meshes.map(({colour}) => known.indexOf(colour) & 255);
@@ -65,10 +64,11 @@ export class SoftwarePicture implements Picture {
     const {scene, target, ratio} = this;
     let now = nothing;
     if (scene) {
-      now = around(now, project(scene.solid, scene.paint, camera, target, this.solid));
+      this.solid.take(scene, scene.solid, scene.paint, camera, target);
+      now = around(now, this.solid.box);
       if (scene.ghost) {
-        if (!this.ghost.length) this.ghost = new Float32Array(stride * scene.points);
-        now = around(now, project(scene.ghost, null, camera, target, this.ghost));
+        this.ghost.take(scene, scene.ghost, null, camera, target);
+        now = around(now, this.ghost.box);
       }
     }
     const marks = (scene?.marks ?? []).filter(({visible}) => visible).map((one) => ({one, ...placesOf(one, scene!.solid.points, camera, target, ratio)}));
@@ -85,14 +85,17 @@ export class SoftwarePicture implements Picture {
     this.context.putImageData(target.image, 0, 0, left, top, right - left, bottom - top);
   }
 
-  private drawMeshes({meshes, paint, ghost, edges}: Scene, box: Box): void {
+  private drawMeshes({paint, ghost, edges}: Scene, box: Box): void {
     const {target, rows} = this, shades = paint ? this.painted : this.own;
     shades.set(paint?.table ?? this.colours, paint !== null, edges !== null);
-    meshes.forEach(({triangles}, i) => drawTriangles(target, this.solid, triangles, shades.surface, paint ? -1 : rows[i], 'front'));
+    const all = (of: Projected, table: Int32Array, faces: Faces, row: (mesh: number) => number): void => of.parts.forEach(({vertices, triangles, mesh}) =>
+      drawTriangles(target, vertices, triangles, table, row(mesh), faces));
+    const own = (mesh: number): number => paint ? -1 : rows[mesh];
+    all(this.solid, shades.surface, 'front', own);
     farthest(target, box);
-    meshes.forEach(({triangles}, i) => drawTriangles(target, this.solid, triangles, shades.surface, paint ? -1 : rows[i], 'back'));
-    if (ghost) for (const {triangles} of meshes) drawTriangles(target, this.ghost, triangles, this.ghosts.surface, 0, 'ghost');
-    edges?.forEach((lines, i) => drawLines(target, this.solid, lines, shades.lines, paint ? -1 : rows[i]));
+    all(this.solid, shades.surface, 'back', own);
+    if (ghost) all(this.ghost, this.ghosts.surface, 'ghost', () => 0);
+    edges?.forEach((lines, i) => drawLines(target, this.solid.vertices, lines, shades.lines, own(i)));
   }
 
   async finished(): Promise<void> {}
