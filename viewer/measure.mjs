@@ -5,11 +5,11 @@
 // The slider goes on by one step at each refresh of the screen (60 a second), as it does under a hand; the clip plays likewise. For each part the
 // median and the 95th percentile, milliseconds. "page" is state, texts and panels; "picture" is from there until it is drawn: points, normals and
 // triangles, by the processor or a GPU. What is left until it is presented is waiting for the screen and the browser's compositor. Chromium is
-// as it is installed: without a GPU its compositor, too, is the processor. Needs what the tests need (npm ci; chromium).
+// as it is installed: without a GPU its compositor, too, is the processor, and nobody listens to its requests. Needs what the tests need (npm ci; chromium).
 import {resolve} from 'node:path';
 import {parseArgs} from 'node:util';
-import {settled, startBrowser} from './tests/support/browser.mjs';
 import {makeLargeReport} from './tests/support/large.mjs';
+import {startPlainBrowser} from './tests/support/plain_browser.mjs';
 import {notePresented} from './tests/support/presented.mjs';
 import {makeReport} from './tests/support/report.mjs';
 
@@ -22,15 +22,21 @@ const {values, positionals: [what]} = parseArgs({
 });
 const frames = Number(values.frames), [width, height] = values.size.split('x').map(Number), live = what?.startsWith('http') ?? false;
 if (live && !values.control) throw new Error('--control PLUG is the slider that moves');
-const browser = await startBrowser({width, height});
+const browser = await startPlainBrowser({width, height});
 const address = new URL(live ? what : what ? 'file://' + resolve(what)
   : browser.write('report.html', makeReport(makeLargeReport({points: Number(values.points), modes: Number(values.modes), frames}))));
 if (values.renderer) address.searchParams.set('renderer', values.renderer);
-const {page} = await browser.open(address.href);
-if (values.mode) await page.evaluate((mode) => window.kpsa.setMode(mode), values.mode);
-if (values.tab) await page.getByRole('tab', {name: values.tab}).click();
-if (values.edges) await page.getByRole('button', {name: 'Edges'}).click();
-await settled(page);
+const page = await browser.open(address.href);
+const settled = (mode = null) => page.evaluate((wanted) => window.kpsa.setMode(wanted ?? window.kpsa.state.mode), mode);
+const press = (role, name) => page.evaluate((r, n) => {
+  const found = [...document.querySelectorAll(r)].find((one) => one.textContent === n);
+  if (!found) throw new Error(`there is no ${n}`);
+  found.click();
+}, role, name);
+await settled(values.mode);
+if (values.tab) await press('[role=tab]', values.tab);
+if (values.edges) await press('button', 'Edges');
+await settled();
 const facts = await page.evaluate(() => {
   const {width, height} = document.querySelector('.stage canvas');
   return {title: document.title, head: document.querySelector('.name p').textContent, renderer: window.kpsa.renderer, mode: window.kpsa.state.mode, size: `${width} x ${height}`};
@@ -55,8 +61,8 @@ if (live) {
     return {low: Number(slider.min), high: Number(slider.max)};
   }, values.control);
   const steps = Array.from({length: frames + warm}, (_, i) => low + (high - low) * Math.abs(i / frames * 6 % 2 - 1)), stop = await notePresented(page);
-  const all = await page.evaluate(([name, to]) => window.kpsa.timeControl(name, to), [values.control, steps]), {marked} = await stop();
-  const rows = all.map((row, i) => ({...row, presented: marked[i]})).slice(warm);
+  const all = await page.evaluate((name, to) => window.kpsa.timeControl(name, to), values.control, steps), {marked} = await stop();
+  const answered = all.map((row, i) => ({...row, presented: marked[i]})), rows = answered.slice(Math.min(warm, answered.length >> 2));
   tell('program: evaluation', rows.map((row) => row.program));
   tell('until the answer is in the page', rows.map((row) => row.answer));
   tell('page', rows.map((row) => row.page));
@@ -79,7 +85,7 @@ if (live) {
       void window.kpsa.setFrame(frame);
     }
   }, numbers);
-  await settled(page);
+  await settled();
   rate((await stop()).all.slice(warm));
 }
 await browser.stop();

@@ -29,7 +29,7 @@ test('frames of a generated report are measured', async () => {
 test('a slider of a live view is measured, and a picture of it drawn', async () => {
   const server = await startServer(), folder = mkdtempSync(join(tmpdir(), 'kpsa-picture-'));
   try {
-    const text = await run('measure.mjs', server.url, '--control', 'bend.rotateX', '--frames', '16');
+    const text = await run('measure.mjs', server.url, '--control', 'bend.rotateX', '--frames', '40');
     assert.ok(Math.abs(row(text, 'program: evaluation') - 0.695) < 0.01, 'as the server says');
     assert.ok(row(text, 'until the answer is in the page') > 0);
     for (const name of ['page', 'picture']) row(text, name);

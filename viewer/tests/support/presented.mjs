@@ -3,17 +3,16 @@
 /** Notes until the result is called; that gives the times at which pictures were presented: of all (`all`), and of each "kpsa picture" that the
     page marked (`marked`; NaN where there was no picture after it). Milliseconds. */
 export async function notePresented(page) {
-  const session = await page.context().newCDPSession(page), events = [];
-  session.on('Tracing.dataCollected', ({value}) => events.push(...value));
-  await session.send('Tracing.start', {
+  const events = [];
+  page.on('Tracing.dataCollected', ({value}) => events.push(...value));
+  await page.send('Tracing.start', {
     transferMode: 'ReportEvents', traceConfig: {excludedCategories: ['*'], includedCategories: ['blink.user_timing', 'disabled-by-default-devtools.timeline.frame']},
   });
-  await page.evaluate(() => performance.mark('kpsa begin'));
+  await page.evaluate(() => { performance.mark('kpsa begin'); });
   return async () => {
-    const complete = new Promise((resolve) => session.once('Tracing.tracingComplete', resolve));
-    await session.send('Tracing.end');
+    const complete = new Promise((resolve) => page.on('Tracing.tracingComplete', resolve));
+    await page.send('Tracing.end');
     await complete;
-    await session.detach();
     const begin = events.find(({name}) => name === 'kpsa begin');
     const offset = begin.args.data.startTime - begin.ts / 1000, timesOf = (wanted, phase) =>
       events.filter(({name, ph}) => name === wanted && (!phase || ph === phase)).map(({ts}) => ts / 1000 + offset).sort((a, b) => a - b);
