@@ -91,12 +91,11 @@ export function makeApi(app: () => App | null, ready: Promise<void>, errors: str
     async timeControl(name, values) {
       const {session} = now(), loops: Loop[] = [];
       if (!session) throw new Error('a report has no controls to set');
-      const end = session.drawn.on((loop) => {
-        if (!loop) return;
+      const before = session.drawn.value, end = session.drawn.on((loop) => {
+        if (!loop || loop === before) return;
         performance.mark('kpsa picture');
         loops.push(loop);
       });
-      loops.length = 0;  // the one there was
       for (const value of values) {
         await new Promise((resolve) => requestAnimationFrame(resolve));
         session.set({[name]: value});
