@@ -44,17 +44,17 @@ const facts = await page.evaluate(() => {
 console.log(`${facts.title}: ${facts.head}\ndrawn by ${facts.renderer}, ${facts.size} pixels in a window of ${width} x ${height}; mode ${facts.mode}`);
 
 function tell(name, times) {
-  const sorted = times.filter(Number.isFinite).sort((a, b) => a - b), at = (share) => sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
+  const sorted = times.slice().sort((a, b) => a - b), at = (share) => sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
   console.log(`  ${name.padEnd(34)} ${at(0.5).toFixed(2).padStart(8)} ${at(0.95).toFixed(2).padStart(8)}`);
 }
 /** How many of those times are different ones, a second. */
 function rate(times) {
-  const different = [...new Set(times.filter(Number.isFinite))];
+  const different = [...new Set(times)];
   console.log(`${((different.length - 1) / (different.at(-1) - different[0]) * 1000).toFixed(1)} pictures a second on the screen`);
 }
 console.log(`  ${'ms'.padEnd(34)} ${'median'.padStart(8)} ${'95 %'.padStart(8)}`);
 
-const warm = 10;
+const warm = 10, afterWarming = (all) => all.slice(Math.min(warm, all.length >> 2));
 if (live) {
   const {low, high} = await page.evaluate((name) => {
     const slider = [...document.querySelectorAll('.control')].find((row) => row.querySelector('.name').title.startsWith(name)).querySelector('input[type=range]');
@@ -62,7 +62,7 @@ if (live) {
   }, values.control);
   const steps = Array.from({length: frames + warm}, (_, i) => low + (high - low) * Math.abs(i / frames * 6 % 2 - 1)), stop = await notePresented(page);
   const all = await page.evaluate((name, to) => window.kpsa.timeControl(name, to), values.control, steps), {marked} = await stop();
-  const answered = all.map((row, i) => ({...row, presented: marked[i]})), rows = answered.slice(Math.min(warm, answered.length >> 2));
+  const answered = all.map((row, i) => ({...row, presented: marked[i]})), rows = afterWarming(answered.filter((row) => Number.isFinite(row.presented)));
   tell('program: evaluation', rows.map((row) => row.program));
   tell('until the answer is in the page', rows.map((row) => row.answer));
   tell('page', rows.map((row) => row.page));
@@ -86,6 +86,6 @@ if (live) {
     }
   }, numbers);
   await settled();
-  rate((await stop()).all.slice(warm));
+  rate(afterWarming((await stop()).all));
 }
 await browser.stop();

@@ -22,7 +22,8 @@ export interface Api {
   readonly loopMs: number | null;
   /** What draws: a GPU, or the processor. */
   readonly renderer: string;
-  /** Live: moves a control to one value after the other, one at each refresh of the screen, as a hand does; the pictures that were drawn.
+  /** Live: moves a control to one value after the other, one at each refresh of the screen, as a hand does, and again until there are
+      pictures for a quarter of them; the pictures that were drawn.
       Each of them is marked (performance.mark) as "kpsa picture". */
   timeControl(name: string, values: readonly number[]): Promise<Loop[]>;
   /** Shows frames one after the other: the page's own work of each (state, texts, layout), and until the picture was drawn; milliseconds. */
@@ -96,9 +97,9 @@ export function makeApi(app: () => App | null, ready: Promise<void>, errors: str
         performance.mark('kpsa picture');
         loops.push(loop);
       });
-      for (const value of values) {
+      for (let i = 0; i < values.length || loops.length < values.length / 4; ++i) {
         await new Promise((resolve) => requestAnimationFrame(resolve));
-        session.set({[name]: value});
+        session.set({[name]: values[i % values.length]});
       }
       await settled();
       end();
