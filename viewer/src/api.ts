@@ -1,6 +1,7 @@
 // window.kpsa: what tests and scripts see of the page.
 import type {App} from './app';
-import type {Side} from './gpu/positions';
+import type {Loop} from './live/session';
+import type {Side} from './shape/positions';
 import {viewModes, type State, type ViewMode} from './state';
 
 export interface Api {
@@ -12,16 +13,20 @@ export interface Api {
   setMode(mode: ViewMode): Promise<void>;
   /** Live: moves a control; resolves when the picture that has it is drawn. */
   setControl(name: string, value: number): Promise<void>;
-  /** x y z of each vertex, metres, as the shader has them. */
+  /** x y z of each vertex, metres, as they are drawn. */
   positions(side?: Side): Float32Array;
   /** Where a vertex is in the page, in CSS pixels. */
   project(vertex: number): {x: number; y: number};
   /** Where a handle is in the page, in CSS pixels. */
   projectHandle(handle: number): {x: number; y: number};
   readonly loopMs: number | null;
-  /** Live, of the latest loop: until the answer was here, the page's own work, until the picture was drawn; milliseconds. */
-  readonly loopParts: Readonly<{answer: number; page: number; picture: number}> | null;
-  /** Shows frames one after the other: the page's own work of each, and until the picture was drawn; milliseconds. */
+  /** What draws: a GPU, or the processor. */
+  readonly renderer: string;
+  /** Live: moves a control to one value after the other, one at each refresh of the screen, as a hand does, and again until there are
+      pictures for a quarter of them; the pictures that were drawn.
+      Each of them is marked (performance.mark) as "kpsa picture". */
+  timeControl(name: string, values: readonly number[]): Promise<Loop[]>;
+  /** Shows frames one after the other: the page's own work of each (state, texts, layout), and until the picture was drawn; milliseconds. */
   timeFrames(frames: readonly number[]): {page: number[]; picture: number[]};
   readonly errors: string[];
 }
@@ -81,22 +86,37 @@ export function makeApi(app: () => App | null, ready: Promise<void>, errors: str
     get loopMs() {
       return app()?.context?.session?.loopMs.value ?? null;
     },
-    get loopParts() {
-      return app()?.context?.session?.parts ?? null;
+    get renderer() {
+      return now().viewport.picture.name;
+    },
+    async timeControl(name, values) {
+      const {session} = now(), loops: Loop[] = [];
+      if (!session) throw new Error('a report has no controls to set');
+      const before = session.drawn.value, end = session.drawn.on((loop) => {
+        if (!loop || loop === before) return;
+        performance.mark('kpsa picture');
+        loops.push(loop);
+      });
+      for (let i = 0; i < values.length || loops.length < values.length / 4; ++i) {
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+        session.set({[name]: values[i % values.length]});
+      }
+      await settled();
+      end();
+      return loops;
     },
     timeFrames(frames) {
-      const {store, viewport} = now(), gl = viewport.renderer.getContext(), texel = new Uint8Array(4), page: number[] = [], picture: number[] = [];
-      const wait = (): void => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, texel);  // returns when all is drawn
-      wait();
+      const {store, viewport} = now(), page: number[] = [], picture: number[] = [];
+      viewport.picture.wait();
       for (const frame of frames) {
         const begin = performance.now();
         store.set({playing: false, frame});
-        viewport.draw();
         document.body.getBoundingClientRect();  // styles and layout of what has changed
-        const asked = performance.now();
-        wait();
-        page.push(asked - begin);
-        picture.push(performance.now() - asked);
+        const told = performance.now();
+        viewport.draw();
+        viewport.picture.wait();
+        page.push(told - begin);
+        picture.push(performance.now() - told);
       }
       return {page, picture};
     },

@@ -1,4 +1,4 @@
-// Frames of a report: hands the row of a frame and its residual to the GPU, and says what is known of it.
+// Frames of a report: hands the row of a frame and its residual to the picture, and says what is known of it.
 import type {Context} from './context';
 import {isSame, rowOf} from './data/residual';
 import {noFacts} from './facts';

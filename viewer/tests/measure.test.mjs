@@ -20,17 +20,21 @@ const row = (text, name) => {
 test('frames of a generated report are measured', async () => {
   const text = await run('measure.mjs', '--points', '700', '--modes', '5', '--frames', '12');
   assert.match(text, /Large: .*7\d\d points|Large: .*6\d\d points/);
+  assert.match(text, /drawn by the processor, \d+ x \d+ pixels in a window of 1440 x 900/);
   row(text, 'page');
   assert.ok(row(text, 'picture') > 0);
+  assert.match(text, /^[\d.]+ pictures a second on the screen$/m);
 });
 
 test('a slider of a live view is measured, and a picture of it drawn', async () => {
   const server = await startServer(), folder = mkdtempSync(join(tmpdir(), 'kpsa-picture-'));
   try {
-    const text = await run('measure.mjs', server.url, '--control', 'bend.rotateX', '--frames', '16');
+    const text = await run('measure.mjs', server.url, '--control', 'bend.rotateX', '--frames', '40');
     assert.ok(Math.abs(row(text, 'program: evaluation') - 0.695) < 0.01, 'as the server says');
     assert.ok(row(text, 'until the answer is in the page') > 0);
-    for (const name of ['page', 'all but the picture', 'picture']) row(text, name);
+    for (const name of ['page', 'picture']) row(text, name);
+    assert.ok(row(text, 'slider to the screen') > row(text, 'slider to the drawn picture'));
+    assert.match(text, /^[\d.]+ pictures a second on the screen$/m);
     const picture = join(folder, 'live.png');
     await run('picture.mjs', server.url, picture, '--set', 'bend.rotateX=20', '--press', 'e', '--size', '800x600');
     const png = readFileSync(picture);

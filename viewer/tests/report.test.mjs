@@ -207,25 +207,6 @@ test('keys', async () => {
   await page.keyboard.press('L');
 });
 
-test('a lost picture comes back', async () => {
-  await fresh();
-  await page.evaluate(() => window.kpsa.setFrame(9));
-  const before = await picture(), points = await page.evaluate(() => [...window.kpsa.positions()]);
-  await page.evaluate(async () => {
-    const canvas = document.querySelector('.stage canvas'), lose = canvas.getContext('webgl2').getExtension('WEBGL_lose_context');
-    const heard = (name) => new Promise((resolve) => canvas.addEventListener(name, () => setTimeout(resolve, 50), {once: true}));
-    const lost = heard('webglcontextlost');
-    lose.loseContext();
-    await lost;
-    const restored = heard('webglcontextrestored');
-    lose.restoreContext();
-    await restored;
-  });
-  await settled(page);
-  assert.ok(difference(before, await picture()) < 1e-4);
-  assert.deepEqual(await page.evaluate(() => [...window.kpsa.positions()]), points);
-});
-
 test('the strip says hit, blend or miss, and why', async () => {
   await fresh();
   const strip = page.locator('.strip'), box = await strip.boundingBox();

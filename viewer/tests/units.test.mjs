@@ -3,18 +3,18 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {load} from './support/units.mjs';
 
-test('points at one place share their triangles, unless there are very many', async () => {
-  const {trianglesAbout} = await load('gpu/triangles_about.ts');
-  // `count` triangles that all have their first corner at one place, as a point of its own each
-  const fan = (count) => {
-    const rest = Float32Array.from({length: 9 * count}, (_, i) => i % 9 < 3 ? 0 : i);
-    return trianglesAbout(rest, [{triangles: Uint32Array.from({length: 3 * count}, (_, i) => i)}], 3 * count).spans;
-  };
-  assert.equal(fan(64)[1], 64);
-  assert.equal(fan(65)[1], 1);
-  // and one point of many triangles adds up 256 of them
-  const rest = Float32Array.from({length: 903}, (_, i) => i), triangles = Uint32Array.from({length: 900}, (_, i) => [0, i % 300 + 1, (i + 1) % 300 + 1][i % 3]);
-  assert.equal(trianglesAbout(rest, [{triangles}], 301).spans[1], 256);
+test('points at one place share their normals', async () => {
+  const {Normals} = await load('shape/normals.ts');
+  // two triangles at a right angle, with corners of their own where they meet, and a point of none
+  const rest = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0, /**/ 0, 0, 0, 0, 0, -1, 1, 0, 0, /**/ 5, 5, 5]);
+  const triangles = Uint32Array.from([0, 1, 2, 3, 5, 4]), out = new Float32Array(rest.length), half = Math.SQRT1_2;
+  const near = (v, wanted) => wanted.forEach((x, c) => assert.ok(Math.abs(out[3 * v + c] - x) < 1e-6, `${v}: ${out.subarray(3 * v, 3 * v + 3)}`));
+  const normals = new Normals(rest, [{triangles}]);
+  normals.compute(rest, out);
+  for (const v of [0, 1, 3, 5]) near(v, [0, half, half]);
+  near(2, [0, 0, 1]);
+  near(4, [0, 1, 0]);
+  near(6, [0, 0, 0]);
 });
 
 test('frames without a stored difference that are misses, or whose error is 0, count as zeros', async () => {
@@ -35,7 +35,7 @@ test('a node of very many inputs is laid out', async () => {
 });
 
 test('edges of triangles are there once, whichever way round they are', async () => {
-  const {edgesOf} = await load('gpu/edges.ts');
+  const {edgesOf} = await load('shape/edges.ts');
   const pairs = (triangles, points) => [...edgesOf(Uint32Array.from(triangles), points)].reduce((all, v, i) => (i % 2 ? all[all.length - 1].push(v) : all.push([v]), all), []);
   assert.deepEqual(pairs([0, 1, 2, 2, 1, 3], 4), [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]);
   assert.deepEqual(pairs([], 4), []);

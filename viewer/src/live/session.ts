@@ -6,6 +6,15 @@ import type {Viewport} from '../view/viewport';
 import type {Client, DragRequest, EvaluateAnswer, EvaluateMode, Values} from './client';
 import {History} from './history';
 
+/** A picture and how it came about: when its change was asked for (a time of the page), and what each part took; milliseconds. */
+export interface Loop {
+  asked: number;
+  program: number;  // evaluation
+  answer: number;   // until the answer was in the page
+  page: number;     // state, texts and panels
+  picture: number;  // until the picture was drawn
+}
+
 export class Session {
   /** What the user has moved; everything else is as in the clip or as the rig sets it. */
   moved: Values = {};
@@ -14,8 +23,8 @@ export class Session {
   /** Something was moved or released. */
   readonly touched = new Signal<number>(0);
   readonly loopMs = new Signal<number | null>(null);
-  /** Of the latest answer: until it was here, what the page's own work took, and until the picture was drawn; milliseconds. */
-  readonly parts = {answer: 0, page: 0, picture: 0};
+  /** The latest picture; whoever listens hears of each when it is drawn. */
+  readonly drawn = new Signal<Loop | null>(null);
   /** x y z of each handle, as they were evaluated last. */
   readonly places = new Signal<readonly (number | null)[]>([]);
   /** Whether both sides are asked for, so that the error is known. */
@@ -122,14 +131,14 @@ export class Session {
           ...this.model.meta.handles?.length && showHandles ? {handles: true} : {}, ...drag ? {drag: drag.to} : {},
         }, this.model.points);
         if (this.ended) break;
-        this.parts.answer = performance.now() - sent;
+        const took = performance.now() - sent;
         const {dragged} = answer.facts;
         if (dragged && drag && drags === this.drags) {
           this.history.note(this.moved, drag.gesture, performance.now(), true);
           this.moved = {...this.moved, ...dragged};
           this.touched.set(this.touched.value + 1);
         }
-        await this.show(answer, clip, frame, !drag && !Object.keys(set).length);
+        await this.show(answer, took, clip, frame, !drag && !Object.keys(set).length);
       } catch (error) {
         if (this.ended) break;
         this.facts.set({...this.facts.value, problem: (error as Error).message});
@@ -142,7 +151,7 @@ export class Session {
     this.busy = false;
   }
 
-  private async show({facts, accelerated, full}: EvaluateAnswer, clip: number, frame: number, ofClip: boolean): Promise<void> {
+  private async show({facts, accelerated, full}: EvaluateAnswer, took: number, clip: number, frame: number, ofClip: boolean): Promise<void> {
     if (facts.generation !== undefined && facts.generation !== (this.model.meta.generation ?? facts.generation)) return;
     const begin = performance.now();
     if (accelerated || full) this.viewport.view?.positions.setSent(accelerated, full);
@@ -154,29 +163,12 @@ export class Session {
     this.facts.set(known);
     if (facts.values) this.values.set(facts.values);
     if (facts.handles) this.places.set(facts.handles);
+    const told = performance.now();
     this.viewport.draw();
-    const drawn = performance.now();
-    this.parts.page = drawn - begin;
-    await finished(this.viewport.renderer.getContext() as WebGL2RenderingContext);
-    this.parts.picture = performance.now() - drawn;
+    await this.viewport.picture.finished();
+    const end = performance.now(), program = ((facts.full_us ?? 0) + (facts.accelerated_us ?? 0)) / 1000;
     ++this.answered;
-    if (this.asked) this.loopMs.set(performance.now() - this.asked);
+    if (this.asked) this.loopMs.set(end - this.asked);
+    this.drawn.set({asked: this.asked, program, answer: took, page: told - begin, picture: end - told});
   }
-}
-
-/** Resolves when the GPU has drawn what it was given. */
-async function finished(gl: WebGL2RenderingContext): Promise<void> {
-  const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-  gl.flush();
-  if (!fence) return;
-  const began = performance.now();
-  while (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED && performance.now() < began + 1000) {
-    await new Promise<void>((resolve) => {
-      if (performance.now() > began + 8) return setTimeout(resolve, 4);  // slow anyway: leave it the processor
-      const channel = new MessageChannel();
-      channel.port1.onmessage = () => resolve();
-      channel.port2.postMessage(0);
-    });
-  }
-  gl.deleteSync(fence);
 }

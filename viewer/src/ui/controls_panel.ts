@@ -116,8 +116,10 @@ function sliderRow(context: Context, info: ControlInfo): Row {
     h('label', {class: 'name', attributes: {title: title(info)}, on: {dblclick: reset}}, info.label ?? info.name),
     slider, field, h('span', {class: 'unit'}, info.unit ?? ''), movesButton(context, info));
   return {info, element, show: (value, moved) => {
-    slider.value = String(value);
-    if (document.activeElement !== field) field.value = String(Number(value.toFixed(4)));
+    // most rows are as they were: what is not touched is not laid out or painted again
+    const text = String(Number(value.toFixed(4)));
+    if (Number(slider.value) !== value) slider.value = String(value);
+    if (field.value !== text && document.activeElement !== field) field.value = text;
     element.classList.toggle('moved', moved && value !== start);
   }};
 }

@@ -1,6 +1,6 @@
 // What is measured on every frame: a list, joined to the marks in the picture.
 import type {Context} from '../context';
-import type {Mark} from '../gpu/marks';
+import type {Mark} from '../draw/marks';
 import {DataTable} from './data_table';
 import {h} from './dom';
 import {duration} from './format';

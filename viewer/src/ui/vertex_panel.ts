@@ -36,7 +36,7 @@ export function makeVertex(context: Context): HTMLElement {
       return;
     }
     const mesh = model.meshes.find((m) => vertex >= m.first && vertex < m.first + m.count);
-    const metres = view.positions.readOne(view.side, vertex).map((x) => x.toFixed(4));
+    const metres = [...view.shownPoints().subarray(3 * vertex, 3 * vertex + 3)].map((x) => x.toFixed(4));
     const inMesh = !mesh ? '' : mesh.first ? `, ${vertex - mesh.first} of ${mesh.name}` : ` of ${mesh.name}`;
     place.textContent = `Vertex ${vertex}${inMesh}, at ${metres.join(', ')} m`;
   });

@@ -21,13 +21,12 @@ function along(stops: readonly Stop[], t: number): [number, number, number] {
 export const errorColour = (inTolerances: number): [number, number, number] => along(errorStops, inTolerances);
 export const fieldColour = (value: number): [number, number, number] => along(fieldStops, value);
 
-/** 256 texels that span 0 to `top` tolerances. */
-export function errorTable(top: number, table: Uint8Array): void {
-  for (let i = 0; i < 256; ++i) table.set([...errorColour(i / 255 * top), 255], 4 * i);
-}
+/** r g b a of 256 colours that span 0 to `top` tolerances. */
+export const errorTable = (top: number): Uint8Array<ArrayBuffer> => table((t) => errorColour(t * top));
+export const fieldTable = (): Uint8Array<ArrayBuffer> => table(fieldColour);
 
-export function fieldTable(table: Uint8Array): void {
-  for (let i = 0; i < 256; ++i) table.set([...fieldColour(i / 255), 255], 4 * i);
+function table(colour: (t: number) => [number, number, number]): Uint8Array<ArrayBuffer> {
+  return Uint8Array.from(Array.from({length: 256}, (_, i) => [...colour(i / 255), 255]).flat());
 }
 
 /** The same as a gradient of CSS, to the right. */

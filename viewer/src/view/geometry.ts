@@ -1,4 +1,4 @@
-// Arithmetic on points that were read back: bounds, the vertex under the pointer, places in the picture.
+// Arithmetic on points: bounds, the vertex under the pointer, places in the picture.
 import {Box3, Vector3, type Camera} from 'three';
 import type {Model} from '../data/model';
 

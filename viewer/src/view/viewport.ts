@@ -1,8 +1,11 @@
-// The picture: renderer, camera and what is drawn of a model. It draws when something has changed, and not otherwise.
-import {Color, DataTexture, LinearFilter, PerspectiveCamera, Scene, Vector3, WebGLRenderer} from 'three';
+// The picture's place in the page: who draws it, the camera, and what is drawn of a model. It draws when something has changed, and not otherwise.
+import {PerspectiveCamera, Vector3} from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 import type {Model} from '../data/model';
-import type {Side} from '../gpu/positions';
+import {makePicture} from '../draw/choose';
+import type {Picture} from '../draw/scene';
+import type {Side} from '../shape/positions';
+import {rgb} from './colours';
 import {boundsOf, toPixels} from './geometry';
 import {ModelView} from './model_view';
 
@@ -10,25 +13,17 @@ export class Viewport {
   readonly canvas: HTMLCanvasElement;
   readonly camera = new PerspectiveCamera(32, 1, 0.01, 100);
   readonly controls: OrbitControls;
-  readonly renderer: WebGLRenderer;
+  readonly picture: Picture;
   view: ModelView | null = null;
-  private readonly scene = new Scene();
   private pending = 0;
-  private background = '#000';
   private inset = 0;  // pixels at the top that the toolbar covers
   private centre = new Vector3();
   private radius = 1;
 
   constructor(private readonly parent: HTMLElement) {
-    this.renderer = new WebGLRenderer({antialias: !drawnBySoftware(), powerPreference: 'high-performance', preserveDrawingBuffer: false});
-    if (!this.renderer.extensions.has('EXT_color_buffer_float')) throw new Error('this browser cannot draw to pictures of floats (EXT_color_buffer_float)');
-    this.renderer.debug.checkShaderErrors = true;
-    this.canvas = this.renderer.domElement;
-    // three.js listens before, and uploads everything again; what was computed, and the background, are left
-    this.canvas.addEventListener('webglcontextrestored', () => {
-      this.view?.positions.again();
-      this.setBackground(this.background);
-    });
+    this.picture = makePicture();
+    this.canvas = this.picture.canvas;
+    for (const restored of ['webglcontextrestored', 'contextrestored']) this.canvas.addEventListener(restored, () => this.invalidate());
     this.canvas.tabIndex = 0;
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', 'The character. Drag to turn, Shift and arrow keys turn, plus and minus zoom, F fits.');
@@ -41,18 +36,15 @@ export class Viewport {
   }
 
   setModel(model: Model): ModelView {
-    this.view?.dispose();
-    this.scene.clear();
-    this.view = new ModelView(model, this.renderer, () => this.invalidate());
-    this.scene.add(this.view.group);
+    this.view = new ModelView(model, () => this.invalidate());
+    this.picture.show(this.view);
     this.resize();
     return this.view;
   }
 
+  /** #rrggbb. */
   setBackground(colour: string): void {
-    this.background = colour;
-    this.renderer.setClearColor(new Color(colour), 1);
-    this.scene.background = null;
+    this.picture.setBackground(rgb(colour));
     this.invalidate();
   }
 
@@ -64,10 +56,8 @@ export class Viewport {
 
   private resize(): void {
     const {clientWidth: width, clientHeight: height} = this.parent, ratio = Math.min(2, devicePixelRatio);
-    this.view?.setPixelRatio(ratio);
     if (!width || !height) return;
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height);
+    this.picture.resize(width, height, ratio);
     this.camera.aspect = width / height;
     this.camera.setViewOffset(width, height, 0, -this.inset / 2, width, height);
     this.invalidate();
@@ -112,7 +102,7 @@ export class Viewport {
   }
 
   points(side: Side): Float32Array {
-    return this.view ? this.view.positions.readBack(side) : new Float32Array();
+    return this.view ? this.view.positions.of(side) : new Float32Array();
   }
 
   pixelsOf(points: Float32Array, vertex: number): {x: number; y: number} {
@@ -128,24 +118,6 @@ export class Viewport {
     cancelAnimationFrame(this.pending);
     this.pending = 0;
     this.view?.update();
-    this.renderer.render(this.scene, this.camera);
+    this.picture.draw(this.camera);
   }
-}
-
-/** Without a GPU, smooth edges cost more than all the rest. */
-function drawnBySoftware(): boolean {
-  const gl = document.createElement('canvas').getContext('webgl2');
-  if (!gl) throw new Error('this browser has no WebGL 2');
-  const info = gl.getExtension('WEBGL_debug_renderer_info');
-  const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
-  gl.getExtension('WEBGL_lose_context')?.loseContext();
-  return /SwiftShader|llvmpipe|softpipe|Basic Render/i.test(name);
-}
-
-/** A line of 256 colours. */
-export function colourLine(table: Uint8Array<ArrayBuffer>): DataTexture {
-  const texture = new DataTexture(table, 256, 1);
-  texture.minFilter = texture.magFilter = LinearFilter;
-  texture.needsUpdate = true;
-  return texture;
 }

@@ -25,7 +25,7 @@ export async function startBrowser({width = 1440, height = 900, dark = true, tou
   const folder = mkdtempSync(join(tmpdir(), 'kpsa-viewer-'));
   const context = await chromium.launchPersistentContext(join(folder, 'profile'), {
     executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium', headless: true, viewport: {width, height}, colorScheme: dark ? 'dark' : 'light', hasTouch: touch, isMobile: touch,
-    args: ['--headless', '--no-sandbox', '--disable-gpu-sandbox', '--use-angle=swiftshader', '--disable-background-networking', '--disable-component-update', '--disable-sync', '--no-first-run'],
+    args: ['--headless', '--no-sandbox', '--disable-background-networking', '--disable-component-update', '--disable-sync', '--no-first-run'],
   });
   /** A page, its requests and its complaints. */
   const open = async (url) => {
