@@ -14,6 +14,7 @@
 #include "nodes/kernels/delta_mush.h"
 #include "nodes/kernels/dual_quaternion.h"
 #include "nodes/kernels/lattice.h"
+#include "nodes/kernels/non_linear.h"
 #include "nodes/kernels/normals.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/soft_mod.h"
@@ -21,6 +22,7 @@
 #include "nodes/kernels/wire.h"
 #include "nodes/kernels/wrap.h"
 #include "tests/nodes/kernel_support.h"
+#include "tests/nodes/non_linear_twin.h"
 
 namespace kpsa::engine {
 namespace {
@@ -320,6 +322,35 @@ int Main(int argc, char** argv) {
             }
             result[i] = p;
           }
+        });
+  }
+  const struct {
+    const char* name;
+    NonLinearMap map;
+  } maps[] = {{"bend", Bend{1.2, -0.4, 0.5}},
+              {"twist", Twist{0.3, -2, -0.3, 0.4}},
+              {"squash", Squash{-0.7, 1.2, 0.3, 0.4, 0.6, -0.3, 0.5}},
+              {"flare", Flare{1.5, 0.5, 0.7, 1.2, 0.3, -0.4, 0.3}},
+              {"sine", Sine{0.1, 0.4, 0.05, 0.5, -0.4, 0.5}},
+              {"wave", Wave{0.1, 0.3, 0.05, -0.5, 0.1, 0.5}}};
+  for (const auto& c : maps) {
+    const NonLinearKernel kernel(all);
+    const Matrix4 frame = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
+    Report(
+        c.name, n,
+        [&] {
+          kernel.Run({c.map, frame, 1}, in, out.view(), {});
+        },
+        [&] {  // in double, since that is what the bounds of floats are stated against
+          const Matrix4 inverse = InverseOrIdentity(frame);
+          non_linear_twin::WithMap(c.map, [&](const auto& f) {
+            for (std::size_t i = 0; i < n; ++i) {
+              const Double3 q = TransformPoint(inverse, {points[i].x, points[i].y, points[i].z});
+              const Double3 move = TransformVector(frame, f(q) - q);
+              result[i] = points[i] + Float3{static_cast<float>(move.x), static_cast<float>(move.y),
+                                             static_cast<float>(move.z)};
+            }
+          });
         });
   }
   for (double distance_weight : {0.0, 1.0}) {
