@@ -1,6 +1,7 @@
 // Nanoseconds a point of every kernel, on one core, beside a plain float loop over x y z triples that does
 // the same.
-//   bench_kernels [points along an edge]       KPSA_SIMD=avx512|avx2|scalar limits the vector unit
+//   bench_kernels [points along an edge] [part of a kernel's name]
+// KPSA_SIMD=avx512|avx2|scalar limits the vector unit.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -89,9 +90,11 @@ double NanosecondsAPoint(std::size_t points, const std::function<void()>& run) {
 }
 
 bool all_faster = true;
+std::string wanted;  // part of the names of those to measure
 
-void Report(const char* name, std::size_t points, const std::function<void()>& kernel,
+void Report(const std::string& name, std::size_t points, const std::function<void()>& kernel,
             const std::function<void()>& twin) {
+  if (name.find(wanted) == std::string::npos) return;
   const double ours = NanosecondsAPoint(points, kernel), theirs = NanosecondsAPoint(points, twin);
   all_faster &= ours <= theirs;
   fmt::print("{:<34} {:>8.2f} {:>10.2f} {:>8.1f}x\n", name, ours, theirs, theirs / ours);
@@ -103,6 +106,7 @@ int Main(int argc, char** argv) {
     return 2;
   }
   const Index edge = argc > 1 ? static_cast<Index>(std::clamp(std::atoi(argv[1]), 8, 2000)) : 131;
+  if (argc > 2) wanted = argv[2];
   const TestMesh mesh = MakeSheet(edge, edge);
   const std::size_t n = mesh.count();
   const std::vector<Index> all = AllPoints(n);
@@ -119,7 +123,7 @@ int Main(int argc, char** argv) {
     const SkinKernel kernel({skin.offsets, skin.joints, skin.weights, 64}, all);
     const std::vector<Matrix4> palette = MakePalette(64, {});
     Report(
-        fmt::format("skin, {} influences", influences).c_str(), n,
+        fmt::format("skin, {} influences", influences), n,
         [&] {
           kernel.Run({palette, 1, {}}, in, out.view(), scratch.span());
         },
@@ -166,7 +170,7 @@ int Main(int argc, char** argv) {
     }
     const std::vector<Double3> centers(64);
     Report(
-        fmt::format("dual quaternions, {} influences", influences).c_str(), n,
+        fmt::format("dual quaternions, {} influences", influences), n,
         [&] {
           kernel.Run({palette, centers, 1, {}, {}}, in, out.view(), scratch.span());
         },
@@ -188,7 +192,7 @@ int Main(int argc, char** argv) {
     std::vector<double> weights(40, 0.0);
     for (std::size_t k = 0; k < 40; k += 5) weights[k] = 0.1 * static_cast<double>(k + 1);
     Report(
-        fmt::format("blendShape, 8 of 40, {:.0f} % each", 100 * share).c_str(), n,
+        fmt::format("blendShape, 8 of 40, {:.0f} % each", 100 * share), n,
         [&] {
           kernel.Run({weights, 1}, in, out.view(), scratch.span());
         },

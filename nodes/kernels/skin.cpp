@@ -10,7 +10,7 @@
 #define HWY_TARGET_INCLUDE "nodes/kernels/skin.cpp"
 #include "hwy/foreach_target.h"
 
-#include "nodes/kernels/xyzw-inl.h"
+#include "nodes/kernels/columns-inl.h"
 
 #ifndef KPSA_NODES_KERNELS_SKIN_RUN_
 #define KPSA_NODES_KERNELS_SKIN_RUN_
@@ -36,24 +36,6 @@ struct SkinBlock {
 HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
 namespace HWY_NAMESPACE {
-
-// A matrix of four columns x y z 0 in as few vectors as there are
-constexpr std::size_t kParts = 16 / HWY_MIN(16, HWY_LANES(float));
-struct M16 {
-  VLanes part[kParts];
-};
-
-HWY_INLINE void MulColumns(const float* matrix, float weight, M16* m) {
-  const DLanes d;
-  const VLanes w = hn::Set(d, weight);
-  for (std::size_t k = 0; k < kParts; ++k) m->part[k] = hn::Mul(w, hn::Load(d, matrix + k * hn::Lanes(d)));
-}
-HWY_INLINE void AddColumns(const float* matrix, float weight, M16* m) {
-  const DLanes d;
-  const VLanes w = hn::Set(d, weight);
-  for (std::size_t k = 0; k < kParts; ++k)
-    m->part[k] = Fma(w, hn::Load(d, matrix + k * hn::Lanes(d)), m->part[k]);
-}
 
 // (c0 x + c2 z) + (c1 y + c3) on every target. p: x y z 1.
 #if HWY_MAX_BYTES == 64
@@ -100,9 +82,7 @@ HWY_INLINE void SkinGroup(const float* palette, std::size_t influences, std::siz
                           const float* points, float* result) {
   if constexpr (n != 0) influences = n;
   for (std::size_t i = 0; i < count; ++i, joints += influences, weights += influences) {
-    M16 m;
-    MulColumns(palette + joints[0], weights[0], &m);
-    for (std::size_t j = 1; j < influences; ++j) AddColumns(palette + joints[j], weights[j], &m);
+    const M16 m = BlendColumns<n>(palette, joints, weights, influences);
     const std::size_t lane = 4u * lanes[i];
     Store4(Transform(m, points + lane), result + lane);
   }
@@ -287,6 +267,7 @@ SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_po
     }
   }
   block_groups_.push_back(static_cast<Index>(groups_.size()));
+  entry_weights_.resize(entry_weights_.size() + 3);  // they are read by fours
 }
 
 SkinFrame SkinFrameOf(const Matrix4& first_joint, const Matrix4& world_from_mesh) {
