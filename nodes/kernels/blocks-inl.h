@@ -43,10 +43,10 @@ HWY_INLINE Blocks GatherBlocks(const float* p, const Index* at) {
 #if HWY_MAX_BYTES == 64
   const DLanes d;
   const hn::Half<DLanes> dh;
-  return hn::Combine(d, hn::Combine(dh, Load4(p + at[3]), Load4(p + at[2])),
-                     hn::Combine(dh, Load4(p + at[1]), Load4(p + at[0])));
+  return hn::Combine(d, hn::Combine(dh, Load4(p + EntryOf<3, 4>(at)), Load4(p + EntryOf<2, 4>(at))),
+                     hn::Combine(dh, Load4(p + EntryOf<1, 4>(at)), Load4(p + EntryOf<0, 4>(at))));
 #elif HWY_MAX_BYTES == 32
-  return hn::Combine(DLanes(), Load4(p + at[1]), Load4(p + at[0]));
+  return hn::Combine(DLanes(), Load4(p + EntryOf<1, 2>(at)), Load4(p + EntryOf<0, 2>(at)));
 #else
   return Load4(p + at[0]);
 #endif

@@ -86,7 +86,7 @@ HWY_INLINE VLanes SplatOf(const float* p) {
 template <std::size_t n, std::size_t e>
 HWY_INLINE void AddBlended(const float* HWY_RESTRICT columns, const Index* HWY_RESTRICT entries,
                            const float* HWY_RESTRICT weights, M16* HWY_RESTRICT sum) {
-  const M16 m = LoadColumns(columns + entries[e]);
+  const M16 m = LoadColumns(columns + EntryOf<e, n>(entries));
   const VLanes w = SplatOf<e>(weights);
   for (std::size_t k = 0; k < kParts; ++k)
     sum->part[k] = e == 0 ? hn::Mul(w, m.part[k]) : Fma(w, m.part[k], sum->part[k]);

@@ -56,7 +56,7 @@ HWY_INLINE void AddMotions(const float* HWY_RESTRICT motions, const Index* HWY_R
   const auto w = hn::Broadcast<e % 4>(hn::LoadDup128(d, weights + e / 4 * 4));
 #endif
   for (std::size_t k = 0; k < kMotionParts; ++k) {
-    const auto m = hn::Load(d, motions + entries[e] + k * hn::Lanes(d));
+    const auto m = hn::Load(d, motions + EntryOf<e, n>(entries) + k * hn::Lanes(d));
     sum->part[k] = e == 0 ? hn::Mul(w, m) : Fma(w, m, sum->part[k]);
   }
   if constexpr (e + 1 < n) AddMotions<n, e + 1>(motions, entries, weights, sum);
