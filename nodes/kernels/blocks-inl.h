@@ -18,9 +18,7 @@ using Blocks = F4;
 HWY_INLINE Blocks ZeroBlocks() { return Zero4(); }
 HWY_INLINE Blocks LoadBlocks(const float* p) { return Load4(p); }
 HWY_INLINE Blocks GatherBlocks(const float* p, const Index* at) { return Load4(p + at[0]); }
-HWY_INLINE Blocks AddBlocks(Blocks a, Blocks b) { return Add4(a, b); }
 HWY_INLINE Blocks SubBlocks(Blocks a, Blocks b) { return Sub4(a, b); }
-HWY_INLINE Blocks MulBlocks(Blocks a, Blocks b) { return Mul4(a, b); }
 HWY_INLINE Blocks FmaBlocks(Blocks a, Blocks b, Blocks c) { return Fma4(a, b, c); }
 HWY_INLINE Blocks YzxBlocks(Blocks a) { return Yzx4(a); }
 template <int lane>
@@ -51,9 +49,7 @@ HWY_INLINE Blocks GatherBlocks(const float* p, const Index* at) {
   return Load4(p + at[0]);
 #endif
 }
-HWY_INLINE Blocks AddBlocks(Blocks a, Blocks b) { return hn::Add(a, b); }
 HWY_INLINE Blocks SubBlocks(Blocks a, Blocks b) { return hn::Sub(a, b); }
-HWY_INLINE Blocks MulBlocks(Blocks a, Blocks b) { return hn::Mul(a, b); }
 HWY_INLINE Blocks FmaBlocks(Blocks a, Blocks b, Blocks c) { return Fma(a, b, c); }
 HWY_INLINE Blocks YzxBlocks(Blocks a) {
   HWY_ALIGN static constexpr std::int32_t kYzxw[16] = {1, 2, 0, 3, 5, 6, 4, 7, 9, 10, 8, 11, 13, 14, 12, 15};

@@ -59,7 +59,7 @@ HWY_INLINE void SumGroup(const Index* HWY_RESTRICT entries, const float* HWY_RES
                          WrapSums* HWY_RESTRICT sums) {
   if constexpr (n != 0) size = n;
   for (const std::size_t end = k + count; k < end; ++k, entries += size, shares += size) {
-    const M16 sum = BlendColumns<n>(frames, entries, shares, size);
+    const Columns sum = BlendColumns<n>(frames, entries, shares, size);
     StoreApart(sum, sums->x + 4 * k, sums->y + 4 * k, sums->z + 4 * k, sums->normals + 4 * k);
   }
 }
@@ -76,8 +76,7 @@ HWY_INLINE void SumFrames(const WrapRun& run, const float* frames, std::size_t b
     switch (row) {  // loops without a branch to mispredict
       case 0:
         for (std::size_t i = k; i < end; ++i)
-          StoreApart(SplatColumns(0), sums->x + 4 * i, sums->y + 4 * i, sums->z + 4 * i,
-                     sums->normals + 4 * i);
+          for (float* column : {sums->x, sums->y, sums->z, sums->normals}) Store4(Zero4(), column + 4 * i);
         break;
       case 2:
         SumGroup<2>(entries, shares, row, end - k, frames, k, sums);
