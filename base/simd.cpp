@@ -11,7 +11,8 @@ struct Choice {
   const char* name;
   std::int64_t target;
 };
-constexpr Choice kChoices[] = {{"avx512", HWY_AVX3}, {"avx2", HWY_AVX2}, {"scalar", HWY_SCALAR | HWY_EMU128}};
+constexpr Choice kChoices[] = {
+    {"avx512", HWY_AVX3}, {"avx2", HWY_AVX2}, {"neon", HWY_NEON}, {"scalar", HWY_SCALAR | HWY_EMU128}};
 
 }  // namespace
 
@@ -31,7 +32,7 @@ std::string ApplySimdChoice() {
   const char* name = std::getenv("KPSA_SIMD");
   if (name == nullptr || SelectSimdTarget(name)) return "";
   return std::string("KPSA_SIMD=") + name +
-         ": expected avx512, avx2 or scalar, and one that this processor has";
+         ": expected avx512, avx2, neon or scalar, and one that this processor has";
 }
 
 std::string SimdTargetName() {

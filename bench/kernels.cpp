@@ -1,6 +1,8 @@
 // Nanoseconds a point of every kernel, on one core, beside a plain float loop over x y z triples that does
-// the same.
-//   bench_kernels [points along an edge]       KPSA_SIMD=avx512|avx2|scalar limits the vector unit
+// the same, and beside its limit: the larger one of the times that its arrays take to pass through the core once,
+// at the bandwidth of a triad over as many bytes, and that its additions and multiplications take at their peak.
+//   bench_kernels [points along an edge] [part of a kernel's name]
+// KPSA_SIMD=avx512|avx2|scalar limits the vector unit.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,10 +12,12 @@
 #include <functional>
 
 #include "base/simd.h"
+#include "bench/kernel_limits.h"
 #include "nodes/kernels/blend_shape.h"
 #include "nodes/kernels/delta_mush.h"
 #include "nodes/kernels/dual_quaternion.h"
 #include "nodes/kernels/lattice.h"
+#include "nodes/kernels/non_linear.h"
 #include "nodes/kernels/normals.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/soft_mod.h"
@@ -21,6 +25,7 @@
 #include "nodes/kernels/wire.h"
 #include "nodes/kernels/wrap.h"
 #include "tests/nodes/kernel_support.h"
+#include "tests/nodes/non_linear_twin.h"
 
 namespace kpsa::engine {
 namespace {
@@ -87,12 +92,25 @@ double NanosecondsAPoint(std::size_t points, const std::function<void()>& run) {
 }
 
 bool all_faster = true;
+std::string wanted;  // part of the names of those to measure
 
-void Report(const char* name, std::size_t points, const std::function<void()>& kernel,
+// What a kernel cannot do without, a point: bytes of its arrays, input, output and what was bound, each once a
+// pass, what is gathered counted once; additions and multiplications of numbers that count, spare lanes left out.
+struct Work {
+  double bytes, operations;
+};
+
+void Report(const std::string& name, std::size_t points, Work work, const std::function<void()>& kernel,
             const std::function<void()>& twin) {
+  if (name.find(wanted) == std::string::npos) return;
   const double ours = NanosecondsAPoint(points, kernel), theirs = NanosecondsAPoint(points, twin);
   all_faster &= ours <= theirs;
-  fmt::print("{:<34} {:>8.2f} {:>10.2f} {:>8.1f}x\n", name, ours, theirs, theirs / ours);
+  static const double peak = OperationsANanosecond();
+  const double moved = work.bytes / BytesANanosecond(static_cast<std::size_t>(work.bytes) * points);
+  const double computed = work.operations / peak;
+  fmt::print("{:<34} {:>8.2f} {:>10.2f} {:>8.1f}x {:>8.2f}  {:<10} {:>4.0f} %\n", name, ours, theirs,
+             theirs / ours, std::max(moved, computed), moved > computed ? "bytes" : "arithmetic",
+             100 * std::max(moved, computed) / ours);
 }
 
 int Main(int argc, char** argv) {
@@ -101,6 +119,7 @@ int Main(int argc, char** argv) {
     return 2;
   }
   const Index edge = argc > 1 ? static_cast<Index>(std::clamp(std::atoi(argv[1]), 8, 2000)) : 131;
+  if (argc > 2) wanted = argv[2];
   const TestMesh mesh = MakeSheet(edge, edge);
   const std::size_t n = mesh.count();
   const std::vector<Index> all = AllPoints(n);
@@ -109,15 +128,17 @@ int Main(int argc, char** argv) {
   std::vector<Float3> points(n), result(n);
   for (std::size_t i = 0; i < n; ++i) points[i] = {in.x[i], in.y[i], in.z[i]};
   AlignedFloats scratch(64 * n + 4096);
-  fmt::print("{} points, {}\n{:<34} {:>8} {:>10} {:>9}\n", n, SimdTargetName(), "kernel", "ns/point", "naive",
-             "faster");
+  fmt::print("{} points, {}\n{:<34} {:>8} {:>10} {:>9} {:>8}  {:<10} {:>6}\n", n, SimdTargetName(), "kernel",
+             "ns/point", "naive", "faster", "limit", "of", "near");
+  const double ring = static_cast<double>(mesh.topology.neighbors().values.size()) / static_cast<double>(n);
 
   for (int influences : {1, 4, 8}) {
     const TestSkin skin = MakeSkin(n, 64, influences, false);
     const SkinKernel kernel({skin.offsets, skin.joints, skin.weights, 64}, all);
     const std::vector<Matrix4> palette = MakePalette(64, {});
     Report(
-        fmt::format("skin, {} influences", influences).c_str(), n,
+        fmt::format("skin, {} influences", influences), n,
+        Work{30.0 + 8 * influences, 30.0 + 24 * influences},
         [&] {
           kernel.Run({palette, 1, {}}, in, out.view(), scratch.span());
         },
@@ -137,7 +158,7 @@ int Main(int argc, char** argv) {
     const SkinKernel kernel({skin.offsets, skin.joints, skin.weights, 64}, all);
     const std::vector<Matrix4> palette = MakePalette(64, {});
     Report(
-        "skin, 1 to 8 influences", n,
+        "skin, 1 to 8 influences", n, Work{30 + 8 * 4.5, 30 + 24 * 4.5},
         [&] {
           kernel.Run({palette, 1, {}}, in, out.view(), scratch.span());
         },
@@ -164,7 +185,8 @@ int Main(int argc, char** argv) {
     }
     const std::vector<Double3> centers(64);
     Report(
-        fmt::format("dual quaternions, {} influences", influences).c_str(), n,
+        fmt::format("dual quaternions, {} influences", influences), n,
+        Work{30.0 + 8 * influences, 74.0 + 16 * influences},
         [&] {
           kernel.Run({palette, centers, 1, {}, {}}, in, out.view(), scratch.span());
         },
@@ -186,7 +208,8 @@ int Main(int argc, char** argv) {
     std::vector<double> weights(40, 0.0);
     for (std::size_t k = 0; k < 40; k += 5) weights[k] = 0.1 * static_cast<double>(k + 1);
     Report(
-        fmt::format("blendShape, 8 of 40, {:.0f} % each", 100 * share).c_str(), n,
+        fmt::format("blendShape, 8 of 40, {:.0f} % each", 100 * share), n,
+        Work{24 + 8 * share * 16, 8 * share * 6},
         [&] {
           kernel.Run({weights, 1}, in, out.view(), scratch.span());
         },
@@ -210,7 +233,7 @@ int Main(int argc, char** argv) {
     const ClusterKernel kernel(all, weights);
     const Matrix4 delta = ComposeTrs({0.1, 0.2, 0.3}, random.Rotation(), {1, 1.1, 1});
     Report(
-        "cluster", n,
+        "cluster", n, {28, 28},
         [&] {
           kernel.Run({delta, {}, 1}, in, out.view(), {});
         },
@@ -256,8 +279,15 @@ int Main(int argc, char** argv) {
           basis[i][static_cast<std::size_t>(a)].push_back(static_cast<float>(w[static_cast<std::size_t>(k)]));
       }
     }
+    // The move of the lattice as a whole, then that of its controls, of which distant ones are not stored
+    const double across = c.local ? c.influence : c.divisions, all_controls = c.divisions;
+    const double width = across * across * across, controls = all_controls * all_controls * all_controls;
+    const Work work =
+        c.local && controls > 13 * width
+            ? Work{28 + 28 + 8 * width, 28 + 6 * width}
+            : Work{28 + 28 + 12 * all_controls, 28 + 6 * (controls + all_controls * (all_controls + 1))};
     Report(
-        c.name, n,
+        c.name, n, work,
         [&] {
           kernel.Run({offsets, base, moved, 1}, in, out.view(), scratch.span());
         },
@@ -306,7 +336,7 @@ int Main(int argc, char** argv) {
       for (std::size_t k = 0; k < 4; ++k) weights[i][k] = static_cast<float>(falloff * w[k]);
     }
     Report(
-        "wire, all points near", n,
+        "wire, all points near", n, {24 + 28 + 32, 27},
         [&] {
           kernel.Run({offsets, 1}, in, out.view(), scratch.span());
         },
@@ -322,6 +352,36 @@ int Main(int argc, char** argv) {
           }
         });
   }
+  const struct {
+    const char* name;
+    double operations;  // of the map
+    NonLinearMap map;
+  } maps[] = {{"bend", 80, Bend{1.2, -0.4, 0.5}},
+              {"twist", 47, Twist{0.3, -2, -0.3, 0.4}},
+              {"squash", 24, Squash{-0.7, 1.2, 0.3, 0.4, 0.6, -0.3, 0.5}},
+              {"flare", 18, Flare{1.5, 0.5, 0.7, 1.2, 0.3, -0.4, 0.3}},
+              {"sine", 25, Sine{0.1, 0.4, 0.05, 0.5, -0.4, 0.5}},
+              {"wave", 31, Wave{0.1, 0.3, 0.05, -0.5, 0.1, 0.5}}};
+  for (const auto& c : maps) {
+    const NonLinearKernel kernel(all);
+    const Matrix4 frame = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
+    Report(
+        c.name, n, Work{28, 45 + c.operations},
+        [&] {
+          kernel.Run({c.map, frame, 1}, in, out.view(), {});
+        },
+        [&] {  // in double, since that is what the bounds of floats are stated against
+          const Matrix4 inverse = InverseOrIdentity(frame);
+          non_linear_twin::WithMap(c.map, [&](const auto& f) {
+            for (std::size_t i = 0; i < n; ++i) {
+              const Double3 q = TransformPoint(inverse, {points[i].x, points[i].y, points[i].z});
+              const Double3 move = TransformVector(frame, f(q) - q);
+              result[i] = points[i] + Float3{static_cast<float>(move.x), static_cast<float>(move.y),
+                                             static_cast<float>(move.z)};
+            }
+          });
+        });
+  }
   for (double distance_weight : {0.0, 1.0}) {
     DeltaMushSettings settings;
     settings.distance_weight = distance_weight;
@@ -335,6 +395,8 @@ int Main(int argc, char** argv) {
     }
     Report(
         distance_weight == 0 ? "deltaMush, 10 iterations" : "deltaMush, 10, distance weights", n,
+        Work{28 + 10 * (36 + 4 * ring + 4 * ring * distance_weight) + 40 + 12 * ring,
+             10 * (9 + 3 * ring + 3 * ring * distance_weight) + 15 * ring + 120},
         [&] { kernel.Run({}, in, out.view(), scratch.span()); },
         [&] {
           a = points;
@@ -419,8 +481,10 @@ int Main(int argc, char** argv) {
         offsets.push_back({Dot(o, f.t), Dot(o, f.b), Dot(o, f.n)});
       }
     }
+    const double shares = static_cast<double>(influences.points.size()) / static_cast<double>(n);
     Report(
         nearest ? "wrap, 8 influences" : "proximityWrap", n,
+        Work{28 + 84 + 20 * ring + 64 + 104 + 8 * shares, 40 + 33 * ring + 30 * shares + 140},
         [&] {
           kernel.Run({1, now}, follower, out.view(), scratch.span());
         },
@@ -442,7 +506,8 @@ int Main(int argc, char** argv) {
   {
     const NormalsKernel kernel(mesh.topology, all, all);
     Report(
-        "normals", n, [&] { kernel.Run(in, out.view(), scratch.span()); },
+        "normals", n, Work{24 + 2 * 28 + 16 + 4 * ring, 2 * 14 + 3 * ring + 9},
+        [&] { kernel.Run(in, out.view(), scratch.span()); },
         [&] {
           std::fill(result.begin(), result.end(), Float3{0, 0, 0});
           const auto triangles = mesh.topology.triangles();

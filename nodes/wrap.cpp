@@ -180,7 +180,7 @@ KPSA_NODES(wrap, registry) {
                  .bind = BindWrap<true>,
                  .demand = DemandWrapNode<true>})
       .version(3)  // carried by its parent
-      .cost(3000, 60);
+      .cost(3000, 14);
   AddDeformer<ComputeWrap>(
       registry, {.name = "proximityWrap",
                  .doc = "Points follow the nearest place of a driver's surface. How parentMatrix has "
@@ -189,7 +189,7 @@ KPSA_NODES(wrap, registry) {
                  .bind = BindWrap<false>,
                  .demand = DemandWrapNode<false>})
       .version(3)  // carried by its parent
-      .cost(5000, 46);
+      .cost(5000, 12);
 }
 
 }  // namespace kpsa::engine

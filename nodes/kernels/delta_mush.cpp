@@ -33,46 +33,169 @@ void PackLocal(ConstPointsView in, const Index* source, const float* pivot, std:
   }
 }
 
+// The sum over neighbours, alike or weighted with a sum of 1.
+template <std::size_t n, std::size_t e, bool kWeighted>
+HWY_INLINE F4 AddNeighbors(const float* HWY_RESTRICT from, const Index* HWY_RESTRICT neighbors,
+                           const float* HWY_RESTRICT weights, F4 sum) {
+  const F4 neighbor = Load4(from + EntryOf<e, n + 1>(neighbors));
+  if constexpr (kWeighted) {
+    sum = e == 0 ? Mul4(SplatOf4<e>(weights), neighbor) : Fma4(SplatOf4<e>(weights), neighbor, sum);
+  } else {
+    sum = e == 0 ? neighbor : Add4(sum, neighbor);
+  }
+  if constexpr (e + 1 < n) sum = AddNeighbors<n, e + 1, kWeighted>(from, neighbors, weights, sum);
+  return sum;
+}
+
 template <std::size_t n, bool kWeighted>  // n = 0: at run time
 HWY_INLINE void SmoothGroup(const MushRows& rows, const float* HWY_RESTRICT from, float* HWY_RESTRICT to) {
   const std::size_t neighbor_count = n == 0 ? rows.neighbor_count : n, count = rows.count;
-  const Index *HWY_RESTRICT neighbors = rows.neighbors, *HWY_RESTRICT order = rows.order;
-  const float *HWY_RESTRICT weights = rows.weights, *HWY_RESTRICT steps = rows.steps;
-  for (std::size_t i = 0; i < count; ++i, neighbors += neighbor_count) {
-    const F4 s = Load4(from + order[i]);
-    F4 sum = Sub4(Load4(from + neighbors[0]), s);
-    if constexpr (kWeighted) sum = Mul4(Splat4(weights[0]), sum);
-    for (std::size_t j = 1; j < neighbor_count; ++j) {
-      const F4 edge = Sub4(Load4(from + neighbors[j]), s);
-      sum = kWeighted ? Fma4(Splat4(weights[j]), edge, sum) : Add4(sum, edge);
+  const Index* HWY_RESTRICT neighbors = rows.rows;
+  const float* HWY_RESTRICT weights = rows.weights;
+  const F4 step = Splat4(rows.step), less = Splat4(kWeighted ? -1.0f : -static_cast<float>(neighbor_count));
+  for (std::size_t i = 0; i < count; ++i, neighbors += neighbor_count + 1) {
+    F4 sum;
+    Index own;
+    if constexpr (n != 0) {
+      sum = AddNeighbors<n, 0, kWeighted>(from, neighbors, weights, Zero4());
+      own = EntryOf<n, n + 1>(neighbors);
+    } else {
+      sum = Load4(from + neighbors[0]);
+      if constexpr (kWeighted) sum = Mul4(Splat4(weights[0]), sum);
+      for (std::size_t j = 1; j < neighbor_count; ++j) {
+        const F4 neighbor = Load4(from + neighbors[j]);
+        sum = kWeighted ? Fma4(Splat4(weights[j]), neighbor, sum) : Add4(sum, neighbor);
+      }
+      own = neighbors[neighbor_count];
     }
     if constexpr (kWeighted) weights += neighbor_count;
-    Store4(Fma4(Splat4(steps[i]), sum, s), to + order[i]);
+    const F4 s = Load4(from + own);
+    Store4(Fma4(step, Fma4(less, s, sum), s), to + own);
+  }
+}
+
+template <bool kWeighted>
+HWY_INLINE void SmoothRowsOf(const MushRows& rows, const float* from, float* to) {
+  switch (rows.neighbor_count) {
+    case 3:
+      return SmoothGroup<3, kWeighted>(rows, from, to);
+    case 4:
+      return SmoothGroup<4, kWeighted>(rows, from, to);
+    case 5:
+      return SmoothGroup<5, kWeighted>(rows, from, to);
+    case 6:
+      return SmoothGroup<6, kWeighted>(rows, from, to);
+    case 7:
+      return SmoothGroup<7, kWeighted>(rows, from, to);
+    case 8:
+      return SmoothGroup<8, kWeighted>(rows, from, to);
+    default:
+      return SmoothGroup<0, kWeighted>(rows, from, to);
   }
 }
 
 // One iteration of a group.
 void SmoothRows(const MushRows& rows, const float* from, float* to) {
   if (rows.neighbor_count == 0) {
-    for (std::size_t i = 0; i < rows.count; ++i) Store4(Load4(from + rows.order[i]), to + rows.order[i]);
+    for (std::size_t i = 0; i < rows.count; ++i) Store4(Load4(from + rows.rows[i]), to + rows.rows[i]);
     return;
   }
-  if (rows.weights != nullptr) return SmoothGroup<0, true>(rows, from, to);
-  switch (rows.neighbor_count) {
-    case 3:
-      return SmoothGroup<3, false>(rows, from, to);
-    case 4:
-      return SmoothGroup<4, false>(rows, from, to);
-    case 5:
-      return SmoothGroup<5, false>(rows, from, to);
-    case 6:
-      return SmoothGroup<6, false>(rows, from, to);
-    case 7:
-      return SmoothGroup<7, false>(rows, from, to);
-    case 8:
-      return SmoothGroup<8, false>(rows, from, to);
-    default:
-      return SmoothGroup<0, false>(rows, from, to);
+  if (rows.weights != nullptr) return SmoothRowsOf<true>(rows, from, to);
+  SmoothRowsOf<false>(rows, from, to);
+}
+
+// Tangent and bitangent at a point: in one vector where it holds both, sums over the edges to n neighbours.
+#if HWY_MAX_BYTES >= 32
+using DTangents = hn::FixedTag<float, 8>;
+template <std::size_t n, std::size_t e>
+HWY_INLINE void AddTangents(const float* HWY_RESTRICT from, const Index* HWY_RESTRICT neighbors,
+                            const float* HWY_RESTRICT weights, hn::Vec<DTangents> s,
+                            hn::Vec<DTangents>* HWY_RESTRICT sums) {
+  const DTangents d;
+  HWY_ALIGN static constexpr std::int32_t kPairs[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+  const auto edge = hn::Sub(hn::LoadDup128(d, from + EntryOf<e, n>(neighbors)), s);
+  const auto w = hn::TableLookupLanes(hn::LoadDup128(d, weights + e / 2 * 4),
+                                      hn::SetTableIndices(d, kPairs + e % 2 * 8));
+  *sums = e == 0 ? hn::Mul(w, edge) : Fma(w, edge, *sums);
+  if constexpr (e + 1 < n) AddTangents<n, e + 1>(from, neighbors, weights, s, sums);
+}
+template <std::size_t n>
+HWY_INLINE void SumTangents(const float* from, const Index* neighbors, const float* weights,
+                            const float* point, float* tangent, float* bitangent) {
+  hn::Vec<DTangents> sums;
+  AddTangents<n, 0>(from, neighbors, weights, hn::LoadDup128(DTangents(), point), &sums);
+  Store4(hn::LowerHalf(D4(), sums), tangent);
+  Store4(hn::UpperHalf(D4(), sums), bitangent);
+}
+#else
+template <std::size_t n>
+HWY_INLINE void SumTangents(const float* from, const Index* neighbors, const float* weights,
+                            const float* point, float* tangent, float* bitangent) {
+  const F4 s = Load4(point);
+  F4 t, b;
+  for (std::size_t e = 0; e < n; ++e) {
+    const F4 edge = Sub4(Load4(from + neighbors[e]), s);
+    t = e == 0 ? Mul4(Splat4(weights[0]), edge) : Fma4(Splat4(weights[2 * e]), edge, t);
+    b = e == 0 ? Mul4(Splat4(weights[1]), edge) : Fma4(Splat4(weights[2 * e + 1]), edge, b);
+  }
+  Store4(t, tangent);
+  Store4(b, bitangent);
+}
+#endif
+
+// Of `count` frames of n neighbours each (0: `size`), by their place in the block.
+template <std::size_t n>
+HWY_INLINE void TangentGroup(const MushFinish& run, std::size_t first, std::size_t size, std::size_t count,
+                             float* HWY_RESTRICT smoothed, float* HWY_RESTRICT tangents,
+                             float* HWY_RESTRICT bitangents) {
+  if constexpr (n != 0) size = n;
+  const float* HWY_RESTRICT from = run.smoothed;
+  const Index* HWY_RESTRICT neighbors = run.frame_neighbors + run.frame_offsets[first];
+  const float* HWY_RESTRICT weights = run.frame_weights + 2 * std::size_t{run.frame_offsets[first]};
+  for (std::size_t i = first; i < first + count; ++i, neighbors += size, weights += 2 * size) {
+    const std::size_t lane = 4u * run.lanes[i];
+    const float* point = from + run.out_local[i];
+    const F4 s = Load4(point);
+    Store4(s, smoothed + lane);
+    if constexpr (n != 0) {
+      SumTangents<n>(from, neighbors, weights, point, tangents + lane, bitangents + lane);
+    } else {
+      F4 t = Zero4(), b = t;
+      for (std::size_t e = 0; e < size; ++e) {
+        const F4 edge = Sub4(Load4(from + neighbors[e]), s);
+        t = e == 0 ? Mul4(Splat4(weights[0]), edge) : Fma4(Splat4(weights[2 * e]), edge, t);
+        b = e == 0 ? Mul4(Splat4(weights[1]), edge) : Fma4(Splat4(weights[2 * e + 1]), edge, b);
+      }
+      Store4(t, tangents + lane);
+      Store4(b, bitangents + lane);
+    }
+  }
+}
+
+HWY_INLINE void GatherTangents(const MushFinish& run, std::size_t begin, std::size_t end, float* smoothed,
+                               float* tangents, float* bitangents) {
+  for (std::size_t i = begin; i < end;) {
+    const std::size_t size = run.frame_offsets[i + 1] - run.frame_offsets[i];
+    std::size_t last = i + 1;
+    while (last < end && run.frame_offsets[last + 1] - run.frame_offsets[last] == size) ++last;
+    switch (size) {
+      case 4:
+        TangentGroup<4>(run, i, size, last - i, smoothed, tangents, bitangents);
+        break;
+      case 5:
+        TangentGroup<5>(run, i, size, last - i, smoothed, tangents, bitangents);
+        break;
+      case 6:
+        TangentGroup<6>(run, i, size, last - i, smoothed, tangents, bitangents);
+        break;
+      case 7:
+        TangentGroup<7>(run, i, size, last - i, smoothed, tangents, bitangents);
+        break;
+      default:
+        TangentGroup<0>(run, i, size, last - i, smoothed, tangents, bitangents);
+        break;
+    }
+    i = last;
   }
 }
 
@@ -94,20 +217,7 @@ HWY_INLINE void Finish(const MushFinish& run, ConstPointsView in, PointsView out
     const std::size_t at = (i - begin) % kFinishBlock;
     if (at == 0) {
       const std::size_t size = HWY_MIN(kFinishBlock, end - i);
-      for (std::size_t k = 0; k < size; ++k) {
-        const std::size_t lane = run.lanes[i + k];
-        const F4 s = Load4(run.smoothed + run.out_local[i + k]);
-        F4 t = Zero4(), b = t;
-        const Index last = run.frame_offsets[i + k + 1];
-        for (Index e = run.frame_offsets[i + k]; e < last; ++e) {
-          const F4 edge = Sub4(Load4(run.smoothed + run.frame_neighbors[e]), s);
-          t = Fma4(Splat4(run.frame_weights[2 * e]), edge, t);
-          b = Fma4(Splat4(run.frame_weights[2 * e + 1]), edge, b);
-        }
-        Store4(s, smoothed + 4 * lane);
-        Store4(t, tangents + 4 * lane);
-        Store4(b, bitangents + 4 * lane);
-      }
+      GatherTangents(run, i, i + size, smoothed, tangents, bitangents);
       for (std::size_t k = 0; k < (run.out_in == nullptr ? 0 : size); ++k) {
         const Index p = run.out_in[i + k];
         incoming[k] = in.x[p], incoming[kFinishBlock + k] = in.y[p], incoming[2 * kFinishBlock + k] = in.z[p];
@@ -225,9 +335,8 @@ const float* DeltaMushKernel::Smooth(ConstPointsView in, const float* pivot, std
                 for (Index g = blocks_[begin]; g < blocks_[end]; ++g) {
                   const Group& group = groups_[g];
                   const float* weights =
-                      neighbor_weights_.empty() ? nullptr : neighbor_weights_.data() + group.first_neighbor;
-                  smooth_rows({order_.data() + group.first_point, neighbors_.data() + group.first_neighbor,
-                               weights, steps_.data() + group.first_point, group.neighbors, group.count},
+                      neighbor_weights_.empty() ? nullptr : neighbor_weights_.data() + group.first_weight;
+                  smooth_rows({rows_.data() + group.first, weights, group.neighbors, group.count, group.step},
                               from, to);
                 }
               });

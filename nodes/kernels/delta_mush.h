@@ -61,7 +61,8 @@ class DeltaMushKernel {
   struct Group {
     Index neighbors;  // of each point
     Index count;
-    Index first_point, first_neighbor;  // in order_ and neighbors_
+    Index first, first_weight;  // in rows_ and neighbor_weights_
+    float step;                 // settings.step, or that / neighbors where these are alike
   };
   // Floats of one of the two buffers. They lie 3 KiB apart modulo 4 KiB: stores to one would otherwise hold
   // up loads from the other whose addresses look alike.
@@ -83,10 +84,8 @@ class DeltaMushKernel {
   std::vector<Index> blocks_;        // first group of each block, and the end
   std::vector<Index> block_counts_;  // [iteration]: blocks that it computes
   std::vector<Group> groups_;
-  std::vector<Index> order_;             // 4 * local number, in the order of groups_
-  std::vector<Index> neighbors_;         // 4 * local number, rows in the order of order_
-  std::vector<float> neighbor_weights_;  // beside neighbors_; empty if all alike
-  std::vector<float> steps_;             // beside order_: step, or step / neighbours
+  std::vector<Index> rows_;  // of each point 4 times the local numbers of its neighbours, and of itself
+  std::vector<float> neighbor_weights_;  // of the neighbours; empty if all alike
   std::vector<std::uint8_t>
       lanes_;  // outputs in blocks of 64, sorted by their number of neighbours: place in block
   std::vector<Index> out_local_;                        // beside lanes_: 4 * local number

@@ -170,28 +170,28 @@ void DeltaMushKernel::BuildRows(const Topology& topology, ConstPointsView rest,
     for (Index p : members) {
       const Index size = row_size(p);
       if (p == members.front() || groups_.back().neighbors != size) {
-        groups_.push_back(
-            {size, 0, static_cast<Index>(order_.size()), static_cast<Index>(neighbors_.size())});
+        const double step = settings.distance_weight == 0 && size > 0 ? settings.step / size : settings.step;
+        groups_.push_back({size, 0, static_cast<Index>(rows_.size()),
+                           static_cast<Index>(neighbor_weights_.size()), static_cast<float>(step)});
       }
       ++groups_.back().count;
-      order_.push_back(4 * local_of[p]);
-      steps_.push_back(static_cast<float>(settings.distance_weight == 0 && size > 0 ? settings.step / size
-                                                                                    : settings.step));
-      if (size == 0) continue;
       double inverse_sum = 0;
       const auto inverse_length = [&](Index q) { return 1 / std::max(Length(point(q) - point(p)), 1e-9); };
-      for (Index q : topology.neighbors().row(p)) inverse_sum += inverse_length(q);
-      for (Index q : topology.neighbors().row(p)) {
-        neighbors_.push_back(4 * local_of[q]);
+      const auto ring = topology.neighbors().row(p).first(size);
+      for (Index q : ring) inverse_sum += inverse_length(q);
+      for (Index q : ring) {
+        rows_.push_back(4 * local_of[q]);
         if (settings.distance_weight == 0) continue;
         neighbor_weights_.push_back(
             static_cast<float>((1 - settings.distance_weight) / size +
                                settings.distance_weight * inverse_length(q) / inverse_sum));
       }
+      rows_.push_back(4 * local_of[p]);
     }
     begin = end;
   }
   blocks_.push_back(static_cast<Index>(groups_.size()));
+  if (!neighbor_weights_.empty()) neighbor_weights_.resize(neighbor_weights_.size() + 3);  // read by fours
   for (int j = 0; j <= settings.iterations; ++j) {
     Index count = 0;
     while (count < block_level.size() && block_level[count] <= settings.iterations + 1 - j) ++count;
@@ -245,6 +245,7 @@ void DeltaMushKernel::BuildFrames(const Topology& topology, ConstPointsView rest
     }
     frame_offsets_.push_back(static_cast<Index>(frame_neighbors_.size()));
   }
+  frame_weights_.resize(frame_weights_.size() + 2);  // they are read by fours
   detail_ = AlignedFloats(3 * PaddedCount(count_));
   float* detail = detail_.data();
   const std::size_t row = PaddedCount(count_);

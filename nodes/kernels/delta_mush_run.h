@@ -7,12 +7,13 @@
 #include "base/points.h"
 
 namespace kpsa::engine {
-inline constexpr std::size_t kFinishBlock = 64;
+inline constexpr std::size_t kFinishBlock = 128;
 // Points with equally many neighbours.
 struct MushRows {
-  const Index *order, *neighbors;
-  const float *weights, *steps;  // weights: null if all alike
+  const Index* rows;     // neighbours and the point itself
+  const float* weights;  // null if all alike; read by fours
   std::size_t neighbor_count, count;
+  float step;  // of the sum over neighbours
 };
 struct MushFinish {
   const float* smoothed;

@@ -23,32 +23,28 @@ std::vector<Index> DriverFramesDemand(const Topology& driver, std::span<const Do
                                       std::span<const Index> frame_points);
 
 // Bound to a set of driver points; frames come as kFrameFloats floats each: F column by column (column k is
-// where the rest direction k has gone), then the normal, unit length, or 0; four floats a column. F is no
-// rotation: it stretches, too.
+// where the rest direction k has gone), then the normal, unit length, or 0; four floats a column, of which the
+// spare ones hold the point (wrap_run.h). F is no rotation: it stretches, too.
 class DriverFrames {
  public:
   DriverFrames() = default;
-  // rest: all driver points. frame_points, in_points: sorted; in_points holds at least the demand.
+  // rest: all driver points. frame_points, in_points: sorted; in_points holds at least the demand and those
+  // points.
   DriverFrames(const Topology& driver, std::span<const Double3> rest, std::span<const Index> frame_points,
                std::span<const Index> in_points);
 
-  std::size_t count() const { return edge_offsets_.size() - 1; }
-  // Of one frame: whether it exists.
-  bool exists(std::size_t frame) const { return edge_offsets_[frame + 1] > edge_offsets_[frame]; }
-  // For the frames, and normals on the way.
-  std::size_t Floats() const { return kFrameFloats * count() + 4 * (triangles_.size() / 3); }
-  // points: the in_points now, x y z 0 each. frames [Floats()]: count() frames first; those that do not exist
-  // are left alone. Both 16-byte aligned.
+  // Of the i-th frame point: whether its frame exists, and where it begins among the floats.
+  bool exists(std::size_t i) const { return exists_[i]; }
+  Index begin(std::size_t i) const { return kFrameFloats * slots_[i]; }
+  std::size_t Floats() const { return kFrameFloats * own_.size(); }
+  // points: the in_points now, x y z 0 each. Both 64-byte aligned.
   void Run(const float* points, float* frames, const Parallel* parallel = nullptr) const noexcept;
 
  private:
-  std::vector<Index> own_;  // entry of points, a frame
-  std::vector<Index> edge_offsets_ = {0}, triangle_offsets_ = {0};
-  std::vector<Index> edge_points_;  // entry of points
-  std::vector<float> duals_;        // M^-1 e, 4 an edge
-  std::vector<Index> around_;       // triangles around the point
-  std::vector<Index> triangles_;    // 3 entries of points each
-  std::vector<float> normal_duals_;
+  std::vector<Index> slots_;  // groups of frames with equally long rings (wrap_run.h)
+  std::vector<bool> exists_;
+  std::vector<Index> first_ = {0}, own_, spokes_;
+  AlignedFloats duals_, normal_duals_;
 };
 
 }  // namespace kpsa::engine

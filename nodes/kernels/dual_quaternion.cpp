@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <type_traits>
+#include <utility>
 
 #include "base/check.h"
 #include "nodes/kernels/transform_math.h"
@@ -16,19 +19,19 @@
 #ifndef KPSA_NODES_KERNELS_DUAL_QUATERNION_RUN_
 #define KPSA_NODES_KERNELS_DUAL_QUATERNION_RUN_
 namespace kpsa::engine {
-// What one Run hands to the vector code. Of each joint: rotation xyzw, dual part xyzw, the columns x y z 0
-// of its stretch, and 1 if it stretches.
+// What one Run hands to the vector code.
 struct DualRun : SkinFrame {
-  const float* joints;
+  const float* motions;  // rotation xyzw, dual part xyzw
+  const float*
+      stretches;  // columns x y z 0, but for the last number: whether the joint stretches; null: none does
   float envelope;
   const float* masks;  // null if all 1
   const float* blend;  // null if all 1
   const float* linear[3];
-  const Index* offsets;
-  const Index* entry_joints;
+  const std::uint16_t* lanes;
+  const Index *offsets, *entry_motions, *entry_joints;
   const float* entry_weights;
 };
-inline constexpr std::size_t kDualPart = 4, kStretch = 8, kStretches = 24;
 }  // namespace kpsa::engine
 #endif
 
@@ -36,35 +39,122 @@ HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
-// One point: the blended dual quaternion (not unit) and the stretched point, in place.
-HWY_INLINE void BlendMotions(const DualRun& run, std::size_t point, float* rotation, float* dual, float* p) {
+// Rotation and dual part in as few vectors as there are
+using DMotion = hn::CappedTag<float, 8>;
+constexpr std::size_t kMotionParts = 8 / HWY_MIN(8, HWY_LANES(float));
+struct Motion {
+  hn::Vec<DMotion> part[kMotionParts];
+};
+
+template <std::size_t n, std::size_t e>
+HWY_INLINE void AddMotions(const float* HWY_RESTRICT motions, const Index* HWY_RESTRICT entries,
+                           const float* HWY_RESTRICT weights, Motion* HWY_RESTRICT sum) {
+  const DMotion d;
+#if HWY_TARGET == HWY_SCALAR
+  const auto w = hn::Set(d, weights[e]);
+#else
+  const auto w = hn::Broadcast<e % 4>(hn::LoadDup128(d, weights + e / 4 * 4));
+#endif
+  for (std::size_t k = 0; k < kMotionParts; ++k) {
+    const auto m = hn::Load(d, motions + EntryOf<e, n>(entries) + k * hn::Lanes(d));
+    sum->part[k] = e == 0 ? hn::Mul(w, m) : Fma(w, m, sum->part[k]);
+  }
+  if constexpr (e + 1 < n) AddMotions<n, e + 1>(motions, entries, weights, sum);
+}
+HWY_INLINE void StoreMotion(const Motion& m, float* rotation, float* dual) {
+#if HWY_MAX_BYTES >= 32
+  Store4(hn::LowerHalf(D4(), m.part[0]), rotation);
+  Store4(hn::UpperHalf(D4(), m.part[0]), dual);
+#else
+  const DMotion d;
+  float* to[2] = {rotation, dual};
+  for (std::size_t k = 0; k < kMotionParts; ++k)
+    hn::Store(m.part[k], d, to[k * hn::Lanes(d) / 4] + k * hn::Lanes(d) % 4);
+#endif
+}
+
+// Blended dual quaternions (not unit) of `count` points of n entries each; 0: `size`.
+template <std::size_t n>
+HWY_INLINE void BlendGroup(const float* HWY_RESTRICT motions, const std::uint16_t* HWY_RESTRICT lanes,
+                           const Index* HWY_RESTRICT entries, const float* HWY_RESTRICT weights,
+                           std::size_t size, std::size_t count, float* HWY_RESTRICT rotations,
+                           float* HWY_RESTRICT duals) {
+  if constexpr (n != 0) size = n;
+  for (std::size_t i = 0; i < count; ++i, entries += size, weights += size) {
+    Motion sum;
+    if constexpr (n != 0) {
+      AddMotions<n, 0>(motions, entries, weights, &sum);
+    } else {
+      const DMotion d;
+      for (auto& part : sum.part) part = hn::Zero(d);
+      for (std::size_t e = 0; e < size; ++e) {
+        const auto w = hn::Set(d, weights[e]);
+        for (std::size_t k = 0; k < kMotionParts; ++k) {
+          const auto m = hn::Load(d, motions + entries[e] + k * hn::Lanes(d));
+          sum.part[k] = e == 0 ? hn::Mul(w, m) : Fma(w, m, sum.part[k]);
+        }
+      }
+    }
+    StoreMotion(sum, rotations + 4 * lanes[i], duals + 4 * lanes[i]);
+  }
+}
+
+void BlendMotions(const DualRun& run, std::size_t begin, std::size_t end, float* rotations, float* duals) {
+  for (std::size_t i = begin; i < end;) {
+    const Index first = run.offsets[i], size = run.offsets[i + 1] - first;
+    std::size_t last = i + 1;
+    while (last < end && run.offsets[last + 1] - run.offsets[last] == size) ++last;
+    const std::uint16_t* lanes = run.lanes + i;
+    const Index* entries = run.entry_motions + first;
+    const float* weights = run.entry_weights + first;
+    const auto blend = [&](auto n) HWY_ATTR {
+      BlendGroup<n()>(run.motions, lanes, entries, weights, size, last - i, rotations, duals);
+    };
+    switch (size) {  // loops without a branch to mispredict
+      case 1:
+        blend(std::integral_constant<std::size_t, 1>());
+        break;
+      case 2:
+        blend(std::integral_constant<std::size_t, 2>());
+        break;
+      case 3:
+        blend(std::integral_constant<std::size_t, 3>());
+        break;
+      case 4:
+        blend(std::integral_constant<std::size_t, 4>());
+        break;
+      case 5:
+        blend(std::integral_constant<std::size_t, 5>());
+        break;
+      case 6:
+        blend(std::integral_constant<std::size_t, 6>());
+        break;
+      case 7:
+        blend(std::integral_constant<std::size_t, 7>());
+        break;
+      case 8:
+        blend(std::integral_constant<std::size_t, 8>());
+        break;
+      default:
+        blend(std::integral_constant<std::size_t, 0>());
+        break;
+    }
+    i = last;
+  }
+}
+
+// The stretched point, in place, where one of its joints stretches.
+HWY_INLINE void Stretch(const DualRun& run, std::size_t point, float* p) {
   const Index begin = run.offsets[point], end = run.offsets[point + 1];
-  if (begin == end) {
-    Store4(Zero4(), rotation);
-    Store4(Zero4(), dual);
-    return;
-  }
-  const float* pivot = run.joints + run.entry_joints[begin];
-  F4 w = Splat4(run.entry_weights[begin]);
-  F4 q = Mul4(w, Load4(pivot)), d = Mul4(w, Load4(pivot + kDualPart));
-  bool stretches = pivot[kStretches] != 0;
-  for (Index e = begin + 1; e < end; ++e) {
-    const float* m = run.joints + run.entry_joints[e];
-    const float cosine = (pivot[0] * m[0] + pivot[1] * m[1]) + (pivot[2] * m[2] + pivot[3] * m[3]);
-    w = Splat4(cosine < 0 ? -run.entry_weights[e] : run.entry_weights[e]);
-    q = Fma4(w, Load4(m), q);
-    d = Fma4(w, Load4(m + kDualPart), d);
-    stretches |= m[kStretches] != 0;
-  }
-  Store4(q, rotation);
-  Store4(d, dual);
+  bool stretches = false;
+  for (Index e = begin; e < end; ++e) stretches |= run.stretches[run.entry_joints[e] + 15] != 0;
   if (!stretches) return;
-  const float* m = pivot + kStretch;
-  w = Splat4(run.entry_weights[begin]);
+  const float* m = run.stretches + run.entry_joints[begin];
+  F4 w = Splat4(run.entry_weights[begin]);
   F4 c0 = Mul4(w, Load4(m)), c1 = Mul4(w, Load4(m + 4)), c2 = Mul4(w, Load4(m + 8)),
      c3 = Mul4(w, Load4(m + 12));
   for (Index e = begin + 1; e < end; ++e) {
-    m = run.joints + run.entry_joints[e] + kStretch;
+    m = run.stretches + run.entry_joints[e];
     w = Splat4(run.entry_weights[e]);
     c0 = Fma4(w, Load4(m), c0);
     c1 = Fma4(w, Load4(m + 4), c1);
@@ -79,11 +169,17 @@ void DualBlockLanes(const DualRun& run, std::size_t begin, std::size_t end, Cons
   const DLanes d;
   const std::size_t count = end - begin;
   alignas(64) float points[4 * DualQuaternionKernel::kBlock];
-  alignas(64) float rotations[4 * DualQuaternionKernel::kBlock] = {};
-  alignas(64) float duals[4 * DualQuaternionKernel::kBlock] = {};
-  PackXyzw(in.x + begin, in.y + begin, in.z + begin, 0, count, 1.0f, points);
-  for (std::size_t i = 0; i < count; ++i)
-    BlendMotions(run, begin + i, rotations + 4 * i, duals + 4 * i, points + 4 * i);
+  alignas(64) float rotations[4 * DualQuaternionKernel::kBlock];
+  alignas(64) float duals[4 * DualQuaternionKernel::kBlock];
+  for (std::size_t i = count; i < (count + 15) / 16 * 16; ++i) {
+    Store4(Zero4(), rotations + 4 * i);
+    Store4(Zero4(), duals + 4 * i);
+  }
+  BlendMotions(run, begin, end, rotations, duals);
+  if (run.stretches != nullptr) {
+    PackXyzw(in.x + begin, in.y + begin, in.z + begin, 0, count, 1.0f, points);
+    for (std::size_t i = begin; i < end; ++i) Stretch(run, i, points + 4 * run.lanes[i]);
+  }
 
   const bool plain = run.masks == nullptr && run.envelope == 1.0f;
   const VLanes one = hn::Set(d, 1.0f), two = hn::Set(d, 2.0f), tiny = hn::Set(d, 1e-12f);
@@ -92,7 +188,10 @@ void DualBlockLanes(const DualRun& run, std::size_t begin, std::size_t end, Cons
     VLanes vx, vy, vz, vw, dx, dy, dz, dw, px, py, pz, pw;
     hn::LoadInterleaved4(d, rotations + 4 * i, vx, vy, vz, vw);
     hn::LoadInterleaved4(d, duals + 4 * i, dx, dy, dz, dw);
-    hn::LoadInterleaved4(d, points + 4 * i, px, py, pz, pw);
+    const VLanes x = hn::Load(d, in.x + begin + i), y = hn::Load(d, in.y + begin + i);
+    const VLanes z = hn::Load(d, in.z + begin + i);
+    px = x, py = y, pz = z;
+    if (run.stretches != nullptr) hn::LoadInterleaved4(d, points + 4 * i, px, py, pz, pw);
     const VLanes square = Fma(vx, vx, Fma(vy, vy, Fma(vz, vz, hn::Mul(vw, vw))));
     const VLanes scale = hn::Div(one, hn::Sqrt(hn::IfThenElse(hn::Lt(square, tiny), tiny, square)));
     vx = hn::Mul(vx, scale), vy = hn::Mul(vy, scale), vz = hn::Mul(vz, scale), vw = hn::Mul(vw, scale);
@@ -112,8 +211,6 @@ void DualBlockLanes(const DualRun& run, std::size_t begin, std::size_t end, Cons
     VLanes w = hn::Set(d, run.envelope);
     if (run.masks != nullptr) w = hn::Mul(w, hn::Load(d, run.masks + begin + i));
     const auto all = hn::Eq(w, one), none = hn::Eq(w, hn::Zero(d));
-    const VLanes x = hn::Load(d, in.x + begin + i), y = hn::Load(d, in.y + begin + i);
-    const VLanes z = hn::Load(d, in.z + begin + i);
     const VLanes unmoved[3] = {x, y, z};
     float* to[3] = {out.x + begin + i, out.y + begin + i, out.z + begin + i};
     for (std::size_t r = 0; r < 3; ++r) {
@@ -152,8 +249,8 @@ HWY_EXPORT(DualBlockLanes);
 
 namespace {
 
-// The joint's entry in the scratch: rotation, dual part, stretch about its centre.
-void WriteJoint(const Matrix4& m, Double3 center, const double origin[3], float* to) {
+// The joint's rotation and dual part, and its stretch about its centre; false if it does not stretch.
+bool WriteJoint(const Matrix4& m, Double3 center, const double origin[3], float* motion, float* stretch_to) {
   constexpr double kRigid = 1e-6;
   Matrix4 stretch;
   double apart = Determinant3(m) < 0 ? 1 : 0;
@@ -179,13 +276,14 @@ void WriteJoint(const Matrix4& m, Double3 center, const double origin[3], float*
                      0};
   const Quaternion dual = t * q;
   const double parts[8] = {q.x, q.y, q.z, q.w, dual.x, dual.y, dual.z, dual.w};
-  for (std::size_t i = 0; i < 8; ++i) to[i] = static_cast<float>(parts[i]);
+  for (std::size_t i = 0; i < 8; ++i) motion[i] = static_cast<float>(parts[i]);
   for (int c = 0; c < 4; ++c) {
-    float* column = to + kStretch + 4 * static_cast<std::size_t>(c);
+    float* column = stretch_to + 4 * static_cast<std::size_t>(c);
     for (int r = 0; r < 3; ++r) column[r] = static_cast<float>(stretch(r, c));
     column[3] = 0;
   }
-  to[kStretches] = stretches ? 1.0f : 0.0f;
+  stretch_to[15] = stretches ? 1.0f : 0.0f;
+  return stretches;
 }
 
 }  // namespace
@@ -208,13 +306,13 @@ DualQuaternionKernel::DualQuaternionKernel(const SkinWeights& weights, std::span
   }
   for (Index j = 0; j < joint_count_; ++j) {
     if (place[j] != 0) continue;
-    place[j] = static_cast<Index>(kJointFloats * joints_.size());
+    place[j] = static_cast<Index>(joints_.size());
     joints_.push_back(j);
   }
 
   // Entries of each point, the largest weight first; a point without any keeps its base through a mask of 0
   std::vector<float> masks(point_weights.begin(), point_weights.end());
-  entry_offsets_.push_back(0);
+  std::vector<std::vector<std::pair<Index, float>>> rows(count_);  // place of the joint, weight
   for (std::size_t i = 0; i < count_; ++i) {
     const Index begin = weights.offsets[out_points[i]], end = weights.offsets[out_points[i] + 1];
     double sum = 0;
@@ -231,18 +329,46 @@ DualQuaternionKernel::DualQuaternionKernel(const SkinWeights& weights, std::span
     } else if (wanted(i)) {
       const double scale = std::fabs(sum) > 1e-6 ? 1 / sum : 1;
       const auto add = [&](Index e) {
-        entry_joints_.push_back(place[weights.joints[e]]);
-        entry_weights_.push_back(static_cast<float>(weights.weights[e] * scale));
+        rows[i].emplace_back(place[weights.joints[e]], static_cast<float>(weights.weights[e] * scale));
       };
       add(largest);
       for (Index e = begin; e < end; ++e) {
         if (weights.weights[e] != 0 && e != largest) add(e);
       }
     }
-    entry_offsets_.push_back(static_cast<Index>(entry_joints_.size()));
   }
+  AddEntries(rows);
   if (!masks.empty()) masks_ = PaddedWeights(masks, count_);
   if (!blend_weights.empty()) blend_ = PaddedWeights(blend_weights, count_);
+}
+
+void DualQuaternionKernel::AddEntries(std::span<const std::vector<std::pair<Index, float>>> rows) {
+  std::map<std::pair<Index, Index>, Index> motions;  // pivot and joint
+  entry_offsets_.push_back(0);
+  for (std::size_t begin = 0; begin < count_; begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, count_);
+    for (std::size_t i = begin; i < end; ++i) lanes_.push_back(static_cast<std::uint16_t>(i - begin));
+    std::stable_sort(lanes_.begin() + static_cast<std::ptrdiff_t>(begin), lanes_.end(),
+                     [&](auto a, auto b) { return rows[begin + a].size() < rows[begin + b].size(); });
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto& row = rows[begin + lanes_[i]];
+      for (const auto& [joint, weight] : row) {
+        const Index pivot = row.front().first;
+        Index motion = joint;
+        if (joint != pivot) {
+          const auto [at, fresh] =
+              motions.emplace(std::pair(pivot, joint), static_cast<Index>(joints_.size() + pairs_.size()));
+          if (fresh) pairs_.push_back({pivot, joint});
+          motion = at->second;
+        }
+        entry_motions_.push_back(kMotionFloats * motion);
+        entry_joints_.push_back(kStretchFloats * joint);
+        entry_weights_.push_back(weight);
+      }
+      entry_offsets_.push_back(static_cast<Index>(entry_motions_.size()));
+    }
+  }
+  entry_weights_.resize(entry_weights_.size() + 3);  // they are read by fours
 }
 
 void DualQuaternionKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out,
@@ -258,16 +384,29 @@ void DualQuaternionKernel::Run(const Inputs& inputs, ConstPointsView in, PointsV
   DualRun run{};
   static_cast<SkinFrame&>(run) = SkinFrameOf(inputs.palette[0], inputs.world_from_mesh);
   const double origin[3] = {run.origin[0], run.origin[1], run.origin[2]};
+  float* motions = scratch.data();
+  float* stretches = motions + (kMotionFloats * (joints_.size() + pairs_.size()) + 15) / 16 * 16;
+  bool any_stretches = false;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    WriteJoint(inputs.palette[joints_[j]], inputs.centers[joints_[j]], origin,
-               scratch.data() + kJointFloats * j);
+    any_stretches |= WriteJoint(inputs.palette[joints_[j]], inputs.centers[joints_[j]], origin,
+                                motions + kMotionFloats * j, stretches + kStretchFloats * j);
   }
-  run.joints = scratch.data();
+  float* to = motions + kMotionFloats * joints_.size();
+  for (const Pair& pair : pairs_) {
+    const float *a = motions + kMotionFloats * pair.pivot, *b = motions + kMotionFloats * pair.joint;
+    const float cosine = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
+    for (std::size_t k = 0; k < kMotionFloats; ++k) to[k] = cosine < 0 ? -b[k] : b[k];
+    to += kMotionFloats;
+  }
+  run.motions = motions;
+  run.stretches = any_stretches ? stretches : nullptr;
   run.envelope = static_cast<float>(inputs.envelope);
   run.masks = masks_.data();
   run.blend = blend_.data();
   run.linear[0] = inputs.linear.x, run.linear[1] = inputs.linear.y, run.linear[2] = inputs.linear.z;
+  run.lanes = lanes_.data();
   run.offsets = entry_offsets_.data();
+  run.entry_motions = entry_motions_.data();
   run.entry_joints = entry_joints_.data();
   run.entry_weights = entry_weights_.data();
   const std::size_t blocks = (count_ + kBlock - 1) / kBlock;

@@ -9,7 +9,9 @@
 // rounding of floats; stretches below a millionth count as none. Weights are made to sum to 1.
 #pragma once
 
+#include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/matrix.h"
@@ -38,20 +40,33 @@ class DualQuaternionKernel {
   std::size_t point_count() const { return count_; }
   // The joints that the output points need, ascending: no other entry of the palette but the first is read.
   std::span<const Index> joints() const { return joints_; }
-  std::size_t ScratchFloats() const { return kJointFloats * (joints_.size() + 1); }
+  std::size_t ScratchFloats() const {
+    return kMotionFloats * (joints_.size() + pairs_.size()) + kStretchFloats * joints_.size() + 16;
+  }
   // in: bind-space points, out: world-space points; may be the same.
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
 
   static constexpr std::size_t kBlock = 128;
-  static constexpr std::size_t kJointFloats = 32;  // of a joint in the scratch
+  static constexpr std::size_t kMotionFloats = 8, kStretchFloats = 16;  // in the scratch
 
  private:
+  // Two joints by their places in joints_, of which the second one's motion is blended with the sign that brings
+  // it nearest to the first one's.
+  struct Pair {
+    Index pivot, joint;
+  };
+  void AddEntries(std::span<const std::vector<std::pair<Index, float>>> rows);  // joint's place and weight
+
   std::size_t count_ = 0;
   Index joint_count_ = 0;
   std::vector<Index> joints_;
+  std::vector<Pair> pairs_;  // that occur, of different joints
+  // Points, in blocks sorted by their number of entries; the largest weight's comes first.
+  std::vector<std::uint16_t> lanes_;  // place in its block
   std::vector<Index> entry_offsets_;  // of each point, and the end
-  std::vector<Index> entry_joints_;   // kJointFloats * place in joints_; the largest weight's comes first
+  std::vector<Index> entry_motions_;  // kMotionFloats times the place in joints_, or of the pair behind these
+  std::vector<Index> entry_joints_;   // kStretchFloats times the place in joints_
   std::vector<float> entry_weights_;
   AlignedFloats masks_;  // point weights, empty if all 1
   AlignedFloats blend_;  // empty if all 1

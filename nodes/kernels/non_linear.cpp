@@ -1,137 +1,112 @@
 #include "nodes/kernels/non_linear.h"
 
 #include <cmath>
-#include <type_traits>
 
 #include "base/check.h"
 #include "base/scalar_math.h"
+#include "nodes/kernels/non_linear_run.h"
 #include "nodes/kernels/weights.h"
 
 namespace kpsa::engine {
 namespace {
 
-// Of bounds that may be the wrong way round.
-double Between(double value, double low, double high) {
-  return value < low ? low : value > high ? high : value;
-}
-// 0 at low, 1 at high.
-double Along(double value, double low, double high) {
-  const double width = high - low;
-  if (!(width > 0)) return value < low ? 0 : 1;
-  return Between((value - low) / width, 0, 1);
-}
-double Faded(double amplitude, double dropoff, double r) {
-  return amplitude * (dropoff >= 0 ? 1 - dropoff * r : 1 + dropoff * (1 - r));
-}
-double Ripple(double at, double offset, double wavelength) {
-  return Sin(2 * kPi * (at - offset) / wavelength);
-}
 constexpr double kLeastWavelength = 1e-9;
+constexpr float kLeastWidth = 1e-30f;  // of what is divided by in floats
+constexpr std::size_t kGrain = 2048;
 
-// Each map with what does not depend on the point.
-struct BendMap {
-  explicit BendMap(const Bend& bend) : b(bend) {}
-  bool idle() const { return b.curvature == 0; }
-  Double3 operator()(Double3 q) const {
-    const double y = Between(q.y, b.low, b.high), angle = b.curvature * y;
-    double sine, cosine;
-    SinCos(angle, &sine, &cosine);
-    const bool small = std::fabs(angle) < 1e-3;  // then the differences below would lose digits
-    const double x_arc = small ? y * angle * 0.5 * (1 - angle * angle / 12) : (1 - cosine) / b.curvature;
-    const double y_arc = small ? y * (1 - angle * angle / 6) : sine / b.curvature;
-    const double beyond = q.y - y;
-    return {x_arc + q.x * cosine + beyond * sine, y_arc - q.x * sine + beyond * cosine, q.z};
-  }
-  Bend b;
-};
+float Float(double value) { return static_cast<float>(value); }
 
-struct TwistMap {
-  explicit TwistMap(const Twist& twist) : t(twist) {}
-  bool idle() const { return t.start == 0 && t.end == 0; }
-  Double3 operator()(Double3 q) const {
-    double sine, cosine;
-    SinCos(t.start + (t.end - t.start) * Along(q.y, t.low, t.high), &sine, &cosine);
-    return {q.x * cosine + q.z * sine, q.y, q.z * cosine - q.x * sine};
-  }
-  Twist t;
-};
+AlongRun MakeAlong(double low, double high) {
+  const float from = Float(low), to = Float(high);
+  const bool wide = to - from > kLeastWidth;
+  return {from, wide ? to : from, wide ? 1 / (to - from) : 0};
+}
 
-struct SquashMap {
-  explicit SquashMap(const Squash& squash) : s(squash) {
-    along = s.factor >= 0 ? 1 + s.factor : 1 / (1 - s.factor);
-    across = Exp(-0.5 * s.expand * Log(along));
-  }
-  bool idle() const { return s.factor == 0; }
-  Double3 operator()(Double3 q) const {
-    const double y = Between(q.y, s.low, s.high), t = Along(y, s.low, s.high);
-    const bool first = t < s.max_expand_pos;
-    const double width = first ? s.max_expand_pos : 1 - s.max_expand_pos;
-    const double u = width > 0 ? (first ? t : 1 - t) / width : 1;
-    const double round = u * (2 - u), smooth = u * u * (3 - 2 * u);
-    const double bump = round + (first ? s.start_smoothness : s.end_smoothness) * (smooth - round);
-    const double scale = 1 + (across - 1) * bump;
-    return {q.x * scale, y * along + (q.y - y), q.z * scale};
-  }
-  Squash s;
-  double along = 1, across = 1;
-};
+RippleRun MakeRipple(double amplitude, double wavelength, double offset, double dropoff) {
+  return {Float(2 / wavelength), Float(-std::fmod(2 * offset / wavelength, 2.0)),
+          Float(dropoff >= 0 ? amplitude : amplitude * (1 + dropoff)), Float(-amplitude * dropoff)};
+}
+bool Ripples(double amplitude, double wavelength) {
+  return amplitude != 0 && std::fabs(wavelength) > kLeastWavelength;
+}
 
-struct FlareMap {
-  explicit FlareMap(const Flare& flare) : f(flare) {}
-  bool idle() const {
-    return f.start_x == 1 && f.start_z == 1 && f.end_x == 1 && f.end_z == 1 && f.curve == 0;
-  }
-  Double3 operator()(Double3 q) const {
-    const double t = Along(q.y, f.low, f.high), bulge = f.curve * 4 * t * (1 - t);
-    return {q.x * (f.start_x + (f.end_x - f.start_x) * t + bulge), q.y,
-            q.z * (f.start_z + (f.end_z - f.start_z) * t + bulge)};
-  }
-  Flare f;
-};
+// Each fills in its part of the run; false: it is idle.
 
-struct SineMap {
-  explicit SineMap(const Sine& sine) : s(sine) {}
-  bool idle() const { return s.amplitude == 0 || !(std::fabs(s.wavelength) > kLeastWavelength); }
-  Double3 operator()(Double3 q) const {
-    const double y = Between(q.y, s.low, s.high);
-    const double r = y < 0 ? Along(-y, 0, -s.low) : Along(y, 0, s.high);
-    return {q.x + Faded(s.amplitude, s.dropoff, r) * Ripple(y, s.offset, s.wavelength), q.y, q.z};
-  }
-  Sine s;
-};
+bool Prepare(const Bend& b, NonLinearRun* run) {
+  run->bend = {Float(b.low), Float(b.high), Float(b.curvature), Float(1 / b.curvature),
+               Float(b.curvature / kPi)};
+  return b.curvature != 0;
+}
 
-struct WaveMap {
-  explicit WaveMap(const Wave& wave) : w(wave) {}
-  bool idle() const { return w.amplitude == 0 || !(std::fabs(w.wavelength) > kLeastWavelength); }
-  Double3 operator()(Double3 q) const {
-    const double radius = Between(std::sqrt(q.x * q.x + q.z * q.z), w.min_radius, w.max_radius);
-    const double r = Along(radius, w.min_radius, w.max_radius);
-    return {q.x, q.y + Faded(w.amplitude, w.dropoff, r) * Ripple(radius, w.offset, w.wavelength), q.z};
-  }
-  Wave w;
-};
+bool Prepare(const Twist& t, NonLinearRun* run) {
+  run->twist = {MakeAlong(t.low, t.high), Float(std::fmod(t.start / kPi, 2.0)),
+                Float((t.end - t.start) / kPi)};
+  return t.start != 0 || t.end != 0;
+}
 
-// Calls use(the prepared map).
-template <typename F>
-auto WithMap(const NonLinearMap& map, F use) {
-  return std::visit(
-      [&](const auto& given) {
-        using T = std::decay_t<decltype(given)>;
-        if constexpr (std::is_same_v<T, Bend>) return use(BendMap(given));
-        if constexpr (std::is_same_v<T, Twist>) return use(TwistMap(given));
-        if constexpr (std::is_same_v<T, Squash>) return use(SquashMap(given));
-        if constexpr (std::is_same_v<T, Flare>) return use(FlareMap(given));
-        if constexpr (std::is_same_v<T, Sine>) return use(SineMap(given));
-        if constexpr (std::is_same_v<T, Wave>) return use(WaveMap(given));
-      },
-      map);
+bool Prepare(const Squash& s, NonLinearRun* run) {
+  const double along = s.factor >= 0 ? 1 + s.factor : 1 / (1 - s.factor);
+  const double widths[2] = {s.max_expand_pos, 1 - s.max_expand_pos};
+  SquashRun& squash = run->squash;
+  squash = {Float(s.low),
+            Float(s.high),
+            MakeAlong(s.low, s.high),
+            Float(s.max_expand_pos),
+            {0, 0},
+            {1, 1},
+            {Float(s.start_smoothness), Float(s.end_smoothness)},
+            Float(along - 1),
+            Float(Exp(-0.5 * s.expand * Log(along)) - 1)};
+  for (int half = 0; half < 2; ++half) {
+    if (widths[half] > kLeastWidth) squash.scale[half] = Float(1 / widths[half]), squash.bias[half] = 0;
+  }
+  return s.factor != 0;
+}
+
+bool Prepare(const Flare& f, NonLinearRun* run) {
+  run->flare = {MakeAlong(f.low, f.high),   Float(f.start_x - 1),       Float(f.start_z - 1),
+                Float(f.end_x - f.start_x), Float(f.end_z - f.start_z), Float(4 * f.curve)};
+  return f.start_x != 1 || f.start_z != 1 || f.end_x != 1 || f.end_z != 1 || f.curve != 0;
+}
+
+bool Prepare(const Sine& s, NonLinearRun* run) {
+  const float low = Float(s.low), high = Float(s.high);
+  const bool below = low<-kLeastWidth, above = high> kLeastWidth;
+  run->sine = {MakeRipple(s.amplitude, s.wavelength, s.offset, s.dropoff),
+               low,
+               high,
+               below ? 1 / low : 0,
+               below ? 0.0f : 1.0f,
+               above ? 1 / high : 0,
+               above ? 0.0f : 1.0f};
+  return Ripples(s.amplitude, s.wavelength);
+}
+
+bool Prepare(const Wave& w, NonLinearRun* run) {
+  run->wave = {MakeRipple(w.amplitude, w.wavelength, w.offset, w.dropoff), Float(w.min_radius),
+               Float(w.max_radius), MakeAlong(w.min_radius, w.max_radius)};
+  return Ripples(w.amplitude, w.wavelength);
+}
+
+// False where the frame has no inverse, or none in floats.
+bool PrepareFrame(const Matrix4& frame, NonLinearRun* run) {
+  Matrix4 inverse;
+  if (!Invert(frame, &inverse)) return false;
+  bool finite = true;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) {
+      run->inverse[3 * r + c] = Float(inverse(r, c));
+      run->linear[3 * r + c] = Float(frame(r, c));
+      finite &= std::isfinite(run->inverse[3 * r + c]) && std::isfinite(run->linear[3 * r + c]);
+    }
+    run->pivot[r] = Float(frame(r, 3));
+  }
+  const Double3 offset = TransformPoint(inverse, {run->pivot[0], run->pivot[1], run->pivot[2]});
+  for (int r = 0; r < 3; ++r) run->offset[r] = Float(offset[r]);
+  return finite;
 }
 
 }  // namespace
-
-Double3 ApplyNonLinear(const NonLinearMap& map, Double3 q) {
-  return WithMap(map, [&](const auto& f) { return f.idle() ? q : f(q); });
-}
 
 NonLinearKernel::NonLinearKernel(std::span<const Index> out_points, std::span<const float> point_weights)
     : count_(out_points.size()), weights_(PaddedWeights(point_weights, out_points.size())) {}
@@ -140,27 +115,15 @@ void NonLinearKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView o
                           const Parallel* parallel) const noexcept {
   KPSA_CHECK_EQ(in.count, count_);
   KPSA_CHECK_EQ(out.count, count_);
-  const float envelope = static_cast<float>(inputs.envelope);
-  const Matrix4& frame = inputs.frame;
-  Matrix4 inverse;
-  if (envelope == 0 || !Invert(frame, &inverse)) return CopyPoints(in, out);
-  WithMap(inputs.map, [&](const auto& f) {
-    if (f.idle()) return CopyPoints(in, out);
-    ForRanges(parallel, count_, 512, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Double3 p{in.x[i], in.y[i], in.z[i]};
-        const double w = weights_.data()[i] * envelope;
-        Double3 moved = p;
-        if (w != 0) {
-          const Double3 q = TransformPoint(inverse, p);
-          moved = p + TransformVector(frame, f(q) - q) * w;
-        }
-        out.x[i] = static_cast<float>(moved.x);
-        out.y[i] = static_cast<float>(moved.y);
-        out.z[i] = static_cast<float>(moved.z);
-      }
-    });
-  });
+  NonLinearRun run{};
+  run.kind = inputs.map.index();
+  run.weights = weights_.data();
+  run.envelope = Float(inputs.envelope);
+  const bool moves = run.envelope != 0 && PrepareFrame(inputs.frame, &run) &&
+                     std::visit([&](const auto& map) { return Prepare(map, &run); }, inputs.map);
+  if (!moves) return CopyPoints(in, out);
+  ForRanges(parallel, count_, kGrain,
+            [&](std::size_t begin, std::size_t end) { RunNonLinear(run, in, out, begin, end); });
 }
 
 }  // namespace kpsa::engine

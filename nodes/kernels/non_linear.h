@@ -55,15 +55,14 @@ struct Wave {
 };
 using NonLinearMap = std::variant<Bend, Twist, Squash, Flare, Sine, Wave>;
 
-// f of one point of the handle's space.
-Double3 ApplyNonLinear(const NonLinearMap& map, Double3 q);
-
-// A local kernel.
+// A local kernel. Floats, about the handle's origin: a point is off by less than 8 times 2^-24 of its distance
+// from there, of its own coordinates and of its move together, times how steep the map is where that is more
+// than 1 (tests/nodes/non_linear_twin.h maps in double).
 class NonLinearKernel {
  public:
   struct Inputs {
     NonLinearMap map;
-    Matrix4 frame;  // the points' space from the handle's; where it is singular, points stay
+    Matrix4 frame;  // the points' space from the handle's; where it has no inverse in floats, points stay
     double envelope = 1;
   };
 

@@ -10,7 +10,7 @@
 #define HWY_TARGET_INCLUDE "nodes/kernels/skin.cpp"
 #include "hwy/foreach_target.h"
 
-#include "nodes/kernels/xyzw-inl.h"
+#include "nodes/kernels/columns-inl.h"
 
 #ifndef KPSA_NODES_KERNELS_SKIN_RUN_
 #define KPSA_NODES_KERNELS_SKIN_RUN_
@@ -37,48 +37,20 @@ HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
-// A matrix of four columns x y z 0 in as few vectors as there are
-constexpr std::size_t kParts = 16 / HWY_MIN(16, HWY_LANES(float));
-struct M16 {
-  VLanes part[kParts];
-};
-
-HWY_INLINE void MulColumns(const float* matrix, float weight, M16* m) {
-  const DLanes d;
-  const VLanes w = hn::Set(d, weight);
-  for (std::size_t k = 0; k < kParts; ++k) m->part[k] = hn::Mul(w, hn::Load(d, matrix + k * hn::Lanes(d)));
-}
-HWY_INLINE void AddColumns(const float* matrix, float weight, M16* m) {
-  const DLanes d;
-  const VLanes w = hn::Set(d, weight);
-  for (std::size_t k = 0; k < kParts; ++k)
-    m->part[k] = Fma(w, hn::Load(d, matrix + k * hn::Lanes(d)), m->part[k]);
-}
-
 // (c0 x + c2 z) + (c1 y + c3) on every target. p: x y z 1.
-#if HWY_MAX_BYTES == 64
-HWY_INLINE F4 Transform(const M16& m, const float* p) {
-  const DLanes d;
-  const hn::Half<DLanes> dh;
-  HWY_ALIGN static constexpr std::int32_t kSpread[16] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
-  const VLanes spread = hn::TableLookupLanes(hn::LoadDup128(d, p), hn::SetTableIndices(d, kSpread));
-  const VLanes product = hn::Mul(m.part[0], spread);
-  const auto half = hn::Add(hn::LowerHalf(dh, product), hn::UpperHalf(dh, product));
-  return hn::Add(hn::LowerHalf(D4(), half), hn::UpperHalf(D4(), half));
-}
-#elif HWY_MAX_BYTES == 32
-HWY_INLINE F4 Transform(const M16& m, const float* p) {
-  const DLanes d;
+#if HWY_MAX_BYTES >= 32
+HWY_INLINE F4 Transform(const Columns& m, const float* p) {
+  const DColumns d;
   HWY_ALIGN static constexpr std::int32_t kXy[8] = {0, 0, 0, 0, 1, 1, 1, 1},
                                           kZw[8] = {2, 2, 2, 2, 3, 3, 3, 3};
-  const VLanes point = hn::LoadDup128(d, p);
-  const VLanes xy = hn::TableLookupLanes(point, hn::SetTableIndices(d, kXy));
-  const VLanes zw = hn::TableLookupLanes(point, hn::SetTableIndices(d, kZw));
-  const VLanes half = hn::Add(hn::Mul(m.part[0], xy), hn::Mul(m.part[1], zw));
+  const auto point = hn::LoadDup128(d, p);
+  const auto xy = hn::TableLookupLanes(point, hn::SetTableIndices(d, kXy));
+  const auto zw = hn::TableLookupLanes(point, hn::SetTableIndices(d, kZw));
+  const auto half = hn::Add(hn::Mul(m.part[0], xy), hn::Mul(m.part[1], zw));
   return hn::Add(hn::LowerHalf(D4(), half), hn::UpperHalf(D4(), half));
 }
 #elif HWY_TARGET == HWY_SCALAR
-HWY_INLINE F4 Transform(const M16& m, const float* p) {
+HWY_INLINE F4 Transform(const Columns& m, const float* p) {
   F4 r;
   for (std::size_t i = 0; i < 4; ++i) {
     const float c0 = hn::GetLane(m.part[i]), c1 = hn::GetLane(m.part[4 + i]), c2 = hn::GetLane(m.part[8 + i]);
@@ -87,7 +59,7 @@ HWY_INLINE F4 Transform(const M16& m, const float* p) {
   return r;
 }
 #else
-HWY_INLINE F4 Transform(const M16& m, const float* p) {
+HWY_INLINE F4 Transform(const Columns& m, const float* p) {
   const F4 even = hn::Add(hn::Mul(m.part[0], Splat4(p[0])), hn::Mul(m.part[2], Splat4(p[2])));
   return hn::Add(even, hn::Add(hn::Mul(m.part[1], Splat4(p[1])), m.part[3]));
 }
@@ -100,9 +72,7 @@ HWY_INLINE void SkinGroup(const float* palette, std::size_t influences, std::siz
                           const float* points, float* result) {
   if constexpr (n != 0) influences = n;
   for (std::size_t i = 0; i < count; ++i, joints += influences, weights += influences) {
-    M16 m;
-    MulColumns(palette + joints[0], weights[0], &m);
-    for (std::size_t j = 1; j < influences; ++j) AddColumns(palette + joints[j], weights[j], &m);
+    const Columns m = BlendColumns<n>(palette, joints, weights, influences);
     const std::size_t lane = 4u * lanes[i];
     Store4(Transform(m, points + lane), result + lane);
   }
@@ -287,6 +257,7 @@ SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_po
     }
   }
   block_groups_.push_back(static_cast<Index>(groups_.size()));
+  entry_weights_.resize(entry_weights_.size() + 3);  // they are read by fours
 }
 
 SkinFrame SkinFrameOf(const Matrix4& first_joint, const Matrix4& world_from_mesh) {

@@ -44,56 +44,63 @@ WrapKernel::WrapKernel(WrapMode mode, const Topology& driver, std::span<const Do
     if (offsets_[i] == offsets_[i + 1]) weights_.data()[i] = 0;
   }
   for (const double share : influences.weights) shares_.push_back(static_cast<float>(share));
+  shares_.resize(shares_.size() + 3);  // they are read by fours
   const auto place_in = [](const std::vector<Index>& sorted, Index point) {
     const auto it = std::lower_bound(sorted.begin(), sorted.end(), point);
     KPSA_CHECK(it != sorted.end() && *it == point);
     return static_cast<Index>(it - sorted.begin());
   };
-  const std::vector<Index> in(in_points.begin(), in_points.end());
-  std::vector<Index> framed = influences.points;
-  std::sort(framed.begin(), framed.end());
-  framed.erase(std::unique(framed.begin(), framed.end()), framed.end());
-  if (mode_ != WrapMode::kSnap) frames_ = DriverFrames(driver, driver_rest, framed, in_points);
+  if (mode_ == WrapMode::kSnap) {
+    const std::vector<Index> in(in_points.begin(), in_points.end());
+    for (const Index point : influences.points) entries_.push_back(4 * place_in(in, point));
+    return;
+  }
+  std::vector<Index> points = influences.points;
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  frames_ = DriverFrames(driver, driver_rest, points, in_points);
+  std::vector<bool> framed;  // by influence
   for (const Index point : influences.points) {
-    entries_.push_back(place_in(in, point));
-    const Index frame = mode_ == WrapMode::kSnap ? kNoIndex : place_in(framed, point);
-    frame_of_.push_back(frame != kNoIndex && frames_.exists(frame) ? frame : kNoIndex);
+    const Index i = place_in(points, point);
+    entries_.push_back(frames_.begin(i));
+    framed.push_back(frames_.exists(i));
   }
 
   // The rest side, by what computes the present one
-  AlignedFloats points(4 * in_count_ + 16), frames(frames_.Floats() + 16);
+  AlignedFloats driver_points(DriverFloats()), frames(frames_.Floats());
   for (std::size_t i = 0; i < in_count_; ++i) {
     for (int k = 0; k < 3; ++k)
-      points.data()[4 * i + static_cast<std::size_t>(k)] = static_cast<float>(driver_rest[in_points[i]][k]);
+      driver_points.data()[4 * i + static_cast<std::size_t>(k)] =
+          static_cast<float>(driver_rest[in_points[i]][k]);
   }
-  frames_.Run(points.data(), frames.data());
-  directions_.assign(8 * count_, 0.0f);
+  frames_.Run(driver_points.data(), frames.data());
+  const std::size_t row = PaddedCount(count_);
+  directions_ = AlignedFloats(6 * row);
   for (std::size_t i = 0; i < count_; ++i) {
     Double3 normal;
-    double framed = 0;
+    double share = 0;
     for (Index e = offsets_[i]; e < offsets_[i + 1]; ++e) {
-      if (frame_of_[e] == kNoIndex) continue;
-      const float* n = frames.data() + kFrameFloats * frame_of_[e] + 12;
+      if (!framed[e]) continue;
+      const float* n = frames.data() + entries_[e] + 12;
       normal = normal + Double3{n[0], n[1], n[2]} * influences.weights[e];
-      framed += influences.weights[e];
+      share += influences.weights[e];
     }
     if (!(Length(normal) > kFolded)) continue;
     normal = normal * (1 / Length(normal));
     const Double3 tangent = Across(normal), binormal = Cross(normal, tangent);
-    for (int k = 0; k < 3; ++k) {
-      directions_[8 * i + static_cast<std::size_t>(k)] = static_cast<float>(tangent[k] / framed);
-      directions_[8 * i + 4 + static_cast<std::size_t>(k)] = static_cast<float>(binormal[k] / framed);
+    float* to = directions_.data() + i;
+    for (int k = 0; k < 3; ++k, to += row) {
+      to[0] = static_cast<float>(tangent[k] / share);
+      to[3 * row] = static_cast<float>(binormal[k] / share);
     }
   }
-  const std::size_t row = PaddedCount(count_);
   rest_ = AlignedFloats(13 * row);
-  if (mode_ == WrapMode::kSnap) return;
-  FindWrapPlaces({offsets_.data(), entries_.data(), frame_of_.data(), shares_.data(), directions_.data(),
-                  nullptr, nullptr, row, 1, false, mode_ == WrapMode::kSurface},
-                 points.data(), frames.data(), 0, count_, rest_.data());
+  FindWrapPlaces({offsets_.data(), entries_.data(), shares_.data(), directions_.data(), nullptr, nullptr, row,
+                  1, mode_ == WrapMode::kSurface},
+                 frames.data(), 0, count_, rest_.data());
 }
 
-std::size_t WrapKernel::ScratchFloats() const { return (4 * in_count_ + 15) / 16 * 16 + frames_.Floats(); }
+std::size_t WrapKernel::ScratchFloats() const { return DriverFloats() + frames_.Floats(); }
 
 void WrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
                      const Parallel* parallel) const noexcept {
@@ -103,31 +110,29 @@ void WrapKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, s
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
   const float envelope = static_cast<float>(inputs.envelope);
   if (envelope == 0) return CopyPoints(in, out);
-  float *driver = scratch.data(), *frames = driver + (4 * in_count_ + 15) / 16 * 16;
+  float *driver = scratch.data(), *frames = driver + DriverFloats();
   const bool moved = !(stage_from_driver_ == Matrix4());
   ForRanges(parallel, in_count_, kWrapGrain, [&](std::size_t begin, std::size_t end) {
+    if (!moved) return PackWrapDriver(inputs.driver, begin, end, driver);
     for (std::size_t i = begin; i < end; ++i) {
+      const Double3 p =
+          TransformPoint(stage_from_driver_, {inputs.driver.x[i], inputs.driver.y[i], inputs.driver.z[i]});
       float* to = driver + 4 * i;
-      to[0] = inputs.driver.x[i], to[1] = inputs.driver.y[i], to[2] = inputs.driver.z[i], to[3] = 0;
-      if (!moved) continue;
-      const Double3 p = TransformPoint(stage_from_driver_, {to[0], to[1], to[2]});
       to[0] = static_cast<float>(p.x), to[1] = static_cast<float>(p.y), to[2] = static_cast<float>(p.z);
+      to[3] = 0;
     }
   });
+  const WrapRun run{offsets_.data(),     entries_.data(), shares_.data(),
+                    directions_.data(),  rest_.data(),    weights_.data(),
+                    PaddedCount(count_), envelope,        mode_ == WrapMode::kSurface};
+  if (mode_ == WrapMode::kSnap) {
+    ForRanges(parallel, count_, kWrapGrain,
+              [&](std::size_t begin, std::size_t end) { RunSnap(run, driver, in, out, begin, end); });
+    return;
+  }
   frames_.Run(driver, frames, parallel);
-  const WrapRun run{offsets_.data(),
-                    entries_.data(),
-                    frame_of_.data(),
-                    shares_.data(),
-                    directions_.data(),
-                    rest_.data(),
-                    weights_.data(),
-                    PaddedCount(count_),
-                    envelope,
-                    mode_ == WrapMode::kSnap,
-                    mode_ == WrapMode::kSurface};
   ForRanges(parallel, count_, kWrapGrain,
-            [&](std::size_t begin, std::size_t end) { RunWrap(run, driver, frames, in, out, begin, end); });
+            [&](std::size_t begin, std::size_t end) { RunWrap(run, frames, in, out, begin, end); });
 }
 
 }  // namespace kpsa::engine

@@ -33,6 +33,9 @@ struct WrapInfluences {
   CsrView<Index> rows() const { return {offsets, points}; }
 };
 
+// What has less of a point's weight is no influence: floats could not tell, and its ring would be asked for.
+inline constexpr double kLeastShare = 1.0 / (1 << 26);
+
 // `driver`: a tree over the driver at rest.
 //
 // The corners of the nearest triangle with their barycentric weights. Then `smooth` times: every driver point
@@ -73,12 +76,14 @@ class WrapKernel {
            const Parallel* parallel = nullptr) const noexcept;
 
  private:
+  std::size_t DriverFloats() const { return 4 * PaddedCount(in_count_); }
+
   WrapMode mode_;
   Matrix4 stage_from_driver_;
   std::size_t in_count_ = 0, count_ = 0;
-  std::vector<Index> offsets_, entries_, frame_of_;  // influences: entry of `driver`, frame (kNoIndex: none)
-  std::vector<float> shares_, directions_;           // directions: tangent and binormal at rest
-  AlignedFloats weights_, rest_;                     // of the points; their places at rest (wrap_run.h)
+  std::vector<Index> offsets_, entries_;  // influences (wrap_run.h)
+  std::vector<float> shares_;
+  AlignedFloats weights_, directions_, rest_;  // of the points (wrap_run.h)
   DriverFrames frames_;
 };
 

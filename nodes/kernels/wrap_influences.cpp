@@ -12,10 +12,12 @@ namespace {
 using Row = std::vector<std::pair<Index, double>>;  // driver point, weight; ascending
 
 void AddRow(const Row& row, WrapInfluences* influences) {
-  double sum = 0;
-  for (const auto& [point, weight] : row) sum += weight;
+  double all = 0, sum = 0;
+  for (const auto& [point, weight] : row) all += weight;
+  const auto counts = [&](double weight) { return weight > kLeastShare * all; };
+  for (const auto& [point, weight] : row) sum += counts(weight) ? weight : 0;
   for (const auto& [point, weight] : row) {
-    if (weight == 0) continue;
+    if (!counts(weight)) continue;
     influences->points.push_back(point);
     influences->weights.push_back(weight / sum);
   }

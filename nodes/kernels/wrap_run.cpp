@@ -6,7 +6,7 @@
 #define HWY_TARGET_INCLUDE "nodes/kernels/wrap_run.cpp"
 #include "hwy/foreach_target.h"
 
-#include "nodes/kernels/xyzw-inl.h"
+#include "nodes/kernels/columns-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
@@ -14,46 +14,8 @@ namespace HWY_NAMESPACE {
 
 constexpr float kFoldedSquare = 1e-10f;  // of the tangents' lengths, squared
 
-void NormalsOf(const Index* HWY_RESTRICT triangles, const float* HWY_RESTRICT driver, std::size_t begin,
-               std::size_t end, float* HWY_RESTRICT normals) {
-  for (std::size_t t = begin; t < end; ++t) {
-    const Index* corner = triangles + 3 * t;
-    const F4 a = Load4(driver + 4 * std::size_t{corner[0]});
-    const F4 b = Sub4(Load4(driver + 4 * std::size_t{corner[1]}), a);
-    const F4 c = Sub4(Load4(driver + 4 * std::size_t{corner[2]}), a);
-    Store4(Cross4(b, c), normals + 4 * t);
-  }
-}
-
-void FramesOf(const FramesRun& run, const float* HWY_RESTRICT driver, const float* HWY_RESTRICT normals,
-              std::size_t begin, std::size_t end, float* HWY_RESTRICT frames) {
-  for (std::size_t f = begin; f < end; ++f) {
-    const Index first = run.edge_offsets[f], last = run.edge_offsets[f + 1];
-    if (first == last) continue;
-    F4 sum = Zero4();
-    for (Index t = run.triangle_offsets[f]; t < run.triangle_offsets[f + 1]; ++t)
-      sum = Add4(sum, Load4(normals + 4 * std::size_t{run.around[t]}));
-    alignas(16) float n[4];
-    Store4(sum, n);
-    const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-    const F4 normal = length == 0 ? sum : Mul4(sum, Splat4(1 / length));  // not a number stays what it is
-    const float* dual = run.normal_duals + 4 * f;
-    F4 x = Mul4(normal, Splat4(dual[0])), y = Mul4(normal, Splat4(dual[1])),
-       z = Mul4(normal, Splat4(dual[2]));
-    const F4 own = Load4(driver + 4 * std::size_t{run.own[f]});
-    for (Index e = first; e < last; ++e) {
-      const F4 edge = Sub4(Load4(driver + 4 * std::size_t{run.edge_points[e]}), own);
-      dual = run.duals + 4 * std::size_t{e};
-      x = Fma4(edge, Splat4(dual[0]), x);
-      y = Fma4(edge, Splat4(dual[1]), y);
-      z = Fma4(edge, Splat4(dual[2]), z);
-    }
-    float* frame = frames + kFrameFloats * f;
-    Store4(x, frame);
-    Store4(y, frame + 4);
-    Store4(z, frame + 8);
-    Store4(normal, frame + 12);
-  }
+void PackDriver(ConstPointsView points, std::size_t begin, std::size_t end, float* driver) {
+  PackXyzw(points.x, points.y, points.z, begin, end, 0.0f, driver);
 }
 
 struct Lanes3 {
@@ -83,47 +45,83 @@ HWY_INLINE void Store3(const Lanes3& a, float* rows, std::size_t row) {
   hn::Store(a.z, d, rows + 2 * row);
 }
 
-// Sums over influences, of a block of points.
+// Sums over influences, of a block of points: of the frames, column by column. Their spare lanes hold the
+// anchor's x, y and z.
 struct WrapSums {
-  alignas(64) float anchors[4 * kWrapBlock] = {}, tangents[4 * kWrapBlock] = {},
-                                binormals[4 * kWrapBlock] = {}, normals[4 * kWrapBlock] = {};
+  alignas(64) float x[4 * kWrapBlock] = {}, y[4 * kWrapBlock] = {}, z[4 * kWrapBlock] = {},
+                          normals[4 * kWrapBlock] = {};
 };
 
-HWY_INLINE void SumInfluences(const WrapRun& run, const float* HWY_RESTRICT driver,
-                              const float* HWY_RESTRICT frames, std::size_t begin, std::size_t size,
-                              WrapSums* sums) {
-  for (std::size_t k = 0; k < size; ++k) {
-    const std::size_t point = begin + k;
-    F4 anchor = Zero4(), x = anchor, y = anchor, z = anchor, normal = anchor;
-    for (Index e = run.offsets[point]; e < run.offsets[point + 1]; ++e) {
-      const F4 share = Splat4(run.shares[e]);
-      anchor = Fma4(share, Load4(driver + 4 * std::size_t{run.entries[e]}), anchor);
-      if (run.frame_of[e] == kNoIndex) continue;
-      const float* frame = frames + kFrameFloats * run.frame_of[e];
-      x = Fma4(share, Load4(frame), x);
-      y = Fma4(share, Load4(frame + 4), y);
-      z = Fma4(share, Load4(frame + 8), z);
-      normal = Fma4(share, Load4(frame + 12), normal);
-    }
-    const float* along = run.directions + 8 * point;
-    Store4(anchor, sums->anchors + 4 * k);
-    Store4(Fma4(x, Splat4(along[0]), Fma4(y, Splat4(along[1]), Mul4(z, Splat4(along[2])))),
-           sums->tangents + 4 * k);
-    Store4(Fma4(x, Splat4(along[4]), Fma4(y, Splat4(along[5]), Mul4(z, Splat4(along[6])))),
-           sums->binormals + 4 * k);
-    Store4(normal, sums->normals + 4 * k);
+// `count` points of n influences each; 0: `size`.
+template <std::size_t n>
+HWY_INLINE void SumGroup(const Index* HWY_RESTRICT entries, const float* HWY_RESTRICT shares,
+                         std::size_t size, std::size_t count, const float* HWY_RESTRICT frames, std::size_t k,
+                         WrapSums* HWY_RESTRICT sums) {
+  if constexpr (n != 0) size = n;
+  for (const std::size_t end = k + count; k < end; ++k, entries += size, shares += size) {
+    const Columns sum = BlendColumns<n>(frames, entries, shares, size);
+    StoreApart(sum, sums->x + 4 * k, sums->y + 4 * k, sums->z + 4 * k, sums->normals + 4 * k);
   }
 }
 
-// The frame of the sums at `at`: whether it exists, and then its axes.
-HWY_INLINE auto FrameOf(const WrapRun& run, const WrapSums& sums, std::size_t at, Lanes3* t, Lanes3* b,
-                        Lanes3* n) {
+HWY_INLINE void SumFrames(const WrapRun& run, const float* frames, std::size_t begin, std::size_t size,
+                          WrapSums* sums) {
+  const Index* offsets = run.offsets + begin;
+  for (std::size_t k = 0; k < size;) {
+    const Index row = offsets[k + 1] - offsets[k];
+    std::size_t end = k + 1;
+    while (end < size && offsets[end + 1] - offsets[end] == row) ++end;
+    const Index* entries = run.entries + offsets[k];
+    const float* shares = run.shares + offsets[k];
+    switch (row) {  // loops without a branch to mispredict
+      case 0:
+        for (std::size_t i = k; i < end; ++i)
+          for (float* column : {sums->x, sums->y, sums->z, sums->normals}) Store4(Zero4(), column + 4 * i);
+        break;
+      case 2:
+        SumGroup<2>(entries, shares, row, end - k, frames, k, sums);
+        break;
+      case 3:
+        SumGroup<3>(entries, shares, row, end - k, frames, k, sums);
+        break;
+      case 8:
+        SumGroup<8>(entries, shares, row, end - k, frames, k, sums);
+        break;
+      default:
+        SumGroup<0>(entries, shares, row, end - k, frames, k, sums);
+        break;
+    }
+    k = end;
+  }
+}
+HWY_INLINE void SumAnchors(const WrapRun& run, const float* HWY_RESTRICT driver, std::size_t begin,
+                           std::size_t size, float* HWY_RESTRICT anchors) {
+  for (std::size_t k = 0; k < size; ++k) {
+    F4 anchor = Zero4();
+    for (Index e = run.offsets[begin + k]; e < run.offsets[begin + k + 1]; ++e)
+      anchor = Fma4(Splat4(run.shares[e]), Load4(driver + run.entries[e]), anchor);
+    Store4(anchor, anchors + 4 * k);
+  }
+}
+
+// The anchor of the sums at `at`, of point i, and its frame: whether it exists, and then its axes.
+HWY_INLINE auto FrameOf(const WrapRun& run, const WrapSums& sums, std::size_t at, std::size_t i,
+                        Lanes3* anchor, Lanes3* t, Lanes3* b, Lanes3* n) {
   const DLanes d;
   const VLanes folded = hn::Set(d, kFoldedSquare), one = hn::Set(d, 1.0f);
+  Lanes3 x, y, z;
   VLanes spare;
-  hn::LoadInterleaved4(d, sums.tangents + 4 * at, t->x, t->y, t->z, spare);
-  hn::LoadInterleaved4(d, sums.binormals + 4 * at, b->x, b->y, b->z, spare);
+  hn::LoadInterleaved4(d, sums.x + 4 * at, x.x, x.y, x.z, anchor->x);
+  hn::LoadInterleaved4(d, sums.y + 4 * at, y.x, y.y, y.z, anchor->y);
+  hn::LoadInterleaved4(d, sums.z + 4 * at, z.x, z.y, z.z, anchor->z);
   hn::LoadInterleaved4(d, sums.normals + 4 * at, n->x, n->y, n->z, spare);
+  const auto carried = [&](const Lanes3& along) HWY_ATTR {
+    return Lanes3{Fma(x.x, along.x, Fma(y.x, along.y, hn::Mul(z.x, along.z))),
+                  Fma(x.y, along.x, Fma(y.y, along.y, hn::Mul(z.y, along.z))),
+                  Fma(x.z, along.x, Fma(y.z, along.y, hn::Mul(z.z, along.z)))};
+  };
+  *t = carried(Load3(run.directions + i, run.row));
+  *b = carried(Load3(run.directions + i + 3 * run.row, run.row));
   const VLanes tt = Dot3(*t, *t), bb = Dot3(*b, *b), nn = Dot3(*n, *n);
   // Not "nn > ...": what is not a number must come out as such
   auto exists = hn::Not(hn::Or(hn::Le(nn, folded), hn::Le(hn::Add(tt, bb), hn::Zero(d))));
@@ -141,17 +139,14 @@ HWY_INLINE auto FrameOf(const WrapRun& run, const WrapSums& sums, std::size_t at
   return exists;
 }
 
-void Places(const WrapRun& run, const float* driver, const float* frames, std::size_t begin, std::size_t end,
-            float* places) {
+void Places(const WrapRun& run, const float* frames, std::size_t begin, std::size_t end, float* places) {
   const DLanes d;
   WrapSums sums;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
     const std::size_t at = (i - begin) % kWrapBlock;
-    if (at == 0) SumInfluences(run, driver, frames, i, HWY_MIN(kWrapBlock, end - i), &sums);
+    if (at == 0) SumFrames(run, frames, i, HWY_MIN(kWrapBlock, end - i), &sums);
     Lanes3 anchor, t, b, n;
-    VLanes spare;
-    hn::LoadInterleaved4(d, sums.anchors + 4 * at, anchor.x, anchor.y, anchor.z, spare);
-    const auto exists = FrameOf(run, sums, at, &t, &b, &n);
+    const auto exists = FrameOf(run, sums, at, i, &anchor, &t, &b, &n);
     float* to = places + i;
     Store3(anchor, to, run.row);
     Store3(t, to + 3 * run.row, run.row);
@@ -161,49 +156,61 @@ void Places(const WrapRun& run, const float* driver, const float* frames, std::s
   }
 }
 
-// Goals as moves from where the point would be at rest: what rests stays, to the bit.
-void Wrap(const WrapRun& run, const float* driver, const float* frames, ConstPointsView in, PointsView out,
-          std::size_t begin, std::size_t end) {
+HWY_INLINE void StoreMoved(const WrapRun& run, const Lanes3& p, const Lanes3& move, std::size_t i,
+                           PointsView out) {
   const DLanes d;
-  const VLanes zero = hn::Zero(d);
+  const VLanes w = hn::Mul(hn::Load(d, run.weights + i), hn::Set(d, run.envelope));
+  const auto stays = hn::Eq(w, hn::Zero(d));
+  hn::Store(hn::IfThenElse(stays, p.x, Fma(w, move.x, p.x)), d, out.x + i);
+  hn::Store(hn::IfThenElse(stays, p.y, Fma(w, move.y, p.y)), d, out.y + i);
+  hn::Store(hn::IfThenElse(stays, p.z, Fma(w, move.z, p.z)), d, out.z + i);
+}
+
+// Goals as moves from where the point would be at rest: what rests stays, to the bit.
+void Wrap(const WrapRun& run, const float* frames, ConstPointsView in, PointsView out, std::size_t begin,
+          std::size_t end) {
+  const DLanes d;
   const std::size_t row = run.row;
   WrapSums sums;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
     const std::size_t at = (i - begin) % kWrapBlock;
-    if (at == 0) SumInfluences(run, driver, frames, i, HWY_MIN(kWrapBlock, end - i), &sums);
+    if (at == 0) SumFrames(run, frames, i, HWY_MIN(kWrapBlock, end - i), &sums);
+    const Lanes3 p{hn::Load(d, in.x + i), hn::Load(d, in.y + i), hn::Load(d, in.z + i)};
+    Lanes3 anchor, t, b, n;
+    auto turns = FrameOf(run, sums, at, i, &anchor, &t, &b, &n);
+    const float* rest = run.rest + i;
+    const Lanes3 rest_anchor = Load3(rest, row), rest_t = Load3(rest + 3 * row, row),
+                 rest_b = Load3(rest + 6 * row, row), rest_n = Load3(rest + 9 * row, row);
+    turns = hn::And(turns, hn::Gt(hn::Load(d, rest + 12 * row), hn::Zero(d)));
+    const Lanes3 offset = Sub3(p, rest_anchor);
+    const VLanes along_t = hn::IfThenElseZero(turns, Dot3(rest_t, offset));
+    const VLanes along_b = hn::IfThenElseZero(turns, Dot3(rest_b, offset));
+    const VLanes along_n = hn::IfThenElseZero(turns, Dot3(rest_n, offset));
+    const auto axis = [&](VLanes now, VLanes then)
+                          HWY_ATTR { return hn::IfThenElseZero(turns, hn::Sub(now, then)); };
+    Lanes3 move = Sub3(anchor, rest_anchor);
+    move.x = Fma(axis(t.x, rest_t.x), along_t,
+                 Fma(axis(b.x, rest_b.x), along_b, Fma(axis(n.x, rest_n.x), along_n, move.x)));
+    move.y = Fma(axis(t.y, rest_t.y), along_t,
+                 Fma(axis(b.y, rest_b.y), along_b, Fma(axis(n.y, rest_n.y), along_n, move.y)));
+    move.z = Fma(axis(t.z, rest_t.z), along_t,
+                 Fma(axis(b.z, rest_b.z), along_b, Fma(axis(n.z, rest_n.z), along_n, move.z)));
+    StoreMoved(run, p, move, i, out);
+  }
+}
+
+void Snap(const WrapRun& run, const float* driver, ConstPointsView in, PointsView out, std::size_t begin,
+          std::size_t end) {
+  const DLanes d;
+  alignas(64) float anchors[4 * kWrapBlock] = {};
+  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
+    const std::size_t at = (i - begin) % kWrapBlock;
+    if (at == 0) SumAnchors(run, driver, i, HWY_MIN(kWrapBlock, end - i), anchors);
     Lanes3 anchor;
     VLanes spare;
-    hn::LoadInterleaved4(d, sums.anchors + 4 * at, anchor.x, anchor.y, anchor.z, spare);
+    hn::LoadInterleaved4(d, anchors + 4 * at, anchor.x, anchor.y, anchor.z, spare);
     const Lanes3 p{hn::Load(d, in.x + i), hn::Load(d, in.y + i), hn::Load(d, in.z + i)};
-    Lanes3 move;
-    if (run.snaps) {
-      move = Sub3(anchor, p);
-    } else {
-      Lanes3 t, b, n;
-      auto turns = FrameOf(run, sums, at, &t, &b, &n);
-      const float* rest = run.rest + i;
-      const Lanes3 rest_anchor = Load3(rest, row), rest_t = Load3(rest + 3 * row, row),
-                   rest_b = Load3(rest + 6 * row, row), rest_n = Load3(rest + 9 * row, row);
-      turns = hn::And(turns, hn::Gt(hn::Load(d, rest + 12 * row), zero));
-      const Lanes3 offset = Sub3(p, rest_anchor);
-      const VLanes along_t = hn::IfThenElseZero(turns, Dot3(rest_t, offset));
-      const VLanes along_b = hn::IfThenElseZero(turns, Dot3(rest_b, offset));
-      const VLanes along_n = hn::IfThenElseZero(turns, Dot3(rest_n, offset));
-      const auto axis = [&](VLanes now, VLanes then)
-                            HWY_ATTR { return hn::IfThenElseZero(turns, hn::Sub(now, then)); };
-      move = Sub3(anchor, rest_anchor);
-      move.x = Fma(axis(t.x, rest_t.x), along_t,
-                   Fma(axis(b.x, rest_b.x), along_b, Fma(axis(n.x, rest_n.x), along_n, move.x)));
-      move.y = Fma(axis(t.y, rest_t.y), along_t,
-                   Fma(axis(b.y, rest_b.y), along_b, Fma(axis(n.y, rest_n.y), along_n, move.y)));
-      move.z = Fma(axis(t.z, rest_t.z), along_t,
-                   Fma(axis(b.z, rest_b.z), along_b, Fma(axis(n.z, rest_n.z), along_n, move.z)));
-    }
-    const VLanes w = hn::Mul(hn::Load(d, run.weights + i), hn::Set(d, run.envelope));
-    const auto stays = hn::Eq(w, zero);
-    hn::Store(hn::IfThenElse(stays, p.x, Fma(w, move.x, p.x)), d, out.x + i);
-    hn::Store(hn::IfThenElse(stays, p.y, Fma(w, move.y, p.y)), d, out.y + i);
-    hn::Store(hn::IfThenElse(stays, p.z, Fma(w, move.z, p.z)), d, out.z + i);
+    StoreMoved(run, p, Sub3(anchor, p), i, out);
   }
 }
 
@@ -214,26 +221,25 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace kpsa::engine {
 
-HWY_EXPORT(NormalsOf);
-HWY_EXPORT(FramesOf);
+HWY_EXPORT(PackDriver);
 HWY_EXPORT(Places);
 HWY_EXPORT(Wrap);
+HWY_EXPORT(Snap);
 
-void RunTriangleNormals(const Index* triangles, const float* driver, std::size_t begin, std::size_t end,
-                        float* normals) noexcept {
-  HWY_DYNAMIC_DISPATCH(NormalsOf)(triangles, driver, begin, end, normals);
+void PackWrapDriver(ConstPointsView points, std::size_t begin, std::size_t end, float* driver) noexcept {
+  HWY_DYNAMIC_DISPATCH(PackDriver)(points, begin, end, driver);
 }
-void RunDriverFrames(const FramesRun& run, const float* driver, const float* normals, std::size_t begin,
-                     std::size_t end, float* frames) noexcept {
-  HWY_DYNAMIC_DISPATCH(FramesOf)(run, driver, normals, begin, end, frames);
+void FindWrapPlaces(const WrapRun& run, const float* frames, std::size_t begin, std::size_t end,
+                    float* places) noexcept {
+  HWY_DYNAMIC_DISPATCH(Places)(run, frames, begin, end, places);
 }
-void FindWrapPlaces(const WrapRun& run, const float* driver, const float* frames, std::size_t begin,
-                    std::size_t end, float* places) noexcept {
-  HWY_DYNAMIC_DISPATCH(Places)(run, driver, frames, begin, end, places);
+void RunWrap(const WrapRun& run, const float* frames, ConstPointsView in, PointsView out, std::size_t begin,
+             std::size_t end) noexcept {
+  HWY_DYNAMIC_DISPATCH(Wrap)(run, frames, in, out, begin, end);
 }
-void RunWrap(const WrapRun& run, const float* driver, const float* frames, ConstPointsView in, PointsView out,
-             std::size_t begin, std::size_t end) noexcept {
-  HWY_DYNAMIC_DISPATCH(Wrap)(run, driver, frames, in, out, begin, end);
+void RunSnap(const WrapRun& run, const float* driver, ConstPointsView in, PointsView out, std::size_t begin,
+             std::size_t end) noexcept {
+  HWY_DYNAMIC_DISPATCH(Snap)(run, driver, in, out, begin, end);
 }
 
 }  // namespace kpsa::engine

@@ -6,6 +6,12 @@
 #define KPSA_NODES_KERNELS_XYZW_INL_H_
 #endif
 
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
+#include "base/points.h"
+
 #include "base/simd-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -54,6 +60,26 @@ HWY_INLINE F4 Yzx4(F4 a) {
   return hn::TableLookupLanes(a, hn::SetTableIndices(D4(), kYzxw));
 }
 #endif
+
+// The e-th of n numbers. Two are loaded at once, since loads are what kernels that gather have to wait for.
+template <std::size_t e, std::size_t n>
+HWY_INLINE Index EntryOf(const Index* entries) {
+  if constexpr (e % 2 == 0 && e + 1 == n) return entries[e];
+  std::uint64_t two;
+  std::memcpy(&two, entries + e / 2 * 2, sizeof(two));
+  const bool low = (e % 2 == 0) == (std::endian::native == std::endian::little);
+  return static_cast<Index>(low ? two : two >> 32);
+}
+
+// The e-th of p in all lanes; four that lie together are loaded at once.
+template <std::size_t e>
+HWY_INLINE F4 SplatOf4(const float* p) {
+#if HWY_TARGET == HWY_SCALAR
+  return Splat4(p[e]);
+#else
+  return hn::Broadcast<e % 4>(hn::LoadU(D4(), p + e / 4 * 4));
+#endif
+}
 
 // a x b
 HWY_INLINE F4 Cross4(F4 a, F4 b) { return Yzx4(Fma4(a, Yzx4(b), Neg4(Mul4(Yzx4(a), b)))); }

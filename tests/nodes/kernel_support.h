@@ -93,8 +93,10 @@ inline std::vector<Matrix4> MakePalette(Index joint_count, Double3 place, std::u
   Random random(seed);
   std::vector<Matrix4> palette;
   for (Index j = 0; j < joint_count; ++j) {
-    palette.push_back(ComposeTrs(place + random.Vector() * 0.2, random.Rotation(),
-                                 Double3{1, 1, 1} + random.Vector() * 0.2));
+    // One after the other: compilers draw arguments of a call in different orders
+    const Double3 scale = Double3{1, 1, 1} + random.Vector() * 0.2;
+    const Quaternion rotation = random.Rotation();
+    palette.push_back(ComposeTrs(place + random.Vector() * 0.2, rotation, scale));
   }
   return palette;
 }

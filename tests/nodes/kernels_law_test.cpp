@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "base/digest.h"
 #include "base/simd.h"
 #include "nodes/kernels/blend_shape.h"
 #include "nodes/kernels/delta_mush.h"
@@ -28,7 +29,7 @@
 namespace kpsa::engine {
 namespace {
 
-const std::vector<std::string> kTargets = {"avx512", "avx2", "scalar"};
+const std::vector<std::string> kTargets = {"avx512", "avx2", "neon", "scalar"};
 
 // One kernel on a mesh, reduced to: the demand of a set of points, and their evaluation from the demanded
 // points.
@@ -384,6 +385,12 @@ TEST_F(KernelLaw, EveryVectorUnitGivesTheSameBits) {
   for (const Subject& subject : subjects_) {
     SelectSimdTarget("scalar");
     const std::vector<float> scalar = Evaluate(subject, all);
+    Hasher bits;
+    bits.Add(std::span<const float>(scalar));
+    std::string name = subject.name;  // of an attribute in XML
+    std::replace_if(
+        name.begin(), name.end(), [](char c) { return c == ' ' || c == ','; }, '_');
+    RecordProperty(name, bits.Finish().ToHex());  // tests/wide.sh compares them with another machine's
     for (const std::string& target : kTargets) {
       if (!SelectSimdTarget(target)) continue;
       ASSERT_EQ(SimdTargetName(), target);

@@ -85,6 +85,28 @@ TEST(Wrap, TheOffsetTurnsWithTheNormal) {
   EXPECT_LT(MaxDistance(rig.Points(), expected), 1e-6);
 }
 
+TEST(Wrap, WhatDoesNotCountIsNoInfluence) {
+  // Spread over ten rings, the outer points have shares below the last digit of a float
+  const TestMesh sheet = MakeSheet(41, 41);
+  const TriangleTree tree(sheet.rest.view(), sheet.topology.triangles());
+  const std::vector<Index> one = {20 * 41 + 20};
+  const WrapInfluences spread = SurfaceInfluences(tree, sheet.topology, sheet.rest.view(), one, 1, 10);
+  EXPECT_GT(spread.points.size(), 100u);
+  EXPECT_LT(spread.points.size(), 300u);  // the hexagon of ten rings has 331
+  EXPECT_GT(*std::min_element(spread.weights.begin(), spread.weights.end()), kLeastShare);
+  EXPECT_NEAR(std::accumulate(spread.weights.begin(), spread.weights.end(), 0.0), 1, 1e-12);
+  // A driver point that lies almost where influences end
+  PointBuffer points = PointBuffer::FromPlaces(std::vector<Double3>{{0, 0, 0}, {0.5, 0, 0}, {0, 0.9999, 0}});
+  const TriangleTree corners(std::as_const(points).view(), std::vector<Index>{0, 0, 0, 1, 1, 1, 2, 2, 2});
+  const PointBuffer follower = PointBuffer::FromPlaces(std::vector<Double3>{{0, 0, 0}});
+  const WrapInfluences near = NearestInfluences(corners, follower.view(), std::vector<Index>{0}, 1, 8);
+  EXPECT_EQ(near.points, (std::vector<Index>{0, 1, 2}));
+  points.view().y[2] = 0.99999f;
+  const TriangleTree further(std::as_const(points).view(), std::vector<Index>{0, 0, 0, 1, 1, 1, 2, 2, 2});
+  EXPECT_EQ(NearestInfluences(further, follower.view(), std::vector<Index>{0}, 1, 8).points,
+            (std::vector<Index>{0, 1}));
+}
+
 TEST(Wrap, SnappedPointsLieOnTheDriver) {
   DriverRig rig("proximityWrap", Cage(), Cloth(), {{"wrapMode", "snap"}});
   const Matrix4 motion = ComposeTrs({0, 0, 1}, Random(6).Rotation(), {1, 0.5, 2});
