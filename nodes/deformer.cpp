@@ -39,12 +39,8 @@ struct WithFalloff {
 
 void ComputeWithFalloff(ComputeContext& c) {
   const auto& bound = c.kernel_as<WithFalloff>();
-  ComputeContext own = c;
-  own.kernel = bound.kernel.get();
-  if (bound.falloff < 0) {
-    bound.compute(own);
-    return;
-  }
+  c.kernel = bound.kernel.get();
+  if (bound.falloff < 0) return bound.compute(c);
   const ConstPointsView& in = c.points(bound.points);
   const PointsView& out = c.out_points(0);
   const std::size_t row = PaddedCount(out.count);
@@ -55,7 +51,7 @@ void ComputeWithFalloff(ComputeContext& c) {
   } else {
     GatherPoints(in, bound.positions, before);
   }
-  bound.compute(own);
+  bound.compute(c);
   const float* weights = c.points(bound.falloff).x;
   c.host->For(out.count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {

@@ -81,6 +81,7 @@ class CarriedFrame {
   double Growth(const Matrix4& parent_now) const;
   bool fixed() const { return fixed_; }
   const Matrix4& parent_rest() const { return parent_rest_; }
+  const Matrix4& parent_rest_inverse() const { return parent_rest_inverse_; }
   // world_from_stage at rest; the identity for stages in world space.
   const Matrix4& world_from_stage() const { return world_from_stage_; }
   const Matrix4& stage_from_world() const { return stage_from_world_; }

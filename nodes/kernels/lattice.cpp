@@ -241,22 +241,24 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   };
   float resting[4];  // most controls; not numbers where the matrix is none
   const bool rest_moves = move({}, resting);
+  if (inputs.moved.empty() && !rest_moves) return;
   std::array<std::uint32_t, 32> rows{};
-  bool any = false;
-  for (std::size_t row = 0, c = 0; c < controls_; ++row) {
-    bool moves = false;
-    for (const std::size_t end = c + divisions_[0]; c < end; ++c) {
-      float* to = scratch.data() + 4 * c;
-      const Double3& offset = inputs.offsets[c];
-      if ((offset.x != 0) | (offset.y != 0) | (offset.z != 0)) {
-        moves |= move(offset, to);
-      } else {
-        std::memcpy(to, resting, sizeof(resting));
-        moves |= rest_moves;
-      }
-    }
-    if (moves) rows[row / divisions_[1]] |= std::uint32_t{1} << (row % divisions_[1]);
-    any |= moves;
+  const auto fill = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c) std::memcpy(scratch.data() + 4 * c, resting, sizeof(resting));
+  };
+  const std::size_t ds = divisions_[0], dt = divisions_[1];
+  if (sparse_ || rest_moves) {  // all controls are read
+    fill(0, controls_);
+    if (rest_moves) rows.fill(~std::uint32_t{0} >> (32 - dt));
+  }
+  bool any = rest_moves;
+  std::size_t filled = sparse_ || rest_moves ? controls_ : 0;  // up to the end of a row
+  for (const Index c : inputs.moved) {
+    const std::size_t row = c / ds;
+    if (c >= filled) fill(row * ds, filled = (row + 1) * ds);
+    if (!move(inputs.offsets[c], scratch.data() + 4 * std::size_t{c})) continue;
+    rows[row / dt] |= std::uint32_t{1} << (row % dt);
+    any = true;
   }
   if (!any) return;
   if (sparse_) {

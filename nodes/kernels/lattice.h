@@ -46,6 +46,7 @@ class LatticeKernel {
  public:
   struct Inputs {
     std::span<const Double3> offsets;  // of every control from its place on the grid; lattice space
+    std::span<const Index> moved;      // the controls whose offsets are not 0, ascending: no other is read
     Matrix4 base_matrix;               // point space from the lattice's base, now (bindPreMatrix^-1)
     Matrix4 matrix;                    // point space from the lattice, now
     double envelope = 1;
