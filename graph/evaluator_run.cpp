@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "graph/step_host.h"
 
 namespace kpsa::engine {
@@ -15,6 +16,9 @@ namespace {
 
 constexpr std::size_t kComparedBytes = 512;  // small outputs beyond are taken as changed
 constexpr float kWorthThreadsNs = 20000;     // a level cheaper than this runs on the calling thread
+// How many steps before its turn a kernel with points is fetched: what ran since the last frame has put it out of the
+// first caches.
+constexpr Index kFetchAhead = 2;
 
 }  // namespace
 
@@ -126,7 +130,13 @@ bool Evaluator::RunUnit(Index first) {
   Index stale = first;
   while (stale < end && computed_[stale] != 0 && NewerDep(stale) == kNoIndex) ++stale;
   if (stale == end) return true;
+  const Plan::Step* const steps = plan_->steps().data();
+  const auto fetch = [&](Index s) {
+    if (s < end) Prefetch(steps[s].kernel, steps[s].kernel_bytes);
+  };
+  for (Index s = first; s < first + kFetchAhead; ++s) fetch(s);
   for (Index s = first; s < end; ++s) {
+    fetch(s + kFetchAhead);
     Index cause = kNoIndex;
     if constexpr (kRecord) cause = NewerDep(s);
     if (!Compute<kRecord>(s, cause, s >= stale)) {

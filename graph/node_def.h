@@ -107,6 +107,8 @@ struct BoundKernel {
   std::shared_ptr<const void> object;
   std::size_t scratch_floats = 0;  // per evaluation, from the thread's workspace
   std::size_t state_bytes = 0;     // per evaluator, zeroed at its creation
+  std::size_t object_bytes = 0;    // sizeof, where it is worth fetching ahead of the compute
+  ComputeFn compute = nullptr;     // in place of the group's, as the binding knows more; null: the group's
 };
 
 using DemandFn = std::function<void(Demand&)>;

@@ -105,7 +105,7 @@ Parallel HostParallel(NodeContext<Ports...> c) {
 // A kernel and what its adapter keeps beside it, as the engine wants it.
 template <typename T>
 BoundKernel MakeBound(T object, std::size_t scratch_floats, std::size_t state_bytes = 0) {
-  return BoundKernel{std::make_shared<const T>(std::move(object)), scratch_floats, state_bytes};
+  return BoundKernel{std::make_shared<const T>(std::move(object)), scratch_floats, state_bytes, sizeof(T)};
 }
 
 }  // namespace kpsa::engine

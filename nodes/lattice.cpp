@@ -121,33 +121,19 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
   return MakeBound(std::move(bound), scratch);
 }
 
-// The offsets of the controls that are not where they rest, most often a few; their numbers.
-std::span<const Index> MovedControls(ConstPointsView now, ConstPointsView rest, Double3* offsets,
-                                     Index* moved) {
-  constexpr std::size_t kTogether = 16;
-  std::size_t count = 0;
-  for (std::size_t begin = 0; begin < now.count; begin += kTogether) {
-    const std::size_t end = std::min(begin + kTogether, now.count);
-    int differ = 0;  // no branch for each
-    for (std::size_t i = begin; i < end; ++i)
-      differ |= (now.x[i] != rest.x[i]) | (now.y[i] != rest.y[i]) | (now.z[i] != rest.z[i]);
-    if (differ == 0) continue;
-    for (std::size_t i = begin; i < end; ++i) {
-      offsets[i] = {static_cast<double>(now.x[i]) - rest.x[i], static_cast<double>(now.y[i]) - rest.y[i],
-                    static_cast<double>(now.z[i]) - rest.z[i]};
-      moved[count] = static_cast<Index>(i);
-      count += (offsets[i].x != 0) | (offsets[i].y != 0) | (offsets[i].z != 0);
-    }
-  }
-  return {moved, count};
-}
-
 void ComputeLattice(DeformerContext<In<"points", ConstPointsView>> c) {
   const auto& bound = c.kernel_as<LatticeBound>();
+  const ConstPointsView& controls = c.get<"points">();
+  const ConstPointsView rest = bound.grid.view();
   auto* offsets = reinterpret_cast<Double3*>(c.scratch());
   auto* moved = reinterpret_cast<Index*>(c.scratch() + bound.offset_floats);
   float* scratch = c.scratch() + bound.offset_floats + bound.moved_floats;
-  const std::span<const Index> numbers = MovedControls(c.get<"points">(), bound.grid.view(), offsets, moved);
+  const std::span<const Index> numbers(moved, FindMovedControls(controls, rest, moved));  // most often a few
+  for (const Index i : numbers) {
+    offsets[i] = {static_cast<double>(controls.x[i]) - rest.x[i],
+                  static_cast<double>(controls.y[i]) - rest.y[i],
+                  static_cast<double>(controls.z[i]) - rest.z[i]};
+  }
   const Matrix4 now = bound.frame.Motion(c.get<"parentMatrix">()) * bound.stage_from_lattice;
   const Parallel parallel = HostParallel(c);
   bound.kernel.Run({{offsets, bound.grid.count()}, numbers, now, now, c.get<"envelope">()},

@@ -24,22 +24,6 @@ double RecordingNs(const Plan& plan, const RecordedSteps& recorded) {
   return each * events;
 }
 
-// What the clock shows where nothing lies between two looks at it: within every recorded step, for those with few points
-// as much as a fifth of it.
-double EmptyIntervalNs() {
-  constexpr int kLooks = 1000;
-  double least = 1e9;
-  for (int attempt = 0; attempt < 5; ++attempt) {
-    std::uint64_t sum = 0;
-    for (int i = 0; i < kLooks; ++i) {
-      const std::uint64_t begin = ProfileClock();
-      sum += ProfileClock() - begin;
-    }
-    least = std::min(least, static_cast<double>(sum) / kLooks);
-  }
-  return least;
-}
-
 }  // namespace
 
 // Steps with points that the outputs of these nodes need, themselves included.
@@ -109,7 +93,6 @@ Status Side::RecordTurn(const std::vector<double>& at, std::size_t first, std::s
   Profile profile(*plan);
   RecordedSteps turn;
   turn.counts.resize(plan->steps().size());
-  const double empty = EmptyIntervalNs();
   for (std::size_t f = first; f < end; ++f) {
     double wall = 0;
     for (int attempt = 0;; ++attempt) {
@@ -133,8 +116,7 @@ Status Side::RecordTurn(const std::vector<double>& at, std::size_t first, std::s
     recorded->kpsa.reconstruction += taken.reconstruction;
     turn.wall_ns += wall;
     for (std::size_t s = 0; s < turn.counts.size(); ++s) {
-      const double clock = empty * static_cast<double>(profile.counts()[s]);
-      recorded->self_ns[s] += std::max(0.0, static_cast<double>(profile.self_ns()[s]) - clock);
+      recorded->self_ns[s] += static_cast<double>(profile.self_ns()[s]);
       recorded->counts[s] += profile.counts()[s];
       turn.counts[s] += profile.counts()[s];
     }

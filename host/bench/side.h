@@ -22,7 +22,7 @@ inline constexpr std::size_t kTurnFrames =
 // Steps with points that the outputs of these nodes need, themselves included.
 std::vector<char> PointStepsAbove(const Plan& plan, const std::vector<NodeId>& nodes);
 
-// What the steps of a plan took, by step, less what the clock takes within them.
+// What the steps of a plan took, by step; recording included.
 struct RecordedSteps {
   std::vector<double> self_ns;
   std::vector<std::uint64_t> counts;

@@ -69,6 +69,25 @@ void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, s
   }
 }
 
+std::size_t MovedControls(ConstPointsView now, ConstPointsView rest, Index* HWY_RESTRICT moved) {
+  const DLanes d;
+  std::size_t count = 0;
+  for (std::size_t begin = 0; begin < now.count; begin += hn::Lanes(d)) {
+    const auto equal = [&](const float* a, const float* b) HWY_ATTR {  // no NaN is
+      return hn::Eq(hn::Load(d, a + begin), hn::Load(d, b + begin));
+    };
+    const auto rests = hn::And(equal(now.x, rest.x), hn::And(equal(now.y, rest.y), equal(now.z, rest.z)));
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, hn::Not(rests), bytes);
+    std::uint64_t bits;
+    std::memcpy(&bits, bytes, sizeof(bits));
+    bits &= (std::uint64_t{1} << HWY_MIN(hn::Lanes(d), now.count - begin)) - 1;
+    for (; bits != 0; bits &= bits - 1)
+      moved[count++] = static_cast<Index>(begin + static_cast<std::size_t>(std::countr_zero(bits)));
+  }
+  return count;
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
@@ -77,6 +96,11 @@ HWY_AFTER_NAMESPACE();
 namespace kpsa::engine {
 
 HWY_EXPORT(BlendTiles);
+HWY_EXPORT(MovedControls);
+
+std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept {
+  return HWY_DYNAMIC_DISPATCH(MovedControls)(now, rest, moved);
+}
 
 namespace {
 constexpr double kRim =

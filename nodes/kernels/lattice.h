@@ -41,6 +41,9 @@ struct LatticeSettings {
 // Bernstein.
 std::vector<double> LatticeBasis(int divisions, int order, double x);
 
+// The controls that are not where they rest, ascending, in `moved` (as many as there are, at most); how many.
+std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept;
+
 // A local kernel.
 class LatticeKernel {
  public:

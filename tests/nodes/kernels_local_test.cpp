@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "base/simd.h"
 #include "nodes/kernels/blend_shape.h"
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/skin.h"
@@ -410,6 +411,25 @@ TEST_F(LocalKernels, PointsOutsideOfALatticeStay) {
     }
   }
   EXPECT_GT(outside, 100u);
+}
+
+TEST(Lattice, MovedControlsAreFoundOnEveryVectorUnit) {
+  for (const std::string target : {"avx512", "avx2", "scalar"}) {
+    if (!SelectSimdTarget(target)) continue;
+    for (const Index count : {8u, 27u, 48u, 125u}) {
+      const PointBuffer rest(count);
+      PointBuffer now(count);
+      const PointsView places = now.view();
+      for (std::size_t i = count; i < PaddedCount(count); ++i)
+        places.x[i] = 5;    // what is behind them is none
+      places.x[1] = -0.0f;  // has not moved
+      places.x[2] = 1, places.y[5] = NAN, places.z[count - 1] = -1;
+      std::vector<Index> moved(count);
+      moved.resize(FindMovedControls(places, rest.view(), moved.data()));
+      EXPECT_EQ(moved, (std::vector<Index>{2, 5, count - 1})) << target << ", " << count;
+    }
+  }
+  SelectSimdTarget("");
 }
 
 TEST(Lattice, BadSettingsAreNamed) {
