@@ -261,6 +261,7 @@ int Main(int argc, char** argv) {
     Random random(6);
     std::vector<Double3> offsets(kernel.control_count());
     for (Double3& o : offsets) o = random.Vector() * 0.1;
+    const std::vector<Index> every = AllPoints(offsets.size());
     const Matrix4 base = InverseOrIdentity(lattice_from_rest),
                   moved = base * ComposeTrs({0.1, 0, 0}, random.Rotation(), {1, 1, 1});
     // The naive twin stores its basis, too
@@ -289,7 +290,7 @@ int Main(int argc, char** argv) {
     Report(
         c.name, n, work,
         [&] {
-          kernel.Run({offsets, base, moved, 1}, in, out.view(), scratch.span());
+          kernel.Run({offsets, every, base, moved, 1}, in, out.view(), scratch.span());
         },
         [&] {
           std::vector<Float3> moves;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "graph/step_host.h"
 
 namespace kpsa::engine {
@@ -15,6 +16,9 @@ namespace {
 
 constexpr std::size_t kComparedBytes = 512;  // small outputs beyond are taken as changed
 constexpr float kWorthThreadsNs = 20000;     // a level cheaper than this runs on the calling thread
+// How many steps before its turn a kernel with points is fetched: what ran since the last frame has put it out of the
+// first caches.
+constexpr Index kFetchAhead = 2;
 
 }  // namespace
 
@@ -112,7 +116,9 @@ template <bool kRecord>
 }
 
 void Evaluator::AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns) {
-  const auto thread = static_cast<int>(std::hash<std::thread::id>()(std::this_thread::get_id()) % 1000000);
+  int thread = 0;  // who it was shows in events that are kept alone
+  if (profile_->keep_events)
+    thread = static_cast<int>(std::hash<std::thread::id>()(std::this_thread::get_id()) % 1000000);
   profile_->Add({step, cause, begin_ns, end_ns, thread, frame_});
 }
 
@@ -121,14 +127,19 @@ bool Evaluator::RunUnit(Index first) {
   // One buffer goes through all members: if one of them is stale, all run, from the first. Members before the
   // stale one give what they gave before, so their stamps stay.
   const Index end = first + plan_->steps()[first].unit_size;
-  bool run = false;
-  for (Index s = first; s < end; ++s) run = run || computed_[s] == 0 || NewerDep(s) != kNoIndex;
-  if (!run) return true;
-  bool stale = false;
+  Index stale = first;
+  while (stale < end && computed_[stale] != 0 && NewerDep(stale) == kNoIndex) ++stale;
+  if (stale == end) return true;
+  const Plan::Step* const steps = plan_->steps().data();
+  const auto fetch = [&](Index s) {
+    if (s < end) Prefetch(steps[s].kernel, steps[s].kernel_bytes);
+  };
+  for (Index s = first; s < first + kFetchAhead; ++s) fetch(s);
   for (Index s = first; s < end; ++s) {
-    const Index cause = NewerDep(s);
-    stale = stale || computed_[s] == 0 || cause != kNoIndex;
-    if (!Compute<kRecord>(s, cause, stale)) {
+    fetch(s + kFetchAhead);
+    Index cause = kNoIndex;
+    if constexpr (kRecord) cause = NewerDep(s);
+    if (!Compute<kRecord>(s, cause, s >= stale)) {
       for (Index member = first; member < end; ++member) computed_[member] = 0;  // the buffer is torn
       return false;
     }

@@ -55,6 +55,7 @@ class Plan {
     std::uint32_t batch = kNoIndex;           // into batches(), for steps that can run together
     std::uint16_t unit_size = 1;              // steps that run together; at the first of them
     std::uint16_t unit_offset = 0;            // how far the first of the unit is before this step
+    std::uint32_t kernel_bytes = 0;           // from `kernel` on, that are worth fetching ahead
     bool runs_plainly() const {
       return branch == kNoIndex && batch == kNoIndex && unit_size == 1 && unit_offset == 0;
     }

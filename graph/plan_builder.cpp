@@ -10,7 +10,8 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr Index kLeastBatch = 4;  // steps that are worth a batch
+constexpr Index kLeastBatch = 4;             // steps that are worth a batch
+constexpr std::size_t kFetchedBytes = 1024;  // of a kernel, ahead of its step
 
 }  // namespace
 
@@ -176,6 +177,7 @@ void PlanBuilder::PlaceOutputs() {
     }
     const BoundKernel& kernel = kernels_[s];
     step.kernel = kernel.object.get();
+    step.kernel_bytes = static_cast<std::uint32_t>(std::min(kernel.object_bytes, kFetchedBytes));
     if (kernel.object != nullptr) plan_->owned_.push_back(kernel.object);
     step.scratch = static_cast<std::uint32_t>(plan_->workspace_floats_);
     plan_->workspace_floats_ += PaddedCount(kernel.scratch_floats);
@@ -257,7 +259,8 @@ void PlanBuilder::FillSteps() {
 
     // What it runs
     if (group != nullptr) {
-      step.compute = group->compute;
+      const ComputeFn bound = kernels_[placed_[n]].compute;
+      step.compute = bound != nullptr ? bound : group->compute;
     } else if (instance == nullptr) {
       step.compute = draft.gather_type == Type::kWeights ? ComputeGatherWeights : ComputeGatherPoints;
     } else if (instance->kind == Instance::Kind::kAssemble) {

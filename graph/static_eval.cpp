@@ -248,7 +248,7 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   context.at_rest = rest;
   try {
     if (group.decide != nullptr) context.chosen = group.decide(context);
-    if (host.error.empty()) group.compute(context);
+    if (host.error.empty()) (kernel->compute != nullptr ? kernel->compute : group.compute)(context);
   } catch (...) {
     host.Fail(ThrownText());
   }

@@ -78,13 +78,18 @@ void CueGather::Gather(const Inputs& in, float* scratch, std::span<double> raw) 
     raw[point.row] = p.x, raw[point.row + 1] = p.y, raw[point.row + 2] = p.z;
   }
   for (const Block& block : blocks_) {
+    const auto take = [&](const Matrix4& values) {
+      for (std::uint32_t e = block.begin; e < block.end; ++e)
+        raw[entries_[e].row] = values.m[entries_[e].element];
+    };
     const Matrix4& matrix = in.matrices[block.matrix];
-    Matrix4 product;
-    if (block.joint != kNoIndex || block.relative)
-      product = (block.joint != kNoIndex ? joint_from_world[block.joint] : space_from_world) * matrix;
-    const Matrix4& values = block.joint != kNoIndex || block.relative ? product : matrix;
-    for (std::uint32_t e = block.begin; e < block.end; ++e)
-      raw[entries_[e].row] = values.m[entries_[e].element];
+    if (block.joint != kNoIndex) {
+      take(joint_from_world[block.joint] * matrix);
+    } else if (block.relative) {
+      take(space_from_world * matrix);
+    } else {
+      take(matrix);
+    }
   }
   for (const Scalar& scalar : scalars_) raw[scalar.row] = in.scalars[scalar.input];
   for (const Product& of : products_) {

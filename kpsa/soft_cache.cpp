@@ -119,7 +119,6 @@ constexpr float kHugeMeasurement = 1e15f;  // deviations, or metres: reconstruct
 
 // |block * g|^2 for a block of h x h, column-major.
 float BlockNorm(const float* block, const float* g, std::size_t h) {
-  if (h == 1) return block[0] * g[0] * (block[0] * g[0]);
   float sum = 0;
   for (std::size_t i = 0; i < h; ++i) {
     float value = 0;
@@ -187,17 +186,30 @@ RawScores ComputeRawScores(const SoftCacheModel& model, std::span<const float> y
   }
   RawScores raw;
   float largest = -1;
+  const auto consider = [&](float norm, std::size_t cue) {
+    if (norm > largest) largest = norm, raw.worst_cue = static_cast<Index>(cue);
+  };
   const float* block = model.leave_one_out.data();
-  for (std::size_t k = 0; k < model.cues(); ++k) {
-    const std::size_t begin = model.offsets[k], height = model.offsets[k + 1] - begin;
+  const Index* const offsets = model.offsets.data();
+  const float* const of = g.data();
+  const std::size_t cues = model.cues();
+  for (std::size_t k = 0; k < cues; ++k) {
+    if (map) {  // most cues are scalars, many in a row
+      for (; k < cues && offsets[k + 1] - offsets[k] == 1; ++k, ++block) {
+        const float error = block[0] * of[offsets[k]];
+        consider(error * error, k);
+      }
+      if (k == cues) break;
+    }
+    const std::size_t begin = offsets[k], height = offsets[k + 1] - begin;
     float norm = 0;
     if (map) {
-      norm = BlockNorm(block, g.data() + begin, height);
+      norm = BlockNorm(block, of + begin, height);
       block += height * height;
     } else {
-      for (std::size_t j = begin; j < begin + height; ++j) norm = norm + g[j] * g[j];
+      for (std::size_t j = begin; j < begin + height; ++j) norm = norm + of[j] * of[j];
     }
-    if (norm > largest) largest = norm, raw.worst_cue = static_cast<Index>(k);
+    consider(norm, k);
   }
   raw.score1 = map ? squared : std::sqrt(squared);
   raw.score2 = map && largest > 0 ? std::sqrt(static_cast<double>(largest)) : 0;

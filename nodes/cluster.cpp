@@ -4,6 +4,7 @@
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
+#include "nodes/kernels/carried_delta.h"
 #include "nodes/kernels/soft_mod.h"
 #include "nodes/kernels/weights.h"
 #include "nodes/node_file.h"
@@ -93,19 +94,19 @@ Result<BoundKernel> BindSoftMod(const Binding& binding) {
 void ComputeCluster(ClusterContext c) {
   const auto& bound = c.kernel_as<ClusterBound>();
   const Matrix4 &parent = c.get<"parentMatrix">(), &handle = c.get<"matrix">();
-  Matrix4 delta, motion = bound.frame.Motion(parent);
-  if (bound.has_bind_pre) {
-    delta = handle * c.get<"bindPreMatrix">();
-  } else if (bound.frame.fixed()) {
+  CarriedDelta carried;
+  if (bound.frame.fixed()) {  // the points wait for the skin: the parent stays where it rests
     // The handle's motion in its parent's frame, as seen from where the parent rests
     const Matrix4 own = InverseOrIdentity(parent) * handle * bound.parent_from_handle_inverse;
-    delta = bound.frame.MotionInStage(own);
+    carried.delta = bound.frame.MotionInStage(own);
   } else {
-    delta = handle * bound.parent_from_handle_inverse * InverseOrIdentity(parent);
+    FindCarriedDelta(handle, bound.parent_from_handle_inverse, parent, bound.frame.parent_rest_inverse(),
+                     &carried);
   }
+  if (bound.has_bind_pre) carried.delta = handle * c.get<"bindPreMatrix">();
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({delta, TransformPoint(motion, bound.pivot), c.get<"envelope">()}, c.get<"inPoints">(),
-                   c.out<"outPoints">(), {}, &parallel);
+  bound.kernel.Run({carried.delta, TransformPoint(carried.motion, bound.pivot), c.get<"envelope">()},
+                   c.get<"inPoints">(), c.out<"outPoints">(), {}, &parallel);
 }
 
 void DeclareHandle(NodeBuilder& b) {

@@ -28,23 +28,19 @@ void DeclareShared(NodeBuilder& builder) {
       .per_geometry();
 }
 
-// A deformer's own kernel, and what it needs where a falloff is connected.
+// Where a falloff is connected: the deformer's own kernel, and what it takes to blend. Where none is, the step runs the
+// deformer's own compute.
 struct WithFalloff {
   std::shared_ptr<const void> kernel;
   ComputeFn compute = nullptr;
   std::size_t scratch_floats = 0;  // the kernel's own; behind them, the points as they came in
-  int points = 0, falloff = -1;    // positions of the inputs; -1: no falloff is connected
+  int points = 0, falloff = 0;     // positions of the inputs
   std::vector<Index> positions;    // of the output points among those that come in; empty: the same
 };
 
 void ComputeWithFalloff(ComputeContext& c) {
   const auto& bound = c.kernel_as<WithFalloff>();
-  ComputeContext own = c;
-  own.kernel = bound.kernel.get();
-  if (bound.falloff < 0) {
-    bound.compute(own);
-    return;
-  }
+  c.kernel = bound.kernel.get();
   const ConstPointsView& in = c.points(bound.points);
   const PointsView& out = c.out_points(0);
   const std::size_t row = PaddedCount(out.count);
@@ -55,7 +51,7 @@ void ComputeWithFalloff(ComputeContext& c) {
   } else {
     GatherPoints(in, bound.positions, before);
   }
-  bound.compute(own);
+  bound.compute(c);
   const float* weights = c.points(bound.falloff).x;
   c.host->For(out.count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -96,11 +92,9 @@ NodeBuilder AddDeformer(NodeRegistry& registry, Deformer deformer, ComputeFn com
       if (!made.ok()) return made.status();
       own = std::move(*made);
     }
-    WithFalloff bound{own.object, compute, (own.scratch_floats + 15) / 16 * 16, points, -1, {}};
-    if (binding.input("falloffWeights").total() == 0) {
-      return MakeBound(std::move(bound), own.scratch_floats, own.state_bytes);
-    }
-    bound.falloff = falloff;
+    if (own.compute == nullptr) own.compute = compute;
+    if (binding.input("falloffWeights").total() == 0) return own;
+    WithFalloff bound{own.object, own.compute, (own.scratch_floats + 15) / 16 * 16, points, falloff, {}};
     const PointSet &in = binding.input("inPoints"), &out = binding.output("outPoints");
     if (!(in == out)) bound.positions = in.PositionsOf(out);
     const std::size_t scratch = bound.scratch_floats + 3 * PaddedCount(out.size());

@@ -81,6 +81,7 @@ class CarriedFrame {
   double Growth(const Matrix4& parent_now) const;
   bool fixed() const { return fixed_; }
   const Matrix4& parent_rest() const { return parent_rest_; }
+  const Matrix4& parent_rest_inverse() const { return parent_rest_inverse_; }
   // world_from_stage at rest; the identity for stages in world space.
   const Matrix4& world_from_stage() const { return world_from_stage_; }
   const Matrix4& stage_from_world() const { return stage_from_world_; }
@@ -104,7 +105,7 @@ Parallel HostParallel(NodeContext<Ports...> c) {
 // A kernel and what its adapter keeps beside it, as the engine wants it.
 template <typename T>
 BoundKernel MakeBound(T object, std::size_t scratch_floats, std::size_t state_bytes = 0) {
-  return BoundKernel{std::make_shared<const T>(std::move(object)), scratch_floats, state_bytes};
+  return BoundKernel{std::make_shared<const T>(std::move(object)), scratch_floats, state_bytes, sizeof(T)};
 }
 
 }  // namespace kpsa::engine

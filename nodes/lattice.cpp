@@ -15,8 +15,8 @@ struct LatticeBound {
   LatticeKernel kernel;
   CarriedFrame frame;
   Matrix4 stage_from_lattice;  // at rest; the lattice is the cube [-0.5, 0.5]^3
-  std::vector<Double3> grid;   // the controls' places at rest, as the attribute holds them (in float)
-  std::size_t offset_floats = 0;
+  PointBuffer grid;            // the controls' places at rest, as the attribute holds them
+  std::size_t offset_floats = 0, moved_floats = 0;
 };
 
 std::vector<std::int64_t> Divisions(const Structural& s) {
@@ -106,33 +106,38 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
   Result<Matrix4> box = RestBox(binding, *rest);
   if (!box.ok()) return box.status();
   const Value* controls = s.rest("points");
-  std::vector<Double3> grid = Grid(d);
-  if (controls == nullptr || controls->points() == nullptr || controls->points()->count() != grid.size()) {
-    return Status::Invalid("points: expected {} control points", grid.size());
-  }
-  for (Double3& place : grid) {  // controls at rest give offsets of exactly 0
-    for (int a = 0; a < 3; ++a) place[a] = static_cast<float>(place[a]);
-  }
+  PointBuffer grid = PointBuffer::FromPlaces(Grid(d));  // controls at rest give offsets of exactly 0
+  const std::size_t count = grid.count();
+  if (controls == nullptr || controls->points() == nullptr || controls->points()->count() != count)
+    return Status::Invalid("points: expected {} control points", count);
   LatticeBound bound{LatticeKernel(settings, *rest, InverseOrIdentity(*box),
                                    binding.output("outPoints").ToVector(), BoundWeights(binding)),
-                     *frame, *box, std::move(grid), 0};
-  bound.offset_floats = (bound.grid.size() * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
-  const std::size_t scratch = bound.offset_floats + bound.kernel.ScratchFloats();
+                     *frame,
+                     *box,
+                     std::move(grid),
+                     PaddedCount(count * sizeof(Double3) / sizeof(float)),
+                     PaddedCount(count)};
+  const std::size_t scratch = bound.offset_floats + bound.moved_floats + bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
 }
 
 void ComputeLattice(DeformerContext<In<"points", ConstPointsView>> c) {
   const auto& bound = c.kernel_as<LatticeBound>();
   const ConstPointsView& controls = c.get<"points">();
+  const ConstPointsView rest = bound.grid.view();
   auto* offsets = reinterpret_cast<Double3*>(c.scratch());
-  for (std::size_t i = 0; i < bound.grid.size(); ++i) {
-    const Double3& rest = bound.grid[i];
-    offsets[i] = {controls.x[i] - rest.x, controls.y[i] - rest.y, controls.z[i] - rest.z};
+  auto* moved = reinterpret_cast<Index*>(c.scratch() + bound.offset_floats);
+  float* scratch = c.scratch() + bound.offset_floats + bound.moved_floats;
+  const std::span<const Index> numbers(moved, FindMovedControls(controls, rest, moved));  // most often a few
+  for (const Index i : numbers) {
+    offsets[i] = {static_cast<double>(controls.x[i]) - rest.x[i],
+                  static_cast<double>(controls.y[i]) - rest.y[i],
+                  static_cast<double>(controls.z[i]) - rest.z[i]};
   }
   const Matrix4 now = bound.frame.Motion(c.get<"parentMatrix">()) * bound.stage_from_lattice;
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{offsets, bound.grid.size()}, now, now, c.get<"envelope">()}, c.get<"inPoints">(),
-                   c.out<"outPoints">(), {c.scratch() + bound.offset_floats, bound.kernel.ScratchFloats()},
+  bound.kernel.Run({{offsets, bound.grid.count()}, numbers, now, now, c.get<"envelope">()},
+                   c.get<"inPoints">(), c.out<"outPoints">(), {scratch, bound.kernel.ScratchFloats()},
                    &parallel);
 }
 

@@ -69,6 +69,25 @@ void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, s
   }
 }
 
+std::size_t MovedControls(ConstPointsView now, ConstPointsView rest, Index* HWY_RESTRICT moved) {
+  const DLanes d;
+  std::size_t count = 0;
+  for (std::size_t begin = 0; begin < now.count; begin += hn::Lanes(d)) {
+    const auto equal = [&](const float* a, const float* b) HWY_ATTR {  // no NaN is
+      return hn::Eq(hn::Load(d, a + begin), hn::Load(d, b + begin));
+    };
+    const auto rests = hn::And(equal(now.x, rest.x), hn::And(equal(now.y, rest.y), equal(now.z, rest.z)));
+    std::uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, hn::Not(rests), bytes);
+    std::uint64_t bits;
+    std::memcpy(&bits, bytes, sizeof(bits));
+    bits &= (std::uint64_t{1} << HWY_MIN(hn::Lanes(d), now.count - begin)) - 1;
+    for (; bits != 0; bits &= bits - 1)
+      moved[count++] = static_cast<Index>(begin + static_cast<std::size_t>(std::countr_zero(bits)));
+  }
+  return count;
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
@@ -77,6 +96,11 @@ HWY_AFTER_NAMESPACE();
 namespace kpsa::engine {
 
 HWY_EXPORT(BlendTiles);
+HWY_EXPORT(MovedControls);
+
+std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept {
+  return HWY_DYNAMIC_DISPATCH(MovedControls)(now, rest, moved);
+}
 
 namespace {
 constexpr double kRim =
@@ -241,22 +265,24 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   };
   float resting[4];  // most controls; not numbers where the matrix is none
   const bool rest_moves = move({}, resting);
+  if (inputs.moved.empty() && !rest_moves) return;
   std::array<std::uint32_t, 32> rows{};
-  bool any = false;
-  for (std::size_t row = 0, c = 0; c < controls_; ++row) {
-    bool moves = false;
-    for (const std::size_t end = c + divisions_[0]; c < end; ++c) {
-      float* to = scratch.data() + 4 * c;
-      const Double3& offset = inputs.offsets[c];
-      if ((offset.x != 0) | (offset.y != 0) | (offset.z != 0)) {
-        moves |= move(offset, to);
-      } else {
-        std::memcpy(to, resting, sizeof(resting));
-        moves |= rest_moves;
-      }
-    }
-    if (moves) rows[row / divisions_[1]] |= std::uint32_t{1} << (row % divisions_[1]);
-    any |= moves;
+  const auto fill = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c) std::memcpy(scratch.data() + 4 * c, resting, sizeof(resting));
+  };
+  const std::size_t ds = divisions_[0], dt = divisions_[1];
+  if (sparse_ || rest_moves) {  // all controls are read
+    fill(0, controls_);
+    if (rest_moves) rows.fill(~std::uint32_t{0} >> (32 - dt));
+  }
+  bool any = rest_moves;
+  std::size_t filled = sparse_ || rest_moves ? controls_ : 0;  // up to the end of a row
+  for (const Index c : inputs.moved) {
+    const std::size_t row = c / ds;
+    if (c >= filled) fill(row * ds, filled = (row + 1) * ds);
+    if (!move(inputs.offsets[c], scratch.data() + 4 * std::size_t{c})) continue;
+    rows[row / dt] |= std::uint32_t{1} << (row % dt);
+    any = true;
   }
   if (!any) return;
   if (sparse_) {

@@ -41,11 +41,15 @@ struct LatticeSettings {
 // Bernstein.
 std::vector<double> LatticeBasis(int divisions, int order, double x);
 
+// The controls that are not where they rest, ascending, in `moved` (as many as there are, at most); how many.
+std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept;
+
 // A local kernel.
 class LatticeKernel {
  public:
   struct Inputs {
     std::span<const Double3> offsets;  // of every control from its place on the grid; lattice space
+    std::span<const Index> moved;      // the controls whose offsets are not 0, ascending: no other is read
     Matrix4 base_matrix;               // point space from the lattice's base, now (bindPreMatrix^-1)
     Matrix4 matrix;                    // point space from the lattice, now
     double envelope = 1;

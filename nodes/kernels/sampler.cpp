@@ -172,6 +172,15 @@ Quaternion SampleRotation(const SamplerKeys& keys, double seconds) {
 
 void SampleScalars(const SamplerKeys& keys, const KeySpan& span, std::span<double> out) {
   KPSA_CHECK_EQ(keys.components, out.size());
+  if (keys.interpolation == Interpolation::kLinear && span.t != 0) {  // as Sample does, side by side
+    const auto from = keys.values.subspan(span.key * out.size(), 2 * out.size());
+    const double t = span.t;
+    for (std::size_t c = 0; c < out.size(); ++c) {
+      const double v0 = from[c], v1 = from[out.size() + c];
+      out[c] = v0 + (v1 - v0) * t;
+    }
+    return;
+  }
   for (std::size_t c = 0; c < out.size(); ++c) out[c] = Sample(keys, span, c);
 }
 void SampleScalars(const SamplerKeys& keys, double seconds, std::span<double> out) {

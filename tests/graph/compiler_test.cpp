@@ -157,6 +157,31 @@ TEST(StructuralDrivers, OfAnEarlierFailureIsNotToldAsTheOnesOfAnother) {
   EXPECT_EQ(status.ToString(), "node \"bad\" (badMatrix): no matrix");
 }
 
+// A binding that knows more than the declaration may bring a compute of its own; at rest, too.
+TEST(BoundKernels, MayChooseTheCompute) {
+  NodeRegistry registry;
+  registry.add("half", "Half of its input, or as the binding chooses, twice as much.")
+      .in("input", 1.0)
+      .structural("twice", false)
+      .out("out", Type::kDouble)
+      .compute([](ComputeContext& c) { c.out_value<double>(0) = 0.5 * c.get<double>(0); })
+      .bind([](const Binding& b) -> Result<BoundKernel> {
+        BoundKernel kernel;
+        if (b.structural().get_bool("twice"))
+          kernel.compute = [](ComputeContext& c) { c.out_value<double>(0) = 2 * c.get<double>(0); };
+        return kernel;
+      });
+  for (const bool twice : {false, true}) {
+    TestGraph g(registry);
+    g.add("half", "n", {{"twice", twice}});
+    g.vary("n.input");
+    g.want("n.out");
+    EXPECT_EQ(g.compiler.Rest(g.graph, g.plug("n.out"))->AsDouble(), twice ? 2 : 0.5);
+    g.set("n.input", 8.0);
+    EXPECT_EQ(g.pull<double>("n.out"), twice ? 16 : 4);
+  }
+}
+
 TEST_F(CompilerTest, PointsThatDoNotExist) {
   g.add("grid", "g");
   g.add("add", "a");

@@ -101,6 +101,15 @@ inline std::vector<Matrix4> MakePalette(Index joint_count, Double3 place, std::u
   return palette;
 }
 
+// The controls of a lattice whose offsets are not 0.
+inline std::vector<Index> MovedControls(std::span<const Double3> offsets) {
+  std::vector<Index> moved;
+  for (Index c = 0; c < offsets.size(); ++c) {
+    if (!(offsets[c] == Double3())) moved.push_back(c);
+  }
+  return moved;
+}
+
 struct TestTarget {
   std::vector<Index> points;
   std::vector<float> deltas;

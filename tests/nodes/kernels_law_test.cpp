@@ -138,7 +138,7 @@ class KernelLaw : public testing::Test {
              for (Double3& o : offsets) o = random.Vector() * 0.2;
              AlignedFloats scratch(kernel.ScratchFloats());
              const Matrix4 now = c.moved ? base * Translation({0.1, 0.2, 0}) : base;
-             kernel.Run({offsets, base, now, 0.8}, in, out, scratch.span(), parallel);
+             kernel.Run({offsets, MovedControls(offsets), base, now, 0.8}, in, out, scratch.span(), parallel);
            }});
     }
     for (CurveBasis basis : {CurveBasis::kLinear, CurveBasis::kCatmullRom, CurveBasis::kBSpline}) {

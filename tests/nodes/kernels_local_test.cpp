@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "base/simd.h"
 #include "nodes/kernels/blend_shape.h"
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/skin.h"
@@ -294,8 +295,9 @@ TEST_F(LocalKernels, LatticeAgreesWithItsTwin) {
     Random random(9);
     std::vector<Double3> offsets(kernel.control_count());
     for (Double3& o : offsets) o = random.Vector() * 0.2;
+    const std::vector<Index> every = AllPoints(offsets.size());
     for (const Matrix4& now : {base, moved}) {
-      const LatticeKernel::Inputs inputs{offsets, base, now, 0.75};
+      const LatticeKernel::Inputs inputs{offsets, every, base, now, 0.75};
       EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, inputs, points.view()).view()),
                             LatticeTwin(settings, InverseOrIdentity(base), inputs, rest_, incoming, mask_)),
                 1e-6)
@@ -311,17 +313,47 @@ TEST_F(LocalKernels, ALatticeThatMovesAsAWholeMovesItsPoints) {
   const std::vector<Double3> still(kernel.control_count()),
       shifted(kernel.control_count(), Double3{0.25, 0.5, -0.125});
   // At rest: bit for bit
-  const PointBuffer rest = Evaluate(kernel, {still, base, base, 1}, in());
+  const PointBuffer rest = Evaluate(kernel, {still, {}, base, base, 1}, in());
   for (std::size_t i = 0; i < rest_.size(); ++i) ASSERT_TRUE(SameBits(rest.view(), in(), i));
   // All controls shifted, in a lattice of size 2
   std::vector<Double3> expected;
   for (Double3 p : rest_) expected.push_back(p + Double3{0.5, 1, -0.25});
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {shifted, base, base, 1}, in()).view()), expected), 3e-7);
+  EXPECT_LT(
+      MaxDistance(ToDouble(Evaluate(kernel, {shifted, MovedControls(shifted), base, base, 1}, in()).view()),
+                  expected),
+      3e-7);
   // The lattice itself turned
   const Matrix4 turn = ComposeTrs({1, 0, 0}, Random(4).Rotation(), {1, 1, 1});
   for (std::size_t i = 0; i < rest_.size(); ++i) expected[i] = TransformPoint(turn, rest_[i]);
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {still, base, turn * base, 1}, in()).view()), expected),
+  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {still, {}, base, turn * base, 1}, in()).view()), expected),
             3e-7);
+}
+
+// Whether controls that rest are named as moved changes no bit; the offsets of those that are not are not read.
+TEST_F(LocalKernels, ALatticeReadsTheOffsetsOfMovedControlsAlone) {
+  const Matrix4 base = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
+  Matrix4 none = base;
+  none(1, 1) = NAN;
+  std::size_t differ = 0;
+  for (const LatticeSettings& settings :
+       {LatticeSettings{{5, 4, 3}, false},
+        LatticeSettings{{9, 8, 7}, true, {2, 2, 2}, LatticeOutside::kAll}}) {
+    const LatticeKernel kernel(settings, in(), InverseOrIdentity(base), all_, mask_);
+    std::vector<Double3> offsets(kernel.control_count()), unread(offsets.size(), Double3{NAN, NAN, NAN});
+    for (const std::size_t c : {std::size_t{7}, std::size_t{8}, offsets.size() / 2})
+      unread[c] = offsets[c] = {0.1, -0.2, 0.05};
+    const std::vector<Index> every = AllPoints(offsets.size()), moved = MovedControls(offsets);
+    ASSERT_EQ(moved.size(), 3u);
+    for (const Matrix4& matrix : {base, none}) {
+      const PointBuffer a = Evaluate(kernel, {offsets, every, matrix, matrix, 0.75}, in()),
+                        b = Evaluate(kernel, {unread, moved, matrix, matrix, 0.75}, in());
+      for (std::size_t i = 0; i < rest_.size(); ++i) {
+        ASSERT_TRUE(SameBits(a.view(), b.view(), i)) << i;
+        differ += !SameBits(a.view(), in(), i);
+      }
+    }
+  }
+  EXPECT_GT(differ, 100u);
 }
 
 TEST_F(LocalKernels, ASmallestLatticeShears) {
@@ -332,7 +364,10 @@ TEST_F(LocalKernels, ASmallestLatticeShears) {
   const Matrix4 base = Scaling({2, 2, 2});
   std::vector<Double3> expected;
   for (Double3 p : rest_) expected.push_back({p.x + 0.5 * (p.y / 2 + 0.5), p.y, p.z});
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {offsets, base, base, 1}, in()).view()), expected), 2e-7);
+  EXPECT_LT(
+      MaxDistance(ToDouble(Evaluate(kernel, {offsets, MovedControls(offsets), base, base, 1}, in()).view()),
+                  expected),
+      2e-7);
 }
 
 TEST_F(LocalKernels, ALatticeTurnedByItsParentTurnsItsResult) {
@@ -348,10 +383,13 @@ TEST_F(LocalKernels, ALatticeTurnedByItsParentTurnsItsResult) {
     carried.view().y[i] = static_cast<float>(p.y);
     carried.view().z[i] = static_cast<float>(p.z);
   }
-  std::vector<Double3> expected = ToDouble(Evaluate(kernel, {offsets, base, base, 1}, in()).view());
+  std::vector<Double3> expected =
+      ToDouble(Evaluate(kernel, {offsets, MovedControls(offsets), base, base, 1}, in()).view());
   for (Double3& p : expected) p = TransformPoint(parent, p);
   EXPECT_LT(MaxDistance(
-                ToDouble(Evaluate(kernel, {offsets, parent * base, parent * base, 1}, carried.view()).view()),
+                ToDouble(Evaluate(kernel, {offsets, MovedControls(offsets), parent * base, parent * base, 1},
+                                  carried.view())
+                             .view()),
                 expected),
             1e-6);
 }
@@ -360,7 +398,7 @@ TEST_F(LocalKernels, PointsOutsideOfALatticeStay) {
   const Matrix4 base = Scaling({0.5, 0.5, 2});
   const std::vector<Double3> shifted(8, Double3{1, 0, 0});
   const LatticeKernel kernel({{2, 2, 2}}, in(), InverseOrIdentity(base), all_);
-  const PointBuffer out = Evaluate(kernel, {shifted, base, base, 1}, in());
+  const PointBuffer out = Evaluate(kernel, {shifted, MovedControls(shifted), base, base, 1}, in());
   std::size_t outside = 0;
   for (std::size_t i = 0; i < rest_.size(); ++i) {
     const bool far = std::fabs(rest_[i].x) > 0.26 || std::fabs(rest_[i].y) > 0.26;
@@ -373,6 +411,25 @@ TEST_F(LocalKernels, PointsOutsideOfALatticeStay) {
     }
   }
   EXPECT_GT(outside, 100u);
+}
+
+TEST(Lattice, MovedControlsAreFoundOnEveryVectorUnit) {
+  for (const std::string target : {"avx512", "avx2", "scalar"}) {
+    if (!SelectSimdTarget(target)) continue;
+    for (const Index count : {8u, 27u, 48u, 125u}) {
+      const PointBuffer rest(count);
+      PointBuffer now(count);
+      const PointsView places = now.view();
+      for (std::size_t i = count; i < PaddedCount(count); ++i)
+        places.x[i] = 5;    // what is behind them is none
+      places.x[1] = -0.0f;  // has not moved
+      places.x[2] = 1, places.y[5] = NAN, places.z[count - 1] = -1;
+      std::vector<Index> moved(count);
+      moved.resize(FindMovedControls(places, rest.view(), moved.data()));
+      EXPECT_EQ(moved, (std::vector<Index>{2, 5, count - 1})) << target << ", " << count;
+    }
+  }
+  SelectSimdTarget("");
 }
 
 TEST(Lattice, BadSettingsAreNamed) {
@@ -394,16 +451,17 @@ TEST_F(LocalKernels, AChainInPlaceIsTheChainApart) {
   const ClusterKernel cluster(all_, mask_);
   const LatticeKernel lattice({{3, 3, 3}}, in(), {}, all_);
   const std::vector<Double3> offsets(27, Double3{0.1, 0, 0});
+  const std::vector<Index> all = AllPoints(27);
   const Matrix4 turn = ComposeTrs({}, Random(1).Rotation(), {1, 1, 1});
   AlignedFloats scratch(10000);
   const PointBuffer a = Evaluate(skin_kernel, {palette, 1, {}}, in()),
                     b = Evaluate(cluster, {turn, {}, 1}, a.view());
-  const PointBuffer c = Evaluate(lattice, {offsets, {}, turn, 1}, b.view());
+  const PointBuffer c = Evaluate(lattice, {offsets, all, {}, turn, 1}, b.view());
   PointBuffer d(mesh_.count());
   CopyPoints(in(), d.view());
   skin_kernel.Run({palette, 1, {}}, d.view(), d.view(), scratch.span());
   cluster.Run({turn, {}, 1}, d.view(), d.view(), scratch.span());
-  lattice.Run({offsets, {}, turn, 1}, d.view(), d.view(), scratch.span());
+  lattice.Run({offsets, all, {}, turn, 1}, d.view(), d.view(), scratch.span());
   for (std::size_t i = 0; i < rest_.size(); ++i) ASSERT_TRUE(SameBits(c.view(), d.view(), i));
 }
 
