@@ -9,7 +9,7 @@ namespace kpsa::engine {
 namespace {
 
 // What it costs (bench_kernels): a run, a point that comes out, and a point that is smoothed once.
-constexpr float kMushNs = 500, kFrameNs = 10, kStepNs = 1.6f;
+constexpr float kMushNs = 500, kFrameNs = 8, kStepNs = 1.6f;
 
 DeltaMushSettings Settings(const Structural& s) {
   return {s.get_int("iterations"), s.get_double("smoothingStep"), s.get_double("distanceWeight"),

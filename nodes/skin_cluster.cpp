@@ -173,7 +173,7 @@ KPSA_NODES(skin_cluster, registry) {
        .own = DeclareSkin,
        .bind = BindSkin,
        .demand = DemandSkin})
-      .cost(500, 5);
+      .cost(300, 3);
 }
 
 }  // namespace kpsa::engine
