@@ -272,8 +272,11 @@ void Rounds::WholeUnits() {
     for (Index first = 0; first < plan_->steps().size(); ++first) {
       const Index end = first + plan_->steps()[first].unit_size;
       bool needed = false;
-      for (Index s = first; s < end; ++s)
+      for (Index s = first; s < end; ++s) {
         needed = needed || g_.twin.computed().count(plan_->step_name(s)) != 0;
+        for (const Index reader : plan_->consumers(s))  // of an input that is read on, without the node
+          needed = needed || g_.twin.computed().count(plan_->step_name(reader)) != 0;
+      }
       for (Index s = first; s < end && needed && end > first + 1; ++s) {
         const std::string node = plan_->step_name(s);
         if (*plan_->step_label(s) == 0) {
