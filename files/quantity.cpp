@@ -137,8 +137,8 @@ Result<double> ParseQuantity(std::string_view text, Unit unit, const FileUnits& 
     return Status::Invalid("\"{}\": expected {}{}", whole, Dimension(unit),
                            unit == Unit::kNone ? "" : " or a bare number in the file's unit");
   }
-  if (name == "f") return number / units.fps;
-  number *= suffix->factor;
+  number = name == "f" ? number / units.fps : number * suffix->factor;
+  if (!std::isfinite(number)) return Status::Invalid("\"{}\" is outside of the range of numbers", whole);
   return number;
 }
 

@@ -63,9 +63,7 @@ void ComputeIntToDouble(ComputeContext& context) {
   context.out_value<double>(0) = static_cast<double>(context.get<std::int64_t>(0));
 }
 void ComputeDoubleToInt(ComputeContext& context) {
-  const double v = context.get<double>(0);
-  const bool fits = v > -9.2e18 && v < 9.2e18;  // false for NaN, too
-  context.out_value<std::int64_t>(0) = fits ? static_cast<std::int64_t>(v) : 0;
+  context.out_value<std::int64_t>(0) = WholeNumber(context.get<double>(0));
 }
 void ComputeDoubleToBool(ComputeContext& context) {
   context.out_value<std::int64_t>(0) = context.get<double>(0) != 0;

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "base/check.h"
+#include "graph/builtin_steps.h"
 
 namespace kpsa::engine {
 
@@ -45,7 +46,7 @@ double Value::AsDouble() const {
 
 std::int64_t Value::AsInt() const {
   if (const auto* i = get_if<std::int64_t>()) return *i;
-  if (const auto* d = get_if<double>()) return static_cast<std::int64_t>(*d);
+  if (const auto* d = get_if<double>()) return WholeNumber(*d);
   return 0;
 }
 

@@ -23,10 +23,6 @@ Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
   const Result<std::vector<float>> values = file.Values<float>(kModes, {s->modes, rows});
   if (!values.ok()) return values.status();
   s->kept_modes = {rows, s->modes, *values};
-  const Result<std::string> digest = file.Metadata(kModesDigest);
-  if (!digest.ok()) return digest.status();
-  if (*digest != ModesDigest(*s))
-    return Status::Invalid("the file is damaged: its modes are not those that were written");
   return {};
 }
 
@@ -53,9 +49,7 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
   return writer.Write(path);
 }
 
-namespace {
-
-Result<Subspace> SubspaceIn(const SafetensorsFile& file, KeptModes modes) {
+Result<Subspace> SubspaceContent(const SafetensorsFile& file, KeptModes modes) {
   const auto kind = file.metadata().find("kind");
   if (kind == file.metadata().end() || kind->second != kSubspaceKind) {
     return Status::Invalid("a file of tensors, but not a subspace (write one with `kpsa train`)");
@@ -99,12 +93,23 @@ Result<Subspace> SubspaceIn(const SafetensorsFile& file, KeptModes modes) {
       (file.tensors().contains(kModes) || file.metadata().contains(kModesDigest)))
     KPSA_RETURN_IF_ERROR(ReadKeptModes(file, &s));
   KPSA_RETURN_IF_ERROR(ValidateSubspace(s));
+  return s;
+}
+
+namespace {
+
+Status CheckDigests(const SafetensorsFile& file, KeptModes modes, const Subspace& s) {
   const Result<std::string> digest = file.Metadata("digest");
   if (!digest.ok()) return digest.status();
   if (*digest != ContentDigest(s))
     return Status::Invalid(
         "the file is damaged: its contents are not those that were written; train it again");
-  return s;
+  if (modes == KeptModes::kSkip || !file.tensors().contains(kModes)) return {};
+  const Result<std::string> of_modes = file.Metadata(kModesDigest);
+  if (!of_modes.ok()) return of_modes.status();
+  if (*of_modes != ModesDigest(s))
+    return Status::Invalid("the file is damaged: its modes are not those that were written");
+  return {};
 }
 
 }  // namespace
@@ -112,8 +117,10 @@ Result<Subspace> SubspaceIn(const SafetensorsFile& file, KeptModes modes) {
 Result<Subspace> ReadSubspace(const std::string& path, KeptModes modes) {
   const Result<SafetensorsFile> file = SafetensorsFile::Read(path);
   if (!file.ok()) return file.status();
-  Result<Subspace> subspace = SubspaceIn(*file, modes);
+  Result<Subspace> subspace = SubspaceContent(*file, modes);
   if (!subspace.ok()) return Status(subspace.status()).At({path});
+  if (Status status = CheckDigests(*file, modes, *subspace); !status.ok())
+    return std::move(status).At({path});
   return subspace;
 }
 

@@ -166,6 +166,10 @@ TEST(Quantity, ReadsSuffixes) {
   EXPECT_DOUBLE_EQ(*ParseQuantity("1%", Unit::kNone, units), 0.01);
   EXPECT_DOUBLE_EQ(*ParseQuantity("0.5s", Unit::kTime, units), 0.5);
   EXPECT_DOUBLE_EQ(*ParseQuantity("12f", Unit::kTime, units), 0.25);
+  units.fps = 0.01;
+  EXPECT_DOUBLE_EQ(*ParseQuantity("1e305f", Unit::kTime, units), 1e307);
+  EXPECT_EQ(ParseQuantity("1e308f", Unit::kTime, units).status().ToString(),
+            "\"1e308f\" is outside of the range of numbers");
 }
 
 TEST(Quantity, SaysWhatIsWrong) {

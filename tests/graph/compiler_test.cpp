@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/test_graph.h"
 #include "tests/support/toy_nodes.h"
 
@@ -43,6 +45,21 @@ TEST_F(CompilerTest, RequestsThatNameWhatCannotVary) {
   // Setting what the request did not name
   const Result<PlugHandle> varying = g.evaluator->FindVarying(g.graph, g.plug("b.b"));
   EXPECT_EQ(varying.status().ToString(), "b.b does not vary in this plan: name it in Request::varying");
+}
+
+TEST_F(CompilerTest, ConstantsBecomeWholeNumbersAsVaryingOnesDo) {
+  g.add("add", "n");
+  g.add("choice", "c");
+  g.connect("n.out", "c.selector");
+  for (const auto& [number, whole] :
+       {std::pair(-3.9, -3), std::pair(1e30, 0), std::pair(-1e30, 0), std::pair(1e300 * 1e300, 0)}) {
+    g.request.varying.clear();
+    g.hold("n.a", std::isfinite(number) ? number : 1e308);
+    g.hold("n.b", std::isfinite(number) ? 0.0 : 1e308);
+    EXPECT_EQ(g.pull<std::int64_t>("c.selector"), whole) << number;
+    g.vary("n.a");
+    EXPECT_EQ(g.pull<std::int64_t>("c.selector"), whole) << number;
+  }
 }
 
 TEST_F(CompilerTest, StructuralDrivenByWhatVariesNamesBothEnds) {

@@ -6,6 +6,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "base/matrix.h"
+
 namespace kpsa::engine {
 namespace {
 
@@ -154,18 +156,19 @@ void AddToyNodes(NodeRegistry& registry) {
       .in("by", 0.0)
       .out("outPoints", Type::kPoints)
       .compute([](ComputeContext& c) {
-        const auto& raised = c.kernel_as<std::vector<float>>();
+        const auto& raised = c.kernel_as<std::vector<bool>>();
+        const double by = c.get<double>(1);
         for (std::size_t i = 0; i < c.points(0).count; ++i) {
           c.out_points(0).x[i] = c.points(0).x[i];
-          c.out_points(0).y[i] = c.points(0).y[i] + raised[i] * static_cast<float>(c.get<double>(1));
+          c.out_points(0).y[i] = c.points(0).y[i];
+          if (raised[i] && by != 0) c.out_points(0).y[i] += static_cast<float>(by);
           c.out_points(0).z[i] = c.points(0).z[i];
         }
       })
       .bind([](const Binding& b) -> Result<BoundKernel> {
         const auto first = static_cast<Index>(b.structural().get_int("first"));
-        auto raised = std::make_shared<std::vector<float>>();
-        for (const Index point : b.output("outPoints").ToVector())
-          raised->push_back(point < first ? 0.0f : 1.0f);
+        auto raised = std::make_shared<std::vector<bool>>();
+        for (const Index point : b.output("outPoints").ToVector()) raised->push_back(point >= first);
         return BoundKernel{raised, 0, 0};
       })
       .in_place("points")
@@ -253,9 +256,12 @@ void AddToyNodes(NodeRegistry& registry) {
       .lazy()
       .out("out", Type::kDouble)
       .compute([](std::int64_t selector, ArrayView<double> input) {
-        return selector < input.size() ? input[static_cast<std::uint32_t>(selector)] : 0;
+        return selector >= 0 && selector < input.size() ? input[static_cast<std::uint32_t>(selector)] : 0;
       })
-      .decide([](ComputeContext& c) -> std::uint64_t { return std::uint64_t{1} << c.get<std::int64_t>(0); });
+      .decide([](ComputeContext& c) -> std::uint64_t {
+        const std::int64_t selector = c.get<std::int64_t>(0);
+        return selector < 0 || selector > kMostChoices ? 0 : std::uint64_t{1} << selector;
+      });
   registry.add("together", "Adds all, or none.")
       .in("wanted", false)
       .in("input", 0.0)
@@ -271,6 +277,40 @@ void AddToyNodes(NodeRegistry& registry) {
         c.out_value<double>(0) = sum;
       })
       .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 1 : 2; });
+  registry.add("shift", "A translation.")
+      .in("offset", Double3())
+      .out("out", Type::kMatrix)
+      .compute([](Double3 offset) { return Translation(offset); });
+  registry.add("chain", "A product.")
+      .in("matrix", Matrix4())
+      .array()
+      .out("out", Type::kMatrix)
+      .compute([](ArrayView<Matrix4> matrices) {
+        Matrix4 all;
+        for (std::uint32_t i = 0; i < matrices.size(); ++i) all = all * matrices[i];
+        return all;
+      })
+      .cost(20000, 0);
+  registry.add("carry", "A point in a matrix.")
+      .in("matrix", Matrix4())
+      .in("point", Double3())
+      .out("out", Type::kDouble3)
+      .compute([](const Matrix4& m, Double3 point) { return TransformPoint(m, point); });
+  registry.add("carryPoints", "Points in a matrix.")
+      .points_in("points")
+      .in("matrix", Matrix4())
+      .out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        const ConstPointsView& from = c.points(0);
+        for (std::size_t i = 0; i < from.count; ++i) {
+          const Double3 p = TransformPoint(c.get<Matrix4>(1), {from.x[i], from.y[i], from.z[i]});
+          c.out_points(0).x[i] = static_cast<float>(p.x);
+          c.out_points(0).y[i] = static_cast<float>(p.y);
+          c.out_points(0).z[i] = static_cast<float>(p.z);
+        }
+      })
+      .in_place("points")
+      .cost(20000, 4);
   registry.add("picky", "Fails where it is told to.")
       .structural("where", 0)
       .structural("factor", 2.0)

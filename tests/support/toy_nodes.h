@@ -14,11 +14,13 @@ namespace kpsa::engine {
 // of x stays below threshold, all points are the mean cue; otherwise the full points; fails where the mean is
 // below floor), trail (input -> out; stateful: half of the way from where it was), twoWays (a -> outA, b ->
 // outB), choice (selector, input[i] lazy -> out), together (wanted, input[i] lazy_together -> out, the sum or
-// 0), picky (points -> points; S where: 1 fails to bind, 2 demands nonsense, 3 cannot count, 4 fails to
+// 0), shift (offset double3 -> out, a translation), chain (matrix[i] -> out, their product), carry (matrix,
+// point -> out), carryPoints (points, matrix -> points, in place), picky (points -> points; S where: 1 fails to bind, 2 demands nonsense, 3 cannot count, 4 fails to
 // compute; S factor), grid (S divisions, S mode enum, points on the grid
 // -> outPoints; weight[i] with element names; size 0..10). Some claim to cost more than they do, so that
 // small graphs are evaluated on several threads.
 inline constexpr double kThrows = -1e6;
+inline constexpr int kMostChoices = 63;  // what a choice's selector may be
 void AddToyNodes(NodeRegistry& registry);
 const NodeRegistry& ToyRegistry();  // one with nothing else
 
