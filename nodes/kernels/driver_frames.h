@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/matrix.h"
+#include "base/points.h"
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
 #include "nodes/kernels/wrap_run.h"
