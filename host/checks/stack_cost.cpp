@@ -13,7 +13,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kLittleNs = 20e3, kLittleBound = 1.5;
+constexpr double kLittleNs = 5e3, kLittleBound = 1.5;
 // What no subspace does without, on any machine: measuring, and reconstructing a point.
 constexpr double kMeasuringNs = 5e3, kReconstructionNs = 2;
 constexpr std::size_t kFrames = 36;

@@ -18,6 +18,7 @@ class LocalMisses : public ::testing::Test {
   static void SetUpTestSuite() {
     TrainOptions options = QuickTraining();
     options.without.trust = true;  // doubts as they are: thresholds among them make it happen
+    options.may_have_cues_by_tile = false;  // nor fewer numbers than 300
     const std::shared_ptr<const Subspace> trained = TrainRig(kHello, options);
     ASSERT_NE(trained, nullptr);
     auto doubting = std::make_shared<Subspace>(*trained);

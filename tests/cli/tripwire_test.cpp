@@ -153,9 +153,10 @@ TEST_F(Tripwire, BeforeADeltaMushItFiresOnlyWhereCuesAreMeasuredBehindIt) {
   const TripwireRig before("[skin, cage, trip, mush]", "mush");
   trained = TrainRig(before.rig(), QuickTraining());
   ASSERT_NE(trained, nullptr);
-  const bool behind = std::any_of(trained->cues.begin(), trained->cues.end(),
-                                  [](const CueDescription& cue) { return cue.stage == "trip"; });
-  ASSERT_TRUE(behind) << "no cue is measured at the tripwire";
+  const bool behind = std::any_of(trained->cues.begin(), trained->cues.end(), [](const CueDescription& cue) {
+    return cue.stage == "trip" || cue.stage == "mush";
+  });
+  ASSERT_TRUE(behind) << "no cue is measured at the tripwire, or behind it";
   options = Armed(trained, kInfinity);
   options.clip = "wave";
   RigRun cues(before.rig(), options);
@@ -179,7 +180,8 @@ TEST_F(Tripwire, TheProgramReportsItAsNeverEvaluated) {
     std::sort(nodes.begin(), nodes.end());
     return nodes;
   };
-  EXPECT_EQ(never("1000"), (std::vector<std::string>{"mush", "trip"}));
+  const std::vector<std::string> asleep = never("1000");
+  EXPECT_TRUE(std::ranges::includes(asleep, std::vector<std::string>{"mush", "trip"}));
   EXPECT_EQ(never("0"), std::vector<std::string>());
   // The canary: armed from outside, the rig itself fails
   const ProcessResult armed =
@@ -282,12 +284,10 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   ASSERT_EQ(bench.exit_code, 0) << bench.err;
   std::vector<std::string> never = nlohmann::json::parse(bench.out)["nodes"]["never_evaluated"];
   std::sort(never.begin(), never.end());
-  std::string names;
-  for (const std::string& node : never) names += node + " ";
-  EXPECT_EQ(names,
-            "browL browR browWireL browWireR cheekL cheekModL cheekModR cheekR chin chinMod "
-            "face_mesh_skinCluster jawCage lowerLip lowerLipWire mush nose noseMod skullCage trip upperLip "
-            "upperLipWire ");
+  // All that stands between the cues and the tripwire, whichever points training chose
+  for (const char* node : {"browWireL", "cheekModL", "face_mesh_skinCluster", "jawCage", "lowerLipWire",
+                           "mush", "noseMod", "skullCage", "trip", "upperLipWire"})
+    EXPECT_TRUE(std::ranges::binary_search(never, node)) << node;
 }
 
 }  // namespace

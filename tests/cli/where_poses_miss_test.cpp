@@ -22,9 +22,12 @@ class FinerTiles : public ::testing::Test {
   static void ExpectTheCheaperIsTaken(const TrainOptions& options) {
     const std::vector<TrainingRecord::Tried> tried = Tried(options);
     ASSERT_GE(tried.size(), 2u);
-    EXPECT_EQ(tried[0].what, kForAllPoints);
-    EXPECT_EQ(tried[1].what, kFinelyStored);
-    EXPECT_GT(tried[0].misses, 0.2);
+    const auto coarse = std::ranges::find(tried, kForAllPoints, &TrainingRecord::Tried::what);
+    ASSERT_NE(coarse, tried.end());
+    EXPECT_GT(coarse->misses, 0.2);
+    EXPECT_TRUE(std::ranges::any_of(tried, [](const TrainingRecord::Tried& one) {
+      return one.what == kFinelyStored || one.what == kFewerCues;  // which are stored finely, too
+    }));
     const auto least = std::ranges::min_element(tried, {}, &TrainingRecord::Tried::cost);
     for (const TrainingRecord::Tried& one : tried) EXPECT_EQ(one.taken, &one == &*least) << one.what;
   }
