@@ -28,11 +28,11 @@ constexpr std::size_t kWorstRounds = 6, kWorstPoints = 8;  // at most so many ti
 constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
-// Of the rows: what is tried, fewer until more judges miss, or more where many do
-constexpr double kFewer[] = {0.7, 0.5, 0.35}, kMore = 1.5;
+// Of the rows: fewer are tried, until more judges miss; not where many do
+constexpr double kFewer[] = {0.7, 0.5, 0.35};
 constexpr double kMissedMore = 0.004;  // of the judges: fewer rows may add so much
-constexpr double kManyMissed = 0.05;   // likewise: more rows are tried
-constexpr double kHalf = 0.5;          // of the cost, for others
+constexpr double kManyMissed = 0.05;
+constexpr double kHalf = 0.5;  // of the cost, for others
 constexpr std::size_t kOthers = 2;
 
 constexpr double kStricter = 0.5;  // of the tolerance: clips that nobody trained on err up to so much more
@@ -108,27 +108,24 @@ class Chooser {
   }
 
   // As few rows as the judges do not miss more often with, with half the tolerance, too, since clips err more
-  // than judges do. Or more rows where many miss, if that costs less.
+  // than judges do.
   void ChooseRows(const std::vector<CuePlace>& places) {
     const CueChoice all = best_;
+    if (std::max(all.misses, all.misses_of_stricter) > kManyMissed) return;
     const bool has_worst = std::ranges::any_of(all.cues, [&](const CueRef& cue) {
       return std::ranges::find(places[all.place], cue) == places[all.place].end() &&
              cue.kind != CueKind::kScalar;
     });
-    const auto with = [&](double share) {
-      rows_ = static_cast<std::size_t>(share * static_cast<double>(options_.rows));
-      return TryPlace(places[place_], has_worst);
-    };
     place_ = all.place;
     for (const double share : kFewer) {
       const CueChoice before = best_;
-      if (with(share) && best_.misses <= all.misses + kMissedMore &&
+      rows_ = static_cast<std::size_t>(share * static_cast<double>(options_.rows));
+      if (TryPlace(places[place_], has_worst) && best_.misses <= all.misses + kMissedMore &&
           best_.misses_of_stricter <= all.misses_of_stricter + kMissedMore)
         continue;
       best_ = before;
       break;
     }
-    if (best_.cues == all.cues && std::max(all.misses, all.misses_of_stricter) > kManyMissed) with(kMore);
   }
 
   void FindCheaper() {

@@ -14,7 +14,7 @@ using CuePlace = std::vector<CueRef>;  // points that may be measured together
 
 struct CueChoiceOptions {
   std::size_t rows = 300;        // of measurements: a point takes 3, a scalar 1
-  bool may_choose_rows = false;  // fewer or more of them, where judges say that a frame then costs less
+  bool may_choose_rows = false;  // fewer of them, where judges miss no more
   std::size_t min_points = 16;   // points see what no scalar does: some of them are kept to judge by
   double tolerance = 1e-4;       // scene units
   // Where errors count by their RMS alone (light, with its noise): one round, no worst points.

@@ -14,16 +14,16 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kDoubtCost = 100;  // ns a tile, on the scale of the nodes' costs
-constexpr double kByteCost = 0.03;  // ns a byte of the tiles, likewise
-constexpr double kPartial = 0.4;    // of a full evaluation: what patches cost that are worth a try
+constexpr double kDoubtCost = 40;    // ns a tile, on the scale of the nodes' costs
+constexpr double kByteCost = 0.015;  // ns a byte of the tiles, likewise
+constexpr double kPartial = 0.4;     // of a full evaluation: what patches cost that are worth a try
 // Shares of the largest doubt that are tried (PatchLayout::share)
 constexpr double kShares[] = {0.15, 0.25, 0.4, 0.6, 1};
 // Of the cost with a score of all points: known to hold on clips, it stays where parts do not spare more
 constexpr double kClearlyLess = 0.95;
 constexpr double kFewMisses = 0.02;  // of the judges, by SoftCache's own score: parts are not tried
 constexpr double kOutside = 0.03;    // of a clip's frames, on the average of generated characters
-constexpr double kRowCost = 5;       // ns a row that is measured, likewise
+constexpr double kRowCost = 4;       // ns a row that is measured, likewise
 // Sets of as many judges, drawn of them anew: where a few poses decide, others would decide otherwise
 constexpr int kDraws = 8;
 constexpr std::uint64_t kDrawSeed = 0x9b05688c2b3e6c1full;

@@ -20,6 +20,7 @@ constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so ma
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
 constexpr double kLess = 0.95;          // likewise, where the others are as fine
+constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
 constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
 constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of a rotation moves points, about
 
@@ -127,6 +128,9 @@ Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
 Status SubspaceCandidates::CompareWithCheaper(Subspace* subspace) {
   const std::vector<CueChoice::Other> others = std::exchange(cues.choice.cheaper, {});
   if (others.empty() || poses->judges.poses() == 0 || setup->of_light()) return Status();
+  const Result<double> points = setup->CostOfPoints(cues.set.cues);
+  if (!points.ok()) return points.status();
+  if (*points < kDearPoints * (best_ns_ > 0 ? best_ns_ : cues.choice.cost)) return Status();
   if (best_ns_ == 0) {
     const Result<FrameCost> priced = Price(subspace, cues.set);
     if (!priced.ok()) return priced.status();
