@@ -29,7 +29,7 @@ constexpr double kWorstShare = 0.1;                        // and of all points
 constexpr double kWorthwhile = 0.5;  // of the poses beyond the tolerance that must be left by them
 
 // Of the rows: fewer are tried, until more judges miss; not where many do
-constexpr double kFewer[] = {0.7, 0.5, 0.35};
+constexpr double kFewer[] = {0.5, 0.35};
 constexpr double kMissedMore = 0.004;  // of the judges: fewer rows may add so much
 constexpr double kManyMissed = 0.05;
 constexpr double kHalf = 0.5;  // of the cost, for others
@@ -74,7 +74,7 @@ class Chooser {
     const bool compares = options_.judges != nullptr;
     for (const CuePlace& place : places) {
       place_ = static_cast<std::size_t>(&place - places.data());
-      const bool better = TryPlace(place, true);
+      const bool better = TryPlace(place);
       if (chosen_.empty()) continue;
       if (!compares) return {std::move(chosen_), place_};
       if (!better) break;  // earlier ones see even less
@@ -86,7 +86,7 @@ class Chooser {
 
  private:
   // Whether it is cheaper than those before.
-  bool TryPlace(const CuePlace& place, bool with_worst) {
+  bool TryPlace(const CuePlace& place) {
     const bool compares = options_.judges != nullptr;
     chosen_.clear();
     SelectInRounds(place, 3);
@@ -102,8 +102,7 @@ class Chooser {
     const bool early = std::any_of(chosen_.begin(), chosen_.end(),
                                    [](const CueRef& cue) { return cue.kind == CueKind::kStage; });
     const double hopeless = compares && best_.misses > kMissed ? kFewBeyond : kHopeless;
-    if (with_worst && early && !options_.by_rms && AddWorstPoints(hopeless))
-      better |= compares && KeepIfCheaper();
+    if (early && !options_.by_rms && AddWorstPoints(hopeless)) better |= compares && KeepIfCheaper();
     return better;
   }
 
@@ -117,10 +116,15 @@ class Chooser {
              cue.kind != CueKind::kScalar;
     });
     place_ = all.place;
+    const double price = best_price_;
     for (const double share : kFewer) {
       const CueChoice before = best_;
       rows_ = static_cast<std::size_t>(share * static_cast<double>(options_.rows));
-      if (TryPlace(places[place_], has_worst) && best_.misses <= all.misses + kMissedMore &&
+      chosen_.clear();
+      SelectInRounds(places[place_], price);
+      AddPoints(places[place_]);
+      if (has_worst) AddWorstPoints(kHopeless);
+      if (!chosen_.empty() && KeepIfCheaper() && best_.misses <= all.misses + kMissedMore &&
           best_.misses_of_stricter <= all.misses_of_stricter + kMissedMore)
         continue;
       best_ = before;
@@ -147,6 +151,7 @@ class Chooser {
     tried_.push_back({chosen_, cost, of_hits});
     if (!best_.cues.empty() && cost >= best_.cost) return false;
     best_ = {chosen_, place_, cost, missed.share, missed.of_stricter};
+    best_price_ = price_;
     return true;
   }
 
@@ -203,6 +208,7 @@ class Chooser {
 
   // A row costs what it costs at run time, whatever it measures; a cue of three rows has to be worth them.
   void SelectInRounds(const std::vector<CueRef>& place, double point_price) {
+    price_ = point_price;
     const std::vector<CueRef> candidates = Candidates(pca_, noise_, place, options_.max_outputs);
     std::vector<double> weights;
     const std::size_t rounds = options_.by_rms ? 1 : kSelectionRounds;
@@ -277,6 +283,7 @@ class Chooser {
   const PoseMatrix& poses_;
   const CueChoiceOptions& options_;
   std::size_t place_ = 0, rows_ = options_.rows;
+  double price_ = 0, best_price_ = 0;  // of a point, in rows
   std::vector<CueChoice::Other> tried_;
   std::vector<CueRef> chosen_;
   CueChoice best_;

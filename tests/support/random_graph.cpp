@@ -137,12 +137,20 @@ void RandomGraph::AddNode() {
       Set(plug, double(choices.Pick(kToyPoints + 2)));
     } else if (a.kind == ToyKind::kPoints) {
       Set(plug, RandomPoints());
-      if (choices.Chance(30)) Set({name, a.name, choices.Pick(kToyPoints), choices.Pick(3)}, RandomNumber());
+      if (choices.Chance(30)) {
+        const double number =
+            RandomNumber();  // first: compilers order what an argument list draws as they like
+        Set({name, a.name, choices.Pick(kToyPoints), choices.Pick(3)}, number);
+      }
     } else if (a.kind == ToyKind::kVector) {
       Set(plug, RandomVector());
-      if (choices.Chance(30)) Set({name, a.name, -1, choices.Pick(3)}, RandomNumber());
+      if (choices.Chance(30)) {
+        const double number = RandomNumber();
+        Set({name, a.name, -1, choices.Pick(3)}, number);
+      }
     } else if (choices.Chance(50) && !(attribute == "input" && MayFail(type))) {
-      Set({name, a.name, a.array ? choices.Pick(4) : -1}, RandomValue(a.name, a.kind));
+      const NaiveTwin::Held value = RandomValue(a.name, a.kind);
+      Set({name, a.name, a.array ? choices.Pick(4) : -1}, value);
     }
   }
   for (int i = 0; i < 5; ++i) Connect(nodes.size() - 1, false);
