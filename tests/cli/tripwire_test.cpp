@@ -150,12 +150,12 @@ TEST_F(Tripwire, BeforeADeltaMushItFiresOnlyWhereCuesAreMeasuredBehindIt) {
   EXPECT_EQ(Count(Failures(&zero, true)), 49u);
 
   // Cues behind it evaluate it, for their own points: it sees that, too
-  const TripwireRig before("[trip, skin, cage, mush]", "mush");
+  const TripwireRig before("[skin, cage, trip, mush]", "mush");
   trained = TrainRig(before.rig(), QuickTraining());
   ASSERT_NE(trained, nullptr);
   const bool behind = std::any_of(trained->cues.begin(), trained->cues.end(),
-                                  [](const CueDescription& cue) { return cue.stage == "skin"; });
-  ASSERT_TRUE(behind) << "no cue is measured right behind the tripwire";
+                                  [](const CueDescription& cue) { return cue.stage == "mush"; });
+  ASSERT_TRUE(behind) << "no cue is measured behind the tripwire";
   options = Armed(trained, kInfinity);
   options.clip = "wave";
   RigRun cues(before.rig(), options);
