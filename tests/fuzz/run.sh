@@ -5,9 +5,22 @@
 # table; the exit status says whether there are findings (docs/safety.md).
 set -e
 cd "$(dirname "$0")/../.."
-seconds=${1:?seconds for each fuzzer}
-shift
 all="rig gltf subspace npz caches weights expression frames graph"
+refuse() {
+  echo "tests/fuzz/run.sh: $1; usage: sh tests/fuzz/run.sh SECONDS [NAME...], of $all" >&2
+  exit 2
+}
+seconds=${1:-nothing}
+case $seconds in
+  0* | *[!0-9]*) refuse "expected seconds for each fuzzer, found \"$seconds\"" ;;
+esac
+shift
+for name in "$@"; do
+  case " $all " in
+    *" $name "*) ;;
+    *) refuse "there is no fuzzer \"$name\"" ;;
+  esac
+done
 folder=$PWD/build-fuzz
 sh cmake/dependencies.sh clang libclang-rt-14-dev
 cmake -S . -B "$folder/build" -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" -DKPSA_FUZZ=ON > /dev/null

@@ -12,24 +12,6 @@ namespace {
 
 double hidden = 0;
 
-void ComputeRaise(ComputeContext& c) {
-  const auto& raised = c.kernel_as<std::vector<bool>>();
-  const double by = c.get<double>(1);
-  for (std::size_t i = 0; i < c.points(0).count; ++i) {
-    c.out_points(0).x[i] = c.points(0).x[i];
-    c.out_points(0).y[i] = c.points(0).y[i];
-    if (raised[i] && by != 0) c.out_points(0).y[i] += static_cast<float>(by);
-    c.out_points(0).z[i] = c.points(0).z[i];
-  }
-}
-
-Result<BoundKernel> BindRaise(const Binding& b) {
-  const auto first = static_cast<Index>(b.structural().get_int("first"));
-  auto raised = std::make_shared<std::vector<bool>>();
-  for (const Index point : b.output("outPoints").ToVector()) raised->push_back(point >= first);
-  return BoundKernel{raised, 0, 0};
-}
-
 // Toys, and some that are like one of them but for what is wrong.
 const NodeRegistry& WrongToys() {
   static const NodeRegistry* const registry = [] {
@@ -39,37 +21,11 @@ const NodeRegistry& WrongToys() {
         .in("input", 0.0)
         .out("out", Type::kDouble)
         .compute([](double v) { return v + hidden; });
-    toys->add("greedySelect", "Has both inputs evaluated.")
-        .in("which", false)
-        .in("a", 0.0)
-        .lazy()
-        .in("b", 0.0)
-        .lazy()
-        .out("out", Type::kDouble)
-        .compute([](bool which, double a, double b) { return which ? b : a; })
-        .decide([](ComputeContext&) -> std::uint64_t { return 3; });
-    toys->add("blindSelect", "Has the other input evaluated.")
-        .in("which", false)
-        .in("a", 0.0)
-        .lazy()
-        .in("b", 0.0)
-        .lazy()
-        .out("out", Type::kDouble)
-        .compute([](bool which, double a, double b) { return which ? b : a; })
-        .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 1 : 2; });
-    toys->add("shyRaise", "Touches more points than it says.")
-        .structural("first", 0)
-        .points_in("points")
-        .in("by", 0.0)
-        .out("outPoints", Type::kPoints)
-        .compute(ComputeRaise)
-        .bind(BindRaise)
-        .touches("points",
-                 [](const Structural& structural, const PointSet& points) {
-                   const auto first = static_cast<Index>(structural.get_int("first") + 6);
-                   return std::ranges::any_of(points.ToVector(), [&](Index p) { return p >= first; });
-                 })
-        .strength("by");
+    AddToySelect(*toys, "greedySelect", "Has both inputs evaluated.",
+                 [](ComputeContext&) -> std::uint64_t { return 3; });
+    AddToySelect(*toys, "blindSelect", "Has the other input evaluated.",
+                 [](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 1 : 2; });
+    AddToyRaise(*toys, "shyRaise", "Touches more points than it says.", 6);
     toys->add("calmFail", "Never fails.").in("input", 0.0).out("out", Type::kDouble).compute([](double v) {
       return v;
     });

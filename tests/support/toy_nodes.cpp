@@ -72,6 +72,49 @@ int TakeBatchComputes() { return batch_computes.exchange(0); }
 
 BlockComputes TakeBlockComputes() { return {block_computes.exchange(0), block_frames.exchange(0)}; }
 
+void AddToySelect(NodeRegistry& registry, const char* name, const char* doc, DecideFn decide) {
+  registry.add(name, doc)
+      .in("which", false)
+      .in("a", 0.0)
+      .lazy()
+      .in("b", 0.0)
+      .lazy()
+      .out("out", Type::kDouble)
+      .compute([](bool which, double a, double b) { return which ? b : a; })
+      .decide(decide);
+}
+
+void AddToyRaise(NodeRegistry& registry, const char* name, const char* doc, Index forgotten) {
+  registry.add(name, doc)
+      .structural("first", 0)
+      .points_in("points")
+      .in("by", 0.0)
+      .out("outPoints", Type::kPoints)
+      .compute([](ComputeContext& c) {
+        const auto& raised = c.kernel_as<std::vector<bool>>();
+        const double by = c.get<double>(1);
+        for (std::size_t i = 0; i < c.points(0).count; ++i) {
+          c.out_points(0).x[i] = c.points(0).x[i];
+          c.out_points(0).y[i] = c.points(0).y[i];
+          if (raised[i] && by != 0) c.out_points(0).y[i] += static_cast<float>(by);
+          c.out_points(0).z[i] = c.points(0).z[i];
+        }
+      })
+      .bind([](const Binding& b) -> Result<BoundKernel> {
+        const auto first = static_cast<Index>(b.structural().get_int("first"));
+        auto raised = std::make_shared<std::vector<bool>>();
+        for (const Index point : b.output("outPoints").ToVector()) raised->push_back(point >= first);
+        return BoundKernel{raised, 0, 0};
+      })
+      .in_place("points")
+      .touches("points",
+               [forgotten](const Structural& structural, const PointSet& points) {
+                 const auto first = static_cast<Index>(structural.get_int("first")) + forgotten;
+                 return std::ranges::any_of(points.ToVector(), [&](Index point) { return point >= first; });
+               })
+      .strength("by");
+}
+
 void AddToyNodes(NodeRegistry& registry) {
   registry.add("add", "Adds.")
       .in("a", 0.0)
@@ -102,15 +145,8 @@ void AddToyNodes(NodeRegistry& registry) {
         return sum;
       })
       .cost(20000, 0);
-  registry.add("select", "Takes one of two.")
-      .in("which", false)
-      .in("a", 0.0)
-      .lazy()
-      .in("b", 0.0)
-      .lazy()
-      .out("out", Type::kDouble)
-      .compute([](bool which, double a, double b) { return which ? b : a; })
-      .decide([](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 2 : 1; });
+  AddToySelect(registry, "select", "Takes one of two.",
+               [](ComputeContext& c) -> std::uint64_t { return c.get<std::int64_t>(0) != 0 ? 2 : 1; });
   registry.add("fail", "Fails below zero.")
       .in("input", 0.0)
       .out("out", Type::kDouble)
@@ -150,34 +186,7 @@ void AddToyNodes(NodeRegistry& registry) {
       })
       .in_place("points")
       .cost(20000, 2);
-  registry.add("raise", "Raises the points from one on.")
-      .structural("first", 0)
-      .points_in("points")
-      .in("by", 0.0)
-      .out("outPoints", Type::kPoints)
-      .compute([](ComputeContext& c) {
-        const auto& raised = c.kernel_as<std::vector<bool>>();
-        const double by = c.get<double>(1);
-        for (std::size_t i = 0; i < c.points(0).count; ++i) {
-          c.out_points(0).x[i] = c.points(0).x[i];
-          c.out_points(0).y[i] = c.points(0).y[i];
-          if (raised[i] && by != 0) c.out_points(0).y[i] += static_cast<float>(by);
-          c.out_points(0).z[i] = c.points(0).z[i];
-        }
-      })
-      .bind([](const Binding& b) -> Result<BoundKernel> {
-        const auto first = static_cast<Index>(b.structural().get_int("first"));
-        auto raised = std::make_shared<std::vector<bool>>();
-        for (const Index point : b.output("outPoints").ToVector()) raised->push_back(point >= first);
-        return BoundKernel{raised, 0, 0};
-      })
-      .in_place("points")
-      .touches("points",
-               [](const Structural& structural, const PointSet& points) {
-                 const auto first = static_cast<Index>(structural.get_int("first"));
-                 return std::ranges::any_of(points.ToVector(), [&](Index point) { return point >= first; });
-               })
-      .strength("by");
+  AddToyRaise(registry, "raise", "Raises the points from one on.", 0);
   registry.add("smooth", "Means over a ring.")
       .structural("rings", 1)
       .points_in("points")

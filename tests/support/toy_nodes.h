@@ -22,6 +22,10 @@ namespace kpsa::engine {
 inline constexpr double kThrows = -1e6;
 inline constexpr int kMostChoices = 63;  // what a choice's selector may be
 void AddToyNodes(NodeRegistry& registry);
+// Two of them by another name: with another opinion of which input is wanted; and one that does not own up to so many
+// of the points that it touches.
+void AddToySelect(NodeRegistry& registry, const char* name, const char* doc, DecideFn decide);
+void AddToyRaise(NodeRegistry& registry, const char* name, const char* doc, Index forgotten);
 const NodeRegistry& ToyRegistry();  // one with nothing else
 
 // How often the block compute of "cached" ran since the last call, and over how many frames.

@@ -1,4 +1,4 @@
-// Where libFuzzer asks for a changed input.
+// Where libFuzzer asks for a changed input; KPSA_MUTATE is who changes it (bytes.h).
 #include <algorithm>
 
 #include "tests/fuzz/mutators/bytes.h"
@@ -12,5 +12,5 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
     bytes->resize(std::max(before, room));
     bytes->resize(LLVMFuzzerMutate(bytes->data(), std::min(before, room), room));
   };
-  return kpsa::engine::MutateFor(&kpsa::engine::MutateTensors, change, data, size, most, seed);
+  return kpsa::engine::MutateFor(&kpsa::engine::KPSA_MUTATE, change, data, size, most, seed);
 }
