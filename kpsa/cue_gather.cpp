@@ -22,7 +22,7 @@ double ValueOf(const ArrayView<Matrix4>& matrices, const ArrayView<double>& scal
 
 CueGather::CueGather(const KpsaConfig::Data& data)
     : has_space_(data.has_space), rest_origin_(data.rest_origin), joints_(data.joints) {
-  std::map<std::tuple<Index, Index, bool>, std::vector<Entry>> blocks;
+  std::map<std::tuple<Index, Index, bool>, std::vector<MatrixEntry>> blocks;
   std::size_t next = 0;
   for (const KpsaConfig::Row& row : data.rows) {
     switch (row.kind) {
@@ -49,7 +49,13 @@ CueGather::CueGather(const KpsaConfig::Data& data)
     const auto begin = static_cast<std::uint32_t>(entries_.size());
     entries_.insert(entries_.end(), entries.begin(), entries.end());
     const auto& [joint, matrix, relative] = of;
-    blocks_.push_back({matrix, joint, relative, begin, static_cast<std::uint32_t>(entries_.size())});
+    std::uint32_t columns = 0;
+    for (const MatrixEntry& entry : entries) columns |= 1u << entry.element / 4;
+    blocks_.push_back({matrix,
+                       joint != kNoIndex ? joint
+                       : relative        ? MatrixBlock::kAfterSpace
+                                         : MatrixBlock::kAsItIs,
+                       columns, begin, static_cast<std::uint32_t>(entries_.size())});
   }
 }
 
@@ -77,20 +83,7 @@ void CueGather::Gather(const Inputs& in, float* scratch, std::span<double> raw) 
     if (point.joint != kNoIndex) p = TransformPoint(joint_from_space[point.joint], p);
     raw[point.row] = p.x, raw[point.row + 1] = p.y, raw[point.row + 2] = p.z;
   }
-  for (const Block& block : blocks_) {
-    const auto take = [&](const Matrix4& values) {
-      for (std::uint32_t e = block.begin; e < block.end; ++e)
-        raw[entries_[e].row] = values.m[entries_[e].element];
-    };
-    const Matrix4& matrix = in.matrices[block.matrix];
-    if (block.joint != kNoIndex) {
-      take(joint_from_world[block.joint] * matrix);
-    } else if (block.relative) {
-      take(space_from_world * matrix);
-    } else {
-      take(matrix);
-    }
-  }
+  TakeEntries(blocks_, entries_.data(), in.matrices, joint_from_world, space_from_world, raw.data());
   for (const Scalar& scalar : scalars_) raw[scalar.row] = in.scalars[scalar.input];
   for (const Product& of : products_) {
     double value = of.of.of_a.Of(ValueOf(in.matrices, in.scalars, of.of.a));

@@ -8,6 +8,7 @@
 
 #include "graph/compute_context.h"
 #include "kpsa/kpsa_node.h"
+#include "kpsa/matrix_entries.h"
 
 namespace kpsa::engine {
 
@@ -33,16 +34,6 @@ class CueGather {
     bool in_space = false, near = false;
     std::size_t row = 0;  // of three
   };
-  struct Entry {
-    std::uint32_t element = 0;  // of a column-major 4x4 matrix
-    std::uint32_t row = 0;
-  };
-  struct Block {  // entries of a matrix that are measured in the same frame
-    Index matrix = 0;
-    Index joint = kNoIndex;  // into joints_; else
-    bool relative = false;   // to the space; else as the matrix is
-    std::uint32_t begin = 0, end = 0;
-  };
   struct Scalar {
     Index input = 0;
     std::size_t row = 0;
@@ -55,8 +46,8 @@ class CueGather {
   Double3 rest_origin_;
   std::vector<Index> joints_;  // into matrices
   std::vector<Point> points_;
-  std::vector<Block> blocks_;
-  std::vector<Entry> entries_;
+  std::vector<MatrixBlock> blocks_;  // entries of a matrix that are measured in the same frame
+  std::vector<MatrixEntry> entries_;
   std::vector<Scalar> scalars_;
   std::vector<Product> products_;
 };

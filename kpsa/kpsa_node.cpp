@@ -11,6 +11,7 @@
 #include "base/matrix.h"
 #include "kpsa/bound_patches.h"
 #include "kpsa/cue_gather.h"
+#include "kpsa/matrix_entries.h"
 #include "kpsa/near_stack.h"
 #include "kpsa/signals.h"
 #include "kpsa/space_frame.h"
@@ -114,18 +115,12 @@ struct GuardVerdict {
 GuardVerdict AskGuards(KpsaContext c, const KpsaConfig::Data& data, bool in_parts) {
   GuardVerdict verdict;
   const ArrayView<Matrix4> matrices = c.get<"matrices">();
-  for (std::uint32_t j = 0; j < matrices.size(); ++j) {
-    const double* lo = data.matrix_lo.data() + 12 * j;
-    const double* hi = data.matrix_hi.data() + 12 * j;
+  const auto next = [&](std::uint32_t from) {
+    return FirstBeyond(matrices, from, data.matrix_lo.data(), data.matrix_hi.data());
+  };
+  for (std::uint32_t j = next(0); j < matrices.size(); j = next(j + 1)) {
     const Matrix4& m = matrices[j];
-    bool inside = true;  // no branch per entry; NaN is outside
-    for (std::size_t column = 0; column < 4; ++column) {
-      for (std::size_t row = 0; row < 3; ++row) {
-        const double v = m.m[4 * column + row];
-        inside &= (v >= lo[3 * column + row]) & (v <= hi[3 * column + row]);
-      }
-    }
-    if (inside) continue;
+    const double *lo = data.matrix_lo.data() + 12 * j, *hi = data.matrix_hi.data() + 12 * j;
     const double* ramp = data.matrix_ramp.data() + 12 * j;
     for (std::size_t e = 0; e < 12; ++e)
       verdict.Add(GuardWeight(lo[e], hi[e], ramp[e], m.m[4 * (e / 3) + e % 3]), j,

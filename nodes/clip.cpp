@@ -88,14 +88,19 @@ Result<BoundKernel> BindClipTransform(const Binding& binding) {
   return MakeBound(std::move(k), 0);
 }
 
-// Of a rotation of unit length.
-void WriteTrs(const Double3& translation, Quaternion rotation, const Double3& scale, Matrix4* matrix) {
-  Matrix4 m = RotationFromUnit(rotation);
-  for (int column = 0; column < 3; ++column) {
-    for (int row = 0; row < 3; ++row) m(row, column) *= scale[column];
-  }
-  m(0, 3) = translation.x, m(1, 3) = translation.y, m(2, 3) = translation.z;
-  *matrix = m;
+// ComposeTrs of a rotation of unit length, written in place: a matrix that is made elsewhere and copied in wide pieces
+// waits for its elements' stores.
+void WriteTrs(const Double3& translation, const Quaternion& q, const Double3& scale, Matrix4* matrix) {
+  std::array<double, 16>& m = matrix->m;
+  const double xx = q.x * q.x, yy = q.y * q.y, zz = q.z * q.z, xy = q.x * q.y, xz = q.x * q.z, yz = q.y * q.z,
+               xw = q.x * q.w, yw = q.y * q.w, zw = q.z * q.w;
+  m[0] = (1 - 2 * (yy + zz)) * scale.x, m[1] = 2 * (xy + zw) * scale.x, m[2] = 2 * (xz - yw) * scale.x,
+  m[3] = 0;
+  m[4] = 2 * (xy - zw) * scale.y, m[5] = (1 - 2 * (xx + zz)) * scale.y, m[6] = 2 * (yz + xw) * scale.y,
+  m[7] = 0;
+  m[8] = 2 * (xz + yw) * scale.z, m[9] = 2 * (yz - xw) * scale.z, m[10] = (1 - 2 * (xx + yy)) * scale.z,
+  m[11] = 0;
+  m[12] = translation.x, m[13] = translation.y, m[14] = translation.z, m[15] = 1;
 }
 
 // The local matrix where find(t) gives the place among the kernel's times[t].
