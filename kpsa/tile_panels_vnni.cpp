@@ -16,6 +16,7 @@ constexpr std::size_t kMaxGroups = (2 * kMaxTileRank + 32) / 4;
 // signed.
 struct InputBytes {
   alignas(64) std::int32_t high[kMaxGroups], low[kMaxGroups];
+  std::size_t high_groups = 0;  // beyond these all of `high` are zero: small inputs come last
 };
 
 KPSA_VNNI inline void SplitInputs(const std::int16_t* q, std::size_t groups, InputBytes* bytes) {
@@ -31,6 +32,8 @@ KPSA_VNNI inline void SplitInputs(const std::int16_t* q, std::size_t groups, Inp
     _mm256_store_si256(reinterpret_cast<__m256i*>(bytes->high + g),
                        _mm256_shuffle_epi8(_mm512_cvtepi16_epi8(high), order));
   }
+  bytes->high_groups = groups;
+  while (bytes->high_groups > 0 && bytes->high[bytes->high_groups - 1] == 0) --bytes->high_groups;
 }
 
 // _mm512_dpbusd_epi32 in place: GCC 12 keeps its result elsewhere and copies it back, for as much again.
@@ -51,65 +54,57 @@ KPSA_VNNI inline __m512 Transformed(const float* m, __m512 x, __m512 y, __m512 z
                                          _mm512_fmadd_ps(_mm512_set1_ps(m[6]), z, _mm512_set1_ps(m[9]))));
 }
 
-// kVectors of a panel's rows at a time, for some frames.
-template <int kComponents, int kFrames, int kVectors>
+// kVectors of a panel's rows at a time.
+template <int kComponents, int kVectors>
 KPSA_VNNI inline void Panels(const std::uint8_t* u, std::size_t panels, std::size_t groups, const float* mean,
-                             std::size_t first, const InputBytes* bytes, const TileFrame* frames) {
+                             std::size_t first, const InputBytes& bytes, const TileFrame& frame) {
   constexpr std::size_t kRows = kPanelPoints * kComponents;
-  const std::size_t padded = PaddedCount(frames[0].out.count);
+  const std::size_t padded = PaddedCount(frame.out.count);
   for (std::size_t p = 0; p < panels; ++p, u += 4 * groups * kRows, mean += kRows, first += kPanelPoints) {
 #pragma GCC unroll 2
     for (std::size_t row = 0; row < kRows; row += 16 * kVectors) {
-      __m512i high[kFrames][kVectors], low[kFrames][kVectors];
-#pragma GCC unroll 4
-      for (int f = 0; f < kFrames; ++f) {
+      __m512i high[kVectors], low[kVectors];
+#pragma GCC unroll 6
+      for (int v = 0; v < kVectors; ++v)
+        high[v] = _mm512_setzero_si512(), low[v] = _mm512_set1_epi32(-frame.bias);
+      const std::uint8_t* at = u + 4 * row;
+      std::size_t g = 0;
+      for (; g < bytes.high_groups; ++g, at += 4 * kRows) {
+        const __m512i q_high = _mm512_set1_epi32(bytes.high[g]), q_low = _mm512_set1_epi32(bytes.low[g]);
 #pragma GCC unroll 6
         for (int v = 0; v < kVectors; ++v) {
-          high[f][v] = _mm512_setzero_si512();
-          low[f][v] = _mm512_set1_epi32(-frames[f].bias);
+          const __m512i columns = _mm512_load_si512(at + 64 * v);
+          AddProducts(&high[v], columns, q_high);
+          AddProducts(&low[v], columns, q_low);
         }
       }
-      for (std::size_t g = 0; g < groups; ++g) {
-        const std::uint8_t* at = u + 4 * (g * kRows + row);
-        __m512i columns[kVectors];
+      for (; g < groups; ++g, at += 4 * kRows) {
+        const __m512i q_low = _mm512_set1_epi32(bytes.low[g]);
 #pragma GCC unroll 6
-        for (int v = 0; v < kVectors; ++v) columns[v] = _mm512_load_si512(at + 64 * v);
-#pragma GCC unroll 4
-        for (int f = 0; f < kFrames; ++f) {
-          const __m512i q_high = _mm512_set1_epi32(bytes[f].high[g]),
-                        q_low = _mm512_set1_epi32(bytes[f].low[g]);
-#pragma GCC unroll 6
-          for (int v = 0; v < kVectors; ++v) {
-            AddProducts(&high[f][v], columns[v], q_high);
-            AddProducts(&low[f][v], columns[v], q_low);
-          }
-        }
+        for (int v = 0; v < kVectors; ++v) AddProducts(&low[v], _mm512_load_si512(at + 64 * v), q_low);
       }
-#pragma GCC unroll 4
-      for (int f = 0; f < kFrames; ++f) {
-        float* const components[3] = {frames[f].out.x, frames[f].out.y, frames[f].out.z};
-        const __m512 step = _mm512_set1_ps(frames[f].step);
-        __m512 position[kVectors];
+      float* const components[3] = {frame.out.x, frame.out.y, frame.out.z};
+      const __m512 step = _mm512_set1_ps(frame.step);
+      __m512 position[kVectors];
 #pragma GCC unroll 6
-        for (int v = 0; v < kVectors; ++v)
-          position[v] = Position(high[f][v], low[f][v], step, mean + row + 16 * static_cast<std::size_t>(v));
-        if constexpr (kVectors == 6) {
-          if (frames[f].space != nullptr) {
-            const float* m = frames[f].space->data();
+      for (int v = 0; v < kVectors; ++v)
+        position[v] = Position(high[v], low[v], step, mean + row + 16 * static_cast<std::size_t>(v));
+      if constexpr (kVectors == 6) {
+        if (frame.space != nullptr) {
+          const float* m = frame.space->data();
 #pragma GCC unroll 2
-            for (int v = 0; v < 2; ++v) {
-              const __m512 x = position[v], y = position[v + 2], z = position[v + 4];
-              position[v] = Transformed(m, x, y, z);
-              position[v + 2] = Transformed(m + 1, x, y, z);
-              position[v + 4] = Transformed(m + 2, x, y, z);
-            }
+          for (int v = 0; v < 2; ++v) {
+            const __m512 x = position[v], y = position[v + 2], z = position[v + 4];
+            position[v] = Transformed(m, x, y, z);
+            position[v + 2] = Transformed(m + 1, x, y, z);
+            position[v + 4] = Transformed(m + 2, x, y, z);
           }
         }
+      }
 #pragma GCC unroll 6
-        for (int v = 0; v < kVectors; ++v) {
-          const std::size_t at = row + 16 * static_cast<std::size_t>(v), point = first + at % kPanelPoints;
-          if (point < padded) _mm512_store_ps(components[at / kPanelPoints] + point, position[v]);
-        }
+      for (int v = 0; v < kVectors; ++v) {
+        const std::size_t to = row + 16 * static_cast<std::size_t>(v), point = first + to % kPanelPoints;
+        if (point < padded) _mm512_store_ps(components[to / kPanelPoints] + point, position[v]);
       }
     }
   }
@@ -121,7 +116,7 @@ KPSA_VNNI void Tile(const std::uint8_t* u, std::size_t panels, std::size_t group
   InputBytes bytes[kBlockFrames];
   for (std::size_t f = 0; f < frame_count; ++f) SplitInputs(frames[f].q, groups, &bytes[f]);
   for (std::size_t f = 0; f < frame_count; ++f)
-    Panels<kComponents, 1, 2 * kComponents>(u, panels, groups, mean, first, bytes + f, frames + f);
+    Panels<kComponents, 2 * kComponents>(u, panels, groups, mean, first, bytes[f], frames[f]);
 }
 
 }  // namespace
