@@ -5,8 +5,10 @@ cd "$(dirname "$0")/.."
 sh cmake/dependencies.sh clang libclang-rt-14-dev
 sh cmake/dependencies.sh blender chromium zsh fish &  # for tests of the Python module, of the page and of completions; it takes as long as a good part of the build
 others=$!
-cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON > /dev/null
+cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON -DKPSA_TESTS_BY_ROOM=ON > /dev/null
 cmake --build build
 wait $others || echo "Blender, Chromium or shells could not be installed: their tests are skipped"
 ctest --test-dir build --output-on-failure -j "$(nproc)"
+# Tests within a process that said that they are skipped, and why
+awk '/: Skipped$/ {getline why} /^\[  SKIPPED \] .* ms\)$/ {print $4 " was skipped: " why}' build/Testing/Temporary/LastTest.log
 sh tests/sanitize.sh

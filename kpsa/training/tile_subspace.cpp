@@ -13,7 +13,6 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
-constexpr double kTrialBeyond = 0.02;   // share of poses farther off, at most
 
 // The cues of some rows of a set.
 CueSet Subset(const CueSet& set, const std::vector<std::size_t>& kept) {
@@ -114,12 +113,12 @@ double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tol
 
 std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                                                std::vector<TileCandidates> candidates,
-                                               const TileCueOptions& options) {
+                                               const TileCueOptions& options, double most_beyond) {
   if (candidates.size() > kTrialTiles * kTrialTiles) {
     std::vector<TileCandidates> some;
     for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
     const TileChoice trial = ChooseTiles(mean, poses, std::move(some), options);
-    if (ShareBeyond(poses, trial, options.tolerance / 2) > kTrialBeyond) return std::nullopt;
+    if (ShareBeyond(poses, trial, options.tolerance / 2) > most_beyond) return std::nullopt;
   }
   return ChooseTiles(mean, poses, std::move(candidates), options);
 }

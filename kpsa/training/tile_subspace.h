@@ -28,11 +28,11 @@ struct TileChoice {
 TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                        std::vector<TileCandidates> candidates, const TileCueOptions& options);
 
-// The same where an eighth of many tiles says that the others are worth their time: few poses would be
-// farther off than half the tolerance.
+// The same where an eighth of many tiles says that the others are worth their time: at most that share of the poses
+// would be farther off than half the tolerance.
 std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                                                std::vector<TileCandidates> candidates,
-                                               const TileCueOptions& options);
+                                               const TileCueOptions& options, double most_beyond);
 
 // Leaves out the cues that no tile reads, and tells the subspace of the others.
 void FinishTiles(TileSubspace* made);
