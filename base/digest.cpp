@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <bit>
+
+static_assert(std::endian::native == std::endian::little, "words are read as they lie in memory");
+
 namespace kpsa::engine {
 namespace {
 
@@ -26,7 +30,11 @@ void Hasher::AddBytes(const void* data, std::size_t size) {
   while (size > 0) {
     const std::size_t step = size < 8 ? size : 8;
     std::uint64_t word = 0;
-    for (std::size_t i = 0; i < step; ++i) word |= static_cast<std::uint64_t>(bytes[i]) << (8 * i);
+    if (step == 8) {
+      std::memcpy(&word, bytes, 8);
+    } else {
+      std::memcpy(&word, bytes, step);
+    }
     a_ = Rotate(a_ ^ Mix(word + 0x9e3779b97f4a7c15ull), 27) * 5 + b_;
     b_ = Rotate(b_ + Mix(word ^ a_), 31) * 9 + step;
     bytes += step;

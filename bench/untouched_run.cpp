@@ -1,21 +1,15 @@
 #include "bench/untouched_run.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "bench/program.h"
 #include "cli/common.h"
-#include "cli/interrupt.h"
 #include "files/file.h"
 #include "gltf/import.h"
 #include "report/table.h"
@@ -27,29 +21,6 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr std::uint64_t kMostBytes = 1u << 28;
-
-// Its standard output goes into the file.
-Status RunProgram(std::vector<std::string> arguments, const std::string& output) {
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(), O_WRONLY | O_CREAT | O_TRUNC,
-                                   0644);
-  pid_t child = 0;
-  const int error = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) return Status::Invalid("cannot be started: {}", std::strerror(error)).At({arguments[0]});
-  int ended = 0;
-  while (waitpid(child, &ended, 0) < 0) {
-    if (errno != EINTR) return Status::Invalid("cannot be waited for").At({arguments[0]});
-  }
-  if (Interrupted()) return InterruptedStatus();
-  if (!WIFEXITED(ended) || WEXITSTATUS(ended) != 0)
-    return Status::Invalid("{} failed", fmt::join(arguments, " "));
-  return Status();
-}
 
 Result<Json> ReadJson(const std::string& path) {
   const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(path, kMostBytes);
@@ -125,9 +96,10 @@ Result<Row> TryCharacter(const std::string& program, const std::string& name, co
   KPSA_RETURN_IF_ERROR(CountJointsAndMorphs(character, &row));
   const std::string stem = folder + "/" + fs::path(character).stem().string();
   const std::string rig = stem + ".yaml", trained = stem + ".train.json", benched = stem + ".bench.json";
-  KPSA_RETURN_IF_ERROR(RunProgram({program, "init", character, "-o", rig, "--force", "-q"}, "/dev/null"));
-  KPSA_RETURN_IF_ERROR(RunProgram({program, "train", rig, "--force", "-q", "--json"}, trained));
-  KPSA_RETURN_IF_ERROR(RunProgram({program, "bench", rig, "-q", "--json"}, benched));
+  KPSA_RETURN_IF_ERROR(
+      RunProgram({program, "init", character, "-o", rig, "--force", "-q"}, "/dev/null").status());
+  KPSA_RETURN_IF_ERROR(RunProgram({program, "train", rig, "--force", "-q", "--json"}, trained).status());
+  KPSA_RETURN_IF_ERROR(RunProgram({program, "bench", rig, "-q", "--json"}, benched).status());
   KPSA_RETURN_IF_ERROR(ReadFigures(trained, benched, &row));
   return row;
 }

@@ -109,35 +109,9 @@ BoundKernel BuiltinKernel(const InstanceTable& table, const DraftStep& draft) {
   return kernel;
 }
 
-}  // namespace
-
-struct Compiler::Impl {
-  std::map<Digest, BoundKernel> kernels;
-  std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> rest;
-  CompileStats stats;
-
-  void UseRest(StaticEvaluator& statics, const RestDigests& digests, std::size_t count) {
-    for (Index i = 0; i < count; ++i) {
-      if (const auto it = rest.find(digests[i]); it != rest.end()) statics.SetRest(i, it->second);
-    }
-  }
-  // Keeps what this compilation needed, forgets the rest.
-  void KeepRest(StaticEvaluator& statics, const RestDigests& digests, std::size_t count) {
-    std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> kept;
-    for (Index i = 0; i < count; ++i) {
-      if (auto outputs = statics.FindRest(i)) kept.emplace(digests[i], std::move(outputs));
-    }
-    rest = std::move(kept);
-  }
-};
-
-Compiler::Compiler() : impl_(std::make_unique<Impl>()) {}
-Compiler::~Compiler() = default;
-const CompileStats& Compiler::stats() const { return impl_->stats; }
-
-Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const Request& request) {
-  impl_->stats = CompileStats();
-  InstanceTable table(graph, request);
+// Resolves a request: the sources of its outputs.
+Status ReachOutputs(const Graph& graph, const Request& request, InstanceTable* table,
+                    std::vector<Source>* wanted) {
   for (const PlugRef& plug : request.varying) {
     KPSA_RETURN_IF_ERROR(graph.CheckPlug(plug));
     if (graph.def(plug.node).attributes[static_cast<std::size_t>(plug.attribute)].output) {
@@ -151,9 +125,8 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
                                graph.PlugName(c->source));
       }
     }
-    table.AddVarying(plug);
+    table->AddVarying(plug);
   }
-  std::vector<Source> wanted;
   for (const RequestedOutput& output : request.outputs) KPSA_RETURN_IF_ERROR(graph.CheckPlug(output.plug));
   for (const RequestedOutput& output : request.outputs) {
     const AttributeDef& a =
@@ -162,12 +135,71 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
       return Status::Invalid("{}: ask for the points and name a point set instead",
                              graph.PlugName(output.plug));
     }
-    wanted.push_back(table.Reach(output.plug));
-    if (SlotSize(wanted.back().type) == 0)
+    wanted->push_back(table->Reach(output.plug));
+    if (SlotSize(wanted->back().type) == 0)
       return Status::Invalid("{} is structural and has no value at run time", graph.PlugName(output.plug));
   }
+  return table->status();
+}
 
-  if (!table.status().ok()) return table.status();
+}  // namespace
+
+struct Compiler::Impl {
+  std::map<Digest, BoundKernel> kernels;
+  std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> rest;
+  CompileStats stats;
+
+  // A kernel that was bound before, or one that is bound now and kept.
+  Result<BoundKernel> KernelOf(InstanceTable& table, StaticEvaluator& statics, const RestDigests& digests,
+                               Index instance, const InstanceSets& sets, Digest* key) {
+    Hasher hasher;
+    hasher.Add(digests[instance]);
+    for (const auto& elements : sets.outputs) {
+      for (const PointSet& set : elements) hasher.Add(set.digest());
+    }
+    for (const PointSet& set : sets.inputs) hasher.Add(set.digest());
+    *key = hasher.Finish();
+    if (const auto it = kernels.find(*key); it != kernels.end()) {
+      ++stats.kernels_reused;
+      return it->second;
+    }
+    Result<BoundKernel> kernel = Bind(table, statics, instance, sets);
+    if (kernel.ok()) kernels.emplace(*key, *kernel), ++stats.kernels_bound;
+    return kernel;
+  }
+  // Rest values and kernels of earlier compilations, which what is evaluated here adds to.
+  void Share(InstanceTable& table, StaticEvaluator& statics, const RestDigests& digests) {
+    for (Index i = 0; i < table.instances().size(); ++i) {
+      if (const auto it = rest.find(digests[i]); it != rest.end()) statics.SetRest(i, it->second);
+    }
+    statics.BindBy([&](Index instance, const InstanceSets& sets) {
+      if (table.instances()[instance].kind != Instance::Kind::kNode ||
+          !table.group(table.instances()[instance]).bind)
+        return Result<BoundKernel>(BoundKernel());
+      Digest key;
+      return KernelOf(table, statics, digests, instance, sets, &key);
+    });
+  }
+  std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> RestOf(const InstanceTable& table,
+                                                                           StaticEvaluator& statics,
+                                                                           const RestDigests& digests) {
+    std::map<Digest, std::shared_ptr<const StaticEvaluator::Outputs>> kept;
+    for (Index i = 0; i < table.instances().size(); ++i) {
+      if (auto outputs = statics.FindRest(i)) kept.emplace(digests[i], std::move(outputs));
+    }
+    return kept;
+  }
+};
+
+Compiler::Compiler() : impl_(std::make_unique<Impl>()) {}
+Compiler::~Compiler() = default;
+const CompileStats& Compiler::stats() const { return impl_->stats; }
+
+Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const Request& request) {
+  impl_->stats = CompileStats();
+  InstanceTable table(graph, request);
+  std::vector<Source> wanted;
+  KPSA_RETURN_IF_ERROR(ReachOutputs(graph, request, &table, &wanted));
   bool binds = false;
   for (const Instance& instance : table.instances()) {
     binds = binds || (instance.kind == Instance::Kind::kNode && table.group(instance).bind);
@@ -177,7 +209,7 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
   std::unique_ptr<RestDigests> digests;
   if (binds) {
     digests = std::make_unique<RestDigests>(table, order);
-    impl_->UseRest(statics, *digests, table.instances().size());
+    impl_->Share(table, statics, *digests);
   }
   Result<PlanDraft> draft = DraftPlan(table, statics, wanted, request);
   if (!statics.status().ok()) return statics.status();  // rather than what follows from it
@@ -194,31 +226,48 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
       continue;
     }
     if (!table.group(*instance).bind) continue;
-    Hasher hasher;
-    hasher.Add((*digests)[step.instance]);
-    for (const auto& elements : step.sets.outputs) {
-      for (const PointSet& set : elements) hasher.Add(set.digest());
-    }
-    for (const PointSet& set : step.sets.inputs) hasher.Add(set.digest());
-    const Digest key = hasher.Finish();
-    if (const auto it = impl_->kernels.find(key); it != impl_->kernels.end()) {
-      kernels[s] = it->second;
-      ++impl_->stats.kernels_reused;
-    } else {
-      Result<BoundKernel> kernel = Bind(table, statics, step.instance, step.sets);
-      if (!statics.status().ok())
-        return statics.status();  // an input's failure rather than what follows from it
-      if (!kernel.ok()) return kernel.status();
-      kernels[s] = *kernel;
-      ++impl_->stats.kernels_bound;
-    }
+    Digest key;
+    Result<BoundKernel> kernel = impl_->KernelOf(table, statics, *digests, step.instance, step.sets, &key);
+    if (!statics.status().ok())
+      return statics.status();  // an input's failure rather than what follows from it
+    if (!kernel.ok()) return kernel.status();
+    kernels[s] = *kernel;
     used.emplace(key, kernels[s]);
   }
+  // What this compilation needed is kept, the rest forgotten
   impl_->kernels = std::move(used);
   impl_->stats.rest_evaluated = statics.evaluated();
-  if (binds) impl_->KeepRest(statics, *digests, table.instances().size());
+  if (binds) impl_->rest = impl_->RestOf(table, statics, *digests);
   const StepOrder step_order = OrderSteps(table, *draft);
   return PlanBuilder(table, *draft, step_order, request, std::move(kernels)).Build();
+}
+
+Result<std::vector<Compiler::Stepped>> Compiler::Steps(const Graph& graph, const Request& request) {
+  InstanceTable table(graph, request);
+  std::vector<Source> wanted;
+  KPSA_RETURN_IF_ERROR(ReachOutputs(graph, request, &table, &wanted));
+  StaticEvaluator statics(table);
+  const RestDigests digests(table, table.Order());
+  impl_->Share(table, statics, digests);
+  const Result<PlanDraft> draft = DraftPlan(table, statics, wanted, request);
+  if (!statics.status().ok()) return statics.status();
+  if (!draft.ok()) return draft.status();
+  impl_->rest.merge(impl_->RestOf(table, statics, digests));
+  std::map<Index, Stepped> nodes;
+  for (const DraftStep& step : draft->steps) {
+    if (step.instance == kNoIndex && step.inputs[0].kind == DraftInput::Kind::kStep)
+      continue;  // another's points
+    const NodeId node = step.instance != kNoIndex ? table.instances()[step.instance].node
+                                                  : table.varying()[step.inputs[0].varying].node;
+    Stepped& stepped = nodes[node.index];
+    stepped.node = node;
+    for (const auto& elements : step.sets.outputs) {
+      for (const PointSet& set : elements) stepped.points = stepped.points || set.total() > 0;
+    }
+  }
+  std::vector<Stepped> list;
+  for (const auto& [index, stepped] : nodes) list.push_back(stepped);
+  return list;
 }
 
 Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
@@ -230,12 +279,12 @@ Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
   StaticEvaluator statics(table);
   const std::vector<Index> order = table.Order();
   const RestDigests digests(table, order);
-  for (Index i = 0; i < table.instances().size(); ++i) {
-    if (const auto it = impl_->rest.find(digests[i]); it != impl_->rest.end()) statics.SetRest(i, it->second);
-  }
+  impl_->Share(table, statics, digests);
   const Value* value = statics.Get(source, true);
   if (value == nullptr || !statics.status().ok()) return statics.status();
-  return *value;
+  const Value rest = *value;
+  impl_->rest.merge(impl_->RestOf(table, statics, digests));
+  return rest;
 }
 
 }  // namespace kpsa::engine

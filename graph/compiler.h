@@ -6,6 +6,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "graph/graph.h"
 #include "graph/plan.h"
@@ -31,6 +32,15 @@ class Compiler {
   // Structural::rest).
   Result<Value> Rest(const Graph& graph, const PlugRef& plug);
   const CompileStats& stats() const;
+
+  // A node that a plan of the request has a step of.
+  struct Stepped {
+    NodeId node;
+    bool points = false;  // of one that has points
+  };
+  // Of all nodes, without repetition, which is what Compile does before it binds. Errors: those of Compile that are
+  // found by then.
+  Result<std::vector<Stepped>> Steps(const Graph& graph, const Request& request);
 
  private:
   struct Impl;

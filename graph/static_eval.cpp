@@ -173,7 +173,7 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   Result<InstanceSets> sets = FullOutputs(table_, totals_, number);
   if (!sets.ok()) return sets.status();
   KPSA_RETURN_IF_ERROR(FillDemand(table_, totals_, *this, number, &*sets));
-  Result<BoundKernel> kernel = Bind(table_, *this, number, *sets);
+  Result<BoundKernel> kernel = binder_ ? binder_(number, *sets) : Bind(table_, *this, number, *sets);
   if (!kernel.ok()) return kernel.status();
   const ComputeGroup& group = table_.group(instance);
   Arena arena;

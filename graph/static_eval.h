@@ -2,6 +2,7 @@
 // once. Internal to graph/.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <unordered_map>
 #include <vector>
@@ -19,6 +20,9 @@ class StaticEvaluator final : public StaticValues {
   PointTotals& totals() { return totals_; }
   const Status& status() const { return status_; }
   Index evaluated() const { return evaluated_; }
+  // What binds kernels; as Bind of graph/node_binding unless set.
+  using Binder = std::function<Result<BoundKernel>(Index instance, const InstanceSets& sets)>;
+  void BindBy(Binder binder) { binder_ = std::move(binder); }
   // Rest values that are known already (from an earlier compilation), by instance.
   using Outputs = std::vector<std::vector<Value>>;  // by output position and element
   void SetRest(Index instance, std::shared_ptr<const Outputs> outputs) {
@@ -39,6 +43,7 @@ class StaticEvaluator final : public StaticValues {
   Status status_;
   bool told_ = false;  // which plug it leaves without a value
   Index evaluated_ = 0;
+  Binder binder_;
 };
 
 // The points of `set` out of a complete array.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <unordered_map>
 
 #include "graph/evaluator.h"
 #include "kpsa/signature.h"
@@ -11,15 +12,6 @@
 
 namespace kpsa::engine {
 namespace {
-
-// Position of a signal in a list, added if it is not there.
-Index Place(std::vector<Signal>* list, const Signal& signal) {
-  for (Index i = 0; i < list->size(); ++i) {
-    if ((*list)[i].name == signal.name) return i;
-  }
-  list->push_back(signal);
-  return static_cast<Index>(list->size() - 1);
-}
 
 Result<Signal> FindSignal(const Graph& graph, const std::string& name, const RigWithin& within) {
   Result<PlugRef> plug = graph.FindPlug(within.prefix + name);
@@ -169,39 +161,57 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
   return Status();
 }
 
-// The input of a signal that is measured, whether a guard looks at it or not.
-Index PlaceCue(const Signal& signal, AccelerationDraft* draft) {
-  auto& list = signal.matrix ? draft->matrices : draft->scalars;
-  const std::size_t before = list.size();
-  const Index input = Place(&list, signal);
-  if (list.size() == before) return input;
-  constexpr double kAnything = std::numeric_limits<double>::infinity();
-  KpsaConfig::Data& data = draft->data;
-  const auto add = [&](std::vector<double>* to, double value) {
-    to->insert(to->end(), signal.entries(), value);
-  };
-  add(signal.matrix ? &data.matrix_lo : &data.scalar_lo, -kAnything);
-  add(signal.matrix ? &data.matrix_hi : &data.scalar_hi, kAnything);
-  add(signal.matrix ? &data.matrix_ramp : &data.scalar_ramp, 0);
-  (signal.matrix ? data.matrix_patches : data.scalar_patches).push_back(kAllPatches);
-  return input;
-}
+// The inputs of signals that are measured, whether guards look at them or not.
+class CueSignals {
+ public:
+  CueSignals(const Graph& graph, const AccelerationTarget& target, AccelerationDraft* draft)
+      : graph_(graph), target_(target), draft_(draft) {
+    for (const bool matrix : {false, true}) {
+      std::vector<Signal>& list = ListOf(matrix);
+      for (Index i = 0; i < list.size(); ++i) places_.emplace(list[i].name, i);
+    }
+  }
 
-// The row of a scalar, which may be an entry of a matrix.
-Result<KpsaConfig::Row> ScalarRow(const Graph& graph, const AccelerationTarget& target,
-                                  const std::string& plug, AccelerationDraft* draft) {
-  const SignalEntry split = SplitEntryName(plug);
-  const Result<Signal> signal = FindSignal(graph, split.signal, target.within);
-  if (!signal.ok()) return signal.status();
-  if (signal->matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
-    return Status::Invalid("the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)",
-                           plug);
-  KpsaConfig::Row row;
-  row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
-  row.element = static_cast<Index>(split.entry.value_or(0));
-  row.input = PlaceCue(*signal, draft);
-  return row;
-}
+  // A signal that is no input yet becomes one.
+  Index Place(const Signal& signal) {
+    std::vector<Signal>& list = ListOf(signal.matrix);
+    const auto [place, is_new] = places_.emplace(signal.name, static_cast<Index>(list.size()));
+    if (!is_new) return place->second;
+    list.push_back(signal);
+    constexpr double kAnything = std::numeric_limits<double>::infinity();
+    KpsaConfig::Data& data = draft_->data;
+    const auto add = [&](std::vector<double>* to, double value) {
+      to->insert(to->end(), signal.entries(), value);
+    };
+    add(signal.matrix ? &data.matrix_lo : &data.scalar_lo, -kAnything);
+    add(signal.matrix ? &data.matrix_hi : &data.scalar_hi, kAnything);
+    add(signal.matrix ? &data.matrix_ramp : &data.scalar_ramp, 0);
+    (signal.matrix ? data.matrix_patches : data.scalar_patches).push_back(kAllPatches);
+    return place->second;
+  }
+
+  // The row of a scalar, which may be an entry of a matrix.
+  Result<KpsaConfig::Row> RowOf(const std::string& plug) {
+    const SignalEntry split = SplitEntryName(plug);
+    const Result<Signal> signal = FindSignal(graph_, split.signal, target_.within);
+    if (!signal.ok()) return signal.status();
+    if (signal->matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
+      return Status::Invalid(
+          "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", plug);
+    KpsaConfig::Row row;
+    row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
+    row.element = static_cast<Index>(split.entry.value_or(0));
+    row.input = Place(*signal);
+    return row;
+  }
+
+ private:
+  std::vector<Signal>& ListOf(bool matrix) { return matrix ? draft_->matrices : draft_->scalars; }
+  const Graph& graph_;
+  const AccelerationTarget& target_;
+  AccelerationDraft* draft_;
+  std::unordered_map<std::string, Index> places_;  // a signal is in one of both lists
+};
 
 // Where the rows of the measurement come from.
 Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
@@ -213,6 +223,7 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
     std::vector<Index> points;
   };
   std::vector<CueInput> inputs;
+  CueSignals signals(graph, target, draft);
   for (const CueDescription& cue : subspace.cues) {
     if (cue.kind != CueDescription::Kind::kPoint) continue;
     const auto& stages = target.meshes[cue.mesh].stages;
@@ -245,14 +256,14 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
                                inputs[i].points.begin());
       }
     } else if (cue.kind == CueDescription::Kind::kScalar) {
-      const Result<KpsaConfig::Row> scalar = ScalarRow(graph, target, cue.plug, draft);
+      const Result<KpsaConfig::Row> scalar = signals.RowOf(cue.plug);
       if (!scalar.ok()) return scalar.status();
       row = *scalar;
     } else {
       KpsaConfig::Product product;
       product.lo = cue.lo, product.hi = cue.hi;
       for (std::size_t f = 0; f < cue.factors.size(); ++f) {
-        const Result<KpsaConfig::Row> factor = ScalarRow(graph, target, cue.factors[f].plug, draft);
+        const Result<KpsaConfig::Row> factor = signals.RowOf(cue.factors[f].plug);
         if (!factor.ok()) return factor.status();
         (f == 0 ? product.a : product.b) = *factor;
         (f == 0 ? product.of_a : product.of_b) = cue.factors[f].curve;
@@ -271,7 +282,7 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
           (row.kind != KpsaConfig::Row::Kind::kMatrix && row.kind != KpsaConfig::Row::Kind::kPoint))
         return Status::Invalid("the subspace measures in the space of \"{}\", which is no world matrix",
                                cue.joint);
-      const Index matrix = PlaceCue(*joint, draft);
+      const Index matrix = signals.Place(*joint);
       const auto found = std::find(data->joints.begin(), data->joints.end(), matrix);
       row.joint = static_cast<Index>(found - data->joints.begin());
       if (found == data->joints.end()) data->joints.push_back(matrix);
@@ -294,7 +305,8 @@ std::string StretchedName(const Graph& graph, Compiler* compiler, const Accelera
     const Result<Value> rest = compiler->Rest(graph, plug);
     Request request;
     request.outputs.push_back({plug, {}});
-    const auto plan = compiler->Compile(graph, request);
+    const auto plan =
+        Compiler().Compile(graph, request);  // the other one keeps kernels of the last compilation
     if (rest.ok() && plan.ok()) {
       Evaluator evaluator(*plan);
       if (evaluator.Evaluate().ok()) {

@@ -14,14 +14,23 @@ namespace {
 constexpr double kBorder = 3;              // typical distances of neighbours
 constexpr std::size_t kFewestOfLevel = 3;  // regions; fewer would be most of an output each
 
-// The median distance of points to the nearest other one of the same tile.
+// The median distance of points to the nearest other one of the same tile. Of neighbours by x only those are looked
+// at that may be nearer.
 double TypicalDistance(std::span<const Double3> tile) {
+  std::vector<Double3> by_x(tile.begin(), tile.end());
+  std::erase_if(by_x, [](const Double3& p) { return !std::isfinite(Dot(p, p)); });
+  std::ranges::sort(by_x, {}, &Double3::x);
   std::vector<double> nearest;
-  for (std::size_t i = 0; i < tile.size(); ++i) {
+  for (std::size_t i = 0; i < by_x.size(); ++i) {
     double least = std::numeric_limits<double>::infinity();
-    for (std::size_t j = 0; j < tile.size(); ++j) {
-      const Double3 d = tile[i] - tile[j];
-      if (i != j && Dot(d, d) > 0) least = std::min(least, Dot(d, d));
+    const auto is_beyond = [&](const Double3& other) {
+      const Double3 d = by_x[i] - other;
+      if (d.x * d.x > least) return true;
+      if (Dot(d, d) > 0) least = std::min(least, Dot(d, d));
+      return false;
+    };
+    for (std::size_t j = i + 1; j < by_x.size() && !is_beyond(by_x[j]);) ++j;
+    for (std::size_t j = i; j-- > 0 && !is_beyond(by_x[j]);) {
     }
     if (std::isfinite(least)) nearest.push_back(std::sqrt(least));
   }
@@ -29,23 +38,38 @@ double TypicalDistance(std::span<const Double3> tile) {
   return UpperMedian(std::move(nearest));
 }
 
-// Points by their x, so that near ones are found without looking at all of them.
+// Points by their x and the box around them, so that near ones are found without looking at all of them.
 struct ByX {
   std::vector<std::pair<double, Index>> points;
+  Double3 lo, hi;
   ByX(std::span<const Double3> positions, Index first, Index count) {
     for (Index i = first; i < first + count; ++i) {
-      if (std::isfinite(Dot(positions[i], positions[i]))) points.emplace_back(positions[i].x, i);
+      const Double3& p = positions[i];
+      if (!std::isfinite(Dot(p, p))) continue;
+      if (points.empty()) lo = hi = p;
+      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
+      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
+      points.emplace_back(p.x, i);
     }
     std::sort(points.begin(), points.end());
+  }
+  // False where no point can be nearer than that; also for what is no number.
+  bool MayBeNear(const Double3& at, double within) const {
+    return !points.empty() && at.x > lo.x - within && at.x < hi.x + within && at.y > lo.y - within &&
+           at.y < hi.y + within && at.z > lo.z - within && at.z < hi.z + within;
   }
   // Distance to the nearest one, at most `within`.
   double Nearest(std::span<const Double3> positions, const Double3& at, double within) const {
     double least = within * within;
-    auto it = std::lower_bound(points.begin(), points.end(), std::pair(at.x - within, Index{0}));
-    for (; it != points.end() && it->first <= at.x + within; ++it) {
-      const Double3 d = positions[it->second] - at;
+    const auto is_beyond = [&](const std::pair<double, Index>& point) {
+      const Double3 d = positions[point.second] - at;
+      if (d.x * d.x > least) return true;
       least = std::min(least, Dot(d, d));
-    }
+      return false;
+    };
+    const auto from = std::lower_bound(points.begin(), points.end(), std::pair(at.x, Index{0}));
+    for (auto it = from; it != points.end() && !is_beyond(*it);) ++it;
+    for (auto it = from; it != points.begin() && !is_beyond(*std::prev(it));) --it;
     return std::sqrt(least);
   }
 };
@@ -103,7 +127,7 @@ std::vector<PatchPoints> MakePatches(std::span<const std::vector<Double3>> posit
       const ByX own(of, first, count);
       for (Index i = 0; i < total; ++i) {
         double weight = i >= first && i < first + count ? 1 : 0;
-        if (weight == 0 && border > 0 && std::isfinite(Dot(of[i], of[i])))
+        if (weight == 0 && border > 0 && own.MayBeNear(of[i], border))
           weight = 1 - Smoothstep(own.Nearest(of, of[i], border) / border);
         if (!(weight > 0)) continue;
         patch.points.push_back(i);

@@ -61,13 +61,12 @@ Result<std::vector<Signal>> FindRelativeMatrices(const Graph& graph, Compiler* c
   Request request;
   for (const PlugRef& output : outputs) request.outputs.push_back({output, {}});
   request.varying = varying;
-  Result<std::shared_ptr<const Plan>> plan = compiler->Compile(graph, request);
-  if (!plan.ok()) return plan.status();
+  const auto steps = compiler->Steps(graph, request);
+  if (!steps.ok()) return steps.status();
   std::set<Index> nodes, with_points;
-  for (const Plan::StepInfo& info : (*plan)->infos()) {
-    if (info.node.index == kNoIndex) continue;
-    nodes.insert(info.node.index);
-    if (info.points_total > 0) with_points.insert(info.node.index);
+  for (const Compiler::Stepped& stepped : *steps) {
+    nodes.insert(stepped.node.index);
+    if (stepped.points) with_points.insert(stepped.node.index);
   }
   std::map<std::string, Signal> found, still;
   for (const Index index : with_points) {
@@ -92,19 +91,18 @@ Result<std::vector<Signal>> FindSignals(const Graph& graph, Compiler* compiler,
   Request request;
   for (const PlugRef& output : outputs) request.outputs.push_back({output, {}});
   request.varying = varying;
-  Result<std::shared_ptr<const Plan>> plan = compiler->Compile(graph, request);
-  if (!plan.ok()) return plan.status();
-  if (const std::string& node = (*plan)->stateful_node(); !node.empty()) {
-    return Status::Invalid(
-        "\"{}\" remembers its previous frame, and a subspace knows poses only: points after it cannot be "
-        "accelerated; accelerate a stage before it",
-        node);
-  }
-
+  const auto steps = compiler->Steps(graph, request);
+  if (!steps.ok()) return steps.status();
   // Nodes that have a varying step, and whether one of them has points
   std::map<Index, bool> nodes;
-  for (const Plan::StepInfo& info : (*plan)->infos()) {
-    if (info.node.index != kNoIndex) nodes[info.node.index] |= info.points_total > 0;
+  for (const Compiler::Stepped& stepped : *steps) {
+    if (graph.def(stepped.node).stateful) {
+      return Status::Invalid(
+          "\"{}\" remembers its previous frame, and a subspace knows poses only: points after it cannot be "
+          "accelerated; accelerate a stage before it",
+          graph.name(stepped.node));
+    }
+    nodes[stepped.node.index] = stepped.points;
   }
   std::set<Index> varying_nodes;
   for (const PlugRef& plug : varying) varying_nodes.insert(plug.node.index);

@@ -15,11 +15,12 @@ std::string ModesDigest(const Subspace& s) {
   return hasher.Finish().ToHex();
 }
 
-std::string ContentDigest(const Subspace& s) {
+std::string ContentDigest(const Subspace& s, const std::map<std::string, std::string>& header) {
   Hasher hasher;
-  for (const auto& [key, text] : SubspaceHeader(s)) {
+  for (const char* key : kHeaderKeys) {
     hasher.Add(std::string_view(key));
-    hasher.Add(std::string_view(text));
+    const auto text = header.find(key);
+    hasher.Add(text == header.end() ? std::string_view() : std::string_view(text->second));
   }
   hasher.Add(std::span<const double>(s.cue_mean));
   hasher.Add(std::span<const double>(s.cue_scale));

@@ -31,8 +31,9 @@ Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
 Status WriteSubspace(const Subspace& s, const std::string& path) {
   KPSA_RETURN_IF_ERROR(ValidateSubspace(s));
   SafetensorsWriter writer;
-  for (const auto& [key, text] : SubspaceHeader(s)) writer.SetMetadata(key, text);
-  writer.SetMetadata("digest", ContentDigest(s));
+  const std::map<std::string, std::string> header = SubspaceHeader(s);
+  for (const auto& [key, text] : header) writer.SetMetadata(key, text);
+  writer.SetMetadata("digest", ContentDigest(s, header));
   Add<double>(&writer, "cueMean", s.cue_mean);
   Add<double>(&writer, "cueScale", s.cue_scale);
   Add<std::uint32_t>(&writer, "cueOffsets", s.soft_cache.offsets);
@@ -101,7 +102,7 @@ namespace {
 Status CheckDigests(const SafetensorsFile& file, KeptModes modes, const Subspace& s) {
   const Result<std::string> digest = file.Metadata("digest");
   if (!digest.ok()) return digest.status();
-  if (*digest != ContentDigest(s))
+  if (*digest != ContentDigest(s, file.metadata()))
     return Status::Invalid(
         "the file is damaged: its contents are not those that were written; train it again");
   if (modes == KeptModes::kSkip || !file.tensors().contains(kModes)) return {};

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "files/json_depth.h"
 #include "kpsa/calibration_file.h"
 
 namespace kpsa::engine {
@@ -14,6 +15,7 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kMaxCues = 1u << 16, kMaxOutputs = 1u << 12;
 constexpr std::uint64_t kMaxPoints = 1u << 28;
+constexpr int kDeepestEntry = 8;  // brackets
 
 // Reads typed members of a JSON object; the first failure is kept, and everything after it gives defaults.
 class Reader {
@@ -56,14 +58,10 @@ class Reader {
 Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, bool list, std::size_t limit) {
   const Result<std::string> text = file.Metadata(key);
   if (!text.ok()) return text.status();
-  int depth_reached = 0;
-  const auto callback = [&](int depth, Json::parse_event_t, Json&) {
-    depth_reached = std::max(depth_reached, depth);
-    return depth <= 8;
-  };
-  Json json = Json::parse(*text, callback, false);
-  if (json.is_discarded() || depth_reached > 8 || json.is_array() != list || (!list && !json.is_object()) ||
-      json.size() > limit) {
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(text->data()), text->size());
+  Json json = CheckJsonDepth(bytes, kDeepestEntry).ok() ? Json::parse(*text, nullptr, false)
+                                                        : Json(Json::value_t::discarded);
+  if (json.is_discarded() || json.is_array() != list || (!list && !json.is_object()) || json.size() > limit) {
     return Status::Invalid("\"{}\" is not a JSON {} of at most {} entries", key, list ? "list" : "object",
                            limit);
   }

@@ -11,7 +11,11 @@ namespace kpsa::engine {
 
 inline constexpr char kSubspaceKind[] = "kpsa-subspace";
 
-// All entries but the digests. The version is the oldest that knows all of the subspace: one without any of what is
+// Of all entries but the digests, in the order of their digest.
+inline constexpr const char* kHeaderKeys[] = {"cues",  "frame",   "kind",     "outputs", "ranges", "rigHash",
+                                              "space", "summary", "training", "units",   "version"};
+
+// All entries of kHeaderKeys. The version is the oldest that knows all of the subspace: one without any of what is
 // new is what it was before.
 std::map<std::string, std::string> SubspaceHeader(const Subspace& s);
 

@@ -76,14 +76,16 @@ class Writer {
   }
 
   int Target(const SparseTarget& target, std::size_t points) {
-    std::vector<std::uint16_t> indices(target.points.begin(), target.points.end());
-    KPSA_CHECK_LT(points, std::size_t{65536});
-    const int index_view = View(std::span<const std::uint16_t>(indices));
+    const std::vector<std::uint16_t> narrow(target.points.begin(), target.points.end());
+    const bool fits = points < 65536;
+    const int index_view =
+        fits ? View(std::span<const std::uint16_t>(narrow)) : View(std::span<const Index>(target.points));
     const int value_view = View(std::span<const Float3>(target.deltas));
     accessors_.push_back(fmt::format(
         "{{\"componentType\":5126,\"count\":{},\"type\":\"VEC3\"{},\"sparse\":{{\"count\":{},\"indices\":"
-        "{{\"bufferView\":{},\"componentType\":5123}},\"values\":{{\"bufferView\":{}}}}}}}",
-        points, Bounds(target.deltas, true), indices.size(), index_view, value_view));
+        "{{\"bufferView\":{},\"componentType\":{}}},\"values\":{{\"bufferView\":{}}}}}}}",
+        points, Bounds(target.deltas, true), target.points.size(), index_view, fits ? 5123 : 5125,
+        value_view));
     return static_cast<int>(accessors_.size()) - 1;
   }
 
@@ -104,11 +106,21 @@ std::string Writer::Mesh(const GlbMesh& mesh) {
   const int position = Accessor(View(std::span<const Float3>(mesh.positions), kArray), 5126, count, "VEC3",
                                 Bounds(mesh.positions, false));
   const int normal = Accessor(View(std::span<const Float3>(mesh.normals), kArray), 5126, count, "VEC3");
-  std::vector<std::array<std::uint8_t, 4>> joints;
+  std::vector<std::array<std::uint8_t, 4>> narrow;
+  std::vector<std::array<std::uint16_t, 4>> wide;
   std::vector<std::array<float, 4>> weights;
-  for (const Influences& i : mesh.influences) joints.push_back(i.joints), weights.push_back(i.weights);
+  bool fits = true;  // into a byte
+  for (const Influences& i : mesh.influences) {
+    wide.push_back(i.joints), weights.push_back(i.weights);
+    std::array<std::uint8_t, 4>& bytes = narrow.emplace_back();
+    for (std::size_t k = 0; k < 4; ++k) {
+      fits = fits && i.joints[k] < 256;
+      bytes[k] = static_cast<std::uint8_t>(i.joints[k]);
+    }
+  }
   const int joint =
-      Accessor(View(std::span<const std::array<std::uint8_t, 4>>(joints), kArray), 5121, count, "VEC4");
+      fits ? Accessor(View(std::span<const std::array<std::uint8_t, 4>>(narrow), kArray), 5121, count, "VEC4")
+           : Accessor(View(std::span<const std::array<std::uint16_t, 4>>(wide), kArray), 5123, count, "VEC4");
   const int weight =
       Accessor(View(std::span<const std::array<float, 4>>(weights), kArray), 5126, count, "VEC4");
   std::string color;
@@ -189,12 +201,14 @@ std::string Writer::Finish(const GlbScene& scene) {
   const int inverse = Accessor(View(std::span<const std::array<float, 16>>(inverse_binds)), 5126,
                                inverse_binds.size(), "MAT4");
   bool hides = false;
+  std::vector<std::vector<std::string>> children_of(scene.nodes.size());
+  for (std::size_t c = 0; c < scene.nodes.size(); ++c) {
+    if (scene.nodes[c].parent >= 0)
+      children_of[static_cast<std::size_t>(scene.nodes[c].parent)].push_back(fmt::format("{}", c));
+  }
   for (std::size_t i = 0; i < scene.nodes.size(); ++i) {
     const GlbNode& node = scene.nodes[i];
-    std::vector<std::string> children;
-    for (std::size_t c = 0; c < scene.nodes.size(); ++c) {
-      if (scene.nodes[c].parent == static_cast<int>(i)) children.push_back(fmt::format("{}", c));
-    }
+    const std::vector<std::string>& children = children_of[i];
     std::string text = fmt::format("{{\"name\":\"{}\"", node.name);
     if (node.mesh >= 0) {
       text += fmt::format(",\"mesh\":{},\"skin\":0", node.mesh);
@@ -290,7 +304,7 @@ Influences MakeInfluences(std::span<const double> weight_of_joint) {
     const int share =
         k == 0 ? rest : static_cast<int>(std::floor(weight_of_joint[order[k]] / sum * 4096 + 0.5));
     rest -= share;
-    out.joints[k] = share > 0 ? static_cast<std::uint8_t>(order[k]) : 0;
+    out.joints[k] = share > 0 ? static_cast<std::uint16_t>(order[k]) : std::uint16_t{0};
     out.weights[k] = static_cast<float>(share) / 4096;
   }
   return out;

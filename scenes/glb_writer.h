@@ -25,7 +25,7 @@ struct SparseTarget {
 
 // Up to four joints a point; the weights of a point add up to exactly 1.
 struct Influences {
-  std::array<std::uint8_t, 4> joints = {0, 0, 0, 0};
+  std::array<std::uint16_t, 4> joints = {0, 0, 0, 0};
   std::array<float, 4> weights = {1, 0, 0, 0};
 };
 

@@ -10,7 +10,9 @@ namespace kpsa::engine {
 
 std::span<float> PoseMatrix::AddPose() {
   KPSA_CHECK(!centered_);
-  return Grow();
+  const std::span<float> pose = Grow();
+  std::ranges::fill(pose, 0.0f);  // a pose that was taken away may have been there
+  return pose;
 }
 
 void PoseMatrix::Append(const PoseMatrix& other) {
@@ -18,12 +20,29 @@ void PoseMatrix::Append(const PoseMatrix& other) {
   for (std::size_t t = 0; t < other.poses_; ++t) std::ranges::copy(other.row(t), Grow().begin());
 }
 
+void PoseMatrix::Append(PoseMatrix&& other) {
+  KPSA_CHECK(layout_ == other.layout_ && (centered_ == other.centered_ || other.poses_ == 0));
+  for (std::size_t t = 0; t < other.poses_; ++t) {
+    std::ranges::copy(std::as_const(other).row(t), Grow().begin());
+    if (t % kBlockPoses + 1 == kBlockPoses) other.blocks_[t / kBlockPoses].reset();
+  }
+  other.Truncate(0);
+}
+
 PoseMatrix PoseMatrix::TakeEvery(std::size_t count) {
-  PoseMatrix kept(layout_), taken(layout_);
-  kept.centered_ = taken.centered_ = centered_;
-  for (std::size_t t = 0; t < poses_; ++t)
-    std::ranges::copy(std::as_const(*this).row(t), (t % count == count - 1 ? taken : kept).Grow().begin());
-  *this = std::move(kept);
+  PoseMatrix taken(layout_);
+  taken.centered_ = centered_;
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < poses_; ++t) {
+    const std::span<const float> from = std::as_const(*this).row(t);
+    if (t % count == count - 1) {
+      std::ranges::copy(from, taken.Grow().begin());
+    } else {
+      if (kept != t) std::ranges::copy(from, row(kept).begin());
+      ++kept;
+    }
+  }
+  Truncate(kept);
   return taken;
 }
 

@@ -56,6 +56,7 @@ class PoseMatrix {
   bool centered() const { return centered_; }
   // The poses of another matrix of the same layout, both centred with the same mean, or neither.
   void Append(const PoseMatrix& other);
+  void Append(PoseMatrix&& other);  // which is empty then; its memory is freed on the way
   // Keeps the first poses.
   void Truncate(std::size_t poses);
   // Takes the last of so many poses away, again and again.

@@ -177,7 +177,7 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddEnds(&ends));
   ranges_of_tiles.Widen(ends);
   if (more.poses() > 0) more.Subtract(modes->pca.mean);
-  poses->poses.Append(more);
+  poses->poses.Append(std::move(more));
   if (poses->spare) {
     poses->spare->Subtract(modes->pca.mean);
     poses->poses.Append(*std::exchange(poses->spare, std::nullopt));

@@ -49,10 +49,15 @@ std::vector<Index> Closure(const Topology& topology, const DeltaMushSettings& se
   return found;
 }
 
+// What is left beside the diagonal counts as nothing below this share of it: a turn by less changes no double.
+constexpr double kDiagonal = 1e-18;
+
 // The eigenvectors of a symmetric 3x3 matrix by Jacobi rotations; values descending.
 void SymmetricEigen(double a[3][3], double values[3], Double3 vectors[3]) {
   double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int sweep = 0; sweep < 12; ++sweep) {
+    const double least = kDiagonal * (std::fabs(a[0][0]) + std::fabs(a[1][1]) + std::fabs(a[2][2]));
+    if (std::fabs(a[0][1]) <= least && std::fabs(a[0][2]) <= least && std::fabs(a[1][2]) <= least) break;
     for (int p = 0; p < 2; ++p) {
       for (int q = p + 1; q < 3; ++q) {
         if (a[p][q] == 0) continue;

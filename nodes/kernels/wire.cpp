@@ -40,35 +40,81 @@ std::vector<Cubic> Spans(const CurveShape& shape, std::span<const Double3> verti
   return spans;
 }
 
-double NearestOnSpans(std::span<const Cubic> spans, Double3 p, double* distance) {
-  double best = std::numeric_limits<double>::infinity(), best_u = 0;
-  const auto consider = [&](std::size_t span, double t) {
-    const Double3 offset = spans[span].At(t) - p;
-    const double d = Dot(offset, offset);
-    if (d < best) best = d, best_u = static_cast<double>(span) + t;
+// The spans of a curve, and boxes around runs of them.
+class SpanTable {
+ public:
+  SpanTable(const CurveShape& shape, std::span<const Double3> vertices) : spans_(Spans(shape, vertices)) {
+    for (std::size_t i = 0; i < spans_.size(); ++i) {
+      const Cubic& span = spans_[i];
+      if (i % kRun == 0) boxes_.push_back({span.c[0], span.c[0]});
+      Box& box = boxes_.back();
+      for (int a = 0; a < 3; ++a) {
+        const double reach = std::fabs(span.c[1][a]) + std::fabs(span.c[2][a]) + std::fabs(span.c[3][a]);
+        box.low[a] = std::min(box.low[a], span.c[0][a] - reach);
+        box.high[a] = std::max(box.high[a], span.c[0][a] + reach);
+      }
+    }
+  }
+
+  // The parameter of the nearest place, the first one where several are as near. Runs whose boxes are farther than a
+  // place of the curve are not searched.
+  double Nearest(Double3 p, double* distance) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < spans_.size(); i += kRun) {
+      const Double3 offset = spans_[i].c[0] - p;
+      least = std::min(least, Dot(offset, offset));
+    }
+    double best = std::numeric_limits<double>::infinity(), best_u = 0;
+    for (std::size_t run = 0; run < boxes_.size(); ++run) {
+      if (boxes_[run].SquareTo(p) > kRounding * std::min(least, best)) continue;
+      for (std::size_t i = run * kRun; i < std::min(spans_.size(), (run + 1) * kRun); ++i)
+        Search(i, p, &best, &best_u);
+    }
+    *distance = std::sqrt(best);
+    return best_u;
+  }
+
+ private:
+  static constexpr std::size_t kRun = 16;
+  static constexpr double kRounding = 1 + 1e-9;  // of boxes and places
+  struct Box {
+    Double3 low, high;
+    double SquareTo(Double3 p) const {
+      Double3 beyond;
+      for (int a = 0; a < 3; ++a) beyond[a] = std::max({0.0, low[a] - p[a], p[a] - high[a]});
+      return Dot(beyond, beyond);
+    }
   };
-  constexpr int kSteps = 8;
-  for (std::size_t i = 0; i < spans.size(); ++i) {
-    consider(i, 0);
-    double left = 0, slope_left = spans[i].Slope(0, p);
+
+  void Search(std::size_t span, Double3 p, double* best, double* best_u) const {
+    const Cubic& cubic = spans_[span];
+    const auto consider = [&](double t) {
+      const Double3 offset = cubic.At(t) - p;
+      const double d = Dot(offset, offset);
+      if (d < *best) *best = d, *best_u = static_cast<double>(span) + t;
+    };
+    constexpr int kSteps = 8;
+    consider(0);
+    double left = 0, slope_left = cubic.Slope(0, p);
     for (int k = 1; k <= kSteps; ++k) {
-      const double right = static_cast<double>(k) / kSteps, slope_right = spans[i].Slope(right, p);
+      const double right = static_cast<double>(k) / kSteps, slope_right = cubic.Slope(right, p);
       if (slope_left < 0 && slope_right >= 0) {  // a minimum lies between
         double a = left, b = right;
         for (int step = 0; step < 30; ++step) {
           const double middle = 0.5 * (a + b);
-          (spans[i].Slope(middle, p) < 0 ? a : b) = middle;
+          (cubic.Slope(middle, p) < 0 ? a : b) = middle;
         }
-        consider(i, 0.5 * (a + b));
+        consider(0.5 * (a + b));
       }
       left = right;
       slope_left = slope_right;
     }
-    consider(i, 1);
+    consider(1);
   }
-  *distance = std::sqrt(best);
-  return best_u;
-}
+
+  std::vector<Cubic> spans_;
+  std::vector<Box> boxes_;
+};
 
 // A curve at rest, and how near points are to it. A Catmull-Rom span, and a reflected end, may leave the box
 // of the vertices by an eighth or two of its size; points farther than that and the dropoff need no search.
@@ -77,7 +123,7 @@ class RestCurve {
   RestCurve(const WireSettings& settings, std::span<const Double3> vertices)
       : settings_(settings),
         shape_{settings.basis, settings.closed, vertices.size()},
-        spans_(Spans(shape_, vertices)),
+        spans_(shape_, vertices),
         low_(vertices[0]),
         high_(vertices[0]) {
     for (Double3 v : vertices) {
@@ -93,14 +139,14 @@ class RestCurve {
       if (!(p[a] >= low_[a] - margin_ && p[a] <= high_[a] + margin_)) return 0;
     }
     double distance;
-    *u = NearestOnSpans(spans_, p, &distance);
+    *u = spans_.Nearest(p, &distance);
     return settings_.profile.Evaluate(distance / settings_.dropoff);
   }
 
  private:
   WireSettings settings_;
   CurveShape shape_;
-  std::vector<Cubic> spans_;
+  SpanTable spans_;
   Double3 low_, high_;
   double margin_;
 };
@@ -155,7 +201,7 @@ Double3 CurveShape::Point(std::span<const Double3> curve_vertices, double u) con
 
 double CurveShape::Nearest(std::span<const Double3> curve_vertices, Double3 p) const {
   double distance;
-  return NearestOnSpans(Spans(*this, curve_vertices), p, &distance);
+  return SpanTable(*this, curve_vertices).Nearest(p, &distance);
 }
 
 Status WireKernel::Validate(const WireSettings& settings, std::span<const Double3> rest_vertices) {

@@ -384,6 +384,48 @@ TEST_F(CompilerTest, VaryingElementsThatNobodySet) {
   EXPECT_DOUBLE_EQ(g.pull<double>("s.out"), 6);
 }
 
+// A rest value evaluates all points with kernels that a plan of all points needs, too.
+TEST_F(CompilerTest, WhatRestValuesBoundIsUsedAgain) {
+  g.add("source", "src", {{"count", 10}});
+  g.add("picky", "p1");
+  g.add("move", "m");
+  g.connect("src.outPoints", "p1.points");
+  g.connect("p1.outPoints", "m.points");
+  g.vary("src.step");
+  g.want("m.outPoints");
+  ASSERT_TRUE(g.compiler.Rest(g.graph, g.plug("m.outPoints")).ok());
+  ASSERT_TRUE(g.compile().ok());
+  EXPECT_EQ(g.compiler.stats().kernels_bound, 0u);
+  EXPECT_GT(g.compiler.stats().kernels_reused, 0u);
+}
+
+TEST_F(CompilerTest, StepsAreThoseOfThePlanAndBindNothing) {
+  g.add("source", "src", {{"count", 10}});
+  g.add("picky", "p1");
+  g.add("move", "m");
+  g.add("add", "shift");
+  g.add("scale3", "still", {{"factor", 2.0}});
+  g.connect("shift.out", "m.offset");
+  g.connect("still.out.y", "shift.b");
+  g.connect("src.outPoints", "p1.points");
+  g.connect("p1.outPoints", "m.points");
+  g.vary("shift.a");
+  g.vary("src.step");
+  g.want("m.outPoints");
+  const auto steps = g.compiler.Steps(g.graph, g.request);
+  ASSERT_TRUE(steps.ok());
+  ASSERT_TRUE(g.compile().ok());
+  EXPECT_GT(g.compiler.stats().kernels_bound, 0u);
+  EXPECT_EQ(g.compiler.stats().kernels_reused, 0u);
+  std::map<std::string, bool> of_plan, listed;
+  for (const Plan::StepInfo& info : g.plan->infos())
+    of_plan[g.graph.name(info.node)] |= info.points_total > 0;
+  for (const Compiler::Stepped& stepped : *steps) listed[g.graph.name(stepped.node)] = stepped.points;
+  EXPECT_EQ(listed, of_plan);
+  EXPECT_EQ(listed,
+            (std::map<std::string, bool>{{"m", true}, {"p1", true}, {"shift", false}, {"src", true}}));
+}
+
 TEST_F(CompilerTest, TheRestStateIgnoresClips) {
   NodeRegistry registry;
   AddToyNodes(registry);

@@ -321,7 +321,7 @@ TEST(Curves, RunFromSideToSide) {
 TEST(Influences, KeepTheFourLargest) {
   const double weights[] = {0.05, 0.3, 0.1, 0.2, 0.35};
   const Influences out = MakeInfluences(weights);
-  EXPECT_EQ(out.joints, (std::array<std::uint8_t, 4>{4, 1, 3, 2}));
+  EXPECT_EQ(out.joints, (std::array<std::uint16_t, 4>{4, 1, 3, 2}));
   EXPECT_EQ(out.weights[0] + out.weights[1] + out.weights[2] + out.weights[3], 1.0f);
   EXPECT_NEAR(out.weights[0], 0.35 / 0.95, 2e-3);
 }

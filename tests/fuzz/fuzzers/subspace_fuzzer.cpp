@@ -5,6 +5,7 @@
 #include "files/safetensors.h"
 #include "kpsa/subspace.h"
 #include "kpsa/subspace_digest.h"
+#include "kpsa/subspace_header.h"
 #include "tests/fuzz/fuzzer.h"
 
 namespace kpsa::engine {
@@ -56,8 +57,10 @@ KPSA_FUZZER(subspace) {
   Require(written.ok(), "what was read cannot be written: " + written.ToString());
   const Result<Subspace> mended = ReadSubspace(path, KeptModes::kRead);
   Require(mended.ok(), "what was written cannot be read: " + mended.status().ToString());
-  Require(ContentDigest(*mended) == ContentDigest(*content) && ModesDigest(*mended) == ModesDigest(*content),
-          "what was written reads back as something else");
+  Require(
+      ContentDigest(*mended, SubspaceHeader(*mended)) == ContentDigest(*content, SubspaceHeader(*content)) &&
+          ModesDigest(*mended) == ModesDigest(*content),
+      "what was written reads back as something else");
   Use(*mended);
 }
 

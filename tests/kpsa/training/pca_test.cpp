@@ -225,5 +225,23 @@ TEST(PoseMatrix, GrowsWithoutMovingRowsAndCentersOnce) {
   EXPECT_NEAR(poses.Mean().cwiseAbs().maxCoeff(), 0, 1e-12);
 }
 
+TEST(PoseMatrix, PosesAreTakenAwayInPlaceAndComeBack) {
+  PoseMatrix poses({.points = 3});
+  for (int i = 0; i < 200; ++i) poses.AddPose()[4] = static_cast<float>(i);
+  const float* const first = poses.row(0).data();
+  PoseMatrix taken = poses.TakeEvery(4);
+  ASSERT_EQ(poses.poses(), 150u);
+  ASSERT_EQ(taken.poses(), 50u);
+  EXPECT_EQ(poses.row(0).data(), first);  // nothing was copied anew
+  EXPECT_EQ(poses.blocks(), 3u);
+  for (std::size_t t = 0; t < 150; ++t) EXPECT_EQ(poses.row(t)[4], static_cast<float>(4 * (t / 3) + t % 3));
+  for (std::size_t t = 0; t < 50; ++t) EXPECT_EQ(taken.row(t)[4], static_cast<float>(4 * t + 3));
+  EXPECT_EQ(poses.AddPose()[4], 0.0f);  // where a pose was that is gone
+  poses.Append(std::move(taken));
+  ASSERT_EQ(poses.poses(), 201u);
+  EXPECT_EQ(poses.row(200)[4], 199.0f);
+  EXPECT_EQ(taken.poses(), 0u);
+}
+
 }  // namespace
 }  // namespace kpsa::engine
