@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "base/check.h"
+#include "graph/authored.h"
 #include "graph/builtin_steps.h"
 #include "graph/plan_builder.h"
 #include "graph/static_eval.h"
@@ -136,6 +136,22 @@ Compiler::~Compiler() = default;
 const CompileStats& Compiler::stats() const { return impl_->stats; }
 
 Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const Request& request) {
+  try {
+    return CompileOrThrow(graph, request);
+  } catch (const NodeFailure& failure) {
+    return failure.status;
+  }
+}
+
+Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
+  try {
+    return RestOrThrow(graph, plug);
+  } catch (const NodeFailure& failure) {
+    return failure.status;
+  }
+}
+
+Result<std::shared_ptr<const Plan>> Compiler::CompileOrThrow(const Graph& graph, const Request& request) {
   impl_->stats = CompileStats();
   InstanceTable table(graph, request);
   for (const PlugRef& plug : request.varying) {
@@ -221,7 +237,7 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
   return PlanBuilder(table, *draft, step_order, request, std::move(kernels)).Build();
 }
 
-Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
+Result<Value> Compiler::RestOrThrow(const Graph& graph, const PlugRef& plug) {
   KPSA_RETURN_IF_ERROR(graph.CheckPlug(plug));
   Request request;
   InstanceTable table(graph, request);
