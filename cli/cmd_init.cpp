@@ -54,7 +54,8 @@ Status CopyFile(const fs::path& from, const fs::path& to, bool force) {
   if (const auto there = ReadFileBytes(to.string(), kMostBytes); there.ok() && *there == *bytes)
     return Status();
   std::error_code error;
-  fs::create_directories(to.parent_path(), error);  // without one, writing says why
+  fs::create_directories(to.parent_path(), error);  // without one, the next line says why
+  KPSA_RETURN_IF_ERROR(CheckOutput(to.string(), force, {}));
   return WriteFileAtomically(to.string(), force, *bytes);
 }
 

@@ -86,6 +86,7 @@ void Compute(ComputeContext& c) {
   }
   NodeCall call;
   call.inputs = {inputs, "inputs"}, call.outputs = {outputs, "outputs"};
+  call.points = {{}, "points"}, call.out_points = {{}, "out_points"};
   if (!function.deformer) {
     if (const std::string wrong = Call(function, call); !wrong.empty()) c.host->Fail(wrong);
     return;

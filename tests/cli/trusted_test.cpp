@@ -18,26 +18,28 @@ constexpr char kWeights[] =
 constexpr char kSkin[] =
     R"({"kpsa": "weights", "version": 1, "mesh": "body", "points": 3, "maps": {"tip": {"default": 1, "indices": [], "values": []}}})";
 
-// A way in which a rig's file may name another, and a file that it may name so; @ stands for the path.
+// A way in which a rig's file may name another, and a file that it may name so; PATH stands for it.
 struct Kind {
   std::string name, file, rig;
 };
 const std::string kBody = "kpsa: 1\ncharacter: c.gltf\n";
 const std::vector<Kind> kKinds = {
-    {"character", "c.gltf", "kpsa: 1\ncharacter: '@'\n"},
-    {"include", "part.yaml", kBody + "include: ['@']\n"},
-    {"plugin", "wobble.so", kBody + "plugins: ['@']\n"},
+    {"character", "c.gltf", "kpsa: 1\ncharacter: 'PATH'\n"},
+    {"include", "part.yaml", kBody + "include: ['PATH']\n"},
+    {"plugin", "wobble.so", kBody + "plugins: ['PATH']\n"},
     {"weights", "w.json",
-     kBody + "nodes: {l: {type: cluster, weights: '@#m'}}\ndeform: [{meshes: [body], stack: [gltf, l]}]\n"},
-    {"influences", "skin.json", kBody + "overrides: {body_skinCluster.influences: '@'}\n"},
+     kBody +
+         "nodes: {l: {type: cluster, weights: 'PATH#m'}}\ndeform: [{meshes: [body], stack: [gltf, l]}]\n"},
+    {"influences", "skin.json", kBody + "overrides: {body_skinCluster.influences: 'PATH'}\n"},
     {"shapes", "shape.obj",
-     kBody + "nodes: {fix: {type: blendShape, targets: {file: '@'}}}\ndeform: [{meshes: [body], stack: "
+     kBody + "nodes: {fix: {type: blendShape, targets: {file: 'PATH'}}}\ndeform: [{meshes: [body], stack: "
              "[gltf, fix]}]\n"},
-    {"reference", "c.gltf", "kpsa: 1\nreferences: {a: {file: '@'}}\n"},
+    {"reference", "c.gltf", "kpsa: 1\nreferences: {a: {file: 'PATH'}}\n"},
     {"template", "w.json",
      kBody + "templates: {t: {params: {map: string}, nodes: {l: {type: cluster, weights: '$(map)#m'}}}}\n"
-             "use: {u: {template: t, map: '@'}}\ndeform: [{meshes: [body], stack: [gltf, 'u:l']}]\n"},
-    {"subspace", "f.kpsa", kBody + "accelerate: {f: {points: [body@skin], subspace: '@', tolerance: 1cm}}\n"},
+             "use: {u: {template: t, map: 'PATH'}}\ndeform: [{meshes: [body], stack: [gltf, 'u:l']}]\n"},
+    {"subspace", "f.kpsa",
+     kBody + "accelerate: {f: {points: [body@skin], subspace: 'PATH', tolerance: 1cm}}\n"},
 };
 
 class Trusted : public ::testing::Test {
@@ -61,7 +63,7 @@ class Trusted : public ::testing::Test {
   }
   std::string WriteNaming(const Kind& kind, const std::string& path) const {
     std::string rig = kind.rig;
-    rig.replace(rig.find('@'), 1, path);
+    rig.replace(rig.find("PATH"), 4, path);
     return folder.Write("rig/rig.yaml", rig);
   }
   void ExpectLeaves(const ProcessResult& run, const std::string& what) const {
@@ -101,7 +103,7 @@ TEST_F(Trusted, WhatARigNamesStaysInItsFolder) {
 }
 
 TEST_F(Trusted, NothingOfAFileOutsideIsShown) {
-  folder.Write("outside/part.yaml", "SECRET: [\n");
+  folder.Write("outside/part.yaml", "kpsa: 1\nSECRET: 1\n");
   WriteNaming(kKinds[1], "../outside/part.yaml");
   const ProcessResult run = Run({"validate", "rig.yaml"});
   ExpectLeaves(run, "");
@@ -181,7 +183,7 @@ TEST_F(Trusted, InitCopiesACharacterThatTheRigMayNotName) {
   b.root["buffers"] = {{{"byteLength", b.buffer.size()}, {"uri", "data/c.bin"}}};
   folder.Write("outside/apart.gltf", b.root.dump());
   const ProcessResult init = Run({"init", "../outside/apart.gltf", "-o", "new/rig.yaml"});
-  EXPECT_EQ(init.exit_code, 3) << "the folder of the rig is not made: " << init.err;
+  EXPECT_EQ(init.exit_code, 2) << "the folder of the rig is not made: " << init.err;
   fs::create_directory(folder / "rig/new");
   const ProcessResult copied = Run({"init", "../outside/apart.gltf", "-o", "new/rig.yaml"});
   EXPECT_EQ(copied.exit_code, 0) << copied.err;
@@ -200,7 +202,7 @@ TEST_F(Trusted, InitCopiesACharacterThatTheRigMayNotName) {
   // A character of the project is named where it is
   folder.Write("kpsa.project", "");
   EXPECT_EQ(Run({"init", "../outside/apart.gltf", "-o", "named.yaml"}).exit_code, 0);
-  EXPECT_NE(TemporaryFolder::Read(folder / "rig/named.yaml").find("character: ../outside/apart.gltf"),
+  EXPECT_NE(TemporaryFolder::Read(folder / "rig/named.yaml").find("character: \"../outside/apart.gltf\""),
             std::string::npos);
 }
 

@@ -13,7 +13,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kFullFrame = 1000;
+constexpr double kWholeFrame = 1000;
 
 // Points that bend with the products of what is measured.
 TileMap BentTile() {
@@ -44,7 +44,7 @@ CalibratedSubspace Costing(double ns, bool by_tile) {
 }
 // What is taken of two.
 double Taken(double by_tile, double for_all, bool tiles_first) {
-  TrainingTrials trials(kFullFrame);
+  TrainingTrials trials(kWholeFrame);
   for (const bool tiles : {tiles_first, !tiles_first})
     trials.Add(tiles ? "tiles" : "all", 0, Costing(tiles ? by_tile : for_all, tiles));
   return trials.Take({}).cost.ns;
@@ -61,7 +61,7 @@ TEST(TrainingTrials, CuesOfTilesHaveToBeClearlyCheaper) {
 }
 
 TEST(TrainingTrials, TheRecordTellsOfAllAndOfOneThatWasTaken) {
-  TrainingTrials trials(kFullFrame);
+  TrainingTrials trials(kWholeFrame);
   trials.Add("dear", 50, Costing(400, false));
   trials.Add("cheap", 50, Costing(150, false));
   EXPECT_EQ(trials.least_ns(), 200);
