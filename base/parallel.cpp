@@ -7,6 +7,8 @@
 #include <tbb/task_arena.h>
 #include <tbb/task_group.h>
 
+#include "base/cancel.h"
+
 #if defined(KPSA_WITH_TSAN)
 // The library of TBB is not instrumented: the sanitizer does not see how it hands tasks to threads and waits
 // for them. What it orders is told below (before the loop, in each range, after the loop); its own objects
@@ -39,11 +41,13 @@ void Observe(char*) {}
 void ParallelFor(std::size_t count, std::size_t grain, RangeBody body) {
   if (count == 0) return;
   if (grain == 0) grain = 1;
+  ThrowIfCancelled();
   if (count <= grain) {
     body(0, count);
     return;
   }
   const std::size_t chunks = (count + grain - 1) / grain;
+  const CancelSource* const cancel = CurrentCancel();
   char begins = 0, ends = 0;
   Publish(&begins);
   // Its bodies round as the caller does. A thread's tasks do by themselves, but as it rounded when it first
@@ -54,6 +58,8 @@ void ParallelFor(std::size_t count, std::size_t grain, RangeBody body) {
       tbb::blocked_range<std::size_t>(0, chunks),
       [&](const tbb::blocked_range<std::size_t>& range) {
         Observe(&begins);
+        const CancelScope scope(cancel);  // which may be another one than this thread was just in
+        ThrowIfCancelled();
         const std::size_t end = range.end() * grain;
         body(range.begin() * grain, end < count ? end : count);
         Publish(&ends);

@@ -22,7 +22,8 @@ class RangeBody {
 };
 
 // Calls body(begin, end) over disjoint ranges that cover [0, count), each range except the last a multiple of
-// `grain` long. Runs inline where count <= grain. Blocks until all ranges are done.
+// `grain` long. Runs inline where count <= grain. Blocks until all ranges are done. What a range throws ends the others
+// and comes out here; so does Cancelled, where the scope around the call (base/cancel.h) asks for it before a range.
 void ParallelFor(std::size_t count, std::size_t grain, RangeBody body);
 
 // Limits the threads that ParallelFor may use, in this scope, process-wide (0: as many as there are cores).

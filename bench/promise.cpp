@@ -117,7 +117,10 @@ Result<std::string> WriteStarterRig(const std::string& character, const std::str
   NodeRegistry registry;
   AddAllNodes(registry);
   StarterOptions options;
-  options.character = fs::relative(character, folder).string();
+  options.character = fs::path(character).filename().string();
+  std::error_code error;
+  fs::copy_file(character, folder / options.character, error);
+  if (error) return Status::Invalid("cannot be copied: {}", error.message()).At({character});
   options.subspace = name + ".kpsa";
   const Result<std::string> text = StarterRig(registry, character, options);
   if (!text.ok()) return text.status();

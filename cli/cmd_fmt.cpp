@@ -19,8 +19,10 @@ struct FmtFlags : Flags {
 // All that kpsa validate says of a rig; of a part that others include, what can be said of it alone.
 Status CheckRig(const std::string& file, const YamlNode& root, const FmtFlags& flags) {
   if (root.Find("character") == nullptr && root.Find("references") == nullptr) {
+    const Result<TrustedFolders> trusted = TrustedFolders::OfRig(file, flags.trust, "--trust");
+    if (!trusted.ok()) return trusted.status();
     RigFile part;
-    return ReadRigFile(file, std::nullopt, &part, true);
+    return ReadRigFile(file, std::nullopt, &part, true, &*trusted);
   }
   Flags rig = flags;
   rig.file = file;

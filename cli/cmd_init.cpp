@@ -6,6 +6,9 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
+#include "files/file.h"
+#include "files/trusted_folders.h"
+#include "gltf/document_files.h"
 #include "rig/build/writer.h"
 
 namespace kpsa::engine {
@@ -16,6 +19,45 @@ namespace fs = std::filesystem;
 struct InitFlags : Flags {
   std::optional<std::string> iterations, samples;
 };
+
+// How a rig at `place` is to name its character, relative to itself; and what is to be copied there, from and to, where
+// rigs there may not name the character where it is.
+struct CharacterPlace {
+  std::string named;
+  std::vector<std::pair<fs::path, fs::path>> copies;
+};
+
+Result<CharacterPlace> PlaceCharacter(const std::string& file, const std::string& place) {
+  std::error_code error;
+  const fs::path folder = place == "-" ? fs::path() : fs::path(place).parent_path();
+  const fs::path relative = fs::relative(file, folder.empty() ? fs::path(".") : folder, error);
+  const std::string named = error || relative.empty() ? file : relative.string();
+  const Result<TrustedFolders> trusted = TrustedFolders::OfRig(place == "-" ? "" : place, {});
+  if (!trusted.ok()) return trusted.status();
+  if (place == "-" || trusted->Hold((folder / named).string())) return CharacterPlace{named, {}};
+  const fs::path name = fs::path(file).filename();
+  const Result<std::vector<std::string>> beside = gltf::FilesBeside(file);
+  if (!beside.ok()) return beside.status();
+  CharacterPlace copied{name.string(), {{file, folder / name}}};
+  for (const std::string& other : *beside) {
+    const fs::path from = fs::path(file).parent_path() / other;
+    if (fs::exists(from, error)) copied.copies.emplace_back(from, folder / other);  // an image may be missing
+  }
+  return copied;
+}
+
+// Unless the same is there already.
+Status CopyFile(const fs::path& from, const fs::path& to, bool force) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{4} << 30;
+  const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(from.string(), kMostBytes);
+  if (!bytes.ok()) return bytes.status();
+  if (const auto there = ReadFileBytes(to.string(), kMostBytes); there.ok() && *there == *bytes)
+    return Status();
+  std::error_code error;
+  fs::create_directories(to.parent_path(), error);  // without one, the next line says why
+  KPSA_RETURN_IF_ERROR(CheckOutput(to.string(), force, {}));
+  return WriteFileAtomically(to.string(), force, *bytes);
+}
 
 CommandResult Init(const InitFlags& flags) {
   StarterOptions options;
@@ -33,18 +75,20 @@ CommandResult Init(const InitFlags& flags) {
   const std::string stem = fs::path(flags.file).stem().string();
   const std::string place = flags.output.value_or(stem + ".yaml");
   KPSA_RETURN_IF_ERROR(CheckOutput(place, flags.force, {".yaml", ".yml"}));
-  // The rig names its character relative to itself
-  std::error_code error;
-  const fs::path folder = place == "-" ? fs::path() : fs::path(place).parent_path();
-  const fs::path relative = fs::relative(flags.file, folder.empty() ? fs::path(".") : folder, error);
-  options.character = error || relative.empty() ? flags.file : relative.string();
+  const Result<CharacterPlace> character = PlaceCharacter(flags.file, place);
+  if (!character.ok()) return character.status();
+  options.character = character->named;
   options.subspace = (place == "-" ? stem : fs::path(place).stem().string()) + ".kpsa";
   NodeRegistry registry;
   AddAllNodes(registry);
   std::string remark;
   const Result<std::string> text = StarterRig(registry, flags.file, options, &remark);
   if (!text.ok()) return text.status();
+  for (const auto& [from, to] : character->copies) KPSA_RETURN_IF_ERROR(CopyFile(from, to, flags.force));
   KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, *text));
+  if (!flags.quiet && !character->copies.empty())
+    Say(fmt::format("{}: a copy of {}, since rigs name files of their own folder",
+                    character->copies.front().second.string(), flags.file));
   if (!flags.quiet && !remark.empty()) Say(fmt::format("note: {}: {}", flags.file, remark));
   if (!flags.quiet && place != "-")
     Say(fmt::format("{}: a starter rig; read it, it says what to change\nnext: kpsa {} {}", place,
@@ -59,7 +103,9 @@ void AddInitCommand(CLI::App* program, Command* chosen) {
   CLI::App* command = AddCommand(
       program, "init", "Write a starter rig for a character",
       "Controls are ranged by the character's clips and grouped by part of the body; its own deformers are "
-      "followed by a deltaMush. IK, a cage about the jaw and dual quaternions are suggested in comments.\n"
+      "followed by a deltaMush. IK, a cage about the jaw and dual quaternions are suggested in comments. "
+      "A character that the rig may not name where it is (kpsa help eval: --trust) is copied beside the "
+      "rig.\n"
       "Examples:\n"
       "  kpsa init head.glb\n"
       "  kpsa init characters/head.glb -o rigs/head.yaml",

@@ -35,6 +35,7 @@ Result<FileFacts> FactsOf(const InspectFlags& flags, double fps) {
   Flags rig;
   rig.file = flags.file;
   rig.plugins = flags.plugins;
+  rig.trust = flags.trust;
   rig.reads_only = flags.reads_only, rig.rig_plugins = flags.rig_plugins;
   rig.rest = character;
   const Result<std::unique_ptr<OpenRig>> open = LoadRigOf(rig);

@@ -38,6 +38,8 @@ void AddPluginFlags(CLI::App* command, Flags* flags, NativeCode code) {
   } else {
     AddSwitch(command, "--no-plugins", &flags->no_plugins, "load no plugin but those of --plugin");
   }
+  AddRepeated(command, "--trust", "FOLDER", &flags->trust,
+              "files in it may be named by the rig, too, besides those in its own folder; may be repeated");
 }
 
 void AddTimeFlags(CLI::App* command, Flags* flags) {
@@ -103,6 +105,7 @@ Result<std::unique_ptr<OpenRig>> LoadRigOf(const Flags& flags) {
   PluginLoader plugins(&open->registry);
   KPSA_RETURN_IF_ERROR(LoadPlugins(flags, &plugins));
   options.plugins = &plugins;
+  options.trust = flags.trust, options.trust_word = "--trust";
   Result<Rig> rig = LoadRig(open->registry, flags.file, options);
   if (!rig.ok()) return rig.status();
   open->rig = std::move(*rig);

@@ -30,6 +30,7 @@ struct Flags {
   std::string file;               // the rig or character
   std::vector<std::string> sets;  // --set plug=value
   std::vector<std::string> plugins;
+  std::vector<std::string> trust;                                    // --trust folder
   bool reads_only = false, rig_plugins = false, no_plugins = false;  // NativeCode, --plugins, --no-plugins
   std::optional<std::string> pose, clip, fps, variant;
   bool rest = false;
@@ -46,7 +47,7 @@ enum class NativeCode : std::uint8_t { kWhatRigsName, kWhereToldTo };
 void AddRigFlags(CLI::App* command, Flags* flags, NativeCode code = NativeCode::kWhatRigsName);
 // The same without FILE; with or without --clip
 void AddPoseFlags(CLI::App* command, Flags* flags, bool clip, NativeCode code = NativeCode::kWhatRigsName);
-// --plugin, and --no-plugins or --plugins
+// --plugin, --no-plugins or --plugins, and --trust: what a rig may do
 void AddPluginFlags(CLI::App* command, Flags* flags, NativeCode code = NativeCode::kWhatRigsName);
 void AddTimeFlags(CLI::App* command, Flags* flags);                            // --frames --times
 void AddOutputFlags(CLI::App* command, Flags* flags, const std::string& doc);  // -o --force

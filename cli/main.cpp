@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "base/cancel.h"
 #include "base/simd.h"
 #include "cli/command.h"
 #include "cli/common.h"
@@ -151,7 +152,11 @@ int Main(int argc, char** argv) {
   }
   CommandResult result = Status();
   try {
+    const FlagCancel cancel(InterruptFlag());
+    const CancelScope scope(&cancel);
     result = chosen();
+  } catch (const Cancelled&) {
+    result = InterruptedStatus();
   } catch (const std::bad_alloc&) {
     result = Status::Invalid("not enough memory");
   } catch (const std::exception& error) {

@@ -11,6 +11,7 @@
 
 #include "files/file.h"
 #include "files/json_depth.h"
+#include "files/trusted_folders.h"
 
 namespace kpsa::engine::gltf {
 namespace {
@@ -247,6 +248,12 @@ Result<std::vector<std::uint8_t>> ReadUri(const std::string& uri, const std::str
   const Result<std::string> relative = RelativePathOfUri(uri);
   if (!relative.ok()) return relative.status();
   const std::string path = (std::filesystem::path(folder) / *relative).string();
+  TrustedFolders beside;
+  beside.Add(folder);
+  if (!beside.Hold(path)) {
+    return Status::Invalid("\"{}\" leaves the document's folder by a symbolic link; move the file there",
+                           Shortened(uri));
+  }
   std::error_code error;
   if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error))
     return Status::Invalid("\"{}\" is not a file", Shortened(uri));

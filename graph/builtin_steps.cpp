@@ -15,15 +15,16 @@ void Gather(const std::vector<Index>& positions, const float* from, float* to) {
 
 void ComputeGatherPoints(ComputeContext& context) {
   const auto& positions = context.kernel_as<std::vector<Index>>();
-  const ConstPointsView& from = context.points(0);
-  const PointsView& to = context.out_points(0);
+  const ConstPointsView& from = context.slot<ConstPointsView>(0);
+  const PointsView& to = context.out_slot<PointsView>(0);
   Gather(positions, from.x, to.x);
   Gather(positions, from.y, to.y);
   Gather(positions, from.z, to.z);
 }
 
 void ComputeGatherWeights(ComputeContext& context) {
-  Gather(context.kernel_as<std::vector<Index>>(), context.points(0).x, context.out_points(0).x);
+  Gather(context.kernel_as<std::vector<Index>>(), context.slot<ConstPointsView>(0).x,
+         context.out_slot<PointsView>(0).x);
 }
 
 void ComputeAssembleSmall(ComputeContext& context) {
@@ -37,8 +38,8 @@ void ComputeAssembleSmall(ComputeContext& context) {
 
 void ComputeAssemblePoints(ComputeContext& context) {
   const auto& kernel = context.kernel_as<AssembleKernel>();
-  const ConstPointsView& from = context.points(0);
-  const PointsView& to = context.out_points(0);
+  const ConstPointsView& from = context.slot<ConstPointsView>(0);
+  const PointsView& to = context.out_slot<PointsView>(0);
   float* out[3] = {to.x, to.y, to.z};
   const float* in[3] = {from.x, from.y, from.z};
   for (int c = 0; c < 3; ++c) {
@@ -49,27 +50,27 @@ void ComputeAssemblePoints(ComputeContext& context) {
     const auto point = static_cast<std::size_t>(kernel.children[i] / 4);
     const int component = kernel.children[i] % 4;
     if (component < 3) {
-      out[component][point] = static_cast<float>(context.get<double>(static_cast<int>(1 + i)));
+      out[component][point] = static_cast<float>(context.slot<double>(static_cast<int>(1 + i)));
     } else if (to.y == nullptr) {
-      out[0][point] = static_cast<float>(context.get<double>(static_cast<int>(1 + i)));
+      out[0][point] = static_cast<float>(context.slot<double>(static_cast<int>(1 + i)));
     } else {
       for (int c = 0; c < 3; ++c)
-        out[c][point] = static_cast<float>(context.get<Double3>(static_cast<int>(1 + i))[c]);
+        out[c][point] = static_cast<float>(context.slot<Double3>(static_cast<int>(1 + i))[c]);
     }
   }
 }
 
 void ComputeIntToDouble(ComputeContext& context) {
-  context.out_value<double>(0) = static_cast<double>(context.get<std::int64_t>(0));
+  context.out_slot<double>(0) = static_cast<double>(context.slot<std::int64_t>(0));
 }
 void ComputeDoubleToInt(ComputeContext& context) {
-  context.out_value<std::int64_t>(0) = WholeNumber(context.get<double>(0));
+  context.out_slot<std::int64_t>(0) = WholeNumber(context.slot<double>(0));
 }
 void ComputeDoubleToBool(ComputeContext& context) {
-  context.out_value<std::int64_t>(0) = context.get<double>(0) != 0;
+  context.out_slot<std::int64_t>(0) = context.slot<double>(0) != 0;
 }
 void ComputeIntToBool(ComputeContext& context) {
-  context.out_value<std::int64_t>(0) = context.get<std::int64_t>(0) != 0;
+  context.out_slot<std::int64_t>(0) = context.slot<std::int64_t>(0) != 0;
 }
 
 }  // namespace kpsa::engine

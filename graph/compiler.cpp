@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "base/check.h"
+#include "graph/authored.h"
 #include "graph/builtin_steps.h"
 #include "graph/plan_builder.h"
 #include "graph/static_eval.h"
@@ -109,6 +109,16 @@ BoundKernel BuiltinKernel(const InstanceTable& table, const DraftStep& draft) {
   return kernel;
 }
 
+// What a node's own functions throw is an error.
+template <typename F>
+auto OrItsFailure(F run) -> decltype(run()) {
+  try {
+    return run();
+  } catch (const NodeFailure& failure) {
+    return failure.status;
+  }
+}
+
 // Resolves a request: the sources of its outputs.
 Status ReachOutputs(const Graph& graph, const Request& request, InstanceTable* table,
                     std::vector<Source>* wanted) {
@@ -196,6 +206,18 @@ Compiler::~Compiler() = default;
 const CompileStats& Compiler::stats() const { return impl_->stats; }
 
 Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const Request& request) {
+  return OrItsFailure([&] { return CompileOrThrow(graph, request); });
+}
+
+Result<std::vector<Compiler::Stepped>> Compiler::Steps(const Graph& graph, const Request& request) {
+  return OrItsFailure([&] { return StepsOrThrow(graph, request); });
+}
+
+Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
+  return OrItsFailure([&] { return RestOrThrow(graph, plug); });
+}
+
+Result<std::shared_ptr<const Plan>> Compiler::CompileOrThrow(const Graph& graph, const Request& request) {
   impl_->stats = CompileStats();
   InstanceTable table(graph, request);
   std::vector<Source> wanted;
@@ -242,7 +264,7 @@ Result<std::shared_ptr<const Plan>> Compiler::Compile(const Graph& graph, const 
   return PlanBuilder(table, *draft, step_order, request, std::move(kernels)).Build();
 }
 
-Result<std::vector<Compiler::Stepped>> Compiler::Steps(const Graph& graph, const Request& request) {
+Result<std::vector<Compiler::Stepped>> Compiler::StepsOrThrow(const Graph& graph, const Request& request) {
   InstanceTable table(graph, request);
   std::vector<Source> wanted;
   KPSA_RETURN_IF_ERROR(ReachOutputs(graph, request, &table, &wanted));
@@ -270,7 +292,7 @@ Result<std::vector<Compiler::Stepped>> Compiler::Steps(const Graph& graph, const
   return list;
 }
 
-Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
+Result<Value> Compiler::RestOrThrow(const Graph& graph, const PlugRef& plug) {
   KPSA_RETURN_IF_ERROR(graph.CheckPlug(plug));
   Request request;
   InstanceTable table(graph, request);

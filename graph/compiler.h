@@ -26,7 +26,7 @@ class Compiler {
   Compiler& operator=(const Compiler&) = delete;
 
   // Errors: a structural attribute driven by something that varies (names both ends), a kernel that cannot be
-  // bound (the node's reason), a demanded point out of range.
+  // bound (the node's reason), a demanded point out of range, what a node's own functions throw.
   Result<std::shared_ptr<const Plan>> Compile(const Graph& graph, const Request& request);
   // The value of a plug with everything at its default and no clip (DESIGN of rest states: node_def.h,
   // Structural::rest).
@@ -43,6 +43,9 @@ class Compiler {
   Result<std::vector<Stepped>> Steps(const Graph& graph, const Request& request);
 
  private:
+  Result<std::shared_ptr<const Plan>> CompileOrThrow(const Graph& graph, const Request& request);
+  Result<std::vector<Stepped>> StepsOrThrow(const Graph& graph, const Request& request);
+  Result<Value> RestOrThrow(const Graph& graph, const PlugRef& plug);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -9,16 +9,24 @@
 #include "base/parallel.h"
 #include "base/points.h"
 #include "base/types.h"
+#include "graph/slot_kind.h"
 
 namespace kpsa::engine {
 
-// The elements of an array input, each in a slot of its own.
+// Throws what becomes an error of the node that computes, with the name of the array.
+[[noreturn]] void ThrowNoElement(const std::uint32_t* table, std::uint32_t element);
+
+// The elements of an array input, each in a slot of its own. An element that there is not is an error of the node.
 template <typename T>
 class ArrayView {
  public:
   ArrayView(const std::byte* values, const std::uint32_t* table) : values_(values), table_(table) {}
   std::uint32_t size() const { return table_[0]; }
-  const T& operator[](std::uint32_t i) const { return *reinterpret_cast<const T*>(values_ + table_[1 + i]); }
+  const T& operator[](std::uint32_t i) const {
+    if (i >= table_[0]) [[unlikely]]
+      ThrowNoElement(table_, i);
+    return *reinterpret_cast<const T*>(values_ + table_[1 + i]);
+  }
 
  private:
   const std::byte* values_;
@@ -31,7 +39,11 @@ class OutArray {
  public:
   OutArray(std::byte* values, const std::uint32_t* table) : values_(values), table_(table) {}
   std::uint32_t size() const { return table_[0]; }
-  T& operator[](std::uint32_t i) const { return *reinterpret_cast<T*>(values_ + table_[1 + i]); }
+  T& operator[](std::uint32_t i) const {
+    if (i >= table_[0]) [[unlikely]]
+      ThrowNoElement(table_, i);
+    return *reinterpret_cast<T*>(values_ + table_[1 + i]);
+  }
 
  private:
   std::byte* values_;
@@ -47,6 +59,8 @@ class ComputeHost {
   virtual void Fail(std::string_view message) = 0;
   // As kpsa::engine::ParallelFor where the host evaluates in parallel, inline otherwise.
   virtual void For(std::size_t count, std::size_t grain, RangeBody body) = 0;
+  // Throws what becomes an error of the node that computes, where it has no such slot, or one of another type.
+  virtual void Check(const SlotAccess& access) const { (void)access; }
   // For profiles: whether times are wanted, and how long a part of the node's work took. Parts are the node's
   // own, from 0 to kMaxParts - 1. In decide and compute.
   static constexpr int kMaxParts = 4;
@@ -69,32 +83,55 @@ class ComputeContext {
   bool at_rest =
       false;  // the rest state is computed while compiling: all lazy inputs are there, whatever decide says
 
-  // Inputs and outputs by their position in the group's lists; authors of nodes name them
-  // (graph/node_context.h). T is the slot's type (graph/value.h).
+  // Inputs and outputs by their position in the group's lists. T is the slot's type (graph/value.h). Each access is
+  // looked up, and a wrong one is an error of the node; where a compute names what it reads (graph/node_context.h),
+  // that is checked once, when its type is registered, and an access costs nothing.
   template <typename T>
   const T& get(int i) const {
-    return *reinterpret_cast<const T*>(values + in[i]);
+    Check<T>(i, true, false);
+    return slot<T>(i);
   }
   template <typename T>
   ArrayView<T> array(int i) const {
-    return ArrayView<T>(values, in + in[i]);
+    Check<T>(i, true, true);
+    return slots<T>(i);
   }
   const ConstPointsView& points(int i) const { return get<ConstPointsView>(i); }
   template <typename T>
   T& out_value(int i) const {
-    return *reinterpret_cast<T*>(values + out[i]);
-  }
-  template <typename T>
-  T& out_value(int i, std::uint32_t element) const {
-    return *reinterpret_cast<T*>(values + (out + out[i])[1 + element]);
+    Check<T>(i, false, false);
+    return out_slot<T>(i);
   }
   template <typename T>
   OutArray<T> out_array(int i) const {
-    return OutArray<T>(values, out + out[i]);
+    Check<T>(i, false, true);
+    return out_slots<T>(i);
+  }
+  template <typename T>
+  T& out_value(int i, std::uint32_t element) const {
+    return out_array<T>(i)[element];
   }
   const PointsView& out_points(int i) const { return out_value<PointsView>(i); }
   const PointsView& out_points(int i, std::uint32_t element) const {
     return out_value<PointsView>(i, element);
+  }
+
+  // The same unchecked, for positions and types that were checked before.
+  template <typename T>
+  const T& slot(int i) const {
+    return *reinterpret_cast<const T*>(values + in[i]);
+  }
+  template <typename T>
+  ArrayView<T> slots(int i) const {
+    return ArrayView<T>(values, in + in[i]);
+  }
+  template <typename T>
+  T& out_slot(int i) const {
+    return *reinterpret_cast<T*>(values + out[i]);
+  }
+  template <typename T>
+  OutArray<T> out_slots(int i) const {
+    return OutArray<T>(values, out + out[i]);
   }
 
   template <typename K>
@@ -105,10 +142,17 @@ class ComputeContext {
   S& state_as() const {
     return *reinterpret_cast<S*>(state);
   }
+
+ private:
+  template <typename T>
+  void Check(int position, bool input, bool array) const {
+    if (host != nullptr) host->Check(SlotAccess::Of<T>(position, input, array));
+  }
 };
 
 // What a batch sees: steps of one kind, each with inputs of its own. Their outputs (one small value each) are
-// not slots but stand in a row, so that the host can compare them with what they were.
+// not slots but stand in a row, so that the host can compare them with what they were. Nothing is checked here: nodes
+// name what their batches read (NodeBatch in graph/node_context.h).
 class BatchContext {
  public:
   const std::byte* values = nullptr;  // the evaluator's slots

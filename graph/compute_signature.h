@@ -15,44 +15,10 @@
 #include "base/points.h"
 #include "base/types.h"
 #include "graph/compute_context.h"
+#include "graph/slot_kind.h"
 #include "graph/value.h"
 
 namespace kpsa::engine {
-
-enum class SlotKind : std::uint8_t {
-  kBool,     // of Type::kBool
-  kInteger,  // of Type::kInt and kEnum
-  kChoice,   // a scoped enum: of Type::kEnum
-  kDouble,
-  kDouble3,
-  kQuaternion,
-  kMatrix,
-  kPoints,  // ConstPointsView and PointsView: of points, colors and weights
-  kOther,   // of none
-};
-
-// The kind of slots that a C++ type reads and writes.
-template <typename T>
-constexpr SlotKind SlotKindOf() {
-  if constexpr (std::is_same_v<T, bool>)
-    return SlotKind::kBool;
-  else if constexpr (std::is_integral_v<T>)
-    return SlotKind::kInteger;
-  else if constexpr (std::is_enum_v<T>)
-    return SlotKind::kChoice;
-  else if constexpr (std::is_same_v<T, double>)
-    return SlotKind::kDouble;
-  else if constexpr (std::is_same_v<T, Double3>)
-    return SlotKind::kDouble3;
-  else if constexpr (std::is_same_v<T, Quaternion>)
-    return SlotKind::kQuaternion;
-  else if constexpr (std::is_same_v<T, Matrix4>)
-    return SlotKind::kMatrix;
-  else if constexpr (std::is_same_v<T, ConstPointsView> || std::is_same_v<T, PointsView>)
-    return SlotKind::kPoints;
-  else
-    return SlotKind::kOther;
-}
 
 struct ComputeParameter {
   SlotKind kind = SlotKind::kOther;
@@ -96,17 +62,17 @@ template <typename T>
 struct ArgumentOf {
   static decltype(auto) Get(const ComputeContext& context, int i) {
     if constexpr (std::is_same_v<T, bool>) {
-      return context.get<std::int64_t>(i) != 0;
+      return context.slot<std::int64_t>(i) != 0;
     } else if constexpr (std::is_integral_v<T> || std::is_enum_v<T>) {
-      return static_cast<T>(context.get<std::int64_t>(i));
+      return static_cast<T>(context.slot<std::int64_t>(i));
     } else {
-      return context.get<T>(i);
+      return context.slot<T>(i);
     }
   }
 };
 template <typename T>
 struct ArgumentOf<ArrayView<T>> {
-  static ArrayView<T> Get(const ComputeContext& context, int i) { return context.array<T>(i); }
+  static ArrayView<T> Get(const ComputeContext& context, int i) { return context.slots<T>(i); }
 };
 
 // How an output is written: bools and integers as std::int64_t.
@@ -118,7 +84,7 @@ struct OutputSlot {
                 "no output is of this type: write bool, an integer, double, Double3, Quaternion, Matrix4, "
                 "PointsView, or an OutArray of one of them");
   static auto& Get(const ComputeContext& context, int i) {
-    return context.out_value<std::conditional_t<std::is_integral_v<T>, std::int64_t, T>>(i);
+    return context.out_slot<std::conditional_t<std::is_integral_v<T>, std::int64_t, T>>(i);
   }
 };
 template <typename T>
@@ -126,7 +92,7 @@ struct OutputSlot<OutArray<T>> {
   static constexpr ComputeParameter value = ParameterOfType<T>(true);
   static_assert(!std::is_integral_v<T> || std::is_same_v<T, std::int64_t>,
                 "elements of bool and int are std::int64_t");
-  static OutArray<T> Get(const ComputeContext& context, int i) { return context.out_array<T>(i); }
+  static OutArray<T> Get(const ComputeContext& context, int i) { return context.out_slots<T>(i); }
 };
 
 struct ComputeSignature {

@@ -1,6 +1,8 @@
 #include "graph/evaluator.h"
 
+#include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "base/check.h"
 #include "graph/step_host.h"
@@ -197,8 +199,18 @@ void Evaluator::RecordFailure(Index step, std::string_view message) {
   failure_ = message;
 }
 
+void Evaluator::RecordCancelled(Index step) {
+  std::lock_guard<std::mutex> lock(failure_mutex_);
+  cancelled_ = true;
+  failed_step_ = std::min(failed_step_, step);
+}
+
 Status Evaluator::TakeFailure() {
   if (failed_step_ == kNoIndex) return Status();
+  if (std::exchange(cancelled_, false)) {
+    failed_step_ = kNoIndex;
+    return Status::Make(ErrorKind::kInterrupted, "interrupted");
+  }
   Status status = Status::Evaluation("node \"{}\" ({}): {}", plan_->step_name(failed_step_),
                                      plan_->step_type(failed_step_), failure_)
                       .OfNode(plan_->step_name(failed_step_));

@@ -130,6 +130,7 @@ class Evaluator final {
   void OwnWorkspace(Index segment);
   void AddEvent(Index step, Index cause, std::uint64_t begin_ns, std::uint64_t end_ns);
   void RecordFailure(Index step, std::string_view message);
+  void RecordCancelled(Index step);
   Status TakeFailure();
   void MarkComputed(Index step, bool changed);
   bool dirty(Index step) const { return (dirty_[step / 64] >> (step % 64) & 1) != 0; }
@@ -171,6 +172,7 @@ class Evaluator final {
   std::mutex failure_mutex_;  // taken on failures only
   std::string failure_;
   Index failed_step_ = kNoIndex;
+  bool cancelled_ = false;  // that, rather than a failure
 };
 
 }  // namespace kpsa::engine

@@ -104,7 +104,7 @@ template <bool kRecord>
       step.compute(context);
     }
   } catch (...) {  // not on to a thread that nobody watches
-    host.Fail(ThrownText());
+    host.FailOfThrown(context);
   }
   if constexpr (kRecord) AddEvent(number, cause, begin, ProfileClock());
   if (host.failed) [[unlikely]] {
@@ -155,7 +155,7 @@ bool Evaluator::Decide(Index number, Index* cause) {
   StepHost host(this, number);
   ComputeContext context = ContextOf(plan_->steps()[number]);
   context.host = &host;
-  host.Guard([&] { chosen_[plan_->steps()[number].branch] = branch.decide(context); });
+  host.Guard(context, [&] { chosen_[plan_->steps()[number].branch] = branch.decide(context); });
   return !host.failed;
 }
 
@@ -270,7 +270,11 @@ bool Evaluator::TryBatch(Index number, Index end) {
   context.kernel = batch.kernel;
   context.out = reinterpret_cast<std::byte*>(workspace_->data() + batch.scratch);
   context.count = batch.count;
-  batch.compute(context);
+  try {
+    batch.compute(context);
+  } catch (...) {  // one by one, they say whose it is
+    return false;
+  }
   const std::size_t size = plan_->steps()[number].value_size;
   const std::byte* now = context.out;
   for (Index s = number; s < last; ++s, now += size) {
@@ -364,7 +368,11 @@ bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) 
     const float each = count == 0 ? 0 : cost / static_cast<float>(count);
     const auto grain = static_cast<std::size_t>(each > 0 ? kWorthThreadsNs / 2 / each : 64) + 1;
     if (cost > kWorthThreadsNs && count > 1) {
-      ParallelFor(count, grain, run_some);
+      try {
+        ParallelFor(count, grain, run_some);
+      } catch (const Cancelled&) {  // between steps
+        RecordCancelled(ready_.front());
+      }
     } else {
       run_some(0, count);
     }

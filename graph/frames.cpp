@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/cancel.h"
 #include "base/check.h"
 #include "base/parallel.h"
 #include "base/thrown.h"
@@ -74,14 +75,20 @@ class FrameQueue {
   Status Result() const {
     if (error_.ok() && thrown_ != nullptr) return ThrownStatus();
     if (!error_.ok() || done_ == frame_count_) return error_;
+    return InterruptedStatus();
+  }
+
+ private:
+  Status InterruptedStatus() const {
     return Status::Make(ErrorKind::kInterrupted,
                         fmt::format("interrupted after {} of {} frames", done_, frame_count_));
   }
 
- private:
   Status ThrownStatus() const {
     try {
       std::rethrow_exception(thrown_);
+    } catch (const Cancelled&) {
+      return InterruptedStatus();
     } catch (...) {
       const std::string text = ThrownText();
       if (!thrown_at_.frame.has_value()) return Status::Evaluation("{}", text);
@@ -146,7 +153,8 @@ class BlockEvaluator {
       try {
         plan_.branches()[plan_.steps()[step].branch].compute_block(contexts_.data(), ready);
       } catch (...) {
-        for (std::size_t i = 0; i < ready; ++i) contexts_[i].host->Fail(ThrownText());
+        for (std::size_t i = 0; i < ready; ++i)
+          contexts_[i].host->Fail(ThrownByStep(plan_.shape(step), contexts_[i]));
       }
       const std::uint64_t share = profile_ != nullptr ? (ProfileClock() - start) / ready : 0;
       for (std::size_t i = 0; i < ready; ++i)
@@ -188,9 +196,11 @@ Status EvaluateFrames(const std::shared_ptr<const Plan>& plan, std::size_t frame
   const std::size_t block =
       std::clamp<std::size_t>(share, 1, alone ? 1 : static_cast<std::size_t>(options.block));
   FrameQueue queue(frame_count, block, sink, options.cancel);
+  const FlagCancel cancel(options.cancel);  // within frames
   // Nothing leaves a thread but through the queue
   const auto work = [&](bool first) {
     Place at;
+    const CancelScope scope(&cancel);
     try {
       std::optional<BlockEvaluator> evaluator;
       try {

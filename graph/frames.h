@@ -25,7 +25,7 @@ struct FrameOptions {
   int threads = 0;  // 0: as many as ParallelFor may use
   int block =
       8;  // frames that a thread evaluates side by side; shortened where there are too few for all threads
-  const std::atomic<bool>* cancel = nullptr;  // looked at between frames
+  const std::atomic<bool>* cancel = nullptr;  // looked at between frames, and in nodes that take long
   Profile* profile = nullptr;                 // records all frames, with their numbers
 };
 

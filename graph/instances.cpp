@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "graph/authored.h"
 #include "graph/structural_view.h"
 
 namespace kpsa::engine {
@@ -110,7 +111,8 @@ const Value* InstanceTable::HeldValue(NodeId node, int attribute, int element, b
   if (value != nullptr) {
     made = *value;
   } else if (a.default_from) {
-    made = a.default_from(StructuralView(*this, node, element, nullptr, nullptr));
+    const StructuralView view(*this, node, element, nullptr, nullptr);
+    made = CallAuthored(*this, node, [&] { return a.default_from(view); });
   } else if (!a.default_value.empty() || !IsPointType(a.type)) {
     made = a.default_value;
   } else {

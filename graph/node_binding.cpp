@@ -1,12 +1,24 @@
 #include "graph/node_binding.h"
 
-#include "base/check.h"
-#include "base/thrown.h"
+#include <algorithm>
+
+#include "base/near_names.h"
+#include "graph/authored.h"
 
 namespace kpsa::engine {
 namespace {
 
-// Positions of attributes in a group, by name.
+[[noreturn]] void ThrowUnknown(const InstanceTable& table, const Instance& instance, std::string_view name,
+                               bool output) {
+  std::vector<std::string> names;
+  for (const AttributeDef& a : table.graph().def(instance.node).attributes) {
+    if (a.output == output && !a.structural) names.push_back(a.name);
+  }
+  ThrowMisuse("it asks for the points of \"{}\", which is no {} of it{}; it has {}", name,
+              output ? "output" : "input", DidYouMean(std::string(name), names), fmt::join(names, ", "));
+}
+
+// Positions of attributes in a group, by name; -1 where an array has no such element, or another group reads it.
 int InputNumber(const InstanceTable& table, const Instance& instance, std::string_view name, int element) {
   const ComputeGroup& group = table.group(instance);
   for (std::size_t i = 0; i < instance.inputs.size(); ++i) {
@@ -16,6 +28,10 @@ int InputNumber(const InstanceTable& table, const Instance& instance, std::strin
     const bool one = !a.array || (a.per_geometry && group.per_geometry);
     if (one || input.element == element) return static_cast<int>(i);
   }
+  const NodeDef& def = table.graph().def(instance.node);
+  const auto declared = std::ranges::any_of(
+      def.attributes, [&](const AttributeDef& a) { return a.name == name && !a.output && !a.structural; });
+  if (!declared) ThrowUnknown(table, instance, name, false);
   return -1;
 }
 
@@ -23,8 +39,7 @@ int OutputPosition(const InstanceTable& table, const Instance& instance, std::st
   for (std::size_t p = 0; p < instance.output_sizes.size(); ++p) {
     if (table.output_def(instance, static_cast<int>(p)).name == name) return static_cast<int>(p);
   }
-  KPSA_CHECK(false);
-  return -1;
+  ThrowUnknown(table, instance, name, true);
 }
 
 const PointSet& OutputSet(const InstanceTable& table, const Instance& instance, const InstanceSets& sets,
@@ -62,7 +77,8 @@ class DemandOf final : public Demand {
     const int i = InputNumber(table_, instance_, name, element);
     if (i < 0) return;
     const Input& input = instance_.inputs[static_cast<std::size_t>(i)];
-    KPSA_CHECK(!input.lazy && IsSmallType(table_.input_def(instance_, input.position).type));
+    if (input.lazy || !IsSmallType(table_.input_def(instance_, input.position).type))
+      ThrowMisuse("it skips \"{}\"; expected an input that is neither lazy nor points", name);
     sets_->skipped.resize(instance_.inputs.size(), false);
     sets_->skipped[static_cast<std::size_t>(i)] = true;
   }
@@ -144,8 +160,9 @@ Result<Index> PointTotals::OfOutput(Index number, int position, int element) {
       const ComputeGroup& group = table_.group(instance);
       if (group.point_count) {
         const StructuralView view(table_, instance.node, instance.geometry, &instance, &statics_);
-        Result<Index> count =
-            group.point_count(view, table_.output_def(instance, key.position).name, key.element);
+        Result<Index> count = CallAuthored(table_, instance.node, [&] {
+          return group.point_count(view, table_.output_def(instance, key.position).name, key.element);
+        });
         if (!count.ok())
           return Status::Invalid("{}: {}", Describe(table_, instance), count.status().ToString())
               .OfNode(table_.graph().name(instance.node));
@@ -217,7 +234,10 @@ Status FillDemand(InstanceTable& table, PointTotals& totals, StaticValues& stati
   if (group.demand) {
     const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);
     DemandOf demand(table, instance, view, sets);
-    group.demand(demand);
+    CallAuthored(table, instance.node, [&] {
+      group.demand(demand);
+      return true;
+    });
     if (!demand.mismatch.empty())
       return Status::Invalid("{}: {}", Describe(table, instance), demand.mismatch)
           .OfNode(table.graph().name(instance.node));
@@ -253,14 +273,8 @@ Result<BoundKernel> Bind(InstanceTable& table, StaticValues& statics, Index numb
   if (instance.kind != Instance::Kind::kNode || !table.group(instance).bind) return BoundKernel();
   const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);
   const BindingOf binding(table, instance, view, sets);
-  const auto bind = [&]() -> Result<BoundKernel> {
-    try {
-      return table.group(instance).bind(binding);
-    } catch (...) {
-      return Status::Invalid("{}", ThrownText());
-    }
-  };
-  Result<BoundKernel> kernel = bind();
+  Result<BoundKernel> kernel =
+      CallAuthored(table, instance.node, [&] { return table.group(instance).bind(binding); });
   if (!kernel.ok())
     return Status::Invalid("{}: {}", Describe(table, instance), kernel.status().ToString())
         .OfNode(table.graph().name(instance.node));

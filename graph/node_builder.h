@@ -175,10 +175,9 @@ class NodeBuilder {
     group().compute_block = f;
     return *this;
   }
-  // Many steps of the group run as one: `bind` (or null) makes its kernel of theirs, `f` computes all of
-  // them.
-  NodeBuilder& batch(BindBatchFn bind, ComputeBatchFn f);
-  template <auto kBatch>  // a function of a NodeBatch
+  // Many steps of the group run as one: `bind` (or null) makes its kernel of theirs, a function of a NodeBatch computes
+  // all of them. Where it throws, they are computed one by one.
+  template <auto kBatch>
   NodeBuilder& batch(BindBatchFn bind) {
     using Batch = ContextOf<decltype(kBatch)>;
     check_ports(Batch::kPorts, "batch()");
@@ -226,9 +225,9 @@ class NodeBuilder {
     return [](ComputeContext& context) {
       const R result = F{}(ArgumentOf<std::decay_t<Args>>::Get(context, static_cast<int>(I))...);
       if constexpr (std::is_integral_v<R> || std::is_enum_v<R>) {
-        context.out_value<std::int64_t>(0) = static_cast<std::int64_t>(result);
+        context.out_slot<std::int64_t>(0) = static_cast<std::int64_t>(result);
       } else {
-        context.out_value<R>(0) = result;
+        context.out_slot<R>(0) = result;
       }
     };
   }
@@ -251,6 +250,7 @@ class NodeBuilder {
     }
   }
 
+  NodeBuilder& batch(BindBatchFn bind, ComputeBatchFn f);
   AttributeDef& attribute();  // the latest; a problem where there is none
   ComputeGroup& group();
   const AttributeDef& attribute_of(int number) const {

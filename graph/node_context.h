@@ -153,6 +153,7 @@ class NodeBatch {
   const K& kernel_as() const {
     return context_->kernel_as<K>();
   }
+  std::size_t count() const { return context_->count; }  // steps
 
  private:
   const BatchContext* context_;

@@ -1,14 +1,14 @@
 #include "graph/node_def.h"
 
 #include <algorithm>
-
-#include "base/check.h"
+#include <stdexcept>
 
 namespace kpsa::engine {
 
 std::int64_t Structural::ChoiceOf(std::string_view name, const std::type_info& as) const {
   const std::type_info* declared = choice_type(name);
-  KPSA_CHECK(declared == nullptr || *declared == as);
+  if (declared != nullptr && *declared != as)
+    throw std::logic_error(fmt::format("it asks for \"{}\" as another enum than it is declared with", name));
   return value(name).AsInt();
 }
 

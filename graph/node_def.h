@@ -45,8 +45,8 @@ struct AttributeDef {
   std::function<Value(const Structural&)> default_from;  // for defaults that follow from structural values
 };
 
-// The view that compile-time functions of a node receive. Names are attribute names; a name that the
-// definition lacks is a programmer's error.
+// The view that compile-time functions of a node receive. Names are attribute names; asking for one that the
+// definition lacks throws, and so becomes an error of the node.
 class Structural {
  public:
   virtual ~Structural() = default;
@@ -62,7 +62,7 @@ class Structural {
   int get_int(std::string_view name) const { return static_cast<int>(value(name).AsInt()); }
   double get_double(std::string_view name) const { return value(name).AsDouble(); }
   bool get_bool(std::string_view name) const { return value(name).AsInt() != 0; }
-  // Of an enum, as what it was declared with; another one is a programmer's error, too.
+  // Of an enum, as what it was declared with; asking for another one throws, too.
   template <typename E>
   E choice(std::string_view name) const {
     return static_cast<E>(ChoiceOf(name, typeid(E)));

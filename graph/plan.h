@@ -16,6 +16,7 @@
 
 #include "graph/graph.h"
 #include "graph/point_set.h"
+#include "graph/step_shape.h"
 
 namespace kpsa::engine {
 
@@ -118,6 +119,7 @@ class Plan {
     std::uint32_t name = 0, type = 0, label = 0;
     Index segment = 0;
     Index points = 0, points_total = 0;  // 0 for steps without points
+    Index shape = kNoIndex;              // what its compute reads and writes; kNoIndex: it is none of a node
     float cost_ns = 0;
   };
   struct Excluded {
@@ -134,6 +136,9 @@ class Plan {
   const std::vector<Varying>& varying() const { return varying_; }
   const std::vector<Output>& outputs() const { return outputs_; }
   const std::vector<StepInfo>& infos() const { return infos_; }
+  const StepShape* shape(Index step) const {
+    return infos_[step].shape == kNoIndex ? nullptr : &shapes_[infos_[step].shape];
+  }
   const std::vector<Excluded>& excluded() const { return excluded_; }
   // The first node that needs its previous frame (NodeDef::stateful), or "": such a plan is evaluated in
   // ascending order on one evaluator.
@@ -180,6 +185,7 @@ class Plan {
   std::vector<Varying> varying_;
   std::vector<Output> outputs_;
   std::vector<StepInfo> infos_;
+  std::vector<StepShape> shapes_;  // of the types of nodes, once each
   std::vector<Excluded> excluded_;
   std::vector<std::vector<std::pair<Index, Index>>> closures_;
   std::vector<std::byte> initial_values_;

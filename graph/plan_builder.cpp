@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "base/check.h"
+#include "graph/authored.h"
 #include "graph/builtin_steps.h"
 #include "graph/static_eval.h"
 
@@ -209,6 +210,12 @@ Index PlanBuilder::ProducerOf(const DraftInput& input) const {
   return kNoIndex;
 }
 
+Index PlanBuilder::ShapeOf(const Instance& instance, const ComputeGroup& group) {
+  const auto [it, added] = shape_of_.emplace(&group, static_cast<Index>(plan_->shapes_.size()));
+  if (added) plan_->shapes_.push_back(StepShape::Of(table_.graph().def(instance.node), group));
+  return it->second;
+}
+
 void PlanBuilder::FillSteps() {
   std::vector<std::uint32_t> table;
   for (Index n = 0; n < placed_.size(); ++n) {
@@ -218,6 +225,8 @@ void PlanBuilder::FillSteps() {
     const Instance* instance = draft.instance == kNoIndex ? nullptr : &table_.instances()[draft.instance];
     const ComputeGroup* group =
         instance != nullptr && instance->kind == Instance::Kind::kNode ? &table_.group(*instance) : nullptr;
+
+    if (group != nullptr) info.shape = ShapeOf(*instance, *group);
 
     // Inputs: a slot each; arrays as tables behind them
     table.assign(group != nullptr ? group->inputs.size() : draft.inputs.size(), 0);
@@ -357,8 +366,11 @@ void PlanBuilder::MakeBatches() {
         }
         Plan::Batch batch;
         batch.compute = group->compute_batch;
-        if (group->bind_batch)
-          plan_->owned_.push_back(group->bind_batch(kernels)), batch.kernel = plan_->owned_.back().get();
+        if (group->bind_batch) {
+          const NodeId node = plan_->infos_[first].node;
+          plan_->owned_.push_back(CallAuthored(table_, node, [&] { return group->bind_batch(kernels); }));
+          batch.kernel = plan_->owned_.back().get();
+        }
         batch.first = first;
         batch.count = last - first;
         batch.stride = plan_->steps_[first + 1].in - plan_->steps_[first].in;

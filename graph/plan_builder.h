@@ -38,6 +38,7 @@ class PlanBuilder {
                           std::uint32_t reuse);
   std::uint32_t ConstantSlot(const Value& value, Type type, const PointSet& points);
   std::uint32_t AddText(const std::string& text);
+  Index ShapeOf(const Instance& instance, const ComputeGroup& group);
 
   InstanceTable& table_;
   const PlanDraft& draft_;
@@ -52,6 +53,7 @@ class PlanBuilder {
   std::unordered_map<std::string, std::uint32_t> small_constants_;  // slots by their bytes
   std::map<std::pair<const Value*, Digest>, std::uint32_t> point_constants_;
   std::unordered_map<std::string, std::uint32_t> texts_;
+  std::unordered_map<const ComputeGroup*, Index> shape_of_;
 };
 
 }  // namespace kpsa::engine

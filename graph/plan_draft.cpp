@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "graph/authored.h"
 #include "graph/static_eval.h"
 
 namespace kpsa::engine {
@@ -150,8 +151,8 @@ class Drafter {
         table_.graph().def(instance.node).stateful)
       return nullptr;
     const ComputeGroup& group = table_.group(instance);
-    if (group.touches(StructuralView(table_, instance.node, instance.geometry, &instance, &statics_),
-                      points) &&
+    const StructuralView view(table_, instance.node, instance.geometry, &instance, &statics_);
+    if (CallAuthored(table_, instance.node, [&] { return group.touches(view, points); }) &&
         !RestsAtZero(instance, group.strength_input))
       return nullptr;
     const auto input = std::ranges::find(instance.inputs, group.touched_input, &Input::position);

@@ -19,7 +19,7 @@ namespace kpsa::engine {
 
 // Of the declarations that this header includes: raised whenever one of them changes its layout or meaning.
 // Libraries of another version are refused.
-inline constexpr int kPluginAbi = 7;
+inline constexpr int kPluginAbi = 8;
 
 }  // namespace kpsa::engine
 

@@ -1,10 +1,11 @@
 #include "graph/point_set.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <numeric>
-
-#include "base/check.h"
+#include <stdexcept>
 
 namespace kpsa::engine {
 
@@ -24,7 +25,8 @@ PointSet PointSet::None(Index total) {
 PointSet PointSet::Of(std::vector<Index> indices, Index total) {
   std::sort(indices.begin(), indices.end());
   indices.erase(std::unique(indices.begin(), indices.end()), indices.end());
-  if (!indices.empty()) KPSA_CHECK_LT(indices.back(), total);
+  if (!indices.empty() && indices.back() >= total)
+    throw std::out_of_range(fmt::format("point {} of {}", indices.back(), total));
   if (indices.size() == total) return All(total);
   PointSet set = None(total);
   set.indices_ = std::make_shared<const std::vector<Index>>(std::move(indices));
@@ -43,15 +45,21 @@ bool PointSet::Contains(Index point) const {
   return indices_ != nullptr && std::binary_search(indices_->begin(), indices_->end(), point);
 }
 
+void PointSet::CheckTotal(const PointSet& other) const {
+  if (total_ != other.total_)
+    throw std::logic_error(
+        fmt::format("a set of {} points and one of {} are not of the same points", total_, other.total_));
+}
+
 bool PointSet::Includes(const PointSet& other) const {
-  KPSA_CHECK_EQ(total_, other.total_);
+  CheckTotal(other);
   if (all_ || other.empty()) return true;
   if (other.all_ || other.size() > size()) return false;
   return std::includes(indices_->begin(), indices_->end(), other.indices_->begin(), other.indices_->end());
 }
 
 PointSet PointSet::Union(const PointSet& other) const {
-  KPSA_CHECK_EQ(total_, other.total_);
+  CheckTotal(other);
   if (all_ || other.empty()) return *this;
   if (other.all_ || empty()) return other;
   std::vector<Index> merged;
@@ -62,7 +70,7 @@ PointSet PointSet::Union(const PointSet& other) const {
 }
 
 std::vector<Index> PointSet::PositionsOf(const PointSet& subset) const {
-  KPSA_CHECK_EQ(total_, subset.total_);
+  CheckTotal(subset);
   std::vector<Index> positions(subset.size());
   Index at = 0;
   for (Index i = 0; i < subset.size(); ++i) {
@@ -72,7 +80,8 @@ std::vector<Index> PointSet::PositionsOf(const PointSet& subset) const {
       continue;
     }
     while (at < size() && (*indices_)[at] < point) ++at;
-    KPSA_CHECK(at < size() && (*indices_)[at] == point);
+    if (at >= size() || (*indices_)[at] != point)
+      throw std::out_of_range(fmt::format("point {} is not in the set", point));
     positions[i] = at;
   }
   return positions;

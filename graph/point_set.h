@@ -36,6 +36,7 @@ class PointSet {
   friend bool operator==(const PointSet& a, const PointSet& b);
 
  private:
+  void CheckTotal(const PointSet& other) const;
   Index total_ = 0;
   bool all_ = false;
   std::shared_ptr<const std::vector<Index>> indices_;

@@ -4,8 +4,9 @@
 #include <cstring>
 #include <utility>
 
+#include "base/cancel.h"
 #include "base/check.h"
-#include "base/thrown.h"
+#include "graph/step_shape.h"
 
 namespace kpsa::engine {
 namespace {
@@ -15,6 +16,8 @@ class StaticHost final : public ComputeHost {
  public:
   void Fail(std::string_view message) override { error = message; }
   void For(std::size_t count, std::size_t, RangeBody body) override { body(0, count); }
+  void Check(const SlotAccess& access) const override { shape.Check(access); }
+  StepShape shape;
   std::string error;
 };
 
@@ -237,6 +240,7 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   }
   AlignedFloats scratch(kernel->scratch_floats), state((kernel->state_bytes + 3) / 4);
   StaticHost host;
+  host.shape = StepShape::Of(table_.graph().def(instance.node), group);
   ComputeContext context;
   context.values = arena.data();
   context.in = in.data();
@@ -249,8 +253,10 @@ Status StaticEvaluator::Run(Index number, bool rest) {
   try {
     if (group.decide != nullptr) context.chosen = group.decide(context);
     if (host.error.empty()) (kernel->compute != nullptr ? kernel->compute : group.compute)(context);
+  } catch (const Cancelled&) {  // on to whoever compiles
+    throw;
   } catch (...) {
-    host.Fail(ThrownText());
+    host.Fail(ThrownByStep(&host.shape, context));
   }
   if (!host.error.empty())
     return Status::Evaluation("{}: {}", Describe(table_, instance), host.error)

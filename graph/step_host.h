@@ -1,7 +1,7 @@
 // What a compute may ask the evaluator for. Internal to graph/.
 #pragma once
 
-#include "base/thrown.h"
+#include "base/cancel.h"
 #include "graph/evaluator.h"
 
 namespace kpsa::engine {
@@ -21,6 +21,9 @@ class Evaluator::StepHost final : public ComputeHost {
       body(0, count);
     }
   }
+  void Check(const SlotAccess& access) const override {
+    if (const StepShape* shape = evaluator_->plan_->shape(step)) shape->Check(access);
+  }
   bool recording() const override { return evaluator_->profile_ != nullptr; }
   void AddPart(int part, std::uint64_t ns) override {
     if (evaluator_->profile_ != nullptr) evaluator_->profile_->AddPart(step, part, ns);
@@ -28,11 +31,22 @@ class Evaluator::StepHost final : public ComputeHost {
   // Calls what a node's author wrote. An exception of it is a failure of the step: it may run on a thread that nobody
   // watches, and ends in none of the evaluator's own code.
   template <typename F>
-  void Guard(const F& function) {
+  void Guard(const ComputeContext& context, const F& function) {
     try {
       function();
     } catch (...) {
-      Fail(ThrownText());
+      FailOfThrown(context);
+    }
+  }
+  // In a catch block: of the exception that is being handled.
+  [[gnu::noinline, gnu::cold]] void FailOfThrown(const ComputeContext& context) {
+    try {
+      throw;
+    } catch (const Cancelled&) {
+      failed = true;
+      evaluator_->RecordCancelled(step);
+    } catch (...) {
+      Fail(ThrownByStep(evaluator_->plan_->shape(step), context));
     }
   }
   bool failed = false;

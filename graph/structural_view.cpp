@@ -1,12 +1,18 @@
 #include "graph/structural_view.h"
 
-#include "base/check.h"
+#include "base/near_names.h"
+#include "graph/authored.h"
 
 namespace kpsa::engine {
 
 int StructuralView::Attribute(std::string_view name) const {
-  const int attribute = table_.graph().def(node_).FindAttribute(name);
-  KPSA_CHECK(attribute >= 0);
+  const NodeDef& def = table_.graph().def(node_);
+  const int attribute = def.FindAttribute(name);
+  if (attribute < 0) {
+    const std::vector<std::string> names = def.AttributeNames();
+    ThrowMisuse("it asks for \"{}\", which is no attribute of it{}; it has {}", name,
+                DidYouMean(std::string(name), names), fmt::join(names, ", "));
+  }
   return attribute;
 }
 

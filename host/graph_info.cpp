@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "graph/authored.h"
 #include "graph/instances.h"
 #include "host/face_impl.h"
 #include "host/problems.h"
@@ -89,8 +90,12 @@ kpsa::Result<PlugValue> Rig::Value(std::string_view name) const {
         engine::Status::Usage("{} is a part of points: expected a plug of its own", name).OfNode(node));
   const engine::Request nothing;
   engine::InstanceTable table(graph, nothing);
-  const engine::Value& value = *table.HeldValue(plug->node, plug->attribute, plug->element);
-  return ValueOf(attribute, value, plug->component, impl_->rest.units.FactorOf(attribute.unit));
+  try {
+    const engine::Value& value = *table.HeldValue(plug->node, plug->attribute, plug->element);
+    return ValueOf(attribute, value, plug->component, impl_->rest.units.FactorOf(attribute.unit));
+  } catch (const engine::NodeFailure& failure) {  // its default, which follows from others
+    return failed(failure.status);
+  }
 }
 
 }  // namespace kpsa

@@ -39,6 +39,7 @@ kpsa::Result<kpsa::Rig> Library::Load(const std::string& path, const LoadOptions
   rig_options.rest = true;
   rig_options.fps = options.fps;
   rig_options.variant = options.variant;
+  rig_options.trust = options.trust;
   if (options.plugins) rig_options.plugins = &impl_->plugins;
   engine::Result<engine::Rig> rig = engine::LoadRig(impl_->registry, path, rig_options);
   if (!rig.ok()) return engine::ProblemsOf(engine::Status(rig.status()).At({path}));

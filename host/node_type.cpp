@@ -49,7 +49,11 @@ Type TypeOf(NodeAttribute::Type type) {
 // A type's function with what it needs to be called; its kernel has the points that are wanted as well.
 struct Function {
   std::function<std::string(const NodeCall&)> compute;
-  std::vector<std::size_t> inputs, outputs;  // numbers of each
+  struct Attribute {
+    std::string name;
+    std::size_t numbers = 0;
+  };
+  std::vector<Attribute> inputs, outputs;
   bool deformer = false;
 };
 struct Kernel {
@@ -70,25 +74,31 @@ void Compute(ComputeContext& c) {
   const auto& kernel = c.kernel_as<Kernel>();
   const Function& function = *kernel.function;
   const int first = function.deformer ? 1 : 0;  // after inPoints, outPoints
-  std::vector<std::span<const double>> inputs;
-  std::vector<std::span<double>> outputs;
-  for (std::size_t i = 0; i < function.inputs.size(); ++i)
-    inputs.emplace_back(&c.get<double>(first + static_cast<int>(i)), function.inputs[i]);
-  for (std::size_t i = 0; i < function.outputs.size(); ++i)
-    outputs.emplace_back(&c.out_value<double>(first + static_cast<int>(i)), function.outputs[i]);
+  std::vector<Row<const double>> inputs;
+  std::vector<Row<double>> outputs;
+  for (std::size_t i = 0; i < function.inputs.size(); ++i) {
+    const auto& [name, numbers] = function.inputs[i];
+    inputs.emplace_back(std::span(&c.slot<double>(first + static_cast<int>(i)), numbers), name);
+  }
+  for (std::size_t i = 0; i < function.outputs.size(); ++i) {
+    const auto& [name, numbers] = function.outputs[i];
+    outputs.emplace_back(std::span(&c.out_slot<double>(first + static_cast<int>(i)), numbers), name);
+  }
+  NodeCall call;
+  call.inputs = {inputs, "inputs"}, call.outputs = {outputs, "outputs"};
+  call.points = {{}, "points"}, call.out_points = {{}, "out_points"};
   if (!function.deformer) {
-    if (const std::string wrong = Call(function, {inputs, outputs, {}, {}}); !wrong.empty())
-      c.host->Fail(wrong);
+    if (const std::string wrong = Call(function, call); !wrong.empty()) c.host->Fail(wrong);
     return;
   }
-  const ConstPointsView in = c.points(0);
+  const ConstPointsView in = c.slot<ConstPointsView>(0);
   std::vector<float> points(3 * std::size_t{in.count});
   for (std::size_t i = 0; i < in.count; ++i)
     points[3 * i] = in.x[i], points[3 * i + 1] = in.y[i], points[3 * i + 2] = in.z[i];
   std::vector<float> moved = points;
-  if (const std::string wrong = Call(function, {inputs, outputs, points, moved}); !wrong.empty())
-    return c.host->Fail(wrong);
-  const PointsView out = c.out_points(0);
+  call.points = {points, "points"}, call.out_points = {moved, "out_points"};
+  if (const std::string wrong = Call(function, call); !wrong.empty()) return c.host->Fail(wrong);
+  const PointsView out = c.out_slot<PointsView>(0);
   for (std::size_t i = 0; i < out.count; ++i) {
     const std::size_t from = 3 * std::size_t{kernel.points[i]};
     out.x[i] = moved[from], out.y[i] = moved[from + 1], out.z[i] = moved[from + 2];
@@ -135,12 +145,12 @@ Status DeclareNode(const NodeType& type, NodeRegistry* registry) {
     const std::size_t count = NumbersIn(input.type);
     if (!input.value.empty() && input.value.size() != count)
       return wrong(fmt::format("{}: expected {} numbers, got {}", input.name, count, input.value.size()));
-    function->inputs.push_back(count);
+    function->inputs.push_back({input.name, count});
     node.in(input.name, DefaultOf(input));
   }
   if (type.deformer) node.out("outPoints", Type::kPoints, "the deformed points").per_geometry();
   for (const NodeAttribute& output : type.outputs) {
-    function->outputs.push_back(NumbersIn(output.type));
+    function->outputs.push_back({output.name, NumbersIn(output.type)});
     node.out(output.name, TypeOf(output.type));
   }
   if (type.deformer && !type.outputs.empty())

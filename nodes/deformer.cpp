@@ -41,8 +41,8 @@ struct WithFalloff {
 void ComputeWithFalloff(ComputeContext& c) {
   const auto& bound = c.kernel_as<WithFalloff>();
   c.kernel = bound.kernel.get();
-  const ConstPointsView& in = c.points(bound.points);
-  const PointsView& out = c.out_points(0);
+  const ConstPointsView& in = c.slot<ConstPointsView>(bound.points);
+  const PointsView& out = c.out_slot<PointsView>(0);
   const std::size_t row = PaddedCount(out.count);
   float* copy = c.scratch + bound.scratch_floats;
   const PointsView before{copy, copy + row, copy + 2 * row, out.count};  // compute may work in place
@@ -52,7 +52,7 @@ void ComputeWithFalloff(ComputeContext& c) {
     GatherPoints(in, bound.positions, before);
   }
   bound.compute(c);
-  const float* weights = c.points(bound.falloff).x;
+  const float* weights = c.slot<ConstPointsView>(bound.falloff).x;
   c.host->For(out.count, 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const float w = weights[i];

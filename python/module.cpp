@@ -512,7 +512,8 @@ PYBIND11_MODULE(_kpsa, m) {
           py::arg("compute") = py::none(), py::kw_only(), py::arg("deformer") = false, py::arg("doc") = "",
           "A node type that a Python function computes: for prototypes, as it is slow, frames with it run on "
           "one "
-          "thread, and no points that need it are trained. inputs: defaults by name (a number, three, four, a matrix "
+          "thread, and no points that need it are trained. inputs: defaults by name (a number, three, four, "
+          "a matrix "
           "[4, 4]); "
           "outputs: names, or kinds by name (\"number\", \"vector\", \"quaternion\", \"matrix\"). "
           "compute(**inputs) gives the output, a tuple of them or a dict; of a deformer, compute(points, "
@@ -521,9 +522,10 @@ PYBIND11_MODULE(_kpsa, m) {
       .def(
           "load",
           [](const kpsa::Library& l, const std::string& path, const std::optional<std::string>& variant,
-             std::optional<double> fps, bool plugins) {
-            return Checked([&] { return l.Load(path, {variant, fps, plugins}); });
+             std::optional<double> fps, bool plugins, const std::vector<std::string>& trust) {
+            return Checked([&] { return l.Load(path, {variant, fps, plugins, trust}); });
           },
           py::arg("path"), py::kw_only(), py::arg("variant") = py::none(), py::arg("fps") = py::none(),
-          py::arg("plugins") = true, "A rig (.yaml) or a character (.glb, .gltf, .vrm).");
+          py::arg("plugins") = true, py::arg("trust") = py::list(),
+          "A rig (.yaml) or a character (.glb, .gltf, .vrm).");
 }

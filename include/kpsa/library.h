@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "kpsa/node_type.h"
 #include "kpsa/result.h"
@@ -17,6 +18,9 @@ struct LoadOptions {
   std::optional<std::string> variant = {};  // of the rig's `variants`, or hero:NAME of a reference's
   std::optional<double> fps = {};           // frames a second, instead of the rig's
   bool plugins = true;  // false: a rig that names plugins is refused, and no foreign code is loaded
+  // A rig names files of its own folder, or of the project around that (a folder with a file kpsa.project), and of
+  // these folders and those of the environment's KPSA_TRUST (docs/safety.md). Others are refused.
+  std::vector<std::string> trust = {};
 };
 
 // May be copied (copies share it) and used by several threads at once: types may be added while others load, train

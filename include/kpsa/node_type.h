@@ -4,7 +4,9 @@
 
 #include <functional>
 #include <span>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace kpsa {
@@ -22,12 +24,35 @@ struct NodeAttribute {
       {};  // an input's where nothing is set; empty: zeros, or what turns and moves nothing
 };
 
+// A span whose places are checked: asking for one that there is not throws, which is an error of the node.
+template <typename T>
+class Row {
+ public:
+  Row() = default;
+  Row(std::span<T> values, std::string_view name) : values_(values), name_(name) {}
+  T& operator[](std::size_t i) const {
+    if (i >= values_.size())
+      throw std::out_of_range("asks for place " + std::to_string(i) + " of " + std::string(name_) +
+                              ", which has " + std::to_string(values_.size()));
+    return values_[i];
+  }
+  std::size_t size() const { return values_.size(); }
+  T* data() const { return values_.data(); }
+  auto begin() const { return values_.begin(); }
+  auto end() const { return values_.end(); }
+  operator std::span<T>() const { return values_; }  // NOLINT: implicit by design
+
+ private:
+  std::span<T> values_;
+  std::string_view name_;  // "inputs", or an attribute's
+};
+
 // What a function reads and writes while it computes.
 struct NodeCall {
-  std::span<const std::span<const double>> inputs;  // by input, as many numbers as its type has
-  std::span<const std::span<double>> outputs;       // by output; to be written
-  std::span<const float> points;                    // of a deformer: x y z a point, as they come in
-  std::span<float> out_points;                      // as many; they hold the same when the function is called
+  Row<const Row<const double>> inputs;  // by input, as many numbers as its type has
+  Row<const Row<double>> outputs;       // by output; to be written
+  Row<const float> points;              // of a deformer: x y z a point, as they come in
+  Row<float> out_points;                // as many; they hold the same when the function is called
 };
 
 struct NodeType {

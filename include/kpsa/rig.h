@@ -63,7 +63,8 @@ struct TrainingOptions {
   double seconds = std::numeric_limits<double>::infinity();  // about how long it may take
   int threads = 0;                                           // 0: all
   bool paper = false;  // the method of the paper as it stands (Meyer and Anderson 2007)
-  // What is being done, and the share of it, 0 to 1; false cancels. On the thread that trains.
+  // What is being done, and the share of it, 0 to 1; false cancels. On the thread that trains; some
+  // times a second, with the same words, while a part takes long.
   std::function<bool(std::string_view what, double share)> progress = {};
 };
 struct TrainingReport {

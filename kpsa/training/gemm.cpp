@@ -78,6 +78,7 @@ void PackedProduct(const double* a, const double* b, std::size_t depth, std::siz
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include "base/cancel.h"
 #include "base/check.h"
 #include "base/parallel.h"
 
@@ -110,6 +111,7 @@ void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, std::siz
   AlignedDoubles packed_a(row_panels * kRowStep * kDepth), packed_b(column_panels * kColumnStep * kDepth);
   AlignedDoubles tile(row_panels * kRowStep * column_panels * kColumnStep);
   for (std::size_t k = 0; k < a.columns(); k += kDepth) {
+    ThrowIfCancelled();
     const std::size_t depth = std::min(kDepth, a.columns() - k);
     a.Pack(row, height, k, depth, kRowStep, packed_a.data());
     b_transposed.Pack(column, width, k, depth, kColumnStep, packed_b.data());

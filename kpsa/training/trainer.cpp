@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "kpsa/training/finer_subspaces.h"
+#include "kpsa/training/training_cancel.h"
 
 namespace kpsa::engine {
 namespace {
@@ -104,11 +105,21 @@ Result<Subspace> TrainOnce(const TrainingRig& rig, const std::vector<TrainingCli
 
 Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                        const TrainOptions& options) {
-  Result<Subspace> trained = TrainOnce(rig, clips, options);
-  if (!trained.ok() || !options.by_tile_as_before || trained->by_tile()) return trained;
-  TrainOptions together = options;  // with cues for all points, what is learnt changes all of them
-  together.by_tile_as_before = false;
-  return TrainOnce(rig, clips, together);
+  TrainingCancel cancel(options.progress);
+  const CancelScope scope(&cancel);
+  TrainOptions watched = options;
+  if (options.progress)
+    watched.progress = [&](const char* what, double share) { return cancel.Say(what, share); };
+  try {
+    Result<Subspace> trained = TrainOnce(rig, clips, watched);
+    if (!trained.ok() && cancel.asked()) throw Cancelled();  // an evaluation that was ended, say
+    if (!trained.ok() || !watched.by_tile_as_before || trained->by_tile()) return trained;
+    watched.by_tile_as_before = false;  // with cues for all points, what is learnt changes all of them
+    return TrainOnce(rig, clips, watched);
+  } catch (const Cancelled&) {
+    KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+    return Status::Make(ErrorKind::kInterrupted, "interrupted");
+  }
 }
 
 }  // namespace kpsa::engine

@@ -55,7 +55,9 @@ struct TrainOptions {
     bool trust = false;          // the doubts of all tiles count alike
     bool miss_costs = false;  // cues by the error they leave, at the first place; no finer tiles for misses
   } without;
-  std::function<bool(const char* what, double share)> progress;  // false cancels; may be null
+  // On the thread that trains, at each stage, and some times a second within those that take long; false cancels. May
+  // be null.
+  std::function<bool(const char* what, double share)> progress;
 };
 
 // What the trainer needs of a rig. set_clip lets a clip of the character play (nullopt: the rest pose).

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/cancel.h"
 #include "base/check.h"
 #include "kpsa/training/gemm.h"
 
@@ -69,6 +70,7 @@ VarimaxResult Varimax(const VarimaxOptions& options, int components, Eigen::Matr
     bool turned = false;
     for (Eigen::Index j = 0; j + 1 < m; ++j) {
       for (Eigen::Index k = j + 1; k < m; ++k) {
+        ThrowIfCancelled();
         turned |= PlanarStep(points, components, modes->col(j).data(), modes->col(k).data(),
                              &s[static_cast<std::size_t>(j)], &s[static_cast<std::size_t>(k)]);
       }

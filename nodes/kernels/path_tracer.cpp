@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/cancel.h"
 #include "base/check.h"
 #include "base/scalar_math.h"
 
@@ -312,12 +313,15 @@ Double3 PathTracer::Direct(const ShadingPlace& place, std::uint32_t seed, int sa
   return sum;
 }
 
+constexpr int kSamplesUnasked = 64;  // some tens of microseconds
+
 // E = pi / N sum L_i over cosine-weighted directions, with L = albedo / pi (E_direct + E_bounced) there.
 Double3 PathTracer::Indirect(const ShadingPlace& place, const PathOptions& options) const {
   Double3 sum;
   if (!place.hit) return sum;
   const double largest = options.largest > 0 ? options.largest : std::numeric_limits<double>::infinity();
   for (int s = 0; s < options.samples; ++s) {
+    if (s % kSamplesUnasked == 0) ThrowIfCancelled();
     const auto sample = static_cast<std::uint32_t>(s);
     Double3 through = {1, 1, 1};
     ShadingPlace from = place;

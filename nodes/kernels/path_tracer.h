@@ -82,7 +82,8 @@ class PathTracer {
   ShadingPlace OnPoint(Index point) const;
   // Irradiance that arrives from lights; `samples` a light that has a size.
   Double3 Direct(const ShadingPlace& place, std::uint32_t seed, int samples) const;
-  // Irradiance that arrives from surfaces: the mean of paths of at most `bounces` surfaces, 1 at least.
+  // Irradiance that arrives from surfaces: the mean of paths of at most `bounces` surfaces, 1 at least. Throws
+  // Cancelled where the scope around it asks for that (base/cancel.h).
   Double3 Indirect(const ShadingPlace& place, const PathOptions& options) const;
 
  private:

@@ -13,6 +13,9 @@ __all__ = ["BenchReport", "Clip", "Connection", "Control", "Error", "GraphEdit",
            "Scene", "TrainingReport", "Verdict", "load"]
 
 
-def load(path, *, variant=None, fps=None, plugins=True):
-    """A rig (.yaml) or a character (.glb, .gltf, .vrm), with the standard node types."""
-    return Library().load(str(path), variant=variant, fps=fps, plugins=plugins)
+def load(path, *, variant=None, fps=None, plugins=True, trust=()):
+    """A rig (.yaml) or a character (.glb, .gltf, .vrm), with the standard node types.
+
+    trust: folders besides the rig's own whose files it may name.
+    """
+    return Library().load(str(path), variant=variant, fps=fps, plugins=plugins, trust=[str(folder) for folder in trust])

@@ -185,8 +185,8 @@ class Library:
         points that need it are trained. inputs: defaults by name (a number, three, four, a matrix [4, 4]); outputs: names, or kinds by
         name ("number", "vector", "quaternion", "matrix"). compute(**inputs) gives the output, a tuple of them or a dict; of a
         deformer, compute(points, **inputs) gives points [P, 3], or changes them and gives None. Without compute: a decorator."""
-    def load(self, path: str, *, variant: Optional[str] = None, fps: Optional[float] = None, plugins: bool = True) -> Rig:
+    def load(self, path: str, *, variant: Optional[str] = None, fps: Optional[float] = None, plugins: bool = True, trust: Sequence[str] = ...) -> Rig:
         """A rig (.yaml) or a character (.glb, .gltf, .vrm)."""
 
-def load(path: Union[str, os.PathLike[str]], *, variant: Optional[str] = None, fps: Optional[float] = None, plugins: bool = True) -> Rig:
+def load(path: Union[str, os.PathLike[str]], *, variant: Optional[str] = None, fps: Optional[float] = None, plugins: bool = True, trust: Sequence[Union[str, os.PathLike[str]]] = ...) -> Rig:
     """A rig (.yaml) or a character (.glb, .gltf, .vrm), with the standard node types."""

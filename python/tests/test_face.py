@@ -115,6 +115,21 @@ def test_errors_say_where(rig, tmp_path):
         rig.accelerated("none.kpsa")
 
 
+def test_rigs_name_files_of_trusted_folders(tmp_path, monkeypatch):
+    monkeypatch.delenv("KPSA_TRUST", raising=False)
+    (tmp_path / "rig").mkdir()
+    path = tmp_path / "rig" / "rig.yaml"
+    path.write_text(f"kpsa: 1\ncharacter: {SCENES / 'hello' / 'hello.glb'}\n")
+    with pytest.raises(kpsa.Error, match="leads out of the rig's folder.* trust ") as error:
+        kpsa.load(path)
+    assert error.value.line == 2
+    assert kpsa.load(path, trust=[SCENES / "hello"]).meshes
+    with pytest.raises(kpsa.Error, match="nowhere"):
+        kpsa.load(path, trust=[tmp_path / "nowhere"])
+    monkeypatch.setenv("KPSA_TRUST", str(SCENES))
+    assert kpsa.load(path).meshes
+
+
 def test_frames_are_the_same_on_any_number_of_threads(fast):
     scene = fast.scene()
     scene.play("wave")

@@ -20,9 +20,6 @@ struct BuildInput {
   const Graph& graph() const { return *rig.graph; }
   // Of a file of the rig, by its index in RigFile::sources.
   const FileUnits& units(int source) const { return file.sources[static_cast<std::size_t>(source)].units; }
-  const std::string& folder(int source) const {
-    return file.sources[static_cast<std::size_t>(source)].folder;
-  }
   // False, with an error at the place, where `status` is one.
   bool Fail(const SourceLocation& where, Status status) const {
     if (status.ok()) return true;

@@ -82,7 +82,8 @@ struct GivenOverrides {
 
 class Loader {
  public:
-  Loader(const NodeRegistry& registry, const RigOptions& options) : registry_(registry), options_(options) {}
+  Loader(const NodeRegistry& registry, const RigOptions& options, TrustedFolders trusted)
+      : registry_(registry), options_(options), trusted_(std::move(trusted)) {}
 
   // `given`: of the file that references this one; null for the one that was asked for.
   Result<LoadedRig> Load(const std::string& path, const std::optional<std::string>& variant,
@@ -103,7 +104,8 @@ class Loader {
 
   const NodeRegistry& registry_;
   const RigOptions& options_;
-  std::vector<Opened> open_;  // the outermost first
+  const TrustedFolders trusted_;  // of the rig that was asked for, for those that it references, too
+  std::vector<Opened> open_;      // the outermost first
   std::size_t references_ = 0;
 };
 
@@ -139,12 +141,13 @@ Result<LoadedRig> Loader::Load(const std::string& path, const std::optional<std:
   SourceLocation character_at{path, 0, 0};
   std::optional<std::string> inner_variant;
   if (IsCharacterFile(path)) {
+    file.trusted = trusted_;
     file.sources.push_back({path, "", FileUnits(), {}});
     file.character = RigString{path, character_at, 0};
     if (options_.fps.has_value()) file.sources[0].units.fps = *options_.fps;
     if (variant.has_value()) return ApplyVariant(*variant, &file);
   } else {
-    errors.Append(ReadRigFile(path, options_.fps, &file));
+    errors.Append(ReadRigFile(path, options_.fps, &file, false, &trusted_));
     if ((!file.character.has_value() && file.references.empty()) || !file.complete)
       return InOrder(errors.Take());
     if (file.character.has_value()) character_at = file.character->where;
@@ -318,7 +321,10 @@ Result<Rig> LoadRig(const NodeRegistry& registry, const std::string& path, const
   if (options.fps.has_value() && !(*options.fps > 0 && std::isfinite(*options.fps))) {
     return Status::Usage("frames a second: expected a number above 0, found {}", *options.fps);
   }
-  Result<LoadedRig> loaded = Loader(registry, options).Load(path, options.variant, nullptr);
+  Result<TrustedFolders> trusted = TrustedFolders::OfRig(path, options.trust, options.trust_word);
+  if (!trusted.ok()) return trusted.status();
+  Result<LoadedRig> loaded =
+      Loader(registry, options, std::move(*trusted)).Load(path, options.variant, nullptr);
   if (!loaded.ok()) return loaded.status();
   loaded->rig.graph->AdoptPoses();
   return std::move(loaded->rig);

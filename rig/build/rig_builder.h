@@ -25,6 +25,9 @@ struct RigOptions {
   std::optional<double> fps;        // instead of the rig's
   std::optional<std::string> variant;  // of the rig's `variants`, or hero:NAME of a reference's
   PluginLoader* plugins = nullptr;     // of the registry; null: rigs with plugins are refused
+  std::vector<std::string> trust =
+      {};  // folders besides its own whose files it may name (files/trusted_folders.h)
+  std::string trust_word = "trust";  // what messages call naming such a folder
 };
 
 // A plug that an animator and the trainer may move. It is a number; runtime units.

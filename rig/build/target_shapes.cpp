@@ -136,7 +136,9 @@ bool TargetShapes::ReadFileEntry(const YamlNode& entry, int source, std::vector<
   if (name != nullptr) ReadString(*name, "name", &renamed, in_.errors);
   if (in_.errors->count() != before) return false;
 
-  from.file = FindFile(*file_node, ResolvePath(in_.folder(source), path));
+  const auto resolved = ResolvePath(in_.file, source, path, *file_node, in_.errors);
+  if (!resolved.has_value()) return false;
+  from.file = FindFile(*file_node, *resolved);
   std::vector<const FileShape*> chosen;
   if (from.file == nullptr || !Choose(*from.file, entry, choice, in_.errors, &chosen)) return false;
   if (name != nullptr && chosen.size() != 1) {

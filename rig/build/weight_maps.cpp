@@ -29,7 +29,9 @@ bool WeightMaps::FindMap(const YamlNode& reference, const std::string& key, int 
   const WeightReference parts = SplitWeightReference(text);
   if (parts.path.empty())
     return in_.errors->Add(reference, "weights \"{}\": expected the file before the #, FILE.json#MAP", text);
-  const std::string path = ResolvePath(in_.folder(source), parts.path);
+  const auto resolved = ResolvePath(in_.file, source, parts.path, reference, in_.errors);
+  if (!resolved.has_value()) return false;
+  const std::string& path = *resolved;
   *file = FindFile(reference, path);
   if (*file == nullptr) return false;
   const Result<const NamedWeights*> found = FindWeights(**file, path, parts.map);

@@ -91,8 +91,12 @@ void SectionReader::ReadReferences(const YamlNode& node) {
     }
     map.RejectUnread();
     if (file == nullptr || !ReadString(*file, "file", &reference.file.text, errors)) continue;
-    reference.file.text =
-        ResolvePath(rig->sources[static_cast<std::size_t>(source)].folder, reference.file.text);
+    auto resolved = ResolvePath(*rig, source, reference.file.text, *file, errors);
+    if (!resolved.has_value()) {
+      rig->complete = false;
+      continue;
+    }
+    reference.file.text = std::move(*resolved);
     reference.file.where = file->where();
     reference.file.source = source;
     rig->references.push_back(std::move(reference));

@@ -112,8 +112,11 @@ class Reader {
       RigString character{{}, node->where(), source};
       if (Define("character", "character", node->where()) &&
           ReadString(*node, "character", &character.text, errors_)) {
-        character.text = ResolvePath(here.folder, character.text);
-        rig_->character = std::move(character);
+        auto file = ResolvePath(*rig_, source, character.text, *node, errors_);
+        if (file.has_value()) {
+          character.text = std::move(*file);
+          rig_->character = std::move(character);
+        }
       }
     }
     if (const YamlNode* node = map.Find("weld"); node != nullptr && Define("weld", "weld", node->where())) {
@@ -158,8 +161,11 @@ class Reader {
     for (const YamlNode& item : items) {
       std::string file;
       if (!ReadString(item, key, &file, errors_)) continue;
-      files.push_back(
-          {ResolvePath(rig_->sources[static_cast<std::size_t>(source)].folder, file), item.where(), source});
+      if (auto resolved = ResolvePath(*rig_, source, file, item, errors_)) {
+        files.push_back({std::move(*resolved), item.where(), source});
+      } else {
+        rig_->complete = false;
+      }
     }
     return files;
   }
@@ -193,9 +199,13 @@ class Reader {
 
 }  // namespace
 
-std::string ResolvePath(const std::string& folder, const std::string& path) {
-  const std::filesystem::path named(path);
-  return named.is_absolute() || folder.empty() ? path : (std::filesystem::path(folder) / named).string();
+std::optional<std::string> ResolvePath(const RigFile& rig, int source, const std::string& path,
+                                       const YamlNode& at, YamlErrors* errors) {
+  const std::filesystem::path folder = rig.sources[static_cast<std::size_t>(source)].folder;
+  Result<std::string> file =
+      rig.trusted.Check((folder / path).string());  // an absolute path takes the place of both
+  if (!errors->Add(at, file.status())) return std::nullopt;
+  return std::move(*file);
 }
 
 void ReadUnits(const YamlNode& node, FileUnits* units, YamlErrors* errors) {
@@ -221,8 +231,16 @@ void ReadVersion(YamlMap* map, YamlErrors* errors) {
   }
 }
 
-Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig, bool part) {
+Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig, bool part,
+                   const TrustedFolders* trusted) {
   *rig = RigFile();
+  if (trusted != nullptr) {
+    rig->trusted = *trusted;
+  } else {
+    Result<TrustedFolders> own = TrustedFolders::OfRig(path, {});
+    if (!own.ok()) return own.status();
+    rig->trusted = std::move(*own);
+  }
   YamlErrors errors;
   Reader(rig, &errors, fps).ReadAll(path);
   for (RigSource& source : rig->sources) source.units.fps = fps.value_or(rig->fps.value_or(kDefaultFps));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "files/quantity.h"
+#include "files/trusted_folders.h"
 #include "files/yaml_document.h"
 
 namespace kpsa::engine {
@@ -127,6 +128,7 @@ struct RigVariant {
 };
 
 struct RigFile {
+  TrustedFolders trusted;              // what the files may name
   std::vector<RigSource> sources;      // [0] is the file that was opened
   std::optional<RigString> character;  // path, resolved
   std::vector<RigString> plugins;      // paths, resolved
@@ -148,15 +150,18 @@ struct RigFile {
 
 // Reads a rig and what it includes, relative to the including file. Errors are collected over all files; *rig
 // then holds what could be read, for finding more of them. `fps` overrides the rig's for the suffix f. A part
-// that others include has no character.
-Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig, bool part = false);
+// that others include has no character. Files that it names are in `trusted`; null: TrustedFolders::OfRig(path).
+Status ReadRigFile(const std::string& path, std::optional<double> fps, RigFile* rig, bool part = false,
+                   const TrustedFolders* trusted = nullptr);
 
 // The units: section into `units`.
 void ReadUnits(const YamlNode& node, FileUnits* units, YamlErrors* errors);
 // Checks `kpsa: 1`.
 void ReadVersion(YamlMap* map, YamlErrors* errors);
 
-// `path` as named by a file in `folder`.
-std::string ResolvePath(const std::string& folder, const std::string& path);
+// The file that `path` is, as the rig's file `source` names it at `at`; nothing, with an error, where it leads out of
+// the trusted folders.
+std::optional<std::string> ResolvePath(const RigFile& rig, int source, const std::string& path,
+                                       const YamlNode& at, YamlErrors* errors);
 
 }  // namespace kpsa::engine

@@ -208,8 +208,7 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
     }
     if (const YamlNode* path = map.Find("subspace");
         path != nullptr && ReadString(*path, "subspace", &accelerate.subspace, errors)) {
-      accelerate.subspace =
-          ResolvePath(rig->sources[static_cast<std::size_t>(source)].folder, accelerate.subspace);
+      accelerate.subspace = ResolvePath(*rig, source, accelerate.subspace, *path, errors).value_or("");
     }
     double number = 0;
     if (const YamlNode* tolerance = map.Find("tolerance");

@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
 
+#include "graph/frames.h"
 #include "kpsa/training_record.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/process.h"
@@ -127,6 +129,60 @@ TEST_F(BackgroundLearning, WhatMissedHitsInTheNextVersionAndEvaluatorsStayAsThey
   const std::string bytes = TemporaryFolder::Read(*folder_ / "new.kpsa");
   EXPECT_GT(bytes.size(), 10'000u);
   EXPECT_EQ(BytesOf(*newer), bytes);
+}
+
+// All at once: frames on several threads, each step of them recorded, misses that these threads hand in, a training in
+// the background on threads of its own, and versions that are taken up between requests.
+TEST_F(BackgroundLearning, WhileFramesOnManyThreadsAreRecorded) {
+  const std::vector<double> times = [] {
+    RigRun run(folder_->rig(), {.clip = "sway"});
+    return ClipFrames(run.rig, {"sway"})->front().times;
+  }();
+  Learner learner(trained_, OpenRig, {.threads = 2});
+  std::shared_ptr<const Subspace> played = trained_;
+  std::vector<std::size_t> missed;  // by version
+  std::size_t requests = 0;
+  for (int version = 0; version < 2; ++version) {
+    RigRun run(folder_->rig(), {.subspace = played, .clip = "sway"});
+    ASSERT_TRUE(run.ok()) << run.error;
+    const std::vector<RunFrame> alone = Play(&run, "sway");
+    missed.push_back(static_cast<std::size_t>(
+        std::ranges::count_if(alone, [](const RunFrame& frame) { return !frame.hit; })));
+    Profile profile(*run.plan);
+    profile.keep_events = true;
+    FrameOptions options;
+    options.threads = 3, options.block = 2, options.profile = &profile;
+    const auto request = [&] {
+      profile.Clear();
+      const Status status = EvaluateFrames(
+          run.plan, times.size(), options,
+          [&](std::size_t frame, Evaluator& evaluator) {
+            evaluator.Set(run.plan->FindVarying(run.rig.scene.time), times[frame]);
+          },
+          [&](std::size_t frame, const Evaluator& evaluator, const Status& evaluated) {
+            const RunFrame got = run.Frame(evaluator);
+            EXPECT_TRUE(SameBytes(got.points, alone[frame].points)) << frame;
+            if (!got.hit) learner.Add({"sway", times[frame]});
+            return evaluated;
+          });
+      EXPECT_TRUE(status.ok()) << status.ToString();
+      EXPECT_GE(profile.events().size(), times.size());
+      ++requests;
+    };
+    request();
+    if (version == 1) break;
+    ASSERT_TRUE(learner.Learn());
+    do {
+      request();
+    } while (learner.state().learning);
+    const Status learnt = learner.Wait();
+    ASSERT_TRUE(learnt.ok()) << learnt.ToString();
+    played = learner.TakeNewest();
+    ASSERT_NE(played, nullptr);
+  }
+  EXPECT_GE(requests, 3u);
+  EXPECT_GT(missed[0], times.size() / 2);
+  EXPECT_LE(10 * missed[1], missed[0]);
 }
 
 TEST_F(BackgroundLearning, MissesAreBoundedAndNeverKeptTwice) {

@@ -96,9 +96,9 @@ TEST_F(TwoHellos, AreAcceleratedAsTheRigAlone) {
   ASSERT_NE(subspace, nullptr);
   RigRunOptions options;
   options.subspace = WithThreshold(*subspace, 50, 100);
-  options.clip = "wave";
+  options.clip = std::string("wave");
   RigRun alone(folder.rig(), options);
-  options.clip = "a:wave";
+  options.clip = std::string("a:wave");
   RigRun both(two(), options);
   ASSERT_TRUE(alone.ok()) << alone.error;
   ASSERT_TRUE(both.ok()) << both.error;

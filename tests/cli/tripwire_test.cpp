@@ -61,7 +61,7 @@ TEST_F(Tripwire, AtTheEndItFiresOnEverythingButHits) {
   ASSERT_NE(trained, nullptr);
   const auto with_clip = [&](double tolerance) {
     RigRunOptions options = Armed(trained, tolerance);
-    options.clip = "wave";
+    options.clip = std::string("wave");
     return options;
   };
   // The canaries: the rig itself, and the rig with tolerance 0
@@ -140,7 +140,7 @@ TEST_F(Tripwire, BeforeADeltaMushItFiresOnlyWhereCuesAreMeasuredBehindIt) {
   auto trained = TrainRig(between.rig(), training);
   ASSERT_NE(trained, nullptr);
   RigRunOptions options = Armed(trained, kInfinity);
-  options.clip = "wave";
+  options.clip = std::string("wave");
   RigRun run(between.rig(), options);
   ASSERT_TRUE(run.ok()) << run.error;
   EXPECT_EQ(Count(Failures(&run, true)), 0u);
@@ -157,7 +157,7 @@ TEST_F(Tripwire, BeforeADeltaMushItFiresOnlyWhereCuesAreMeasuredBehindIt) {
                                   [](const CueDescription& cue) { return cue.stage == "mush"; });
   ASSERT_TRUE(behind) << "no cue is measured behind the tripwire";
   options = Armed(trained, kInfinity);
-  options.clip = "wave";
+  options.clip = std::string("wave");
   RigRun cues(before.rig(), options);
   ASSERT_TRUE(cues.ok()) << cues.error;
   EXPECT_EQ(Count(Failures(&cues, true)), 49u);
@@ -249,7 +249,7 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   const auto trained = std::make_shared<const Subspace>(std::move(*subspace));
 
   RigRunOptions run_options = Armed(trained, kInfinity);
-  run_options.clip = "talk";
+  run_options.clip = std::string("talk");
   RigRun pure(folder / "face.yaml", run_options);
   run_options.accelerate.tolerance = 0;
   RigRun zero(folder / "face.yaml", run_options);

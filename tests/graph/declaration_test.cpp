@@ -9,6 +9,8 @@
 namespace kpsa::engine {
 namespace {
 
+void FloorMany(NodeBatch<In<"p", double>, Out<"x", double>>) {}
+
 enum class Side { kLeft, kRight };
 
 NodeBuilder AllKinds(NodeBuilder n) {
@@ -148,7 +150,7 @@ TEST(Declarations, OnesThatContradictThemselves) {
       .points_in("p", "", Type::kDouble)
       .out("x", Type::kPoints)
       .compute([](ComputeContext&) {})
-      .batch(nullptr, nullptr);
+      .batch<FloorMany>(nullptr);
   EXPECT_GE(none.status().errors().size(), 12u) << none.status().ToString();
 }
 

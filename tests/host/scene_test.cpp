@@ -399,6 +399,28 @@ TEST_F(SceneStates, FunctionsOfTheProgramComputeNodes) {
   EXPECT_NE(thrown.message.find("out of luck"), std::string::npos) << thrown.message;
   EXPECT_EQ(thrown.node, "bad");
   EXPECT_EQ(thrown.line, 8);
+  // So are places that there are not
+  NodeType reaching{
+      .name = "reaching", .inputs = {{"far"}}, .outputs = {{"output", NodeAttribute::Type::kVector}}};
+  reaching.compute = [](const NodeCall& call) -> std::string {
+    const double far = call.inputs[0][0];
+    if (far == 1) call.outputs[0][3] = 0;
+    if (far == 2) (void)call.inputs[1];
+    if (far == 3) (void)call.points[0];
+    if (far == 4) call.outputs[1][0] = 0;
+    return "";
+  };
+  ASSERT_TRUE(library.AddNode(reaching));
+  Scene reached(Load(library, "  mush: {", "  arm: {type: reaching}\n  mush: {"));
+  EXPECT_TRUE(reached.Values("arm.output"));
+  const std::string kPlaces[] = {"place 3 of output, which has 3", "place 1 of inputs, which has 1",
+                                 "place 0 of points, which has 0", "place 1 of outputs, which has 1"};
+  for (int far = 1; far <= 4; ++far) {
+    ASSERT_TRUE(reached.Set("arm.far", far));
+    const Problem beyond = Failed(reached.Values("arm.output"));
+    EXPECT_EQ(beyond.node, "arm");
+    EXPECT_NE(beyond.message.find(kPlaces[far - 1]), std::string::npos) << beyond.message;
+  }
   // Declarations that are wrong
   const auto wrong = [&](NodeType type) { return Failed(library.AddNode(type)).message; };
   EXPECT_NE(wrong(Picky()).find("\"picky\", which the program has already"), std::string::npos)

@@ -5,9 +5,12 @@
 
 #include <cmath>
 
+#include "base/parallel.h"
 #include "base/scalar_math.h"
+#include "graph/frames.h"
 #include "graph/geometry.h"
 #include "nodes/standard_nodes.h"
+#include "tests/support/countdown.h"
 #include "tests/support/memory_in_use.h"
 #include "tests/support/test_graph.h"
 
@@ -316,6 +319,70 @@ TEST(IndirectIllumination, FollowsItsLightAndFailsClearly) {
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.ToString().find("2 lightKinds, 1 matrices and 1 colours"), std::string::npos)
       << status.ToString();
+}
+
+// Wherever it is asked to, in a pixel too; and what is evaluated afterwards is what it would have been.
+TEST(IndirectIllumination, EndsWhereItIsAskedTo) {
+  for (const bool parallel : {false, true}) {
+    Room room;
+    room.options.parallel = parallel;
+    room.hold("gi.samples", Value(1000));
+    room.vary("lamp.intensity");
+    const std::vector<float> bright = room.pull_points("gi.irradiance");
+    room.set("lamp.intensity", 6.0);
+    const Countdown never;
+    {
+      const CancelScope scope(&never);
+      EXPECT_NE(room.pull_points("gi.irradiance"), bright);
+    }
+    EXPECT_GT(never.questions(), 2 * 24 * 16) << "more than once a pixel";
+    for (const long long questions : {0LL, 1LL, never.questions() / 2, never.questions() - 1}) {
+      room.set("lamp.intensity", 3.0 + 1e-3 * static_cast<double>(questions + 1));
+      const Countdown countdown(questions);
+      {
+        const CancelScope scope(&countdown);
+        const Status status = room.try_pull("gi.irradiance");
+        EXPECT_EQ(status.kind(), ErrorKind::kInterrupted) << status.ToString();
+      }
+      EXPECT_LE(countdown.questions(), questions + 16 + 2 * HardwareThreads());
+      room.set("lamp.intensity", 3.0);
+      EXPECT_EQ(room.pull_points("gi.irradiance"), bright);
+    }
+    // Where it is a constant, whoever compiles ends
+    Room still;
+    still.hold("gi.samples", Value(1000));
+    const Countdown soon(20);
+    const CancelScope scope(&soon);
+    EXPECT_THROW((void)still.try_pull("gi.irradiance"), Cancelled);
+  }
+}
+
+TEST(IndirectIllumination, FramesEndWithinOne) {
+  Room room;
+  room.hold("gi.samples", Value(1000));
+  room.vary("lamp.intensity");
+  room.want("gi.irradiance");
+  ASSERT_TRUE(room.compile().ok());
+  const Result<PlugHandle> intensity = room.evaluator->FindVarying(room.graph, room.plug("lamp.intensity"));
+  ASSERT_TRUE(intensity.ok());
+  for (const int threads : {1, 3}) {
+    FrameOptions options;
+    options.threads = threads;
+    std::size_t given = 0;
+    const Countdown countdown(100);
+    const CancelScope scope(&countdown);
+    const Status status = EvaluateFrames(
+        room.plan, 10, options,
+        [&](std::size_t frame, Evaluator& evaluator) {
+          EXPECT_TRUE(evaluator.Set(*intensity, 1.0 + static_cast<double>(frame)).ok());
+        },
+        [&](std::size_t, const Evaluator&, const Status& evaluated) {
+          given += evaluated.ok();
+          return evaluated;
+        });
+    EXPECT_EQ(status.kind(), ErrorKind::kInterrupted) << status.ToString();
+    EXPECT_EQ(given, 0u) << "the first frame was not through";
+  }
 }
 
 }  // namespace

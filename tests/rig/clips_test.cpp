@@ -91,7 +91,7 @@ connections: [{from: half.output, to: "body.weight[up]", override: true}]
 clips: {shot: {layers: [{clip: wave}], frames: [6, 30]}}
 )";
   RigOptions options;
-  options.clip = "shot";
+  options.clip = std::string("shot");
   Rig rig = Loaded(text, options);
   EXPECT_EQ(Driver(rig, "body.weight[up]"), "half.output");
   EXPECT_EQ(rig.graph->def(rig.graph->FindPlug(Driver(rig, "tip.offsetParentMatrix"))->node).name,

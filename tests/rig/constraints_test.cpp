@@ -381,7 +381,7 @@ TEST_F(RigConstraints, AHumansArmReachesOverItsClip) {
   const auto play = [&](const std::string& text, bool rest) {
     RigOptions options;
     options.rest = rest;
-    if (!rest) options.clip = "body_move";
+    if (!rest) options.clip = std::string("body_move");
     return RigPlayer(folder.Write("h.yaml", character + text), options);
   };
   RigPlayer plain = play("", true), rest = play(nodes, true), moving = play(nodes, false);

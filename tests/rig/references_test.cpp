@@ -197,7 +197,7 @@ TEST_F(References, ClipAndStartSayWhatPlays) {
       << "a second into late, and that begins later";
   // A chosen clip is that of one character, from the beginning; the others go on
   RigOptions options;
-  options.clip = "a:wave";
+  options.clip = std::string("a:wave");
   RigPlayer chosen(path, options);
   EXPECT_EQ(chosen.rig.scene.clip, "a:wave");
   chosen.Set("time.time", 1.5);
@@ -214,7 +214,7 @@ TEST_F(References, ClipAndStartSayWhatPlays) {
 
 TEST_F(References, LayersMixClipsOfSeveralCharacters) {
   RigOptions options;
-  options.clip = "shot";
+  options.clip = std::string("shot");
   RigPlayer player(Write("references: {a: {file: c.gltf, start: 100}, b: {file: c.gltf}, c: {file: c.gltf}}\n"
                          "clips: {shot: {layers: [{clip: 'a:wave', start: 12, mask: ['a:*']}, "
                          "{clip: 'b:wave', start: 24}]}}\n"),

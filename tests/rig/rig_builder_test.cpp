@@ -22,7 +22,7 @@ TEST_F(RigBuilderTest, ACharacterAloneIsARig) {
   EXPECT_TRUE(rig->controls.empty());
   EXPECT_EQ(rig->files, std::vector<std::string>{folder / "c.gltf"});
   RigOptions options;
-  options.clip = "nobody";
+  options.clip = std::string("nobody");
   EXPECT_TRUE(Has(LoadRig(StandardRegistry(), folder / "c.gltf", options).status().ToString(),
                   "has no clip \"nobody\""));
   options = {};

@@ -46,6 +46,11 @@ void DemandSmooth(Demand& demand) {
 
 std::atomic<int> block_computes{0}, block_frames{0}, batch_computes{0};
 
+void ComputeFloors(NodeBatch<In<"input", double>, Out<"out", double>> c) {
+  ++batch_computes;
+  for (std::size_t i = 0; i < c.count(); ++i) c.out<"out">(i) = std::floor(c.get<"input">(i));
+}
+
 void ComputeCached(ComputeContext& c) {
   const PointsView& out = c.out_points(0);
   const bool miss = c.chosen != 0;
@@ -131,10 +136,7 @@ void AddToyNodes(NodeRegistry& registry) {
       .in("input", 0.0)
       .out("out", Type::kDouble)
       .compute([](double v) { return std::floor(v); })
-      .batch(nullptr, [](const BatchContext& c) {
-        ++batch_computes;
-        for (std::size_t i = 0; i < c.count; ++i) c.out_value<double>(i) = std::floor(c.get<double>(i, 0));
-      });
+      .batch<ComputeFloors>(nullptr);
   registry.add("sum", "Adds many.")
       .in("input", 0.0)
       .array()

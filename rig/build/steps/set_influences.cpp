@@ -13,7 +13,9 @@ void SetInfluencesOf(const BuildInput& in, const MadeNode& made, WeightMaps* map
   const YamlNode& value = key->value;
   std::string text;
   if (!ReadString(value, "influences", &text, in.errors)) return;
-  const WeightFile* file = maps->FindFile(value, ResolvePath(in.folder(key->source), text));
+  const auto path = ResolvePath(in.file, key->source, text, value, in.errors);
+  if (!path.has_value()) return;
+  const WeightFile* file = maps->FindFile(value, *path);
   const DeformedGeometry* of = nullptr;
   if (file == nullptr || !maps->FindGeometry(value, made, *file, file->path, &of)) return;
   CharacterMesh& mesh = scene->meshes[*of->mesh];
