@@ -15,6 +15,8 @@
 namespace kpsa::engine {
 namespace {
 
+constexpr std::size_t kSurveyBytes = 192'000'000;  // of estimates at a time
+
 Eigen::MatrixXd TransposedProduct(const Eigen::Ref<const Eigen::MatrixXd>& a,
                                   const Eigen::Ref<const Eigen::MatrixXd>& b) {
   return Multiply(GemmOperand::Dense(a).Transposed(), GemmOperand::Dense(b));
@@ -26,8 +28,8 @@ Eigen::VectorXd Reach(const Eigen::MatrixXd& gain) {
 }
 
 // covariance P [M x M] of the mode coordinates, cues C [r x M] -> G, its factors and B.
-Estimator MapWithCovariance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c, const Eigen::MatrixXd& p,
-                            const Eigen::VectorXd& noise, bool keep_gain = true) {
+Estimator MapWithCovariance(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::MatrixXd& c,
+                            const Eigen::MatrixXd& p, const Eigen::VectorXd& noise, bool keep_gain = true) {
   Estimator estimator;
   const Eigen::MatrixXd cp = Multiply(c, p);  // [r x M]
   estimator.covariance = Multiply(cp, c.transpose());
@@ -160,15 +162,18 @@ std::vector<PoseErrors> EstimateErrors(const Pca& pca, const CueSet& cues, const
 PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& estimator,
                          const PoseMatrix& poses, std::size_t stride, double limit) {
   KPSA_CHECK(poses.centered() && poses.layout() == pca.layout && stride > 0);
-  const std::size_t points = pca.layout.points, kChunk = 384;
+  const std::size_t points = pca.layout.points;
   const auto components = static_cast<std::size_t>(pca.layout.components);
-  const Eigen::MatrixXd a = pca.output_modes();
+  const Eigen::Ref<const Eigen::MatrixXd> a = pca.output_modes();
+  const std::size_t chunk =  // poses at a time
+      std::clamp<std::size_t>(
+          kSurveyBytes / (sizeof(double) * std::max<std::size_t>(1, pca.layout.outputs())), 24, 384);
   PointSurvey survey;
   survey.largest.resize(points);
   survey.beyond.resize(points);
-  for (std::size_t first = 0; first < poses.poses(); first += kChunk * stride) {
+  for (std::size_t first = 0; first < poses.poses(); first += chunk * stride) {
     std::vector<std::size_t> chosen;
-    for (std::size_t t = first; t < poses.poses() && chosen.size() < kChunk; t += stride) chosen.push_back(t);
+    for (std::size_t t = first; t < poses.poses() && chosen.size() < chunk; t += stride) chosen.push_back(t);
     Eigen::MatrixXd y(cues.rows(), static_cast<Eigen::Index>(chosen.size()));
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       y.col(static_cast<Eigen::Index>(k)) = MeasuredCues(pca.layout, cues, poses.row(chosen[k]));
