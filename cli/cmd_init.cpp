@@ -6,9 +6,7 @@
 #include "cli/frames_range.h"
 #include "cli/options.h"
 #include "cli/output.h"
-#include "files/file.h"
 #include "files/trusted_folders.h"
-#include "gltf/document_files.h"
 #include "rig/build/writer.h"
 
 namespace kpsa::engine {
@@ -20,43 +18,17 @@ struct InitFlags : Flags {
   std::optional<std::string> iterations, samples;
 };
 
-// How a rig at `place` is to name its character, relative to itself; and what is to be copied there, from and to, where
-// rigs there may not name the character where it is.
-struct CharacterPlace {
-  std::string named;
-  std::vector<std::pair<fs::path, fs::path>> copies;
-};
-
-Result<CharacterPlace> PlaceCharacter(const std::string& file, const std::string& place) {
+// How a rig at `place` names its character: relative to itself, where rigs there may name it so; else by its whole path.
+Result<std::string> CharacterOf(const std::string& file, const std::string& place) {
   std::error_code error;
-  const fs::path folder = place == "-" ? fs::path() : fs::path(place).parent_path();
+  const std::string rig = place == "-" ? "" : place;
+  const fs::path folder = fs::path(rig).parent_path();
   const fs::path relative = fs::relative(file, folder.empty() ? fs::path(".") : folder, error);
   const std::string named = error || relative.empty() ? file : relative.string();
-  const Result<TrustedFolders> trusted = TrustedFolders::OfRig(place == "-" ? "" : place, {});
+  const Result<TrustedFolders> trusted = TrustedFolders::OfRig(rig, {});
   if (!trusted.ok()) return trusted.status();
-  if (place == "-" || trusted->Hold((folder / named).string())) return CharacterPlace{named, {}};
-  const fs::path name = fs::path(file).filename();
-  const Result<std::vector<std::string>> beside = gltf::FilesBeside(file);
-  if (!beside.ok()) return beside.status();
-  CharacterPlace copied{name.string(), {{file, folder / name}}};
-  for (const std::string& other : *beside) {
-    const fs::path from = fs::path(file).parent_path() / other;
-    if (fs::exists(from, error)) copied.copies.emplace_back(from, folder / other);  // an image may be missing
-  }
-  return copied;
-}
-
-// Unless the same is there already.
-Status CopyFile(const fs::path& from, const fs::path& to, bool force) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{4} << 30;
-  const Result<std::vector<std::uint8_t>> bytes = ReadFileBytes(from.string(), kMostBytes);
-  if (!bytes.ok()) return bytes.status();
-  if (const auto there = ReadFileBytes(to.string(), kMostBytes); there.ok() && *there == *bytes)
-    return Status();
-  std::error_code error;
-  fs::create_directories(to.parent_path(), error);  // without one, the next line says why
-  KPSA_RETURN_IF_ERROR(CheckOutput(to.string(), force, {}));
-  return WriteFileAtomically(to.string(), force, *bytes);
+  return trusted->Hold((folder / named).string()) ? named
+                                                  : fs::absolute(file, error).lexically_normal().string();
 }
 
 CommandResult Init(const InitFlags& flags) {
@@ -75,20 +47,16 @@ CommandResult Init(const InitFlags& flags) {
   const std::string stem = fs::path(flags.file).stem().string();
   const std::string place = flags.output.value_or(stem + ".yaml");
   KPSA_RETURN_IF_ERROR(CheckOutput(place, flags.force, {".yaml", ".yml"}));
-  const Result<CharacterPlace> character = PlaceCharacter(flags.file, place);
+  const Result<std::string> character = CharacterOf(flags.file, place);
   if (!character.ok()) return character.status();
-  options.character = character->named;
+  options.character = *character;
   options.subspace = (place == "-" ? stem : fs::path(place).stem().string()) + ".kpsa";
   NodeRegistry registry;
   AddAllNodes(registry);
   std::string remark;
   const Result<std::string> text = StarterRig(registry, flags.file, options, &remark);
   if (!text.ok()) return text.status();
-  for (const auto& [from, to] : character->copies) KPSA_RETURN_IF_ERROR(CopyFile(from, to, flags.force));
   KPSA_RETURN_IF_ERROR(WriteText(place, flags.force, *text));
-  if (!flags.quiet && !character->copies.empty())
-    Say(fmt::format("{}: a copy of {}, since rigs name files of their own folder",
-                    character->copies.front().second.string(), flags.file));
   if (!flags.quiet && !remark.empty()) Say(fmt::format("note: {}: {}", flags.file, remark));
   if (!flags.quiet && place != "-")
     Say(fmt::format("{}: a starter rig; read it, it says what to change\nnext: kpsa {} {}", place,
@@ -103,9 +71,7 @@ void AddInitCommand(CLI::App* program, Command* chosen) {
   CLI::App* command = AddCommand(
       program, "init", "Write a starter rig for a character",
       "Controls are ranged by the character's clips and grouped by part of the body; its own deformers are "
-      "followed by a deltaMush. IK, a cage about the jaw and dual quaternions are suggested in comments. "
-      "A character that the rig may not name where it is (kpsa help eval: --trust) is copied beside the "
-      "rig.\n"
+      "followed by a deltaMush. IK, a cage about the jaw and dual quaternions are suggested in comments.\n"
       "Examples:\n"
       "  kpsa init head.glb\n"
       "  kpsa init characters/head.glb -o rigs/head.yaml",

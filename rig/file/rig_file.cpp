@@ -200,10 +200,15 @@ class Reader {
 }  // namespace
 
 std::optional<std::string> ResolvePath(const RigFile& rig, int source, const std::string& path,
-                                       const YamlNode& at, YamlErrors* errors) {
+                                       const YamlNode& at, YamlErrors* errors, FileUse use) {
   const std::filesystem::path folder = rig.sources[static_cast<std::size_t>(source)].folder;
+  TrustedFolders trusted = rig.trusted;
+  if (use == FileUse::kRead) {
+    if (std::filesystem::path(path).is_absolute() && WithoutLinksAndDots(path).has_value()) return path;
+    trusted.Add(folder.string());  // of a part that was named by an absolute path
+  }
   Result<std::string> file =
-      rig.trusted.Check((folder / path).string());  // an absolute path takes the place of both
+      trusted.Check((folder / path).string());  // an absolute path takes the place of both
   if (!errors->Add(at, file.status())) return std::nullopt;
   return std::move(*file);
 }

@@ -160,8 +160,10 @@ void ReadUnits(const YamlNode& node, FileUnits* units, YamlErrors* errors);
 void ReadVersion(YamlMap* map, YamlErrors* errors);
 
 // The file that `path` is, as the rig's file `source` names it at `at`; nothing, with an error, where it leads out of
-// the trusted folders.
+// the trusted folders by `..` or over links. An absolute path says openly where it leads: it may be read, and so may
+// what is named within its folder. What is written has to be in the trusted folders in any case.
+enum class FileUse { kRead, kWritten };
 std::optional<std::string> ResolvePath(const RigFile& rig, int source, const std::string& path,
-                                       const YamlNode& at, YamlErrors* errors);
+                                       const YamlNode& at, YamlErrors* errors, FileUse use = FileUse::kRead);
 
 }  // namespace kpsa::engine

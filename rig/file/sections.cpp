@@ -208,7 +208,8 @@ void SectionReader::ReadAccelerate(const YamlNode& node) {
     }
     if (const YamlNode* path = map.Find("subspace");
         path != nullptr && ReadString(*path, "subspace", &accelerate.subspace, errors)) {
-      accelerate.subspace = ResolvePath(*rig, source, accelerate.subspace, *path, errors).value_or("");
+      accelerate.subspace =
+          ResolvePath(*rig, source, accelerate.subspace, *path, errors, FileUse::kWritten).value_or("");
     }
     double number = 0;
     if (const YamlNode* tolerance = map.Find("tolerance");
