@@ -19,7 +19,7 @@
 extern "C" const char* __tsan_default_suppressions() {
   return "race:tbb::detail::d1::fold_tree\n"  // the end of a task: never above a body
          "race_top:tbb::detail\n"
-         "race_top:include/oneapi/tbb\n"
+         "race_top:oneapi/tbb\n"
          "race_top:base/parallel.cpp\n";
 }
 #endif
@@ -36,6 +36,16 @@ void Publish(char*) {}
 void Observe(char*) {}
 #endif
 
+// Also where a body throws.
+struct PublishAtEnd {
+  char* place;
+  ~PublishAtEnd() { Publish(place); }
+};
+struct ObserveAtEnd {
+  char* place;
+  ~ObserveAtEnd() { Observe(place); }
+};
+
 }  // namespace
 
 void ParallelFor(std::size_t count, std::size_t grain, RangeBody body) {
@@ -50,6 +60,7 @@ void ParallelFor(std::size_t count, std::size_t grain, RangeBody body) {
   const CancelSource* const cancel = CurrentCancel();
   char begins = 0, ends = 0;
   Publish(&begins);
+  const ObserveAtEnd ended{&ends};
   // Its bodies round as the caller does. A thread's tasks do by themselves, but as it rounded when it first
   // used TBB: where that was within a library that flushes small numbers to zero, they would do so for good
   tbb::task_group_context rounding(tbb::task_group_context::bound, tbb::task_group_context::default_traits |
@@ -58,14 +69,13 @@ void ParallelFor(std::size_t count, std::size_t grain, RangeBody body) {
       tbb::blocked_range<std::size_t>(0, chunks),
       [&](const tbb::blocked_range<std::size_t>& range) {
         Observe(&begins);
+        const PublishAtEnd end_of_range{&ends};
         const CancelScope scope(cancel);  // which may be another one than this thread was just in
         ThrowIfCancelled();
         const std::size_t end = range.end() * grain;
         body(range.begin() * grain, end < count ? end : count);
-        Publish(&ends);
       },
       rounding);
-  Observe(&ends);
 }
 
 ThreadLimit::ThreadLimit(int threads)

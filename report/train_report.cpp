@@ -130,7 +130,7 @@ std::string TrainText(const TrainResult& r) {
   text +=
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
-  if (!r.record.limited.empty()) text += fmt::format("in the time given: {}\n", r.record.limited);
+  if (!r.record.limited.empty()) text += fmt::format("in the time and memory given: {}\n", r.record.limited);
   for (const TrainingRecord::Tried& one : r.record.tried) {
     text += fmt::format(
         "{} cues {}: {} ({} numbers); a frame is expected to cost {:.2g} of a full one, {:.3g} % of new "

@@ -44,7 +44,11 @@ Status RecordPoses(TrainingSetup* setup, TrainingPoses* to, TrainingRecord* reco
   }
   KPSA_RETURN_IF_ERROR(setup->sampler->LearnHowControlsMove());
   if (setup->options.by_tile_as_before) KPSA_RETURN_IF_ERROR(setup->trained_sampler->LearnHowControlsMove());
-  KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddTraining(&to->poses));
+  const Result<std::size_t> sampled = setup->trained_sampler->AddTraining(&to->poses);
+  if (!sampled.ok()) return sampled.status();
+  if (*sampled < setup->options.samples)
+    setup->limit.LeaveOut(fmt::format("{} of {} samples, as more would take too much memory", *sampled,
+                                      setup->options.samples));
   record->sampled_poses = to->poses.poses() - record->clip_poses;
   if (to->poses.poses() < 3)
     return Status::Invalid("{} training poses are too few: name clips or samples to train on",

@@ -57,10 +57,11 @@ std::vector<SampledPose> TrainingSampler::SweepsWithTilts() const {
   return sweeps;
 }
 
-Status TrainingSampler::AddTraining(PoseMatrix* poses) const {
+Result<std::size_t> TrainingSampler::AddTraining(PoseMatrix* poses) const {
   if (options_.samples > 0) KPSA_RETURN_IF_ERROR(recorder_->AddSamples(SweepsWithTilts(), clips_, poses));
-  return AddSampled(std::min(options_.samples, std::max(RoomBeside(*poses), kLeastSamples)), options_.seed,
-                    poses);
+  const std::size_t count = std::min(options_.samples, std::max(RoomBeside(*poses), kLeastSamples));
+  KPSA_RETURN_IF_ERROR(AddSampled(count, options_.seed, poses));
+  return count;
 }
 
 Status TrainingSampler::AddMore(const PoseMatrix& beside, PoseMatrix* poses) const {

@@ -78,7 +78,7 @@ TEST(TimeLimits, AreSecondsAndWhatTheyLeftOutIsTold) {
   }
   const ProcessResult run = RunKpsa({"train", "hello.yaml", "--time", "0.000001s", "-q"}, 60, folder.path());
   EXPECT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_NE(run.out.find("in the time given: 250 of "), std::string::npos) << run.out;
+  EXPECT_NE(run.out.find("in the time and memory given: 250 of "), std::string::npos) << run.out;
 }
 
 }  // namespace
