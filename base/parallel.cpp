@@ -17,7 +17,8 @@
 #include <sanitizer/tsan_interface.h>
 
 extern "C" const char* __tsan_default_suppressions() {
-  return "race:tbb::detail::d1::fold_tree\n"  // the end of a task: never above a body
+  return "race:fold_tree\n"           // the end of a task, inlined or not: never above a body
+         "race:check_being_stolen\n"  // its beginning, likewise
          "race_top:tbb::detail\n"
          "race_top:oneapi/tbb\n"
          "race_top:base/parallel.cpp\n";
