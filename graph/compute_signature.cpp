@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "graph/node_def.h"
+#include "graph/slot_names.h"
 
 namespace kpsa::engine {
 namespace {
@@ -18,20 +19,9 @@ bool Fits(const ComputeParameter& parameter, const AttributeDef& attribute, bool
              (parameter.array && type == Type::kBool);
     case SlotKind::kChoice:
       return type == Type::kEnum && (attribute.choice == nullptr || *attribute.choice == *parameter.choice);
-    case SlotKind::kDouble:
-      return type == Type::kDouble;
-    case SlotKind::kDouble3:
-      return type == Type::kDouble3;
-    case SlotKind::kQuaternion:
-      return type == Type::kQuaternion;
-    case SlotKind::kMatrix:
-      return type == Type::kMatrix;
-    case SlotKind::kPoints:
-      return IsPointType(type);
-    case SlotKind::kOther:
-      return false;
+    default:
+      return IsPlainSlot(parameter.kind, type);
   }
-  return false;
 }
 
 std::string CppName(const ComputeParameter& parameter) {
@@ -46,22 +36,8 @@ std::string CppName(const ComputeParameter& parameter) {
     case SlotKind::kChoice:
       name = "an enum";
       break;
-    case SlotKind::kDouble:
-      name = "double";
-      break;
-    case SlotKind::kDouble3:
-      name = "Double3";
-      break;
-    case SlotKind::kQuaternion:
-      name = "Quaternion";
-      break;
-    case SlotKind::kMatrix:
-      name = "Matrix4";
-      break;
-    case SlotKind::kPoints:
-      name = "ConstPointsView";
-      break;
-    case SlotKind::kOther:
+    default:
+      if (const char* plain = PlainSlotName(parameter.kind)) name = plain;
       break;
   }
   return parameter.array ? fmt::format("ArrayView<{}>", name) : name;

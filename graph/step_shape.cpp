@@ -2,46 +2,21 @@
 
 #include "base/text.h"
 #include "base/thrown.h"
+#include "graph/slot_names.h"
 
 namespace kpsa::engine {
 namespace {
 
 bool Holds(Type type, SlotKind kind) {
-  switch (kind) {
-    case SlotKind::kInteger:
-      return type == Type::kBool || type == Type::kInt || type == Type::kEnum;
-    case SlotKind::kDouble:
-      return type == Type::kDouble;
-    case SlotKind::kDouble3:
-      return type == Type::kDouble3;
-    case SlotKind::kQuaternion:
-      return type == Type::kQuaternion;
-    case SlotKind::kMatrix:
-      return type == Type::kMatrix;
-    case SlotKind::kPoints:
-      return IsPointType(type);
-    default:
-      return false;
-  }
+  if (kind == SlotKind::kInteger) return type == Type::kBool || type == Type::kInt || type == Type::kEnum;
+  return IsPlainSlot(kind, type);
 }
 
 const char* NameOf(SlotKind kind) {
-  switch (kind) {
-    case SlotKind::kInteger:
-      return "std::int64_t";
-    case SlotKind::kDouble:
-      return "double";
-    case SlotKind::kDouble3:
-      return "Double3";
-    case SlotKind::kQuaternion:
-      return "Quaternion";
-    case SlotKind::kMatrix:
-      return "Matrix4";
-    case SlotKind::kPoints:
-      return "points";
-    default:
-      return "a type that no slot is of (bools and enums are std::int64_t)";
-  }
+  if (kind == SlotKind::kInteger) return "std::int64_t";
+  if (kind == SlotKind::kPoints) return "points";  // to read or to write
+  const char* name = PlainSlotName(kind);
+  return name != nullptr ? name : "a type that no slot is of (bools and enums are std::int64_t)";
 }
 
 std::string Described(const StepShape::Slot& slot) {
