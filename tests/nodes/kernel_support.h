@@ -101,6 +101,13 @@ inline std::vector<Matrix4> MakePalette(Index joint_count, Double3 place, std::u
   return palette;
 }
 
+// Of joints, as skins read them.
+inline std::vector<const Matrix4*> Pointers(const std::vector<Matrix4>& matrices) {
+  std::vector<const Matrix4*> pointers;
+  for (const Matrix4& matrix : matrices) pointers.push_back(&matrix);
+  return pointers;
+}
+
 // The controls of a lattice whose offsets are not 0.
 inline std::vector<Index> MovedControls(std::span<const Double3> offsets) {
   std::vector<Index> moved;

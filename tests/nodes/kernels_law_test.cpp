@@ -84,8 +84,7 @@ class KernelLaw : public testing::Test {
              const SkinKernel kernel({skin_.offsets, skin_.joints, skin_.weights, 30}, out_points,
                                      masked ? Masked(out_points) : std::vector<float>());
              AlignedFloats scratch(kernel.ScratchFloats());
-             const Matrix4 base = masked ? Translation({0.1, 0.2, 0.3}) : Matrix4();
-             kernel.Run({palette_, masked ? 0.75 : 1.0, base}, in, out, scratch.span(), parallel);
+             kernel.Run({{Pointers(palette_)}, masked ? 0.75 : 1.0}, in, out, scratch.span(), parallel);
            }});
       subjects_.push_back(
           {masked ? "blendShape with weights" : "blendShape",
@@ -281,13 +280,15 @@ class KernelLaw : public testing::Test {
              const SkinWeights weights{skin_.offsets, skin_.joints, skin_.weights, 30};
              const std::vector<float> mask = Masked(out_points);
              const SkinKernel linear(weights, out_points);
-             const DualQuaternionKernel kernel(weights, out_points, blended ? std::vector<float>() : mask,
+             const DualQuaternionKernel kernel(weights, centers_, out_points,
+                                               blended ? std::vector<float>() : mask,
                                                blended ? mask : std::vector<float>());
              AlignedFloats scratch(kernel.ScratchFloats()), linear_scratch(linear.ScratchFloats());
              PointBuffer apart(out_points.size());
-             if (blended) linear.Run({palette_, 1, {}}, in, apart.view(), linear_scratch.span(), parallel);
-             kernel.Run({palette_, centers_, 1, Translation({0.1, 0.2, 0.3}), std::as_const(apart).view()},
-                        in, out, scratch.span(), parallel);
+             if (blended)
+               linear.Run({{Pointers(palette_)}, 1}, in, apart.view(), linear_scratch.span(), parallel);
+             kernel.Run({{Pointers(palette_)}, 1, std::as_const(apart).view()}, in, out, scratch.span(),
+                        parallel);
            }});
     }
   }
