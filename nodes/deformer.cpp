@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "graph/geometry.h"
+#include "nodes/kernels/carried_delta.h"
 #include "nodes/kernels/weights.h"
 
 namespace kpsa::engine {
@@ -159,11 +160,10 @@ Matrix4 CarriedFrame::StageFromWorld(const Matrix4& parent_now) const {
 }
 
 Matrix4 CarriedFrame::StageFromHandle(const Matrix4& parent_now, const Matrix4& handle) const {
-  return fixed_ ? stage_from_world_ * (parent_rest_ * (InverseOrIdentity(parent_now) * handle)) : handle;
-}
-
-Matrix4 CarriedFrame::MotionInStage(const Matrix4& in_parent) const {
-  return stage_from_world_ * (parent_rest_ * in_parent * parent_rest_inverse_) * world_from_stage_;
+  if (!fixed_) return handle;
+  Matrix4 frame;
+  FindWaitingFrame(stage_from_world_ * parent_rest_, parent_now, handle, &frame);
+  return frame;
 }
 
 double CarriedFrame::Growth(const Matrix4& parent_now) const {

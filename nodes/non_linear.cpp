@@ -27,11 +27,13 @@ template <typename Map, FixedName... kSettings>
 void ComputeNonLinear(DeformerContext<In<"matrix", Matrix4>, In<kSettings, double>...> c) {
   static_assert(sizeof(Map) == sizeof...(kSettings) * sizeof(double));
   const auto& bound = c.template kernel_as<NonLinearBound>();
-  const Matrix4 stage_from_handle =
-      bound.frame.StageFromHandle(c.template get<"parentMatrix">(), c.template get<"matrix">());
+  const Matrix4& handle = c.template get<"matrix">();
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({Map{c.template get<kSettings>()...}, stage_from_handle, c.template get<"envelope">()},
-                   c.template get<"inPoints">(), c.template out<"outPoints">(), {}, &parallel);
+  bound.kernel.Run(
+      {Map{c.template get<kSettings>()...},
+       bound.frame.fixed() ? bound.frame.StageFromHandle(c.template get<"parentMatrix">(), handle) : handle,
+       c.template get<"envelope">()},
+      c.template get<"inPoints">(), c.template out<"outPoints">(), {}, &parallel);
 }
 
 void DeclareHandle(NodeBuilder& b) {

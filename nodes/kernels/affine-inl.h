@@ -60,13 +60,14 @@ HWY_INLINE double FourDot(Four a, Four b) {
   const Four product = a * b;
   return product[0] + product[1] + product[2];
 }
-// The rows of the inverse of m's linear part; false, and those of the identity, where there is none.
+// The rows of the inverse of m's linear part; false, and those of the identity, where m has none.
 HWY_INLINE bool InverseRows(const FourColumns& m, Four (&rows)[3]) {
   rows[0] = FourCross(m.c[1], m.c[2]);
   rows[1] = FourCross(m.c[2], m.c[0]);
   rows[2] = FourCross(m.c[0], m.c[1]);
   const double det = FourDot(m.c[0], rows[0]), scale = 1 / det;
-  const bool regular = det != 0 && std::isfinite(det) && std::isfinite(scale);
+  const double place = (m.c[3][0] + m.c[3][1] + m.c[3][2]) * 0;  // not a number where it is none
+  const bool regular = det != 0 && std::isfinite(det + place) && std::isfinite(scale);
   if (!regular) [[unlikely]] {
     rows[0] = Four{1, 0, 0, 0}, rows[1] = Four{0, 1, 0, 0}, rows[2] = Four{0, 0, 1, 0};
     return false;

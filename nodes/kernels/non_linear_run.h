@@ -4,6 +4,7 @@
 
 #include <cstddef>
 
+#include "base/matrix.h"
 #include "base/points.h"
 
 namespace kpsa::engine {
@@ -49,19 +50,23 @@ struct WaveRun {
 
 struct NonLinearRun {
   std::size_t kind;  // the map's index in NonLinearMap: that of these that is set
-  BendRun bend;
-  TwistRun twist;
-  SquashRun squash;
-  FlareRun flare;
-  SineRun sine;
-  WaveRun wave;
+  union {
+    BendRun bend;
+    TwistRun twist;
+    SquashRun squash;
+    FlareRun flare;
+    SineRun sine;
+    WaveRun wave;
+  };
   // q = inverse (p - pivot) + offset: the pivot is the handle's origin in floats, offset what that leaves
-  float pivot[3], offset[3];
-  float inverse[9], linear[9];  // row-major
+  float pivot[4], offset[4];
+  float inverse[12], linear[12];  // rows; columns
   const float* weights;
   float envelope;
 };
 
+// The last four of a frame, the points' space from the handle's; false where it has no inverse, or none in floats.
+bool PrepareFrame(const Matrix4& frame, NonLinearRun* run) noexcept;
 // begin a multiple of 16; writes whole vectors. In place allowed.
 void RunNonLinear(const NonLinearRun& run, ConstPointsView in, PointsView out, std::size_t begin,
                   std::size_t end) noexcept;
