@@ -14,6 +14,7 @@
 #define HWY_TARGET_INCLUDE "nodes/kernels/lattice.cpp"
 #include "hwy/foreach_target.h"
 
+#include "nodes/kernels/affine-inl.h"
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -88,6 +89,18 @@ std::size_t MovedControls(ConstPointsView now, ConstPointsView rest, Index* HWY_
   return count;
 }
 
+// The moves of these controls, which a matrix and the envelope take to the points' space, at their places in `moves`.
+void ControlMoves(const Matrix4& matrix, double envelope, const Double3* HWY_RESTRICT offsets,
+                  const Index* moved, std::size_t count, float* HWY_RESTRICT moves) {
+  FourColumns m = LoadColumns(matrix);
+  for (Four& column : m.c) column = Four{column[0], column[1], column[2], 0};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Double3& offset = offsets[moved[i]];
+    const Four move = m.c[0] * offset.x + m.c[1] * offset.y + m.c[2] * offset.z;
+    StoreFour(move * envelope, moves + 4 * std::size_t{moved[i]});
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
@@ -97,6 +110,7 @@ namespace kpsa::engine {
 
 HWY_EXPORT(BlendTiles);
 HWY_EXPORT(MovedControls);
+HWY_EXPORT(ControlMoves);
 
 std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept {
   return HWY_DYNAMIC_DISPATCH(MovedControls)(now, rest, moved);
@@ -175,6 +189,11 @@ LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView re
     width *= static_cast<std::size_t>(settings.local ? order[a] : settings.divisions[a]);
   }
   sparse_ = settings.local && controls_ > kDenseControls * width;
+  for (std::size_t c = 0; c < controls_; ++c) {
+    const std::size_t row = c / divisions_[0];
+    rows_.push_back({static_cast<Index>(row * divisions_[0]), static_cast<std::uint8_t>(row % divisions_[1]),
+                     static_cast<std::uint8_t>(row / divisions_[1])});
+  }
 
   std::vector<Index> row_controls;
   std::vector<float> row_weights, rows;
@@ -256,44 +275,45 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
     CopyPoints(in, out);
   }
 
-  // The moves of the controls, in the points' space
-  const auto move = [&](Double3 offset, float* to) {
-    offset = TransformVector(inputs.matrix, offset);
-    for (int a = 0; a < 3; ++a) to[a] = static_cast<float>(offset[a] * inputs.envelope);
-    to[3] = 0;
-    return (to[0] != 0) | (to[1] != 0) | (to[2] != 0);
-  };
-  float resting[4];  // most controls; not numbers where the matrix is none
-  const bool rest_moves = move({}, resting);
+  // The moves of the controls, in the points' space. Most rest; not even they have numbers where the matrix has none
+  float* const moves = scratch.data();
+  const Index first = 0;
+  const Double3 none;
+  HWY_DYNAMIC_DISPATCH(ControlMoves)(inputs.matrix, inputs.envelope, &none, &first, 1, moves);
+  const float resting[4] = {moves[0], moves[1], moves[2], moves[3]};
+  const bool rest_moves = (resting[0] != 0) | (resting[1] != 0) | (resting[2] != 0);
   if (inputs.moved.empty() && !rest_moves) return;
   std::array<std::uint32_t, 32> rows{};
   const auto fill = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t c = begin; c < end; ++c) std::memcpy(scratch.data() + 4 * c, resting, sizeof(resting));
+    if (!rest_moves) {
+      std::fill(moves + 4 * begin, moves + 4 * end, 0.0f);
+    } else {
+      for (std::size_t c = begin; c < end; ++c) std::memcpy(moves + 4 * c, resting, sizeof(resting));
+    }
   };
   const std::size_t ds = divisions_[0], dt = divisions_[1];
   if (sparse_ || rest_moves) {  // all controls are read
     fill(0, controls_);
     if (rest_moves) rows.fill(~std::uint32_t{0} >> (32 - dt));
+  } else {
+    std::size_t filled = 0;  // up to the end of a row
+    for (const Index c : inputs.moved) {
+      const Row& row = rows_[c];
+      rows[row.u] |= std::uint32_t{1} << row.t;
+      if (c >= filled) fill(row.first, filled = row.first + ds);
+    }
   }
-  bool any = rest_moves;
-  std::size_t filled = sparse_ || rest_moves ? controls_ : 0;  // up to the end of a row
-  for (const Index c : inputs.moved) {
-    const std::size_t row = c / ds;
-    if (c >= filled) fill(row * ds, filled = (row + 1) * ds);
-    if (!move(inputs.offsets[c], scratch.data() + 4 * std::size_t{c})) continue;
-    rows[row / dt] |= std::uint32_t{1} << (row % dt);
-    any = true;
-  }
-  if (!any) return;
+  HWY_DYNAMIC_DISPATCH(ControlMoves)
+  (inputs.matrix, inputs.envelope, inputs.offsets.data(), inputs.moved.data(), inputs.moved.size(), moves);
   if (sparse_) {
-    blend_.Run(scratch.data(), out, parallel);
+    blend_.Run(moves, out, parallel);
     return;
   }
   const std::size_t row_count = divisions_[0] + divisions_[1] + divisions_[2];
   ForRanges(parallel, tiles_.size(), 32, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(BlendTiles)
     (tiles_.data() + begin, axis_weights_.data() + begin * 16 * row_count, end - begin, divisions_[0],
-     divisions_[1], divisions_[2], scratch.data(), rows.data(), weights_.data(), out);
+     divisions_[1], divisions_[2], moves, rows.data(), weights_.data(), out);
   });
 }
 

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -50,8 +51,8 @@ class LatticeKernel {
   struct Inputs {
     std::span<const Double3> offsets;  // of every control from its place on the grid; lattice space
     std::span<const Index> moved;      // the controls whose offsets are not 0, ascending: no other is read
-    Matrix4 base_matrix;               // point space from the lattice's base, now (bindPreMatrix^-1)
-    Matrix4 matrix;                    // point space from the lattice, now
+    const Matrix4& base_matrix;        // point space from the lattice's base, now (bindPreMatrix^-1)
+    const Matrix4& matrix;             // point space from the lattice, now
     double envelope = 1;
   };
 
@@ -67,8 +68,14 @@ class LatticeKernel {
            const Parallel* parallel = nullptr) const noexcept;
 
  private:
+  // A control's row along s: where it begins, and its place along t and u.
+  struct Row {
+    Index first;
+    std::uint8_t t, u;
+  };
   std::size_t count_ = 0, controls_ = 0;
   std::array<std::size_t, 3> divisions_ = {};
+  std::vector<Row> rows_;       // by control
   AlignedFloats weights_;       // per point: point weight x outside falloff
   bool sparse_ = false;         // linear and large: 8 controls a point; otherwise all, axis by axis
   ControlBlend blend_;          // of sparse_
