@@ -4,6 +4,7 @@
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
+#include "nodes/kernels/carried_delta.h"
 #include "nodes/node_file.h"
 
 namespace kpsa::engine {
@@ -135,7 +136,9 @@ void ComputeLattice(DeformerContext<In<"points", ConstPointsView>> c) {
                   static_cast<double>(controls.y[i]) - rest.y[i],
                   static_cast<double>(controls.z[i]) - rest.z[i]};
   }
-  const Matrix4 now = bound.carried ? c.get<"parentMatrix">() * bound.from_lattice : bound.from_lattice;
+  Matrix4 carried;
+  if (bound.carried) FindProduct(c.get<"parentMatrix">(), bound.from_lattice, &carried);
+  const Matrix4& now = bound.carried ? carried : bound.from_lattice;
   const Parallel parallel = HostParallel(c);
   bound.kernel.Run({{offsets, bound.grid.count()}, numbers, now, now, c.get<"envelope">()},
                    c.get<"inPoints">(), c.out<"outPoints">(), {scratch, bound.kernel.ScratchFloats()},

@@ -28,12 +28,12 @@ void ComputeNonLinear(DeformerContext<In<"matrix", Matrix4>, In<kSettings, doubl
   static_assert(sizeof(Map) == sizeof...(kSettings) * sizeof(double));
   const auto& bound = c.template kernel_as<NonLinearBound>();
   const Matrix4& handle = c.template get<"matrix">();
+  Matrix4 waiting;
+  if (bound.frame.fixed()) waiting = bound.frame.StageFromHandle(c.template get<"parentMatrix">(), handle);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run(
-      {Map{c.template get<kSettings>()...},
-       bound.frame.fixed() ? bound.frame.StageFromHandle(c.template get<"parentMatrix">(), handle) : handle,
-       c.template get<"envelope">()},
-      c.template get<"inPoints">(), c.template out<"outPoints">(), {}, &parallel);
+  bound.kernel.Run({Map{c.template get<kSettings>()...}, bound.frame.fixed() ? waiting : handle,
+                    c.template get<"envelope">()},
+                   c.template get<"inPoints">(), c.template out<"outPoints">(), {}, &parallel);
 }
 
 void DeclareHandle(NodeBuilder& b) {

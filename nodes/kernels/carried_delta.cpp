@@ -90,13 +90,15 @@ void WaitingDeltaLanes(const Matrix4& handle, const Matrix4& parent, const Waiti
   StoreDelta({m.c[0], m.c[1], m.c[2]}, Placed(m, pivot) - about, delta);
 }
 
-void WaitingFrameLanes(const Matrix4& before, const Matrix4& parent, const Matrix4& handle,
-                       Matrix4* HWY_RESTRICT frame) {
-  const FourColumns m = Waiting(before, parent, LoadColumns(handle));
-  for (std::size_t c = 0; c < 4; ++c) {
-    StoreFour(m.c[c], frame->m.data() + 4 * c);
-    frame->m[4 * c + 3] = c == 3 ? 1 : 0;
-  }
+HWY_INLINE void StoreAffine(const FourColumns& m, Matrix4* HWY_RESTRICT to) {
+  for (std::size_t c = 0; c < 3; ++c) StoreFour(Four{m.c[c][0], m.c[c][1], m.c[c][2], 0}, &to->m[4 * c]);
+  StoreFour(Four{m.c[3][0], m.c[3][1], m.c[3][2], 1}, &to->m[12]);
+}
+void WaitingFrameLanes(const Matrix4& before, const Matrix4& parent, const Matrix4& handle, Matrix4* frame) {
+  StoreAffine(Waiting(before, parent, LoadColumns(handle)), frame);
+}
+void ProductLanes(const Matrix4& a, const Matrix4& b, Matrix4* product) {
+  StoreAffine(Product(LoadColumns(a), b.m.data()), product);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -110,6 +112,7 @@ HWY_EXPORT(CarriedLanes);
 HWY_EXPORT(ParentLanes);
 HWY_EXPORT(WaitingDeltaLanes);
 HWY_EXPORT(WaitingFrameLanes);
+HWY_EXPORT(ProductLanes);
 
 void FindCarriedDelta(const Matrix4& handle, const Matrix4& parent, const CarriedRest& rest,
                       AffineDelta* delta) noexcept {
@@ -125,6 +128,10 @@ void FindWaitingDelta(const Matrix4& handle, const Matrix4& parent, const Waitin
 void FindWaitingFrame(const Matrix4& before, const Matrix4& parent, const Matrix4& handle,
                       Matrix4* frame) noexcept {
   HWY_DYNAMIC_DISPATCH(WaitingFrameLanes)(before, parent, handle, frame);
+}
+
+void FindProduct(const Matrix4& a, const Matrix4& b, Matrix4* product) noexcept {
+  HWY_DYNAMIC_DISPATCH(ProductLanes)(a, b, product);
 }
 
 }  // namespace kpsa::engine

@@ -36,6 +36,8 @@ struct ParentMotion {
 // False where the parent has no inverse.
 bool FindParentMotion(const Matrix4& parent, const ParentRest& rest, ParentMotion* motion) noexcept;
 
+// a b
+void FindProduct(const Matrix4& a, const Matrix4& b, Matrix4* product) noexcept;
 // before (parent^-1 handle)
 void FindWaitingFrame(const Matrix4& before, const Matrix4& parent, const Matrix4& handle,
                       Matrix4* frame) noexcept;

@@ -119,6 +119,8 @@ std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* 
 namespace {
 constexpr double kRim =
     1e-6;  // a point this far outside counts as inside: lattices are fitted to bounding boxes
+// Controls are fewer than 2^15, divisions 32 at most: a product with their share, rounded up, is exact
+constexpr std::size_t kShare = std::size_t{1} << 20;
 constexpr std::size_t kDenseControls = 13;  // measured: a stored control costs as much as 13 of the dense sum
 }  // namespace
 
@@ -189,11 +191,8 @@ LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView re
     width *= static_cast<std::size_t>(settings.local ? order[a] : settings.divisions[a]);
   }
   sparse_ = settings.local && controls_ > kDenseControls * width;
-  for (std::size_t c = 0; c < controls_; ++c) {
-    const std::size_t row = c / divisions_[0];
-    rows_.push_back({static_cast<Index>(row * divisions_[0]), static_cast<std::uint8_t>(row % divisions_[1]),
-                     static_cast<std::uint8_t>(row / divisions_[1])});
-  }
+  over_s_ = static_cast<std::uint32_t>(kShare / divisions_[0] + 1);
+  over_t_ = static_cast<std::uint32_t>(kShare / divisions_[1] + 1);
 
   std::vector<Index> row_controls;
   std::vector<float> row_weights, rows;
@@ -285,22 +284,22 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   if (inputs.moved.empty() && !rest_moves) return;
   std::array<std::uint32_t, 32> rows{};
   const auto fill = [&](std::size_t begin, std::size_t end) {
-    if (!rest_moves) {
-      std::fill(moves + 4 * begin, moves + 4 * end, 0.0f);
-    } else {
-      for (std::size_t c = begin; c < end; ++c) std::memcpy(moves + 4 * c, resting, sizeof(resting));
-    }
+    for (std::size_t c = begin; c < end; ++c) std::memcpy(moves + 4 * c, resting, sizeof(resting));
   };
   const std::size_t ds = divisions_[0], dt = divisions_[1];
   if (sparse_ || rest_moves) {  // all controls are read
-    fill(0, controls_);
+    if (rest_moves) {
+      fill(0, controls_);
+    } else {
+      std::memset(moves, 0, 4 * controls_ * sizeof(float));
+    }
     if (rest_moves) rows.fill(~std::uint32_t{0} >> (32 - dt));
   } else {
     std::size_t filled = 0;  // up to the end of a row
     for (const Index c : inputs.moved) {
-      const Row& row = rows_[c];
-      rows[row.u] |= std::uint32_t{1} << row.t;
-      if (c >= filled) fill(row.first, filled = row.first + ds);
+      const std::uint32_t row = (c * over_s_) / kShare, u = (row * over_t_) / kShare;
+      rows[u] |= std::uint32_t{1} << (row - u * dt);
+      if (c >= filled) fill(row * ds, filled = (row + 1) * ds);
     }
   }
   HWY_DYNAMIC_DISPATCH(ControlMoves)

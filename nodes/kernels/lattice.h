@@ -68,15 +68,10 @@ class LatticeKernel {
            const Parallel* parallel = nullptr) const noexcept;
 
  private:
-  // A control's row along s: where it begins, and its place along t and u.
-  struct Row {
-    Index first;
-    std::uint8_t t, u;
-  };
   std::size_t count_ = 0, controls_ = 0;
   std::array<std::size_t, 3> divisions_ = {};
-  std::vector<Row> rows_;       // by control
-  AlignedFloats weights_;       // per point: point weight x outside falloff
+  std::uint32_t over_s_ = 0, over_t_ = 0;  // of what is divided by their divisions, times 2^20
+  AlignedFloats weights_;                  // per point: point weight x outside falloff
   bool sparse_ = false;         // linear and large: 8 controls a point; otherwise all, axis by axis
   ControlBlend blend_;          // of sparse_
   std::vector<Index> tiles_;    // of dense: first points of the tiles of 16 that have a weight

@@ -29,6 +29,7 @@ void ClusterKernel::Run(const AffineDelta& delta, double strength, ConstPointsVi
   const float envelope = static_cast<float>(strength);
   if (delta.is_zero || envelope == 0 || begin_ >= end_) return CopyPoints(in, out);
   const auto copy = [&](std::size_t begin, std::size_t size) {
+    if (size == 0) return;
     CopyPoints({in.x + begin, in.y + begin, in.z + begin, size},
                {out.x + begin, out.y + begin, out.z + begin, size});
   };
