@@ -324,6 +324,7 @@ int Main(int argc, char** argv) {
     Random random(7);
     std::vector<Double3> offsets(8);
     for (Double3& o : offsets) o = random.Vector() * 0.1;
+    const WireOffsets moved(offsets);
     const CurveShape shape{settings.basis, false, 8};
     std::vector<std::array<Index, 4>> controls(n);
     std::vector<std::array<float, 4>> weights(n);
@@ -339,7 +340,7 @@ int Main(int argc, char** argv) {
     Report(
         "wire, all points near", n, {24 + 28 + 32, 27},
         [&] {
-          kernel.Run({offsets, 1}, in, out.view(), scratch.span());
+          kernel.Run({moved, 1}, in, out.view(), scratch.span());
         },
         [&] {
           for (std::size_t i = 0; i < n; ++i) {

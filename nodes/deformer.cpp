@@ -152,17 +152,18 @@ Result<CarriedFrame> CarriedFrame::Bind(const Structural& structural) {
     if (!Invert(frame.world_from_stage_, &frame.stage_from_world_))
       return Status::Invalid("geometryMatrix is singular");
   }
+  frame.stage_from_parent_ = frame.stage_from_world_ * frame.parent_rest_;
   return frame;
 }
 
 Matrix4 CarriedFrame::StageFromWorld(const Matrix4& parent_now) const {
-  return fixed_ ? stage_from_world_ * parent_rest_ * InverseOrIdentity(parent_now) : Matrix4();
+  return StageFromHandle(parent_now, Matrix4());
 }
 
 Matrix4 CarriedFrame::StageFromHandle(const Matrix4& parent_now, const Matrix4& handle) const {
   if (!fixed_) return handle;
   Matrix4 frame;
-  FindWaitingFrame(stage_from_world_ * parent_rest_, parent_now, handle, &frame);
+  FindWaitingFrame(stage_from_parent_, parent_now, handle, &frame);
   return frame;
 }
 

@@ -88,7 +88,7 @@ class CarriedFrame {
 
  private:
   bool fixed_ = false;
-  Matrix4 parent_rest_, parent_rest_inverse_, world_from_stage_, stage_from_world_;
+  Matrix4 parent_rest_, parent_rest_inverse_, world_from_stage_, stage_from_world_, stage_from_parent_;
 };
 
 // The host's threads as kernels want them.

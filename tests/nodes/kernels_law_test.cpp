@@ -141,18 +141,18 @@ class KernelLaw : public testing::Test {
            }});
     }
     for (CurveBasis basis : {CurveBasis::kLinear, CurveBasis::kCatmullRom, CurveBasis::kBSpline}) {
-      subjects_.push_back({"wire " + std::to_string(static_cast<int>(basis)),
-                           true,
-                           {},
-                           [this, basis](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
-                             WireSettings settings;
-                             settings.basis = basis;
-                             settings.dropoff = 0.3;
-                             const WireKernel kernel(settings, vertices_, mesh_.rest.view(), out_points,
-                                                     Masked(out_points));
-                             AlignedFloats scratch(kernel.ScratchFloats());
-                             kernel.Run({vertex_offsets_, 0.9}, in, out, scratch.span(), parallel);
-                           }});
+      subjects_.push_back(
+          {"wire " + std::to_string(static_cast<int>(basis)),
+           true,
+           {},
+           [this, basis](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             WireSettings settings;
+             settings.basis = basis;
+             settings.dropoff = 0.3;
+             const WireKernel kernel(settings, vertices_, mesh_.rest.view(), out_points, Masked(out_points));
+             AlignedFloats scratch(kernel.ScratchFloats());
+             kernel.Run({WireOffsets(vertex_offsets_), 0.9}, in, out, scratch.span(), parallel);
+           }});
     }
     AddRingSubjects();
     AddDualQuaternions();
@@ -164,7 +164,8 @@ class KernelLaw : public testing::Test {
                                        {far, std::span(vertices_).first(3)}};
            const WireKernel kernel(curves, 0.3, mesh_.rest.view(), out_points, Masked(out_points));
            AlignedFloats scratch(kernel.ScratchFloats());
-           kernel.Run({std::span(vertex_offsets_).first(5), 0.9}, in, out, scratch.span(), parallel);
+           kernel.Run({WireOffsets(std::span(vertex_offsets_).first(5)), 0.9}, in, out, scratch.span(),
+                      parallel);
          }});
     for (const NonLinearMap& map : std::vector<NonLinearMap>{
              Bend{1.2, -0.4, 0.5}, Twist{0.3, -2, -0.3, 0.4}, Squash{-0.7, 1.2, 0.3, 0.4, 0.6, -0.3, 0.5},
