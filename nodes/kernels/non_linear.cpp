@@ -101,7 +101,7 @@ void NonLinearKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView o
   run.kind = inputs.map.index();
   run.weights = weights_.data();
   run.envelope = Float(inputs.envelope);
-  const bool moves = run.envelope != 0 && PrepareFrame(inputs.frame, &run) &&
+  const bool moves = run.envelope != 0 && PrepareHandleFrame(inputs.frame, 1, &run.frame) &&
                      std::visit([&](const auto& map) { return Prepare(map, &run); }, inputs.map);
   if (!moves) return CopyPoints(in, out);
   ForRanges(parallel, count_, kGrain,

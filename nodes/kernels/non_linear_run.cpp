@@ -4,7 +4,7 @@
 #define HWY_TARGET_INCLUDE "nodes/kernels/non_linear_run.cpp"
 #include "hwy/foreach_target.h"
 
-#include "nodes/kernels/affine-inl.h"
+#include "nodes/kernels/handle_frame-inl.h"
 #include "nodes/kernels/sine-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -118,50 +118,11 @@ HWY_INLINE void Move(const WaveRun& wave, VLanes* x, VLanes* y, VLanes* z) {
   *x = *z = hn::Zero(d);
 }
 
-bool FrameOf(const Matrix4& frame, NonLinearRun* HWY_RESTRICT run) {
-  const FourColumns m = LoadColumns(frame);
-  Four rows[3];
-  if (!InverseRows(m, rows)) return false;
-  FourFloats sum{};  // of zeros, or of what is not finite
-  const auto round = [&](Four four, float* to) HWY_ATTR {
-    const FourFloats floats = __builtin_convertvector(four, FourFloats);
-    std::memcpy(to, &floats, sizeof(floats));
-    sum += floats * 0.0f;
-    return floats;
-  };
-  for (std::size_t i = 0; i < 3; ++i) {
-    round(rows[i], run->inverse + 4 * i);
-    round(m.c[i], run->linear + 4 * i);
-  }
-  const Four left = __builtin_convertvector(round(m.c[3], run->pivot), Four) - m.c[3];
-  for (std::size_t i = 0; i < 3; ++i) run->offset[i] = static_cast<float>(FourDot(rows[i], left));
-  return sum[0] == 0 && sum[1] == 0 && sum[2] == 0;
-}
-
 template <typename Map>
 HWY_INLINE void Deform(const Map& map, const NonLinearRun& run, ConstPointsView in, PointsView out,
                        std::size_t begin, std::size_t end) {
-  const DLanes d;
-  const auto row = [&](const float* m, std::size_t step, VLanes x, VLanes y, VLanes z, VLanes last) HWY_ATTR {
-    return Fma(hn::Set(d, m[0]), x, Fma(hn::Set(d, m[step]), y, Fma(hn::Set(d, m[2 * step]), z, last)));
-  };
-  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
-    const VLanes w = hn::Mul(hn::Load(d, run.weights + i), hn::Set(d, run.envelope));
-    const VLanes px = hn::Load(d, in.x + i), py = hn::Load(d, in.y + i), pz = hn::Load(d, in.z + i);
-    const VLanes rx = hn::Sub(px, hn::Set(d, run.pivot[0])), ry = hn::Sub(py, hn::Set(d, run.pivot[1])),
-                 rz = hn::Sub(pz, hn::Set(d, run.pivot[2]));
-    VLanes x = row(run.inverse, 1, rx, ry, rz, hn::Set(d, run.offset[0]));
-    VLanes y = row(run.inverse + 4, 1, rx, ry, rz, hn::Set(d, run.offset[1]));
-    VLanes z = row(run.inverse + 8, 1, rx, ry, rz, hn::Set(d, run.offset[2]));
-    Move(map, &x, &y, &z);
-    const auto moves = hn::Ne(w, hn::Zero(d));
-    const auto moved = [&](const float* linear, VLanes p) HWY_ATTR {
-      return hn::IfThenElse(moves, Fma(w, row(linear, 4, x, y, z, hn::Zero(d)), p), p);
-    };
-    hn::Store(moved(run.linear, px), d, out.x + i);
-    hn::Store(moved(run.linear + 1, py), d, out.y + i);
-    hn::Store(moved(run.linear + 2, pz), d, out.z + i);
-  }
+  MoveInFrame(run.frame, run.weights, run.envelope, in, out, begin, end,
+              [&](VLanes* x, VLanes* y, VLanes* z) HWY_ATTR { Move(map, x, y, z); });
 }
 
 void NonLinearLanes(const NonLinearRun& run, ConstPointsView in, PointsView out, std::size_t begin,
@@ -189,12 +150,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace kpsa::engine {
 
-HWY_EXPORT(FrameOf);
 HWY_EXPORT(NonLinearLanes);
-
-bool PrepareFrame(const Matrix4& frame, NonLinearRun* run) noexcept {
-  return HWY_DYNAMIC_DISPATCH(FrameOf)(frame, run);
-}
 
 void RunNonLinear(const NonLinearRun& run, ConstPointsView in, PointsView out, std::size_t begin,
                   std::size_t end) noexcept {

@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "base/matrix.h"
 #include "base/points.h"
+#include "nodes/kernels/handle_frame.h"
 
 namespace kpsa::engine {
 
@@ -58,15 +58,11 @@ struct NonLinearRun {
     SineRun sine;
     WaveRun wave;
   };
-  // q = inverse (p - pivot) + offset: the pivot is the handle's origin in floats, offset what that leaves
-  float pivot[4], offset[4];
-  float inverse[12], linear[12];  // rows; columns
+  HandleFrame frame;
   const float* weights;
   float envelope;
 };
 
-// The last four of a frame, the points' space from the handle's; false where it has no inverse, or none in floats.
-bool PrepareFrame(const Matrix4& frame, NonLinearRun* run) noexcept;
 // begin a multiple of 16; writes whole vectors. In place allowed.
 void RunNonLinear(const NonLinearRun& run, ConstPointsView in, PointsView out, std::size_t begin,
                   std::size_t end) noexcept;
