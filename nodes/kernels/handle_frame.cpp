@@ -11,8 +11,8 @@ namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
 bool HandleLanes(const Matrix4& matrix, double size, HandleFrame* HWY_RESTRICT frame) {
-  FourColumns m = LoadColumns(matrix);
-  for (std::size_t c = 0; c < 3; ++c) m.c[c] *= size;
+  const FourColumns m = LoadColumns(matrix);
+  const double inverse_size = 1 / size;
   Four rows[3];
   if (!InverseRows(m, rows)) return false;
   FourFloats sum{};  // of zeros, or of what is not finite
@@ -23,8 +23,9 @@ bool HandleLanes(const Matrix4& matrix, double size, HandleFrame* HWY_RESTRICT f
     return floats;
   };
   for (std::size_t i = 0; i < 3; ++i) {
+    rows[i] *= inverse_size;
     round(rows[i], frame->inverse + 4 * i);
-    round(m.c[i], frame->linear + 4 * i);
+    round(m.c[i] * size, frame->linear + 4 * i);
   }
   const Four left = __builtin_convertvector(round(m.c[3], frame->pivot), Four) - m.c[3];
   for (std::size_t i = 0; i < 3; ++i) frame->offset[i] = static_cast<float>(FourDot(rows[i], left));
