@@ -70,7 +70,8 @@ void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, s
   }
 }
 
-std::size_t MovedControls(ConstPointsView now, ConstPointsView rest, Index* HWY_RESTRICT moved) {
+std::size_t MovedControls(const ConstPointsView& now, const ConstPointsView& rest,
+                          Index* HWY_RESTRICT moved) {
   const DLanes d;
   std::size_t count = 0;
   for (std::size_t begin = 0; begin < now.count; begin += hn::Lanes(d)) {
@@ -112,7 +113,8 @@ HWY_EXPORT(BlendTiles);
 HWY_EXPORT(MovedControls);
 HWY_EXPORT(ControlMoves);
 
-std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept {
+std::size_t FindMovedControls(const ConstPointsView& now, const ConstPointsView& rest,
+                              Index* moved) noexcept {
   return HWY_DYNAMIC_DISPATCH(MovedControls)(now, rest, moved);
 }
 
@@ -279,12 +281,14 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
   const Index first = 0;
   const Double3 none;
   HWY_DYNAMIC_DISPATCH(ControlMoves)(inputs.matrix, inputs.envelope, &none, &first, 1, moves);
-  const float resting[4] = {moves[0], moves[1], moves[2], moves[3]};
-  const bool rest_moves = (resting[0] != 0) | (resting[1] != 0) | (resting[2] != 0);
+  std::array<float, 4> resting;
+  std::memcpy(resting.data(), moves, sizeof(resting));
+  const bool rest_moves = (moves[0] != 0) | (moves[1] != 0) | (moves[2] != 0);
   if (inputs.moved.empty() && !rest_moves) return;
-  std::array<std::uint32_t, 32> rows{};
+  std::array<std::uint32_t, 32> rows;
+  for (std::size_t u = 0; u < divisions_[2]; ++u) rows[u] = 0;
   const auto fill = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t c = begin; c < end; ++c) std::memcpy(moves + 4 * c, resting, sizeof(resting));
+    for (std::size_t c = begin; c < end; ++c) std::memcpy(moves + 4 * c, resting.data(), sizeof(resting));
   };
   const std::size_t ds = divisions_[0], dt = divisions_[1];
   if (sparse_ || rest_moves) {  // all controls are read

@@ -43,7 +43,7 @@ struct LatticeSettings {
 std::vector<double> LatticeBasis(int divisions, int order, double x);
 
 // The controls that are not where they rest, ascending, in `moved` (as many as there are, at most); how many.
-std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept;
+std::size_t FindMovedControls(const ConstPointsView& now, const ConstPointsView& rest, Index* moved) noexcept;
 
 // A local kernel.
 class LatticeKernel {
