@@ -17,6 +17,7 @@
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/non_linear.h"
 #include "nodes/kernels/normals.h"
+#include "nodes/kernels/sculpt.h"
 #include "nodes/kernels/shrink_wrap.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/soft_mod.h"
@@ -152,6 +153,17 @@ class KernelLaw : public testing::Test {
              const WireKernel kernel(settings, vertices_, mesh_.rest.view(), out_points, Masked(out_points));
              AlignedFloats scratch(kernel.ScratchFloats());
              kernel.Run({WireOffsets(vertex_offsets_), 0.9}, in, out, scratch.span(), parallel);
+           }});
+    }
+    for (const SculptMode mode : {SculptMode::kFlip, SculptMode::kProject, SculptMode::kStretch}) {
+      subjects_.push_back(
+          {"sculpt " + std::to_string(static_cast<int>(mode)),
+           true,
+           {},
+           [this, mode](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             const Matrix4 handle = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
+             const SculptShape shape{mode, SculptDropoff::kLinear, 0.5, 0.6, {0, 0.6, 0.8}};
+             SculptKernel(out_points, Masked(out_points)).Run({shape, handle, 0.4, 0.8}, in, out, parallel);
            }});
     }
     AddRingSubjects();
