@@ -83,7 +83,7 @@ KPSA_NODES(sculpt, registry) {
                                         .doc = "A sphere pushes points out of itself.",
                                         .own = DeclareSculpt,
                                         .bind = BindSculpt})
-      .cost(300, 30);
+      .cost(300, 1);
 }
 
 }  // namespace kpsa::engine
