@@ -140,7 +140,7 @@ int Main(int argc, char** argv) {
         fmt::format("skin, {} influences", influences), n,
         Work{30.0 + 8 * influences, 30.0 + 24 * influences},
         [&] {
-          kernel.Run({palette, 1, {}}, in, out.view(), scratch.span());
+          kernel.Run({{Pointers(palette)}, 1}, in, out.view(), scratch.span());
         },
         [&] {
           std::vector<Affine> joints(palette.begin(), palette.end());
@@ -160,7 +160,7 @@ int Main(int argc, char** argv) {
     Report(
         "skin, 1 to 8 influences", n, Work{30 + 8 * 4.5, 30 + 24 * 4.5},
         [&] {
-          kernel.Run({palette, 1, {}}, in, out.view(), scratch.span());
+          kernel.Run({{Pointers(palette)}, 1}, in, out.view(), scratch.span());
         },
         [&] {
           std::vector<Affine> joints(palette.begin(), palette.end());
@@ -175,7 +175,8 @@ int Main(int argc, char** argv) {
   }
   for (int influences : {4, 8}) {
     const TestSkin skin = MakeSkin(n, 64, influences, false);
-    const DualQuaternionKernel kernel({skin.offsets, skin.joints, skin.weights, 64}, all);
+    const std::vector<Double3> centers(64);
+    const DualQuaternionKernel kernel({skin.offsets, skin.joints, skin.weights, 64}, centers, all);
     std::vector<Matrix4> palette = MakePalette(64, {});
     for (Matrix4& m : palette) {
       Double3 place, scale;
@@ -183,12 +184,11 @@ int Main(int argc, char** argv) {
       DecomposeTrs(m, &place, &rotation, &scale);
       m = ComposeTrs(place, rotation, {1, 1, 1});
     }
-    const std::vector<Double3> centers(64);
     Report(
         fmt::format("dual quaternions, {} influences", influences), n,
         Work{30.0 + 8 * influences, 74.0 + 16 * influences},
         [&] {
-          kernel.Run({palette, centers, 1, {}, {}}, in, out.view(), scratch.span());
+          kernel.Run({{Pointers(palette)}, 1}, in, out.view(), scratch.span());
         },
         [&] {
           std::vector<Motion> joints(palette.begin(), palette.end());
@@ -324,6 +324,7 @@ int Main(int argc, char** argv) {
     Random random(7);
     std::vector<Double3> offsets(8);
     for (Double3& o : offsets) o = random.Vector() * 0.1;
+    const WireOffsets moved(offsets);
     const CurveShape shape{settings.basis, false, 8};
     std::vector<std::array<Index, 4>> controls(n);
     std::vector<std::array<float, 4>> weights(n);
@@ -339,7 +340,7 @@ int Main(int argc, char** argv) {
     Report(
         "wire, all points near", n, {24 + 28 + 32, 27},
         [&] {
-          kernel.Run({offsets, 1}, in, out.view(), scratch.span());
+          kernel.Run({moved, 1}, in, out.view(), scratch.span());
         },
         [&] {
           for (std::size_t i = 0; i < n; ++i) {

@@ -2,7 +2,7 @@
 // of an accelerated frame have: chains of one deformer, every step of which is stale, over 16 and over 80 points. A line
 // through the two times meets no points at all at the cost of the step. Cold: between two runs 2 MB of something else go
 // through the caches, as a subspace does in every frame.
-//   bench_steps [deformers in a chain]          40 if not given
+//   bench_steps [deformers in a chain [deformer]]          40 if not given, of all types
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,6 +34,13 @@ struct Chain {
   std::vector<std::pair<std::string, std::function<Value(double)>>> moving;
 };
 
+void ComputeNudge(
+    NodeContext<In<"inPoints", ConstPointsView>, In<"by", double>, Out<"outPoints", PointsView>> c) {
+  const PointsView& out = c.out<"outPoints">();
+  CopyPoints(c.get<"inPoints">(), out);
+  out.x[0] += static_cast<float>(c.get<"by">());
+}
+
 const NodeRegistry& Registry() {
   static const NodeRegistry* registry = [] {
     auto* nodes = new NodeRegistry;
@@ -42,11 +49,7 @@ const NodeRegistry& Registry() {
         .points_in("inPoints", "")
         .in("by", 0.0)
         .out("outPoints", Type::kPoints)
-        .compute(+[](ComputeContext& c) {
-          const PointsView& out = c.out_points(0);
-          CopyPoints(c.points(0), out);
-          out.x[0] += static_cast<float>(c.get<double>(1));
-        })
+        .compute<ComputeNudge>()
         .in_place("inPoints");
     return nodes;
   }();
@@ -240,6 +243,7 @@ int Main(int argc, char** argv) {
   const auto driver = std::make_shared<const Mesh>(std::move(data));
   fmt::print("{:<36} {:>16} {:>10} {:>10}\n", "deformer", "beyond points", "cold", "a point");
   for (const Chain& chain : Chains(mesh, driver)) {
+    if (argc > 2 && chain.type != argv[2]) continue;
     const Cost cost = Measure(chain, mesh, length);
     fmt::print("{:<36} {:>13.0f} ns {:>7.0f} ns {:>7.2f} ns\n",
                chain.type + (chain.what.empty() ? "" : ", " + chain.what), cost.step, cost.cold, cost.point);

@@ -18,8 +18,10 @@ struct ClusterBound {
   ClusterKernel kernel;
   CarriedFrame frame;
   bool has_bind_pre = false;
-  Matrix4 parent_from_handle_inverse;  // rest(matrix)^-1 . rest(parentMatrix)
-  Double3 pivot;                       // of the handle at rest, stage space
+  Double3 pivot;        // of the handle at rest, stage space
+  CarriedRest carried;  // of stages in world space
+  WaitingRest
+      waiting;  // of stages in mesh space: the handle's motion in its parent's frame, from where that rests
 };
 
 Result<ClusterBound> MakeCluster(const Binding& binding, std::vector<float> weights) {
@@ -31,12 +33,15 @@ Result<ClusterBound> MakeCluster(const Binding& binding, std::vector<float> weig
   ClusterBound bound{ClusterKernel(binding.output("outPoints").ToVector(), weights),
                      *frame,
                      s.is_set("bindPreMatrix"),
+                     TransformPoint(frame->stage_from_world(), TransformPoint(*handle, {})),
                      {},
                      {}};
   Matrix4 handle_inverse;
   if (!Invert(*handle, &handle_inverse)) return Status::Invalid("matrix is singular at rest");
-  bound.parent_from_handle_inverse = handle_inverse * frame->parent_rest();
-  bound.pivot = TransformPoint(frame->stage_from_world(), TransformPoint(*handle, {}));
+  bound.carried = {handle_inverse * frame->parent_rest(),
+                   TransformPoint(frame->parent_rest_inverse(), bound.pivot)};
+  bound.waiting = {frame->stage_from_world() * frame->parent_rest(),
+                   handle_inverse * frame->world_from_stage(), bound.pivot};
   return bound;
 }
 
@@ -94,19 +99,17 @@ Result<BoundKernel> BindSoftMod(const Binding& binding) {
 void ComputeCluster(ClusterContext c) {
   const auto& bound = c.kernel_as<ClusterBound>();
   const Matrix4 &parent = c.get<"parentMatrix">(), &handle = c.get<"matrix">();
-  CarriedDelta carried;
-  if (bound.frame.fixed()) {  // the points wait for the skin: the parent stays where it rests
-    // The handle's motion in its parent's frame, as seen from where the parent rests
-    const Matrix4 own = InverseOrIdentity(parent) * handle * bound.parent_from_handle_inverse;
-    carried.delta = bound.frame.MotionInStage(own);
+  AffineDelta delta;
+  if (bound.has_bind_pre) {
+    const Matrix4 motion = bound.frame.Motion(parent);
+    delta = MakeAffineDelta(handle * c.get<"bindPreMatrix">(), TransformPoint(motion, bound.pivot));
+  } else if (bound.frame.fixed()) {  // the points wait for the skin: the parent stays where it rests
+    FindWaitingDelta(handle, parent, bound.waiting, &delta);
   } else {
-    FindCarriedDelta(handle, bound.parent_from_handle_inverse, parent, bound.frame.parent_rest_inverse(),
-                     &carried);
+    FindCarriedDelta(handle, parent, bound.carried, &delta);
   }
-  if (bound.has_bind_pre) carried.delta = handle * c.get<"bindPreMatrix">();
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({carried.delta, TransformPoint(carried.motion, bound.pivot), c.get<"envelope">()},
-                   c.get<"inPoints">(), c.out<"outPoints">(), {}, &parallel);
+  bound.kernel.Run(delta, c.get<"envelope">(), c.get<"inPoints">(), c.out<"outPoints">(), &parallel);
 }
 
 void DeclareHandle(NodeBuilder& b) {

@@ -39,7 +39,7 @@ using WireContext =
 struct WireBound {
   WireKernel kernel;
   CarriedFrame frame;
-  std::size_t vertices, offset_floats;
+  std::size_t view_floats = 0;  // of several curves: their displacements in a row
   bool several = false;
 };
 
@@ -88,7 +88,6 @@ Result<BoundKernel> BindWire(const Binding& binding) {
   const std::vector<WireSource> sources = Sources(binding);
   std::vector<std::vector<Double3>> vertices;
   std::vector<WireSettings> settings;
-  std::size_t all_vertices = 0;
   for (const WireSource& source : sources) {
     if (source.curve == nullptr) return Status::Invalid("curve is not set");
     if (source.displacements != source.curve->cvs().size()) {
@@ -98,7 +97,6 @@ Result<BoundKernel> BindWire(const Binding& binding) {
     vertices.emplace_back();
     for (const Double3& cv : source.curve->cvs())
       vertices.back().push_back(TransformPoint(frame->stage_from_world(), cv));
-    all_vertices += vertices.back().size();
     settings.emplace_back();
     settings.back().closed = source.curve->closed();
     settings.back().dropoff = source.dropoff / scale;
@@ -110,32 +108,28 @@ Result<BoundKernel> BindWire(const Binding& binding) {
   WireBound bound{several
                       ? WireKernel(curves, s.get_double("crossingEffect"), *rest, out, BoundWeights(binding))
                       : WireKernel(settings[0], vertices[0], *rest, out, BoundWeights(binding)),
-                  *frame, all_vertices, 0, several};
-  bound.offset_floats = (all_vertices * sizeof(Double3) / sizeof(float) + 15) / 16 * 16;
-  const std::size_t scratch = bound.offset_floats + bound.kernel.ScratchFloats();
+                  *frame, 0, several};
+  if (several) bound.view_floats = PaddedCount(curves.size() * sizeof(ConstPointsView) / sizeof(float));
+  const std::size_t scratch = bound.view_floats + bound.kernel.ScratchFloats();
   return MakeBound(std::move(bound), scratch);
 }
 
 void ComputeWire(WireContext c) {
   const auto& bound = c.kernel_as<WireBound>();
-  auto* offsets = reinterpret_cast<Double3*>(c.scratch());
-  // In mesh space the skin turns offsets later: take the parent's turn out again
-  const Matrix4 turn = bound.frame.StageFromWorld(c.get<"parentMatrix">());
-  Double3* to = offsets;
-  const auto add = [&](const ConstPointsView& displacements) {
-    for (std::size_t i = 0; i < displacements.count; ++i) {
-      *to++ = TransformVector(turn, {displacements.x[i], displacements.y[i], displacements.z[i]});
-    }
-  };
+  std::span<const ConstPointsView> offsets(&c.get<"displacements">(), 1);
   if (bound.several) {
     const ArrayView<ConstPointsView> wires = c.get<"deformedWire">();
-    for (std::uint32_t i = 0; i < wires.size(); ++i) add(wires[i]);
-  } else {
-    add(c.get<"displacements">());
+    auto* views = reinterpret_cast<ConstPointsView*>(c.scratch());
+    for (std::uint32_t i = 0; i < wires.size(); ++i) views[i] = wires[i];
+    offsets = {views, wires.size()};
   }
+  // In mesh space the skin turns offsets later: take the parent's turn out again
+  const bool turns = bound.frame.fixed();
+  Matrix4 turn;
+  if (turns) turn = bound.frame.StageFromWorld(c.get<"parentMatrix">());
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({{offsets, bound.vertices}, c.get<"envelope">()}, c.get<"inPoints">(),
-                   c.out<"outPoints">(), {c.scratch() + bound.offset_floats, bound.kernel.ScratchFloats()},
+  bound.kernel.Run({offsets, c.get<"envelope">(), turns ? &turn : nullptr}, c.get<"inPoints">(),
+                   c.out<"outPoints">(), {c.scratch() + bound.view_floats, bound.kernel.ScratchFloats()},
                    &parallel);
 }
 

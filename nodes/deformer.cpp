@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "graph/geometry.h"
+#include "nodes/kernels/carried_delta.h"
 #include "nodes/kernels/weights.h"
 
 namespace kpsa::engine {
@@ -151,19 +152,19 @@ Result<CarriedFrame> CarriedFrame::Bind(const Structural& structural) {
     if (!Invert(frame.world_from_stage_, &frame.stage_from_world_))
       return Status::Invalid("geometryMatrix is singular");
   }
+  frame.stage_from_parent_ = frame.stage_from_world_ * frame.parent_rest_;
   return frame;
 }
 
 Matrix4 CarriedFrame::StageFromWorld(const Matrix4& parent_now) const {
-  return fixed_ ? stage_from_world_ * parent_rest_ * InverseOrIdentity(parent_now) : Matrix4();
+  return StageFromHandle(parent_now, Matrix4());
 }
 
 Matrix4 CarriedFrame::StageFromHandle(const Matrix4& parent_now, const Matrix4& handle) const {
-  return fixed_ ? stage_from_world_ * (parent_rest_ * (InverseOrIdentity(parent_now) * handle)) : handle;
-}
-
-Matrix4 CarriedFrame::MotionInStage(const Matrix4& in_parent) const {
-  return stage_from_world_ * (parent_rest_ * in_parent * parent_rest_inverse_) * world_from_stage_;
+  if (!fixed_) return handle;
+  Matrix4 frame;
+  FindWaitingFrame(stage_from_parent_, parent_now, handle, &frame);
+  return frame;
 }
 
 double CarriedFrame::Growth(const Matrix4& parent_now) const {

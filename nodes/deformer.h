@@ -75,8 +75,6 @@ class CarriedFrame {
   // The same of a handle, whose matrix is of the world. Against its parent first: where it follows that, it
   // stays where it is but for the rounding of that.
   Matrix4 StageFromHandle(const Matrix4& parent_now, const Matrix4& handle) const;
-  // A motion in the parent's axes as one of the points, with the parent where it rests.
-  Matrix4 MotionInStage(const Matrix4& in_parent) const;
   // How much larger the parent has become since rest, along one axis; a rigid motion gives exactly 1.
   double Growth(const Matrix4& parent_now) const;
   bool fixed() const { return fixed_; }
@@ -90,7 +88,7 @@ class CarriedFrame {
 
  private:
   bool fixed_ = false;
-  Matrix4 parent_rest_, parent_rest_inverse_, world_from_stage_, stage_from_world_;
+  Matrix4 parent_rest_, parent_rest_inverse_, world_from_stage_, stage_from_world_, stage_from_parent_;
 };
 
 // The host's threads as kernels want them.

@@ -4,6 +4,7 @@
 
 #include "graph/geometry.h"
 #include "nodes/deformer.h"
+#include "nodes/kernels/carried_delta.h"
 #include "nodes/node_file.h"
 
 namespace kpsa::engine {
@@ -13,9 +14,10 @@ enum class LatticeInterpolation { kLinear, kBspline, kBernstein };
 
 struct LatticeBound {
   LatticeKernel kernel;
-  CarriedFrame frame;
-  Matrix4 stage_from_lattice;  // at rest; the lattice is the cube [-0.5, 0.5]^3
-  PointBuffer grid;            // the controls' places at rest, as the attribute holds them
+  bool carried = false;  // by the parent: in world space
+  // At rest, from the cube [-0.5, 0.5]^3: to the parent where it carries, to the stage otherwise
+  Matrix4 from_lattice;
+  PointBuffer grid;  // the controls' places at rest, as the attribute holds them
   std::size_t offset_floats = 0, moved_floats = 0;
 };
 
@@ -112,8 +114,8 @@ Result<BoundKernel> BindLattice(const Binding& binding) {
     return Status::Invalid("points: expected {} control points", count);
   LatticeBound bound{LatticeKernel(settings, *rest, InverseOrIdentity(*box),
                                    binding.output("outPoints").ToVector(), BoundWeights(binding)),
-                     *frame,
-                     *box,
+                     !frame->fixed(),
+                     frame->fixed() ? *box : frame->parent_rest_inverse() * *box,
                      std::move(grid),
                      PaddedCount(count * sizeof(Double3) / sizeof(float)),
                      PaddedCount(count)};
@@ -134,7 +136,9 @@ void ComputeLattice(DeformerContext<In<"points", ConstPointsView>> c) {
                   static_cast<double>(controls.y[i]) - rest.y[i],
                   static_cast<double>(controls.z[i]) - rest.z[i]};
   }
-  const Matrix4 now = bound.frame.Motion(c.get<"parentMatrix">()) * bound.stage_from_lattice;
+  Matrix4 carried;
+  if (bound.carried) FindProduct(c.get<"parentMatrix">(), bound.from_lattice, &carried);
+  const Matrix4& now = bound.carried ? carried : bound.from_lattice;
   const Parallel parallel = HostParallel(c);
   bound.kernel.Run({{offsets, bound.grid.count()}, numbers, now, now, c.get<"envelope">()},
                    c.get<"inPoints">(), c.out<"outPoints">(), {scratch, bound.kernel.ScratchFloats()},

@@ -27,10 +27,12 @@ template <typename Map, FixedName... kSettings>
 void ComputeNonLinear(DeformerContext<In<"matrix", Matrix4>, In<kSettings, double>...> c) {
   static_assert(sizeof(Map) == sizeof...(kSettings) * sizeof(double));
   const auto& bound = c.template kernel_as<NonLinearBound>();
-  const Matrix4 stage_from_handle =
-      bound.frame.StageFromHandle(c.template get<"parentMatrix">(), c.template get<"matrix">());
+  const Matrix4& handle = c.template get<"matrix">();
+  Matrix4 waiting;
+  if (bound.frame.fixed()) waiting = bound.frame.StageFromHandle(c.template get<"parentMatrix">(), handle);
   const Parallel parallel = HostParallel(c);
-  bound.kernel.Run({Map{c.template get<kSettings>()...}, stage_from_handle, c.template get<"envelope">()},
+  bound.kernel.Run({Map{c.template get<kSettings>()...}, bound.frame.fixed() ? waiting : handle,
+                    c.template get<"envelope">()},
                    c.template get<"inPoints">(), c.template out<"outPoints">(), {}, &parallel);
 }
 

@@ -34,9 +34,11 @@ void ComputeSculpt(SculptContext c) {
   const auto& bound = c.kernel_as<SculptBound>();
   const double radius = c.get<"radius">();
   const Matrix4& handle = c.get<"matrix">();
-  const Matrix4 stage_from_world = bound.frame.StageFromWorld(c.get<"parentMatrix">());
+  Matrix4 waiting;
+  if (bound.frame.fixed()) waiting = bound.frame.StageFromHandle(c.get<"parentMatrix">(), handle);
   SculptKernel::Inputs inputs{{bound.mode, bound.dropoff, 0, 0, {}},
-                              stage_from_world * handle * Scaling({radius, radius, radius}),
+                              bound.frame.fixed() ? waiting : handle,
+                              radius,
                               c.get<"envelope">()};
   // Lengths are world ones: the mean radius of the sphere as its handle scales it
   const double size = radius * std::cbrt(std::fabs(Determinant3(handle)));
@@ -81,7 +83,7 @@ KPSA_NODES(sculpt, registry) {
                                         .doc = "A sphere pushes points out of itself.",
                                         .own = DeclareSculpt,
                                         .bind = BindSculpt})
-      .cost(300, 30);
+      .cost(300, 1);
 }
 
 }  // namespace kpsa::engine

@@ -52,13 +52,11 @@ Result<std::vector<float>> BoundBlendWeights(const Binding& binding) {
 
 enum class SkinningMethod { kClassicLinear, kDualQuaternion, kWeightBlended };
 
-// The matrices of the palette that no point needs stay as they are: nobody reads them.
 struct SkinBound {
   std::optional<SkinKernel> linear;          // of classicLinear and weightBlended
   std::optional<DualQuaternionKernel> dual;  // of dualQuaternion and weightBlended
-  std::vector<Matrix4> joint_from_bind;
-  std::vector<Double3> centers;  // of dual: the joints at bind, mesh space
-  std::size_t palette_floats = 0;
+  Index joint_count = 0;
+  std::size_t joint_floats = 0;
 };
 
 Result<BoundKernel> BindSkin(const Binding& binding) {
@@ -66,8 +64,8 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
   const auto* influences = s.asset<Influences>("influences");
   if (influences == nullptr) return Status::Invalid("influences are not set");
   const PointSet& out = binding.output("outPoints");
-  const SkinWeights weights{influences->offsets(), influences->joints(), influences->weights(),
-                            influences->joint_count()};
+  SkinWeights weights{influences->offsets(), influences->joints(), influences->weights(),
+                      influences->joint_count()};
   if (weights.point_count() != out.total()) {
     return Status::Invalid("its influences are for {} points, the geometry has {}", weights.point_count(),
                            out.total());
@@ -77,13 +75,16 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
     return Status::Invalid("matrix has {} elements, its influences name {} joints", s.array_size("matrix"),
                            influences->joint_count());
   }
-  SkinBound bound;
+  std::vector<Matrix4> joint_from_bind;
   for (Index j = 0; j < influences->joint_count(); ++j) {
     const Value& bind = s.value("bindPreMatrix", static_cast<int>(j));
-    bound.joint_from_bind.push_back(bind.get_if<Matrix4>() != nullptr ? bind.get<Matrix4>() : Matrix4());
+    joint_from_bind.push_back(bind.get_if<Matrix4>() != nullptr ? bind.get<Matrix4>() : Matrix4());
   }
-  bound.palette_floats = bound.joint_from_bind.size() * sizeof(Matrix4) / sizeof(float);
-  std::size_t scratch = bound.palette_floats;
+  weights.joint_from_bind = joint_from_bind;
+  SkinBound bound;
+  bound.joint_count = influences->joint_count();
+  bound.joint_floats = PaddedCount(bound.joint_count * sizeof(const Matrix4*) / sizeof(float));
+  std::size_t scratch = bound.joint_floats;
   const auto method = s.choice<SkinningMethod>("skinningMethod");
   const std::vector<Index> points = out.ToVector();
   if (method != SkinningMethod::kDualQuaternion) {
@@ -98,10 +99,11 @@ Result<BoundKernel> BindSkin(const Binding& binding) {
       blend = std::move(*shares);
       scratch += 3 * PaddedCount(points.size());
     }
-    bound.dual.emplace(weights, points, BoundWeights(binding), blend);
+    std::vector<Double3> centers;  // the joints at bind, mesh space
+    for (const Matrix4& bind : joint_from_bind)
+      centers.push_back(TransformPoint(InverseOrIdentity(bind), {}));
+    bound.dual.emplace(weights, centers, points, BoundWeights(binding), blend);
     scratch += bound.dual->ScratchFloats();
-    for (const Matrix4& bind : bound.joint_from_bind)
-      bound.centers.push_back(TransformPoint(InverseOrIdentity(bind), {}));
   }
   return MakeBound(std::move(bound), scratch);
 }
@@ -111,23 +113,20 @@ using SkinContext = DeformerContext<In<"matrix", ArrayView<Matrix4>>, In<"offset
 void ComputeSkin(SkinContext c) {
   const auto& bound = c.kernel_as<SkinBound>();
   const ArrayView<Matrix4> matrix = c.get<"matrix">();
-  auto* palette = reinterpret_cast<Matrix4*>(c.scratch());
-  const Double3& offset = c.get<"offset">();
-  const auto follow = [&](Index j) {
-    palette[j] = j < matrix.size() ? matrix[j] * bound.joint_from_bind[j] : bound.joint_from_bind[j];
-    palette[j](0, 3) += offset.x, palette[j](1, 3) += offset.y, palette[j](2, 3) += offset.z;
-  };
-  if (!bound.joint_from_bind.empty()) follow(0);
+  // The places of those that no point needs stay as they are: nobody reads them
+  auto* world = reinterpret_cast<const Matrix4**>(c.scratch());
+  static constexpr Matrix4 kUnmoved;
+  const auto follow = [&](Index j) { world[j] = j < matrix.size() ? &matrix[j] : &kUnmoved; };
+  follow(0);
   for (Index j : bound.linear.has_value() ? bound.linear->joints() : bound.dual->joints()) follow(j);
+  const SkinJoints joints{{world, bound.joint_count}, c.get<"offset">()};
   const Parallel parallel = HostParallel(c);
-  const std::span<const Matrix4> all(palette, bound.joint_from_bind.size());
   const double envelope = c.get<"envelope">();
   const ConstPointsView& in = c.get<"inPoints">();
   const PointsView& out = c.out<"outPoints">();
-  float* scratch = c.scratch() + bound.palette_floats;
+  float* scratch = c.scratch() + bound.joint_floats;
   if (!bound.dual.has_value()) {
-    bound.linear->Run({all, envelope, Matrix4()}, in, out, {scratch, bound.linear->ScratchFloats()},
-                      &parallel);
+    bound.linear->Run({joints, envelope}, in, out, {scratch, bound.linear->ScratchFloats()}, &parallel);
     return;
   }
   ConstPointsView linear;
@@ -135,13 +134,11 @@ void ComputeSkin(SkinContext c) {
     const std::size_t row = PaddedCount(in.count);
     const PointsView apart{scratch, scratch + row, scratch + 2 * row, in.count};
     scratch += 3 * row;
-    bound.linear->Run({all, envelope, Matrix4()}, in, apart, {scratch, bound.linear->ScratchFloats()},
-                      &parallel);
+    bound.linear->Run({joints, envelope}, in, apart, {scratch, bound.linear->ScratchFloats()}, &parallel);
     scratch += bound.linear->ScratchFloats();
     linear = apart;
   }
-  bound.dual->Run({all, bound.centers, envelope, Matrix4(), linear}, in, out,
-                  {scratch, bound.dual->ScratchFloats()}, &parallel);
+  bound.dual->Run({joints, envelope, linear}, in, out, {scratch, bound.dual->ScratchFloats()}, &parallel);
 }
 
 void DeclareSkin(NodeBuilder& b) {

@@ -5,6 +5,7 @@
 
 #include "graph/geometry.h"
 #include "nodes/driver_mesh.h"
+#include "nodes/kernels/carried_delta.h"
 #include "nodes/node_file.h"
 
 namespace kpsa::engine {
@@ -64,7 +65,8 @@ void DemandWrapNode(Demand& demand) {
 
 struct WrapBound {
   WrapKernel kernel;
-  CarriedFrame frame;
+  bool carried = false;  // by the parent: in world space
+  ParentRest parent;
   std::size_t KernelFloats() const { return (kernel.ScratchFloats() + 15) / 16 * 16; }
 };
 
@@ -81,12 +83,17 @@ Result<BoundKernel> BindWrap(const Binding& binding) {
   const Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
   const PointSet& driver_points = binding.input("driverPoints", -1);
+  Double3 middle;  // of the driver
+  for (const Double3& p : driver->rest->points)
+    middle = middle + p * (1 / static_cast<double>(driver->rest->points.size()));
   WrapBound bound{
       WrapKernel(ModeOf<kAmongPoints>(s), *driver->topology, driver->rest->points, driver->stage_from_driver,
                  influences, *rest, out.ToVector(), driver_points.ToVector(), weights),
-      *frame};
+      !frame->fixed(),
+      {frame->parent_rest(), frame->parent_rest_inverse(),
+       TransformPoint(frame->parent_rest_inverse(), middle)}};
   std::size_t scratch = bound.KernelFloats();
-  if (!frame->fixed()) scratch += 3 * PaddedCount(driver_points.size()) + 6 * PaddedCount(out.size());
+  if (bound.carried) scratch += 3 * PaddedCount(driver_points.size()) + 6 * PaddedCount(out.size());
   return MakeBound(std::move(bound), scratch);
 }
 
@@ -105,9 +112,9 @@ void ComputeWrap(DeformerContext<In<"driverPoints", ConstPointsView>> c) {
   const double envelope = c.get<"envelope">();
   const ConstPointsView &driver = c.get<"driverPoints">(), &in = c.get<"inPoints">();
   const PointsView& out = c.out<"outPoints">();
-  const Matrix4 motion = bound.frame.Motion(c.get<"parentMatrix">());
-  Matrix4 back;
-  if (motion == Matrix4() || !Invert(motion, &back)) {
+  const Matrix4& parent = c.get<"parentMatrix">();
+  ParentMotion motion;
+  if (!bound.carried || parent == bound.parent.parent || !FindParentMotion(parent, bound.parent, &motion)) {
     bound.kernel.Run({envelope, driver}, in, out, kernel_scratch, &parallel);
     return;
   }
@@ -117,26 +124,14 @@ void ComputeWrap(DeformerContext<In<"driverPoints", ConstPointsView>> c) {
                    wrapped = TakeRows(in.count, &scratch);
   const auto to_rest = [&](const ConstPointsView& from, const PointsView& to) {
     c.For(from.count, 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Double3 p = TransformPoint(back, {from.x[i], from.y[i], from.z[i]});
-        to.x[i] = static_cast<float>(p.x);
-        to.y[i] = static_cast<float>(p.y);
-        to.z[i] = static_cast<float>(p.z);
-      }
+      ApplyAffineDelta(motion.to_rest, nullptr, 1, from, to, begin, end);
     });
   };
   to_rest(driver, resting_driver);
   to_rest(in, resting);
   bound.kernel.Run({envelope, resting_driver}, resting, wrapped, kernel_scratch, &parallel);
   c.For(in.count, 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Double3 move = TransformVector(motion, {static_cast<double>(wrapped.x[i]) - resting.x[i],
-                                                    static_cast<double>(wrapped.y[i]) - resting.y[i],
-                                                    static_cast<double>(wrapped.z[i]) - resting.z[i]});
-      out.x[i] = static_cast<float>(in.x[i] + move.x);
-      out.y[i] = static_cast<float>(in.y[i] + move.y);
-      out.z[i] = static_cast<float>(in.z[i] + move.z);
-    }
+    AddTurned(motion.linear, resting, wrapped, in, out, begin, end);
   });
 }
 

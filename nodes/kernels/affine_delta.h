@@ -10,9 +10,9 @@ namespace kpsa::engine {
 
 // d(p) = linear (p - pivot) + offset
 struct AffineDelta {
-  float linear[9];  // row-major: upper 3x3 of M, minus the identity
-  float pivot[3];
-  float offset[3];       // M pivot - pivot
+  float linear[12];      // columns x y z and a spare number: upper 3x3 of M, minus the identity
+  float pivot[4];        // x y z and a spare number, as is the next
+  float offset[4];       // M pivot - pivot
   bool is_zero = false;  // M is the identity exactly
 };
 
@@ -20,8 +20,13 @@ struct AffineDelta {
 AffineDelta MakeAffineDelta(const Matrix4& matrix, Double3 pivot);
 
 // out = in + w d(in) over points [begin, end) of dense views, begin a multiple of 16; w = weights[i] *
-// envelope, weights padded. In place allowed. Points of weight 0 keep their bits.
+// envelope, weights padded; null: envelope. In place allowed. Points of weight 0 keep their bits.
 void ApplyAffineDelta(const AffineDelta& delta, const float* weights, float envelope, ConstPointsView in,
                       PointsView out, std::size_t begin, std::size_t end) noexcept;
+
+// out = in + linear (to - from), likewise; linear as an AffineDelta's, with the identity in it. Points whose `to` is
+// `from` keep their bits.
+void AddTurned(const float* linear, ConstPointsView from, ConstPointsView to, ConstPointsView in,
+               PointsView out, std::size_t begin, std::size_t end) noexcept;
 
 }  // namespace kpsa::engine

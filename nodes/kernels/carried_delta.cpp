@@ -1,94 +1,104 @@
 #include "nodes/kernels/carried_delta.h"
 
-#include <cmath>
-#include <cstdint>
-#include <cstring>
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "nodes/kernels/carried_delta.cpp"
 #include "hwy/foreach_target.h"
 
-#include "base/simd-inl.h"
+#include "nodes/kernels/affine-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
-// A column, or a row: GCC and Clang make as many vectors of it as the target asks for.
-typedef double Four __attribute__((vector_size(32)));
-typedef std::int64_t FourBits __attribute__((vector_size(32)));
-typedef double Two __attribute__((vector_size(16)));
-
-// c = a b, with sums in the order of the definition; b(row, column) = at(row, column).
-template <typename At>
-HWY_INLINE void Multiply(const Four (&a)[4], At at, Four (&c)[4]) {
-  for (std::size_t k = 0; k < 4; ++k)
-    c[k] = a[0] * at(0, k) + a[1] * at(1, k) + a[2] * at(2, k) + a[3] * at(3, k);
-}
-struct ByColumns {
-  const double* m;
-  HWY_INLINE double operator()(std::size_t row, std::size_t column) const { return m[4 * column + row]; }
-};
-// Row by row, columns 1 0 3 2.
-struct ByTurnedRows {
-  alignas(32) double m[16];
-  HWY_INLINE double operator()(std::size_t row, std::size_t column) const {
-    return m[4 * row + (column ^ 1)];
-  }
-};
-
-// As base/matrix.h's Invert; the identity where there is none.
-HWY_INLINE void Inverse(const Four (&m)[4], ByTurnedRows* inverse) {
-  // 2x2 minors of the upper two rows and of the lower two
-  Two minor[6];
-  Four rows02[4], rows13[4];  // rows 0 2 1 3 and 1 3 0 2
-  for (std::size_t c = 0; c < 4; ++c) {
-    rows02[c] = __builtin_shufflevector(m[c], m[c], 0, 2, 1, 3);
-    rows13[c] = __builtin_shufflevector(m[c], m[c], 1, 3, 0, 2);
-  }
-  for (std::size_t i = 0, at = 0; i < 4; ++i) {
-    for (std::size_t j = i + 1; j < 4; ++j, ++at) {
-      const Four products = rows02[i] * rows13[j];
-      minor[at] = __builtin_shufflevector(products, products, 0, 1) -
-                  __builtin_shufflevector(products, products, 2, 3);
-    }
-  }
-  const double det = minor[0][0] * minor[5][1] - minor[1][0] * minor[4][1] + minor[2][0] * minor[3][1] +
-                     minor[3][0] * minor[2][1] - minor[4][0] * minor[1][1] + minor[5][0] * minor[0][1];
-  const double scale = 1 / det;
-  if (det == 0 || !std::isfinite(det) || !std::isfinite(scale)) {
-    for (std::size_t i = 0; i < 16; ++i) inverse->m[i] = i / 4 == (i % 4 ^ 1) ? 1 : 0;
-    return;
-  }
-  Four k[6];
-  for (std::size_t i = 0; i < 6; ++i) k[i] = __builtin_shufflevector(minor[i], minor[i], 1, 1, 0, 0);
-  // Signs turn on the factors, which rounds nothing
-  constexpr std::int64_t kSign = INT64_MIN;
-  Four odd[4], even[4];
-  for (std::size_t c = 0; c < 4; ++c) {
-    odd[c] = reinterpret_cast<Four>(reinterpret_cast<FourBits>(m[c]) ^ FourBits{kSign, 0, kSign, 0});
-    even[c] = reinterpret_cast<Four>(reinterpret_cast<FourBits>(m[c]) ^ FourBits{0, kSign, 0, kSign});
-  }
-  const Four rows[4] = {(odd[1] * k[5] - odd[2] * k[4] + odd[3] * k[3]) * scale,
-                        (even[0] * k[5] - even[2] * k[2] + even[3] * k[1]) * scale,
-                        (odd[0] * k[4] - odd[1] * k[2] + odd[3] * k[0]) * scale,
-                        (even[0] * k[3] - even[1] * k[1] + even[2] * k[0]) * scale};
-  std::memcpy(inverse->m, rows, sizeof(rows));
+// As floats, and in double again; what is not finite is 0.
+HWY_INLINE Four StorePivot(Four pivot, float* to) {
+  const Four finite = (pivot - pivot) == 0 ? pivot : Four{};
+  const FourFloats floats = __builtin_convertvector(finite, FourFloats);
+  std::memcpy(to, &floats, sizeof(floats));
+  return __builtin_convertvector(floats, Four);
 }
 
-void FindDelta(const double* HWY_RESTRICT handle, const double* HWY_RESTRICT parent_from_handle,
-               const double* HWY_RESTRICT parent, const double* HWY_RESTRICT parent_rest_inverse,
-               double* HWY_RESTRICT delta, double* HWY_RESTRICT motion) {
-  Four of_handle[4], of_parent[4], product[4], result[4];
-  std::memcpy(of_handle, handle, sizeof(of_handle));
-  std::memcpy(of_parent, parent, sizeof(of_parent));
-  ByTurnedRows inverse;
-  Inverse(of_parent, &inverse);
-  Multiply(of_handle, ByColumns{parent_from_handle}, product);
-  Multiply(of_parent, ByColumns{parent_rest_inverse}, result);
-  std::memcpy(motion, result, sizeof(result));
-  Multiply<const ByTurnedRows&>(product, inverse, result);
-  std::memcpy(delta, result, sizeof(result));
+// linear: columns of M; offset: M pivot - pivot.
+HWY_INLINE void StoreDelta(const Four (&linear)[3], Four offset, AffineDelta* delta) {
+  const Four moves[4] = {linear[0] - Four{1, 0, 0, 0}, linear[1] - Four{0, 1, 0, 0},
+                         linear[2] - Four{0, 0, 1, 0}, offset};
+  for (std::size_t c = 0; c < 3; ++c) StoreFour(moves[c], delta->linear + 4 * c);
+  StoreFour(offset, delta->offset);
+  const auto moved = (moves[0] != 0) | (moves[1] != 0) | (moves[2] != 0) | (moves[3] != 0);
+  delta->is_zero = (moved[0] | moved[1] | moved[2]) == 0;
+}
+
+// ahead parent^-1 about a pivot of the parent; false, and ahead, where there is no inverse.
+HWY_INLINE bool Behind(const FourColumns& ahead, const FourColumns& parent, Double3 pivot_in_parent,
+                       AffineDelta* HWY_RESTRICT delta) {
+  Four rows[3];
+  const bool regular = InverseRows(parent, rows);
+  alignas(32) double inverse[12];  // row by row
+  for (std::size_t r = 0; r < 3; ++r) StoreFour(rows[r], inverse + 4 * r);
+  Four linear[3];
+  for (std::size_t c = 0; c < 3; ++c)
+    linear[c] = ahead.c[0] * inverse[c] + ahead.c[1] * inverse[4 + c] + ahead.c[2] * inverse[8 + c];
+
+  // M p = linear (p - the parent's place) + ahead's place
+  const double pivot[3] = {pivot_in_parent.x, pivot_in_parent.y, pivot_in_parent.z};
+  alignas(32) double arm[4];
+  const Four about = StorePivot(Placed(parent, pivot), delta->pivot);
+  StoreFour(regular ? about - parent.c[3] : about, arm);
+  const Four place = linear[0] * arm[0] + linear[1] * arm[1] + linear[2] * arm[2];
+  StoreDelta(linear, place + (ahead.c[3] - about), delta);
+  return regular;
+}
+
+void CarriedLanes(const Matrix4& handle, const Matrix4& parent, const CarriedRest& rest, AffineDelta* delta) {
+  Behind(Product(LoadColumns(handle), rest.after.m.data()), LoadColumns(parent), rest.pivot, delta);
+}
+
+bool ParentLanes(const Matrix4& parent, const ParentRest& rest, ParentMotion* motion) {
+  const FourColumns now = LoadColumns(parent);
+  for (std::size_t c = 0; c < 3; ++c) StoreFour(Turned(now, &rest.inverse.m[4 * c]), motion->linear + 4 * c);
+  return Behind(LoadColumns(rest.parent), now, rest.pivot, &motion->to_rest);
+}
+
+// parent^-1 m
+HWY_INLINE FourColumns Against(const Matrix4& parent, const FourColumns& m) {
+  const FourColumns of_parent = LoadColumns(parent);
+  Four rows[3];
+  const bool regular = InverseRows(of_parent, rows);
+  const FourColumns inverse = {{Four{rows[0][0], rows[1][0], rows[2][0], 0},
+                                Four{rows[0][1], rows[1][1], rows[2][1], 0},
+                                Four{rows[0][2], rows[1][2], rows[2][2], 0}, Four{}}};
+  alignas(32) double columns[16];
+  for (std::size_t c = 0; c < 3; ++c) StoreFour(m.c[c], columns + 4 * c);
+  StoreFour(regular ? m.c[3] - of_parent.c[3] : m.c[3], columns + 12);
+  return Product(inverse, columns);
+}
+
+// before (parent^-1 m)
+HWY_INLINE FourColumns Waiting(const Matrix4& before, const Matrix4& parent, const FourColumns& m) {
+  const FourColumns own = Against(parent, m);
+  alignas(32) double columns[16];
+  for (std::size_t c = 0; c < 4; ++c) StoreFour(own.c[c], columns + 4 * c);
+  return Product(LoadColumns(before), columns);
+}
+
+void WaitingDeltaLanes(const Matrix4& handle, const Matrix4& parent, const WaitingRest& rest,
+                       AffineDelta* HWY_RESTRICT delta) {
+  const FourColumns m = Waiting(rest.before, parent, Product(LoadColumns(handle), rest.after.m.data()));
+  alignas(32) double pivot[4];
+  const Four about = StorePivot(FourOf(rest.pivot), delta->pivot);
+  StoreFour(about, pivot);
+  StoreDelta({m.c[0], m.c[1], m.c[2]}, Placed(m, pivot) - about, delta);
+}
+
+HWY_INLINE void StoreAffine(const FourColumns& m, Matrix4* HWY_RESTRICT to) {
+  for (std::size_t c = 0; c < 3; ++c) StoreFour(Four{m.c[c][0], m.c[c][1], m.c[c][2], 0}, &to->m[4 * c]);
+  StoreFour(Four{m.c[3][0], m.c[3][1], m.c[3][2], 1}, &to->m[12]);
+}
+void WaitingFrameLanes(const Matrix4& before, const Matrix4& parent, const Matrix4& handle, Matrix4* frame) {
+  StoreAffine(Waiting(before, parent, LoadColumns(handle)), frame);
+}
+void ProductLanes(const Matrix4& a, const Matrix4& b, Matrix4* product) {
+  StoreAffine(Product(LoadColumns(a), b.m.data()), product);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -98,13 +108,30 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace kpsa::engine {
 
-HWY_EXPORT(FindDelta);
+HWY_EXPORT(CarriedLanes);
+HWY_EXPORT(ParentLanes);
+HWY_EXPORT(WaitingDeltaLanes);
+HWY_EXPORT(WaitingFrameLanes);
+HWY_EXPORT(ProductLanes);
 
-void FindCarriedDelta(const Matrix4& handle, const Matrix4& parent_from_handle, const Matrix4& parent,
-                      const Matrix4& parent_rest_inverse, CarriedDelta* result) noexcept {
-  HWY_DYNAMIC_DISPATCH(FindDelta)
-  (handle.m.data(), parent_from_handle.m.data(), parent.m.data(), parent_rest_inverse.m.data(),
-   result->delta.m.data(), result->motion.m.data());
+void FindCarriedDelta(const Matrix4& handle, const Matrix4& parent, const CarriedRest& rest,
+                      AffineDelta* delta) noexcept {
+  HWY_DYNAMIC_DISPATCH(CarriedLanes)(handle, parent, rest, delta);
+}
+bool FindParentMotion(const Matrix4& parent, const ParentRest& rest, ParentMotion* motion) noexcept {
+  return HWY_DYNAMIC_DISPATCH(ParentLanes)(parent, rest, motion);
+}
+void FindWaitingDelta(const Matrix4& handle, const Matrix4& parent, const WaitingRest& rest,
+                      AffineDelta* delta) noexcept {
+  HWY_DYNAMIC_DISPATCH(WaitingDeltaLanes)(handle, parent, rest, delta);
+}
+void FindWaitingFrame(const Matrix4& before, const Matrix4& parent, const Matrix4& handle,
+                      Matrix4* frame) noexcept {
+  HWY_DYNAMIC_DISPATCH(WaitingFrameLanes)(before, parent, handle, frame);
+}
+
+void FindProduct(const Matrix4& a, const Matrix4& b, Matrix4* product) noexcept {
+  HWY_DYNAMIC_DISPATCH(ProductLanes)(a, b, product);
 }
 
 }  // namespace kpsa::engine

@@ -45,6 +45,28 @@ HWY_INLINE void AddBlended(const float* HWY_RESTRICT columns, const Index* HWY_R
   AddColumns(columns + EntryOf<e, n>(entries), SplatOf<e>(weights), e == 0, sum);
   if constexpr (e + 1 < n) AddBlended<n, e + 1>(columns, entries, weights, sum);
 }
+// The same of many: the e-th goes to the (e % 4)-th of four sums, so that none waits for the one before it.
+HWY_INLINE Columns BlendMany(const float* HWY_RESTRICT columns, const Index* HWY_RESTRICT entries,
+                             const float* HWY_RESTRICT weights, std::size_t size) {
+  Columns a, b, c, d;
+  AddColumns(columns + EntryOf<0, 4>(entries), SplatOf<0>(weights), true, &a);
+  AddColumns(columns + EntryOf<1, 4>(entries), SplatOf<1>(weights), true, &b);
+  AddColumns(columns + EntryOf<2, 4>(entries), SplatOf<2>(weights), true, &c);
+  AddColumns(columns + EntryOf<3, 4>(entries), SplatOf<3>(weights), true, &d);
+  std::size_t e = 4;
+  for (; e + 4 <= size; e += 4) {
+    AddColumns(columns + EntryOf<0, 4>(entries + e), SplatOf<0>(weights + e), false, &a);
+    AddColumns(columns + EntryOf<1, 4>(entries + e), SplatOf<1>(weights + e), false, &b);
+    AddColumns(columns + EntryOf<2, 4>(entries + e), SplatOf<2>(weights + e), false, &c);
+    AddColumns(columns + EntryOf<3, 4>(entries + e), SplatOf<3>(weights + e), false, &d);
+  }
+  if (e < size) AddColumns(columns + entries[e], SplatOf<0>(weights + e), false, &a);
+  if (e + 1 < size) AddColumns(columns + entries[e + 1], SplatOf<1>(weights + e), false, &b);
+  if (e + 2 < size) AddColumns(columns + entries[e + 2], SplatOf<2>(weights + e), false, &c);
+  for (std::size_t k = 0; k < sizeof(a.part) / sizeof(a.part[0]); ++k)
+    a.part[k] = hn::Add(hn::Add(a.part[k], b.part[k]), hn::Add(c.part[k], d.part[k]));
+  return a;
+}
 // The sum of weights[e] times the columns that begin at columns + entries[e], over n of these; 0: `size`, at
 // least one. Weights are read by fours: up to three more than there are.
 template <std::size_t n>
@@ -54,6 +76,7 @@ HWY_INLINE Columns BlendColumns(const float* HWY_RESTRICT columns, const Index* 
   if constexpr (n != 0) {
     AddBlended<n, 0>(columns, entries, weights, &sum);
   } else {
+    if (size >= 4) return BlendMany(columns, entries, weights, size);
     for (std::size_t e = 0; e < size; ++e)
       AddColumns(columns + entries[e], hn::Set(DColumns(), weights[e]), e == 0, &sum);
   }

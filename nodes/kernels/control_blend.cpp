@@ -43,6 +43,27 @@ void BlendControls(const Index* points, const Index* controls, const float* weig
   }
 }
 
+bool PackLanes(ConstPointsView offsets, const float* turn, float envelope, float* packed) {
+  const DLanes d;
+  const VLanes share = hn::Set(d, envelope), zero = hn::Zero(d);
+  std::size_t moving = 0;
+  for (std::size_t i = 0; i < offsets.count; i += hn::Lanes(d)) {
+    VLanes x = hn::Load(d, offsets.x + i), y = hn::Load(d, offsets.y + i), z = hn::Load(d, offsets.z + i);
+    if (turn != nullptr) {
+      const auto row = [&](const float* m) HWY_ATTR {
+        return Fma(hn::Set(d, m[0]), x, Fma(hn::Set(d, m[3]), y, hn::Mul(hn::Set(d, m[6]), z)));
+      };
+      const VLanes turned_x = row(turn), turned_y = row(turn + 1);
+      z = row(turn + 2), x = turned_x, y = turned_y;
+    }
+    x = hn::Mul(x, share), y = hn::Mul(y, share), z = hn::Mul(z, share);
+    const auto rests = hn::And(hn::Eq(x, zero), hn::And(hn::Eq(y, zero), hn::Eq(z, zero)));
+    moving += hn::CountTrue(d, hn::AndNot(rests, hn::FirstN(d, offsets.count - i)));
+    hn::StoreInterleaved4(x, y, z, zero, d, packed + 4 * i);
+  }
+  return moving != 0;
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
@@ -51,6 +72,7 @@ HWY_AFTER_NAMESPACE();
 namespace kpsa::engine {
 
 HWY_EXPORT(BlendControls);
+HWY_EXPORT(PackLanes);
 
 ControlBlend::ControlBlend(std::size_t width, std::span<const Index> controls, std::span<const float> weights)
     : width_(width) {
@@ -72,6 +94,14 @@ void ControlBlend::Run(const float* offsets, PointsView points, const Parallel* 
     (points_.data() + begin, controls_.data() + begin * width_, weights_.data() + begin * width_, width_,
      end - begin, offsets, points);
   });
+}
+
+bool PackOffsets(ConstPointsView offsets, const Matrix4* turn, double envelope, float* packed) noexcept {
+  float linear[9];  // columns
+  for (std::size_t k = 0; turn != nullptr && k < 9; ++k)
+    linear[k] = static_cast<float>(turn->m[k / 3 * 4 + k % 3]);
+  return HWY_DYNAMIC_DISPATCH(PackLanes)(offsets, turn == nullptr ? nullptr : linear,
+                                         static_cast<float>(envelope), packed);
 }
 
 }  // namespace kpsa::engine

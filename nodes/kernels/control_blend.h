@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "base/matrix.h"
 #include "base/points.h"
 #include "nodes/kernels/parallel_hook.h"
 
@@ -27,5 +28,10 @@ class ControlBlend {
   std::vector<Index> controls_;
   std::vector<float> weights_;
 };
+
+// Offsets as `ControlBlend::Run` wants them: those of a view, turned by the linear part of a matrix (null: as they
+// are), times the envelope. Writes whole vectors of points, kPointPadding - 1 more than there are at most. False if
+// none of them moves.
+bool PackOffsets(ConstPointsView offsets, const Matrix4* turn, double envelope, float* packed) noexcept;
 
 }  // namespace kpsa::engine

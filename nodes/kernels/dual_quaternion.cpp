@@ -20,7 +20,8 @@
 #define KPSA_NODES_KERNELS_DUAL_QUATERNION_RUN_
 namespace kpsa::engine {
 // What one Run hands to the vector code.
-struct DualRun : SkinFrame {
+struct DualRun {
+  float origin[3];
   const float* motions;  // rotation xyzw, dual part xyzw
   const float*
       stretches;  // columns x y z 0, but for the last number: whether the joint stretches; null: none does
@@ -217,14 +218,9 @@ void DualBlockLanes(const DualRun& run, std::size_t begin, std::size_t end, Cons
       const VLanes origin = hn::Set(d, run.origin[r]);
       VLanes result = hn::Add(moved[r], origin);
       if (!plain) {
-        const float* b = run.base + 4 * r;
-        const VLanes turned =
-            Fma(hn::Set(d, b[0]), x, Fma(hn::Set(d, b[1]), y, hn::Mul(hn::Set(d, b[2]), z)));
-        const VLanes base = hn::Add(turned, hn::Set(d, b[3]));
+        const VLanes base = hn::Sub(unmoved[r], origin);
         const VLanes blended = hn::IfThenElse(all, moved[r], Fma(w, hn::Sub(moved[r], base), base));
-        const VLanes left =
-            run.base_is_identity ? unmoved[r] : hn::Add(turned, hn::Set(d, run.base_offset[r]));
-        result = hn::IfThenElse(none, left, hn::Add(blended, origin));
+        result = hn::IfThenElse(none, unmoved[r], hn::Add(blended, origin));
       }
       if (run.blend != nullptr) {
         const VLanes share = hn::Load(d, run.blend + begin + i);
@@ -249,68 +245,63 @@ HWY_EXPORT(DualBlockLanes);
 
 namespace {
 
-// The joint's rotation and dual part, and its stretch about its centre; false if it does not stretch.
-bool WriteJoint(const Matrix4& m, Double3 center, const double origin[3], float* motion, float* stretch_to) {
-  constexpr double kRigid = 1e-6;
-  Matrix4 stretch;
-  double apart = Determinant3(m) < 0 ? 1 : 0;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      const double dot = m(0, r) * m(0, c) + m(1, r) * m(1, c) + m(2, r) * m(2, c);
-      apart = std::max(apart, std::fabs(dot - (r == c ? 1.0 : 0.0)));
-    }
-  }
-  const bool stretches = apart > 2 * kRigid;
-  const Quaternion q = QuaternionFromRotation(stretches ? NearestRotation(m) : m);
+// Of a joint that stretches, with these columns relative to the origin: its motion, and its stretch about its centre.
+void WriteStretched(const double* columns, Double3 center, float* motion, float* stretch_to) {
+  Matrix4 m, stretch;
+  for (std::size_t i = 0; i < 16; ++i) m.m[i] = i % 4 == 3 ? (i == 15 ? 1 : 0) : columns[i];
+  const Quaternion q = QuaternionFromRotation(NearestRotation(m));
   const Matrix4 rotation = RotationFromUnit(q);
-  if (stretches) {
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c)
-        stretch(r, c) = rotation(0, r) * m(0, c) + rotation(1, r) * m(1, c) + rotation(2, r) * m(2, c);
-    }
-    const Double3 shift = center - TransformVector(stretch, center);
-    for (int r = 0; r < 3; ++r) stretch(r, 3) = shift[r];
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c)
+      stretch(r, c) = rotation(0, r) * m(0, c) + rotation(1, r) * m(1, c) + rotation(2, r) * m(2, c);
   }
-  const Double3 moved = TransformPoint(m, center) - TransformVector(rotation, center);
-  const Quaternion t{0.5 * (moved.x - origin[0]), 0.5 * (moved.y - origin[1]), 0.5 * (moved.z - origin[2]),
-                     0};
-  const Quaternion dual = t * q;
+  const Double3 shift = center - TransformVector(stretch, center);
+  for (int r = 0; r < 3; ++r) stretch(r, 3) = shift[r];
+  const Double3 t = (TransformPoint(m, center) - TransformVector(rotation, center)) * 0.5;
+  const Quaternion dual = Quaternion{t.x, t.y, t.z, 0} * q;
   const double parts[8] = {q.x, q.y, q.z, q.w, dual.x, dual.y, dual.z, dual.w};
   for (std::size_t i = 0; i < 8; ++i) motion[i] = static_cast<float>(parts[i]);
-  for (int c = 0; c < 4; ++c) {
-    float* column = stretch_to + 4 * static_cast<std::size_t>(c);
-    for (int r = 0; r < 3; ++r) column[r] = static_cast<float>(stretch(r, c));
-    column[3] = 0;
-  }
-  stretch_to[15] = stretches ? 1.0f : 0.0f;
-  return stretches;
+  for (std::size_t i = 0; i < 15; ++i) stretch_to[i] = i % 4 == 3 ? 0 : static_cast<float>(stretch.m[i]);
+}
+
+void WriteUnstretched(float* stretch_to) {
+  for (std::size_t i = 0; i < 15; ++i) stretch_to[i] = i % 5 == 0 ? 1 : 0;
 }
 
 }  // namespace
 
-DualQuaternionKernel::DualQuaternionKernel(const SkinWeights& weights, std::span<const Index> out_points,
+DualQuaternionKernel::DualQuaternionKernel(const SkinWeights& weights, std::span<const Double3> centers,
+                                           std::span<const Index> out_points,
                                            std::span<const float> point_weights,
                                            std::span<const float> blend_weights)
-    : count_(out_points.size()), joint_count_(weights.joint_count) {
+    : count_(out_points.size()) {
+  KPSA_CHECK_EQ(centers.size(), weights.joint_count);
   KPSA_CHECK(IsSortedSet(out_points, weights.point_count()));
   KPSA_CHECK(point_weights.empty() || point_weights.size() == count_);
   KPSA_CHECK(blend_weights.empty() || blend_weights.size() == count_);
   const auto wanted = [&](std::size_t i) { return blend_weights.empty() || blend_weights[i] != 0; };
 
-  // The joints that occur, and their places in the run's palette
-  std::vector<Index> place(joint_count_, kNoIndex);
+  // The joints that occur, and their places in the palette
+  std::vector<Index> joints, place(weights.joint_count, kNoIndex);
   for (std::size_t i = 0; i < count_; ++i) {
     for (Index e = weights.offsets[out_points[i]]; e < weights.offsets[out_points[i] + 1]; ++e) {
       if (weights.weights[e] != 0 && wanted(i)) place[weights.joints[e]] = 0;
     }
   }
-  for (Index j = 0; j < joint_count_; ++j) {
+  for (Index j = 0; j < weights.joint_count; ++j) {
     if (place[j] != 0) continue;
-    place[j] = static_cast<Index>(joints_.size());
-    joints_.push_back(j);
+    place[j] = static_cast<Index>(joints.size());
+    joints.push_back(j);
+    centers_.push_back(centers[j]);
+  }
+  palette_ = SkinPalette(joints, weights.joint_from_bind, weights.joint_count);
+  center_rows_.resize(3 * PaddedJoints());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    for (int a = 0; a < 3; ++a)
+      center_rows_[static_cast<std::size_t>(a) * PaddedJoints() + j] = centers_[j][a];
   }
 
-  // Entries of each point, the largest weight first; a point without any keeps its base through a mask of 0
+  // Entries of each point, the largest weight first; a point without any stays through a mask of 0
   std::vector<float> masks(point_weights.begin(), point_weights.end());
   std::vector<std::vector<std::pair<Index, float>>> rows(count_);  // place of the joint, weight
   for (std::size_t i = 0; i < count_; ++i) {
@@ -357,7 +348,7 @@ void DualQuaternionKernel::AddEntries(std::span<const std::vector<std::pair<Inde
         Index motion = joint;
         if (joint != pivot) {
           const auto [at, fresh] =
-              motions.emplace(std::pair(pivot, joint), static_cast<Index>(joints_.size() + pairs_.size()));
+              motions.emplace(std::pair(pivot, joint), static_cast<Index>(PaddedJoints() + pairs_.size()));
           if (fresh) pairs_.push_back({pivot, joint});
           motion = at->second;
         }
@@ -373,8 +364,6 @@ void DualQuaternionKernel::AddEntries(std::span<const std::vector<std::pair<Inde
 
 void DualQuaternionKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out,
                                std::span<float> scratch, const Parallel* parallel) const noexcept {
-  KPSA_CHECK_EQ(inputs.palette.size(), joint_count_);
-  KPSA_CHECK_EQ(inputs.centers.size(), joint_count_);
   KPSA_CHECK_EQ(in.count, count_);
   KPSA_CHECK_EQ(out.count, count_);
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
@@ -382,22 +371,21 @@ void DualQuaternionKernel::Run(const Inputs& inputs, ConstPointsView in, PointsV
   if (count_ == 0) return;
 
   DualRun run{};
-  static_cast<SkinFrame&>(run) = SkinFrameOf(inputs.palette[0], inputs.world_from_mesh);
-  const double origin[3] = {run.origin[0], run.origin[1], run.origin[2]};
-  float* motions = scratch.data();
-  float* stretches = motions + (kMotionFloats * (joints_.size() + pairs_.size()) + 15) / 16 * 16;
-  bool any_stretches = false;
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    any_stretches |= WriteJoint(inputs.palette[joints_[j]], inputs.centers[joints_[j]], origin,
-                                motions + kMotionFloats * j, stretches + kStretchFloats * j);
+  const std::size_t count = joints().size();
+  auto* columns = reinterpret_cast<double*>(scratch.data());
+  float* motions = scratch.data() + ColumnFloats();
+  float* stretches = motions + MotionFloats();
+  palette_.Run(inputs.joints, run.origin, columns);
+  const bool any_stretches = FindMotions({count, columns, center_rows_.data()}, motions, stretches);
+  for (std::size_t j = 0; any_stretches && j < count; ++j) {
+    float* stretch = stretches + kStretchFloats * j;
+    if (stretch[kStretchFloats - 1] == 0) {
+      WriteUnstretched(stretch);
+    } else {
+      WriteStretched(columns + 16 * j, centers_[j], motions + kMotionFloats * j, stretch);
+    }
   }
-  float* to = motions + kMotionFloats * joints_.size();
-  for (const Pair& pair : pairs_) {
-    const float *a = motions + kMotionFloats * pair.pivot, *b = motions + kMotionFloats * pair.joint;
-    const float cosine = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
-    for (std::size_t k = 0; k < kMotionFloats; ++k) to[k] = cosine < 0 ? -b[k] : b[k];
-    to += kMotionFloats;
-  }
+  TurnMotions(pairs_.data(), pairs_.size(), motions, motions + kMotionFloats * PaddedJoints());
   run.motions = motions;
   run.stretches = any_stretches ? stretches : nullptr;
   run.envelope = static_cast<float>(inputs.envelope);

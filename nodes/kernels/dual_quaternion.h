@@ -9,6 +9,7 @@
 // rounding of floats; stretches below a millionth count as none. Weights are made to sum to 1.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -16,6 +17,7 @@
 
 #include "base/matrix.h"
 #include "base/points.h"
+#include "nodes/kernels/dual_motions.h"
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/skin.h"
 
@@ -25,48 +27,49 @@ namespace kpsa::engine {
 class DualQuaternionKernel {
  public:
   struct Inputs {
-    std::span<const Matrix4> palette;  // joint_count entries: world_from_joint * joint_from_bind
-    std::span<const Double3> centers;  // of every joint: its place at bind, mesh space
+    SkinJoints joints;
     double envelope = 1;
-    Matrix4 world_from_mesh;  // as SkinKernel's
-    ConstPointsView linear;   // with blend weights only: what SkinKernel gives; not the output
+    ConstPointsView linear = {};  // with blend weights only: what SkinKernel gives; not the output
   };
 
-  // `weights` must be valid. point_weights: see weights.h. blend_weights: one an output point, 0 takes the
-  // linear result bit for bit, 1 the dual quaternions'; empty: 1 everywhere.
-  DualQuaternionKernel(const SkinWeights& weights, std::span<const Index> out_points,
-                       std::span<const float> point_weights = {}, std::span<const float> blend_weights = {});
+  // `weights` must be valid. centers: of every joint, its place at bind, mesh space. point_weights: see weights.h.
+  // blend_weights: one an output point, 0 takes the linear result bit for bit, 1 the dual quaternions'; empty: 1
+  // everywhere.
+  DualQuaternionKernel(const SkinWeights& weights, std::span<const Double3> centers,
+                       std::span<const Index> out_points, std::span<const float> point_weights = {},
+                       std::span<const float> blend_weights = {});
 
   std::size_t point_count() const { return count_; }
-  // The joints that the output points need, ascending: no other entry of the palette but the first is read.
-  std::span<const Index> joints() const { return joints_; }
+  // The joints that the output points need, ascending: no other matrix but the first is read.
+  std::span<const Index> joints() const { return palette_.joints(); }
   std::size_t ScratchFloats() const {
-    return kMotionFloats * (joints_.size() + pairs_.size()) + kStretchFloats * joints_.size() + 16;
+    return ColumnFloats() + MotionFloats() + kStretchFloats * joints().size();
   }
   // in: bind-space points, out: world-space points; may be the same.
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
 
   static constexpr std::size_t kBlock = 128;
-  static constexpr std::size_t kMotionFloats = 8, kStretchFloats = 16;  // in the scratch
 
  private:
-  // Two joints by their places in joints_, of which the second one's motion is blended with the sign that brings
-  // it nearest to the first one's.
-  struct Pair {
-    Index pivot, joint;
-  };
+  // In the scratch, each a multiple of 16: columns of the joints in double, motions of joints (whole groups) and
+  // pairs, stretches.
+  std::size_t ColumnFloats() const { return 32 * joints().size(); }
+  std::size_t PaddedJoints() const { return (joints().size() + kJointGroup - 1) / kJointGroup * kJointGroup; }
+  std::size_t MotionFloats() const { return PaddedCount(kMotionFloats * (PaddedJoints() + pairs_.size())); }
   void AddEntries(std::span<const std::vector<std::pair<Index, float>>> rows);  // joint's place and weight
 
   std::size_t count_ = 0;
-  Index joint_count_ = 0;
-  std::vector<Index> joints_;
-  std::vector<Pair> pairs_;  // that occur, of different joints
+  SkinPalette palette_;
+  std::vector<Double3> centers_;     // of joints()
+  std::vector<double> center_rows_;  // the same as FindMotions wants them
+  std::vector<MotionPair> pairs_;    // by their places in joints(); that occur, of different joints
   // Points, in blocks sorted by their number of entries; the largest weight's comes first.
   std::vector<std::uint16_t> lanes_;  // place in its block
   std::vector<Index> entry_offsets_;  // of each point, and the end
-  std::vector<Index> entry_motions_;  // kMotionFloats times the place in joints_, or of the pair behind these
-  std::vector<Index> entry_joints_;   // kStretchFloats times the place in joints_
+  std::vector<Index>
+      entry_motions_;                // kMotionFloats times the place in joints(), or of the pair behind these
+  std::vector<Index> entry_joints_;  // kStretchFloats times the place in joints()
   std::vector<float> entry_weights_;
   AlignedFloats masks_;  // point weights, empty if all 1
   AlignedFloats blend_;  // empty if all 1

@@ -14,6 +14,7 @@
 #define HWY_TARGET_INCLUDE "nodes/kernels/lattice.cpp"
 #include "hwy/foreach_target.h"
 
+#include "nodes/kernels/affine-inl.h"
 #include "nodes/kernels/xyzw-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -69,7 +70,8 @@ void BlendTiles(const Index* tiles, const float* axis, std::size_t tile_count, s
   }
 }
 
-std::size_t MovedControls(ConstPointsView now, ConstPointsView rest, Index* HWY_RESTRICT moved) {
+std::size_t MovedControls(const ConstPointsView& now, const ConstPointsView& rest,
+                          Index* HWY_RESTRICT moved) {
   const DLanes d;
   std::size_t count = 0;
   for (std::size_t begin = 0; begin < now.count; begin += hn::Lanes(d)) {
@@ -88,6 +90,18 @@ std::size_t MovedControls(ConstPointsView now, ConstPointsView rest, Index* HWY_
   return count;
 }
 
+// The moves of these controls, which a matrix and the envelope take to the points' space, at their places in `moves`.
+void ControlMoves(const Matrix4& matrix, double envelope, const Double3* HWY_RESTRICT offsets,
+                  const Index* moved, std::size_t count, float* HWY_RESTRICT moves) {
+  FourColumns m = LoadColumns(matrix);
+  for (Four& column : m.c) column = Four{column[0], column[1], column[2], 0};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Double3& offset = offsets[moved[i]];
+    const Four move = m.c[0] * offset.x + m.c[1] * offset.y + m.c[2] * offset.z;
+    StoreFour(move * envelope, moves + 4 * std::size_t{moved[i]});
+  }
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace kpsa::engine
 HWY_AFTER_NAMESPACE();
@@ -97,14 +111,18 @@ namespace kpsa::engine {
 
 HWY_EXPORT(BlendTiles);
 HWY_EXPORT(MovedControls);
+HWY_EXPORT(ControlMoves);
 
-std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept {
+std::size_t FindMovedControls(const ConstPointsView& now, const ConstPointsView& rest,
+                              Index* moved) noexcept {
   return HWY_DYNAMIC_DISPATCH(MovedControls)(now, rest, moved);
 }
 
 namespace {
 constexpr double kRim =
     1e-6;  // a point this far outside counts as inside: lattices are fitted to bounding boxes
+// Controls are fewer than 2^15, divisions 32 at most: a product with their share, rounded up, is exact
+constexpr std::size_t kShare = std::size_t{1} << 20;
 constexpr std::size_t kDenseControls = 13;  // measured: a stored control costs as much as 13 of the dense sum
 }  // namespace
 
@@ -175,6 +193,8 @@ LatticeKernel::LatticeKernel(const LatticeSettings& settings, ConstPointsView re
     width *= static_cast<std::size_t>(settings.local ? order[a] : settings.divisions[a]);
   }
   sparse_ = settings.local && controls_ > kDenseControls * width;
+  over_s_ = static_cast<std::uint32_t>(kShare / divisions_[0] + 1);
+  over_t_ = static_cast<std::uint32_t>(kShare / divisions_[1] + 1);
 
   std::vector<Index> row_controls;
   std::vector<float> row_weights, rows;
@@ -256,44 +276,47 @@ void LatticeKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out
     CopyPoints(in, out);
   }
 
-  // The moves of the controls, in the points' space
-  const auto move = [&](Double3 offset, float* to) {
-    offset = TransformVector(inputs.matrix, offset);
-    for (int a = 0; a < 3; ++a) to[a] = static_cast<float>(offset[a] * inputs.envelope);
-    to[3] = 0;
-    return (to[0] != 0) | (to[1] != 0) | (to[2] != 0);
-  };
-  float resting[4];  // most controls; not numbers where the matrix is none
-  const bool rest_moves = move({}, resting);
+  // The moves of the controls, in the points' space. Most rest; not even they have numbers where the matrix has none
+  float* const moves = scratch.data();
+  const Index first = 0;
+  const Double3 none;
+  HWY_DYNAMIC_DISPATCH(ControlMoves)(inputs.matrix, inputs.envelope, &none, &first, 1, moves);
+  std::array<float, 4> resting;
+  std::memcpy(resting.data(), moves, sizeof(resting));
+  const bool rest_moves = (moves[0] != 0) | (moves[1] != 0) | (moves[2] != 0);
   if (inputs.moved.empty() && !rest_moves) return;
-  std::array<std::uint32_t, 32> rows{};
+  std::array<std::uint32_t, 32> rows;
+  for (std::size_t u = 0; u < divisions_[2]; ++u) rows[u] = 0;
   const auto fill = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t c = begin; c < end; ++c) std::memcpy(scratch.data() + 4 * c, resting, sizeof(resting));
+    for (std::size_t c = begin; c < end; ++c) std::memcpy(moves + 4 * c, resting.data(), sizeof(resting));
   };
   const std::size_t ds = divisions_[0], dt = divisions_[1];
   if (sparse_ || rest_moves) {  // all controls are read
-    fill(0, controls_);
+    if (rest_moves) {
+      fill(0, controls_);
+    } else {
+      std::memset(moves, 0, 4 * controls_ * sizeof(float));
+    }
     if (rest_moves) rows.fill(~std::uint32_t{0} >> (32 - dt));
+  } else {
+    std::size_t filled = 0;  // up to the end of a row
+    for (const Index c : inputs.moved) {
+      const std::uint32_t row = (c * over_s_) / kShare, u = (row * over_t_) / kShare;
+      rows[u] |= std::uint32_t{1} << (row - u * dt);
+      if (c >= filled) fill(row * ds, filled = (row + 1) * ds);
+    }
   }
-  bool any = rest_moves;
-  std::size_t filled = sparse_ || rest_moves ? controls_ : 0;  // up to the end of a row
-  for (const Index c : inputs.moved) {
-    const std::size_t row = c / ds;
-    if (c >= filled) fill(row * ds, filled = (row + 1) * ds);
-    if (!move(inputs.offsets[c], scratch.data() + 4 * std::size_t{c})) continue;
-    rows[row / dt] |= std::uint32_t{1} << (row % dt);
-    any = true;
-  }
-  if (!any) return;
+  HWY_DYNAMIC_DISPATCH(ControlMoves)
+  (inputs.matrix, inputs.envelope, inputs.offsets.data(), inputs.moved.data(), inputs.moved.size(), moves);
   if (sparse_) {
-    blend_.Run(scratch.data(), out, parallel);
+    blend_.Run(moves, out, parallel);
     return;
   }
   const std::size_t row_count = divisions_[0] + divisions_[1] + divisions_[2];
   ForRanges(parallel, tiles_.size(), 32, [&](std::size_t begin, std::size_t end) {
     HWY_DYNAMIC_DISPATCH(BlendTiles)
     (tiles_.data() + begin, axis_weights_.data() + begin * 16 * row_count, end - begin, divisions_[0],
-     divisions_[1], divisions_[2], scratch.data(), rows.data(), weights_.data(), out);
+     divisions_[1], divisions_[2], moves, rows.data(), weights_.data(), out);
   });
 }
 

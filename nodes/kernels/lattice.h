@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -42,7 +43,7 @@ struct LatticeSettings {
 std::vector<double> LatticeBasis(int divisions, int order, double x);
 
 // The controls that are not where they rest, ascending, in `moved` (as many as there are, at most); how many.
-std::size_t FindMovedControls(ConstPointsView now, ConstPointsView rest, Index* moved) noexcept;
+std::size_t FindMovedControls(const ConstPointsView& now, const ConstPointsView& rest, Index* moved) noexcept;
 
 // A local kernel.
 class LatticeKernel {
@@ -50,8 +51,8 @@ class LatticeKernel {
   struct Inputs {
     std::span<const Double3> offsets;  // of every control from its place on the grid; lattice space
     std::span<const Index> moved;      // the controls whose offsets are not 0, ascending: no other is read
-    Matrix4 base_matrix;               // point space from the lattice's base, now (bindPreMatrix^-1)
-    Matrix4 matrix;                    // point space from the lattice, now
+    const Matrix4& base_matrix;        // point space from the lattice's base, now (bindPreMatrix^-1)
+    const Matrix4& matrix;             // point space from the lattice, now
     double envelope = 1;
   };
 
@@ -69,7 +70,8 @@ class LatticeKernel {
  private:
   std::size_t count_ = 0, controls_ = 0;
   std::array<std::size_t, 3> divisions_ = {};
-  AlignedFloats weights_;       // per point: point weight x outside falloff
+  std::uint32_t over_s_ = 0, over_t_ = 0;  // of what is divided by their divisions, times 2^20
+  AlignedFloats weights_;                  // per point: point weight x outside falloff
   bool sparse_ = false;         // linear and large: 8 controls a point; otherwise all, axis by axis
   ControlBlend blend_;          // of sparse_
   std::vector<Index> tiles_;    // of dense: first points of the tiles of 16 that have a weight

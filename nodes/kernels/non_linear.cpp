@@ -56,7 +56,7 @@ bool Prepare(const Squash& s, NonLinearRun* run) {
             {1, 1},
             {Float(s.start_smoothness), Float(s.end_smoothness)},
             Float(along - 1),
-            Float(Exp(-0.5 * s.expand * Log(along)) - 1)};
+            Float((s.expand == 1 ? 1 / std::sqrt(along) : Exp(-0.5 * s.expand * Log(along))) - 1)};
   for (int half = 0; half < 2; ++half) {
     if (widths[half] > kLeastWidth) squash.scale[half] = Float(1 / widths[half]), squash.bias[half] = 0;
   }
@@ -88,24 +88,6 @@ bool Prepare(const Wave& w, NonLinearRun* run) {
   return Ripples(w.amplitude, w.wavelength);
 }
 
-// False where the frame has no inverse, or none in floats.
-bool PrepareFrame(const Matrix4& frame, NonLinearRun* run) {
-  Matrix4 inverse;
-  if (!Invert(frame, &inverse)) return false;
-  bool finite = true;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      run->inverse[3 * r + c] = Float(inverse(r, c));
-      run->linear[3 * r + c] = Float(frame(r, c));
-      finite &= std::isfinite(run->inverse[3 * r + c]) && std::isfinite(run->linear[3 * r + c]);
-    }
-    run->pivot[r] = Float(frame(r, 3));
-  }
-  const Double3 offset = TransformPoint(inverse, {run->pivot[0], run->pivot[1], run->pivot[2]});
-  for (int r = 0; r < 3; ++r) run->offset[r] = Float(offset[r]);
-  return finite;
-}
-
 }  // namespace
 
 NonLinearKernel::NonLinearKernel(std::span<const Index> out_points, std::span<const float> point_weights)
@@ -115,11 +97,11 @@ void NonLinearKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView o
                           const Parallel* parallel) const noexcept {
   KPSA_CHECK_EQ(in.count, count_);
   KPSA_CHECK_EQ(out.count, count_);
-  NonLinearRun run{};
+  NonLinearRun run;
   run.kind = inputs.map.index();
   run.weights = weights_.data();
   run.envelope = Float(inputs.envelope);
-  const bool moves = run.envelope != 0 && PrepareFrame(inputs.frame, &run) &&
+  const bool moves = run.envelope != 0 && PrepareHandleFrame(inputs.frame, 1, &run.frame) &&
                      std::visit([&](const auto& map) { return Prepare(map, &run); }, inputs.map);
   if (!moves) return CopyPoints(in, out);
   ForRanges(parallel, count_, kGrain,

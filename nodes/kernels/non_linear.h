@@ -62,7 +62,8 @@ class NonLinearKernel {
  public:
   struct Inputs {
     NonLinearMap map;
-    Matrix4 frame;  // the points' space from the handle's; where it has no inverse in floats, points stay
+    const Matrix4&
+        frame;  // the points' space from the handle's; where it has no inverse in floats, points stay
     double envelope = 1;
   };
 

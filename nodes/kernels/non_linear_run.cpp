@@ -4,6 +4,7 @@
 #define HWY_TARGET_INCLUDE "nodes/kernels/non_linear_run.cpp"
 #include "hwy/foreach_target.h"
 
+#include "nodes/kernels/handle_frame-inl.h"
 #include "nodes/kernels/sine-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -120,27 +121,8 @@ HWY_INLINE void Move(const WaveRun& wave, VLanes* x, VLanes* y, VLanes* z) {
 template <typename Map>
 HWY_INLINE void Deform(const Map& map, const NonLinearRun& run, ConstPointsView in, PointsView out,
                        std::size_t begin, std::size_t end) {
-  const DLanes d;
-  const auto row = [&](const float* m, VLanes x, VLanes y, VLanes z, VLanes last) HWY_ATTR {
-    return Fma(hn::Set(d, m[0]), x, Fma(hn::Set(d, m[1]), y, Fma(hn::Set(d, m[2]), z, last)));
-  };
-  for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
-    const VLanes w = hn::Mul(hn::Load(d, run.weights + i), hn::Set(d, run.envelope));
-    const VLanes px = hn::Load(d, in.x + i), py = hn::Load(d, in.y + i), pz = hn::Load(d, in.z + i);
-    const VLanes rx = hn::Sub(px, hn::Set(d, run.pivot[0])), ry = hn::Sub(py, hn::Set(d, run.pivot[1])),
-                 rz = hn::Sub(pz, hn::Set(d, run.pivot[2]));
-    VLanes x = row(run.inverse, rx, ry, rz, hn::Set(d, run.offset[0]));
-    VLanes y = row(run.inverse + 3, rx, ry, rz, hn::Set(d, run.offset[1]));
-    VLanes z = row(run.inverse + 6, rx, ry, rz, hn::Set(d, run.offset[2]));
-    Move(map, &x, &y, &z);
-    const auto moves = hn::Ne(w, hn::Zero(d));
-    const auto moved = [&](const float* linear, VLanes p) HWY_ATTR {
-      return hn::IfThenElse(moves, Fma(w, row(linear, x, y, z, hn::Zero(d)), p), p);
-    };
-    hn::Store(moved(run.linear, px), d, out.x + i);
-    hn::Store(moved(run.linear + 3, py), d, out.y + i);
-    hn::Store(moved(run.linear + 6, pz), d, out.z + i);
-  }
+  MoveInFrame(run.frame, run.weights, run.envelope, in, out, begin, end,
+              [&](VLanes* x, VLanes* y, VLanes* z) HWY_ATTR { Move(map, x, y, z); });
 }
 
 void NonLinearLanes(const NonLinearRun& run, ConstPointsView in, PointsView out, std::size_t begin,

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "base/points.h"
+#include "nodes/kernels/handle_frame.h"
 
 namespace kpsa::engine {
 
@@ -49,15 +50,15 @@ struct WaveRun {
 
 struct NonLinearRun {
   std::size_t kind;  // the map's index in NonLinearMap: that of these that is set
-  BendRun bend;
-  TwistRun twist;
-  SquashRun squash;
-  FlareRun flare;
-  SineRun sine;
-  WaveRun wave;
-  // q = inverse (p - pivot) + offset: the pivot is the handle's origin in floats, offset what that leaves
-  float pivot[3], offset[3];
-  float inverse[9], linear[9];  // row-major
+  union {
+    BendRun bend;
+    TwistRun twist;
+    SquashRun squash;
+    FlareRun flare;
+    SineRun sine;
+    WaveRun wave;
+  };
+  HandleFrame frame;
   const float* weights;
   float envelope;
 };

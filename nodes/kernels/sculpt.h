@@ -9,12 +9,13 @@
 //            outside within d go as far as the surface point below them, linear dropoff: times
 //            1 - (r - 1) / d
 // and never farther than the maximum displacement. At the very centre there is no direction: the point stays
-// (flip, project). Double arithmetic.
+// (flip, project). Floats, about the centre: a point is off by some 2^-23 of its distance from there and of its move
+// (tests/nodes/sculpt_test.cpp maps in double).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "base/matrix.h"
 #include "base/points.h"
@@ -33,25 +34,24 @@ struct SculptShape {
   Double3 stretch;  // kStretch: direction, unit length; 0: points stay
 };
 
-// Where a point goes, both in the space of the unit sphere.
-Double3 SculptPoint(const SculptShape& shape, Double3 p);
-
 // A local kernel.
 class SculptKernel {
  public:
   struct Inputs {
     SculptShape shape;
-    Matrix4 stage_from_sphere;  // from the space in which the sphere is of radius 1 about the origin
+    const Matrix4& stage_from_handle;  // from the space in which the sphere is about the origin
+    double radius = 1;                 // there
     double envelope = 1;
   };
   SculptKernel(std::span<const Index> out_points, std::span<const float> point_weights = {});
-  std::size_t point_count() const { return weights_.size(); }
-  // A singular stage_from_sphere moves nothing.
+  std::size_t point_count() const { return count_; }
+  // Where the sphere is flat, nothing moves.
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out,
            const Parallel* parallel = nullptr) const noexcept;
 
  private:
-  std::vector<float> weights_;
+  std::size_t count_ = 0;
+  AlignedFloats weights_;
 };
 
 }  // namespace kpsa::engine

@@ -16,8 +16,9 @@
 #define KPSA_NODES_KERNELS_SKIN_RUN_
 namespace kpsa::engine {
 // What one Run hands to the vector code.
-struct SkinRun : SkinFrame {
-  const float* palette;  // columns x y z 0 of each joint, translations relative to `origin`
+struct SkinRun {
+  const float* palette;  // columns of each joint, relative to `origin`
+  float origin[3];
   float envelope;
   const float* sums;   // minus 1
   const float* masks;  // null if all 1
@@ -149,17 +150,14 @@ void SkinBlockLanes(const SkinRun& run, const SkinBlock& block, ConstPointsView 
     const auto all = hn::Eq(w, hn::Set(d, 1.0f)), none = hn::Eq(w, hn::Zero(d));
     const VLanes x = hn::Load(d, in.x + begin + i), y = hn::Load(d, in.y + begin + i);
     const VLanes z = hn::Load(d, in.z + begin + i);
-    const auto row = [&](int r, const VLanes skinned, const VLanes origin, const VLanes unmoved) HWY_ATTR {
-      const float* b = run.base + 4 * r;
-      const VLanes turned = Fma(hn::Set(d, b[0]), x, Fma(hn::Set(d, b[1]), y, hn::Mul(hn::Set(d, b[2]), z)));
-      const VLanes base = hn::Add(turned, hn::Set(d, b[3]));
+    const auto row = [&](const VLanes skinned, const VLanes origin, const VLanes unmoved) HWY_ATTR {
+      const VLanes base = hn::Sub(unmoved, origin);
       const VLanes blended = hn::IfThenElse(all, skinned, Fma(w, hn::Sub(skinned, base), base));
-      const VLanes left = run.base_is_identity ? unmoved : hn::Add(turned, hn::Set(d, run.base_offset[r]));
-      return hn::IfThenElse(none, left, hn::Add(blended, origin));
+      return hn::IfThenElse(none, unmoved, hn::Add(blended, origin));
     };
-    hn::Store(row(0, rx, ox, x), d, out.x + begin + i);
-    hn::Store(row(1, ry, oy, y), d, out.y + begin + i);
-    hn::Store(row(2, rz, oz, z), d, out.z + begin + i);
+    hn::Store(row(rx, ox, x), d, out.x + begin + i);
+    hn::Store(row(ry, oy, y), d, out.y + begin + i);
+    hn::Store(row(rz, oz, z), d, out.z + begin + i);
   }
 }
 
@@ -202,22 +200,23 @@ Status SkinWeights::Validate() const {
 
 SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_points,
                        std::span<const float> point_weights)
-    : count_(out_points.size()), joint_count_(weights.joint_count), sums_(PaddedCount(out_points.size())) {
+    : count_(out_points.size()), sums_(PaddedCount(out_points.size())) {
   KPSA_CHECK(IsSortedSet(out_points, weights.point_count()));
   KPSA_CHECK(point_weights.empty() || point_weights.size() == count_);
 
-  // The joints that occur, and their places in the run's palette
-  std::vector<Index> place(joint_count_, kNoIndex);
+  // The joints that occur, and their places in the palette
+  std::vector<Index> joints, place(weights.joint_count, kNoIndex);
   for (Index p : out_points) {
     for (Index e = weights.offsets[p]; e < weights.offsets[p + 1]; ++e) {
       if (weights.weights[e] != 0) place[weights.joints[e]] = 0;
     }
   }
-  for (Index j = 0; j < joint_count_; ++j) {
-    if (place[j] == 0) place[j] = 16 * static_cast<Index>(joints_.size()), joints_.push_back(j);
+  for (Index j = 0; j < weights.joint_count; ++j) {
+    if (place[j] == 0) place[j] = 16 * static_cast<Index>(joints.size()), joints.push_back(j);
   }
+  palette_ = SkinPalette(joints, weights.joint_from_bind, weights.joint_count);
 
-  // Sums; a point without weights keeps its base through a mask of 0
+  // Sums; a point without weights stays through a mask of 0
   std::vector<std::uint16_t> influence_count(count_);
   std::vector<float> masks(point_weights.begin(), point_weights.end());
   for (std::size_t i = 0; i < count_; ++i) {
@@ -260,40 +259,16 @@ SkinKernel::SkinKernel(const SkinWeights& weights, std::span<const Index> out_po
   entry_weights_.resize(entry_weights_.size() + 3);  // they are read by fours
 }
 
-SkinFrame SkinFrameOf(const Matrix4& first_joint, const Matrix4& world_from_mesh) {
-  SkinFrame frame{};
-  for (int r = 0; r < 3; ++r) {
-    const double t = first_joint(r, 3);
-    frame.origin[r] = std::isfinite(t) ? static_cast<float>(t) : 0.0f;
-    for (int c = 0; c < 3; ++c) frame.base[4 * r + c] = static_cast<float>(world_from_mesh(r, c));
-    frame.base[4 * r + 3] = static_cast<float>(world_from_mesh(r, 3) - double{frame.origin[r]});
-    frame.base_offset[r] = static_cast<float>(world_from_mesh(r, 3));
-  }
-  frame.base_is_identity = world_from_mesh == Matrix4();
-  return frame;
-}
-
 void SkinKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
                      const Parallel* parallel) const noexcept {
-  KPSA_CHECK_EQ(inputs.palette.size(), joint_count_);
   KPSA_CHECK_EQ(in.count, count_);
   KPSA_CHECK_EQ(out.count, count_);
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
   if (count_ == 0) return;
 
   SkinRun run{};
-  static_cast<SkinFrame&>(run) = SkinFrameOf(inputs.palette[0], inputs.world_from_mesh);
-  float* palette = scratch.data();
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const double* m = inputs.palette[joints_[j]].m.data();
-    float* to = palette + 16 * j;
-    for (int c = 0; c < 4; ++c) {
-      for (int r = 0; r < 3; ++r)
-        to[4 * c + r] = static_cast<float>(c == 3 ? m[12 + r] - double{run.origin[r]} : m[4 * c + r]);
-      to[4 * c + 3] = 0;
-    }
-  }
-  run.palette = palette;
+  palette_.Run(inputs.joints, run.origin, scratch.data());
+  run.palette = scratch.data();
   run.envelope = static_cast<float>(inputs.envelope);
   run.sums = sums_.data();
   run.masks = masks_.data();

@@ -8,6 +8,7 @@
 #include "base/points.h"
 #include "base/status.h"
 #include "nodes/kernels/parallel_hook.h"
+#include "nodes/kernels/skin_palette.h"
 
 namespace kpsa::engine {
 
@@ -18,31 +19,21 @@ struct SkinWeights {
   std::span<const Index> joints;
   std::span<const float> weights;
   Index joint_count = 0;
+  std::span<const Matrix4> joint_from_bind = {};  // of every joint; empty: identities
   std::size_t point_count() const { return offsets.size() - 1; }
   // Names the first bad point: offsets that do not ascend, a joint out of range, a weight not finite, more
   // than 4096 influences.
   Status Validate() const;
 };
 
-// What both kinds of skin compute about, so that blending happens in small numbers wherever the character
-// stands: the place of the first joint, and the mesh without its skin.
-struct SkinFrame {
-  float origin[3];       // translations are relative to it
-  float base[12];        // rows of world_from_mesh relative to origin
-  float base_offset[3];  // its translation alone
-  bool base_is_identity;
-};
-SkinFrame SkinFrameOf(const Matrix4& first_joint, const Matrix4& world_from_mesh);
-
 // A local kernel. Weights are used as they are, not normalised; a sum within 1e-5 of 1 counts as 1, which
 // keeps the shape of a character that stands 1,000 m away up to the spacing of float there. A point without
-// influences is carried by world_from_mesh alone.
+// influences stays where it is.
 class SkinKernel {
  public:
   struct Inputs {
-    std::span<const Matrix4> palette;  // joint_count entries: world_from_joint * joint_from_bind
+    SkinJoints joints;
     double envelope = 1;
-    Matrix4 world_from_mesh;  // what the envelope and point weights blend towards: the mesh without its skin
   };
 
   // `weights` must be valid. point_weights: see weights.h.
@@ -50,9 +41,9 @@ class SkinKernel {
              std::span<const float> point_weights = {});
 
   std::size_t point_count() const { return count_; }
-  // The joints that the output points need, ascending: no other palette entry but the first is read.
-  std::span<const Index> joints() const { return joints_; }
-  std::size_t ScratchFloats() const { return 16 * (joints_.size() + 1); }
+  // The joints that the output points need, ascending: no other matrix but the first is read.
+  std::span<const Index> joints() const { return palette_.joints(); }
+  std::size_t ScratchFloats() const { return 16 * joints().size(); }
   // in: bind-space points, out: world-space points; may be the same.
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
@@ -66,13 +57,12 @@ class SkinKernel {
 
  private:
   std::size_t count_ = 0;
-  Index joint_count_ = 0;
-  std::vector<Index> joints_;
+  SkinPalette palette_;
   std::vector<Group> groups_;         // all blocks in a row
   std::vector<Index> block_groups_;   // first group of each block, and the end
   std::vector<Index> block_entries_;  // first entry of each block
   std::vector<std::uint16_t> lanes_;  // place in its block of each point, in order of the groups
-  std::vector<Index> entry_joints_;   // per influence: 16 * place in joints_
+  std::vector<Index> entry_joints_;   // per influence: 16 * place in joints()
   std::vector<float> entry_weights_;
   AlignedFloats sums_;   // sum of weights minus 1, per point
   AlignedFloats masks_;  // point weights, empty if all 1

@@ -19,12 +19,17 @@ ClusterKernel::ClusterKernel(std::span<const Index> out_points, std::span<const 
 
 void ClusterKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float>,
                         const Parallel* parallel) const noexcept {
+  Run(MakeAffineDelta(inputs.delta, inputs.pivot), inputs.envelope, in, out, parallel);
+}
+
+void ClusterKernel::Run(const AffineDelta& delta, double strength, ConstPointsView in, PointsView out,
+                        const Parallel* parallel) const noexcept {
   KPSA_CHECK_EQ(in.count, count_);
   KPSA_CHECK_EQ(out.count, count_);
-  const AffineDelta delta = MakeAffineDelta(inputs.delta, inputs.pivot);
-  const float envelope = static_cast<float>(inputs.envelope);
+  const float envelope = static_cast<float>(strength);
   if (delta.is_zero || envelope == 0 || begin_ >= end_) return CopyPoints(in, out);
   const auto copy = [&](std::size_t begin, std::size_t size) {
+    if (size == 0) return;
     CopyPoints({in.x + begin, in.y + begin, in.z + begin, size},
                {out.x + begin, out.y + begin, out.z + begin, size});
   };

@@ -28,6 +28,8 @@ class ClusterKernel {
   std::size_t ScratchFloats() const { return 0; }
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
+  void Run(const AffineDelta& delta, double envelope, ConstPointsView in, PointsView out,
+           const Parallel* parallel = nullptr) const noexcept;
 
  private:
   std::size_t count_ = 0;

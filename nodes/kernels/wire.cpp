@@ -300,20 +300,18 @@ WireKernel::WireKernel(std::span<const WireCurve> curves, double crossing_effect
 
 void WireKernel::Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
                      const Parallel* parallel) const noexcept {
-  KPSA_CHECK_EQ(inputs.offsets.size(), vertices_);
   KPSA_CHECK_EQ(in.count, count_);
   KPSA_CHECK_EQ(out.count, count_);
   KPSA_CHECK_LE(ScratchFloats(), scratch.size());
   CopyPoints(in, out);
   bool any = false;
-  for (std::size_t v = 0; v < vertices_; ++v) {
-    for (int a = 0; a < 3; ++a) {
-      float& to = scratch[4 * v + static_cast<std::size_t>(a)];
-      to = static_cast<float>(inputs.offsets[v][a] * inputs.envelope);
-      any |= to != 0;
-    }
-    scratch[4 * v + 3] = 0;
+  std::size_t vertex = 0;
+  for (const ConstPointsView& offsets : inputs.offsets) {
+    KPSA_CHECK_LE(vertex + offsets.count, vertices_);
+    any |= PackOffsets(offsets, inputs.turn, inputs.envelope, scratch.data() + 4 * vertex);
+    vertex += offsets.count;
   }
+  KPSA_CHECK_EQ(vertex, vertices_);
   if (any) blend_.Run(scratch.data(), out, parallel);
 }
 

@@ -55,9 +55,10 @@ struct WireCurve {
 class WireKernel {
  public:
   struct Inputs {
-    std::span<const Double3>
-        offsets;  // of every vertex from where it rests now; points' space; curve by curve
+    // Of every vertex from where it rests now, one view after the other, and what turns them to the points' space.
+    std::span<const ConstPointsView> offsets;
     double envelope = 1;
+    const Matrix4* turn = nullptr;  // its linear part; null: none
   };
 
   // Names too few vertices (2; closed: 3), one that is not finite, a dropoff that is not positive, a bad
@@ -72,7 +73,7 @@ class WireKernel {
 
   std::size_t point_count() const { return count_; }
   std::size_t affected_points() const { return blend_.affected_points(); }
-  std::size_t ScratchFloats() const { return 4 * vertices_; }
+  std::size_t ScratchFloats() const { return 4 * (vertices_ + kPointPadding); }
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;
 

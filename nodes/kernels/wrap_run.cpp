@@ -48,8 +48,7 @@ HWY_INLINE void Store3(const Lanes3& a, float* rows, std::size_t row) {
 // Sums over influences, of a block of points: of the frames, column by column. Their spare lanes hold the
 // anchor's x, y and z.
 struct WrapSums {
-  alignas(64) float x[4 * kWrapBlock] = {}, y[4 * kWrapBlock] = {}, z[4 * kWrapBlock] = {},
-                          normals[4 * kWrapBlock] = {};
+  alignas(64) float x[4 * kWrapBlock], y[4 * kWrapBlock], z[4 * kWrapBlock], normals[4 * kWrapBlock];
 };
 
 // `count` points of n influences each; 0: `size`.
@@ -93,6 +92,8 @@ HWY_INLINE void SumFrames(const WrapRun& run, const float* frames, std::size_t b
     }
     k = end;
   }
+  for (std::size_t k = size; k % 16 != 0; ++k)  // what fills the last vector
+    for (float* column : {sums->x, sums->y, sums->z, sums->normals}) Store4(Zero4(), column + 4 * k);
 }
 HWY_INLINE void SumAnchors(const WrapRun& run, const float* HWY_RESTRICT driver, std::size_t begin,
                            std::size_t size, float* HWY_RESTRICT anchors) {

@@ -63,16 +63,5 @@ TEST(CarriedFrames, InMeshSpaceTakeAHandleToWhereItsParentRests) {
   EXPECT_GT(Difference(frame->StageFromWorld(kParentNow), frame->stage_from_world()), 0.1);
 }
 
-TEST(CarriedFrames, AMotionInTheParentIsThatOfTheStage) {
-  const Result<CarriedFrame> frame = CarriedFrame::Bind(AStage(1));
-  ASSERT_TRUE(frame.ok());
-  const Matrix4 motion = frame->MotionInStage(kHandle);
-  const Double3 in_parent{0.1, -0.3, 0.2};
-  const Matrix4 stage_from_parent = frame->stage_from_world() * kParentRest;
-  const Double3 moved = TransformPoint(motion, TransformPoint(stage_from_parent, in_parent));
-  const Double3 expected = TransformPoint(stage_from_parent, TransformPoint(kHandle, in_parent));
-  EXPECT_LT(Length(moved - expected), 1e-12);
-}
-
 }  // namespace
 }  // namespace kpsa::engine

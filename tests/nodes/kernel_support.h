@@ -7,6 +7,7 @@
 #include <cstring>
 #include <random>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/check.h"
@@ -100,6 +101,25 @@ inline std::vector<Matrix4> MakePalette(Index joint_count, Double3 place, std::u
   }
   return palette;
 }
+
+// Of joints, as skins read them.
+inline std::vector<const Matrix4*> Pointers(const std::vector<Matrix4>& matrices) {
+  std::vector<const Matrix4*> pointers;
+  for (const Matrix4& matrix : matrices) pointers.push_back(&matrix);
+  return pointers;
+}
+
+// Offsets of a wire's vertices, in one view.
+class WireOffsets {
+ public:
+  explicit WireOffsets(std::span<const Double3> offsets)
+      : buffer_(PointBuffer::FromPlaces(offsets)), view_(std::as_const(buffer_).view()) {}
+  operator std::span<const ConstPointsView>() const { return {&view_, 1}; }  // NOLINT: implicit by design
+
+ private:
+  PointBuffer buffer_;
+  ConstPointsView view_;
+};
 
 // The controls of a lattice whose offsets are not 0.
 inline std::vector<Index> MovedControls(std::span<const Double3> offsets) {

@@ -17,6 +17,7 @@
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/non_linear.h"
 #include "nodes/kernels/normals.h"
+#include "nodes/kernels/sculpt.h"
 #include "nodes/kernels/shrink_wrap.h"
 #include "nodes/kernels/skin.h"
 #include "nodes/kernels/soft_mod.h"
@@ -84,8 +85,7 @@ class KernelLaw : public testing::Test {
              const SkinKernel kernel({skin_.offsets, skin_.joints, skin_.weights, 30}, out_points,
                                      masked ? Masked(out_points) : std::vector<float>());
              AlignedFloats scratch(kernel.ScratchFloats());
-             const Matrix4 base = masked ? Translation({0.1, 0.2, 0.3}) : Matrix4();
-             kernel.Run({palette_, masked ? 0.75 : 1.0, base}, in, out, scratch.span(), parallel);
+             kernel.Run({{Pointers(palette_)}, masked ? 0.75 : 1.0}, in, out, scratch.span(), parallel);
            }});
       subjects_.push_back(
           {masked ? "blendShape with weights" : "blendShape",
@@ -142,18 +142,29 @@ class KernelLaw : public testing::Test {
            }});
     }
     for (CurveBasis basis : {CurveBasis::kLinear, CurveBasis::kCatmullRom, CurveBasis::kBSpline}) {
-      subjects_.push_back({"wire " + std::to_string(static_cast<int>(basis)),
-                           true,
-                           {},
-                           [this, basis](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
-                             WireSettings settings;
-                             settings.basis = basis;
-                             settings.dropoff = 0.3;
-                             const WireKernel kernel(settings, vertices_, mesh_.rest.view(), out_points,
-                                                     Masked(out_points));
-                             AlignedFloats scratch(kernel.ScratchFloats());
-                             kernel.Run({vertex_offsets_, 0.9}, in, out, scratch.span(), parallel);
-                           }});
+      subjects_.push_back(
+          {"wire " + std::to_string(static_cast<int>(basis)),
+           true,
+           {},
+           [this, basis](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             WireSettings settings;
+             settings.basis = basis;
+             settings.dropoff = 0.3;
+             const WireKernel kernel(settings, vertices_, mesh_.rest.view(), out_points, Masked(out_points));
+             AlignedFloats scratch(kernel.ScratchFloats());
+             kernel.Run({WireOffsets(vertex_offsets_), 0.9}, in, out, scratch.span(), parallel);
+           }});
+    }
+    for (const SculptMode mode : {SculptMode::kFlip, SculptMode::kProject, SculptMode::kStretch}) {
+      subjects_.push_back(
+          {"sculpt " + std::to_string(static_cast<int>(mode)),
+           true,
+           {},
+           [this, mode](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
+             const Matrix4 handle = ComposeTrs({0.1, 0, 0.1}, Random(8).Rotation(), {0.7, 0.8, 0.9});
+             const SculptShape shape{mode, SculptDropoff::kLinear, 0.5, 0.6, {0, 0.6, 0.8}};
+             SculptKernel(out_points, Masked(out_points)).Run({shape, handle, 0.4, 0.8}, in, out, parallel);
+           }});
     }
     AddRingSubjects();
     AddDualQuaternions();
@@ -165,7 +176,8 @@ class KernelLaw : public testing::Test {
                                        {far, std::span(vertices_).first(3)}};
            const WireKernel kernel(curves, 0.3, mesh_.rest.view(), out_points, Masked(out_points));
            AlignedFloats scratch(kernel.ScratchFloats());
-           kernel.Run({std::span(vertex_offsets_).first(5), 0.9}, in, out, scratch.span(), parallel);
+           kernel.Run({WireOffsets(std::span(vertex_offsets_).first(5)), 0.9}, in, out, scratch.span(),
+                      parallel);
          }});
     for (const NonLinearMap& map : std::vector<NonLinearMap>{
              Bend{1.2, -0.4, 0.5}, Twist{0.3, -2, -0.3, 0.4}, Squash{-0.7, 1.2, 0.3, 0.4, 0.6, -0.3, 0.5},
@@ -281,13 +293,15 @@ class KernelLaw : public testing::Test {
              const SkinWeights weights{skin_.offsets, skin_.joints, skin_.weights, 30};
              const std::vector<float> mask = Masked(out_points);
              const SkinKernel linear(weights, out_points);
-             const DualQuaternionKernel kernel(weights, out_points, blended ? std::vector<float>() : mask,
+             const DualQuaternionKernel kernel(weights, centers_, out_points,
+                                               blended ? std::vector<float>() : mask,
                                                blended ? mask : std::vector<float>());
              AlignedFloats scratch(kernel.ScratchFloats()), linear_scratch(linear.ScratchFloats());
              PointBuffer apart(out_points.size());
-             if (blended) linear.Run({palette_, 1, {}}, in, apart.view(), linear_scratch.span(), parallel);
-             kernel.Run({palette_, centers_, 1, Translation({0.1, 0.2, 0.3}), std::as_const(apart).view()},
-                        in, out, scratch.span(), parallel);
+             if (blended)
+               linear.Run({{Pointers(palette_)}, 1}, in, apart.view(), linear_scratch.span(), parallel);
+             kernel.Run({{Pointers(palette_)}, 1, std::as_const(apart).view()}, in, out, scratch.span(),
+                        parallel);
            }});
     }
   }

@@ -74,7 +74,7 @@ TEST_F(LocalKernels, WireAgreesWithItsTwin) {
       WireSettings settings{basis, closed, 0.3, {FalloffCurve::kSmooth, {}}};
       ASSERT_TRUE(WireKernel::Validate(settings, vertices).ok());
       const WireKernel kernel(settings, vertices, in(), all_, mask_);
-      const PointBuffer out = Evaluate(kernel, {offsets, 0.5}, in());
+      const PointBuffer out = Evaluate(kernel, {WireOffsets(offsets), 0.5}, in());
       const CurveShape shape{basis, closed, 6};
       std::vector<Double3> moved = vertices;
       for (std::size_t i = 0; i < 6; ++i) moved[i] = moved[i] + offsets[i];
@@ -110,8 +110,10 @@ TEST_F(LocalKernels, AWireThatMovesAsAWholeMovesThePointsOnIt) {
   std::vector<Double3> expected;
   for (Double3 p : rest_) expected.push_back(p + offsets[0]);
   EXPECT_LT(
-      MaxDistance(ToDouble(Evaluate(WireKernel(settings, vertices, in(), all_), {offsets, 1}, in()).view()),
-                  expected),
+      MaxDistance(
+          ToDouble(
+              Evaluate(WireKernel(settings, vertices, in(), all_), {WireOffsets(offsets), 1}, in()).view()),
+          expected),
       2e-7);
 }
 
@@ -123,10 +125,11 @@ TEST_F(LocalKernels, OneOfSeveralCurvesIsTheWire) {
   WireSettings settings;
   settings.dropoff = 0.3;
   const WireCurve curve{settings, vertices};
-  const PointBuffer one = Evaluate(WireKernel(settings, vertices, in(), all_, mask_), {offsets, 0.5}, in());
+  const PointBuffer one =
+      Evaluate(WireKernel(settings, vertices, in(), all_, mask_), {WireOffsets(offsets), 0.5}, in());
   for (double crossing : {0.0, 1.0}) {
     const WireKernel kernel({&curve, 1}, crossing, in(), all_, mask_);
-    const PointBuffer several = Evaluate(kernel, {offsets, 0.5}, in());
+    const PointBuffer several = Evaluate(kernel, {WireOffsets(offsets), 0.5}, in());
     for (std::size_t i = 0; i < rest_.size(); ++i) ASSERT_TRUE(SameBits(one.view(), several.view(), i));
   }
 }
@@ -138,13 +141,16 @@ TEST_F(LocalKernels, CurvesThatLieTogetherMovePointsOnceUnlessTheyAddUp) {
   settings.dropoff = 0.3;
   const WireCurve curves[] = {{settings, vertices}, {settings, vertices}};
   const std::vector<Double3> one =
-      ToDouble(Evaluate(WireKernel(settings, vertices, in(), all_), {offsets, 1}, in()).view());
-  EXPECT_LT(MaxDistance(ToDouble(Evaluate(WireKernel(curves, 0, in(), all_), {twice, 1}, in()).view()), one),
-            1e-6);
+      ToDouble(Evaluate(WireKernel(settings, vertices, in(), all_), {WireOffsets(offsets), 1}, in()).view());
+  EXPECT_LT(
+      MaxDistance(ToDouble(Evaluate(WireKernel(curves, 0, in(), all_), {WireOffsets(twice), 1}, in()).view()),
+                  one),
+      1e-6);
   std::vector<Double3> expected;
   for (std::size_t i = 0; i < rest_.size(); ++i) expected.push_back(rest_[i] + (one[i] - rest_[i]) * 2.0);
   EXPECT_LT(
-      MaxDistance(ToDouble(Evaluate(WireKernel(curves, 1, in(), all_), {twice, 1}, in()).view()), expected),
+      MaxDistance(ToDouble(Evaluate(WireKernel(curves, 1, in(), all_), {WireOffsets(twice), 1}, in()).view()),
+                  expected),
       1e-6);
 }
 
@@ -171,7 +177,8 @@ TEST_F(LocalKernels, NearCurvesTakeOverFromFarOnes) {
           a * (crossing + (1 - crossing) * a / whole) - 2 * b * (crossing + (1 - crossing) * b / whole);
       expected.push_back(p + Double3{0, 0, 0.9 * mask_[i] * move});
     }
-    EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {offsets, 0.9}, in()).view()), expected), 1e-6);
+    EXPECT_LT(MaxDistance(ToDouble(Evaluate(kernel, {WireOffsets(offsets), 0.9}, in()).view()), expected),
+              1e-6);
   }
 }
 

@@ -1,6 +1,9 @@
 #include "nodes/kernels/sculpt.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "nodes/kernels/weights.h"
 #include "tests/nodes/driver_rig.h"
@@ -11,6 +14,71 @@ namespace {
 using Mode = SculptMode;
 using Dropoff = SculptDropoff;
 
+// Of one point, in a sphere of radius 1 about the origin.
+Double3 SculptPoint(const SculptShape& shape, Double3 p) {
+  const PointBuffer in = PointBuffer::FromPlaces(std::vector<Double3>{p});
+  PointBuffer out(1);
+  SculptKernel(AllPoints(1)).Run({shape, Matrix4(), 1, 1}, in.view(), out.view());
+  return ToDouble(std::as_const(out).view())[0];
+}
+
+// The same in double.
+Double3 SculptTwin(const SculptShape& shape, Double3 p) {
+  const double r = Length(p), d = shape.dropoff_distance;
+  const bool linear = shape.dropoff == Dropoff::kLinear && d > 0;
+  if (shape.mode == Mode::kStretch) {
+    if (!(r < 1 + d) || shape.stretch == Double3()) return p;
+    const double fade = r <= 1 || !linear ? 1 : 1 - (r - 1) / d;
+    const Double3 from = r <= 1 ? p : p * (1 / r);
+    const double along = Dot(from, shape.stretch);
+    const double exit = std::sqrt(along * along + std::max(1 - Dot(from, from), 0.0)) - along;
+    return p + shape.stretch * std::min(exit * fade, shape.max_displacement);
+  }
+  if (!(r > 0)) return p;
+  double way = 0;
+  if (shape.mode == Mode::kFlip) {
+    if (linear && r < 1 + d) way = 1 + r / (1 + d) * d - r;
+    if (!linear && r < 1) way = 1 - r;
+  } else if (std::fabs(r - 1) < d) {
+    way = (1 - r) * (linear ? 1 - std::fabs(r - 1) / d : 1);
+  }
+  return p * (1 + std::clamp(way, -shape.max_displacement, shape.max_displacement) / r);
+}
+
+// Not where it jumps, and what is nearly tangent to a stretch takes the root of what floats leave of its depth.
+TEST(Sculpt, AgreesWithItsTwin) {
+  Random random(14);
+  PointBuffer in(5000), out(5000);
+  for (std::size_t i = 0; i < in.count(); ++i) {
+    const Double3 p = random.Vector() * 1.2;
+    in.view().x[i] = static_cast<float>(p.x), in.view().y[i] = static_cast<float>(p.y);
+    in.view().z[i] = static_cast<float>(p.z);
+  }
+  const std::vector<Double3> points = ToDouble(std::as_const(in).view());
+  const Matrix4 handle = ComposeTrs({0.1, 0.2, -0.1}, random.Rotation(), {1.5, 0.75, 1});
+  const Matrix4 inverse = InverseOrIdentity(handle * Scaling({0.8, 0.8, 0.8}));
+  const SculptKernel kernel(AllPoints(in.count()));
+  for (const Mode mode : {Mode::kFlip, Mode::kProject, Mode::kStretch}) {
+    for (const Dropoff dropoff : {Dropoff::kNone, Dropoff::kLinear}) {
+      for (const double most : {0.125, 10.0}) {
+        const SculptShape shape{mode, dropoff, 0.4, most, {0.6, 0, 0.8}};
+        kernel.Run({shape, handle, 0.8, 1}, std::as_const(in).view(), out.view());
+        const std::vector<Double3> result = ToDouble(std::as_const(out).view());
+        std::size_t moved = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          const Double3 q = TransformPoint(inverse, points[i]);
+          if (std::fabs(Length(q) - 1) < 1e-4 || std::fabs(Length(q) - 1.4) < 1e-4) continue;
+          const Double3 there = TransformPoint(handle, SculptTwin(shape, q) * 0.8);
+          EXPECT_LT(Length(result[i] - there), mode == Mode::kStretch ? 3e-5 : 1e-6)
+              << static_cast<int>(mode) << " " << i;
+          moved += !(result[i] == points[i]);
+        }
+        EXPECT_GT(moved, 500u);
+      }
+    }
+  }
+}
+
 double Along(Mode mode, Dropoff dropoff, double d, double x, double most = 100) {
   const Double3 there = SculptPoint({mode, dropoff, d, most, {1, 0, 0}}, {x, 0, 0});
   EXPECT_EQ(there.y, 0);
@@ -18,35 +86,35 @@ double Along(Mode mode, Dropoff dropoff, double d, double x, double most = 100) 
 }
 
 TEST(Sculpt, FlipPushesOutAlongTheRadius) {
-  EXPECT_DOUBLE_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 0.25), 1);
-  EXPECT_DOUBLE_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, -0.25), -1);
-  EXPECT_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 1.25), 1.25);
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 0.25), 1);
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, -0.25), -1);
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 1.25), 1.25);
   // Linear: [0, 1.5] goes to [1, 1.5], and what is outside stays
-  EXPECT_DOUBLE_EQ(Along(Mode::kFlip, Dropoff::kLinear, 0.5, 0.75), 1.25);
-  EXPECT_DOUBLE_EQ(Along(Mode::kFlip, Dropoff::kLinear, 0.5, 1.2), 1.4);
-  EXPECT_EQ(Along(Mode::kFlip, Dropoff::kLinear, 0.5, 1.6), 1.6);
-  EXPECT_DOUBLE_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 0.25, 0.5), 0.75);  // not farther than that
-  EXPECT_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 0), 0);
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kLinear, 0.5, 0.75), 1.25);
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kLinear, 0.5, 1.2), 1.4);
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kLinear, 0.5, 1.6), 1.6);
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 0.25, 0.5), 0.75);  // not farther than that
+  EXPECT_FLOAT_EQ(Along(Mode::kFlip, Dropoff::kNone, 0, 0), 0);
 }
 
 TEST(Sculpt, ProjectDrawsOntoTheSphere) {
-  EXPECT_DOUBLE_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 0.75), 1);
-  EXPECT_DOUBLE_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 1.4), 1);
-  EXPECT_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 1.6), 1.6);
-  EXPECT_DOUBLE_EQ(Along(Mode::kProject, Dropoff::kLinear, 0.5, 1.25), 1.125);  // half of the way
-  EXPECT_DOUBLE_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 1.4, 0.1), 1.3);
-  EXPECT_EQ(Along(Mode::kProject, Dropoff::kLinear, 0, 0.5), 0.5);
+  EXPECT_FLOAT_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 0.75), 1);
+  EXPECT_FLOAT_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 1.4), 1);
+  EXPECT_FLOAT_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 1.6), 1.6);
+  EXPECT_FLOAT_EQ(Along(Mode::kProject, Dropoff::kLinear, 0.5, 1.25), 1.125);  // half of the way
+  EXPECT_FLOAT_EQ(Along(Mode::kProject, Dropoff::kNone, 0.5, 1.4, 0.1), 1.3);
+  EXPECT_FLOAT_EQ(Along(Mode::kProject, Dropoff::kLinear, 0, 0.5), 0.5);
 }
 
 TEST(Sculpt, StretchGoesOneWay) {
-  EXPECT_DOUBLE_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, 0.25), 1);
-  EXPECT_DOUBLE_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, -0.5), 1);
-  EXPECT_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, 1.5), 1.5);
-  EXPECT_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, -1.5), -1.5);
-  EXPECT_DOUBLE_EQ(Along(Mode::kStretch, Dropoff::kLinear, 1, -1.5), -0.5);  // half of the diameter
+  EXPECT_FLOAT_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, 0.25), 1);
+  EXPECT_FLOAT_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, -0.5), 1);
+  EXPECT_FLOAT_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, 1.5), 1.5);
+  EXPECT_FLOAT_EQ(Along(Mode::kStretch, Dropoff::kNone, 0, -1.5), -1.5);
+  EXPECT_FLOAT_EQ(Along(Mode::kStretch, Dropoff::kLinear, 1, -1.5), -0.5);  // half of the diameter
   const Double3 beside = SculptPoint({Mode::kStretch, Dropoff::kNone, 0, 100, {0, 1, 0}}, {0.6, -0.1, 0});
-  EXPECT_DOUBLE_EQ(beside.x, 0.6);
-  EXPECT_DOUBLE_EQ(beside.y, 0.8);
+  EXPECT_FLOAT_EQ(beside.x, 0.6);
+  EXPECT_FLOAT_EQ(beside.y, 0.8);
 }
 
 TEST(Sculpt, ThereAreNoJumps) {
