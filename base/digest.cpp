@@ -42,6 +42,21 @@ void Hasher::AddBytes(const void* data, std::size_t size) {
   }
 }
 
+void Hasher::AddLongBytes(const void* data, std::size_t size) {
+  constexpr std::size_t kLanes = 4, kStep = 8 * kLanes;
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  std::uint64_t lanes[kLanes] = {0, 1, 2, 3};
+  const unsigned char* const end = bytes + size / kStep * kStep;
+  for (; bytes != end; bytes += kStep) {
+    std::uint64_t words[kLanes];
+    std::memcpy(words, bytes, kStep);
+    for (std::size_t i = 0; i < kLanes; ++i)
+      lanes[i] = Rotate(lanes[i] + words[i] * 0xc2b2ae3d27d4eb4full, 31) * 0x9e3779b97f4a7c15ull;
+  }
+  AddBytes(lanes, sizeof(lanes));
+  AddBytes(bytes, size % kStep);
+}
+
 void Hasher::Add(std::string_view text) {
   Add(static_cast<std::uint64_t>(text.size()));
   AddBytes(text.data(), text.size());

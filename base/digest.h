@@ -33,6 +33,14 @@ class Hasher {
     Add(static_cast<std::uint64_t>(values.size()));
     AddBytes(values.data(), values.size_bytes());
   }
+  // The same of many bytes in a fraction of the time (four words at once); another digest than Add gives.
+  template <typename T>
+  requires std::is_trivially_copyable_v<T>
+  void AddLong(std::span<const T> values) {
+    Add(static_cast<std::uint64_t>(values.size()));
+    AddLongBytes(values.data(), values.size_bytes());
+  }
+  void AddLongBytes(const void* data, std::size_t size);
   void Add(const Digest& digest) {
     Add(digest.lo);
     Add(digest.hi);

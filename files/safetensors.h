@@ -80,18 +80,26 @@ class SafetensorsFile {
 
   // The string of a metadata key; an error names the key and the nearest one that exists.
   Result<std::string> Metadata(const std::string& key) const;
-  // A copy of a tensor of the wanted type and shape. A shape entry of kAnySize matches every size. float and
+  // The bytes of a tensor of the wanted type and shape. A shape entry of kAnySize matches every size. float and
   // double tensors must be finite; kF16 tensors are read as T = std::uint16_t with half = true, and must be
   // finite, too.
   static constexpr std::uint64_t kAnySize = ~std::uint64_t{0};
   template <typename T>
-  Result<std::vector<T>> Values(const std::string& key, std::span<const std::uint64_t> shape,
-                                bool half = false) const {
+  Result<std::span<const std::byte>> Bytes(const std::string& key, std::span<const std::uint64_t> shape,
+                                           bool half = false) const {
     const Result<const Tensor*> tensor =
         Checked(key, half ? TensorType::kF16 : TensorTypeOf<T>::value, shape);
     if (!tensor.ok()) return tensor.status();
-    std::vector<T> values((*tensor)->bytes.size() / sizeof(T));
-    CopyBytes((*tensor)->bytes, values.data());
+    return (*tensor)->bytes;
+  }
+  // A copy of them.
+  template <typename T>
+  Result<std::vector<T>> Values(const std::string& key, std::span<const std::uint64_t> shape,
+                                bool half = false) const {
+    const Result<std::span<const std::byte>> bytes = Bytes<T>(key, shape, half);
+    if (!bytes.ok()) return bytes.status();
+    std::vector<T> values(bytes->size() / sizeof(T));
+    CopyBytes(*bytes, values.data());
     return values;
   }
   template <typename T>

@@ -12,6 +12,7 @@
 #include <unordered_map>
 
 #include "files/file.h"
+#include "files/utf8.h"
 
 namespace kpsa::engine {
 namespace {
@@ -175,29 +176,13 @@ class TreeBuilder final : public YAML::EventHandler {
   Status duplicates;  // collected: the parse goes on
 };
 
-// The first byte that is not well-formed UTF-8 or a control character; npos if there is none (Unicode 15,
-// table 3-7).
+// The first byte that is not well-formed UTF-8 or a control character; npos if there is none.
 std::size_t FindBadByte(std::string_view text) {
-  const auto at = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
-  const auto continues = [&](std::size_t i) { return (at(i) & 0xC0u) == 0x80u; };
-  for (std::size_t i = 0; i < text.size();) {
-    const unsigned c = at(i);
-    if (c < 0x80) {
-      if ((c < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7F) return i;
-      i += 1;
-    } else if (c >= 0xC2 && c <= 0xDF && continues(i + 1)) {
-      i += 2;
-    } else if (c >= 0xE0 && c <= 0xEF && continues(i + 1) && continues(i + 2) &&
-               !(c == 0xE0 && at(i + 1) < 0xA0) && !(c == 0xED && at(i + 1) > 0x9F)) {
-      i += 3;
-    } else if (c >= 0xF0 && c <= 0xF4 && continues(i + 1) && continues(i + 2) && continues(i + 3) &&
-               !(c == 0xF0 && at(i + 1) < 0x90) && !(c == 0xF4 && at(i + 1) > 0x8F)) {
-      i += 4;
-    } else {
-      return i;
-    }
-  }
-  return std::string_view::npos;
+  const auto is_control = [](char c) {
+    return (static_cast<unsigned char>(c) < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7F;
+  };
+  const auto control = static_cast<std::size_t>(std::ranges::find_if(text, is_control) - text.begin());
+  return std::min(FindNotUtf8(text), control < text.size() ? control : std::string_view::npos);
 }
 
 std::string_view LineOf(std::string_view text, int line) {

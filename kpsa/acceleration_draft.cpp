@@ -1,14 +1,12 @@
 #include "kpsa/acceleration_draft.h"
 
 #include <algorithm>
-#include <map>
 #include <set>
 #include <unordered_map>
 
 #include "graph/evaluator.h"
 #include "kpsa/signature.h"
 #include "kpsa/space_frame.h"
-#include "kpsa/training_record.h"
 
 namespace kpsa::engine {
 namespace {
@@ -34,13 +32,14 @@ Status RestEntries(const Graph& graph, Compiler* compiler, const Signal& signal,
   return Status();
 }
 
+using RangesByPlug = std::unordered_map<std::string_view, const TrainedRange*>;
+
 // What may vary, and what is set here without varying: guards look at both. What is set and was never moved
 // in training has no range that says how far it may go, and is a miss whatever its value.
-std::vector<PlugRef> GuardedPlugs(const Graph& graph, const AccelerationTarget& target,
-                                  const TrainingRecord& record,
-                                  const std::map<std::string, TrainedRange>& ranges,
-                                  const std::vector<SetHere>& set_here, AccelerationDraft* draft) {
-  const std::set<std::string> controls(record.controls.begin(), record.controls.end());
+std::vector<PlugRef> GuardedPlugs(const Graph& graph, const AccelerationTarget& target, const TrainedRig& rig,
+                                  const RangesByPlug& ranges, const std::vector<SetHere>& set_here,
+                                  AccelerationDraft* draft) {
+  const std::set<std::string> controls(rig.controls.begin(), rig.controls.end());
   std::vector<PlugRef> guarded = target.varying;
   std::vector<std::string> untrained;
   for (const SetHere& set : set_here) {
@@ -63,8 +62,7 @@ std::vector<PlugRef> GuardedPlugs(const Graph& graph, const AccelerationTarget& 
 
 // The same rig as in training?
 Status CheckRig(const Graph& graph, const AccelerationTarget& target, const Subspace& subspace,
-                const TrainingRecord& record, const AccelerateOptions& options, AccelerationDraft* draft,
-                std::vector<SetHere>* set_here) {
+                const AccelerateOptions& options, AccelerationDraft* draft, std::vector<SetHere>* set_here) {
   if (subspace.outputs.size() != target.meshes.size()) {
     return Status::Invalid("the subspace is for {} meshes, the rig accelerates {}", subspace.outputs.size(),
                            target.meshes.size());
@@ -75,12 +73,13 @@ Status CheckRig(const Graph& graph, const AccelerationTarget& target, const Subs
                              target.meshes[m].name);
     }
   }
-  if (SignatureDigest(record.signature) != subspace.rig_hash)
+  const Signature& trained = subspace.rig.signature;
+  if (SignatureDigest(trained) != subspace.rig_hash)
     return Status::Invalid("the subspace is corrupt: its rig hash is not that of the rig that it describes");
   Signature now = RigSignature(graph, target.outputs(), target.space, target.controls, target.within);
-  *set_here = TakeSetHere(graph, target.outputs(), target.space, target.controls, target.within,
-                          record.signature, &now);
-  if (const std::string difference = SignatureDifference(record.signature, now); !difference.empty()) {
+  *set_here =
+      TakeSetHere(graph, target.outputs(), target.space, target.controls, target.within, trained, &now);
+  if (const std::string difference = SignatureDifference(trained, now); !difference.empty()) {
     if (!options.stale_is_miss) {
       return Status::Invalid("the subspace is stale: since it was trained, {} changed; train it again{}",
                              difference,
@@ -126,12 +125,11 @@ std::set<Index> CarriedNodes(const Graph& graph, const AccelerationTarget& targe
 
 // Guards of what varies or is set here: with its trained range, or, if it never moved there, its rest value.
 Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
-                 const Subspace& subspace, const TrainingRecord& record, const std::vector<SetHere>& set_here,
-                 AccelerationDraft* draft) {
+                 const Subspace& subspace, const std::vector<SetHere>& set_here, AccelerationDraft* draft) {
   KpsaConfig::Data& data = draft->data;
-  std::map<std::string, TrainedRange> ranges;
-  for (const TrainedRange& range : subspace.ranges) ranges.emplace(range.plug, range);
-  const std::vector<PlugRef> varying = GuardedPlugs(graph, target, record, ranges, set_here, draft);
+  RangesByPlug ranges;
+  for (const TrainedRange& range : subspace.ranges) ranges.emplace(range.plug, &range);
+  const std::vector<PlugRef> varying = GuardedPlugs(graph, target, subspace.rig, ranges, set_here, draft);
   std::vector<std::string> unguarded;
   Result<std::vector<Signal>> signals = FindSignals(graph, compiler, target.outputs(), varying,
                                                     CarriedNodes(graph, target, subspace), &unguarded);
@@ -144,7 +142,8 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
     for (std::size_t e = 0; e < signal.entries(); ++e) {
       TrainedRange range;
       if (const auto it = ranges.find(target.within.Inner(EntryName(signal, e))); it != ranges.end()) {
-        range = it->second;
+        range.lo = it->second->lo, range.hi = it->second->hi, range.ramp = it->second->ramp;
+        range.patches = it->second->patches;
       } else {
         if (!have_rest) KPSA_RETURN_IF_ERROR(RestEntries(graph, compiler, signal, rest));
         have_rest = true;
@@ -172,6 +171,42 @@ class CueSignals {
     }
   }
 
+  // The row of a scalar, which may be an entry of a matrix.
+  Result<KpsaConfig::Row> RowOf(const std::string& plug) {
+    const SignalEntry split = SplitEntryName(plug);
+    const Result<const Placed*> placed = Find(split.signal);
+    if (!placed.ok()) return placed.status();
+    const bool is_matrix = (*placed)->signal.matrix;
+    if (is_matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
+      return Status::Invalid(
+          "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", plug);
+    KpsaConfig::Row row;
+    row.kind = is_matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
+    row.element = static_cast<Index>(split.entry.value_or(0));
+    row.input = (*placed)->input;
+    return row;
+  }
+  // The matrix in whose space something is measured.
+  Result<Index> JointOf(const std::string& plug) {
+    const Result<const Placed*> placed = Find(plug);
+    if (!placed.ok()) return placed.status();
+    return (*placed)->signal.relative ? (*placed)->input : kNoIndex;
+  }
+
+ private:
+  struct Placed {
+    Signal signal;
+    Index input = 0;
+  };
+  // A signal by what the subspace calls it; many cues are entries of the same one.
+  Result<const Placed*> Find(const std::string& name) {
+    const auto known = found_.find(name);
+    if (known != found_.end()) return &known->second;
+    Result<Signal> signal = FindSignal(graph_, name, target_.within);
+    if (!signal.ok()) return signal.status();
+    const Index input = Place(*signal);
+    return &found_.emplace(name, Placed{std::move(*signal), input}).first->second;
+  }
   // A signal that is no input yet becomes one.
   Index Place(const Signal& signal) {
     std::vector<Signal>& list = ListOf(signal.matrix);
@@ -189,28 +224,12 @@ class CueSignals {
     (signal.matrix ? data.matrix_patches : data.scalar_patches).push_back(kAllPatches);
     return place->second;
   }
-
-  // The row of a scalar, which may be an entry of a matrix.
-  Result<KpsaConfig::Row> RowOf(const std::string& plug) {
-    const SignalEntry split = SplitEntryName(plug);
-    const Result<Signal> signal = FindSignal(graph_, split.signal, target_.within);
-    if (!signal.ok()) return signal.status();
-    if (signal->matrix != split.entry.has_value() || split.entry.value_or(0) > 11)
-      return Status::Invalid(
-          "the subspace measures \"{}\", which is no entry of a matrix (plug/0 to plug/11)", plug);
-    KpsaConfig::Row row;
-    row.kind = signal->matrix ? KpsaConfig::Row::Kind::kMatrix : KpsaConfig::Row::Kind::kScalar;
-    row.element = static_cast<Index>(split.entry.value_or(0));
-    row.input = Place(*signal);
-    return row;
-  }
-
- private:
   std::vector<Signal>& ListOf(bool matrix) { return matrix ? draft_->matrices : draft_->scalars; }
   const Graph& graph_;
   const AccelerationTarget& target_;
   AccelerationDraft* draft_;
   std::unordered_map<std::string, Index> places_;  // a signal is in one of both lists
+  std::unordered_map<std::string, Placed> found_;
 };
 
 // Where the rows of the measurement come from.
@@ -276,16 +295,15 @@ Status AddCues(const Graph& graph, const AccelerationTarget& target, const Subsp
       data->products.push_back(product);
     }
     if (!cue.joint.empty()) {
-      const Result<Signal> joint = FindSignal(graph, cue.joint, target.within);
+      const Result<Index> joint = signals.JointOf(cue.joint);
       if (!joint.ok()) return joint.status();
-      if (!joint->relative ||
+      if (*joint == kNoIndex ||
           (row.kind != KpsaConfig::Row::Kind::kMatrix && row.kind != KpsaConfig::Row::Kind::kPoint))
         return Status::Invalid("the subspace measures in the space of \"{}\", which is no world matrix",
                                cue.joint);
-      const Index matrix = signals.Place(*joint);
-      const auto found = std::find(data->joints.begin(), data->joints.end(), matrix);
+      const auto found = std::find(data->joints.begin(), data->joints.end(), *joint);
       row.joint = static_cast<Index>(found - data->joints.begin());
-      if (found == data->joints.end()) data->joints.push_back(matrix);
+      if (found == data->joints.end()) data->joints.push_back(*joint);
     }
     data->rows.push_back(row);
   }
@@ -333,6 +351,7 @@ Status PlacePatches(const Graph& graph, Compiler* compiler, const AccelerationTa
     if (!rest.ok()) return rest.status();
     const ConstPointsView points = rest->points()->view();
     std::vector<Double3>& of = positions.emplace_back();
+    of.reserve(points.count);
     for (std::size_t i = 0; i < points.count; ++i) of.push_back({points.x[i], points.y[i], points.z[i]});
   }
   draft->data.patches = MakePatches(positions, tiles);
@@ -347,10 +366,9 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
                                             const AccelerateOptions& options) {
   AccelerationDraft draft;
   draft.data.subspace = subspace;
-  const TrainingRecord record = ParseTraining(subspace->training);
   std::vector<SetHere> set_here;
-  KPSA_RETURN_IF_ERROR(CheckRig(graph, target, *subspace, record, options, &draft, &set_here));
-  KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, record, set_here, &draft));
+  KPSA_RETURN_IF_ERROR(CheckRig(graph, target, *subspace, options, &draft, &set_here));
+  KPSA_RETURN_IF_ERROR(AddGuards(graph, compiler, target, *subspace, set_here, &draft));
   KPSA_RETURN_IF_ERROR(AddCues(graph, target, *subspace, &draft));
   for (const AccelerationTarget::MeshPoints& mesh : target.meshes)
     draft.data.outputs_in_space.push_back(mesh.stages.back().world);

@@ -39,6 +39,7 @@ Status ReadPatches(const SafetensorsFile& file, Subspace* s) {
     pair.middle = (*middles)[i];
     if ((*counts)[i] > kMaxPatches || next + (*counts)[i] > pairs->size() / 2)
       return Status::Invalid("calibration pose {} has {} patches", i, (*counts)[i]);
+    pair.patches.reserve((*counts)[i]);
     for (std::size_t p = 0; p < (*counts)[i]; ++p, ++next)
       pair.patches.push_back({(*pairs)[2 * next], (*pairs)[2 * next + 1], guards[next]});
   }
@@ -76,6 +77,7 @@ Status ReadCalibration(const SafetensorsFile& file, Subspace* s) {
   constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
   const Result<std::vector<double>> calibration = file.Values<double>("calibration", {kAny, 4});
   if (!calibration.ok()) return calibration.status();
+  s->calibration.reserve(calibration->size() / 4);
   for (std::size_t i = 0; i + 3 < calibration->size(); i += 4) {
     const std::span<const double> row(calibration->data() + i, 4);
     const bool known = row[3] >= 0 && row[3] < kPoseKinds && row[3] == std::floor(row[3]);

@@ -7,23 +7,23 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
   const Subspace& s = *data_.subspace;
   hasher.Add(std::string_view(s.rig_hash));
   hasher.Add(std::string_view(s.training));
-  hasher.Add(std::span<const double>(s.cue_mean));
-  hasher.Add(std::span<const float>(s.soft_cache.factor.span()));
-  hasher.Add(std::span<const float>(s.latent));
+  hasher.AddLong(std::span<const double>(s.cue_mean));
+  hasher.AddLong(std::span<const float>(s.soft_cache.factor.span()));
+  hasher.AddLong(std::span<const float>(s.latent));
   for (const TileMap& tiles : s.tiles) {
-    hasher.Add(std::span<const std::uint8_t>(tiles.data().u.span()));
-    hasher.Add(std::span<const std::uint16_t>(tiles.data().v.span()));
-    hasher.Add(std::span<const float>(tiles.data().scale.span()));
-    hasher.Add(std::span<const std::uint32_t>(tiles.data().columns));
-    hasher.Add(std::span<const float>(tiles.data().mean.span()));
-    hasher.Add(std::span<const std::uint8_t>(tiles.data().pairs));
-    hasher.Add(std::span<const std::uint16_t>(tiles.data().w.span()));
-    hasher.Add(std::span<const std::uint16_t>(tiles.data().doubt.span()));
-    hasher.Add(std::span<const std::uint32_t>(tiles.data().joints));
-    hasher.Add(std::span<const std::uint32_t>(tiles.data().joint_rows));
+    hasher.AddLong(std::span<const std::uint8_t>(tiles.data().u.span()));
+    hasher.AddLong(std::span<const std::uint16_t>(tiles.data().v.span()));
+    hasher.AddLong(std::span<const float>(tiles.data().scale.span()));
+    hasher.AddLong(std::span<const std::uint32_t>(tiles.data().columns));
+    hasher.AddLong(std::span<const float>(tiles.data().mean.span()));
+    hasher.AddLong(std::span<const std::uint8_t>(tiles.data().pairs));
+    hasher.AddLong(std::span<const std::uint16_t>(tiles.data().w.span()));
+    hasher.AddLong(std::span<const std::uint16_t>(tiles.data().doubt.span()));
+    hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joints));
+    hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joint_rows));
   }
   for (const PointCues& cues : data_.cues) {
-    hasher.Add(std::span<const Index>(cues.points));
+    hasher.AddLong(std::span<const Index>(cues.points));
     hasher.Add(cues.in_space);
     hasher.Add(cues.near);
   }
@@ -47,33 +47,30 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(product.lo);
     hasher.Add(product.hi);
   }
-  hasher.Add(std::span<const Index>(data_.joints));
+  hasher.AddLong(std::span<const Index>(data_.joints));
   for (const auto* range : {&data_.matrix_lo, &data_.matrix_hi, &data_.matrix_ramp, &data_.scalar_lo,
                             &data_.scalar_hi, &data_.scalar_ramp})
-    hasher.Add(std::span<const double>(*range));
+    hasher.AddLong(std::span<const double>(*range));
   for (const auto* patches : {&data_.matrix_patches, &data_.scalar_patches})
-    hasher.Add(std::span<const std::uint64_t>(*patches));
+    hasher.AddLong(std::span<const std::uint64_t>(*patches));
+  std::vector<double> calibration;
   for (const CalibrationPair& pair : s.calibration) {
-    hasher.Add(pair.score);
-    hasher.Add(pair.error);
-    hasher.Add(pair.guard);
-    hasher.Add(pair.kind);
-    hasher.Add(pair.middle);
-    for (const PatchPair& patch : pair.patches) {
-      hasher.Add(patch.score);
-      hasher.Add(patch.error);
-      hasher.Add(patch.guard);
-    }
+    calibration.insert(calibration.end(),
+                       {pair.score, pair.error, pair.guard, pair.middle, static_cast<double>(pair.kind),
+                        static_cast<double>(pair.patches.size())});
+    for (const PatchPair& patch : pair.patches)
+      calibration.insert(calibration.end(), {patch.score, patch.error, patch.guard});
   }
+  hasher.AddLong(std::span<const double>(calibration));
   hasher.Add(s.patches.tiles);
   hasher.Add(s.patches.share);
-  hasher.Add(std::span<const double>(s.patches.costs));
+  hasher.AddLong(std::span<const double>(s.patches.costs));
   for (const PatchPoints& patch : data_.patches) {
     hasher.Add(patch.output);
-    hasher.Add(std::span<const Index>(patch.points));
-    hasher.Add(std::span<const float>(patch.weights));
+    hasher.AddLong(std::span<const Index>(patch.points));
+    hasher.AddLong(std::span<const float>(patch.weights));
   }
-  hasher.Add(std::span<const double>(s.inverse_rest_stretch.m));
+  hasher.AddLong(std::span<const double>(s.inverse_rest_stretch.m));
   hasher.Add(s.extent);
   hasher.Add(s.score.measured);
   hasher.Add(s.score.doubt);
@@ -81,8 +78,8 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(place);
   hasher.Add(data_.has_space);
   hasher.Add(data_.space_scales);
-  hasher.Add(std::span<const char>(data_.outputs_in_space));
-  hasher.Add(std::span<const char>(data_.relative));
+  hasher.AddLong(std::span<const char>(data_.outputs_in_space));
+  hasher.AddLong(std::span<const char>(data_.relative));
   hasher.Add(data_.always_miss);
   hasher.Add(std::string_view(data_.always_miss_reason));
   digest_ = hasher.Finish();

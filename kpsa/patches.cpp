@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numeric>
 #include <utility>
 
 #include "base/median.h"
+#include "kpsa/point_blocks.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa::engine {
@@ -14,64 +15,72 @@ namespace {
 constexpr double kBorder = 3;              // typical distances of neighbours
 constexpr std::size_t kFewestOfLevel = 3;  // regions; fewer would be most of an output each
 
-// The median distance of points to the nearest other one of the same tile. Of neighbours by x only those are looked
-// at that may be nearer.
-double TypicalDistance(std::span<const Double3> tile) {
-  std::vector<Double3> by_x(tile.begin(), tile.end());
-  std::erase_if(by_x, [](const Double3& p) { return !std::isfinite(Dot(p, p)); });
-  std::ranges::sort(by_x, {}, &Double3::x);
-  std::vector<double> nearest;
-  for (std::size_t i = 0; i < by_x.size(); ++i) {
-    double least = std::numeric_limits<double>::infinity();
-    const auto is_beyond = [&](const Double3& other) {
-      const Double3 d = by_x[i] - other;
-      if (d.x * d.x > least) return true;
-      if (Dot(d, d) > 0) least = std::min(least, Dot(d, d));
-      return false;
-    };
-    for (std::size_t j = i + 1; j < by_x.size() && !is_beyond(by_x[j]);) ++j;
-    for (std::size_t j = i; j-- > 0 && !is_beyond(by_x[j]);) {
+constexpr std::size_t kBlocksOfTile = kTilePoints / PointBlocks::kSize;
+static_assert(kTilePoints % PointBlocks::kSize == 0, "a block is of one tile");
+
+// The median distance of points to the nearest other one of the same tile.
+double TypicalDistance(const PointBlocks& blocks, std::size_t tile) {
+  const std::size_t first = tile * kBlocksOfTile, count = std::min(kBlocksOfTile, blocks.size() - first);
+  std::vector<std::uint32_t> all(count);
+  std::iota(all.begin(), all.end(), static_cast<std::uint32_t>(first));
+  std::vector<double> nearest;  // squared
+  for (std::size_t block = first; block < first + count; ++block) {
+    PointBlocks::Distances least;
+    least.fill(PointBox::kFar);
+    blocks.NearestApart(all, block, &least);
+    for (std::size_t i = 0; i < PointBlocks::kSize; ++i) {
+      if (blocks.IsSomewhere(block * PointBlocks::kSize + i) && least[i] < PointBox::kFar)
+        nearest.push_back(least[i]);
     }
-    if (std::isfinite(least)) nearest.push_back(std::sqrt(least));
   }
-  if (nearest.empty()) return 0;
-  return UpperMedian(std::move(nearest));
+  return nearest.empty() ? 0 : std::sqrt(UpperMedian(std::move(nearest)));
 }
 
-// Points by their x and the box around them, so that near ones are found without looking at all of them.
-struct ByX {
-  std::vector<std::pair<double, Index>> points;
-  Double3 lo, hi;
-  ByX(std::span<const Double3> positions, Index first, Index count) {
-    for (Index i = first; i < first + count; ++i) {
-      const Double3& p = positions[i];
-      if (!std::isfinite(Dot(p, p))) continue;
-      if (points.empty()) lo = hi = p;
-      lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
-      hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
-      points.emplace_back(p.x, i);
-    }
-    std::sort(points.begin(), points.end());
-  }
-  // False where no point can be nearer than that; also for what is no number.
-  bool MayBeNear(const Double3& at, double within) const {
-    return !points.empty() && at.x > lo.x - within && at.x < hi.x + within && at.y > lo.y - within &&
-           at.y < hi.y + within && at.z > lo.z - within && at.z < hi.z + within;
-  }
-  // Distance to the nearest one, at most `within`.
-  double Nearest(std::span<const Double3> positions, const Double3& at, double within) const {
-    double least = within * within;
-    const auto is_beyond = [&](const std::pair<double, Index>& point) {
-      const Double3 d = positions[point.second] - at;
-      if (d.x * d.x > least) return true;
-      least = std::min(least, Dot(d, d));
-      return false;
+// Makes a patch of some blocks in a row, of an output of `total` points.
+class PatchMaker {
+ public:
+  PatchMaker(PointBlocks* blocks, std::size_t total) : blocks_(*blocks), total_(total) {}
+
+  // In other blocks points take the less, the farther they are from those of the patch, and nothing beyond the border.
+  void Make(std::size_t first, std::size_t count, double border, PatchPoints* patch) {
+    PointBox own;
+    for (std::size_t b = first; b < first + count; ++b) own.Add(blocks_.box(b));
+    blocks_.FindNear(own, 0, blocks_.size(), border * border, &around_);
+    std::size_t next = 0;
+    const auto add_others = [&](std::size_t end) {
+      for (; next < around_.size() && around_[next] < end; ++next) {
+        blocks_.FindNear(blocks_.box(around_[next]), first, count, border * border, &near_);
+        if (!near_.empty()) AddNear(around_[next], border, patch);
+      }
     };
-    const auto from = std::lower_bound(points.begin(), points.end(), std::pair(at.x, Index{0}));
-    for (auto it = from; it != points.end() && !is_beyond(*it);) ++it;
-    for (auto it = from; it != points.begin() && !is_beyond(*std::prev(it));) --it;
-    return std::sqrt(least);
+    add_others(first);
+    for (std::size_t i = first * PointBlocks::kSize; i < EndOf(first + count - 1); ++i) Add(i, 1, patch);
+    while (next < around_.size() && around_[next] < first + count) ++next;
+    add_others(blocks_.size());
   }
+
+ private:
+  std::size_t EndOf(std::size_t block) const { return std::min((block + 1) * PointBlocks::kSize, total_); }
+  static void Add(std::size_t point, double weight, PatchPoints* patch) {
+    patch->points.push_back(static_cast<Index>(point));
+    patch->weights.push_back(static_cast<float>(weight));
+  }
+  void AddNear(std::size_t block, double border, PatchPoints* patch) {
+    const double beyond = border * border;
+    PointBlocks::Distances least;  // squared
+    least.fill(beyond);
+    blocks_.Nearest(near_, block, &least);
+    const std::size_t begin = block * PointBlocks::kSize;
+    for (std::size_t i = begin; i < EndOf(block); ++i) {
+      if (!(least[i - begin] < beyond && blocks_.IsSomewhere(i))) continue;
+      const double weight = 1 - Smoothstep(std::sqrt(least[i - begin]) / border);
+      if (weight > 0) Add(i, weight, patch);
+    }
+  }
+
+  PointBlocks& blocks_;
+  std::size_t total_;
+  std::vector<std::uint32_t> around_, near_;
 };
 
 }  // namespace
@@ -114,25 +123,17 @@ std::vector<PatchPoints> MakePatches(std::span<const std::vector<Double3>> posit
                                      std::size_t tiles_of_patch) {
   std::vector<PatchPoints> patches;
   for (std::size_t m = 0; m < positions.size(); ++m) {
-    const std::span<const Double3> of(positions[m]);
-    const auto total = static_cast<Index>(of.size()), size = static_cast<Index>(tiles_of_patch * kTilePoints);
-    for (Index first = 0; first < total; first += size) {
-      PatchPoints& patch = patches.emplace_back();
-      patch.output = static_cast<Index>(m);
-      const Index count = std::min(size, total - first);
+    PointBlocks blocks(positions[m]);
+    PatchMaker maker(&blocks, positions[m].size());
+    const std::size_t tiles = (positions[m].size() + kTilePoints - 1) / kTilePoints;
+    for (std::size_t tile = 0; tile < tiles; tile += tiles_of_patch) {
       double border = 0;
-      for (Index tile = first; tile < first + count; tile += kTilePoints)
-        border = std::max(border, kBorder * TypicalDistance(of.subspan(
-                                                tile, std::min<Index>(kTilePoints, first + count - tile))));
-      const ByX own(of, first, count);
-      for (Index i = 0; i < total; ++i) {
-        double weight = i >= first && i < first + count ? 1 : 0;
-        if (weight == 0 && border > 0 && own.MayBeNear(of[i], border))
-          weight = 1 - Smoothstep(own.Nearest(of, of[i], border) / border);
-        if (!(weight > 0)) continue;
-        patch.points.push_back(i);
-        patch.weights.push_back(static_cast<float>(weight));
-      }
+      for (std::size_t t = tile; t < std::min(tile + tiles_of_patch, tiles); ++t)
+        border = std::max(border, kBorder * TypicalDistance(blocks, t));
+      const std::size_t first = tile * kBlocksOfTile;
+      patches.emplace_back().output = static_cast<Index>(m);
+      maker.Make(first, std::min(tiles_of_patch * kBlocksOfTile, blocks.size() - first), border,
+                 &patches.back());
     }
   }
   return patches;

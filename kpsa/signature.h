@@ -17,6 +17,14 @@ struct NodeSignature {
 };
 using Signature = std::map<std::string, NodeSignature>;  // by the node's name, which may hold anything
 
+// What a subspace says of the rig that it was trained on.
+struct TrainedRig {
+  Signature signature;
+  std::vector<std::string>
+      controls;  // plugs, as Graph::PlugName: what may be posed within the trained ranges
+  friend bool operator==(const TrainedRig&, const TrainedRig&) = default;
+};
+
 // A rig within another one: its nodes' names begin with `prefix`, and hang under `root`. It has the identity
 // of the rig alone, and in a subspace things are called as there.
 struct RigWithin {

@@ -70,7 +70,7 @@ std::string CueName(const Subspace& subspace, const CueDescription& cue) {
 Status ValidateSubspace(const Subspace& s) {
   const std::size_t rows = s.rows();
   std::size_t counted = 0;
-  std::set<std::string> joints;
+  std::set<std::string_view> joints;
   for (const CueDescription& cue : s.cues) {
     if (!cue.joint.empty()) joints.insert(cue.joint);
   }

@@ -17,15 +17,16 @@
 #include "base/status.h"
 #include "kpsa/calibration.h"
 #include "kpsa/patches.h"
+#include "kpsa/signature.h"
 #include "kpsa/soft_cache.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa::engine {
 
-// 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues; 5: without
-// patches; 6: without guards of patches; 7: without calibration poses near clips
-inline constexpr int kSubspaceVersion = 8, kGuardedPatchesVersion = 7, kPatchesVersion = 6,
-                     kProductCuesVersion = 5, kProductTilesVersion = 4, kOldestVersion = 3;
+// What a file may be of; 9 is what is written. 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues; 5: without
+// patches; 6: without guards of patches; 7: without calibration poses near clips; 8: cues, ranges and the trained rig are
+// JSON, and not tensors
+inline constexpr int kSubspaceVersion = 9, kListsVersion = 9, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
@@ -112,14 +113,15 @@ struct Subspace {
   // Tiles have cues of their own, and their doubts alone judge: SoftCache's own score speaks of all points,
   // and would say of no part that it misses.
   bool by_tile() const { return doubt_inputs() > 0 && soft_cache.factor.size() == 0; }
-  std::string rig_hash;          // what it was trained on
+  TrainedRig rig;                // what it was trained on,
+  std::string rig_hash;          // and the SignatureDigest of that
   std::string units = "m";       // of points and errors; kLightUnits: numbers, and errors are RMS of a frame
   std::string space;             // "" world or mesh space, else the joint
   Matrix4 inverse_rest_stretch;  // of the space (kpsa/space_frame.h)
   double extent = 0;             // metres: diagonal of the mean shape, or 0 where a stretch is no length
   std::vector<std::string> carried;  // transforms up from the space that move the points with it: no guards
   bool space_scales = false;         // a uniform scale above the space scales the points in it and no more
-  std::string training = "{}";       // JSON: summary of the training, shown by `inspect`
+  std::string training = "{}";       // JSON: summary of the training (kpsa/training_record.h)
   std::size_t rows() const { return cue_mean.size(); }  // r
   std::size_t doubt_inputs() const;                     // what LargestDoubt leaves; 0 without products
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }

@@ -15,12 +15,30 @@ std::string ModesDigest(const Subspace& s) {
   return hasher.Finish().ToHex();
 }
 
-std::string ContentDigest(const Subspace& s, const std::map<std::string, std::string>& header) {
+std::string FileDigest(const SafetensorsFile& file) {
   Hasher hasher;
-  for (const char* key : kHeaderKeys) {
+  for (const auto& [key, text] : file.metadata()) {
+    if (key == kDigest || key == kModesDigest) continue;
     hasher.Add(std::string_view(key));
-    const auto text = header.find(key);
-    hasher.Add(text == header.end() ? std::string_view() : std::string_view(text->second));
+    hasher.Add(std::string_view(text));
+  }
+  for (const auto& [key, tensor] : file.tensors()) {
+    if (key == kModes) continue;
+    hasher.Add(std::string_view(key));
+    hasher.Add(TensorTypeName(tensor.type));
+    hasher.Add(std::span<const std::uint64_t>(tensor.shape));
+    hasher.AddLong(tensor.bytes);
+  }
+  return hasher.Finish().ToHex();
+}
+
+std::string ContentDigest(const Subspace& s, const std::map<std::string, std::string>& metadata) {
+  Hasher hasher;
+  for (const char* key : {"cues", "frame", "kind", "outputs", "ranges", "rigHash", "space", "summary",
+                          "training", "units", "version"}) {
+    hasher.Add(std::string_view(key));
+    const auto text = metadata.find(key);
+    hasher.Add(text == metadata.end() ? std::string_view() : std::string_view(text->second));
   }
   hasher.Add(std::span<const double>(s.cue_mean));
   hasher.Add(std::span<const double>(s.cue_scale));

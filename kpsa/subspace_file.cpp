@@ -1,4 +1,4 @@
-// The .kpsa file: lists as JSON in the metadata, numbers as tensors. See kpsa/subspace.h and
+// The .kpsa file: what is small as JSON in the metadata, all else as tensors. See kpsa/subspace.h and
 // files/safetensors.h.
 #include <span>
 
@@ -7,13 +7,14 @@
 #include "kpsa/subspace.h"
 #include "kpsa/subspace_digest.h"
 #include "kpsa/subspace_header.h"
+#include "kpsa/subspace_lists.h"
 #include "kpsa/subspace_tensors.h"
 #include "kpsa/tiles_file.h"
 
 namespace kpsa::engine {
 namespace {
 
-constexpr char kModes[] = "modes", kModesDigest[] = "modesDigest", kLatent[] = "latent";
+constexpr char kLatent[] = "latent";
 
 // Column by column: a row of the tensor is a mode.
 Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
@@ -31,9 +32,8 @@ Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
 Status WriteSubspace(const Subspace& s, const std::string& path) {
   KPSA_RETURN_IF_ERROR(ValidateSubspace(s));
   SafetensorsWriter writer;
-  const std::map<std::string, std::string> header = SubspaceHeader(s);
-  for (const auto& [key, text] : header) writer.SetMetadata(key, text);
-  writer.SetMetadata("digest", ContentDigest(s, header));
+  for (const auto& [key, text] : SubspaceHeader(s)) writer.SetMetadata(key, text);
+  AddLists(s, &writer);
   Add<double>(&writer, "cueMean", s.cue_mean);
   Add<double>(&writer, "cueScale", s.cue_scale);
   Add<std::uint32_t>(&writer, "cueOffsets", s.soft_cache.offsets);
@@ -47,26 +47,35 @@ Status WriteSubspace(const Subspace& s, const std::string& path) {
                       std::span<const float>(s.kept_modes.values));
     writer.SetMetadata(kModesDigest, ModesDigest(s));
   }
+  const Result<SafetensorsFile> written = SafetensorsFile::Parse(writer.Serialize(), path);
+  if (!written.ok()) return written.status();
+  writer.SetMetadata(kDigest, FileDigest(*written));
   return writer.Write(path);
 }
 
-Result<Subspace> SubspaceContent(const SafetensorsFile& file, KeptModes modes) {
+Result<int> SubspaceVersion(const SafetensorsFile& file) {
   const auto kind = file.metadata().find("kind");
   if (kind == file.metadata().end() || kind->second != kSubspaceKind) {
     return Status::Invalid("a file of tensors, but not a subspace (write one with `kpsa train`)");
   }
   const Result<std::string> version = file.Metadata("version");
   if (!version.ok()) return version.status();
-  bool known = false;
-  for (int v = kOldestVersion; v <= kSubspaceVersion; ++v) known |= *version == std::to_string(v);
-  if (!known) {
-    return Status::Invalid(
-        "the subspace has format version {}, this program reads versions {} to {}; train it again or use "
-        "the program that wrote it",
-        *version, kOldestVersion, kSubspaceVersion);
+  for (int v = kOldestVersion; v <= kSubspaceVersion; ++v) {
+    if (*version == std::to_string(v)) return v;
   }
+  return Status::Invalid(
+      "the subspace has format version {}, this program reads versions {} to {}; train it again or use "
+      "the program that wrote it",
+      *version, kOldestVersion, kSubspaceVersion);
+}
+
+Result<Subspace> SubspaceContent(const SafetensorsFile& file, KeptModes modes) {
+  const Result<int> version = SubspaceVersion(file);
+  if (!version.ok()) return version.status();
+  const bool has_json_lists = *version < kListsVersion;
   Subspace s;
-  KPSA_RETURN_IF_ERROR(ReadSubspaceHeader(file, &s));
+  KPSA_RETURN_IF_ERROR(ReadSubspaceHeader(file, has_json_lists, &s));
+  if (!has_json_lists) KPSA_RETURN_IF_ERROR(ReadLists(file, &s));
   constexpr std::uint64_t kAny = SafetensorsFile::kAnySize;
   KPSA_RETURN_IF_ERROR(Assign(file.Values<double>("cueMean", {kAny}), &s.cue_mean));
   const std::uint64_t rows = s.rows();
@@ -79,9 +88,8 @@ Result<Subspace> SubspaceContent(const SafetensorsFile& file, KeptModes modes) {
       return Status::Invalid("cue {} begins at row {} of {}", k, offset, rows);
     }
   }
-  KPSA_RETURN_IF_ERROR(
-      Assign(file.Values<float>("factor", {s.score.measured > 0 ? s.soft_cache.factor_size() : kAny}),
-             &s.soft_cache.factor));
+  KPSA_RETURN_IF_ERROR(ReadAligned(file, "factor", &s.soft_cache.factor, false,
+                                   s.score.measured > 0 ? s.soft_cache.factor_size() : kAny));
   KPSA_RETURN_IF_ERROR(Assign(file.Values<float>("leaveOneOut", {kAny}), &s.soft_cache.leave_one_out));
   if (file.tensors().contains(kLatent)) {
     KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(kLatent, {kAny}), &s.latent));
@@ -100,9 +108,10 @@ Result<Subspace> SubspaceContent(const SafetensorsFile& file, KeptModes modes) {
 namespace {
 
 Status CheckDigests(const SafetensorsFile& file, KeptModes modes, const Subspace& s) {
-  const Result<std::string> digest = file.Metadata("digest");
+  const Result<std::string> digest = file.Metadata(kDigest);
   if (!digest.ok()) return digest.status();
-  if (*digest != ContentDigest(s, file.metadata()))
+  const bool is_of_file = *SubspaceVersion(file) >= kListsVersion;
+  if (*digest != (is_of_file ? FileDigest(file) : ContentDigest(s, file.metadata())))
     return Status::Invalid(
         "the file is damaged: its contents are not those that were written; train it again");
   if (modes == KeptModes::kSkip || !file.tensors().contains(kModes)) return {};

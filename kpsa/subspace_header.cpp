@@ -6,16 +6,13 @@
 #include <utility>
 
 #include "files/json_depth.h"
-#include "kpsa/calibration_file.h"
+#include "kpsa/subspace_lists.h"
+#include "kpsa/training_record.h"
 
 namespace kpsa::engine {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr std::size_t kMaxCues = 1u << 16, kMaxOutputs = 1u << 12;
-constexpr std::uint64_t kMaxPoints = 1u << 28;
-constexpr int kDeepestEntry = 8;  // brackets
 
 // Reads typed members of a JSON object; the first failure is kept, and everything after it gives defaults.
 class Reader {
@@ -70,23 +67,6 @@ Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, b
 
 constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
 
-int VersionOf(const Subspace& s) {
-  const bool products =
-      std::any_of(s.tiles.begin(), s.tiles.end(), [](const TileMap& t) { return t.has_products(); });
-  const bool relative = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
-    return cue.plug.find(".worldMatrix/") != std::string::npos;
-  });
-  const bool multiplied = std::any_of(s.cues.begin(), s.cues.end(), [](const CueDescription& cue) {
-    return cue.kind == CueDescription::Kind::kProduct;
-  });
-  if (AnyNearClips(s)) return kSubspaceVersion;
-  if (std::ranges::any_of(s.ranges, [](const TrainedRange& r) { return r.patches != kAllPatches; }))
-    return kGuardedPatchesVersion;
-  if (s.patches.tiles > 0) return kPatchesVersion;
-  if (multiplied) return kProductCuesVersion;
-  return products || relative || s.score != ScoreMix() ? kProductTilesVersion : kOldestVersion;
-}
-
 // What the space was at rest, and what moves with it.
 Status ReadFrame(const Json& frame, Subspace* s) {
   const auto bad = [&](const char* key, const char* expected) {
@@ -109,41 +89,6 @@ Status ReadFrame(const Json& frame, Subspace* s) {
     s->inverse_rest_stretch(i / 3, i % 3) = entry.get<double>();
   }
   return {};
-}
-
-Json CuesJson(const Subspace& s) {
-  Json cues = Json::array();
-  for (const CueDescription& cue : s.cues) {
-    if (cue.kind == CueDescription::Kind::kScalar) {
-      cues.push_back({{"kind", "scalar"}, {"plug", cue.plug}});
-    } else if (cue.kind == CueDescription::Kind::kProduct) {
-      Json factors = Json::array();
-      for (const CueDescription::Factor& factor : cue.factors) {
-        factors.push_back({{"plug", factor.plug},
-                           {"centre", factor.curve.centre},
-                           {"scale", factor.curve.scale},
-                           {"hinge", factor.curve.hinge}});
-      }
-      cues.push_back({{"kind", "product"}, {"factors", factors}, {"lo", cue.lo}, {"hi", cue.hi}});
-    } else {
-      cues.push_back({{"kind", "point"}, {"stage", cue.stage}, {"mesh", cue.mesh}, {"point", cue.point}});
-    }
-    if (!cue.joint.empty()) cues.back()["joint"] = cue.joint;
-  }
-  return cues;
-}
-
-Json RangesJson(const Subspace& s) {
-  Json ranges = Json::array();
-  for (const TrainedRange& range : s.ranges) {
-    ranges.push_back({{"plug", range.plug}, {"lo", range.lo}, {"hi", range.hi}, {"ramp", range.ramp}});
-    if (range.patches == kAllPatches) continue;
-    Json& patches = ranges.back()[kRangePatches] = Json::array();
-    for (std::size_t p = 0; p < kMaxPatches; ++p) {
-      if ((range.patches >> p & 1) != 0) patches.push_back(p);
-    }
-  }
-  return ranges;
 }
 
 // *status: the first failure of a Reader; entries after it read as defaults.
@@ -195,6 +140,19 @@ Status ReadRanges(const Json& ranges, Status* status, Subspace* s) {
   return {};
 }
 
+// Before version 9: the lists are JSON, and the trained rig is a part of the training's text.
+Status ReadJsonLists(const SafetensorsFile& file, Status* status, Subspace* s) {
+  const Result<Json> cues = JsonMetadata(file, "cues", true, kMaxCues),
+                     ranges = JsonMetadata(file, "ranges", true, kMaxCues),
+                     training = JsonMetadata(file, "training", false, 1u << 16);
+  for (const Result<Json>* part : {&cues, &ranges, &training}) KPSA_RETURN_IF_ERROR(part->status());
+  KPSA_RETURN_IF_ERROR(ReadCues(*cues, status, s));
+  KPSA_RETURN_IF_ERROR(ReadRanges(*ranges, status, s));
+  s->training = *file.Metadata("training");
+  s->rig = TakeTrainedRig(&s->training);
+  return {};
+}
+
 }  // namespace
 
 std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
@@ -212,29 +170,23 @@ std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
                   {"quantile2", s.soft_cache.quantile2},
                   {"tolerance", s.tolerance},
                   {"violationRate", s.violation_rate},
-                  {"blendStart", s.blend_start}};
-  if (VersionOf(s) > kOldestVersion) summary["score"] = {s.score.measured, s.score.doubt};
+                  {"blendStart", s.blend_start},
+                  {"score", {s.score.measured, s.score.doubt}}};
   if (s.patches.tiles > 0) {
     summary["tilesOfPatch"] = s.patches.tiles;
     summary["patchShare"] = s.patches.share;
   }
-  return {{"kind", kSubspaceKind},      {"version", std::to_string(VersionOf(s))},
-          {"summary", summary.dump()},  {"outputs", outputs.dump()},
-          {"cues", CuesJson(s).dump()}, {"ranges", RangesJson(s).dump()},
-          {"rigHash", s.rig_hash},      {"units", s.units},
-          {"space", s.space},           {"frame", frame.dump()},
-          {"training", s.training}};
+  return {{"kind", kSubspaceKind},     {"version", std::to_string(kSubspaceVersion)},
+          {"summary", summary.dump()}, {"outputs", outputs.dump()},
+          {"rigHash", s.rig_hash},     {"units", s.units},
+          {"space", s.space},          {"frame", frame.dump()}};
 }
 
-Status ReadSubspaceHeader(const SafetensorsFile& file, Subspace* s) {
+Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace* s) {
   const Result<Json> summary = JsonMetadata(file, "summary", false, 64),
                      outputs = JsonMetadata(file, "outputs", true, kMaxOutputs),
-                     cues = JsonMetadata(file, "cues", true, kMaxCues),
-                     ranges = JsonMetadata(file, "ranges", true, kMaxCues),
-                     frame = JsonMetadata(file, "frame", false, 64),
-                     training = JsonMetadata(file, "training", false, 1u << 16);
-  for (const Result<Json>* part : {&summary, &outputs, &cues, &ranges, &frame, &training})
-    KPSA_RETURN_IF_ERROR(part->status());
+                     frame = JsonMetadata(file, "frame", false, 64);
+  for (const Result<Json>* part : {&summary, &outputs, &frame}) KPSA_RETURN_IF_ERROR(part->status());
   Status status;
   Reader reader("summary", *summary, &status);
   const std::string mode = reader.Text("mode");
@@ -262,14 +214,11 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, Subspace* s) {
     Reader output("an output", entry, &status);
     s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints), output.Text("stage")});
   }
-  KPSA_RETURN_IF_ERROR(ReadCues(*cues, &status, s));
-  KPSA_RETURN_IF_ERROR(ReadRanges(*ranges, &status, s));
+  if (with_lists) KPSA_RETURN_IF_ERROR(ReadJsonLists(file, &status, s));
   s->extent = Reader("frame", *frame, &status).Number("extent");
   KPSA_RETURN_IF_ERROR(ReadFrame(*frame, s));
-  for (const auto& [key, target] : {std::pair{"rigHash", &s->rig_hash},
-                                    {"units", &s->units},
-                                    {"space", &s->space},
-                                    {"training", &s->training}}) {
+  for (const auto& [key, target] :
+       {std::pair{"rigHash", &s->rig_hash}, {"units", &s->units}, {"space", &s->space}}) {
     const Result<std::string> text = file.Metadata(key);
     KPSA_RETURN_IF_ERROR(text.status());
     *target = *text;

@@ -1,4 +1,4 @@
-// The metadata of a .kpsa file: what it says in words and lists (docs/kpsa-file.md). For kpsa/subspace_file.
+// The metadata of a .kpsa file: what it says in words and JSON (docs/kpsa-file.md). For kpsa/subspace_file.
 #pragma once
 
 #include <map>
@@ -10,16 +10,13 @@
 namespace kpsa::engine {
 
 inline constexpr char kSubspaceKind[] = "kpsa-subspace";
+inline constexpr int kDeepestEntry = 8;  // brackets of JSON
 
-// Of all entries but the digests, in the order of their digest.
-inline constexpr const char* kHeaderKeys[] = {"cues",  "frame",   "kind",     "outputs", "ranges", "rigHash",
-                                              "space", "summary", "training", "units",   "version"};
-
-// All entries of kHeaderKeys. The version is the oldest that knows all of the subspace: one without any of what is
-// new is what it was before.
+// All entries but the digests.
 std::map<std::string, std::string> SubspaceHeader(const Subspace& s);
 
-// Errors: entries that are missing, of another kind, or beyond bounds.
-Status ReadSubspaceHeader(const SafetensorsFile& file, Subspace* s);
+// with_lists: of a file before version 9, which has cues, ranges and the trained rig here. Errors: entries that are
+// missing, of another kind, or beyond bounds.
+Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace* s);
 
 }  // namespace kpsa::engine

@@ -18,11 +18,14 @@ Status Assign(Result<std::vector<T>> values, std::vector<T>* target) {
   *target = std::move(*values);
   return {};
 }
+// A list of any size, or of one.
 template <typename T>
-Status Assign(const Result<std::vector<T>>& values, AlignedArray<T>* target) {
-  if (!values.ok()) return values.status();
-  *target = AlignedArray<T>(values->size());
-  if (!values->empty()) std::memcpy(target->data(), values->data(), values->size() * sizeof(T));
+Status ReadAligned(const SafetensorsFile& file, const std::string& key, AlignedArray<T>* target,
+                   bool half = false, std::uint64_t size = SafetensorsFile::kAnySize) {
+  const Result<std::span<const std::byte>> bytes = file.Bytes<T>(key, std::span(&size, 1), half);
+  if (!bytes.ok()) return bytes.status();
+  *target = AlignedArray<T>(bytes->size() / sizeof(T));
+  if (!bytes->empty()) std::memcpy(target->data(), bytes->data(), bytes->size());
   return {};
 }
 

@@ -48,16 +48,16 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "direct", {kAny}), &data.direct));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "counts", {kAny}), &data.counts));
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "columns", {kAny}), &data.columns));
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "scale", {kAny}), &data.scale));
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "v", {kAny}, true), &data.v));
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "u", {kAny}), &data.u));
-    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "mean", {kAny}), &data.mean));
+    KPSA_RETURN_IF_ERROR(ReadAligned(file, prefix + "scale", &data.scale));
+    KPSA_RETURN_IF_ERROR(ReadAligned(file, prefix + "v", &data.v, true));
+    KPSA_RETURN_IF_ERROR(ReadAligned(file, prefix + "u", &data.u));
+    KPSA_RETURN_IF_ERROR(ReadAligned(file, prefix + "mean", &data.mean));
     if (file.tensors().contains(prefix + "products")) {
       KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "products", {kAny}), &data.products));
       KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint8_t>(prefix + "pairs", {kAny}), &data.pairs));
-      KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(prefix + "whitening", {kAny}), &data.whitening));
-      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "w", {kAny}, true), &data.w));
-      KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint16_t>(prefix + "doubt", {kAny}, true), &data.doubt));
+      KPSA_RETURN_IF_ERROR(ReadAligned(file, prefix + "whitening", &data.whitening));
+      KPSA_RETURN_IF_ERROR(ReadAligned(file, prefix + "w", &data.w, true));
+      KPSA_RETURN_IF_ERROR(ReadAligned(file, prefix + "doubt", &data.doubt, true));
     }
     if (file.tensors().contains(prefix + "joints")) {
       KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "joints", {kAny}), &data.joints));

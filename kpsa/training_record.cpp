@@ -8,6 +8,17 @@ using nlohmann::json;
 
 namespace {
 
+constexpr char kControlsMember[] = "controls", kSignatureMember[] = "signature";
+
+std::vector<std::string> NamesIn(const json& object, const char* name) {
+  std::vector<std::string> list;
+  if (!object.contains(name) || !object[name].is_array()) return list;
+  for (const json& entry : object[name]) {
+    if (entry.is_string()) list.push_back(entry.get<std::string>());
+  }
+  return list;
+}
+
 json SignatureJson(const Signature& signature) {
   json nodes = json::object();
   for (const auto& [name, node] : signature)
@@ -77,9 +88,7 @@ std::string TrainingJson(const TrainingRecord& r) {
                    {"clip", r.worst.clip},
                    {"time", r.worst.time},
                    {"controls", r.worst.controls},
-                   {"error", r.worst.error}}},
-                 {"controls", r.controls},
-                 {"signature", SignatureJson(r.signature)}};
+                   {"error", r.worst.error}}}};
   if (!r.limited.empty()) object["limited"] = r.limited;
   for (const auto& [clip, times] : r.learnt) object["learnt"].push_back({{"clip", clip}, {"times", times}});
   for (const Miss& pose : r.learnt_poses)
@@ -106,16 +115,7 @@ TrainingRecord ParseTraining(const std::string& text) {
     return from.contains(name) && from[name].is_boolean() && from[name].get<bool>();
   };
   const auto words = [&](const char* name) { return words_in(object, name); };
-  const auto names = [&](const char* name) {
-    std::vector<std::string> list;
-    if (!object.contains(name) || !object[name].is_array()) return list;
-    for (const json& entry : object[name]) {
-      if (entry.is_string()) list.push_back(entry.get<std::string>());
-    }
-    return list;
-  };
-  r.clips = names("clips");
-  r.controls = names("controls");
+  r.clips = NamesIn(object, "clips");
   r.clip_poses = count("clip_poses");
   r.sampled_poses = count("sampled_poses");
   r.calibration_poses = count("calibration_poses");
@@ -185,8 +185,27 @@ TrainingRecord ParseTraining(const std::string& text) {
     r.rules.push_back(
         {words_in(one, "rule"), number(one, "misses"), number(one, "cost"), is_true_in(one, "taken")});
   });
-  if (object.contains("signature")) r.signature = ParseSignature(object["signature"]);
   return r;
+}
+
+TrainedRig TakeTrainedRig(std::string* text) {
+  TrainedRig rig;
+  json object = json::parse(*text, nullptr, false);
+  if (!object.is_object()) return rig;
+  rig.controls = NamesIn(object, kControlsMember);
+  if (object.contains(kSignatureMember)) rig.signature = ParseSignature(object[kSignatureMember]);
+  object.erase(kControlsMember);
+  object.erase(kSignatureMember);
+  *text = object.dump();
+  return rig;
+}
+
+std::string TrainingText(const Subspace& s) {
+  json object = json::parse(s.training, nullptr, false);
+  if (!object.is_object()) return s.training;
+  object[kControlsMember] = s.rig.controls;
+  object[kSignatureMember] = SignatureJson(s.rig.signature);
+  return object.dump();
 }
 
 }  // namespace kpsa::engine

@@ -1,5 +1,5 @@
 // What a subspace remembers of its training, as the JSON text in Subspace::training: counts, seeds, held-out
-// errors and the rig's signature. Nothing of it depends on the machine or the time: the same training gives
+// errors. Nothing of it depends on the machine or the time: the same training gives
 // the same bytes.
 #pragma once
 
@@ -67,13 +67,16 @@ struct TrainingRecord {
     std::vector<std::pair<std::string, double>> controls;  // that are not at rest; metres, radians
     double error = 0;
   } worst;
-  std::vector<std::string>
-      controls;  // plugs, as Graph::PlugName: what may be posed within the trained ranges
-  Signature signature;
 };
 
 std::string TrainingJson(const TrainingRecord& record);
 // Missing parts come out empty; a text that is no JSON object gives an empty record.
 TrainingRecord ParseTraining(const std::string& json);
+
+// In files before version 9 the text has what the trained rig is, too: members "signature" and "controls", which are
+// taken out of it. Missing parts come out empty.
+TrainedRig TakeTrainedRig(std::string* json);
+// The text with both of them, for people.
+std::string TrainingText(const Subspace& subspace);
 
 }  // namespace kpsa::engine

@@ -207,7 +207,7 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
                  {"calibration poses", Count(subspace->calibration.size())},
                  {"rig", subspace->rig_hash},
                  {"memory bytes", memory},
-                 {"training", subspace->training}};
+                 {"training", TrainingText(*subspace)}};
   const TrainingRecord record = ParseTraining(subspace->training);
   facts.facts.insert(
       facts.facts.end(),

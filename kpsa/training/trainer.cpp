@@ -39,13 +39,15 @@ Status FindRanges(TrainingSetup* setup, const TrainingPoses& poses, RangeFinder*
 }
 
 // Which rig it was trained on.
-void Sign(const TrainingSetup& setup, TrainingRecord* record) {
+void Sign(const TrainingSetup& setup, Subspace* subspace) {
   const TrainingRig& rig = setup.rig;
-  record->signature = RigSignature(*rig.graph, rig.target.outputs(), rig.target.space, rig.target.controls);
-  for (const PlugRef& control : rig.target.controls) record->controls.push_back(rig.graph->PlugName(control));
+  subspace->rig.signature =
+      RigSignature(*rig.graph, rig.target.outputs(), rig.target.space, rig.target.controls);
+  subspace->rig_hash = SignatureDigest(subspace->rig.signature);
+  std::vector<std::string>& controls = subspace->rig.controls;
+  for (const PlugRef& control : rig.target.controls) controls.push_back(rig.graph->PlugName(control));
   for (std::size_t c = setup.drawn.size(); c < rig.controls.size(); ++c)
-    record->controls.push_back(rig.graph->PlugName(rig.controls[c].plug));
-  record->limited = setup.limit.left_out();
+    controls.push_back(rig.graph->PlugName(rig.controls[c].plug));
 }
 
 Result<Subspace> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
@@ -94,8 +96,8 @@ Result<Subspace> TrainOnce(const TrainingRig& rig, const std::vector<TrainingCli
     KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&*subspace));
 
   KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
-  Sign(setup, &record);
-  subspace->rig_hash = SignatureDigest(record.signature);
+  Sign(setup, &*subspace);
+  record.limited = setup.limit.left_out();
   subspace->training = TrainingJson(record);
   KPSA_RETURN_IF_ERROR(ValidateSubspace(*subspace));
   return subspace;

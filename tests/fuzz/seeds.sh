@@ -24,7 +24,7 @@ accelerate:
   strip: {points: [strip@mush], tolerance: 1mm, train: {samples: 60}}
 RIG
 train() { "$build/kpsa" train "$folder/strip.yaml" --force -q --calibration 20 -o "$corpus/subspace/$1.kpsa" $2 > /dev/null; }
-mkdir -p $corpus/subspace
+mkdir -p $corpus/subspace  # version*.kpsa there are of earlier versions, which nobody writes any more
 train map "--modes 4 --rows 9"
 train modes "--modes 3 --rows 9 --keep-modes"
 train paper "--paper --key-points 4 --modes 4"

@@ -9,8 +9,8 @@
 #include <limits>
 #include <random>
 
-#include "kpsa/training/frame_cost.h"
 #include "kpsa/tiles.h"
+#include "kpsa/training/frame_cost.h"
 
 namespace kpsa::engine {
 namespace {
@@ -89,6 +89,67 @@ TEST(Patches, GoOverIntoTheRestWithinThreeDistances) {
       }
     }
   }
+}
+
+// Each point with each other one: what MakePatches finds without looking at all of them.
+double NaiveTypicalDistance(std::span<const Double3> tile) {
+  std::vector<double> nearest;
+  for (const Double3& p : tile) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Double3& q : tile) {
+      const Double3 d = p - q;
+      if (Dot(d, d) > 0) least = std::min(least, Dot(d, d));
+    }
+    if (std::isfinite(Dot(p, p)) && std::isfinite(least)) nearest.push_back(std::sqrt(least));
+  }
+  std::ranges::sort(nearest);
+  return nearest.empty() ? 0 : nearest[nearest.size() / 2];
+}
+
+TEST(Patches, AreThoseOfANaiveTwin) {
+  std::mt19937 random(5);
+  const auto draw = [&] { return static_cast<double>(random()) / 4294967296.0; };
+  std::size_t borders = 0;
+  for (int round = 0; round < 60; ++round) {
+    SCOPED_TRACE(round);
+    std::vector<Double3> points(1 + random() % 900);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double s = static_cast<double>(i) / 40;  // a strip that is wound up, and rough
+      points[i] = {std::cos(s) * (1 + 0.02 * s) + 0.01 * draw(), std::sin(s) + 0.01 * draw(), 0.1 * draw()};
+      if (round % 3 == 1 && random() % 20 == 0) points[i].y = std::nan("");
+      if (round % 3 == 1 && random() % 30 == 0) points[i].x = -std::numeric_limits<double>::infinity();
+      if (round % 4 == 2 && i > 0 && random() % 3 == 0) points[i] = points[i - 1];
+      if (round == 50) points[i] = {1, 2, 3};
+      if (round == 51) points[i].z = std::nan("");
+    }
+    const std::size_t tiles = 1 + random() % 3, size = tiles * kTilePoints;
+    const std::span<const Double3> of(points);
+    const std::vector<PatchPoints> patches = MakePatches(std::vector<std::vector<Double3>>{points}, tiles);
+    ASSERT_EQ(patches.size(), (points.size() + size - 1) / size);
+    for (std::size_t p = 0; p < patches.size(); ++p) {
+      const std::size_t first = p * size, end = std::min(first + size, points.size());
+      double border = 0;
+      for (std::size_t t = first; t < end; t += kTilePoints)
+        border = std::max(border, 3 * NaiveTypicalDistance(of.subspan(t, std::min(kTilePoints, end - t))));
+      PatchPoints expected;
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        double least = border * border;
+        for (std::size_t k = first; k < end; ++k) {
+          const Double3 d = points[k] - points[i];
+          if (Dot(d, d) < least) least = Dot(d, d);
+        }
+        const bool is_own = i >= first && i < end;
+        const double weight = is_own ? 1 : border > 0 ? 1 - Smoothstep(std::sqrt(least) / border) : 0;
+        if (!(weight > 0)) continue;
+        borders += is_own ? 0 : 1;
+        expected.points.push_back(static_cast<Index>(i));
+        expected.weights.push_back(static_cast<float>(weight));
+      }
+      EXPECT_EQ(patches[p].points, expected.points);
+      EXPECT_EQ(patches[p].weights, expected.weights);
+    }
+  }
+  EXPECT_GT(borders, 1000u);
 }
 
 TEST(Patches, ChosenRegionsCostLeast) {
