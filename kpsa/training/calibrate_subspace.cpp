@@ -20,6 +20,8 @@ constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say
 constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips may go farther
 constexpr double kJudging = 1.5;  // that a pose is judged, in the time that it took to train on
 constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
+constexpr double kMoreMisses =
+    0.05;  // than expected, or than with wider ranges: others are tried, or not taken
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kCalibrationSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
                         kTrialSeed = 0x6a09e667f3bcc908ull;
@@ -124,6 +126,48 @@ Result<Guarded> Guard(const Calibrator& of, const CalibrationWork& work, const R
   return result;
 }
 
+// A guarded subspace with the poses that say what its threshold is.
+struct Calibrated {
+  Subspace subspace;
+  JudgedSet judged;
+  TrainingRecord::Separation separation;
+  Calibration calibration;
+  double missed = 0;  // of the poses within the ranges, all kinds alike, as ExpectedCost counts them
+};
+Calibrated CalibrateWith(const Calibrator& of, const Guarded& guarded, const std::vector<char>& entries,
+                         std::size_t patches, JudgedSet judged) {
+  Calibrated result{guarded.subspace, std::move(judged), {}, {}, 0};
+  Subspace& subspace = result.subspace;
+  std::vector<ScoreJudge>& judges = result.judged.judges;
+  AskGuards(subspace.ranges, entries, result.judged.entries, patches, &judges);
+  result.separation = SeparationOf(judges, subspace.tolerance);
+  if (guarded.chosen.tried.empty()) subspace.score = ScoreOf(subspace, {}, of.full_cost);
+  AsChosen(guarded.chosen, subspace, &judges);
+  if (!guarded.chosen.trust.empty()) WeighTiles(guarded.chosen.trust, &subspace);
+  if (subspace.patches.tiles == 0) {
+    for (TrainedRange& range : subspace.ranges) range.patches = kAllPatches;
+  }
+  subspace.calibration = PairsOf(subspace, judges);
+  double missed[kPoseKinds] = {}, poses[kPoseKinds] = {};
+  for (std::size_t i = 0; i < judges.size(); ++i) {
+    const SampledPose& pose = result.judged.poses[i];
+    subspace.calibration[i].near_clips = pose.near_clips && pose.kind == PoseKind::kSampled;
+  }
+  result.calibration =
+      Calibrate(subspace.calibration, subspace.tolerance, subspace.violation_rate, subspace.blend_start);
+  for (const ScoreJudge& judge : judges) {
+    missed[judge.kind] += ShareOfFull(judge, subspace.score, result.calibration.threshold, subspace.patches);
+    poses[judge.kind] += 1;
+  }
+  int kinds = 0;
+  for (int kind = 0; kind < kPoseKinds; ++kind) {
+    if (kind == kBeyond || poses[kind] == 0) continue;
+    result.missed += missed[kind] / poses[kind], ++kinds;
+  }
+  result.missed /= std::max(kinds, 1);
+  return result;
+}
+
 std::string RuleName(const MissRule& rule, const RangeMargins& margins) {
   std::string name = rule.score.doubt == 0      ? "likeness to the trained poses"
                      : rule.score.measured == 0 ? "doubts of tiles"
@@ -216,58 +260,56 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   }
   KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.98));
   const std::vector<char> guarded = GuardedEntries(of, carried->rigid);
-  Guarded taken;
-  const RangeMargins* of_taken = nullptr;
+  std::vector<Guarded> tried;  // by margins
+  std::size_t taken = 0;
   double least = std::numeric_limits<double>::infinity();
-  std::vector<TrainingRecord::Rule>& rules = work.record->rules;
-  rules.clear();
-  const auto tell = [&](const Guarded& of_some, const RangeMargins& some, bool as_taken) {
-    const auto told = TriedRules(of_some.chosen, some, of_some.outside, of.full_cost, as_taken);
-    rules.insert(rules.end(), told.begin(), told.end());
-  };
   for (const RangeMargins& some : margins) {
-    if (some.told_by_doubts && taken.subspace.score.doubt == 0) continue;
-    Result<Guarded> tried = Guard(of, work, some, guarded, *subspace, &score_judge, scoring, outside);
-    if (!tried.ok()) return tried.status();
-    const double ns = tried->chosen.cost.ns + tried->outside;
-    if (of_taken != nullptr && ns > kAsGood * least) {
-      tell(*tried, some, false);
-      continue;
-    }
-    if (of_taken != nullptr) tell(taken, *of_taken, false);
-    taken = std::move(*tried), of_taken = &some;
+    if (some.told_by_doubts && tried[taken].subspace.score.doubt == 0) continue;
+    Result<Guarded> one = Guard(of, work, some, guarded, *subspace, &score_judge, scoring, outside);
+    if (!one.ok()) return one.status();
+    const double ns = one->chosen.cost.ns + one->outside;
+    tried.push_back(std::move(*one));
+    if (tried.size() > 1 && ns > kAsGood * least) continue;
+    taken = tried.size() - 1;
     least = std::min(least, ns);
   }
-  tell(taken, *of_taken, true);
-  *subspace = std::move(taken.subspace);
-  if (!of.rig.target.colors)
-    KPSA_RETURN_IF_ERROR(
-        JudgePoses(of, work, kBeyond, kCalibrationSeed, of_taken->of_controls, &judge, &calibrating));
-  work.record->calibration_poses = calibrating.poses.size();
-  work.record->held_out_rms = judge.rms();
-  work.record->held_out_max = judge.max();
-AskGuards(subspace->ranges, guarded, calibrating.entries, patches, &calibrating.judges);
-  work.record->separation = SeparationOf(calibrating.judges, subspace->tolerance);
-  FrameCost cost = taken.chosen.cost;
-  if (scoring.judges.empty()) {
-    subspace->score = ScoreOf(*subspace, {}, of.full_cost);
-    cost = ExpectedCost(*subspace, calibrating.judges, 0, of.full_cost, kCautious * of.options.tolerance,
+  // Where the poses that calibrate, others than those that chose, are wrong a little too often beyond the ranges, a
+  // threshold that leaves a few of them out takes many right ones with them: narrower ranges cost less
+  Calibrated best;
+  std::size_t of_best = taken;
+  for (std::size_t narrower = 0; narrower <= taken; ++narrower) {
+    const std::size_t i = taken - narrower;
+    JudgedSet own = calibrating;
+    if (!of.rig.target.colors)
+      KPSA_RETURN_IF_ERROR(
+          JudgePoses(of, work, kBeyond, kCalibrationSeed + narrower, margins[i].of_controls, &judge, &own));
+    if (narrower == 0) {
+      work.record->held_out_rms = judge.rms();
+      work.record->held_out_max = judge.max();
+    }
+    Calibrated one = CalibrateWith(of, tried[i], guarded, patches, std::move(own));
+    if (narrower == 0 || one.missed + kMoreMisses <= best.missed) best = std::move(one), of_best = i;
+    if (best.missed <= tried[of_best].chosen.cost.misses + kMoreMisses) break;
+  }
+  std::vector<TrainingRecord::Rule>& rules = work.record->rules;
+  rules.clear();
+  for (const bool as_taken : {false, true}) {
+    for (std::size_t i = 0; i < tried.size(); ++i) {
+      if ((i == of_best) != as_taken) continue;
+      const auto told = TriedRules(tried[i].chosen, margins[i], tried[i].outside, of.full_cost, as_taken);
+      rules.insert(rules.end(), told.begin(), told.end());
+    }
+  }
+  *subspace = std::move(best.subspace);
+  work.record->calibration_poses = best.judged.poses.size();
+  work.record->separation = best.separation;
+  FrameCost cost = tried[of_best].chosen.cost;
+  if (scoring.judges.empty())
+    cost = ExpectedCost(*subspace, best.judged.judges, 0, of.full_cost, kCautious * of.options.tolerance,
                         kCalibrationConfidence);
-  }
-  AsChosen(taken.chosen, *subspace, &calibrating.judges);
-  if (!taken.chosen.trust.empty()) WeighTiles(taken.chosen.trust, subspace);
-  if (subspace->patches.tiles == 0) {
-    for (TrainedRange& range : subspace->ranges) range.patches = kAllPatches;
-  }
-  subspace->calibration = PairsOf(*subspace, calibrating.judges);
-  for (std::size_t i = 0; i < calibrating.poses.size(); ++i) {
-    const SampledPose& pose = calibrating.poses[i];
-    subspace->calibration[i].near_clips = pose.near_clips && pose.kind == PoseKind::kSampled;
-  }
-  const Calibration calibration =
-      Calibrate(subspace->calibration, subspace->tolerance, subspace->violation_rate, subspace->blend_start);
+  const Calibration& calibration = best.calibration;
   if (calibration.worst != Calibration::kNoPose)
-    RecordWorst(of, calibrating.poses[calibration.worst], calibration.worst_error, work.record);
+    RecordWorst(of, best.judged.poses[calibration.worst], calibration.worst_error, work.record);
   return cost;
 }
 
