@@ -2,8 +2,9 @@
 # Builds everything and runs all tests, and again under the address and undefined-behaviour sanitizers.
 set -e
 cd "$(dirname "$0")/.."
-sh cmake/dependencies.sh clang libclang-rt-14-dev
-sh cmake/dependencies.sh blender chromium zsh fish &  # for tests of the Python module, of the page and of completions; it takes as long as a good part of the build
+sh cmake/dependencies.sh
+# For the sanitized build, and for tests of the Python module, of the page and of completions; it takes as long as a good part of the build
+sh cmake/dependencies.sh clang libclang-rt-14-dev blender chromium zsh fish &
 others=$!
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DKPSA_UNITY=ON -DKPSA_TESTS_BY_ROOM=ON > /dev/null
 cmake --build build
