@@ -105,7 +105,8 @@ Status ParseTensor(const std::string& name, const std::string& key, const Json& 
   *begin = offsets[0].get<std::uint64_t>();
   *end = offsets[1].get<std::uint64_t>();
   if (*begin > *end || *end > data_size) {
-    return Status::Invalid("tensor \"{}\" lies at bytes {} to {} of {}", key, *begin, *end, data_size)
+    return Status::Invalid("tensor \"{}\" lies at bytes {} to {} of {}{}", key, *begin, *end, data_size,
+                           *end > data_size ? ": the file is cut short" : "")
         .At({name});
   }
   if (*end - *begin != size) {

@@ -1,14 +1,23 @@
 #!/bin/sh
-# Builds the program and its tests under sanitizers and runs all tests there: the address and undefined-behaviour
-# sanitizers, or with `sh tests/sanitize.sh tsan` the thread sanitizer. Tests that measure what sanitizers change
-# (KPSA_NATIVE in CMakeLists.txt) are left out, and long trainings, but for `sh tests/sanitize.sh asan all` (ten minutes
-# more). Clang, since it compiles sanitized code four times faster than GCC,
-# and since a second compiler sees what the first does not. kpsa is a folder of another project's there (examples/embed),
-# so that what add_subdirectory makes of it is built and run, too.
+# Builds the program and its tests under sanitizers and runs the tests there:
+#   sh tests/sanitize.sh [asan|tsan [all]]
+# asan, the address and undefined-behaviour sanitizers, if nothing is given; tsan: the thread sanitizer. Tests that measure what
+# sanitizers change (KPSA_NATIVE in CMakeLists.txt) are left out, and long trainings, but with `all`. Clang, since it
+# compiles sanitized code four times faster than GCC, and since a second compiler sees what the first does not. kpsa is a
+# folder of another project's there (examples/embed), so that what add_subdirectory makes of it is built and run, too.
 set -e
 cd "$(dirname "$0")/.."
+which=${1:-asan} all=OFF
+[ "${2:-}" = all ] && all=ON
+case "$which ${2:-}" in
+  "asan " | "tsan " | "asan all" | "tsan all") ;;
+  *)
+    echo "tests/sanitize.sh: expected [asan|tsan [all]], found \"$*\"" >&2
+    exit 2
+    ;;
+esac
 sh cmake/dependencies.sh clang libclang-rt-14-dev
-if [ "${1:-asan}" = tsan ]; then
+if [ "$which" = tsan ]; then
   folder=build-tsan sanitizer=KPSA_TSAN
   export TSAN_OPTIONS="halt_on_error=1 suppressions=$PWD/tests/tsan.supp"
 else
@@ -16,7 +25,7 @@ else
 fi
 sh tests/package/whole.sh . $folder/project
 cmake -S $folder/project -B $folder -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g0" \
-  -D$sanitizer=ON -DKPSA_COMPILE_ONCE=ON -DKPSA_PROGRAM=ON -DKPSA_SANITIZE_ALL="$([ "${2:-}" = all ] && echo ON || echo OFF)" > /dev/null
+  -D$sanitizer=ON -DKPSA_COMPILE_ONCE=ON -DKPSA_PROGRAM=ON -DKPSA_SANITIZE_ALL=$all > /dev/null
 cmake --build $folder
 ctest --test-dir $folder/kpsa --output-on-failure -j "$(nproc)"
 sh tests/package/embed.sh . $folder $folder/embedded

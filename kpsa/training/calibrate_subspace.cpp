@@ -20,8 +20,6 @@ constexpr std::size_t kTrialSweeps = 120, kTrialSamples = 30;  // poses that say
 constexpr double kAsGood = 1.02;  // in cost: wider margins are taken, since clips may go farther
 constexpr double kJudging = 1.5;  // that a pose is judged, in the time that it took to train on
 constexpr double kSpared = 1.5;   // of the fewest poses that could promise a rate
-constexpr double kMoreMisses =
-    0.05;  // than expected, or than with wider ranges: others are tried, or not taken
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kCalibrationSeed = 0x5deece66dull, kScoreSeed = 0x3c6ef372fe94f82bull,
                         kTrialSeed = 0x6a09e667f3bcc908ull;
@@ -273,24 +271,25 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     taken = tried.size() - 1;
     least = std::min(least, ns);
   }
-  // Where the poses that calibrate, others than those that chose, are wrong a little too often beyond the ranges, a
-  // threshold that leaves a few of them out takes many right ones with them: narrower ranges cost less
-  Calibrated best;
-  std::size_t of_best = taken;
-  for (std::size_t narrower = 0; narrower <= taken; ++narrower) {
-    const std::size_t i = taken - narrower;
+  std::vector<double> expected;
+  for (const Guarded& one : tried) expected.push_back(one.chosen.cost.misses);
+  std::vector<Calibrated> calibrated(tried.size());
+  const auto calibrate = [&](std::size_t i) -> Result<double> {
     JudgedSet own = calibrating;
     if (!of.rig.target.colors)
-      KPSA_RETURN_IF_ERROR(
-          JudgePoses(of, work, kBeyond, kCalibrationSeed + narrower, margins[i].of_controls, &judge, &own));
-    if (narrower == 0) {
+      KPSA_RETURN_IF_ERROR(JudgePoses(of, work, kBeyond, kCalibrationSeed + (taken - i),
+                                      margins[i].of_controls, &judge, &own));
+    if (i == taken) {
       work.record->held_out_rms = judge.rms();
       work.record->held_out_max = judge.max();
     }
-    Calibrated one = CalibrateWith(of, tried[i], guarded, patches, std::move(own));
-    if (narrower == 0 || one.missed + kMoreMisses <= best.missed) best = std::move(one), of_best = i;
-    if (best.missed <= tried[of_best].chosen.cost.misses + kMoreMisses) break;
-  }
+    calibrated[i] = CalibrateWith(of, tried[i], guarded, patches, std::move(own));
+    return calibrated[i].missed;
+  };
+  const Result<std::size_t> narrowed = NarrowByCalibration(taken, expected, calibrate);
+  if (!narrowed.ok()) return narrowed.status();
+  const std::size_t of_best = *narrowed;
+  Calibrated& best = calibrated[of_best];
   std::vector<TrainingRecord::Rule>& rules = work.record->rules;
   rules.clear();
   for (const bool as_taken : {false, true}) {

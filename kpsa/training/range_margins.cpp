@@ -19,6 +19,7 @@ constexpr std::size_t kMostPoses = 1600;           // of all joints: where there
 constexpr std::size_t kLeastPoses = 4;             // and with fewer than these none does
 constexpr std::size_t kTriedAtOnce = 256;          // are held
 constexpr double kGrowth = 1.1;                    // of the errors at the ends
+constexpr double kClearly = 0.05;                  // of the poses: more, or fewer, that miss
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kSeed = 0x510e527fade682d1ull;
 
@@ -172,6 +173,18 @@ class MarginFinder {
 Result<FoundMargins> FindMargins(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
                                  const Subspace& subspace) {
   return MarginFinder(of, work, cues, subspace).Run();
+}
+
+Result<std::size_t> NarrowByCalibration(std::size_t chosen, std::span<const double> expected,
+                                        const std::function<Result<double>(std::size_t)>& missed) {
+  std::size_t best = chosen;
+  double least = 0;
+  for (std::size_t set = chosen;; --set) {
+    const Result<double> share = missed(set);
+    if (!share.ok()) return share.status();
+    if (set == chosen || *share + kClearly <= least) best = set, least = *share;
+    if (least <= expected[best] + kClearly || set == 0) return best;
+  }
 }
 
 }  // namespace kpsa::engine

@@ -3,6 +3,9 @@
 // leaves a range is nearly always right. Internal to training.
 #pragma once
 
+#include <functional>
+#include <span>
+
 #include "kpsa/training/calibrate_subspace.h"
 
 namespace kpsa::engine {
@@ -24,5 +27,13 @@ struct FoundMargins {
 // those at the ends: the others miss by themselves, if the threshold stays.
 Result<FoundMargins> FindMargins(const Calibrator& of, const CalibrationWork& work, const CueSet& cues,
                                  const Subspace& subspace);
+
+// Which of such sets it is in the end: `chosen`, or a narrower one. Sets are chosen on other poses than those that
+// calibrate; where these are wrong a little too often beyond the ranges, a threshold that leaves a few of them out takes
+// many right ones with them. expected: shares of poses within the ranges that miss, by set. missed: calibrates with a set,
+// and says what misses then; asked of `chosen` first, then of the next narrower one as long as clearly more miss than
+// expected. A narrower one is taken where clearly fewer miss. Errors: those of `missed`.
+Result<std::size_t> NarrowByCalibration(std::size_t chosen, std::span<const double> expected,
+                                        const std::function<Result<double>(std::size_t)>& missed);
 
 }  // namespace kpsa::engine

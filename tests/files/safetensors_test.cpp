@@ -114,7 +114,7 @@ TEST(Safetensors, EveryKindOfDamageHasOneMessage) {
       {"offsets reversed", one(R"({"dtype":"U8","shape":[1],"data_offsets":[1,0]})", 1),
        "lies at bytes 1 to 0"},
       {"beyond the end", one(R"({"dtype":"U8","shape":[5],"data_offsets":[0,5]})", 1),
-       "lies at bytes 0 to 5 of 1"},
+       "lies at bytes 0 to 5 of 1: the file is cut short"},
       {"size differs from shape", one(R"({"dtype":"F32","shape":[1],"data_offsets":[0,3]})", 3),
        "needs 4 bytes, it has 3"},
       {"bytes left over", one(R"({"dtype":"U8","shape":[1],"data_offsets":[0,1]})", 2), "account for 1"},
