@@ -19,7 +19,7 @@ constexpr std::size_t kMostPoses = 1600;           // of all joints: where there
 constexpr std::size_t kLeastPoses = 4;             // and with fewer than these none does
 constexpr std::size_t kTriedAtOnce = 256;          // are held
 constexpr double kGrowth = 1.1;                    // of the errors at the ends
-constexpr double kClearly = 0.05;                  // of the poses: more, or fewer, that miss
+constexpr double kClearMisses = 0.05;              // of the poses: more, or fewer, that miss
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kSeed = 0x510e527fade682d1ull;
 
@@ -182,8 +182,8 @@ Result<std::size_t> NarrowByCalibration(std::size_t chosen, std::span<const doub
   for (std::size_t set = chosen;; --set) {
     const Result<double> share = missed(set);
     if (!share.ok()) return share.status();
-    if (set == chosen || *share + kClearly <= least) best = set, least = *share;
-    if (least <= expected[best] + kClearly || set == 0) return best;
+    if (set == chosen || *share + kClearMisses <= least) best = set, least = *share;
+    if (least <= expected[best] + kClearMisses || set == 0) return best;
   }
 }
 
