@@ -6,6 +6,7 @@
 #include "graph/builtin_steps.h"
 #include "graph/plan_builder.h"
 #include "graph/static_eval.h"
+#include "graph/structural_view.h"
 
 namespace kpsa::engine {
 namespace {
@@ -217,6 +218,10 @@ Result<Value> Compiler::Rest(const Graph& graph, const PlugRef& plug) {
   return OrItsFailure([&] { return RestOrThrow(graph, plug); });
 }
 
+Result<Compiler::SplitPoints> Compiler::Split(const Graph& graph, const PlugRef& points) {
+  return OrItsFailure([&] { return SplitOrThrow(graph, points); });
+}
+
 Result<std::shared_ptr<const Plan>> Compiler::CompileOrThrow(const Graph& graph, const Request& request) {
   impl_->stats = CompileStats();
   InstanceTable table(graph, request);
@@ -290,6 +295,44 @@ Result<std::vector<Compiler::Stepped>> Compiler::StepsOrThrow(const Graph& graph
   std::vector<Stepped> list;
   for (const auto& [index, stepped] : nodes) list.push_back(stepped);
   return list;
+}
+
+Result<Compiler::SplitPoints> Compiler::SplitOrThrow(const Graph& graph, const PlugRef& points) {
+  KPSA_RETURN_IF_ERROR(graph.CheckPlug(points));
+  const NodeDef& def = graph.def(points.node);
+  if (!def.last_step) return SplitPoints();
+  Request request;
+  InstanceTable table(graph, request);
+  const Source source = table.Reach(points);
+  if (!table.status().ok()) return table.status();
+  const std::vector<Index> order = table.Order();
+  if (source.kind != Source::Kind::kInstance) return SplitPoints();
+  const Instance& instance = table.instances()[source.instance];
+  if (instance.kind != Instance::Kind::kNode || instance.node != points.node) return SplitPoints();
+  const ComputeGroup& group = table.group(instance);
+  SplitPoints split;
+  for (const Input& input : instance.inputs) {
+    const int attribute = group.inputs[static_cast<std::size_t>(input.position)];
+    const AttributeDef& a = def.attributes[static_cast<std::size_t>(attribute)];
+    const PlugRef plug{points.node, attribute, input.element, -1};
+    if (a.type == Type::kMatrix) continue;
+    const Connection* driven = graph.FindConnection(plug);
+    if (IsPointType(a.type) && split.in.attribute < 0 && driven != nullptr) {
+      split.in = driven->source;
+      continue;
+    }
+    if (input.source.kind != Source::Kind::kValue) return SplitPoints();
+  }
+  if (split.in.attribute < 0) return SplitPoints();
+  StaticEvaluator statics(table);
+  const RestDigests digests(table, order);
+  impl_->Share(table, statics, digests);
+  const StructuralView view(table, instance.node, instance.geometry, &instance, &statics);
+  Result<std::shared_ptr<const LastStep>> step = def.last_step(view);
+  impl_->rest.merge(impl_->RestOf(table, statics, digests));
+  if (!step.ok()) return step.status();
+  split.step = std::move(*step);
+  return split;
 }
 
 Result<Value> Compiler::RestOrThrow(const Graph& graph, const PlugRef& plug) {

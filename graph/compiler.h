@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "graph/graph.h"
+#include "graph/last_step.h"
 #include "graph/plan.h"
 
 namespace kpsa::engine {
@@ -31,6 +32,13 @@ class Compiler {
   // The value of a plug with everything at its default and no clip (DESIGN of rest states: node_def.h,
   // Structural::rest).
   Result<Value> Rest(const Graph& graph, const PlugRef& plug);
+  // The last step of the node that gives these points (NodeDef::last_step), and the points that come into it. Null where
+  // it has none, or where an input besides points and matrices is driven: it might vary.
+  struct SplitPoints {
+    std::shared_ptr<const LastStep> step;
+    PlugRef in;
+  };
+  Result<SplitPoints> Split(const Graph& graph, const PlugRef& points);
   const CompileStats& stats() const;
 
   // A node that a plan of the request has a step of.
@@ -45,6 +53,7 @@ class Compiler {
  private:
   Result<std::shared_ptr<const Plan>> CompileOrThrow(const Graph& graph, const Request& request);
   Result<std::vector<Stepped>> StepsOrThrow(const Graph& graph, const Request& request);
+  Result<SplitPoints> SplitOrThrow(const Graph& graph, const PlugRef& points);
   Result<Value> RestOrThrow(const Graph& graph, const PlugRef& plug);
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -71,6 +71,10 @@ class NodeBuilder {
     def_->prototype = true;
     return *this;
   }
+  NodeBuilder& last_step(LastStepFn fn) {
+    def_->last_step = std::move(fn);
+    return *this;
+  }
   NodeBuilder& passes_points() {
     def_->passes_points = true;
     return *this;

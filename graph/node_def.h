@@ -18,6 +18,7 @@
 
 namespace kpsa::engine {
 
+class LastStep;
 class Structural;
 
 inline constexpr int kMaxArrayElements = 1 << 20;  // of an array attribute
@@ -118,6 +119,8 @@ using TouchFn = std::function<bool(const Structural&, const PointSet&)>;
 using BindFn = std::function<Result<BoundKernel>(const Binding&)>;
 // From the kernels of the steps of a batch, which outlive it.
 using BindBatchFn = std::function<std::shared_ptr<const void>(std::span<const void* const> kernels)>;
+// Null: it has none with these values.
+using LastStepFn = std::function<Result<std::shared_ptr<const LastStep>>(const Structural&)>;
 using PointCountFn = std::function<Result<Index>(const Structural&, std::string_view output, int element)>;
 
 // Outputs that are computed together, and from what.
@@ -153,6 +156,7 @@ struct NodeDef {
   bool stateful = false;             // needs its previous frame
   bool prototype = false;      // a function of the host program computes it: slow, on one thread at a time
   bool passes_points = false;  // its points are those that come in, where it succeeds
+  LastStepFn last_step;        // of its points (graph/last_step.h); null: it has none
   std::vector<AttributeDef> attributes;
   std::vector<ComputeGroup> groups;
   std::vector<std::string> problems;  // of the declaration, noted while it was built
