@@ -38,6 +38,11 @@ struct AccelerationTarget {
   std::vector<PlugRef> outputs() const;
 };
 
+// Of each mesh, what its last step is and what comes into it, where it has one that no control reaches
+// (graph/last_step.h).
+Result<std::vector<Compiler::SplitPoints>> SplitMeshes(const Graph& graph, Compiler* compiler,
+                                                       const AccelerationTarget& target);
+
 struct AccelerateOptions {
   double tolerance = -1;          // metres; below 0: the subspace's own; infinity: pure KPSA
   double violation_rate = -1;     // below 0: the subspace's own

@@ -358,7 +358,44 @@ Status PlacePatches(const Graph& graph, Compiler* compiler, const AccelerationTa
   return Status();
 }
 
+// What gives the points from inner ones, where the subspace reconstructs these.
+Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
+                 AccelerationDraft* draft) {
+  const Subspace& subspace = *draft->data.subspace;
+  if (!subspace.of_inner() || draft->data.always_miss) return Status();
+  Result<std::vector<Compiler::SplitPoints>> split = SplitMeshes(graph, compiler, target);
+  if (!split.ok()) return split.status();
+  for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
+    const SubspaceOutput& output = subspace.outputs[m];
+    std::shared_ptr<const LastStep>& step = draft->data.steps.emplace_back();
+    if (output.inner == 0) continue;
+    step = std::move((*split)[m].step);
+    if (step == nullptr || step->points() != output.points || step->inner_points() != output.inner)
+      return Status::Invalid(
+          "the subspace is for {} points before the last step of {}, and the rig has {} there; train it "
+          "again",
+          output.inner, output.name, step == nullptr ? 0 : step->inner_points());
+  }
+  return Status();
+}
+
 }  // namespace
+
+Result<std::vector<Compiler::SplitPoints>> SplitMeshes(const Graph& graph, Compiler* compiler,
+                                                       const AccelerationTarget& target) {
+  std::vector<Compiler::SplitPoints> split(target.meshes.size());
+  for (std::size_t m = 0; m < split.size() && !target.colors; ++m) {
+    const PlugRef& points = target.meshes[m].stages.back().points;
+    const auto varies = [&](const PlugRef& plug) {
+      return plug.node == points.node && graph.PlugType(plug) != Type::kMatrix;
+    };
+    if (std::ranges::any_of(target.varying, varies) || std::ranges::any_of(target.controls, varies)) continue;
+    Result<Compiler::SplitPoints> one = compiler->Split(graph, points);
+    if (!one.ok()) return one.status();
+    split[m] = std::move(*one);
+  }
+  return split;
+}
 
 Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compiler,
                                             const AccelerationTarget& target,
@@ -372,6 +409,7 @@ Result<AccelerationDraft> DraftAcceleration(const Graph& graph, Compiler* compil
   KPSA_RETURN_IF_ERROR(AddCues(graph, target, *subspace, &draft));
   for (const AccelerationTarget::MeshPoints& mesh : target.meshes)
     draft.data.outputs_in_space.push_back(mesh.stages.back().world);
+  KPSA_RETURN_IF_ERROR(FindSteps(graph, compiler, target, &draft));
   for (const Signal& signal : draft.matrices) draft.data.relative.push_back(signal.relative);
   for (const auto* list : {&draft.matrices, &draft.scalars}) {
     for (const Signal& signal : *list) draft.data.guard_names.push_back(signal.name);

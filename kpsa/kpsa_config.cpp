@@ -22,6 +22,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joints));
     hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joint_rows));
   }
+  for (const SubspaceOutput& output : s.outputs) hasher.Add(output.inner);
   for (const PointCues& cues : data_.cues) {
     hasher.AddLong(std::span<const Index>(cues.points));
     hasher.Add(cues.in_space);

@@ -13,6 +13,7 @@
 #include "kpsa/cue_gather.h"
 #include "kpsa/matrix_entries.h"
 #include "kpsa/near_stack.h"
+#include "kpsa/rigid_points.h"
 #include "kpsa/signals.h"
 #include "kpsa/space_frame.h"
 
@@ -61,8 +62,10 @@ struct KpsaKernel {
   struct Output {
     bool all = true;
     std::vector<Index> points;  // wanted ones, where not all
-    std::vector<Index> tiles;   // that hold them
-    std::size_t padded = 0;     // floats of a component of the whole mesh, for the scratch
+    std::vector<Index> tiles;   // that hold them, or the inner points that they need; none: all
+    std::size_t padded = 0;     // floats of a component of all that is reconstructed, for the scratch
+    std::shared_ptr<const LastStep::Bound> step;  // from inner points to the wanted ones; null: none
+    bool direct() const { return all && step == nullptr; }
   };
   std::vector<Output> outputs;
   BoundPatches patches;
@@ -260,7 +263,9 @@ void Reconstruct(KpsaContext c, const KpsaKernel& kernel, std::size_t m, PointsV
   const std::span<const float> y = TileInputsOf(c, subspace);
   const Matrix4& matrix = c.state_as<KpsaState>().world_from_space;
   const bool in_space = kernel.config->data().outputs_in_space[m] != 0;
-  const Matrix4* space = !in_space || matrix == Matrix4() ? nullptr : &matrix;
+  const Matrix4* const moved = !in_space || matrix == Matrix4() ? nullptr : &matrix;
+  // The step runs in the space: that grows and turns all of it at once
+  const Matrix4* const space = wanted.step == nullptr ? moved : nullptr;
   const TileMap& tiles = subspace.tiles[m];
   const float* inputs = DoubtInputsOf(c, subspace, m);
   const auto reconstruct = [&](std::span<const Index> of, const PointsView& to) {
@@ -268,9 +273,16 @@ void Reconstruct(KpsaContext c, const KpsaKernel& kernel, std::size_t m, PointsV
     if (inputs == nullptr) return tiles.ReconstructBlock(y, {&to, 1}, of, spaces);
     tiles.ReconstructFrom({&inputs, 1}, {&to, 1}, of, spaces);
   };
-  if (wanted.all) return reconstruct({}, out);
+  if (wanted.direct()) return reconstruct({}, out);
   const PointsView mesh{c.scratch(), c.scratch() + wanted.padded, c.scratch() + 2 * wanted.padded,
                         tiles.points()};
+  if (wanted.step != nullptr) {
+    reconstruct(wanted.tiles, mesh);
+    const std::size_t used = 3 * wanted.padded;
+    wanted.step->Run(mesh, out, {c.scratch() + used, wanted.step->scratch_floats()});
+    if (moved != nullptr) TransformPoints(ToFloats(*moved), out);
+    return;
+  }
   if (!wanted.tiles.empty()) reconstruct(wanted.tiles, mesh);
   for (std::size_t i = 0; i < wanted.points.size(); ++i) {
     out.x[i] = mesh.x[wanted.points[i]];
@@ -313,7 +325,7 @@ void ComputeBlock(ComputeContext* contexts, std::size_t count) {
   const auto at = [&](std::size_t i) { return KpsaContext(contexts[i]); };
   for (std::size_t i = 0; i < count; ++i) WriteVerdict(at(i));
   for (std::size_t m = 0; m < kernel.outputs.size(); ++m) {
-    if (!kernel.outputs[m].all) {
+    if (!kernel.outputs[m].direct()) {
       for (std::size_t i = 0; i < count; ++i) {
         const PointsView& out = at(i).out<"outPoints">()[static_cast<std::uint32_t>(m)];
         if (out.count > 0) Reconstruct(at(i), kernel, m, out);
@@ -399,14 +411,19 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
     const PointSet& wanted = binding.output("outPoints", static_cast<int>(m));
     KpsaKernel::Output output;
     output.all = wanted.is_all();
-    if (!output.all) {
-      output.points = wanted.ToVector();
-      for (Index point : output.points) {
+    if (!data.steps.empty() && data.steps[m] != nullptr) output.step = data.steps[m]->Bind(wanted);
+    if (!output.direct()) {
+      if (output.step == nullptr) output.points = wanted.ToVector();
+      const std::size_t reconstructed = subspace.outputs[m].reconstructed();
+      const std::vector<Index>& needed = output.step == nullptr ? output.points : output.step->inner();
+      for (Index point : needed) {
         const auto tile = static_cast<Index>(point / kTilePoints);
         if (output.tiles.empty() || output.tiles.back() != tile) output.tiles.push_back(tile);
       }
-      output.padded = PaddedCount(subspace.outputs[m].points);
-      whole = std::max(whole, 3 * output.padded);
+      if (output.step != nullptr && output.tiles.size() == subspace.tiles[m].tiles()) output.tiles.clear();
+      output.padded = PaddedCount(reconstructed);
+      whole =
+          std::max(whole, 3 * output.padded + (output.step == nullptr ? 0 : output.step->scratch_floats()));
     }
     kernel.outputs.push_back(std::move(output));
   }

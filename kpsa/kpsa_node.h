@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "graph/last_step.h"
 #include "graph/node_registry.h"
 #include "graph/profile.h"
 #include "kpsa/subspace.h"
@@ -54,6 +55,8 @@ class KpsaConfig final : public Asset {
     std::vector<Product> products;
     std::vector<PatchPoints> patches;    // [patches of the subspace]
     std::vector<char> outputs_in_space;  // [outputs] as of cues: they are given in spaceMatrix's frame
+    // [outputs] what gives the points from inner ones, where these are reconstructed; else null
+    std::vector<std::shared_ptr<const LastStep>> steps;
     // Trained ranges and how guards come in outside of them (TrainedRange); see MatrixEntries
     std::vector<double> matrix_lo, matrix_hi, matrix_ramp;      // [12 * matrices]
     std::vector<double> scalar_lo, scalar_hi, scalar_ramp;      // [scalars]

@@ -146,17 +146,23 @@ Status ValidateSubspace(const Subspace& s) {
       return Status::Invalid("output \"{}\" is not at the stage \"{}\"", output.name, output.stage);
   }
   for (std::size_t i = 0; i < s.outputs.size(); ++i) {
-    if (s.tiles[i].points() != s.outputs[i].points || s.tiles[i].inputs() != s.tile_inputs() ||
+    if (s.outputs[i].inner > 0 &&
+        (s.outputs[i].inner < s.outputs[i].points || s.components != 3 || s.patches.tiles > 0)) {
+      return Status::Invalid("output \"{}\" has {} points, and {} inner ones of {} components in {} patches",
+                             s.outputs[i].name, s.outputs[i].points, s.outputs[i].inner, s.components,
+                             s.patches.tiles);
+    }
+    if (s.tiles[i].points() != s.outputs[i].reconstructed() || s.tiles[i].inputs() != s.tile_inputs() ||
         s.tiles[i].data().components != s.components) {
       return Status::Invalid("output \"{}\" has {} points of {} components, its tiles {} of {}",
-                             s.outputs[i].name, s.outputs[i].points, s.components, s.tiles[i].points(),
-                             s.tiles[i].data().components);
+                             s.outputs[i].name, s.outputs[i].reconstructed(), s.components,
+                             s.tiles[i].points(), s.tiles[i].data().components);
     }
   }
   if (!s.kept_modes.values.empty()) {
     const ModeMatrix& kept = s.kept_modes;
     std::size_t points = 0;
-    for (const SubspaceOutput& output : s.outputs) points += output.points;
+    for (const SubspaceOutput& output : s.outputs) points += output.reconstructed();
     if (kept.rows != points * static_cast<std::size_t>(s.components) || kept.columns != s.modes ||
         kept.values.size() != kept.rows * kept.columns || !AllFinite(std::span(kept.values))) {
       return Status::Invalid("the kept modes are {} x {}, or not finite; expected {} x {}", kept.rows,
@@ -219,6 +225,10 @@ std::size_t Subspace::doubt_inputs() const {
   bool products = false;
   for (const TileMap& map : tiles) all += map.input_size(), products = products || map.has_products();
   return products ? all : 0;
+}
+
+bool Subspace::of_inner() const {
+  return std::ranges::any_of(outputs, [](const SubspaceOutput& output) { return output.inner > 0; });
 }
 
 std::size_t Subspace::tile_count() const {

@@ -3,7 +3,7 @@
 //   SubspaceScratch scratch(subspace);                     // once a thread
 //   Measure(subspace, raw, &scratch);                      // raw cue values -> y
 //   Verdict v = Judge(subspace, threshold, &scratch);      // SoftCache
-//   subspace.tiles[output].Reconstruct(scratch.inputs(), points)  // -> points (kpsa/tiles.h)
+//   subspace.tiles[output].Reconstruct(scratch.inputs(), points)  // -> points, or inner ones (kpsa/tiles.h)
 //
 // None of these allocates. The file is safetensors (files/safetensors.h) with kind "kpsa-subspace".
 #pragma once
@@ -23,10 +23,11 @@
 
 namespace kpsa::engine {
 
-// What a file may be of; 9 is what is written. 3: without products of latents, world matrices as cues, and doubts; 4: without products as cues; 5: without
-// patches; 6: without guards of patches; 7: without calibration poses near clips; 8: cues, ranges and the trained rig are
-// JSON, and not tensors
-inline constexpr int kSubspaceVersion = 9, kListsVersion = 9, kOldestVersion = 3;
+// What a file may be of; 9 is what is written, or 10 where inner points are reconstructed. 3: without products of
+// latents, world matrices as cues, and doubts; 4: without products as cues; 5: without patches; 6: without guards of
+// patches; 7: without calibration poses near clips; 8: cues, ranges and the trained rig are JSON, and not tensors; 9:
+// without inner points
+inline constexpr int kSubspaceVersion = 10, kInnerVersion = 10, kListsVersion = 9, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
@@ -76,6 +77,10 @@ struct SubspaceOutput {
   std::string name;  // "head_mesh@mush"
   std::size_t points = 0;
   std::string stage = {};  // of a mesh: what comes after its '@'; either may hold more of them
+  // What is reconstructed instead of them: the inner points of the last step (graph/last_step.h) of the node that they
+  // come from, which then runs; 0: the points themselves.
+  std::size_t inner = 0;
+  std::size_t reconstructed() const { return inner > 0 ? inner : points; }
   friend bool operator==(const SubspaceOutput&, const SubspaceOutput&) = default;
 };
 
@@ -125,6 +130,7 @@ struct Subspace {
   std::size_t rows() const { return cue_mean.size(); }  // r
   std::size_t doubt_inputs() const;                     // what LargestDoubt leaves; 0 without products
   std::size_t tile_inputs() const { return latent.empty() ? rows() : latent.size() / rows(); }
+  bool of_inner() const;           // inner points of some output are reconstructed
   std::size_t tile_count() const;  // of all outputs
   std::vector<std::size_t> tiles_of_outputs() const;
 };

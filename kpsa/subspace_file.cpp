@@ -20,7 +20,7 @@ constexpr char kLatent[] = "latent";
 Status ReadKeptModes(const SafetensorsFile& file, Subspace* s) {
   std::uint64_t rows = 0;
   for (const SubspaceOutput& output : s->outputs)
-    rows += output.points * static_cast<std::uint64_t>(s->components);
+    rows += output.reconstructed() * static_cast<std::uint64_t>(s->components);
   const Result<std::vector<float>> values = file.Values<float>(kModes, {s->modes, rows});
   if (!values.ok()) return values.status();
   s->kept_modes = {rows, s->modes, *values};

@@ -65,6 +65,7 @@ Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, b
   return json;
 }
 
+constexpr char kInner[] = "inner";           // points of an output; missing: none
 constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
 
 // What the space was at rest, and what moves with it.
@@ -157,8 +158,10 @@ Status ReadJsonLists(const SafetensorsFile& file, Status* status, Subspace* s) {
 
 std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
   Json outputs = Json::array();
-  for (const SubspaceOutput& output : s.outputs)
+  for (const SubspaceOutput& output : s.outputs) {
     outputs.push_back({{"name", output.name}, {"points", output.points}, {"stage", output.stage}});
+    if (output.inner > 0) outputs.back()[kInner] = output.inner;
+  }
   Json frame = {{"extent", s.extent}, {"scales", s.space_scales}, {"carried", s.carried}};
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) frame["inverseRestStretch"].push_back(s.inverse_rest_stretch(r, c));
@@ -176,10 +179,11 @@ std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
     summary["tilesOfPatch"] = s.patches.tiles;
     summary["patchShare"] = s.patches.share;
   }
-  return {{"kind", kSubspaceKind},     {"version", std::to_string(kSubspaceVersion)},
-          {"summary", summary.dump()}, {"outputs", outputs.dump()},
-          {"rigHash", s.rig_hash},     {"units", s.units},
-          {"space", s.space},          {"frame", frame.dump()}};
+  return {
+      {"kind", kSubspaceKind},     {"version", std::to_string(s.of_inner() ? kInnerVersion : kListsVersion)},
+      {"summary", summary.dump()}, {"outputs", outputs.dump()},
+      {"rigHash", s.rig_hash},     {"units", s.units},
+      {"space", s.space},          {"frame", frame.dump()}};
 }
 
 Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace* s) {
@@ -213,6 +217,8 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace
   for (const Json& entry : *outputs) {
     Reader output("an output", entry, &status);
     s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints), output.Text("stage")});
+    if (entry.is_object() && entry.contains(kInner))
+      s->outputs.back().inner = output.Count(kInner, kMaxPoints);
   }
   if (with_lists) KPSA_RETURN_IF_ERROR(ReadJsonLists(file, &status, s));
   s->extent = Reader("frame", *frame, &status).Number("extent");

@@ -40,7 +40,7 @@ Status ReadTiles(const SafetensorsFile& file, Subspace* s) {
   for (std::size_t i = 0; i < s->outputs.size(); ++i) {
     const std::string prefix = fmt::format("tiles.{}.", i);
     TileData data;
-    data.points = s->outputs[i].points;
+    data.points = s->outputs[i].reconstructed();
     data.components = s->components;
     data.inputs = s->tile_inputs();
     KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(prefix + "ranks", {kAny}), &data.ranks));

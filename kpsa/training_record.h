@@ -19,6 +19,7 @@ inline constexpr const char *kForAllPoints = "for all points",
                             *kFewerCues = "fewer for all points, tiles stored finely",
                             *kForHalf = "for all points, as for half the tolerance",
                             *kByTile = "of each tile", *kByTileFinely = "of each tile, tiles stored finely";
+inline constexpr const char* kBeforeLastStep = ", points before the last step";
 
 struct TrainingRecord {
   std::vector<std::string> clips;

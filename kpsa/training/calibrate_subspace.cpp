@@ -238,7 +238,8 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   // Calibration poses of every kind; as many new ones say how to score them, and how far ranges reach. A picture
   // has few.
   const bool of_tiles = !of.options.without.trust;
-  PoseJudge judge(*subspace, of.layout, cues, of_tiles), score_judge(*subspace, of.layout, cues, of_tiles);
+  PoseJudge judge(of.rig, *subspace, of.layout, cues, of_tiles),
+      score_judge(of.rig, *subspace, of.layout, cues, of_tiles);
   std::vector<RangeMargins> margins(1);
   JudgedSet outside;
   if (!of.rig.target.colors && of.size.margins) {

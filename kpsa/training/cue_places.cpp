@@ -65,15 +65,17 @@ struct PricedStage {
 };
 
 // Stages of a mesh, the latest local one first, each cheaper than the one before by at least `saving`.
-Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* compiler,
-                                             const AccelerationTarget::MeshPoints& mesh, Index total,
-                                             double saving) {
+Result<std::vector<PricedStage>> PriceStages(const TrainingRig& rig, Compiler* compiler, std::size_t m,
+                                             Index total, double saving) {
+  const AccelerationTarget::MeshPoints& mesh = rig.target.meshes[m];
+  // What comes out of a last step is not among the poses
+  const std::size_t stages = mesh.stages.size() - (rig.step(m) == nullptr ? 0 : 1);
   if (rig.target.colors && mesh.stages.size() > 1)
     return std::vector<PricedStage>(1);  // that is what it is for
   std::vector<PricedStage> priced;
   const std::vector<Index> probe = EvenSpread(total, kProbePoints);
   const auto local = static_cast<Index>(kMaxPointsPerCue * static_cast<double>(probe.size()));
-  for (std::size_t stage = mesh.stages.size(); stage-- > 0;) {
+  for (std::size_t stage = stages; stage-- > 0;) {
     const Result<Kept> kept =
         KeptFor(rig, compiler, {{mesh.stages[stage].points, PointSet::Of(probe, total)}}, total);
     if (!kept.ok()) return kept.status();
@@ -118,7 +120,7 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
   std::size_t count = 0;
   for (std::size_t m = 0; m < meshes.size(); ++m) {
     Result<std::vector<PricedStage>> priced =
-        PriceStages(rig, compiler, meshes[m], totals[m], kSaving * result.full_cost);
+        PriceStages(rig, compiler, m, totals[m], kSaving * result.full_cost);
     if (!priced.ok()) return priced.status();
     count = std::max(count, priced->size());
     stages.push_back(std::move(*priced));

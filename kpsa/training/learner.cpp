@@ -18,6 +18,7 @@ TrainOptions OptionsOf(const Subspace& subspace, const TrainingRecord& record, s
   options.seed = record.seed;
   options.tolerance = subspace.tolerance, options.violation_rate = subspace.violation_rate;
   options.keep_modes = !subspace.kept_modes.values.empty();
+  options.inner = subspace.of_inner() ? TrainOptions::Inner::kAlways : TrainOptions::Inner::kNever;
   if (record.mode == "paper") options.mode = EstimatorMode::kPaper;
   const TrainingRecord::Asked& asked = record.asked;
   options.samples = samples;

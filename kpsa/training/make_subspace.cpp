@@ -118,7 +118,8 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   }
   Eigen::Index first = 0;
   for (const SubspaceOutput& output : s.outputs) {
-    const auto height = static_cast<Eigen::Index>(output.points * static_cast<std::size_t>(s.components));
+    const auto height =
+        static_cast<Eigen::Index>(output.reconstructed() * static_cast<std::size_t>(s.components));
     KPSA_CHECK_LE(first + height, maps.rows());
     inputs.left_out = pca.row_residual.segment(first, height);
     if (poses != nullptr && !latent) {

@@ -38,8 +38,41 @@ CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchL
   return pair;
 }
 
-PoseJudge::PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues, bool of_tiles)
-    : subspace_(subspace), layout_(layout), cues_(cues), of_tiles_(of_tiles && subspace.doubt_inputs() > 0) {}
+namespace {
+
+// Runs a last step on recorded and on reconstructed inner points.
+class Finisher {
+ public:
+  Finisher(const SubspaceOutput& output, const LastStep::Bound& step)
+      : step_(step), inner_(output.inner), out_(output.points), scratch_(step.scratch_floats()) {}
+  // inner points as a row has them
+  ConstPointsView Of(std::span<const float> row) {
+    const PointsView to = inner_.view();
+    for (std::size_t i = 0; i < to.count; ++i)
+      to.x[i] = row[3 * i], to.y[i] = row[3 * i + 1], to.z[i] = row[3 * i + 2];
+    return Of(std::as_const(inner_).view());
+  }
+  ConstPointsView Of(ConstPointsView inner) {
+    step_.Run(inner, out_.view(), scratch_.span());
+    return std::as_const(out_).view();
+  }
+
+ private:
+  const LastStep::Bound& step_;
+  PointBuffer inner_, out_;
+  AlignedFloats scratch_;
+};
+
+}  // namespace
+
+PoseJudge::PoseJudge(const TrainingRig& rig, const Subspace& subspace, const PoseLayout& layout,
+                     const CueSet& cues, bool of_tiles)
+    : subspace_(subspace), layout_(layout), cues_(cues), of_tiles_(of_tiles && subspace.doubt_inputs() > 0) {
+  for (std::size_t m = 0; m < subspace.outputs.size(); ++m)
+    steps_.push_back(subspace.outputs[m].inner == 0
+                         ? nullptr
+                         : rig.step(m)->Bind(PointSet::All(static_cast<Index>(subspace.outputs[m].points))));
+}
 
 std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
   struct Errors {
@@ -53,7 +86,13 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
     SubspaceScratch scratch(subspace_);
     std::vector<double> raw(subspace_.rows());
     std::vector<PointBuffer> buffers;
-    for (const SubspaceOutput& output : subspace_.outputs) buffers.emplace_back(output.points);
+    for (const SubspaceOutput& output : subspace_.outputs) buffers.emplace_back(output.reconstructed());
+    std::vector<Finisher> recorded, made;  // of outputs with last steps
+    for (std::size_t m = 0; m < steps_.size(); ++m) {
+      if (steps_[m] == nullptr) continue;
+      recorded.emplace_back(subspace_.outputs[m], *steps_[m]);
+      made.emplace_back(subspace_.outputs[m], *steps_[m]);
+    }
     std::vector<float> doubts(subspace_.doubt_inputs() == 0 ? 0 : subspace_.tile_count()),
         of_tiles(subspace_.tile_count());
     std::vector<double> of_patches(subspace_.patches.patches);
@@ -73,16 +112,24 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
         pairs[t].doubt =
             static_cast<double>(LargestDoubt(subspace_, scratch.inputs(), scratch.t.span(), doubts).largest);
       std::ranges::fill(of_tiles, 0.0f);
-      std::size_t column = 0;
+      std::size_t column = 0, step = 0;
       float* of_tile = of_tiles.data();
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         double output_sum = 0;
         subspace_.tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
-        const ConstPointsView p = std::as_const(buffers[m]).view();
-        for (std::size_t i = 0; i < p.count; ++i, column += 3) {
-          const Double3 d{p.x[i] - static_cast<double>(row[column]),
-                          p.y[i] - static_cast<double>(row[column + 1]),
-                          p.z[i] - static_cast<double>(row[column + 2])};
+        ConstPointsView p = std::as_const(buffers[m]).view();
+        const std::span<const float> of_output = row.subspan(column, 3 * p.count);
+        column += of_output.size();
+        ConstPointsView exact;  // where it is not the row
+        if (steps_[m] != nullptr) {
+          exact = recorded[step].Of(of_output);
+          p = made[step++].Of(p);
+        }
+        for (std::size_t i = 0; i < p.count; ++i) {
+          const Double3 at = steps_[m] != nullptr
+                                 ? Double3{exact.x[i], exact.y[i], exact.z[i]}
+                                 : Double3{of_output[3 * i], of_output[3 * i + 1], of_output[3 * i + 2]};
+          const Double3 d = Double3{p.x[i], p.y[i], p.z[i]} - at;
           const double squared = Dot(d, d);
           output_sum += squared;
           errors[t].largest = std::max(errors[t].largest, squared);
@@ -113,7 +160,9 @@ std::vector<JudgedPose> PoseJudge::Judge(const PoseMatrix& poses) {
 }
 
 double PoseJudge::rms() const {
-  return poses_ == 0 ? 0 : std::sqrt(sum_ / static_cast<double>(poses_ * layout_.points));
+  std::size_t points = 0;
+  for (const SubspaceOutput& output : subspace_.outputs) points += output.points;
+  return poses_ == 0 ? 0 : std::sqrt(sum_ / static_cast<double>(poses_ * points));
 }
 
 }  // namespace kpsa::engine

@@ -2,11 +2,13 @@
 // training.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "kpsa/subspace.h"
 #include "kpsa/training/cue_selection.h"
 #include "kpsa/training/pose_matrix.h"
+#include "kpsa/training/trainer.h"
 
 namespace kpsa::engine {
 
@@ -24,7 +26,9 @@ CalibrationPair PairOf(const JudgedPose& pose, const ScoreMix& mix, const PatchL
 class PoseJudge {
  public:
   // cues: those of the subspace, in terms of the layout. of_tiles: what is told of each tile is wanted.
-  PoseJudge(const Subspace& subspace, const PoseLayout& layout, const CueSet& cues, bool of_tiles);
+  // Errors are those of what comes out of the rig's last steps, where inner points are reconstructed.
+  PoseJudge(const TrainingRig& rig, const Subspace& subspace, const PoseLayout& layout, const CueSet& cues,
+            bool of_tiles);
   // Every pose reconstructed, whatever its score. Poses are not centred.
   std::vector<JudgedPose> Judge(const PoseMatrix& poses);
   // Over all poses so far, of the pure reconstruction, metres (of light: its units).
@@ -36,6 +40,7 @@ class PoseJudge {
   const PoseLayout& layout_;
   const CueSet& cues_;
   const bool of_tiles_;
+  std::vector<std::shared_ptr<const LastStep::Bound>> steps_;  // by output; null: none
   double sum_ = 0, max_ = 0;
   std::size_t poses_ = 0;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <utility>
 
 #include "base/check.h"
 #include "base/matrix.h"
@@ -23,7 +24,10 @@ Result<std::shared_ptr<const Plan>> PoseRecorder::CompileFor(const std::vector<P
   // Outputs: points of the meshes, candidate points, signals, space
   Request request;
   const AccelerationTarget& target = rig_.target;
-  for (const auto& mesh : target.meshes) request.outputs.push_back({mesh.stages.back().points, {}});
+  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
+    const bool split = rig_.step(m) != nullptr;
+    request.outputs.push_back({split ? rig_.split[m].in : target.meshes[m].stages.back().points, {}});
+  }
   for (const CandidateStage& candidate : candidates_) {
     const PlugRef& points = target.meshes[candidate.mesh].stages[candidate.stage].points;
     Request whole;
@@ -77,7 +81,10 @@ Result<PoseLayout> PoseRecorder::Layout(std::size_t products) {
   if (!plan.ok()) return plan.status();
   layout_ = PoseLayout();
   std::size_t o = 0;
-  for (; o < rig_.target.meshes.size(); ++o) layout_.points += (*plan)->outputs()[o].points.size();
+  for (; o < rig_.target.meshes.size(); ++o) {
+    const LastStep* step = rig_.step(o);
+    layout_.points += step == nullptr ? (*plan)->outputs()[o].points.size() : step->inner_points();
+  }
   for (const CandidateStage& candidate : candidates_) layout_.stage_points += candidate.points.size();
   for (const Signal& signal : signals_) {
     layout_.scalars += signal.entries();
@@ -110,7 +117,18 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
       row[column++] = static_cast<float>(p.z);
     }
   };
-  for (const auto& mesh : target.meshes) store_points(evaluator.Points(o++), mesh.stages.back().world);
+  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
+    const LastStep* step = rig_.step(m);
+    const ConstPointsView points = evaluator.Points(o++);
+    const bool in_space = target.meshes[m].stages.back().world;
+    if (step == nullptr) {
+      store_points(points, in_space);
+      continue;
+    }
+    PointBuffer inner(step->inner_points());
+    step->Inner(points, inner.view());
+    store_points(std::as_const(inner).view(), in_space);
+  }
   for (const CandidateStage& candidate : candidates_)
     store_points(evaluator.Points(o++), target.meshes[candidate.mesh].stages[candidate.stage].world);
   StoreSignals(evaluator, space_from_world, o, row.subspan(column));
@@ -144,7 +162,15 @@ Status PoseRecorder::CheckFinite(std::span<const float> row) const {
   auto column = static_cast<std::size_t>(bad - row.begin());
   if (column < layout_.outputs()) {
     std::size_t point = column / 3;
-    for (const auto& mesh : rig_.target.meshes) {
+    for (std::size_t m = 0; m < rig_.target.meshes.size(); ++m) {
+      const AccelerationTarget::MeshPoints& mesh = rig_.target.meshes[m];
+      if (const LastStep* step = rig_.step(m); step != nullptr) {
+        if (point < step->inner_points())
+          return Status::Evaluation("point {} of {} is not a number before its last step",
+                                    std::min(point, step->points() - 1), mesh.name);
+        point -= step->inner_points();
+        continue;
+      }
       Request request;
       request.outputs.push_back({mesh.stages.back().points, {}});
       const Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);

@@ -62,7 +62,7 @@ class MarginFinder {
         work_(work),
         controls_(work.sampler->drawn()),
         joints_(JointsOf(controls_)),
-        judge_(subspace, of.layout, cues, !of.options.without.trust) {}
+        judge_(of.rig, subspace, of.layout, cues, !of.options.without.trust) {}
 
   Result<FoundMargins> Run() {
     careful_.of_controls.assign(controls_.size(), 0);

@@ -232,12 +232,13 @@ Result<FrameCost> SubspaceCandidates::Price(Subspace* subspace, const CueSet& of
   GivePatches(patches, subspace);
   std::vector<ScoreJudge> judged;
   for (const JudgedPose& pose :
-       PoseJudge(*subspace, setup->layout, of, !setup->options.without.trust).Judge(poses->judges))
+       PoseJudge(setup->rig, *subspace, setup->layout, of, !setup->options.without.trust)
+           .Judge(poses->judges))
     judged.push_back({pose, 0, poses->judge_kinds[judged.size()]});
   subspace->tolerance = setup->options.tolerance;
   subspace->violation_rate = setup->options.violation_rate;
-  return ChooseMisses(subspace, judged, *points, setup->full_cost, kCautious * setup->options.tolerance,
-                      kEvenOdds)
+  return ChooseMisses(subspace, judged, *points + setup->CostOfSteps(), setup->full_cost,
+                      kCautious * setup->options.tolerance, kEvenOdds)
       .cost;
 }
 

@@ -15,6 +15,12 @@ constexpr std::size_t kMostPlans = 2500;  // of all tiles; neighbours share one 
 constexpr std::size_t kOwnPoints = 40, kNearPoints = 24;  // candidates in a tile, and about it
 constexpr std::size_t kNearProbes = 12;                   // points of a tile that say what is near
 
+// What tiles of a mesh are made of: its points, or the inner ones of its last step.
+Index RowsOf(const TrainingRig& rig, std::size_t mesh, Index total) {
+  const LastStep* const step = rig.step(mesh);
+  return step == nullptr ? total : static_cast<Index>(step->inner_points());
+}
+
 // For each tile of each mesh, in their order: which of the signals are relative matrices of transforms that
 // its points need, as indices, ascending.
 Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, Compiler* compiler,
@@ -26,7 +32,8 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
     if (signals[s].relative) matrices.emplace(signals[s].plug.node.index, static_cast<Index>(s));
   }
   std::size_t tiles = 0;
-  for (const Index total : totals) tiles += (total + kTilePoints - 1) / kTilePoints;
+  for (std::size_t m = 0; m < totals.size(); ++m)
+    tiles += (RowsOf(rig, m, totals[m]) + kTilePoints - 1) / kTilePoints;
   const std::size_t together = (tiles * (clips.size() + 1) + kMostPlans - 1) / kMostPlans;
   std::vector<std::set<Index>> movers(tiles);
   std::vector<char> moves(signals.size(), 0);
@@ -36,10 +43,14 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
                               : std::optional<std::string_view>(clips[static_cast<std::size_t>(clip)].name)));
     std::size_t first_tile = 0;
     for (std::size_t m = 0; m < totals.size(); ++m) {
-      const std::size_t count = (totals[m] + kTilePoints - 1) / kTilePoints;
+      const std::size_t rows = RowsOf(rig, m, totals[m]), count = (rows + kTilePoints - 1) / kTilePoints;
       for (std::size_t t = 0; t < count; t += together) {
-        std::vector<Index> points(std::min<std::size_t>(together * kTilePoints, totals[m] - t * kTilePoints));
-        std::iota(points.begin(), points.end(), static_cast<Index>(t * kTilePoints));
+        // Inner points behind those of the mesh belong to any of these
+        const bool of_any = (t + together) * kTilePoints > totals[m] && rows > totals[m];
+        const std::size_t first = of_any ? 0 : t * kTilePoints;
+        std::vector<Index> points(of_any ? totals[m]
+                                         : std::min<std::size_t>(together * kTilePoints, totals[m] - first));
+        std::iota(points.begin(), points.end(), static_cast<Index>(first));
         Request request;
         request.outputs.push_back(
             {rig.target.meshes[m].stages.back().points, PointSet::Of(points, totals[m])});
@@ -136,8 +147,9 @@ Result<std::vector<TileCandidates>> FindTileCandidates(const TrainingRig& rig, C
   std::vector<TileCandidates> tiles;
   Index mesh_begin = 0;
   for (std::size_t m = 0; m < options.totals.size(); ++m) {
-    for (Index first = 0; first < options.totals[m]; first += kTilePoints) {
-      const Index count = std::min<Index>(kTilePoints, options.totals[m] - first);
+    const Index rows = RowsOf(rig, m, options.totals[m]);
+    for (Index first = 0; first < rows; first += kTilePoints) {
+      const Index count = std::min<Index>(kTilePoints, rows - first);
       TileCandidates& tile = tiles.emplace_back();
       tile.first_column = 3 * static_cast<std::size_t>(mesh_begin + first);
       tile.height = 3 * static_cast<std::size_t>(count);
@@ -146,7 +158,7 @@ Result<std::vector<TileCandidates>> FindTileCandidates(const TrainingRig& rig, C
       }
       AddPoints(points[m], options.positions.subspan(mesh_begin + first, count), first, count, &tile);
     }
-    mesh_begin += options.totals[m];
+    mesh_begin += rows;
   }
   return tiles;
 }

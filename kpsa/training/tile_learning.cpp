@@ -89,7 +89,7 @@ TileTrial TryTiles(const TileSubspace& made, const Eigen::VectorXd& mean, const 
     std::vector<double> raw(s.rows());
     std::vector<float> of_tiles(tiles);
     std::vector<PointBuffer> buffers;
-    for (const SubspaceOutput& output : s.outputs) buffers.emplace_back(output.points);
+    for (const SubspaceOutput& output : s.outputs) buffers.emplace_back(output.reconstructed());
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t pose = first + i * stride;
       const std::span<const float> row = poses.row(pose);

@@ -153,7 +153,7 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
       for (Index e = 0; e < 12 && joint != kNoIndex; ++e) fitted.joint_rows.push_back(row_of.at(joint + e));
       return fitted;
     };
-    const std::size_t height = output.points * static_cast<std::size_t>(s.components);
+    const std::size_t height = output.reconstructed() * static_cast<std::size_t>(s.components);
     inputs.first_column = first;
     s.tiles.push_back(
         BuildTiles(model, mean.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height)),

@@ -1,5 +1,6 @@
 #include "kpsa/training/trainer.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "kpsa/training/finer_subspaces.h"
@@ -9,6 +10,9 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
+// Inner points are trained on where a frame costs so many times what their last steps do, and taken where that is
+// clearly cheaper
+constexpr double kWorthSplitting = 2, kClearlyCheaper = 0.9;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -50,8 +54,17 @@ void Sign(const TrainingSetup& setup, Subspace* subspace) {
     controls.push_back(rig.graph->PlugName(rig.controls[c].plug));
 }
 
-Result<Subspace> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
-                           const TrainOptions& options) {
+// A training by itself: of what comes out, or of inner points.
+struct Trained {
+  Subspace subspace;
+  TrainingRecord record;
+  double ns = 0;       // what a frame is expected to cost, on the scale of the nodes' costs,
+  double full_ns = 0;  // and the whole evaluation
+  double seconds = 0;  // that it took
+};
+
+Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
+                          const TrainOptions& options) {
   TrainingSetup setup(rig, clips, options);
   TrainingRecord record = RecordOf(clips, options);
   KPSA_RETURN_IF_ERROR(setup.Prepare());
@@ -78,14 +91,14 @@ Result<Subspace> TrainOnce(const TrainingRig& rig, const std::vector<TrainingCli
   // Subspaces
   KPSA_RETURN_IF_ERROR(setup.Say("subspace", 0.85));
   const bool of_points = !setup.of_light() && setup.of_map();
-  if (of_points && !options.without.patches) {
+  if (of_points && !options.without.patches && rig.split.empty()) {
     KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
     Result<PatchLayout> patches = PricePatches(setup.rig, &setup.compiler, setup.totals, modes.positions);
     if (!patches.ok()) return patches.status();
     candidates.patches = std::move(*patches);
   }
   Result<Subspace> subspace = candidates.Best();
-  if (!subspace.ok()) return subspace;
+  if (!subspace.ok()) return subspace.status();
   KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
   const CandidateCalibrator calibrator{&candidates, ranges,
                                        CalibrationWithin(poses.pose_seconds, options, &setup.limit)};
@@ -98,9 +111,87 @@ Result<Subspace> TrainOnce(const TrainingRig& rig, const std::vector<TrainingCli
   KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
   Sign(setup, &*subspace);
   record.limited = setup.limit.left_out();
-  subspace->training = TrainingJson(record);
-  KPSA_RETURN_IF_ERROR(ValidateSubspace(*subspace));
-  return subspace;
+  const Result<double> points = setup.CostOfPoints(candidates.cues.set.cues);
+  if (!points.ok()) return points.status();
+  const double ns = *points + setup.CostOfSteps() + candidates.cost.ns;
+  return Trained{std::move(*subspace), std::move(record), ns, setup.full_cost, setup.limit.elapsed()};
+}
+
+// The rig with its last steps taken apart, in every clip; nothing where it has none.
+Result<std::optional<TrainingRig>> SplitRig(const TrainingRig& rig, const std::vector<TrainingClip>& clips) {
+  TrainingRig with = rig;
+  Compiler compiler;
+  const std::size_t meshes = rig.target.meshes.size();
+  for (std::size_t c = 0; c <= clips.size(); ++c) {
+    KPSA_RETURN_IF_ERROR(
+        rig.set_clip(c == 0 ? std::nullopt : std::optional<std::string_view>(clips[c - 1].name)));
+    Result<std::vector<Compiler::SplitPoints>> split = SplitMeshes(*rig.graph, &compiler, rig.target);
+    if (!split.ok()) return split.status();
+    if (c == 0) with.split = *split;
+    for (std::size_t m = 0; m < meshes; ++m) {
+      if ((*split)[m].step == nullptr) with.split[m] = {};
+    }
+  }
+  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+  bool any = false;
+  for (std::size_t m = 0; m < meshes; ++m) {
+    const std::vector<AccelerationTarget::Stage>& stages = rig.target.meshes[m].stages;
+    const bool reached = std::ranges::any_of(rig.controls, [&](const ControlRange& control) {
+      return control.plug.node == stages.back().points.node;
+    });
+    if (reached || stages.size() < 2) with.split[m] = {};
+    any = any || with.split[m].step != nullptr;
+  }
+  if (!any) return std::optional<TrainingRig>();
+  return std::optional(std::move(with));
+}
+
+// What was tried, of both.
+void AddTried(const Trained& other, Trained* taken) {
+  std::vector<TrainingRecord::Tried> all = other.record.tried;
+  for (TrainingRecord::Tried& one : all) one.taken = false;
+  all.insert(all.end(), taken->record.tried.begin(), taken->record.tried.end());
+  taken->record.tried = std::move(all);
+}
+
+// Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost
+// less.
+Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
+                          const TrainOptions& options) {
+  const bool may = options.mode == EstimatorMode::kMap && !rig.target.colors && !options.keep_modes &&
+                   options.inner != TrainOptions::Inner::kNever;
+  Result<std::optional<TrainingRig>> split = std::optional<TrainingRig>();
+  if (may) split = SplitRig(rig, clips);
+  if (!split.ok()) return split.status();
+  if (!split->has_value()) return TrainOnce(rig, clips, options);
+  if (options.inner == TrainOptions::Inner::kAlways) return TrainOnce(**split, clips, options);
+  Result<Trained> whole = TrainOnce(rig, clips, options);
+  if (!whole.ok()) return whole;
+  double steps = 0;
+  for (std::size_t m = 0; m < (*split)->split.size(); ++m)
+    steps += (*split)->step(m) == nullptr ? 0 : static_cast<double>((*split)->step(m)->cost_ns());
+  if (whole->ns < kWorthSplitting * steps || options.seconds < 2 * whole->seconds) return whole;
+  TrainOptions rest = options;
+  rest.seconds -= whole->seconds;
+  Result<Trained> inner = TrainOnce(**split, clips, rest);
+  if (!inner.ok()) return inner.status().kind() == ErrorKind::kInterrupted ? inner : whole;
+  for (Trained* one : {&*whole, &*inner}) {
+    if (!one->record.tried.empty()) continue;
+    one->record.tried.push_back(
+        {kForAllPoints, one->subspace.cues.size(), one->subspace.rows(), 0, one->ns / one->full_ns, true});
+  }
+  for (TrainingRecord::Tried& one : inner->record.tried) one.what += kBeforeLastStep;
+  const bool cheaper = inner->ns < kClearlyCheaper * whole->ns;
+  Trained& taken = cheaper ? *inner : *whole;
+  AddTried(cheaper ? *whole : *inner, &taken);
+  return std::move(taken);
+}
+
+Result<Subspace> Finish(Result<Trained> trained) {
+  if (!trained.ok()) return trained.status();
+  trained->subspace.training = TrainingJson(trained->record);
+  KPSA_RETURN_IF_ERROR(ValidateSubspace(trained->subspace));
+  return std::move(trained->subspace);
 }
 
 }  // namespace
@@ -113,11 +204,11 @@ Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& 
   if (options.progress)
     watched.progress = [&](const char* what, double share) { return cancel.Say(what, share); };
   try {
-    Result<Subspace> trained = TrainOnce(rig, clips, watched);
+    Result<Subspace> trained = Finish(TrainBest(rig, clips, watched));
     if (!trained.ok() && cancel.asked()) throw Cancelled();  // an evaluation that was ended, say
     if (!trained.ok() || !watched.by_tile_as_before || trained->by_tile()) return trained;
     watched.by_tile_as_before = false;  // with cues for all points, what is learnt changes all of them
-    return TrainOnce(rig, clips, watched);
+    return Finish(TrainBest(rig, clips, watched));
   } catch (const Cancelled&) {
     KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
     return Status::Make(ErrorKind::kInterrupted, "interrupted");

@@ -41,6 +41,9 @@ struct TrainOptions {
   // Where tiles have cues of their own: what was learnt teaches only those that miss it, and all others are
   // those of the training without it, byte for byte (kpsa/training/tile_learning.h).
   bool by_tile_as_before = false;
+  // Inner points of last steps (graph/last_step.h) instead of what comes out of these: where that is expected to cost
+  // less, or as a subspace has it that learns.
+  enum class Inner : std::uint8_t { kIfCheaper, kNever, kAlways } inner = Inner::kIfCheaper;
   // About how long training may take: fewer poses, no cues of tiles, and a shorter calibration, where
   // that is too short. Which poses fit depends on the machine; with time enough, the subspace is that without
   // a limit.
@@ -67,6 +70,9 @@ struct TrainingRig {
   AccelerationTarget target;
   std::vector<ControlRange> controls;
   std::function<Status(std::optional<std::string_view>)> set_clip;
+  // By mesh, with steps where inner points are trained on (graph/last_step.h); empty: nowhere. Train's own.
+  std::vector<Compiler::SplitPoints> split = {};
+  const LastStep* step(std::size_t mesh) const { return split.empty() ? nullptr : split[mesh].step.get(); }
 };
 
 // Errors: no poses, nothing moves, a pose that fails to evaluate (its clip and time or its controls),

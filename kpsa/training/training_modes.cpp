@@ -58,6 +58,9 @@ Status ChooseCues(double tolerance, const TrainingPoses& poses, const PoseMatrix
         "are "
         "kept to judge by)",
         choice.rows);
+  const double steps = setup->CostOfSteps();
+  chosen.cost += steps;
+  for (CueChoice::Other& other : chosen.cheaper) other.cost += steps, other.cost_of_hits += steps;
   to->set = MakeCueSet(modes.pca, chosen.cues, modes.noise);
   to->choice = std::move(chosen);
   return Status();

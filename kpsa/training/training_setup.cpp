@@ -75,9 +75,18 @@ std::vector<SubspaceOutput> TrainingSetup::Outputs() const {
   std::vector<SubspaceOutput> outputs;
   for (std::size_t m = 0; m < rig.target.meshes.size(); ++m) {
     const AccelerationTarget::MeshPoints& mesh = rig.target.meshes[m];
-    outputs.push_back({mesh.name, totals[m], of_light() ? "" : mesh.stages.back().name});
+    const LastStep* const step = rig.step(m);
+    outputs.push_back({mesh.name, totals[m], of_light() ? "" : mesh.stages.back().name,
+                       step == nullptr ? 0 : step->inner_points()});
   }
   return outputs;
+}
+
+double TrainingSetup::CostOfSteps() const {
+  double ns = 0;
+  for (std::size_t m = 0; m < rig.target.meshes.size(); ++m)
+    ns += rig.step(m) == nullptr ? 0 : static_cast<double>(rig.step(m)->cost_ns());
+  return ns;
 }
 
 Result<double> TrainingSetup::CostOfPoints(std::span<const CueRef> cues) {

@@ -29,6 +29,7 @@ struct TrainingSetup {
   std::vector<SubspaceOutput> Outputs() const;
   // What the graph spends until the points among the cues are there (ns, on the scale of the nodes' costs).
   Result<double> CostOfPoints(std::span<const CueRef> cues);
+  double CostOfSteps() const;  // likewise, of the last steps after inner points
 
   const TrainingRig rig;                  // its controls are the rig's, then tilts
   const std::vector<ControlRange> drawn;  // the rig's

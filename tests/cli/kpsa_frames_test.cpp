@@ -1,5 +1,6 @@
 // What a frame of an accelerated rig is: a hit, a blend or the full evaluation, whatever came before it and
-// whoever evaluates it. On the bundled hello rig with thresholds that make all three happen.
+// whoever evaluates it. On the bundled hello rig with thresholds that make all three happen; with what is reconstructed
+// the points, and those before the last step of its mush (graph/last_step.h).
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -13,11 +14,15 @@
 namespace kpsa::engine {
 namespace {
 
-class KpsaFrames : public ::testing::Test {
+class KpsaFrames : public ::testing::TestWithParam<TrainOptions::Inner> {
  protected:
-  static void SetUpTestSuite() {
-    trained_ = TrainRig(kHello, QuickTraining());
+  void SetUp() override {
+    if (trained_ != nullptr && trained_->of_inner() == of_inner()) return;
+    TrainOptions options = QuickTraining();
+    options.inner = GetParam();
+    trained_ = TrainRig(kHello, options);
     ASSERT_NE(trained_, nullptr);
+    ASSERT_EQ(trained_->of_inner(), of_inner());
     // Poses of which some leave the trained ranges; thresholds among the scores of the others
     RigRun run(kHello, {.subspace = WithGuardsOnly(*trained_)});
     ASSERT_TRUE(run.ok()) << run.error;
@@ -34,6 +39,7 @@ class KpsaFrames : public ::testing::Test {
     mixed_ = WithThreshold(*trained_, tau_lo_, tau_);
   }
   static void TearDownTestSuite() { trained_.reset(), mixed_.reset(), poses_.clear(); }
+  static bool of_inner() { return GetParam() == TrainOptions::Inner::kAlways; }
 
   static std::vector<RunFrame> InOrder() {
     RigRun run(kHello, {.subspace = mixed_});
@@ -59,7 +65,7 @@ class KpsaFrames : public ::testing::Test {
   static inline double tau_lo_ = 0, tau_ = 0;
 };
 
-TEST_F(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
+TEST_P(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
   RigRun full(kHello), pure(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
   std::size_t hits = 0, blends = 0, misses = 0, guard_misses = 0;
   const std::vector<RunFrame> frames = InOrder();
@@ -98,7 +104,7 @@ TEST_F(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {
 }
 
 // Outside a trained range the full evaluation comes in as it does with the score, over the guard's ramp.
-TEST_F(KpsaFrames, GuardsBlendTheFullEvaluationIn) {
+TEST_P(KpsaFrames, GuardsBlendTheFullEvaluationIn) {
   RigRun full(kHello), pure(kHello, {.subspace = trained_, .accelerate = {.tolerance = kInfinity}}),
       guarded(kHello, {.subspace = WithGuardsOnly(*trained_)});
   ASSERT_TRUE(guarded.ok()) << guarded.error;
@@ -132,7 +138,7 @@ TEST_F(KpsaFrames, GuardsBlendTheFullEvaluationIn) {
   }
 }
 
-TEST_F(KpsaFrames, DoNotDependOnWhatCameBefore) {
+TEST_P(KpsaFrames, DoNotDependOnWhatCameBefore) {
   const std::vector<RunFrame> expected = InOrder();
   EXPECT_FALSE(SameBytes(expected[0].points, expected[1].points));  // mixing them up would show
   std::vector<std::size_t> order(2 * poses_.size());                // every frame twice
@@ -150,7 +156,7 @@ TEST_F(KpsaFrames, DoNotDependOnWhatCameBefore) {
   }
 }
 
-TEST_F(KpsaFrames, AnyThreadsBlocksAndOrderGiveTheSameBytes) {
+TEST_P(KpsaFrames, AnyThreadsBlocksAndOrderGiveTheSameBytes) {
   const std::vector<RunFrame> expected = InOrder();
   RigRun run(kHello, {.subspace = mixed_});
   ASSERT_TRUE(run.ok()) << run.error;
@@ -192,7 +198,7 @@ TEST_F(KpsaFrames, AnyThreadsBlocksAndOrderGiveTheSameBytes) {
 
 // From a hit through the blend zone to a miss, slowly: what is emitted minus the exact points goes to nothing
 // without a jump. With a zone of no width, it jumps by the whole error.
-TEST_F(KpsaFrames, NothingPopsInTheBlendZone) {
+TEST_P(KpsaFrames, NothingPopsInTheBlendZone) {
   // By SoftCache's own score, which grows along the path
   const auto trained = std::make_shared<Subspace>(*trained_);
   trained->score = ScoreMix();
@@ -241,7 +247,7 @@ TEST_F(KpsaFrames, NothingPopsInTheBlendZone) {
   EXPECT_GT(hard, 5 * soft);
 }
 
-TEST_F(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
+TEST_P(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
   RigRun run(kHello, {.subspace = WithGuardsOnly(*trained_)}), full(kHello);
   const std::vector<double> rest(run.rig.controls.size(), 0.0);
   for (std::size_t c = 0; c < run.rig.controls.size(); ++c) {
@@ -266,7 +272,7 @@ TEST_F(KpsaFrames, ControlsBeyondTheirTrainedRangeMissByName) {
   }
 }
 
-TEST_F(KpsaFrames, AControlThatIsNoNumberMissesAndLeavesNothingBehind) {
+TEST_P(KpsaFrames, AControlThatIsNoNumberMissesAndLeavesNothingBehind) {
   RigRun run(kHello, {.subspace = WithGuardsOnly(*trained_)});
   const std::vector<double> rest(run.rig.controls.size(), 0.0);
   run.Pose(rest);
@@ -284,6 +290,12 @@ TEST_F(KpsaFrames, AControlThatIsNoNumberMissesAndLeavesNothingBehind) {
     EXPECT_TRUE(SameBytes(after.points, before.points));
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Reconstructs, KpsaFrames,
+                         ::testing::Values(TrainOptions::Inner::kNever, TrainOptions::Inner::kAlways),
+                         [](const auto& of) {
+                           return of.param == TrainOptions::Inner::kAlways ? "InnerPoints" : "Points";
+                         });
 
 }  // namespace
 }  // namespace kpsa::engine

@@ -85,7 +85,8 @@ struct Limb {
   }
   double LargestError(const PoseMatrix& fresh) const {
     double largest = 0;
-    for (const JudgedPose& pose : PoseJudge(made.subspace, fresh.layout(), made.cues, false).Judge(fresh))
+    for (const JudgedPose& pose :
+         PoseJudge(TrainingRig(), made.subspace, fresh.layout(), made.cues, false).Judge(fresh))
       largest = std::max(largest, pose.error);
     return largest;
   }
@@ -119,7 +120,8 @@ TEST(TileCues, ALimbIsToldInTheSpaceOfItsJoint) {
 TEST(TileCues, SayWhatTheyWouldMiss) {
   const Limb limb(true);
   double farthest = 0;
-  for (const JudgedPose& pose : PoseJudge(limb.made.subspace, LimbLayout(), limb.made.cues, false).Judge([&] {
+  for (const JudgedPose& pose :
+       PoseJudge(TrainingRig(), limb.made.subspace, LimbLayout(), limb.made.cues, false).Judge([&] {
          PoseMatrix same(LimbLayout());
          for (std::size_t t = 0; t < limb.poses.poses(); ++t) {
            const std::span<float> row = same.AddPose();

@@ -1,0 +1,195 @@
+// Subspaces that reconstruct the points before the last step of a deltaMush, and run that step themselves.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+#include "tests/cli/hello_folder.h"
+#include "tests/cli/rig_run.h"
+
+namespace kpsa::engine {
+namespace {
+
+TrainOptions InnerTraining(TrainOptions::Inner inner = TrainOptions::Inner::kAlways) {
+  TrainOptions options = QuickTraining();
+  options.inner = inner;
+  return options;
+}
+
+class InnerPoints : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new HelloFolder;
+    folder_->Edit("divisions: [2, 5, 2], members: all}",
+                  "divisions: [2, 5, 2], members: all, parent: lower}");
+    folder_->Edit("mush: {type: deltaMush, iterations: 10}",
+                  "mush: {type: deltaMush, iterations: 10, parent: lower}");
+    folder_->Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
+    trained_ = TrainRig(folder_->rig(), InnerTraining());
+    ASSERT_NE(trained_, nullptr);
+  }
+  static void TearDownTestSuite() {
+    trained_.reset();
+    delete folder_;
+  }
+  static inline const HelloFolder* folder_ = nullptr;
+  static inline std::shared_ptr<const Subspace> trained_;
+};
+
+TEST_F(InnerPoints, HitsRunNoMushAndKeepTheTolerance) {
+  ASSERT_EQ(trained_->outputs.size(), 1u);
+  EXPECT_EQ(trained_->outputs[0].inner, trained_->outputs[0].points) << "all weights are 1";
+  EXPECT_EQ(trained_->outputs[0].name, "column@mush");
+  RigRun full(folder_->rig()), run(folder_->rig(), {.subspace = trained_});
+  ASSERT_TRUE(run.ok()) << run.error;
+  std::size_t hits = 0, beyond = 0, misses = 0;
+  const auto poses = SmoothPoses(run.rig, 60, 1.1);
+  for (const auto& pose : poses) {
+    full.Pose(pose), run.Pose(pose);
+    const RunFrame exact = full.Evaluate(), frame = run.Evaluate();
+    hits += frame.hit, misses += frame.full_weight == 1;
+    if (frame.hit) beyond += LargestDistance(frame.points, exact.points) > kQuickTolerance;
+    EXPECT_EQ(SameBytes(frame.points, exact.points), frame.full_weight == 1);
+  }
+  EXPECT_GT(hits, poses.size() / 4);
+  EXPECT_LE(beyond, poses.size() / 20);
+  EXPECT_GT(misses, 0u);
+  EXPECT_EQ(run.Computes("mush"), poses.size() - hits) << "blends and misses";
+}
+
+// The step runs in the space: what carries that, turns it and makes it larger does the same to the detail.
+TEST_F(InnerPoints, GrowAndTravelWithTheSpace) {
+  const std::vector<std::string> moving = {"lower.translateX", "lower.rotateY", "lower.scaleX",
+                                           "lower.scaleY", "lower.scaleZ"};
+  RigRun full(folder_->rig(), {.varying = moving}),
+      run(folder_->rig(), {.subspace = trained_, .varying = moving});
+  ASSERT_TRUE(run.ok()) << run.error;
+  std::size_t hits = 0;
+  for (const auto& pose : SmoothPoses(run.rig, 20, 0.7)) {
+    const double t = static_cast<double>(hits + 1) / 20;
+    for (RigRun* of : {&full, &run}) {
+      of->Pose(pose);
+      of->Set("lower.translateX", 3 * t), of->Set("lower.rotateY", 2 * t);
+      for (const char* scale : {"lower.scaleX", "lower.scaleY", "lower.scaleZ"}) of->Set(scale, 1 + 0.7 * t);
+    }
+    const RunFrame frame = run.Evaluate();
+    if (!frame.hit) continue;
+    ++hits;
+    EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.5 * kQuickTolerance);
+  }
+  EXPECT_GT(hits, 5u);
+}
+
+TEST_F(InnerPoints, SomePointsHaveTheBitsOfAll) {
+  RigRun run(folder_->rig(), {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
+  ASSERT_TRUE(run.ok()) << run.error;
+  const NodeDef& def = run.rig.graph->def(run.accelerated.node);
+  const PlugRef points{run.accelerated.node, def.FindAttribute("outPoints"), 0, -1};
+  const auto total = static_cast<Index>(trained_->outputs[0].points);
+  for (const std::vector<Index>& some :
+       {std::vector<Index>{0}, {total / 2}, {1, 5, total / 3, total - 1}, {total - 2, total - 1}}) {
+    Request request;
+    request.varying = VaryingPlugs(run.rig);
+    request.outputs.push_back({points, PointSet::Of(some, total)});
+    const Result<std::shared_ptr<const Plan>> plan = run.compiler.Compile(*run.rig.graph, request);
+    ASSERT_TRUE(plan.ok()) << plan.status().ToString();
+    Evaluator evaluator(*plan);
+    for (const auto& pose : SmoothPoses(run.rig, 5, 0.8)) {
+      run.Pose(pose);
+      const std::vector<float> all = run.Evaluate().points;
+      for (std::size_t c = 0; c < run.rig.controls.size(); ++c) {
+        const PlugRef& plug = run.rig.controls[c].plug;
+        const Index varying = (*plan)->FindVarying(plug);
+        if (varying != kNoIndex)
+          evaluator.Set(varying, pose[c],
+                        (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
+      }
+      ASSERT_TRUE(evaluator.Evaluate().ok());
+      const ConstPointsView part = evaluator.Points(0);
+      ASSERT_EQ(part.count, some.size());
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        EXPECT_EQ(part.x[i], all[some[i]]);
+        EXPECT_EQ(part.y[i], all[total + some[i]]);
+        EXPECT_EQ(part.z[i], all[2 * total + some[i]]);
+      }
+    }
+  }
+}
+
+TEST_F(InnerPoints, AreInTheFile) {
+  const std::string path = *folder_ / "inner.kpsa";
+  ASSERT_TRUE(WriteSubspace(*trained_, path).ok());
+  const std::string bytes = folder_->Read(path);
+  EXPECT_NE(bytes.find("\"version\":\"10\""), std::string::npos)
+      << "programs that do not know of them say so";
+  const Result<Subspace> read = ReadSubspace(path);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->outputs, trained_->outputs);
+  RigRun before(folder_->rig(), {.subspace = trained_}),
+      after(folder_->rig(), {.subspace = std::make_shared<const Subspace>(*read)});
+  for (const auto& pose : SmoothPoses(before.rig, 5, 0.8)) {
+    before.Pose(pose), after.Pose(pose);
+    EXPECT_TRUE(SameBytes(before.Evaluate().points, after.Evaluate().points));
+  }
+  Subspace fewer = *trained_;
+  fewer.outputs[0].inner = fewer.outputs[0].points - 1;
+  EXPECT_FALSE(ValidateSubspace(fewer).ok());
+}
+
+// Points that are mixed with what comes in need both; borders and weights of 0 are what comes in.
+TEST(InnerPointsOfRigs, OfAMushWithAWeightMap) {
+  const HelloFolder folder;
+  const std::size_t count = RigRun(folder.rig()).rig.scene.meshes[0].mesh().point_count();
+  folder.Write("mush.json",
+               fmt::format(R"({{"kpsa": "weights", "version": 1, "mesh": "column", "points": {}, "maps": {{
+      "mush": {{"default": 0.4, "indices": [0, 1, 2, 40, 41, 42], "values": [0, 1, 1, 0, 1, 0]}}}}}})",
+                           count));
+  folder.Edit("mush: {type: deltaMush, iterations: 10}",
+              "mush: {type: deltaMush, iterations: 10, weights: \"mush.json#mush\"}");
+  const auto trained = TrainRig(folder.rig(), InnerTraining());
+  ASSERT_NE(trained, nullptr);
+  EXPECT_GT(trained->outputs[0].inner, trained->outputs[0].points);
+  RigRun full(folder.rig()), run(folder.rig(), {.subspace = trained});
+  ASSERT_TRUE(run.ok()) << run.error;
+  std::size_t hits = 0;
+  for (const auto& pose : SmoothPoses(run.rig, 20, 0.7)) {
+    full.Pose(pose), run.Pose(pose);
+    const RunFrame frame = run.Evaluate();
+    if (!frame.hit) continue;
+    ++hits;
+    EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.5 * kQuickTolerance);
+  }
+  EXPECT_GT(hits, 5u);
+}
+
+TEST(InnerPointsOfRigs, NotWhereAControlReachesTheStep) {
+  const HelloFolder folder;
+  folder.Edit("  upper.rotateX:", "  mush.displacement: {min: 0, max: 1}\n  upper.rotateX:");
+  const auto trained = TrainRig(folder.rig(), InnerTraining());
+  ASSERT_NE(trained, nullptr);
+  EXPECT_FALSE(trained->of_inner());
+}
+
+// What is set on the step was never seen: every frame is evaluated fully.
+TEST(InnerPointsOfRigs, AnotherEnvelopeMisses) {
+  const HelloFolder folder;
+  const auto trained = TrainRig(folder.rig(), InnerTraining());
+  ASSERT_NE(trained, nullptr);
+  for (const char* envelope : {"0", "0.5"}) {
+    folder.Write("hello.yaml", HelloFolder::Yaml());
+    folder.Edit("mush: {type: deltaMush, iterations: 10}",
+                std::string("mush: {type: deltaMush, iterations: 10, envelope: ") + envelope + "}");
+    RigRun full(folder.rig()),
+        run(folder.rig(), {.subspace = trained, .accelerate = {.stale_is_miss = true}});
+    ASSERT_TRUE(run.ok()) << run.error;
+    for (const auto& pose : SmoothPoses(run.rig, 4, 0.7)) {
+      full.Pose(pose), run.Pose(pose);
+      const RunFrame frame = run.Evaluate();
+      EXPECT_EQ(frame.full_weight, 1);
+      EXPECT_TRUE(SameBytes(frame.points, full.Evaluate().points));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kpsa::engine
