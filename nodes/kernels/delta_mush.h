@@ -34,6 +34,9 @@ std::vector<Index> DeltaMushDemand(const Topology& topology, const DeltaMushSett
                                    std::span<const Index> out_points,
                                    std::span<const float> point_weights = {});
 
+// A pivot of points: their middle.
+Double3 MiddleOf(ConstPointsView points);
+
 // A ring kernel: `in` holds the points in_points (sorted, a superset of the demand), `out` the out_points. In
 // place only where in_points and out_points are the same.
 class DeltaMushKernel {

@@ -4,17 +4,13 @@
 
 #include "base/check.h"
 #include "nodes/kernels/delta_mush.h"
+#include "nodes/kernels/delta_mush_run.h"
 #include "nodes/kernels/weights.h"
 
 namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kBlock = 512;  // points that are sorted by their number of neighbours together
-
-bool Smooths(const Topology& topology, const DeltaMushSettings& settings, Index point) {
-  return settings.step != 0 && topology.neighbors().row(point).size() >= 2 &&
-         !(settings.pin_borders && topology.is_border(point));
-}
 
 // The smoothed part of the demand, sorted by (level, mesh index). Level 0: outputs that change; 1: their
 // rings, for the frames; then the rings of what smooths, one more for each iteration.
@@ -49,6 +45,11 @@ std::vector<Index> Closure(const Topology& topology, const DeltaMushSettings& se
 
 }  // namespace
 
+bool Smooths(const Topology& topology, const DeltaMushSettings& settings, Index point) {
+  return settings.step != 0 && topology.neighbors().row(point).size() >= 2 &&
+         !(settings.pin_borders && topology.is_border(point));
+}
+
 Status DeltaMushSettings::Validate() const {
   if (iterations < 0 || iterations > 1000) {
     return Status::Invalid("deltaMush with {} iterations, expected 0 to 1000", iterations);
@@ -59,6 +60,12 @@ Status DeltaMushSettings::Validate() const {
     return Status::Invalid("deltaMush with a distance weight of {}, expected 0 to 1", distance_weight);
   }
   return {};
+}
+
+Double3 MiddleOf(ConstPointsView points) {
+  Double3 sum;
+  for (std::size_t i = 0; i < points.count; ++i) sum = sum + Double3{points.x[i], points.y[i], points.z[i]};
+  return points.count == 0 ? sum : sum * (1.0 / static_cast<double>(points.count));
 }
 
 std::vector<Index> DeltaMushDemand(const Topology& topology, const DeltaMushSettings& settings,

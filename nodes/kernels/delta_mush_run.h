@@ -5,9 +5,14 @@
 #include <cstdint>
 
 #include "base/points.h"
+#include "nodes/kernels/delta_mush.h"
 
 namespace kpsa::engine {
 inline constexpr std::size_t kFinishBlock = 128;
+
+// Not pinned, and with at least two neighbours.
+bool Smooths(const Topology& topology, const DeltaMushSettings& settings, Index point);
+
 // Points with equally many neighbours.
 struct MushRows {
   const Index* rows;     // neighbours and the point itself
