@@ -2,6 +2,7 @@
 
 #include "base/matrix.h"
 #include "nodes/deformer.h"
+#include "nodes/delta_mush_step.h"
 #include "nodes/mesh_topology.h"
 #include "nodes/node_file.h"
 
@@ -10,11 +11,6 @@ namespace {
 
 // What it costs (bench_kernels): a run, a point that comes out, and a point that is smoothed once.
 constexpr float kMushNs = 500, kFrameNs = 8, kStepNs = 1.6f;
-
-DeltaMushSettings Settings(const Structural& s) {
-  return {s.get_int("iterations"), s.get_double("smoothingStep"), s.get_double("distanceWeight"),
-          s.get_bool("pinBorderVertices")};
-}
 
 // iterations + 1 rings: the frames read smoothed neighbours.
 void DemandMush(Demand& demand) {
@@ -26,9 +22,9 @@ void DemandMush(Demand& demand) {
     demand.Require("inPoints", 0, PointSet::All(out.total()));  // bind reports what is wrong
     return;
   }
-  demand.Require(
-      "inPoints", 0,
-      PointSet::Of(DeltaMushDemand(*topology, Settings(s), out.ToVector(), WeightsAt(s, out)), out.total()));
+  demand.Require("inPoints", 0,
+                 PointSet::Of(DeltaMushDemand(*topology, MushSettings(s), out.ToVector(), WeightsAt(s, out)),
+                              out.total()));
 }
 
 // The pivot, for precision far from the origin: the middle of the rest shape, carried by parentMatrix. It
@@ -39,15 +35,9 @@ struct MushBound {
   Double3 middle;
 };
 
-Double3 Middle(ConstPointsView rest) {
-  Double3 sum;
-  for (std::size_t i = 0; i < rest.count; ++i) sum = sum + Double3{rest.x[i], rest.y[i], rest.z[i]};
-  return rest.count == 0 ? sum : sum * (1.0 / static_cast<double>(rest.count));
-}
-
 Result<BoundKernel> BindMush(const Binding& binding) {
   const Structural& s = binding.structural();
-  const DeltaMushSettings settings = Settings(s);
+  const DeltaMushSettings settings = MushSettings(s);
   KPSA_RETURN_IF_ERROR(settings.Validate());
   const PointSet &out = binding.output("outPoints"), &in = binding.input("inPoints");
   Status error;
@@ -60,7 +50,7 @@ Result<BoundKernel> BindMush(const Binding& binding) {
   if (!rest.ok()) return rest.status();
   Result<CarriedFrame> frame = CarriedFrame::Bind(s);
   if (!frame.ok()) return frame.status();
-  const Double3 middle = Middle(*rest);
+  const Double3 middle = MiddleOf(*rest);
   MushBound bound{
       DeltaMushKernel(*topology, *rest, settings, out.ToVector(), in.ToVector(), WeightsAt(s, out), middle),
       *frame, middle};
@@ -102,7 +92,8 @@ KPSA_NODES(delta_mush, registry) {
                                       .bind = BindMush,
                                       .demand = DemandMush})
       .version(2)  // detail that fades in folds and grows with its parent
-      .cost(kMushNs, kFrameNs + 10 * kStepNs);
+      .cost(kMushNs, kFrameNs + 10 * kStepNs)
+      .last_step(MushLastStep);
 }
 
 }  // namespace kpsa::engine

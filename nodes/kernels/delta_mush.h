@@ -14,6 +14,7 @@
 
 #include "base/points.h"
 #include "base/status.h"
+#include "nodes/kernels/mush_frames.h"
 #include "nodes/kernels/parallel_hook.h"
 #include "nodes/kernels/topology.h"
 
@@ -32,6 +33,9 @@ struct DeltaMushSettings {
 std::vector<Index> DeltaMushDemand(const Topology& topology, const DeltaMushSettings& settings,
                                    std::span<const Index> out_points,
                                    std::span<const float> point_weights = {});
+
+// A pivot of points: their middle.
+Double3 MiddleOf(ConstPointsView points);
 
 // A ring kernel: `in` holds the points in_points (sorted, a superset of the demand), `out` the out_points. In
 // place only where in_points and out_points are the same.
@@ -69,8 +73,6 @@ class DeltaMushKernel {
   std::size_t BufferFloats() const { return (4 * local_count_ + 1023) / 1024 * 1024 + 768; }
   void BuildRows(const Topology& topology, ConstPointsView rest, const DeltaMushSettings& settings,
                  std::span<const Index> local, std::span<const int> level, std::span<const Index> local_of);
-  void BuildFrames(const Topology& topology, ConstPointsView rest, std::span<const Index> out_points,
-                   std::span<const Index> local_of, Double3 rest_pivot);
   // Packs `in` and smooths it; the smoothed points, xyzw by local number.
   const float* Smooth(ConstPointsView in, const float* pivot, std::span<float> scratch,
                       const Parallel* parallel) const noexcept;
@@ -80,19 +82,12 @@ class DeltaMushKernel {
   // Local numbers: the smoothed part of the demand sorted by (level, mesh index); level = the number of
   // iterations from the end at which a point is last read, so that what an iteration computes is a prefix.
   std::vector<Index> source_;        // local -> entry of `in`; empty if the same
-  std::vector<Index> out_in_;        // output -> entry of `in`; empty if the same
   std::vector<Index> blocks_;        // first group of each block, and the end
   std::vector<Index> block_counts_;  // [iteration]: blocks that it computes
   std::vector<Group> groups_;
   std::vector<Index> rows_;  // of each point 4 times the local numbers of its neighbours, and of itself
   std::vector<float> neighbor_weights_;  // of the neighbours; empty if all alike
-  std::vector<std::uint8_t>
-      lanes_;  // outputs in blocks of 64, sorted by their number of neighbours: place in block
-  std::vector<Index> out_local_;                        // beside lanes_: 4 * local number
-  std::vector<Index> frame_offsets_, frame_neighbors_;  // beside lanes_; empty rows where the detail is 0
-  std::vector<float> frame_weights_;                    // a, b of each frame neighbour
-  AlignedFloats detail_;                                // 3 rows, padded
-  AlignedFloats masks_;                                 // point weights, padded; empty if all 1
+  MushFrames frames_;
 };
 
 }  // namespace kpsa::engine

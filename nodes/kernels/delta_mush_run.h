@@ -1,13 +1,18 @@
-// Inside deltaMush only: what its binding (delta_mush_bind.cpp) and its run (delta_mush.cpp) share.
+// Inside deltaMush only: what its files share.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 
 #include "base/points.h"
+#include "nodes/kernels/delta_mush.h"
 
 namespace kpsa::engine {
 inline constexpr std::size_t kFinishBlock = 128;
+
+// Not pinned, and with at least two neighbours.
+bool Smooths(const Topology& topology, const DeltaMushSettings& settings, Index point);
+
 // Points with equally many neighbours.
 struct MushRows {
   const Index* rows;     // neighbours and the point itself
@@ -17,7 +22,7 @@ struct MushRows {
 };
 struct MushFinish {
   const float* smoothed;
-  const std::uint8_t* lanes;  // place in its block of 64 of each frame, sorted by the number of neighbours
+  const std::uint8_t* lanes;  // place in its block of each frame, sorted by the number of neighbours
   const Index *out_local, *frame_offsets, *frame_neighbors;  // by frame
   const float* frame_weights;
   const Index* out_in;  // by output; null: the same
@@ -26,6 +31,11 @@ struct MushFinish {
   float envelope, displacement;
   float pivot[3];
 };
+
+// The points [begin, end) of `in` minus the pivot, as xyzw by local number, up to the padding of that; source: local
+// number -> entry of `in`, null if the same.
+void PackMush(ConstPointsView in, const Index* source, const float* pivot, std::size_t begin, std::size_t end,
+              float* xyzw) noexcept;
 
 // The detail of the outputs [begin, end) from their rest points, in the frames of the smoothed rest shape.
 void ComputeMushDetail(const MushFinish& run, ConstPointsView rest, std::size_t begin,

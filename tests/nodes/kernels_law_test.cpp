@@ -13,6 +13,7 @@
 #include "base/simd.h"
 #include "nodes/kernels/blend_shape.h"
 #include "nodes/kernels/delta_mush.h"
+#include "nodes/kernels/delta_mush_step.h"
 #include "nodes/kernels/dual_quaternion.h"
 #include "nodes/kernels/lattice.h"
 #include "nodes/kernels/non_linear.h"
@@ -111,6 +112,22 @@ class KernelLaw : public testing::Test {
                         scratch.span(), parallel);
            }});
     }
+    const auto step = std::make_shared<const DeltaMushStep>(mesh_.topology, mesh_.rest.view(), Mush(false),
+                                                            DeltaMushStep::Constants{1, 0.8, {}});
+    subjects_.push_back(
+        {"deltaMush, of smoothed points", false,
+         [step](auto out_points) { return step->Bind(out_points).inner(); },
+         [step](auto out_points, auto in_points, auto in, auto out, const Parallel* parallel) {
+           PointBuffer inner(step->inner_points());
+           for (std::size_t i = 0; i < in_points.size(); ++i) {
+             const Index row = in_points[i];
+             inner.view().x[row] = in.x[i], inner.view().y[row] = in.y[i];
+             inner.view().z[row] = in.z[i];
+           }
+           const DeltaMushStep::Part part = step->Bind(out_points);
+           AlignedFloats scratch(part.ScratchFloats());
+           part.Run(inner.view(), out, scratch.span(), parallel);
+         }});
     subjects_.push_back(
         {"cluster", true, {}, [this](auto out_points, auto, auto in, auto out, const Parallel* parallel) {
            const ClusterKernel kernel(out_points, Masked(out_points));

@@ -1,0 +1,124 @@
+#include "nodes/kernels/delta_mush_step.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "base/check.h"
+#include "nodes/kernels/delta_mush_run.h"
+#include "nodes/kernels/weights.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr float kNoPivot[3] = {};
+
+std::vector<Index> AllOf(std::size_t count) {
+  std::vector<Index> all(count);
+  std::iota(all.begin(), all.end(), Index{0});
+  return all;
+}
+
+bool CountsUp(std::span<const Index> numbers) {
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] != i) return false;
+  }
+  return true;
+}
+
+void CopyPoint(ConstPointsView from, std::size_t i, PointsView to, std::size_t j) {
+  to.x[j] = from.x[i], to.y[j] = from.y[i], to.z[j] = from.z[i];
+}
+
+}  // namespace
+
+DeltaMushStep::DeltaMushStep(const Topology& topology, ConstPointsView rest,
+                             const DeltaMushSettings& settings, Constants constants)
+    : topology_(&topology),
+      smoothing_(topology, rest, settings, AllOf(rest.count), AllOf(rest.count), {}, MiddleOf(rest)),
+      envelope_(static_cast<float>(constants.envelope)),
+      displacement_(static_cast<float>(constants.displacement)),
+      masks_(std::move(constants.weights)),
+      in_rows_(AllOf(rest.count)),
+      smoothed_(rest.count, false) {
+  if (masks_.empty()) masks_.assign(rest.count, 1.0f);
+  KPSA_CHECK_EQ(masks_.size(), rest.count);
+  const auto smooths = [&](Index p) { return settings.iterations > 0 && Smooths(topology, settings, p); };
+  for (Index p = 0; p < points(); ++p) {
+    if (envelope_ * masks_[p] == 0 || !smooths(p)) masks_[p] = 0;
+    if (!Changes(p)) continue;
+    changes_ = true;
+    smoothed_[p] = true;
+    for (Index q : topology.neighbors().row(p)) smoothed_[q] = smooths(q);
+  }
+  for (Index p = 0; p < points(); ++p) {
+    if (!smoothed_[p] || envelope_ * masks_[p] == 1) continue;
+    in_rows_[p] = static_cast<Index>(inner_points());
+    extra_.push_back(p);
+  }
+  rest_ = PointBuffer(inner_points());
+  for (std::size_t i = 0; i < inner_points(); ++i)
+    CopyPoint(rest, i < points() ? i : extra_[i - points()], rest_.view(), i);
+  smoothed_rest_ = PointBuffer(inner_points());
+  Inner(rest, smoothed_rest_.view());
+}
+
+void DeltaMushStep::Inner(ConstPointsView in, PointsView inner) const {
+  KPSA_CHECK_EQ(in.count, points());
+  KPSA_CHECK_EQ(inner.count, inner_points());
+  AlignedFloats scratch(smoothing_.ScratchFloats());
+  smoothing_.Run({.envelope = 1, .displacement = 0, .pivot = MiddleOf(in)}, in,
+                 {inner.x, inner.y, inner.z, points()}, scratch.span());
+  for (std::size_t i = 0; i < points(); ++i) {
+    if (!smoothed_[i]) CopyPoint(in, i, inner, i);
+  }
+  for (std::size_t k = 0; k < extra_.size(); ++k) CopyPoint(in, extra_[k], inner, points() + k);
+}
+
+DeltaMushStep::Part DeltaMushStep::Bind(std::span<const Index> out_points) const {
+  KPSA_CHECK(IsSortedSet(out_points, points()));
+  Part part;
+  part.inputs_ = {envelope_, displacement_, {}};
+  std::vector<bool> read(inner_points(), false);
+  MushFrames::Outputs outputs{out_points, {}, {}};
+  for (Index p : out_points) {
+    outputs.in.push_back(in_rows_[p]);
+    outputs.masks.push_back(masks_[p]);
+    if (!Changes(p)) continue;
+    read[p] = true;
+    for (Index q : topology_->neighbors().row(p)) read[q] = true;
+  }
+  if (CountsUp(outputs.in)) outputs.in.clear();
+  if (std::ranges::all_of(outputs.masks, [](float w) { return w == 1; })) outputs.masks.clear();
+  std::vector<Index> local_of(points(), kNoIndex);
+  for (Index p = 0; p < points(); ++p) {
+    if (!read[p]) continue;
+    local_of[p] = static_cast<Index>(part.source_.size());
+    part.source_.push_back(p);
+  }
+  for (Index p : out_points) read[in_rows_[p]] = true;
+  for (Index i = 0; i < inner_points(); ++i) {
+    if (read[i]) part.inner_.push_back(i);
+  }
+  part.local_count_ = part.source_.size();
+  if (CountsUp(part.source_)) part.source_.clear();
+
+  AlignedFloats smoothed(part.ScratchFloats());
+  PackMush(smoothed_rest_.view(), part.source_.empty() ? nullptr : part.source_.data(), kNoPivot, 0,
+           part.local_count_, smoothed.data());
+  part.frames_ =
+      MushFrames(*topology_, std::move(outputs), local_of, rest_.view(), smoothed.data(), kNoPivot);
+  return part;
+}
+
+void DeltaMushStep::Part::Run(ConstPointsView inner, PointsView out, std::span<float> scratch,
+                              const Parallel* parallel) const noexcept {
+  KPSA_CHECK_LE(ScratchFloats(), scratch.size());
+  KPSA_CHECK(inner_.empty() || inner_.back() < inner.count);
+  ForRanges(parallel, local_count_, 8192, [&](std::size_t begin, std::size_t end) {
+    PackMush(inner, source_.empty() ? nullptr : source_.data(), kNoPivot, begin, end, scratch.data());
+  });
+  frames_.Run(inputs_, scratch.data(), inner, out, parallel);
+}
+
+}  // namespace kpsa::engine

@@ -1,0 +1,69 @@
+// deltaMush in two: what smooths, and the frames that give the detail back. In between are the inner points, from which
+// the frames go on by themselves: of smoothed points, and of some as they came in.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/points.h"
+#include "nodes/kernels/delta_mush.h"
+#include "nodes/kernels/mush_frames.h"
+#include "nodes/kernels/parallel_hook.h"
+#include "nodes/kernels/topology.h"
+
+namespace kpsa::engine {
+
+// Inner point i below points() is mesh point i: smoothed where a frame reads it (what does not smooth is as it came
+// in), as it came in elsewhere. After them, what has no row yet: points as they came in which an output is mixed with,
+// or is. Immutable, any thread.
+class DeltaMushStep {
+ public:
+  struct Constants {
+    double envelope = 1, displacement = 1;
+    std::vector<float> weights;  // of all points; empty: 1
+  };
+  // Some of the outputs. Of Run, the bits of a point do not depend on which others there are.
+  class Part {
+   public:
+    const std::vector<Index>& inner() const { return inner_; }  // that Run reads, ascending
+    std::size_t ScratchFloats() const { return 4 * PaddedCount(local_count_); }
+    // inner: a view of all of them. No pivot: edges are differences of what is read, and what is added to a smoothed
+    // point is small.
+    void Run(ConstPointsView inner, PointsView out, std::span<float> scratch,
+             const Parallel* parallel = nullptr) const noexcept;
+
+   private:
+    friend class DeltaMushStep;
+    MushFrames frames_;
+    MushFrames::Inputs inputs_ = {};
+    std::size_t local_count_ = 0;
+    std::vector<Index> inner_, source_;  // source_: local number -> inner point; empty if the same
+  };
+
+  // rest: points of the whole mesh. settings must be valid; the topology must outlive the step.
+  DeltaMushStep(const Topology& topology, ConstPointsView rest, const DeltaMushSettings& settings,
+                Constants constants);
+
+  bool changes() const { return changes_; }  // any point
+  std::size_t points() const { return in_rows_.size(); }
+  std::size_t inner_points() const { return points() + extra_.size(); }
+  void Inner(ConstPointsView in, PointsView inner) const;  // two buffers
+  Part Bind(std::span<const Index> out_points) const;      // sorted
+
+ private:
+  bool Changes(Index point) const { return masks_[point] != 0; }
+
+  const Topology* topology_;
+  DeltaMushKernel smoothing_;  // of all points
+  float envelope_, displacement_;
+  bool changes_ = false;
+  // [points()]
+  std::vector<float> masks_;    // 0 where nothing changes
+  std::vector<Index> in_rows_;  // the row of a point as it came in; any where no output reads that
+  std::vector<bool> smoothed_;  // whether row i is smoothed
+  // [inner_points()], and of the rows after points()
+  PointBuffer rest_, smoothed_rest_;  // as they come in, and the inner points
+  std::vector<Index> extra_;          // whose they are
+};
+
+}  // namespace kpsa::engine
