@@ -109,8 +109,9 @@ struct BoundKernel {
   std::size_t scratch_floats = 0;  // per evaluation, from the thread's workspace
   std::size_t state_bytes = 0;     // per evaluator, zeroed at its creation
   float cost_ns = 0;  // of an evaluation, where the points that come out do not say it; 0: ComputeGroup's
-  std::size_t object_bytes = 0;  // sizeof, where it is worth fetching ahead of the compute
-  ComputeFn compute = nullptr;   // in place of the group's, as the binding knows more; null: the group's
+  Index touched_points = kNoIndex;  // of these, that cost ComputeGroup's a point; kNoIndex: all
+  std::size_t object_bytes = 0;     // sizeof, where it is worth fetching ahead of the compute
+  ComputeFn compute = nullptr;      // in place of the group's, as the binding knows more; null: the group's
 };
 
 using DemandFn = std::function<void(Demand&)>;

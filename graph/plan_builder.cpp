@@ -336,10 +336,11 @@ void PlanBuilder::FillSteps() {
         info.points_total += set.total();
       }
     }
-    info.cost_ns = group == nullptr
-                       ? 10.0f + 0.5f * static_cast<float>(info.points)
-                       : group->cost_ns + group->cost_ns_per_point * static_cast<float>(info.points);
-    if (const float of_bound = kernels_[placed_[n]].cost_ns; of_bound > 0) info.cost_ns = of_bound;
+    const BoundKernel& kernel = kernels_[placed_[n]];
+    const auto touched = static_cast<float>(std::min(info.points, kernel.touched_points));
+    info.cost_ns = group == nullptr ? 10.0f + 0.5f * static_cast<float>(info.points)
+                                    : group->cost_ns + group->cost_ns_per_point * touched;
+    if (kernel.cost_ns > 0) info.cost_ns = kernel.cost_ns;
   }
 }
 

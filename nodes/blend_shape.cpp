@@ -151,7 +151,7 @@ KPSA_NODES(blend_shape, registry) {
                  .own = DeclareBlendShape,
                  .bind = BindBlendShape,
                  .demand = DemandBlendShape})
-      .cost(300, 2);
+      .cost(100, 0.6f);
 
   registry.add("combinationShape", "The weight of a shape that acts where others act together.")
       .category("deformer")

@@ -91,9 +91,13 @@ Result<std::vector<float>> SoftModWeights(const Structural& s, const PointSet& p
 Result<BoundKernel> BindSoftMod(const Binding& binding) {
   Result<std::vector<float>> weights = SoftModWeights(binding.structural(), binding.output("outPoints"));
   if (!weights.ok()) return weights.status();
+  const auto touched =
+      static_cast<Index>(weights->size()) - static_cast<Index>(std::ranges::count(*weights, 0.0f));
   Result<ClusterBound> bound = MakeCluster(binding, std::move(*weights));
   if (!bound.ok()) return bound.status();
-  return MakeBound(std::move(*bound), 0);
+  BoundKernel made = MakeBound(std::move(*bound), 0);
+  made.touched_points = touched;
+  return made;
 }
 
 void ComputeCluster(ClusterContext c) {
@@ -139,13 +143,13 @@ KPSA_NODES(cluster, registry) {
                                          .doc = "Moves weighted points with a handle.",
                                          .own = DeclareHandle,
                                          .bind = BindCluster})
-      .cost(200, 0.3f);
+      .cost(40, 0.25f);
   AddDeformer<ComputeCluster>(registry,
                               {.name = "softMod",
                                .doc = "Moves points with a handle, fading with the distance from a centre.",
                                .own = DeclareSoftMod,
                                .bind = BindSoftMod})
-      .cost(200, 0.3f)
+      .cost(40, 0.25f)
       .touches("inPoints", [](const Structural& structural, const PointSet& points) {
         const Result<std::vector<float>> weights = SoftModWeights(structural, points);
         return !weights.ok() || std::ranges::any_of(*weights, [](float w) { return w != 0; });

@@ -111,7 +111,10 @@ Result<BoundKernel> BindWire(const Binding& binding) {
                   *frame, 0, several};
   if (several) bound.view_floats = PaddedCount(curves.size() * sizeof(ConstPointsView) / sizeof(float));
   const std::size_t scratch = bound.view_floats + bound.kernel.ScratchFloats();
-  return MakeBound(std::move(bound), scratch);
+  const auto touched = static_cast<Index>(bound.kernel.affected_points());
+  BoundKernel made = MakeBound(std::move(bound), scratch);
+  made.touched_points = touched;
+  return made;
 }
 
 void ComputeWire(WireContext c) {
@@ -175,7 +178,7 @@ KPSA_NODES(curve, registry) {
       .unit(Unit::kLength)
       .out("worldMatrix", Type::kMatrix, "parentMatrix, which carries the curve")
       .compute<ComputeDisplacements>()
-      .cost(150, 20)
+      .cost(20, 4)
       .compute<ComputeWorldMatrix>()
       .cost(10, 0);
   AddDeformer<ComputeWire>(registry, {.name = "wire",
@@ -183,7 +186,7 @@ KPSA_NODES(curve, registry) {
                                       .own = DeclareWire,
                                       .bind = BindWire,
                                       .demand = DemandWire})
-      .cost(300, 0.8f);
+      .cost(35, 2.4f);
 }
 
 }  // namespace kpsa::engine

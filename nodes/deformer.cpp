@@ -94,6 +94,12 @@ NodeBuilder AddDeformer(NodeRegistry& registry, Deformer deformer, ComputeFn com
       own = std::move(*made);
     }
     if (own.compute == nullptr) own.compute = compute;
+    if (own.touched_points == kNoIndex) {
+      const std::vector<float> weights = BoundWeights(binding);
+      if (!weights.empty())
+        own.touched_points =
+            static_cast<Index>(weights.size()) - static_cast<Index>(std::ranges::count(weights, 0.0f));
+    }
     if (binding.input("falloffWeights").total() == 0) return own;
     WithFalloff bound{own.object, own.compute, (own.scratch_floats + 15) / 16 * 16, points, falloff, {}};
     const PointSet &in = binding.input("inPoints"), &out = binding.output("outPoints");

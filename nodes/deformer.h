@@ -103,7 +103,10 @@ Parallel HostParallel(NodeContext<Ports...> c) {
 // A kernel and what its adapter keeps beside it, as the engine wants it.
 template <typename T>
 BoundKernel MakeBound(T object, std::size_t scratch_floats, std::size_t state_bytes = 0) {
-  return BoundKernel{std::make_shared<const T>(std::move(object)), scratch_floats, state_bytes, sizeof(T)};
+  return BoundKernel{.object = std::make_shared<const T>(std::move(object)),
+                     .scratch_floats = scratch_floats,
+                     .state_bytes = state_bytes,
+                     .object_bytes = sizeof(T)};
 }
 
 }  // namespace kpsa::engine

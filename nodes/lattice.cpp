@@ -189,7 +189,7 @@ KPSA_NODES(lattice, registry) {
                                .own = DeclareLattice,
                                .bind = BindLattice,
                                .demand = DemandLattice})
-      .cost(500, 3);
+      .cost(130, 4);
 }
 
 }  // namespace kpsa::engine

@@ -104,7 +104,7 @@ template <typename Map, FixedName... kSettings>
 void Add(NodeRegistry& registry, const char* name, const char* doc, void (*own)(NodeBuilder&)) {
   AddDeformer<ComputeNonLinear<Map, kSettings...>>(
       registry, {.name = name, .doc = doc, .own = own, .bind = BindNonLinear})
-      .cost(300, 1.2f);
+      .cost(50, 1.2f);
 }
 
 }  // namespace

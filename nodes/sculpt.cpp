@@ -83,7 +83,7 @@ KPSA_NODES(sculpt, registry) {
                                         .doc = "A sphere pushes points out of itself.",
                                         .own = DeclareSculpt,
                                         .bind = BindSculpt})
-      .cost(300, 1);
+      .cost(60, 0.75f);
 }
 
 }  // namespace kpsa::engine

@@ -170,7 +170,7 @@ KPSA_NODES(skin_cluster, registry) {
        .own = DeclareSkin,
        .bind = BindSkin,
        .demand = DemandSkin})
-      .cost(300, 3);
+      .cost(70, 2.5f);
 }
 
 }  // namespace kpsa::engine

@@ -1,6 +1,7 @@
 #include "kpsa/training/trainer.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "kpsa/training/finer_subspaces.h"
@@ -10,9 +11,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
-// Inner points are trained on where a frame costs so many times what their last steps do, and taken where that is
-// clearly cheaper
-constexpr double kWorthSplitting = 2, kClearlyCheaper = 0.9;
+constexpr double kWorthSplitting = 2;     // what a frame costs, in last steps: inner points are tried
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -61,10 +60,13 @@ struct Trained {
   double ns = 0;       // what a frame is expected to cost, on the scale of the nodes' costs,
   double full_ns = 0;  // and the whole evaluation
   double seconds = 0;  // that it took
+  bool ended = false;  // with its cues, as these lie where the last step is dear: there is no subspace
 };
 
+// Ends with its cues where these are points that come out, and a frame then is expected to cost more than `enough`.
 Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
-                          const TrainOptions& options) {
+                          const TrainOptions& options,
+                          double enough = std::numeric_limits<double>::infinity()) {
   TrainingSetup setup(rig, clips, options);
   TrainingRecord record = RecordOf(clips, options);
   KPSA_RETURN_IF_ERROR(setup.Prepare());
@@ -87,6 +89,15 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   KPSA_RETURN_IF_ERROR(FindModes(setup, &poses, &modes, &record));
   SubspaceCandidates candidates{&setup, &poses, &modes, &record, setup.limit.elapsed() - before_modes};
   KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
+
+  const CueChoice& choice = candidates.cues.choice;
+  if (choice.cost > enough &&
+      std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; })) {
+    record.tried.push_back({kForAllPoints, choice.cues.size(),
+                            static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
+                            choice.cost / setup.full_cost, false});
+    return Trained{{}, std::move(record), choice.cost, setup.full_cost, setup.limit.elapsed(), true};
+  }
 
   // Subspaces
   KPSA_RETURN_IF_ERROR(setup.Say("subspace", 0.85));
@@ -114,7 +125,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   const Result<double> points = setup.CostOfPoints(candidates.cues.set.cues);
   if (!points.ok()) return points.status();
   const double ns = *points + setup.CostOfSteps() + candidates.cost.ns;
-  return Trained{std::move(*subspace), std::move(record), ns, setup.full_cost, setup.limit.elapsed()};
+  return Trained{std::move(*subspace), std::move(record), ns, setup.full_cost, setup.limit.elapsed(), false};
 }
 
 // The rig with its last steps taken apart, in every clip; nothing where it has none.
@@ -146,6 +157,15 @@ Result<std::optional<TrainingRig>> SplitRig(const TrainingRig& rig, const std::v
   return std::optional(std::move(with));
 }
 
+// What was tried is told apart from that of another training; also where there was no choice.
+void NameTried(Trained* trained, const char* suffix) {
+  std::vector<TrainingRecord::Tried>& tried = trained->record.tried;
+  if (tried.empty())
+    tried.push_back({kForAllPoints, trained->subspace.cues.size(), trained->subspace.rows(), 0,
+                     trained->ns / trained->full_ns, true});
+  for (TrainingRecord::Tried& one : tried) one.what += suffix;
+}
+
 // What was tried, of both.
 void AddTried(const Trained& other, Trained* taken) {
   std::vector<TrainingRecord::Tried> all = other.record.tried;
@@ -165,26 +185,28 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   if (!split.ok()) return split.status();
   if (!split->has_value()) return TrainOnce(rig, clips, options);
   if (options.inner == TrainOptions::Inner::kAlways) return TrainOnce(**split, clips, options);
-  Result<Trained> whole = TrainOnce(rig, clips, options);
-  if (!whole.ok()) return whole;
   double steps = 0;
   for (std::size_t m = 0; m < (*split)->split.size(); ++m)
     steps += (*split)->step(m) == nullptr ? 0 : static_cast<double>((*split)->step(m)->cost_ns());
-  if (whole->ns < kWorthSplitting * steps || options.seconds < 2 * whole->seconds) return whole;
+  const double enough = kWorthSplitting * steps;
+  Result<Trained> whole = TrainOnce(rig, clips, options, enough);
+  if (!whole.ok() || whole->ns < enough) return whole;
+  if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
   TrainOptions rest = options;
   rest.seconds -= whole->seconds;
   Result<Trained> inner = TrainOnce(**split, clips, rest);
-  if (!inner.ok()) return inner.status().kind() == ErrorKind::kInterrupted ? inner : whole;
-  for (Trained* one : {&*whole, &*inner}) {
-    if (!one->record.tried.empty()) continue;
-    one->record.tried.push_back(
-        {kForAllPoints, one->subspace.cues.size(), one->subspace.rows(), 0, one->ns / one->full_ns, true});
+  if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
+  if (inner.ok()) NameTried(&*inner, kBeforeLastStep);
+  if (whole->ended && !(inner.ok() && inner->ns < whole->ns)) {
+    if (inner.ok()) rest.seconds -= inner->seconds;
+    whole = TrainOnce(rig, clips, rest);
+    if (!whole.ok()) return whole;
   }
-  for (TrainingRecord::Tried& one : inner->record.tried) one.what += kBeforeLastStep;
-  const bool cheaper = inner->ns < kClearlyCheaper * whole->ns;
-  Trained& taken = cheaper ? *inner : *whole;
-  AddTried(cheaper ? *whole : *inner, &taken);
-  return std::move(taken);
+  if (!inner.ok()) return whole;
+  if (!whole->ended) NameTried(&*whole, "");
+  const bool cheaper = inner->ns < whole->ns;
+  AddTried(cheaper ? *whole : *inner, cheaper ? &*inner : &*whole);
+  return cheaper ? std::move(inner) : std::move(whole);
 }
 
 Result<Subspace> Finish(Result<Trained> trained) {

@@ -71,6 +71,8 @@ class WrapKernel {
              std::span<const float> point_weights = {});
 
   std::size_t point_count() const { return count_; }
+  std::size_t influence_count() const { return shares_.size(); }  // of all points
+  std::size_t driver_count() const { return in_count_; }
   std::size_t ScratchFloats() const;
   void Run(const Inputs& inputs, ConstPointsView in, PointsView out, std::span<float> scratch,
            const Parallel* parallel = nullptr) const noexcept;

@@ -43,7 +43,7 @@ TEST_F(InnerPoints, HitsRunNoMushAndKeepTheTolerance) {
   RigRun full(folder_->rig()), run(folder_->rig(), {.subspace = trained_});
   ASSERT_TRUE(run.ok()) << run.error;
   std::size_t hits = 0, beyond = 0, misses = 0;
-  const auto poses = SmoothPoses(run.rig, 60, 1.1);
+  const auto poses = SmoothPoses(run.rig, 60, 1.6);
   for (const auto& pose : poses) {
     full.Pose(pose), run.Pose(pose);
     const RunFrame exact = full.Evaluate(), frame = run.Evaluate();
