@@ -316,8 +316,9 @@ Result<Compiler::SplitPoints> Compiler::SplitOrThrow(const Graph& graph, const P
     const AttributeDef& a = def.attributes[static_cast<std::size_t>(attribute)];
     const PlugRef plug{points.node, attribute, input.element, -1};
     if (a.type == Type::kMatrix) continue;
-    const Connection* driven = graph.FindConnection(plug);
-    if (IsPointType(a.type) && split.in.attribute < 0 && driven != nullptr) {
+    if (IsPointType(a.type) && split.in.attribute < 0) {  // the first are those that it deforms
+      const Connection* driven = graph.FindConnection(plug);
+      if (driven == nullptr) return SplitPoints();
       split.in = driven->source;
       continue;
     }

@@ -3,9 +3,10 @@
 // may reconstruct the inner ones and run the step itself, where these are smoother than what comes out: of a deltaMush
 // they are the smoothed points, and the step turns the detail with their frames.
 //
-// Moving, turning and uniformly scaling the points that come in does the same to the inner points and to those that
-// come out, so the space does not matter. What the node has besides points (envelope, displacement) is baked in, as it
-// is at rest; it is the caller's to know that it does not vary. Immutable, any thread.
+// Moving and turning the points that come in does the same to the inner points and to those that come out; scaling them
+// uniformly, to the inner points: the step is to be run where what carries the points is as large as at rest. What the
+// node has besides points (envelope, displacement) is baked in, as it is at rest; it is the caller's to know that it
+// does not vary. Immutable, any thread.
 #pragma once
 
 #include <memory>

@@ -14,6 +14,8 @@ namespace kpsa::engine {
 
 namespace {
 
+constexpr double kExactStep = 0.05;  // of the tolerance: what a last step may be off by, run by itself
+
 double TimeOf(const SampledPose& pose, const TrainingClip& clip) {
   return clip.times.front() + pose.phase * (clip.times.back() - clip.times.front());
 }
@@ -21,12 +23,15 @@ double TimeOf(const SampledPose& pose, const TrainingClip& clip) {
 }  // namespace
 
 Result<std::shared_ptr<const Plan>> PoseRecorder::CompileFor(const std::vector<PlugRef>& varying) {
-  // Outputs: points of the meshes, candidate points, signals, space
+  // Outputs: points of the meshes, or what their last steps start from; what comes out of these; candidate points, signals, space
   Request request;
   const AccelerationTarget& target = rig_.target;
   for (std::size_t m = 0; m < target.meshes.size(); ++m) {
     const bool split = rig_.step(m) != nullptr;
     request.outputs.push_back({split ? rig_.split[m].in : target.meshes[m].stages.back().points, {}});
+  }
+  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
+    if (rig_.step(m) != nullptr) request.outputs.push_back({target.meshes[m].stages.back().points, {}});
   }
   for (const CandidateStage& candidate : candidates_) {
     const PlugRef& points = target.meshes[candidate.mesh].stages[candidate.stage].points;
@@ -103,7 +108,30 @@ Matrix4 PoseRecorder::SpaceFromWorld(const Evaluator& evaluator) const {
       SpaceFrameOf(evaluator.Get<Matrix4>(last), inverse_rest_stretch_).world_from_space);
 }
 
-void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const {
+namespace {
+
+PointBuffer InSpace(ConstPointsView points, bool world, const Matrix4& space_from_world) {
+  PointBuffer moved(points.count);
+  const PointsView to = moved.view();
+  for (std::size_t i = 0; i < points.count; ++i) {
+    Double3 p{points.x[i], points.y[i], points.z[i]};
+    if (world) p = TransformPoint(space_from_world, p);
+    to.x[i] = static_cast<float>(p.x), to.y[i] = static_cast<float>(p.y), to.z[i] = static_cast<float>(p.z);
+  }
+  return moved;
+}
+
+// Infinite where a point is no number, which is told elsewhere.
+double LargestOff(ConstPointsView a, ConstPointsView b) {
+  double largest = 0;
+  for (std::size_t i = 0; i < a.count; ++i)
+    largest = std::max(largest, Length(Double3{a.x[i], a.y[i], a.z[i]} - Double3{b.x[i], b.y[i], b.z[i]}));
+  return largest;
+}
+
+}  // namespace
+
+double PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const {
   const AccelerationTarget& target = rig_.target;
   const Matrix4 space_from_world = SpaceFromWorld(evaluator);
   Index o = 0;
@@ -117,7 +145,10 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
       row[column++] = static_cast<float>(p.z);
     }
   };
-  for (std::size_t m = 0; m < target.meshes.size(); ++m) {
+  const std::size_t meshes = target.meshes.size();
+  Index of_step = static_cast<Index>(meshes);
+  double off = 0;
+  for (std::size_t m = 0; m < meshes; ++m) {
     const LastStep* step = rig_.step(m);
     const ConstPointsView points = evaluator.Points(o++);
     const bool in_space = target.meshes[m].stages.back().world;
@@ -125,15 +156,22 @@ void PoseRecorder::Store(const Evaluator& evaluator, std::span<float> row) const
       store_points(points, in_space);
       continue;
     }
-    PointBuffer inner(step->inner_points());
-    step->Inner(points, inner.view());
-    store_points(std::as_const(inner).view(), in_space);
+    const PointBuffer in = InSpace(points, in_space, space_from_world),
+                      out = InSpace(evaluator.Points(of_step++), in_space, space_from_world);
+    PointBuffer inner(step->inner_points()), made(step->points());
+    step->Inner(in.view(), inner.view());
+    store_points(std::as_const(inner).view(), false);
+    AlignedFloats scratch(steps_[m]->scratch_floats());
+    steps_[m]->Run(std::as_const(inner).view(), made.view(), scratch.span());
+    off = std::max(off, LargestOff(std::as_const(made).view(), out.view()));
   }
+  o = of_step;
   for (const CandidateStage& candidate : candidates_)
     store_points(evaluator.Points(o++), target.meshes[candidate.mesh].stages[candidate.stage].world);
   StoreSignals(evaluator, space_from_world, o, row.subspan(column));
   StoreProducts(products_, layout_, row);
   KPSA_CHECK_EQ(column + layout_.scalars, row.size());
+  return off;
 }
 
 void PoseRecorder::StoreSignals(const Evaluator& evaluator, const Matrix4& space_from_world, Index o,
@@ -206,8 +244,10 @@ Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t
       set(i, evaluator);
       Status status = evaluator.Evaluate();
       if (status.ok()) {
-        Store(evaluator, rows[i]);
-        continue;
+        const double off = Store(evaluator, rows[i]);
+        if (!(off > kExactStep * tolerance_)) continue;
+        status = Status::Invalid(
+            "what comes out of the last step differs by {:.3g} m from what the step gives", off);
       }
       std::lock_guard<std::mutex> lock(mutex);
       if (i < failed) failed = i, failure = std::move(status);

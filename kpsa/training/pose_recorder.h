@@ -1,6 +1,6 @@
 // Evaluates poses of a rig into rows of a pose matrix: output points, candidate points of earlier stages,
 // and entries of signals, all in the space of the target. A pose with a value that is not finite is an error
-// that names it. Internal to training.
+// that names it; so is one in which a last step, run by itself, does not give what comes out. Internal to training.
 #pragma once
 
 #include <map>
@@ -24,13 +24,22 @@ std::vector<Index> FirstScalars(std::span<const Signal> signals, const PoseLayou
 
 class PoseRecorder {
  public:
+  // tolerance: a share of it is what a last step, run by itself, may be off by; metres.
   PoseRecorder(const TrainingRig& rig, Compiler* compiler, std::vector<CandidateStage> candidates,
-               std::vector<Signal> signals, const Matrix4& inverse_rest_stretch = Matrix4())
+               std::vector<Signal> signals, const Matrix4& inverse_rest_stretch = Matrix4(),
+               double tolerance = 0)
       : rig_(rig),
         compiler_(compiler),
         candidates_(std::move(candidates)),
         signals_(std::move(signals)),
-        inverse_rest_stretch_(inverse_rest_stretch) {}
+        inverse_rest_stretch_(inverse_rest_stretch),
+        tolerance_(tolerance) {
+    for (std::size_t m = 0; m < rig.split.size(); ++m) {
+      const LastStep* step = rig.step(m);
+      steps_.push_back(step == nullptr ? nullptr
+                                       : step->Bind(PointSet::All(static_cast<Index>(step->points()))));
+    }
+  }
   // Scalars of the layout: signals that are not relative, `products` of them, relative matrices.
   Result<PoseLayout> Layout(std::size_t products = 0);
   // What is recorded from now on has them.
@@ -66,7 +75,8 @@ class PoseRecorder {
   Status Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
                 const std::function<void(std::size_t, Evaluator&)>& set,
                 const std::function<std::string(std::size_t)>& name);
-  void Store(const Evaluator& evaluator, std::span<float> row) const;
+  // How far what comes out of last steps is from what these give, run by themselves (metres).
+  double Store(const Evaluator& evaluator, std::span<float> row) const;
 
   const TrainingRig& rig_;
   Compiler* compiler_;
@@ -76,6 +86,8 @@ class PoseRecorder {
   // By clip (none: the rest pose), and whether controls are sampled; binding wraps takes long
   std::map<std::pair<std::optional<std::string>, bool>, std::shared_ptr<const Plan>> plans_;
   Matrix4 inverse_rest_stretch_;
+  double tolerance_ = 0;
+  std::vector<std::shared_ptr<const LastStep::Bound>> steps_;  // by mesh, as rig.split
   PoseLayout layout_;
 };
 

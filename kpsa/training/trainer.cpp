@@ -11,7 +11,8 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
-constexpr double kWorthSplitting = 2;     // what a frame costs, in last steps: inner points are tried
+// What a frame costs, in last steps: inner points are tried; and of that, with which they are taken
+constexpr double kWorthSplitting = 2, kClearlyCheaper = 0.8;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -63,7 +64,8 @@ struct Trained {
   bool ended = false;  // with its cues, as these lie where the last step is dear: there is no subspace
 };
 
-// Ends with its cues where these are points that come out, and a frame then is expected to cost more than `enough`.
+// Ends with its cues where these are points that come out, a frame is expected to cost more than `enough`, and no cues of
+// tiles would be tried.
 Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                           const TrainOptions& options,
                           double enough = std::numeric_limits<double>::infinity()) {
@@ -91,7 +93,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
 
   const CueChoice& choice = candidates.cues.choice;
-  if (choice.cost > enough &&
+  if (choice.cost > enough && std::max(choice.misses, choice.misses_of_stricter) <= kManyMisses &&
       std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; })) {
     record.tried.push_back({kForAllPoints, choice.cues.size(),
                             static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
@@ -197,14 +199,14 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   Result<Trained> inner = TrainOnce(**split, clips, rest);
   if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
   if (inner.ok()) NameTried(&*inner, kBeforeLastStep);
-  if (whole->ended && !(inner.ok() && inner->ns < whole->ns)) {
+  if (whole->ended && !(inner.ok() && inner->ns < kClearlyCheaper * whole->ns)) {
     if (inner.ok()) rest.seconds -= inner->seconds;
     whole = TrainOnce(rig, clips, rest);
     if (!whole.ok()) return whole;
   }
   if (!inner.ok()) return whole;
   if (!whole->ended) NameTried(&*whole, "");
-  const bool cheaper = inner->ns < whole->ns;
+  const bool cheaper = inner->ns < kClearlyCheaper * whole->ns;
   AddTried(cheaper ? *whole : *inner, cheaper ? &*inner : &*whole);
   return cheaper ? std::move(inner) : std::move(whole);
 }

@@ -56,7 +56,7 @@ Status TrainingSetup::Prepare() {
     inverse_rest_stretch = InverseRestStretch(rest->get<Matrix4>());
   }
   recorder = std::make_unique<PoseRecorder>(rig, &compiler, std::move(candidates), std::move(signals),
-                                            inverse_rest_stretch);
+                                            inverse_rest_stretch, options.tolerance);
   Result<PoseLayout> found_layout =
       recorder->Layout(measures && !options.without.cue_products ? kCueProducts : 0);
   if (!found_layout.ok()) return found_layout.status();

@@ -119,7 +119,8 @@ TEST(Caches, OfPointsThatAreNotFiniteAreRefused) {
     const ProcessResult run =
         RunKpsa({"eval", kHello, "--set", "upper.translateX=1e36", "--frames", "0:1", "-o", folder / name});
     EXPECT_EQ(run.exit_code, 4) << name << run.err;
-    EXPECT_NE(run.err.find("not finite after node \"mush\" (deltaMush)"), std::string::npos) << name << run.err;
+    EXPECT_NE(run.err.find("not finite after node \"mush\" (deltaMush)"), std::string::npos)
+        << name << run.err;
     EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
   }
 }

@@ -159,7 +159,8 @@ TEST(Faults, MemoryIsLimitedWhereItIsAskedFor) {
       0);
   // A small archive that claims gigabytes: two arrays of zeros, deflated
   const ProcessResult made = RunShell(
-      "/usr/bin/python3 -c \"import numpy; numpy.savez_compressed('bomb.npz', a=numpy.zeros((1000, 100000, 3), "
+      "/usr/bin/python3 -c \"import numpy; numpy.savez_compressed('bomb.npz', a=numpy.zeros((1000, 100000, "
+      "3), "
       "numpy.float32))\"",
       120, folder.path());
   if (made.exit_code != 0) GTEST_SKIP() << "no NumPy: " << made.err;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <numeric>
 
+#include "kpsa/training_record.h"
 #include "tests/cli/hello_folder.h"
 #include "tests/cli/rig_run.h"
 
@@ -168,6 +169,31 @@ TEST(InnerPointsOfRigs, NotWhereAControlReachesTheStep) {
   const auto trained = TrainRig(folder.rig(), InnerTraining());
   ASSERT_NE(trained, nullptr);
   EXPECT_FALSE(trained->of_inner());
+}
+
+// They are tried where what comes out is dear, and taken where they are clearly cheaper.
+TEST(InnerPointsOfRigs, AreTakenWhereTheyCostLess) {
+  const HelloFolder folder;
+  std::size_t inner = 0, tried = 0;
+  for (const double tolerance : {2e-5, 5e-4, 1e-2}) {
+    TrainOptions options = InnerTraining(TrainOptions::Inner::kIfCheaper);
+    options.tolerance = tolerance;
+    const auto trained = TrainRig(folder.rig(), options);
+    ASSERT_NE(trained, nullptr);
+    double least_of_inner = kInfinity, taken = 0;
+    for (const TrainingRecord::Tried& one : ParseTraining(trained->training).tried) {
+      if (one.what.ends_with(kBeforeLastStep)) least_of_inner = std::min(least_of_inner, one.cost);
+      if (one.taken) taken = one.cost;
+    }
+    tried += least_of_inner < kInfinity, inner += trained->of_inner();
+    if (trained->of_inner()) {
+      EXPECT_EQ(taken, least_of_inner);
+    }
+    if (least_of_inner < 0.5 * taken) ADD_FAILURE() << tolerance << " takes what costs twice as much";
+  }
+  EXPECT_GE(tried, 1u);
+  EXPECT_GE(inner, 1u);
+  EXPECT_LT(tried, 3u) << "not where hits cost next to nothing";
 }
 
 // What is set on the step was never seen: every frame is evaluated fully.

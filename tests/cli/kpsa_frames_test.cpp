@@ -3,8 +3,10 @@
 // the points, and those before the last step of its mush (graph/last_step.h).
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <random>
+#include <tuple>
 
 #include "graph/frames.h"
 #include "tests/cli/hello_folder.h"
@@ -17,7 +19,10 @@ namespace {
 class KpsaFrames : public ::testing::TestWithParam<TrainOptions::Inner> {
  protected:
   void SetUp() override {
-    if (trained_ != nullptr && trained_->of_inner() == of_inner()) return;
+    if (const auto known = prepared_.find(of_inner()); known != prepared_.end()) {
+      std::tie(trained_, mixed_, poses_, tau_lo_, tau_) = known->second;
+      return;
+    }
     TrainOptions options = QuickTraining();
     options.inner = GetParam();
     if (of_inner())
@@ -39,8 +44,9 @@ class KpsaFrames : public ::testing::TestWithParam<TrainOptions::Inner> {
     std::sort(scores.begin(), scores.end());
     tau_lo_ = scores[scores.size() / 3], tau_ = scores[2 * scores.size() / 3];
     mixed_ = WithThreshold(*trained_, tau_lo_, tau_);
+    prepared_[of_inner()] = {trained_, mixed_, poses_, tau_lo_, tau_};
   }
-  static void TearDownTestSuite() { trained_.reset(), mixed_.reset(), poses_.clear(); }
+  static void TearDownTestSuite() { trained_.reset(), mixed_.reset(), poses_.clear(), prepared_.clear(); }
   // Inner points follow the skin so well that their ranges are trusted much farther
   static double beyond() { return of_inner() ? 2.6 : 1.5; }
   static bool of_inner() { return GetParam() == TrainOptions::Inner::kAlways; }
@@ -67,6 +73,9 @@ class KpsaFrames : public ::testing::TestWithParam<TrainOptions::Inner> {
   static inline std::shared_ptr<const Subspace> trained_, mixed_;
   static inline std::vector<std::vector<double>> poses_;
   static inline double tau_lo_ = 0, tau_ = 0;
+  static inline std::map<bool, std::tuple<std::shared_ptr<const Subspace>, std::shared_ptr<const Subspace>,
+                                          std::vector<std::vector<double>>, double, double>>
+      prepared_;  // by of_inner()
 };
 
 TEST_P(KpsaFrames, HitsBlendsAndMissesAreWhatTheScoreSays) {

@@ -15,6 +15,7 @@ class FinerTiles : public ::testing::Test {
   // What training compared; tiles stored finely are in it only where they were tried.
   static std::vector<TrainingRecord::Tried> Tried(TrainOptions options) {
     options.may_have_cues_by_tile = false;  // whose tiles are stored finely anyway
+    options.inner = TrainOptions::Inner::kNever;
     const auto trained = TrainRig(kHello, options);
     EXPECT_NE(trained, nullptr);
     return trained == nullptr ? std::vector<TrainingRecord::Tried>() : ParseTraining(trained->training).tried;

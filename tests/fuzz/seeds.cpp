@@ -109,6 +109,9 @@ void WriteSubspaces(const std::string& folder) {
   s.tolerance = 1e-3;
   s.ranges = {MakeTrainedRange("a.x", -1, 1, 0, 0.05)};
   Check(WriteSubspace(s, folder + "/products.kpsa"));
+  Subspace before_last_step = s;
+  before_last_step.outputs = {{"sheet@mush", 380, "mush", 400}};
+  Check(WriteSubspace(before_last_step, folder + "/inner.kpsa"));
   s.patches = MakePatchLayout(s.tiles_of_outputs());
   s.patches.costs.assign(s.patches.regions.size(), 0.1);
   s.calibration = {{0.5, 1e-4, 0, 0}};

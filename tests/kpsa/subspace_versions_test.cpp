@@ -141,7 +141,7 @@ std::string RefusalOf(const std::string& bytes) {
 
 TEST(SubspaceVersions, EarlierFilesSayWhatTheySaid) {
   const TemporaryFolder folder;
-  for (int version = kOldestVersion; version < kSubspaceVersion; ++version) {
+  for (int version = kOldestVersion; version < kListsVersion; ++version) {
     SCOPED_TRACE(version);
     const std::string path = PathOfVersion(version), again = folder / "again.kpsa";
     EXPECT_EQ(*SafetensorsFile::Read(path)->Metadata("version"), std::to_string(version));
@@ -151,7 +151,7 @@ TEST(SubspaceVersions, EarlierFilesSayWhatTheySaid) {
     EXPECT_EQ(old->patches.tiles > 0, version == 6 || version == 7);
     EXPECT_EQ(old->ranges[0].patches, version == 7 ? 0b10 : kAllPatches);
     ASSERT_TRUE(WriteSubspace(*old, again).ok());
-    EXPECT_EQ(*SafetensorsFile::Read(again)->Metadata("version"), std::to_string(kSubspaceVersion));
+    EXPECT_EQ(*SafetensorsFile::Read(again)->Metadata("version"), std::to_string(kListsVersion));
     const Result<Subspace> now = ReadSubspace(again);
     ASSERT_TRUE(now.ok()) << now.status().ToString();
     ExpectSame(*old, *now);
