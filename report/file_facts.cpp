@@ -208,6 +208,7 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
                  {"rig", subspace->rig_hash},
                  {"memory bytes", memory},
                  {"training", TrainingText(*subspace)}};
+  if (subspace->of_inner()) facts.facts.emplace_back("reconstructs", "points before the last step");
   const TrainingRecord record = ParseTraining(subspace->training);
   facts.facts.insert(
       facts.facts.end(),

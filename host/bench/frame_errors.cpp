@@ -74,8 +74,9 @@ double OverFrames(const std::vector<double>& values) {
 }
 
 bool HaveKeptModes(const std::vector<AppliedSubspace>& applied) {
-  return std::all_of(applied.begin(), applied.end(),
-                     [](const AppliedSubspace& one) { return !one.subspace->kept_modes.values.empty(); });
+  return std::ranges::all_of(applied, [](const AppliedSubspace& one) {
+    return !one.subspace->kept_modes.values.empty() && !one.subspace->of_inner();
+  });
 }
 
 Result<FrameErrors> SplitFrames(const RigOpener& opener, const RigChange& clip,

@@ -27,7 +27,7 @@ double OverFrames(const std::vector<double>& errors);  // their RMS; 0 of none
 // What SoftCache decided: for each frame the share of the full evaluation in the points of each subspace.
 using FullWeights = std::vector<std::vector<double>>;
 
-// Whether every subspace was trained to keep its modes, which SplitFrames needs.
+// Whether every subspace was trained to keep its modes, and these are of the points that come out: what SplitFrames needs.
 bool HaveKeptModes(const std::vector<AppliedSubspace>& applied);
 
 // Evaluates the times once more, on a rig loaded anew, every frame reconstructed.

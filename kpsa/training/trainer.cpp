@@ -180,7 +180,7 @@ void AddTried(const Trained& other, Trained* taken) {
 // less.
 Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                           const TrainOptions& options) {
-  const bool may = options.mode == EstimatorMode::kMap && !rig.target.colors && !options.keep_modes &&
+  const bool may = options.mode == EstimatorMode::kMap && !rig.target.colors &&
                    options.inner != TrainOptions::Inner::kNever;
   Result<std::optional<TrainingRig>> split = std::optional<TrainingRig>();
   if (may) split = SplitRig(rig, clips);

@@ -124,10 +124,11 @@ TEST_P(KpsaFrames, GuardsBlendTheFullEvaluationIn) {
   for (std::size_t c = 0; c < full.rig.controls.size(); ++c) {
     std::size_t hits = 0, blends = 0, misses = 0;
     double last = 0;
-    for (int step = 0; step <= 100; ++step) {
+    const int steps = of_inner() ? 400 : 100;  // over a longer way
+    for (int step = 0; step <= steps; ++step) {
       SCOPED_TRACE(testing::Message() << full.rig.controls[c].name << " " << step);
       std::vector<double> pose(full.rig.controls.size(), 0.0);
-      pose[c] = (0.9 + 0.01 * (beyond() - 0.9) * step) * full.rig.controls[c].max;
+      pose[c] = (0.9 + (beyond() - 0.9) * step / steps) * full.rig.controls[c].max;
       for (RigRun* run : {&full, &pure, &guarded}) run->Pose(pose);
       const RunFrame frame = guarded.Evaluate();
       const std::vector<float> exact = full.Evaluate().points, reconstructed = pure.Evaluate().points;
