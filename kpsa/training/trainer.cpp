@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 // What a frame costs, in last steps: inner points are tried; and of that, with which they are taken
-constexpr double kWorthSplitting = 2, kClearlyCheaper = 0.8;
+constexpr double kWorthSplitting = 2, kCheaperInner = 0.95;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -199,14 +199,14 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   Result<Trained> inner = TrainOnce(**split, clips, rest);
   if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
   if (inner.ok()) NameTried(&*inner, kBeforeLastStep);
-  if (whole->ended && !(inner.ok() && inner->ns < kClearlyCheaper * whole->ns)) {
+  if (whole->ended && !(inner.ok() && inner->ns < kCheaperInner * whole->ns)) {
     if (inner.ok()) rest.seconds -= inner->seconds;
     whole = TrainOnce(rig, clips, rest);
     if (!whole.ok()) return whole;
   }
   if (!inner.ok()) return whole;
   if (!whole->ended) NameTried(&*whole, "");
-  const bool cheaper = inner->ns < kClearlyCheaper * whole->ns;
+  const bool cheaper = inner->ns < kCheaperInner * whole->ns;
   AddTried(cheaper ? *whole : *inner, cheaper ? &*inner : &*whole);
   return cheaper ? std::move(inner) : std::move(whole);
 }
