@@ -170,7 +170,7 @@ a deltaMush or at any other place of the graph, and how many. All store their re
 and took turns with the full evaluation in one run.
 
 - Full: the same program, every optimisation on; nothing of it is slowed down. Its cost stands below in nanoseconds a point, and what
-  it is spent on. Wraps, skins, lattices and wires run in SIMD floats, squash, bend and twist in doubles, a point at a time.
+  it is spent on. All deformers here run in SIMD floats.
 - Full cost within it: deformers that make less than the tolerance in the clip cost, and show nothing. \`bench --idle\` switches each one off
   on 48 frames of the clip, and then, the one that makes least first, as many together as keep within the tolerance: the share is of what is then
   not evaluated. A speedup of 1 / (1 - share) can be had by leaving them out.
@@ -189,8 +189,9 @@ and took turns with the full evaluation in one run.
 ## The three characters
 
 The clip is \`talk\`. A key point behind a deltaMush needs all points around it, so key points of the output drag in much of the mesh: paper
-mode has no advantage here. The default measures before it, and where that does not tell enough, a few points behind it, too: the car's and the
-animal's cues cost most of their frames (docs/decisions/15-worst-output-points-as-cues.md).
+mode has no advantage here. The default measures before it, and where that does not tell enough, a few points behind it, too
+(docs/decisions/15-worst-output-points-as-cues.md), or it stands for the points before the mush's last step and runs that itself, as for the
+animal (docs/decisions/27-points-before-the-last-step.md): its error is then no longer split.
 
 END
   cat "$work/main.md"
