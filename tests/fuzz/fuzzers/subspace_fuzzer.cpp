@@ -32,11 +32,12 @@ void Use(const Subspace& s) {
     if (verdict.hit) Reached("hit");
     if (s.doubt_inputs() > 0) Reached("products");
     if (s.patches.tiles > 0) Reached("patches");
+    if (s.of_inner()) Reached("inner points");
     if (s.patches.tiles > 0)
       (void)JudgePatches(s, threshold, scratch.y.span(), scratch.g.span(), scratch.t.span(), doubts, scores);
     if (verdict.reason == MissReason::kNotFinite) continue;
     for (std::size_t output = 0; output < s.outputs.size(); ++output) {
-      PointBuffer buffer(s.outputs[output].points, s.components);
+      PointBuffer buffer(s.outputs[output].reconstructed(), s.components);
       s.tiles[output].Reconstruct(scratch.inputs(), buffer.view());
     }
   }
