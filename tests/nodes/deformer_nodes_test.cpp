@@ -7,6 +7,7 @@
 #include "base/scalar_math.h"
 #include "graph/compiler.h"
 #include "graph/geometry.h"
+#include "nodes/deformer.h"
 #include "tests/nodes/driver_rig.h"
 #include "tests/nodes/node_support.h"
 
@@ -214,6 +215,19 @@ TEST_F(DeltaMushNode, BordersStayWhereTheyArePinned) {
   ExpectPoints(Turned(), {0.5, 0, 0, 0, 0, 0});
   g.hold("d.pinBorderVertices", Value(true));
   ExpectPoints(Turned(), {0.5, 0, 0, 3, 0, 0});
+}
+
+// What a kernel takes in memory is no time.
+TEST(DeformerKernels, CostWhatTheirNodesSay) {
+  struct Large {
+    double numbers[40] = {};
+  };
+  const BoundKernel made = MakeBound(Large(), 3, 5);
+  EXPECT_EQ(made.cost_ns, 0) << "the group's";
+  EXPECT_EQ(made.touched_points, kNoIndex);
+  EXPECT_EQ(made.object_bytes, sizeof(Large));
+  EXPECT_EQ(made.scratch_floats, 3u);
+  EXPECT_EQ(made.state_bytes, 5u);
 }
 
 }  // namespace
