@@ -91,8 +91,7 @@ Result<std::vector<float>> SoftModWeights(const Structural& s, const PointSet& p
 Result<BoundKernel> BindSoftMod(const Binding& binding) {
   Result<std::vector<float>> weights = SoftModWeights(binding.structural(), binding.output("outPoints"));
   if (!weights.ok()) return weights.status();
-  const auto touched =
-      static_cast<Index>(weights->size()) - static_cast<Index>(std::ranges::count(*weights, 0.0f));
+  const Index touched = TouchedPoints(*weights);
   Result<ClusterBound> bound = MakeCluster(binding, std::move(*weights));
   if (!bound.ok()) return bound.status();
   BoundKernel made = MakeBound(std::move(*bound), 0);

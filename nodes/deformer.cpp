@@ -96,9 +96,7 @@ NodeBuilder AddDeformer(NodeRegistry& registry, Deformer deformer, ComputeFn com
     if (own.compute == nullptr) own.compute = compute;
     if (own.touched_points == kNoIndex) {
       const std::vector<float> weights = BoundWeights(binding);
-      if (!weights.empty())
-        own.touched_points =
-            static_cast<Index>(weights.size()) - static_cast<Index>(std::ranges::count(weights, 0.0f));
+      if (!weights.empty()) own.touched_points = TouchedPoints(weights);
     }
     if (binding.input("falloffWeights").total() == 0) return own;
     WithFalloff bound{own.object, own.compute, (own.scratch_floats + 15) / 16 * 16, points, falloff, {}};
@@ -126,6 +124,10 @@ std::vector<float> WeightsAt(const Structural& structural, const PointSet& point
   for (Index i = 0; i < points.size(); ++i)
     weights[i] = points[i] < map->weights().size() ? map->weights()[points[i]] : 0.0f;
   return weights;
+}
+
+Index TouchedPoints(std::span<const float> weights) {
+  return static_cast<Index>(std::ranges::count_if(weights, [](float w) { return w != 0; }));
 }
 
 std::vector<float> BoundWeights(const Binding& binding) {

@@ -55,6 +55,8 @@ NodeBuilder AddDeformer(NodeRegistry& registry, Deformer deformer) {
 // The weight map at these points (empty: 1 everywhere); for bind, at the output points.
 std::vector<float> WeightsAt(const Structural& structural, const PointSet& points);
 std::vector<float> BoundWeights(const Binding& binding);
+// How many of them are not 0: BoundKernel::touched_points.
+Index TouchedPoints(std::span<const float> weights);
 // The whole geometry at this stage with everything at its default; an error where upstream could not be
 // evaluated.
 Result<ConstPointsView> RestPoints(const Structural& structural);

@@ -1,7 +1,6 @@
 #include "nodes/kernels/delta_mush_step.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "base/check.h"
@@ -12,12 +11,6 @@ namespace kpsa::engine {
 namespace {
 
 constexpr float kNoPivot[3] = {};
-
-std::vector<Index> AllOf(std::size_t count) {
-  std::vector<Index> all(count);
-  std::iota(all.begin(), all.end(), Index{0});
-  return all;
-}
 
 bool CountsUp(std::span<const Index> numbers) {
   for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -35,11 +28,11 @@ void CopyPoint(ConstPointsView from, std::size_t i, PointsView to, std::size_t j
 DeltaMushStep::DeltaMushStep(const Topology& topology, ConstPointsView rest,
                              const DeltaMushSettings& settings, Constants constants)
     : topology_(&topology),
-      smoothing_(topology, rest, settings, AllOf(rest.count), AllOf(rest.count), {}, MiddleOf(rest)),
+      smoothing_(topology, rest, settings, AllPoints(rest.count), AllPoints(rest.count), {}, MiddleOf(rest)),
       envelope_(static_cast<float>(constants.envelope)),
       displacement_(static_cast<float>(constants.displacement)),
       masks_(std::move(constants.weights)),
-      in_rows_(AllOf(rest.count)),
+      in_rows_(AllPoints(rest.count)),
       smoothed_(rest.count, false) {
   if (masks_.empty()) masks_.assign(rest.count, 1.0f);
   KPSA_CHECK_EQ(masks_.size(), rest.count);

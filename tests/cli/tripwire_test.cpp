@@ -179,9 +179,7 @@ TEST_F(Tripwire, TheProgramReportsItAsNeverEvaluated) {
     std::sort(nodes.begin(), nodes.end());
     return nodes;
   };
-  std::vector<std::string> at_any = never("1000");
-  std::erase(at_any, "cage");  // a point there costs little enough to be measured
-  EXPECT_EQ(at_any, (std::vector<std::string>{"mush", "trip"}));
+  EXPECT_EQ(never("1000"), (std::vector<std::string>{"mush", "trip"})) << "points at the cage are measured";
   EXPECT_EQ(never("0"), std::vector<std::string>());
   // The canary: armed from outside, the rig itself fails
   const ProcessResult armed =
