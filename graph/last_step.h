@@ -34,9 +34,10 @@ class LastStep {
 
   virtual ~LastStep() = default;
   virtual std::size_t points() const = 0;  // that come in, and out: of the whole mesh
-  // At least as many: inner point i < points() belongs to point i, those after them to any.
+  // At least as many: inner point i < points() belongs to point i.
   virtual std::size_t inner_points() const = 0;
-  virtual float cost_ns() const = 0;  // of a Run for all points
+  virtual Index PointOf(Index inner) const = 0;  // that an inner point belongs to
+  virtual float cost_ns() const = 0;             // of a Run for all points
   // in: all points that come into the node. May allocate.
   virtual void Inner(ConstPointsView in, PointsView inner) const = 0;
   virtual std::unique_ptr<const Bound> Bind(const PointSet& out) const = 0;

@@ -13,7 +13,7 @@
 #include "kpsa/cue_gather.h"
 #include "kpsa/matrix_entries.h"
 #include "kpsa/near_stack.h"
-#include "kpsa/rigid_points.h"
+#include "kpsa/output_reconstruction.h"
 #include "kpsa/signals.h"
 #include "kpsa/space_frame.h"
 
@@ -59,15 +59,7 @@ struct KpsaKernel {
   // The same where errors are larger, since the space has grown: [j] for a growth of sqrt(2)^j. Errors are
   // lengths of the space, the tolerance is one of the world.
   std::vector<double> grown_tau;
-  struct Output {
-    bool all = true;
-    std::vector<Index> points;  // wanted ones, where not all
-    std::vector<Index> tiles;   // that hold them, or the inner points that they need; none: all
-    std::size_t padded = 0;     // floats of a component of all that is reconstructed, for the scratch
-    std::shared_ptr<const LastStep::Bound> step;  // from inner points to the wanted ones; null: none
-    bool direct() const { return all && step == nullptr; }
-  };
-  std::vector<Output> outputs;
+  std::vector<OutputReconstruction> outputs;
   BoundPatches patches;
   CueGather gather;
   std::size_t tiles = 0;  // whose doubts are kept where there are patches
@@ -256,39 +248,15 @@ void WriteVerdict(KpsaContext c) {
   c.out<"offender">() = v.offender == kNoIndex ? -1 : static_cast<std::int64_t>(v.offender);
 }
 
-// Reconstructs output m into `out` (the wanted points only), in the space of its stage.
-void Reconstruct(KpsaContext c, const KpsaKernel& kernel, std::size_t m, PointsView out) {
-  const Subspace& subspace = *kernel.config->data().subspace;
-  const KpsaKernel::Output& wanted = kernel.outputs[m];
-  const std::span<const float> y = TileInputsOf(c, subspace);
+// What output m is reconstructed from in a frame, and where to.
+OutputReconstruction::Frame FrameOf(KpsaContext c, const KpsaConfig::Data& data, std::size_t m) {
+  OutputReconstruction::Frame frame;
+  frame.inputs = DoubtInputsOf(c, *data.subspace, m);
+  frame.y = TileInputsOf(c, *data.subspace);
   const Matrix4& matrix = c.state_as<KpsaState>().world_from_space;
-  const bool in_space = kernel.config->data().outputs_in_space[m] != 0;
-  const Matrix4* const moved = !in_space || matrix == Matrix4() ? nullptr : &matrix;
-  // The step runs in the space: that grows and turns all of it at once
-  const Matrix4* const space = wanted.step == nullptr ? moved : nullptr;
-  const TileMap& tiles = subspace.tiles[m];
-  const float* inputs = DoubtInputsOf(c, subspace, m);
-  const auto reconstruct = [&](std::span<const Index> of, const PointsView& to) {
-    const std::span<const Matrix4> spaces(space, space == nullptr ? 0 : 1);
-    if (inputs == nullptr) return tiles.ReconstructBlock(y, {&to, 1}, of, spaces);
-    tiles.ReconstructFrom({&inputs, 1}, {&to, 1}, of, spaces);
-  };
-  if (wanted.direct()) return reconstruct({}, out);
-  const PointsView mesh{c.scratch(), c.scratch() + wanted.padded, c.scratch() + 2 * wanted.padded,
-                        tiles.points()};
-  if (wanted.step != nullptr) {
-    reconstruct(wanted.tiles, mesh);
-    const std::size_t used = 3 * wanted.padded;
-    wanted.step->Run(mesh, out, {c.scratch() + used, wanted.step->scratch_floats()});
-    if (moved != nullptr) TransformPoints(ToFloats(*moved), out);
-    return;
-  }
-  if (!wanted.tiles.empty()) reconstruct(wanted.tiles, mesh);
-  for (std::size_t i = 0; i < wanted.points.size(); ++i) {
-    out.x[i] = mesh.x[wanted.points[i]];
-    out.y[i] = mesh.y[wanted.points[i]];
-    out.z[i] = mesh.z[wanted.points[i]];
-  }
+  if (data.outputs_in_space[m] != 0 && !(matrix == Matrix4())) frame.world_from_space = &matrix;
+  frame.out = c.out<"outPoints">()[static_cast<std::uint32_t>(m)];
+  return frame;
 }
 
 void CopyFull(ConstPointsView from, PointsView to) {
@@ -311,7 +279,8 @@ void Compute(KpsaContext c) {
       continue;
     }
     const Stopwatch watch(c, KpsaPart::kReconstruction);
-    Reconstruct(c, kernel, m, out);
+    const OutputReconstruction::Frame frame = FrameOf(c, kernel.config->data(), m);
+    kernel.outputs[m].Run({&frame, 1}, c.scratch());
     if (verdict.hit) continue;
     kernel.patches.Blend(state.patches, m, full[m], regions, out);
     if (state.patches.all > 0) BlendPoints(state.patches.all, full[m], out);
@@ -321,41 +290,17 @@ void Compute(KpsaContext c) {
 // Hits only: the engine evaluates misses one by one.
 void ComputeBlock(ComputeContext* contexts, std::size_t count) {
   const auto& kernel = contexts[0].kernel_as<KpsaKernel>();
-  const Subspace& subspace = *kernel.config->data().subspace;
   const auto at = [&](std::size_t i) { return KpsaContext(contexts[i]); };
   for (std::size_t i = 0; i < count; ++i) WriteVerdict(at(i));
   for (std::size_t m = 0; m < kernel.outputs.size(); ++m) {
-    if (!kernel.outputs[m].direct()) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const PointsView& out = at(i).out<"outPoints">()[static_cast<std::uint32_t>(m)];
-        if (out.count > 0) Reconstruct(at(i), kernel, m, out);
-      }
-      continue;
-    }
+    if (at(0).out<"outPoints">()[static_cast<std::uint32_t>(m)].count == 0) continue;
     // Frames that share a pass over the subspace
     const Stopwatch watch(at(0), KpsaPart::kReconstruction);
-    const std::size_t r = subspace.tile_inputs();
     for (std::size_t first = 0; first < count; first += kBlockFrames) {
       const std::size_t frames = std::min(kBlockFrames, count - first);
-      float* y = at(first).scratch();
-      PointsView outs[kBlockFrames];
-      Matrix4 spaces[kBlockFrames];
-      const float* inputs[kBlockFrames];
-      bool moved = false;
-      for (std::size_t f = 0; f < frames; ++f) {
-        inputs[f] = DoubtInputsOf(at(first + f), subspace, m);
-        if (inputs[f] == nullptr)
-          std::memcpy(y + f * r, TileInputsOf(at(first + f), subspace).data(), r * sizeof(float));
-        outs[f] = at(first + f).out<"outPoints">()[static_cast<std::uint32_t>(m)];
-        spaces[f] = at(first + f).state_as<KpsaState>().world_from_space;
-        moved = moved || (kernel.config->data().outputs_in_space[m] != 0 && !(spaces[f] == Matrix4()));
-      }
-      const std::span<const Matrix4> through(spaces, moved ? frames : 0);
-      if (inputs[0] == nullptr) {
-        subspace.tiles[m].ReconstructBlock({y, frames * r}, {outs, frames}, {}, through);
-      } else {
-        subspace.tiles[m].ReconstructFrom({inputs, frames}, {outs, frames}, {}, through);
-      }
+      OutputReconstruction::Frame some[kBlockFrames];
+      for (std::size_t f = 0; f < frames; ++f) some[f] = FrameOf(at(first + f), kernel.config->data(), m);
+      kernel.outputs[m].Run({some, frames}, at(first).scratch());
     }
   }
 }
@@ -406,25 +351,11 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
           std::max(0.0, Calibrate(subspace.calibration, smaller, rate, subspace.blend_start).threshold.tau));
     }
   }
-  std::size_t whole = 0;
+  std::size_t scratch = 0;  // floats
   for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
     const PointSet& wanted = binding.output("outPoints", static_cast<int>(m));
-    KpsaKernel::Output output;
-    output.all = wanted.is_all();
-    if (!data.steps.empty() && data.steps[m] != nullptr) output.step = data.steps[m]->Bind(wanted);
-    if (!output.direct()) {
-      if (output.step == nullptr) output.points = wanted.ToVector();
-      const std::size_t reconstructed = subspace.outputs[m].reconstructed();
-      const std::vector<Index>& needed = output.step == nullptr ? output.points : output.step->inner();
-      for (Index point : needed) {
-        const auto tile = static_cast<Index>(point / kTilePoints);
-        if (output.tiles.empty() || output.tiles.back() != tile) output.tiles.push_back(tile);
-      }
-      if (output.step != nullptr && output.tiles.size() == subspace.tiles[m].tiles()) output.tiles.clear();
-      output.padded = PaddedCount(reconstructed);
-      whole =
-          std::max(whole, 3 * output.padded + (output.step == nullptr ? 0 : output.step->scratch_floats()));
-    }
+    OutputReconstruction output(data.subspace, m, wanted, data.steps.empty() ? nullptr : data.steps[m].get());
+    scratch = std::max(scratch, output.scratch_floats());
     kernel.outputs.push_back(std::move(output));
   }
   kernel.patches = BoundPatches(
@@ -434,10 +365,8 @@ Result<BoundKernel> BindKpsa(const Binding& binding) {
   kernel.tiles = data.patches.empty() ? 0 : subspace.tile_count();
   kernel.gather = CueGather(data);
   const std::size_t padded = subspace.soft_cache.padded_rows();
-  // Floats: the whole mesh; the measurements of a block of frames; or raw cue values (doubles), g, joints
-  const std::size_t scratch =
-      std::max({whole, PaddedCount(kBlockFrames * std::max(subspace.rows(), subspace.tile_inputs())),
-                3 * padded + kernel.gather.scratch_floats()});
+  // Or raw cue values (doubles), g, joints
+  scratch = std::max(scratch, 3 * padded + kernel.gather.scratch_floats());
   const std::size_t after = subspace.score.doubt > 0  ? subspace.doubt_inputs()
                             : subspace.latent.empty() ? 0
                                                       : subspace.tile_inputs();

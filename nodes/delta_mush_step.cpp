@@ -31,6 +31,7 @@ class MushStep final : public LastStep {
   MushStep(Value mesh, DeltaMushStep step) : mesh_(std::move(mesh)), step_(std::move(step)) {}
   std::size_t points() const override { return step_.points(); }
   std::size_t inner_points() const override { return step_.inner_points(); }
+  Index PointOf(Index inner) const override { return step_.PointOf(inner); }
   float cost_ns() const override { return kPointNs * static_cast<float>(points()); }
   void Inner(ConstPointsView in, PointsView inner) const override { step_.Inner(in, inner); }
   std::unique_ptr<const Bound> Bind(const PointSet& out) const override {

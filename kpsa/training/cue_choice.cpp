@@ -262,6 +262,7 @@ class Chooser {
       std::size_t added = 0;
       for (const Index point : order) {
         if (added == kWorstPoints || more.size() == chosen_.size() + most || survey.beyond[point] == 0) break;
+        if (!options_.measurable.empty() && !options_.measurable[point]) continue;
         const CueRef cue{CueKind::kOutput, point};
         if (std::find(more.begin(), more.end(), cue) != more.end()) continue;
         more.push_back(cue);

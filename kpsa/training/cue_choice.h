@@ -19,7 +19,8 @@ struct CueChoiceOptions {
   double tolerance = 1e-4;       // scene units
   // Where errors count by their RMS alone (light, with its noise): one round, no worst points.
   bool by_rms = false;
-  std::size_t max_outputs = 0;  // output points that may become cues, spread; 0: all
+  std::vector<bool> measurable = {};  // by output row: a point that the graph can give; empty: all
+  std::size_t max_outputs = 0;        // output points that may become cues, spread; 0: all
   // Where points may be measured, the dearest place first, each seeing more than the next
   // (kpsa/training/cue_places.h); empty: the points of stages, or where there are none, the outputs.
   std::vector<CuePlace> places = {};

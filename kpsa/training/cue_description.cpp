@@ -47,7 +47,7 @@ CueDescription Describe(const TrainingRig& rig, const PoseRecorder& recorder, st
   };
   if (cue.kind == CueKind::kOutput) {
     std::size_t m = 0;
-    for (; index >= totals[m]; ++m) index -= totals[m];
+    for (; index >= rig.rows(m, totals[m]); ++m) index -= rig.rows(m, totals[m]);
     return put(m, OutputStage(*rig.graph, rig.target.meshes[m].stages), index);
   }
   for (const CandidateStage& candidate : recorder.candidates()) {

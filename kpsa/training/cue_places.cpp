@@ -131,7 +131,7 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
   for (std::size_t p = 0; p < count; ++p) {
     CuePlace& place = result.places.emplace_back();
     Index output = 0;
-    for (std::size_t m = 0; m < meshes.size(); output += totals[m++]) {
+    for (std::size_t m = 0; m < meshes.size(); output += rig.rows(m, totals[m]), ++m) {
       const std::size_t stage = stages[m][std::min(p, stages[m].size() - 1)].stage;
       if (stage + 1 == meshes[m].stages.size()) {
         for (Index i = 0; i < totals[m]; ++i) place.push_back({CueKind::kOutput, output + i});
@@ -177,7 +177,7 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
     outputs.push_back({meshes[mesh].stages[stage].points, PointSet::Of(wanted, totals[mesh])});
   };
   Index begin = 0;
-  for (std::size_t m = 0; m < meshes.size(); begin += totals[m++])
+  for (std::size_t m = 0; m < meshes.size(); begin += rig.rows(m, totals[m]), ++m)
     request(CueKind::kOutput, begin, totals[m], m, meshes[m].stages.size() - 1, nullptr);
   begin = 0;
   for (const CandidateStage& stage : stages) {
@@ -199,7 +199,7 @@ Result<PatchLayout> PricePatches(const TrainingRig& rig, Compiler* compiler, std
   for (std::size_t m = 0; m < totals.size(); ++m) {
     tiles.push_back((totals[m] + kTilePoints - 1) / kTilePoints);
     positions.emplace_back(points.begin(), points.begin() + totals[m]);
-    points = points.subspan(totals[m]);
+    points = points.subspan(rig.rows(m, totals[m]));
     outputs.push_back({rig.target.meshes[m].stages.back().points, {}});
   }
   PatchLayout layout = MakePatchLayout(tiles);

@@ -15,12 +15,6 @@ constexpr std::size_t kMostPlans = 2500;  // of all tiles; neighbours share one 
 constexpr std::size_t kOwnPoints = 40, kNearPoints = 24;  // candidates in a tile, and about it
 constexpr std::size_t kNearProbes = 12;                   // points of a tile that say what is near
 
-// What tiles of a mesh are made of: its points, or the inner ones of its last step.
-Index RowsOf(const TrainingRig& rig, std::size_t mesh, Index total) {
-  const LastStep* const step = rig.step(mesh);
-  return step == nullptr ? total : static_cast<Index>(step->inner_points());
-}
-
 // For each tile of each mesh, in their order: which of the signals are relative matrices of transforms that
 // its points need, as indices, ascending.
 Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, Compiler* compiler,
@@ -33,7 +27,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
   }
   std::size_t tiles = 0;
   for (std::size_t m = 0; m < totals.size(); ++m)
-    tiles += (RowsOf(rig, m, totals[m]) + kTilePoints - 1) / kTilePoints;
+    tiles += (rig.rows(m, totals[m]) + kTilePoints - 1) / kTilePoints;
   const std::size_t together = (tiles * (clips.size() + 1) + kMostPlans - 1) / kMostPlans;
   std::vector<std::set<Index>> movers(tiles);
   std::vector<char> moves(signals.size(), 0);
@@ -43,14 +37,14 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
                               : std::optional<std::string_view>(clips[static_cast<std::size_t>(clip)].name)));
     std::size_t first_tile = 0;
     for (std::size_t m = 0; m < totals.size(); ++m) {
-      const std::size_t rows = RowsOf(rig, m, totals[m]), count = (rows + kTilePoints - 1) / kTilePoints;
+      const std::size_t rows = rig.rows(m, totals[m]), count = (rows + kTilePoints - 1) / kTilePoints;
       for (std::size_t t = 0; t < count; t += together) {
-        // Inner points behind those of the mesh belong to any of these
-        const bool of_any = (t + together) * kTilePoints > totals[m] && rows > totals[m];
-        const std::size_t first = of_any ? 0 : t * kTilePoints;
-        std::vector<Index> points(of_any ? totals[m]
-                                         : std::min<std::size_t>(together * kTilePoints, totals[m] - first));
+        const std::size_t first = t * kTilePoints;
+        std::vector<Index> points(std::min(together * kTilePoints, rows - first));
         std::iota(points.begin(), points.end(), static_cast<Index>(first));
+        if (const LastStep* const step = rig.step(m); step != nullptr) {
+          for (Index& point : points) point = step->PointOf(point);
+        }
         Request request;
         request.outputs.push_back(
             {rig.target.meshes[m].stages.back().points, PointSet::Of(points, totals[m])});
@@ -89,13 +83,14 @@ struct NearPoint {
 };
 
 // The candidates of each mesh, by point.
-std::vector<std::vector<NearPoint>> ByMesh(const TileCandidateOptions& options) {
+std::vector<std::vector<NearPoint>> ByMesh(const TrainingRig& rig, const TileCandidateOptions& options) {
   std::vector<std::vector<NearPoint>> result(options.totals.size());
   for (const CueRef& cue : options.points) {
     Index rest = cue.index;
     if (cue.kind == CueKind::kOutput) {
       std::size_t mesh = 0;
-      while (rest >= options.totals[mesh]) rest -= options.totals[mesh++];
+      for (; rest >= rig.rows(mesh, options.totals[mesh]); ++mesh)
+        rest -= rig.rows(mesh, options.totals[mesh]);
       result[mesh].push_back({cue, rest, options.positions[cue.index]});
       continue;
     }
@@ -143,11 +138,11 @@ Result<std::vector<TileCandidates>> FindTileCandidates(const TrainingRig& rig, C
       FindTileMovers(rig, compiler, clips, options.totals, options.signals);
   if (!movers.ok()) return movers.status();
   const std::vector<Index> first_entry = FirstScalars(options.signals, options.layout);
-  const std::vector<std::vector<NearPoint>> points = ByMesh(options);
+  const std::vector<std::vector<NearPoint>> points = ByMesh(rig, options);
   std::vector<TileCandidates> tiles;
   Index mesh_begin = 0;
   for (std::size_t m = 0; m < options.totals.size(); ++m) {
-    const Index rows = RowsOf(rig, m, options.totals[m]);
+    const Index rows = rig.rows(m, options.totals[m]);
     for (Index first = 0; first < rows; first += kTilePoints) {
       const Index count = std::min<Index>(kTilePoints, rows - first);
       TileCandidates& tile = tiles.emplace_back();

@@ -73,6 +73,10 @@ struct TrainingRig {
   // By mesh, with steps where inner points are trained on (graph/last_step.h); empty: nowhere. Train's own.
   std::vector<Compiler::SplitPoints> split = {};
   const LastStep* step(std::size_t mesh) const { return split.empty() ? nullptr : split[mesh].step.get(); }
+  // What is reconstructed of a mesh that has so many points.
+  Index rows(std::size_t mesh, Index points) const {
+    return step(mesh) == nullptr ? points : static_cast<Index>(step(mesh)->inner_points());
+  }
 };
 
 // Errors: no poses, nothing moves, a pose that fails to evaluate (its clip and time or its controls),

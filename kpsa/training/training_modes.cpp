@@ -26,6 +26,16 @@ void TruncateModes(const TrainingSetup& setup, const PoseMatrix& judges, Trainin
     residual = HonestResidual(residual, modes->pca.poses, modes->pca.mode_count());
 }
 
+// Rows of the outputs that are points as they come out of the graph.
+std::vector<bool> MeasurableRows(const TrainingSetup& setup) {
+  std::vector<bool> measurable;
+  for (std::size_t m = 0; m < setup.totals.size(); ++m) {
+    const std::size_t begin = measurable.size();
+    measurable.resize(begin + setup.rig.rows(m, setup.totals[m]), setup.rig.step(m) == nullptr);
+  }
+  return measurable;
+}
+
 Status ChooseCues(double tolerance, const TrainingPoses& poses, const PoseMatrix& judges,
                   TrainingSetup* setup, const TrainingModes& modes, TrainingCues* to) {
   CueChoiceOptions choice;
@@ -37,6 +47,7 @@ Status ChooseCues(double tolerance, const TrainingPoses& poses, const PoseMatrix
   choice.places = setup->places;
   choice.judges = judges.poses() > 0 && !setup->options.without.miss_costs ? &judges : nullptr;
   choice.judge_kinds = poses.judge_kinds;
+  if (!setup->rig.split.empty()) choice.measurable = MeasurableRows(*setup);
   KPSA_RETURN_IF_ERROR(setup->rig.set_clip(std::nullopt));
   Status priced;
   choice.points_cost = [&](std::span<const CueRef> cues) {

@@ -47,6 +47,7 @@ class DeltaMushStep {
   bool changes() const { return changes_; }  // any point
   std::size_t points() const { return in_rows_.size(); }
   std::size_t inner_points() const { return points() + extra_.size(); }
+  Index PointOf(Index inner) const { return inner < points() ? inner : extra_[inner - points()]; }
   void Inner(ConstPointsView in, PointsView inner) const;  // two buffers
   Part Bind(std::span<const Index> out_points) const;      // sorted
 

@@ -51,8 +51,10 @@ struct Fold {
     pca = *ComputePca(poses, mean, {.max_modes = 20});
     noise.scalars = {0, 0, 1e-8};
   }
-  std::vector<CueRef> Choose() const {
-    return ChooseCues(pca, positions, noise, poses, {.rows = 20, .min_points = 4, .tolerance = kTolerance})
+  std::vector<CueRef> Choose(std::vector<bool> measurable = {}) const {
+    return ChooseCues(
+               pca, positions, noise, poses,
+               {.rows = 20, .min_points = 4, .tolerance = kTolerance, .measurable = std::move(measurable)})
         .cues;
   }
   double LargestError(const std::vector<CueRef>& chosen) const {
@@ -83,6 +85,17 @@ TEST(CueChoice, PointsThatNoEarlierStageTellsOfAreMeasured) {
   EXPECT_LT(fold.LargestError(chosen), kTolerance);
   std::erase_if(chosen, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
   EXPECT_GT(fold.LargestError(chosen), 3 * kTolerance);
+}
+
+// Rows of points before a last step, which no plug of the graph gives.
+TEST(CueChoice, WhatTheGraphCannotGiveIsNotMeasured) {
+  const Fold fold(3);
+  std::vector<bool> measurable(kPoints, true);
+  measurable[1] = false;
+  const std::vector<Index> some = Outputs(fold.Choose(measurable));
+  EXPECT_FALSE(some.empty());
+  EXPECT_EQ(std::ranges::count(some, Index{1}), 0);
+  EXPECT_TRUE(Outputs(fold.Choose(std::vector<bool>(kPoints, false))).empty());
 }
 
 TEST(CueChoice, NothingIsMeasuredBehindTheStageWhereTheToleranceIsKeptAnyway) {

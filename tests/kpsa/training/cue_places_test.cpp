@@ -65,6 +65,29 @@ class CuePlacesTest : public testing::Test {
   std::vector<Index> totals_;
 };
 
+// A step with more inner points than its mesh has.
+class LargerStep final : public LastStep {
+ public:
+  std::size_t points() const override { return kMeshPoints; }
+  std::size_t inner_points() const override { return kMeshPoints + 7; }
+  Index PointOf(Index inner) const override { return inner % kMeshPoints; }
+  float cost_ns() const override { return 1; }
+  void Inner(ConstPointsView, PointsView) const override {}
+  std::unique_ptr<const Bound> Bind(const PointSet&) const override { return nullptr; }
+};
+
+// Rows of a mesh come after all that is reconstructed of the one before it.
+TEST_F(CuePlacesTest, OutputsComeAfterInnerPointsOfOtherMeshes) {
+  AddStack("b_"), AddMesh("b_"), AddControl("b_up.a", false);
+  const double one = Cost({}, {{CueKind::kOutput, kMeshPoints + 6}});
+  EXPECT_GT(one, 0);
+  rig_.split.resize(2);
+  rig_.split[0].step = std::make_shared<const LargerStep>();
+  EXPECT_EQ(Cost({}, {{CueKind::kOutput, kMeshPoints + 6}}), 0) << "which is behind the points of the first";
+  EXPECT_GT(Cost({}, {{CueKind::kOutput, kMeshPoints + 7}}), 0);
+  EXPECT_EQ(Cost({}, {{CueKind::kOutput, kMeshPoints + 7 + 6}}), one);
+}
+
 // A picture is measured where its rig says, whatever that costs, at points that lie in no rows.
 TEST_F(CuePlacesTest, LightIsMeasuredAtItsFirstStage) {
   rig_.target.colors = true;

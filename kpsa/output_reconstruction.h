@@ -1,0 +1,48 @@
+// Points of one output from the inputs of its tiles: those that a request wants, through the last step where the
+// subspace reconstructs inner points (graph/last_step.h). Immutable, any thread; the bits of a point do not depend on
+// which others are wanted, nor on the frames beside it.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "graph/last_step.h"
+#include "kpsa/subspace.h"
+
+namespace kpsa::engine {
+
+class OutputReconstruction {
+ public:
+  struct Frame {
+    const float* inputs = nullptr;  // of this output's tiles, as LargestDoubt leaves them; null: they read y
+    std::span<const float> y;
+    const Matrix4* world_from_space = nullptr;  // null where points come out in the space
+    PointsView out;                             // the wanted points
+  };
+
+  // output: its number in the subspace. step: of all its points, or null.
+  OutputReconstruction(std::shared_ptr<const Subspace> subspace, std::size_t output, const PointSet& wanted,
+                       const LastStep* step);
+  std::size_t scratch_floats() const;
+  // At most kBlockFrames at a time, all with inputs or none. scratch: aligned to 64 bytes. Allocates nothing.
+  void Run(std::span<const Frame> frames, float* scratch) const;
+
+ private:
+  const TileMap& tiles() const { return subspace_->tiles[output_]; }
+  bool direct() const { return all_ && step_ == nullptr; }
+  // The tiles listed (none: all) of each frame, into what comes out; or of one, into the mesh, in the space or, where
+  // no step follows, as they come out.
+  void Reconstruct(std::span<const Frame> frames, const PointsView* mesh, std::span<float> y) const;
+  void RunOne(const Frame& frame, std::span<float> y, std::span<float> scratch) const;
+
+  std::shared_ptr<const Subspace> subspace_;
+  std::size_t output_;
+  bool all_ = true;            // points are wanted
+  std::vector<Index> points_;  // which, where not all and no step gives them
+  std::vector<Index> tiles_;   // that hold them, or what the step reads; none: all
+  std::size_t padded_ = 0;     // floats of a component of all that is reconstructed, for the scratch
+  std::shared_ptr<const LastStep::Bound> step_;
+};
+
+}  // namespace kpsa::engine
