@@ -362,13 +362,31 @@ Status PlacePatches(const Graph& graph, Compiler* compiler, const AccelerationTa
 Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
                  AccelerationDraft* draft) {
   const Subspace& subspace = *draft->data.subspace;
-  if (!subspace.of_inner() || draft->data.always_miss) return Status();
+  if ((!subspace.of_inner() && subspace.mends.empty()) || draft->data.always_miss) return Status();
   Result<std::vector<Compiler::SplitPoints>> split = SplitMeshes(graph, compiler, target);
   if (!split.ok()) return split.status();
   for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
     const SubspaceOutput& output = subspace.outputs[m];
     std::shared_ptr<const LastStep>& step = draft->data.steps.emplace_back();
-    if (output.inner == 0) continue;
+    const auto of_output = [&](const TileMend& mend) { return mend.output == m; };
+    if (output.inner == 0) {
+      const auto mend = std::ranges::find_if(subspace.mends, of_output);
+      if (mend == subspace.mends.end()) continue;
+      step = std::move((*split)[m].step);
+      if (step == nullptr || step->points() != output.points)
+        return Status::Invalid(
+            "the subspace mends points of {} by its last step, which the rig lacks; train it again",
+            output.name);
+      for (const TileMend& one : subspace.mends) {
+        if (!of_output(one)) continue;
+        const auto bound = step->Bind(PointSet::Of(one.points, static_cast<Index>(output.points)));
+        if (bound->inner() != one.inner)
+          return Status::Invalid(
+              "the subspace mends points of {} by a last step that the rig lacks; train it again",
+              output.name);
+      }
+      continue;
+    }
     step = std::move((*split)[m].step);
     if (step == nullptr || step->points() != output.points || step->inner_points() != output.inner)
       return Status::Invalid(

@@ -23,6 +23,12 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joint_rows));
   }
   for (const SubspaceOutput& output : s.outputs) hasher.Add(output.inner);
+  for (const TileMend& mend : s.mends) {
+    hasher.Add(mend.output);
+    hasher.Add(mend.tile);
+    hasher.AddLong(std::span<const Index>(mend.points));
+    hasher.AddLong(std::span<const float>(mend.map));
+  }
   for (const PointCues& cues : data_.cues) {
     hasher.AddLong(std::span<const Index>(cues.points));
     hasher.Add(cues.in_space);

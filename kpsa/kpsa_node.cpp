@@ -253,6 +253,7 @@ OutputReconstruction::Frame FrameOf(KpsaContext c, const KpsaConfig::Data& data,
   OutputReconstruction::Frame frame;
   frame.inputs = DoubtInputsOf(c, *data.subspace, m);
   frame.y = TileInputsOf(c, *data.subspace);
+  frame.measured = Measured(c);
   const Matrix4& matrix = c.state_as<KpsaState>().world_from_space;
   if (data.outputs_in_space[m] != 0 && !(matrix == Matrix4())) frame.world_from_space = &matrix;
   frame.out = c.out<"outPoints">()[static_cast<std::uint32_t>(m)];

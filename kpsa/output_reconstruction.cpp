@@ -1,5 +1,6 @@
 #include "kpsa/output_reconstruction.h"
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -28,7 +29,11 @@ void CopyPoint(ConstPointsView from, std::size_t i, PointsView to, std::size_t j
 OutputReconstruction::OutputReconstruction(std::shared_ptr<const Subspace> subspace, std::size_t output,
                                            const PointSet& wanted, const LastStep* step)
     : subspace_(std::move(subspace)), output_(output), all_(wanted.is_all()) {
-  if (step != nullptr) step_ = step->Bind(wanted);
+  if (step != nullptr && subspace_->outputs[output_].inner > 0) {
+    step_ = step->Bind(wanted);
+  } else if (step != nullptr) {
+    mends_ = BoundMends(subspace_->mends, tiles(), static_cast<Index>(output_), wanted, *step);
+  }
   if (direct()) return;
   padded_ = PaddedCount(subspace_->outputs[output_].reconstructed());
   if (step_ == nullptr) points_ = wanted.ToVector();
@@ -38,14 +43,18 @@ OutputReconstruction::OutputReconstruction(std::shared_ptr<const Subspace> subsp
 
 std::size_t OutputReconstruction::scratch_floats() const {
   const std::size_t y = PaddedCount(kBlockFrames * subspace_->tile_inputs());
-  return y + 3 * padded_ + (step_ == nullptr ? 0 : step_->scratch_floats());
+  return y +
+         std::max(3 * padded_ + (step_ == nullptr ? 0 : step_->scratch_floats()), mends_.scratch_floats());
 }
 
 void OutputReconstruction::Run(std::span<const Frame> frames, float* scratch) const {
   const std::span<float> all(scratch, scratch_floats());
   const std::span<float> y = all.first(PaddedCount(kBlockFrames * subspace_->tile_inputs()));
-  if (direct()) return Reconstruct(frames, nullptr, y);
-  for (const Frame& frame : frames) RunOne(frame, y, all.subspan(y.size()));
+  if (direct()) Reconstruct(frames, nullptr, y);
+  for (const Frame& frame : frames) {
+    if (!direct()) RunOne(frame, y, all.subspan(y.size()));
+    mends_.Run(tiles(), frame.measured, frame.world_from_space, frame.out, all.subspan(y.size()));
+  }
 }
 
 void OutputReconstruction::Reconstruct(std::span<const Frame> frames, const PointsView* mesh,

@@ -17,11 +17,12 @@ class OutputReconstruction {
   struct Frame {
     const float* inputs = nullptr;  // of this output's tiles, as LargestDoubt leaves them; null: they read y
     std::span<const float> y;
+    const float* measured = nullptr;            // the same, for mends
     const Matrix4* world_from_space = nullptr;  // null where points come out in the space
     PointsView out;                             // the wanted points
   };
 
-  // output: its number in the subspace. step: of all its points, or null.
+  // output: its number in the subspace. step: of all its points, where it has inner points or mends; or null.
   OutputReconstruction(std::shared_ptr<const Subspace> subspace, std::size_t output, const PointSet& wanted,
                        const LastStep* step);
   std::size_t scratch_floats() const;
@@ -43,6 +44,7 @@ class OutputReconstruction {
   std::vector<Index> tiles_;   // that hold them, or what the step reads; none: all
   std::size_t padded_ = 0;     // floats of a component of all that is reconstructed, for the scratch
   std::shared_ptr<const LastStep::Bound> step_;
+  BoundMends mends_;
 };
 
 }  // namespace kpsa::engine

@@ -159,6 +159,14 @@ Status ValidateSubspace(const Subspace& s) {
                              s.tiles[i].points(), s.tiles[i].data().components);
     }
   }
+  KPSA_RETURN_IF_ERROR(CheckMends(s.mends, s.tiles));
+  for (std::size_t i = 0; i < s.mends.size(); ++i) {
+    const TileMend& mend = s.mends[i];
+    if (s.outputs[mend.output].inner > 0 || s.of_light() || !s.latent.empty() ||
+        (i > 0 && std::pair(mend.output, mend.tile) <= std::pair(s.mends[i - 1].output, s.mends[i - 1].tile)))
+      return Status::Invalid("tile {} of output {} is mended twice, or out of order, or without a last step",
+                             mend.tile, mend.output);
+  }
   if (!s.kept_modes.values.empty()) {
     const ModeMatrix& kept = s.kept_modes;
     std::size_t points = 0;

@@ -19,6 +19,7 @@
 #include "kpsa/patches.h"
 #include "kpsa/signature.h"
 #include "kpsa/soft_cache.h"
+#include "kpsa/tile_mends.h"
 #include "kpsa/tiles.h"
 
 namespace kpsa::engine {
@@ -27,7 +28,7 @@ namespace kpsa::engine {
 // latents, world matrices as cues, and doubts; 4: without products as cues; 5: without patches; 6: without guards of
 // patches; 7: without calibration poses near clips; 8: cues, ranges and the trained rig are JSON, and not tensors; 9:
 // without inner points
-inline constexpr int kSubspaceVersion = 10, kInnerVersion = 10, kListsVersion = 9, kOldestVersion = 3;
+inline constexpr int kSubspaceVersion = 11, kMendsVersion = 11, kInnerVersion = 10, kListsVersion = 9, kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
@@ -106,6 +107,7 @@ struct Subspace {
   double tolerance = 0, violation_rate = 0.01,
          blend_start = kBlendStart;  // the trained defaults; scene units
   std::vector<TileMap> tiles;        // [outputs]
+  std::vector<TileMend> mends;       // of outputs without inner points, by output and tile
   // A [cN x M], of all outputs one after the other, where training was asked to keep it; else empty. Reports
   // split errors with it (kpsa/training/error_split.h); no frame needs it, so of a file it is copied and
   // checked only where asked for.

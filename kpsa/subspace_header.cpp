@@ -154,6 +154,11 @@ Status ReadJsonLists(const SafetensorsFile& file, Status* status, Subspace* s) {
   return {};
 }
 
+// The oldest that says all of it.
+int VersionOf(const Subspace& s) {
+  return !s.mends.empty() ? kMendsVersion : s.of_inner() ? kInnerVersion : kListsVersion;
+}
+
 }  // namespace
 
 std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
@@ -179,11 +184,10 @@ std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
     summary["tilesOfPatch"] = s.patches.tiles;
     summary["patchShare"] = s.patches.share;
   }
-  return {
-      {"kind", kSubspaceKind},     {"version", std::to_string(s.of_inner() ? kInnerVersion : kListsVersion)},
-      {"summary", summary.dump()}, {"outputs", outputs.dump()},
-      {"rigHash", s.rig_hash},     {"units", s.units},
-      {"space", s.space},          {"frame", frame.dump()}};
+  return {{"kind", kSubspaceKind},     {"version", std::to_string(VersionOf(s))},
+          {"summary", summary.dump()}, {"outputs", outputs.dump()},
+          {"rigHash", s.rig_hash},     {"units", s.units},
+          {"space", s.space},          {"frame", frame.dump()}};
 }
 
 Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace* s) {

@@ -11,6 +11,8 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::uint64_t kAnyRows = SafetensorsFile::kAnySize;
+constexpr char kMendsKey[] = "mends", kMendPointsKey[] = "mendPoints", kMendInnerKey[] = "mendInner",
+               kMendMeansKey[] = "mendMeans", kMendMapsKey[] = "mendMaps";
 constexpr char kCueKindsKey[] = "cueKinds", kCuesKey[] = "cues", kFactorsKey[] = "factors",
                kFactorCurvesKey[] = "factorCurves", kProductBoundsKey[] = "productBounds",
                kRangeNamesKey[] = "rangeNames", kRangesKey[] = "ranges", kRangePatchesKey[] = "rangePatches",
@@ -212,6 +214,60 @@ Status ReadTraining(const SafetensorsFile& file, std::string* training) {
   return is_object ? Status() : Status::Invalid("\"{}\" is not a JSON object", kTrainingKey);
 }
 
+// Of each mend: output, tile, points, inner points, numbers of its map.
+void AddMends(const Subspace& s, SafetensorsWriter* writer) {
+  std::vector<std::uint32_t> sizes, points, inner;
+  std::vector<float> means, maps;
+  for (const TileMend& mend : s.mends) {
+    for (const std::size_t size : {std::size_t{mend.output}, std::size_t{mend.tile}, mend.points.size(),
+                                   mend.inner.size(), mend.map.size()})
+      sizes.push_back(static_cast<std::uint32_t>(size));
+    points.insert(points.end(), mend.points.begin(), mend.points.end());
+    inner.insert(inner.end(), mend.inner.begin(), mend.inner.end());
+    means.insert(means.end(), mend.mean.begin(), mend.mean.end());
+    maps.insert(maps.end(), mend.map.begin(), mend.map.end());
+  }
+  Add<std::uint32_t>(writer, kMendsKey, sizes);
+  Add<std::uint32_t>(writer, kMendPointsKey, points);
+  Add<std::uint32_t>(writer, kMendInnerKey, inner);
+  Add<float>(writer, kMendMeansKey, means);
+  Add<float>(writer, kMendMapsKey, maps);
+}
+
+// Takes as many numbers from the front of a list; false where it has fewer.
+template <typename T>
+bool Take(std::size_t count, std::span<const T>* from, std::vector<T>* to) {
+  if (count > from->size()) return false;
+  to->assign(from->begin(), from->begin() + static_cast<std::ptrdiff_t>(count));
+  *from = from->subspan(count);
+  return true;
+}
+
+Status ReadMends(const SafetensorsFile& file, Subspace* s) {
+  if (!file.tensors().contains(kMendsKey)) return {};
+  std::vector<std::uint32_t> sizes, points, inner;
+  std::vector<float> means, maps;
+  for (const auto& [key, list] :
+       {std::pair{kMendsKey, &sizes}, {kMendPointsKey, &points}, {kMendInnerKey, &inner}})
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<std::uint32_t>(key, {kAnyRows}), list));
+  for (const auto& [key, list] : {std::pair{kMendMeansKey, &means}, {kMendMapsKey, &maps}})
+    KPSA_RETURN_IF_ERROR(Assign(file.Values<float>(key, {kAnyRows}), list));
+  std::span<const std::uint32_t> of_points(points), of_inner(inner);
+  std::span<const float> of_means(means), of_maps(maps);
+  bool fits = sizes.size() % 5 == 0 && sizes.size() / 5 <= kMaxMends;
+  for (std::size_t i = 0; fits && i < sizes.size(); i += 5) {
+    TileMend& mend = s->mends.emplace_back();
+    mend.output = sizes[i], mend.tile = sizes[i + 1];
+    fits = Take(sizes[i + 2], &of_points, &mend.points) && Take(sizes[i + 3], &of_inner, &mend.inner) &&
+           Take(3 * std::size_t{sizes[i + 3]}, &of_means, &mend.mean) &&
+           Take(sizes[i + 4], &of_maps, &mend.map);
+  }
+  if (!fits || !of_points.empty() || !of_inner.empty() || !of_means.empty() || !of_maps.empty())
+    return Status::Invalid("the sizes of mended tiles are not those of {} points and {} numbers",
+                           points.size(), maps.size());
+  return {};
+}
+
 }  // namespace
 
 void AddLists(const Subspace& s, SafetensorsWriter* writer) {
@@ -219,6 +275,7 @@ void AddLists(const Subspace& s, SafetensorsWriter* writer) {
   AddCues(s, &names, writer);
   AddRanges(s, &names, writer);
   AddRig(s.rig, &names, writer);
+  if (!s.mends.empty()) AddMends(s, writer);
   names.AddTo(writer);
   Add<std::uint8_t>(writer, kTrainingKey,
                     {reinterpret_cast<const std::uint8_t*>(s.training.data()), s.training.size()});
@@ -230,6 +287,7 @@ Status ReadLists(const SafetensorsFile& file, Subspace* s) {
   KPSA_RETURN_IF_ERROR(ReadCues(file, &*names, s));
   KPSA_RETURN_IF_ERROR(ReadRanges(file, &*names, s));
   KPSA_RETURN_IF_ERROR(ReadRig(file, &*names, &s->rig));
+  KPSA_RETURN_IF_ERROR(ReadMends(file, s));
   return ReadTraining(file, &s->training);
 }
 

@@ -377,6 +377,18 @@ void TileMap::JointMatricesOf(const float* y, float* entries) const {
   }
 }
 
+bool TileMap::JointOf(std::size_t tile, const float* y, Matrix4* joint) const {
+  if (data_.joints.empty() || data_.joints[tile] == 0) return false;
+  float entries[12];
+  for (std::size_t i = 0; i < 12; ++i) {
+    const std::size_t e = 12 * (data_.joints[tile] - 1) + i;
+    entries[i] = static_cast<float>(data_.joint_mean[e] +
+                                    data_.joint_deviation[e] * static_cast<double>(y[data_.joint_rows[e]]));
+  }
+  *joint = MatrixOf(entries);
+  return true;
+}
+
 TileMap TileMap::WithDoubts(std::span<const double> factors) const {
   KPSA_CHECK_EQ(factors.size(), tiles());
   TileMap result = *this;

@@ -108,7 +108,12 @@ class TileMap {
   std::size_t bytes() const;  // read for one frame
   double bytes_per_point() const;
   double mean_rank() const;
-  double mean_cues() const;  // |J|
+  double mean_cues() const;                                        // |J|
+  std::span<const std::uint32_t> CuesOf(std::size_t tile) const {  // J
+    return {data_.columns.data() + column_begin_[tile], data_.counts[tile]};
+  }
+  // The matrix of the joint that the tile lies in, relative to the space of the points; false where it lies in that.
+  bool JointOf(std::size_t tile, const float* y, Matrix4* joint) const;
   bool has_products() const { return !data_.products.empty(); }
   // The same with doubts that many times as large. [tiles()]
   TileMap WithDoubts(std::span<const double> factors) const;

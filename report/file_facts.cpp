@@ -209,6 +209,9 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
                  {"memory bytes", memory},
                  {"training", TrainingText(*subspace)}};
   if (subspace->of_inner()) facts.facts.emplace_back("reconstructs", "points before the last step");
+  std::size_t mended = 0;
+  for (const TileMend& mend : subspace->mends) mended += mend.points.size();
+  if (mended > 0) facts.facts.emplace_back("mended points", fmt::format("{}, by their last step", mended));
   const TrainingRecord record = ParseTraining(subspace->training);
   facts.facts.insert(
       facts.facts.end(),

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "kpsa/training/finer_subspaces.h"
+#include "kpsa/training/mend_tiles.h"
 #include "kpsa/training/training_cancel.h"
 
 namespace kpsa::engine {
@@ -64,10 +65,10 @@ struct Trained {
   bool ended = false;  // with its cues, as these lie where the last step is dear: there is no subspace
 };
 
-// Ends with its cues where these are points that come out, a frame is expected to cost more than `enough`, and no cues of
+// steps: by which points may be mended, by mesh; or none. Ends with its cues where these are points that come out, a frame is expected to cost more than `enough`, and no cues of
 // tiles would be tried.
 Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
-                          const TrainOptions& options,
+                          const TrainOptions& options, const std::vector<Compiler::SplitPoints>& steps = {},
                           double enough = std::numeric_limits<double>::infinity()) {
   TrainingSetup setup(rig, clips, options);
   TrainingRecord record = RecordOf(clips, options);
@@ -121,6 +122,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
       (!candidates.fine || cost.lost() > kTooManyMisses) && setup.limit.left() > candidates.modes_seconds)
     KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&*subspace));
 
+  if (!steps.empty()) KPSA_RETURN_IF_ERROR(MendTiles(&setup, steps, candidates.cues.set, &*subspace));
   KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
   Sign(setup, &*subspace);
   record.limited = setup.limit.left_out();
@@ -180,18 +182,19 @@ void AddTried(const Trained& other, Trained* taken) {
 // less.
 Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                           const TrainOptions& options) {
-  const bool may = options.mode == EstimatorMode::kMap && !rig.target.colors &&
-                   options.inner != TrainOptions::Inner::kNever;
   Result<std::optional<TrainingRig>> split = std::optional<TrainingRig>();
-  if (may) split = SplitRig(rig, clips);
+  if (options.mode == EstimatorMode::kMap && !rig.target.colors) split = SplitRig(rig, clips);
   if (!split.ok()) return split.status();
   if (!split->has_value()) return TrainOnce(rig, clips, options);
+  const std::vector<Compiler::SplitPoints> mends =
+      options.keep_modes || options.without.mends ? std::vector<Compiler::SplitPoints>() : (*split)->split;
+  if (options.inner == TrainOptions::Inner::kNever) return TrainOnce(rig, clips, options, mends);
   if (options.inner == TrainOptions::Inner::kAlways) return TrainOnce(**split, clips, options);
   double steps = 0;
   for (std::size_t m = 0; m < (*split)->split.size(); ++m)
     steps += (*split)->step(m) == nullptr ? 0 : static_cast<double>((*split)->step(m)->cost_ns());
   const double enough = kWorthSplitting * steps;
-  Result<Trained> whole = TrainOnce(rig, clips, options, enough);
+  Result<Trained> whole = TrainOnce(rig, clips, options, mends, enough);
   if (!whole.ok() || whole->ns < enough) return whole;
   if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
   TrainOptions rest = options;
@@ -201,7 +204,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   if (inner.ok()) NameTried(&*inner, kBeforeLastStep);
   if (whole->ended && !(inner.ok() && inner->ns < kCheaperInner * whole->ns)) {
     if (inner.ok()) rest.seconds -= inner->seconds;
-    whole = TrainOnce(rig, clips, rest);
+    whole = TrainOnce(rig, clips, rest, mends);
     if (!whole.ok()) return whole;
   }
   if (!inner.ok()) return whole;

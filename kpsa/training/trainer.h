@@ -55,6 +55,7 @@ struct TrainOptions {
     bool hinges = false;
     bool tile_products = false;  // where all points share cues: SoftCache's own score alone judges them
     bool patches = false;        // every miss is one of all points
+    bool mends = false;          // points by last steps
     bool trust = false;          // the doubts of all tiles count alike
     bool miss_costs = false;  // cues by the error they leave, at the first place; no finer tiles for misses
   } without;

@@ -33,6 +33,11 @@ void Use(const Subspace& s) {
     if (s.doubt_inputs() > 0) Reached("products");
     if (s.patches.tiles > 0) Reached("patches");
     if (s.of_inner()) Reached("inner points");
+    for (const TileMend& mend : s.mends) {
+      Matrix4 joint;
+      (void)s.tiles[mend.output].JointOf(mend.tile, scratch.y.data(), &joint);
+      Reached("mends");
+    }
     if (s.patches.tiles > 0)
       (void)JudgePatches(s, threshold, scratch.y.span(), scratch.g.span(), scratch.t.span(), doubts, scores);
     if (verdict.reason == MissReason::kNotFinite) continue;

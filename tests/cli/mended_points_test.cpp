@@ -1,0 +1,155 @@
+// Points whose frames a deltaMush turns over are mended: what its last step needs is reconstructed, and the step gives
+// them.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "tests/cli/hello_folder.h"
+#include "tests/cli/rig_run.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr double kFineTolerance = 1e-5;  // that a few points of the elbow go beyond
+
+TrainOptions FineTraining(bool mends) {
+  TrainOptions options = QuickTraining();
+  options.tolerance = kFineTolerance;
+  options.rows = 60, options.min_points = 4, options.max_modes = 8;
+  options.may_have_cues_by_tile = false;
+  options.inner = TrainOptions::Inner::kNever;
+  options.without.mends = !mends;
+  return options;
+}
+
+class MendedPoints : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new HelloFolder;
+    folder_->Edit("stack: [skin, cage, mush]", "stack: [skin, mush]");
+    trained_ = TrainRig(folder_->rig(), FineTraining(true));
+    ASSERT_NE(trained_, nullptr);
+    ASSERT_FALSE(trained_->mends.empty());
+  }
+  static void TearDownTestSuite() {
+    trained_.reset();
+    delete folder_;
+  }
+  static RigRunOptions AnyError(std::shared_ptr<const Subspace> subspace) {
+    return {.subspace = std::move(subspace), .accelerate = {.tolerance = kInfinity}};
+  }
+  static std::vector<Index> Mended() {
+    std::vector<Index> points;
+    for (const TileMend& mend : trained_->mends)
+      points.insert(points.end(), mend.points.begin(), mend.points.end());
+    return points;
+  }
+  static double Distance(const std::vector<float>& a, const std::vector<float>& b, Index point) {
+    double sum = 0;
+    for (std::size_t i = point; i < a.size(); i += a.size() / 3)
+      sum += std::pow(static_cast<double>(a[i] - b[i]), 2);
+    return std::sqrt(sum);
+  }
+  static inline const HelloFolder* folder_ = nullptr;
+  static inline std::shared_ptr<const Subspace> trained_;
+};
+
+TEST_F(MendedPoints, AreNearerAndOthersAreAsTheyWere) {
+  const auto without = TrainRig(folder_->rig(), FineTraining(false));
+  ASSERT_NE(without, nullptr);
+  EXPECT_TRUE(without->mends.empty());
+  RigRun full(folder_->rig()), run(folder_->rig(), AnyError(trained_)),
+      plain(folder_->rig(), AnyError(without));
+  ASSERT_TRUE(run.ok()) << run.error;
+  const std::vector<Index> mended = Mended();
+  std::vector<double> worst(mended.size(), 0), before(mended.size(), 0);
+  for (const auto& pose : SmoothPoses(run.rig, 60, 0.95)) {
+    full.Pose(pose), run.Pose(pose), plain.Pose(pose);
+    const std::vector<float> exact = full.Evaluate().points, with = run.Evaluate().points,
+                             as_before = plain.Evaluate().points;
+    for (std::size_t k = 0; k < mended.size(); ++k) {
+      worst[k] = std::max(worst[k], Distance(with, exact, mended[k]));
+      before[k] = std::max(before[k], Distance(as_before, exact, mended[k]));
+    }
+    for (Index p = 0; p < exact.size() / 3; ++p) {
+      if (std::ranges::find(mended, p) != mended.end()) continue;
+      EXPECT_EQ(Distance(with, as_before, p), 0) << p;
+    }
+  }
+  double sum = 0, sum_before = 0;
+  for (std::size_t k = 0; k < mended.size(); ++k) sum += worst[k], sum_before += before[k];
+  EXPECT_LT(sum, 0.7 * sum_before);
+}
+
+TEST_F(MendedPoints, HaveTheirBitsInAnyCompany) {
+  RigRun run(folder_->rig(), AnyError(trained_));
+  ASSERT_TRUE(run.ok()) << run.error;
+  const NodeDef& def = run.rig.graph->def(run.accelerated.node);
+  const PlugRef points{run.accelerated.node, def.FindAttribute("outPoints"), 0, -1};
+  const auto total = static_cast<Index>(trained_->outputs[0].points);
+  const std::vector<Index> mended = Mended();
+  for (const std::vector<Index>& some : {std::vector<Index>{mended[0]}, {mended.back()}, mended}) {
+    Request request;
+    request.varying = VaryingPlugs(run.rig);
+    request.outputs.push_back({points, PointSet::Of(some, total)});
+    const Result<std::shared_ptr<const Plan>> plan = run.compiler.Compile(*run.rig.graph, request);
+    ASSERT_TRUE(plan.ok()) << plan.status().ToString();
+    Evaluator evaluator(*plan);
+    for (const auto& pose : SmoothPoses(run.rig, 5, 0.8)) {
+      run.Pose(pose);
+      const std::vector<float> all = run.Evaluate().points;
+      for (std::size_t c = 0; c < run.rig.controls.size(); ++c) {
+        const PlugRef& plug = run.rig.controls[c].plug;
+        const Index varying = (*plan)->FindVarying(plug);
+        if (varying != kNoIndex)
+          evaluator.Set(varying, pose[c],
+                        (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
+      }
+      ASSERT_TRUE(evaluator.Evaluate().ok());
+      const ConstPointsView part = evaluator.Points(0);
+      ASSERT_EQ(part.count, some.size());
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        EXPECT_EQ(part.x[i], all[some[i]]);
+        EXPECT_EQ(part.y[i], all[total + some[i]]);
+        EXPECT_EQ(part.z[i], all[2 * total + some[i]]);
+      }
+    }
+  }
+}
+
+TEST_F(MendedPoints, AreInTheFile) {
+  const std::string path = *folder_ / "mends.kpsa";
+  ASSERT_TRUE(WriteSubspace(*trained_, path).ok());
+  EXPECT_NE(folder_->Read(path).find("\"version\":\"11\""), std::string::npos);
+  const Result<Subspace> read = ReadSubspace(path);
+  ASSERT_TRUE(read.ok()) << read.status().ToString();
+  EXPECT_EQ(read->mends, trained_->mends);
+}
+
+TEST_F(MendedPoints, ThatMakeNoSenseAreRefused) {
+  const auto refused = [](auto edit) {
+    Subspace s = *trained_;
+    edit(&s.mends[0]);
+    return !ValidateSubspace(s).ok();
+  };
+  EXPECT_FALSE(refused([](TileMend*) {}));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->output = 1; }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->tile = 1000; }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->points.clear(); }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->points.push_back(mend->points.back()); }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->points.push_back(1u << 20); }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->inner.push_back(0); }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->mean.pop_back(); }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->map.push_back(0); }));
+  EXPECT_TRUE(refused([](TileMend* mend) { mend->map[0] = std::nanf(""); }));
+  Subspace twice = *trained_;
+  twice.mends.push_back(twice.mends[0]);
+  EXPECT_FALSE(ValidateSubspace(twice).ok());
+  // A list that no last step asks for
+  auto other = std::make_shared<Subspace>(*trained_);
+  other->mends[0].inner.back() += 1;
+  EXPECT_NE(RigRun(folder_->rig(), {.subspace = other}).error.find("last step"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace kpsa::engine
