@@ -14,8 +14,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr std::size_t kPoses = 1200,
-                      kFewestPoses = 200;  // that points are judged by; a third of them of the clips
+constexpr std::size_t kFewestPoses = 200;  // that points are judged by; a third of them of the clips
 constexpr std::size_t kMostBytes = std::size_t{320} << 20;  // of these
 constexpr std::size_t kMostMendedPoints = 8;
 // Tolerances: points that are farther off are mended, where poses are frames of clips; others count half
@@ -37,7 +36,7 @@ Status Record(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>& sp
   if (!layout.ok()) return layout.status();
   to->inner = PoseMatrix(*layout);
   const std::size_t bytes = sizeof(float) * (setup->layout.columns() + layout->columns());
-  const std::size_t poses = std::min(kPoses, kMostBytes / bytes);
+  const std::size_t poses = std::min(kMendPoses, kMostBytes / bytes);
   if (poses < kFewestPoses) return Status();
   std::size_t frames = 0;
   for (const TrainingClip& clip : setup->clips) frames += clip.times.size();

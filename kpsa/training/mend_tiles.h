@@ -8,6 +8,9 @@
 
 namespace kpsa::engine {
 
+inline constexpr std::size_t kMendPoses =
+    1200;  // that points are judged by, at most; each is evaluated twice
+
 // setup: of the training of the subspace, with all poses drawn; cues: those of the subspace, in terms of its layout.
 // split: last steps of the meshes, null where there is none. Leaves the calibration as it is, which is cautious then.
 Status MendTiles(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>& split, const CueSet& cues,
