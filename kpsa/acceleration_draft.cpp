@@ -368,31 +368,29 @@ Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarge
   for (std::size_t m = 0; m < subspace.outputs.size(); ++m) {
     const SubspaceOutput& output = subspace.outputs[m];
     std::shared_ptr<const LastStep>& step = draft->data.steps.emplace_back();
-    const auto of_output = [&](const TileMend& mend) { return mend.output == m; };
-    if (output.inner == 0) {
-      const auto mend = std::ranges::find_if(subspace.mends, of_output);
-      if (mend == subspace.mends.end()) continue;
-      step = std::move((*split)[m].step);
-      if (step == nullptr || step->points() != output.points)
-        return Status::Invalid(
-            "the subspace mends points of {} by its last step, which the rig lacks; train it again",
-            output.name);
-      for (const TileMend& one : subspace.mends) {
-        if (!of_output(one)) continue;
-        const auto bound = step->Bind(PointSet::Of(one.points, static_cast<Index>(output.points)));
-        if (bound->inner() != one.inner)
-          return Status::Invalid(
-              "the subspace mends points of {} by a last step that the rig lacks; train it again",
-              output.name);
-      }
+    const std::shared_ptr<const LastStep>& here = (*split)[m].step;
+    if (here ==
+        nullptr) {  // what it has besides points may vary here: points come out as calibration had them
+      if (output.inner > 0)
+        draft->AlwaysMiss(
+            fmt::format("the last step of {} may vary, which the subspace stands before", output.name));
       continue;
     }
-    step = std::move((*split)[m].step);
-    if (step == nullptr || step->points() != output.points || step->inner_points() != output.inner)
+    for (const TileMend& mend : subspace.mends) {
+      if (mend.output != m) continue;
+      step = here;
+      if (here->points() != output.points ||
+          here->Bind(PointSet::Of(mend.points, static_cast<Index>(output.points)))->inner() != mend.inner)
+        return Status::Invalid(
+            "the subspace mends points of {} by a last step that the rig lacks; train it again", output.name);
+    }
+    if (output.inner == 0) continue;
+    step = here;
+    if (here->points() != output.points || here->inner_points() != output.inner)
       return Status::Invalid(
           "the subspace is for {} points before the last step of {}, and the rig has {} there; train it "
           "again",
-          output.inner, output.name, step == nullptr ? 0 : step->inner_points());
+          output.inner, output.name, here->inner_points());
   }
   return Status();
 }

@@ -121,6 +121,20 @@ TEST_F(InnerPoints, SomePointsHaveTheBitsOfAll) {
   }
 }
 
+// What the step has besides points may vary: then nothing is reconstructed.
+TEST_F(InnerPoints, MissWhereTheStepVaries) {
+  const std::vector<std::string> varying = {"mush.envelope"};
+  RigRun full(folder_->rig(), {.varying = varying}),
+      run(folder_->rig(), {.subspace = trained_, .varying = varying});
+  ASSERT_TRUE(run.ok()) << run.error;
+  for (const double envelope : {1.0, 0.5}) {
+    for (const auto& pose : SmoothPoses(run.rig, 3, 0.8)) {
+      for (RigRun* of : {&full, &run}) of->Pose(pose), of->Set("mush.envelope", envelope);
+      EXPECT_TRUE(SameBytes(run.Evaluate().points, full.Evaluate().points));
+    }
+  }
+}
+
 TEST_F(InnerPoints, AreInTheFile) {
   const std::string path = *folder_ / "inner.kpsa";
   ASSERT_TRUE(WriteSubspace(*trained_, path).ok());

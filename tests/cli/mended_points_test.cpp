@@ -117,6 +117,23 @@ TEST_F(MendedPoints, HaveTheirBitsInAnyCompany) {
   }
 }
 
+// What the step has besides points may vary: then points are as their tiles have them, and what is set misses.
+TEST_F(MendedPoints, NotWhereTheStepVaries) {
+  const std::vector<std::string> varying = {"mush.envelope"};
+  RigRunOptions any = AnyError(trained_);
+  any.varying = varying;
+  RigRun full(folder_->rig(), {.varying = varying}), run(folder_->rig(), any),
+      careful(folder_->rig(), {.subspace = trained_, .varying = varying});
+  ASSERT_TRUE(run.ok()) << run.error;
+  ASSERT_TRUE(careful.ok()) << careful.error;
+  for (const auto& pose : SmoothPoses(run.rig, 5, 0.8)) {
+    run.Pose(pose);
+    EXPECT_TRUE(run.Evaluate().hit);
+    for (RigRun* of : {&full, &careful}) of->Pose(pose), of->Set("mush.envelope", 0.5);
+    EXPECT_TRUE(SameBytes(careful.Evaluate().points, full.Evaluate().points));
+  }
+}
+
 TEST_F(MendedPoints, AreInTheFile) {
   const std::string path = *folder_ / "mends.kpsa";
   ASSERT_TRUE(WriteSubspace(*trained_, path).ok());
