@@ -17,7 +17,8 @@ namespace {
 constexpr std::size_t kFewestPoses = 200;  // that points are judged by; a third of them of the clips
 constexpr std::size_t kMostBytes = std::size_t{320} << 20;  // of these
 constexpr std::size_t kMostMendedPoints = 8;
-// Tolerances: points that are farther off are mended, where poses are frames of clips; others count half
+// Tolerances: points that are farther off in frames of the clips are mended, or without clips in other poses, which count
+// half: what these do far out, clips hardly ever do
 constexpr double kOff = 0.5, kOfSamples = 0.5;
 constexpr double kBetter = 0.7;                   // of what they were off, in poses that were not fitted to
 constexpr std::size_t kHeldOut = 4;               // of so many poses, one
@@ -58,8 +59,9 @@ Status Record(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>& sp
 // How far off each point is, worst pose of the clips first, then of the others.
 struct Off {
   std::vector<float> clips, samples;
+  bool has_clips = false;
   double of(std::size_t point) const {
-    return std::max(static_cast<double>(clips[point]), kOfSamples * static_cast<double>(samples[point]));
+    return has_clips ? static_cast<double>(clips[point]) : kOfSamples * static_cast<double>(samples[point]);
   }
 };
 
@@ -76,7 +78,7 @@ Double3 At(std::span<const float> row, std::size_t i) {
 Off Judge(const Subspace& subspace, const CueSet& cues, const Points& points, Eigen::MatrixXf* y) {
   const PoseLayout& layout = points.rows.layout();
   y->resize(static_cast<Eigen::Index>(subspace.rows()), static_cast<Eigen::Index>(points.rows.poses()));
-  Off off{std::vector<float>(layout.points, 0), std::vector<float>(layout.points, 0)};
+  Off off{std::vector<float>(layout.points, 0), std::vector<float>(layout.points, 0), points.of_clips > 0};
   std::mutex mutex;
   ParallelFor(points.rows.poses(), 16, [&](std::size_t begin, std::size_t end) {
     SubspaceScratch scratch(subspace);
