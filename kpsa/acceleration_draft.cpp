@@ -369,8 +369,8 @@ Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarge
     const SubspaceOutput& output = subspace.outputs[m];
     std::shared_ptr<const LastStep>& step = draft->data.steps.emplace_back();
     const std::shared_ptr<const LastStep>& here = (*split)[m].step;
-    if (here ==
-        nullptr) {  // what it has besides points may vary here: points come out as calibration had them
+    // What it has besides points may vary here: points come out as calibration had them
+    if (here == nullptr) {
       if (output.inner > 0)
         draft->AlwaysMiss(
             fmt::format("the last step of {} may vary, which the subspace stands before", output.name));

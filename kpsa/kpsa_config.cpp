@@ -27,6 +27,7 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.Add(mend.output);
     hasher.Add(mend.tile);
     hasher.AddLong(std::span<const Index>(mend.points));
+    hasher.AddLong(std::span<const float>(mend.mean));
     hasher.AddLong(std::span<const float>(mend.map));
   }
   for (const PointCues& cues : data_.cues) {

@@ -17,7 +17,7 @@ class OutputReconstruction {
   struct Frame {
     const float* inputs = nullptr;  // of this output's tiles, as LargestDoubt leaves them; null: they read y
     std::span<const float> y;
-    const float* measured = nullptr;            // the same, for mends
+    const float* measured = nullptr;            // y of the cues, for mends
     const Matrix4* world_from_space = nullptr;  // null where points come out in the space
     PointsView out;                             // the wanted points
   };

@@ -178,4 +178,37 @@ std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, 
   return poses;
 }
 
+void ExpectBitsOfAll(RigRun* run, const std::vector<std::vector<Index>>& sets) {
+  const NodeDef& def = run->rig.graph->def(run->accelerated.node);
+  const PlugRef points{run->accelerated.node, def.FindAttribute("outPoints"), 0, -1};
+  for (const std::vector<Index>& some : sets) {
+    const std::size_t total = run->Evaluate().points.size() / 3;
+    Request request;
+    request.varying = VaryingPlugs(run->rig);
+    request.outputs.push_back({points, PointSet::Of(some, static_cast<Index>(total))});
+    const Result<std::shared_ptr<const Plan>> plan = run->compiler.Compile(*run->rig.graph, request);
+    ASSERT_TRUE(plan.ok()) << plan.status().ToString();
+    Evaluator evaluator(*plan);
+    for (const auto& pose : SmoothPoses(run->rig, 5, 0.8)) {
+      run->Pose(pose);
+      const std::vector<float> all = run->Evaluate().points;
+      for (std::size_t c = 0; c < run->rig.controls.size(); ++c) {
+        const PlugRef& plug = run->rig.controls[c].plug;
+        const Index varying = (*plan)->FindVarying(plug);
+        if (varying != kNoIndex)
+          evaluator.Set(varying, pose[c],
+                        (*plan)->varying()[varying].type == Type::kDouble3 ? plug.component : -1);
+      }
+      ASSERT_TRUE(evaluator.Evaluate().ok());
+      const ConstPointsView part = evaluator.Points(0);
+      ASSERT_EQ(part.count, some.size());
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        EXPECT_EQ(part.x[i], all[some[i]]);
+        EXPECT_EQ(part.y[i], all[total + some[i]]);
+        EXPECT_EQ(part.z[i], all[2 * total + some[i]]);
+      }
+    }
+  }
+}
+
 }  // namespace kpsa::engine

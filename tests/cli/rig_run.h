@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "host/rig_training.h"
 #include "graph/evaluator.h"
+#include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 
 namespace kpsa::engine {
@@ -90,5 +90,8 @@ class RigRun {
 // Poses along a smooth path through the controls' ranges, `reach` times as far as they go.
 std::vector<std::vector<double>> SmoothPoses(const Rig& rig, std::size_t count, double reach,
                                              double speed = 0.37);
+
+// Some points of the first output of the KPSA node, evaluated alone, have the bits that they have among all.
+void ExpectBitsOfAll(RigRun* run, const std::vector<std::vector<Index>>& sets);
 
 }  // namespace kpsa::engine
