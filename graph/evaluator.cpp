@@ -39,7 +39,7 @@ Evaluator::Evaluator(std::shared_ptr<const Plan> plan, EvaluatorOptions options)
   computed_.assign(steps, 0);
   chosen_.assign(plan_->branches().size(), 0);
   dirty_.assign(steps / 64 + 1, 0);
-  wanted_.assign(steps / 64 + 1, 0);
+  walked_.assign(steps / 64 + 1, 0);
   taking_.assign(plan_->segments().size(), 0);
   asked_.assign(plan_->segments().size(), 0);
   shared_.reserve(plan_->segments().size());
@@ -162,33 +162,15 @@ void Evaluator::SetPoints(Index varying, ConstPointsView points) {
   if (!equal) Changed(varying);
 }
 
-// Marks the dirty steps that `step` needs, itself included, as wanted.
-void Evaluator::MarkWanted(Index step) {
-  const auto steps = static_cast<Index>(plan_->steps().size());
-  const auto want = [&](Index producer) {
-    if (producer >= steps || !dirty(producer)) return;
-    const std::uint64_t bit = std::uint64_t{1} << (producer % 64);
-    if ((wanted_[producer / 64] & bit) != 0) return;
-    wanted_[producer / 64] |= bit;
-    stack_.push_back(producer);
-  };
-  want(step);
-  while (!stack_.empty()) {
-    const Index top = stack_.back();
-    stack_.pop_back();
-    const Plan::Step& s = plan_->steps()[top];
-    for (Index d = 0; d < s.deps_count; ++d) want(plan_->deps()[s.deps + d]);
-    if (s.branch != kNoIndex) {
-      for (Index producer : plan_->branches()[s.branch].lazy_deps) want(producer);
-    }
-    // A unit runs as a whole: the first of its members to come here wants all of them, and marks the unit's
-    // first step
-    const Index first = top - s.unit_offset;
-    const Index size = plan_->steps()[first].unit_size;
-    if (size == 1 || (top != first && wanted(first))) continue;
-    for (Index member = first; member < first + size; ++member) want(member);
-    wanted_[first / 64] |= std::uint64_t{1} << (first % 64);
+// The steps that an output needs: as the plan has them, or those of the last output that was asked for.
+const std::uint64_t* Evaluator::NeedsOf(Index output) {
+  if (const auto needs = plan_->needs(output); !needs.empty()) return needs.data();
+  if (walked_output_ != output) {
+    std::fill(walked_.begin(), walked_.end(), 0);
+    plan_->AddNeeds(plan_->outputs()[output].producer, walked_, &stack_);
+    walked_output_ = output;
   }
+  return walked_.data();
 }
 
 void Evaluator::RecordFailure(Index step, std::string_view message) {
@@ -231,22 +213,19 @@ Status Evaluator::Evaluate() {
 }
 
 Status Evaluator::Pull(Index output) {
-  const Index producer = plan_->outputs()[output].producer;
   if (IsFresh(output)) return Status();
   set_since_run_ = false;
-  MarkWanted(producer);
   NextRun();
-  wanted_only_ = true;
+  wanted_ = NeedsOf(output);
   Run(plan_->segments()[0], plan_->segments()[0].begin, plan_->segments()[0].end);
-  wanted_only_ = false;
-  std::fill(wanted_.begin(), wanted_.end(), 0);
+  wanted_ = nullptr;
   return TakeFailure();
 }
 
 std::size_t Evaluator::MemoryBytes() const {
   const auto bytes = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof(*this) + plan_->initial_values().size() + buffers_.size() * 4 + state_.size() * 4 +
-         bytes(changed_) + bytes(computed_) + bytes(chosen_) + bytes(dirty_) + bytes(wanted_) +
+         bytes(changed_) + bytes(computed_) + bytes(chosen_) + bytes(dirty_) + bytes(walked_) +
          bytes(taking_) + bytes(asked_) + bytes(shared_) + bytes(stack_) + bytes(ready_);
 }
 

@@ -100,7 +100,7 @@ class Evaluator final {
   template <typename T>
   void Write(Index varying, const T& value, std::size_t offset);
   void Changed(Index varying);
-  void MarkWanted(Index step);
+  const std::uint64_t* NeedsOf(Index output);
   ComputeContext ContextOf(const Plan::Step& step);
   Index NewerDep(Index step) const;
   Index NewerLazyDep(Index step) const;
@@ -134,7 +134,7 @@ class Evaluator final {
   Status TakeFailure();
   void MarkComputed(Index step, bool changed);
   bool dirty(Index step) const { return (dirty_[step / 64] >> (step % 64) & 1) != 0; }
-  bool wanted(Index step) const { return (wanted_[step / 64] >> (step % 64) & 1) != 0; }
+  bool wanted(Index step) const { return wanted_ == nullptr || (wanted_[step / 64] >> (step % 64) & 1) != 0; }
   void SetDirty(Index begin, Index end);
   void ClearDirty(Index step) { dirty_[step / 64] &= ~(std::uint64_t{1} << (step % 64)); }
 
@@ -145,11 +145,13 @@ class Evaluator final {
   std::unique_ptr<std::uint64_t[]> values_;
   AlignedFloats buffers_;
   AlignedFloats state_;
-  std::vector<std::uint32_t> changed_;         // by producer: the epoch in which its value last changed
-  std::vector<std::uint32_t> computed_;        // by step: the epoch in which it last computed; 0 never
-  std::vector<std::uint64_t> chosen_;          // by branch
-  std::vector<std::uint64_t> dirty_, wanted_;  // bits, by step; wanted_ only during a pull of one output
-  bool wanted_only_ = false;
+  std::vector<std::uint32_t> changed_;     // by producer: the epoch in which its value last changed
+  std::vector<std::uint32_t> computed_;    // by step: the epoch in which it last computed; 0 never
+  std::vector<std::uint64_t> chosen_;      // by branch
+  std::vector<std::uint64_t> dirty_;       // bits, by step
+  const std::uint64_t* wanted_ = nullptr;  // bits, by step, during a pull of one output; null: all
+  std::vector<std::uint64_t> walked_;      // those of walked_output_, where the plan does not have them
+  Index walked_output_ = kNoIndex;
   std::vector<std::uint64_t> taking_;  // by segment: the taking of the workspace in which it ran
   std::uint64_t takings_ = 0;
   std::vector<Index> stack_;          // steps to visit

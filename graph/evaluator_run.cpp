@@ -183,10 +183,9 @@ bool Evaluator::RunShared(Index g) {
 bool Evaluator::RunSegment(Index g) {
   const Plan::Segment& segment = plan_->segments()[g];
   if (segment.uses_workspace) OwnWorkspace(g);
-  const bool wanted_only = wanted_only_;
-  wanted_only_ = false;
+  const std::uint64_t* const wanted = std::exchange(wanted_, nullptr);
   const bool fine = Run(segment, segment.begin, segment.end);
-  wanted_only_ = wanted_only;
+  wanted_ = wanted;
   return fine;
 }
 
@@ -255,13 +254,13 @@ inline bool Update(std::byte* slot, const std::byte* now) {
   return difference != 0;
 }
 
-// Runs the batch that begins with this step, if it ends before `end` and all of it is stale.
+// Runs the batch that begins with this step, if it ends before `end` and all of it is wanted and stale.
 bool Evaluator::TryBatch(Index number, Index end) {
   const Plan::Batch& batch = plan_->batches()[plan_->steps()[number].batch];
   const Index last = batch.first + batch.count;
-  if (number != batch.first || last > end || wanted_only_) return false;
+  if (number != batch.first || last > end) return false;
   for (Index s = number; s < last; ++s) {
-    if (!dirty(s) || (computed_[s] != 0 && NewerDep(s) == kNoIndex)) return false;
+    if (!dirty(s) || !wanted(s) || (computed_[s] != 0 && NewerDep(s) == kNoIndex)) return false;
   }
   BatchContext context;
   context.values = values();
@@ -304,7 +303,7 @@ bool Evaluator::RunRange(Index begin, Index end) {
   const Plan::Step* const steps = plan_->steps().data();
   for (Index w = begin / 64; w * 64 < end; ++w) {
     std::uint64_t bits = dirty_[w];
-    if (wanted_only_) bits &= wanted_[w];
+    if (wanted_ != nullptr) bits &= wanted_[w];
     if (w == begin / 64) bits &= ~std::uint64_t{0} << (begin % 64);
     if ((w + 1) * 64 > end) bits &= ~std::uint64_t{0} >> ((64 - end % 64) % 64);
     for (; bits != 0; bits &= bits - 1) {
@@ -347,7 +346,7 @@ bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) 
       const Index size = s.unit_size;
       bool run = false;
       for (Index member = step; member < step + size; ++member) {
-        run = run || (dirty(member) && (!wanted_only_ || wanted(member)));
+        run = run || (dirty(member) && wanted(member));
       }
       if (run && s.branch == kNoIndex) {
         for (Index member = step; member < step + size; ++member) {
@@ -386,7 +385,7 @@ bool Evaluator::RunLevels(const Plan::Segment& segment, Index begin, Index end) 
     }
     for (Index step = first; step < last; ++step) {
       if (plan_->steps()[step].branch == kNoIndex || !dirty(step)) continue;
-      if (wanted_only_ && !wanted(step)) continue;
+      if (!wanted(step)) continue;
       ClearDirty(step);
       const bool fine = profile_ != nullptr ? RunBranch<true>(step) : RunBranch<false>(step);
       if (!fine) {

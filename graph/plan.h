@@ -161,6 +161,15 @@ class Plan {
     return varying < closures_.size() ? std::span<const std::pair<Index, Index>>(closures_[varying])
                                       : std::span<const std::pair<Index, Index>>();
   }
+  // The steps that an output needs, itself included, whatever is chosen, a bit each; empty where a walk is cheaper than
+  // storing them.
+  std::span<const std::uint64_t> needs(Index output) const {
+    return output < needs_.size() ? std::span<const std::uint64_t>(needs_[output])
+                                  : std::span<const std::uint64_t>();
+  }
+  // The same of a producer, added to bits [steps / 64 + 1]; `stack` is scratch, of the capacity of as many steps.
+  // Returns how many steps it visited.
+  std::size_t AddNeeds(Index producer, std::span<std::uint64_t> bits, std::vector<Index>* stack) const;
   const std::vector<std::byte>& initial_values() const {
     return initial_values_;
   }  // constants in their slots
@@ -188,6 +197,7 @@ class Plan {
   std::vector<StepShape> shapes_;  // of the types of nodes, once each
   std::vector<Excluded> excluded_;
   std::vector<std::vector<std::pair<Index, Index>>> closures_;
+  std::vector<std::vector<std::uint64_t>> needs_;
   std::vector<std::byte> initial_values_;
   std::string text_, stateful_node_, prototype_node_;
   std::vector<std::shared_ptr<const void>> owned_;  // kernels, constant points, gather maps

@@ -449,6 +449,19 @@ void PlanBuilder::CacheClosures() {
   }
 }
 
+void PlanBuilder::CacheNeeds() {
+  // Of as many outputs as cost no more than a few visits a step
+  std::size_t budget = 16 * (plan_->steps_.size() + 64);
+  std::vector<Index> stack;
+  stack.reserve(plan_->steps_.size());
+  for (Index output = 0; output < plan_->outputs_.size() && budget > 0; ++output) {
+    std::vector<std::uint64_t> bits(plan_->steps_.size() / 64 + 1, 0);
+    budget -=
+        std::min(budget, 1 + bits.size() + plan_->AddNeeds(plan_->outputs_[output].producer, bits, &stack));
+    plan_->needs_.push_back(std::move(bits));
+  }
+}
+
 void PlanBuilder::Explain() {
   std::vector<char> kept(table_.graph().node_capacity(), 0), folded = kept;
   std::vector<PlanDraft::Passed> passed(kept.size(), PlanDraft::Passed::kNo);
@@ -482,6 +495,7 @@ std::shared_ptr<const Plan> PlanBuilder::Build() {
   FillRequestOutputs();
   Connect();
   CacheClosures();
+  CacheNeeds();
   Explain();
   plan_->tables_.shrink_to_fit();
   plan_->deps_.shrink_to_fit();

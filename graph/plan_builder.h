@@ -29,6 +29,7 @@ class PlanBuilder {
   void FillRequestOutputs();
   void Connect();
   void CacheClosures();
+  void CacheNeeds();
   void Explain();
   std::uint32_t SlotOf(const DraftInput& input);
   Index ProducerOf(const DraftInput& input) const;

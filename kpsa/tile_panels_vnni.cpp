@@ -61,6 +61,7 @@ KPSA_VNNI inline void Panels(const std::uint8_t* u, std::size_t panels, std::siz
   constexpr std::size_t kRows = kPanelPoints * kComponents;
   const std::size_t padded = PaddedCount(frame.out.count);
   for (std::size_t p = 0; p < panels; ++p, u += 4 * groups * kRows, mean += kRows, first += kPanelPoints) {
+    const bool whole = first + kPanelPoints <= padded;
 #pragma GCC unroll 2
     for (std::size_t row = 0; row < kRows; row += 16 * kVectors) {
       __m512i high[kVectors], low[kVectors];
@@ -104,7 +105,7 @@ KPSA_VNNI inline void Panels(const std::uint8_t* u, std::size_t panels, std::siz
 #pragma GCC unroll 6
       for (int v = 0; v < kVectors; ++v) {
         const std::size_t to = row + 16 * static_cast<std::size_t>(v), point = first + to % kPanelPoints;
-        if (point < padded) _mm512_store_ps(components[to / kPanelPoints] + point, position[v]);
+        if (whole || point < padded) _mm512_store_ps(components[to / kPanelPoints] + point, position[v]);
       }
     }
   }

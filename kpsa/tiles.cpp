@@ -45,37 +45,40 @@ constexpr int VectorsAtOnce() {
 }
 constexpr bool kManyRegisters = HWY_LANES(float) >= 16;
 
-// The inputs of the byte columns: q = round(t / step) of 16 bits, with the step that the largest asks for. z
-// [rank, padded to 16 with zeros] is overwritten.
-void QuantizeInputs(std::size_t wide, std::size_t rank, float* HWY_RESTRICT t, std::int16_t* HWY_RESTRICT q16,
-                    TileFrame* frame) {
+// The inputs of the byte columns: q = round(t / step) of 16 bits, with the step that the largest asks for; high
+// bytes of the wide columns, their low bytes, the narrow columns. t [rank, padded to 16]. Reads nothing that it
+// has just written: loads that straddle stores wait for them.
+void QuantizeInputs(std::size_t wide, std::size_t rank, const float* HWY_RESTRICT t,
+                    std::int16_t* HWY_RESTRICT q16, TileFrame* frame) {
   const hn::CappedTag<float, 16> d;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   const hn::Rebind<std::int16_t, decltype(d)> ds;
   const std::size_t lanes = hn::Lanes(d);
-  // High bytes of the wide columns, their low bytes, the narrow columns
-  if (wide > 0) {
-    std::memmove(t + wide, t, rank * sizeof(float));
-    for (std::size_t k = 0; k < wide; ++k) t[k] = 256.0f * t[k];
-  }
-  const std::size_t count = wide + rank, padded = (count + 15) / 16 * 16;
-  for (std::size_t k = count; k < padded; ++k) t[k] = 0;
+  const auto first = [&](std::size_t count, std::size_t k) HWY_ATTR {  // of t + k; then zeros
+    return hn::IfThenElseZero(hn::FirstN(d, count - k), hn::LoadU(d, t + k));
+  };
+  const auto high = [&](std::size_t k) HWY_ATTR { return hn::Mul(hn::Set(d, 256.0f), first(wide, k)); };
   // As integers, magnitudes are in the order of the numbers, and NaNs and infinities come last
   const auto magnitude = hn::Set(di, 0x7fffffff);
   auto most = hn::Zero(di);
-  for (std::size_t k = 0; k < padded; k += lanes)
-    most = hn::Max(most, hn::And(magnitude, hn::BitCast(di, hn::Load(d, t + k))));
+  for (std::size_t k = 0; k < rank; k += lanes)
+    most = hn::Max(most, hn::And(magnitude, hn::BitCast(di, first(rank, k))));
+  for (std::size_t k = 0; k < wide; k += lanes)
+    most = hn::Max(most, hn::And(magnitude, hn::BitCast(di, high(k))));
   const std::int32_t bits = hn::GetLane(hn::MaxOfLanes(di, most));
   const float largest = std::bit_cast<float>(bits);
   const bool spoiled = bits >= 0x7f800000;
   frame->step = spoiled ? std::numeric_limits<float>::quiet_NaN() : largest / kInputRange;
   const auto inverse = hn::Set(d, !spoiled && largest > kSmallestInput ? kInputRange / largest : 0.0f);
   auto total = hn::Zero(di);
-  for (std::size_t k = 0; k < padded; k += lanes) {
-    const auto q = hn::NearestInt(hn::Mul(hn::Load(d, t + k), inverse));
+  const auto put = [&](hn::Vec<decltype(d)> value, std::size_t to) HWY_ATTR {
+    const auto q = hn::NearestInt(hn::Mul(value, inverse));
     total = hn::Add(total, q);
-    hn::StoreU(hn::DemoteTo(ds, q), ds, q16 + k);
-  }
+    hn::StoreU(hn::DemoteTo(ds, q), ds, q16 + to);
+  };
+  for (std::size_t k = 0; k < wide; k += lanes) put(high(k), k);
+  for (std::size_t k = 0; k < rank; k += lanes) put(first(rank, k), wide + k);
+  std::memset(q16 + wide + rank, 0, 4 * sizeof(*q16));  // the rest of a group of four
   frame->bias = !spoiled ? 128 * hn::GetLane(hn::SumOfLanes(di, total)) : 0;
 }
 
@@ -215,7 +218,7 @@ Matrix4 MatrixOf(const float* entries) {
 constexpr std::size_t kTilesAhead = 4;  // whose inputs are computed before their points
 static_assert(kTilesAhead <= kTilesAtOnce);
 struct InputSpace {
-  alignas(64) float t[2 * kMaxTileRank + 16];
+  alignas(64) float t[kMaxTileRank + 16];
 };
 // Four byte columns each.
 std::size_t Groups(std::size_t rank, std::size_t wide) { return (rank + wide + 3) / 4; }
@@ -426,9 +429,12 @@ void TileMap::ReconstructBlock(std::span<const float> y, std::span<const PointsV
                                std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
   KPSA_CHECK_LE(outs.size() * data_.inputs, y.size());
   Run(
-      [&](std::span<const std::size_t> some, std::size_t frame, InputSpace* t) {
+      [&](std::span<const std::size_t> some, std::size_t frame, InputSpace* space, const float** t) {
         TileTerms terms[kTilesAhead];
-        for (std::size_t i = 0; i < some.size(); ++i) SetTerms(some[i], t[i].t, nullptr, terms + i);
+        for (std::size_t i = 0; i < some.size(); ++i) {
+          t[i] = space[i].t;
+          SetTerms(some[i], space[i].t, nullptr, terms + i);
+        }
         ComputeTileInputs({terms, some.size()}, y.data() + frame * data_.inputs);
       },
       [&](std::size_t frame, float* entries) { JointMatricesOf(y.data() + frame * data_.inputs, entries); },
@@ -439,9 +445,8 @@ void TileMap::ReconstructFrom(std::span<const float* const> inputs, std::span<co
                               std::span<const Index> tiles, std::span<const Matrix4> spaces) const {
   KPSA_CHECK_EQ(inputs.size(), outs.size());
   Run(
-      [&](std::span<const std::size_t> some, std::size_t frame, InputSpace* t) {
-        for (std::size_t i = 0; i < some.size(); ++i)
-          std::copy_n(inputs[frame] + scale_begin_[some[i]], Padded16(data_.ranks[some[i]]), t[i].t);
+      [&](std::span<const std::size_t> some, std::size_t frame, InputSpace*, const float** t) {
+        for (std::size_t i = 0; i < some.size(); ++i) t[i] = inputs[frame] + scale_begin_[some[i]];
       },
       [&](std::size_t frame, float* entries) {
         std::copy_n(inputs[frame] + data_.scale.size(), data_.joint_rows.size(), entries);
@@ -465,7 +470,8 @@ void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::spa
   // The inputs of some tiles, then their points: short chains of dependent instructions, which overlap
   TileInput input[kTilesAhead][kBlockFrames];
   TileFrame frames[kTilesAhead][kBlockFrames];
-  InputSpace t[kTilesAhead];
+  InputSpace space_of_inputs[kTilesAhead];
+  const float* t[kTilesAhead];
   std::size_t some[kTilesAhead];
   const std::size_t joint_count = data_.joint_rows.size() / 12;
   FloatMatrix joint_space[kBlockFrames][kMaxTileJoints];
@@ -477,21 +483,24 @@ void TileMap::Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::spa
       float entries[12 * kMaxTileJoints];
       joints_of(first + f, entries);
       for (std::size_t j = 0; j < joint_count; ++j) {
-        const Matrix4 joint = MatrixOf(entries + 12 * j);
-        joint_space[f][j] = ToFloats(spaces.empty() ? joint : spaces[first + f] * joint);
+        if (spaces.empty()) {
+          std::copy_n(entries + 12 * j, 12, joint_space[f][j].data());
+        } else {
+          joint_space[f][j] = ToFloats(spaces[first + f] * MatrixOf(entries + 12 * j));
+        }
       }
     }
     for (std::size_t next = 0; next < count; next += kTilesAhead) {
       const std::size_t ahead = std::min(kTilesAhead, count - next);
       for (std::size_t i = 0; i < ahead; ++i) some[i] = tiles.empty() ? next + i : tiles[next + i];
       for (std::size_t f = 0; f < frame_count; ++f) {
-        inputs_of({some, ahead}, first + f, t);
+        inputs_of({some, ahead}, first + f, space_of_inputs, t);
         for (std::size_t i = 0; i < ahead; ++i) {
           frames[i][f].q = input[i][f].q;
           frames[i][f].out = outs[first + f];
           const std::size_t joint = data_.joints.empty() ? 0 : data_.joints[some[i]];
           frames[i][f].space = joint > 0 ? &joint_space[f][joint - 1] : spaces.empty() ? nullptr : &space[f];
-          quantize(data_.wide[some[i]], data_.ranks[some[i]], t[i].t, input[i][f].q, &frames[i][f]);
+          quantize(data_.wide[some[i]], data_.ranks[some[i]], t[i], input[i][f].q, &frames[i][f]);
         }
       }
       for (std::size_t i = 0; i < ahead; ++i) {

@@ -143,8 +143,8 @@ class TileMap {
   void SetTerms(std::size_t tile, float* z, float* doubt, TileTerms* terms) const;
   Status CheckJoints(const TileData& data, const std::string& what) const;
   void JointMatricesOf(const float* y, float* entries) const;  // [joints][12]
-  // The tiles listed (none: all) of some frames; inputs_of(tiles, frame, t) writes the inputs of a few tiles
-  // to t. joints_of(frame, entries): as JointMatricesOf.
+  // The tiles listed (none: all) of some frames; inputs_of(tiles, frame, space, t): where the inputs of
+  // a few tiles are, perhaps in `space`. joints_of(frame, entries): as JointMatricesOf.
   template <typename InputsOf, typename JointsOf>
   void Run(const InputsOf& inputs_of, const JointsOf& joints_of, std::span<const PointsView> outs,
            std::span<const Index> tiles, std::span<const Matrix4> spaces) const;

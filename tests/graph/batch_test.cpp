@@ -95,6 +95,39 @@ TEST(Batch, PullsOfOneOutputRunNoMoreThanThat) {
   EXPECT_EQ(floors.Values(9, 9), (std::vector<double>{9, 9, 9, 9, 10, 10, 10, 10}));
 }
 
+TEST(Batch, APullThatNeedsAllOfThemRunsThemTogether) {
+  TestGraph g(ToyRegistry());
+  g.add("add", "a");
+  g.vary("a.a");
+  std::string sum = "a.out";
+  for (int i = 0; i < 6; ++i) {
+    const std::string n = std::to_string(i);
+    g.add("add", "s" + n, {{"b", 0.25 * i}});
+    g.add("floor", "f" + n);
+    g.add("add", "sum" + n);
+    g.connect("a.out", "s" + n + ".a");
+    g.connect("s" + n + ".out", "f" + n + ".input");
+    g.connect("f" + n + ".out", "sum" + n + ".a");
+    g.connect(sum, "sum" + n + ".b");
+    sum = "sum" + n + ".out";
+  }
+  const Index some = g.want("f3.out"), all = g.want(sum);
+  ASSERT_TRUE(g.compile().ok());
+  ASSERT_EQ(g.plan->batches().size(), 1u);
+  g.evaluator->Record(nullptr);
+  TakeBatchComputes();
+  ASSERT_TRUE(g.evaluator->Pull(all).ok());
+  EXPECT_EQ(TakeBatchComputes(), 1);
+  EXPECT_DOUBLE_EQ(g.evaluator->Get<double>(all), 0 + 0 + 0 + 0 + 1 + 1);
+  g.set("a.a", 10.5);
+  ASSERT_TRUE(g.evaluator->Pull(some).ok());
+  EXPECT_EQ(TakeBatchComputes(), 0);
+  EXPECT_DOUBLE_EQ(g.evaluator->Get<double>(some), 11);
+  ASSERT_TRUE(g.evaluator->Pull(all).ok());  // what is left of them
+  EXPECT_EQ(TakeBatchComputes(), 0);
+  EXPECT_DOUBLE_EQ(g.evaluator->Get<double>(all), 10.5 + 10 + 10 + 11 + 11 + 11 + 11);
+}
+
 TEST(Batch, ThreadsGiveTheSame) {
   Floors floors(8);
   floors.g.evaluator = std::make_unique<Evaluator>(floors.g.plan, EvaluatorOptions{true, nullptr});

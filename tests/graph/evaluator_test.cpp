@@ -62,6 +62,34 @@ TEST(Evaluator, PullRunsOnlyWhatThatOutputNeeds) {
   EXPECT_EQ(g.computes("right"), 1u);
 }
 
+// So many outputs, each of what the one before it needs and a step more, that the plan does not keep what every one needs.
+TEST(Evaluator, PullsOfAnyOfManyOutputsRunOnlyWhatItNeeds) {
+  constexpr int kCount = 400;
+  TestGraph g(ToyRegistry());
+  std::vector<Index> outputs;
+  for (int i = 0; i < kCount; ++i) {
+    const std::string name = "a" + std::to_string(i);
+    g.add("add", name, {{"b", 1.0}});
+    i == 0 ? g.vary("a0.a") : g.connect("a" + std::to_string(i - 1) + ".out", name + ".a");
+    outputs.push_back(g.want(name + ".out"));
+  }
+  ASSERT_TRUE(g.compile().ok());
+  ASSERT_FALSE(g.plan->needs(outputs[3]).empty());
+  ASSERT_TRUE(g.plan->needs(outputs.back()).empty());
+  g.evaluator->Record(g.profile.get());
+  double start = 0;
+  for (const int i : {399, 3, 398, 250, 398, 399}) {
+    g.set("a0.a", ++start);
+    ASSERT_TRUE(g.evaluator->Pull(outputs[static_cast<std::size_t>(i)]).ok());
+    EXPECT_DOUBLE_EQ(g.evaluator->Get<double>(outputs[static_cast<std::size_t>(i)]), start + i + 1);
+  }
+  EXPECT_EQ(g.computes("a0"), 6u);
+  EXPECT_EQ(g.computes("a4"), 5u);
+  EXPECT_EQ(g.computes("a250"), 5u);
+  EXPECT_EQ(g.computes("a251"), 4u);
+  EXPECT_EQ(g.computes("a399"), 2u);
+}
+
 TEST(Evaluator, FoldsWhatDependsOnNothingThatVaries) {
   TestGraph g(ToyRegistry());
   g.add("add", "constant", {{"a", 2.0}, {"b", 3.0}});
