@@ -38,7 +38,8 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   const auto add = [&](const char* what, Subspace tried) {
     const Result<double> points = setup.CostOfPoints(of.cues.set.cues);
     if (!points.ok()) return points.status();
-    trials.Add(what, *points + setup.CostOfSteps(), {std::move(tried), of.cues.set, record, of.cost});
+    trials.Add(what, *points + setup.CostOfSteps(), {std::move(tried), of.cues.set, record, of.cost},
+               what == kByTileFinely ? 1 / kFinelyLess : 1);
     return Status();
   };
   const auto calibrated = [&](const char* what, Subspace now) {

@@ -15,7 +15,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr double kWorthTrying = 0.35;  // of what a frame costs: what others could save
+constexpr double kWorthTrying = 0.45;  // of what a frame costs: what others could save
 // Cues of tiles: of the poses they are trained on, that a trial leaves beyond half the tolerance, at most; and where
 // so many miss by cues for all points that others can hardly be worse
 constexpr double kMostBeyond = 0.03, kMostBeyondElse = 0.1, kMostMiss = 0.3;
@@ -102,7 +102,7 @@ Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     const Result<FrameCost> priced = Price(&made.subspace, made.cues);
     if (!priced.ok()) return priced.status();
     Tried(finely ? kByTileFinely : kByTile, made.cues, priced->misses, priced->ns);
-    if (priced->ns < of_tiles.ns) {
+    if (priced->ns < (finely ? kFinelyLess : 1) * of_tiles.ns) {
       of_tiles = *priced, with_tiles = std::move(made), fine = finely;
       best = record->tried.size() - 1;
     }

@@ -17,6 +17,9 @@ namespace kpsa::engine {
 inline constexpr double kManyMisses = 0.05;     // of new poses: cues of each tile are tried
 inline constexpr double kFewMisses = 0.01;      // likewise: finer tiles for these
 inline constexpr double kTooManyMisses = 0.15;  // and cues as for half the tolerance
+// Of the expected cost with coarse tiles: tiles with cues of their own are stored finely. Clips miss less than judges,
+// who come to the ends of ranges; the bytes are read for sure.
+inline constexpr double kFinelyLess = 0.9;
 
 // Refers to its parts. FindModes has centred the poses.
 struct SubspaceCandidates {

@@ -12,11 +12,11 @@ constexpr double kOfTiles = 1 / 0.85;
 
 }  // namespace
 
-void TrainingTrials::Add(const char* what, double points, CalibratedSubspace tried) {
+void TrainingTrials::Add(const char* what, double points, CalibratedSubspace tried, double weight) {
   const double ns = tried.cost.ns + points;
   tried_.push_back({what, tried.cues.cues.size(), static_cast<std::size_t>(tried.cues.rows()),
                     tried.cost.misses, ns / full_, false});
-  const double weighed = tried.subspace.by_tile() ? kOfTiles * ns : ns;
+  const double weighed = weight * (tried.subspace.by_tile() ? kOfTiles * ns : ns);
   if (tried_.size() > 1 && weighed >= least_weighed_) return;
   best_ = std::move(tried), best_ns_ = ns, least_weighed_ = weighed, best_of_ = tried_.size() - 1;
 }

@@ -22,8 +22,8 @@ class TrainingTrials {
   explicit TrainingTrials(double full) : full_(full) {}
 
   // points: what the graph spends until the points among the cues are there (ns). what: as
-  // TrainingRecord::Tried says it.
-  void Add(const char* what, double points, CalibratedSubspace tried);
+  // TrainingRecord::Tried says it. weight: of what it costs, in the comparison.
+  void Add(const char* what, double points, CalibratedSubspace tried, double weight = 1);
 
   const FrameCost& least() const { return best_.cost; }
   double least_ns() const { return best_ns_; }  // with its points
