@@ -5,13 +5,22 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/fresh_pages.h"
 
 namespace kpsa::engine {
 
-AlignedFloats::AlignedFloats(std::size_t size) : size_(size) {
-  if (size == 0) return;
-  data_ = static_cast<float*>(::operator new(size * sizeof(float), std::align_val_t(kPointAlignment)));
-  std::memset(data_, 0, size * sizeof(float));
+AlignedFloats AlignedFloats::Uninitialized(std::size_t size) {
+  AlignedFloats floats;
+  if (size == 0) return floats;
+  const std::size_t bytes = size * sizeof(float);
+  floats.data_ = static_cast<float*>(::operator new(bytes, std::align_val_t(AlignmentFor(bytes))));
+  floats.size_ = size;
+  FetchPages(floats.data_, bytes);
+  return floats;
+}
+
+AlignedFloats::AlignedFloats(std::size_t size) : AlignedFloats(Uninitialized(size)) {
+  if (size > 0) std::memset(data_, 0, size * sizeof(float));
 }
 
 AlignedFloats::AlignedFloats(AlignedFloats&& other) noexcept
@@ -23,7 +32,7 @@ AlignedFloats& AlignedFloats::operator=(AlignedFloats&& other) noexcept {
   return *this;
 }
 
-AlignedFloats::AlignedFloats(const AlignedFloats& other) : AlignedFloats(other.size_) {
+AlignedFloats::AlignedFloats(const AlignedFloats& other) : AlignedFloats(Uninitialized(other.size_)) {
   if (size_ > 0) std::memcpy(data_, other.data_, size_ * sizeof(float));
 }
 
@@ -33,7 +42,7 @@ AlignedFloats& AlignedFloats::operator=(const AlignedFloats& other) {
 }
 
 AlignedFloats::~AlignedFloats() {
-  if (data_ != nullptr) ::operator delete(data_, std::align_val_t(kPointAlignment));
+  if (data_ != nullptr) ::operator delete(data_, std::align_val_t(AlignmentFor(size_ * sizeof(float))));
 }
 
 PointBuffer::PointBuffer(std::size_t count, int components)

@@ -35,11 +35,13 @@ struct PointsView {
   operator ConstPointsView() const { return {x, y, z, count}; }  // NOLINT: implicit by design
 };
 
-// Owns aligned floats. Move-only; contents start as zeros.
+// Owns aligned floats.
 class AlignedFloats {
  public:
   AlignedFloats() = default;
-  explicit AlignedFloats(std::size_t size);
+  explicit AlignedFloats(std::size_t size);  // zeros
+  // To be written before they are read.
+  static AlignedFloats Uninitialized(std::size_t size);
   AlignedFloats(AlignedFloats&&) noexcept;
   AlignedFloats& operator=(AlignedFloats&&) noexcept;
   AlignedFloats(const AlignedFloats& other);

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "base/check.h"
+#include "base/fresh_pages.h"
 #include "files/file.h"
 
 static_assert(std::endian::native == std::endian::little, "tensors are copied as they lie in memory");
@@ -121,13 +122,15 @@ Status ParseTensor(const std::string& name, const std::string& key, const Json& 
 // looked at at once.
 template <typename Bits>
 bool AllFinite(std::span<const std::byte> bytes, Bits exponent) {
-  bool finite = true;
+  // Where all of them are set, the lowest one more carries into the sign
+  const auto lowest = static_cast<Bits>(exponent & (~exponent + 1u));
+  Bits carried = 0;
   for (std::size_t i = 0; i < bytes.size(); i += sizeof(Bits)) {
     Bits value;
     std::memcpy(&value, bytes.data() + i, sizeof(Bits));
-    finite &= (value & exponent) != exponent;
+    carried = static_cast<Bits>(carried | static_cast<Bits>((value & exponent) + lowest));
   }
-  return finite;
+  return (carried >> (8 * sizeof(Bits) - 1)) == 0;
 }
 
 }  // namespace
@@ -141,24 +144,41 @@ std::uint64_t Tensor::count() const {
   return product;
 }
 
-Result<SafetensorsFile> SafetensorsFile::Parse(std::vector<std::byte> bytes, const std::string& name) {
+namespace {
+
+// For a while only: large pages may hold more than the file.
+AlignedFloats MemoryFor(std::size_t file_size) {
+  const std::size_t unit = file_size >= kLargePage / 4 ? kLargePage : 64;
+  return AlignedFloats::Uninitialized((file_size + unit - 1) / unit * unit / sizeof(float));
+}
+
+}  // namespace
+
+Result<SafetensorsFile> SafetensorsFile::Parse(std::span<const std::byte> bytes, const std::string& name) {
+  AlignedFloats memory = MemoryFor(bytes.size());
+  if (!bytes.empty()) std::memcpy(memory.data(), bytes.data(), bytes.size());
+  return ParseOwn(std::move(memory), bytes.size(), name);
+}
+
+Result<SafetensorsFile> SafetensorsFile::ParseOwn(AlignedFloats memory, std::size_t size,
+                                                  const std::string& name) {
   SafetensorsFile file;
   file.name_ = name;
-  file.bytes_ = std::move(bytes);
-  if (file.bytes_.size() < 8)
-    return Status::Invalid("{} bytes are too few for a header", file.bytes_.size()).At({name});
+  file.memory_ = std::move(memory);
+  const std::span<const std::byte> bytes(reinterpret_cast<const std::byte*>(file.memory_.data()), size);
+  if (bytes.size() < 8) return Status::Invalid("{} bytes are too few for a header", bytes.size()).At({name});
   std::uint64_t header_size;
-  std::memcpy(&header_size, file.bytes_.data(), 8);
-  if (header_size > file.bytes_.size() - 8 || header_size > kMaxHeader) {
+  std::memcpy(&header_size, bytes.data(), 8);
+  if (header_size > bytes.size() - 8 || header_size > kMaxHeader) {
     return Status::Invalid(
                "the header claims {} bytes, the file has {} (not a safetensors file, or cut short)",
-               header_size, file.bytes_.size())
+               header_size, bytes.size())
         .At({name});
   }
   const Result<Json> header =
-      ParseHeader({reinterpret_cast<const char*>(file.bytes_.data()) + 8, header_size}, name);
+      ParseHeader({reinterpret_cast<const char*>(bytes.data()) + 8, header_size}, name);
   if (!header.ok()) return header.status();
-  const std::span<const std::byte> data = std::span<const std::byte>(file.bytes_).subspan(8 + header_size);
+  const std::span<const std::byte> data = bytes.subspan(8 + header_size);
 
   // Every byte of the data belongs to exactly one tensor
   struct Extent {
@@ -217,11 +237,11 @@ Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   }
   if (size > kMaxFile)
     return Status::Invalid("is larger than {} bytes, the most that is read", kMaxFile).At({path});
-  std::vector<std::byte> bytes(size);
+  AlignedFloats memory = MemoryFor(size);
   stream.seekg(0);
-  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  stream.read(reinterpret_cast<char*>(memory.data()), static_cast<std::streamsize>(size));
   if (!stream) return Status::Invalid("could not be read to its end").At({path});
-  return Parse(std::move(bytes), path);
+  return ParseOwn(std::move(memory), size, path);
 }
 
 Result<std::string> SafetensorsFile::Metadata(const std::string& key) const {

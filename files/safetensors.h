@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/points.h"
 #include "base/status.h"
 
 namespace kpsa::engine {
@@ -71,7 +72,7 @@ class SafetensorsFile {
   // Errors (kInvalidInput, each names `name`): not readable, too short, header length beyond the file, header
   // not JSON or not an object of tensors, unknown type, shape overflow, length that differs from shape, data
   // that overlap or leave holes or end before or after the file.
-  static Result<SafetensorsFile> Parse(std::vector<std::byte> bytes, const std::string& name);
+  static Result<SafetensorsFile> Parse(std::span<const std::byte> bytes, const std::string& name);
   static Result<SafetensorsFile> Read(const std::string& path);
 
   const std::string& name() const { return name_; }
@@ -113,8 +114,10 @@ class SafetensorsFile {
                                 std::span<const std::uint64_t> shape) const;
   static void CopyBytes(std::span<const std::byte> from, void* to);
 
+  static Result<SafetensorsFile> ParseOwn(AlignedFloats memory, std::size_t size, const std::string& name);
+
   std::string name_;
-  std::vector<std::byte> bytes_;
+  AlignedFloats memory_;  // of the file
   std::map<std::string, std::string> metadata_;
   std::map<std::string, Tensor> tensors_;
 };

@@ -1,6 +1,8 @@
 // Storage of numbers for SIMD kernels.
 #pragma once
 
+#include <cstddef>
+#include <cstring>
 #include <span>
 
 #include "base/points.h"
@@ -13,6 +15,11 @@ class AlignedArray {
  public:
   AlignedArray() = default;
   explicit AlignedArray(std::size_t size) : floats_((size * sizeof(T) + 3) / 4), size_(size) {}
+  // Of these bytes; the rest of the last float is unknown.
+  explicit AlignedArray(std::span<const std::byte> bytes)
+      : floats_(AlignedFloats::Uninitialized((bytes.size() + 3) / 4)), size_(bytes.size() / sizeof(T)) {
+    if (!bytes.empty()) std::memcpy(floats_.data(), bytes.data(), bytes.size());
+  }
   T* data() { return reinterpret_cast<T*>(floats_.data()); }
   const T* data() const { return reinterpret_cast<const T*>(floats_.data()); }
   std::size_t size() const { return size_; }

@@ -24,8 +24,7 @@ Status ReadAligned(const SafetensorsFile& file, const std::string& key, AlignedA
                    bool half = false, std::uint64_t size = SafetensorsFile::kAnySize) {
   const Result<std::span<const std::byte>> bytes = file.Bytes<T>(key, std::span(&size, 1), half);
   if (!bytes.ok()) return bytes.status();
-  *target = AlignedArray<T>(bytes->size() / sizeof(T));
-  if (!bytes->empty()) std::memcpy(target->data(), bytes->data(), bytes->size());
+  *target = AlignedArray<T>(*bytes);
   return {};
 }
 

@@ -11,6 +11,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr float kNoPivot[3] = {};
+constexpr std::size_t kFew = 16;  // of so many points, one: these are smoothed by themselves
 
 bool CountsUp(std::span<const Index> numbers) {
   for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -28,7 +29,8 @@ void CopyPoint(ConstPointsView from, std::size_t i, PointsView to, std::size_t j
 DeltaMushStep::DeltaMushStep(const Topology& topology, ConstPointsView rest,
                              const DeltaMushSettings& settings, Constants constants)
     : topology_(&topology),
-      smoothing_(topology, rest, settings, AllPoints(rest.count), AllPoints(rest.count), {}, MiddleOf(rest)),
+      settings_(settings),
+      whole_(std::make_unique<Whole>()),
       envelope_(static_cast<float>(constants.envelope)),
       displacement_(static_cast<float>(constants.displacement)),
       masks_(std::move(constants.weights)),
@@ -52,20 +54,49 @@ DeltaMushStep::DeltaMushStep(const Topology& topology, ConstPointsView rest,
   rest_ = PointBuffer(inner_points());
   for (std::size_t i = 0; i < inner_points(); ++i)
     CopyPoint(rest, i < points() ? i : extra_[i - points()], rest_.view(), i);
-  smoothed_rest_ = PointBuffer(inner_points());
-  Inner(rest, smoothed_rest_.view());
+}
+
+const DeltaMushStep::Whole& DeltaMushStep::whole() const {
+  std::call_once(whole_->made, [&] {
+    const std::vector<Index> all = AllPoints(points());
+    whole_->smoothing.emplace(*topology_, rest(), settings_, all, all, std::span<const float>(),
+                              MiddleOf(rest()));
+    whole_->rest = PointBuffer(inner_points());
+    Inner(*whole_->smoothing, rest(), whole_->rest.view());
+  });
+  return *whole_;
 }
 
 void DeltaMushStep::Inner(ConstPointsView in, PointsView inner) const {
   KPSA_CHECK_EQ(in.count, points());
   KPSA_CHECK_EQ(inner.count, inner_points());
-  AlignedFloats scratch(smoothing_.ScratchFloats());
-  smoothing_.Run({.envelope = 1, .displacement = 0, .pivot = MiddleOf(in)}, in,
-                 {inner.x, inner.y, inner.z, points()}, scratch.span());
+  Inner(*whole().smoothing, in, inner);
+}
+
+void DeltaMushStep::Inner(const DeltaMushKernel& smoothing, ConstPointsView in, PointsView inner) const {
+  AlignedFloats scratch(smoothing.ScratchFloats());
+  smoothing.Run({.envelope = 1, .displacement = 0, .pivot = MiddleOf(in)}, in,
+                {inner.x, inner.y, inner.z, points()}, scratch.span());
   for (std::size_t i = 0; i < points(); ++i) {
     if (!smoothed_[i]) CopyPoint(in, i, inner, i);
   }
   for (std::size_t k = 0; k < extra_.size(); ++k) CopyPoint(in, extra_[k], inner, points() + k);
+}
+
+PointBuffer DeltaMushStep::InnerRest(std::span<const Index> of) const {
+  if (of.size() > points() / kFew) return whole().rest;
+  std::vector<Index> smoothed;
+  std::ranges::copy_if(of, std::back_inserter(smoothed), [&](Index p) { return smoothed_[p]; });
+  const std::vector<Index> needed = DeltaMushDemand(*topology_, settings_, smoothed);
+  const DeltaMushKernel smoothing(*topology_, rest(), settings_, smoothed, needed, {}, MiddleOf(rest()));
+  PointBuffer in(needed.size()), out(smoothed.size());
+  for (std::size_t i = 0; i < needed.size(); ++i) CopyPoint(rest(), needed[i], in.view(), i);
+  AlignedFloats scratch(smoothing.ScratchFloats());
+  smoothing.Run({.envelope = 1, .displacement = 0, .pivot = MiddleOf(rest())}, in.view(), out.view(),
+                scratch.span());
+  PointBuffer inner = rest_;
+  for (std::size_t i = 0; i < smoothed.size(); ++i) CopyPoint(out.view(), i, inner.view(), smoothed[i]);
+  return inner;
 }
 
 DeltaMushStep::Part DeltaMushStep::Bind(std::span<const Index> out_points) const {
@@ -94,11 +125,12 @@ DeltaMushStep::Part DeltaMushStep::Bind(std::span<const Index> out_points) const
     if (read[i]) part.inner_.push_back(i);
   }
   part.local_count_ = part.source_.size();
+  const PointBuffer inner_rest = InnerRest(part.source_);
   if (CountsUp(part.source_)) part.source_.clear();
 
   AlignedFloats smoothed(part.ScratchFloats());
-  PackMush(smoothed_rest_.view(), part.source_.empty() ? nullptr : part.source_.data(), kNoPivot, 0,
-           part.local_count_, smoothed.data());
+  PackMush(std::as_const(inner_rest).view(), part.source_.empty() ? nullptr : part.source_.data(), kNoPivot,
+           0, part.local_count_, smoothed.data());
   part.frames_ =
       MushFrames(*topology_, std::move(outputs), local_of, rest_.view(), smoothed.data(), kNoPivot);
   return part;

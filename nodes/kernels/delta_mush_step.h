@@ -2,6 +2,9 @@
 // the frames go on by themselves: of smoothed points, and of some as they came in.
 #pragma once
 
+#include <memory>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -54,8 +57,21 @@ class DeltaMushStep {
  private:
   bool Changes(Index point) const { return masks_[point] != 0; }
 
+  // Smooths all points, which few bindings need: made when it is first asked for.
+  struct Whole {
+    std::once_flag made;
+    std::optional<DeltaMushKernel> smoothing;
+    PointBuffer rest;  // inner points of the rest shape
+  };
+  const Whole& whole() const;
+  void Inner(const DeltaMushKernel& smoothing, ConstPointsView in, PointsView inner) const;
+  ConstPointsView rest() const { return {rest_.view().x, rest_.view().y, rest_.view().z, points()}; }
+  // Inner points of the rest shape, at least those of the list, sorted.
+  PointBuffer InnerRest(std::span<const Index> of) const;
+
   const Topology* topology_;
-  DeltaMushKernel smoothing_;  // of all points
+  DeltaMushSettings settings_;
+  std::unique_ptr<Whole> whole_;
   float envelope_, displacement_;
   bool changes_ = false;
   // [points()]
@@ -63,8 +79,8 @@ class DeltaMushStep {
   std::vector<Index> in_rows_;  // the row of a point as it came in; any where no output reads that
   std::vector<bool> smoothed_;  // whether row i is smoothed
   // [inner_points()], and of the rows after points()
-  PointBuffer rest_, smoothed_rest_;  // as they come in, and the inner points
-  std::vector<Index> extra_;          // whose they are
+  PointBuffer rest_;          // as they come in
+  std::vector<Index> extra_;  // whose they are
 };
 
 }  // namespace kpsa::engine

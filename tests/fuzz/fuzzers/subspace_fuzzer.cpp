@@ -52,7 +52,7 @@ void Use(const Subspace& s) {
 
 KPSA_FUZZER(subspace) {
   const auto* begin = reinterpret_cast<const std::byte*>(bytes.data());
-  const Result<SafetensorsFile> file = SafetensorsFile::Parse({begin, begin + bytes.size()}, "fuzzed");
+  const Result<SafetensorsFile> file = SafetensorsFile::Parse(std::span(begin, bytes.size()), "fuzzed");
   if (!file.ok()) return RequireRefusal(file.status());
   const Result<Subspace> content = SubspaceContent(*file, KeptModes::kRead);
   if (!content.ok()) return RequireRefusal(content.status());
