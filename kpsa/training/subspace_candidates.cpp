@@ -29,6 +29,10 @@ constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of 
 
 }  // namespace
 
+bool MissMany(const CueChoice& choice) {
+  return choice.misses > kManyMisses || choice.misses_of_stricter > kManyMissesOfHalf;
+}
+
 bool SubspaceCandidates::HasTimeForTiles() {
   if (setup->limit.left() > kTilesInModes * modes_seconds) return true;
   setup->limit.LeaveOut("no cues of each tile");
@@ -55,8 +59,7 @@ Subspace SubspaceCandidates::ForAllPoints(bool finely) {
 Result<Subspace> SubspaceCandidates::Best() {
   // Where few of the judges miss, but narrowly, a clip that nobody trained on may miss more
   const bool misses = setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 &&
-                      !setup->of_light() &&
-                      std::max(cues.choice.misses, cues.choice.misses_of_stricter) > kManyMisses;
+                      !setup->of_light() && MissMany(cues.choice);
   Subspace subspace;
   if (misses && HasTimeForTiles()) {
     KPSA_RETURN_IF_ERROR(CompareWithTiles(&subspace));

@@ -14,7 +14,9 @@
 
 namespace kpsa::engine {
 
-inline constexpr double kManyMisses = 0.05;     // of new poses: cues of each tile are tried
+// Of new poses, and at half the tolerance: cues of each tile are tried. Where these are, they are mostly better.
+inline constexpr double kManyMisses = 0.05, kManyMissesOfHalf = 0.02;
+bool MissMany(const CueChoice& choice);
 inline constexpr double kFewMisses = 0.01;      // likewise: finer tiles for these
 inline constexpr double kTooManyMisses = 0.15;  // and cues as for half the tolerance
 // Of the expected cost with coarse tiles: tiles with cues of their own are stored finely. Clips miss less than judges,

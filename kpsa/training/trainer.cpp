@@ -94,7 +94,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
 
   const CueChoice& choice = candidates.cues.choice;
-  if (choice.cost > enough && std::max(choice.misses, choice.misses_of_stricter) <= kManyMisses &&
+  if (choice.cost > enough && !MissMany(choice) &&
       std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; })) {
     record.tried.push_back({kForAllPoints, choice.cues.size(),
                             static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
