@@ -234,7 +234,7 @@ TEST_F(LocalMisses, AreWhatAGuardOfSomePatchesAsksFor) {
   TrainedRange& range =
       *std::ranges::max_element(guarded->ranges, {}, [](const TrainedRange& one) { return one.hi - one.lo; });
   constexpr std::size_t kPatch = 2;
-  range.hi = (range.lo + range.hi) / 2, range.ramp = (range.hi - range.lo) / 20;
+  range.hi = range.lo + 0.4 * (range.hi - range.lo), range.ramp = (range.hi - range.lo) / 20;
   auto of_all = std::make_shared<Subspace>(*guarded);
   for (TrainedRange& one : guarded->ranges) one.patches = std::uint64_t{1} << kPatch;
   const std::vector<RunFrame> frames = Frames(guarded), whole = Frames(of_all), before = Frames(cheap_);
