@@ -122,8 +122,11 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
       (!candidates.fine || cost.lost() > kTooManyMisses) && setup.limit.left() > candidates.modes_seconds)
     KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&*subspace));
 
-  if (!steps.empty() && setup.limit.left() > 2 * poses.pose_seconds * static_cast<double>(kMendPoses))
-    KPSA_RETURN_IF_ERROR(MendTiles(&setup, steps, candidates.cues.set, &*subspace));
+  if (!steps.empty() && setup.limit.left() > 2 * poses.pose_seconds * static_cast<double>(kMendPoses)) {
+    // Where a step is not as exact as a small tolerance asks, nothing is mended
+    Status mended = MendTiles(&setup, steps, candidates.cues.set, &*subspace);
+    if (mended.kind() == ErrorKind::kInterrupted) return mended;
+  }
   KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
   Sign(setup, &*subspace);
   record.limited = setup.limit.left_out();
