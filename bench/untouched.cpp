@@ -1,8 +1,9 @@
 // What the program does for characters that nobody tuned it for: makes a body, a head and a creature from a
 // seed, runs `kpsa init`, `train` and `bench` on each with nothing changed, and prints one table.
-//   bench_untouched [--seed N] [--assets FOLDER] [--only NAME]... [--keep FOLDER] [--markdown]
+//   bench_untouched [--seed N] [--assets FOLDER] [--only NAME]... [--points N] [--samples N] [--keep FOLDER] [--markdown]
 // --assets: also human.glb, head.glb, Fox.glb and robot.glb of that folder. --only takes names of the table's
-// first column. --keep: characters, rigs, subspaces and the program's JSON stay in that folder, one of their
+// first column. --points: of each character that is made, about so many. --samples: of `kpsa train`, for how its
+// memory grows. --keep: characters, rigs, subspaces and the program's JSON stay in that folder, one of their
 // own a character. The table comes at the end, or at an interrupt of what there is. Exit code 1 if a promise
 // is broken on a test clip, 2 usage, 3 a character that cannot be tried.
 #include <fmt/format.h>
@@ -29,6 +30,8 @@ struct Options {
   std::uint64_t seed = 1;
   std::string assets, keep;
   std::vector<std::string> only;  // none: all
+  std::size_t points = 0;         // 0: as many as there usually are
+  std::string samples;            // empty: as many as the program takes
   bool markdown = false;
   bool Wants(const std::string& name) const {
     return only.empty() || std::find(only.begin(), only.end(), name) != only.end();
@@ -43,18 +46,23 @@ Result<Options> ReadOptions(int argc, char** argv) {
       options.markdown = true;
       continue;
     }
-    if (name != "--seed" && name != "--assets" && name != "--only" && name != "--keep")
-      return Status::Usage("{}: expected --seed N, --assets FOLDER, --only NAME, --keep FOLDER or --markdown",
-                           name);
+    if (name != "--seed" && name != "--assets" && name != "--only" && name != "--points" &&
+        name != "--samples" && name != "--keep")
+      return Status::Usage(
+          "{}: expected --seed N, --assets FOLDER, --only NAME, --points N, --samples N, --keep FOLDER or "
+          "--markdown",
+          name);
     if (++i == argc) return Status::Usage("{}: expected a value", name);
     const std::string value = argv[i];
     if (name == "--assets") options.assets = value;
     if (name == "--keep") options.keep = value;
-    if (name == "--seed") {
-      const Result<int> seed = ParseCount(name, value, 0, 1'000'000);
-      if (!seed.ok()) return seed.status();
-      options.seed = static_cast<std::uint64_t>(*seed);
+    if (name == "--seed" || name == "--points") {
+      const Result<int> number = ParseCount(name, value, name == "--seed" ? 0 : 1000, 1'000'000);
+      if (!number.ok()) return number.status();
+      if (name == "--seed") options.seed = static_cast<std::uint64_t>(*number);
+      if (name == "--points") options.points = static_cast<std::size_t>(*number);
     }
+    if (name == "--samples") options.samples = value;
     if (name == "--only") options.only.push_back(value);
   }
   std::vector<std::string> names;
@@ -127,7 +135,8 @@ class Bench {
     if (!folder.ok()) return folder.status();
     const std::string path = *folder + "/" + name + ".glb";
     std::ofstream file(path, std::ios::binary);
-    file << scenes::WriteGlb(MakeCharacter(kind, options_.seed, UsualPoints(kind)));
+    file << scenes::WriteGlb(
+        MakeCharacter(kind, options_.seed, options_.points > 0 ? options_.points : UsualPoints(kind)));
     if (!file.flush()) return Status::Invalid("cannot be written").At({path});
     return Try(name, path);
   }
@@ -136,7 +145,9 @@ class Bench {
     const Result<std::string> folder = workshop_.Folder(name);
     if (!folder.ok()) return folder.status();
     Say(fmt::format("{}: kpsa init, train, bench ...", name));
-    Result<Row> row = TryCharacter(KPSA_PROGRAM, name, path, *folder);
+    std::vector<std::string> options;
+    if (!options_.samples.empty()) options = {"--samples", options_.samples};
+    Result<Row> row = TryCharacter(KPSA_PROGRAM, name, path, *folder, options);
     if (!row.ok()) return row.status();
     rows_.push_back(std::move(*row));
     return Status();

@@ -73,13 +73,14 @@ Status CountJointsAndMorphs(const std::string& path, Row* row) {
 }
 
 Table MakeTable(std::span<const Row> rows) {
-  Table table({"character", ">points", ">joints", ">morphs", ">training", ">tolerance", ">held-out hits",
-               "test clip", ">hits", ">speed of hits", ">predicted", ">misses included", ">largest error",
-               "promise"});
+  Table table({"character", ">points", ">joints", ">morphs", ">training", ">memory", ">tolerance",
+               ">held-out hits", "test clip", ">hits", ">speed of hits", ">predicted", ">misses included",
+               ">largest error", "promise"});
   for (const Row& row : rows) {
     table.Row({row.character, Thousands(row.points), std::to_string(row.joints), std::to_string(row.morphs),
-               fmt::format("{:.0f} s", row.training_seconds), LengthText(row.tolerance),
-               fmt::format("{:.0f} %", 100 * row.held_out_hits), row.test_clip,
+               fmt::format("{:.0f} s", row.training_seconds),
+               fmt::format("{:.1f} GB", 1e-9 * static_cast<double>(row.training_bytes)),
+               LengthText(row.tolerance), fmt::format("{:.0f} %", 100 * row.held_out_hits), row.test_clip,
                fmt::format("{:.0f} %", 100 * row.hits), RatioText(row.speedup_on_hits),
                RatioText(row.predicted), RatioText(row.speedup),
                row.accepts ? fmt::format("{:.2f}", row.largest_error) : "-", row.kept ? "kept" : "BROKEN"});
@@ -90,7 +91,7 @@ Table MakeTable(std::span<const Row> rows) {
 }  // namespace
 
 Result<Row> TryCharacter(const std::string& program, const std::string& name, const std::string& character,
-                         const std::string& folder) {
+                         const std::string& folder, const std::vector<std::string>& training) {
   Row row;
   row.character = name;
   KPSA_RETURN_IF_ERROR(CountJointsAndMorphs(character, &row));
@@ -98,7 +99,11 @@ Result<Row> TryCharacter(const std::string& program, const std::string& name, co
   const std::string rig = stem + ".yaml", trained = stem + ".train.json", benched = stem + ".bench.json";
   KPSA_RETURN_IF_ERROR(
       RunProgram({program, "init", character, "-o", rig, "--force", "-q"}, "/dev/null").status());
-  KPSA_RETURN_IF_ERROR(RunProgram({program, "train", rig, "--force", "-q", "--json"}, trained).status());
+  std::vector<std::string> train = {program, "train", rig, "--force", "-q", "--json"};
+  train.insert(train.end(), training.begin(), training.end());
+  const Result<ProgramCost> cost = RunProgram(std::move(train), trained);
+  if (!cost.ok()) return cost.status();
+  row.training_bytes = cost->peak_bytes;
   KPSA_RETURN_IF_ERROR(RunProgram({program, "bench", rig, "-q", "--json"}, benched).status());
   KPSA_RETURN_IF_ERROR(ReadFigures(trained, benched, &row));
   return row;

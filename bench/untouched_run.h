@@ -14,6 +14,7 @@ struct Row {
   std::string character, test_clip;
   std::size_t points = 0, joints = 0, morphs = 0;
   double training_seconds = 0;
+  std::size_t training_bytes = 0;           // the most memory that training took at once
   double tolerance = 0;                     // metres
   double held_out_hits = 0;                 // share of the trainer's own poses
   double predicted = 0;                     // speedup, by the trainer
@@ -24,10 +25,10 @@ struct Row {
   bool kept = false;                        // the promise, on the test clip
 };
 
-// `program` is kpsa; the rig and the subspace are written into the folder, which is there. What the program
-// says comes to stderr. Errors: it cannot be started, it fails, it prints what is not its JSON.
+// `program` is kpsa; the rig and the subspace are written into the folder, which is there. training:
+// arguments of `kpsa train` beside. What the program says comes to stderr. Errors: it cannot be started, it fails, it prints what is not its JSON.
 Result<Row> TryCharacter(const std::string& program, const std::string& name, const std::string& character,
-                         const std::string& folder);
+                         const std::string& folder, const std::vector<std::string>& training = {});
 
 std::string RowsText(std::span<const Row> rows);
 std::string RowsMarkdown(std::span<const Row> rows);

@@ -48,7 +48,7 @@ CueDescription Describe(const TrainingRig& rig, const PoseRecorder& recorder, st
   if (cue.kind == CueKind::kOutput) {
     std::size_t m = 0;
     for (; index >= rig.rows(m, totals[m]); ++m) index -= rig.rows(m, totals[m]);
-    return put(m, OutputStage(*rig.graph, rig.target.meshes[m].stages), index);
+    return put(m, OutputStage(*rig.graph, rig.target.meshes[m].stages), rig.PointOf(m, index));
   }
   for (const CandidateStage& candidate : recorder.candidates()) {
     if (index < candidate.points.size())

@@ -134,8 +134,9 @@ Result<CuePlaces> FindCuePlaces(const TrainingRig& rig, Compiler* compiler, std:
     for (std::size_t m = 0; m < meshes.size(); output += rig.rows(m, totals[m]), ++m) {
       const std::size_t stage = stages[m][std::min(p, stages[m].size() - 1)].stage;
       if (stage + 1 == meshes[m].stages.size()) {
-        for (Index i = 0; i < totals[m]; ++i) place.push_back({CueKind::kOutput, output + i});
-        if (p == 0) result.of_tiles.insert(result.of_tiles.end(), place.end() - totals[m], place.end());
+        const Index rows = rig.rows(m, totals[m]);
+        for (Index i = 0; i < rows; ++i) place.push_back({CueKind::kOutput, output + i});
+        if (p == 0) result.of_tiles.insert(result.of_tiles.end(), place.end() - rows, place.end());
         continue;
       }
       const auto [at, first] = recorded.emplace(std::pair(m, stage), next);
@@ -170,7 +171,8 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
     std::vector<Index> wanted;
     for (const CueRef& cue : cues) {
       if (cue.kind != kind || cue.index < begin || cue.index >= begin + count) continue;
-      wanted.push_back(points == nullptr ? cue.index - begin : (*points)[cue.index - begin]);
+      wanted.push_back(points == nullptr ? rig.PointOf(mesh, cue.index - begin)
+                                         : (*points)[cue.index - begin]);
     }
     if (wanted.empty()) return;
     std::sort(wanted.begin(), wanted.end());
@@ -178,7 +180,9 @@ Result<double> CostOfPoints(const TrainingRig& rig, Compiler* compiler, std::spa
   };
   Index begin = 0;
   for (std::size_t m = 0; m < meshes.size(); begin += rig.rows(m, totals[m]), ++m)
-    request(CueKind::kOutput, begin, totals[m], m, meshes[m].stages.size() - 1, nullptr);
+    // Inner points are not measured
+    request(CueKind::kOutput, begin, rig.step(m) == nullptr ? rig.rows(m, totals[m]) : 0, m,
+            meshes[m].stages.size() - 1, nullptr);
   begin = 0;
   for (const CandidateStage& stage : stages) {
     const auto count = static_cast<Index>(stage.points.size());

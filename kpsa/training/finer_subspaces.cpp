@@ -38,7 +38,8 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   const auto add = [&](const char* what, Subspace tried) {
     const Result<double> points = setup.CostOfPoints(of.cues.set.cues);
     if (!points.ok()) return points.status();
-    trials.Add(what, *points + setup.CostOfSteps(), {std::move(tried), of.cues.set, record, of.cost},
+    trials.Add(what, *points + setup.CostOfSteps(),
+               {std::move(tried), of.cues.set, record, of.cost, what != kByTile && what != kForAllPoints},
                what == kByTileFinely ? 1 / kFinelyLess : 1);
     return Status();
   };
@@ -94,6 +95,7 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   CalibratedSubspace best = trials.Take(std::move(before.tried));
   *subspace = std::move(best.subspace), of.cues.set = std::move(best.cues), record = std::move(best.record);
   of.cost = best.cost;
+  of.by_tile = subspace->by_tile(), of.fine = best.fine;
   return Status();
 }
 

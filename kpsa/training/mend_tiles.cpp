@@ -15,8 +15,8 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kFewestPoses = 200;  // that points are judged by; a third of them of the clips
-constexpr std::size_t kMostBytes = std::size_t{320} << 20;  // of these
-constexpr std::size_t kMostMendedPoints = 8;
+constexpr std::size_t kMostBytes = std::size_t{320} << 20;      // of these, at a time
+constexpr std::size_t kMostMendedPoints = 8, kAPointOf = 2000;  // one of so many, where that is more
 // Tolerances: points that are farther off in frames of the clips are mended, or without clips in other poses, which count
 // half: what these do far out, clips hardly ever do
 constexpr double kOff = 0.5, kOfSamples = 0.5;
@@ -24,42 +24,89 @@ constexpr double kBetter = 0.7;                   // of what they were off, in p
 constexpr std::size_t kHeldOut = 4;               // of so many poses, one
 constexpr double kRidges[] = {1e-7, 1e-5, 1e-3};  // of the variance of a cue
 
-struct Points {
-  PoseMatrix rows, inner;    // as they come out, with what is measured; and before the last steps
-  std::size_t of_clips = 0;  // poses, the first ones
+// Poses that points are judged by, those of the clips first: evaluated a few at a time.
+class MendPoses {
+ public:
+  explicit MendPoses(TrainingSetup* setup) : setup_(setup) {
+    std::size_t frames = 0;
+    for (const TrainingClip& clip : setup->clips) frames += clip.times.size();
+    const std::size_t every = frames / (kMendPoses / 3) + 1;
+    for (const TrainingClip& clip : setup->clips) {
+      for (std::size_t f = 0; f < clip.times.size(); f += every)
+        poses_.push_back({clip.name, clip.times[f], {}});
+    }
+    of_clips_ = poses_.size();
+    std::vector<SampledPose> sampled =
+        setup->sampler->Of(PoseKind::kSampled, kMendPoses - std::min(kMendPoses, of_clips_),
+                           setup->options.seed ^ 0x3c6ef372fe94f82bull);
+    std::ranges::stable_sort(sampled, {}, &SampledPose::clip);
+    for (const SampledPose& pose : sampled) poses_.push_back(RecordedOf(pose, setup->clips));
+  }
+  std::size_t size() const { return poses_.size(); }
+  std::size_t of_clips() const { return of_clips_; }
+
+  // Rows of some recorders, each of the same poses; `use` gets them with the number of their first pose.
+  Status Record(std::span<PoseRecorder* const> recorders,
+                const std::function<void(std::size_t, std::span<const PoseMatrix>)>& use) const {
+    std::size_t bytes = 0;
+    for (const PoseRecorder* recorder : recorders) bytes += sizeof(float) * recorder->layout().columns();
+    const std::size_t at_once = std::max<std::size_t>(1, kMostBytes / bytes);
+    for (std::size_t first = 0; first < size(); first += at_once) {
+      std::vector<const RecordedPose*> some;
+      for (std::size_t t = first; t < std::min(first + at_once, size()); ++t) some.push_back(&poses_[t]);
+      std::vector<PoseMatrix> rows;
+      for (PoseRecorder* recorder : recorders) {
+        PoseMatrix& to = rows.emplace_back(recorder->layout());
+        for (std::size_t t = 0; t < some.size(); ++t) to.AddPose();
+        KPSA_RETURN_IF_ERROR(recorder->Replay(some, [&](std::size_t t) { return to.row(t); }));
+      }
+      use(first, rows);
+      KPSA_RETURN_IF_ERROR(setup_->Say("mended points", 0.99));
+    }
+    return Status();
+  }
+
+ private:
+  TrainingSetup* setup_;
+  std::vector<RecordedPose> poses_;
+  std::size_t of_clips_ = 0;
 };
 
-Status Record(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>& split, Points* to) {
-  TrainingRig rig = setup->rig;
-  rig.split = split;
-  PoseRecorder recorder(rig, &setup->compiler, {}, {}, setup->inverse_rest_stretch, setup->options.tolerance);
-  Result<PoseLayout> layout = recorder.Layout();
-  if (!layout.ok()) return layout.status();
-  to->inner = PoseMatrix(*layout);
-  const std::size_t bytes = sizeof(float) * (setup->layout.columns() + layout->columns());
-  const std::size_t poses = std::min(kMendPoses, kMostBytes / bytes);
-  if (poses < kFewestPoses) return Status();
-  std::size_t frames = 0;
-  for (const TrainingClip& clip : setup->clips) frames += clip.times.size();
-  const std::size_t every = frames / (poses / 3) + 1;
-  for (const TrainingClip& clip : setup->clips) {
-    TrainingClip some{clip.name, {}, clip.learnt};
-    for (std::size_t f = 0; f < clip.times.size(); f += every) some.times.push_back(clip.times[f]);
-    if (some.times.empty()) continue;
-    KPSA_RETURN_IF_ERROR(setup->recorder->AddClip(some, &to->rows));
-    KPSA_RETURN_IF_ERROR(recorder.AddClip(some, &to->inner));
+// Some points in all of these poses.
+class SomePoints {
+ public:
+  // By number, ascending.
+  SomePoints(std::vector<std::size_t> points, std::size_t poses)
+      : points_(std::move(points)), at_(points_.size() * poses) {}
+  void Store(std::size_t first, const PoseMatrix& rows) {
+    for (std::size_t t = 0; t < rows.poses(); ++t) {
+      for (std::size_t k = 0; k < points_.size(); ++k) {
+        const float* from = rows.row(t).data() + 3 * points_[k];
+        at_[(first + t) * points_.size() + k] = {static_cast<double>(from[0]), static_cast<double>(from[1]),
+                                                 static_cast<double>(from[2])};
+      }
+    }
   }
-  to->of_clips = to->rows.poses();
-  const std::vector<SampledPose> sampled = setup->sampler->Of(PoseKind::kSampled, poses - to->of_clips,
-                                                              setup->options.seed ^ 0x3c6ef372fe94f82bull);
-  KPSA_RETURN_IF_ERROR(setup->recorder->AddSamples(sampled, setup->clips, &to->rows));
-  return recorder.AddSamples(sampled, setup->clips, &to->inner);
-}
+  Double3 At(std::size_t pose, std::size_t point) const {
+    const auto found = std::ranges::lower_bound(points_, point);
+    return at_[pose * points_.size() + static_cast<std::size_t>(found - points_.begin())];
+  }
+
+ private:
+  std::vector<std::size_t> points_;
+  std::vector<Double3> at_;
+};
+
+struct Points {
+  const MendPoses* poses;
+  SomePoints out, inner;  // as they come out, and before the last steps; of all meshes
+};
 
 // How far off each point is, worst pose of the clips first, then of the others.
 struct Off {
   std::vector<float> clips, samples;
   bool has_clips = false;
+  Off(std::size_t points, bool of_clips) : clips(points, 0), samples(points, 0), has_clips(of_clips) {}
   double of(std::size_t point) const {
     return has_clips ? static_cast<double>(clips[point]) : kOfSamples * static_cast<double>(samples[point]);
   }
@@ -74,20 +121,19 @@ Double3 At(std::span<const float> row, std::size_t i) {
           static_cast<double>(row[3 * i + 2])};
 }
 
-// y of each pose, and how far off each point of all outputs is.
-Off Judge(const Subspace& subspace, const CueSet& cues, const Points& points, Eigen::MatrixXf* y) {
-  const PoseLayout& layout = points.rows.layout();
-  y->resize(static_cast<Eigen::Index>(subspace.rows()), static_cast<Eigen::Index>(points.rows.poses()));
-  Off off{std::vector<float>(layout.points, 0), std::vector<float>(layout.points, 0), points.of_clips > 0};
+// y of the poses from `first_pose` on, and how far off each point of all outputs is.
+void Judge(const Subspace& subspace, const CueSet& cues, const PoseMatrix& rows, std::size_t first_pose,
+           std::size_t of_clips, Eigen::MatrixXf* y, Off* off) {
+  const PoseLayout& layout = rows.layout();
   std::mutex mutex;
-  ParallelFor(points.rows.poses(), 16, [&](std::size_t begin, std::size_t end) {
+  ParallelFor(rows.poses(), 16, [&](std::size_t begin, std::size_t end) {
     SubspaceScratch scratch(subspace);
     std::vector<double> raw(subspace.rows());
     std::vector<PointBuffer> buffers;
     for (const SubspaceOutput& output : subspace.outputs) buffers.emplace_back(output.points);
-    Off own{std::vector<float>(layout.points, 0), std::vector<float>(layout.points, 0)};
+    Off own(layout.points, of_clips > 0);
     for (std::size_t t = begin; t < end; ++t) {
-      const std::span<const float> row = points.rows.row(t);
+      const std::span<const float> row = rows.row(t);
       CueReader reader(layout, row, nullptr);
       std::size_t r = 0;
       for (const CueRef& cue : cues.cues) {
@@ -95,12 +141,13 @@ Off Judge(const Subspace& subspace, const CueSet& cues, const Points& points, Ei
         r += CueHeight(layout, cue);
       }
       Measure(subspace, raw, &scratch);
-      std::copy_n(scratch.y.data(), subspace.rows(), y->col(static_cast<Eigen::Index>(t)).data());
+      std::copy_n(scratch.y.data(), subspace.rows(),
+                  y->col(static_cast<Eigen::Index>(first_pose + t)).data());
       std::size_t first = 0;
       for (std::size_t m = 0; m < buffers.size(); ++m) {
         subspace.tiles[m].Reconstruct(scratch.inputs(), buffers[m].view());
         const ConstPointsView made = std::as_const(buffers[m]).view();
-        std::vector<float>& worst = t < points.of_clips ? own.clips : own.samples;
+        std::vector<float>& worst = first_pose + t < of_clips ? own.clips : own.samples;
         for (std::size_t i = 0; i < made.count; ++i) {
           const auto error = static_cast<float>(Length(At(made, i) - At(row, first + i)));
           worst[first + i] = std::max(worst[first + i], error);
@@ -110,11 +157,10 @@ Off Judge(const Subspace& subspace, const CueSet& cues, const Points& points, Ei
     }
     const std::lock_guard lock(mutex);
     for (std::size_t i = 0; i < layout.points; ++i) {
-      off.clips[i] = std::max(off.clips[i], own.clips[i]);
-      off.samples[i] = std::max(off.samples[i], own.samples[i]);
+      off->clips[i] = std::max(off->clips[i], own.clips[i]);
+      off->samples[i] = std::max(off->samples[i], own.samples[i]);
     }
   });
-  return off;
 }
 
 // One tile: its poses, as its map sees them.
@@ -137,7 +183,7 @@ class Mender {
     const auto cues = tiles.CuesOf(tile);
     const auto n = static_cast<Eigen::Index>(mend.inner.size()), j = static_cast<Eigen::Index>(cues.size());
     std::vector<std::size_t> poses;
-    for (std::size_t t = 0; t < points_.rows.poses(); ++t) {
+    for (std::size_t t = 0; t < points_.poses->size(); ++t) {
       if (all || t % kHeldOut != kHeldOut - 1) poses.push_back(t);
     }
     Eigen::MatrixXd x(static_cast<Eigen::Index>(poses.size()), j), target(x.rows(), 3 * n);
@@ -150,7 +196,7 @@ class Mender {
       const bool moved = tiles.JointOf(tile, y, &joint);
       const Matrix4 back = moved ? InverseOrIdentity(joint) : Matrix4();
       for (Eigen::Index i = 0; i < n; ++i) {
-        Double3 at = At(points_.inner.row(t), first_inner_ + mend.inner[static_cast<std::size_t>(i)]);
+        Double3 at = points_.inner.At(t, first_inner_ + mend.inner[static_cast<std::size_t>(i)]);
         if (moved) at = TransformPoint(back, at);
         target(k, i) = at.x, target(k, n + i) = at.y, target(k, 2 * n + i) = at.z;
       }
@@ -176,15 +222,15 @@ class Mender {
     AlignedFloats scratch(bound.scratch_floats());
     PointBuffer made(mend.points.size()), whole(tiles.points());
     mended->assign(mend.points.size(), 0), before->assign(mend.points.size(), 0);
-    for (std::size_t t = kHeldOut - 1; t < points_.rows.poses(); t += kHeldOut) {
+    for (std::size_t t = kHeldOut - 1; t < points_.poses->size(); t += kHeldOut) {
       const auto y = y_.col(static_cast<Eigen::Index>(t));
       bound.Run(tiles, y.data(), nullptr, made.view(), scratch.span());
       const Index only[] = {mend.tile};
       const PointsView all = whole.view();
       tiles.ReconstructBlock({y.data(), static_cast<std::size_t>(y.size())}, {&all, 1}, only);
-      const double weight = t < points_.of_clips ? 1 : kOfSamples;
+      const double weight = t < points_.poses->of_clips() ? 1 : kOfSamples;
       for (std::size_t k = 0; k < mend.points.size(); ++k) {
-        const Double3 exact = At(points_.rows.row(t), first_point_ + mend.points[k]);
+        const Double3 exact = points_.out.At(t, first_point_ + mend.points[k]);
         (*mended)[k] = std::max((*mended)[k], weight * Length(At(std::as_const(made).view(), k) - exact));
         (*before)[k] =
             std::max((*before)[k], weight * Length(At(std::as_const(whole).view(), mend.points[k]) - exact));
@@ -227,11 +273,22 @@ class Mender {
 
 Status MendTiles(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>& split, const CueSet& cues,
                  Subspace* subspace) {
-  Points points{PoseMatrix(setup->layout), PoseMatrix(setup->layout)};
-  KPSA_RETURN_IF_ERROR(Record(setup, split, &points));
-  if (points.rows.poses() == 0) return Status();
-  Eigen::MatrixXf y;
-  const Off off = Judge(*subspace, cues, points, &y);
+  const MendPoses poses(setup);
+  if (poses.size() < kFewestPoses) return Status();
+  TrainingRig rig = setup->rig;
+  rig.split = split;
+  PoseRecorder of_inner(rig, &setup->compiler, {}, {}, setup->inverse_rest_stretch, setup->options.tolerance);
+  KPSA_RETURN_IF_ERROR(of_inner.Layout().status());
+  Eigen::MatrixXf y(static_cast<Eigen::Index>(subspace->rows()), static_cast<Eigen::Index>(poses.size()));
+  Off off(setup->layout.points, poses.of_clips() > 0);
+  PoseRecorder* const of_all[] = {setup->recorder.get()};
+  KPSA_RETURN_IF_ERROR(poses.Record(of_all, [&](std::size_t first, std::span<const PoseMatrix> rows) {
+    Judge(*subspace, cues, rows[0], first, poses.of_clips(), &y, &off);
+  }));
+
+  // What is farthest off, by tile, and what that takes
+  std::vector<TileMend> wanted;
+  std::vector<std::size_t> out, inner, first_points, first_inners;
   std::size_t first_point = 0, first_inner = 0;
   for (std::size_t m = 0; m < subspace->outputs.size(); ++m) {
     const std::size_t count = subspace->outputs[m].points;
@@ -241,17 +298,35 @@ Status MendTiles(TrainingSetup* setup, const std::vector<Compiler::SplitPoints>&
       if (off.of(first_point + p) > kOff * setup->options.tolerance) worst.push_back(p);
     }
     std::ranges::stable_sort(worst, std::greater<>(), [&](Index p) { return off.of(first_point + p); });
-    worst.resize(std::min(worst.size(), kMostMendedPoints));
+    worst.resize(std::min(worst.size(), std::max(kMostMendedPoints, count / kAPointOf)));
     std::ranges::sort(worst);
-    for (std::size_t k = 0; k < worst.size();) {
-      const auto tile = static_cast<Index>(worst[k] / kTilePoints);
-      std::vector<Index> of_tile;
-      for (; k < worst.size() && worst[k] / kTilePoints == tile; ++k) of_tile.push_back(worst[k]);
-      const Mender mender(*subspace, points, y, *step, first_point, first_inner);
-      std::optional<TileMend> mend = mender.Mend(static_cast<Index>(m), tile, std::move(of_tile));
-      if (mend) subspace->mends.push_back(std::move(*mend));
+    for (const Index point : worst) {
+      const auto tile = static_cast<Index>(point / kTilePoints);
+      if (wanted.empty() || wanted.back().output != m || wanted.back().tile != tile)
+        wanted.push_back({static_cast<Index>(m), tile, {}, {}, {}, {}});
+      wanted.back().points.push_back(point);
+      out.push_back(first_point + point);
     }
+    if (!worst.empty()) {
+      const std::shared_ptr<const LastStep::Bound> bound =
+          step->Bind(PointSet::Of(worst, static_cast<Index>(count)));
+      for (const Index i : bound->inner()) inner.push_back(first_inner + i);
+    }
+    first_points.push_back(first_point), first_inners.push_back(first_inner);
     first_point += count, first_inner += step == nullptr ? count : step->inner_points();
+  }
+  if (wanted.empty()) return setup->rig.set_clip(std::nullopt);
+  Points points{&poses, {std::move(out), poses.size()}, {std::move(inner), poses.size()}};
+  PoseRecorder* const of_both[] = {setup->recorder.get(), &of_inner};
+  KPSA_RETURN_IF_ERROR(poses.Record(of_both, [&](std::size_t first, std::span<const PoseMatrix> rows) {
+    points.out.Store(first, rows[0]);
+    points.inner.Store(first, rows[1]);
+  }));
+  for (TileMend& one : wanted) {
+    const Mender mender(*subspace, points, y, *split[one.output].step, first_points[one.output],
+                        first_inners[one.output]);
+    std::optional<TileMend> mend = mender.Mend(one.output, one.tile, std::move(one.points));
+    if (mend) subspace->mends.push_back(std::move(*mend));
   }
   return setup->rig.set_clip(std::nullopt);
 }

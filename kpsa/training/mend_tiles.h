@@ -9,7 +9,7 @@
 namespace kpsa::engine {
 
 inline constexpr std::size_t kMendPoses =
-    1200;  // that points are judged by, at most; each is evaluated twice
+    1200;  // that points are judged by, at most; each is evaluated up to three times
 
 // setup: of the training of the subspace, with all poses drawn; cues: those of the subspace, in terms of its layout.
 // split: last steps of the meshes, null where there is none. Leaves the calibration as it is, which is cautious then.

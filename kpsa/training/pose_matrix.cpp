@@ -17,13 +17,18 @@ std::span<float> PoseMatrix::AddPose() {
 
 void PoseMatrix::Append(const PoseMatrix& other) {
   KPSA_CHECK(layout_ == other.layout_ && (centered_ == other.centered_ || other.poses_ == 0));
-  for (std::size_t t = 0; t < other.poses_; ++t) std::ranges::copy(other.row(t), Grow().begin());
+  for (std::size_t t = 0; t < other.poses_; ++t) Append(other, t);
+}
+
+void PoseMatrix::Append(const PoseMatrix& other, std::size_t pose) {
+  std::ranges::copy(other.row(pose), Grow().begin());
+  origins_.back() = other.origins_[pose];
 }
 
 void PoseMatrix::Append(PoseMatrix&& other) {
   KPSA_CHECK(layout_ == other.layout_ && (centered_ == other.centered_ || other.poses_ == 0));
   for (std::size_t t = 0; t < other.poses_; ++t) {
-    std::ranges::copy(std::as_const(other).row(t), Grow().begin());
+    Append(other, t);
     if (t % kBlockPoses + 1 == kBlockPoses) other.blocks_[t / kBlockPoses].reset();
   }
   other.Truncate(0);
@@ -36,10 +41,10 @@ PoseMatrix PoseMatrix::TakeEvery(std::size_t count) {
   for (std::size_t t = 0; t < poses_; ++t) {
     const std::span<const float> from = std::as_const(*this).row(t);
     if (t % count == count - 1) {
-      std::ranges::copy(from, taken.Grow().begin());
+      taken.Append(*this, t);
     } else {
       if (kept != t) std::ranges::copy(from, row(kept).begin());
-      ++kept;
+      origins_[kept++] = origins_[t];
     }
   }
   Truncate(kept);
@@ -49,10 +54,12 @@ PoseMatrix PoseMatrix::TakeEvery(std::size_t count) {
 void PoseMatrix::Truncate(std::size_t poses) {
   poses_ = std::min(poses_, poses);
   blocks_.resize((poses_ + kBlockPoses - 1) / kBlockPoses);
+  origins_.resize(poses_);
 }
 
 std::span<float> PoseMatrix::Grow() {
   if (poses_ % kBlockPoses == 0) blocks_.push_back(std::make_unique<float[]>(kBlockPoses * columns()));
+  origins_.push_back(0);
   return row(poses_++);
 }
 

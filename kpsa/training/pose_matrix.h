@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -46,6 +47,9 @@ class PoseMatrix {
   std::span<float> AddPose();
   std::span<float> row(std::size_t pose);
   std::span<const float> row(std::size_t pose) const;
+  // A number that stays with a pose wherever it goes, 0 if none was given (PoseRecorder's, of what it recorded).
+  std::uint32_t origin(std::size_t pose) const { return origins_[pose]; }
+  void set_origin(std::size_t pose, std::uint32_t origin) { origins_[pose] = origin; }
   // The poses [block * kBlockPoses, ...) are contiguous, D floats apart.
   std::size_t blocks() const { return blocks_.size(); }
 
@@ -57,6 +61,7 @@ class PoseMatrix {
   // The poses of another matrix of the same layout, both centred with the same mean, or neither.
   void Append(const PoseMatrix& other);
   void Append(PoseMatrix&& other);  // which is empty then; its memory is freed on the way
+  void Append(const PoseMatrix& other, std::size_t pose);  // one of them
   // Keeps the first poses.
   void Truncate(std::size_t poses);
   // Takes the last of so many poses away, again and again.
@@ -69,6 +74,7 @@ class PoseMatrix {
   std::size_t poses_ = 0;
   bool centered_ = false;
   std::vector<std::unique_ptr<float[]>> blocks_;
+  std::vector<std::uint32_t> origins_;  // by pose
 };
 
 // The places of all points on the average, those at stages behind the outputs', and the diagonal of the box

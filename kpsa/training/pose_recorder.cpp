@@ -22,13 +22,24 @@ double TimeOf(const SampledPose& pose, const TrainingClip& clip) {
 
 }  // namespace
 
+RecordedPose RecordedOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) {
+  RecordedPose recorded;
+  recorded.values = pose.values;
+  if (pose.clip < 0) return recorded;
+  const TrainingClip& clip = clips[static_cast<std::size_t>(pose.clip)];
+  recorded.clip = clip.name;
+  if (!clip.times.empty()) recorded.time = TimeOf(pose, clip);
+  return recorded;
+}
+
 Result<std::shared_ptr<const Plan>> PoseRecorder::CompileFor(const std::vector<PlugRef>& varying) {
   // Outputs: points of the meshes, or what their last steps start from; what comes out of these; candidate points, signals, space
   Request request;
   const AccelerationTarget& target = rig_.target;
   for (std::size_t m = 0; m < target.meshes.size(); ++m) {
     const bool split = rig_.step(m) != nullptr;
-    request.outputs.push_back({split ? rig_.split[m].in : target.meshes[m].stages.back().points, {}});
+    request.outputs.push_back({split ? rig_.split[m].in : target.meshes[m].stages.back().points,
+                               only_.empty() ? PointSet() : only_[m]});
   }
   for (std::size_t m = 0; m < target.meshes.size(); ++m) {
     if (rig_.step(m) != nullptr) request.outputs.push_back({target.meshes[m].stages.back().points, {}});
@@ -211,10 +222,15 @@ Status PoseRecorder::CheckFinite(std::span<const float> row) const {
       }
       Request request;
       request.outputs.push_back({mesh.stages.back().points, {}});
+      if (!only_.empty()) request.outputs[0].points = only_[m];
       const Result<std::shared_ptr<const Plan>> plan = compiler_->Compile(*rig_.graph, request);
-      const std::size_t total = plan.ok() ? (*plan)->outputs()[0].points.total() : 0;
-      if (point < total) return Status::Evaluation("point {} of {} is not a number", point, mesh.name);
-      point -= total;
+      const std::size_t count = plan.ok() ? (*plan)->outputs()[0].points.size() : 0;
+      if (point < count) {
+        const PointSet& points = (*plan)->outputs()[0].points;
+        return Status::Evaluation("point {} of {} is not a number", points[static_cast<Index>(point)],
+                                  mesh.name);
+      }
+      point -= count;
     }
   }
   if (column >= layout_.scalar_begin()) {
@@ -228,11 +244,34 @@ Status PoseRecorder::CheckFinite(std::span<const float> row) const {
   return Status::Evaluation("a point of an earlier stage is not a number");
 }
 
-Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
-                            const std::function<void(std::size_t, Evaluator&)>& set,
+Status PoseRecorder::Record(std::span<const RecordedPose* const> poses,
+                            const std::function<std::span<float>(std::size_t)>& row,
                             const std::function<std::string(std::size_t)>& name) {
+  const std::size_t count = poses.size();
+  if (count == 0) return Status();
+  const std::string* const clip = poses[0]->clip ? &*poses[0]->clip : nullptr;
+  const bool sampled = !poses[0]->values.empty();
+  const PlanResult found = PlanOf(clip, sampled);
+  if (!found.ok()) return found.status();
+  const std::shared_ptr<const Plan>& plan = *found;
+  const Index time = plan->FindVarying(rig_.time);
+  const std::vector<std::size_t> used = sampled ? FreeControls(clip != nullptr) : std::vector<std::size_t>();
+  std::vector<Index> numbers;
+  for (const std::size_t c : used) numbers.push_back(plan->FindVarying(rig_.controls[c].plug));
+  const auto set = [&](const RecordedPose& pose, Evaluator& e) {
+    if (clip != nullptr) e.Set(time, pose.time);
+    for (std::size_t k = 0; k < used.size(); ++k) {
+      const double value = pose.values[used[k]];
+      const Type type = plan->varying()[numbers[k]].type;
+      if (type == Type::kInt || type == Type::kBool || type == Type::kEnum) {
+        e.SetInt(numbers[k], static_cast<std::int64_t>(value));
+      } else {
+        e.Set(numbers[k], value, rig_.controls[used[k]].plug.component);
+      }
+    }
+  };
   std::vector<std::span<float>> rows;
-  for (std::size_t i = 0; i < count; ++i) rows.push_back(poses->AddPose());
+  for (std::size_t i = 0; i < count; ++i) rows.push_back(row(i));
   std::mutex mutex;
   std::size_t failed = count;
   Status failure;
@@ -241,7 +280,7 @@ Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t
   ParallelFor(count, grain, [&](std::size_t begin, std::size_t end) {
     Evaluator evaluator(plan);
     for (std::size_t i = begin; i < end; ++i) {
-      set(i, evaluator);
+      set(*poses[i], evaluator);
       Status status = evaluator.Evaluate();
       if (status.ok()) {
         const double off = Store(evaluator, rows[i]);
@@ -261,13 +300,45 @@ Status PoseRecorder::Record(const std::shared_ptr<const Plan>& plan, std::size_t
   return Status();
 }
 
-Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
-  const PlanResult plan = PlanOf(&clip.name, false);
-  if (!plan.ok()) return plan.status();
-  const Index time = (*plan)->FindVarying(rig_.time);
+Status PoseRecorder::Add(std::span<const RecordedPose* const> poses, PoseMatrix* to,
+                         const std::function<std::string(std::size_t)>& name) {
+  const std::size_t first = to->poses();
+  for (const RecordedPose* pose : poses) {
+    to->AddPose();
+    if (!keeps_origins_) continue;
+    to->set_origin(to->poses() - 1, static_cast<std::uint32_t>(recorded_.size()));
+    recorded_.push_back(*pose);
+  }
   return Record(
-      *plan, clip.times.size(), poses, [&](std::size_t i, Evaluator& e) { e.Set(time, clip.times[i]); },
-      [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
+      poses, [&](std::size_t i) { return to->row(first + i); }, name);
+}
+
+Status PoseRecorder::Replay(std::span<const RecordedPose* const> poses,
+                            const std::function<std::span<float>(std::size_t)>& row) {
+  std::map<std::pair<std::optional<std::string>, bool>, std::vector<std::size_t>> alike;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    alike[{poses[i]->clip, !poses[i]->values.empty()}].push_back(i);
+  for (const auto& [key, numbers] : alike) {
+    std::vector<const RecordedPose*> some;
+    for (const std::size_t i : numbers) some.push_back(poses[i]);
+    KPSA_RETURN_IF_ERROR(Record(
+        some, [&numbers, &row](std::size_t i) { return row(numbers[i]); },
+        [&some](std::size_t i) {
+          return some[i]->values.empty() && some[i]->clip
+                     ? fmt::format("clip \"{}\" at {} s", *some[i]->clip, some[i]->time)
+                     : std::string("a sampled pose");
+        }));
+  }
+  return Status();
+}
+
+Status PoseRecorder::AddClip(const TrainingClip& clip, PoseMatrix* poses) {
+  std::vector<RecordedPose> frames;
+  for (const double t : clip.times) frames.push_back({clip.name, t, {}});
+  std::vector<const RecordedPose*> pointers;
+  for (const RecordedPose& frame : frames) pointers.push_back(&frame);
+  return Add(pointers, poses,
+             [&](std::size_t i) { return fmt::format("clip \"{}\" at {} s", clip.name, clip.times[i]); });
 }
 
 Status PoseRecorder::WidenRanges(const TrainingClip& clip, std::vector<double>* lo, std::vector<double>* hi) {
@@ -368,30 +439,11 @@ Status PoseRecorder::AddSamples(const std::vector<SampledPose>& samples,
       if (sample.clip == clip) mine.push_back(&sample);
     }
     if (mine.empty()) continue;
-    const TrainingClip* playing = clip < 0 ? nullptr : &clips[static_cast<std::size_t>(clip)];
-    const std::vector<std::size_t> used = FreeControls(playing != nullptr);
-    const PlanResult plan = PlanOf(playing == nullptr ? nullptr : &playing->name, true);
-    if (!plan.ok()) return plan.status();
-    std::vector<Index> numbers;
-    for (std::size_t c : used) numbers.push_back((*plan)->FindVarying(rig_.controls[c].plug));
-    const Index time = (*plan)->FindVarying(rig_.time);
-    KPSA_RETURN_IF_ERROR(Record(
-        *plan, mine.size(), poses,
-        [&](std::size_t i, Evaluator& e) {
-          if (playing != nullptr && !playing->times.empty()) {
-            e.Set(time, TimeOf(*mine[i], *playing));
-          }
-          for (std::size_t k = 0; k < used.size(); ++k) {
-            const double value = mine[i]->values[used[k]];
-            const Type type = (*plan)->varying()[numbers[k]].type;
-            if (type == Type::kInt || type == Type::kBool || type == Type::kEnum) {
-              e.SetInt(numbers[k], static_cast<std::int64_t>(value));
-            } else {
-              e.Set(numbers[k], value, rig_.controls[used[k]].plug.component);
-            }
-          }
-        },
-        [&](std::size_t i) { return NameOf(*mine[i], clips); }));
+    std::vector<RecordedPose> sampled;
+    for (const SampledPose* pose : mine) sampled.push_back(RecordedOf(*pose, clips));
+    std::vector<const RecordedPose*> pointers;
+    for (const RecordedPose& pose : sampled) pointers.push_back(&pose);
+    KPSA_RETURN_IF_ERROR(Add(pointers, poses, [&](std::size_t i) { return NameOf(*mine[i], clips); }));
   }
   return Status();
 }

@@ -19,6 +19,15 @@ struct CandidateStage {
   std::vector<Index> points;        // of the mesh
 };
 
+// A pose as it was recorded, for another recorder of the same rig. Empty values: the clip plays, no control is sampled.
+struct RecordedPose {
+  std::optional<std::string> clip;
+  double time = 0;
+  std::vector<double> values;  // by control
+};
+
+RecordedPose RecordedOf(const SampledPose& pose, const std::vector<TrainingClip>& clips);
+
 // The scalar of each signal's first entry.
 std::vector<Index> FirstScalars(std::span<const Signal> signals, const PoseLayout& layout);
 
@@ -40,6 +49,11 @@ class PoseRecorder {
                                        : step->Bind(PointSet::All(static_cast<Index>(step->points()))));
     }
   }
+  // Records some points of each mesh instead of all. Before anything else, and not of meshes with last steps.
+  void Only(std::vector<PointSet> points) { only_ = std::move(points); }
+  // Rows know from now on which poses they are (PoseMatrix::origin).
+  void KeepOrigins() { keeps_origins_ = true; }
+  const RecordedPose& recorded(std::uint32_t origin) const { return recorded_[origin]; }
   // Scalars of the layout: signals that are not relative, `products` of them, relative matrices.
   Result<PoseLayout> Layout(std::size_t products = 0);
   // What is recorded from now on has them.
@@ -50,6 +64,9 @@ class PoseRecorder {
   // Appends a row for each sampled pose.
   Status AddSamples(const std::vector<SampledPose>& samples, const std::vector<TrainingClip>& clips,
                     PoseMatrix* poses);
+  // Poses that another one recorded, each into the row that is given for it.
+  Status Replay(std::span<const RecordedPose* const> poses,
+                const std::function<std::span<float>(std::size_t)>& row);
   // Widens the ranges [lo, hi] of all entries of the signals, in their order, by what they are at times of a
   // clip; no points are evaluated.
   Status WidenRanges(const TrainingClip& clip, std::vector<double>* lo, std::vector<double>* hi);
@@ -72,9 +89,13 @@ class PoseRecorder {
   void StoreSignals(const Evaluator& evaluator, const Matrix4& space_from_world, Index first_output,
                     std::span<float> entries) const;
   Status CheckFinite(std::span<const float> row) const;
-  Status Record(const std::shared_ptr<const Plan>& plan, std::size_t count, PoseMatrix* poses,
-                const std::function<void(std::size_t, Evaluator&)>& set,
+  // All of one clip (or without one), and all sampled or none.
+  Status Record(std::span<const RecordedPose* const> poses,
+                const std::function<std::span<float>(std::size_t)>& row,
                 const std::function<std::string(std::size_t)>& name);
+  // The same, appended.
+  Status Add(std::span<const RecordedPose* const> poses, PoseMatrix* to,
+             const std::function<std::string(std::size_t)>& name);
   // How far what comes out of last steps is from what these give, run by themselves (metres).
   double Store(const Evaluator& evaluator, std::span<float> row) const;
 
@@ -83,6 +104,9 @@ class PoseRecorder {
   std::vector<CandidateStage> candidates_;
   std::vector<Signal> signals_;
   std::vector<CueProduct> products_;
+  std::vector<PointSet> only_;  // by mesh; empty: all points
+  bool keeps_origins_ = false;
+  std::vector<RecordedPose> recorded_;  // by origin
   // By clip (none: the rest pose), and whether controls are sampled; binding wraps takes long
   std::map<std::pair<std::optional<std::string>, bool>, std::shared_ptr<const Plan>> plans_;
   Matrix4 inverse_rest_stretch_;

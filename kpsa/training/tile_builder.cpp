@@ -163,38 +163,68 @@ TileMap BuildTiles(const Eigen::MatrixXd& gain, const Eigen::VectorXd& mean, int
 TileMap BuildTiles(const std::function<TileModel(std::size_t tile)>& models, const Eigen::VectorXd& mean,
                    int components, std::size_t inputs_count, const TileInputs& inputs,
                    const TileOptions& options, TileReport* report) {
-  TileData data;
-  const auto c = static_cast<std::size_t>(components);
-  data.points = static_cast<std::size_t>(mean.size()) / c;
-  data.components = components;
-  data.inputs = inputs_count;
-  const std::size_t tiles = (data.points + kTilePoints - 1) / kTilePoints, rows = kPanelPoints * c;
-  const auto panels = [&](std::size_t tile) {
-    return (std::min(kTilePoints, data.points - tile * kTilePoints) + kPanelPoints - 1) / kPanelPoints;
-  };
-  std::vector<TileFactors> factors(tiles);
-  std::vector<TileProducts> products(tiles);
-  std::vector<std::vector<std::uint32_t>> joint_rows(tiles);
-  std::vector<Eigen::VectorXd> means(tiles);
+  TileBuilder builder(components, inputs_count);
+  const std::size_t points = static_cast<std::size_t>(mean.size()) / static_cast<std::size_t>(components);
+  builder.Add((points + kTilePoints - 1) / kTilePoints, models, inputs, options);
+  return builder.Finish(mean, inputs, report);
+}
+
+struct TileBuilder::Made {
+  std::vector<TileFactors> factors;
+  std::vector<TileProducts> products;
+  std::vector<std::vector<std::uint32_t>> joint_rows;
+  std::vector<Eigen::VectorXd> means;
+};
+
+TileBuilder::TileBuilder(int components, std::size_t inputs_count)
+    : components_(components), inputs_count_(inputs_count), made_(std::make_unique<Made>()) {}
+TileBuilder::~TileBuilder() = default;
+
+void TileBuilder::Add(std::size_t tiles, const std::function<TileModel(std::size_t tile)>& models,
+                      const TileInputs& inputs, const TileOptions& options) {
+  const std::size_t first = made_->factors.size();
+  made_->factors.resize(first + tiles);
+  made_->products.resize(first + tiles);
+  made_->joint_rows.resize(first + tiles);
+  made_->means.resize(first + tiles);
   ParallelFor(tiles, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const TileModel model = models(t);
       const TileOptions own = OwnOptions(options, model.left_out);
-      factors[t] = FactorModel(model, inputs.samples, components, own, true);
-      joint_rows[t] = model.joint_rows;
-      means[t] = model.mean;
-      if (inputs.poses == nullptr || components != 3 || factors[t].columns.empty()) continue;
+      TileFactors& factors = made_->factors[first + t];
+      factors = FactorModel(model, inputs.samples, components_, own, true);
+      made_->joint_rows[first + t] = model.joint_rows;
+      made_->means[first + t] = model.mean;
+      if (inputs.poses == nullptr || components_ != 3 || factors.columns.empty()) continue;
       TileFactors factored =
-          factors[t].direct ? FactorModel(model, inputs.samples, components, own, false) : factors[t];
-      const Eigen::MatrixXd target = model.target.size() > 0
-                                         ? Eigen::MatrixXd()
-                                         : TargetOf(*inputs.poses, inputs.first_column + t * kTilePoints * c,
-                                                    static_cast<std::size_t>(model.gain.rows()));
-      products[t] = FitProducts(model.target.size() > 0 ? model.target : target, *inputs.measured,
-                                inputs.clip_poses, own, &factored);
-      if (!products[t].pairs.empty()) factors[t] = std::move(factored);
+          factors.direct ? FactorModel(model, inputs.samples, components_, own, false) : factors;
+      const Eigen::MatrixXd target =
+          model.target.size() > 0
+              ? Eigen::MatrixXd()
+              : TargetOf(*inputs.poses,
+                         inputs.first_column + t * kTilePoints * static_cast<std::size_t>(components_),
+                         static_cast<std::size_t>(model.gain.rows()));
+      TileProducts& products = made_->products[first + t];
+      products = FitProducts(model.target.size() > 0 ? model.target : target, *inputs.measured,
+                             inputs.clip_poses, own, &factored);
+      if (!products.pairs.empty()) factors = std::move(factored);
     }
   });
+}
+
+TileMap TileBuilder::Finish(const Eigen::VectorXd& mean, const TileInputs& inputs, TileReport* report) {
+  const std::vector<TileFactors>& factors = made_->factors;
+  const std::vector<Eigen::VectorXd>& means = made_->means;
+  TileData data;
+  const auto c = static_cast<std::size_t>(components_);
+  data.points = static_cast<std::size_t>(mean.size()) / c;
+  data.components = components_;
+  data.inputs = inputs_count_;
+  const std::size_t tiles = factors.size(), rows = kPanelPoints * c;
+  KPSA_CHECK_EQ(tiles, (data.points + kTilePoints - 1) / kTilePoints);
+  const auto panels = [&](std::size_t tile) {
+    return (std::min(kTilePoints, data.points - tile * kTilePoints) + kPanelPoints - 1) / kPanelPoints;
+  };
 
   // Sizes, then the layout
   std::size_t scales = 0, v_size = 0, u_size = 0;
@@ -246,8 +276,8 @@ TileMap BuildTiles(const std::function<TileModel(std::size_t tile)>& models, con
     v += static_cast<std::size_t>(f.v.cols()) * k16;
     u = WriteColumns(f, c, panels(t), u);
   }
-  WriteProducts(factors, products, &data);
-  WriteJoints(joint_rows, inputs, &data);
+  WriteProducts(factors, made_->products, &data);
+  WriteJoints(made_->joint_rows, inputs, &data);
   if (report != nullptr) *report = found;
   Result<TileMap> map = TileMap::Make(std::move(data), "tiles");
   KPSA_CHECK(map.ok());

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "kpsa/tiles.h"
@@ -57,5 +58,24 @@ struct TileModel {
 TileMap BuildTiles(const std::function<TileModel(std::size_t tile)>& models, const Eigen::VectorXd& mean,
                    int components, std::size_t inputs_count, const TileInputs& inputs,
                    const TileOptions& options, TileReport* report = nullptr);
+// The same, some tiles after the other: of each part its models and its inputs, whose poses, measured alike, hold that
+// part from first_column on.
+class TileBuilder {
+ public:
+  TileBuilder(int components, std::size_t inputs_count);
+  ~TileBuilder();
+  TileBuilder(const TileBuilder&) = delete;
+  TileBuilder& operator=(const TileBuilder&) = delete;
+  void Add(std::size_t tiles, const std::function<TileModel(std::size_t tile)>& models,
+           const TileInputs& inputs, const TileOptions& options);
+  // mean: of all rows [cN]; inputs: row_mean and row_scale.
+  TileMap Finish(const Eigen::VectorXd& mean, const TileInputs& inputs, TileReport* report = nullptr);
+
+ private:
+  struct Made;
+  const int components_;
+  const std::size_t inputs_count_;
+  std::unique_ptr<Made> made_;
+};
 
 }  // namespace kpsa::engine

@@ -42,9 +42,8 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
         const std::size_t first = t * kTilePoints;
         std::vector<Index> points(std::min(together * kTilePoints, rows - first));
         std::iota(points.begin(), points.end(), static_cast<Index>(first));
-        if (const LastStep* const step = rig.step(m); step != nullptr) {
-          for (Index& point : points) point = step->PointOf(point);
-        }
+        const LastStep* const step = rig.step(m);
+        for (Index& point : points) point = step == nullptr ? rig.PointOf(m, point) : step->PointOf(point);
         Request request;
         request.outputs.push_back(
             {rig.target.meshes[m].stages.back().points, PointSet::Of(points, totals[m])});
@@ -78,7 +77,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
 
 struct NearPoint {
   CueRef cue;
-  Index point = 0;  // of the mesh
+  Index point = 0;  // of the mesh, or the row before it among those that are trained on
   Double3 at;
 };
 
@@ -97,8 +96,8 @@ std::vector<std::vector<NearPoint>> ByMesh(const TrainingRig& rig, const TileCan
     std::size_t stage = 0;
     while (rest >= options.stages[stage].points.size())
       rest -= static_cast<Index>(options.stages[stage++].points.size());
-    result[options.stages[stage].mesh].push_back(
-        {cue, options.stages[stage].points[rest], options.positions[options.layout.points + cue.index]});
+    result[options.stages[stage].mesh].push_back({cue, options.stages[stage].points[rest] / rig.every,
+                                                  options.positions[options.layout.points + cue.index]});
   }
   for (auto& points : result) std::ranges::sort(points, {}, &NearPoint::point);
   return result;

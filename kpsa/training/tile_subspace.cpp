@@ -80,6 +80,28 @@ TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
   return choice;
 }
 
+TileModel ModelOf(const TileChoice& choice, std::size_t tile, const PoseMatrix& poses,
+                  const TileCandidates& points, const TileCueOptions& options) {
+  const Index joint = choice.tiles.joint[tile];
+  TileModel fitted =
+      FitTile(poses, choice.measured, choice.cues, options, points, joint, ColumnsOf(choice, tile));
+  const CueSet& cues = choice.cues;
+  for (Index e = 0; e < 12 && joint != kNoIndex; ++e) {
+    const auto entry = std::ranges::find(cues.cues, CueRef{CueKind::kScalar, joint + e});
+    KPSA_CHECK(entry != cues.cues.end());
+    fitted.joint_rows.push_back(cues.offsets[static_cast<std::size_t>(entry - cues.cues.begin())]);
+  }
+  return fitted;
+}
+
+TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size_t clip_poses) {
+  TileInputs inputs;
+  inputs.samples = SampledColumns(choice.measured);
+  inputs.poses = &poses, inputs.measured = &choice.measured, inputs.clip_poses = clip_poses;
+  inputs.row_mean = choice.cues.mean, inputs.row_scale = choice.cues.scale;
+  return inputs;
+}
+
 void FinishTiles(TileSubspace* made) {
   DropUnread(made);
   Subspace& s = made->subspace;
@@ -130,34 +152,19 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
   Subspace& s = made.subspace;
   s.outputs = std::move(outputs);
   s.components = poses.layout().components;
-  const TileCues& chosen = choice.tiles;
-  const Eigen::MatrixXd& measured = choice.measured;
   made.cues = choice.cues;
-  const CueSet& cues = choice.cues;
 
-  TileInputs inputs;
-  inputs.samples = SampledColumns(measured);
-  inputs.poses = &poses, inputs.measured = &measured, inputs.clip_poses = clip_poses;
-  inputs.row_mean = cues.mean, inputs.row_scale = cues.scale;
-  std::map<Index, std::uint32_t> row_of;  // of scalars
-  for (std::size_t k = 0; k < cues.cues.size(); ++k) {
-    if (cues.cues[k].kind == CueKind::kScalar && cues.cues[k].joint == kNoIndex)
-      row_of.emplace(cues.cues[k].index, cues.offsets[k]);
-  }
+  TileInputs inputs = InputsOf(choice, poses, clip_poses);
   std::size_t tile = 0, first = 0;
   for (const SubspaceOutput& output : s.outputs) {
     const auto model = [&](std::size_t t) {
-      const Index joint = chosen.joint[tile + t];
-      TileModel fitted = FitTile(poses, measured, cues, choice.options, choice.candidates[tile + t], joint,
-                                 ColumnsOf(choice, tile + t));
-      for (Index e = 0; e < 12 && joint != kNoIndex; ++e) fitted.joint_rows.push_back(row_of.at(joint + e));
-      return fitted;
+      return ModelOf(choice, tile + t, poses, choice.candidates[tile + t], choice.options);
     };
     const std::size_t height = output.reconstructed() * static_cast<std::size_t>(s.components);
     inputs.first_column = first;
     s.tiles.push_back(
         BuildTiles(model, mean.segment(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(height)),
-                   s.components, static_cast<std::size_t>(cues.rows()), inputs, options));
+                   s.components, static_cast<std::size_t>(choice.cues.rows()), inputs, options));
     tile += s.tiles.back().tiles();
     first += height;
   }

@@ -34,6 +34,13 @@ std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, cons
                                                std::vector<TileCandidates> candidates,
                                                const TileCueOptions& options, double most_beyond);
 
+// What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
+// tile has the columns of `points`; options: the choice's, with the mean of these poses.
+TileModel ModelOf(const TileChoice& choice, std::size_t tile, const PoseMatrix& poses,
+                  const TileCandidates& points, const TileCueOptions& options);
+// What all tiles of a choice are made with.
+TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size_t clip_poses);
+
 // Leaves out the cues that no tile reads, and tells the subspace of the others.
 void FinishTiles(TileSubspace* made);
 

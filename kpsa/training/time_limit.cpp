@@ -39,7 +39,7 @@ void KeepSpread(std::size_t count, PoseMatrix* poses, std::size_t* of_clips) {
   PoseMatrix kept(poses->layout());
   std::size_t clips = 0;
   for (const Index t : EvenSpread(poses->poses(), count)) {
-    std::ranges::copy(std::as_const(*poses).row(t), kept.AddPose().begin());
+    kept.Append(*poses, t);
     clips += t < *of_clips;
   }
   *poses = std::move(kept);

@@ -6,7 +6,9 @@
 
 #include "kpsa/training/finer_subspaces.h"
 #include "kpsa/training/mend_tiles.h"
+#include "kpsa/training/some_points.h"
 #include "kpsa/training/training_cancel.h"
+#include "kpsa/training/whole_subspace.h"
 
 namespace kpsa::engine {
 namespace {
@@ -14,6 +16,7 @@ namespace {
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 // What a frame costs, in last steps: inner points are tried; and of that, with which they are taken
 constexpr double kWorthSplitting = 2, kCheaperInner = 0.95;
+constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -65,6 +68,26 @@ struct Trained {
   bool ended = false;  // with its cues, as these lie where the last step is dear: there is no subspace
 };
 
+// Mends what is farthest off, signs, and says what a frame costs. steps: as TrainOnce has them; pose_seconds: that a
+// training pose took.
+Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, const TimeLimit& limit,
+                               double pose_seconds, TrainingSetup* setup,
+                               const SubspaceCandidates& candidates, TrainingRecord record,
+                               Subspace subspace) {
+  if (!steps.empty() && limit.left() > 2 * pose_seconds * static_cast<double>(kMendPoses)) {
+    // Where a step is not as exact as a small tolerance asks, nothing is mended
+    Status mended = MendTiles(setup, steps, candidates.cues.set, &subspace);
+    if (mended.kind() == ErrorKind::kInterrupted) return mended;
+  }
+  KPSA_RETURN_IF_ERROR(setup->rig.set_clip(std::nullopt));
+  Sign(*setup, &subspace);
+  record.limited = limit.left_out();
+  const Result<double> points = setup->CostOfPoints(candidates.cues.set.cues);
+  if (!points.ok()) return points.status();
+  const double ns = *points + setup->CostOfSteps() + candidates.cost.ns;
+  return Trained{std::move(subspace), std::move(record), ns, setup->full_cost, limit.elapsed(), false};
+}
+
 // steps: by which points may be mended, by mesh; or none. Ends with its cues where these are points that come out, a frame is expected to cost more than `enough`, and no cues of
 // tiles would be tried.
 Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
@@ -105,7 +128,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   // Subspaces
   KPSA_RETURN_IF_ERROR(setup.Say("subspace", 0.85));
   const bool of_points = !setup.of_light() && setup.of_map();
-  if (of_points && !options.without.patches && rig.split.empty()) {
+  if (of_points && !options.without.patches && rig.split.empty() && rig.some.empty()) {
     KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
     Result<PatchLayout> patches = PricePatches(setup.rig, &setup.compiler, setup.totals, modes.positions);
     if (!patches.ok()) return patches.status();
@@ -122,18 +145,16 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
       (!candidates.fine || cost.lost() > kTooManyMisses) && setup.limit.left() > candidates.modes_seconds)
     KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&*subspace));
 
-  if (!steps.empty() && setup.limit.left() > 2 * poses.pose_seconds * static_cast<double>(kMendPoses)) {
-    // Where a step is not as exact as a small tolerance asks, nothing is mended
-    Status mended = MendTiles(&setup, steps, candidates.cues.set, &*subspace);
-    if (mended.kind() == ErrorKind::kInterrupted) return mended;
-  }
-  KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
-  Sign(setup, &*subspace);
-  record.limited = setup.limit.left_out();
-  const Result<double> points = setup.CostOfPoints(candidates.cues.set.cues);
-  if (!points.ok()) return points.status();
-  const double ns = *points + setup.CostOfSteps() + candidates.cost.ns;
-  return Trained{std::move(*subspace), std::move(record), ns, setup.full_cost, setup.limit.elapsed(), false};
+  if (rig.some.empty())
+    return FinishTraining(steps, setup.limit, poses.pose_seconds, &setup, candidates, std::move(record),
+                          std::move(*subspace));
+  TrainingRig all = rig;
+  all.some.clear(), all.every = 1;
+  WholeSubspace whole(all, options, candidates);
+  Result<Subspace> of_all = whole.Make(ranges, calibrator.size);
+  if (!of_all.ok()) return of_all.status();
+  return FinishTraining(steps, setup.limit, poses.pose_seconds, whole.setup(), whole.candidates(),
+                        std::move(record), std::move(*of_all));
 }
 
 // The rig with its last steps taken apart, in every clip; nothing where it has none.
@@ -182,16 +203,32 @@ void AddTried(const Trained& other, Trained* taken) {
   taken->record.tried = std::move(all);
 }
 
+// Where a rig has many points, it with some of them: enough to choose by.
+Result<std::optional<TrainingRig>> RigOfSome(const TrainingRig& rig, const TrainOptions& options) {
+  if (options.mode != EstimatorMode::kMap || rig.target.colors || options.keep_modes ||
+      options.inner == TrainOptions::Inner::kAlways)
+    return std::optional<TrainingRig>();
+  return SomePointsOf(rig, options.many_points, options.some_points);
+}
+
 // Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost
 // less.
 Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                           const TrainOptions& options) {
+  const Result<std::optional<TrainingRig>> of_some = RigOfSome(rig, options);
+  if (!of_some.ok()) return of_some.status();
   Result<std::optional<TrainingRig>> split = std::optional<TrainingRig>();
   if (options.mode == EstimatorMode::kMap && !rig.target.colors) split = SplitRig(rig, clips);
   if (!split.ok()) return split.status();
-  if (!split->has_value()) return TrainOnce(rig, clips, options);
+  const bool mended = split->has_value() && !options.keep_modes && !options.without.mends;
   const std::vector<Compiler::SplitPoints> mends =
-      options.keep_modes || options.without.mends ? std::vector<Compiler::SplitPoints>() : (*split)->split;
+      mended ? (*split)->split : std::vector<Compiler::SplitPoints>();
+  if (of_some->has_value()) {
+    TrainOptions choosing = options;  // what is learnt changes all tiles
+    choosing.by_tile_as_before = false, choosing.seconds *= kToChoose;
+    return TrainOnce(**of_some, clips, choosing, mends);
+  }
+  if (!split->has_value()) return TrainOnce(rig, clips, options);
   if (options.inner == TrainOptions::Inner::kNever) return TrainOnce(rig, clips, options, mends);
   if (options.inner == TrainOptions::Inner::kAlways) return TrainOnce(**split, clips, options);
   double steps = 0;

@@ -48,6 +48,9 @@ struct TrainOptions {
   // that is too short. Which poses fit depends on the machine; with time enough, the subspace is that without
   // a limit.
   double seconds = std::numeric_limits<double>::infinity();
+  // Points of all meshes: where there are more, about so many of them say how, and then all are trained
+  // (kpsa/training/whole_subspace.h).
+  std::size_t many_points = 24'000, some_points = 16'000;
   // Parts that training does without, to tell what each is worth (bench_ablation --parts).
   struct Without {
     bool relative_matrices = false;  // as cues
@@ -73,11 +76,17 @@ struct TrainingRig {
   std::function<Status(std::optional<std::string_view>)> set_clip;
   // By mesh, with steps where inner points are trained on (graph/last_step.h); empty: nowhere. Train's own.
   std::vector<Compiler::SplitPoints> split = {};
+  // By mesh, the points that training chooses by, ascending; empty: all (kpsa/training/some_points.h). Of so many, one is
+  // among them. Train's own.
+  std::vector<std::vector<Index>> some = {};
+  Index every = 1;
   const LastStep* step(std::size_t mesh) const { return split.empty() ? nullptr : split[mesh].step.get(); }
-  // What is reconstructed of a mesh that has so many points.
+  // What is reconstructed of a mesh that has so many points; where these are not inner ones: which point it is.
   Index rows(std::size_t mesh, Index points) const {
-    return step(mesh) == nullptr ? points : static_cast<Index>(step(mesh)->inner_points());
+    return step(mesh) == nullptr ? (points + every - 1) / every
+                                 : static_cast<Index>(step(mesh)->inner_points());
   }
+  Index PointOf(std::size_t mesh, Index row) const { return some.empty() ? row : some[mesh][row]; }
 };
 
 // Errors: no poses, nothing moves, a pose that fails to evaluate (its clip and time or its controls),

@@ -57,6 +57,12 @@ Status TrainingSetup::Prepare() {
   }
   recorder = std::make_unique<PoseRecorder>(rig, &compiler, std::move(candidates), std::move(signals),
                                             inverse_rest_stretch, options.tolerance);
+  if (!rig.some.empty()) {
+    std::vector<PointSet> some;
+    for (std::size_t m = 0; m < totals.size(); ++m) some.push_back(PointSet::Of(rig.some[m], totals[m]));
+    recorder->Only(std::move(some));
+    recorder->KeepOrigins();
+  }
   Result<PoseLayout> found_layout =
       recorder->Layout(measures && !options.without.cue_products ? kCueProducts : 0);
   if (!found_layout.ok()) return found_layout.status();
@@ -76,7 +82,8 @@ std::vector<SubspaceOutput> TrainingSetup::Outputs() const {
   for (std::size_t m = 0; m < rig.target.meshes.size(); ++m) {
     const AccelerationTarget::MeshPoints& mesh = rig.target.meshes[m];
     const LastStep* const step = rig.step(m);
-    outputs.push_back({mesh.name, totals[m], of_light() ? "" : mesh.stages.back().name,
+    outputs.push_back({mesh.name, step == nullptr ? rig.rows(m, totals[m]) : totals[m],
+                       of_light() ? "" : mesh.stages.back().name,
                        step == nullptr ? 0 : step->inner_points()});
   }
   return outputs;

@@ -14,6 +14,7 @@ struct CalibratedSubspace {
   CueSet cues;
   TrainingRecord record;  // with the calibration of this one
   FrameCost cost;         // but its points
+  bool fine = false;      // its tiles
 };
 
 class TrainingTrials {

@@ -168,8 +168,12 @@ class Builder {
     mesh.vertex_count = static_cast<Index>(gltf_mesh.vertex_count());
     mesh.transform = scene_.transforms[gltf_node];
     auto it = welded_.find(from.mesh);  // instances of a mesh share its geometry
-    if (it == welded_.end())
-      it = welded_.emplace(from.mesh, WeldMesh(character_, from.mesh, name, options_.weld)).first;
+    if (it == welded_.end()) {
+      const std::vector<Index> joint_order =
+          from.skin == kNoIndex ? std::vector<Index>() : JointOrder(character_, character_.skins[from.skin]);
+      it =
+          welded_.emplace(from.mesh, WeldMesh(character_, from.mesh, name, options_.weld, joint_order)).first;
+    }
     mesh.geometry = it->second;
     for (std::size_t p = 0; p < gltf_mesh.primitives.size(); ++p) {
       const gltf::Primitive& primitive = gltf_mesh.primitives[p];

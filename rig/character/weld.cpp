@@ -5,6 +5,7 @@
 #include <bit>
 #include <limits>
 #include <numeric>
+#include <tuple>
 
 namespace kpsa::engine {
 namespace {
@@ -117,8 +118,21 @@ std::uint64_t Morton(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
   return spread(x) | spread(y) << 1 | spread(z) << 2;
 }
 
-// The vertices given, along a Morton curve through their bounding box; ties by index.
-void SortSpatially(const std::vector<float>& positions, std::vector<Index>* vertices) {
+// The place in joint_order of the joint with the largest weight; before all where there is none.
+Index LeadingJoint(const gltf::Mesh& mesh, Index vertex, std::span<const Index> joint_order) {
+  if (joint_order.empty() || !mesh.skinned()) return 0;
+  Index joint = 0;
+  float most = 0;
+  for (const gltf::Influence& influence : mesh.influence_rows().row(vertex)) {
+    if (influence.weight > most && influence.joint < joint_order.size())
+      most = influence.weight, joint = joint_order[influence.joint] + 1;
+  }
+  return joint;
+}
+
+// The vertices given, joint by joint, those of each along a Morton curve through the bounding box of all; ties by index.
+void SortSpatially(const gltf::Mesh& mesh, std::span<const Index> joint_order, std::vector<Index>* vertices) {
+  const std::vector<float>& positions = mesh.positions;
   std::array<double, 3> low, high;
   low.fill(std::numeric_limits<double>::infinity());
   high.fill(-std::numeric_limits<double>::infinity());
@@ -130,17 +144,17 @@ void SortSpatially(const std::vector<float>& positions, std::vector<Index>* vert
   }
   // One scale for all axes keeps the cells cubes
   const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], 1e-300});
-  std::vector<std::pair<std::uint64_t, Index>> order;
+  std::vector<std::tuple<Index, std::uint64_t, Index>> order;
   order.reserve(vertices->size());
   for (Index v : *vertices) {
     std::array<std::uint64_t, 3> cell;
     for (std::size_t i = 0; i < 3; ++i) {
       cell[i] = static_cast<std::uint64_t>((positions[3 * v + i] - low[i]) / extent * 0x1fffff);
     }
-    order.emplace_back(Morton(cell[0], cell[1], cell[2]), v);
+    order.emplace_back(LeadingJoint(mesh, v, joint_order), Morton(cell[0], cell[1], cell[2]), v);
   }
   std::sort(order.begin(), order.end());
-  for (std::size_t i = 0; i < order.size(); ++i) (*vertices)[i] = order[i].second;
+  for (std::size_t i = 0; i < order.size(); ++i) (*vertices)[i] = std::get<2>(order[i]);
 }
 
 // The lowest equal vertex of every vertex.
@@ -211,7 +225,27 @@ std::shared_ptr<const MorphTargets> PointTargets(const gltf::Mesh& mesh,
 
 }  // namespace
 
-WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::string name, bool weld) {
+std::vector<Index> JointOrder(const gltf::Character& character, const gltf::Skin& skin) {
+  std::vector<Index> place(character.nodes.size(), kNoIndex), open;
+  Index next = 0;
+  for (Index root = 0; root < character.nodes.size(); ++root) {
+    if (character.nodes[root].parent != kNoIndex) continue;
+    open.push_back(root);
+    while (!open.empty()) {
+      const Index node = open.back();
+      open.pop_back();
+      place[node] = next++;
+      const std::vector<Index>& children = character.nodes[node].children;
+      open.insert(open.end(), children.rbegin(), children.rend());
+    }
+  }
+  std::vector<Index> order;
+  for (const Index joint : skin.joints) order.push_back(place[joint]);
+  return order;
+}
+
+WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::string name, bool weld,
+                    std::span<const Index> joint_order) {
   const gltf::Mesh& mesh = character.meshes[mesh_index];
   std::vector<Index> representative;
   if (weld) {
@@ -224,7 +258,7 @@ WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::str
   for (Index v = 0; v < representative.size(); ++v) {
     if (representative[v] == v) welded.point_to_vertex.push_back(v);
   }
-  SortSpatially(mesh.positions, &welded.point_to_vertex);
+  SortSpatially(mesh, joint_order, &welded.point_to_vertex);
 
   Mesh::Data data;
   data.name = std::move(name);

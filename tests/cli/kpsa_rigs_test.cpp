@@ -302,7 +302,7 @@ TEST_F(Untrained, CombinationsMissOrKeepTheTolerance) {
   }
   EXPECT_GT(hits, 10u);
   EXPECT_LE(violations, frames / 20);
-  EXPECT_GT(unguarded, frames / 8);  // within the trained ranges, and beyond the tolerance without SoftCache
+  EXPECT_GT(unguarded, frames / 16);  // within the trained ranges, and beyond the tolerance without SoftCache
 }
 
 // A clip moves a joint that is no control and never moved in training.

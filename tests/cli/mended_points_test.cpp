@@ -105,6 +105,15 @@ TEST_F(MendedPoints, NotWhereTheStepVaries) {
   }
 }
 
+// Where the step's floats are not as exact as the tolerance, no point is mended, and all is trained as without.
+TEST_F(MendedPoints, NotWhereTheToleranceIsFinerThanTheStep) {
+  TrainOptions options = FineTraining(true);
+  options.tolerance = 1e-7;
+  const auto trained = TrainRig(folder_->rig(), options);
+  ASSERT_NE(trained, nullptr);
+  EXPECT_TRUE(trained->mends.empty());
+}
+
 TEST_F(MendedPoints, AreInTheFile) {
   const std::string path = *folder_ / "mends.kpsa";
   ASSERT_TRUE(WriteSubspace(*trained_, path).ok());

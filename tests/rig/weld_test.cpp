@@ -94,6 +94,34 @@ TEST(Weld, KeepsVerticesApartThatMoveApart) {
   EXPECT_FALSE(together(5, 6));
 }
 
+// The joints of a skin stand in any order; a chain stays together, and so do the points of a joint.
+TEST(Weld, PointsOfAJointFollowEachOther) {
+  gltf::Character character = SplitGrid(12, 12, 0);
+  gltf::Mesh& mesh = character.meshes[0];
+  // root -> (a -> b), c
+  character.nodes = std::vector<gltf::Node>(4);
+  character.nodes[0].children = {2, 1};
+  character.nodes[2].children = {3};
+  character.nodes[1].parent = character.nodes[2].parent = 0, character.nodes[3].parent = 2;
+  gltf::Skin skin;
+  skin.joints = {1, 3, 0, 2};
+  const std::vector<Index> order = JointOrder(character, skin);
+  EXPECT_EQ(order, (std::vector<Index>{3, 2, 0, 1}));
+  mesh.influence_offsets.assign(1, 0);
+  for (Index v = 0; v < mesh.vertex_count(); ++v) {
+    mesh.influences.push_back({v % 4, 0.6f});
+    mesh.influences.push_back({(v + 1) % 4, 0.4f});
+    mesh.influence_offsets.push_back(static_cast<Index>(mesh.influences.size()));
+  }
+  const WeldedMesh welded = WeldMesh(character, 0, "m", true, order),
+                   without = WeldMesh(character, 0, "m", true);
+  std::vector<Index> places, places_without;
+  for (const Index v : welded.point_to_vertex) places.push_back(order[v % 4]);
+  for (const Index v : without.point_to_vertex) places_without.push_back(order[v % 4]);
+  EXPECT_TRUE(std::ranges::is_sorted(places));
+  EXPECT_FALSE(std::ranges::is_sorted(places_without));
+}
+
 TEST(Weld, DropsTrianglesThatCollapse) {
   gltf::Character character = SplitGrid(3, 2, 1);
   character.meshes[0].primitives[0].triangles.insert(character.meshes[0].primitives[0].triangles.end(),
