@@ -226,17 +226,28 @@ std::shared_ptr<const MorphTargets> PointTargets(const gltf::Mesh& mesh,
 }  // namespace
 
 std::vector<Index> JointOrder(const gltf::Character& character, const gltf::Skin& skin) {
-  std::vector<Index> place(character.nodes.size(), kNoIndex), open;
+  struct Open {
+    Index node;
+    bool back;   // from the ends of its chains to the node
+    bool alone;  // its children have been
+  };
+  std::vector<Index> place(character.nodes.size(), kNoIndex);
+  std::vector<Open> open;
   Index next = 0;
   for (Index root = 0; root < character.nodes.size(); ++root) {
     if (character.nodes[root].parent != kNoIndex) continue;
-    open.push_back(root);
+    open.push_back({root, false, false});
     while (!open.empty()) {
-      const Index node = open.back();
+      const auto [node, back, alone] = open.back();
       open.pop_back();
-      place[node] = next++;
+      if (alone || !back) place[node] = next++;
+      if (alone) continue;
+      if (back) open.push_back({node, true, true});
       const std::vector<Index>& children = character.nodes[node].children;
-      open.insert(open.end(), children.rbegin(), children.rend());
+      for (std::size_t k = 0; k < children.size(); ++k) {
+        const std::size_t child = back ? k : children.size() - 1 - k;
+        open.push_back({children[child], (child % 2 == 1) != back, false});
+      }
     }
   }
   std::vector<Index> order;

@@ -25,7 +25,8 @@ struct WeldedMesh {
 // index. joint_order: by joint of the mesh's influences, as JointOrder gives it; empty: joints do not count.
 WeldedMesh WeldMesh(const gltf::Character& character, Index mesh, std::string name, bool weld,
                     std::span<const Index> joint_order = {});
-// A number for each joint of the skin, by which a chain of joints stays together: depth first through the nodes.
+// A number for each joint of the skin, by which a chain of joints stays together: depth first through the nodes, every
+// second child from the end of its chain to itself, so that siblings follow each other where they hang.
 std::vector<Index> JointOrder(const gltf::Character& character, const gltf::Skin& skin);
 
 // The influences of the points of a skinned mesh. Vertices of unskinned primitives follow one more "joint",

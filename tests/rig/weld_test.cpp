@@ -95,10 +95,24 @@ TEST(Weld, KeepsVerticesApartThatMoveApart) {
 }
 
 // The joints of a skin stand in any order; a chain stays together, and so do the points of a joint.
+TEST(Weld, EverySecondChainOfJointsGoesBack) {
+  // 0 -> (1 -> 2 -> 3), (4 -> (5 -> 6), 7), 8
+  gltf::Character character;
+  character.nodes = std::vector<gltf::Node>(9);
+  for (const auto& [parent, children] : std::vector<std::pair<Index, std::vector<Index>>>{
+           {0, {1, 4, 8}}, {1, {2}}, {2, {3}}, {4, {5, 7}}, {5, {6}}}) {
+    character.nodes[parent].children = children;
+    for (const Index child : children) character.nodes[child].parent = parent;
+  }
+  gltf::Skin skin;
+  skin.joints = {0, 1, 2, 3, 7, 6, 5, 4, 8};
+  EXPECT_EQ(JointOrder(character, skin), (std::vector<Index>{0, 1, 2, 3, 4, 5, 6, 7, 8}));
+}
+
 TEST(Weld, PointsOfAJointFollowEachOther) {
   gltf::Character character = SplitGrid(12, 12, 0);
   gltf::Mesh& mesh = character.meshes[0];
-  // root -> (a -> b), c
+  // 0 -> (2 -> 3), 1
   character.nodes = std::vector<gltf::Node>(4);
   character.nodes[0].children = {2, 1};
   character.nodes[2].children = {3};
