@@ -120,7 +120,8 @@ std::uint64_t Morton(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
 
 // The place in joint_order of the joint with the largest weight; before all where there is none.
 Index LeadingJoint(const gltf::Mesh& mesh, Index vertex, std::span<const Index> joint_order) {
-  if (joint_order.empty() || !mesh.skinned()) return 0;
+  // Shapes are local, and count for more where there are some
+  if (joint_order.empty() || !mesh.skinned() || !mesh.targets.empty()) return 0;
   Index joint = 0;
   float most = 0;
   for (const gltf::Influence& influence : mesh.influence_rows().row(vertex)) {

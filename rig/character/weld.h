@@ -22,7 +22,7 @@ struct WeldedMesh {
 
 // O(V log V). `weld` false keeps every vertex as a point of its own (still in spatial order). Equal means
 // equal as numbers (-0 is 0). Triangles that lose a corner are left out. Unnamed targets are named by their
-// index. joint_order: by joint of the mesh's influences, as JointOrder gives it; empty: joints do not count.
+// index. joint_order: by joint of the mesh's influences, as JointOrder gives it; empty: joints do not count, nor do they where the mesh has morph targets.
 WeldedMesh WeldMesh(const gltf::Character& character, Index mesh, std::string name, bool weld,
                     std::span<const Index> joint_order = {});
 // A number for each joint of the skin, by which a chain of joints stays together: depth first through the nodes, every

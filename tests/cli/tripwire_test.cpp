@@ -286,7 +286,7 @@ TEST_F(Tripwire, BehindTheFacesWholeStack) {
   for (const std::string& node : never) names += node + " ";
   EXPECT_EQ(names,
             "browL browR browWireL browWireR cheekL cheekModL cheekModR cheekR chinMod face_mesh_skinCluster "
-            "jawCage lowerLipWire mush nose noseMod skullCage trip upperLipWire ");
+            "jawCage lowerLipWire mush noseMod skullCage trip upperLipWire ");
 }
 
 }  // namespace
