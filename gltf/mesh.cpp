@@ -60,7 +60,7 @@ Status ReadTriangles(const Document& document, const tinygltf::Primitive& in, co
   return {};
 }
 
-// The n of all attributes <prefix>n, ascending.
+// The n of all attributes <prefix>n, ascending. "-0" and "00" are no numbers of sets.
 std::vector<int> AttributeSets(const std::map<std::string, int>& attributes, std::string_view prefix) {
   std::vector<int> sets;
   for (const auto& [name, accessor] : attributes) {
@@ -68,7 +68,8 @@ std::vector<int> AttributeSets(const std::map<std::string, int>& attributes, std
     int n = 0;
     const char* end = name.data() + name.size();
     const auto [stop, error] = std::from_chars(name.data() + prefix.size(), end, n);
-    if (error == std::errc() && stop == end && n >= 0) sets.push_back(n);
+    if (error == std::errc() && stop == end && n >= 0 && name == fmt::format("{}{}", prefix, n))
+      sets.push_back(n);
   }
   std::sort(sets.begin(), sets.end());
   return sets;

@@ -82,6 +82,7 @@ int FindAttribute(const std::map<std::string, int>& attributes, const std::strin
 }
 
 Status CheckCount(const Document& document, int accessor, std::size_t expected, const std::string& what) {
+  if (accessor < 0) return Status::Invalid("{} is missing", what);
   const std::size_t count = AccessorCount(document, accessor);
   if (count == expected) return {};
   return Status::Invalid("{} (accessors[{}]) has {} elements, POSITION has {}", what, accessor, count,

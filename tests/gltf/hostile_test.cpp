@@ -197,6 +197,18 @@ TEST(GltfHostile, DamagedAccessors) {
       {"wrong type", [&](GltfBuilder& b) { accessor(b, kPosition)["type"] = "VEC2"; }},
       {"wrong type", [&](GltfBuilder& b) { accessor(b, kWeights)["type"] = "MAT2"; }},
       {"must not be normalized", [&](GltfBuilder& b) { accessor(b, kJoints)["normalized"] = true; }},
+      {"must have a WEIGHTS_n for each JOINTS_n",  // -0 is a number, and no set
+       [](GltfBuilder& b) {
+         json& attributes = b.root["meshes"][0]["primitives"][0]["attributes"];
+         attributes["WEIGHTS_-0"] = attributes["WEIGHTS_0"];
+         attributes.erase("WEIGHTS_0");
+       }},
+      {"must have a WEIGHTS_n for each JOINTS_n",
+       [](GltfBuilder& b) {
+         json& attributes = b.root["meshes"][0]["primitives"][0]["attributes"];
+         attributes["JOINTS_00"] = attributes["JOINTS_0"];
+         attributes.erase("JOINTS_0");
+       }},
       {"bufferView is 100", [&](GltfBuilder& b) { accessor(b, kPosition)["bufferView"] = 100; }},
       {"ends at byte", [](GltfBuilder& b) { b.root["bufferViews"][0]["byteLength"] = 9007199254740992; }},
       {"ends at byte", [](GltfBuilder& b) { b.root["bufferViews"][0]["byteOffset"] = 9007199254740992; }},
