@@ -318,12 +318,13 @@ Status PoseRecorder::Replay(std::span<const RecordedPose* const> poses,
   std::map<std::pair<std::optional<std::string>, bool>, std::vector<std::size_t>> alike;
   for (std::size_t i = 0; i < poses.size(); ++i)
     alike[{poses[i]->clip, !poses[i]->values.empty()}].push_back(i);
-  for (const auto& [key, numbers] : alike) {
+  for (const auto& of : alike) {
+    const std::vector<std::size_t>& numbers = of.second;
     std::vector<const RecordedPose*> some;
     for (const std::size_t i : numbers) some.push_back(poses[i]);
     KPSA_RETURN_IF_ERROR(Record(
-        some, [&numbers, &row](std::size_t i) { return row(numbers[i]); },
-        [&some](std::size_t i) {
+        some, [&](std::size_t i) { return row(numbers[i]); },
+        [&](std::size_t i) {
           return some[i]->values.empty() && some[i]->clip
                      ? fmt::format("clip \"{}\" at {} s", *some[i]->clip, some[i]->time)
                      : std::string("a sampled pose");
