@@ -25,8 +25,9 @@ struct Row {
   bool kept = false;                        // the promise, on the test clip
 };
 
-// `program` is kpsa; the rig and the subspace are written into the folder, which is there. training:
-// arguments of `kpsa train` beside. What the program says comes to stderr. Errors: it cannot be started, it fails, it prints what is not its JSON.
+// `program` is kpsa; the rig and the subspace are written into the folder, which is there. training: arguments of
+// `kpsa train` beside. What the program says comes to stderr. Errors: it cannot be started, it fails, it prints what is
+// not its JSON.
 Result<Row> TryCharacter(const std::string& program, const std::string& name, const std::string& character,
                          const std::string& folder, const std::vector<std::string>& training = {});
 

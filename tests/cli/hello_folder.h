@@ -35,6 +35,15 @@ class HelloFolder : public TemporaryFolder {
     return Write("hello.yaml", Replaced(Read(*this / "hello.yaml"), from, to));
   }
   std::string rig() const { return *this / "hello.yaml"; }
+  // Adds "shell", a second mesh with the points and the skin of the first.
+  void AddShell() const {
+    GlbParts glb(Read(*this / "hello.glb"));
+    nlohmann::json shell = glb.json["nodes"][2];
+    shell["name"] = "shell";
+    glb.json["nodes"].push_back(shell);
+    glb.json["scenes"][0]["nodes"].push_back(3);
+    Write("hello.glb", glb.Bytes());
+  }
   // Adds the clip "sway", in which the lower joint turns as the upper one does in "wave".
   void AddSway() const {
     GlbParts glb(Read(*this / "hello.glb"));

@@ -25,12 +25,7 @@ class TwoMeshes : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new HelloFolder;
-    GlbParts glb(HelloFolder::Glb());
-    nlohmann::json shell = glb.json["nodes"][2];
-    shell["name"] = "shell";
-    glb.json["nodes"].push_back(shell);
-    glb.json["scenes"][0]["nodes"].push_back(3);
-    folder_->Write("hello.glb", glb.Bytes());
+    folder_->AddShell();
     folder_->Edit("  mush: {type: deltaMush, iterations: 10}\n",
                   "  mush: {type: deltaMush, iterations: 10}\n  soft: {type: deltaMush, iterations: 4}\n  "
                   "grip: {type: transform}\n"
