@@ -135,6 +135,35 @@ Double3 EulerFromRotation(const Matrix4& m, RotateOrder order) {
   return angles;
 }
 
+Double3 EulerNear(Double3 angles, RotateOrder order, Double3 others) {
+  const int* axes = kOrders[static_cast<int>(order)];
+  const int i = axes[0], j = axes[1], k = axes[2];
+  const auto whole_turns = [](double from, double to) {
+    return 2 * kPi * std::round((to - from) / (2 * kPi));
+  };
+  Double3 nearest;
+  double least = std::numeric_limits<double>::infinity();
+  // R_k(c) R_j(b) R_i(a) = R_k(c + pi) R_j(pi - b) R_i(a + pi)
+  for (const bool other : {false, true}) {
+    Double3 now = angles;
+    if (other) now[i] += kPi, now[j] = kPi - now[j], now[k] += kPi;
+    const double cos_b = std::cos(now[j]), sin_b = std::sin(now[j]);
+    if (std::fabs(cos_b) < 1e-4) {  // only a - c, or a + c, is told
+      const double parity = (i + 1) % 3 == j ? 1.0 : -1.0, sign = sin_b > 0 ? parity : -parity;
+      double off = others[i] - sign * others[k] - (now[i] - sign * now[k]);
+      off -= whole_turns(0, off);
+      now[i] = others[i] - off / 2, now[k] = others[k] + sign * off / 2;
+    }
+    double squared = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      now[axis] += whole_turns(now[axis], others[axis]);
+      squared += (now[axis] - others[axis]) * (now[axis] - others[axis]);
+    }
+    if (squared < least) nearest = now, least = squared;
+  }
+  return nearest;
+}
+
 Matrix4 RotationFromQuaternion(Quaternion q) { return RotationFromUnit(Normalized(q)); }
 
 Matrix4 RotationFromUnit(Quaternion q) {

@@ -37,6 +37,9 @@ Matrix4 ComposeTrs(Double3 translation, Quaternion rotation, Double3 scale);
 void DecomposeTrs(const Matrix4& m, Double3* translation, Quaternion* rotation, Double3* scale);
 // Angles of a rotation matrix (orthonormal upper 3x3) for an order, each within (-pi, pi].
 Double3 EulerFromRotation(const Matrix4& rotation, RotateOrder order);
+// Of all angles that turn as these do, those nearest to others: what follows a motion without jumps by half a turn.
+// Within 0.1 mrad of gimbal lock the turn is kept to that.
+Double3 EulerNear(Double3 angles, RotateOrder order, Double3 others);
 Quaternion QuaternionFromRotation(const Matrix4& rotation);
 
 Quaternion operator*(Quaternion a, Quaternion b);  // b is applied first

@@ -27,11 +27,24 @@ std::optional<PlugRef> ShownByClip(const Graph& graph, const Control& control) {
   if (control.by_clip) return control.plug;
   const NodeDef& def = graph.def(control.plug.node);
   const std::string& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)].name;
-  if (attribute != "rotate" && attribute != "translate") return std::nullopt;
   PlugRef shown = control.plug;
-  shown.attribute = def.FindAttribute(attribute == "rotate" ? "poseRotate" : "poseTranslate");
+  shown.attribute = def.FindAttribute(attribute == "rotate"      ? "poseRotate"
+                                      : attribute == "translate" ? "poseTranslate"
+                                      : attribute == "scale"     ? "poseScale"
+                                                                 : "");
   if (shown.attribute < 0) return std::nullopt;
   return shown;
+}
+
+// Of a transform's angles.
+std::optional<RotateOrder> OrderOf(const Graph& graph, const PlugRef& plug) {
+  const NodeDef& def = graph.def(plug.node);
+  const int order = def.FindAttribute("rotateOrder");
+  if (order < 0 || def.attributes[static_cast<std::size_t>(plug.attribute)].name != "rotate")
+    return std::nullopt;
+  const Value* set = graph.FindValue({plug.node, order, -1, -1});
+  const Value& value = set != nullptr ? *set : def.attributes[static_cast<std::size_t>(order)].default_value;
+  return static_cast<RotateOrder>(value.AsInt());
 }
 
 // Where light is measured by fewer paths than pictures have: keySamples of its node.
@@ -113,6 +126,7 @@ TrainingRig MakeTrainingRig(Rig* rig, const AccelerateEntry& entry) {
     training.controls.push_back({control.plug, control.min, control.max, control.value, control.by_clip,
                                  carriers.count(control.plug.node.index) != 0,
                                  ShownByClip(*rig->graph, control)});
+    training.controls.back().turns = OrderOf(*rig->graph, control.plug);
     // The attribute's own limits; what counts or chooses has no values in between
     const AttributeDef& attribute = def.attributes[static_cast<std::size_t>(control.plug.attribute)];
     const Type type = rig->graph->PlugType(control.plug);

@@ -1,5 +1,6 @@
 // transform and joint: local = offsetParentMatrix . T . R(rotateOrder) . S, in Maya's sense. The rest pose or
 // the clip feeds offsetParentMatrix; translate, rotate and scale are the controls on top of it.
+#include "base/matrix.h"
 #include "base/scalar_math.h"
 #include "nodes/choices.h"
 #include "nodes/deformer.h"
@@ -60,6 +61,11 @@ void ComputePoseTranslate(LocalContext<Out<"poseTranslate", Double3>> c) {
   const Matrix4& rest = c.kernel_as<TransformKernel>().rest;
   c.out<"poseTranslate">() = {local(0, 3) - rest(0, 3), local(1, 3) - rest(1, 3), local(2, 3) - rest(2, 3)};
 }
+void ComputePoseScale(LocalContext<Out<"poseScale", Double3>> c) {
+  const Matrix4 pose = InverseOrIdentity(c.kernel_as<TransformKernel>().rest) * Local(c);
+  Double3& scale = c.out<"poseScale">();
+  for (int i = 0; i < 3; ++i) scale[i] = Length(Double3{pose(0, i), pose(1, i), pose(2, i)});
+}
 void ComputeSwingTwist(LocalContext<Out<"swing", Double3>, Out<"twist", double>> c) {
   const auto& kernel = c.kernel_as<TransformKernel>();
   const SwingTwist parts = DecomposeSwingTwist(PoseRotation(Local(c), kernel.rest), kernel.twist_axis);
@@ -89,6 +95,7 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
       .unit(Unit::kAngle)
       .out("poseTranslate", Type::kDouble3, "translation against rest; includes the clip")
       .unit(Unit::kLength)
+      .out("poseScale", Type::kDouble3, "lengths of the axes against rest; includes the clip")
       .out("swing", Type::kDouble3, "rotation vector of poseRotate without its twist")
       .unit(Unit::kAngle)
       .out("twist", Type::kDouble, "angle about twistAxis")
@@ -102,6 +109,7 @@ void AddTransform(NodeRegistry& registry, const char* name, const char* doc) {
   b.compute<ComputePose>().bind(BindTransform).cost(250, 0);
   b.compute<ComputePoseVector>().bind(BindTransform).cost(200, 0);
   b.compute<ComputePoseTranslate>().bind(BindTransform).cost(60, 0);
+  b.compute<ComputePoseScale>().bind(BindTransform).cost(150, 0);
   b.compute<ComputeSwingTwist>().bind(BindTransform).cost(300, 0);
 }
 

@@ -389,6 +389,20 @@ std::string PoseRecorder::NameOf(const SampledPose& pose, const std::vector<Trai
   return text;
 }
 
+namespace {
+
+// The middle of what the controls of a node turn, that of c among them.
+Double3 MiddleAngles(const std::vector<ControlRange>& controls, std::size_t c) {
+  Double3 middle;
+  for (const ControlRange& control : controls) {
+    if (control.plug.node == controls[c].plug.node && control.turns)
+      middle[std::max(0, control.plug.component)] = (control.min + control.max) / 2;
+  }
+  return middle;
+}
+
+}  // namespace
+
 Result<ClipPoses> PoseRecorder::ControlsOfClips(const std::vector<TrainingClip>& clips) {
   ClipPoses poses;
   for (const TrainingClip& clip : clips) {
@@ -421,7 +435,10 @@ Result<ClipPoses> PoseRecorder::ControlsOfClips(const std::vector<TrainingClip>&
         const auto output = static_cast<Index>(i);
         const int component = rig_.controls[shown[i]].shown->component;
         if ((*plan)->outputs()[i].type == Type::kDouble3) {
-          pose[shown[i]] = evaluator.Get<Double3>(output)[std::max(0, component)];
+          const Double3 all = evaluator.Get<Double3>(output);
+          const std::optional<RotateOrder>& turns = rig_.controls[shown[i]].turns;
+          const Double3 near = turns ? EulerNear(all, *turns, MiddleAngles(rig_.controls, shown[i])) : all;
+          pose[shown[i]] = near[std::max(0, component)];
         } else if ((*plan)->outputs()[i].type == Type::kDouble) {
           pose[shown[i]] = evaluator.Get<double>(output);
         }

@@ -18,6 +18,7 @@ struct ControlRange {
   bool often = false;    // it carries the space of the points: half of the mixtures move it
   std::optional<PlugRef> shown =
       {};  // where the value can be read that gives what a clip does (poseRotate.x for rotateX)
+  std::optional<RotateOrder> turns = {};  // that is an angle of a turn: each pose has others, too
   // What the attribute itself admits, where that is more than [min, max]; whole numbers admit nothing more.
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();

@@ -19,6 +19,8 @@ constexpr double kWorthTrying = 0.45;  // of what a frame costs: what others cou
 // Cues of tiles: of the poses they are trained on, that a trial leaves beyond half the tolerance, at most; and where
 // so many miss by cues for all points that others can hardly be worse
 constexpr double kMostBeyond = 0.03, kMostBeyondElse = 0.1, kMostMiss = 0.3;
+constexpr double kMostBeyondOfMisses =
+    0.25;  // or beyond the tolerance, of the poses that miss by cues for all points
 constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so many
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
@@ -213,7 +215,8 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   }
   std::optional<TileChoice> chosen =
       ChoosePromisingTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice,
-                           cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond);
+                           cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
+                           kMostBeyondOfMisses * cues.choice.misses);
   if (!chosen) return false;
   tiles = std::move(*chosen);
   return true;

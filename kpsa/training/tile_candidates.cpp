@@ -15,6 +15,40 @@ constexpr std::size_t kMostPlans = 2500;  // of all tiles; neighbours share one 
 constexpr std::size_t kOwnPoints = 40, kNearPoints = 24;  // candidates in a tile, and about it
 constexpr std::size_t kNearProbes = 12;                   // points of a tile that say what is near
 
+Status SetClip(const TrainingRig& rig, const std::vector<TrainingClip>& clips, int clip) {
+  return rig.set_clip(clip < 0 ? std::nullopt
+                               : std::optional<std::string_view>(clips[static_cast<std::size_t>(clip)].name));
+}
+
+void AddVarying(const TrainingRig& rig, bool playing, Request* request) {
+  request->varying = {rig.time};
+  for (const ControlRange& control : rig.controls) {
+    if (!playing || !control.by_clip) request->varying.push_back(control.plug);
+  }
+}
+
+// Of the transforms with relative matrices those that a clip or a control moves, whatever follows them. One that moves
+// no point has no guard: a clip that nobody trained on may turn it anyhow.
+Result<std::set<Index>> VaryingNodes(const TrainingRig& rig, Compiler* compiler,
+                                     const std::vector<TrainingClip>& clips,
+                                     std::span<const Signal> signals) {
+  std::set<Index> nodes;
+  for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
+    KPSA_RETURN_IF_ERROR(SetClip(rig, clips, clip));
+    Request request;
+    for (const Signal& signal : signals) {
+      if (signal.relative) request.outputs.push_back({signal.plug, {}});
+    }
+    if (request.outputs.empty()) break;
+    AddVarying(rig, clip >= 0, &request);
+    const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
+    if (!plan.ok()) return plan.status();
+    for (const Plan::StepInfo& info : (*plan)->infos()) nodes.insert(info.node.index);
+  }
+  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+  return nodes;
+}
+
 // For each tile of each mesh, in their order: which of the signals are relative matrices of transforms that
 // its points need, as indices, ascending.
 Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, Compiler* compiler,
@@ -32,9 +66,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
   std::vector<std::set<Index>> movers(tiles);
   std::vector<char> moves(signals.size(), 0);
   for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
-    KPSA_RETURN_IF_ERROR(
-        rig.set_clip(clip < 0 ? std::nullopt
-                              : std::optional<std::string_view>(clips[static_cast<std::size_t>(clip)].name)));
+    KPSA_RETURN_IF_ERROR(SetClip(rig, clips, clip));
     std::size_t first_tile = 0;
     for (std::size_t m = 0; m < totals.size(); ++m) {
       const std::size_t rows = rig.rows(m, totals[m]), count = (rows + kTilePoints - 1) / kTilePoints;
@@ -47,10 +79,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
         Request request;
         request.outputs.push_back(
             {rig.target.meshes[m].stages.back().points, PointSet::Of(points, totals[m])});
-        request.varying = {rig.time};
-        for (const ControlRange& control : rig.controls) {
-          if (clip < 0 || !control.by_clip) request.varying.push_back(control.plug);
-        }
+        AddVarying(rig, clip >= 0, &request);
         const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
         if (!plan.ok()) return plan.status();
         for (const Plan::StepInfo& info : (*plan)->infos()) {
@@ -64,10 +93,11 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
       first_tile += count;
     }
   }
-  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+  const Result<std::set<Index>> varying = VaryingNodes(rig, compiler, clips, signals);
+  if (!varying.ok()) return varying.status();
   for (const auto& [node, signal] : matrices) {  // what stands still in the world moves in the space
     for (std::set<Index>& of_tile : movers) {
-      if (!moves[static_cast<std::size_t>(signal)]) of_tile.insert(signal);
+      if (!moves[static_cast<std::size_t>(signal)] && !varying->contains(node)) of_tile.insert(signal);
     }
   }
   std::vector<std::vector<Index>> result;

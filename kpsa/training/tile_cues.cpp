@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <set>
 #include <tuple>
 
 #include "base/parallel.h"
@@ -30,7 +31,8 @@ constexpr Eigen::Index kTrialPoints = 4;     // every so manieth point,
 constexpr Eigen::Index kTried = 5;           // as of every so manieth of these poses
 constexpr std::size_t kSpaceProbes = 6,
                       kProbePoses = 240;  // points and poses that say which joints carry a tile,
-constexpr std::size_t kSpaces = 3;        // of which so many are compared
+constexpr std::size_t kSpaces = 3;        // of which so many are compared, also
+constexpr std::size_t kParting = 8;       // in so many poses in which two of them part most
 constexpr double kJointWorth = 0.8;       // of the error (fourth powers) without
 constexpr double kSeen = 2e-3;            // tolerances: what moves points less is not seen
 constexpr double kCueGain = 2e-3;         // of what all scalars leave: a cue has to tell more
@@ -55,13 +57,19 @@ Eigen::MatrixXd PointErrors(const Eigen::MatrixXd& left) {
   return errors;
 }
 
-// Every `stride`-th pose as it is seen from a joint (kNoIndex: from the space). Rows are centred, and in
+std::vector<std::size_t> EveryPose(const PoseMatrix& poses, std::size_t stride) {
+  std::vector<std::size_t> rows;
+  for (std::size_t t = 0; t < poses.poses(); t += stride) rows.push_back(t);
+  return rows;
+}
+
+// Some poses as they are seen from a joint (kNoIndex: from the space). Rows are centred, and in
 // scene units. Without poses where the joint's matrix has no inverse.
 class View {
  public:
-  View(const PoseMatrix& poses, const TileCueOptions& options, Index joint, std::size_t stride)
-      : poses_(poses), options_(options), joint_(joint), stride_(stride) {
-    for (std::size_t t = 0; t < poses.poses(); t += stride) {
+  View(const PoseMatrix& poses, const TileCueOptions& options, Index joint, std::vector<std::size_t> rows)
+      : poses_(poses), options_(options), joint_(joint), rows_(std::move(rows)) {
+    for (const std::size_t t : rows_) {
       std::optional<Affine> back = Affine(Affine::Identity());
       if (joint != kNoIndex)
         back = InverseOf(RelativeMatrix(poses.layout(), poses.row(t), options.mean, joint));
@@ -126,7 +134,7 @@ class View {
 
  private:
   std::span<const float> RowOf(Eigen::Index t) const {
-    return poses_.row(static_cast<std::size_t>(t) * stride_);
+    return poses_.row(rows_[static_cast<std::size_t>(t)]);
   }
   void Put(std::size_t column, std::size_t points, Eigen::Index row, Eigen::MatrixXd* to) const {
     const auto height = static_cast<Eigen::Index>(3 * points);
@@ -147,7 +155,7 @@ class View {
   const PoseMatrix& poses_;
   const TileCueOptions& options_;
   const Index joint_;
-  const std::size_t stride_;
+  const std::vector<std::size_t> rows_;
   std::vector<Affine> back_;
 };
 
@@ -162,7 +170,7 @@ class TileChooser {
 
   std::vector<CueRef> Run() {
     ChooseSpace();
-    const View view(poses_, options_, joint_, stride_);
+    const View view(poses_, options_, joint_, EveryPose(poses_, stride_));
     y_ = view.Points(tile_.first_column, tile_.height);
     ChooseScalars(view);
     FindResidual();
@@ -189,7 +197,7 @@ class TileChooser {
                       points = tile_.height / 3, probes = std::min(kSpaceProbes, points);
     std::vector<std::pair<double, Index>> moved;
     for (const Index joint : tile_.joints) {
-      const View view(poses_, options_, joint, stride);
+      const View view(poses_, options_, joint, EveryPose(poses_, stride));
       if (view.empty()) continue;
       double sum = 0;
       for (std::size_t p = 0; p < probes; ++p) {
@@ -200,16 +208,60 @@ class TileChooser {
     }
     std::sort(moved.begin(), moved.end());
     if (moved.empty()) return;
-    double least = kJointWorth * ErrorIn(kNoIndex);
-    for (std::size_t i = 0; i < std::min(kSpaces, moved.size()); ++i) {
-      const double error = ErrorIn(moved[i].second);
-      if (error < least) least = error, joint_ = moved[i].second;
+    if (moved.size() > kSpaces) moved.resize(kSpaces);
+    const std::vector<std::size_t> apart = WhereTheyPart(moved);
+    double least = kJointWorth * ErrorIn(kNoIndex, apart);
+    for (const auto& [sum, joint] : moved) {
+      const double error = ErrorIn(joint, apart);
+      if (error < least) least = error, joint_ = joint;
     }
   }
 
-  // Mean fourth power of a point's error in poses that are not fitted to.
-  double ErrorIn(Index joint) const {
-    const View view(poses_, options_, joint, 2 * stride_);
+  // Poses in which joints, and the space, would carry the middle of the tile farthest from each other. A tongue hardly
+  // moves in its jaw: whose chin it is, few poses tell.
+  std::vector<std::size_t> WhereTheyPart(const std::vector<std::pair<double, Index>>& joints) const {
+    const Eigen::VectorXd& mean = *options_.mean;
+    const auto first = static_cast<Eigen::Index>(tile_.first_column),
+               points = static_cast<Eigen::Index>(tile_.height / 3);
+    const Eigen::Vector3d middle =
+        Eigen::Map<const Eigen::Matrix3Xd>(mean.data() + first, 3, points).rowwise().mean();
+    std::vector<Eigen::Matrix3Xd> carried{middle.replicate(1, static_cast<Eigen::Index>(poses_.poses()))};
+    const std::vector<float> no_pose(poses_.layout().columns(), 0.0f);
+    for (const auto& [sum, joint] : joints) {
+      const std::optional<Affine> back =
+          InverseOf(RelativeMatrix(poses_.layout(), no_pose, options_.mean, joint));
+      if (!back) continue;
+      const Eigen::Vector3d in_joint = back->leftCols<3>() * middle + back->col(3);
+      Eigen::Matrix3Xd& to = carried.emplace_back(3, carried[0].cols());
+      for (Eigen::Index t = 0; t < to.cols(); ++t) {
+        const Affine matrix =
+            RelativeMatrix(poses_.layout(), poses_.row(static_cast<std::size_t>(t)), options_.mean, joint);
+        to.col(t) = matrix.leftCols<3>() * in_joint + matrix.col(3);
+      }
+    }
+    std::set<std::size_t> found;
+    for (std::size_t a = 0; a < carried.size(); ++a) {
+      for (std::size_t b = a + 1; b < carried.size(); ++b) {
+        const Eigen::VectorXd apart = (carried[a] - carried[b]).colwise().squaredNorm();
+        std::vector<std::size_t> order = EveryPose(poses_, 1);
+        const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(kParting, order.size()));
+        std::partial_sort(order.begin(), end, order.end(), [&](std::size_t s, std::size_t t) {
+          return std::pair(-apart[static_cast<Eigen::Index>(s)], s) <
+                 std::pair(-apart[static_cast<Eigen::Index>(t)], t);
+        });
+        found.insert(order.begin(), end);
+      }
+    }
+    return {found.begin(), found.end()};
+  }
+
+  // Mean fourth power of a point's error in poses that are not fitted to, some of which are given.
+  double ErrorIn(Index joint, const std::vector<std::size_t>& apart) const {
+    std::vector<std::size_t> rows = EveryPose(poses_, 2 * stride_);
+    std::erase_if(rows, [&](std::size_t t) { return std::ranges::binary_search(apart, t); });
+    const std::size_t first_apart = rows.size();
+    rows.insert(rows.end(), apart.begin(), apart.end());
+    const View view(poses_, options_, joint, std::move(rows));
     if (view.empty()) return std::numeric_limits<double>::infinity();
     const Eigen::MatrixXd all = view.Points(tile_.first_column, tile_.height),
                           x = Moving(view.Cues(ScalarsIn(joint)), nullptr);
@@ -217,7 +269,8 @@ class TileChooser {
     for (Eigen::Index i = 0; 3 * i < y.rows(); ++i)
       y.middleRows(3 * i, 3) = all.middleRows(3 * kTrialPoints * i, 3);
     std::vector<Eigen::Index> held, fitted;
-    for (Eigen::Index t = 0; t < y.cols(); ++t) (t % kTried == 2 ? held : fitted).push_back(t);
+    for (Eigen::Index t = 0; t < y.cols(); ++t)
+      (t % kTried == 2 || t >= static_cast<Eigen::Index>(first_apart) ? held : fitted).push_back(t);
     Eigen::MatrixXd left = y(Eigen::all, held);
     if (x.rows() > 0) {
       const Eigen::MatrixXd xf = x(Eigen::all, fitted), yf = y(Eigen::all, fitted);
@@ -423,7 +476,7 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
         (of.index >= poses.layout().relative_begin && (of.index - poses.layout().relative_begin) % 12 >= 9);
     unit[i] = (is_length ? 1 : options.turn_reach) / set.scale[row];
   }
-  const View view(poses, options, joint, 1);
+  const View view(poses, options, joint, EveryPose(poses, 1));
   const Eigen::Index count = measured.cols();
   model.target = view.Points(tile.first_column, tile.height);
   model.mean = view.Mean(tile.first_column, tile.height);

@@ -13,6 +13,7 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
+constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
 
 // The cues of some rows of a set.
 CueSet Subset(const CueSet& set, const std::vector<std::size_t>& kept) {
@@ -135,12 +136,15 @@ double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tol
 
 std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                                                std::vector<TileCandidates> candidates,
-                                               const TileCueOptions& options, double most_beyond) {
+                                               const TileCueOptions& options, double most_of_half,
+                                               double most_of_whole) {
   if (candidates.size() > kTrialTiles * kTrialTiles) {
     std::vector<TileCandidates> some;
     for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
     const TileChoice trial = ChooseTiles(mean, poses, std::move(some), options);
-    if (ShareBeyond(poses, trial, options.tolerance / 2) > most_beyond) return std::nullopt;
+    if (ShareBeyond(poses, trial, options.tolerance / 2) > most_of_half &&
+        ShareBeyond(poses, trial, kOfWhole * options.tolerance) > most_of_whole)
+      return std::nullopt;
   }
   return ChooseTiles(mean, poses, std::move(candidates), options);
 }

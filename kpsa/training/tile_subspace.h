@@ -29,10 +29,11 @@ TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                        std::vector<TileCandidates> candidates, const TileCueOptions& options);
 
 // The same where an eighth of many tiles says that the others are worth their time: at most that share of the poses
-// would be farther off than half the tolerance.
+// would be farther off than half the tolerance, or that of them than (nearly) all of it.
 std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                                                std::vector<TileCandidates> candidates,
-                                               const TileCueOptions& options, double most_beyond);
+                                               const TileCueOptions& options, double most_of_half,
+                                               double most_of_whole);
 
 // What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
 // tile has the columns of `points`; options: the choice's, with the mean of these poses.

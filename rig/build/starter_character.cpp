@@ -81,15 +81,22 @@ bool StarterCharacter::AnyMotion() const {
     return std::any_of(motion.rotate, motion.rotate + 3, beyond(kLeastDegrees)) ||
            std::any_of(motion.translate, motion.translate + 3,
                        beyond(kLeastTranslation * rig.rest_diagonal)) ||
+           std::any_of(motion.scale, motion.scale + 3, beyond(kLeastScale)) ||
            std::any_of(motion.weights.begin(), motion.weights.end(), beyond(kLeastWeight));
   });
 }
 
 std::optional<NodeId> StarterCharacter::Space() const {
   std::optional<NodeId> best;
+  std::vector<bool> scaled(character.nodes.size(), false);
   // Parents first: later ones are deeper along the one chain that qualifies
   for (Index i : character.order) {
-    if (carries[i] >= kSpaceShare && character.nodes[i].mesh == kNoIndex) best = rig.scene.transforms[i];
+    const auto& scale = motions[i].scale;
+    scaled[i] =
+        std::any_of(scale, scale + 3, [](const MotionRange& range) { return range.size() > kLeastScale; }) ||
+        (character.nodes[i].parent != kNoIndex && scaled[character.nodes[i].parent]);
+    if (carries[i] >= kSpaceShare && character.nodes[i].mesh == kNoIndex && !scaled[i])
+      best = rig.scene.transforms[i];
   }
   return best;
 }

@@ -16,6 +16,7 @@ namespace kpsa::engine {
 inline constexpr double kLeastDegrees = 0.1;
 inline constexpr double kLeastTranslation = 1e-4;  // of the rest diagonal
 inline constexpr double kLeastWeight = 0.01;
+inline constexpr double kLeastScale = 0.01;  // of the scale at rest
 
 // Refers to the rig, which was loaded from a character alone, at rest.
 struct StarterCharacter {

@@ -60,6 +60,13 @@ class ControlWriter {
         if (range.size() > kLeastTranslation * in_.rig.rest_diagonal)
           add("translate", axis, RoundedOut({range.min * 100, range.max * 100}, step));
       }
+      for (int axis = 0; axis < 3; ++axis) {
+        const MotionRange& range = motion.scale[axis];
+        if (range.size() >= kLeastScale) {
+          const MotionRange grown = RoundedOut({range.min + 1, range.max + 1}, 0.01);
+          add("scale", axis, {std::max(grown.min, 0.01), grown.max});
+        }
+      }
       if (moves && !(in_.carries[i] > 0)) idle.push_back(name);
     }
     WriteExpressions();
@@ -95,7 +102,9 @@ class ControlWriter {
       group_->text += fmt::format("  # {} cannot be told from another plug by its name\n", InComment(name));
       return;
     }
-    const double unit = plug.component < 0 ? 1 : attribute.starts_with("rotate") ? kPi / 180 : 0.01;
+    const double unit = attribute.starts_with("rotate")      ? kPi / 180
+                        : attribute.starts_with("translate") ? 0.01
+                                                             : 1;
     out_.controls.push_back({plug, {range.min * unit, range.max * unit}});
     group_->text += fmt::format("  {}: {{min: {}, max: {}}}\n", Quoted(name, false), Rounded(range.min),
                                 Rounded(range.max));

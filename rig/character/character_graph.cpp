@@ -169,10 +169,7 @@ class Builder {
     mesh.transform = scene_.transforms[gltf_node];
     auto it = welded_.find(from.mesh);  // instances of a mesh share its geometry
     if (it == welded_.end()) {
-      const std::vector<Index> joint_order =
-          from.skin == kNoIndex ? std::vector<Index>() : JointOrder(character_, character_.skins[from.skin]);
-      it =
-          welded_.emplace(from.mesh, WeldMesh(character_, from.mesh, name, options_.weld, joint_order)).first;
+      it = welded_.emplace(from.mesh, WeldMesh(character_, from.mesh, name, options_.weld)).first;
     }
     mesh.geometry = it->second;
     for (std::size_t p = 0; p < gltf_mesh.primitives.size(); ++p) {

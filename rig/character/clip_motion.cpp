@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kLeastTurn = 0.1;  // smaller motion is noise
 constexpr double kLeastMetres = 1e-6;
+constexpr double kLeastGrowth = 1e-3;
 constexpr double kSlack = 0.05;  // of a range: so much beyond another is still within
 constexpr double kSamples = 96;  // a second: 4 a frame of a clip of 24,
 constexpr std::size_t kLeastParts = 4, kMostParts = 400;  // of the time between two keys
@@ -44,19 +45,40 @@ std::size_t PartsAfter(const gltf::Channel& channel, std::size_t k) {
   return std::clamp(static_cast<std::size_t>(std::min(samples, 1e6)), kLeastParts, kMostParts);
 }
 
+// Ranges of angles, in degrees. An elbow that bends beyond 90 degrees about its second axis jumps by half a turn in all
+// three where each pose has the angles within a turn: they follow the motion, but where that goes round and round.
+class Turns {
+ public:
+  void Add(const Matrix4& rotation) {
+    const Double3 within = EulerFromRotation(rotation, RotateOrder::kXyz);
+    last_ = EulerNear(within, RotateOrder::kXyz, last_);
+    for (int i = 0; i < 3; ++i) followed_[i].Add(last_[i] * 180 / kPi), within_[i].Add(within[i] * 180 / kPi);
+  }
+  void AddTo(Motion* motion) const {
+    double of_followed = 0, of_within = 0;
+    for (int i = 0; i < 3; ++i) {
+      of_followed += followed_[i].max - followed_[i].min;
+      of_within += within_[i].max - within_[i].min;
+    }
+    for (int i = 0; i < 3; ++i) motion->rotate[i].Add(of_followed <= of_within ? followed_[i] : within_[i]);
+  }
+
+ private:
+  Double3 last_;  // from rest on
+  MotionRange followed_[3], within_[3];
+};
+
 void AddChannel(const gltf::Character& character, const gltf::Channel& channel, Motion* motion) {
   const gltf::Node& node = character.nodes[channel.node];
   const auto width = static_cast<std::size_t>(channel.components);
   const bool cubic = channel.interpolation == gltf::Interpolation::kCubicSpline;
   const Matrix4 rest_inverse = InverseOrIdentity(node.LocalMatrix());
+  Turns turns;
   const auto add = [&](const double* value) {
     switch (channel.path) {
       case gltf::Path::kRotation: {
         const Quaternion now{value[0], value[1], value[2], value[3]};
-        const Matrix4 relative =
-            RotationFromQuaternion(Conjugate(Normalized(node.rotation)) * Normalized(now));
-        const Double3 angles = EulerFromRotation(relative, RotateOrder::kXyz);
-        for (int i = 0; i < 3; ++i) motion->rotate[i].Add(angles[i] * 180 / kPi);
+        turns.Add(RotationFromQuaternion(Conjugate(Normalized(node.rotation)) * Normalized(now)));
         break;
       }
       case gltf::Path::kTranslation: {
@@ -65,6 +87,9 @@ void AddChannel(const gltf::Character& character, const gltf::Channel& channel, 
         break;
       }
       case gltf::Path::kScale:
+        for (int i = 0; i < 3; ++i) {
+          if (node.scale[i] != 0) motion->scale[i].Add(value[i] / node.scale[i] - 1);
+        }
         break;
       case gltf::Path::kWeights:
         motion->weights.resize(std::max(motion->weights.size(), width));
@@ -78,6 +103,7 @@ void AddChannel(const gltf::Character& character, const gltf::Channel& channel, 
     for (std::size_t part = 1; part < parts; ++part)
       add(Between(channel, k, static_cast<double>(part) / static_cast<double>(parts)).data());
   }
+  if (channel.path == gltf::Path::kRotation) turns.AddTo(motion);
 }
 
 bool GoesBeyond(const MotionRange& range, const MotionRange& other) {
@@ -99,6 +125,7 @@ std::size_t CountBeyond(const std::vector<ClipMotion>& motions, std::size_t clip
       count += motion.rotate[i].size() >= kLeastTurn && GoesBeyond(motion.rotate[i], others.rotate[i]);
       count +=
           motion.translate[i].size() >= kLeastMetres && GoesBeyond(motion.translate[i], others.translate[i]);
+      count += motion.scale[i].size() >= kLeastGrowth && GoesBeyond(motion.scale[i], others.scale[i]);
     }
     for (std::size_t k = 0; k < motion.weights.size(); ++k)
       count += GoesBeyond(motion.weights[k], others.weights[k]);
@@ -109,16 +136,13 @@ std::size_t CountBeyond(const std::vector<ClipMotion>& motions, std::size_t clip
 }  // namespace
 
 void Motion::Add(const Motion& other) {
-  const auto add = [](const MotionRange& from, MotionRange* to) {
-    to->Add(from.min);
-    to->Add(from.max);
-  };
   for (int i = 0; i < 3; ++i) {
-    add(other.rotate[i], &rotate[i]);
-    add(other.translate[i], &translate[i]);
+    rotate[i].Add(other.rotate[i]);
+    translate[i].Add(other.translate[i]);
+    scale[i].Add(other.scale[i]);
   }
   weights.resize(std::max(weights.size(), other.weights.size()));
-  for (std::size_t k = 0; k < other.weights.size(); ++k) add(other.weights[k], &weights[k]);
+  for (std::size_t k = 0; k < other.weights.size(); ++k) weights[k].Add(other.weights[k]);
 }
 
 ClipMotion MeasureClip(const gltf::Character& character, const gltf::Clip& clip) {

@@ -15,13 +15,18 @@ struct MotionRange {
     min = std::min(min, value);
     max = std::max(max, value);
   }
+  void Add(const MotionRange& other) {
+    Add(other.min);
+    Add(other.max);
+  }
   double size() const { return std::max(-min, max); }
 };
 
 // What clips do to one glTF node, relative to its rest.
 struct Motion {
-  MotionRange rotate[3];     // degrees, as Euler angles in the rest pose's axes, X first
+  MotionRange rotate[3];  // degrees, as Euler angles in the rest pose's axes, X first, that follow the motion
   MotionRange translate[3];  // metres, in the rest pose's axes
+  MotionRange scale[3];      // of the scale at rest, less 1
   std::vector<MotionRange> weights;
   void Add(const Motion& other);
 };

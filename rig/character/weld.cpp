@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <limits>
 #include <numeric>
-#include <tuple>
+
+#include "rig/character/point_order.h"
 
 namespace kpsa::engine {
 namespace {
@@ -104,60 +104,6 @@ class VertexOrder {
   std::vector<std::uint64_t> hashes_;
 };
 
-// Interleaves the low 21 bits of three numbers: x0 y0 z0 x1 y1 z1 ... (Morton order).
-std::uint64_t Morton(std::uint64_t x, std::uint64_t y, std::uint64_t z) {
-  const auto spread = [](std::uint64_t v) {
-    v &= 0x1fffff;
-    v = (v | v << 32) & 0x1f00000000ffffull;
-    v = (v | v << 16) & 0x1f0000ff0000ffull;
-    v = (v | v << 8) & 0x100f00f00f00f00full;
-    v = (v | v << 4) & 0x10c30c30c30c30c3ull;
-    v = (v | v << 2) & 0x1249249249249249ull;
-    return v;
-  };
-  return spread(x) | spread(y) << 1 | spread(z) << 2;
-}
-
-// The place in joint_order of the joint with the largest weight; before all where there is none.
-Index LeadingJoint(const gltf::Mesh& mesh, Index vertex, std::span<const Index> joint_order) {
-  // Shapes are local, and count for more where there are some
-  if (joint_order.empty() || !mesh.skinned() || !mesh.targets.empty()) return 0;
-  Index joint = 0;
-  float most = 0;
-  for (const gltf::Influence& influence : mesh.influence_rows().row(vertex)) {
-    if (influence.weight > most && influence.joint < joint_order.size())
-      most = influence.weight, joint = joint_order[influence.joint] + 1;
-  }
-  return joint;
-}
-
-// The vertices given, joint by joint, those of each along a Morton curve through the bounding box of all; ties by index.
-void SortSpatially(const gltf::Mesh& mesh, std::span<const Index> joint_order, std::vector<Index>* vertices) {
-  const std::vector<float>& positions = mesh.positions;
-  std::array<double, 3> low, high;
-  low.fill(std::numeric_limits<double>::infinity());
-  high.fill(-std::numeric_limits<double>::infinity());
-  for (Index v : *vertices) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      low[i] = std::min(low[i], static_cast<double>(positions[3 * v + i]));
-      high[i] = std::max(high[i], static_cast<double>(positions[3 * v + i]));
-    }
-  }
-  // One scale for all axes keeps the cells cubes
-  const double extent = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2], 1e-300});
-  std::vector<std::tuple<Index, std::uint64_t, Index>> order;
-  order.reserve(vertices->size());
-  for (Index v : *vertices) {
-    std::array<std::uint64_t, 3> cell;
-    for (std::size_t i = 0; i < 3; ++i) {
-      cell[i] = static_cast<std::uint64_t>((positions[3 * v + i] - low[i]) / extent * 0x1fffff);
-    }
-    order.emplace_back(LeadingJoint(mesh, v, joint_order), Morton(cell[0], cell[1], cell[2]), v);
-  }
-  std::sort(order.begin(), order.end());
-  for (std::size_t i = 0; i < order.size(); ++i) (*vertices)[i] = std::get<2>(order[i]);
-}
-
 // The lowest equal vertex of every vertex.
 std::vector<Index> Representatives(const gltf::Mesh& mesh) {
   std::vector<Index> order(mesh.vertex_count()), representative(mesh.vertex_count());
@@ -226,38 +172,7 @@ std::shared_ptr<const MorphTargets> PointTargets(const gltf::Mesh& mesh,
 
 }  // namespace
 
-std::vector<Index> JointOrder(const gltf::Character& character, const gltf::Skin& skin) {
-  struct Open {
-    Index node;
-    bool back;   // from the ends of its chains to the node
-    bool alone;  // its children have been
-  };
-  std::vector<Index> place(character.nodes.size(), kNoIndex);
-  std::vector<Open> open;
-  Index next = 0;
-  for (Index root = 0; root < character.nodes.size(); ++root) {
-    if (character.nodes[root].parent != kNoIndex) continue;
-    open.push_back({root, false, false});
-    while (!open.empty()) {
-      const auto [node, back, alone] = open.back();
-      open.pop_back();
-      if (alone || !back) place[node] = next++;
-      if (alone) continue;
-      if (back) open.push_back({node, true, true});
-      const std::vector<Index>& children = character.nodes[node].children;
-      for (std::size_t k = 0; k < children.size(); ++k) {
-        const std::size_t child = back ? k : children.size() - 1 - k;
-        open.push_back({children[child], (child % 2 == 1) != back, false});
-      }
-    }
-  }
-  std::vector<Index> order;
-  for (const Index joint : skin.joints) order.push_back(place[joint]);
-  return order;
-}
-
-WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::string name, bool weld,
-                    std::span<const Index> joint_order) {
+WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::string name, bool weld) {
   const gltf::Mesh& mesh = character.meshes[mesh_index];
   std::vector<Index> representative;
   if (weld) {
@@ -270,7 +185,7 @@ WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::str
   for (Index v = 0; v < representative.size(); ++v) {
     if (representative[v] == v) welded.point_to_vertex.push_back(v);
   }
-  SortSpatially(mesh, joint_order, &welded.point_to_vertex);
+  SortByHalves(mesh, &welded.point_to_vertex);
 
   Mesh::Data data;
   data.name = std::move(name);

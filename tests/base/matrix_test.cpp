@@ -58,6 +58,34 @@ TEST(Matrix, EulerAnglesComeBackForEveryOrder) {
   }
 }
 
+// Angles that walk anywhere, far beyond a turn and through gimbal lock: what EulerFromRotation makes of them comes back
+// near to where it was a step before.
+TEST(Matrix, EulerAnglesFollowAMotion) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> step(-0.05, 0.05), start(-4, 4);
+  double apart = 0;  // of EulerFromRotation's own angles, from one step to the next
+  for (int order = 0; order < 6; ++order) {
+    const auto in_order = static_cast<RotateOrder>(order);
+    constexpr int kMiddle[6] = {1, 2, 0, 2, 0, 1};
+    for (int walk = 0; walk < 20; ++walk) {
+      Double3 angles{start(random), start(random), start(random)}, followed = angles, wrapped = angles;
+      for (int i = 0; i < 400; ++i) {
+        for (int axis = 0; axis < 3; ++axis) angles[axis] += step(random) + (walk % 3 == axis ? 0.03 : 0);
+        if (i % 50 == 0) angles[kMiddle[order]] = kPi / 2 * (i % 100 == 0 ? 1 : -1);
+        const Matrix4 m = RotationFromEuler(angles, in_order);
+        const Double3 from = EulerFromRotation(m, in_order), to = EulerNear(from, in_order, angles);
+        ASSERT_LT(MaxDifference(m, RotationFromEuler(to, in_order)), 2e-4);
+        ASSERT_LT(Length(to - angles), 1e-3) << order << " " << walk << " " << i;
+        followed = EulerNear(from, in_order, followed);
+        ASSERT_LT(MaxDifference(m, RotationFromEuler(followed, in_order)), 2e-4);
+        apart = std::max(apart, Length(from - wrapped));
+        wrapped = from;
+      }
+    }
+  }
+  EXPECT_GT(apart, 3);
+}
+
 TEST(Matrix, XyzTurnsAboutXFirst) {
   const Matrix4 m = RotationFromEuler({kPi / 2, 0, kPi / 2}, RotateOrder::kXyz);
   const Double3 p = TransformVector(m, {0, 1, 0});  // X takes y to z; Z leaves z alone

@@ -21,6 +21,7 @@ void AddTransforms(std::vector<NodeSetUp>* all) {
                      {"poseRotate", Moves::kNot},
                      {"poseRotateVector", Moves::kNot},
                      {"poseTranslate", Moves::kNot},
+                     {"poseScale", Moves::kNot},
                      {"swing", Moves::kNot},
                      {"twist", Moves::kNot}},
                     0,

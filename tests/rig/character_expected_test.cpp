@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "files/npz.h"
 #include "graph/compiler.h"
 #include "graph/evaluator.h"
-#include "files/npz.h"
 #include "tests/rig/rig_fixture.h"
 #include "tests/support/expected_files.h"
 

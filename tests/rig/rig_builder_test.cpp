@@ -280,9 +280,10 @@ TEST_F(RigBuilderTest, SettingsFromOutside) {
   ASSERT_TRUE(setting.ok());
   EXPECT_TRUE(Has(ApplySetting(&rig, *setting).ToString(), "is driven by"));
 
-  Result<PoseFile> pose = ReadPoseFile(
-      rig,
-      folder.Write("p.yaml", "kpsa: 1\nunits: {length: mm}\nclip: walk\ntime: 1.5s\npose: {a.translateX: 5, tip.rotateY: 1rad}\n"));
+  Result<PoseFile> pose =
+      ReadPoseFile(rig, folder.Write("p.yaml",
+                                     "kpsa: 1\nunits: {length: mm}\nclip: walk\ntime: 1.5s\npose: "
+                                     "{a.translateX: 5, tip.rotateY: 1rad}\n"));
   ASSERT_TRUE(pose.ok()) << pose.status().ToString();
   ASSERT_EQ(pose->settings.size(), 2u);
   EXPECT_DOUBLE_EQ(pose->settings[0].value.AsDouble(), 0.005);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "base/scalar_math.h"
 #include "rig/build/writer.h"
 #include "tests/rig/rig_fixture.h"
 #include "tests/support/moving_character.h"
@@ -213,6 +214,48 @@ TEST_F(StarterTrainingTest, RangesAreThoseBetweenKeys) {
   EXPECT_GE(rig.controls[0].max, high - 1e-3);
   EXPECT_NEAR(rig.controls[0].max, high, 0.02);
   EXPECT_NEAR(rig.controls[0].min, low, 0.02);
+}
+
+// An elbow that bends by 130 degrees about Y: within a turn, angles of X, Y and Z would be 180, 50 and 180.
+TEST_F(StarterTrainingTest, RangesFollowABendBeyondARightAngle) {
+  MovingCharacter character;
+  std::vector<float> times, turns;
+  for (int k = 0; k <= 48; ++k) {
+    const double angle = -65 * kPi / 180 * (1 - std::cos(k * 0.25)) / 2;  // half of it
+    times.push_back(static_cast<float>(k) / 24);
+    turns.insert(turns.end(),
+                 {0, static_cast<float>(std::sin(angle)), 0, static_cast<float>(std::cos(angle))});
+  }
+  character.Animate("bend", 2, "rotation", times, turns);
+  const std::string text = Starter(character);
+  const Rig rig = Reload(text);
+  ASSERT_EQ(rig.controls.size(), 1u) << text;
+  EXPECT_EQ(rig.controls[0].name, "tip.rotateY");
+  EXPECT_NEAR(rig.controls[0].min, -130 * kPi / 180, 0.02);
+  EXPECT_EQ(rig.controls[0].max, 0);
+}
+
+// Joints that are scaled are controls, and nothing below them carries the points rigidly.
+TEST_F(StarterTrainingTest, GrowthIsAControlAndNoSpace) {
+  MovingCharacter character;
+  character.Swing("dance", 40, 3);
+  EXPECT_EQ(Reload(Starter(character)).accelerate.at(0).space.has_value(), true);
+  character.Animate("squash", 1, "scale", {0, 1, 2}, {1, 1, 1, 1.2f, 0.7f, 1, 1, 1.5f, 1});
+  const std::string text = Starter(character);
+  const Rig rig = Reload(text);
+  ASSERT_EQ(rig.accelerate.size(), 1u) << text;
+  EXPECT_FALSE(rig.accelerate[0].space.has_value()) << text;
+  const auto range = [&](const std::string& name) {
+    for (const Control& control : rig.controls) {
+      if (control.name == name) return std::pair(control.min, control.max);
+    }
+    return std::pair(-1.0, -1.0);
+  };
+  EXPECT_NEAR(range("root.scaleX").first, 1, 1e-9) << text;
+  EXPECT_NEAR(range("root.scaleX").second, 1.2, 0.011);  // rounded outwards
+  EXPECT_NEAR(range("root.scaleY").first, 0.7, 0.011);
+  EXPECT_NEAR(range("root.scaleY").second, 1.5, 0.011);
+  EXPECT_EQ(range("root.scaleZ").first, -1);  // not moved
 }
 
 TEST_F(StarterTrainingTest, WhatMovesAsAWholeIsNotAccelerated) {

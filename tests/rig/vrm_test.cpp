@@ -119,7 +119,8 @@ TEST_F(VrmTest, ClipsAndCombinationsGoTogetherWithExpressions) {
   b.Push("animations", {{"name", "talk"},
                         {"samplers", {{{"input", times}, {"output", morph}}}},
                         {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}}});
-  b.root["extensions"]["VRMC_vrm"]["expressions"]["preset"]["aa"]["morphTargetBinds"] = json::array({Bind(0, 0, 1)});
+  b.root["extensions"]["VRMC_vrm"]["expressions"]["preset"]["aa"]["morphTargetBinds"] =
+      json::array({Bind(0, 0, 1)});
   RigPlayer player(Rigged(b, {"expressions.weight[aa]"}));
   ASSERT_TRUE(player.ok());
   player.Set("time.time", 1);
