@@ -123,6 +123,22 @@ std::set<Index> CarriedNodes(const Graph& graph, const AccelerationTarget& targe
   return carried;
 }
 
+// The world matrices that cues are measured by: what turns their transforms is guarded, also where it moves no point.
+std::vector<PlugRef> MatricesRead(const Graph& graph, const AccelerationTarget& target,
+                                  const Subspace& subspace) {
+  std::set<std::string> names;
+  for (const CueDescription& cue : subspace.cues) {
+    if (cue.kind == CueDescription::Kind::kScalar) names.insert(SplitEntryName(cue.plug).signal);
+    if (!cue.joint.empty()) names.insert(cue.joint);
+  }
+  std::vector<PlugRef> plugs;
+  for (const std::string& name : names) {
+    const Result<Signal> signal = FindSignal(graph, name, target.within);
+    if (signal.ok() && signal->relative) plugs.push_back(signal->plug);
+  }
+  return plugs;
+}
+
 // Guards of what varies or is set here: with its trained range, or, if it never moved there, its rest value.
 Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarget& target,
                  const Subspace& subspace, const std::vector<SetHere>& set_here, AccelerationDraft* draft) {
@@ -131,8 +147,10 @@ Status AddGuards(const Graph& graph, Compiler* compiler, const AccelerationTarge
   for (const TrainedRange& range : subspace.ranges) ranges.emplace(range.plug, &range);
   const std::vector<PlugRef> varying = GuardedPlugs(graph, target, subspace.rig, ranges, set_here, draft);
   std::vector<std::string> unguarded;
-  Result<std::vector<Signal>> signals = FindSignals(graph, compiler, target.outputs(), varying,
-                                                    CarriedNodes(graph, target, subspace), &unguarded);
+  std::vector<PlugRef> plugs = target.outputs();
+  for (const PlugRef& plug : MatricesRead(graph, target, subspace)) plugs.push_back(plug);
+  Result<std::vector<Signal>> signals =
+      FindSignals(graph, compiler, plugs, varying, CarriedNodes(graph, target, subspace), &unguarded);
   if (!signals.ok()) return signals.status();
   if (!unguarded.empty()) draft->AlwaysMiss(unguarded[0] + " varies and cannot be guarded");
   for (const Signal& signal : *signals) {

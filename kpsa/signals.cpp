@@ -77,8 +77,17 @@ Result<std::vector<Signal>> FindRelativeMatrices(const Graph& graph, Compiler* c
           .emplace(name, Signal{name, c.source, true, true});
     }
   }
-  // Relative to a space that moves, they all move by the same matrix
-  if (!still.empty()) found.insert(*still.begin());
+  // Relative to a space that moves, they all move by the same matrix; but one that moves no point may vary all the same
+  for (const auto& [name, signal] : still) {
+    Request alone;
+    alone.outputs.push_back({signal.plug, {}});
+    alone.varying = varying;
+    const auto of_it = compiler->Steps(graph, alone);
+    if (!of_it.ok()) return of_it.status();
+    if (!of_it->empty()) continue;
+    found.emplace(name, signal);
+    break;
+  }
   std::vector<Signal> sorted;
   for (auto& [name, signal] : found) sorted.push_back(std::move(signal));
   return sorted;

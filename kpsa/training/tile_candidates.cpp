@@ -27,28 +27,6 @@ void AddVarying(const TrainingRig& rig, bool playing, Request* request) {
   }
 }
 
-// Of the transforms with relative matrices those that a clip or a control moves, whatever follows them. One that moves
-// no point has no guard: a clip that nobody trained on may turn it anyhow.
-Result<std::set<Index>> VaryingNodes(const TrainingRig& rig, Compiler* compiler,
-                                     const std::vector<TrainingClip>& clips,
-                                     std::span<const Signal> signals) {
-  std::set<Index> nodes;
-  for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
-    KPSA_RETURN_IF_ERROR(SetClip(rig, clips, clip));
-    Request request;
-    for (const Signal& signal : signals) {
-      if (signal.relative) request.outputs.push_back({signal.plug, {}});
-    }
-    if (request.outputs.empty()) break;
-    AddVarying(rig, clip >= 0, &request);
-    const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
-    if (!plan.ok()) return plan.status();
-    for (const Plan::StepInfo& info : (*plan)->infos()) nodes.insert(info.node.index);
-  }
-  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
-  return nodes;
-}
-
 // For each tile of each mesh, in their order: which of the signals are relative matrices of transforms that
 // its points need, as indices, ascending.
 Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, Compiler* compiler,
@@ -93,11 +71,9 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
       first_tile += count;
     }
   }
-  const Result<std::set<Index>> varying = VaryingNodes(rig, compiler, clips, signals);
-  if (!varying.ok()) return varying.status();
   for (const auto& [node, signal] : matrices) {  // what stands still in the world moves in the space
     for (std::set<Index>& of_tile : movers) {
-      if (!moves[static_cast<std::size_t>(signal)] && !varying->contains(node)) of_tile.insert(signal);
+      if (!moves[static_cast<std::size_t>(signal)]) of_tile.insert(signal);
     }
   }
   std::vector<std::vector<Index>> result;

@@ -11,7 +11,6 @@ namespace kpsa::engine {
 namespace {
 
 constexpr double kPlaces = 10;        // of the box's diagonal, in roots of weights
-constexpr double kShapes = 0.7;       // likewise, of what a shape does most
 constexpr std::size_t kProbes = 256;  // points that tell along which direction some are cut
 constexpr int kRounds = 8;            // of the power method
 
@@ -52,13 +51,25 @@ class Halver {
       for (const gltf::Influence& influence : mesh.influences)
         joints = std::max(joints, std::size_t{influence.joint} + 1);
     }
-    AddShapes(3 + joints);
-    const std::size_t dimensions = 3 + joints + mesh.targets.size();
-    axis_.resize(dimensions), mean_.resize(dimensions), next_.resize(dimensions);
+    axis_.resize(3 + joints), mean_.resize(3 + joints), next_.resize(3 + joints);
+  }
+
+  // Along a Morton curve; one scale for all axes keeps its cells cubes.
+  void SortAlongCurve(std::span<Index> some) const {
+    std::vector<std::pair<std::uint64_t, Index>> keys;
+    keys.reserve(some.size());
+    for (const Index v : some) {
+      std::array<std::uint64_t, 3> cell;
+      for (std::size_t i = 0; i < 3; ++i)
+        cell[i] = static_cast<std::uint64_t>((Coordinate(v, i) - low_[i]) / extent_ * 0x1fffff);
+      keys.emplace_back(Morton(cell[0], cell[1], cell[2]), v);
+    }
+    std::ranges::sort(keys);
+    for (std::size_t k = 0; k < some.size(); ++k) some[k] = keys[k].second;
   }
 
   void Sort(std::span<Index> some) {
-    if (some.size() <= kOrderTogether) return SortTogether(some);
+    if (some.size() <= kOrderTogether) return SortAlongCurve(some);
     FindAxis(some);
     keys_.clear();
     for (const Index v : some) keys_.emplace_back(Along(v, axis_), v);
@@ -77,35 +88,10 @@ class Halver {
  private:
   double Coordinate(Index v, std::size_t i) const { return static_cast<double>(mesh_.positions[3 * v + i]); }
 
-  // How far each shape moves a vertex, of how far it moves any.
-  void AddShapes(std::size_t first) {
-    shape_offsets_.assign(mesh_.vertex_count() + 1, 0);
-    for (const gltf::MorphTarget& target : mesh_.targets) {
-      for (const Index v : target.vertices) ++shape_offsets_[v + 1];
-    }
-    for (std::size_t v = 0; v < mesh_.vertex_count(); ++v) shape_offsets_[v + 1] += shape_offsets_[v];
-    shapes_.resize(shape_offsets_.back());
-    std::vector<std::size_t> next(shape_offsets_.begin(), shape_offsets_.end() - 1);
-    for (std::size_t k = 0; k < mesh_.targets.size(); ++k) {
-      const gltf::MorphTarget& target = mesh_.targets[k];
-      std::vector<double> lengths;
-      for (std::size_t i = 0; i < target.vertices.size(); ++i) {
-        const auto d = [&](std::size_t axis) { return static_cast<double>(target.deltas[3 * i + axis]); };
-        lengths.push_back(std::sqrt(d(0) * d(0) + d(1) * d(1) + d(2) * d(2)));
-      }
-      const double most = lengths.empty() ? 0 : *std::ranges::max_element(lengths);
-      for (std::size_t i = 0; i < lengths.size(); ++i)
-        shapes_[next[target.vertices[i]]++] = {first + k,
-                                               most > 0 ? kShapes * std::sqrt(lengths[i] / most) : 0};
-    }
-  }
-
   // Calls use(dimension, value) for what is not 0 of a vertex.
   template <typename Use>
   void ForEach(Index v, const Use& use) const {
     for (std::size_t i = 0; i < 3; ++i) use(i, place_ * (Coordinate(v, i) - low_[i]));
-    for (std::size_t i = shape_offsets_[v]; i < shape_offsets_[v + 1]; ++i)
-      use(shapes_[i].first, shapes_[i].second);
     if (!mesh_.skinned()) return;
     for (const gltf::Influence& influence : mesh_.influence_rows().row(v))
       use(3 + std::size_t{influence.joint}, std::sqrt(static_cast<double>(influence.weight)));
@@ -151,34 +137,21 @@ class Halver {
     }
   }
 
-  // Along a Morton curve; one scale for all axes keeps its cells cubes.
-  void SortTogether(std::span<Index> some) const {
-    std::array<std::pair<std::uint64_t, Index>, kOrderTogether> keys;
-    const double scale = extent_ > 0 ? 0x1fffff / extent_ : 0;
-    for (std::size_t k = 0; k < some.size(); ++k) {
-      std::array<std::uint64_t, 3> cell;
-      for (std::size_t i = 0; i < 3; ++i)
-        cell[i] = static_cast<std::uint64_t>((Coordinate(some[k], i) - low_[i]) * scale);
-      keys[k] = {Morton(cell[0], cell[1], cell[2]), some[k]};
-    }
-    std::sort(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(some.size()));
-    for (std::size_t k = 0; k < some.size(); ++k) some[k] = keys[k].second;
-  }
-
   const gltf::Mesh& mesh_;
   std::array<double, 3> low_;
-  double extent_ = 0, place_ = 0;
-  std::vector<std::size_t> shape_offsets_;              // [vertices + 1]
-  std::vector<std::pair<std::size_t, double>> shapes_;  // dimension, value
-  std::vector<double> axis_, mean_, next_;              // [3 + joints + shapes]
+  double extent_ = 1e-300, place_ = 0;
+  std::vector<double> axis_, mean_, next_;  // [3 + joints]
   std::vector<std::pair<double, Index>> keys_, sorted_;
 };
 
 }  // namespace
 
-void SortByHalves(const gltf::Mesh& mesh, std::vector<Index>* vertices) {
+void SortPoints(const gltf::Mesh& mesh, std::vector<Index>* vertices) {
   std::ranges::sort(*vertices);  // probes are every so manieth
-  Halver(mesh, *vertices).Sort(*vertices);
+  Halver halver(mesh, *vertices);
+  // Shapes are local, as the curve is, and mostly move points that one joint leads
+  if (!mesh.targets.empty()) return halver.SortAlongCurve(*vertices);
+  halver.Sort(*vertices);
 }
 
 }  // namespace kpsa::engine

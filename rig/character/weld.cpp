@@ -185,7 +185,7 @@ WeldedMesh WeldMesh(const gltf::Character& character, Index mesh_index, std::str
   for (Index v = 0; v < representative.size(); ++v) {
     if (representative[v] == v) welded.point_to_vertex.push_back(v);
   }
-  SortByHalves(mesh, &welded.point_to_vertex);
+  SortPoints(mesh, &welded.point_to_vertex);
 
   Mesh::Data data;
   data.name = std::move(name);

@@ -133,12 +133,12 @@ TEST(Weld, PointsKeptTogetherFollowFewJoints) {
   std::vector<Index> file, sorted;
   for (Index v = 0; v < mesh.vertex_count(); ++v) file.push_back(v);
   sorted = file;
-  SortByHalves(mesh, &sorted);
+  SortPoints(mesh, &sorted);
   EXPECT_TRUE(std::ranges::is_permutation(sorted, file));
   EXPECT_LT(3 * joints_of_tiles(sorted), 2 * joints_of_tiles(file));
   std::vector<Index> shuffled = file;
   std::shuffle(shuffled.begin(), shuffled.end(), random);
-  SortByHalves(mesh, &shuffled);
+  SortPoints(mesh, &shuffled);
   EXPECT_EQ(shuffled, sorted);
 }
 
