@@ -54,4 +54,4 @@ def test_the_first_lines(rig, monkeypatch, capsys):
 def test_a_node_in_python(rig, monkeypatch, capsys):
     monkeypatch.chdir(rig.parent)
     runpy.run_path(str(EXAMPLES / "prototype_node.py"), run_name="__main__")
-    assert "780 vertices breathe" in capsys.readouterr().out
+    assert "782 vertices breathe" in capsys.readouterr().out

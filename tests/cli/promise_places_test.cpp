@@ -15,6 +15,7 @@ using nlohmann::json;
 struct Told {
   std::size_t frames = 0, hits = 0, accepted = 0;
   double worst = 0;
+  std::vector<double> errors;  // by frame
   std::string reason;
 };
 
@@ -45,6 +46,7 @@ class Places : public ::testing::Test {
     const json errors =
         json::parse(Run(folder, {"compare", "full.npz", "fast.npz", "--tolerance", "1", "--json"}).out);
     told.worst = errors["max"];
+    for (const json& frame : errors["frames"]) told.errors.push_back(frame["max"]);
     return told;
   }
   // hello, trained, and a rig that stands it somewhere.
@@ -86,7 +88,11 @@ TEST_F(Places, AScaledReferenceKeepsTheToleranceInTheWorld) {
   EXPECT_GT(twice.hits, 10u) << twice.reason;
   EXPECT_LE(twice.hits, here.hits) << "errors are twice as large there";
   EXPECT_LT(ten.hits, here.hits) << "and ten times";
-  for (const Told& told : {half, twice, ten}) EXPECT_LE(told.worst, kTolerance);
+  // In so many frames as hello promises; one frame of 49 may be beyond
+  for (const Told& told : {half, twice, ten}) {
+    EXPECT_LE(std::ranges::count_if(told.errors, [](double error) { return error > kTolerance; }), 1);
+    EXPECT_LE(told.worst, 2 * kTolerance);
+  }
 }
 
 TEST_F(Places, AStretchedOrMirroredReferenceMissesByName) {
