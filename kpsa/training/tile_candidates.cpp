@@ -71,6 +71,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
       first_tile += count;
     }
   }
+  KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
   for (const auto& [node, signal] : matrices) {  // what stands still in the world moves in the space
     for (std::set<Index>& of_tile : movers) {
       if (!moves[static_cast<std::size_t>(signal)]) of_tile.insert(signal);
