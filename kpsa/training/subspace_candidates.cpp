@@ -19,8 +19,8 @@ constexpr double kWorthTrying = 0.45;  // of what a frame costs: what others cou
 // Cues of tiles: of the poses they are trained on, that a trial leaves beyond half the tolerance, at most; and where
 // so many miss by cues for all points that others can hardly be worse
 constexpr double kMostBeyond = 0.03, kMostBeyondElse = 0.1, kMostMiss = 0.3;
-constexpr double kMostBeyondOfMisses =
-    0.25;  // or beyond the tolerance, of the poses that miss by cues for all points
+// Or, of the poses that miss by cues for all points, that a trial leaves beyond the tolerance
+constexpr double kMostBeyondOfMisses = 0.1;
 constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so many
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
