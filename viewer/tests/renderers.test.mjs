@@ -9,7 +9,7 @@ import {makeReport} from './support/report.mjs';
 
 let browser, address;
 before(async () => {
-  browser = await startBrowser({width: 800, height: 560});
+  browser = await startBrowser({width: 1000, height: 700});
   address = browser.write('report.html', makeReport(makeMeta(makeCharacter())));
 });
 after(async () => browser?.stop());
