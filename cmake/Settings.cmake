@@ -15,7 +15,7 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   endif()
 endif()
 if(KPSA_COMPILE_ONCE)
-  set(KPSA_NO_TARGETS "HWY_SSSE3|HWY_SSE4|HWY_AVX2|HWY_AVX3_DL")  # the widest and the narrowest
+  set(KPSA_NO_TARGETS "HWY_SSSE3|HWY_SSE4|HWY_AVX3|HWY_AVX3_DL")  # what most machines have, and the narrowest
 else()
   set(KPSA_NO_TARGETS "HWY_SSSE3|HWY_SSE4|HWY_AVX3_DL")
 endif()

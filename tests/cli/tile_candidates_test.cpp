@@ -13,9 +13,8 @@
 namespace kpsa::engine {
 namespace {
 
-// The skin lists an antenna that no point weighs on, and a clip turns it. Nothing guards what moves no point: where a tile
-// lay in its space, a clip that turned it farther took the tile along.
-TEST(TileCandidates, JointsThatMoveNoPointCarryNone) {
+// A character whose skin lists an antenna that no point weighs on.
+MovingCharacter AntennaCharacter() {
   MovingCharacter character;
   nlohmann::json& root = character.builder.root;
   root["nodes"][2]["children"] = {3};
@@ -26,6 +25,13 @@ TEST(TileCandidates, JointsThatMoveNoPointCarryNone) {
   root["skins"][0]["joints"] = {1, 2, 3};
   root["skins"][0]["inverseBindMatrices"] = character.builder.Accessor(bind, "MAT4");
   character.Swing("talk", 40, 2);
+  return character;
+}
+
+// A clip turns the antenna. Nothing guarded what moves no point: where a tile lay in its space, a clip that turned it
+// farther took the tile along.
+TEST(TileCandidates, JointsThatMoveNoPointCarryNone) {
+  MovingCharacter character = AntennaCharacter();
   character.Swing("talk", 20, 2, 3);
   TemporaryFolder folder;
   const std::string glb = folder.Write("m.gltf", character.builder.Text());
@@ -60,6 +66,40 @@ TEST(TileCandidates, JointsThatMoveNoPointCarryNone) {
   ASSERT_EQ(tiles->size(), 1u);
   EXPECT_EQ(playing, std::nullopt) << "the rig is what it was";
   EXPECT_NE(std::ranges::find((*tiles)[0].joints, entry("tip.worldMatrix")), (*tiles)[0].joints.end());
+}
+
+// Where cues are measured in the space of a joint, what turns it is guarded, though it moves no point.
+TEST(TileCandidates, JointsThatCuesAreMeasuredByAreGuarded) {
+  MovingCharacter character = AntennaCharacter();
+  TemporaryFolder folder;
+  const Result<std::string> text =
+      StarterRig(AcceleratedRegistry(), folder.Write("m.gltf", character.builder.Text()));
+  ASSERT_TRUE(text.ok()) << text.status().ToString();
+  const std::string path = folder.Write("m.yaml", *text);
+  TrainOptions options;
+  options.samples = 60;
+  const auto trained = TrainRig(path, options, {"talk"});
+  ASSERT_NE(trained, nullptr);
+  auto by_antenna = std::make_shared<Subspace>(*WithGuardsOnly(*trained));
+  bool found = false;
+  for (CueDescription& cue : by_antenna->cues) {
+    if (found || cue.kind != CueDescription::Kind::kPoint) continue;
+    cue.joint = "antenna.worldMatrix";
+    found = true;
+  }
+  ASSERT_TRUE(found);
+  const auto turned = [&](std::shared_ptr<const Subspace> subspace, double degrees) {
+    RigRun run(path, {.subspace = std::move(subspace), .varying = {"antenna.rotateZ"}});
+    EXPECT_TRUE(run.ok()) << run.error;
+    if (!run.ok()) return RunFrame();
+    run.Set("antenna.rotateZ", degrees);
+    return run.Evaluate();
+  };
+  EXPECT_TRUE(turned(WithGuardsOnly(*trained), 20).hit) << "it moves no point and is no cue's";
+  EXPECT_TRUE(turned(by_antenna, 0).hit);
+  const RunFrame frame = turned(by_antenna, 20);
+  EXPECT_EQ(frame.full_weight, 1) << frame.text;
+  EXPECT_NE(frame.text.find("antenna.matrix"), std::string::npos) << frame.text;
 }
 
 }  // namespace
