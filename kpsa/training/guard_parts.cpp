@@ -86,14 +86,9 @@ Result<std::vector<std::uint64_t>> FindGuardedPatches(const TrainingRig& rig, Co
   for (std::size_t s = 0; s < guards; ++s) by_node.emplace(signals[s].plug.node.index, s);
   std::vector<std::uint64_t> patches(guards, 0);
   for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
-    KPSA_RETURN_IF_ERROR(
-        rig.set_clip(clip < 0 ? std::nullopt
-                              : std::optional<std::string_view>(clips[static_cast<std::size_t>(clip)].name)));
+    KPSA_RETURN_IF_ERROR(rig.Play(clips, clip));
     Request request;
-    request.varying = {rig.time};
-    for (const ControlRange& control : rig.controls) {
-      if (clip < 0 || !control.by_clip) request.varying.push_back(control.plug);
-    }
+    request.varying = rig.Varying(clip >= 0);
     for (std::size_t p = 0; p < needs.size(); ++p) {
       request.outputs.clear();
       for (const auto& [place, points] : needs[p].points) {

@@ -70,24 +70,12 @@ std::vector<Index> FirstScalars(std::span<const Signal> signals, const PoseLayou
   return first;
 }
 
-std::vector<std::size_t> PoseRecorder::FreeControls(bool playing) const {
-  std::vector<std::size_t> controls;
-  for (std::size_t c = 0; c < rig_.controls.size(); ++c) {
-    if (!playing || !rig_.controls[c].by_clip) controls.push_back(c);
-  }
-  return controls;
-}
-
 PoseRecorder::PlanResult PoseRecorder::PlanOf(const std::string* clip, bool sampled) {
   const std::pair key(clip == nullptr ? std::optional<std::string>() : *clip, sampled);
   if (const auto known = plans_.find(key); known != plans_.end()) return known->second;
   KPSA_RETURN_IF_ERROR(
       rig_.set_clip(clip == nullptr ? std::nullopt : std::optional<std::string_view>(*clip)));
-  std::vector<PlugRef> varying{rig_.time};
-  if (sampled) {
-    for (const std::size_t c : FreeControls(clip != nullptr)) varying.push_back(rig_.controls[c].plug);
-  }
-  PlanResult plan = CompileFor(varying);
+  PlanResult plan = CompileFor(sampled ? rig_.Varying(clip != nullptr) : std::vector<PlugRef>{rig_.time});
   if (plan.ok()) plans_.emplace(key, *plan);
   return plan;
 }
@@ -255,7 +243,8 @@ Status PoseRecorder::Record(std::span<const RecordedPose* const> poses,
   if (!found.ok()) return found.status();
   const std::shared_ptr<const Plan>& plan = *found;
   const Index time = plan->FindVarying(rig_.time);
-  const std::vector<std::size_t> used = sampled ? FreeControls(clip != nullptr) : std::vector<std::size_t>();
+  const std::vector<std::size_t> used =
+      sampled ? rig_.FreeControls(clip != nullptr) : std::vector<std::size_t>();
   std::vector<Index> numbers;
   for (const std::size_t c : used) numbers.push_back(plan->FindVarying(rig_.controls[c].plug));
   const auto set = [&](const RecordedPose& pose, Evaluator& e) {

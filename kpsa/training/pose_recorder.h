@@ -82,7 +82,6 @@ class PoseRecorder {
   PlanResult CompileFor(const std::vector<PlugRef>& varying);
   // The plan of a clip, or with none: sampled, with the controls that the clip leaves free, else with time.
   PlanResult PlanOf(const std::string* clip, bool sampled);
-  std::vector<std::size_t> FreeControls(bool playing) const;
   std::string NameOf(const SampledPose& pose, const std::vector<TrainingClip>& clips) const;
   // Of the space, which is the last output of the plan.
   Matrix4 SpaceFromWorld(const Evaluator& evaluator) const;

@@ -15,18 +15,6 @@ constexpr std::size_t kMostPlans = 2500;  // of all tiles; neighbours share one 
 constexpr std::size_t kOwnPoints = 40, kNearPoints = 24;  // candidates in a tile, and about it
 constexpr std::size_t kNearProbes = 12;                   // points of a tile that say what is near
 
-Status SetClip(const TrainingRig& rig, const std::vector<TrainingClip>& clips, int clip) {
-  return rig.set_clip(clip < 0 ? std::nullopt
-                               : std::optional<std::string_view>(clips[static_cast<std::size_t>(clip)].name));
-}
-
-void AddVarying(const TrainingRig& rig, bool playing, Request* request) {
-  request->varying = {rig.time};
-  for (const ControlRange& control : rig.controls) {
-    if (!playing || !control.by_clip) request->varying.push_back(control.plug);
-  }
-}
-
 // For each tile of each mesh, in their order: which of the signals are relative matrices of transforms that
 // its points need, as indices, ascending.
 Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, Compiler* compiler,
@@ -44,7 +32,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
   std::vector<std::set<Index>> movers(tiles);
   std::vector<char> moves(signals.size(), 0);
   for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
-    KPSA_RETURN_IF_ERROR(SetClip(rig, clips, clip));
+    KPSA_RETURN_IF_ERROR(rig.Play(clips, clip));
     std::size_t first_tile = 0;
     for (std::size_t m = 0; m < totals.size(); ++m) {
       const std::size_t rows = rig.rows(m, totals[m]), count = (rows + kTilePoints - 1) / kTilePoints;
@@ -57,7 +45,7 @@ Result<std::vector<std::vector<Index>>> FindTileMovers(const TrainingRig& rig, C
         Request request;
         request.outputs.push_back(
             {rig.target.meshes[m].stages.back().points, PointSet::Of(points, totals[m])});
-        AddVarying(rig, clip >= 0, &request);
+        request.varying = rig.Varying(clip >= 0);
         const Result<std::shared_ptr<const Plan>> plan = compiler->Compile(*rig.graph, request);
         if (!plan.ok()) return plan.status();
         for (const Plan::StepInfo& info : (*plan)->infos()) {

@@ -264,6 +264,25 @@ Result<Subspace> Finish(Result<Trained> trained) {
 
 }  // namespace
 
+Status TrainingRig::Play(const std::vector<TrainingClip>& clips, int clip) const {
+  return set_clip(clip < 0 ? std::nullopt
+                           : std::optional<std::string_view>(clips[static_cast<std::size_t>(clip)].name));
+}
+
+std::vector<std::size_t> TrainingRig::FreeControls(bool playing) const {
+  std::vector<std::size_t> free;
+  for (std::size_t c = 0; c < controls.size(); ++c) {
+    if (!playing || !controls[c].by_clip) free.push_back(c);
+  }
+  return free;
+}
+
+std::vector<PlugRef> TrainingRig::Varying(bool playing) const {
+  std::vector<PlugRef> plugs{time};
+  for (const std::size_t c : FreeControls(playing)) plugs.push_back(controls[c].plug);
+  return plugs;
+}
+
 Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                        const TrainOptions& options) {
   TrainingCancel cancel(options.progress);

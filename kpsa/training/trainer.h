@@ -87,6 +87,11 @@ struct TrainingRig {
                                  : static_cast<Index>(step(mesh)->inner_points());
   }
   Index PointOf(std::size_t mesh, Index row) const { return some.empty() ? row : some[mesh][row]; }
+  // Lets a clip of these play; -1: none.
+  Status Play(const std::vector<TrainingClip>& clips, int clip) const;
+  // The controls that vary while a clip plays, which drives the others, or while none does; and with time, their plugs.
+  std::vector<std::size_t> FreeControls(bool playing) const;
+  std::vector<PlugRef> Varying(bool playing) const;
 };
 
 // Errors: no poses, nothing moves, a pose that fails to evaluate (its clip and time or its controls),

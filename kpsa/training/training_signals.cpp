@@ -35,11 +35,8 @@ Result<TrainingSignals> FindTrainingSignals(const TrainingRig& rig, Compiler* co
   std::set<Index> moves_points;
   std::vector<std::vector<PlugRef>> varying_in;  // by clip
   for (int clip = -1; clip < static_cast<int>(clips.size()); ++clip) {
-    if (clip >= 0) KPSA_RETURN_IF_ERROR(rig.set_clip(clips[static_cast<std::size_t>(clip)].name));
-    std::vector<PlugRef> varying{rig.time};
-    for (const ControlRange& control : rig.controls) {
-      if (clip < 0 || !control.by_clip) varying.push_back(control.plug);
-    }
+    KPSA_RETURN_IF_ERROR(rig.Play(clips, clip));
+    std::vector<PlugRef> varying = rig.Varying(clip >= 0);
     Result<std::vector<Signal>> found =
         FindSignals(*rig.graph, compiler, rig.target.outputs(), varying, {}, nullptr);
     if (!found.ok()) return found.status();
@@ -57,8 +54,7 @@ Result<TrainingSignals> FindTrainingSignals(const TrainingRig& rig, Compiler* co
   // A transform that moves no point tells of the space where it stands still in the world. One that moves has no range
   // that was trained, and may do anything in another clip
   for (std::size_t c = 0; c < varying_in.size(); ++c) {
-    if (c > 0) KPSA_RETURN_IF_ERROR(rig.set_clip(clips[c - 1].name));
-    if (c == 0) KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
+    KPSA_RETURN_IF_ERROR(rig.Play(clips, static_cast<int>(c) - 1));
     std::vector<PlugRef> plugs;
     for (const Signal& signal : signals.relative) {
       if (!moves_points.contains(signal.plug.node.index)) plugs.push_back(signal.plug);
