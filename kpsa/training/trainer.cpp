@@ -163,8 +163,7 @@ Result<std::optional<TrainingRig>> SplitRig(const TrainingRig& rig, const std::v
   Compiler compiler;
   const std::size_t meshes = rig.target.meshes.size();
   for (std::size_t c = 0; c <= clips.size(); ++c) {
-    KPSA_RETURN_IF_ERROR(
-        rig.set_clip(c == 0 ? std::nullopt : std::optional<std::string_view>(clips[c - 1].name)));
+    KPSA_RETURN_IF_ERROR(rig.Play(clips, static_cast<int>(c) - 1));
     Result<std::vector<Compiler::SplitPoints>> split = SplitMeshes(*rig.graph, &compiler, rig.target);
     if (!split.ok()) return split.status();
     if (c == 0) with.split = *split;
