@@ -122,8 +122,8 @@ class Motion:
         return turned(*(self.curve(reach, knots=knots) for reach in (x, y, z)))
 
 
-def tube(path, radii, along, around):
-    """A closed surface about a path: points [n, 3], triangles [m, 3]."""
+def tube(path, radii, along, around, closed=True):
+    """A surface about a path, with round ends where it is closed: points [n, 3], triangles [m, 3]."""
     path, radii = np.asarray(path, float), np.asarray(radii, float)
     kept = [0] + [k for k in range(1, len(path)) if np.linalg.norm(path[k] - path[k - 1]) > 1e-6]
     path, radii = path[kept], radii[kept]
@@ -132,7 +132,9 @@ def tube(path, radii, along, around):
     f = at - k
     middle = path[k] * (1 - f)[:, None] + path[k + 1] * f[:, None]
     ends = np.clip(np.minimum(np.arange(along), np.arange(along)[::-1]) / max(2, along * 0.06), 0, 1)
-    radius = (radii[k] * (1 - f) + radii[k + 1] * f) * np.sqrt(np.clip(1 - (1 - ends) ** 2, 0.02, 1))
+    radius = radii[k] * (1 - f) + radii[k + 1] * f
+    if closed:
+        radius *= np.sqrt(np.clip(1 - (1 - ends) ** 2, 0.02, 1))
     forward = np.gradient(middle, axis=0)
     forward /= np.linalg.norm(forward, axis=1)[:, None]
     aside = np.cross(forward, [0.0, 0, 1] if np.abs(forward[:, 2]).mean() < 0.8 else [1.0, 0, 0])
@@ -355,9 +357,9 @@ def clothed(path, random):
     skirt = [bones.chain(f"skirt{k}_", hips, [0.16 * np.sin(a), 0.92, 0.12 * np.cos(a)], [0.3 * np.sin(a), 0.45, 0.27 * np.cos(a)], 3) for k, a in enumerate(angles)]
     hair = [bones.chain(f"hair{k}_", head, [0.06 * np.sin(k), 1.72, -0.05 + 0.02 * np.cos(k)], [0.14 * np.sin(k), 1.35, -0.14], 4) for k in range(5)]
     body = merged(parts)
-    sleeves = [tube([[p * x, 1.42, 0] for p in (0.1, 0.3, 0.45, 0.62)], [0.085, 0.075, 0.062, 0.06], 40, 30) for x in (1, -1)]
-    shirt = merged([tube([[0, 1, 0], [0, 1.2, 0], [0, 1.4, 0], [0, 1.48, 0]], [0.165, 0.145, 0.175, 0.1], 60, 60)] + sleeves)
-    cloth = tube([[0, 1, 0], [0, 0.9, 0], [0, 0.7, 0], [0, 0.45, 0]], [0.15, 0.18, 0.25, 0.31], 50, 80)
+    sleeves = [tube([[p * x, 1.42, 0] for p in (0.1, 0.3, 0.45, 0.62)], [0.085, 0.075, 0.062, 0.06], 40, 30, closed=False) for x in (1, -1)]
+    shirt = merged([tube([[0, 1, 0], [0, 1.2, 0], [0, 1.4, 0], [0, 1.48, 0]], [0.165, 0.145, 0.175, 0.1], 60, 60, closed=False)] + sleeves)
+    cloth = tube([[0, 1, 0], [0, 0.9, 0], [0, 0.7, 0], [0, 0.45, 0]], [0.15, 0.18, 0.25, 0.31], 50, 80, closed=False)
     strands = merged([tube(bones.path(chain, [1.1 * bones.places[chain[-1]][0], 1.3, -0.15]), [0.03, 0.035, 0.03, 0.02, 0.01], 40, 16) for chain in hair])
     shapes = {}
     for k in range(6):

@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "graph/evaluator.h"
+#include "kpsa/partial_step.h"
 #include "kpsa/signature.h"
 #include "kpsa/space_frame.h"
 
@@ -403,12 +404,13 @@ Status FindSteps(const Graph& graph, Compiler* compiler, const AccelerationTarge
             "the subspace mends points of {} by a last step that the rig lacks; train it again", output.name);
     }
     if (output.inner == 0) continue;
-    step = here;
-    if (here->points() != output.points || here->inner_points() != output.inner)
+    const bool fits = here->points() == output.points;
+    step = fits && !output.stepped.empty() ? MakePartialStep(here, output.stepped) : here;
+    if (!fits || step->inner_points() != output.inner)
       return Status::Invalid(
           "the subspace is for {} points before the last step of {}, and the rig has {} there; train it "
           "again",
-          output.inner, output.name, here->inner_points());
+          output.inner, output.name, step->inner_points());
   }
   return Status();
 }

@@ -22,7 +22,10 @@ KpsaConfig::KpsaConfig(Data data) : data_(std::move(data)) {
     hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joints));
     hasher.AddLong(std::span<const std::uint32_t>(tiles.data().joint_rows));
   }
-  for (const SubspaceOutput& output : s.outputs) hasher.Add(output.inner);
+  for (const SubspaceOutput& output : s.outputs) {
+    hasher.Add(output.inner);
+    hasher.AddLong(std::span<const Index>(output.stepped));
+  }
   for (const TileMend& mend : s.mends) {
     hasher.Add(mend.output);
     hasher.Add(mend.tile);

@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "kpsa/rigid_points.h"
+#include "kpsa/scratch_points.h"
 
 namespace kpsa::engine {
 namespace {
@@ -18,10 +19,6 @@ std::vector<Index> TilesWith(std::span<const Index> rows) {
     if (tiles.empty() || tiles.back() != tile) tiles.push_back(tile);
   }
   return tiles;
-}
-
-void CopyPoint(ConstPointsView from, std::size_t i, PointsView to, std::size_t j) {
-  to.x[j] = from.x[i], to.y[j] = from.y[i], to.z[j] = from.z[i];
 }
 
 }  // namespace

@@ -24,11 +24,12 @@
 
 namespace kpsa::engine {
 
-// What a file may be of; 9 is what is written, or 10 where inner points are reconstructed. 3: without products of
-// latents, world matrices as cues, and doubts; 4: without products as cues; 5: without patches; 6: without guards of
-// patches; 7: without calibration poses near clips; 8: cues, ranges and the trained rig are JSON, and not tensors; 9:
-// without inner points
-inline constexpr int kSubspaceVersion = 11, kMendsVersion = 11, kInnerVersion = 10, kListsVersion = 9, kOldestVersion = 3;
+// What a file may be of; 9 is what is written, or 10 where inner points are reconstructed, 11 where points are mended,
+// 12 where inner points are of some tiles. 3: without products of latents, world matrices as cues, and doubts; 4: without
+// products as cues; 5: without patches; 6: without guards of patches; 7: without calibration poses near clips; 8: cues,
+// ranges and the trained rig are JSON, and not tensors; 9: without inner points
+inline constexpr int kSubspaceVersion = 12, kPartialVersion = 12, kMendsVersion = 11, kInnerVersion = 10, kListsVersion = 9,
+                     kOldestVersion = 3;
 inline constexpr std::size_t kMaxCueJoints = 64;
 inline constexpr const char* kLightUnits = "light";
 
@@ -81,6 +82,9 @@ struct SubspaceOutput {
   // What is reconstructed instead of them: the inner points of the last step (graph/last_step.h) of the node that they
   // come from, which then runs; 0: the points themselves.
   std::size_t inner = 0;
+  // Where only some tiles go through the step, and the others are points as they come out: which, ascending
+  // (kpsa/partial_step.h); empty: all.
+  std::vector<Index> stepped = {};
   std::size_t reconstructed() const { return inner > 0 ? inner : points; }
   friend bool operator==(const SubspaceOutput&, const SubspaceOutput&) = default;
 };

@@ -66,6 +66,7 @@ Result<Json> JsonMetadata(const SafetensorsFile& file, const std::string& key, b
 }
 
 constexpr char kInner[] = "inner";           // points of an output; missing: none
+constexpr char kStepped[] = "stepped";       // tiles that they are of; missing: all
 constexpr char kRangePatches[] = "patches";  // that a range speaks of; missing: of all
 
 // What the space was at rest, and what moves with it.
@@ -89,6 +90,16 @@ Status ReadFrame(const Json& frame, Subspace* s) {
     if (!entry.is_number()) return bad(kStretch, "nine numbers");
     s->inverse_rest_stretch(i / 3, i % 3) = entry.get<double>();
   }
+  return {};
+}
+
+Status ReadStepped(const Json& tiles, SubspaceOutput* output) {
+  bool known = tiles.is_array() && !tiles.empty();
+  for (std::size_t i = 0; known && i < tiles.size(); ++i) {
+    known = tiles[i].is_number_unsigned() && tiles[i].get<std::uint64_t>() < kMaxPoints;
+    if (known) output->stepped.push_back(static_cast<Index>(tiles[i].get<std::uint64_t>()));
+  }
+  if (!known) return Status::Invalid("an output: \"{}\" should be numbers of tiles", kStepped);
   return {};
 }
 
@@ -156,7 +167,12 @@ Status ReadJsonLists(const SafetensorsFile& file, Status* status, Subspace* s) {
 
 // The oldest that says all of it.
 int VersionOf(const Subspace& s) {
-  return !s.mends.empty() ? kMendsVersion : s.of_inner() ? kInnerVersion : kListsVersion;
+  const bool partial =
+      std::ranges::any_of(s.outputs, [](const SubspaceOutput& output) { return !output.stepped.empty(); });
+  return partial            ? kPartialVersion
+         : !s.mends.empty() ? kMendsVersion
+         : s.of_inner()     ? kInnerVersion
+                            : kListsVersion;
 }
 
 }  // namespace
@@ -166,6 +182,7 @@ std::map<std::string, std::string> SubspaceHeader(const Subspace& s) {
   for (const SubspaceOutput& output : s.outputs) {
     outputs.push_back({{"name", output.name}, {"points", output.points}, {"stage", output.stage}});
     if (output.inner > 0) outputs.back()[kInner] = output.inner;
+    if (!output.stepped.empty()) outputs.back()[kStepped] = output.stepped;
   }
   Json frame = {{"extent", s.extent}, {"scales", s.space_scales}, {"carried", s.carried}};
   for (int r = 0; r < 3; ++r) {
@@ -223,6 +240,8 @@ Status ReadSubspaceHeader(const SafetensorsFile& file, bool with_lists, Subspace
     s->outputs.push_back({output.Text("name"), output.Count("points", kMaxPoints), output.Text("stage")});
     if (entry.is_object() && entry.contains(kInner))
       s->outputs.back().inner = output.Count(kInner, kMaxPoints);
+    if (entry.is_object() && entry.contains(kStepped))
+      KPSA_RETURN_IF_ERROR(ReadStepped(entry[kStepped], &s->outputs.back()));
   }
   if (with_lists) KPSA_RETURN_IF_ERROR(ReadJsonLists(file, &status, s));
   s->extent = Reader("frame", *frame, &status).Number("extent");

@@ -6,15 +6,10 @@
 
 #include "base/check.h"
 #include "kpsa/rigid_points.h"
+#include "kpsa/scratch_points.h"
 
 namespace kpsa::engine {
 namespace {
-
-PointsView ViewOf(std::span<float> floats, std::size_t count) {
-  const std::size_t padded = PaddedCount(count);
-  return {floats.data(), floats.data() + padded, floats.data() + 2 * padded, count};
-}
-std::size_t FloatsOf(std::size_t points) { return 3 * PaddedCount(points); }
 
 bool CountsUp(std::span<const Index> numbers) {
   return std::ranges::adjacent_find(numbers, std::greater_equal()) == numbers.end();

@@ -19,7 +19,8 @@ inline constexpr const char *kForAllPoints = "for all points",
                             *kFewerCues = "fewer for all points, tiles stored finely",
                             *kForHalf = "for all points, as for half the tolerance",
                             *kByTile = "of each tile", *kByTileFinely = "of each tile, tiles stored finely";
-inline constexpr const char* kBeforeLastStep = ", points before the last step";
+inline constexpr const char *kBeforeLastStep = ", points before the last step",
+                            *kBeforeLastStepOfSome = ", points before the last step where they are nearer";
 
 struct TrainingRecord {
   std::vector<std::string> clips;

@@ -19,6 +19,7 @@ TrainOptions OptionsOf(const Subspace& subspace, const TrainingRecord& record, s
   options.tolerance = subspace.tolerance, options.violation_rate = subspace.violation_rate;
   options.keep_modes = !subspace.kept_modes.values.empty();
   options.inner = subspace.of_inner() ? TrainOptions::Inner::kAlways : TrainOptions::Inner::kNever;
+  for (const SubspaceOutput& output : subspace.outputs) options.stepped.push_back(output.stepped);
   if (record.mode == "paper") options.mode = EstimatorMode::kPaper;
   const TrainingRecord::Asked& asked = record.asked;
   options.samples = samples;

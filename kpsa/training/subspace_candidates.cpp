@@ -61,10 +61,11 @@ Subspace SubspaceCandidates::ForAllPoints(bool finely) {
 Result<Subspace> SubspaceCandidates::Best() {
   // Where few of the judges miss, but narrowly, a clip that nobody trained on may miss more
   const bool misses = setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 &&
-                      !setup->of_light() && MissMany(cues.choice);
+                      !setup->of_light() && (MissMany(cues.choice) || !setup->rig.stepped.empty());
   Subspace subspace;
   if (misses && HasTimeForTiles()) {
     KPSA_RETURN_IF_ERROR(CompareWithTiles(&subspace));
+    if (!poor.empty()) return subspace;
   } else {
     fine = misses;
     subspace = ForAllPoints(fine);
@@ -96,6 +97,7 @@ Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   KPSA_RETURN_IF_ERROR(setup->Say("cues of tiles", 0.8));
   const Result<bool> promising = ChooseTiles();
   if (!promising.ok()) return promising.status();
+  if (!poor.empty()) return Status();
   // Their doubts alone judge them; stored finely where poses miss
   TileSubspace with_tiles;
   FrameCost of_tiles{.misses = 1, .ns = std::numeric_limits<double>::infinity()};
@@ -213,10 +215,14 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   for (std::size_t s = 0; s < first.size(); ++s) {
     if (!setup->recorder->signals()[s].matrix) add(first[s]);
   }
-  std::optional<TileChoice> chosen =
-      ChoosePromisingTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice,
-                           cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
-                           kMostBeyondOfMisses * cues.choice.misses);
+  if (!setup->rig.stepped.empty()) {  // all tiles have been tried
+    tiles = kpsa::engine::ChooseTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice);
+    return true;
+  }
+  std::optional<TileChoice> chosen = ChoosePromisingTiles(
+      modes->pca.mean, poses->poses, std::move(*candidates), choice,
+      cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
+      kMostBeyondOfMisses * cues.choice.misses, may_step && setup->rig.some.empty() ? &poor : nullptr);
   if (!chosen) return false;
   tiles = std::move(*chosen);
   return true;

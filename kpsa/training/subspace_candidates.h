@@ -41,6 +41,8 @@ struct SubspaceCandidates {
   bool by_tile = false;      // its cues
   bool fewer = false;        // not those that were expected to cost least, but cheaper ones
   bool tried_tiles = false;
+  bool may_step = false;           // points of some tiles may go through a last step, and
+  std::vector<std::size_t> poor = {};  // these tiles alone are to blame that cues of tiles are not promising
   FrameCost cost = {};               // by the last calibration, but points
   TileChoice tiles = {};             // where they were tried
   RangeFinder ranges_of_tiles = {};  // of the poses that these alone were trained on

@@ -1,7 +1,9 @@
 #include "kpsa/training/tile_subspace.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <numeric>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -14,6 +16,8 @@ namespace {
 
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
+// Of the poses, that tiles which are not to blame may leave beyond half the tolerance; and of the tiles, those to blame
+constexpr double kFewBeyond = 0.005, kMostPoor = 0.5;
 
 // The cues of some rows of a set.
 CueSet Subset(const CueSet& set, const std::vector<std::size_t>& kept) {
@@ -111,42 +115,79 @@ void FinishTiles(TileSubspace* made) {
   s.soft_cache.offsets = made->cues.offsets;
 }
 
-double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance) {
+Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice) {
   const auto count = static_cast<Eigen::Index>(poses.poses());
-  std::vector<Eigen::VectorXd> largest(choice.candidates.size());  // squared, by tile
+  Eigen::MatrixXf errors(count, static_cast<Eigen::Index>(choice.candidates.size()));
   ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const TileModel fitted = FitTile(poses, choice.measured, choice.cues, choice.options,
                                        choice.candidates[t], choice.tiles.joint[t], ColumnsOf(choice, t));
       Eigen::MatrixXd left = fitted.target;
       if (!fitted.columns.empty()) left -= fitted.gain * choice.measured(fitted.columns, Eigen::all);
-      largest[t].setZero(count);
-      for (Eigen::Index i = 0; i + 2 < left.rows(); i += 3) {
-        largest[t] = largest[t].cwiseMax(left.middleRows<3>(i).colwise().squaredNorm().transpose());
-      }
+      Eigen::VectorXd largest = Eigen::VectorXd::Zero(count);  // squared
+      for (Eigen::Index i = 0; i + 2 < left.rows(); i += 3)
+        largest = largest.cwiseMax(left.middleRows<3>(i).colwise().squaredNorm().transpose());
+      errors.col(static_cast<Eigen::Index>(t)) = largest.cwiseSqrt().cast<float>();
     }
   });
-  Eigen::Index beyond = 0;
-  for (Eigen::Index t = 0; t < count; ++t) {
-    beyond += std::any_of(largest.begin(), largest.end(),
-                          [&](const Eigen::VectorXd& of) { return of[t] > tolerance * tolerance; });
+  return errors;
+}
+
+double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<const std::size_t> but) {
+  Eigen::VectorXf largest = Eigen::VectorXf::Zero(errors.rows());
+  for (Eigen::Index t = 0; t < errors.cols(); ++t) {
+    if (std::ranges::find(but, static_cast<std::size_t>(t)) == but.end())
+      largest = largest.cwiseMax(errors.col(t));
   }
-  return static_cast<double>(beyond) / static_cast<double>(std::max<Eigen::Index>(count, 1));
+  const auto beyond = (largest.array() > static_cast<float>(tolerance)).count();
+  return static_cast<double>(beyond) / static_cast<double>(std::max<Eigen::Index>(errors.rows(), 1));
+}
+
+std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most) {
+  std::vector<std::size_t> order(static_cast<std::size_t>(errors.cols()));
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const Eigen::VectorXi beyond =
+      (errors.array() > static_cast<float>(tolerance)).cast<int>().colwise().sum().transpose();
+  std::ranges::stable_sort(order, std::greater<>(),
+                           [&](std::size_t t) { return beyond[static_cast<Eigen::Index>(t)]; });
+  // Fewer of the worst leave more
+  std::size_t lo = 0, hi = order.size();
+  while (lo < hi) {
+    const std::size_t middle = (lo + hi) / 2;
+    if (ShareBeyond(errors, tolerance, std::span(order).first(middle)) <= most) {
+      hi = middle;
+    } else {
+      lo = middle + 1;
+    }
+  }
+  order.resize(lo);
+  std::ranges::sort(order);
+  return order;
 }
 
 std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                                                std::vector<TileCandidates> candidates,
                                                const TileCueOptions& options, double most_of_half,
-                                               double most_of_whole) {
-  if (candidates.size() > kTrialTiles * kTrialTiles) {
-    std::vector<TileCandidates> some;
-    for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
-    const TileChoice trial = ChooseTiles(mean, poses, std::move(some), options);
-    if (ShareBeyond(poses, trial, options.tolerance / 2) > most_of_half &&
-        ShareBeyond(poses, trial, kOfWhole * options.tolerance) > most_of_whole)
-      return std::nullopt;
-  }
-  return ChooseTiles(mean, poses, std::move(candidates), options);
+                                               double most_of_whole, std::vector<std::size_t>* poor) {
+  if (candidates.size() <= kTrialTiles * kTrialTiles)
+    return ChooseTiles(mean, poses, std::move(candidates), options);
+  const double half = options.tolerance / 2;
+  const auto few = [&](const Eigen::MatrixXf& errors) {
+    const std::vector<std::size_t> worst = WorstTiles(errors, half, kFewBeyond);
+    return static_cast<double>(worst.size()) <= kMostPoor * static_cast<double>(errors.cols())
+               ? worst
+               : std::vector<std::size_t>();
+  };
+  std::vector<TileCandidates> some;
+  for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
+  const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
+  const bool promising = ShareBeyond(trial, half) <= most_of_half ||
+                         ShareBeyond(trial, kOfWhole * options.tolerance) <= most_of_whole;
+  if (!promising && (poor == nullptr || few(trial).empty())) return std::nullopt;
+  TileChoice all = ChooseTiles(mean, poses, std::move(candidates), options);
+  if (promising) return all;
+  *poor = few(TileErrors(poses, all));
+  return std::nullopt;
 }
 
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,

@@ -29,11 +29,12 @@ TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                        std::vector<TileCandidates> candidates, const TileCueOptions& options);
 
 // The same where an eighth of many tiles says that the others are worth their time: at most that share of the poses
-// would be farther off than half the tolerance, or that of them than (nearly) all of it.
+// would be farther off than half the tolerance, or that of them than (nearly) all of it. Else, where `poor` is not null
+// and a few tiles are to blame: which of all tiles are, so that the others keep the half in all but a few poses.
 std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                                                std::vector<TileCandidates> candidates,
                                                const TileCueOptions& options, double most_of_half,
-                                               double most_of_whole);
+                                               double most_of_whole, std::vector<std::size_t>* poor);
 
 // What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
 // tile has the columns of `points`; options: the choice's, with the mean of these poses.
@@ -45,8 +46,13 @@ TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size
 // Leaves out the cues that no tile reads, and tells the subspace of the others.
 void FinishTiles(TileSubspace* made);
 
-// Share of the same poses in which a point of those tiles would be farther off, were they stored exactly.
-double ShareBeyond(const PoseMatrix& poses, const TileChoice& choice, double tolerance);
+// How far off a point of each tile of the choice would be in each of the same poses, were they stored exactly.
+// [poses x tiles]
+Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice);
+// Share of the poses in which a tile is farther off, but some of them.
+double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<const std::size_t> but = {});
+// The fewest tiles, the worst first, but for which that is at most `most`; ascending.
+std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most);
 
 // The first clip_poses of the same poses are of clips. The caller fills what MakeSubspace's does.
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "kpsa/partial_step.h"
 #include "kpsa/training/finer_subspaces.h"
 #include "kpsa/training/mend_tiles.h"
 #include "kpsa/training/some_points.h"
@@ -65,7 +66,8 @@ struct Trained {
   double ns = 0;       // what a frame is expected to cost, on the scale of the nodes' costs,
   double full_ns = 0;  // and the whole evaluation
   double seconds = 0;  // that it took
-  bool ended = false;  // with its cues, as these lie where the last step is dear: there is no subspace
+  bool ended = false;  // with its cues, as these lie where the last step is dear: there is no subspace. Or
+  std::vector<std::vector<Index>> poor = {};  // with these tiles, by mesh: the last step should be of them alone
 };
 
 // Mends what is farthest off, signs, and says what a frame costs. steps: as TrainOnce has them; pose_seconds: that a
@@ -88,11 +90,27 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
   return Trained{std::move(subspace), std::move(record), ns, setup->full_cost, limit.elapsed(), false};
 }
 
-// steps: by which points may be mended, by mesh; or none. Ends with its cues where these are points that come out, a frame is expected to cost more than `enough`, and no cues of
-// tiles would be tried.
+// Tiles of all meshes, by mesh.
+std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<const std::size_t> tiles) {
+  std::vector<std::vector<Index>> of_meshes;
+  std::size_t first = 0;
+  for (std::size_t m = 0; m < setup.totals.size(); ++m) {
+    const std::size_t count = (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints;
+    std::vector<Index>& own = of_meshes.emplace_back();
+    for (const std::size_t tile : tiles) {
+      if (tile >= first && tile < first + count) own.push_back(static_cast<Index>(tile - first));
+    }
+    first += count;
+  }
+  return of_meshes;
+}
+
+// steps: by which points may be mended, by mesh; or none. enough: ends with its cues where these are points that come out,
+// a frame is expected to cost more, and no cues of tiles would be tried; or with tiles that are to blame that no cues of
+// tiles serve. Without it there is a subspace.
 Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                           const TrainOptions& options, const std::vector<Compiler::SplitPoints>& steps = {},
-                          double enough = std::numeric_limits<double>::infinity()) {
+                          std::optional<double> enough = std::nullopt) {
   TrainingSetup setup(rig, clips, options);
   TrainingRecord record = RecordOf(clips, options);
   KPSA_RETURN_IF_ERROR(setup.Prepare());
@@ -117,7 +135,8 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
 
   const CueChoice& choice = candidates.cues.choice;
-  if (choice.cost > enough && !MissMany(choice) &&
+  candidates.may_step = enough.has_value();
+  if (enough && choice.cost > *enough && !MissMany(choice) &&
       std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; })) {
     record.tried.push_back({kForAllPoints, choice.cues.size(),
                             static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
@@ -136,6 +155,10 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   }
   Result<Subspace> subspace = candidates.Best();
   if (!subspace.ok()) return subspace.status();
+  if (!candidates.poor.empty()) {
+    return Trained{{}, std::move(record), choice.cost, setup.full_cost, setup.limit.elapsed(), true,
+                   ByMesh(setup, candidates.poor)};
+  }
   KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
   const CandidateCalibrator calibrator{&candidates, ranges,
                                        CalibrationWithin(poses.pose_seconds, options, &setup.limit)};
@@ -185,6 +208,18 @@ Result<std::optional<TrainingRig>> SplitRig(const TrainingRig& rig, const std::v
   return std::optional(std::move(with));
 }
 
+// The same, but steps are of these tiles alone, by mesh.
+TrainingRig OfTiles(TrainingRig split, std::vector<std::vector<Index>> tiles) {
+  for (std::size_t m = 0; m < split.split.size() && m < tiles.size(); ++m) {
+    Compiler::SplitPoints& of = split.split[m];
+    if (tiles[m].empty()) of = {};
+    if (of.step != nullptr) of.step = MakePartialStep(of.step, tiles[m]);
+  }
+  tiles.resize(split.split.size());
+  split.stepped = std::move(tiles);
+  return split;
+}
+
 // What was tried is told apart from that of another training; also where there was no choice.
 void NameTried(Trained* trained, const char* suffix) {
   std::vector<TrainingRecord::Tried>& tried = trained->record.tried;
@@ -229,16 +264,27 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   }
   if (!split->has_value()) return TrainOnce(rig, clips, options);
   if (options.inner == TrainOptions::Inner::kNever) return TrainOnce(rig, clips, options, mends);
-  if (options.inner == TrainOptions::Inner::kAlways) return TrainOnce(**split, clips, options);
+  if (options.inner == TrainOptions::Inner::kAlways) {
+    const bool some = std::ranges::any_of(options.stepped, [](const auto& tiles) { return !tiles.empty(); });
+    return TrainOnce(some ? OfTiles(**split, options.stepped) : **split, clips, options);
+  }
   double steps = 0;
   for (std::size_t m = 0; m < (*split)->split.size(); ++m)
     steps += (*split)->step(m) == nullptr ? 0 : static_cast<double>((*split)->step(m)->cost_ns());
   const double enough = kWorthSplitting * steps;
   Result<Trained> whole = TrainOnce(rig, clips, options, mends, enough);
-  if (!whole.ok() || whole->ns < enough) return whole;
+  if (!whole.ok() || (!whole->ended && whole->ns < enough)) return whole;
   if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
   TrainOptions rest = options;
   rest.seconds -= whole->seconds;
+  if (!whole->poor.empty()) {
+    Result<Trained> some = TrainOnce(OfTiles(**split, whole->poor), clips, rest);
+    if (!some.ok() && some.status().kind() == ErrorKind::kInterrupted) return some;
+    if (some.ok()) NameTried(&*some, kBeforeLastStepOfSome);
+    // Steps of all tiles cost more by themselves
+    if (some.ok() && some->ns < enough) return some;
+    if (some.ok()) rest.seconds -= some->seconds;
+  }
   Result<Trained> inner = TrainOnce(**split, clips, rest);
   if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
   if (inner.ok()) NameTried(&*inner, kBeforeLastStep);

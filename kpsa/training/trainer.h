@@ -44,6 +44,8 @@ struct TrainOptions {
   // Inner points of last steps (graph/last_step.h) instead of what comes out of these: where that is expected to cost
   // less, or as a subspace has it that learns.
   enum class Inner : std::uint8_t { kIfCheaper, kNever, kAlways } inner = Inner::kIfCheaper;
+  // With kAlways: of these tiles alone, by mesh; empty, or of a mesh: of all.
+  std::vector<std::vector<Index>> stepped = {};
   // About how long training may take: fewer poses, no cues of tiles, and a shorter calibration, where
   // that is too short. Which poses fit depends on the machine; with time enough, the subspace is that without
   // a limit.
@@ -76,6 +78,8 @@ struct TrainingRig {
   std::function<Status(std::optional<std::string_view>)> set_clip;
   // By mesh, with steps where inner points are trained on (graph/last_step.h); empty: nowhere. Train's own.
   std::vector<Compiler::SplitPoints> split = {};
+  // By mesh, the tiles of which alone that is (kpsa/partial_step.h); empty: all. Train's own.
+  std::vector<std::vector<Index>> stepped = {};
   // By mesh, the points that training chooses by, ascending; empty: all (kpsa/training/some_points.h). Of so many, one is
   // among them. Train's own.
   std::vector<std::vector<Index>> some = {};
