@@ -45,9 +45,8 @@ class PartialBound final : public LastStep::Bound {
   }
   const std::vector<Index>& inner() const override { return inner_; }
   std::size_t scratch_floats() const override {
-    return step_ == nullptr
-               ? 0
-               : FloatsOf(inner_points_) + FloatsOf(places_.size()) + step_->scratch_floats();
+    return step_ == nullptr ? 0
+                            : FloatsOf(inner_points_) + FloatsOf(places_.size()) + step_->scratch_floats();
   }
   void Run(ConstPointsView inner, PointsView out, std::span<float> scratch) const noexcept override {
     if (out_.is_all()) {

@@ -154,11 +154,13 @@ Status ValidateSubspace(const Subspace& s) {
                              s.patches.tiles);
     }
     const std::vector<Index>& stepped = s.outputs[i].stepped;
-    if (!stepped.empty() &&
-        (s.outputs[i].inner == 0 || std::ranges::adjacent_find(stepped, std::greater_equal()) != stepped.end() ||
-         stepped.back() >= (s.outputs[i].points + kTilePoints - 1) / kTilePoints)) {
-      return Status::Invalid("output \"{}\" of {} points and {} inner ones has a last step of tiles up to {}, or they do not count up",
-                             s.outputs[i].name, s.outputs[i].points, s.outputs[i].inner, stepped.back());
+    if (!stepped.empty() && (s.outputs[i].inner == 0 ||
+                             std::ranges::adjacent_find(stepped, std::greater_equal()) != stepped.end() ||
+                             stepped.back() >= (s.outputs[i].points + kTilePoints - 1) / kTilePoints)) {
+      return Status::Invalid(
+          "output \"{}\" of {} points and {} inner ones has a last step of tiles up to {}, or they do not "
+          "count up",
+          s.outputs[i].name, s.outputs[i].points, s.outputs[i].inner, stepped.back());
     }
     if (s.tiles[i].points() != s.outputs[i].reconstructed() || s.tiles[i].inputs() != s.tile_inputs() ||
         s.tiles[i].data().components != s.components) {

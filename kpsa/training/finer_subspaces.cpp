@@ -64,7 +64,7 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   };
   const char* const fine = of.by_tile ? kByTileFinely : of.fewer ? kFewerCues : kFinelyStored;
   KPSA_RETURN_IF_ERROR(add(of.fine ? fine : of.by_tile ? kByTile : kForAllPoints, std::move(*subspace)));
-  bool may_be_for_all = of.by_tile;
+  bool may_be_for_all = of.by_tile && !of.by_tiles_alone();
   if (of.by_tile &&
       of.others_ns < trials.least_ns()) {  // calibration misses more than the judges of both did
     for_all_points(), may_be_for_all = false;

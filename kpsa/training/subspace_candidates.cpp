@@ -1,6 +1,7 @@
 #include "kpsa/training/subspace_candidates.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -35,6 +36,8 @@ bool MissMany(const CueChoice& choice) {
   return choice.misses > kManyMisses || choice.misses_of_stricter > kManyMissesOfHalf;
 }
 
+bool SubspaceCandidates::by_tiles_alone() const { return !setup->rig.stepped.empty(); }
+
 bool SubspaceCandidates::HasTimeForTiles() {
   if (setup->limit.left() > kTilesInModes * modes_seconds) return true;
   setup->limit.LeaveOut("no cues of each tile");
@@ -58,21 +61,25 @@ Subspace SubspaceCandidates::ForAllPoints(bool finely) {
       poses->clip_poses);
 }
 
-Result<Subspace> SubspaceCandidates::Best() {
+Result<std::optional<Subspace>> SubspaceCandidates::Best() {
   // Where few of the judges miss, but narrowly, a clip that nobody trained on may miss more
-  const bool misses = setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 &&
-                      !setup->of_light() && (MissMany(cues.choice) || !setup->rig.stepped.empty());
+  const bool may_try =
+                 setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 && !setup->of_light(),
+             misses = may_try && MissMany(cues.choice);
   Subspace subspace;
-  if (misses && HasTimeForTiles()) {
-    KPSA_RETURN_IF_ERROR(CompareWithTiles(&subspace));
-    if (!poor.empty()) return subspace;
+  if ((misses || (may_try && (dear || by_tiles_alone()))) && HasTimeForTiles()) {
+    const Result<bool> made = CompareWithTiles(&subspace);
+    if (!made.ok()) return made.status();
+    if (!*made) return std::optional<Subspace>();
+  } else if (dear || by_tiles_alone()) {
+    return std::optional<Subspace>();
   } else {
     fine = misses;
     subspace = ForAllPoints(fine);
   }
-  KPSA_RETURN_IF_ERROR(CompareWithCheaper(&subspace));
+  if (!by_tiles_alone()) KPSA_RETURN_IF_ERROR(CompareWithCheaper(&subspace));
   Describe(&subspace);
-  return subspace;
+  return std::optional(std::move(subspace));
 }
 
 void SubspaceCandidates::Describe(Subspace* described) const {
@@ -93,11 +100,11 @@ void SubspaceCandidates::Describe(Subspace* described) const {
 }
 
 // Of one with cues for all points, and of those with cues of each tile, the cheaper one.
-Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
+Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   KPSA_RETURN_IF_ERROR(setup->Say("cues of tiles", 0.8));
   const Result<bool> promising = ChooseTiles();
   if (!promising.ok()) return promising.status();
-  if (!poor.empty()) return Status();
+  if (!poor.empty() || (dear && !*promising)) return false;
   // Their doubts alone judge them; stored finely where poses miss
   TileSubspace with_tiles;
   FrameCost of_tiles{.misses = 1, .ns = std::numeric_limits<double>::infinity()};
@@ -113,11 +120,18 @@ Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
       of_tiles = *priced, with_tiles = std::move(made), fine = finely;
       best = record->tried.size() - 1;
     }
+    if (may_step && setup->rig.some.empty() && of_tiles.misses > kManyMisses) {
+      poor = PoorTiles(TileErrors(poses->poses, tiles), setup->options.tolerance);
+      if (!poor.empty()) return false;
+    }
     if (!IsWorthTrying(of_tiles) || of_tiles.misses > kHopelessTiles) break;
   }
   // As chosen, without products of tiles: others with these would hardly do better, and take their time
-  by_tile = of_tiles.misses < kManyMisses && of_tiles.ns < kClearly * cues.choice.cost;
-  if (by_tile) {
+  by_tile = by_tiles_alone() || (of_tiles.misses < kManyMisses && of_tiles.ns < kClearly * cues.choice.cost);
+  if (by_tiles_alone() && !std::isfinite(of_tiles.ns)) return false;
+  if (by_tiles_alone()) {
+    // What all points would measure nobody has looked at
+  } else if (by_tile) {
     Tried(kForAllPoints, cues.set, cues.choice.misses, cues.choice.cost);
   } else {
     KPSA_RETURN_IF_ERROR(setup->Say("subspace", 0.87));
@@ -132,7 +146,7 @@ Status SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   record->tried[best].taken = true;
   best_ns_ = record->tried[best].cost * setup->full_cost;
   if (by_tile) *subspace = std::move(with_tiles.subspace), cues.set = std::move(with_tiles.cues);
-  return Status();
+  return true;
 }
 
 Status SubspaceCandidates::CompareWithCheaper(Subspace* subspace) {
@@ -215,16 +229,18 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   for (std::size_t s = 0; s < first.size(); ++s) {
     if (!setup->recorder->signals()[s].matrix) add(first[s]);
   }
-  if (!setup->rig.stepped.empty()) {  // all tiles have been tried
+  if (by_tiles_alone()) {  // all have been tried
     tiles = kpsa::engine::ChooseTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice);
     return true;
   }
-  std::optional<TileChoice> chosen = ChoosePromisingTiles(
-      modes->pca.mean, poses->poses, std::move(*candidates), choice,
-      cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
-      kMostBeyondOfMisses * cues.choice.misses, may_step && setup->rig.some.empty() ? &poor : nullptr);
-  if (!chosen) return false;
-  tiles = std::move(*chosen);
+  TilePromise promise{cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
+                      kMostBeyondOfMisses * cues.choice.misses, may_step && setup->rig.some.empty(), dear};
+  if (dear) promise.most_of_half = kFewBeyond, promise.most_of_whole = 0;
+  PromisingTiles chosen =
+      ChoosePromisingTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice, promise);
+  poor = std::move(chosen.poor);
+  if (!chosen.choice) return false;
+  tiles = std::move(*chosen.choice);
   return true;
 }
 

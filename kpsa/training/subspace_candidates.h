@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "kpsa/patches.h"
@@ -41,19 +42,23 @@ struct SubspaceCandidates {
   bool by_tile = false;      // its cues
   bool fewer = false;        // not those that were expected to cost least, but cheaper ones
   bool tried_tiles = false;
-  bool may_step = false;           // points of some tiles may go through a last step, and
-  std::vector<std::size_t> poor = {};  // these tiles alone are to blame that cues of tiles are not promising
-  FrameCost cost = {};               // by the last calibration, but points
-  TileChoice tiles = {};             // where they were tried
-  RangeFinder ranges_of_tiles = {};  // of the poses that these alone were trained on
+  // What comes out of a last step is dear to measure: cues of tiles are tried, and nothing else is made of it
+  bool dear = false;
+  bool may_step = false;               // points of some tiles may go through that step
+  std::vector<std::size_t> poor = {};  // they alone are to blame that cues of tiles are not promising
+  FrameCost cost = {};                 // by the last calibration, but points
+  TileChoice tiles = {};               // where they were tried
+  RangeFinder ranges_of_tiles = {};    // of the poses that these alone were trained on
   // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost
   Subspace others = {};
   double others_ns = std::numeric_limits<double>::infinity();
 
-  // The subspace with which a frame is expected to cost least, by the judges.
-  Result<Subspace> Best();
+  // The subspace with which a frame is expected to cost least, by the judges; none where some tiles are poor, or where
+  // it is dear and cues of tiles do not serve.
+  Result<std::optional<Subspace>> Best();
 
   bool IsWorthTrying(const FrameCost& of) const;
+  bool by_tiles_alone() const;  // the rig has some tiles before a last step
   // The largest step, and one that can be done without.
   bool HasTimeForTiles();
   Subspace ForAllPoints(bool finely);
@@ -66,7 +71,8 @@ struct SubspaceCandidates {
  private:
   // The subspace is given its best score by the judges, and is then priced.
   Result<FrameCost> Price(Subspace* subspace, const CueSet& of) const;
-  Status CompareWithTiles(Subspace* subspace);
+  // False: with nothing.
+  Result<bool> CompareWithTiles(Subspace* subspace);
   // With what was cheaper but for its misses, by the judges that compare subspaces.
   Status CompareWithCheaper(Subspace* subspace);
   void Tried(const char* what, const CueSet& of, double misses, double ns);

@@ -16,8 +16,9 @@ namespace {
 
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
-// Of the poses, that tiles which are not to blame may leave beyond half the tolerance; and of the tiles, those to blame
-constexpr double kFewBeyond = 0.005, kMostPoor = 0.5;
+constexpr double kMostPoor = 0.75;      // of the tiles: are to blame that the others are not worth their time
+// Of the tolerance, that tiles which are not to blame go beyond in that share of the poses
+constexpr std::pair<double, double> kPoor[] = {{0.5, kFewBeyond}, {0.75, 2 * kFewBeyond}};
 
 // The cues of some rows of a set.
 CueSet Subset(const CueSet& set, const std::vector<std::size_t>& kept) {
@@ -165,29 +166,38 @@ std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolera
   return order;
 }
 
-std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
-                                               std::vector<TileCandidates> candidates,
-                                               const TileCueOptions& options, double most_of_half,
-                                               double most_of_whole, std::vector<std::size_t>* poor) {
-  if (candidates.size() <= kTrialTiles * kTrialTiles)
-    return ChooseTiles(mean, poses, std::move(candidates), options);
+std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance) {
+  for (const auto& [share, beyond] : kPoor) {
+    std::vector<std::size_t> worst = WorstTiles(errors, share * tolerance, beyond);
+    if (static_cast<double>(worst.size()) <= kMostPoor * static_cast<double>(errors.cols())) return worst;
+  }
+  return {};
+}
+
+PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                                    std::vector<TileCandidates> candidates, const TileCueOptions& options,
+                                    const TilePromise& promise) {
   const double half = options.tolerance / 2;
-  const auto few = [&](const Eigen::MatrixXf& errors) {
-    const std::vector<std::size_t> worst = WorstTiles(errors, half, kFewBeyond);
-    return static_cast<double>(worst.size()) <= kMostPoor * static_cast<double>(errors.cols())
-               ? worst
-               : std::vector<std::size_t>();
+  const auto keeps = [&](const Eigen::MatrixXf& errors) {
+    return ShareBeyond(errors, half) <= promise.most_of_half ||
+           ShareBeyond(errors, kOfWhole * options.tolerance) <= promise.most_of_whole;
   };
-  std::vector<TileCandidates> some;
-  for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
-  const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
-  const bool promising = ShareBeyond(trial, half) <= most_of_half ||
-                         ShareBeyond(trial, kOfWhole * options.tolerance) <= most_of_whole;
-  if (!promising && (poor == nullptr || few(trial).empty())) return std::nullopt;
-  TileChoice all = ChooseTiles(mean, poses, std::move(candidates), options);
-  if (promising) return all;
-  *poor = few(TileErrors(poses, all));
-  return std::nullopt;
+  const bool many = candidates.size() > kTrialTiles * kTrialTiles;
+  bool promising = !promise.may_step;
+  if (many) {
+    std::vector<TileCandidates> some;
+    for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
+    const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
+    promising = keeps(trial);
+    if (!promising && (!promise.may_step || PoorTiles(trial, options.tolerance).empty())) return {};
+  }
+  PromisingTiles found{ChooseTiles(mean, poses, std::move(candidates), options), {}};
+  if (promising) return found;
+  const Eigen::MatrixXf errors = TileErrors(poses, *found.choice);
+  if (!many && keeps(errors)) return found;
+  found.poor = PoorTiles(errors, options.tolerance);
+  if (many || promise.strict || !found.poor.empty()) found.choice.reset();
+  return found;
 }
 
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,

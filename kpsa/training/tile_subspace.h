@@ -28,13 +28,29 @@ struct TileChoice {
 TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
                        std::vector<TileCandidates> candidates, const TileCueOptions& options);
 
-// The same where an eighth of many tiles says that the others are worth their time: at most that share of the poses
-// would be farther off than half the tolerance, or that of them than (nearly) all of it. Else, where `poor` is not null
-// and a few tiles are to blame: which of all tiles are, so that the others keep the half in all but a few poses.
-std::optional<TileChoice> ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
-                                               std::vector<TileCandidates> candidates,
-                                               const TileCueOptions& options, double most_of_half,
-                                               double most_of_whole, std::vector<std::size_t>* poor);
+// Of the poses: so few of them hardly matter.
+inline constexpr double kFewBeyond = 0.005;
+
+// When tiles are worth their time: at most that share of the poses would be farther off than half the tolerance, or that
+// of them than (nearly) all of it.
+struct TilePromise {
+  double most_of_half = 0, most_of_whole = 0;
+  bool may_step = false;  // points of some tiles may go through a last step instead
+  bool strict = false;    // also of few tiles
+};
+struct PromisingTiles {
+  std::optional<TileChoice> choice;
+  // Where there is none: the tiles that are to blame (PoorTiles)
+  std::vector<std::size_t> poor = {};
+};
+// The same where an eighth of many tiles says that the others are worth their time.
+PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
+                                    std::vector<TileCandidates> candidates, const TileCueOptions& options,
+                                    const TilePromise& promise);
+
+// The fewest tiles without which the others keep half the tolerance, or most of it, in all but a few poses; none where
+// these would be most of the mesh.
+std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance);
 
 // What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
 // tile has the columns of `points`; options: the choice's, with the mean of these poses.

@@ -67,7 +67,8 @@ struct Trained {
   double full_ns = 0;  // and the whole evaluation
   double seconds = 0;  // that it took
   bool ended = false;  // with its cues, as these lie where the last step is dear: there is no subspace. Or
-  std::vector<std::vector<Index>> poor = {};  // with these tiles, by mesh: the last step should be of them alone
+  std::vector<std::vector<Index>> poor =
+      {};  // with these tiles, by mesh: the last step should be of them alone
 };
 
 // Mends what is farthest off, signs, and says what a frame costs. steps: as TrainOnce has them; pose_seconds: that a
@@ -136,13 +137,9 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
 
   const CueChoice& choice = candidates.cues.choice;
   candidates.may_step = enough.has_value();
-  if (enough && choice.cost > *enough && !MissMany(choice) &&
-      std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; })) {
-    record.tried.push_back({kForAllPoints, choice.cues.size(),
-                            static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
-                            choice.cost / setup.full_cost, false});
-    return Trained{{}, std::move(record), choice.cost, setup.full_cost, setup.limit.elapsed(), true};
-  }
+  candidates.dear =
+      enough && choice.cost > *enough && !MissMany(choice) &&
+      std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
 
   // Subspaces
   KPSA_RETURN_IF_ERROR(setup.Say("subspace", 0.85));
@@ -153,24 +150,35 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     if (!patches.ok()) return patches.status();
     candidates.patches = std::move(*patches);
   }
-  Result<Subspace> subspace = candidates.Best();
-  if (!subspace.ok()) return subspace.status();
-  if (!candidates.poor.empty()) {
-    return Trained{{}, std::move(record), choice.cost, setup.full_cost, setup.limit.elapsed(), true,
-                   ByMesh(setup, candidates.poor)};
+  Result<std::optional<Subspace>> best = candidates.Best();
+  if (!best.ok()) return best.status();
+  if (!*best) {
+    if (candidates.by_tiles_alone()) return Status::Invalid("no cues of tiles serve");
+    record.tried.push_back({kForAllPoints, choice.cues.size(),
+                            static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
+                            choice.cost / setup.full_cost, false});
+    return Trained{
+        {},
+        std::move(record),
+        choice.cost,
+        setup.full_cost,
+        setup.limit.elapsed(),
+        true,
+        candidates.poor.empty() ? std::vector<std::vector<Index>>() : ByMesh(setup, candidates.poor)};
   }
+  Subspace subspace = std::move(**best);
   KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
   const CandidateCalibrator calibrator{&candidates, ranges,
                                        CalibrationWithin(poses.pose_seconds, options, &setup.limit)};
-  KPSA_RETURN_IF_ERROR(calibrator.Calibrate(&*subspace));
+  KPSA_RETURN_IF_ERROR(calibrator.Calibrate(&subspace));
   const FrameCost& cost = candidates.cost;
   if (of_points && !options.without.miss_costs && calibrator.size.margins && candidates.IsWorthTrying(cost) &&
       (!candidates.fine || cost.lost() > kTooManyMisses) && setup.limit.left() > candidates.modes_seconds)
-    KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&*subspace));
+    KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&subspace));
 
   if (rig.some.empty())
     return FinishTraining(steps, setup.limit, poses.pose_seconds, &setup, candidates, std::move(record),
-                          std::move(*subspace));
+                          std::move(subspace));
   TrainingRig all = rig;
   all.some.clear(), all.every = 1;
   WholeSubspace whole(all, options, candidates);
@@ -277,17 +285,27 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
   TrainOptions rest = options;
   rest.seconds -= whole->seconds;
+  std::optional<Trained> some;
   if (!whole->poor.empty()) {
-    Result<Trained> some = TrainOnce(OfTiles(**split, whole->poor), clips, rest);
-    if (!some.ok() && some.status().kind() == ErrorKind::kInterrupted) return some;
-    if (some.ok()) NameTried(&*some, kBeforeLastStepOfSome);
-    // Steps of all tiles cost more by themselves
-    if (some.ok() && some->ns < enough) return some;
-    if (some.ok()) rest.seconds -= some->seconds;
+    Result<Trained> made = TrainOnce(OfTiles(**split, whole->poor), clips, rest);
+    if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
+    if (made.ok()) {
+      NameTried(&*made, kBeforeLastStepOfSome);
+      if (made->ns < enough) return made;  // the steps of all tiles cost half of that by themselves
+      rest.seconds -= made->seconds;
+      some = std::move(*made);
+    }
   }
   Result<Trained> inner = TrainOnce(**split, clips, rest);
   if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
   if (inner.ok()) NameTried(&*inner, kBeforeLastStep);
+  // The cheaper one of the two that reconstruct inner points
+  if (some && (!inner.ok() || some->ns < inner->ns)) {
+    if (inner.ok()) AddTried(*inner, &*some);
+    inner = std::move(*some);
+  } else if (some) {
+    AddTried(*some, &*inner);
+  }
   if (whole->ended && !(inner.ok() && inner->ns < kCheaperInner * whole->ns)) {
     if (inner.ok()) rest.seconds -= inner->seconds;
     whole = TrainOnce(rig, clips, rest, mends);

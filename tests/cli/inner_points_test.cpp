@@ -1,8 +1,11 @@
-// Subspaces that reconstruct the points before the last step of a deltaMush, and run that step themselves.
+// Subspaces that reconstruct the points before the last step of a deltaMush, and run that step themselves: of all points,
+// or of some tiles.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "kpsa/training_record.h"
 #include "tests/cli/hello_folder.h"
@@ -17,29 +20,46 @@ TrainOptions InnerTraining(TrainOptions::Inner inner = TrainOptions::Inner::kAlw
   return options;
 }
 
-class InnerPoints : public ::testing::Test {
+class InnerPoints : public ::testing::TestWithParam<std::vector<Index>> {  // tiles; none: all
  protected:
-  static void SetUpTestSuite() {
+  void SetUp() override {
+    if (folder_ == nullptr) WriteRig();
+    std::shared_ptr<const Subspace>& known = prepared_[GetParam()];
+    if (known == nullptr) {
+      TrainOptions options = InnerTraining();
+      options.stepped = {GetParam()};
+      known = TrainRig(folder_->rig(), options);
+    }
+    trained_ = known;
+    ASSERT_NE(trained_, nullptr);
+    ASSERT_EQ(trained_->outputs.size(), 1u);
+    EXPECT_EQ(trained_->outputs[0].stepped, GetParam());
+  }
+  static void WriteRig() {
     folder_ = new HelloFolder;
     folder_->Edit("divisions: [2, 5, 2], members: all}",
                   "divisions: [2, 5, 2], members: all, parent: lower}");
     folder_->Edit("mush: {type: deltaMush, iterations: 10}",
                   "mush: {type: deltaMush, iterations: 10, parent: lower}");
     folder_->Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
-    trained_ = TrainRig(folder_->rig(), InnerTraining());
-    ASSERT_NE(trained_, nullptr);
   }
   static void TearDownTestSuite() {
-    trained_.reset();
-    delete folder_;
+    trained_.reset(), prepared_.clear();
+    delete std::exchange(folder_, nullptr);
   }
   static inline const HelloFolder* folder_ = nullptr;
   static inline std::shared_ptr<const Subspace> trained_;
+  static inline std::map<std::vector<Index>, std::shared_ptr<const Subspace>> prepared_;
 };
 
-TEST_F(InnerPoints, HitsRunNoMushAndKeepTheTolerance) {
-  ASSERT_EQ(trained_->outputs.size(), 1u);
-  EXPECT_EQ(trained_->outputs[0].inner, trained_->outputs[0].points) << "all weights are 1";
+TEST_P(InnerPoints, HitsRunNoMushAndKeepTheTolerance) {
+  const SubspaceOutput& output = trained_->outputs[0];
+  if (GetParam().empty()) {
+    EXPECT_EQ(output.inner, output.points) << "all weights are 1";
+  } else {
+    EXPECT_GT(output.inner, output.points) << "what frames of the tiles' border read";
+    EXPECT_LT(output.inner, output.points + GetParam().size() * kTilePoints);
+  }
   EXPECT_EQ(trained_->outputs[0].name, "column@mush");
   RigRun full(folder_->rig()), run(folder_->rig(), {.subspace = trained_});
   ASSERT_TRUE(run.ok()) << run.error;
@@ -63,7 +83,7 @@ TEST_F(InnerPoints, HitsRunNoMushAndKeepTheTolerance) {
 }
 
 // The step runs in the space: what carries that, turns it and makes it larger does the same to the detail.
-TEST_F(InnerPoints, GrowAndTravelWithTheSpace) {
+TEST_P(InnerPoints, GrowAndTravelWithTheSpace) {
   const std::vector<std::string> moving = {"lower.translateX", "lower.rotateY", "lower.scaleX",
                                            "lower.scaleY", "lower.scaleZ"};
   RigRun full(folder_->rig(), {.varying = moving}),
@@ -85,7 +105,7 @@ TEST_F(InnerPoints, GrowAndTravelWithTheSpace) {
   EXPECT_GT(hits, 5u);
 }
 
-TEST_F(InnerPoints, SomePointsHaveTheBitsOfAll) {
+TEST_P(InnerPoints, SomePointsHaveTheBitsOfAll) {
   RigRun run(folder_->rig(), {.subspace = trained_, .accelerate = {.tolerance = kInfinity}});
   ASSERT_TRUE(run.ok()) << run.error;
   const auto total = static_cast<Index>(trained_->outputs[0].points);
@@ -93,7 +113,7 @@ TEST_F(InnerPoints, SomePointsHaveTheBitsOfAll) {
 }
 
 // What the step has besides points may vary: then nothing is reconstructed.
-TEST_F(InnerPoints, MissWhereTheStepVaries) {
+TEST_P(InnerPoints, MissWhereTheStepVaries) {
   const std::vector<std::string> varying = {"mush.envelope"};
   RigRun full(folder_->rig(), {.varying = varying}),
       run(folder_->rig(), {.subspace = trained_, .varying = varying});
@@ -106,11 +126,11 @@ TEST_F(InnerPoints, MissWhereTheStepVaries) {
   }
 }
 
-TEST_F(InnerPoints, AreInTheFile) {
+TEST_P(InnerPoints, AreInTheFile) {
   const std::string path = *folder_ / "inner.kpsa";
   ASSERT_TRUE(WriteSubspace(*trained_, path).ok());
   const std::string bytes = folder_->Read(path);
-  EXPECT_NE(bytes.find("\"version\":\"10\""), std::string::npos)
+  EXPECT_NE(bytes.find(GetParam().empty() ? "\"version\":\"10\"" : "\"version\":\"12\""), std::string::npos)
       << "programs that do not know of them say so";
   const Result<Subspace> read = ReadSubspace(path);
   ASSERT_TRUE(read.ok()) << read.status().ToString();
@@ -124,7 +144,26 @@ TEST_F(InnerPoints, AreInTheFile) {
   Subspace fewer = *trained_;
   fewer.outputs[0].inner = fewer.outputs[0].points - 1;
   EXPECT_FALSE(ValidateSubspace(fewer).ok());
+  const auto last = static_cast<Index>(trained_->outputs[0].points / kTilePoints);
+  for (const std::vector<Index>& tiles : {std::vector<Index>{1, 1}, {2, 1}, {last + 1}}) {
+    Subspace wrong = *trained_;
+    wrong.outputs[0].stepped = tiles;
+    EXPECT_FALSE(ValidateSubspace(wrong).ok()) << tiles[0];
+  }
 }
+
+// Tiles that the rig's step reads other points for.
+TEST_P(InnerPoints, OfOtherTilesAreRefused) {
+  Subspace other = *trained_;
+  other.outputs[0].stepped = {0, 2, 4};
+  const RigRun run(folder_->rig(), {.subspace = std::make_shared<const Subspace>(std::move(other))});
+  ASSERT_FALSE(run.ok());
+  EXPECT_NE(run.error.find("train it again"), std::string::npos) << run.error;
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, InnerPoints,
+                         ::testing::Values(std::vector<Index>(), std::vector<Index>{1, 2, 5}),
+                         [](const auto& of) { return of.param.empty() ? "AllTiles" : "SomeTiles"; });
 
 // Points that are mixed with what comes in need both; borders and weights of 0 are what comes in.
 TEST(InnerPointsOfRigs, OfAMushWithAWeightMap) {

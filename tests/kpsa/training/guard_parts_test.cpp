@@ -10,7 +10,7 @@
 namespace kpsa::engine {
 namespace {
 
-constexpr Index kMeshPoints = 400;  // four tiles
+constexpr Index kGuardedPoints = 400;  // four tiles
 
 // Eight meshes of their own controls: source > lift > blur.
 class GuardParts : public testing::Test {
@@ -30,7 +30,7 @@ class GuardParts : public testing::Test {
     subspace_.patches = MakePatchLayout(std::vector<std::size_t>(8, 4));
   }
   void AddMesh(const std::string& prefix) {
-    g_.add("source", prefix + "rest", {{"count", std::int64_t{kMeshPoints}}});
+    g_.add("source", prefix + "rest", {{"count", std::int64_t{kGuardedPoints}}});
     g_.add("add", prefix + "up");
     g_.add("move", prefix + "lift");
     g_.connect(prefix + "up.out", prefix + "lift.offset");
@@ -43,7 +43,7 @@ class GuardParts : public testing::Test {
     rig_.target.meshes.push_back(std::move(mesh));
     ControlRange& control = rig_.controls.emplace_back();
     control.plug = g_.plug(prefix + "up.a");
-    subspace_.outputs.push_back({prefix + "mesh@blur", kMeshPoints, "blur"});
+    subspace_.outputs.push_back({prefix + "mesh@blur", kGuardedPoints, "blur"});
   }
   // reads: of each tile of the meshes, the rows that it reads.
   std::vector<std::uint64_t> Find(std::vector<std::vector<std::uint32_t>> reads) {
@@ -51,7 +51,7 @@ class GuardParts : public testing::Test {
     subspace_.tiles.clear();
     for (std::size_t m = 0; m < 8; ++m) {
       TileData data;
-      data.points = kMeshPoints, data.inputs = 2;
+      data.points = kGuardedPoints, data.inputs = 2;
       data.ranks = data.wide = {0, 0, 0, 0};
       data.direct = {0, 0, 0, 0};
       for (std::size_t t = 0; t < 4; ++t) {

@@ -132,12 +132,30 @@ TEST(TileCues, SayWhatTheyWouldMiss) {
          return same;
        }()))
     farthest = std::max(farthest, pose.error);
-  EXPECT_EQ(ShareBeyond(limb.poses, limb.choice, farthest), 0) << "storing adds to the errors";
-  EXPECT_EQ(ShareBeyond(limb.poses, limb.choice, 0), 1);
+  const Eigen::MatrixXf errors = TileErrors(limb.poses, limb.choice);
+  EXPECT_EQ(ShareBeyond(errors, farthest), 0) << "storing adds to the errors";
+  EXPECT_EQ(ShareBeyond(errors, 0), 1);
   // Without the entries of a joint hardly a pose is told
   TileChoice blind = limb.choice;
   for (std::vector<std::uint32_t>& cues : blind.tiles.of_tile) cues.clear();
-  EXPECT_GT(ShareBeyond(limb.poses, blind, kLimbTolerance), 0.5);
+  EXPECT_GT(ShareBeyond(TileErrors(limb.poses, blind), kLimbTolerance), 0.5);
+}
+
+TEST(TileCues, SayWhichTilesAreToBlame) {
+  Eigen::MatrixXf errors = Eigen::MatrixXf::Constant(100, 6, 0.1f);
+  errors.col(4).head(40).setConstant(2);
+  errors.col(1).segment(38, 10).setConstant(3);
+  errors(99, 0) = 4;
+  EXPECT_EQ(ShareBeyond(errors, 1), 0.49);
+  const std::size_t but[] = {4};
+  EXPECT_EQ(ShareBeyond(errors, 1, but), 0.11);
+  EXPECT_EQ(WorstTiles(errors, 1, 0.49), std::vector<std::size_t>());
+  EXPECT_EQ(WorstTiles(errors, 1, 0.11), (std::vector<std::size_t>{4}));
+  EXPECT_EQ(WorstTiles(errors, 1, 0.01), (std::vector<std::size_t>{1, 4}));
+  EXPECT_EQ(WorstTiles(errors, 1, 0), (std::vector<std::size_t>{0, 1, 4}));
+  EXPECT_EQ(PoorTiles(errors, 2), (std::vector<std::size_t>{0, 1, 4})) << "by half the tolerance";
+  EXPECT_EQ(PoorTiles(errors, 0.15), (std::vector<std::size_t>{1, 4})) << "by most of it";
+  EXPECT_EQ(PoorTiles(errors, 0.01), std::vector<std::size_t>()) << "all would be";
 }
 
 // The run time's way, against y, the stored joint and the points in its space, one by one.
