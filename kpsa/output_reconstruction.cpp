@@ -26,36 +26,66 @@ std::vector<Index> TilesWith(std::span<const Index> rows) {
 OutputReconstruction::OutputReconstruction(std::shared_ptr<const Subspace> subspace, std::size_t output,
                                            const PointSet& wanted, const LastStep* step)
     : subspace_(std::move(subspace)), output_(output), all_(wanted.is_all()) {
-  if (step != nullptr && subspace_->outputs[output_].inner > 0) {
-    step_ = step->Bind(wanted);
-  } else if (step != nullptr) {
-    mends_ = BoundMends(subspace_->mends, tiles(), static_cast<Index>(output_), wanted, *step);
+  const SubspaceOutput& of = subspace_->outputs[output_];
+  if (step != nullptr && of.inner > 0) {
+    Divide(of, wanted, *step);
+  } else {
+    if (step != nullptr)
+      mends_ = BoundMends(subspace_->mends, tiles(), static_cast<Index>(output_), wanted, *step);
+    if (!all_) points_ = wanted.ToVector(), places_ = wanted.PositionsOf(wanted);
+    direct_ = TilesWith(points_);
   }
-  if (direct()) return;
-  padded_ = PaddedCount(subspace_->outputs[output_].reconstructed());
-  if (step_ == nullptr) points_ = wanted.ToVector();
-  tiles_ = TilesWith(step_ == nullptr ? points_ : step_->inner());
-  if (step_ != nullptr && tiles_.size() == tiles().tiles()) tiles_.clear();
+  if (!direct() || step_ != nullptr) padded_ = PaddedCount(of.reconstructed());
+}
+
+void OutputReconstruction::Divide(const SubspaceOutput& output, const PointSet& wanted,
+                                  const LastStep& step) {
+  if (output.stepped.empty()) {
+    step_ = step.Bind(wanted);
+  } else {
+    std::vector<Index> of_step;
+    for (Index i = 0; i < wanted.size(); ++i) {
+      const auto tile = static_cast<Index>(wanted[i] / kTilePoints);
+      // A tile that ends with the mesh holds inner points, too
+      const bool whole = (std::size_t{tile} + 1) * kTilePoints <= output.points;
+      if (whole && !std::ranges::binary_search(output.stepped, tile)) {
+        points_.push_back(wanted[i]);
+        places_.push_back(i);
+      } else {
+        of_step.push_back(wanted[i]);
+        step_places_.push_back(i);
+      }
+    }
+    direct_ = TilesWith(points_);
+    if (of_step.empty()) return;
+    step_ = step.Bind(PointSet::Of(std::move(of_step), wanted.total()));
+    if (points_.empty()) step_places_.clear();
+  }
+  tiles_ = TilesWith(step_->inner());
+  if (tiles_.size() == tiles().tiles()) tiles_.clear();
 }
 
 std::size_t OutputReconstruction::scratch_floats() const {
   const std::size_t y = PaddedCount(kBlockFrames * subspace_->tile_inputs());
-  return y +
-         std::max(3 * padded_ + (step_ == nullptr ? 0 : step_->scratch_floats()), mends_.scratch_floats());
+  const std::size_t step = step_ == nullptr ? 0 : FloatsOf(step_places_.size()) + step_->scratch_floats();
+  return y + std::max(3 * padded_ + step, mends_.scratch_floats());
 }
 
 void OutputReconstruction::Run(std::span<const Frame> frames, float* scratch) const {
   const std::span<float> all(scratch, scratch_floats());
   const std::span<float> y = all.first(PaddedCount(kBlockFrames * subspace_->tile_inputs()));
-  if (direct()) Reconstruct(frames, nullptr, y);
+  const PointsView mesh{all.data() + y.size(), all.data() + y.size() + padded_,
+                        all.data() + y.size() + 2 * padded_, tiles().points()};
+  if (direct()) Reconstruct(frames, direct_, false, nullptr, y);
   for (const Frame& frame : frames) {
-    if (!direct()) RunOne(frame, y, all.subspan(y.size()));
+    if (!direct() && (step_ == nullptr || !direct_.empty())) CopyPoints(frame, y, mesh);
+    if (step_ != nullptr) RunStep(frame, y, mesh, all.subspan(y.size() + 3 * padded_));
     mends_.Run(tiles(), frame.measured, frame.world_from_space, frame.out, all.subspan(y.size()));
   }
 }
 
-void OutputReconstruction::Reconstruct(std::span<const Frame> frames, const PointsView* mesh,
-                                       std::span<float> y) const {
+void OutputReconstruction::Reconstruct(std::span<const Frame> frames, std::span<const Index> some,
+                                       bool in_space, const PointsView* mesh, std::span<float> y) const {
   KPSA_DCHECK(!frames.empty() && frames.size() <= kBlockFrames);
   PointsView outs[kBlockFrames];
   Matrix4 spaces[kBlockFrames];
@@ -63,31 +93,35 @@ void OutputReconstruction::Reconstruct(std::span<const Frame> frames, const Poin
   bool moved = false;
   for (std::size_t f = 0; f < frames.size(); ++f) {
     outs[f] = mesh == nullptr ? frames[f].out : *mesh;
+    outs[f].count = tiles().points();  // of which only those of some tiles are written
     inputs[f] = frames[f].inputs;
     // A step runs in the space: that grows and turns all of it at once
-    if (step_ != nullptr || frames[f].world_from_space == nullptr) continue;
+    if (in_space || frames[f].world_from_space == nullptr) continue;
     spaces[f] = *frames[f].world_from_space;
     moved = true;
   }
   const std::size_t count = frames.size(), r = subspace_->tile_inputs();
   const std::span<const Matrix4> through(spaces, moved ? count : 0);
-  if (inputs[0] != nullptr) return tiles().ReconstructFrom({inputs, count}, {outs, count}, tiles_, through);
-  if (count == 1) return tiles().ReconstructBlock(frames[0].y, {outs, 1}, tiles_, through);
+  if (inputs[0] != nullptr) return tiles().ReconstructFrom({inputs, count}, {outs, count}, some, through);
+  if (count == 1) return tiles().ReconstructBlock(frames[0].y, {outs, 1}, some, through);
   for (std::size_t f = 0; f < count; ++f)
     std::memcpy(y.data() + f * r, frames[f].y.data(), r * sizeof(float));
-  tiles().ReconstructBlock(y.first(count * r), {outs, count}, tiles_, through);
+  tiles().ReconstructBlock(y.first(count * r), {outs, count}, some, through);
 }
 
-void OutputReconstruction::RunOne(const Frame& frame, std::span<float> y, std::span<float> scratch) const {
-  const PointsView mesh{scratch.data(), scratch.data() + padded_, scratch.data() + 2 * padded_,
-                        tiles().points()};
-  Reconstruct({&frame, 1}, &mesh, y);
-  if (step_ == nullptr) {
-    for (std::size_t i = 0; i < points_.size(); ++i) CopyPoint(mesh, points_[i], frame.out, i);
-    return;
-  }
-  step_->Run(mesh, frame.out, scratch.subspan(3 * padded_));
-  if (frame.world_from_space != nullptr) TransformPoints(ToFloats(*frame.world_from_space), frame.out);
+void OutputReconstruction::CopyPoints(const Frame& frame, std::span<float> y, PointsView mesh) const {
+  Reconstruct({&frame, 1}, direct_, false, &mesh, y);
+  for (std::size_t i = 0; i < points_.size(); ++i) CopyPoint(mesh, points_[i], frame.out, places_[i]);
+}
+
+void OutputReconstruction::RunStep(const Frame& frame, std::span<float> y, PointsView mesh,
+                                   std::span<float> scratch) const {
+  Reconstruct({&frame, 1}, tiles_, true, &mesh, y);
+  const std::size_t apart = step_places_.size();
+  const PointsView made = apart == 0 ? frame.out : ViewOf(scratch, apart);
+  step_->Run(mesh, made, scratch.subspan(FloatsOf(apart)));
+  if (frame.world_from_space != nullptr) TransformPoints(ToFloats(*frame.world_from_space), made);
+  for (std::size_t i = 0; i < apart; ++i) CopyPoint(made, i, frame.out, step_places_[i]);
 }
 
 }  // namespace kpsa::engine

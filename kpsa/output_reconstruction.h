@@ -31,19 +31,27 @@ class OutputReconstruction {
 
  private:
   const TileMap& tiles() const { return subspace_->tiles[output_]; }
-  bool direct() const { return all_ && step_ == nullptr; }
-  // The tiles listed (none: all) of each frame, into what comes out; or of one, into the mesh, in the space or, where
-  // no step follows, as they come out.
-  void Reconstruct(std::span<const Frame> frames, const PointsView* mesh, std::span<float> y) const;
-  void RunOne(const Frame& frame, std::span<float> y, std::span<float> scratch) const;
+  // Points that come out of tiles: with all of these, or with those that no step is of.
+  bool direct() const { return all_ && (step_ == nullptr || !direct_.empty()); }
+  // Which tiles come out as points, and which others the step is of.
+  void Divide(const SubspaceOutput& output, const PointSet& wanted, const LastStep& step);
+  // Some tiles (none: all) of each frame, as they come out, or in the space; into what comes out, or of one, into the
+  // mesh.
+  void Reconstruct(std::span<const Frame> frames, std::span<const Index> some, bool in_space,
+                   const PointsView* mesh, std::span<float> y) const;
+  void CopyPoints(const Frame& frame, std::span<float> y, PointsView mesh) const;
+  void RunStep(const Frame& frame, std::span<float> y, PointsView mesh, std::span<float> scratch) const;
 
   std::shared_ptr<const Subspace> subspace_;
   std::size_t output_;
   bool all_ = true;            // points are wanted
-  std::vector<Index> points_;  // which, where not all and no step gives them
-  std::vector<Index> tiles_;   // that hold them, or what the step reads; none: all
-  std::size_t padded_ = 0;     // floats of a component of all that is reconstructed, for the scratch
+  std::vector<Index> points_;  // of these, where not all: those that no step gives, and
+  std::vector<Index> places_;  // where they come out
+  std::vector<Index> direct_;  // the tiles that hold these; none: all, or where there is a step, none
   std::shared_ptr<const LastStep::Bound> step_;
+  std::vector<Index> tiles_;        // that hold what the step reads; none: all
+  std::vector<Index> step_places_;  // where its points come out; none: they are all that comes out
+  std::size_t padded_ = 0;          // floats of a component of all that is reconstructed, for the scratch
   BoundMends mends_;
 };
 

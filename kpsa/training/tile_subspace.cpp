@@ -16,9 +16,9 @@ namespace {
 
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
-constexpr double kMostPoor = 0.75;      // of the tiles: are to blame that the others are not worth their time
-// Of the tolerance, that tiles which are not to blame go beyond in that share of the poses
-constexpr std::pair<double, double> kPoor[] = {{0.5, kFewBeyond}, {0.75, 2 * kFewBeyond}};
+// Of the tiles: so few may be to blame that the others are not worth their time. With more, other ways cost about as
+// much
+constexpr double kMostPoor = 1.0 / 3;
 
 // The cues of some rows of a set.
 CueSet Subset(const CueSet& set, const std::vector<std::size_t>& kept) {
@@ -167,11 +167,9 @@ std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolera
 }
 
 std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance) {
-  for (const auto& [share, beyond] : kPoor) {
-    std::vector<std::size_t> worst = WorstTiles(errors, share * tolerance, beyond);
-    if (static_cast<double>(worst.size()) <= kMostPoor * static_cast<double>(errors.cols())) return worst;
-  }
-  return {};
+  std::vector<std::size_t> worst = WorstTiles(errors, tolerance / 2, kFewBeyond);
+  if (static_cast<double>(worst.size()) > kMostPoor * static_cast<double>(errors.cols())) worst.clear();
+  return worst;
 }
 
 PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,

@@ -48,8 +48,7 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
                                     std::vector<TileCandidates> candidates, const TileCueOptions& options,
                                     const TilePromise& promise);
 
-// The fewest tiles without which the others keep half the tolerance, or most of it, in all but a few poses; none where
-// these would be most of the mesh.
+// The fewest tiles without which the others keep half the tolerance in all but a few poses; none where these are not few.
 std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance);
 
 // What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
