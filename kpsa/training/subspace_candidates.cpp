@@ -120,7 +120,7 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
       of_tiles = *priced, with_tiles = std::move(made), fine = finely;
       best = record->tried.size() - 1;
     }
-    if (may_step && setup->rig.some.empty() && of_tiles.misses > kManyMisses) {
+    if (may_step && of_tiles.misses > kManyMisses) {
       poor = PoorTiles(TileErrors(poses->poses, tiles), setup->options.tolerance);
       if (!poor.empty()) return false;
     }
@@ -234,7 +234,7 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
     return true;
   }
   TilePromise promise{cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
-                      kMostBeyondOfMisses * cues.choice.misses, may_step && setup->rig.some.empty(), dear};
+                      kMostBeyondOfMisses * cues.choice.misses, may_step, dear};
   if (dear) promise.most_of_half = kFewBeyond, promise.most_of_whole = 0;
   PromisingTiles chosen =
       ChoosePromisingTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice, promise);

@@ -18,6 +18,10 @@ constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
 // What a frame costs, in last steps: inner points are tried; and of that, with which they are taken
 constexpr double kWorthSplitting = 2, kCheaperInner = 0.95;
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
+// Of many points: all are trained at once, with a step of some tiles, where they are no more than so many times as many
+// and a frame is then expected to cost less than that, of a full one
+constexpr std::size_t kMostStepped = 2;
+constexpr double kWorthStepping = 0.5;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -253,6 +257,24 @@ Result<std::optional<TrainingRig>> RigOfSome(const TrainingRig& rig, const Train
   return SomePointsOf(rig, options.many_points, options.some_points);
 }
 
+std::size_t PointsOf(const TrainingRig& some) {
+  std::size_t points = 0;
+  for (const std::vector<Index>& of_mesh : some.some) points += of_mesh.size();
+  return points;
+}
+// Tiles of all points that tiles of some of them cover.
+std::vector<std::vector<Index>> TilesOfAll(const std::vector<std::vector<Index>>& tiles,
+                                           const TrainingRig& some) {
+  std::vector<std::vector<Index>> all(tiles.size());
+  for (std::size_t m = 0; m < tiles.size(); ++m) {
+    const Index end = some.some[m].empty() ? 0 : some.some[m].back() / kTilePoints + 1;
+    for (const Index tile : tiles[m]) {
+      for (Index t = tile * some.every; t < std::min(end, (tile + 1) * some.every); ++t) all[m].push_back(t);
+    }
+  }
+  return all;
+}
+
 // Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost
 // less.
 Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
@@ -268,6 +290,20 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   if (of_some->has_value()) {
     TrainOptions choosing = options;  // what is learnt changes all tiles
     choosing.by_tile_as_before = false, choosing.seconds *= kToChoose;
+    const bool may_step =
+        mended && PointsOf(**of_some) * (*of_some)->every <= kMostStepped * options.many_points;
+    Result<Trained> chosen =
+        TrainOnce(**of_some, clips, choosing, mends,
+                  may_step ? std::optional(std::numeric_limits<double>::infinity()) : std::nullopt);
+    if (!chosen.ok() || chosen->poor.empty()) return chosen;
+    TrainOptions rest = options;
+    rest.seconds -= chosen->seconds;
+    Result<Trained> stepped = TrainOnce(OfTiles(**split, TilesOfAll(chosen->poor, **of_some)), clips, rest);
+    if (!stepped.ok() && stepped.status().kind() == ErrorKind::kInterrupted) return stepped;
+    if (stepped.ok() && stepped->ns < kWorthStepping * stepped->full_ns) {
+      NameTried(&*stepped, kBeforeLastStepOfSome);
+      return stepped;
+    }
     return TrainOnce(**of_some, clips, choosing, mends);
   }
   if (!split->has_value()) return TrainOnce(rig, clips, options);

@@ -247,25 +247,25 @@ TEST(InnerPointsOfRigs, AnotherEnvelopeMisses) {
   }
 }
 
-// Training finds the tiles: those of the bend, and fewer for a larger tolerance.
+// Training finds the tiles: those of the bend, and fewer for a larger tolerance; also where it looks at some points.
 TEST(InnerPointsOfRigs, AreOfTheTilesThatNeedThem) {
   const HelloFolder folder;
   folder.Edit("mush: {type: deltaMush, iterations: 10}",
               "mush: {type: deltaMush, iterations: 10, parent: lower}");
   folder.Edit("divisions: [2, 5, 2], members: all}", "divisions: [2, 5, 2], members: all, parent: lower}");
   folder.Edit("subspace: hello.kpsa", "space: lower, subspace: hello.kpsa");
-  std::size_t before = kMaxTileRank;
-  for (const double tolerance : {2e-4, 2e-3}) {
+  std::vector<std::size_t> stepped;
+  for (const auto& [tolerance, many] : {std::pair{2e-4, 24'000u}, {2e-3, 24'000u}, {2e-3, 500u}}) {
+    SCOPED_TRACE(fmt::format("{} {}", tolerance, many));
     TrainOptions options = InnerTraining(TrainOptions::Inner::kIfCheaper);
     options.tolerance = tolerance;
     options.rows = 60, options.min_points = 4, options.max_modes = 8;  // that miss much
+    options.many_points = many, options.some_points = many;
     const auto trained = TrainRig(folder.rig(), options);
     ASSERT_NE(trained, nullptr);
     const SubspaceOutput& output = trained->outputs[0];
-    EXPECT_GE(output.stepped.size(), 1u);
-    EXPECT_LT(output.stepped.size(), before);
-    EXPECT_LT(output.stepped.size(), (output.points + kTilePoints - 1) / kTilePoints);
-    before = output.stepped.size();
+    stepped.push_back(output.stepped.size());
+    EXPECT_LT(stepped.back(), (output.points + kTilePoints - 1) / kTilePoints);
     RigRun full(folder.rig()), run(folder.rig(), {.subspace = trained});
     ASSERT_TRUE(run.ok()) << run.error;
     std::size_t hits = 0;
@@ -276,8 +276,11 @@ TEST(InnerPointsOfRigs, AreOfTheTilesThatNeedThem) {
       ++hits;
       EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.5 * tolerance);
     }
-    EXPECT_GT(hits, 5u) << tolerance;
+    EXPECT_GT(hits, 5u);
   }
+  EXPECT_GT(stepped[0], stepped[1]);
+  EXPECT_GT(stepped[1], 0u);
+  EXPECT_EQ(stepped[2], 2 * stepped[1]) << "a tile of half of the points covers two";
 }
 
 }  // namespace
