@@ -93,7 +93,7 @@ void OutputReconstruction::Reconstruct(std::span<const Frame> frames, std::span<
   bool moved = false;
   for (std::size_t f = 0; f < frames.size(); ++f) {
     outs[f] = mesh == nullptr ? frames[f].out : *mesh;
-    outs[f].count = tiles().points();  // of which only those of some tiles are written
+    if (!some.empty()) outs[f].count = tiles().points();  // of which only those of some tiles are written
     inputs[f] = frames[f].inputs;
     // A step runs in the space: that grows and turns all of it at once
     if (in_space || frames[f].world_from_space == nullptr) continue;

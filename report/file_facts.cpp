@@ -208,7 +208,14 @@ Result<FileFacts> InspectSubspace(const std::string& path) {
                  {"rig", subspace->rig_hash},
                  {"memory bytes", memory},
                  {"training", TrainingText(*subspace)}};
-  if (subspace->of_inner()) facts.facts.emplace_back("reconstructs", "points before the last step");
+  if (subspace->of_inner()) {
+    std::size_t stepped = 0;
+    for (const SubspaceOutput& output : subspace->outputs) stepped += output.stepped.size();
+    facts.facts.emplace_back(
+        "reconstructs", stepped == 0
+                            ? std::string("points before the last step")
+                            : fmt::format("points, and of {} tiles those before the last step", stepped));
+  }
   std::size_t mended = 0;
   for (const TileMend& mend : subspace->mends) mended += mend.points.size();
   if (mended > 0) facts.facts.emplace_back("mended points", fmt::format("{}, by their last step", mended));

@@ -67,7 +67,8 @@ Result<std::optional<Subspace>> SubspaceCandidates::Best() {
                  setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 && !setup->of_light(),
              misses = may_try && MissMany(cues.choice);
   Subspace subspace;
-  if ((misses || (may_try && (dear || by_tiles_alone()))) && HasTimeForTiles()) {
+  if ((misses || (may_try && (dear || by_tiles_alone() || setup->options.by_tile_as_before))) &&
+      HasTimeForTiles()) {
     const Result<bool> made = CompareWithTiles(&subspace);
     if (!made.ok()) return made.status();
     if (!*made) return std::optional<Subspace>();
@@ -120,11 +121,11 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
       of_tiles = *priced, with_tiles = std::move(made), fine = finely;
       best = record->tried.size() - 1;
     }
-    if (may_step && of_tiles.misses > kManyMisses) {
-      poor = PoorTiles(TileErrors(poses->poses, tiles), setup->options.tolerance);
-      if (!poor.empty()) return false;
-    }
     if (!IsWorthTrying(of_tiles) || of_tiles.misses > kHopelessTiles) break;
+  }
+  if (!may_step.empty() && of_tiles.misses > kManyMisses && std::isfinite(of_tiles.ns)) {
+    poor = PoorTiles(TileErrors(poses->poses, tiles), setup->options.tolerance, may_step);
+    if (!poor.empty()) return false;
   }
   // As chosen, without products of tiles: others with these would hardly do better, and take their time
   by_tile = by_tiles_alone() || (of_tiles.misses < kManyMisses && of_tiles.ns < kClearly * cues.choice.cost);

@@ -42,9 +42,10 @@ struct SubspaceCandidates {
   bool by_tile = false;      // its cues
   bool fewer = false;        // not those that were expected to cost least, but cheaper ones
   bool tried_tiles = false;
-  // What comes out of a last step is dear to measure: cues of tiles are tried, and nothing else is made of it
+  // What comes out of a last step is dear to measure: cues of tiles are tried, and where these do not serve, nothing is
+  // made of it
   bool dear = false;
-  bool may_step = false;               // points of some tiles may go through that step
+  std::vector<char> may_step = {};     // by tile: its points may go through that step; empty: none may
   std::vector<std::size_t> poor = {};  // they alone are to blame that cues of tiles are not promising
   FrameCost cost = {};                 // by the last calibration, but points
   TileChoice tiles = {};               // where they were tried

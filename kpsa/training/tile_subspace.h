@@ -35,8 +35,8 @@ inline constexpr double kFewBeyond = 0.005;
 // of them than (nearly) all of it.
 struct TilePromise {
   double most_of_half = 0, most_of_whole = 0;
-  bool may_step = false;  // points of some tiles may go through a last step instead
-  bool strict = false;    // also of few tiles
+  std::vector<char> may_step = {};  // by tile: its points may go through a last step instead; empty: none may
+  bool strict = false;              // also of few tiles
 };
 struct PromisingTiles {
   std::optional<TileChoice> choice;
@@ -48,8 +48,10 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
                                     std::vector<TileCandidates> candidates, const TileCueOptions& options,
                                     const TilePromise& promise);
 
-// The fewest tiles without which the others keep half the tolerance in all but a few poses; none where these are not few.
-std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance);
+// The fewest tiles without which the others keep half the tolerance in all but a few poses; none where these are not few,
+// or one of them may not step. may_step: of these tiles, every so manieth of the list.
+std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance,
+                                   std::span<const char> may_step, std::size_t every = 1);
 
 // What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
 // tile has the columns of `points`; options: the choice's, with the mean of these poses.

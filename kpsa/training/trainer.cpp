@@ -110,12 +110,26 @@ std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<con
   return of_meshes;
 }
 
-// steps: by which points may be mended, by mesh; or none. enough: ends with its cues where these are points that come out,
-// a frame is expected to cost more, and no cues of tiles would be tried; or with tiles that are to blame that no cues of
-// tiles serve. Without it there is a subspace.
+// Where a training may end without a subspace: with its cues, where these are points that come out, a frame is expected
+// to cost more than `enough`, and no cues of tiles serve; or with tiles of meshes with steps, which are to blame for that.
+struct Ends {
+  double enough = std::numeric_limits<double>::infinity();
+  const std::vector<Compiler::SplitPoints>* steps = nullptr;  // by mesh
+};
+std::vector<char> TilesWithSteps(const TrainingSetup& setup,
+                                 const std::vector<Compiler::SplitPoints>& steps) {
+  std::vector<char> tiles;
+  for (std::size_t m = 0; m < setup.totals.size(); ++m) {
+    const std::size_t count = (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints;
+    tiles.insert(tiles.end(), count, steps[m].step != nullptr);
+  }
+  return tiles;
+}
+
+// mends: last steps by which points may be mended, by mesh; or none. ends: null where there is to be a subspace.
 Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
-                          const TrainOptions& options, const std::vector<Compiler::SplitPoints>& steps = {},
-                          std::optional<double> enough = std::nullopt) {
+                          const TrainOptions& options, const std::vector<Compiler::SplitPoints>& mends = {},
+                          const Ends* ends = nullptr) {
   TrainingSetup setup(rig, clips, options);
   TrainingRecord record = RecordOf(clips, options);
   KPSA_RETURN_IF_ERROR(setup.Prepare());
@@ -140,9 +154,11 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
 
   const CueChoice& choice = candidates.cues.choice;
-  candidates.may_step = enough.has_value();
+  // Another training has to fit
+  if (ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed())
+    candidates.may_step = TilesWithSteps(setup, *ends->steps);
   candidates.dear =
-      enough && choice.cost > *enough && !MissMany(choice) &&
+      ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
       std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
 
   // Subspaces
@@ -181,14 +197,14 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&subspace));
 
   if (rig.some.empty())
-    return FinishTraining(steps, setup.limit, poses.pose_seconds, &setup, candidates, std::move(record),
+    return FinishTraining(mends, setup.limit, poses.pose_seconds, &setup, candidates, std::move(record),
                           std::move(subspace));
   TrainingRig all = rig;
   all.some.clear(), all.every = 1;
   WholeSubspace whole(all, options, candidates);
   Result<Subspace> of_all = whole.Make(ranges, calibrator.size);
   if (!of_all.ok()) return of_all.status();
-  return FinishTraining(steps, setup.limit, poses.pose_seconds, whole.setup(), whole.candidates(),
+  return FinishTraining(mends, setup.limit, poses.pose_seconds, whole.setup(), whole.candidates(),
                         std::move(record), std::move(*of_all));
 }
 
@@ -225,6 +241,7 @@ TrainingRig OfTiles(TrainingRig split, std::vector<std::vector<Index>> tiles) {
   for (std::size_t m = 0; m < split.split.size() && m < tiles.size(); ++m) {
     Compiler::SplitPoints& of = split.split[m];
     if (tiles[m].empty()) of = {};
+    if (of.step == nullptr) tiles[m].clear();
     if (of.step != nullptr) of.step = MakePartialStep(of.step, tiles[m]);
   }
   tiles.resize(split.split.size());
@@ -257,6 +274,18 @@ Result<std::optional<TrainingRig>> RigOfSome(const TrainingRig& rig, const Train
   return SomePointsOf(rig, options.many_points, options.some_points);
 }
 
+// Whether there are tiles, all of them of meshes with steps.
+bool HasTiles(const TrainingRig& split, const std::vector<std::vector<Index>>& tiles) {
+  bool any = false;
+  for (std::size_t m = 0; m < tiles.size(); ++m) {
+    if (tiles[m].empty()) continue;
+    const LastStep* const step = m < split.split.size() ? split.step(m) : nullptr;
+    if (step == nullptr || PointsOfTiles({&tiles[m].back(), 1}, step->points()).empty()) return false;
+    any = true;
+  }
+  return any;
+}
+
 std::size_t PointsOf(const TrainingRig& some) {
   std::size_t points = 0;
   for (const std::vector<Index>& of_mesh : some.some) points += of_mesh.size();
@@ -279,6 +308,7 @@ std::vector<std::vector<Index>> TilesOfAll(const std::vector<std::vector<Index>>
 // less.
 Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                           const TrainOptions& options) {
+  const TimeLimit limit(options.seconds);
   const Result<std::optional<TrainingRig>> of_some = RigOfSome(rig, options);
   if (!of_some.ok()) return of_some.status();
   Result<std::optional<TrainingRig>> split = std::optional<TrainingRig>();
@@ -290,47 +320,55 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   if (of_some->has_value()) {
     TrainOptions choosing = options;  // what is learnt changes all tiles
     choosing.by_tile_as_before = false, choosing.seconds *= kToChoose;
-    const bool may_step =
-        mended && PointsOf(**of_some) * (*of_some)->every <= kMostStepped * options.many_points;
-    Result<Trained> chosen =
-        TrainOnce(**of_some, clips, choosing, mends,
-                  may_step ? std::optional(std::numeric_limits<double>::infinity()) : std::nullopt);
+    if (!split->has_value() || options.inner != TrainOptions::Inner::kIfCheaper ||
+        PointsOf(**of_some) * (*of_some)->every > kMostStepped * options.many_points)
+      return TrainOnce(**of_some, clips, choosing, mends);
+    const Ends ends{.steps = &(*split)->split};
+    Result<Trained> chosen = TrainOnce(**of_some, clips, choosing, mends, &ends);
     if (!chosen.ok() || chosen->poor.empty()) return chosen;
     TrainOptions rest = options;
-    rest.seconds -= chosen->seconds;
+    rest.seconds = limit.left();
     Result<Trained> stepped = TrainOnce(OfTiles(**split, TilesOfAll(chosen->poor, **of_some)), clips, rest);
     if (!stepped.ok() && stepped.status().kind() == ErrorKind::kInterrupted) return stepped;
-    if (stepped.ok() && stepped->ns < kWorthStepping * stepped->full_ns) {
+    if (stepped.ok() && stepped->ns < kWorthStepping * stepped->full_ns &&
+        stepped->ns < kCheaperInner * chosen->ns) {
       NameTried(&*stepped, kBeforeLastStepOfSome);
+      AddTried(*chosen, &*stepped);
       return stepped;
     }
+    choosing.seconds = limit.left();
     return TrainOnce(**of_some, clips, choosing, mends);
   }
   if (!split->has_value()) return TrainOnce(rig, clips, options);
   if (options.inner == TrainOptions::Inner::kNever) return TrainOnce(rig, clips, options, mends);
   if (options.inner == TrainOptions::Inner::kAlways) {
-    const bool some = std::ranges::any_of(options.stepped, [](const auto& tiles) { return !tiles.empty(); });
-    return TrainOnce(some ? OfTiles(**split, options.stepped) : **split, clips, options);
+    return TrainOnce(HasTiles(**split, options.stepped) ? OfTiles(**split, options.stepped) : **split, clips,
+                     options);
   }
   double steps = 0;
   for (std::size_t m = 0; m < (*split)->split.size(); ++m)
     steps += (*split)->step(m) == nullptr ? 0 : static_cast<double>((*split)->step(m)->cost_ns());
   const double enough = kWorthSplitting * steps;
-  Result<Trained> whole = TrainOnce(rig, clips, options, mends, enough);
+  const Ends ends{enough, &(*split)->split};
+  Result<Trained> whole = TrainOnce(rig, clips, options, mends, &ends);
   if (!whole.ok() || (!whole->ended && whole->ns < enough)) return whole;
   if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
   TrainOptions rest = options;
-  rest.seconds -= whole->seconds;
+  rest.seconds = limit.left();
   std::optional<Trained> some;
   if (!whole->poor.empty()) {
     Result<Trained> made = TrainOnce(OfTiles(**split, whole->poor), clips, rest);
     if (!made.ok() && made.status().kind() == ErrorKind::kInterrupted) return made;
     if (made.ok()) {
       NameTried(&*made, kBeforeLastStepOfSome);
-      if (made->ns < enough) return made;  // the steps of all tiles cost half of that by themselves
-      rest.seconds -= made->seconds;
+      // The steps of all tiles cost half of that by themselves
+      if (made->ns < enough && made->ns < kCheaperInner * whole->ns) {
+        AddTried(*whole, &*made);
+        return made;
+      }
       some = std::move(*made);
     }
+    rest.seconds = limit.left();
   }
   Result<Trained> inner = TrainOnce(**split, clips, rest);
   if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
@@ -343,7 +381,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     AddTried(*some, &*inner);
   }
   if (whole->ended && !(inner.ok() && inner->ns < kCheaperInner * whole->ns)) {
-    if (inner.ok()) rest.seconds -= inner->seconds;
+    rest.seconds = limit.left();
     whole = TrainOnce(rig, clips, rest, mends);
     if (!whole.ok()) return whole;
   }

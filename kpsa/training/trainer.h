@@ -44,7 +44,7 @@ struct TrainOptions {
   // Inner points of last steps (graph/last_step.h) instead of what comes out of these: where that is expected to cost
   // less, or as a subspace has it that learns.
   enum class Inner : std::uint8_t { kIfCheaper, kNever, kAlways } inner = Inner::kIfCheaper;
-  // With kAlways: of these tiles alone, by mesh; empty, or of a mesh: of all.
+  // With kAlways: of these tiles alone, by mesh; without any, of all.
   std::vector<std::vector<Index>> stepped = {};
   // About how long training may take: fewer poses, no cues of tiles, and a shorter calibration, where
   // that is too short. Which poses fit depends on the machine; with time enough, the subspace is that without

@@ -9,6 +9,7 @@
 
 #include "kpsa/training_record.h"
 #include "tests/cli/hello_folder.h"
+#include "tests/cli/process.h"
 #include "tests/cli/rig_run.h"
 
 namespace kpsa::engine {
@@ -141,6 +142,11 @@ TEST_P(InnerPoints, AreInTheFile) {
     before.Pose(pose), after.Pose(pose);
     EXPECT_TRUE(SameBytes(before.Evaluate().points, after.Evaluate().points));
   }
+  const ProcessResult inspected = RunKpsa({"inspect", path});
+  EXPECT_NE(inspected.out.find(GetParam().empty() ? "points before the last step"
+                                                  : "points, and of 2 tiles those before the last step"),
+            std::string::npos)
+      << inspected.out << inspected.err;
   Subspace fewer = *trained_;
   fewer.outputs[0].inner = fewer.outputs[0].points - 1;
   EXPECT_FALSE(ValidateSubspace(fewer).ok());

@@ -153,9 +153,14 @@ TEST(TileCues, SayWhichTilesAreToBlame) {
   EXPECT_EQ(WorstTiles(errors, 1, 0.11), (std::vector<std::size_t>{4}));
   EXPECT_EQ(WorstTiles(errors, 1, 0.01), (std::vector<std::size_t>{1, 4}));
   EXPECT_EQ(WorstTiles(errors, 1, 0), (std::vector<std::size_t>{0, 1, 4}));
-  EXPECT_EQ(PoorTiles(errors, 2), std::vector<std::size_t>()) << "half of them are not few";
+  const std::vector<std::size_t> none;
+  std::vector<char> may(6, 1);
+  EXPECT_EQ(PoorTiles(errors, 2, may), none) << "half of them are not few";
   errors(99, 0) = 0;
-  EXPECT_EQ(PoorTiles(errors, 2), (std::vector<std::size_t>{1, 4})) << "beyond half of it";
+  EXPECT_EQ(PoorTiles(errors, 2, may), (std::vector<std::size_t>{1, 4})) << "beyond half of it";
+  may[4] = 0;
+  EXPECT_EQ(PoorTiles(errors, 2, may), none) << "no step would help that one";
+  EXPECT_EQ(PoorTiles(errors, 2, {}), none);
 }
 
 // The run time's way, against y, the stored joint and the points in its space, one by one.
