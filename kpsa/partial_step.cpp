@@ -1,7 +1,6 @@
 #include "kpsa/partial_step.h"
 
 #include <algorithm>
-#include <cstring>
 #include <iterator>
 #include <mutex>
 #include <utility>
@@ -49,13 +48,7 @@ class PartialBound final : public LastStep::Bound {
                             : FloatsOf(inner_points_) + FloatsOf(places_.size()) + step_->scratch_floats();
   }
   void Run(ConstPointsView inner, PointsView out, std::span<float> scratch) const noexcept override {
-    if (out_.is_all()) {
-      std::memcpy(out.x, inner.x, out.count * sizeof(float));
-      std::memcpy(out.y, inner.y, out.count * sizeof(float));
-      std::memcpy(out.z, inner.z, out.count * sizeof(float));
-    } else {
-      for (Index i = 0; i < out_.size(); ++i) CopyPoint(inner, out_[i], out, i);
-    }
+    for (Index i = 0; i < out_.size(); ++i) CopyPoint(inner, out_[i], out, i);
     if (step_ == nullptr) return;
     const PointsView own = ViewOf(scratch, inner_points_);
     scratch = scratch.subspan(FloatsOf(inner_points_));

@@ -170,6 +170,22 @@ TEST_P(InnerPoints, OfOtherTilesAreRefused) {
 INSTANTIATE_TEST_SUITE_P(Of, InnerPoints, ::testing::Values(std::vector<Index>(), std::vector<Index>{2, 3}),
                          [](const auto& of) { return of.param.empty() ? "AllTiles" : "SomeTiles"; });
 
+// Of some smooth poses, those that hit: more than five, within a tolerance and a half.
+void ExpectHitsNear(const HelloFolder& folder, const std::shared_ptr<const Subspace>& trained,
+                    double tolerance) {
+  RigRun full(folder.rig()), run(folder.rig(), {.subspace = trained});
+  ASSERT_TRUE(run.ok()) << run.error;
+  std::size_t hits = 0;
+  for (const auto& pose : SmoothPoses(run.rig, 20, 0.7)) {
+    full.Pose(pose), run.Pose(pose);
+    const RunFrame frame = run.Evaluate();
+    if (!frame.hit) continue;
+    ++hits;
+    EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.5 * tolerance);
+  }
+  EXPECT_GT(hits, 5u);
+}
+
 // Points that are mixed with what comes in need both; borders and weights of 0 are what comes in.
 TEST(InnerPointsOfRigs, OfAMushWithAWeightMap) {
   const HelloFolder folder;
@@ -183,17 +199,7 @@ TEST(InnerPointsOfRigs, OfAMushWithAWeightMap) {
   const auto trained = TrainRig(folder.rig(), InnerTraining());
   ASSERT_NE(trained, nullptr);
   EXPECT_GT(trained->outputs[0].inner, trained->outputs[0].points);
-  RigRun full(folder.rig()), run(folder.rig(), {.subspace = trained});
-  ASSERT_TRUE(run.ok()) << run.error;
-  std::size_t hits = 0;
-  for (const auto& pose : SmoothPoses(run.rig, 20, 0.7)) {
-    full.Pose(pose), run.Pose(pose);
-    const RunFrame frame = run.Evaluate();
-    if (!frame.hit) continue;
-    ++hits;
-    EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.5 * kQuickTolerance);
-  }
-  EXPECT_GT(hits, 5u);
+  ExpectHitsNear(folder, trained, kQuickTolerance);
 }
 
 TEST(InnerPointsOfRigs, NotWhereAControlReachesTheStep) {
@@ -272,17 +278,7 @@ TEST(InnerPointsOfRigs, AreOfTheTilesThatNeedThem) {
     const SubspaceOutput& output = trained->outputs[0];
     stepped.push_back(output.stepped.size());
     EXPECT_LT(stepped.back(), (output.points + kTilePoints - 1) / kTilePoints);
-    RigRun full(folder.rig()), run(folder.rig(), {.subspace = trained});
-    ASSERT_TRUE(run.ok()) << run.error;
-    std::size_t hits = 0;
-    for (const auto& pose : SmoothPoses(run.rig, 20, 0.7)) {
-      full.Pose(pose), run.Pose(pose);
-      const RunFrame frame = run.Evaluate();
-      if (!frame.hit) continue;
-      ++hits;
-      EXPECT_LE(LargestDistance(frame.points, full.Evaluate().points), 1.5 * tolerance);
-    }
-    EXPECT_GT(hits, 5u);
+    ExpectHitsNear(folder, trained, tolerance);
   }
   EXPECT_GT(stepped[0], stepped[1]);
   EXPECT_GT(stepped[1], 0u);

@@ -87,15 +87,19 @@ std::vector<float> RunFor(const LastStep& step, const PointSet& out, ConstPoints
   return made.Interleaved();
 }
 
-class PartialStep : public ::testing::TestWithParam<std::vector<Index>> {};
+class PartialStep : public ::testing::TestWithParam<std::vector<Index>> {
+ protected:
+  PartialStep() {
+    const PointBuffer in = RandomRing(kRingPoints);
+    ring->Inner(in.view(), inner.view());
+    partial->Inner(in.view(), some.view());
+  }
+  const std::shared_ptr<const LastStep> ring = std::make_shared<RingStep>(),
+                                        partial = MakePartialStep(ring, GetParam());
+  PointBuffer inner{ring->inner_points()}, some{partial->inner_points()};
+};
 
 TEST_P(PartialStep, GivesWhatTheStepGives) {
-  const auto ring = std::make_shared<RingStep>();
-  const auto partial = MakePartialStep(ring, GetParam());
-  const PointBuffer in = RandomRing(kRingPoints);
-  PointBuffer inner(ring->inner_points()), some(partial->inner_points());
-  ring->Inner(in.view(), inner.view());
-  partial->Inner(in.view(), some.view());
   std::vector<Index> all(kRingPoints);
   std::iota(all.begin(), all.end(), 0u);
   for (const std::vector<Index>& points : {all, {0}, {127, 128}, {5, 100, 200, 255, 256, 299}}) {
@@ -106,12 +110,6 @@ TEST_P(PartialStep, GivesWhatTheStepGives) {
 }
 
 TEST_P(PartialStep, HasPointsThenInnerPointsOfItsTiles) {
-  const auto ring = std::make_shared<RingStep>();
-  const auto partial = MakePartialStep(ring, GetParam());
-  const PointBuffer in = RandomRing(kRingPoints);
-  PointBuffer inner(ring->inner_points()), some(partial->inner_points());
-  ring->Inner(in.view(), inner.view());
-  partial->Inner(in.view(), some.view());
   PointBuffer out(kRingPoints);
   ring->Bind(PointSet::All(kRingPoints))
       ->Run(std::as_const(inner).view(), out.view(), AlignedFloats(16).span());
