@@ -1,0 +1,185 @@
+#include "kpsa/training/one_training.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "kpsa/training/finer_subspaces.h"
+#include "kpsa/training/mend_tiles.h"
+#include "kpsa/training/whole_subspace.h"
+
+namespace kpsa::engine {
+namespace {
+
+constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
+
+// What was asked for.
+TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
+  TrainingRecord record;
+  record.seed = options.seed;
+  record.mode = options.mode == EstimatorMode::kMap ? "map" : "paper";
+  record.asked = {options.samples,
+                  options.calibration_poses,
+                  options.rows,
+                  static_cast<std::size_t>(options.max_modes),
+                  options.mode == EstimatorMode::kPaper ? options.key_points : options.min_points,
+                  options.may_have_cues_by_tile};
+  for (const TrainingClip& clip : clips) {
+    if (clip.learnt) record.learnt.emplace_back(clip.name, clip.times);
+    if (!clip.learnt) record.clips.push_back(clip.name);
+  }
+  record.learnt_poses = options.learnt_poses;
+  return record;
+}
+
+// Of all poses as they were recorded.
+Status FindRanges(TrainingSetup* setup, const TrainingPoses& poses, RangeFinder* ranges) {
+  *ranges = RangeFinder(setup->layout);
+  ranges->Widen(poses.poses);
+  if (poses.spare) ranges->Widen(*poses.spare);
+  for (const PoseMatrix& learnt : poses.learnt) ranges->Widen(learnt);
+  return setup->of_light() ? Status() : ranges->Widen(setup->clips, setup->recorder.get());
+}
+
+// Which rig it was trained on.
+void Sign(const TrainingSetup& setup, Subspace* subspace) {
+  const TrainingRig& rig = setup.rig;
+  subspace->rig.signature =
+      RigSignature(*rig.graph, rig.target.outputs(), rig.target.space, rig.target.controls);
+  subspace->rig_hash = SignatureDigest(subspace->rig.signature);
+  std::vector<std::string>& controls = subspace->rig.controls;
+  for (const PlugRef& control : rig.target.controls) controls.push_back(rig.graph->PlugName(control));
+  for (std::size_t c = setup.drawn.size(); c < rig.controls.size(); ++c)
+    controls.push_back(rig.graph->PlugName(rig.controls[c].plug));
+}
+
+// Mends what is farthest off, signs, and says what a frame costs. steps: as TrainOnce has them; pose_seconds: that a
+// training pose took.
+Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, const TimeLimit& limit,
+                               double pose_seconds, TrainingSetup* setup,
+                               const SubspaceCandidates& candidates, TrainingRecord record,
+                               Subspace subspace) {
+  if (!steps.empty() && limit.left() > 2 * pose_seconds * static_cast<double>(kMendPoses)) {
+    // Where a step is not as exact as a small tolerance asks, nothing is mended
+    Status mended = MendTiles(setup, steps, candidates.cues.set, &subspace);
+    if (mended.kind() == ErrorKind::kInterrupted) return mended;
+  }
+  KPSA_RETURN_IF_ERROR(setup->rig.set_clip(std::nullopt));
+  Sign(*setup, &subspace);
+  record.limited = limit.left_out();
+  const Result<double> points = setup->CostOfPoints(candidates.cues.set.cues);
+  if (!points.ok()) return points.status();
+  const double ns = *points + setup->CostOfSteps() + candidates.cost.ns;
+  return Trained{std::move(subspace), std::move(record), ns, setup->full_cost, limit.elapsed(), false};
+}
+
+// Tiles of all meshes, by mesh.
+std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<const std::size_t> tiles) {
+  std::vector<std::vector<Index>> of_meshes;
+  std::size_t first = 0;
+  for (std::size_t m = 0; m < setup.totals.size(); ++m) {
+    const std::size_t count = (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints;
+    std::vector<Index>& own = of_meshes.emplace_back();
+    for (const std::size_t tile : tiles) {
+      if (tile >= first && tile < first + count) own.push_back(static_cast<Index>(tile - first));
+    }
+    first += count;
+  }
+  return of_meshes;
+}
+
+// By tile of all meshes: whether these have a step.
+std::vector<char> TilesWithSteps(const TrainingSetup& setup,
+                                 const std::vector<Compiler::SplitPoints>& steps) {
+  std::vector<char> tiles;
+  for (std::size_t m = 0; m < setup.totals.size(); ++m) {
+    const std::size_t count = (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints;
+    tiles.insert(tiles.end(), count, steps[m].step != nullptr);
+  }
+  return tiles;
+}
+
+}  // namespace
+
+Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
+                          const TrainOptions& options, const std::vector<Compiler::SplitPoints>& mends,
+                          const Ends* ends) {
+  TrainingSetup setup(rig, clips, options);
+  TrainingRecord record = RecordOf(clips, options);
+  KPSA_RETURN_IF_ERROR(setup.Prepare());
+
+  // Poses
+  TrainingPoses poses(setup.layout);
+  KPSA_RETURN_IF_ERROR(RecordPoses(&setup, &poses, &record));
+  FitPoses(&setup, &poses, &record);
+  KPSA_RETURN_IF_ERROR(setup.Say("modes", 0.45));
+  poses.clip_poses = record.clip_poses;
+  if (!setup.of_light()) poses.spare = SpareForModes(&poses.poses, &poses.clip_poses);
+  const double before_modes = setup.limit.elapsed();
+  if (setup.layout.products > 0) ChooseProducts(&setup, &poses);
+  RangeFinder ranges(setup.layout);
+  KPSA_RETURN_IF_ERROR(FindRanges(&setup, poses, &ranges));
+  if (setup.of_light() && setup.of_map()) poses.judges = poses.poses.TakeEvery(kJudgeOfLight);
+
+  // Modes and cues
+  TrainingModes modes;
+  KPSA_RETURN_IF_ERROR(FindModes(setup, &poses, &modes, &record));
+  SubspaceCandidates candidates{&setup, &poses, &modes, &record, setup.limit.elapsed() - before_modes};
+  KPSA_RETURN_IF_ERROR(ChooseTrainingCues(options.tolerance, poses, &setup, &modes, &candidates.cues));
+
+  const CueChoice& choice = candidates.cues.choice;
+  // Another training has to fit
+  if (ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed())
+    candidates.may_step = TilesWithSteps(setup, *ends->steps);
+  candidates.dear =
+      ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
+      std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });
+
+  // Subspaces
+  KPSA_RETURN_IF_ERROR(setup.Say("subspace", 0.85));
+  const bool of_points = !setup.of_light() && setup.of_map();
+  if (of_points && !options.without.patches && rig.split.empty() && rig.some.empty()) {
+    KPSA_RETURN_IF_ERROR(setup.rig.set_clip(std::nullopt));
+    Result<PatchLayout> patches = PricePatches(setup.rig, &setup.compiler, setup.totals, modes.positions);
+    if (!patches.ok()) return patches.status();
+    candidates.patches = std::move(*patches);
+  }
+  Result<std::optional<Subspace>> best = candidates.Best();
+  if (!best.ok()) return best.status();
+  if (!*best) {
+    if (candidates.by_tiles_alone()) return Status::Invalid("no cues of tiles serve");
+    record.tried.push_back({kForAllPoints, choice.cues.size(),
+                            static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
+                            choice.cost / setup.full_cost, false});
+    return Trained{
+        {},
+        std::move(record),
+        choice.cost,
+        setup.full_cost,
+        setup.limit.elapsed(),
+        true,
+        candidates.poor.empty() ? std::vector<std::vector<Index>>() : ByMesh(setup, candidates.poor)};
+  }
+  Subspace subspace = std::move(**best);
+  KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
+  const CandidateCalibrator calibrator{&candidates, ranges,
+                                       CalibrationWithin(poses.pose_seconds, options, &setup.limit)};
+  KPSA_RETURN_IF_ERROR(calibrator.Calibrate(&subspace));
+  const FrameCost& cost = candidates.cost;
+  if (of_points && !options.without.miss_costs && calibrator.size.margins && candidates.IsWorthTrying(cost) &&
+      (!candidates.fine || cost.lost() > kTooManyMisses) && setup.limit.left() > candidates.modes_seconds)
+    KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&subspace));
+
+  if (rig.some.empty())
+    return FinishTraining(mends, setup.limit, poses.pose_seconds, &setup, candidates, std::move(record),
+                          std::move(subspace));
+  TrainingRig all = rig;
+  all.some.clear(), all.every = 1;
+  WholeSubspace whole(all, options, candidates);
+  Result<Subspace> of_all = whole.Make(ranges, calibrator.size);
+  if (!of_all.ok()) return of_all.status();
+  return FinishTraining(mends, setup.limit, poses.pose_seconds, whole.setup(), whole.candidates(),
+                        std::move(record), std::move(*of_all));
+}
+
+}  // namespace kpsa::engine

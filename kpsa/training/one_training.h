@@ -1,0 +1,39 @@
+// One training from start to end: of what comes out of the stack, of inner points, or of some of many points. What of
+// these serves best the trainer chooses (kpsa/training/trainer.cpp). Internal to training.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "graph/compiler.h"
+#include "kpsa/subspace.h"
+#include "kpsa/training/trainer.h"
+#include "kpsa/training_record.h"
+
+namespace kpsa::engine {
+
+struct Trained {
+  Subspace subspace;
+  TrainingRecord record;
+  double ns = 0;       // what a frame is expected to cost, on the scale of the nodes' costs,
+  double full_ns = 0;  // and the whole evaluation
+  double seconds = 0;  // that it took
+  bool ended = false;  // as Ends allows: there is no subspace
+  // With the tiles, by mesh, that are to blame: a last step should be of them alone. Empty: with its cues.
+  std::vector<std::vector<Index>> poor = {};
+};
+
+// Where a training may end without a subspace: with its cues, where these are points that come out, a frame is expected
+// to cost more than `enough`, and no cues of tiles serve; or with tiles of meshes with steps, which are to blame for that.
+struct Ends {
+  double enough = std::numeric_limits<double>::infinity();
+  const std::vector<Compiler::SplitPoints>* steps = nullptr;  // by mesh
+};
+
+// mends: last steps by which points may be mended, by mesh; or none. ends: null where there is to be a subspace. Errors:
+// as Train; where the rig has steps of some tiles, also that no cues of tiles serve.
+Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
+                          const TrainOptions& options, const std::vector<Compiler::SplitPoints>& mends = {},
+                          const Ends* ends = nullptr);
+
+}  // namespace kpsa::engine
