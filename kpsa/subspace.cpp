@@ -158,9 +158,9 @@ Status ValidateSubspace(const Subspace& s) {
                              std::ranges::adjacent_find(stepped, std::greater_equal()) != stepped.end() ||
                              stepped.back() >= (s.outputs[i].points + kTilePoints - 1) / kTilePoints)) {
       return Status::Invalid(
-          "output \"{}\" of {} points and {} inner ones has a last step of tiles up to {}, or they do not "
-          "count up",
-          s.outputs[i].name, s.outputs[i].points, s.outputs[i].inner, stepped.back());
+          "output \"{}\": the tiles that a last step is of should count up and be below {}, and there should "
+          "be inner points",
+          s.outputs[i].name, (s.outputs[i].points + kTilePoints - 1) / kTilePoints);
     }
     if (s.tiles[i].points() != s.outputs[i].reconstructed() || s.tiles[i].inputs() != s.tile_inputs() ||
         s.tiles[i].data().components != s.components) {
