@@ -272,8 +272,11 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
     taken = tried.size() - 1;
     least = std::min(least, ns);
   }
-  std::vector<double> expected;
-  for (const Guarded& one : tried) expected.push_back(one.chosen.cost.misses);
+  std::vector<ExpectedOfMargins> expected;
+  for (const Guarded& one : tried) {
+    const double ns = one.chosen.cost.ns + one.outside;
+    expected.push_back({one.chosen.cost.misses, of.full_cost > 0 ? ns / of.full_cost : 0});
+  }
   std::vector<Calibrated> calibrated(tried.size());
   const auto calibrate = [&](std::size_t i) -> Result<double> {
     JudgedSet own = calibrating;

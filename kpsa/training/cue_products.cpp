@@ -1,10 +1,12 @@
 #include "kpsa/training/cue_products.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "base/check.h"
+#include "base/parallel.h"
 #include "kpsa/training/eigen_solvers.h"
 #include "kpsa/training/gemm.h"
 #include "kpsa/training/greedy_columns.h"
@@ -17,6 +19,7 @@ constexpr std::size_t kEnoughPoses = 1000;  // fewer fit some of the thousands o
 constexpr std::size_t kChoosingPoses = 2400, kChoosingPoints = 400;  // that choose
 constexpr std::size_t kMostRegressors = 2;    // a pose: with more of them a regression leaves nothing
 constexpr Eigen::Index kLeftDirections = 64;  // of what is left of the points
+constexpr std::size_t kSolvedAtOnce = 64;     // columns
 constexpr double kRegressorRidge = 1e-7;      // of the mean variance
 constexpr double kTwins = 1 - 1e-8;           // correlation of scalars that are one
 constexpr double kKnots[] = {0.2, 0.35, 0.5, 0.65, 0.8};  // of a range
@@ -35,7 +38,16 @@ Eigen::MatrixXd LeftBy(const Eigen::MatrixXd& y, const Eigen::MatrixXd& x) {
   if (x.rows() == 0) return y;
   Eigen::MatrixXd gram = GramOf(x);
   gram.diagonal().array() += kRegressorRidge * gram.trace() / static_cast<double>(gram.rows());
-  const Eigen::MatrixXd map = gram.llt().solve(CrossOf(x, y));
+  Eigen::MatrixXd map = CrossOf(x, y);
+  const Eigen::LLT<Eigen::MatrixXd> factored(gram);
+  ParallelFor((static_cast<std::size_t>(map.cols()) + kSolvedAtOnce - 1) / kSolvedAtOnce, 1,
+              [&](std::size_t begin, std::size_t end) {
+                for (std::size_t part = begin; part < end; ++part) {
+                  const auto first = static_cast<Eigen::Index>(part * kSolvedAtOnce);
+                  factored.solveInPlace(
+                      map.middleCols(first, std::min<Eigen::Index>(kSolvedAtOnce, map.cols() - first)));
+                }
+              });
   return y - Multiply(GemmOperand::Dense(map).Transposed(), GemmOperand::Dense(x));
 }
 

@@ -171,6 +171,7 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
   PointSurvey survey;
   survey.largest.resize(points);
   survey.beyond.resize(points);
+  Eigen::MatrixXd reached;
   for (std::size_t first = 0; first < poses.poses(); first += chunk * stride) {
     std::vector<std::size_t> chosen;
     for (std::size_t t = first; t < poses.poses() && chosen.size() < chunk; t += stride) chosen.push_back(t);
@@ -178,7 +179,7 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       y.col(static_cast<Eigen::Index>(k)) = MeasuredCues(pca.layout, cues, poses.row(chosen[k]));
     }
-    const Eigen::MatrixXd reached = Multiply(a, Multiply(estimator.coordinates, y));
+    Multiply(GemmOperand::Dense(a), GemmOperand::Dense(Multiply(estimator.coordinates, y)), &reached);
     std::vector<std::atomic<double>> worst(chosen.size());
     ParallelFor(points, 512, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = 0; k < chosen.size(); ++k) {

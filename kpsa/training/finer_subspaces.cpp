@@ -68,6 +68,7 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   if (of.by_tile &&
       of.others_ns < trials.least_ns()) {  // calibration misses more than the judges of both did
     for_all_points(), may_be_for_all = false;
+    if (of.others.tiles.empty()) of.others = of.ForAllPoints(true);
     KPSA_RETURN_IF_ERROR(calibrated(kFinelyStored, std::move(of.others)));
   }
   if (!of.fine && of.IsWorthTrying(trials.least())) KPSA_RETURN_IF_ERROR(again(fine));

@@ -67,6 +67,10 @@ ScoreCosts CostsOfScore(const Subspace& subspace, double full) {
   return {kScoreCost * rows * rows / full, kDoubtCost * tiles / full};
 }
 
+double CostOfReading(std::size_t rows, double bytes) {
+  return kRowCost * static_cast<double>(rows) + kByteCost * bytes;
+}
+
 ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, double full) {
   if (subspace.soft_cache.factor.size() == 0) return DoubtAlone(judges);
   return ChooseScore(judges, subspace.tolerance, subspace.violation_rate, subspace.blend_start,
@@ -128,7 +132,7 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
   cost.misses /= all, cost.wrong /= all;
   for (const TileMap& tiles : subspace.tiles) bytes += static_cast<double>(tiles.bytes());
   const ScoreCosts score = CostsOfScore(subspace, full);
-  cost.ns = points + kRowCost * static_cast<double>(subspace.rows()) + kByteCost * bytes +
+  cost.ns = points + CostOfReading(subspace.rows(), bytes) +
             ((subspace.score.measured > 0 ? score.measured : 0) +
              (subspace.score.doubt > 0 ? score.doubt : 0) + cost.lost()) *
                 full;

@@ -21,6 +21,8 @@ void AskGuards(std::span<const TrainedRange> ranges, const std::vector<char>& gu
 
 // full: what the whole evaluation costs (ns, on the scale of the nodes' costs); 0: unknown.
 ScoreCosts CostsOfScore(const Subspace& subspace, double full);
+// What cues and tiles take of a frame: rows that are measured, bytes of tiles that are read (ns, on that scale).
+double CostOfReading(std::size_t rows, double bytes);
 // How a subspace is judged best: by what its tiles doubt alone where it has no score of its own.
 ScoreMix ScoreOf(const Subspace& subspace, std::span<const ScoreJudge> judges, double full);
 

@@ -89,64 +89,89 @@ HWY_EXPORT(PackedProduct);
 namespace {
 
 constexpr std::size_t kTile = 384;   // rows and columns of C that one task computes: a multiple of 16 and 12
-constexpr std::size_t kDepth = 192;  // columns of A packed at a time; both packed tiles stay in the L2 cache
+constexpr std::size_t kDepth = 128;  // columns of A packed at a time; a panel of them stays in the L1 cache
+// Where C has fewer tiles than this, its depth is split into so many parts at most, of so many columns at least
+constexpr std::size_t kFewTiles = 4, kMostParts = 8, kPartDepth = 8 * kDepth;
 
-// Zeros at a 64-byte boundary: vectors that straddle cache lines cost a third of the speed.
+// At a 64-byte boundary: vectors that straddle cache lines cost a third of the speed.
 class AlignedDoubles {
  public:
-  explicit AlignedDoubles(std::size_t size) : floats_(2 * size) {}
+  explicit AlignedDoubles(std::size_t size) : floats_(AlignedFloats::Uninitialized(2 * size)) {}
   double* data() { return reinterpret_cast<double*>(floats_.data()); }
 
  private:
   AlignedFloats floats_;
 };
 
-// One tile of C, accumulated over the whole depth in a fixed order.
-void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, std::size_t row, std::size_t column,
-                 Eigen::MatrixXd* c) {
-  const std::size_t height = std::min(kTile, a.rows() - row),
-                    width = std::min(kTile, b_transposed.rows() - column);
+// What tiles are computed in, one after the other.
+struct Workspace {
+  AlignedDoubles a{kTile * kDepth}, b{kTile * kDepth}, tile{kTile * kTile};
+};
+
+// A tile of C and what columns of A it is summed over.
+struct Task {
+  std::size_t row, column, begin, end;
+};
+
+// One tile of C, accumulated over the columns of A in a fixed order.
+void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, const Task& task,
+                 Workspace* workspace, Eigen::MatrixXd* c) {
+  const std::size_t height = std::min(kTile, a.rows() - task.row),
+                    width = std::min(kTile, b_transposed.rows() - task.column);
   const std::size_t row_panels = (height + kRowStep - 1) / kRowStep;
   const std::size_t column_panels = (width + kColumnStep - 1) / kColumnStep;
-  AlignedDoubles packed_a(row_panels * kRowStep * kDepth), packed_b(column_panels * kColumnStep * kDepth);
-  AlignedDoubles tile(row_panels * kRowStep * column_panels * kColumnStep);
-  for (std::size_t k = 0; k < a.columns(); k += kDepth) {
+  double* const tile = workspace->tile.data();
+  std::fill_n(tile, row_panels * kRowStep * column_panels * kColumnStep, 0.0);
+  for (std::size_t k = task.begin; k < task.end; k += kDepth) {
     ThrowIfCancelled();
-    const std::size_t depth = std::min(kDepth, a.columns() - k);
-    a.Pack(row, height, k, depth, kRowStep, packed_a.data());
-    b_transposed.Pack(column, width, k, depth, kColumnStep, packed_b.data());
+    const std::size_t depth = std::min(kDepth, task.end - k);
+    a.Pack(task.row, height, k, depth, kRowStep, workspace->a.data());
+    b_transposed.Pack(task.column, width, k, depth, kColumnStep, workspace->b.data());
     HWY_DYNAMIC_DISPATCH(PackedProduct)
-    (packed_a.data(), packed_b.data(), depth, row_panels, column_panels, tile.data(), row_panels * kRowStep);
+    (workspace->a.data(), workspace->b.data(), depth, row_panels, column_panels, tile, row_panels * kRowStep);
   }
   for (std::size_t j = 0; j < width; ++j) {
-    std::copy_n(tile.data() + j * row_panels * kRowStep, height,
-                c->data() + (column + j) * static_cast<std::size_t>(c->rows()) + row);
+    std::copy_n(tile + j * row_panels * kRowStep, height,
+                c->data() + (task.column + j) * static_cast<std::size_t>(c->rows()) + task.row);
   }
 }
 
-Eigen::MatrixXd Product(const GemmOperand& a, const GemmOperand& b_transposed, bool symmetric) {
+// How many parts a depth is split into; by the shape alone, so that the bits do not depend on the threads.
+std::size_t PartsOf(std::size_t tiles, std::size_t depth) {
+  return tiles >= kFewTiles ? 1 : std::clamp<std::size_t>(depth / kPartDepth, 1, kMostParts);
+}
+
+void Product(const GemmOperand& a, const GemmOperand& b_transposed, bool symmetric, Eigen::MatrixXd* c) {
   KPSA_CHECK_EQ(a.columns(), b_transposed.columns());
-  const std::size_t m = a.rows(), n = b_transposed.rows();
-  Eigen::MatrixXd c(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
-  if (m == 0 || n == 0) return c;
-  if (a.columns() == 0) {
-    c.setZero();
-    return c;
+  const std::size_t m = a.rows(), n = b_transposed.rows(), depth = a.columns();
+  c->resize(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
+  if (m == 0 || n == 0) return;
+  if (depth == 0) {
+    c->setZero();
+    return;
   }
-  std::vector<std::pair<std::size_t, std::size_t>> tiles;
+  std::vector<Task> tiles;
   for (std::size_t j = 0; j < n; j += kTile) {
-    for (std::size_t i = symmetric ? j : 0; i < m; i += kTile) tiles.emplace_back(i, j);
+    for (std::size_t i = symmetric ? j : 0; i < m; i += kTile) tiles.push_back({i, j, 0, depth});
   }
-  ParallelFor(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t)
-      ComputeTile(a, b_transposed, tiles[t].first, tiles[t].second, &c);
+  const std::size_t parts = PartsOf(tiles.size(), depth);
+  std::vector<Eigen::MatrixXd> sums(parts - 1, Eigen::MatrixXd(parts > 1 ? c->rows() : 0, c->cols()));
+  ParallelFor(tiles.size() * parts, 1, [&](std::size_t begin, std::size_t end) {
+    Workspace workspace;
+    for (std::size_t t = begin; t < end; ++t) {
+      Task task = tiles[t / parts];
+      const std::size_t part = t % parts;
+      task.begin = depth * part / parts, task.end = depth * (part + 1) / parts;
+      ComputeTile(a, b_transposed, task, &workspace, part == 0 ? c : &sums[part - 1]);
+    }
   });
+  // Above the diagonal a symmetric one has nothing yet, or anything
+  for (const Eigen::MatrixXd& sum : sums) *c += sum;
   if (symmetric) {
-    for (Eigen::Index j = 0; j < c.cols(); ++j) {
-      for (Eigen::Index i = 0; i < j; ++i) c(i, j) = c(j, i);
+    for (Eigen::Index j = 0; j < c->cols(); ++j) {
+      for (Eigen::Index i = 0; i < j; ++i) (*c)(i, j) = (*c)(j, i);
     }
   }
-  return c;
 }
 
 }  // namespace
@@ -173,7 +198,17 @@ GemmOperand GemmOperand::Poses(const PoseMatrix& poses, std::size_t first, std::
   return operand;
 }
 
+GemmOperand GemmOperand::SomePoints(const PoseMatrix& poses, std::size_t end, std::size_t every,
+                                    std::span<const double> column_scale) {
+  KPSA_CHECK(every > 0 && end % 3 == 0);
+  GemmOperand operand = Poses(poses, 0, poses.poses(), 0, end, column_scale);
+  operand.every_ = every;
+  operand.columns_ = (end / 3 + every - 1) / every * 3;
+  return operand;
+}
+
 GemmOperand GemmOperand::Transposed() const {
+  KPSA_CHECK_EQ(every_, 1u);
   GemmOperand operand = *this;
   operand.transposed_ = !transposed_;
   return operand;
@@ -195,11 +230,12 @@ void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, 
       }
     } else if (!transposed_) {
       const float* sources[kRowStep];
-      for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i] + column;
+      for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i];
       for (std::size_t k = 0; k < width; ++k) {
-        const double scale = scale_.empty() ? 1.0 : scale_[column + k];
+        const std::size_t at = every_ == 1 ? column + k : (column + k) / 3 * 3 * every_ + (column + k) % 3;
+        const double scale = scale_.empty() ? 1.0 : scale_[at];
         for (std::size_t i = 0; i < count; ++i)
-          target[k * step + i] = static_cast<double>(sources[i][k]) * scale;
+          target[k * step + i] = static_cast<double>(sources[i][at]) * scale;
       }
     } else {
       for (std::size_t k = 0; k < width; ++k) {
@@ -213,8 +249,14 @@ void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, 
   }
 }
 
+void Multiply(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd* product) {
+  Product(a, b.Transposed(), false, product);
+}
+
 Eigen::MatrixXd Multiply(const GemmOperand& a, const GemmOperand& b) {
-  return Product(a, b.Transposed(), false);
+  Eigen::MatrixXd product;
+  Multiply(a, b, &product);
+  return product;
 }
 
 Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
@@ -222,7 +264,11 @@ Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
   return Multiply(GemmOperand::Dense(a), GemmOperand::Dense(b));
 }
 
-Eigen::MatrixXd Gram(const GemmOperand& a) { return Product(a, a, true); }
+Eigen::MatrixXd Gram(const GemmOperand& a) {
+  Eigen::MatrixXd gram;
+  Product(a, a, true, &gram);
+  return gram;
+}
 
 }  // namespace kpsa::engine
 #endif  // HWY_ONCE

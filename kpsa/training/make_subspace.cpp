@@ -41,6 +41,24 @@ AlignedArray<float> PackFactor(const Eigen::MatrixXd& matrix, bool lower, std::s
   return factor;
 }
 
+// Of the values that tiles are a linear map of: y, or where the estimator has no gain, latent coordinates.
+TileInputs InputsOf(const Estimator& estimator, const Eigen::MatrixXd& training) {
+  TileInputs inputs;
+  inputs.covariance = estimator.covariance;
+  inputs.samples = SampledColumns(training);
+  if (estimator.gain.size() > 0) return inputs;
+  const Eigen::MatrixXd& q = estimator.coordinates;
+  inputs.covariance = q * estimator.covariance * q.transpose();
+  inputs.samples = (q * inputs.samples).eval();
+  return inputs;
+}
+
+// That map. [cN x r or M]
+Eigen::Ref<const Eigen::MatrixXd> MapOf(const Pca& pca, const Estimator& estimator) {
+  using Map = Eigen::Ref<const Eigen::MatrixXd>;
+  return estimator.gain.size() == 0 ? Map(pca.output_modes()) : Map(estimator.gain);
+}
+
 }  // namespace
 
 SoftCacheModel MakeSoftCacheModel(const Estimator& estimator, const CueSet& cues,
@@ -104,18 +122,11 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   s.cue_scale.assign(cues.scale.data(), cues.scale.data() + cues.scale.size());
   s.soft_cache = MakeSoftCacheModel(estimator, cues, training);
 
-  TileInputs inputs;
-  inputs.covariance = estimator.covariance;
-  inputs.samples = SampledColumns(training);
+  TileInputs inputs = InputsOf(estimator, training);
   const bool latent = estimator.gain.size() == 0;
-  using Map = Eigen::Ref<const Eigen::MatrixXd>;
-  const Map maps = latent ? Map(pca.output_modes()) : Map(estimator.gain);
-  if (latent) {
-    const Eigen::MatrixXd& q = estimator.coordinates;
-    for (Eigen::Index i = 0; i < q.size(); ++i) s.latent.push_back(static_cast<float>(q.data()[i]));
-    inputs.covariance = q * estimator.covariance * q.transpose();
-    inputs.samples = (q * inputs.samples).eval();
-  }
+  const Eigen::Ref<const Eigen::MatrixXd> maps = MapOf(pca, estimator);
+  for (Eigen::Index i = 0; latent && i < estimator.coordinates.size(); ++i)
+    s.latent.push_back(static_cast<float>(estimator.coordinates.data()[i]));
   Eigen::Index first = 0;
   for (const SubspaceOutput& output : s.outputs) {
     const auto height =
@@ -132,6 +143,36 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
   }
   KPSA_CHECK_EQ(first, maps.rows());
   return s;
+}
+
+double BytesOfTiles(const Pca& pca, const Estimator& estimator, const Eigen::MatrixXd& training,
+                    const std::vector<SubspaceOutput>& outputs, const TileOptions& options,
+                    const PoseMatrix* poses, std::size_t clip_poses, std::size_t every) {
+  const auto components = static_cast<std::size_t>(pca.layout.components), height = kTilePoints * components;
+  std::vector<Eigen::Index> rows;  // of whole tiles
+  std::size_t first = 0, tiles = 0;
+  for (const SubspaceOutput& output : outputs) {
+    const std::size_t end = first + output.reconstructed() * components;
+    for (std::size_t at = first; at < end; at += height, ++tiles) {
+      if (tiles % every != every / 2 || at + height > end) continue;
+      for (std::size_t row = at; row < at + height; ++row) rows.push_back(static_cast<Eigen::Index>(row));
+    }
+    first = end;
+  }
+  if (rows.empty()) return 0;
+  TileInputs inputs = InputsOf(estimator, training);
+  inputs.left_out = pca.row_residual(rows);
+  PoseMatrix of_rows({.points = rows.size() / components, .components = pca.layout.components});
+  if (poses != nullptr && estimator.gain.size() > 0) {
+    for (std::size_t t = 0; t < poses->poses(); ++t) {
+      const std::span<float> to = of_rows.AddPose();
+      for (std::size_t i = 0; i < rows.size(); ++i) to[i] = poses->row(t)[static_cast<std::size_t>(rows[i])];
+    }
+    inputs.poses = &of_rows, inputs.measured = &training, inputs.clip_poses = clip_poses;
+  }
+  const TileMap some = BuildTiles(MapOf(pca, estimator)(rows, Eigen::all), pca.mean(rows),
+                                  pca.layout.components, inputs, options);
+  return static_cast<double>(some.bytes() * tiles * height) / static_cast<double>(rows.size());
 }
 
 ModeMatrix KeptModesOf(const Pca& pca) {

@@ -25,6 +25,11 @@ Subspace MakeSubspace(const Pca& pca, const CueSet& cues, const Estimator& estim
                       const TileOptions& options, const PoseMatrix* poses = nullptr,
                       std::size_t clip_poses = 0);
 
+// Bytes that a frame reads of the tiles of MakeSubspace, about: by one of `every` tiles. 0: there are too few to tell.
+double BytesOfTiles(const Pca& pca, const Estimator& estimator, const Eigen::MatrixXd& training,
+                    const std::vector<SubspaceOutput>& outputs, const TileOptions& options,
+                    const PoseMatrix* poses, std::size_t clip_poses, std::size_t every);
+
 // Some of the training poses, evenly spread: they watch the largest errors of tiles.
 Eigen::MatrixXd SampledColumns(const Eigen::MatrixXd& training);
 

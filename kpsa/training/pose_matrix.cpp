@@ -58,7 +58,8 @@ void PoseMatrix::Truncate(std::size_t poses) {
 }
 
 std::span<float> PoseMatrix::Grow() {
-  if (poses_ % kBlockPoses == 0) blocks_.push_back(std::make_unique<float[]>(kBlockPoses * columns()));
+  if (poses_ % kBlockPoses == 0)
+    blocks_.push_back(std::make_unique_for_overwrite<float[]>(kBlockPoses * columns()));
   origins_.push_back(0);
   return row(poses_++);
 }

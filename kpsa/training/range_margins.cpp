@@ -19,7 +19,8 @@ constexpr std::size_t kMostPoses = 1600;           // of all joints: where there
 constexpr std::size_t kLeastPoses = 4;             // and with fewer than these none does
 constexpr std::size_t kTriedAtOnce = 256;          // are held
 constexpr double kGrowth = 1.1;                    // of the errors at the ends
-constexpr double kClearMisses = 0.05;              // of the poses: more, or fewer, that miss
+constexpr double kMoreMisses = 0.01;               // of the poses, than expected: narrower margins are tried
+constexpr double kClearlyCheaper = 0.95;  // of what a frame costs with the best so far: they are taken
 constexpr int kBeyond = static_cast<int>(PoseKind::kBeyond);
 constexpr std::uint64_t kSeed = 0x510e527fade682d1ull;
 
@@ -175,15 +176,16 @@ Result<FoundMargins> FindMargins(const Calibrator& of, const CalibrationWork& wo
   return MarginFinder(of, work, cues, subspace).Run();
 }
 
-Result<std::size_t> NarrowByCalibration(std::size_t chosen, std::span<const double> expected,
+Result<std::size_t> NarrowByCalibration(std::size_t chosen, std::span<const ExpectedOfMargins> expected,
                                         const std::function<Result<double>(std::size_t)>& missed) {
   std::size_t best = chosen;
-  double least = 0;
+  double least = 0, more = 0;  // cost, and how many more miss than expected
   for (std::size_t set = chosen;; --set) {
     const Result<double> share = missed(set);
     if (!share.ok()) return share.status();
-    if (set == chosen || *share + kClearMisses <= least) best = set, least = *share;
-    if (least <= expected[best] + kClearMisses || set == 0) return best;
+    const double of_set = *share - expected[set].misses, cost = expected[set].cost + of_set;
+    if (set == chosen || cost <= kClearlyCheaper * least) best = set, least = cost, more = of_set;
+    if (more <= kMoreMisses || set == 0) return best;
   }
 }
 

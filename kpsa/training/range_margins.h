@@ -30,10 +30,14 @@ Result<FoundMargins> FindMargins(const Calibrator& of, const CalibrationWork& wo
 
 // Which of such sets it is in the end: `chosen`, or a narrower one. Sets are chosen on other poses than those that
 // calibrate; where these are wrong a little too often beyond the ranges, a threshold that leaves a few of them out takes
-// many right ones with them. expected: shares of poses within the ranges that miss, by set. missed: calibrates with a set,
-// and says what misses then; asked of `chosen` first, then of the next narrower one as long as clearly more miss than
-// expected. A narrower one is taken where clearly fewer miss. Errors: those of `missed`.
-Result<std::size_t> NarrowByCalibration(std::size_t chosen, std::span<const double> expected,
+// many right ones with them, and as many of a clip's. missed: calibrates with a set, and says what share of the poses
+// within the ranges misses then; asked of `chosen` first, then of the next narrower one as long as more miss than expected.
+// A narrower one is taken where a frame is clearly cheaper with it. Errors: those of `missed`.
+struct ExpectedOfMargins {
+  double misses = 0;  // share of the poses within the ranges
+  double cost = 0;    // of a frame, with these; in full evaluations
+};
+Result<std::size_t> NarrowByCalibration(std::size_t chosen, std::span<const ExpectedOfMargins> expected,
                                         const std::function<Result<double>(std::size_t)>& missed);
 
 }  // namespace kpsa::engine

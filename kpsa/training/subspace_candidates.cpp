@@ -26,6 +26,8 @@ constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so ma
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
 constexpr double kLess = 0.95;          // likewise, where the others are as fine
+constexpr std::size_t kToldBy = 8;      // of so many tiles, one, where there are
+constexpr std::size_t kManyTiles = 64;  // so many
 constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
 constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
 constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of a rotation moves points, about
@@ -134,6 +136,11 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     // What all points would measure nobody has looked at
   } else if (by_tile) {
     Tried(kForAllPoints, cues.set, cues.choice.misses, cues.choice.cost);
+  } else if (const Result<double> least = LeastForAllPoints(); !least.ok()) {
+    return least.status();
+  } else if (of_tiles.ns < kLess * *least) {
+    by_tile = true, others_ns = *least;
+    Tried(kFinelyStored, cues.set, 0, *least);
   } else {
     KPSA_RETURN_IF_ERROR(setup->Say("subspace", 0.87));
     *subspace = ForAllPoints(true);
@@ -148,6 +155,20 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   best_ns_ = record->tried[best].cost * setup->full_cost;
   if (by_tile) *subspace = std::move(with_tiles.subspace), cues.set = std::move(with_tiles.cues);
   return true;
+}
+
+Result<double> SubspaceCandidates::LeastForAllPoints() const {
+  std::size_t tiles = 0;
+  for (const SubspaceOutput& output : setup->Outputs())
+    tiles += (output.reconstructed() + kTilePoints - 1) / kTilePoints;
+  if (tiles < kManyTiles) return 0.0;
+  const Result<double> points = setup->CostOfPoints(cues.set.cues);
+  if (!points.ok()) return points.status();
+  const double bytes = BytesOfTiles(
+      modes->pca, MapEstimator(modes->pca, cues.set), MeasuredPoses(setup->layout, cues.set, poses->poses),
+      setup->Outputs(), TileBudget(TileStorage::kFinely, setup->options.tolerance),
+      setup->options.without.tile_products ? nullptr : &poses->poses, poses->clip_poses, kToldBy);
+  return *points + setup->CostOfSteps() + CostOfReading(static_cast<std::size_t>(cues.set.rows()), bytes);
 }
 
 Status SubspaceCandidates::CompareWithCheaper(Subspace* subspace) {
@@ -190,6 +211,7 @@ void SubspaceCandidates::Tried(const char* what, const CueSet& of, double misses
 
 Result<bool> SubspaceCandidates::ChooseTiles() {
   tried_tiles = true;
+  fits_.clear();
   PoseMatrix more(setup->layout);
   KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));
   record->sampled_poses += more.poses();
@@ -245,11 +267,11 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   return true;
 }
 
-TileSubspace SubspaceCandidates::OfTiles(bool finely) const {
+TileSubspace SubspaceCandidates::OfTiles(bool finely) {
   const TileOptions storage =
       TileBudget(finely ? TileStorage::kFinely : TileStorage::kOwnCues, setup->options.tolerance);
-  TileSubspace made =
-      MakeTileSubspace(modes->pca.mean, poses->poses, poses->clip_poses, tiles, setup->Outputs(), storage);
+  TileSubspace made = MakeTileSubspace(modes->pca.mean, poses->poses, poses->clip_poses, tiles,
+                                       setup->Outputs(), storage, &fits_);
   TeachClips(poses->learnt, learning_tiles_, {&modes->pca.mean, poses->clip_poses, tiles.options, storage},
              setup->options.tolerance, &poses->poses, &made);
   return made;

@@ -50,7 +50,8 @@ struct SubspaceCandidates {
   FrameCost cost = {};                 // by the last calibration, but points
   TileChoice tiles = {};               // where they were tried
   RangeFinder ranges_of_tiles = {};    // of the poses that these alone were trained on
-  // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost
+  // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost; without
+  // tiles where that cannot be less than others_ns, so that nobody made it
   Subspace others = {};
   double others_ns = std::numeric_limits<double>::infinity();
 
@@ -65,13 +66,15 @@ struct SubspaceCandidates {
   Subspace ForAllPoints(bool finely);
   // With more poses, which regressions on few cues are glad of. Whether they may hit often enough.
   Result<bool> ChooseTiles();
-  TileSubspace OfTiles(bool finely) const;
+  TileSubspace OfTiles(bool finely);
   // What does not depend on how its cues were found.
   void Describe(Subspace* subspace) const;
 
  private:
   // The subspace is given its best score by the judges, and is then priced.
   Result<FrameCost> Price(Subspace* subspace, const CueSet& of) const;
+  // What a frame with cues for all points costs at least, told by some of the tiles (ns); 0: nothing can be told.
+  Result<double> LeastForAllPoints() const;
   // False: with nothing.
   Result<bool> CompareWithTiles(Subspace* subspace);
   // With what was cheaper but for its misses, by the judges that compare subspaces.
@@ -79,7 +82,8 @@ struct SubspaceCandidates {
   void Tried(const char* what, const CueSet& of, double misses, double ns);
 
   std::vector<TileCandidates> learning_tiles_ = {};
-  double best_ns_ = 0;  // of what Best has taken so far; 0: not priced
+  std::vector<TileModel> fits_ = {};  // of `tiles`
+  double best_ns_ = 0;                // of what Best has taken so far; 0: not priced
 };
 
 }  // namespace kpsa::engine

@@ -88,13 +88,14 @@ class View {
     Put(first_column, height / 3, 0, &rows);
     return Centered(std::move(rows));
   }
-  Eigen::VectorXd Mean(std::size_t first_column, std::size_t height) const {
-    Eigen::MatrixXd rows(static_cast<Eigen::Index>(height), poses());
-    Put(first_column, height / 3, 0, &rows);
-    Eigen::VectorXd mean = rows.rowwise().mean();
+  // What tiles are fitted to: centred, and the mean.
+  void Target(const TileCandidates& tile, TileModel* model) const {
+    Eigen::MatrixXd rows(static_cast<Eigen::Index>(tile.height), poses());
+    Put(tile.first_column, tile.height / 3, 0, &rows);
+    model->mean = rows.rowwise().mean();
+    model->target = Centered(std::move(rows));
     if (joint_ == kNoIndex)  // the poses are centred
-      mean += options_.mean->segment(static_cast<Eigen::Index>(first_column), rows.rows());
-    return mean;
+      model->mean += options_.mean->segment(static_cast<Eigen::Index>(tile.first_column), model->mean.size());
   }
   Eigen::MatrixXd Cues(std::span<const CueRef> cues) const {
     const PoseLayout& layout = poses_.layout();
@@ -458,6 +459,11 @@ TileCues ChooseTileCues(const PoseMatrix& poses, std::span<const TileCandidates>
   return result;
 }
 
+void SetTarget(const PoseMatrix& poses, const TileCueOptions& options, const TileCandidates& tile,
+               Index joint, TileModel* model) {
+  View(poses, options, joint, EveryPose(poses, 1)).Target(tile, model);
+}
+
 TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, const CueSet& set,
                   const TileCueOptions& options, const TileCandidates& tile, Index joint,
                   std::vector<std::uint32_t> columns) {
@@ -478,8 +484,7 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
   }
   const View view(poses, options, joint, EveryPose(poses, 1));
   const Eigen::Index count = measured.cols();
-  model.target = view.Points(tile.first_column, tile.height);
-  model.mean = view.Mean(tile.first_column, tile.height);
+  view.Target(tile, &model);
   const Eigen::MatrixXd& y = model.target;
   const Eigen::MatrixXd x = unit.asDiagonal() * measured(model.columns, Eigen::all);
   const Eigen::MatrixXd gram = GramOf(x), cross = CrossOf(x, y);

@@ -47,5 +47,8 @@ TileCues ChooseTileCues(const PoseMatrix& poses, std::span<const TileCandidates>
 TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, const CueSet& set,
                   const TileCueOptions& options, const TileCandidates& tile, Index joint,
                   std::vector<std::uint32_t> columns);
+// Its target and its mean, which do not depend on what is measured.
+void SetTarget(const PoseMatrix& poses, const TileCueOptions& options, const TileCandidates& tile,
+               Index joint, TileModel* model);
 
 }  // namespace kpsa::engine

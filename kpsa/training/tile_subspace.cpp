@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "base/check.h"
 #include "base/parallel.h"
@@ -62,6 +63,14 @@ void DropUnread(TileSubspace* made) {
     map = std::move(*fewer);
   }
   made->cues = Subset(made->cues, kept);
+}
+
+// A copy.
+TileModel WithoutTarget(TileModel* model) {
+  Eigen::MatrixXd target = std::exchange(model->target, {});
+  TileModel copy = *model;
+  model->target = std::move(target);
+  return copy;
 }
 
 // The rows that a tile reads.
@@ -204,7 +213,7 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
 
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,
                               const TileChoice& choice, std::vector<SubspaceOutput> outputs,
-                              const TileOptions& options) {
+                              const TileOptions& options, std::vector<TileModel>* fits) {
   TileSubspace made;
   Subspace& s = made.subspace;
   s.outputs = std::move(outputs);
@@ -212,10 +221,20 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
   made.cues = choice.cues;
 
   TileInputs inputs = InputsOf(choice, poses, clip_poses);
+  const bool fitted = fits != nullptr && !fits->empty();
+  if (fits != nullptr) fits->resize(choice.candidates.size());
   std::size_t tile = 0, first = 0;
   for (const SubspaceOutput& output : s.outputs) {
     const auto model = [&](std::size_t t) {
-      return ModelOf(choice, tile + t, poses, choice.candidates[tile + t], choice.options);
+      const std::size_t k = tile + t;
+      if (!fitted) {
+        TileModel made_now = ModelOf(choice, k, poses, choice.candidates[k], choice.options);
+        if (fits != nullptr) (*fits)[k] = WithoutTarget(&made_now);
+        return made_now;
+      }
+      TileModel before = (*fits)[k];
+      SetTarget(poses, choice.options, choice.candidates[k], choice.tiles.joint[k], &before);
+      return before;
     };
     const std::size_t height = output.reconstructed() * static_cast<std::size_t>(s.components);
     inputs.first_column = first;

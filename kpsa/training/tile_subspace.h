@@ -71,9 +71,10 @@ double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<co
 // The fewest tiles, the worst first, but for which that is at most `most`; ascending.
 std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most);
 
-// The first clip_poses of the same poses are of clips. The caller fills what MakeSubspace's does.
+// The first clip_poses of the same poses are of clips. The caller fills what MakeSubspace's does. fits: by tile, without
+// their targets, what the tiles were fitted to the first time, whatever is stored of it; empty: this is the first time.
 TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& poses, std::size_t clip_poses,
                               const TileChoice& choice, std::vector<SubspaceOutput> outputs,
-                              const TileOptions& options);
+                              const TileOptions& options, std::vector<TileModel>* fits = nullptr);
 
 }  // namespace kpsa::engine

@@ -515,6 +515,29 @@ TEST_P(SubspaceTest, InconsistentSubspacesAreNotWritten) {
   EXPECT_FALSE(std::filesystem::exists(path_));
 }
 
+TEST(Subspace, SomeTilesTellTheBytesOfAll) {
+  const Sheet sheet(2000, 15, 1);  // 16 tiles, of two meshes
+  PoseMatrix poses = sheet.RandomPoses(200, 2, sheet.Layout(false, true));
+  const Eigen::VectorXd mean = poses.Mean();
+  poses.Subtract(mean);
+  const Pca pca = std::move(*ComputePca(poses, mean, {.max_modes = 20}));
+  std::vector<CueRef> points;
+  for (Index i = 0; i < 40; ++i) points.push_back({CueKind::kOutput, 50 * i});
+  const CueSet cues = MakeCueSet(pca, points, sheet.diagonal());
+  const Estimator estimator = MapEstimator(pca, cues);
+  const Eigen::MatrixXd measured = MeasuredPoses(poses.layout(), cues, poses);
+  const std::vector<SubspaceOutput> outputs{{"body", 1300}, {"cloth", 700}};
+  const TileOptions options{.rms_budget = 1e-4 * sheet.diagonal()};
+  for (const PoseMatrix* products : {static_cast<const PoseMatrix*>(nullptr), &std::as_const(poses)}) {
+    const Subspace all = MakeSubspace(pca, cues, estimator, measured, outputs, options, products);
+    double bytes = 0;
+    for (const TileMap& tiles : all.tiles) bytes += static_cast<double>(tiles.bytes());
+    EXPECT_NEAR(BytesOfTiles(pca, estimator, measured, outputs, options, products, 0, 4) / bytes, 1, 0.15);
+  }
+  // No whole tile is one of sixty
+  EXPECT_EQ(BytesOfTiles(pca, estimator, measured, outputs, options, nullptr, 0, 60), 0);
+}
+
 TEST(Subspace, BlendMixesPoints) {
   PointBuffer full = PointBuffer::FromInterleaved(std::vector<float>{1, 2, 3, 4, 5, 6}), points(2);
   BlendPoints(0.25, full.view(), points.view());

@@ -61,6 +61,33 @@ TEST_P(GemmTest, ReadsPosesWithAScaleAColumn) {
             1e-11);
 }
 
+// A depth that is split, where the product has few tiles.
+TEST_P(GemmTest, SumsADeepProductInParts) {
+  const Eigen::MatrixXd a = RandomNormal(30, 9001, 6), b = RandomNormal(9001, 20, 7);
+  EXPECT_LT(Difference(Multiply(a, b), a * b), 1e-10);
+  const Eigen::MatrixXd gram = Gram(GemmOperand::Dense(a));
+  EXPECT_LT(Difference(gram, a * a.transpose()), 1e-10);
+  EXPECT_EQ(Difference(gram, gram.transpose()), 0);
+  const ThreadLimit one(1);
+  EXPECT_EQ(Difference(gram, Gram(GemmOperand::Dense(a))), 0);
+}
+
+TEST_P(GemmTest, ReadsSomePointsOfPoses) {
+  const PoseMatrix poses = test::NoisePoses(30, {.points = 400, .scalars = 5}, 8);
+  std::vector<double> scale;
+  for (int j = 0; j < 1205; ++j) scale.push_back(0.5 + 0.01 * j);
+  Eigen::MatrixXd x(30, 3 * 134);  // points 0, 3, ..., 399
+  for (Eigen::Index t = 0; t < 30; ++t) {
+    for (Eigen::Index j = 0; j < x.cols(); ++j) {
+      const auto at = static_cast<std::size_t>(j / 3 * 9 + j % 3);
+      x(t, j) = static_cast<double>(poses.row(static_cast<std::size_t>(t))[at]) * scale[at];
+    }
+  }
+  const GemmOperand some = GemmOperand::SomePoints(poses, 1200, 3, scale);
+  ASSERT_EQ(some.columns(), 402u);
+  EXPECT_LT(Difference(Gram(some), x * x.transpose()), 1e-10);
+}
+
 TEST(Gemm, SymmetricAndTheSameWithAnyNumberOfThreads) {
   const Eigen::MatrixXd a = RandomNormal(900, 50, 5);
   const Eigen::MatrixXd gram = Gram(GemmOperand::Dense(a));

@@ -7,12 +7,14 @@ namespace {
 
 using Indices = std::vector<std::size_t>;
 
+using Expected = std::vector<ExpectedOfMargins>;
+
 // The set that is taken of `expected`, and those that were calibrated on the way.
 struct Narrowed {
   std::size_t taken = 0;
   Indices calibrated;
 };
-Narrowed Narrow(std::size_t chosen, const std::vector<double>& expected, const std::vector<double>& missed) {
+Narrowed Narrow(std::size_t chosen, const Expected& expected, const std::vector<double>& missed) {
   Narrowed result;
   const Result<std::size_t> taken = NarrowByCalibration(chosen, expected, [&](std::size_t set) {
     result.calibrated.push_back(set);
@@ -24,30 +26,34 @@ Narrowed Narrow(std::size_t chosen, const std::vector<double>& expected, const s
 }
 
 TEST(NarrowerRanges, AreNotTriedWhereTheChosenOnesMissAsExpected) {
-  const Narrowed as_expected = Narrow(2, {0.1, 0.05, 0.0}, {0.1, 0.05, 0.04});
+  const Narrowed as_expected = Narrow(2, {{0.1, 0.2}, {0.05, 0.15}, {0.0, 0.1}}, {0.1, 0.05, 0.008});
   EXPECT_EQ(as_expected.taken, 2u);
   EXPECT_EQ(as_expected.calibrated, Indices({2}));
-  EXPECT_EQ(Narrow(0, {0.0}, {0.9}).calibrated, Indices({0}));  // nothing is narrower
+  EXPECT_EQ(Narrow(0, {{0.0, 0.1}}, {0.9}).calibrated, Indices({0}));  // nothing is narrower
 }
 
-TEST(NarrowerRanges, AreTakenWhereClearlyFewerMiss) {
-  const Narrowed next = Narrow(2, {0.1, 0.0, 0.0}, {0.1, 0.02, 0.2});
+TEST(NarrowerRanges, AreTakenWhereAFrameIsClearlyCheaper) {
+  const Narrowed next = Narrow(2, {{0.1, 0.2}, {0.0, 0.1}, {0.0, 0.1}}, {0.1, 0.005, 0.2});
   EXPECT_EQ(next.taken, 1u);
   EXPECT_EQ(next.calibrated, Indices({2, 1}));
   // The next ones miss as many: those after them
-  const Narrowed narrowest = Narrow(2, {0.0, 0.0, 0.0}, {0.01, 0.19, 0.2});
+  const Narrowed narrowest = Narrow(2, {{0.0, 0.1}, {0.0, 0.1}, {0.0, 0.1}}, {0.01, 0.19, 0.2});
   EXPECT_EQ(narrowest.taken, 0u);
   EXPECT_EQ(narrowest.calibrated, Indices({2, 1, 0}));
+  // A few percent of misses are much where a hit costs little
+  EXPECT_EQ(Narrow(1, {{0.0, 0.07}, {0.0, 0.06}}, {0.0, 0.035}).taken, 0u);
 }
 
-TEST(NarrowerRanges, WideOnesStayWhereNarrowerOnesMissHardlyFewer) {
-  const Narrowed all_miss = Narrow(2, {0.0, 0.0, 0.0}, {0.17, 0.4, 0.2});
+TEST(NarrowerRanges, WideOnesStayWhereNarrowerOnesCostHardlyLess) {
+  const Narrowed all_miss = Narrow(2, {{0.0, 0.1}, {0.0, 0.1}, {0.0, 0.1}}, {0.19, 0.4, 0.2});
   EXPECT_EQ(all_miss.taken, 2u);
   EXPECT_EQ(all_miss.calibrated, Indices({2, 1, 0}));
+  // Ranges that guard more cost more than what misses less
+  EXPECT_EQ(Narrow(1, {{0.0, 0.5}, {0.0, 0.1}}, {0.0, 0.3}).taken, 1u);
 }
 
 TEST(NarrowerRanges, ErrorsOfACalibrationEndIt) {
-  const std::vector<double> expected{0, 0};
+  const Expected expected{{0, 0.1}, {0, 0.1}};
   const Result<std::size_t> failed = NarrowByCalibration(1, expected, [](std::size_t set) {
     return set == 1 ? Result<double>(0.5) : Result<double>(Status::Invalid("no pose"));
   });

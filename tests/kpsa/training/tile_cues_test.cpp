@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <random>
@@ -96,6 +97,25 @@ struct Limb {
   TileCues chosen;
   TileSubspace made;
 };
+
+TEST(TileCues, FitsServeTilesThatAreStoredInAnotherWay) {
+  const Limb limb(true);
+  const TileOptions coarse{.rms_budget = 0.1 * kLimbTolerance, .max_budget = 0.5 * kLimbTolerance},
+      fine{.rms_budget = 0.03 * kLimbTolerance, .max_budget = 0.2 * kLimbTolerance};
+  std::vector<TileModel> fits;
+  const auto made = [&](const TileOptions& options) {
+    return MakeTileSubspace(limb.mean, limb.poses, 0, limb.choice, {{"limb", kLimbPoints}}, options, &fits);
+  };
+  const TileSubspace first = made(coarse), second = made(fine);
+  ASSERT_EQ(fits.size(), 2u);
+  EXPECT_EQ(fits[0].target.size(), 0);
+  const TileData &again = second.subspace.tiles[0].data(), &anew = limb.made.subspace.tiles[0].data();
+  EXPECT_LT(first.subspace.tiles[0].bytes(), second.subspace.tiles[0].bytes());
+  EXPECT_EQ(again.columns, anew.columns);
+  EXPECT_EQ(again.ranks, anew.ranks);
+  EXPECT_TRUE(std::ranges::equal(again.u.span(), anew.u.span()));
+  EXPECT_TRUE(std::ranges::equal(again.mean.span(), anew.mean.span()));
+}
 
 TEST(TileCues, ALimbIsToldInTheSpaceOfItsJoint) {
   const Limb limb(true);
