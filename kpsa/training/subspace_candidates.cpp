@@ -25,7 +25,6 @@ constexpr double kMostBeyondOfMisses = 0.1;
 constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so many
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
-constexpr double kLess = 0.95;          // likewise, where the others are as fine
 constexpr std::size_t kToldBy = 8;      // of so many tiles, one, where there are
 constexpr std::size_t kManyTiles = 64;  // so many
 constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
@@ -64,20 +63,20 @@ Subspace SubspaceCandidates::ForAllPoints(bool finely) {
 }
 
 Result<std::optional<Subspace>> SubspaceCandidates::Best() {
-  // Where few of the judges miss, but narrowly, a clip that nobody trained on may miss more
+  // Also where few of the judges miss: what a tile measures is all that moves it, wherever a clip goes that nobody trained
+  // on, while modes of all points know the poses that they were made of
   const bool may_try =
-                 setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 && !setup->of_light(),
-             misses = may_try && MissMany(cues.choice);
+      setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 && !setup->of_light();
+  for_all_finely_ = dear || setup->options.by_tile_as_before || (may_try && MissMany(cues.choice));
   Subspace subspace;
-  if ((misses || (may_try && (dear || by_tiles_alone() || setup->options.by_tile_as_before))) &&
-      HasTimeForTiles()) {
+  if (may_try && HasTimeForTiles()) {
     const Result<bool> made = CompareWithTiles(&subspace);
     if (!made.ok()) return made.status();
     if (!*made) return std::optional<Subspace>();
   } else if (dear || by_tiles_alone()) {
     return std::optional<Subspace>();
   } else {
-    fine = misses;
+    fine = for_all_finely_;
     subspace = ForAllPoints(fine);
   }
   if (!by_tiles_alone()) KPSA_RETURN_IF_ERROR(CompareWithCheaper(&subspace));
@@ -138,18 +137,19 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     Tried(kForAllPoints, cues.set, cues.choice.misses, cues.choice.cost);
   } else if (const Result<double> least = LeastForAllPoints(); !least.ok()) {
     return least.status();
-  } else if (of_tiles.ns < kLess * *least) {
+  } else if (of_tiles.ns < *least) {
     by_tile = true, others_ns = *least;
-    Tried(kFinelyStored, cues.set, 0, *least);
+    Tried(for_all_finely_ ? kFinelyStored : kForAllPoints, cues.set, 0, *least);
   } else {
     KPSA_RETURN_IF_ERROR(setup->Say("subspace", 0.87));
-    *subspace = ForAllPoints(true);
+    *subspace = ForAllPoints(for_all_finely_);
     const Result<FrameCost> of_others = Price(subspace, cues.set);
     if (!of_others.ok()) return of_others.status();
-    by_tile = of_tiles.ns < kLess * of_others->ns;
-    Tried(kFinelyStored, cues.set, of_others->misses, of_others->ns);
-    if (!by_tile) best = record->tried.size() - 1, fine = true;
-    if (by_tile) others = std::move(*subspace), others_ns = of_others->ns;
+    by_tile = of_tiles.ns < of_others->ns;
+    Tried(for_all_finely_ ? kFinelyStored : kForAllPoints, cues.set, of_others->misses, of_others->ns);
+    if (!by_tile) best = record->tried.size() - 1, fine = for_all_finely_;
+    if (by_tile) others_ns = of_others->ns;
+    if (by_tile && for_all_finely_) others = std::move(*subspace);
   }
   record->tried[best].taken = true;
   best_ns_ = record->tried[best].cost * setup->full_cost;
@@ -166,7 +166,9 @@ Result<double> SubspaceCandidates::LeastForAllPoints() const {
   if (!points.ok()) return points.status();
   const double bytes = BytesOfTiles(
       modes->pca, MapEstimator(modes->pca, cues.set), MeasuredPoses(setup->layout, cues.set, poses->poses),
-      setup->Outputs(), TileBudget(TileStorage::kFinely, setup->options.tolerance),
+      setup->Outputs(),
+      TileBudget(for_all_finely_ ? TileStorage::kFinely : TileStorage::kForAllPoints,
+                 setup->options.tolerance),
       setup->options.without.tile_products ? nullptr : &poses->poses, poses->clip_poses, kToldBy);
   return *points + setup->CostOfSteps() + CostOfReading(static_cast<std::size_t>(cues.set.rows()), bytes);
 }
@@ -210,7 +212,6 @@ void SubspaceCandidates::Tried(const char* what, const CueSet& of, double misses
 }
 
 Result<bool> SubspaceCandidates::ChooseTiles() {
-  tried_tiles = true;
   fits_.clear();
   PoseMatrix more(setup->layout);
   KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));

@@ -41,7 +41,6 @@ struct SubspaceCandidates {
   bool fine = false;         // tiles
   bool by_tile = false;      // its cues
   bool fewer = false;        // not those that were expected to cost least, but cheaper ones
-  bool tried_tiles = false;
   // What comes out of a last step is dear to measure: cues of tiles are tried, and where these do not serve, nothing is
   // made of it
   bool dear = false;
@@ -50,8 +49,8 @@ struct SubspaceCandidates {
   FrameCost cost = {};                 // by the last calibration, but points
   TileChoice tiles = {};               // where they were tried
   RangeFinder ranges_of_tiles = {};    // of the poses that these alone were trained on
-  // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost; without
-  // tiles where that cannot be less than others_ns, so that nobody made it
+  // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost, at least;
+  // without tiles where nobody made it, or not finely
   Subspace others = {};
   double others_ns = std::numeric_limits<double>::infinity();
 
@@ -83,6 +82,7 @@ struct SubspaceCandidates {
 
   std::vector<TileCandidates> learning_tiles_ = {};
   std::vector<TileModel> fits_ = {};  // of `tiles`
+  bool for_all_finely_ = false;       // how tiles with cues for all points are stored
   double best_ns_ = 0;                // of what Best has taken so far; 0: not priced
 };
 
