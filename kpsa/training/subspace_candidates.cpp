@@ -25,6 +25,7 @@ constexpr double kMostBeyondOfMisses = 0.1;
 constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so many
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
+constexpr double kAlike = 1.15;         // likewise, where these are known better: clips go where no judge was
 constexpr std::size_t kToldBy = 8;      // of so many tiles, one, where there are
 constexpr std::size_t kManyTiles = 64;  // so many
 constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
@@ -137,7 +138,7 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     Tried(kForAllPoints, cues.set, cues.choice.misses, cues.choice.cost);
   } else if (const Result<double> least = LeastForAllPoints(); !least.ok()) {
     return least.status();
-  } else if (of_tiles.ns < *least) {
+  } else if (of_tiles.ns < kAlike * *least) {
     by_tile = true, others_ns = *least;
     Tried(for_all_finely_ ? kFinelyStored : kForAllPoints, cues.set, 0, *least);
   } else {
@@ -145,7 +146,7 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     *subspace = ForAllPoints(for_all_finely_);
     const Result<FrameCost> of_others = Price(subspace, cues.set);
     if (!of_others.ok()) return of_others.status();
-    by_tile = of_tiles.ns < of_others->ns;
+    by_tile = of_tiles.ns < kAlike * of_others->ns;
     Tried(for_all_finely_ ? kFinelyStored : kForAllPoints, cues.set, of_others->misses, of_others->ns);
     if (!by_tile) best = record->tried.size() - 1, fine = for_all_finely_;
     if (by_tile) others_ns = of_others->ns;
