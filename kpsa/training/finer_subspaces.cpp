@@ -81,6 +81,19 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
         ChooseTrainingCues(setup.options.tolerance / 2, *of.poses, &setup, of.modes, &of.cues));
     KPSA_RETURN_IF_ERROR(again(kForHalf));
   }
+  // Cues of tiles, where nothing had said before that so many would miss
+  if (!of.tried_tiles && setup.options.may_have_cues_by_tile && of.poses->judges.poses() > 0 &&
+      trials.least().misses > kManyMisses && of.HasTimeForTiles()) {
+    of.may_step.clear();  // that would be another training
+    const Result<bool> promising = of.ChooseTiles();
+    if (!promising.ok()) return promising.status();
+    before.sampled_poses = record.sampled_poses;
+    of.by_tile = *promising;
+    for (const bool finely : {false, true}) {
+      if (!of.by_tile || (finely && of.cost.lost() <= kFewMisses)) break;
+      KPSA_RETURN_IF_ERROR(again(finely ? kByTileFinely : kByTile, finely));
+    }
+  }
   CalibratedSubspace best = trials.Take(std::move(before.tried));
   *subspace = std::move(best.subspace), of.cues.set = std::move(best.cues), record = std::move(best.record);
   of.cost = best.cost;

@@ -27,7 +27,7 @@ constexpr double kTilesInModes = 3.5;   // how long these take, in the time that
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
 constexpr double kAlike = 1.15;         // likewise, where these are known better: clips go where no judge was
 constexpr std::size_t kToldBy = 8;      // of so many tiles, one, where there are
-constexpr std::size_t kManyTiles = 64;  // so many
+constexpr std::size_t kManyTiles = 64;  // so many: these have something to gain
 constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
 constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
 constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of a rotation moves points, about
@@ -64,13 +64,13 @@ Subspace SubspaceCandidates::ForAllPoints(bool finely) {
 }
 
 Result<std::optional<Subspace>> SubspaceCandidates::Best() {
-  // Also where few of the judges miss: what a tile measures is all that moves it, wherever a clip goes that nobody trained
-  // on, while modes of all points know the poses that they were made of
+  // With many tiles also where few of the judges miss: what a tile measures is all that moves it, wherever a clip goes that
+  // nobody trained on, while modes of all points know the poses that they were made of
   const bool may_try =
       setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 && !setup->of_light();
   for_all_finely_ = dear || setup->options.by_tile_as_before || (may_try && MissMany(cues.choice));
   Subspace subspace;
-  if (may_try && HasTimeForTiles()) {
+  if (may_try && (for_all_finely_ || by_tiles_alone() || TileCount() >= kManyTiles) && HasTimeForTiles()) {
     const Result<bool> made = CompareWithTiles(&subspace);
     if (!made.ok()) return made.status();
     if (!*made) return std::optional<Subspace>();
@@ -158,11 +158,15 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   return true;
 }
 
-Result<double> SubspaceCandidates::LeastForAllPoints() const {
+std::size_t SubspaceCandidates::TileCount() const {
   std::size_t tiles = 0;
   for (const SubspaceOutput& output : setup->Outputs())
     tiles += (output.reconstructed() + kTilePoints - 1) / kTilePoints;
-  if (tiles < kManyTiles) return 0.0;
+  return tiles;
+}
+
+Result<double> SubspaceCandidates::LeastForAllPoints() const {
+  if (TileCount() < kManyTiles) return 0.0;
   const Result<double> points = setup->CostOfPoints(cues.set.cues);
   if (!points.ok()) return points.status();
   const double bytes = BytesOfTiles(
@@ -217,6 +221,7 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
   PoseMatrix more(setup->layout);
   KPSA_RETURN_IF_ERROR(setup->trained_sampler->AddMore(poses->poses, &more));
   record->sampled_poses += more.poses();
+  tried_tiles = true;
   ranges_of_tiles = RangeFinder(setup->layout);
   ranges_of_tiles.Widen(more);
   PoseMatrix ends(setup->layout);

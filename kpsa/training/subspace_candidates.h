@@ -41,6 +41,7 @@ struct SubspaceCandidates {
   bool fine = false;         // tiles
   bool by_tile = false;      // its cues
   bool fewer = false;        // not those that were expected to cost least, but cheaper ones
+  bool tried_tiles = false;
   // What comes out of a last step is dear to measure: cues of tiles are tried, and where these do not serve, nothing is
   // made of it
   bool dear = false;
@@ -72,6 +73,7 @@ struct SubspaceCandidates {
  private:
   // The subspace is given its best score by the judges, and is then priced.
   Result<FrameCost> Price(Subspace* subspace, const CueSet& of) const;
+  std::size_t TileCount() const;
   // What a frame with cues for all points costs at least, told by some of the tiles (ns); 0: nothing can be told.
   Result<double> LeastForAllPoints() const;
   // False: with nothing.
