@@ -84,7 +84,7 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   // Cues of tiles, where nothing had said before that so many would miss
   if (!of.tried_tiles && setup.options.may_have_cues_by_tile && of.poses->judges.poses() > 0 &&
       trials.least().misses > kManyMisses && of.HasTimeForTiles()) {
-    of.may_step.clear();  // that would be another training
+    of.steps = {};  // that would be another training
     const Result<bool> promising = of.ChooseTiles();
     if (!promising.ok()) return promising.status();
     before.sampled_poses = record.sampled_poses;

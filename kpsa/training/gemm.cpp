@@ -103,9 +103,13 @@ class AlignedDoubles {
   AlignedFloats floats_;
 };
 
-// What tiles are computed in, one after the other.
+std::size_t RoundUp(std::size_t count, std::size_t step) { return (count + step - 1) / step * step; }
+
+// What tiles of a product are computed in, one after the other.
 struct Workspace {
-  AlignedDoubles a{kTile * kDepth}, b{kTile * kDepth}, tile{kTile * kTile};
+  Workspace(std::size_t rows, std::size_t columns, std::size_t depth)
+      : a(rows * depth), b(columns * depth), tile(rows * columns) {}
+  AlignedDoubles a, b, tile;
 };
 
 // A tile of C and what columns of A it is summed over.
@@ -157,7 +161,8 @@ void Product(const GemmOperand& a, const GemmOperand& b_transposed, bool symmetr
   const std::size_t parts = PartsOf(tiles.size(), depth);
   std::vector<Eigen::MatrixXd> sums(parts - 1, Eigen::MatrixXd(parts > 1 ? c->rows() : 0, c->cols()));
   ParallelFor(tiles.size() * parts, 1, [&](std::size_t begin, std::size_t end) {
-    Workspace workspace;
+    Workspace workspace(RoundUp(std::min(m, kTile), kRowStep), RoundUp(std::min(n, kTile), kColumnStep),
+                        std::min(depth, kDepth));
     for (std::size_t t = begin; t < end; ++t) {
       Task task = tiles[t / parts];
       const std::size_t part = t % parts;
@@ -198,17 +203,7 @@ GemmOperand GemmOperand::Poses(const PoseMatrix& poses, std::size_t first, std::
   return operand;
 }
 
-GemmOperand GemmOperand::SomePoints(const PoseMatrix& poses, std::size_t end, std::size_t every,
-                                    std::span<const double> column_scale) {
-  KPSA_CHECK(every > 0 && end % 3 == 0);
-  GemmOperand operand = Poses(poses, 0, poses.poses(), 0, end, column_scale);
-  operand.every_ = every;
-  operand.columns_ = (end / 3 + every - 1) / every * 3;
-  return operand;
-}
-
 GemmOperand GemmOperand::Transposed() const {
-  KPSA_CHECK_EQ(every_, 1u);
   GemmOperand operand = *this;
   operand.transposed_ = !transposed_;
   return operand;
@@ -230,12 +225,11 @@ void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, 
       }
     } else if (!transposed_) {
       const float* sources[kRowStep];
-      for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i];
+      for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i] + column;
       for (std::size_t k = 0; k < width; ++k) {
-        const std::size_t at = every_ == 1 ? column + k : (column + k) / 3 * 3 * every_ + (column + k) % 3;
-        const double scale = scale_.empty() ? 1.0 : scale_[at];
+        const double scale = scale_.empty() ? 1.0 : scale_[column + k];
         for (std::size_t i = 0; i < count; ++i)
-          target[k * step + i] = static_cast<double>(sources[i][at]) * scale;
+          target[k * step + i] = static_cast<double>(sources[i][k]) * scale;
       }
     } else {
       for (std::size_t k = 0; k < width; ++k) {

@@ -19,9 +19,6 @@ class GemmOperand {
   // Poses [first, first + count) and columns [begin, end); column_scale empty or [D].
   static GemmOperand Poses(const PoseMatrix& poses, std::size_t first, std::size_t count, std::size_t begin,
                            std::size_t end, std::span<const double> column_scale = {});
-  // Of all columns [0, end), those of one of `every` points of 3 columns; not to be transposed.
-  static GemmOperand SomePoints(const PoseMatrix& poses, std::size_t end, std::size_t every,
-                                std::span<const double> column_scale = {});
   GemmOperand Transposed() const;
   std::size_t rows() const { return transposed_ ? columns_ : rows_; }
   std::size_t columns() const { return transposed_ ? rows_ : columns_; }
@@ -37,8 +34,7 @@ class GemmOperand {
   const double* dense_ = nullptr;
   std::size_t leading_ = 0;              // of dense_: distance of columns
   std::vector<const float*> pose_rows_;  // [rows_] first wanted column
-  std::span<const double> scale_;        // [columns_] or empty; of all points
-  std::size_t every_ = 1;                // of so many points of pose_rows_ and scale_, one
+  std::span<const double> scale_;        // [columns_] or empty
 };
 
 // a * b. Splits over threads; the result does not depend on how many. To a matrix that is none of the factors: pages that

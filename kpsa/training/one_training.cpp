@@ -12,6 +12,8 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kJudgeOfLight = 5;  // of so many poses, one
+// Of what a frame is expected to cost otherwise: what steps of some tiles may cost, since tiles have their cost besides
+constexpr double kMostInSteps = 0.5;
 
 // What was asked for.
 TrainingRecord RecordOf(const std::vector<TrainingClip>& clips, const TrainOptions& options) {
@@ -88,13 +90,14 @@ std::vector<std::vector<Index>> ByMesh(const TrainingSetup& setup, std::span<con
   return of_meshes;
 }
 
-// By tile of all meshes: whether these have a step.
-std::vector<char> TilesWithSteps(const TrainingSetup& setup,
-                                 const std::vector<Compiler::SplitPoints>& steps) {
-  std::vector<char> tiles;
+// Of all meshes, where these have a step. cost: of a frame without them.
+TileSteps StepsOfTiles(const TrainingSetup& setup, const std::vector<Compiler::SplitPoints>& steps,
+                       double cost) {
+  TileSteps tiles{{}, kMostInSteps * cost};
   for (std::size_t m = 0; m < setup.totals.size(); ++m) {
     const std::size_t count = (setup.rig.rows(m, setup.totals[m]) + kTilePoints - 1) / kTilePoints;
-    tiles.insert(tiles.end(), count, steps[m].step != nullptr);
+    const double ns = steps[m].step == nullptr ? 0 : static_cast<double>(steps[m].step->cost_ns());
+    tiles.ns.insert(tiles.ns.end(), count, ns / static_cast<double>(count));
   }
   return tiles;
 }
@@ -130,7 +133,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   const CueChoice& choice = candidates.cues.choice;
   // Another training has to fit
   if (ends != nullptr && setup.limit.left() > 2 * setup.limit.elapsed())
-    candidates.may_step = TilesWithSteps(setup, *ends->steps);
+    candidates.steps = StepsOfTiles(setup, *ends->steps, choice.cost);
   candidates.dear =
       ends != nullptr && choice.cost > ends->enough && !MissMany(choice) &&
       std::ranges::any_of(choice.cues, [](const CueRef& cue) { return cue.kind == CueKind::kOutput; });

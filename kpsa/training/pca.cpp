@@ -74,12 +74,7 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
     energy = eigen.values.head(wanted);
     vectors = range * eigen.vectors.leftCols(wanted);
   } else if (poses.poses() <= columns) {
-    const std::size_t enough = options.enough_columns * poses.poses();
-    const bool of_some = enough > 0 && columns == poses.layout().outputs() && columns % 3 == 0;
-    const std::size_t every = of_some ? std::max<std::size_t>(1, columns / enough) : 1;
-    SymmetricEigen eigen =
-        LargestEigen(every > 1 ? Gram(GemmOperand::SomePoints(poses, columns, every, scale)) : Gram(x),
-                     wanted, options.seed);
+    SymmetricEigen eigen = LargestEigen(Gram(x), wanted, options.seed);
     energy = std::move(eigen.values);
     vectors = std::move(eigen.vectors);
   } else {

@@ -24,11 +24,8 @@ struct PcaOptions {
   int max_modes = 250;
   double min_ratio = 1e-7;  // of S_k to S_1
   enum class Method : std::uint8_t { kAuto, kSnapshot, kRandomised } method = Method::kAuto;
-  int power_iterations = 2;  // of the randomised method
-  std::uint64_t seed = 1;    // of its random start
-  // Of the snapshot method: where there are more columns of points than this times the poses, it is some of the points
-  // whose Gram matrix is taken, and what it finds are the modes of all of them but for the last ones. 0: all points.
-  std::size_t enough_columns = 0;
+  int power_iterations = 2;                    // of the randomised method
+  std::uint64_t seed = 1;                      // of its random start
   std::span<const double> point_weights = {};  // [N] e.g. areas, > 0; empty: 1
   double stage_weight = 0;                     // weight of the columns of stage points in the decomposition
   double scalar_weight = 0;                    // of the scalars, each first divided by its trained deviation

@@ -69,6 +69,7 @@ Result<std::optional<Subspace>> SubspaceCandidates::Best() {
   const bool may_try =
       setup->options.may_have_cues_by_tile && poses->judges.poses() > 0 && !setup->of_light();
   for_all_finely_ = dear || setup->options.by_tile_as_before || (may_try && MissMany(cues.choice));
+  if (!for_all_finely_) steps = {};  // another training is for what this one cannot do
   Subspace subspace;
   if (may_try && (for_all_finely_ || by_tiles_alone() || TileCount() >= kManyTiles) && HasTimeForTiles()) {
     const Result<bool> made = CompareWithTiles(&subspace);
@@ -125,8 +126,8 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     }
     if (!IsWorthTrying(of_tiles) || of_tiles.misses > kHopelessTiles) break;
   }
-  if (!may_step.empty() && of_tiles.misses > kManyMisses && std::isfinite(of_tiles.ns)) {
-    poor = PoorTiles(TileErrors(poses->poses, tiles), setup->options.tolerance, may_step);
+  if (!steps.ns.empty() && of_tiles.misses > kManyMisses && std::isfinite(of_tiles.ns)) {
+    poor = PoorTiles(TileErrors(poses->poses, tiles), setup->options.tolerance, steps);
     if (!poor.empty()) return false;
   }
   // As chosen, without products of tiles: others with these would hardly do better, and take their time
@@ -264,7 +265,7 @@ Result<bool> SubspaceCandidates::ChooseTiles() {
     return true;
   }
   TilePromise promise{cues.choice.misses > kMostMiss ? kMostBeyondElse : kMostBeyond,
-                      kMostBeyondOfMisses * cues.choice.misses, may_step, dear};
+                      kMostBeyondOfMisses * cues.choice.misses, steps, dear};
   if (dear) promise.most_of_half = kFewBeyond, promise.most_of_whole = 0;
   PromisingTiles chosen =
       ChoosePromisingTiles(modes->pca.mean, poses->poses, std::move(*candidates), choice, promise);

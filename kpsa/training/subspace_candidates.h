@@ -45,7 +45,7 @@ struct SubspaceCandidates {
   // What comes out of a last step is dear to measure: cues of tiles are tried, and where these do not serve, nothing is
   // made of it
   bool dear = false;
-  std::vector<char> may_step = {};     // by tile: its points may go through that step; empty: none may
+  TileSteps steps = {};                // that some tiles may go through, in another training
   std::vector<std::size_t> poor = {};  // they alone are to blame that cues of tiles are not promising
   FrameCost cost = {};                 // by the last calibration, but points
   TileChoice tiles = {};               // where they were tried

@@ -175,12 +175,18 @@ std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolera
   return order;
 }
 
-std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance,
-                                   std::span<const char> may_step, std::size_t every) {
-  if (may_step.empty()) return {};
+std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance, const TileSteps& steps,
+                                   std::size_t every) {
+  if (steps.ns.empty()) return {};
   std::vector<std::size_t> worst = WorstTiles(errors, tolerance / 2, kFewBeyond);
-  if (static_cast<double>(worst.size()) > kMostPoor * static_cast<double>(errors.cols()) ||
-      std::ranges::any_of(worst, [&](std::size_t t) { return may_step[t * every] == 0; }))
+  bool all_step = true;
+  double ns = 0;
+  for (const std::size_t t : worst) {
+    all_step = all_step && steps.ns[t * every] > 0;
+    ns += steps.ns[t * every] * static_cast<double>(every);
+  }
+  if (static_cast<double>(worst.size()) > kMostPoor * static_cast<double>(errors.cols()) || !all_step ||
+      ns > steps.most)
     worst.clear();
   return worst;
 }
@@ -194,19 +200,19 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
            ShareBeyond(errors, kOfWhole * options.tolerance) <= promise.most_of_whole;
   };
   const bool many = candidates.size() > kTrialTiles * kTrialTiles;
-  bool promising = promise.may_step.empty() && !promise.strict;
+  bool promising = promise.steps.ns.empty() && !promise.strict;
   if (many) {
     std::vector<TileCandidates> some;
     for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
     const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
     promising = keeps(trial);
-    if (!promising && PoorTiles(trial, options.tolerance, promise.may_step, kTrialTiles).empty()) return {};
+    if (!promising && PoorTiles(trial, options.tolerance, promise.steps, kTrialTiles).empty()) return {};
   }
   PromisingTiles found{ChooseTiles(mean, poses, std::move(candidates), options), {}};
   if (promising) return found;
   const Eigen::MatrixXf errors = TileErrors(poses, *found.choice);
   if (!many && keeps(errors)) return found;
-  found.poor = PoorTiles(errors, options.tolerance, promise.may_step);
+  found.poor = PoorTiles(errors, options.tolerance, promise.steps);
   if (many || promise.strict || !found.poor.empty()) found.choice.reset();
   return found;
 }

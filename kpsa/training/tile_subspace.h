@@ -2,6 +2,7 @@
 // alone. Internal to training.
 #pragma once
 
+#include <limits>
 #include <optional>
 
 #include "kpsa/subspace.h"
@@ -31,12 +32,18 @@ TileChoice ChooseTiles(const Eigen::VectorXd& mean, const PoseMatrix& poses,
 // Of the poses: so few of them hardly matter.
 inline constexpr double kFewBeyond = 0.005;
 
+// The last steps that tiles may go through instead.
+struct TileSteps {
+  std::vector<double> ns = {};  // by tile, what its step costs; 0: it has none; empty: none has
+  double most = std::numeric_limits<double>::infinity();  // that all of them may cost
+};
+
 // When tiles are worth their time: at most that share of the poses would be farther off than half the tolerance, or that
 // of them than (nearly) all of it.
 struct TilePromise {
   double most_of_half = 0, most_of_whole = 0;
-  std::vector<char> may_step = {};  // by tile: its points may go through a last step instead; empty: none may
-  bool strict = false;              // also of few tiles
+  TileSteps steps = {};
+  bool strict = false;  // also of few tiles
 };
 struct PromisingTiles {
   std::optional<TileChoice> choice;
@@ -49,9 +56,9 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
                                     const TilePromise& promise);
 
 // The fewest tiles without which the others keep half the tolerance in all but a few poses; none where these are not few,
-// or one of them may not step. may_step: of these tiles, every so manieth of the list.
-std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance,
-                                   std::span<const char> may_step, std::size_t every = 1);
+// one of them has no step, or their steps cost too much. Of the tiles of `steps`, errors has one of `every`.
+std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance, const TileSteps& steps,
+                                   std::size_t every = 1);
 
 // What a tile is fitted to, by what that tile of the choice measures. poses: those of the choice, centred, in which the
 // tile has the columns of `points`; options: the choice's, with the mean of these poses.

@@ -12,9 +12,7 @@ namespace {
 
 constexpr std::size_t kStillRows = 12;  // that are measured where nothing moves in the space
 constexpr int kMaxLightModes = 120;     // that are looked at; noise is beyond
-constexpr std::size_t kManyColumns = 24'000,
-                      kEnoughColumns = 3;  // of points: with more, so many a pose are enough
-constexpr int kFewModes = 16;  // where tiles alone say how points move: that say what moves at all
+constexpr int kFewModes = 16;           // where tiles alone say how points move: that say what moves at all
 
 // As many modes as new poses confirm, and noise as new poses have it.
 void TruncateModes(const TrainingSetup& setup, const PoseMatrix& judges, TrainingModes* modes) {
@@ -96,8 +94,6 @@ Status FindModes(const TrainingSetup& setup, TrainingPoses* poses, TrainingModes
                               ? static_cast<int>(setup.options.key_points / 2)
                               : setup.options.max_modes;
   if (setup.of_light()) pca_options.max_modes = std::min(pca_options.max_modes, kMaxLightModes);
-  if (!setup.of_light() && setup.of_map() && setup.layout.outputs() > kManyColumns)
-    pca_options.enough_columns = kEnoughColumns;
   if (!setup.rig.stepped.empty()) pca_options.max_modes = std::min(pca_options.max_modes, kFewModes);
   Result<Pca> pca = ComputePca(poses->poses, mean, pca_options);
   if (!pca.ok()) return pca.status();

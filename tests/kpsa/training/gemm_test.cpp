@@ -72,22 +72,6 @@ TEST_P(GemmTest, SumsADeepProductInParts) {
   EXPECT_EQ(Difference(gram, Gram(GemmOperand::Dense(a))), 0);
 }
 
-TEST_P(GemmTest, ReadsSomePointsOfPoses) {
-  const PoseMatrix poses = test::NoisePoses(30, {.points = 400, .scalars = 5}, 8);
-  std::vector<double> scale;
-  for (int j = 0; j < 1205; ++j) scale.push_back(0.5 + 0.01 * j);
-  Eigen::MatrixXd x(30, 3 * 134);  // points 0, 3, ..., 399
-  for (Eigen::Index t = 0; t < 30; ++t) {
-    for (Eigen::Index j = 0; j < x.cols(); ++j) {
-      const auto at = static_cast<std::size_t>(j / 3 * 9 + j % 3);
-      x(t, j) = static_cast<double>(poses.row(static_cast<std::size_t>(t))[at]) * scale[at];
-    }
-  }
-  const GemmOperand some = GemmOperand::SomePoints(poses, 1200, 3, scale);
-  ASSERT_EQ(some.columns(), 402u);
-  EXPECT_LT(Difference(Gram(some), x * x.transpose()), 1e-10);
-}
-
 TEST(Gemm, SymmetricAndTheSameWithAnyNumberOfThreads) {
   const Eigen::MatrixXd a = RandomNormal(900, 50, 5);
   const Eigen::MatrixXd gram = Gram(GemmOperand::Dense(a));

@@ -85,21 +85,6 @@ TEST(Pca, BothSidesAndTheRandomisedMethodAgreeWithADenseSvd) {
   }
 }
 
-TEST(Pca, SomeOfManyPointsFindTheModesOfAll) {
-  const Sheet sheet(600, 12, 1);
-  const auto train = [&](std::size_t enough) {
-    return Train(sheet.RandomPoses(60, 2, sheet.Layout()), {.max_modes = 12, .enough_columns = enough});
-  };
-  const Trained all = train(0), some = train(3);  // one point of ten
-  ASSERT_EQ(some.pca.mode_count(), all.pca.mode_count());
-  EXPECT_NE(some.pca.modes, all.pca.modes);
-  EXPECT_LT(DistanceFromIdentity(some.pca.output_modes()), 1e-12);
-  for (Eigen::Index k = 0; k < 6; ++k) EXPECT_NEAR(some.pca.singular[k] / all.pca.singular[k], 1, 1e-3) << k;
-  EXPECT_LT(some.pca.discarded_energy(), 1.2 * all.pca.discarded_energy() + 1e-9 * all.pca.total_energy);
-  // Few points are all taken
-  EXPECT_EQ(train(20).pca.modes, all.pca.modes);
-}
-
 TEST(Pca, PosesInTheSpanAreReproduced) {
   // 5 modes of very different size, 40 poses: all of it lies in the span, up to the rounding of the poses to
   // float32

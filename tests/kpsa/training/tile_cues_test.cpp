@@ -174,11 +174,18 @@ TEST(TileCues, SayWhichTilesAreToBlame) {
   EXPECT_EQ(WorstTiles(errors, 1, 0.01), (std::vector<std::size_t>{1, 4}));
   EXPECT_EQ(WorstTiles(errors, 1, 0), (std::vector<std::size_t>{0, 1, 4}));
   const std::vector<std::size_t> none;
-  std::vector<char> may(6, 1);
+  TileSteps may{std::vector<double>(6, 5.0)};
   EXPECT_EQ(PoorTiles(errors, 2, may), none) << "half of them are not few";
   errors(99, 0) = 0;
   EXPECT_EQ(PoorTiles(errors, 2, may), (std::vector<std::size_t>{1, 4})) << "beyond half of it";
-  may[4] = 0;
+  may.most = 10;
+  EXPECT_EQ(PoorTiles(errors, 2, may), (std::vector<std::size_t>{1, 4}));
+  may.most = 9;
+  EXPECT_EQ(PoorTiles(errors, 2, may), none) << "their steps are too dear";
+  may = {std::vector<double>(12, 2.0), 7};
+  EXPECT_EQ(PoorTiles(errors, 2, may, 2), none) << "so are those of all that they stand for";
+  may = {std::vector<double>(6, 5.0)};
+  may.ns[4] = 0;
   EXPECT_EQ(PoorTiles(errors, 2, may), none) << "no step would help that one";
   EXPECT_EQ(PoorTiles(errors, 2, {}), none);
 }
