@@ -22,11 +22,28 @@ HWY_BEFORE_NAMESPACE();
 namespace kpsa::engine {
 namespace HWY_NAMESPACE {
 
-// c[kRowStep x kCount] += a-panel [depth][kRowStep] times kCount columns of a b-panel [depth][kColumnStep].
-template <int kCount, int kVectors>
-HWY_INLINE void MicroTile(const double* HWY_RESTRICT a, const double* HWY_RESTRICT b, std::size_t depth,
-                          double* HWY_RESTRICT c, std::size_t c_stride) {
+// target[lanes] += sum
+HWY_INLINE void AddTo(hn::Vec<hn::ScalableTag<double>> sum, double* HWY_RESTRICT target) {
   const hn::ScalableTag<double> d;
+  hn::StoreU(hn::Add(hn::LoadU(d, target), sum), d, target);
+}
+HWY_INLINE void AddTo(hn::Vec<hn::ScalableTag<float>> sum, double* HWY_RESTRICT target) {
+#if HWY_TARGET == HWY_SCALAR
+  *target += static_cast<double>(hn::GetLane(sum));
+#else
+  const hn::ScalableTag<double> d;
+  const hn::Rebind<float, decltype(d)> half;
+  const hn::ScalableTag<float> whole;
+  AddTo(hn::PromoteTo(d, hn::LowerHalf(half, sum)), target);
+  AddTo(hn::PromoteTo(d, hn::UpperHalf(half, sum)), target + hn::Lanes(whole) / 2);
+#endif
+}
+
+// c[kRowStep x kCount] += a-panel [depth][kRowStep] times kCount columns of a b-panel [depth][kColumnStep].
+template <int kCount, int kVectors, typename Number>
+HWY_INLINE void MicroTile(const Number* HWY_RESTRICT a, const Number* HWY_RESTRICT b, std::size_t depth,
+                          double* HWY_RESTRICT c, std::size_t c_stride) {
+  const hn::ScalableTag<Number> d;
   using V = hn::Vec<decltype(d)>;
   const std::size_t lanes = hn::Lanes(d);
   V sum[kCount][kVectors];
@@ -51,18 +68,19 @@ HWY_INLINE void MicroTile(const double* HWY_RESTRICT a, const double* HWY_RESTRI
   for (int j = 0; j < kCount; ++j) {
 #pragma GCC unroll 16
     for (int v = 0; v < kVectors; ++v) {
-      double* target = c + static_cast<std::size_t>(j) * c_stride + static_cast<std::size_t>(v) * lanes;
-      hn::StoreU(hn::Add(hn::LoadU(d, target), sum[j][v]), d, target);
+      AddTo(sum[j][v], c + static_cast<std::size_t>(j) * c_stride + static_cast<std::size_t>(v) * lanes);
     }
   }
 }
 
 // c [row panels * 16 x column panels * 12], column-major, += packed a times packed b.
-void PackedProduct(const double* a, const double* b, std::size_t depth, std::size_t row_panels,
-                   std::size_t column_panels, double* c, std::size_t c_stride) {
-  constexpr std::size_t kLanes = HWY_LANES(double);
+template <typename Number>
+HWY_INLINE void Panels(const Number* a, const Number* b, std::size_t depth, std::size_t row_panels,
+                       std::size_t column_panels, double* c, std::size_t c_stride) {
+  constexpr std::size_t kLanes = HWY_LANES(Number);
   constexpr int kVectors = static_cast<int>(kRowStep / kLanes);
-  constexpr int kCount = kLanes >= 8 ? 12 : kLanes == 4 ? 3 : 1;  // as many sums as the registers hold
+  // As many sums as the registers hold
+  constexpr int kCount = kLanes * sizeof(Number) == 64 ? 12 : kVectors == 2 ? 6 : kVectors == 4 ? 3 : 1;
   for (std::size_t j = 0; j < column_panels; ++j) {
     for (std::size_t i = 0; i < row_panels; ++i) {
       for (std::size_t part = 0; part < kColumnStep; part += kCount) {
@@ -71,6 +89,14 @@ void PackedProduct(const double* a, const double* b, std::size_t depth, std::siz
       }
     }
   }
+}
+void PackedProduct(const double* a, const double* b, std::size_t depth, std::size_t row_panels,
+                   std::size_t column_panels, double* c, std::size_t c_stride) {
+  Panels(a, b, depth, row_panels, column_panels, c, c_stride);
+}
+void PackedProductOfFloats(const float* a, const float* b, std::size_t depth, std::size_t row_panels,
+                           std::size_t column_panels, double* c, std::size_t c_stride) {
+  Panels(a, b, depth, row_panels, column_panels, c, c_stride);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -85,6 +111,62 @@ HWY_AFTER_NAMESPACE();
 namespace kpsa::engine {
 
 HWY_EXPORT(PackedProduct);
+HWY_EXPORT(PackedProductOfFloats);
+
+namespace {
+
+// Columns of a panel, [width][kStep]: of(k, i) is column k of row i, of which there are `count`.
+template <std::size_t kStep, typename Number, typename Of>
+void PackPanel(std::size_t count, std::size_t width, Number* to, const Of& of) {
+  if (count == kStep) {  // a number that the compiler knows
+    for (std::size_t k = 0; k < width; ++k, to += kStep) {
+      for (std::size_t i = 0; i < kStep; ++i) to[i] = static_cast<Number>(of(k, i));
+    }
+    return;
+  }
+  std::fill_n(to, kStep * width, Number{0});
+  for (std::size_t k = 0; k < width; ++k, to += kStep) {
+    for (std::size_t i = 0; i < count; ++i) to[i] = static_cast<Number>(of(k, i));
+  }
+}
+
+}  // namespace
+
+template <std::size_t kStep, typename Number>
+void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width,
+                       Number* out) const {
+  for (std::size_t panel = 0; panel * kStep < height; ++panel) {
+    Number* const to = out + panel * kStep * width;
+    const std::size_t first = row + panel * kStep, count = std::min(kStep, height - panel * kStep);
+    if (dense_ != nullptr && !transposed_) {
+      const double* const from = dense_ + column * leading_ + first;
+      PackPanel<kStep>(count, width, to,
+                       [&](std::size_t k, std::size_t i) { return from[k * leading_ + i]; });
+    } else if (dense_ != nullptr) {
+      const double* const from = dense_ + first * leading_ + column;
+      PackPanel<kStep>(count, width, to,
+                       [&](std::size_t k, std::size_t i) { return from[i * leading_ + k]; });
+    } else if (!transposed_) {
+      const float* const* const from = pose_rows_.data() + first;
+      if (scale_.empty()) {
+        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) { return from[i][column + k]; });
+      } else {
+        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) {
+          return static_cast<double>(from[i][column + k]) * scale_[column + k];
+        });
+      }
+    } else {
+      const float* const* const from = pose_rows_.data() + column;
+      if (scale_.empty()) {
+        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) { return from[k][first + i]; });
+      } else {
+        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) {
+          return static_cast<double>(from[k][first + i]) * scale_[first + i];
+        });
+      }
+    }
+  }
+}
 
 namespace {
 
@@ -94,10 +176,12 @@ constexpr std::size_t kDepth = 128;  // columns of A packed at a time; a panel o
 constexpr std::size_t kFewTiles = 4, kMostParts = 8, kPartDepth = 8 * kDepth;
 
 // At a 64-byte boundary: vectors that straddle cache lines cost a third of the speed.
-class AlignedDoubles {
+template <typename Number>
+class AlignedNumbers {
  public:
-  explicit AlignedDoubles(std::size_t size) : floats_(AlignedFloats::Uninitialized(2 * size)) {}
-  double* data() { return reinterpret_cast<double*>(floats_.data()); }
+  explicit AlignedNumbers(std::size_t size)
+      : floats_(AlignedFloats::Uninitialized(sizeof(Number) / sizeof(float) * size)) {}
+  Number* data() { return reinterpret_cast<Number*>(floats_.data()); }
 
  private:
   AlignedFloats floats_;
@@ -106,11 +190,24 @@ class AlignedDoubles {
 std::size_t RoundUp(std::size_t count, std::size_t step) { return (count + step - 1) / step * step; }
 
 // What tiles of a product are computed in, one after the other.
+template <typename Number>
 struct Workspace {
   Workspace(std::size_t rows, std::size_t columns, std::size_t depth)
       : a(rows * depth), b(columns * depth), tile(rows * columns) {}
-  AlignedDoubles a, b, tile;
+  AlignedNumbers<Number> a, b;
+  AlignedNumbers<double> tile;
 };
+
+void MultiplyPacked(Workspace<double>* of, std::size_t depth, std::size_t row_panels,
+                    std::size_t column_panels) {
+  HWY_DYNAMIC_DISPATCH(PackedProduct)
+  (of->a.data(), of->b.data(), depth, row_panels, column_panels, of->tile.data(), row_panels * kRowStep);
+}
+void MultiplyPacked(Workspace<float>* of, std::size_t depth, std::size_t row_panels,
+                    std::size_t column_panels) {
+  HWY_DYNAMIC_DISPATCH(PackedProductOfFloats)
+  (of->a.data(), of->b.data(), depth, row_panels, column_panels, of->tile.data(), row_panels * kRowStep);
+}
 
 // A tile of C and what columns of A it is summed over.
 struct Task {
@@ -118,8 +215,9 @@ struct Task {
 };
 
 // One tile of C, accumulated over the columns of A in a fixed order.
+template <typename Number>
 void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, const Task& task,
-                 Workspace* workspace, Eigen::MatrixXd* c) {
+                 Workspace<Number>* workspace, Eigen::MatrixXd* c) {
   const std::size_t height = std::min(kTile, a.rows() - task.row),
                     width = std::min(kTile, b_transposed.rows() - task.column);
   const std::size_t row_panels = (height + kRowStep - 1) / kRowStep;
@@ -129,10 +227,9 @@ void ComputeTile(const GemmOperand& a, const GemmOperand& b_transposed, const Ta
   for (std::size_t k = task.begin; k < task.end; k += kDepth) {
     ThrowIfCancelled();
     const std::size_t depth = std::min(kDepth, task.end - k);
-    a.Pack(task.row, height, k, depth, kRowStep, workspace->a.data());
-    b_transposed.Pack(task.column, width, k, depth, kColumnStep, workspace->b.data());
-    HWY_DYNAMIC_DISPATCH(PackedProduct)
-    (workspace->a.data(), workspace->b.data(), depth, row_panels, column_panels, tile, row_panels * kRowStep);
+    a.Pack<kRowStep>(task.row, height, k, depth, workspace->a.data());
+    b_transposed.Pack<kColumnStep>(task.column, width, k, depth, workspace->b.data());
+    MultiplyPacked(workspace, depth, row_panels, column_panels);
   }
   for (std::size_t j = 0; j < width; ++j) {
     std::copy_n(tile + j * row_panels * kRowStep, height,
@@ -145,6 +242,7 @@ std::size_t PartsOf(std::size_t tiles, std::size_t depth) {
   return tiles >= kFewTiles ? 1 : std::clamp<std::size_t>(depth / kPartDepth, 1, kMostParts);
 }
 
+template <typename Number>
 void Product(const GemmOperand& a, const GemmOperand& b_transposed, bool symmetric, Eigen::MatrixXd* c) {
   KPSA_CHECK_EQ(a.columns(), b_transposed.columns());
   const std::size_t m = a.rows(), n = b_transposed.rows(), depth = a.columns();
@@ -161,8 +259,8 @@ void Product(const GemmOperand& a, const GemmOperand& b_transposed, bool symmetr
   const std::size_t parts = PartsOf(tiles.size(), depth);
   std::vector<Eigen::MatrixXd> sums(parts - 1, Eigen::MatrixXd(parts > 1 ? c->rows() : 0, c->cols()));
   ParallelFor(tiles.size() * parts, 1, [&](std::size_t begin, std::size_t end) {
-    Workspace workspace(RoundUp(std::min(m, kTile), kRowStep), RoundUp(std::min(n, kTile), kColumnStep),
-                        std::min(depth, kDepth));
+    Workspace<Number> workspace(RoundUp(std::min(m, kTile), kRowStep),
+                                RoundUp(std::min(n, kTile), kColumnStep), std::min(depth, kDepth));
     for (std::size_t t = begin; t < end; ++t) {
       Task task = tiles[t / parts];
       const std::size_t part = t % parts;
@@ -209,42 +307,18 @@ GemmOperand GemmOperand::Transposed() const {
   return operand;
 }
 
-void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width,
-                       std::size_t step, double* out) const {
-  for (std::size_t panel = 0; panel * step < height; ++panel) {
-    double* target = out + panel * step * width;  // [width][step]
-    const std::size_t first = row + panel * step, count = std::min(step, height - panel * step);
-    if (count < step) std::fill_n(target, step * width, 0.0);
-    if (dense_ != nullptr && !transposed_) {
-      for (std::size_t k = 0; k < width; ++k)
-        std::copy_n(dense_ + (column + k) * leading_ + first, count, target + k * step);
-    } else if (dense_ != nullptr) {
-      for (std::size_t i = 0; i < count; ++i) {
-        const double* source = dense_ + (first + i) * leading_ + column;
-        for (std::size_t k = 0; k < width; ++k) target[k * step + i] = source[k];
-      }
-    } else if (!transposed_) {
-      const float* sources[kRowStep];
-      for (std::size_t i = 0; i < count; ++i) sources[i] = pose_rows_[first + i] + column;
-      for (std::size_t k = 0; k < width; ++k) {
-        const double scale = scale_.empty() ? 1.0 : scale_[column + k];
-        for (std::size_t i = 0; i < count; ++i)
-          target[k * step + i] = static_cast<double>(sources[i][k]) * scale;
-      }
-    } else {
-      for (std::size_t k = 0; k < width; ++k) {
-        const float* source = pose_rows_[column + k] + first;
-        for (std::size_t i = 0; i < count; ++i) target[k * step + i] = static_cast<double>(source[i]);
-        if (!scale_.empty()) {
-          for (std::size_t i = 0; i < count; ++i) target[k * step + i] *= scale_[first + i];
-        }
-      }
-    }
-  }
+void Multiply(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd* product) {
+  Product<double>(a, b.Transposed(), false, product);
 }
 
-void Multiply(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd* product) {
-  Product(a, b.Transposed(), false, product);
+void MultiplyFloats(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd* product) {
+  Product<float>(a, b.Transposed(), false, product);
+}
+
+Eigen::MatrixXd MultiplyFloats(const GemmOperand& a, const GemmOperand& b) {
+  Eigen::MatrixXd product;
+  MultiplyFloats(a, b, &product);
+  return product;
 }
 
 Eigen::MatrixXd Multiply(const GemmOperand& a, const GemmOperand& b) {
@@ -260,7 +334,7 @@ Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
 
 Eigen::MatrixXd Gram(const GemmOperand& a) {
   Eigen::MatrixXd gram;
-  Product(a, a, true, &gram);
+  Product<double>(a, a, true, &gram);
   return gram;
 }
 

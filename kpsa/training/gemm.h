@@ -1,4 +1,4 @@
-// Matrix products in float64 for training (offline only: the bits depend on the machine). The build has no
+// Matrix products for training (offline only: the bits depend on the machine). The build has no
 // -march flag, so Eigen's own products use SSE2; these use Highway and are 10 to 20 times as fast for large
 // operands.
 #pragma once
@@ -23,10 +23,10 @@ class GemmOperand {
   std::size_t rows() const { return transposed_ ? columns_ : rows_; }
   std::size_t columns() const { return transposed_ ? rows_ : columns_; }
 
-  // Writes rows [row, row + height) of columns [column, column + width) as panels of `step` rows:
-  // out[panel][column][step], zero beyond the matrix.
-  void Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width, std::size_t step,
-            double* out) const;
+  // Writes rows [row, row + height) of columns [column, column + width) as panels of kStep rows:
+  // out[panel][column][kStep], zero beyond the matrix. double or float.
+  template <std::size_t kStep, typename Number>
+  void Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width, Number* out) const;
 
  private:
   bool transposed_ = false;
@@ -43,6 +43,10 @@ void Multiply(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd* produ
 Eigen::MatrixXd Multiply(const GemmOperand& a, const GemmOperand& b);
 Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
                          const Eigen::Ref<const Eigen::MatrixXd>& b);
+// The same of factors rounded to float32, 128 terms of a sum in float32 and these sums in float64: twice as fast, for what
+// is rough anyway, or is small itself. Relative to |a| |b| it is off by about 1e-7.
+void MultiplyFloats(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd* product);
+Eigen::MatrixXd MultiplyFloats(const GemmOperand& a, const GemmOperand& b);
 // a * a^T, symmetric to the last bit.
 Eigen::MatrixXd Gram(const GemmOperand& a);
 // rows * rows^T, and a * b^T: of values by poses.

@@ -46,6 +46,18 @@ std::vector<double> ColumnScales(const PoseLayout& layout, const PcaOptions& opt
   return scale;
 }
 
+// How many modes are not rounding. energies: S_k^2, descending
+Eigen::Index Kept(const Eigen::VectorXd& energies, Eigen::Index wanted, double min_ratio) {
+  Eigen::Index kept = 0;
+  while (kept < wanted && energies[kept] > min_ratio * min_ratio * energies[0]) ++kept;
+  return kept;
+}
+// Of the eigenvectors of X X^T, or of that of an image of it: what turns it into modes of unit length.
+Eigen::MatrixXd ToUnitModes(const SymmetricEigen& eigen, Eigen::Index wanted, double min_ratio) {
+  const Eigen::Index kept = Kept(eigen.values, wanted, min_ratio);
+  return eigen.vectors.leftCols(kept) * eigen.values.head(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
 // Approximately orthonormal modes [columns x m], before the finish.
 Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::span<const double> scale,
                            const PcaOptions& options) {
@@ -55,40 +67,30 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
       static_cast<Eigen::Index>(std::min<std::size_t>(static_cast<std::size_t>(options.max_modes), small));
   const bool randomised = options.method == PcaOptions::Method::kRandomised ||
                           (options.method == PcaOptions::Method::kAuto && small > kMaxGram);
-  Eigen::VectorXd energy;   // S_k^2
-  Eigen::MatrixXd vectors;  // U [T x m]
   if (randomised) {
-    // Range finder on the side of the poses; orthonormalised in every step, or small modes drown
+    // Range finder on the side of the poses; orthonormalised in every step, or small modes drown. What that rounds, the
+    // last image does not
     const Eigen::Index width = std::min<Eigen::Index>(wanted + 20, static_cast<Eigen::Index>(small));
-    Eigen::MatrixXd range = Multiply(
-        x, GemmOperand::Dense(RandomNormal(static_cast<Eigen::Index>(columns), width, options.seed)));
+    Eigen::MatrixXd image = RandomNormal(static_cast<Eigen::Index>(columns), width, options.seed), range;
+    MultiplyFloats(x, GemmOperand::Dense(image), &range);
     Orthonormalize(&range);
     for (int i = 0; i < options.power_iterations; ++i) {
-      Eigen::MatrixXd image = Multiply(x.Transposed(), GemmOperand::Dense(range));
+      MultiplyFloats(x.Transposed(), GemmOperand::Dense(range), &image);
       Orthonormalize(&image);
-      range = Multiply(x, GemmOperand::Dense(image));
+      MultiplyFloats(x, GemmOperand::Dense(image), &range);
       Orthonormalize(&range);
     }
-    Eigen::MatrixXd image = Multiply(x.Transposed(), GemmOperand::Dense(range));
+    Multiply(x.Transposed(), GemmOperand::Dense(range), &image);
     const SymmetricEigen eigen = AllEigen(Gram(GemmOperand::Dense(image).Transposed()));
-    energy = eigen.values.head(wanted);
-    vectors = range * eigen.vectors.leftCols(wanted);
-  } else if (poses.poses() <= columns) {
-    SymmetricEigen eigen = LargestEigen(Gram(x), wanted, options.seed);
-    energy = std::move(eigen.values);
-    vectors = std::move(eigen.vectors);
-  } else {
-    SymmetricEigen eigen = LargestEigen(Gram(x.Transposed()), wanted, options.seed);
-    Eigen::Index kept = 0;
-    while (kept < wanted && eigen.values[kept] > options.min_ratio * options.min_ratio * eigen.values[0])
-      ++kept;
-    return eigen.vectors.leftCols(kept);
+    return Multiply(image, ToUnitModes(eigen, wanted, options.min_ratio));
   }
-  Eigen::Index kept = 0;
-  while (kept < wanted && energy[kept] > options.min_ratio * options.min_ratio * energy[0]) ++kept;
-  // eval: a product with a diagonal is lazy, and the assignment resizes what it reads
-  vectors = (vectors.leftCols(kept) * energy.head(kept).cwiseSqrt().cwiseInverse().asDiagonal()).eval();
-  return Multiply(x.Transposed(), GemmOperand::Dense(vectors));
+  if (poses.poses() <= columns) {
+    const Eigen::MatrixXd vectors =
+        ToUnitModes(LargestEigen(Gram(x), wanted, options.seed), wanted, options.min_ratio);
+    return Multiply(x.Transposed(), GemmOperand::Dense(vectors));
+  }
+  const SymmetricEigen eigen = LargestEigen(Gram(x.Transposed()), wanted, options.seed);
+  return eigen.vectors.leftCols(Kept(eigen.values, wanted, options.min_ratio));
 }
 
 Status CheckInput(const PoseMatrix& poses, const Eigen::VectorXd& mean, const PcaOptions& options) {

@@ -127,7 +127,7 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     if (!IsWorthTrying(of_tiles) || of_tiles.misses > kHopelessTiles) break;
   }
   if (!steps.ns.empty() && of_tiles.misses > kManyMisses && std::isfinite(of_tiles.ns)) {
-    poor = PoorTiles(TileErrors(poses->poses, tiles), setup->options.tolerance, steps);
+    poor = PoorTiles(TileErrors(poses->poses, tiles, fits_), setup->options.tolerance, steps);
     if (!poor.empty()) return false;
   }
   // As chosen, without products of tiles: others with these would hardly do better, and take their time

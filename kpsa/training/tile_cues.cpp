@@ -15,6 +15,7 @@
 #include "kpsa/training/eigen_solvers.h"
 #include "kpsa/training/gemm.h"
 #include "kpsa/training/greedy_columns.h"
+#include "kpsa/training/point_errors.h"
 #include "kpsa/training/quantile.h"
 #include "kpsa/training/ridge.h"
 #include "kpsa/training/tile_builder.h"
@@ -50,13 +51,6 @@ Eigen::MatrixXd Centered(Eigen::MatrixXd rows) {
   rows.colwise() -= mean;
   return rows;
 }
-// [n x T] from [3n x T]
-Eigen::MatrixXd PointErrors(const Eigen::MatrixXd& left) {
-  Eigen::MatrixXd errors(left.rows() / 3, left.cols());
-  for (Eigen::Index i = 0; i < errors.rows(); ++i) errors.row(i) = left.middleRows(3 * i, 3).colwise().norm();
-  return errors;
-}
-
 std::vector<std::size_t> EveryPose(const PoseMatrix& poses, std::size_t stride) {
   std::vector<std::size_t> rows;
   for (std::size_t t = 0; t < poses.poses(); t += stride) rows.push_back(t);
@@ -487,7 +481,9 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
   view.Target(tile, &model);
   const Eigen::MatrixXd& y = model.target;
   const Eigen::MatrixXd x = unit.asDiagonal() * measured(model.columns, Eigen::all);
-  const Eigen::MatrixXd gram = GramOf(x), cross = CrossOf(x, y);
+  // Rounded, as what the map leaves makes up for that
+  const Eigen::MatrixXd gram = GramOf(x),
+                        cross = MultiplyFloats(GemmOperand::Dense(x), GemmOperand::Dense(y).Transposed());
   const Eigen::VectorXd back = unit.cwiseInverse();
   model.covariance = back.asDiagonal() * gram * back.asDiagonal() / static_cast<double>(count);
   model.gain.setZero(y.rows(), height);
@@ -508,14 +504,17 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
     if (error < best) best = error, ridge = candidate;
   }
   model.left_out = std::max(0.0, yh.squaredNorm() + best) / static_cast<double>(yh.size() / 3);
-  Eigen::MatrixXd map = Damped(gram, ridge).solve(cross);
+  Eigen::MatrixXd map = Damped(gram, ridge).solve(cross), left;
   for (int round = 0; round < kWeighings; ++round) {
-    const Eigen::MatrixXd left = y - Multiply(GemmOperand::Dense(map).Transposed(), GemmOperand::Dense(x));
-    const Eigen::ArrayXd largest =
-        PointErrors(left).colwise().maxCoeff().transpose().array() / (kWeighed * options.tolerance);
-    const Eigen::VectorXd weight = (1 + largest.square().min(kMostWeight)).sqrt();
-    const Eigen::MatrixXd weighed = x * weight.asDiagonal();
-    map = Damped(GramOf(weighed), ridge).solve(CrossOf(weighed, y * weight.asDiagonal()));
+    MultiplyFloats(GemmOperand::Dense(map).Transposed(), GemmOperand::Dense(x), &left);
+    left = y - left;
+    const Eigen::ArrayXd largest = LargestErrors(left).array() / (kWeighed * options.tolerance);
+    const Eigen::VectorXd weight = 1 + largest.square().min(kMostWeight);
+    const Eigen::MatrixXd weighed = x * weight.asDiagonal(), gram_weighed = CrossOf(weighed, x);
+    // x w y^T by what the map leaves of y: that is small, so that it may be rounded
+    const Eigen::MatrixXd cross_left =
+        MultiplyFloats(GemmOperand::Dense(weighed), GemmOperand::Dense(left).Transposed());
+    map = Damped(gram_weighed, ridge).solve(gram_weighed * map + cross_left);
   }
   model.gain = map.transpose() * unit.asDiagonal();
   return model;

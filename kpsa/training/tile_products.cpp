@@ -8,6 +8,7 @@
 #include "kpsa/training/eigen_solvers.h"
 #include "kpsa/training/gemm.h"
 #include "kpsa/training/greedy_columns.h"
+#include "kpsa/training/point_errors.h"
 #include "kpsa/training/tile_builder.h"
 
 namespace kpsa::engine {
@@ -56,7 +57,7 @@ class ProductFitter {
     Eigen::MatrixXd y(static_cast<Eigen::Index>(f_.columns.size()), poses_);
     for (Eigen::Index j = 0; j < y.rows(); ++j)
       y.row(j) = measured_.row(static_cast<Eigen::Index>(f_.columns[static_cast<std::size_t>(j)]));
-    moved_ = f_.scale.asDiagonal() * (f_.v * y);
+    moved_ = f_.scale.asDiagonal() * Multiply(f_.v, y);
     whitening_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(kLatents));
     z_.resize(latents, poses_);
     for (Eigen::Index i = 0; i < latents; ++i) {
@@ -70,18 +71,8 @@ class ProductFitter {
 
   // What the linear tile is off by. [3n x T]
   void FindResiduals() {
-    residual_ = target_;
-    residual_.noalias() -= f_.u * moved_;
-  }
-
-  // Of each pose, the largest point error.
-  static Eigen::VectorXd LargestErrors(const Eigen::MatrixXd& errors) {
-    Eigen::VectorXd largest(errors.cols());
-    for (Eigen::Index t = 0; t < errors.cols(); ++t) {
-      const Eigen::Map<const Eigen::MatrixXd> by_point(errors.col(t).data(), 3, errors.rows() / 3);
-      largest[t] = std::sqrt(by_point.colwise().squaredNorm().maxCoeff());
-    }
-    return largest;
+    MultiplyFloats(GemmOperand::Dense(f_.u), GemmOperand::Dense(moved_), &residual_);
+    residual_ = target_ - residual_;
   }
 
   bool validated(Eigen::Index t) const {
@@ -120,14 +111,17 @@ class ProductFitter {
     std::vector<Eigen::Index> held, fitted;
     for (Eigen::Index t = 0; t < poses_; ++t) (validated(t) ? held : fitted).push_back(t);
     if (held.size() < 20 || fitted.size() < 60) return false;
-    gram_ = Multiply(products_, products_.transpose());
-    cross_ = Multiply(residual_, products_.transpose());
+    // Penalties are large, and what is left is small: it may be rounded
+    const GemmOperand products = GemmOperand::Dense(products_);
+    gram_ = GramOf(products_);
+    cross_ = MultiplyFloats(GemmOperand::Dense(residual_), products.Transposed());
     const Eigen::MatrixXd p = products_(Eigen::all, held), r = residual_(Eigen::all, held);
-    const Eigen::MatrixXd gram = gram_ - p * p.transpose(), cross = cross_ - r * p.transpose();
+    const Eigen::MatrixXd gram = gram_ - GramOf(p), cross = cross_ - CrossOf(r, p);
     double best = kWorthwhile * LargestErrors(r).squaredNorm();
     bool found = false;
     for (const double ridge : kRidge) {
-      const Eigen::MatrixXd left = r - Solve(gram, cross, ridge * static_cast<double>(fitted.size())) * p;
+      const Eigen::MatrixXd left =
+          r - Multiply(Solve(gram, cross, ridge * static_cast<double>(fitted.size())), p);
       const double error = LargestErrors(left).squaredNorm();
       if (error < best) best = error, ridge_ = ridge, found = true;
     }
@@ -220,20 +214,20 @@ class ProductFitter {
       p.row(q) = products_.row(q - 1) * deviations_[of];
       p.row(q).array() += means_[of];
     }
-    const Eigen::MatrixXd terms = map * p;
     const Eigen::Index points = map.rows() / 3;
-    Eigen::MatrixXd length(points, poses_);
-    for (Eigen::Index i = 0; i < points; ++i) length.row(i) = terms.middleRows(3 * i, 3).colwise().norm();
-    Eigen::RowVectorXd seen = Eigen::RowVectorXd::Zero(poses_);
+    // By pose, which follow each other in memory
+    const Eigen::MatrixXd length =
+        PointErrors(MultiplyFloats(GemmOperand::Dense(map), GemmOperand::Dense(p))).transpose();
+    Eigen::VectorXd seen = Eigen::VectorXd::Zero(poses_);
     result->doubt = Eigen::MatrixXd::Zero(3 * static_cast<Eigen::Index>(kDoubtPoints), map.cols());
     for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(kDoubtPoints); ++i) {
       Eigen::Index best = 0;
       double most = -1;
       for (Eigen::Index point = 0; point < points; ++point) {
-        const double gain = (length.row(point) - seen).cwiseMax(0.0).squaredNorm();
+        const double gain = (length.col(point) - seen).cwiseMax(0.0).squaredNorm();
         if (gain > most) most = gain, best = point;
       }
-      seen = seen.cwiseMax(length.row(best));
+      seen = seen.cwiseMax(length.col(best));
       for (Eigen::Index c = 0; c < 3; ++c)
         result->doubt.row(c * static_cast<Eigen::Index>(kDoubtPoints) + i) = map.row(3 * best + c);
     }

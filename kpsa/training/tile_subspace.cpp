@@ -9,7 +9,9 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "kpsa/training/cue_values.h"
+#include "kpsa/training/gemm.h"
 #include "kpsa/training/make_subspace.h"
+#include "kpsa/training/point_errors.h"
 #include "kpsa/training/tile_builder.h"
 
 namespace kpsa::engine {
@@ -17,6 +19,10 @@ namespace {
 
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
+// Of the poses, that any tile leaves beyond half the tolerance, about: more of them new poses would miss
+constexpr double kMostBeyondHalf = 0.25;
+// Of what steps may cost, where some tiles stand for all: among the others are more that need one
+constexpr double kOfMost = 0.7;
 // Of the tiles: so few may be to blame that the others are not worth their time. With more, other ways cost about as
 // much
 constexpr double kMostPoor = 1.0 / 3;
@@ -73,6 +79,12 @@ TileModel WithoutTarget(TileModel* model) {
   return copy;
 }
 
+// The same the other way round.
+TileModel WithTarget(TileModel model, const PoseMatrix& poses, const TileChoice& choice, std::size_t tile) {
+  SetTarget(poses, choice.options, choice.candidates[tile], choice.tiles.joint[tile], &model);
+  return model;
+}
+
 // The rows that a tile reads.
 std::vector<std::uint32_t> ColumnsOf(const TileChoice& choice, std::size_t tile) {
   const CueSet& cues = choice.cues;
@@ -125,19 +137,20 @@ void FinishTiles(TileSubspace* made) {
   s.soft_cache.offsets = made->cues.offsets;
 }
 
-Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice) {
+Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
+                           std::span<const TileModel> fits) {
   const auto count = static_cast<Eigen::Index>(poses.poses());
   Eigen::MatrixXf errors(count, static_cast<Eigen::Index>(choice.candidates.size()));
   ParallelFor(choice.candidates.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      const TileModel fitted = FitTile(poses, choice.measured, choice.cues, choice.options,
-                                       choice.candidates[t], choice.tiles.joint[t], ColumnsOf(choice, t));
-      Eigen::MatrixXd left = fitted.target;
-      if (!fitted.columns.empty()) left -= fitted.gain * choice.measured(fitted.columns, Eigen::all);
-      Eigen::VectorXd largest = Eigen::VectorXd::Zero(count);  // squared
-      for (Eigen::Index i = 0; i + 2 < left.rows(); i += 3)
-        largest = largest.cwiseMax(left.middleRows<3>(i).colwise().squaredNorm().transpose());
-      errors.col(static_cast<Eigen::Index>(t)) = largest.cwiseSqrt().cast<float>();
+      const TileModel fitted =
+          fits.empty() ? FitTile(poses, choice.measured, choice.cues, choice.options, choice.candidates[t],
+                                 choice.tiles.joint[t], ColumnsOf(choice, t))
+                       : WithTarget(fits[t], poses, choice, t);
+      const Eigen::MatrixXd measured = choice.measured(fitted.columns, Eigen::all),
+                            told =
+                                MultiplyFloats(GemmOperand::Dense(fitted.gain), GemmOperand::Dense(measured));
+      errors.col(static_cast<Eigen::Index>(t)) = LargestErrors(fitted.target - told).cast<float>();
     }
   });
   return errors;
@@ -186,7 +199,7 @@ std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double toleran
     ns += steps.ns[t * every] * static_cast<double>(every);
   }
   if (static_cast<double>(worst.size()) > kMostPoor * static_cast<double>(errors.cols()) || !all_step ||
-      ns > steps.most)
+      ns > (every > 1 ? kOfMost : 1) * steps.most)
     worst.clear();
   return worst;
 }
@@ -199,13 +212,19 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
     return ShareBeyond(errors, half) <= promise.most_of_half ||
            ShareBeyond(errors, kOfWhole * options.tolerance) <= promise.most_of_whole;
   };
+  // Of all tiles, as some of them say
+  const auto hopeless = [&](const Eigen::MatrixXf& errors) {
+    double share = 0;
+    for (Eigen::Index t = 0; t < errors.cols(); ++t) share += ShareBeyond(errors.col(t), half);
+    return kTrialTiles * share > kMostBeyondHalf;
+  };
   const bool many = candidates.size() > kTrialTiles * kTrialTiles;
   bool promising = promise.steps.ns.empty() && !promise.strict;
   if (many) {
     std::vector<TileCandidates> some;
     for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
     const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
-    promising = keeps(trial);
+    promising = keeps(trial) && !hopeless(trial);
     if (!promising && PoorTiles(trial, options.tolerance, promise.steps, kTrialTiles).empty()) return {};
   }
   PromisingTiles found{ChooseTiles(mean, poses, std::move(candidates), options), {}};
@@ -238,9 +257,7 @@ TileSubspace MakeTileSubspace(const Eigen::VectorXd& mean, const PoseMatrix& pos
         if (fits != nullptr) (*fits)[k] = WithoutTarget(&made_now);
         return made_now;
       }
-      TileModel before = (*fits)[k];
-      SetTarget(poses, choice.options, choice.candidates[k], choice.tiles.joint[k], &before);
-      return before;
+      return WithTarget((*fits)[k], poses, choice, k);
     };
     const std::size_t height = output.reconstructed() * static_cast<std::size_t>(s.components);
     inputs.first_column = first;

@@ -71,8 +71,9 @@ TileInputs InputsOf(const TileChoice& choice, const PoseMatrix& poses, std::size
 void FinishTiles(TileSubspace* made);
 
 // How far off a point of each tile of the choice would be in each of the same poses, were they stored exactly.
-// [poses x tiles]
-Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice);
+// [poses x tiles]; fits: as MakeTileSubspace has them, or empty.
+Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
+                           std::span<const TileModel> fits = {});
 // Share of the poses in which a tile is farther off, but some of them.
 double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<const std::size_t> but = {});
 // The fewest tiles, the worst first, but for which that is at most `most`; ascending.

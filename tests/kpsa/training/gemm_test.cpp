@@ -61,6 +61,15 @@ TEST_P(GemmTest, ReadsPosesWithAScaleAColumn) {
             1e-11);
 }
 
+TEST_P(GemmTest, RoundsFactorsButNotLongSums) {
+  for (const auto& [m, k, n] : {std::tuple{1, 1, 1}, {17, 5, 13}, {33, 401, 390}, {30, 9001, 20}}) {
+    const Eigen::MatrixXd a = RandomNormal(m, k, 8), b = RandomNormal(k, n, 9), exact = a * b;
+    const double off = Difference(MultiplyFloats(GemmOperand::Dense(a), GemmOperand::Dense(b)), exact);
+    EXPECT_LT(off, 1e-6 * std::sqrt(static_cast<double>(k)) * 4);
+    EXPECT_GT(off, 0);
+  }
+}
+
 // A depth that is split, where the product has few tiles.
 TEST_P(GemmTest, SumsADeepProductInParts) {
   const Eigen::MatrixXd a = RandomNormal(30, 9001, 6), b = RandomNormal(9001, 20, 7);
