@@ -135,6 +135,12 @@ void PackPanel(std::size_t count, std::size_t width, Number* to, const Of& of) {
 template <std::size_t kStep, typename Number>
 void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, std::size_t width,
                        Number* out) const {
+  const auto of_poses = [&](std::size_t count, Number* to, const auto& value, const auto& scaled_by) {
+    if (scale_.empty()) return PackPanel<kStep>(count, width, to, value);
+    PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) {
+      return static_cast<double>(value(k, i)) * scale_[scaled_by(k, i)];
+    });
+  };
   for (std::size_t panel = 0; panel * kStep < height; ++panel) {
     Number* const to = out + panel * kStep * width;
     const std::size_t first = row + panel * kStep, count = std::min(kStep, height - panel * kStep);
@@ -148,22 +154,14 @@ void GemmOperand::Pack(std::size_t row, std::size_t height, std::size_t column, 
                        [&](std::size_t k, std::size_t i) { return from[i * leading_ + k]; });
     } else if (!transposed_) {
       const float* const* const from = pose_rows_.data() + first;
-      if (scale_.empty()) {
-        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) { return from[i][column + k]; });
-      } else {
-        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) {
-          return static_cast<double>(from[i][column + k]) * scale_[column + k];
-        });
-      }
+      of_poses(
+          count, to, [&](std::size_t k, std::size_t i) { return from[i][column + k]; },
+          [&](std::size_t k, std::size_t) { return column + k; });
     } else {
       const float* const* const from = pose_rows_.data() + column;
-      if (scale_.empty()) {
-        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) { return from[k][first + i]; });
-      } else {
-        PackPanel<kStep>(count, width, to, [&](std::size_t k, std::size_t i) {
-          return static_cast<double>(from[k][first + i]) * scale_[first + i];
-        });
-      }
+      of_poses(
+          count, to, [&](std::size_t k, std::size_t i) { return from[k][first + i]; },
+          [&](std::size_t, std::size_t i) { return first + i; });
     }
   }
 }

@@ -68,16 +68,15 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
   const bool randomised = options.method == PcaOptions::Method::kRandomised ||
                           (options.method == PcaOptions::Method::kAuto && small > kMaxGram);
   if (randomised) {
-    // Range finder on the side of the poses; orthonormalised in every step, or small modes drown. What that rounds, the
-    // last image does not
+    // Range finder on the side of the poses; orthonormalised in every step, or small modes drown
     const Eigen::Index width = std::min<Eigen::Index>(wanted + 20, static_cast<Eigen::Index>(small));
     Eigen::MatrixXd image = RandomNormal(static_cast<Eigen::Index>(columns), width, options.seed), range;
-    MultiplyFloats(x, GemmOperand::Dense(image), &range);
+    Multiply(x, GemmOperand::Dense(image), &range);
     Orthonormalize(&range);
     for (int i = 0; i < options.power_iterations; ++i) {
-      MultiplyFloats(x.Transposed(), GemmOperand::Dense(range), &image);
+      Multiply(x.Transposed(), GemmOperand::Dense(range), &image);
       Orthonormalize(&image);
-      MultiplyFloats(x, GemmOperand::Dense(image), &range);
+      Multiply(x, GemmOperand::Dense(image), &range);
       Orthonormalize(&range);
     }
     Multiply(x.Transposed(), GemmOperand::Dense(range), &image);

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::size_t kTrialTiles = 8;  // of so many, one is tried
 constexpr double kOfWhole = 0.9;        // of the tolerance: what bytes and doubts leave of it
-// Of the poses, that any tile leaves beyond half the tolerance, about: more of them new poses would miss
+// Of the poses, that any tile is expected to leave beyond half the tolerance: with more, doubts tell too few apart
 constexpr double kMostBeyondHalf = 0.25;
 // Of what steps may cost, where some tiles stand for all: among the others are more that need one
 constexpr double kOfMost = 0.7;
@@ -166,6 +166,12 @@ double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<co
   return static_cast<double>(beyond) / static_cast<double>(std::max<Eigen::Index>(errors.rows(), 1));
 }
 
+double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size_t every) {
+  const auto beyond = (errors.array() > static_cast<float>(tolerance)).count();
+  return static_cast<double>(every) * static_cast<double>(beyond) /
+         static_cast<double>(std::max<Eigen::Index>(errors.rows(), 1));
+}
+
 std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most) {
   std::vector<std::size_t> order(static_cast<std::size_t>(errors.cols()));
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -212,19 +218,13 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
     return ShareBeyond(errors, half) <= promise.most_of_half ||
            ShareBeyond(errors, kOfWhole * options.tolerance) <= promise.most_of_whole;
   };
-  // Of all tiles, as some of them say
-  const auto hopeless = [&](const Eigen::MatrixXf& errors) {
-    double share = 0;
-    for (Eigen::Index t = 0; t < errors.cols(); ++t) share += ShareBeyond(errors.col(t), half);
-    return kTrialTiles * share > kMostBeyondHalf;
-  };
   const bool many = candidates.size() > kTrialTiles * kTrialTiles;
   bool promising = promise.steps.ns.empty() && !promise.strict;
   if (many) {
     std::vector<TileCandidates> some;
     for (std::size_t t = 0; t < candidates.size(); t += kTrialTiles) some.push_back(candidates[t]);
     const Eigen::MatrixXf trial = TileErrors(poses, ChooseTiles(mean, poses, std::move(some), options));
-    promising = keeps(trial) && !hopeless(trial);
+    promising = keeps(trial) && ExpectedBeyond(trial, half, kTrialTiles) <= kMostBeyondHalf;
     if (!promising && PoorTiles(trial, options.tolerance, promise.steps, kTrialTiles).empty()) return {};
   }
   PromisingTiles found{ChooseTiles(mean, poses, std::move(candidates), options), {}};

@@ -56,7 +56,8 @@ PromisingTiles ChoosePromisingTiles(const Eigen::VectorXd& mean, const PoseMatri
                                     const TilePromise& promise);
 
 // The fewest tiles without which the others keep half the tolerance in all but a few poses; none where these are not few,
-// one of them has no step, or their steps cost too much. Of the tiles of `steps`, errors has one of `every`.
+// one of them has no step, or their steps cost too much. Of the tiles of `steps`, errors has one of `every`; then they may
+// cost less, since among the others there are more.
 std::vector<std::size_t> PoorTiles(const Eigen::MatrixXf& errors, double tolerance, const TileSteps& steps,
                                    std::size_t every = 1);
 
@@ -76,6 +77,8 @@ Eigen::MatrixXf TileErrors(const PoseMatrix& poses, const TileChoice& choice,
                            std::span<const TileModel> fits = {});
 // Share of the poses in which a tile is farther off, but some of them.
 double ShareBeyond(const Eigen::MatrixXf& errors, double tolerance, std::span<const std::size_t> but = {});
+// The same of `every` times as many tiles, as far as each is beyond in poses of its own.
+double ExpectedBeyond(const Eigen::MatrixXf& errors, double tolerance, std::size_t every);
 // The fewest tiles, the worst first, but for which that is at most `most`; ascending.
 std::vector<std::size_t> WorstTiles(const Eigen::MatrixXf& errors, double tolerance, double most);
 

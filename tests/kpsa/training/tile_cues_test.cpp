@@ -155,6 +155,10 @@ TEST(TileCues, SayWhatTheyWouldMiss) {
   const Eigen::MatrixXf errors = TileErrors(limb.poses, limb.choice);
   EXPECT_EQ(ShareBeyond(errors, farthest), 0) << "storing adds to the errors";
   EXPECT_EQ(ShareBeyond(errors, 0), 1);
+  std::vector<TileModel> fits;
+  MakeTileSubspace(limb.mean, limb.poses, 0, limb.choice, {{"limb", kLimbPoints}},
+                   {.rms_budget = kLimbTolerance, .max_budget = kLimbTolerance}, &fits);
+  EXPECT_EQ(TileErrors(limb.poses, limb.choice, fits), errors) << "they are fitted to the same poses";
   // Without the entries of a joint hardly a pose is told
   TileChoice blind = limb.choice;
   for (std::vector<std::uint32_t>& cues : blind.tiles.of_tile) cues.clear();
@@ -184,6 +188,10 @@ TEST(TileCues, SayWhichTilesAreToBlame) {
   EXPECT_EQ(PoorTiles(errors, 2, may), none) << "their steps are too dear";
   may = {std::vector<double>(12, 2.0), 7};
   EXPECT_EQ(PoorTiles(errors, 2, may, 2), none) << "so are those of all that they stand for";
+  may.most = 11;
+  EXPECT_EQ(PoorTiles(errors, 2, may, 2), none) << "among the others are more";
+  may.most = 12;
+  EXPECT_EQ(PoorTiles(errors, 2, may, 2), (std::vector<std::size_t>{1, 4}));
   may = {std::vector<double>(6, 5.0)};
   may.ns[4] = 0;
   EXPECT_EQ(PoorTiles(errors, 2, may), none) << "no step would help that one";
@@ -191,6 +199,26 @@ TEST(TileCues, SayWhichTilesAreToBlame) {
 }
 
 // The run time's way, against y, the stored joint and the points in its space, one by one.
+TEST(TileCues, AreGivenUpWhereSomeOfManyLeaveMuch) {
+  Eigen::MatrixXf errors = Eigen::MatrixXf::Constant(100, 6, 0.1f);
+  errors.col(4).head(3).setConstant(2), errors.col(1).tail(2).setConstant(2);
+  EXPECT_EQ(ExpectedBeyond(errors, 1, 8), 0.4);
+  EXPECT_EQ(ExpectedBeyond(errors, 2, 8), 0);
+
+  const Limb limb(true);
+  const auto promises = [&](bool told, double most_of_half, double most_of_whole) {
+    TileCandidates tile = limb.choice.candidates[0];
+    TileCueOptions options = limb.choice.options;
+    if (!told) tile.joints.clear(), tile.points.clear(), tile.own_points = 0, options.values.clear();
+    return ChoosePromisingTiles(limb.mean, limb.poses, std::vector(72, tile), options,
+                                {.most_of_half = most_of_half, .most_of_whole = most_of_whole})
+        .choice.has_value();
+  };
+  EXPECT_TRUE(promises(true, 0.03, 0));
+  EXPECT_FALSE(promises(false, 0.03, 0));
+  EXPECT_FALSE(promises(false, 1, 1)) << "whatever may be left by some of them";
+}
+
 TEST(TileCues, PointsGoThroughTheMatrixOfTheJoint) {
   const Limb limb(true);
   const PoseMatrix fresh = LimbPoses(5, 3);
