@@ -34,7 +34,7 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   TrainingRecord& record = *of.record;
   KPSA_RETURN_IF_ERROR(setup.Say("finer tiles", 0.95));
   TrainingRecord before = record;
-  TrainingTrials trials(setup.full_cost);
+  TrainingTrials trials(setup.full_cost, of.alike());
   const auto add = [&](const char* what, Subspace tried) {
     const Result<double> points = setup.CostOfPoints(of.cues.set.cues);
     if (!points.ok()) return points.status();
@@ -65,11 +65,16 @@ Status CandidateCalibrator::TryFiner(Subspace* subspace) const {
   const char* const fine = of.by_tile ? kByTileFinely : of.fewer ? kFewerCues : kFinelyStored;
   KPSA_RETURN_IF_ERROR(add(of.fine ? fine : of.by_tile ? kByTile : kForAllPoints, std::move(*subspace)));
   bool may_be_for_all = of.by_tile && !of.by_tiles_alone();
-  if (of.by_tile &&
-      of.others_ns < trials.least_ns()) {  // calibration misses more than the judges of both did
-    for_all_points(), may_be_for_all = false;
-    if (of.others.tiles.empty()) of.others = of.ForAllPoints(true);
-    KPSA_RETURN_IF_ERROR(calibrated(kFinelyStored, std::move(of.others)));
+  if (of.others_ns < trials.least_ns()) {  // calibration misses more than the judges of both did
+    if (of.by_tile) {
+      for_all_points(), may_be_for_all = false;
+      if (of.others.tiles.empty()) of.others = of.ForAllPoints(true);
+      KPSA_RETURN_IF_ERROR(calibrated(kFinelyStored, std::move(of.others)));
+    } else {
+      of.by_tile = true;
+      KPSA_RETURN_IF_ERROR(again(of.others_finely ? kByTileFinely : kByTile, of.others_finely));
+      for_all_points(), of.by_tile = false;
+    }
   }
   if (!of.fine && of.IsWorthTrying(trials.least())) KPSA_RETURN_IF_ERROR(again(fine));
   if (may_be_for_all && trials.least().misses > kTooManyMisses) {

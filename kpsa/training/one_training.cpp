@@ -170,7 +170,8 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
   KPSA_RETURN_IF_ERROR(calibrator.Calibrate(&subspace));
   const FrameCost& cost = candidates.cost;
   if (of_points && !options.without.miss_costs && calibrator.size.margins && candidates.IsWorthTrying(cost) &&
-      (!candidates.fine || cost.lost() > kTooManyMisses) && setup.limit.left() > candidates.modes_seconds)
+      (!candidates.fine || cost.lost() > kTooManyMisses || candidates.others_ns < cost.ns) &&
+      setup.limit.left() > candidates.modes_seconds)
     KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&subspace));
 
   if (rig.some.empty())

@@ -25,9 +25,7 @@ constexpr double kMostBeyondOfMisses = 0.1;
 constexpr double kHopelessTiles = 0.3;  // not for cues of tiles that miss so many
 constexpr double kTilesInModes = 3.5;   // how long these take, in the time that modes took
 constexpr double kClearly = 0.5;        // of the expected cost of the others: cues of tiles are taken
-constexpr double kAlike = 1.15;         // likewise, where these are known better: clips go where no judge was
 constexpr std::size_t kToldBy = 8;      // of so many tiles, one, where there are
-constexpr std::size_t kManyTiles = 64;  // so many: these have something to gain
 constexpr double kDearPoints = 0.25;    // of what a frame costs: others are tried
 constexpr double kCheaper = 0.95;       // likewise: fewer cues for all points are taken
 constexpr double kTurnReach = 0.03;     // of the diagonal: how far an entry of a rotation moves points, about
@@ -139,7 +137,7 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     Tried(kForAllPoints, cues.set, cues.choice.misses, cues.choice.cost);
   } else if (const Result<double> least = LeastForAllPoints(); !least.ok()) {
     return least.status();
-  } else if (of_tiles.ns < kAlike * *least) {
+  } else if (of_tiles.ns < alike() * *least) {
     by_tile = true, others_ns = *least;
     Tried(for_all_finely_ ? kFinelyStored : kForAllPoints, cues.set, 0, *least);
   } else {
@@ -147,10 +145,10 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
     *subspace = ForAllPoints(for_all_finely_);
     const Result<FrameCost> of_others = Price(subspace, cues.set);
     if (!of_others.ok()) return of_others.status();
-    by_tile = of_tiles.ns < kAlike * of_others->ns;
+    by_tile = of_tiles.ns < alike() * of_others->ns;
     Tried(for_all_finely_ ? kFinelyStored : kForAllPoints, cues.set, of_others->misses, of_others->ns);
+    others_ns = by_tile ? of_others->ns : of_tiles.ns, others_finely = fine;
     if (!by_tile) best = record->tried.size() - 1, fine = for_all_finely_;
-    if (by_tile) others_ns = of_others->ns;
     if (by_tile && for_all_finely_) others = std::move(*subspace);
   }
   record->tried[best].taken = true;
@@ -158,6 +156,8 @@ Result<bool> SubspaceCandidates::CompareWithTiles(Subspace* subspace) {
   if (by_tile) *subspace = std::move(with_tiles.subspace), cues.set = std::move(with_tiles.cues);
   return true;
 }
+
+double SubspaceCandidates::alike() const { return TileCount() >= kManyTiles ? kAlikeOfMany : kAlikeOfFew; }
 
 std::size_t SubspaceCandidates::TileCount() const {
   std::size_t tiles = 0;
@@ -205,6 +205,7 @@ Status SubspaceCandidates::CompareWithCheaper(Subspace* subspace) {
     }
     for (TrainingRecord::Tried& one : record->tried) one.taken = false;
     record->tried.back().taken = true;
+    if (by_tile) others_ns = best_ns_, others_finely = fine;
     *subspace = std::move(made), best_ns_ = priced->ns;
     by_tile = false, fine = fewer = true;
     cues.choice.cues = other.cues;

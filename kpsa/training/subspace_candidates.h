@@ -24,6 +24,11 @@ inline constexpr double kTooManyMisses = 0.15;  // and cues as for half the tole
 // who come to the ends of ranges; the bytes are read for sure.
 inline constexpr double kFinelyLess = 0.9;
 
+inline constexpr std::size_t kManyTiles = 64;  // so many: cues of tiles have something to gain
+// Of the cost with cues for all points: those of tiles are taken at less. Judges do not go where clips go: with few
+// tiles clips hit more often than these by cues for all points, with many by cues of tiles.
+inline constexpr double kAlikeOfFew = 0.85, kAlikeOfMany = 1.4;
+
 // Refers to its parts. FindModes has centred the poses.
 struct SubspaceCandidates {
   SubspaceCandidates(TrainingSetup* of_setup, TrainingPoses* of_poses, TrainingModes* of_modes,
@@ -50,16 +55,19 @@ struct SubspaceCandidates {
   FrameCost cost = {};                 // by the last calibration, but points
   TileChoice tiles = {};               // where they were tried
   RangeFinder ranges_of_tiles = {};    // of the poses that these alone were trained on
-  // With cues for all points, where those of tiles were taken: not calibrated, and what it was expected to cost, at least;
-  // without tiles where nobody made it, or not finely
+  // With cues for all points, where those of tiles were taken: not calibrated; without tiles where nobody made it, or not
+  // finely
   Subspace others = {};
+  // What these, or those of tiles where they were not taken, were expected to cost, at least
   double others_ns = std::numeric_limits<double>::infinity();
+  bool others_finely = false;  // the tiles of the latter
 
   // The subspace with which a frame is expected to cost least, by the judges; none where some tiles are poor, or where
   // it is dear and cues of tiles do not serve.
   Result<std::optional<Subspace>> Best();
 
   bool IsWorthTrying(const FrameCost& of) const;
+  double alike() const;         // kAlikeOfFew or kAlikeOfMany
   bool by_tiles_alone() const;  // the rig has some tiles before a last step
   // The largest step, and one that can be done without.
   bool HasTimeForTiles();

@@ -4,19 +4,11 @@
 #include <utility>
 
 namespace kpsa::engine {
-namespace {
-
-// Of the cost with cues for all points: clips hit more often by these than judges say, by those of tiles they
-// do not. So the latter have to be clearly cheaper.
-constexpr double kOfTiles = 1 / 0.85;
-
-}  // namespace
-
 void TrainingTrials::Add(const char* what, double points, CalibratedSubspace tried, double weight) {
   const double ns = tried.cost.ns + points;
   tried_.push_back({what, tried.cues.cues.size(), static_cast<std::size_t>(tried.cues.rows()),
                     tried.cost.misses, ns / full_, false});
-  const double weighed = weight * (tried.subspace.by_tile() ? kOfTiles * ns : ns);
+  const double weighed = weight * (tried.subspace.by_tile() ? ns / alike_ : ns);
   if (tried_.size() > 1 && weighed >= least_weighed_) return;
   best_ = std::move(tried), best_ns_ = ns, least_weighed_ = weighed, best_of_ = tried_.size() - 1;
 }

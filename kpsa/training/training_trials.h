@@ -1,5 +1,5 @@
-// Subspaces that training calibrated one after the other, of which the cheapest stays; one with cues of tiles
-// only if it is clearly cheaper than those with cues for all points. Internal to training.
+// Subspaces that training calibrated one after the other, of which the cheapest stays; those with
+// cues of tiles are compared with others as candidates are. Internal to training.
 #pragma once
 
 #include "kpsa/subspace.h"
@@ -20,7 +20,8 @@ struct CalibratedSubspace {
 class TrainingTrials {
  public:
   // full: what the whole evaluation costs (ns, on the scale of the nodes' costs).
-  explicit TrainingTrials(double full) : full_(full) {}
+  // alike: of the cost with cues for all points, at which those of tiles are taken.
+  TrainingTrials(double full, double alike) : full_(full), alike_(alike) {}
 
   // points: what the graph spends until the points among the cues are there (ns). what: as
   // TrainingRecord::Tried says it. weight: of what it costs, in the comparison.
@@ -32,7 +33,7 @@ class TrainingTrials {
   CalibratedSubspace Take(std::vector<TrainingRecord::Tried> earlier);
 
  private:
-  double full_;
+  double full_, alike_;
   std::vector<TrainingRecord::Tried> tried_;
   CalibratedSubspace best_;
   double best_ns_ = 0, least_weighed_ = 0;

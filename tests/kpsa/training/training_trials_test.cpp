@@ -1,14 +1,14 @@
 // Of what training calibrated, the cheapest stays, with what was tried besides.
-#include "kpsa/training/tile_builder.h"
 #include "kpsa/training/training_trials.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "kpsa/tiles.h"
 #include "kpsa/training/eigen_solvers.h"
 #include "kpsa/training/pose_matrix.h"
-#include "kpsa/tiles.h"
+#include "kpsa/training/tile_builder.h"
 
 namespace kpsa::engine {
 namespace {
@@ -43,25 +43,27 @@ CalibratedSubspace Costing(double ns, bool by_tile) {
   return tried;
 }
 // What is taken of two.
-double Taken(double by_tile, double for_all, bool tiles_first) {
-  TrainingTrials trials(kFullCost);
+double Taken(double by_tile, double for_all, bool tiles_first, double alike) {
+  TrainingTrials trials(kFullCost, alike);
   for (const bool tiles : {tiles_first, !tiles_first})
     trials.Add(tiles ? "tiles" : "all", 0, Costing(tiles ? by_tile : for_all, tiles));
   return trials.Take({}).cost.ns;
 }
 
-TEST(TrainingTrials, CuesOfTilesHaveToBeClearlyCheaper) {
+TEST(TrainingTrials, CuesOfTilesAreTakenAtTheShareThatIsSaid) {
   ASSERT_TRUE(Costing(1, true).subspace.by_tile());
   ASSERT_FALSE(Costing(1, false).subspace.by_tile());
-  for (const bool tiles_first : {false, true}) {
-    EXPECT_EQ(Taken(200, 300, tiles_first), 200);
-    EXPECT_EQ(Taken(290, 300, tiles_first), 300) << "hardly cheaper, and clips go elsewhere";
-    EXPECT_EQ(Taken(310, 300, tiles_first), 300);
+  for (const bool first : {false, true}) {
+    EXPECT_EQ(Taken(200, 300, first, 0.85), 200);
+    EXPECT_EQ(Taken(290, 300, first, 0.85), 300) << "hardly cheaper, and clips go elsewhere";
+    EXPECT_EQ(Taken(310, 300, first, 0.85), 300);
+    EXPECT_EQ(Taken(310, 300, first, 1.4), 310) << "hardly dearer, and clips go elsewhere";
+    EXPECT_EQ(Taken(430, 300, first, 1.4), 300);
   }
 }
 
 TEST(TrainingTrials, TheRecordTellsOfAllAndOfOneThatWasTaken) {
-  TrainingTrials trials(kFullCost);
+  TrainingTrials trials(kFullCost, 1);
   trials.Add("dear", 50, Costing(400, false));
   trials.Add("cheap", 50, Costing(150, false));
   EXPECT_EQ(trials.least_ns(), 200);
