@@ -171,7 +171,8 @@ Result<SafetensorsFile> SafetensorsFile::ParseOwn(AlignedFloats memory, std::siz
   std::memcpy(&header_size, bytes.data(), 8);
   if (header_size > bytes.size() - 8 || header_size > kMaxHeader) {
     return Status::Invalid(
-               "the header claims {} bytes, the file has {} (not a safetensors file, or cut short)",
+               "the header claims {} bytes, the file has {} (not a safetensors file, or cut short: expected "
+               "one that kpsa train wrote)",
                header_size, bytes.size())
         .At({name});
   }
@@ -233,7 +234,8 @@ Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   std::uint64_t header_size = 0;
   stream.read(reinterpret_cast<char*>(&header_size), 8);
   if (!stream || header_size > size - 8 || header_size > kMaxHeader) {
-    return Status::Invalid("not a safetensors file, or cut short").At({path});
+    return Status::Invalid("not a safetensors file, or cut short: expected a file that kpsa train wrote")
+        .At({path});
   }
   if (size > kMaxFile)
     return Status::Invalid("is larger than {} bytes, the most that is read", kMaxFile).At({path});

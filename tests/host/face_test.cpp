@@ -188,7 +188,7 @@ TEST_F(Face, ErrorsAreValuesWithPlaces) {
   folder_->Write("broken.kpsa", "no subspace");
   const Problem broken = Failed(rig_->Accelerated({.subspace = Path("broken.kpsa")}));
   EXPECT_EQ(broken.file, Path("broken.kpsa"));
-  EXPECT_EQ(broken.message, "not a safetensors file, or cut short");
+  EXPECT_EQ(broken.message, "not a safetensors file, or cut short: expected a file that kpsa train wrote");
   std::string damaged = folder_->Read(Path("hello.kpsa"));
   damaged.back() = static_cast<char>(damaged.back() ^ 1);
   folder_->Write("damaged.kpsa", damaged);
