@@ -14,7 +14,7 @@ namespace kpsa::engine {
 namespace {
 
 // What a frame costs, in last steps: inner points are tried; and of that, with which they are taken
-constexpr double kWorthSplitting = 2, kCheaperInner = 0.95;
+constexpr double kWorthSplitting = 1.5, kCheaperInner = 0.95;
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 // Of many points: all are trained at once, with a step of some tiles, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
