@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "kpsa/calibration.h"
 #include "kpsa/partial_step.h"
 #include "kpsa/training/one_training.h"
 #include "kpsa/training/some_points.h"
@@ -14,7 +15,9 @@ namespace kpsa::engine {
 namespace {
 
 // What a frame costs, in last steps: inner points are tried; and of that, with which they are taken
-constexpr double kWorthSplitting = 1.5, kCheaperInner = 0.95;
+constexpr double kWorthSplitting = 2, kCheaperInner = 0.95;
+// The same, where of the poses that are made of the clips fewer than these hit: what misses will be missed in playback
+constexpr double kWorthSplittingMisses = 1.5, kManyHits = 0.85;
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 // Of many points: all are trained at once, with a step of some tiles, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
@@ -117,6 +120,11 @@ std::vector<std::vector<Index>> TilesOfAll(const std::vector<std::vector<Index>>
   return all;
 }
 
+bool HitsClips(const Subspace& subspace) {
+  return ExpectedHitRate(Calibrate(subspace.calibration, subspace.tolerance, subspace.violation_rate,
+                                   subspace.blend_start)) > kManyHits;
+}
+
 // Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost
 // less.
 Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
@@ -164,7 +172,10 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   const double enough = kWorthSplitting * steps;
   const Ends ends{enough, &(*split)->split};
   Result<Trained> whole = TrainOnce(rig, clips, options, mends, &ends);
-  if (!whole.ok() || (!whole->ended && whole->ns < enough)) return whole;
+  if (!whole.ok()) return whole;
+  if (!whole->ended && whole->ns < enough &&
+      (whole->ns < kWorthSplittingMisses * steps || HitsClips(whole->subspace)))
+    return whole;
   if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
   TrainOptions rest = options;
   rest.seconds = limit.left();
