@@ -67,7 +67,7 @@ struct SubspaceCandidates {
   Result<std::optional<Subspace>> Best();
 
   bool IsWorthTrying(const FrameCost& of) const;
-  double alike() const;         // kAlikeOfFew or kAlikeOfMany
+  double alike() const;         // at how much more cues of tiles are taken
   bool by_tiles_alone() const;  // the rig has some tiles before a last step
   // The largest step, and one that can be done without.
   bool HasTimeForTiles();

@@ -120,6 +120,7 @@ std::vector<std::vector<Index>> TilesOfAll(const std::vector<std::vector<Index>>
   return all;
 }
 
+// Whether most poses hit that are made of the clips, as playback is.
 bool HitsClips(const Subspace& subspace) {
   return ExpectedHitRate(Calibrate(subspace.calibration, subspace.tolerance, subspace.violation_rate,
                                    subspace.blend_start)) > kManyHits;

@@ -4,6 +4,7 @@
 #include <utility>
 
 namespace kpsa::engine {
+
 void TrainingTrials::Add(const char* what, double points, CalibratedSubspace tried, double weight) {
   const double ns = tried.cost.ns + points;
   tried_.push_back({what, tried.cues.cues.size(), static_cast<std::size_t>(tried.cues.rows()),
