@@ -157,7 +157,7 @@ class Chooser {
 
   PointSurvey Survey(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca_, chosen, noise_);
-    return SurveyPoints(pca_, cues, MapEstimator(pca_, cues, false), poses_,
+    return SurveyPoints(pca_, cues, MapEstimator(pca_, cues, EstimatorParts::kNoGain), poses_,
                         std::max<std::size_t>(1, poses_.poses() / kErrorPoses), options_.tolerance);
   }
 
@@ -168,7 +168,7 @@ class Chooser {
   };
   Missed Misses(const std::vector<CueRef>& chosen) const {
     const CueSet cues = MakeCueSet(pca_, chosen, noise_);
-    const Estimator estimator = MapEstimator(pca_, cues, false);
+    const Estimator estimator = MapEstimator(pca_, cues, EstimatorParts::kReach);
     const Eigen::MatrixXd trained = MeasuredPoses(pca_.layout, cues, poses_),
                           judges = MeasuredPoses(pca_.layout, cues, *options_.judges);
     const SoftCacheModel model = MakeSoftCacheModel(estimator, cues, trained);

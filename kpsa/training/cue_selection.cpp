@@ -44,10 +44,10 @@ class Selector {
         candidates_(candidates),
         positions_(positions),
         options_(options),
-        gains_(MakeGains(pca, candidates, noise, options.point_weights)) {
+        root_(OutputRoot(pca, options.point_weights)),
+        gains_(MakeGains(pca, candidates, noise, root_)) {
     sigma_ = pca.mode_variance().asDiagonal();
-    const Eigen::MatrixXd root = OutputRoot(pca, options.point_weights);
-    weight_ = root.size() == 0 ? Eigen::MatrixXd() : Eigen::MatrixXd(root.transpose() * root);
+    weight_ = root_.size() == 0 ? Eigen::MatrixXd() : Multiply(root_.transpose(), root_);
     blocked_.resize(candidates.size());
     gains_.Reset(sigma_);
   }
@@ -111,14 +111,13 @@ class Selector {
 
  private:
   static CandidateGains MakeGains(const Pca& pca, std::span<const CueRef> candidates, const CueNoise& noise,
-                                  std::span<const double> point_weights) {
+                                  const Eigen::MatrixXd& output_root) {
     const CueSet set = MakeCueSet(pca, candidates, noise);
     std::vector<float> loadings(static_cast<std::size_t>(set.loadings.size()));
     Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
         loadings.data(), set.loadings.rows(), set.loadings.cols()) = set.loadings.cast<float>();
     return CandidateGains(set.offsets, std::move(loadings),
-                          {set.noise.data(), set.noise.data() + set.noise.size()},
-                          OutputRoot(pca, point_weights));
+                          {set.noise.data(), set.noise.data() + set.noise.size()}, output_root);
   }
 
   // U [h x M] with Sigma' = Sigma - U^T U after measuring (sign -1), or Sigma + U^T U after forgetting (sign
@@ -157,6 +156,7 @@ class Selector {
   std::span<const CueRef> candidates_;
   std::span<const Double3> positions_;
   const CueSelectionOptions& options_;
+  const Eigen::MatrixXd root_;  // OutputRoot
   CandidateGains gains_;
   Eigen::MatrixXd sigma_, weight_;  // [M x M]; weight_ W, empty for the identity
   std::vector<std::size_t> chosen_;

@@ -29,7 +29,7 @@ Eigen::VectorXd Reach(const Eigen::MatrixXd& gain) {
 
 // covariance P [M x M] of the mode coordinates, cues C [r x M] -> G, its factors and B.
 Estimator MapWithCovariance(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::MatrixXd& c,
-                            const Eigen::MatrixXd& p, const Eigen::VectorXd& noise, bool keep_gain = true) {
+                            const Eigen::MatrixXd& p, const Eigen::VectorXd& noise, EstimatorParts parts) {
   Estimator estimator;
   const Eigen::MatrixXd cp = Multiply(c, p);  // [r x M]
   estimator.covariance = Multiply(cp, c.transpose());
@@ -42,7 +42,8 @@ Estimator MapWithCovariance(const Eigen::Ref<const Eigen::MatrixXd>& a, const Ei
   estimator.judge = TransposedProduct(estimator.whitening, estimator.whitening);
   estimator.judge = (0.5 * (estimator.judge + estimator.judge.transpose())).eval();
   estimator.coordinates = cholesky.solve(cp).transpose();
-  if (keep_gain) {
+  if (parts == EstimatorParts::kNoGain) return estimator;
+  if (parts == EstimatorParts::kAll) {
     estimator.gain = Multiply(a, estimator.coordinates);
     estimator.reach = Reach(estimator.gain);
     return estimator;
@@ -59,15 +60,15 @@ Estimator MapWithCovariance(const Eigen::Ref<const Eigen::MatrixXd>& a, const Ei
 
 }  // namespace
 
-Estimator MapEstimator(const Pca& pca, const CueSet& cues, bool keep_gain) {
+Estimator MapEstimator(const Pca& pca, const CueSet& cues, EstimatorParts parts) {
   return MapWithCovariance(pca.output_modes(), cues.loadings, pca.mode_variance().asDiagonal(), cues.noise,
-                           keep_gain);
+                           parts);
 }
 
 Estimator RotatedMapEstimator(const Pca& pca, const CueSet& cues, const Eigen::MatrixXd& rotation) {
   const Eigen::MatrixXd covariance = rotation.transpose() * pca.mode_variance().asDiagonal() * rotation;
   return MapWithCovariance(Multiply(pca.output_modes(), rotation), Multiply(cues.loadings, rotation),
-                           covariance, cues.noise);
+                           covariance, cues.noise, EstimatorParts::kAll);
 }
 
 Estimator LeastSquaresEstimator(const Pca& pca, const CueSet& cues) {
@@ -179,7 +180,8 @@ PointSurvey SurveyPoints(const Pca& pca, const CueSet& cues, const Estimator& es
     for (std::size_t k = 0; k < chosen.size(); ++k) {
       y.col(static_cast<Eigen::Index>(k)) = MeasuredCues(pca.layout, cues, poses.row(chosen[k]));
     }
-    Multiply(GemmOperand::Dense(a), GemmOperand::Dense(Multiply(estimator.coordinates, y)), &reached);
+    const Eigen::MatrixXd coordinates = Multiply(estimator.coordinates, y);
+    MultiplyFloats(GemmOperand::Dense(a), GemmOperand::Dense(coordinates), &reached);
     std::vector<std::atomic<double>> worst(chosen.size());
     ParallelFor(points, 512, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = 0; k < chosen.size(); ++k) {

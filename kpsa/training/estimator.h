@@ -28,8 +28,9 @@ struct Estimator {
   std::string warning;    // not empty: paper mode fell back to map, and why
 };
 
-// keep_gain: false saves the memory of B, which is large for pictures.
-Estimator MapEstimator(const Pca& pca, const CueSet& cues, bool keep_gain = true);
+// B takes much memory for pictures, and its columns' reach much time where errors alone are asked for.
+enum class EstimatorParts { kAll, kReach, kNoGain };  // without B; without reach, too, which SoftCache needs
+Estimator MapEstimator(const Pca& pca, const CueSet& cues, EstimatorParts parts = EstimatorParts::kAll);
 
 // Paper mode. A condition number above 1e4, or fewer rows than modes, gives MapEstimator with a warning.
 inline constexpr double kMaxCondition = 1e4;

@@ -1,39 +1,50 @@
 #include "kpsa/training/ridge.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "kpsa/training/gemm.h"
 
 namespace kpsa::engine {
 namespace {
 
+// Where rounding leaves a Gram matrix that is not positive, it is damped so many times as much; never more than so much
+constexpr double kMoreRidge = 100, kMostRidge = 10;
+
 // rows: of which the mean of the diagonal is taken.
-Eigen::LLT<Eigen::MatrixXd> DampedOf(Eigen::MatrixXd gram, Eigen::Index rows, double ridge) {
-  gram.diagonal().array() += ridge * std::max(gram.trace() / static_cast<double>(rows), 1e-300);
-  return gram.llt();
+Cholesky DampedOf(const Eigen::MatrixXd& gram, Eigen::Index rows, double ridge) {
+  const double mean = std::max(gram.trace() / static_cast<double>(rows), 1e-300);
+  for (double more = ridge; more < kMostRidge; more *= kMoreRidge) {
+    Eigen::MatrixXd damped = gram;
+    damped.diagonal().array() += more * mean;
+    Cholesky solver(std::move(damped));
+    if (solver.ok()) return solver;
+  }
+  return Cholesky(Eigen::MatrixXd(gram.diagonal().cwiseMax(mean).asDiagonal()));
 }
 
 }  // namespace
 
-Eigen::LLT<Eigen::MatrixXd> Damped(const Eigen::MatrixXd& gram, double ridge) {
-  return DampedOf(gram, gram.rows(), ridge);
-}
+Cholesky Damped(const Eigen::MatrixXd& gram, double ridge) { return DampedOf(gram, gram.rows(), ridge); }
 
 Eigen::MatrixXd RidgeAt(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const Eigen::MatrixXd& xh,
                         double ridge) {
-  if (x.rows() <= x.cols()) return Damped(GramOf(x), ridge).solve(CrossOf(x, y)).transpose() * xh;
+  if (x.rows() <= x.cols()) {
+    const Eigen::MatrixXd map = Damped(GramOf(x), ridge).Solve(CrossOf(x, y));
+    return Multiply(GemmOperand::Dense(map).Transposed(), GemmOperand::Dense(xh));
+  }
   const Eigen::MatrixXd columns = x.transpose();
-  return y * DampedOf(GramOf(columns), x.rows(), ridge).solve(Multiply(columns, xh));
+  return Multiply(y, DampedOf(GramOf(columns), x.rows(), ridge).Solve(Multiply(columns, xh)));
 }
 
 double ToldByRidge(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const Eigen::MatrixXd& gram,
                    const Eigen::MatrixXd& cross, double ridge) {
   if (x.rows() <= x.cols()) {
-    const Eigen::MatrixXd map = Damped(gram, ridge).solve(cross.transpose());
+    const Eigen::MatrixXd map = Damped(gram, ridge).Solve(cross.transpose());
     return map.cwiseProduct(cross.transpose()).sum();
   }
   const Eigen::MatrixXd columns = GramOf(x.transpose());
-  const Eigen::MatrixXd solved = DampedOf(columns, x.rows(), ridge).solve(y.transpose());
+  const Eigen::MatrixXd solved = DampedOf(columns, x.rows(), ridge).Solve(y.transpose());
   return Multiply(columns, solved).cwiseProduct(y.transpose()).sum();
 }
 

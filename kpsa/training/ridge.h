@@ -3,13 +3,14 @@
 // is a share of the mean of the diagonal of x x^T. Internal to training.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+
+#include "kpsa/training/cholesky.h"
 
 namespace kpsa::engine {
 
-// Of the Gram matrix of rows.
-Eigen::LLT<Eigen::MatrixXd> Damped(const Eigen::MatrixXd& gram, double ridge);
+// Of the Gram matrix of rows; with a larger ridge where that is not positive definite.
+Cholesky Damped(const Eigen::MatrixXd& gram, double ridge);
 // What the regression gives at other columns, xh.
 Eigen::MatrixXd RidgeAt(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y, const Eigen::MatrixXd& xh,
                         double ridge);

@@ -50,8 +50,10 @@ bool SubspaceCandidates::IsWorthTrying(const FrameCost& of) const {
 
 Subspace SubspaceCandidates::ForAllPoints(bool finely) {
   const bool paper = setup->options.mode == EstimatorMode::kPaper;
-  const Estimator estimator = paper ? LeastSquaresEstimator(modes->pca, cues.set)
-                                    : MapEstimator(modes->pca, cues.set, !setup->of_light());
+  const Estimator estimator =
+      paper ? LeastSquaresEstimator(modes->pca, cues.set)
+            : MapEstimator(modes->pca, cues.set,
+                           setup->of_light() ? EstimatorParts::kReach : EstimatorParts::kAll);
   record->warning = estimator.warning;
   const TileStorage coarse = setup->of_light() ? TileStorage::kLight : TileStorage::kForAllPoints;
   return MakeSubspace(

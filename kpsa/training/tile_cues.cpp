@@ -1,6 +1,5 @@
 #include "kpsa/training/tile_cues.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -309,7 +308,7 @@ class TileChooser {
   void FindResidual() {
     residual_ = y_;
     if (x_.rows() > 0) {
-      const Eigen::MatrixXd map = Damped(GramOf(x_), kFirstRidge).solve(CrossOf(x_, y_));
+      const Eigen::MatrixXd map = Damped(GramOf(x_), kFirstRidge).Solve(CrossOf(x_, y_));
       residual_ -= Multiply(GemmOperand::Dense(map).Transposed(), GemmOperand::Dense(x_));
     }
     errors_ = PointErrors(residual_);
@@ -333,8 +332,8 @@ class TileChooser {
     Eigen::MatrixXd s = GramOf(c), b = CrossOf(c, r);
     if (x_.rows() > 0) {
       const Eigen::MatrixXd x = x_ * pose_weight.asDiagonal(), xc = CrossOf(x, c), xr = CrossOf(x, r);
-      const Eigen::LLT<Eigen::MatrixXd> solver = Damped(GramOf(x), kFirstRidge);
-      const Eigen::MatrixXd map = solver.solve(xc);
+      const Cholesky solver = Damped(GramOf(x), kFirstRidge);
+      const Eigen::MatrixXd map = solver.Solve(xc);
       s -= map.transpose() * xc;
       b -= map.transpose() * xr;
     }
@@ -496,15 +495,14 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
                         wanted = cross - cross_held;
   double best = std::numeric_limits<double>::infinity(), ridge = kMapRidge[0];
   for (const double candidate : kMapRidge) {
-    const Eigen::LLT<Eigen::MatrixXd> solver = Damped(fitted, candidate);
-    if (solver.info() != Eigen::Success) continue;
-    const Eigen::MatrixXd map = solver.solve(wanted);  // [p x 3n]
+    const Eigen::MatrixXd map = Damped(fitted, candidate).Solve(wanted);  // [p x 3n]
     // |yh - map^T xh|^2 without the constant
-    const double error = (gram_held * map).cwiseProduct(map).sum() - 2 * map.cwiseProduct(cross_held).sum();
+    const double error =
+        Multiply(gram_held, map).cwiseProduct(map).sum() - 2 * map.cwiseProduct(cross_held).sum();
     if (error < best) best = error, ridge = candidate;
   }
   model.left_out = std::max(0.0, yh.squaredNorm() + best) / static_cast<double>(yh.size() / 3);
-  Eigen::MatrixXd map = Damped(gram, ridge).solve(cross), left;
+  Eigen::MatrixXd map = Damped(gram, ridge).Solve(cross), left;
   for (int round = 0; round < kWeighings; ++round) {
     MultiplyFloats(GemmOperand::Dense(map).Transposed(), GemmOperand::Dense(x), &left);
     left = y - left;
@@ -514,7 +512,7 @@ TileModel FitTile(const PoseMatrix& poses, const Eigen::MatrixXd& measured, cons
     // x w y^T by what the map leaves of y: that is small, so that it may be rounded
     const Eigen::MatrixXd cross_left =
         MultiplyFloats(GemmOperand::Dense(weighed), GemmOperand::Dense(left).Transposed());
-    map = Damped(gram_weighed, ridge).solve(gram_weighed * map + cross_left);
+    map = Damped(gram_weighed, ridge).Solve(Multiply(gram_weighed, map) + cross_left);
   }
   model.gain = map.transpose() * unit.asDiagonal();
   return model;

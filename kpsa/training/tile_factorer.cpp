@@ -44,7 +44,7 @@ class TileFactorer {
     Eigen::MatrixXd gram = Multiply(GemmOperand::Dense(motion_), GemmOperand::Dense(gain).Transposed());
     total_ = gram.trace();
     if (moved_.size() > 0 && std::isfinite(max_budget_))
-      gram += budget_ / (max_budget_ * max_budget_) * (moved_ * moved_.transpose());
+      gram += budget_ / (max_budget_ * max_budget_) * GramOf(moved_);
     const double all = gram.trace();
     SymmetricEigen eigen =
         gram.rows() > 2 * kDirections ? LargestEigen(gram, kDirections, 1) : AllEigen(gram);
@@ -54,7 +54,7 @@ class TileFactorer {
     while (q < eigen.values.size() && rest > 0.01 * budget_ && eigen.values[q] > 1e-14 * eigen.values[0])
       rest -= eigen.values[q++];
     basis_ = eigen.vectors.leftCols(q);
-    if (moved_.size() > 0) sample_motion_ = basis_.transpose() * moved_;
+    if (moved_.size() > 0) sample_motion_ = Multiply(basis_.transpose(), moved_);
     weights_.setZero(samples.cols());
     Weigh();
   }
@@ -226,7 +226,7 @@ class TileFactorer {
     for (Eigen::Index j = 0; j < product.cols(); ++j)
       linear += product.col(j).dot(motion_.col(columns[static_cast<std::size_t>(j)]));
     const Eigen::MatrixXd inner = Inner(covariance_, columns);
-    return std::max(0.0, total_ - 2 * linear + (product * inner).cwiseProduct(product).sum());
+    return std::max(0.0, total_ - 2 * linear + Multiply(product, inner).cwiseProduct(product).sum());
   }
 
   // The largest point error in the samples, against the whole map; keeps it for each sample.
@@ -238,7 +238,7 @@ class TileFactorer {
       Eigen::MatrixXd y(product.cols(), samples_.cols());
       for (Eigen::Index j = 0; j < y.rows(); ++j)
         y.row(j) = samples_.row(columns[static_cast<std::size_t>(j)]);
-      error.noalias() -= product * y;
+      error -= Multiply(product, y);
     }
     for (Eigen::Index i = 0; i < error.cols(); ++i) {
       const Eigen::Map<const Eigen::MatrixXd> by_point(error.col(i).data(), components_,

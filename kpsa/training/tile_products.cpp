@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
+#include "kpsa/training/cholesky.h"
 #include "kpsa/training/eigen_solvers.h"
 #include "kpsa/training/gemm.h"
 #include "kpsa/training/greedy_columns.h"
@@ -103,7 +105,7 @@ class ProductFitter {
   static Eigen::MatrixXd Solve(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& cross, double penalty) {
     Eigen::MatrixXd damped = gram;
     damped.diagonal().array() += penalty;
-    return damped.llt().solve(cross.transpose()).transpose();
+    return Cholesky(std::move(damped)).Solve(cross.transpose()).transpose();
   }
 
   // The penalty that serves poses best that are not fitted to; false where none does.
@@ -131,7 +133,7 @@ class ProductFitter {
   // As few products as explain nearly as much as all: greedy, by a pivoted Cholesky decomposition.
   void ChooseProducts() {
     const Eigen::MatrixXd all = Solve(gram_, cross_, ridge_ * static_cast<double>(poses_));
-    const Eigen::MatrixXd wanted = all * gram_;  // of the fit, not of the noise that it leaves
+    const Eigen::MatrixXd wanted = Multiply(all, gram_);  // of the fit, not of the noise that it leaves
     const double total = wanted.cwiseProduct(all).sum();
     std::vector<Eigen::Index> chosen = GreedyColumns(
         gram_, wanted,

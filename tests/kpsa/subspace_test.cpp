@@ -119,7 +119,7 @@ TEST_P(SubspaceTest, ReconstructsWhatTheEstimatorSays) {
 // Light: tiles read the few coordinates that all cues give together.
 TEST_P(SubspaceTest, LatentCoordinatesSayTheSame) {
   if (GetParam() != EstimatorMode::kMap) return;
-  const Estimator slim = MapEstimator(pca_, cues_, false);
+  const Estimator slim = MapEstimator(pca_, cues_, EstimatorParts::kReach);
   EXPECT_EQ(slim.gain.size(), 0);
   EXPECT_LT((slim.reach - estimator_.gain.cwiseAbs().colwise().maxCoeff().transpose()).norm(), 1e-12);
   Subspace latent = MakeSubspace(pca_, cues_, slim, MeasuredPoses(training_.layout(), cues_, training_),
