@@ -139,6 +139,13 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
   return cost;
 }
 
+double CostOfClips(const Subspace& subspace, double ns, double lost, double full) {
+  if (subspace.patches.tiles > 0) return ns;
+  const double hits = ExpectedHitRate(
+      Calibrate(subspace.calibration, subspace.tolerance, subspace.violation_rate, subspace.blend_start));
+  return ns + (1 - hits - lost) * full;
+}
+
 double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
                    std::span<const ScoreJudge> outside, double full, double tolerance, double confidence) {
   if (outside.empty()) return 0;

@@ -46,7 +46,10 @@ struct FrameCost {
 // its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
-// What is added to that by frames a little beyond the trained ranges, of which clips have a few percent: that
+// What a frame costs where poses are made as the clips are (ns): what far poses miss, playback does not. Of a calibrated subspace
+// a frame of which costs ns, of which poses of all kinds lose a share of `full`. Where parts miss by themselves it is ns.
+double CostOfClips(const Subspace& subspace, double ns, double lost, double full);
+// What is added to ExpectedCost by frames a little beyond the trained ranges, of which clips have a few percent: that
 // guards miss them, or that they are wrong (ns). outside: such poses, of which guards have been asked.
 double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,
                    std::span<const ScoreJudge> outside, double full, double tolerance, double confidence);

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
-#include "kpsa/calibration.h"
 #include "kpsa/partial_step.h"
+#include "kpsa/training/frame_cost.h"
 #include "kpsa/training/one_training.h"
 #include "kpsa/training/some_points.h"
 #include "kpsa/training/time_limit.h"
@@ -14,10 +14,9 @@
 namespace kpsa::engine {
 namespace {
 
-// What a frame costs, in last steps: inner points are tried; and of that, with which they are taken
-constexpr double kWorthSplitting = 2, kCheaperInner = 0.95;
-// The same, where of the poses that are made of the clips fewer than these hit: what misses will be missed in playback
-constexpr double kWorthSplittingMisses = 1.5, kManyHits = 0.85;
+// What a frame costs, in last steps: where cues say so, points that come out need no subspace of their own; where poses
+// made of the clips do, inner points are tried; and of that, with which they are taken
+constexpr double kDearCues = 2, kWorthSplitting = 1.6, kCheaperInner = 0.95;
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 // Of many points: all are trained at once, with a step of some tiles, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
@@ -120,10 +119,9 @@ std::vector<std::vector<Index>> TilesOfAll(const std::vector<std::vector<Index>>
   return all;
 }
 
-// Whether most poses hit that are made of the clips, as playback is.
-bool HitsClips(const Subspace& subspace) {
-  return ExpectedHitRate(Calibrate(subspace.calibration, subspace.tolerance, subspace.violation_rate,
-                                   subspace.blend_start)) > kManyHits;
+double CostOfClips(const Trained& trained) {
+  return trained.ended ? trained.ns
+                       : CostOfClips(trained.subspace, trained.ns, trained.lost, trained.full_ns);
 }
 
 // Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost
@@ -170,13 +168,12 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   double steps = 0;
   for (std::size_t m = 0; m < (*split)->split.size(); ++m)
     steps += (*split)->step(m) == nullptr ? 0 : static_cast<double>((*split)->step(m)->cost_ns());
-  const double enough = kWorthSplitting * steps;
+  const double enough = kDearCues * steps;
   const Ends ends{enough, &(*split)->split};
   Result<Trained> whole = TrainOnce(rig, clips, options, mends, &ends);
   if (!whole.ok()) return whole;
-  if (!whole->ended && whole->ns < enough &&
-      (whole->ns < kWorthSplittingMisses * steps || HitsClips(whole->subspace)))
-    return whole;
+  const double of_whole = CostOfClips(*whole);
+  if (!whole->ended && of_whole < kWorthSplitting * steps) return whole;
   if (!whole->ended && options.seconds < 2 * whole->seconds) return whole;
   TrainOptions rest = options;
   rest.seconds = limit.left();
@@ -187,7 +184,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
     if (made.ok()) {
       NameTried(&*made, kBeforeLastStepOfSome);
       // The steps of all tiles cost half of that by themselves
-      if (made->ns < enough && made->ns < kCheaperInner * whole->ns) {
+      if (made->ns < enough && CostOfClips(*made) < kCheaperInner * of_whole) {
         AddTried(*whole, &*made);
         return made;
       }
@@ -199,20 +196,20 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   if (!inner.ok() && inner.status().kind() == ErrorKind::kInterrupted) return inner;
   if (inner.ok()) NameTried(&*inner, kBeforeLastStep);
   // The cheaper one of the two that reconstruct inner points
-  if (some && (!inner.ok() || some->ns < inner->ns)) {
+  if (some && (!inner.ok() || CostOfClips(*some) < CostOfClips(*inner))) {
     if (inner.ok()) AddTried(*inner, &*some);
     inner = std::move(*some);
   } else if (some) {
     AddTried(*some, &*inner);
   }
-  if (whole->ended && !(inner.ok() && inner->ns < kCheaperInner * whole->ns)) {
+  if (whole->ended && !(inner.ok() && CostOfClips(*inner) < kCheaperInner * of_whole)) {
     rest.seconds = limit.left();
     whole = TrainOnce(rig, clips, rest, mends);
     if (!whole.ok()) return whole;
   }
   if (!inner.ok()) return whole;
   if (!whole->ended) NameTried(&*whole, "");
-  const bool cheaper = inner->ns < kCheaperInner * whole->ns;
+  const bool cheaper = CostOfClips(*inner) < kCheaperInner * CostOfClips(*whole);
   AddTried(cheaper ? *whole : *inner, cheaper ? &*inner : &*whole);
   return cheaper ? std::move(inner) : std::move(whole);
 }

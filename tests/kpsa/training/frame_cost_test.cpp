@@ -78,6 +78,24 @@ TEST(FrameCost, ASmallerToleranceIsAskedOfTheSamePoses) {
 
 // Frames a little beyond the ranges: what guards keep from hitting costs as a miss, what they let pass
 // nothing if it is right, and half a miss if it is wrong.
+// Far poses that are told by their scores miss; those made of the clips hit but for one in ten.
+TEST(FrameCost, OfClipsCountsWhatPosesMadeOfThemMiss) {
+  Subspace subspace = DoubtedAlone();
+  for (std::size_t t = 0; t < 800; ++t) {
+    const bool near = t % 2 == 0, misses = near ? t % 20 == 0 : t % 4 == 1;
+    subspace.calibration.push_back({misses ? 10 : 0.1, (misses ? 2 : 0.5) * kAsked, 0, 0});
+    subspace.calibration.back().near_clips = near;
+  }
+  const double hit = 0.2 * kFullFrame, lost = 0.3;
+  EXPECT_NEAR(CostOfClips(subspace, hit + lost * kFullFrame, lost, kFullFrame), hit + 0.1 * kFullFrame, 1e-6);
+  // Without clips of the sampled poses
+  for (CalibrationPair& pair : subspace.calibration) pair.near_clips = false;
+  EXPECT_NEAR(CostOfClips(subspace, hit + lost * kFullFrame, lost, kFullFrame), hit + 0.3 * kFullFrame, 1e-6);
+  // Of a pose that misses parts may hit
+  subspace.patches.tiles = 4;
+  EXPECT_EQ(CostOfClips(subspace, hit + lost * kFullFrame, lost, kFullFrame), hit + lost * kFullFrame);
+}
+
 TEST(FrameCost, FramesOutsideCostWhatGuardsAskOfThem) {
   const std::vector<ScoreJudge> judges = MadeUpJudges(0, 0);
   const auto outside = [&](double guard, double error) {
