@@ -336,11 +336,5 @@ Eigen::MatrixXd Gram(const GemmOperand& a) {
   return gram;
 }
 
-Eigen::MatrixXd GramFloats(const GemmOperand& a) {
-  Eigen::MatrixXd gram;
-  Product<float>(a, a, true, &gram);
-  return gram;
-}
-
 }  // namespace kpsa::engine
 #endif  // HWY_ONCE

@@ -47,9 +47,8 @@ Eigen::MatrixXd Multiply(const Eigen::Ref<const Eigen::MatrixXd>& a,
 // is rough anyway, or is small itself. Relative to |a| |b| it is off by about 1e-7.
 void MultiplyFloats(const GemmOperand& a, const GemmOperand& b, Eigen::MatrixXd* product);
 Eigen::MatrixXd MultiplyFloats(const GemmOperand& a, const GemmOperand& b);
-// a * a^T, symmetric to the last bit; and of factors rounded to float32, as MultiplyFloats.
+// a * a^T, symmetric to the last bit.
 Eigen::MatrixXd Gram(const GemmOperand& a);
-Eigen::MatrixXd GramFloats(const GemmOperand& a);
 // rows * rows^T, and a * b^T: of values by poses.
 inline Eigen::MatrixXd GramOf(const Eigen::MatrixXd& rows) { return Gram(GemmOperand::Dense(rows)); }
 inline Eigen::MatrixXd CrossOf(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {

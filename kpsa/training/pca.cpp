@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::size_t kMaxGram =
     8000;  // side of the Gram matrix above which kAuto takes the randomised method
-constexpr std::size_t kManyPoses = 1000;  // from so many on products are of float32, as poses are
 
 // Sum of squares of every column. [D]; the result has a NaN or infinity where the poses have one.
 Eigen::VectorXd ColumnEnergies(const PoseMatrix& poses) {
@@ -59,13 +58,6 @@ Eigen::MatrixXd ToUnitModes(const SymmetricEigen& eigen, Eigen::Index wanted, do
   return eigen.vectors.leftCols(kept) * eigen.values.head(kept).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-Eigen::MatrixXd ProductOf(const PoseMatrix& poses, const GemmOperand& a, const GemmOperand& b) {
-  return poses.poses() < kManyPoses ? Multiply(a, b) : MultiplyFloats(a, b);
-}
-Eigen::MatrixXd GramOf(const PoseMatrix& poses, const GemmOperand& a) {
-  return poses.poses() < kManyPoses ? Gram(a) : GramFloats(a);
-}
-
 // Approximately orthonormal modes [columns x m], before the finish.
 Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::span<const double> scale,
                            const PcaOptions& options) {
@@ -93,10 +85,10 @@ Eigen::MatrixXd RoughModes(const PoseMatrix& poses, std::size_t columns, std::sp
   }
   if (poses.poses() <= columns) {
     const Eigen::MatrixXd vectors =
-        ToUnitModes(LargestEigen(GramOf(poses, x), wanted, options.seed), wanted, options.min_ratio);
-    return ProductOf(poses, x.Transposed(), GemmOperand::Dense(vectors));
+        ToUnitModes(LargestEigen(Gram(x), wanted, options.seed), wanted, options.min_ratio);
+    return Multiply(x.Transposed(), GemmOperand::Dense(vectors));
   }
-  const SymmetricEigen eigen = LargestEigen(GramOf(poses, x.Transposed()), wanted, options.seed);
+  const SymmetricEigen eigen = LargestEigen(Gram(x.Transposed()), wanted, options.seed);
   return eigen.vectors.leftCols(Kept(eigen.values, wanted, options.min_ratio));
 }
 
@@ -164,7 +156,7 @@ Result<Pca> ComputePca(const PoseMatrix& poses, const Eigen::VectorXd& mean, con
   Eigen::MatrixXd modes = RoughModes(poses, columns, used_scale, options);
   Orthonormalize(&modes);
   const GemmOperand x = GemmOperand::Poses(poses, 0, pca.poses, 0, columns, used_scale);
-  ThinSvd svd = TallSvd(ProductOf(poses, x, GemmOperand::Dense(modes)));
+  ThinSvd svd = TallSvd(Multiply(x, GemmOperand::Dense(modes)));
   Eigen::Index kept = 0;
   while (kept < svd.values.size() && svd.values[kept] > options.min_ratio * svd.values[0]) ++kept;
   pca.singular = svd.values.head(kept);
