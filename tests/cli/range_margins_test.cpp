@@ -45,7 +45,7 @@ TEST(RangeMargins, AreAsWideAsTheToleranceIsKept) {
     EXPECT_LT(distance, tolerance);
     EXPECT_GT(distance, 0);
   }
-  EXPECT_LT(guarded_from[0], 0.1);
+  EXPECT_LT(guarded_from[0], 0.6 * guarded_from[1]);
   EXPECT_GT(guarded_from[1], 0.25) << "a third of the range, but for the ramp";
   EXPECT_LT(guarded_from[1], 0.7) << "and no farther than was tried";
 }
