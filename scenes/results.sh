@@ -146,7 +146,7 @@ Written by \`sh scenes/results.sh --assets FOLDER\`. All settings but the rigs' 
 
 \`kpsa init\`, \`train\` and \`bench\` with nothing changed. The first three are made from a seed by \`build/bench_untouched\`
 ([benchmarks.md](benchmarks.md) says how), the others are files of that folder. *Held-out hits* are of the trainer's own new poses that are made of the training clips, *predicted* is the
-speedup that \`train\` tells, *misses included* the one of the test clip, its largest accepted error is in tolerances.
+speedup that \`train\` tells, *misses included* the one of the test clip, its largest accepted error is in tolerances. *Memory* is the most that training takes at once.
 
 END
   cat "$work/untouched.md"
