@@ -46,8 +46,9 @@ struct FrameCost {
 // its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
-// What a frame costs where poses are made as the clips are (ns): what far poses miss, playback does not. Of a calibrated subspace
-// a frame of which costs ns, of which poses of all kinds lose a share of `full`. Where parts miss by themselves it is ns.
+// What a frame costs where poses are made as the clips are (ns): what far poses miss, playback does not. Of a
+// calibrated subspace; ns: a frame of all kinds of poses, which lose a share `lost` of `full` by misses and wrong
+// ones. ns again where parts of a pose miss by themselves.
 double CostOfClips(const Subspace& subspace, double ns, double lost, double full);
 // What is added to ExpectedCost by frames a little beyond the trained ranges, of which clips have a few percent: that
 // guards miss them, or that they are wrong (ns). outside: such poses, of which guards have been asked.
