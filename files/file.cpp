@@ -13,6 +13,7 @@
 #include <memory>
 #include <system_error>
 
+#include "files/missing_file.h"
 #include "files/temporaries.h"
 
 namespace kpsa::engine {
@@ -96,8 +97,12 @@ Status CopyTo(const std::string& from, const std::string& to) {
 
 Result<std::vector<std::uint8_t>> ReadFileBytes(const std::string& path, std::uint64_t max_bytes) {
   struct stat info = {};
-  if (::stat(path.c_str(), &info) != 0)
-    return Status::Invalid("cannot be read: {}", Reason(errno)).At({path});
+  if (::stat(path.c_str(), &info) != 0) {
+    const int reason = errno;
+    return Status::Invalid("cannot be read: {}{}", Reason(reason),
+                           reason == ENOENT ? InsteadOfMissing(path) : Suggestion())
+        .At({path});
+  }
   if (S_ISDIR(info.st_mode)) return Status::Invalid("is a folder, expected a file").At({path});
   const auto too_large = [&] {
     return Status::Invalid("is larger than {} bytes, the most that is read", max_bytes).At({path});

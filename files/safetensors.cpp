@@ -11,6 +11,7 @@
 #include "base/check.h"
 #include "base/fresh_pages.h"
 #include "files/file.h"
+#include "files/missing_file.h"
 
 static_assert(std::endian::native == std::endian::little, "tensors are copied as they lie in memory");
 
@@ -224,7 +225,8 @@ Result<SafetensorsFile> SafetensorsFile::ParseOwn(AlignedFloats memory, std::siz
 
 Result<SafetensorsFile> SafetensorsFile::Read(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return Status::Invalid("no such file").At({path});
+  if (!std::filesystem::exists(path, error))
+    return Status::Invalid("no such file{}", InsteadOfMissing(path)).At({path});
   if (!std::filesystem::is_regular_file(path, error))
     return Status::Invalid("is a folder, a pipe or a device, expected a file").At({path});
   const std::uintmax_t size = std::filesystem::file_size(path, error);

@@ -114,5 +114,26 @@ TEST(File, ReadsWithinTheLimit) {
             std::string::npos);
 }
 
+TEST(File, SaysWhatIsThereInsteadOfAMissingOne) {
+  const TemporaryFolder folder;
+  const auto said = [&](const std::string& name) {
+    return ReadFileBytes(folder / name, 9).status().errors().front().message;
+  };
+  EXPECT_EQ(said("head.yaml"), "cannot be read: No such file or directory; its folder has no .yaml file");
+  EXPECT_EQ(said("rigs/old/head.yaml"),
+            "cannot be read: No such file or directory; there is no folder \"" + folder / "rigs" + "\"");
+  for (const char* name : {"arm.yaml", "body.yaml", "character.yaml", "dog.yaml", "elephant.yaml", "arm.glb"})
+    folder.Write(name, "");
+  EXPECT_EQ(said("bodi.yaml"), "cannot be read: No such file or directory (did you mean \"body.yaml\"?)");
+  EXPECT_EQ(said("unlike-all-of-them.glb"),
+            "cannot be read: No such file or directory; its folder has arm.glb");
+  EXPECT_EQ(said("unlike-all-of-them.yaml"),
+            "cannot be read: No such file or directory; its folder has arm.yaml, body.yaml, character.yaml, "
+            "dog.yaml and 1 more");
+  EXPECT_EQ(said("unlike"), "cannot be read: No such file or directory");
+  folder.Write("file", "");
+  EXPECT_EQ(said("file/head.yaml"), "cannot be read: Not a directory");
+}
+
 }  // namespace
 }  // namespace kpsa::engine
