@@ -3,7 +3,8 @@
 namespace kpsa::engine {
 
 const char* PoseKindName(PoseKind kind) {
-  constexpr const char* kNames[] = {"sampled", "mixtures", "neighbours", "beyond the ranges"};
+  constexpr const char* kNames[] = {"sampled", "mixtures", "neighbours", "beyond the ranges",
+                                    "held controls"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

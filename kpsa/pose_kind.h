@@ -13,8 +13,10 @@ enum class PoseKind : std::uint8_t {
   kNeighbours,  // 2 to 6 controls that move the same points, at 50 to 100 % of their reach
   kBeyond,      // a sampled pose with 1 to 3 controls up to kBeyondShare of their range, and their margins,
                 // beyond an end
+  kHeld,  // a moment of a clip, with controls that no clip moves anywhere in their ranges: what an animator
+          // sets over playback, each by itself far out in every second pose
 };
-inline constexpr int kPoseKinds = 4;
+inline constexpr int kPoseKinds = 5;
 inline constexpr double kBeyondShare = 0.1;
 const char* PoseKindName(PoseKind kind);  // "sampled", "mixtures", ...
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "files/json_depth.h"
+#include "kpsa/pose_kind.h"
 #include "kpsa/subspace_lists.h"
 #include "kpsa/training_record.h"
 
@@ -169,7 +170,11 @@ Status ReadJsonLists(const SafetensorsFile& file, Status* status, Subspace* s) {
 int VersionOf(const Subspace& s) {
   const bool partial =
       std::ranges::any_of(s.outputs, [](const SubspaceOutput& output) { return !output.stepped.empty(); });
-  return partial            ? kPartialVersion
+  const bool held = std::ranges::any_of(s.calibration, [](const CalibrationPair& pair) {
+    return pair.kind == static_cast<int>(PoseKind::kHeld);
+  });
+  return held               ? kHeldVersion
+         : partial          ? kPartialVersion
          : !s.mends.empty() ? kMendsVersion
          : s.of_inner()     ? kInnerVersion
                             : kListsVersion;

@@ -1,6 +1,7 @@
 #include "kpsa/training/poses.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -10,6 +11,8 @@ namespace kpsa::engine {
 namespace {
 
 constexpr std::size_t kClipFrames = 80;  // frames of the clips to mix
+constexpr double kMoves = 0.01;          // of its range, that a control moves in the clips: it is not held
+constexpr std::size_t kHeldAtOnce = 8;
 // Of a mesh's weights, in the share of other controls that move together: shapes add up where they overlap
 constexpr double kWeightsTogether = 0.25;
 
@@ -92,6 +95,18 @@ class Sampler {
       const double beyond = (kBeyondShare + c.margin) * (c.max - c.min) * random_.Unit();
       const bool up = random_.Unit() < 0.5 || c.min == c.rest;
       pose->values[i] = std::clamp(up ? c.max + beyond : c.min - beyond, c.lowest, c.highest);
+    }
+  }
+
+  // One control far out, each in its turn, or some of them anywhere, over a clip.
+  void Hold(const std::vector<std::size_t>& held, std::size_t number, std::size_t clips, SampledPose* pose) {
+    pose->clip = static_cast<int>(random_.Below(clips));
+    pose->phase = random_.Unit();
+    if (number % 2 == 0) return Move(held[number / 2 % held.size()], 0.5 + 0.5 * random_.Unit(), pose);
+    const std::size_t count = 1 + random_.Below(std::min(held.size(), kHeldAtOnce));
+    for (const std::size_t k : Some(held.size(), count)) {
+      const ControlRange& c = controls_[held[k]];
+      pose->values[held[k]] = c.min + (c.max - c.min) * random_.Unit();
     }
   }
 
@@ -218,16 +233,35 @@ std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, 
   return poses;
 }
 
+std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls,
+                                      const ClipPoses& clip_poses) {
+  std::vector<std::size_t> held;
+  for (std::size_t c = 0; c < controls.size(); ++c) {
+    const ControlRange& control = controls[c];
+    const double moves = kMoves * (control.max - control.min);
+    const auto stands = [&](const std::vector<double>& pose) {
+      return std::abs(pose[c] - control.rest) <= moves;
+    };
+    if (control.max > control.min && !control.by_clip && std::ranges::all_of(clip_poses, stands))
+      held.push_back(c);
+  }
+  return held;
+}
+
 std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
                                      const ClipPoses& clip_poses, const ControlGroups& groups,
                                      std::size_t clips, std::size_t count, std::uint64_t seed) {
   if (kind == PoseKind::kSampled) return SamplePoses(controls, clip_poses, groups, clips, count, seed);
   std::vector<SampledPose> poses;
   if (controls.empty() || (kind == PoseKind::kNeighbours && groups.empty())) return poses;
+  const std::vector<std::size_t> held =
+      kind == PoseKind::kHeld ? HeldControls(controls, clip_poses) : std::vector<std::size_t>();
+  if (kind == PoseKind::kHeld && (held.empty() || clips == 0)) return poses;
   if (kind == PoseKind::kBeyond) poses = SamplePoses(controls, clip_poses, groups, clips, count, seed);
   Sampler sampler(controls, clip_poses, ~seed);
   poses.resize(count, sampler.Rest());
-  for (SampledPose& pose : poses) {
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    SampledPose& pose = poses[p];
     pose.kind = kind;
     switch (kind) {
       case PoseKind::kMixture:
@@ -235,6 +269,9 @@ std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRan
         break;
       case PoseKind::kNeighbours:
         sampler.Neighbours(groups, &pose);
+        break;
+      case PoseKind::kHeld:
+        sampler.Hold(held, p, clips, &pose);
         break;
       default:
         sampler.Beyond(&pose);

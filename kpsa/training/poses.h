@@ -68,7 +68,10 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
 std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
                                      std::uint64_t seed);
 
-// `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours).
+// The controls that no frame of the clips moves and no clip drives: those of deformers, above all.
+std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses);
+
+// `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours; or clips, of kHeld).
 std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
                                      const ClipPoses& clip_poses, const ControlGroups& groups,
                                      std::size_t clips, std::size_t count, std::uint64_t seed);

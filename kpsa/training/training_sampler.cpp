@@ -15,8 +15,13 @@ constexpr std::size_t kLeastSamples = 200;
 constexpr std::size_t kJudges = 300;  // sampled ones; a third as many of each other kind
 constexpr std::size_t kAtEnds = 40;   // poses: each of eight corners is missed by one transform in 200
 constexpr double kTogether = 0.3;     // of the samples, besides: poses that move most controls at once
-constexpr std::pair<PoseKind, double> kOtherKinds[] = {
-    {PoseKind::kBeyond, 0.08}, {PoseKind::kMixture, 0.06}, {PoseKind::kNeighbours, 0.06}};
+constexpr std::pair<PoseKind, double> kOtherKinds[] = {{PoseKind::kBeyond, 0.08},
+                                                       {PoseKind::kMixture, 0.06},
+                                                       {PoseKind::kNeighbours, 0.06},
+                                                       {PoseKind::kHeld, 0.06}};
+// Of poses with held controls, for each of these: half of them hold it far out. And at most this share of the samples
+constexpr std::size_t kOfHeld = 24;
+constexpr double kMostOfSamples = 0.3;
 
 }  // namespace
 
@@ -89,8 +94,12 @@ Status TrainingSampler::AddSampled(std::size_t count, std::uint64_t seed, PoseMa
   std::size_t rest = count;
   if (!of_light()) {
     for (const auto& [kind, share] : kOtherKinds) {
-      std::vector<SampledPose> some = Of(kind, static_cast<std::size_t>(share * static_cast<double>(count)),
-                                         seed + static_cast<std::uint64_t>(kind));
+      auto of_kind = static_cast<std::size_t>(share * static_cast<double>(count));
+      if (kind == PoseKind::kHeld) {
+        const auto most = static_cast<std::size_t>(kMostOfSamples * static_cast<double>(count));
+        of_kind = std::max(of_kind, std::min(most, kOfHeld * HeldControls(drawn_, clip_poses_).size()));
+      }
+      std::vector<SampledPose> some = Of(kind, of_kind, seed + static_cast<std::uint64_t>(kind));
       if (kind == PoseKind::kBeyond) HalfAsFarBeyond(rig_.controls, &some);
       rest -= some.size();
       KPSA_RETURN_IF_ERROR(recorder_->AddSamples(some, clips_, poses));
@@ -103,7 +112,7 @@ Status TrainingSampler::AddJudges(PoseMatrix* judges, std::vector<int>* kinds) c
   const std::size_t most = std::min(kJudges, kMostJudgeBytes / PoseBytes());
   for (const auto& [kind, count] :
        {std::pair{PoseKind::kSampled, most}, std::pair{PoseKind::kMixture, most / 3},
-        std::pair{PoseKind::kNeighbours, most / 3}}) {
+        std::pair{PoseKind::kNeighbours, most / 3}, std::pair{PoseKind::kHeld, most / 3}}) {
     const std::size_t before = judges->poses();
     KPSA_RETURN_IF_ERROR(
         recorder_->AddSamples(Of(kind, count, options_.seed ^ 0x2545f4914f6cdd1dull), clips_, judges));
