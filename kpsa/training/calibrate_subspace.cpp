@@ -131,10 +131,11 @@ struct Calibrated {
   TrainingRecord::Separation separation;
   Calibration calibration;
   double missed = 0;  // of the poses within the ranges, all kinds alike, as ExpectedCost counts them
+  std::optional<double> lost_of_clips = {};
 };
 Calibrated CalibrateWith(const Calibrator& of, const Guarded& guarded, const std::vector<char>& entries,
                          std::size_t patches, JudgedSet judged) {
-  Calibrated result{guarded.subspace, std::move(judged), {}, {}, 0};
+  Calibrated result{guarded.subspace, std::move(judged), {}, {}, 0, {}};
   Subspace& subspace = result.subspace;
   std::vector<ScoreJudge>& judges = result.judged.judges;
   AskGuards(subspace.ranges, entries, result.judged.entries, patches, &judges);
@@ -157,6 +158,7 @@ Calibrated CalibrateWith(const Calibrator& of, const Guarded& guarded, const std
     missed[judge.kind] += ShareOfFull(judge, subspace.score, result.calibration.threshold, subspace.patches);
     poses[judge.kind] += 1;
   }
+  result.lost_of_clips = LostOfClips(subspace, judges, result.calibration.threshold);
   int kinds = 0;
   for (int kind = 0; kind < kPoseKinds; ++kind) {
     if (kind == kBeyond || poses[kind] == 0) continue;
@@ -310,6 +312,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   if (scoring.judges.empty())
     cost = ExpectedCost(*subspace, best.judged.judges, 0, of.full_cost, kCautious * of.options.tolerance,
                         kCalibrationConfidence);
+  cost.lost_of_clips = best.lost_of_clips;
   const Calibration& calibration = best.calibration;
   if (calibration.worst != Calibration::kNoPose)
     RecordWorst(of, best.judged.poses[calibration.worst], calibration.worst_error, work.record);

@@ -139,11 +139,16 @@ FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> jud
   return cost;
 }
 
-double CostOfClips(const Subspace& subspace, double ns, double lost, double full) {
-  if (subspace.patches.tiles > 0) return ns;
-  const double hits = ExpectedHitRate(
-      Calibrate(subspace.calibration, subspace.tolerance, subspace.violation_rate, subspace.blend_start));
-  return ns + (1 - hits - lost) * full;
+std::optional<double> LostOfClips(const Subspace& subspace, std::span<const ScoreJudge> judges,
+                                  const SoftCacheThreshold& threshold) {
+  double lost = 0;
+  std::size_t poses = 0;
+  for (std::size_t j = 0; j < judges.size(); ++j) {
+    if (!subspace.calibration[j].near_clips) continue;
+    lost += ShareOfFull(judges[j], subspace.score, threshold, subspace.patches);
+    ++poses;
+  }
+  return poses == 0 ? std::nullopt : std::optional(lost / static_cast<double>(poses));
 }
 
 double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,

@@ -2,6 +2,7 @@
 // training.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -37,6 +38,8 @@ struct FrameCost {
   double misses = 0;  // share of the judges, all kinds alike; those of patches count as what they cost
   double wrong = 0;   // likewise: accepted, and beyond the tolerance
   double ns = 0;      // of a frame; a wrong one counts as so many that miss
+  // What those lose by misses, of a full evaluation, that are made as the clips are; none: there are no such judges
+  std::optional<double> lost_of_clips = {};
   double lost() const { return misses + kWrongCost * wrong; }
   static constexpr double kWrongCost = 0.5;
 };
@@ -46,10 +49,10 @@ struct FrameCost {
 // its cues are there (ns).
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence);
-// What a frame costs where poses are made as the clips are (ns): what far poses miss, playback does not. Of a
-// calibrated subspace; ns: a frame of all kinds of poses, which lose a share `lost` of `full` by misses and wrong
-// ones. ns again where parts of a pose miss by themselves.
-double CostOfClips(const Subspace& subspace, double ns, double lost, double full);
+// FrameCost::lost_of_clips of a calibrated subspace, whose calibration is of these judges: what far poses miss, playback
+// does not.
+std::optional<double> LostOfClips(const Subspace& subspace, std::span<const ScoreJudge> judges,
+                                  const SoftCacheThreshold& threshold);
 // What is added to ExpectedCost by frames a little beyond the trained ranges, of which clips have a few percent: that
 // guards miss them, or that they are wrong (ns). outside: such poses, of which guards have been asked.
 double CostOutside(const Subspace& subspace, std::span<const ScoreJudge> judges,

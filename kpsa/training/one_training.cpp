@@ -72,8 +72,9 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
   const Result<double> points = setup->CostOfPoints(candidates.cues.set.cues);
   if (!points.ok()) return points.status();
   const double ns = *points + setup->CostOfSteps() + candidates.cost.ns;
-  return Trained{std::move(subspace),    std::move(record), ns,   setup->full_cost,
-                 candidates.cost.lost(), limit.elapsed(),   false};
+  return Trained{
+      std::move(subspace),           std::move(record), ns,   setup->full_cost, candidates.cost.lost(),
+      candidates.cost.lost_of_clips, limit.elapsed(),   false};
 }
 
 // Tiles of all meshes, by mesh.
@@ -161,6 +162,7 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
         choice.cost,
         setup.full_cost,
         0,
+        {},
         setup.limit.elapsed(),
         true,
         candidates.poor.empty() ? std::vector<std::vector<Index>>() : ByMesh(setup, candidates.poor)};

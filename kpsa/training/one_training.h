@@ -3,6 +3,7 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "graph/compiler.h"
@@ -17,9 +18,10 @@ struct Trained {
   TrainingRecord record;
   double ns = 0;       // what a frame is expected to cost, on the scale of the nodes' costs,
   double full_ns = 0;  // and the whole evaluation
-  double lost = 0;     // of the latter what poses of all kinds lose, that miss or are wrong
-  double seconds = 0;  // that it took
-  bool ended = false;  // as Ends allows: there is no subspace
+  double lost = 0;     // of the latter what poses of all kinds lose, that miss or are wrong,
+  std::optional<double> lost_of_clips = {};  // and those that are made as the clips are (FrameCost)
+  double seconds = 0;                        // that it took
+  bool ended = false;                        // as Ends allows: there is no subspace
   // With the tiles, by mesh, that are to blame: a last step should be of them alone. Empty: with its cues.
   std::vector<std::vector<Index>> poor = {};
 };

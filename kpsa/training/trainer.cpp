@@ -119,9 +119,10 @@ std::vector<std::vector<Index>> TilesOfAll(const std::vector<std::vector<Index>>
   return all;
 }
 
+// What a frame is expected to cost that is made as the clips are (ns).
 double CostOfClips(const Trained& trained) {
-  return trained.ended ? trained.ns
-                       : CostOfClips(trained.subspace, trained.ns, trained.lost, trained.full_ns);
+  if (trained.ended || !trained.lost_of_clips) return trained.ns;
+  return trained.ns + (*trained.lost_of_clips - trained.lost) * trained.full_ns;
 }
 
 // Of what comes out of the stack, and where that is dear, of the points before its last step: what is expected to cost

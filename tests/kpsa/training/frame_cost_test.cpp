@@ -76,26 +76,34 @@ TEST(FrameCost, ASmallerToleranceIsAskedOfTheSamePoses) {
   EXPECT_EQ(CostOf(judges, 0.4 * kAsked).misses, 1) << "all are half the tolerance off";
 }
 
-// Frames a little beyond the ranges: what guards keep from hitting costs as a miss, what they let pass
-// nothing if it is right, and half a miss if it is wrong.
 // Far poses that are told by their scores miss; those made of the clips hit but for one in ten.
 TEST(FrameCost, OfClipsCountsWhatPosesMadeOfThemMiss) {
   Subspace subspace = DoubtedAlone();
+  std::vector<ScoreJudge> judges;
   for (std::size_t t = 0; t < 800; ++t) {
     const bool near = t % 2 == 0, misses = near ? t % 20 == 0 : t % 4 == 1;
-    subspace.calibration.push_back({misses ? 10 : 0.1, (misses ? 2 : 0.5) * kAsked, 0, 0});
+    ScoreJudge& judge = judges.emplace_back();
+    judge.pose.doubt = misses ? 10 : 0.1, judge.pose.error = (misses ? 2 : 0.5) * kAsked;
+    subspace.calibration.push_back({judge.pose.doubt, judge.pose.error, 0, 0});
     subspace.calibration.back().near_clips = near;
   }
-  const double hit = 0.2 * kFullFrame, lost = 0.3;
-  EXPECT_NEAR(CostOfClips(subspace, hit + lost * kFullFrame, lost, kFullFrame), hit + 0.1 * kFullFrame, 1e-6);
-  // Without clips of the sampled poses
+  const SoftCacheThreshold threshold =
+      Calibrate(subspace.calibration, subspace.tolerance, subspace.violation_rate).threshold;
+  const auto lost = [&] { return LostOfClips(subspace, judges, threshold); };
+  EXPECT_NEAR(*lost(), 0.1, 1e-6);
+  // Of five patches, each a fifth of a full frame, one misses
+  subspace.patches.tiles = 1, subspace.patches.patches = 5, subspace.patches.costs.assign(5, 0.2);
+  for (Index p = 0; p < 5; ++p) subspace.patches.regions.push_back({0, p, 1, 0, kNoIndex, 0, true});
+  for (ScoreJudge& judge : judges)
+    judge.pose.patches = {{judge.pose.doubt, judge.pose.error}, {0.1, 0}, {0.1, 0}, {0.1, 0}, {0.1, 0}};
+  EXPECT_NEAR(*lost(), 0.1 * 0.2, 1e-6);
+  // Without clips
   for (CalibrationPair& pair : subspace.calibration) pair.near_clips = false;
-  EXPECT_NEAR(CostOfClips(subspace, hit + lost * kFullFrame, lost, kFullFrame), hit + 0.3 * kFullFrame, 1e-6);
-  // Of a pose that misses parts may hit
-  subspace.patches.tiles = 4;
-  EXPECT_EQ(CostOfClips(subspace, hit + lost * kFullFrame, lost, kFullFrame), hit + lost * kFullFrame);
+  EXPECT_FALSE(lost().has_value());
 }
 
+// Frames a little beyond the ranges: what guards keep from hitting costs as a miss, what they let pass
+// nothing if it is right, and half a miss if it is wrong.
 TEST(FrameCost, FramesOutsideCostWhatGuardsAskOfThem) {
   const std::vector<ScoreJudge> judges = MadeUpJudges(0, 0);
   const auto outside = [&](double guard, double error) {
