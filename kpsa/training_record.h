@@ -20,7 +20,9 @@ inline constexpr const char *kForAllPoints = "for all points",
                             *kForHalf = "for all points, as for half the tolerance",
                             *kByTile = "of each tile", *kByTileFinely = "of each tile, tiles stored finely";
 inline constexpr const char *kBeforeLastStep = ", points before the last step",
-                            *kBeforeLastStepOfSome = ", points before the last step where they are nearer";
+                            *kBeforeLastStepOfSome = ", points before the last step where they are nearer",
+                            *kWithHeld = ", controls that no clip moves among what is followed",
+                            *kWithoutHeld = ", controls that no clip moves left at rest";
 
 struct TrainingRecord {
   std::vector<std::string> clips;
@@ -40,6 +42,8 @@ struct TrainingRecord {
   std::string mode;                           // "map" or "paper"
   std::string warning;
   std::string limited;  // what was left out for want of time
+  // Controls that the subspace does not follow, as people write their plugs: frames that move them miss.
+  std::vector<std::string> at_rest = {};
   // What was tried, where there was a choice: its cues, the rows that these measure, and what judges say.
   struct Tried {
     std::string what;

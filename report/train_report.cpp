@@ -59,6 +59,7 @@ std::string TrainJson(const TrainResult& r) {
                                {"sampled_poses", r.record.sampled_poses}}},
                              {"seconds", r.seconds},
                              {"limited", r.record.limited},
+                             {"at_rest", r.record.at_rest},
                              {"held_out",
                               {{"poses", r.record.calibration_poses},
                                {"rms", r.record.held_out_rms},
@@ -130,6 +131,15 @@ std::string TrainText(const TrainResult& r) {
   text +=
       fmt::format("held out: {}: RMS {}, max {}; motion RMS {}\n", Plural(r.record.calibration_poses, "pose"),
                   error(r.record.held_out_rms), error(r.record.held_out_max), error(r.record.motion_rms));
+  if (const std::vector<std::string>& left = r.record.at_rest; !left.empty()) {
+    constexpr std::size_t kNamed = 6;
+    text += fmt::format(
+        "left at rest, as no clip moves them and following them costs much (frames that move them miss): "
+        "{}{}\n",
+        fmt::join(left.begin(), left.begin() + static_cast<std::ptrdiff_t>(std::min(kNamed, left.size())),
+                  ", "),
+        left.size() > kNamed ? fmt::format(" and {} more", left.size() - kNamed) : "");
+  }
   if (!r.record.limited.empty()) text += fmt::format("in the time and memory given: {}\n", r.record.limited);
   for (const TrainingRecord::Tried& one : r.record.tried) {
     text += fmt::format(

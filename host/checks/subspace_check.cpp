@@ -10,6 +10,7 @@
 #include "host/rig_training.h"
 #include "kpsa/accelerate.h"
 #include "kpsa/training/space_points.h"
+#include "kpsa/training_record.h"
 
 namespace kpsa::engine {
 namespace {
@@ -62,7 +63,7 @@ class Checker {
         subspace_(subspace),
         clips_(clips),
         options_(options),
-        training_(MakeTrainingRig(rig, entry)) {}
+        training_(AtRest(MakeTrainingRig(rig, entry), ParseTraining(subspace->training).at_rest)) {}
 
   Result<SubspaceCheck> Run() {
     if (training_.controls.empty() && clips_.empty()) return std::move(check_);

@@ -20,6 +20,7 @@ TrainOptions OptionsOf(const Subspace& subspace, const TrainingRecord& record, s
   options.keep_modes = !subspace.kept_modes.values.empty();
   options.inner = subspace.of_inner() ? TrainOptions::Inner::kAlways : TrainOptions::Inner::kNever;
   for (const SubspaceOutput& output : subspace.outputs) options.stepped.push_back(output.stepped);
+  options.at_rest = record.at_rest;
   if (record.mode == "paper") options.mode = EstimatorMode::kPaper;
   const TrainingRecord::Asked& asked = record.asked;
   options.samples = samples;

@@ -72,9 +72,11 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
   const Result<double> points = setup->CostOfPoints(candidates.cues.set.cues);
   if (!points.ok()) return points.status();
   const double ns = *points + setup->CostOfSteps() + candidates.cost.ns;
-  return Trained{
-      std::move(subspace),           std::move(record), ns,   setup->full_cost, candidates.cost.lost(),
-      candidates.cost.lost_of_clips, limit.elapsed(),   false};
+  Trained trained;
+  trained.subspace = std::move(subspace), trained.record = std::move(record);
+  trained.ns = ns, trained.full_ns = setup->full_cost, trained.seconds = limit.elapsed();
+  trained.lost = candidates.cost.lost(), trained.lost_of_clips = candidates.cost.lost_of_clips;
+  return trained;
 }
 
 // Tiles of all meshes, by mesh.
@@ -156,16 +158,11 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
     record.tried.push_back({kForAllPoints, choice.cues.size(),
                             static_cast<std::size_t>(candidates.cues.set.rows()), choice.misses,
                             choice.cost / setup.full_cost, false});
-    return Trained{
-        {},
-        std::move(record),
-        choice.cost,
-        setup.full_cost,
-        0,
-        {},
-        setup.limit.elapsed(),
-        true,
-        candidates.poor.empty() ? std::vector<std::vector<Index>>() : ByMesh(setup, candidates.poor)};
+    Trained trained;
+    trained.record = std::move(record), trained.ended = true, trained.held = setup.sampler->held();
+    trained.ns = choice.cost, trained.full_ns = setup.full_cost, trained.seconds = setup.limit.elapsed();
+    if (!candidates.poor.empty()) trained.poor = ByMesh(setup, candidates.poor);
+    return trained;
   }
   Subspace subspace = std::move(**best);
   KPSA_RETURN_IF_ERROR(setup.Say("calibration", 0.95));
@@ -178,16 +175,20 @@ Result<Trained> TrainOnce(const TrainingRig& rig, const std::vector<TrainingClip
       setup.limit.left() > candidates.modes_seconds)
     KPSA_RETURN_IF_ERROR(calibrator.TryFiner(&subspace));
 
+  const auto with_held = [&](Result<Trained> trained) {
+    if (trained.ok()) trained->held = setup.sampler->held();
+    return trained;
+  };
   if (rig.some.empty())
-    return FinishTraining(mends, setup.limit, poses.pose_seconds, &setup, candidates, std::move(record),
-                          std::move(subspace));
+    return with_held(FinishTraining(mends, setup.limit, poses.pose_seconds, &setup, candidates,
+                                    std::move(record), std::move(subspace)));
   TrainingRig all = rig;
   all.some.clear(), all.every = 1;
   WholeSubspace whole(all, options, candidates);
   Result<Subspace> of_all = whole.Make(ranges, calibrator.size);
   if (!of_all.ok()) return of_all.status();
-  return FinishTraining(mends, setup.limit, poses.pose_seconds, whole.setup(), whole.candidates(),
-                        std::move(record), std::move(*of_all));
+  return with_held(FinishTraining(mends, setup.limit, poses.pose_seconds, whole.setup(), whole.candidates(),
+                                  std::move(record), std::move(*of_all)));
 }
 
 }  // namespace kpsa::engine

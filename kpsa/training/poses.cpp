@@ -236,6 +236,7 @@ std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, 
 std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls,
                                       const ClipPoses& clip_poses) {
   std::vector<std::size_t> held;
+  if (clip_poses.empty()) return held;
   for (std::size_t c = 0; c < controls.size(); ++c) {
     const ControlRange& control = controls[c];
     const double moves = kMoves * (control.max - control.min);

@@ -68,7 +68,7 @@ std::vector<SampledPose> PosesTogether(const std::vector<ControlRange>& controls
 std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, std::size_t count,
                                      std::uint64_t seed);
 
-// The controls that no frame of the clips moves and no clip drives: those of deformers, above all.
+// The controls that no frame of the clips moves and no clip drives: those of deformers, above all. Without clips, none.
 std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses);
 
 // `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours; or clips, of kHeld).

@@ -17,6 +17,9 @@ namespace {
 // What a frame costs, in last steps: where cues say so, points that come out need no subspace of their own; where poses
 // made of the clips do, inner points are tried; and of that, with which they are taken
 constexpr double kDearCues = 2, kWorthSplitting = 1.6, kCheaperInner = 0.95;
+// Of a full frame: what a frame made as the clips are costs, with which controls that clips do not move are tried at rest;
+// and of that, what it costs then
+constexpr double kDearFollowing = 0.5, kCheaperAtRest = 0.75;
 constexpr double kToChoose = 0.5;  // of the time, with some of many points: all of them take the rest
 // Of many points: all are trained at once, with a step of some tiles, where they are no more than so many times as many
 // and a frame is then expected to cost less than that, of a full one
@@ -215,6 +218,31 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
   return cheaper ? std::move(inner) : std::move(whole);
 }
 
+// Controls of deformers may do what no subspace tells, and spoil it for the clips, which do not move them: where that costs
+// much, they are left at rest, and frames that move them miss.
+Result<Trained> TrainFollowing(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
+                               const TrainOptions& options) {
+  const TimeLimit limit(options.seconds);
+  if (!options.at_rest.empty()) {
+    Result<Trained> again = TrainBest(AtRest(rig, options.at_rest), clips, options);
+    if (again.ok()) again->record.at_rest = options.at_rest;
+    return again;
+  }
+  Result<Trained> all = TrainBest(rig, clips, options);
+  if (!all.ok() || all->held.empty() || options.mode != EstimatorMode::kMap ||
+      CostOfClips(*all) < kDearFollowing * all->full_ns || limit.left() < 2 * all->seconds)
+    return all;
+  TrainOptions rest = options;
+  rest.seconds = limit.left();
+  for (const std::size_t c : all->held) rest.at_rest.push_back(rig.graph->AuthoredName(rig.controls[c].plug));
+  Result<Trained> at_rest = TrainFollowing(rig, clips, rest);
+  if (!at_rest.ok()) return at_rest.status().kind() == ErrorKind::kInterrupted ? std::move(at_rest) : all;
+  const bool cheaper = CostOfClips(*at_rest) < kCheaperAtRest * CostOfClips(*all);
+  NameTried(cheaper ? &*all : &*at_rest, cheaper ? kWithHeld : kWithoutHeld);
+  AddTried(cheaper ? *all : *at_rest, cheaper ? &*at_rest : &*all);
+  return cheaper ? std::move(at_rest) : std::move(all);
+}
+
 Result<Subspace> Finish(Result<Trained> trained) {
   if (!trained.ok()) return trained.status();
   trained->subspace.training = TrainingJson(trained->record);
@@ -223,6 +251,14 @@ Result<Subspace> Finish(Result<Trained> trained) {
 }
 
 }  // namespace
+
+TrainingRig AtRest(TrainingRig rig, const std::vector<std::string>& controls) {
+  for (ControlRange& control : rig.controls) {
+    if (std::ranges::find(controls, rig.graph->AuthoredName(control.plug)) != controls.end())
+      control.min = control.max = control.rest;
+  }
+  return rig;
+}
 
 Status TrainingRig::Play(const std::vector<TrainingClip>& clips, int clip) const {
   return set_clip(clip < 0 ? std::nullopt
@@ -251,11 +287,11 @@ Result<Subspace> Train(const TrainingRig& rig, const std::vector<TrainingClip>& 
   if (options.progress)
     watched.progress = [&](const char* what, double share) { return cancel.Say(what, share); };
   try {
-    Result<Subspace> trained = Finish(TrainBest(rig, clips, watched));
+    Result<Subspace> trained = Finish(TrainFollowing(rig, clips, watched));
     if (!trained.ok() && cancel.asked()) throw Cancelled();  // an evaluation that was ended, say
     if (!trained.ok() || !watched.by_tile_as_before || trained->by_tile()) return trained;
     watched.by_tile_as_before = false;  // with cues for all points, what is learnt changes all of them
-    return Finish(TrainBest(rig, clips, watched));
+    return Finish(TrainFollowing(rig, clips, watched));
   } catch (const Cancelled&) {
     KPSA_RETURN_IF_ERROR(rig.set_clip(std::nullopt));
     return Status::Make(ErrorKind::kInterrupted, "interrupted");

@@ -46,6 +46,8 @@ struct TrainOptions {
   enum class Inner : std::uint8_t { kIfCheaper, kNever, kAlways } inner = Inner::kIfCheaper;
   // With kAlways: of these tiles alone, by mesh; without any, of all.
   std::vector<std::vector<Index>> stepped = {};
+  // Controls that are left at rest, as people write their plugs, as a subspace has it that learns (TrainingRecord::at_rest).
+  std::vector<std::string> at_rest = {};
   // About how long training may take: fewer poses, no cues of tiles, and a shorter calibration, where
   // that is too short. Which poses fit depends on the machine; with time enough, the subspace is that without
   // a limit.
@@ -97,6 +99,9 @@ struct TrainingRig {
   std::vector<std::size_t> FreeControls(bool playing) const;
   std::vector<PlugRef> Varying(bool playing) const;
 };
+
+// The rig with some of its controls at rest: as people write their plugs (Graph::AuthoredName).
+TrainingRig AtRest(TrainingRig rig, const std::vector<std::string>& controls);
 
 // Errors: no poses, nothing moves, a pose that fails to evaluate (its clip and time or its controls),
 // cancelled (kInterrupted). The graph comes back without a clip.

@@ -22,6 +22,7 @@ class TrainingSampler {
   Status LearnHowControlsMove();
 
   const std::vector<ControlRange>& drawn() const { return drawn_; }  // the rig's own controls
+  std::vector<std::size_t> held() const { return HeldControls(drawn_, clip_poses_); }
   // Without recording them.
   // margins: by control (ControlRange), or none.
   std::vector<SampledPose> Of(PoseKind kind, std::size_t count, std::uint64_t seed,
