@@ -81,6 +81,11 @@ std::string SideText(const BenchResult& r, const BenchContext& context) {
           : "",
       r.hits == 0 ? "" : fmt::format(", {} on hits", RatioText(r.speedup_on_hits(), 2)),
       RatioText(r.ceiling()), r.bound_points_ms > 0 ? " and points that are not accelerated" : "");
+  if (r.speedup() < 1)
+    text += fmt::format("           slower than the full evaluation: {}\n",
+                        r.hits > 0 && r.speedup_on_hits() >= 1
+                            ? "frames that miss cost it once more, and too few hit"
+                            : "even frames that hit cost more; evaluate these without the subspace");
   text += fmt::format("hits       {:.1f} % of frames: {}\n", 100 * static_cast<double>(r.hits) / frames,
                       CountsText(r.hits, r.blends, r.frames - r.hits - r.blends));
   if (!r.most_frequent_reason.empty()) text += "           " + r.most_frequent_reason + "\n";

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
+#include <utility>
 
 namespace kpsa::engine {
 namespace {
@@ -63,6 +65,61 @@ TEST(PosesAtEnds, HaveEveryCornerOfEachTransform) {
   EXPECT_EQ(corners[0].size(), 8u);
   EXPECT_EQ(corners[1].size(), 8u);
   EXPECT_TRUE(PosesAtEnds({}, 60, 7).empty());
+}
+
+// The second transform and the second weight stand still in the clips.
+ClipPoses FramesOfSome(const std::vector<ControlRange>& controls) {
+  ClipPoses frames;
+  for (int f = 0; f < 5; ++f) {
+    std::vector<double>& frame = frames.emplace_back(controls.size(), 0.0);
+    for (const std::size_t c : {0u, 1u, 2u, 6u}) frame[c] = 0.2 * f;
+    frame[3] = 0.001 * f;  // next to nothing
+  }
+  return frames;
+}
+
+TEST(HeldControls, AreThoseThatNoClipMoves) {
+  std::vector<ControlRange> controls = Controls();
+  EXPECT_EQ(HeldControls(controls, FramesOfSome(controls)), (std::vector<std::size_t>{3, 4, 5, 7}));
+  controls[4].by_clip = true;
+  controls[5].min = controls[5].max = 0;
+  EXPECT_EQ(HeldControls(controls, FramesOfSome(controls)), (std::vector<std::size_t>{3, 7}));
+  EXPECT_TRUE(HeldControls(controls, {}).empty()) << "without clips nothing is held over them";
+}
+
+TEST(PosesOfKind, HoldControlsFarOutOverClips) {
+  const std::vector<ControlRange> controls = Controls();
+  const ClipPoses frames = FramesOfSome(controls);
+  const std::set<std::size_t> held{3, 4, 5, 7};
+  const auto poses = PosesOfKind(PoseKind::kHeld, controls, frames, {}, 2, 200, 7);
+  ASSERT_EQ(poses.size(), 200u);
+  std::set<int> clips;
+  std::set<std::pair<std::size_t, bool>> far_out;  // control, whether up
+  std::size_t several = 0;
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    EXPECT_EQ(poses[p].kind, PoseKind::kHeld);
+    EXPECT_FALSE(poses[p].near_clips) << "no clip looks like that";
+    clips.insert(poses[p].clip);
+    std::size_t moved = 0;
+    for (std::size_t c = 0; c < controls.size(); ++c) {
+      const double value = poses[p].values[c];
+      EXPECT_TRUE(value >= controls[c].min && value <= controls[c].max);
+      if (value == 0) continue;
+      EXPECT_TRUE(held.contains(c)) << c;
+      ++moved;
+      if (p % 2 != 0) continue;
+      EXPECT_GE(std::abs(value), 0.5 * std::abs(value > 0 ? controls[c].max : controls[c].min));
+      far_out.emplace(c, value > 0);
+    }
+    if (p % 2 == 0) {
+      EXPECT_EQ(moved, 1u);
+    }
+    several += moved > 1;
+  }
+  EXPECT_EQ(clips, (std::set<int>{0, 1}));
+  EXPECT_EQ(far_out.size(), 7u) << "each control at each of its ends; a weight has one";
+  EXPECT_GT(several, 40u);
+  EXPECT_TRUE(PosesOfKind(PoseKind::kHeld, controls, frames, {}, 0, 9, 7).empty()) << "no clips";
 }
 
 }  // namespace
