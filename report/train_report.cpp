@@ -134,7 +134,8 @@ std::string TrainText(const TrainResult& r) {
   if (const std::vector<std::string>& left = r.record.at_rest; !left.empty()) {
     constexpr std::size_t kNamed = 6;
     text += fmt::format(
-        "left at rest, as no clip moves them and following them costs much (frames that move them miss): "
+        "left at rest, as no clip moves them, and following them costs much or fails (frames that move them "
+        "miss): "
         "{}{}\n",
         fmt::join(left.begin(), left.begin() + static_cast<std::ptrdiff_t>(std::min(kNamed, left.size())),
                   ", "),

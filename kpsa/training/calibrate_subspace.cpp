@@ -67,17 +67,6 @@ Status JudgePoses(const Calibrator& of, const CalibrationWork& work, int kind, s
   return Status();
 }
 
-// By entry: whether it has a guard where the space carries the points.
-std::vector<char> GuardedEntries(const Calibrator& of, const std::vector<std::string>& carried) {
-  std::vector<char> guarded;
-  for (const Signal& signal : of.guards) {
-    const bool free =
-        signal.matrix && std::ranges::find(carried, of.rig.graph->name(signal.plug.node)) != carried.end();
-    guarded.insert(guarded.end(), signal.entries(), !free);
-  }
-  return guarded;
-}
-
 // A range speaks of the patches that need what it watches, where patches miss by themselves.
 Status GuardPatches(const Calibrator& of, const CalibrationWork& work, Subspace* subspace) {
   if (subspace->patches.tiles == 0) return Status();
@@ -260,7 +249,7 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
       KPSA_RETURN_IF_ERROR(JudgePoses(of, work, k, kScoreSeed, {}, &score_judge, &scoring));
   }
   KPSA_RETURN_IF_ERROR(SayStage(of.options, "calibration", 0.98));
-  const std::vector<char> guarded = GuardedEntries(of, carried->rigid);
+  const std::vector<char> guarded = GuardedEntries(of.guards, *of.rig.graph, carried->rigid);
   std::vector<Guarded> tried;  // by margins
   std::size_t taken = 0;
   double least = std::numeric_limits<double>::infinity();
@@ -317,6 +306,17 @@ Result<FrameCost> CalibrateSubspace(const Calibrator& of, const CalibrationWork&
   if (calibration.worst != Calibration::kNoPose)
     RecordWorst(of, best.judged.poses[calibration.worst], calibration.worst_error, work.record);
   return cost;
+}
+
+std::vector<char> GuardedEntries(std::span<const Signal> guards, const Graph& graph,
+                                 const std::vector<std::string>& carried) {
+  std::vector<char> guarded;
+  for (const Signal& signal : guards) {
+    const bool free =
+        signal.matrix && std::ranges::find(carried, graph.name(signal.plug.node)) != carried.end();
+    guarded.insert(guarded.end(), signal.entries(), !free);
+  }
+  return guarded;
 }
 
 Status SayStage(const TrainOptions& options, const char* what, double share) {

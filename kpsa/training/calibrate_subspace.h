@@ -43,6 +43,10 @@ struct CalibrationWork {
 Result<FrameCost> CalibrateSubspace(const Calibrator& calibrator, const CalibrationWork& work,
                                     const CueSet& cues, Subspace* subspace);
 
+// By entry of the guards: whether it has one where the space carries the points.
+std::vector<char> GuardedEntries(std::span<const Signal> guards, const Graph& graph,
+                                 const std::vector<std::string>& carried);
+
 // A stage of training and how much of it is done; kInterrupted where nobody wants to go on.
 Status SayStage(const TrainOptions& options, const char* what, double share);
 

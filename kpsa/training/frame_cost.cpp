@@ -89,13 +89,9 @@ std::vector<CalibrationPair> PairsOf(const Subspace& subspace, std::span<const S
   return pairs;
 }
 
-namespace {
-
 bool IsWrong(const CalibrationPair& pair, const SoftCacheThreshold& threshold, double tolerance) {
   return EmittedError(pair, threshold) > tolerance * (1 + 1e-9);
 }
-
-}  // namespace
 
 FrameCost ExpectedCost(const Subspace& subspace, std::span<const ScoreJudge> judges, double points,
                        double full, double tolerance, double confidence) {

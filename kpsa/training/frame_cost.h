@@ -34,6 +34,9 @@ void GivePatches(const PatchLayout& patches, Subspace* subspace);
 // Scores and errors of poses, with the score and the patches of the subspace.
 std::vector<CalibrationPair> PairsOf(const Subspace& subspace, std::span<const ScoreJudge> judges);
 
+// Whether what is emitted of a pose is beyond the tolerance.
+bool IsWrong(const CalibrationPair& pair, const SoftCacheThreshold& threshold, double tolerance);
+
 struct FrameCost {
   double misses = 0;  // share of the judges, all kinds alike; those of patches count as what they cost
   double wrong = 0;   // likewise: accepted, and beyond the tolerance

@@ -6,6 +6,7 @@
 
 #include "kpsa/training/finer_subspaces.h"
 #include "kpsa/training/mend_tiles.h"
+#include "kpsa/training/untold_controls.h"
 #include "kpsa/training/whole_subspace.h"
 
 namespace kpsa::engine {
@@ -66,13 +67,18 @@ Result<Trained> FinishTraining(const std::vector<Compiler::SplitPoints>& steps, 
     Status mended = MendTiles(setup, steps, candidates.cues.set, &subspace);
     if (mended.kind() == ErrorKind::kInterrupted) return mended;
   }
+  Trained trained;
+  if (setup->of_map() && !setup->of_light() && setup->rig.some.empty()) {
+    Result<std::vector<std::size_t>> untold = UntoldControls(setup, candidates.cues.set, subspace);
+    if (!untold.ok()) return untold.status();
+    trained.untold = std::move(*untold);
+  }
   KPSA_RETURN_IF_ERROR(setup->rig.set_clip(std::nullopt));
   Sign(*setup, &subspace);
   record.limited = limit.left_out();
   const Result<double> points = setup->CostOfPoints(candidates.cues.set.cues);
   if (!points.ok()) return points.status();
   const double ns = *points + setup->CostOfSteps() + candidates.cost.ns;
-  Trained trained;
   trained.subspace = std::move(subspace), trained.record = std::move(record);
   trained.ns = ns, trained.full_ns = setup->full_cost, trained.seconds = limit.elapsed();
   trained.lost = candidates.cost.lost(), trained.lost_of_clips = candidates.cost.lost_of_clips;

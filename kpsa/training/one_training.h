@@ -22,6 +22,7 @@ struct Trained {
   std::optional<double> lost_of_clips = {};  // and those that are made as the clips are (FrameCost)
   double seconds = 0;                        // that it took
   bool ended = false;                        // as Ends allows: there is no subspace
+  std::vector<std::size_t> untold = {};      // of these, that it gets wrong unnoticed (UntoldControls)
   std::vector<std::size_t> held = {};        // controls that no clip moves (HeldControls)
   // With the tiles, by mesh, that are to blame: a last step should be of them alone. Empty: with its cues.
   std::vector<std::vector<Index>> poor = {};

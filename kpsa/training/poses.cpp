@@ -249,6 +249,26 @@ std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls,
   return held;
 }
 
+std::vector<SampledPose> PosesAlone(const std::vector<ControlRange>& controls,
+                                    std::span<const std::size_t> held, std::size_t each, std::size_t clips,
+                                    std::uint64_t seed) {
+  Sampler sampler(controls, {}, seed);
+  std::vector<SampledPose> poses;
+  for (const std::size_t c : held) {
+    const ControlRange& control = controls[c];
+    for (std::size_t k = 0; k < each; ++k) {
+      SampledPose& pose = poses.emplace_back(sampler.Rest());
+      pose.kind = PoseKind::kHeld;
+      pose.clip = static_cast<int>(sampler.random().Below(clips));
+      pose.phase = sampler.random().Unit();
+      const bool up = control.min == control.rest || (control.max != control.rest && k % 2 == 0);
+      const double reach = k % 4 < 2 ? 1 : 0.7 + 0.3 * sampler.random().Unit();
+      pose.values[c] = control.rest + ((up ? control.max : control.min) - control.rest) * reach;
+    }
+  }
+  return poses;
+}
+
 std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,
                                      const ClipPoses& clip_poses, const ControlGroups& groups,
                                      std::size_t clips, std::size_t count, std::uint64_t seed) {

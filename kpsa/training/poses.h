@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "graph/graph.h"
@@ -70,6 +71,11 @@ std::vector<SampledPose> PosesAtEnds(const std::vector<ControlRange>& controls, 
 
 // The controls that no frame of the clips moves and no clip drives: those of deformers, above all. Without clips, none.
 std::vector<std::size_t> HeldControls(const std::vector<ControlRange>& controls, const ClipPoses& clip_poses);
+
+// `each` poses of each of these controls, control after control, over a clip: at its ends in turn, or 70 % of the way there and more.
+std::vector<SampledPose> PosesAlone(const std::vector<ControlRange>& controls,
+                                    std::span<const std::size_t> held, std::size_t each, std::size_t clips,
+                                    std::uint64_t seed);
 
 // `count` poses of a kind; none where there are no controls for it (or groups, of kNeighbours; or clips, of kHeld).
 std::vector<SampledPose> PosesOfKind(PoseKind kind, const std::vector<ControlRange>& controls,

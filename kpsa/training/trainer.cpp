@@ -219,7 +219,7 @@ Result<Trained> TrainBest(const TrainingRig& rig, const std::vector<TrainingClip
 }
 
 // Controls of deformers may do what no subspace tells, and spoil it for the clips, which do not move them: where that costs
-// much, they are left at rest, and frames that move them miss.
+// much, or goes unnoticed, they are left at rest, and frames that move them miss.
 Result<Trained> TrainFollowing(const TrainingRig& rig, const std::vector<TrainingClip>& clips,
                                const TrainOptions& options) {
   const TimeLimit limit(options.seconds);
@@ -229,15 +229,16 @@ Result<Trained> TrainFollowing(const TrainingRig& rig, const std::vector<Trainin
     return again;
   }
   Result<Trained> all = TrainBest(rig, clips, options);
-  if (!all.ok() || all->held.empty() || options.mode != EstimatorMode::kMap ||
-      CostOfClips(*all) < kDearFollowing * all->full_ns || limit.left() < 2 * all->seconds)
-    return all;
+  if (!all.ok() || all->held.empty() || options.mode != EstimatorMode::kMap) return all;
+  const bool dear = CostOfClips(*all) >= kDearFollowing * all->full_ns;
+  if ((!dear && all->untold.empty()) || limit.left() < 2 * all->seconds) return all;
   TrainOptions rest = options;
   rest.seconds = limit.left();
-  for (const std::size_t c : all->held) rest.at_rest.push_back(rig.graph->AuthoredName(rig.controls[c].plug));
+  for (const std::size_t c : dear ? all->held : all->untold)
+    rest.at_rest.push_back(rig.graph->AuthoredName(rig.controls[c].plug));
   Result<Trained> at_rest = TrainFollowing(rig, clips, rest);
   if (!at_rest.ok()) return at_rest.status().kind() == ErrorKind::kInterrupted ? std::move(at_rest) : all;
-  const bool cheaper = CostOfClips(*at_rest) < kCheaperAtRest * CostOfClips(*all);
+  const bool cheaper = !all->untold.empty() || CostOfClips(*at_rest) < kCheaperAtRest * CostOfClips(*all);
   NameTried(cheaper ? &*all : &*at_rest, cheaper ? kWithHeld : kWithoutHeld);
   AddTried(cheaper ? *all : *at_rest, cheaper ? &*at_rest : &*all);
   return cheaper ? std::move(at_rest) : std::move(all);

@@ -56,6 +56,13 @@ std::vector<SampledPose> TrainingSampler::Of(PoseKind kind, std::size_t count, s
   return poses;
 }
 
+std::vector<SampledPose> TrainingSampler::Alone(std::span<const std::size_t> held, std::size_t each,
+                                                std::uint64_t seed) const {
+  std::vector<SampledPose> poses = PosesAlone(drawn_, held, each, clips_.size(), seed);
+  AddTilts(rig_.controls, drawn_.size(), seed, &poses);
+  return poses;
+}
+
 std::vector<SampledPose> TrainingSampler::SweepsWithTilts() const {
   std::vector<SampledPose> sweeps = Sweeps(drawn_);
   AddTilts(rig_.controls, drawn_.size(), options_.seed ^ 0xbb67ae8584caa73bull, &sweeps);

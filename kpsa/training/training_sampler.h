@@ -27,6 +27,10 @@ class TrainingSampler {
   // margins: by control (ControlRange), or none.
   std::vector<SampledPose> Of(PoseKind kind, std::size_t count, std::uint64_t seed,
                               std::span<const double> margins = {}) const;
+  // `each` poses of each of some controls, which it holds far out over the clips (PosesAlone); control after
+  // control.
+  std::vector<SampledPose> Alone(std::span<const std::size_t> held, std::size_t each,
+                                 std::uint64_t seed) const;
   std::vector<SampledPose> SweepsWithTilts() const;  // each control alone
 
   // Sweeps, and as many samples as the options want and memory holds: the sampler's kind, and some of the

@@ -62,10 +62,20 @@ TEST(HeldControlsOfRigs, AreRightOrMissOverClips) {
     return pair.kind == static_cast<int>(PoseKind::kHeld);
   });
   EXPECT_EQ(of_kind, 400);
-  EXPECT_TRUE(ParseTraining(trained->training).at_rest.empty());
-  for (const double amplitude : {0.0, 0.03, 0.06}) {
+  // At its ends a quarter of the frames was wrong and accepted: with 41 controls, few poses of a kind
+  EXPECT_EQ(ParseTraining(trained->training).at_rest, (std::vector<std::string>{"ripple.amplitude"}));
+  const Held at_rest = Play(rig, trained, "ripple.amplitude", 0.03);
+  EXPECT_GT(at_rest.hits, at_rest.frames / 2);
+  EXPECT_LE(at_rest.beyond, at_rest.frames / 10);
+  for (const double amplitude : {0.0, 0.045, 0.06}) {
     const Held held = Play(rig, trained, "ripple.amplitude", amplitude);
-    EXPECT_LE(held.beyond, held.frames / 10) << amplitude;
+    EXPECT_EQ(held.hits, 0u) << amplitude;
+    EXPECT_EQ(held.beyond, 0u) << amplitude;
+  }
+  for (const double grip : {-0.02, 0.02}) {
+    const Held held = Play(rig, trained, "grip7.translateX", grip);
+    EXPECT_GT(held.hits, held.frames / 2) << "the others are followed";
+    EXPECT_LE(held.beyond, held.frames / 10) << grip;
   }
 }
 
