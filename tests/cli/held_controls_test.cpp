@@ -19,7 +19,7 @@ std::string RigWithWave(const HelloFolder& folder, const std::string& wave) {
   for (int i = 0; i < 40; ++i) {
     nodes += fmt::format("  grip{}: {{type: transform, at: [0, {}, 0]}}\n", i, 2 * i);
     nodes += fmt::format("  soft{}: {{type: softMod, matrix: grip{}.worldMatrix, falloffRadius: 6}}\n", i, i);
-    controls += fmt::format("  grip{}.translateX: {{min: -0.02, max: 0.02}}\n", i);
+    controls += fmt::format("  grip{}.translateX: {{min: -1, max: 1}}\n", i);
   }
   std::string stack = "ripple";
   for (int i = 0; i < 40; ++i) stack += fmt::format(", soft{}", i);
@@ -72,7 +72,7 @@ TEST(HeldControlsOfRigs, AreRightOrMissOverClips) {
     EXPECT_EQ(held.hits, 0u) << amplitude;
     EXPECT_EQ(held.beyond, 0u) << amplitude;
   }
-  for (const double grip : {-0.02, 0.02}) {
+  for (const double grip : {-0.01, 0.01}) {
     const Held held = Play(rig, trained, "grip7.translateX", grip);
     EXPECT_GT(held.hits, held.frames / 2) << "the others are followed";
     EXPECT_LE(held.beyond, held.frames / 10) << grip;
